@@ -1,0 +1,105 @@
+#include "client/import/vi_map_files.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/text_format.h>
+#include <zlib.h>
+
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <utility>
+
+namespace selfcal::client {
+namespace {
+
+// Far above any real part file; bounds what a hostile one can claim.
+constexpr std::size_t kMaxUncompressedBytes = std::size_t{1} << 30;
+
+absl::StatusOr<std::string> Gunzip(const std::string& path) {
+  std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"),
+                                                  &gzclose);
+  if (!file) {
+    return absl::NotFoundError(
+        fmt::format("{}: cannot be opened; the map's metadata names it", path));
+  }
+  std::string data;
+  std::array<char, 1 << 16> buffer;
+  while (true) {
+    const int n = gzread(file.get(), buffer.data(), buffer.size());
+    if (n < 0) {
+      int code = Z_OK;
+      return absl::DataLossError(fmt::format("{}: damaged gzip stream: {}",
+                                             path,
+                                             gzerror(file.get(), &code)));
+    }
+    if (n == 0) break;
+    data.append(buffer.data(), static_cast<std::size_t>(n));
+    if (data.size() > kMaxUncompressedBytes) {
+      return absl::InvalidArgumentError(
+          fmt::format("{}: more than 1 GiB uncompressed; not a map part", path));
+    }
+  }
+  // A truncated stream ends without an error from gzread, but is not complete.
+  int code = Z_OK;
+  gzerror(file.get(), &code);
+  if (code != Z_OK || gzdirect(file.get()) != 0) {
+    return absl::DataLossError(
+        fmt::format("{}: truncated, or not a gzip stream", path));
+  }
+  return data;
+}
+
+// The metadata comes from outside: a part is a plain name inside the folder.
+bool IsPlainName(const std::string& name) {
+  return !name.empty() && name.find('/') == std::string::npos && name != ".." &&
+         name != ".";
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    return absl::NotFoundError(fmt::format("{}: cannot be opened", path));
+  }
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+absl::StatusOr<vi_map::ViMap> ReadViMapFiles(const std::string& folder) {
+  const std::string base = folder + "/vi_map/";
+  const std::string metadata_path = base + "vi_map_metadata";
+  absl::StatusOr<std::string> text = ReadFile(metadata_path);
+  if (!text.ok()) {
+    return absl::NotFoundError(fmt::format(
+        "{}: cannot be opened; give a VI-map folder, one that holds vi_map/",
+        metadata_path));
+  }
+  vi_map::MapFiles files;
+  google::protobuf::TextFormat::Parser parser;
+  parser.AllowUnknownField(true);
+  if (!parser.ParseFromString(*text, &files) || files.files().empty()) {
+    return absl::DataLossError(
+        fmt::format("{}: not a list of map files", metadata_path));
+  }
+  vi_map::ViMap map;
+  for (const vi_map::MapFile& file : files.files()) {
+    if (!IsPlainName(file.path())) {
+      return absl::InvalidArgumentError(
+          fmt::format("{}: file name '{}' is not a plain name",
+                      metadata_path,
+                      file.path()));
+    }
+    absl::StatusOr<std::string> data = Gunzip(base + file.path());
+    if (!data.ok()) return data.status();
+    vi_map::ViMap part;
+    if (!part.ParseFromString(*data)) {
+      return absl::DataLossError(fmt::format(
+          "{}: not a VI-map message, or cut off", base + file.path()));
+    }
+    map.MergeFrom(part);
+  }
+  return map;
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,83 @@
+// Recalibration on a set of segments (section IV-C of the paper): partitions,
+// gauge, landmark splitting, bias factors over gaps, Levenberg-Marquardt.
+//
+// Deterministic for one thread. Any thread may call; the progress callback is
+// called on the calling thread.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/information/segment_information.h"
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+enum class LossKind { kNone, kHuber, kCauchy };
+
+struct CalibrateOptions {
+  LossKind loss = LossKind::kHuber;
+  double loss_scale = 2.0;  // in sigmas
+  // Prior on theta from PriorSigmas(rig), centred at rig.factory.
+  bool use_prior = false;
+  int max_iterations = 100;
+  int merge_landmarks = 15;  // partitions that share more are merged
+  int threads = 1;
+};
+
+struct CalibrateProgress {
+  int iteration = 0;
+  int max_iterations = 0;
+  double cost = 0;
+  double step_sigmas = 0;  // largest component of the last step of theta
+};
+
+// Returns false to cancel.
+using ProgressCallback = std::function<bool(const CalibrateProgress&)>;
+
+enum class CalibrateStatus {
+  kConverged,
+  kNotConverged,    // max_iterations
+  kCancelled,
+  kFailed,          // the solver could not use the problem; see message
+};
+
+struct CalibrationResult {
+  CalibrateStatus status = CalibrateStatus::kFailed;
+  std::string message;
+  Calibration theta;
+  // D x D, tangent at theta. Zero rows for components held fixed by the rig;
+  // a direction that was held constant keeps the prior's variance, so that no
+  // sigma is ever small for what was not shown.
+  Eigen::MatrixXd covariance;
+  int rank = 0;  // estimated directions
+  std::vector<UnobservedDirection> held_constant;
+  int iterations = 0;
+  double initial_cost = 0;
+  double final_cost = 0;
+  double reprojection_rms_before_px = 0;
+  double reprojection_rms_after_px = 0;
+  double reprojection_median_before_px = 0;
+  double reprojection_median_after_px = 0;
+  int segments = 0;
+  int partitions = 0;
+  int keyframes = 0;
+  int landmarks = 0;          // variables, split ones counted each
+  int landmarks_dropped = 0;
+  int observations = 0;       // used
+  int observations_dropped = 0;
+};
+
+// Calibrates on the segments (valid for the rig, distinct keys, any order),
+// from theta_start. The result does not depend on their order.
+CalibrationResult Calibrate(const Rig& rig,
+                            const Calibration& theta_start,
+                            const std::vector<MotionSegment>& segments,
+                            const CalibrateOptions& options = {},
+                            const ProgressCallback& progress = nullptr);
+
+}  // namespace selfcal

@@ -1,0 +1,82 @@
+// The plain factors (inertial.h, reprojection.h) wrapped once as Ceres cost
+// functions, and the manifolds of their parameters.
+//
+// Parameter blocks, all double arrays:
+//   theta  [D] tangent offset d from a fixed reference: theta = ref [+] d.
+//              One block for the whole calibration, so that a subspace of it
+//              can be held constant (SubspaceManifold);
+//   q      [4] q_GI as Eigen stores it (x, y, z, w), with RotationManifold;
+//   p      [3] p_GI [m];
+//   vb     [9] (v_GI 3, b_a 3, b_g 3);
+//   l      [3] landmark, either p_G [m], or (alpha, beta, rho) anchored at a
+//              fixed place: p_G = a + R_GA (alpha, beta, 1) / rho.
+// The caller owns what is returned; the data that a factory takes by span or
+// reference must outlive it. Evaluate may be called from many threads.
+#pragma once
+
+#include <ceres/cost_function.h>
+#include <ceres/manifold.h>
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+
+#include "core/factor/inertial.h"
+#include "core/factor/reprojection.h"
+
+namespace selfcal {
+
+// Fixed place from which a landmark is parametrised by inverse depth.
+struct LandmarkAnchor {
+  Eigen::Matrix3d R_GA = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d a_G = Eigen::Vector3d::Zero();  // [m]
+
+  // Homogeneous point in G of (alpha, beta, rho), and the other way.
+  Eigen::Vector4d ToHomogeneous(const Eigen::Vector3d& inverse_depth) const;
+  Eigen::Vector3d FromPoint(const Eigen::Vector3d& p_G) const;
+};
+
+// Blocks (theta, q, p, l); 2 residuals, divided by sigma_px. Where the point
+// cannot be projected, the residual and its Jacobians are zero: such an
+// observation says nothing, and the caller counts it.
+std::unique_ptr<ceres::CostFunction> MakeReprojectionCost(
+    const Calibration& theta_reference,
+    int camera,
+    const Eigen::Vector2d& z_px,
+    double sigma_px,
+    const std::optional<LandmarkAnchor>& anchor);
+
+// Blocks (theta, q0, p0, vb0, q1, p1, vb1); 15 residuals, whitened by the given
+// square root information, which stays fixed while the factor lives: the noise
+// does not chase the estimate.
+std::unique_ptr<ceres::CostFunction> MakeInertialCost(
+    const Calibration& theta_reference,
+    std::span<const ImuSample> samples,
+    std::int64_t t0_ns,
+    std::int64_t t1_ns,
+    const ImuNoise& noise,
+    double gravity_mps2,
+    const InertialMatrix& square_root_information);
+
+// Blocks (vb0, vb1); 6 residuals divided by sigmas (BiasWalkSigmas).
+std::unique_ptr<ceres::CostFunction> MakeBiasWalkCost(
+    const Eigen::Matrix<double, 6, 1>& sigmas);
+
+// One block x of the size of `mean`; residual = square_root (x - mean).
+std::unique_ptr<ceres::CostFunction> MakePriorCost(
+    const Eigen::MatrixXd& square_root, const Eigen::VectorXd& mean);
+
+// q [+] d = q Exp(d), d in rad: ambient 4, tangent 3.
+std::unique_ptr<ceres::Manifold> MakeRotationManifold();
+
+// The rotation of the keyframe that carries the gauge: only roll and pitch
+// move. q [+] d = Exp((d_0, d_1, 0)) q with the axis in G, so the tangent has
+// no part about gravity at any attitude of the body. Ambient 4, tangent 2.
+std::unique_ptr<ceres::Manifold> MakeGaugeRotationManifold();
+
+// x [+] d = x + B d for a D x r basis B of full column rank: what lies outside
+// its span is held constant. Ambient D, tangent r.
+std::unique_ptr<ceres::Manifold> MakeSubspaceManifold(
+    const Eigen::MatrixXd& basis);
+
+}  // namespace selfcal

@@ -1,0 +1,71 @@
+// The IMU samples between two keyframes, integrated into one relative motion,
+// with its derivatives by the biases and the 15 IMU intrinsics and its
+// covariance.
+//
+// Scheme. Raw readings are linear between samples, hence so are the corrected
+//   w = T_g^-1 (w~ - b_g),   f = R_AI^T T_a^-1 (a~ - b_a).
+// Over a step of h from (w_0, f_0) to (w_1, f_1):
+//   rotation by Exp(h (w_0 + w_1) / 2 + h^2 (w_0 x w_1) / 12), the fourth order
+//   Magnus expansion; velocity and position by Simpson's rule, with the
+//   rotation at the middle from the same expansion over half a step.
+// For linear readings that is of fourth order in h; on smooth motion the error
+// is that of the linear interpolation, of second order.
+//
+// The derivatives are those of this scheme, exactly. The noise of each sensor
+// is white in continuous time: over a step its mean has the variance
+// density^2 / h on the raw reading and passes through T^-1.
+//
+// Pure, any thread; allocates nothing.
+// Source: Schneider et al., ICRA 2017, III-B and III-D; Forster et al., "On-
+// Manifold Preintegration for Real-Time Visual-Inertial Odometry" (2017), with
+// the 15 IMU intrinsics added.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+// Motion in the body frame of the first keyframe, gravity not included:
+//   R_GI1 = R_GI0 Delta_R
+//   v_1   = v_0 + g dt + R_GI0 Delta_v
+//   p_1   = p_0 + v_0 dt + g dt^2 / 2 + R_GI0 Delta_p
+// Tangent order of the nine: (Delta_R 3 right perturbation, Delta_v, Delta_p).
+struct Preintegration {
+  double dt_s = 0;
+  Eigen::Quaterniond Delta_R = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d Delta_v = Eigen::Vector3d::Zero();  // [m/s]
+  Eigen::Vector3d Delta_p = Eigen::Vector3d::Zero();  // [m]
+  // By (b_a 3, b_g 3), and by theta_i in the order of calibration.h.
+  Eigen::Matrix<double, 9, 6> J_bias = Eigen::Matrix<double, 9, 6>::Zero();
+  Eigen::Matrix<double, 9, 15> J_theta = Eigen::Matrix<double, 9, 15>::Zero();
+  // Of the nine, from the white noise of the sensors.
+  Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
+};
+
+// What to compute beside the motion; the rest stays zero.
+struct PreintegrationParts {
+  bool jacobians = true;
+  bool covariance = true;
+};
+
+// Integrates from t0_ns to t1_ns >= t0_ns, the end points interpolated. The
+// samples (at least one) must cover the interval, which Validate(segment)
+// ensures, and may reach beyond it; beyond the first and the last sample their
+// readings are held.
+Preintegration Preintegrate(std::span<const ImuSample> samples,
+                            std::int64_t t0_ns,
+                            std::int64_t t1_ns,
+                            const ImuCalibration& imu,
+                            const Eigen::Vector3d& b_a,
+                            const Eigen::Vector3d& b_g,
+                            const ImuNoise& noise,
+                            const PreintegrationParts& parts = {});
+
+}  // namespace selfcal

@@ -1,0 +1,86 @@
+// theta: everything that selfcal estimates about a device, as one value with a
+// tangent space of named components.
+//
+// Order of the tangent, 15 + sum over cameras of (6 + 4 + distortion):
+//   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3;
+//   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n.
+// Rotations are perturbed on the right (so3.h), all else is added.
+// Source: Schneider et al., ICRA 2017, sections III-B and III-C.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "core/model/camera.h"
+
+namespace selfcal {
+
+inline constexpr int kImuTangentSize = 15;
+// Offset of each block in the IMU's tangent.
+inline constexpr int kGyroScale = 0;
+inline constexpr int kGyroMisalignment = 3;
+inline constexpr int kAccelScale = 6;
+inline constexpr int kAccelMisalignment = 9;
+inline constexpr int kAccelRotation = 12;
+// Offset of each block in a camera's tangent.
+inline constexpr int kCameraRotation = 0;
+inline constexpr int kCameraPosition = 3;
+inline constexpr int kCameraIntrinsics = 6;
+
+// theta_i: gyro reads T_g w + b_g, accelerometer T_a R_AI f_I + b_a.
+struct ImuCalibration {
+  Eigen::Vector3d s_g = Eigen::Vector3d::Ones();  // [-]
+  Eigen::Vector3d m_g = Eigen::Vector3d::Zero();  // [-]
+  Eigen::Vector3d s_a = Eigen::Vector3d::Ones();  // [-]
+  Eigen::Vector3d m_a = Eigen::Vector3d::Zero();  // [-]
+  Eigen::Quaterniond q_AI = Eigen::Quaterniond::Identity();
+
+  // Upper triangular: scales on the diagonal, m = (m_x, m_y, m_z) at (0,1),
+  // (0,2), (1,2).
+  Eigen::Matrix3d T_g() const;
+  Eigen::Matrix3d T_a() const;
+};
+
+struct Calibration {
+  ImuCalibration imu;
+  std::vector<CameraCalibration> cameras;
+};
+
+// One component of the tangent. The one list of names and units in the
+// project: every table, message and export takes them from here.
+struct TangentComponent {
+  std::string name;  // "imu.gyro.scale.x", "cam0.focal.x", "cam0.p_CI.x"
+  std::string unit;  // "-", "rad", "m", "px"
+  // Expected standard deviation after one reference segment, in `unit`; the
+  // same on the axes of a block, so that an entropy does not depend on how a
+  // frame is turned.
+  double sigma_ref;
+};
+
+// Dimension of the tangent of a calibration.
+int TangentSize(const Calibration& theta);
+
+// Dimension of camera j's part of the tangent, and where it begins.
+int CameraTangentSize(const CameraCalibration& camera);
+int CameraTangentOffset(const Calibration& theta, int camera);
+
+// The components in the order of the tangent.
+std::vector<TangentComponent> TangentComponents(const Calibration& theta);
+
+// theta [+] delta; delta has TangentSize(theta) entries.
+Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta);
+
+// a [-] b, the delta with b [+] delta = a. Both must have the same cameras and
+// distortion models (SameShape). Rotations give Log(R_b^T R_a).
+Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b);
+
+// Same number of cameras, each with the same distortion model.
+bool SameShape(const Calibration& a, const Calibration& b);
+
+// Value of one component for a person to read: the scalar itself, and for a
+// rotation the component of its rotation vector Log(q) [rad]. Same order.
+Eigen::VectorXd ReadableValues(const Calibration& theta);
+
+}  // namespace selfcal

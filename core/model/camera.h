@@ -1,0 +1,78 @@
+// Pinhole camera with one of three distortion models, behind one interface.
+//
+// A point p_C (camera frame, z forward, any positive scale) has the normalised
+// coordinates u = (x/z, y/z), the distorted ones d = distort(u), and the pixel
+//   z_x = f_x d_x + c_x,   z_y = f_y d_y + c_y.
+// Each distortion model is a file of its own (distortion_fov.h, ...) with the
+// same static interface and its mathematics; this header is all that other
+// rooms include. Pure functions, callable from any thread. A point that cannot
+// be projected is reported by the return value, never as a NaN.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <string_view>
+
+namespace selfcal {
+
+enum class DistortionModel {
+  kFov,               // w: Devernay and Faugeras 2001
+  kRadialTangential,  // k1 k2 p1 p2: Brown
+  kEquidistant,       // k1 k2 k3 k4: Kannala and Brandt
+};
+
+inline constexpr int kMaxDistortion = 4;
+inline constexpr int kMaxIntrinsics = 4 + kMaxDistortion;
+
+// Number of coefficients of a model.
+int DistortionSize(DistortionModel model);
+
+// "fov", "radial-tangential", "equidistant".
+std::string_view DistortionName(DistortionModel model);
+
+// Coefficients of a model, at most kMaxDistortion, kept without allocation.
+using DistortionVector =
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxDistortion, 1>;
+
+// theta_c of the paper, and the constants of the sensor.
+struct CameraCalibration {
+  // T_CI: takes a point from the body frame I to the camera frame C.
+  Eigen::Quaterniond q_CI = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d p_CI = Eigen::Vector3d::Zero();  // [m]
+  Eigen::Vector2d f = Eigen::Vector2d::Ones();     // [px]
+  Eigen::Vector2d c = Eigen::Vector2d::Zero();     // [px]
+  DistortionModel model = DistortionModel::kFov;
+  DistortionVector distortion = DistortionVector::Zero(1);
+  int width_px = 0;  // of the image; constant, never estimated
+  int height_px = 0;
+
+  // f, c and the distortion: the number of columns of d z / d intrinsics.
+  int IntrinsicsSize() const {
+    return 4 + static_cast<int>(distortion.size());
+  }
+};
+
+// Derivatives of the pixel, in px per unit of the argument.
+struct ProjectionJacobians {
+  Eigen::Matrix<double, 2, 3> point;  // by p_C
+  // By (f_x, f_y, c_x, c_y, distortion): 2 x IntrinsicsSize().
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxIntrinsics> intrinsics;
+};
+
+// Projects p_C to the pixel *z_px, and fills *jacobians unless it is null.
+// Returns false, leaving both untouched, for a point at or behind the camera
+// plane, or outside the region in which the model is one-to-one. Does not look
+// at the borders of the image.
+bool Project(const CameraCalibration& camera,
+             const Eigen::Vector3d& p_C,
+             Eigen::Vector2d* z_px,
+             ProjectionJacobians* jacobians);
+
+// The unit bearing in C of a pixel: the inverse of Project up to scale.
+// Returns false, leaving *bearing_C untouched, for a pixel that no point
+// projects to.
+bool Unproject(const CameraCalibration& camera,
+               const Eigen::Vector2d& z_px,
+               Eigen::Vector3d* bearing_C);
+
+}  // namespace selfcal

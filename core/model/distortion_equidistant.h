@@ -1,0 +1,125 @@
+// The equidistant fish-eye model of Kannala and Brandt, "A generic camera model
+// and calibration method for conventional, wide-angle, and fish-eye lenses"
+// (2006), with k1 .. k4. theta is the angle between the ray and the axis:
+//
+//   theta = atan(r_u),  theta_d = theta P(theta^2),
+//   P(Q) = 1 + k1 Q + k2 Q^2 + k3 Q^3 + k4 Q^4,   d = (theta_d / r_u) u.
+//
+// With q = r_u^2 and g(q) = atan(sqrt(q)) / sqrt(q), so that theta^2 = q g^2,
+// nothing is divided by the radius:
+//
+//   d = s u,   s = g(q) P(Q),   Q = q g(q)^2.
+//
+// Derivatives, with dQ/dq = g / (1 + q):
+//
+//   ds/dq  = g'(q) P(Q) + g P'(Q) g / (1 + q)
+//   dd/du  = s I + 2 ds/dq u u^T
+//   dd/dk_i = g Q^i u
+//
+// The model is one-to-one as long as theta_d rises, up to the first zero of
+// 1 + 3 k1 Q + 5 k2 Q^2 + 7 k3 Q^3 + 9 k4 Q^4. The inverse solves
+// theta_d(theta) = |d| by Newton's method inside a bracket of [0, pi/2], with
+// bisection where a step leaves it; then u = tan(theta) d / |d|.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <span>
+
+#include "core/model/distortion_series.h"
+#include "core/model/monotonic.h"
+
+namespace selfcal {
+
+struct DistortionEquidistant {
+  static constexpr int kSize = 4;
+
+  // d = distort(u), with derivatives by u and by (k1 .. k4) unless null.
+  // Returns false and sets nothing where the model is not one-to-one.
+  static bool Distort(std::span<const double, kSize> coefficients,
+                      const Eigen::Vector2d& u,
+                      Eigen::Vector2d* d,
+                      Eigen::Matrix2d* d_by_u,
+                      Eigen::Matrix<double, 2, kSize>* d_by_coefficients) {
+    const std::array<double, 4> k = Array(coefficients);
+    const double q = u.squaredNorm();
+    const ValueAndDerivative g = AtanRatio(q);
+    const double Q = q * g.value * g.value;
+    if (!ProfileRises(k, Q)) return false;
+
+    const double P = 1 + Q * (k[0] + Q * (k[1] + Q * (k[2] + Q * k[3])));
+    const double s = g.value * P;
+    *d = s * u;
+    if (d_by_u != nullptr) {
+      const double P_by_Q =
+          k[0] + Q * (2 * k[1] + Q * (3 * k[2] + Q * 4 * k[3]));
+      const double s_by_q =
+          g.derivative * P + g.value * P_by_Q * g.value / (1 + q);
+      *d_by_u = 2 * s_by_q * u * u.transpose();
+      d_by_u->diagonal().array() += s;
+    }
+    if (d_by_coefficients != nullptr) {
+      Eigen::Vector2d column = g.value * u;
+      for (int i = 0; i < kSize; ++i) {
+        column *= Q;
+        d_by_coefficients->col(i) = column;
+      }
+    }
+    return true;
+  }
+
+  // The inverse of Distort. Returns false and sets nothing where there is none.
+  static bool Undistort(std::span<const double, kSize> coefficients,
+                        const Eigen::Vector2d& d,
+                        Eigen::Vector2d* u) {
+    const double theta_d = d.stableNorm();
+    double theta;
+    if (!SolveAngle(Array(coefficients), theta_d, &theta)) return false;
+    // Near the axis the ratio of the two radii is 1, which 0/0 does not say.
+    *u = theta_d > 0 ? Eigen::Vector2d(std::tan(theta) * (d / theta_d)) : d;
+    return true;
+  }
+
+ private:
+  static std::array<double, 4> Array(std::span<const double, kSize> k) {
+    return {k[0], k[1], k[2], k[3]};
+  }
+
+  // theta in [0, pi/2] with theta_d(theta) = theta_d, in the rising part.
+  static bool SolveAngle(const std::array<double, 4>& k,
+                         double theta_d,
+                         double* theta) {
+    constexpr int kMaxIterations = 100;
+    // Two roundings of theta_d. Further off than a few of them where the
+    // bracket has closed means that the profile ends below theta_d.
+    const double tolerance =
+        8 * std::numeric_limits<double>::epsilon() * std::max(theta_d, 1e-300);
+    double low = 0;
+    double high = std::numbers::pi / 2;
+    double x = std::min(theta_d, high);
+    for (int i = 0; i < kMaxIterations; ++i) {
+      const double Q = x * x;
+      const bool rises = ProfileRises(k, Q);
+      const double P = 1 + Q * (k[0] + Q * (k[1] + Q * (k[2] + Q * k[3])));
+      const double error = theta_d - x * P;
+      if (rises && std::abs(error) <= tolerance) {
+        *theta = x;
+        return true;
+      }
+      (rises && error > 0 ? low : high) = x;
+      const double slope =
+          1 +
+          Q * (3 * k[0] + Q * (5 * k[1] + Q * (7 * k[2] + Q * 9 * k[3])));
+      const double newton = x + error / slope;
+      const bool inside = rises && newton > low && newton < high;
+      x = inside ? newton : (low + high) / 2;
+    }
+    return false;
+  }
+};
+
+}  // namespace selfcal

@@ -1,0 +1,67 @@
+// Where a radial profile r (1 + k_1 r^2 + k_2 r^4 + ...) rises: a distortion
+// model is one-to-one up to the first zero of its derivative, and must not be
+// used beyond it, although the formula gives a number there.
+#pragma once
+
+#include <array>
+
+namespace selfcal {
+
+// True if the polynomial with Bernstein coefficients b on [0, 1] is positive
+// there. The curve lies in the convex hull of its coefficients and ends in the
+// first and the last one; where that decides nothing, the interval is halved
+// (de Casteljau). What is still open after `halvings` touches zero to rounding
+// and counts as not positive.
+template <std::size_t N>
+bool PositiveInBernsteinForm(const std::array<double, N>& b, int halvings) {
+  if (!(b.front() > 0 && b.back() > 0)) return false;
+  bool all_positive = true;
+  for (const double value : b) all_positive = all_positive && value > 0;
+  if (all_positive) return true;
+  if (halvings == 0) return false;
+  std::array<double, N> left;
+  std::array<double, N> right = b;
+  for (std::size_t i = 0; i < N; ++i) {
+    left[i] = right[0];
+    for (std::size_t j = 0; j + 1 < N - i; ++j) {
+      right[j] = (right[j] + right[j + 1]) / 2;
+    }
+  }
+  return PositiveInBernsteinForm(left, halvings - 1) &&
+         PositiveInBernsteinForm(right, halvings - 1);
+}
+
+// True if the derivative of r (1 + sum k_i r^(2i)) is positive on [0, r], with
+// q = r^2: the polynomial 1 + sum (2i + 1) k_i q^i on [0, q]. False if anything
+// is not a number.
+template <std::size_t N>
+bool ProfileRises(const std::array<double, N>& k, double q) {
+  // Scaled to [0, 1]; no power of q is computed that is not needed.
+  std::array<double, N + 1> a;
+  a[0] = 1;
+  double power = 1;
+  double negative = 0;
+  for (std::size_t i = 1; i <= N; ++i) {
+    power *= q;
+    a[i] = static_cast<double>(2 * i + 1) * k[i - 1] * power;
+    if (!(a[i] >= 0)) negative += a[i];
+  }
+  // Nearly every point of a real lens is decided here.
+  if (1 + negative > 0) return true;
+
+  // b_j = sum over i <= j of C(j, i) / C(N, i) a_i.
+  std::array<double, N + 1> b;
+  for (std::size_t j = 0; j <= N; ++j) {
+    b[j] = 0;
+    double weight = 1;
+    for (std::size_t i = 0; i <= j; ++i) {
+      b[j] += weight * a[i];
+      weight *= static_cast<double>(j - i) / static_cast<double>(N - i);
+      if (i == N) break;
+    }
+  }
+  constexpr int kHalvings = 40;
+  return PositiveInBernsteinForm(b, kHalvings);
+}
+
+}  // namespace selfcal

@@ -1,0 +1,85 @@
+// A rig: one physical device, what its maker knew about it, and how its
+// segments are judged. Groups of parameters are configuration.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/model/calibration.h"
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+// Continuous-time densities.
+struct ImuNoise {
+  double gyro_noise_density = 1.7e-4;    // [rad/s/sqrt(Hz)]
+  double accel_noise_density = 2e-3;     // [m/s^2/sqrt(Hz)]
+  double gyro_bias_random_walk = 2e-5;   // [rad/s^2/sqrt(Hz)]
+  double accel_bias_random_walk = 3e-3;  // [m/s^3/sqrt(Hz)]
+};
+
+// A named set of tangent components. A pattern is the name of a component, or
+// begins or ends with '*' (or both), which stands for anything: "imu.*",
+// "*.focal.x".
+struct ParameterGroup {
+  std::string name;
+  std::vector<std::string> patterns;
+};
+
+// The paper's three: "imu", "camera" (f, c, distortion of every camera) and
+// "extrinsics" (q_CI, p_CI of every camera).
+std::vector<ParameterGroup> DefaultGroups();
+
+// A value given to all components that match a pattern.
+struct ComponentSetting {
+  std::string pattern;
+  double value = 0;
+};
+
+struct Rig {
+  std::string id;  // [a-z0-9_-]{1,63}
+  Calibration factory;
+  ImuNoise imu_noise;
+  double pixel_sigma_px = 1.0;
+  double gravity_mps2 = 9.81;  // g = (0, 0, -gravity) in G
+  std::vector<ParameterGroup> groups = DefaultGroups();
+  // Prior standard deviations (factory tolerances) by component, in its unit;
+  // later ones win. Without one: 10 sigma_ref.
+  std::vector<ComponentSetting> prior_sigmas;
+  // Patterns of components that are never estimated.
+  std::vector<std::string> fixed;
+  int table_size = 8;
+  // A segment enters a table only if it gains at least this for the group.
+  double min_gain_nats = 1.0;
+  // After the first run, the next starts when at least this part of the
+  // entries of the tables is new since the last.
+  double retrigger_fraction = 0.5;
+};
+
+// Indices of the tangent components that match at least one pattern, sorted.
+std::vector<int> MatchComponents(const std::vector<TangentComponent>& components,
+                                 const std::vector<std::string>& patterns);
+
+// Components of a group of this rig, sorted, without those held fixed.
+std::vector<int> GroupComponents(const Rig& rig, const ParameterGroup& group);
+
+// Components that are estimated (not fixed), sorted.
+std::vector<int> FreeComponents(const Rig& rig);
+
+// Prior standard deviation of every tangent component, in its unit.
+Eigen::VectorXd PriorSigmas(const Rig& rig);
+
+// sigma_ref of every tangent component, in its unit.
+Eigen::VectorXd ReferenceSigmas(const Rig& rig);
+
+// Every violation: id, positive and finite numbers, unit quaternions, at least
+// one camera, image sizes, distortion in range, groups that match nothing or
+// share a name, patterns that match nothing, everything fixed.
+std::vector<Violation> Validate(const Rig& rig);
+
+// The same rules for a calibration alone; paths begin with `prefix`.
+std::vector<Violation> Validate(const Calibration& theta,
+                                const std::string& prefix);
+
+}  // namespace selfcal

@@ -1,0 +1,116 @@
+// The motion segment: N consecutive keyframes of one session with the IMU
+// samples between them and the landmarks they see, as a SLAM system estimated
+// them.
+//
+// Frames: G is gravity-aligned (z up) and fixed for a session, I is the body
+// (gyroscope) frame. Times are nanoseconds of one clock for a session.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace selfcal {
+
+// x_k of the paper; tangent order (q_GI 3, p_GI 3, v_GI 3, b_a 3, b_g 3).
+struct KeyframeState {
+  std::int64_t t_ns = 0;
+  Eigen::Quaterniond q_GI = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d p_GI = Eigen::Vector3d::Zero();  // [m]
+  Eigen::Vector3d v_GI = Eigen::Vector3d::Zero();  // [m/s], in G
+  Eigen::Vector3d b_a = Eigen::Vector3d::Zero();   // [m/s^2], in A
+  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();   // [rad/s], in I
+};
+
+inline constexpr int kStateTangentSize = 15;
+inline constexpr int kStateRotation = 0;
+inline constexpr int kStatePosition = 3;
+inline constexpr int kStateVelocity = 6;
+inline constexpr int kStateAccelBias = 9;
+inline constexpr int kStateGyroBias = 12;
+
+// x_k [+] delta, in the tangent order above.
+KeyframeState BoxPlus(const KeyframeState& state,
+                      const Eigen::Matrix<double, 15, 1>& delta);
+
+// Raw readings, biases and intrinsics not removed.
+struct ImuSample {
+  std::int64_t t_ns = 0;
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   // w~ [rad/s]
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  // a~ [m/s^2]
+};
+
+struct Landmark {
+  std::uint64_t id = 0;  // unique within a session
+  Eigen::Vector3d p_G = Eigen::Vector3d::Zero();  // [m]
+};
+
+// Keyframe, camera and landmark are indices into the segment and the rig.
+struct Observation {
+  std::int32_t keyframe = 0;
+  std::int32_t camera = 0;
+  std::int32_t landmark = 0;
+  Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
+};
+
+// Identity of a segment within a rig: the same key is the same segment.
+struct SegmentKey {
+  std::string session;
+  std::int64_t index = 0;  // counts the segments of the session from 0
+
+  friend bool operator==(const SegmentKey&, const SegmentKey&) = default;
+  friend auto operator<=>(const SegmentKey&, const SegmentKey&) = default;
+};
+
+struct MotionSegment {
+  SegmentKey key;
+  // Version of the calibration that the SLAM system estimated the states with;
+  // they are linearised there.
+  std::int64_t calibration_version = 1;
+  std::vector<KeyframeState> keyframes;  // strictly increasing in time
+  // Strictly increasing in time, from at or before the first keyframe to at or
+  // after the last. Where the next segment of the session follows directly,
+  // they reach to its first keyframe, so that neighbours can be joined.
+  std::vector<ImuSample> imu;
+  std::vector<Landmark> landmarks;        // ids distinct
+  std::vector<Observation> observations;  // any order, at most one for each
+                                          // (keyframe, camera, landmark)
+};
+
+// One way in which a value breaks its rules: where, and what to do.
+struct Violation {
+  std::string field;    // path, e.g. "keyframes[3].q_GI"
+  std::string message;  // e.g. "norm is 0.93; send a unit quaternion"
+};
+
+// What a segment may be. Counts bound the memory one message can claim.
+struct SegmentLimits {
+  int min_keyframes = 2;
+  int max_keyframes = 2000;
+  int max_imu_samples = 2'000'000;
+  int max_landmarks = 200'000;
+  int max_observations = 2'000'000;
+  double quaternion_norm_tolerance = 1e-6;
+  double max_imu_gap_s = 0.5;       // between neighbouring samples
+  double max_keyframe_gap_s = 10;   // between neighbouring keyframes
+  double max_position_m = 1e6;      // keyframes and landmarks, from the origin
+  double max_speed_mps = 1e3;
+  double max_gyro_radps = 1e3;
+  double max_accel_mps2 = 1e4;
+  double pixel_margin_px = 1;       // outside the image
+  int max_violations = 100;         // the list is cut there, and says so
+};
+
+struct Calibration;  // core/model/calibration.h
+
+// Every violation of the rules above, in the order of the fields; empty means
+// that all other rooms can use the segment without looking again. `theta` tells
+// the number of cameras and the size of their images. Checks finiteness,
+// times, unit quaternions, indices, duplicates, cover by IMU samples, counts.
+std::vector<Violation> Validate(const MotionSegment& segment,
+                                const Calibration& theta,
+                                const SegmentLimits& limits = {});
+
+}  // namespace selfcal

@@ -1,0 +1,42 @@
+// Readings of an IMU with known intrinsics, biases and noise on a trajectory.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+#include "core/simulation/simulate.h"
+
+namespace selfcal {
+
+// All vectors have one entry for each sample.
+struct ImuReadings {
+  std::vector<ImuSample> measured;    // with biases and noise
+  std::vector<ImuSample> noise_free;  // with biases
+  std::vector<Eigen::Vector3d> w_I;   // true angular rate [rad/s]
+  std::vector<Eigen::Vector3d> f_I;   // true specific force [m/s^2]
+  std::vector<Eigen::Vector3d> b_a;   // true biases
+  std::vector<Eigen::Vector3d> b_g;
+};
+
+// Samples from time 0 to the end of the trajectory. Section III-B of the paper:
+//   w~ = T_g w + b_g + n,  a~ = T_a R_AI R_IG (a_G - g) + b_a + n,
+// with n of standard deviation density * sqrt(rate), biases random walks.
+ImuReadings SimulateImu(const Rig& rig,
+                        const ImuCalibration& imu,
+                        const Trajectory& trajectory,
+                        const SimulationOptions& options);
+
+// Index of the last sample at or before t_ns; the samples must reach beyond it.
+std::size_t SampleBefore(const std::vector<ImuSample>& samples,
+                         std::int64_t t_ns);
+
+// The true state at t_ns: pose and velocity of the trajectory, biases linear
+// between samples. t_ns must lie within the samples.
+KeyframeState TrueState(const Trajectory& trajectory,
+                        const ImuReadings& imu,
+                        std::int64_t t_ns);
+
+}  // namespace selfcal

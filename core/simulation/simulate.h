@@ -1,0 +1,102 @@
+// A simulated device with known truth: sensors on a trajectory, and the
+// keyframe states as a SLAM system that runs with a wrong calibration would
+// hand them over.
+//
+// Deterministic: the same options and seed give the same bits. Pure functions,
+// callable from any thread.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+#include "core/simulation/trajectory.h"
+
+namespace selfcal {
+
+struct SimulationOptions {
+  std::uint64_t seed = 1;
+  double imu_rate_hz = 200;
+  double keyframe_rate_hz = 10;
+  int keyframes_per_segment = 40;
+  int landmarks_in_view = 120;  // about, for each keyframe and camera
+  // Keyframes in a row in which a landmark is seen, geometrically distributed,
+  // unless it leaves the image before.
+  double mean_track_length = 10;
+  // Of new tracks: landmarks that were seen before, as a map finds them again.
+  double revisit_fraction = 0.1;
+  double min_depth_m = 0.5;  // of a landmark where it is first seen
+  double max_depth_m = 8;
+  double outlier_fraction = 0;  // observations replaced by a random pixel
+  bool noise = true;            // false: perfect sensors, biases constant
+  // Errors of the SLAM system, one standard deviation. Most of each drifts
+  // slowly, a small part is new with every keyframe.
+  double slam_rotation_rad = 2e-3;  // roll and pitch; yaw drifts 3 times as far
+  double slam_position_m = 5e-3;
+  double slam_velocity_mps = 1e-2;
+  double slam_accel_bias_mps2 = 2e-2;  // on top of what theta_slam gets wrong
+  double slam_gyro_bias_radps = 1e-3;
+  double slam_landmark_relative = 0.02;  // of the depth, before triangulation
+  Eigen::Vector3d b_a0 = {0.05, -0.08, 0.1};
+  Eigen::Vector3d b_g0 = {0.004, -0.003, 0.002};
+};
+
+// A landmark with fewer observations in a segment is left out of it.
+inline constexpr int kMinSegmentObservations = 3;
+
+struct SimulatedSession {
+  std::vector<MotionSegment> segments;  // as the SLAM system hands them over
+  // Truth of the same segments: states, biases and landmarks, noise-free pixels
+  // (also where the segment has an outlier) and noise-free readings with the
+  // true biases. Index for index the same, down to each observation.
+  std::vector<MotionSegment> truth;
+};
+
+// Simulates a session of a rig whose true calibration is theta_true, while the
+// SLAM system believes theta_slam: its landmarks are triangulated under that
+// belief, and its biases absorb what it gets wrong on average. Noise, pixel
+// sigma and gravity are those of the rig.
+//
+// Segments of keyframes_per_segment fill the trajectory from its start; the
+// keyframes that are left at the end and fill no segment are left out. Times
+// count from the start of the trajectory; keyframes do not coincide with IMU
+// samples. theta_true and theta_slam must have the same shape (SameShape), the
+// rates and depths must be positive.
+SimulatedSession Simulate(const Rig& rig,
+                          const Calibration& theta_true,
+                          const Calibration& theta_slam,
+                          const Trajectory& trajectory,
+                          const std::string& session,
+                          const SimulationOptions& options);
+
+// A hand-held device like the one of the paper: one FOV camera of 640 x 480,
+// f = 255 px, w = 0.92, IMU 200 Hz, with its noise. Its calibration is the
+// truth; the caller perturbs it to get a factory's (PerturbCalibration).
+Rig HandheldRig(const std::string& id);
+
+// Errors of a factory calibration.
+struct CalibrationError {
+  double focal_relative = 0.02;
+  double principal_point_px = 5;
+  double distortion_relative = 0.01;
+  double camera_rotation_rad = 0.0174533;
+  double camera_position_m = 0.01;
+  double scale = 0.01;
+  double misalignment = 0.01;
+  double accel_rotation_rad = 0.0174533;
+};
+
+// theta with every block off by exactly the given amount, in a direction drawn
+// from the seed: rotations by the angle about a random axis; p_CI and the
+// principal point by the distance in a random direction; each scale,
+// misalignment and distortion coefficient up or down by the amount, and both
+// focal lengths of a camera together.
+Calibration PerturbCalibration(const Calibration& theta,
+                               const CalibrationError& error,
+                               std::uint64_t seed);
+
+}  // namespace selfcal

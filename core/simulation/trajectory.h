@@ -1,0 +1,83 @@
+// Motion of a body: pose and its derivatives at any time, smooth enough for an
+// IMU (acceleration continuous).
+//
+// Trajectories are immutable once made: any thread may evaluate them. The
+// factories are deterministic: the same arguments give the same bits.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace selfcal {
+
+// Kinematics at one instant.
+struct BodyMotion {
+  Eigen::Quaterniond q_GI;
+  Eigen::Vector3d p_GI;  // [m]
+  Eigen::Vector3d v_GI;  // [m/s], in G
+  Eigen::Vector3d a_GI;  // [m/s^2], in G, gravity not included
+  Eigen::Vector3d w_I;   // [rad/s], in I
+};
+
+class Trajectory {
+ public:
+  virtual ~Trajectory() = default;
+  virtual double duration_s() const = 0;
+  // 0 <= t_s <= duration_s(). The derivatives are those of the returned pose,
+  // analytically.
+  virtual BodyMotion At(double t_s) const = 0;
+};
+
+// A body that does not move, slightly tilted.
+std::unique_ptr<Trajectory> MakeRest(double duration_s);
+
+// Hand-held in a room of 8 x 6 x 4 m: sums of sines in all six degrees of
+// freedom, whose phases and frequencies come from the seed, on top of a slow
+// walk through the room. `excitation` 1 is vigorous (several m/s^2, 1 to 3
+// rad/s), 0.1 calm, 0 at rest.
+std::unique_ptr<Trajectory> MakeHandheld(double duration_s,
+                                         double excitation,
+                                         std::uint64_t seed);
+
+// Calm and excited stretches (excitation 0.05 and 1) of 8 to 15 s in turn,
+// joined smoothly; begins with 5 s of rest.
+std::unique_ptr<Trajectory> MakeMixed(double duration_s, std::uint64_t seed);
+
+// A pose with its time, as in a line of a TUM file.
+struct TimedPose {
+  double t_s;
+  Eigen::Quaterniond q_GI;  // unit
+  Eigen::Vector3d p_GI;     // [m]
+};
+
+struct SplineOptions {
+  // Motion faster than about 1 / (2 knot_spacing_s) is smoothed away, and with
+  // it the noise of single poses, which two derivatives would amplify.
+  double knot_spacing_s = 0.1;
+  // Longest stretch without a pose that may be bridged, by the motion of least
+  // jerk. Recordings with a motion capture system lose sight for about 1 s.
+  double max_gap_s = 1.5;
+};
+
+// A quintic B-spline through poses, for position and rotation alike, fitted by
+// least squares: all derivatives of BodyMotion are continuous, and so are the
+// next two. Time counts from the first pose. Returns null, and says why in
+// *error unless that is null, for fewer than 4 poses, values that are not
+// finite, times that do not increase, a gap, or a turn of more than 90 degrees
+// from one pose to the next.
+std::unique_ptr<Trajectory> MakeSpline(const std::vector<TimedPose>& poses,
+                                       const SplineOptions& options = {},
+                                       std::string* error = nullptr);
+
+// Poses of a TUM file's text ("t tx ty tz qx qy qz qw" a line, '#' comments).
+// Quaternions are normalised if their norm is within 1 % of one. On a malformed
+// line returns false and says in *error which, counting from 1.
+bool ParseTum(const std::string& text,
+              std::vector<TimedPose>* poses,
+              std::string* error);
+
+}  // namespace selfcal

@@ -1,0 +1,94 @@
+// receive -> score -> select -> trigger -> recalibrate -> validate -> publish.
+//
+// Owns the worker threads: `scoring_threads` that score, one low-priority
+// thread that recalibrates. Scores are committed in the order of arrival within
+// a rig, so that tables do not depend on the number of threads. Knows no gRPC.
+// Any thread may call. Nothing is kept only in memory: whatever is stored and
+// unscored, or started and unfinished, is taken up by Start().
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/model/segment.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+struct PipelineOptions {
+  int scoring_threads = 1;
+  // Received, durable, but unscored segments beyond this make Submit wait.
+  int max_backlog = 64;
+  std::string program_version;
+  SegmentLimits limits;
+  CalibrateOptions calibrate;
+};
+
+// The verdict on one segment; durable when it is kStored or kDuplicate.
+struct SubmitResult {
+  enum class Verdict { kStored, kDuplicate, kRejected };
+  Verdict verdict = Verdict::kRejected;
+  std::vector<Violation> violations;  // of a rejected one
+};
+
+// What a watcher of a run is told.
+struct RunUpdate {
+  StoredRun run;
+  CalibrateProgress progress;
+};
+
+// A subscription; destroying it ends it (no callback runs after that).
+class Subscription {
+ public:
+  virtual ~Subscription() = default;
+};
+
+class Pipeline {
+ public:
+  virtual ~Pipeline() = default;
+
+  // Takes up what a stop or a crash left, and starts the threads.
+  virtual absl::Status Start() = 0;
+  // Stops the threads: scoring after the segment at hand, a run by cancelling
+  // it (it stays unfinished in the store and starts again at the next start).
+  virtual void Stop() = 0;
+
+  // Validates and stores one segment and wakes a worker. NOT_FOUND for an
+  // unknown rig; errors of the store as they are. Blocks while the backlog is
+  // full, until `cancelled` returns true (then CANCELLED).
+  virtual absl::StatusOr<SubmitResult> Submit(
+      const std::string& rig,
+      const MotionSegment& segment,
+      const std::function<bool()>& cancelled) = 0;
+
+  virtual absl::StatusOr<StoredRun> StartRecalibration(
+      const std::string& rig) = 0;
+  virtual absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
+                                                        std::int64_t run) = 0;
+
+  // The callback gets the active calibration of the rig at once (on the calling
+  // thread), then each new active one; each version once, in order.
+  virtual absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
+      const std::string& rig,
+      std::function<void(const StoredCalibration&)> callback) = 0;
+
+  // The callback gets the run as it is at once, then every change of state and
+  // iteration, the end included.
+  virtual absl::StatusOr<std::unique_ptr<Subscription>> WatchRun(
+      const std::string& rig,
+      std::int64_t run,
+      std::function<void(const RunUpdate&)> callback) = 0;
+};
+
+// `store` must outlive the pipeline.
+std::unique_ptr<Pipeline> MakePipeline(Store* store,
+                                       const PipelineOptions& options);
+
+}  // namespace selfcal::server

@@ -1,0 +1,192 @@
+// What selfcald keeps, in the language of the domain. The SQLite store
+// (store_sqlite.h) is the implementation; another engine proves itself by the
+// same tests.
+//
+// Every method that changes something is one transaction: when it returns OK
+// the change is committed and synced, when it returns an error nothing has
+// changed. Any thread may call; writes are serialised inside.
+// Errors: NOT_FOUND, ALREADY_EXISTS, FAILED_PRECONDITION from the caller's
+// side; RESOURCE_EXHAUSTED (disk full), DATA_LOSS (a checksum does not match),
+// UNAVAILABLE from the environment.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/information/segment_information.h"
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+#include "core/selection/tables.h"
+
+namespace selfcal::server {
+
+// A page of a list: everything after the token of the page before.
+struct Page {
+  int size = 50;
+  std::string token;  // opaque; empty for the first page
+};
+template <typename T>
+struct Listed {
+  std::vector<T> items;
+  std::string next_token;  // empty on the last page
+};
+
+struct StoredRig {
+  Rig rig;
+  std::int64_t create_time_ns = 0;  // since the Unix epoch
+};
+
+enum class SegmentState { kStored, kScored };
+
+struct StoredSegment {
+  std::string rig;
+  SegmentKey key;
+  std::int64_t sequence = 0;  // order of arrival in the rig, from 1
+  SegmentState state = SegmentState::kStored;
+  bool has_data = false;
+  std::int64_t payload_bytes = 0;  // compressed, 0 once dropped
+  std::int64_t receive_time_ns = 0;
+  std::int64_t calibration_version = 1;
+  std::int64_t start_ns = 0;
+  std::int64_t end_ns = 0;
+  int keyframes = 0;
+  int imu_samples = 0;
+  int landmarks = 0;
+  int observations = 0;
+  std::optional<SegmentInformation> information;  // once scored
+  std::vector<std::string> tables;                // groups that hold it
+};
+
+enum class PutVerdict { kStored, kDuplicate };
+
+enum class CalibrationState { kActive, kSuperseded, kRejected };
+
+struct StoredCalibration {
+  std::string rig;
+  std::int64_t version = 0;  // the factory's is 1
+  CalibrationState state = CalibrationState::kActive;
+  std::int64_t create_time_ns = 0;
+  Calibration theta;
+  Eigen::MatrixXd covariance;  // D x D
+  std::vector<std::string> reasons;  // why it was rejected
+  std::optional<std::int64_t> run;   // that produced it
+  std::int64_t base_version = 0;     // where the solver started, 0: none
+  std::vector<SegmentKey> segments;
+  std::string program_version;
+  std::optional<CalibrationResult> report;  // of the solver
+  double seconds = 0;                       // it took
+};
+
+enum class RunState { kPending, kRunning, kSucceeded, kFailed, kCancelled };
+enum class RunTrigger { kTablesFull, kTablesChanged, kManual };
+
+struct StoredRun {
+  std::string rig;
+  std::int64_t run = 0;  // counts from 1 in a rig
+  RunState state = RunState::kPending;
+  RunTrigger trigger = RunTrigger::kManual;
+  std::int64_t create_time_ns = 0;
+  std::int64_t end_time_ns = 0;       // 0 until it has ended
+  std::int64_t base_version = 0;      // active when it was created
+  std::vector<SegmentKey> segments;   // the snapshot of the tables
+  int attempts = 0;
+  std::int64_t calibration_version = 0;  // 0 until it succeeded
+  std::string message;
+};
+
+// What the commit of a score did.
+struct ScoreCommit {
+  std::vector<std::string> tables;       // groups it entered
+  std::optional<StoredRun> started_run;  // the trigger fired
+};
+
+class Store {
+ public:
+  virtual ~Store() = default;
+
+  // --- Rigs. Creating one also stores its factory calibration as version 1,
+  // active, and its empty tables.
+  virtual absl::StatusOr<StoredRig> CreateRig(const Rig& rig) = 0;
+  virtual absl::StatusOr<StoredRig> GetRig(const std::string& rig) = 0;
+  virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) = 0;
+
+  // --- Segments. `segment` must be valid for the rig. The same key again
+  // changes nothing.
+  virtual absl::StatusOr<PutVerdict> PutSegment(
+      const std::string& rig, const MotionSegment& segment) = 0;
+  virtual absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
+                                                   const SegmentKey& key) = 0;
+  // Newest first.
+  virtual absl::StatusOr<Listed<StoredSegment>> ListSegments(
+      const std::string& rig, const Page& page) = 0;
+  // FAILED_PRECONDITION if its data was dropped; DATA_LOSS if it is damaged.
+  virtual absl::StatusOr<MotionSegment> GetSegmentData(
+      const std::string& rig, const SegmentKey& key) = 0;
+  // The oldest unscored segment of any rig with a sequence after
+  // `after_sequence` in its rig, none if all are scored.
+  struct Unscored {
+    std::string rig;
+    SegmentKey key;
+    std::int64_t sequence;
+  };
+  virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) = 0;
+
+  // Writes the information of one stored segment, offers it to the tables,
+  // drops the data of segments that neither a table nor an unfinished run
+  // references, and, where EvaluateTrigger says so and no run is unfinished,
+  // creates the run with its snapshot. A segment that is scored already changes
+  // nothing.
+  virtual absl::StatusOr<ScoreCommit> CommitScore(
+      const std::string& rig,
+      const SegmentKey& key,
+      const SegmentInformation& information) = 0;
+
+  virtual absl::StatusOr<std::vector<Table>> GetTables(
+      const std::string& rig) = 0;
+
+  // --- Calibrations.
+  virtual absl::StatusOr<StoredCalibration> GetCalibration(
+      const std::string& rig, std::int64_t version) = 0;
+  virtual absl::StatusOr<StoredCalibration> GetActiveCalibration(
+      const std::string& rig) = 0;
+  virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
+      const std::string& rig, const Page& page) = 0;
+
+  // --- Runs.
+  // On the tables as they are. FAILED_PRECONDITION if they are empty or a run
+  // of the rig is unfinished.
+  virtual absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig) = 0;
+  virtual absl::StatusOr<StoredRun> GetRun(const std::string& rig,
+                                           std::int64_t run) = 0;
+  virtual absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
+                                                     const Page& page) = 0;
+  // Pending or running runs of all rigs, oldest first: after a restart a
+  // running one starts again.
+  virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns() = 0;
+  // Pending or running -> running, one attempt more.
+  virtual absl::StatusOr<StoredRun> BeginRun(const std::string& rig,
+                                             std::int64_t run) = 0;
+  // Ends a running run with its calibration, stored as the next version:
+  // active (the one before becomes superseded) or rejected. Drops data that
+  // only the run referenced. May create the next run, as CommitScore does.
+  // The version is assigned here.
+  virtual absl::StatusOr<StoredCalibration> FinishRun(
+      const std::string& rig,
+      std::int64_t run,
+      const StoredCalibration& calibration) = 0;
+  // Ends it without a calibration: kFailed or kCancelled.
+  virtual absl::StatusOr<StoredRun> EndRun(const std::string& rig,
+                                           std::int64_t run,
+                                           RunState state,
+                                           const std::string& message) = 0;
+};
+
+}  // namespace selfcal::server
