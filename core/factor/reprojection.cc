@@ -1,0 +1,57 @@
+#include "core/factor/reprojection.h"
+
+#include "core/model/so3.h"
+
+namespace selfcal {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Matrix23d = Eigen::Matrix<double, 2, 3>;
+
+}  // namespace
+
+bool Reproject(const Eigen::Quaterniond& q_GI,
+               const Eigen::Vector3d& p_GI,
+               const CameraCalibration& camera,
+               const Eigen::Vector4d& landmark_G,
+               const Eigen::Vector2d& z_px,
+               Eigen::Vector2d* residual_px,
+               ReprojectionJacobians* jacobians) {
+  const Matrix3d R_IG = q_GI.toRotationMatrix().transpose();
+  const Matrix3d R_CI = camera.q_CI.toRotationMatrix();
+  const double w = landmark_G[3];
+  // The landmark in the body and in the camera frame, both times w.
+  const Vector3d p_I = R_IG * (landmark_G.head<3>() - w * p_GI);
+  const Vector3d p_C = R_CI * p_I + w * camera.p_CI;
+
+  Vector2d predicted_px;
+  if (jacobians == nullptr) {
+    if (!Project(camera, p_C, &predicted_px, nullptr)) return false;
+    *residual_px = predicted_px - z_px;
+    return true;
+  }
+
+  ProjectionJacobians projection;
+  if (!Project(camera, p_C, &predicted_px, &projection)) return false;
+  *residual_px = predicted_px - z_px;
+
+  const Matrix23d by_p_I = projection.point * R_CI;
+  const Matrix23d by_X = by_p_I * R_IG;
+  // R_GI Exp(d) turns p_I by -d, R_CI Exp(d) turns it by d.
+  const Matrix23d by_turn = by_p_I * Skew(p_I);
+
+  jacobians->pose.leftCols<3>() = by_turn;
+  jacobians->pose.rightCols<3>() = -w * by_X;
+  jacobians->landmark.leftCols<3>() = by_X;
+  jacobians->landmark.col(3) = projection.point * camera.p_CI - by_X * p_GI;
+  const int intrinsics = camera.IntrinsicsSize();
+  jacobians->camera.resize(2, kCameraIntrinsics + intrinsics);
+  jacobians->camera.middleCols<3>(kCameraRotation) = -by_turn;
+  jacobians->camera.middleCols<3>(kCameraPosition) = w * projection.point;
+  jacobians->camera.rightCols(intrinsics) = projection.intrinsics;
+  return true;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,39 @@
+// What the cost functions share about the block theta: the part of the
+// calibration that a factor needs, moved by an offset from the reference, and
+// Jacobians by that offset. Internal to core/factor.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/model/calibration.h"
+#include "core/model/so3.h"
+
+namespace selfcal {
+
+// Turns columns that are derivatives by a rotation's right perturbation at
+// R_ref Exp(d) into derivatives by d itself.
+template <class Columns>
+void ByRotationOffset(const double* d, Columns&& columns) {
+  columns =
+      (columns * RightJacobian(Eigen::Map<const Eigen::Vector3d>(d))).eval();
+}
+
+// The IMU part of the reference, at the offset that the block begins with.
+inline ImuCalibration OffsetImu(const ImuCalibration& reference,
+                                const double* theta) {
+  const Eigen::Map<const Eigen::Matrix<double, kImuTangentSize, 1>> d(theta);
+  return BoxPlus(Calibration{.imu = reference, .cameras = {}}, d).imu;
+}
+
+// One camera of the reference, at its part of the block.
+inline CameraCalibration OffsetCamera(const CameraCalibration& reference,
+                                      const double* camera_theta) {
+  const int size = CameraTangentSize(reference);
+  Eigen::VectorXd delta(kImuTangentSize + size);
+  delta.head<kImuTangentSize>().setZero();
+  delta.tail(size) = Eigen::Map<const Eigen::VectorXd>(camera_theta, size);
+  return BoxPlus(Calibration{.imu = {}, .cameras = {reference}}, delta)
+      .cameras.front();
+}
+
+}  // namespace selfcal
