@@ -17,6 +17,9 @@
 
 namespace selfcal {
 
+// Bounds what one calibration can make others allocate.
+inline constexpr int kMaxCameras = 16;
+
 inline constexpr int kImuTangentSize = 15;
 // Offset of each block in the IMU's tangent.
 inline constexpr int kGyroScale = 0;

@@ -112,8 +112,7 @@ struct DistortionEquidistant {
       }
       (rises && error > 0 ? low : high) = x;
       const double slope =
-          1 +
-          Q * (3 * k[0] + Q * (5 * k[1] + Q * (7 * k[2] + Q * 9 * k[3])));
+          1 + Q * (3 * k[0] + Q * (5 * k[1] + Q * (7 * k[2] + Q * 9 * k[3])));
       const double newton = x + error / slope;
       const bool inside = rises && newton > low && newton < high;
       x = inside ? newton : (low + high) / 2;

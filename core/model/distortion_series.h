@@ -45,9 +45,9 @@ inline ValueAndDerivative TanRatio(double x) {
         1 + x2 * (1.0 / 3 +
                   x2 * (2.0 / 15 + x2 * (17.0 / 315 + x2 * (62.0 / 2835))));
     const double derivative =
-        x *
-        (2.0 / 3 + x2 * (8.0 / 15 + x2 * (34.0 / 105 + x2 * (496.0 / 2835 +
-                                                 x2 * (2764.0 / 31185)))));
+        x * (2.0 / 3 + x2 * (8.0 / 15 +
+                             x2 * (34.0 / 105 + x2 * (496.0 / 2835 +
+                                                      x2 * (2764.0 / 31185)))));
     return {value, derivative};
   }
   const double tangent = std::tan(x);

@@ -58,10 +58,10 @@ class ViolationList {
   // The violations; if some were left out, the last entry says so.
   std::vector<Violation> Take() {
     if (more_) {
-      violations_.push_back(
-          {"",
-           "only the first " + std::to_string(max_violations_) +
-               " violations are listed; there are more"});
+      violations_.push_back({"",
+                             "only the first " +
+                                 std::to_string(max_violations_) +
+                                 " violations are listed; there are more"});
     }
     return std::move(violations_);
   }

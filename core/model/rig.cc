@@ -1,0 +1,90 @@
+#include "core/model/rig.h"
+
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+
+namespace selfcal {
+namespace {
+
+bool Matches(std::string_view name, std::string_view pattern) {
+  const bool open_begin = pattern.starts_with('*');
+  if (open_begin) pattern.remove_prefix(1);
+  const bool open_end = pattern.ends_with('*');
+  if (open_end) pattern.remove_suffix(1);
+  // "*" alone was its begin and its end.
+  if (open_begin && pattern.empty()) return true;
+  if (open_begin && open_end) return name.find(pattern) != name.npos;
+  if (open_begin) return name.ends_with(pattern);
+  if (open_end) return name.starts_with(pattern);
+  return name == pattern;
+}
+
+std::vector<int> Without(const std::vector<int>& all,
+                         const std::vector<int>& removed) {
+  std::vector<int> rest;
+  std::set_difference(all.begin(),
+                      all.end(),
+                      removed.begin(),
+                      removed.end(),
+                      std::back_inserter(rest));
+  return rest;
+}
+
+}  // namespace
+
+std::vector<ParameterGroup> DefaultGroups() {
+  return {
+      {"imu", {"imu.*"}},
+      {"camera", {"*.focal.*", "*.principal.*", "*.distortion.*"}},
+      {"extrinsics", {"*.q_CI.*", "*.p_CI.*"}},
+  };
+}
+
+std::vector<int> MatchComponents(
+    const std::vector<TangentComponent>& components,
+    const std::vector<std::string>& patterns) {
+  std::vector<int> matched;
+  for (std::size_t i = 0; i < components.size(); ++i) {
+    const auto matches = [&](const std::string& pattern) {
+      return Matches(components[i].name, pattern);
+    };
+    if (std::any_of(patterns.begin(), patterns.end(), matches)) {
+      matched.push_back(static_cast<int>(i));
+    }
+  }
+  return matched;
+}
+
+std::vector<int> GroupComponents(const Rig& rig, const ParameterGroup& group) {
+  const auto components = TangentComponents(rig.factory);
+  return Without(MatchComponents(components, group.patterns),
+                 MatchComponents(components, rig.fixed));
+}
+
+std::vector<int> FreeComponents(const Rig& rig) {
+  return GroupComponents(rig, {"", {"*"}});
+}
+
+Eigen::VectorXd PriorSigmas(const Rig& rig) {
+  constexpr double kDefaultInReferenceSigmas = 10;
+  const auto components = TangentComponents(rig.factory);
+  Eigen::VectorXd sigmas = kDefaultInReferenceSigmas * ReferenceSigmas(rig);
+  for (const ComponentSetting& setting : rig.prior_sigmas) {
+    for (const int i : MatchComponents(components, {setting.pattern})) {
+      sigmas[i] = setting.value;
+    }
+  }
+  return sigmas;
+}
+
+Eigen::VectorXd ReferenceSigmas(const Rig& rig) {
+  const auto components = TangentComponents(rig.factory);
+  Eigen::VectorXd sigmas(components.size());
+  for (std::size_t i = 0; i < components.size(); ++i) {
+    sigmas[static_cast<Eigen::Index>(i)] = components[i].sigma_ref;
+  }
+  return sigmas;
+}
+
+}  // namespace selfcal

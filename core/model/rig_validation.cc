@@ -1,0 +1,171 @@
+// Validation of a rig.
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/model/rig.h"
+#include "core/model/violation_list.h"
+
+namespace selfcal {
+namespace {
+
+constexpr std::size_t kMaxNameLength = 63;
+constexpr std::size_t kMaxGroups = 64;
+constexpr std::size_t kMaxPatterns = 1024;
+constexpr int kMaxTableSize = 10'000;
+constexpr int kMaxViolations = 1000;
+
+// What is wrong with the last part of a resource's name.
+std::string NameFault(const std::string& name) {
+  const bool in_alphabet = std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-';
+  });
+  if (in_alphabet && !name.empty() && name.size() <= kMaxNameLength) return "";
+  return "must be 1 to " + std::to_string(kMaxNameLength) +
+         " characters of a-z, 0-9, '_' and '-'";
+}
+
+void CheckPositive(const std::string& field,
+                   double value,
+                   ViolationList* list) {
+  if (std::isfinite(value) && value > 0) return;
+  list->Add(field, Readable(value) + " is not a positive number");
+}
+
+void CheckImuNoise(const ImuNoise& noise, ViolationList* list) {
+  CheckPositive("imu_noise.gyro_noise_density", noise.gyro_noise_density, list);
+  CheckPositive(
+      "imu_noise.accel_noise_density", noise.accel_noise_density, list);
+  CheckPositive(
+      "imu_noise.gyro_bias_random_walk", noise.gyro_bias_random_walk, list);
+  CheckPositive(
+      "imu_noise.accel_bias_random_walk", noise.accel_bias_random_walk, list);
+}
+
+// Adds a violation for a list too long to be looked at.
+bool CheckCount(const std::string& field,
+                std::size_t count,
+                std::size_t max_count,
+                ViolationList* list) {
+  if (count <= max_count) return true;
+  list->Add(field,
+            "has " + std::to_string(count) + " elements; at most " +
+                std::to_string(max_count) + " are allowed");
+  return false;
+}
+
+// Patterns that stand for nothing are spelling mistakes.
+void CheckPattern(const std::vector<TangentComponent>& components,
+                  const std::string& field,
+                  const std::string& pattern,
+                  ViolationList* list) {
+  if (!MatchComponents(components, {pattern}).empty()) return;
+  list->Add(field,
+            "'" + pattern + "' matches no component; use a name such as '" +
+                components.front().name + "', or '*' at its begin or end");
+}
+
+void CheckPatterns(const std::vector<TangentComponent>& components,
+                   const std::string& field,
+                   const std::vector<std::string>& patterns,
+                   ViolationList* list) {
+  if (!CheckCount(field, patterns.size(), kMaxPatterns, list)) return;
+  for (std::size_t i = 0; i < patterns.size(); ++i) {
+    CheckPattern(components, ElementPath(field, i, ""), patterns[i], list);
+  }
+}
+
+void CheckGroups(const Rig& rig,
+                 const std::vector<TangentComponent>& components,
+                 ViolationList* list) {
+  if (rig.groups.empty()) {
+    list->Add("groups", "is empty; at least one group is needed");
+  }
+  if (!CheckCount("groups", rig.groups.size(), kMaxGroups, list)) return;
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < rig.groups.size(); ++i) {
+    const ParameterGroup& group = rig.groups[i];
+    const std::string name_field = ElementPath("groups", i, "name");
+    const std::string patterns_field = ElementPath("groups", i, "patterns");
+    const std::string name_fault = NameFault(group.name);
+    if (!name_fault.empty()) {
+      list->Add(name_field, name_fault);
+    } else if (!names.insert(group.name).second) {
+      list->Add(name_field, "'" + group.name + "' names two groups");
+    }
+    CheckPatterns(components, patterns_field, group.patterns, list);
+    if (group.patterns.empty()) {
+      list->Add(patterns_field, "is empty; the group matches no component");
+    } else if (!MatchComponents(components, group.patterns).empty() &&
+               GroupComponents(rig, group).empty()) {
+      list->Add(patterns_field,
+                "all components of the group are held fixed; drop the group");
+    }
+  }
+}
+
+void CheckPriorSigmas(const Rig& rig,
+                      const std::vector<TangentComponent>& components,
+                      ViolationList* list) {
+  if (!CheckCount(
+          "prior_sigmas", rig.prior_sigmas.size(), kMaxPatterns, list)) {
+    return;
+  }
+  for (std::size_t i = 0; i < rig.prior_sigmas.size(); ++i) {
+    const ComponentSetting& setting = rig.prior_sigmas[i];
+    CheckPattern(components,
+                 ElementPath("prior_sigmas", i, "pattern"),
+                 setting.pattern,
+                 list);
+    CheckPositive(ElementPath("prior_sigmas", i, "value"), setting.value, list);
+  }
+}
+
+void CheckSelection(const Rig& rig, ViolationList* list) {
+  if (rig.table_size < 1 || rig.table_size > kMaxTableSize) {
+    list->Add("table_size",
+              std::to_string(rig.table_size) + " is not in [1, " +
+                  std::to_string(kMaxTableSize) + "]");
+  }
+  if (!(std::isfinite(rig.min_gain_nats) && rig.min_gain_nats >= 0)) {
+    list->Add("min_gain_nats",
+              Readable(rig.min_gain_nats) + " is not a number of at least 0");
+  }
+  if (!(rig.retrigger_fraction > 0 && rig.retrigger_fraction <= 1)) {
+    list->Add("retrigger_fraction",
+              Readable(rig.retrigger_fraction) + " is not in (0, 1]");
+  }
+}
+
+}  // namespace
+
+std::vector<Violation> Validate(const Rig& rig) {
+  ViolationList list(kMaxViolations);
+  const std::string id_fault = NameFault(rig.id);
+  if (!id_fault.empty()) list.Add("id", id_fault);
+  for (Violation& violation : Validate(rig.factory, "factory")) {
+    list.Add(std::move(violation.field), std::move(violation.message));
+  }
+  CheckImuNoise(rig.imu_noise, &list);
+  CheckPositive("pixel_sigma_px", rig.pixel_sigma_px, &list);
+  CheckPositive("gravity_mps2", rig.gravity_mps2, &list);
+  // Without a list of cameras that may be looked at there are no components
+  // for patterns to match.
+  const std::size_t cameras = rig.factory.cameras.size();
+  if (cameras >= 1 && cameras <= static_cast<std::size_t>(kMaxCameras)) {
+    const auto components = TangentComponents(rig.factory);
+    CheckGroups(rig, components, &list);
+    CheckPriorSigmas(rig, components, &list);
+    CheckPatterns(components, "fixed", rig.fixed, &list);
+    if (FreeComponents(rig).empty()) {
+      list.Add("fixed", "holds every component; nothing would be estimated");
+    }
+  }
+  CheckSelection(rig, &list);
+  return list.Take();
+}
+
+}  // namespace selfcal
