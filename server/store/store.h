@@ -44,7 +44,8 @@ struct StoredRig {
   std::int64_t create_time_ns = 0;  // since the Unix epoch
 };
 
-enum class SegmentState { kStored, kScored };
+// kUnusable: its data is damaged or cannot be scored; `problem` says why.
+enum class SegmentState { kStored, kScored, kUnusable };
 
 struct StoredSegment {
   std::string rig;
@@ -63,6 +64,7 @@ struct StoredSegment {
   int observations = 0;
   std::optional<SegmentInformation> information;  // once scored
   std::vector<std::string> tables;                // groups that hold it
+  std::string problem;                            // empty: none
 };
 
 enum class PutVerdict { kStored, kDuplicate };
@@ -108,6 +110,23 @@ struct ScoreCommit {
   std::optional<StoredRun> started_run;  // the trigger fired
 };
 
+// One line of the log of what happened to a rig.
+enum class EventKind {
+  kRigCreated,
+  kRunStarted,
+  kRunEnded,
+  kCalibrationPublished,
+  kCalibrationRejected,
+  kSegmentUnusable,
+};
+struct StoredEvent {
+  std::int64_t event = 0;  // counts from 1
+  std::int64_t time_ns = 0;
+  std::string rig;
+  EventKind kind = EventKind::kRigCreated;
+  std::string detail;
+};
+
 class Store {
  public:
   virtual ~Store() = default;
@@ -130,8 +149,7 @@ class Store {
   // FAILED_PRECONDITION if its data was dropped; DATA_LOSS if it is damaged.
   virtual absl::StatusOr<MotionSegment> GetSegmentData(
       const std::string& rig, const SegmentKey& key) = 0;
-  // The oldest unscored segment of any rig with a sequence after
-  // `after_sequence` in its rig, none if all are scored.
+  // The oldest unscored segments of all rigs, in the order of their arrival.
   struct Unscored {
     std::string rig;
     SegmentKey key;
@@ -148,6 +166,14 @@ class Store {
       const std::string& rig,
       const SegmentKey& key,
       const SegmentInformation& information) = 0;
+
+  // Takes a segment that cannot be used out of the queue and out of the tables
+  // for good, and drops its data unless an unfinished run references it. An
+  // event records the problem. A segment that is unusable already stays as it
+  // is.
+  virtual absl::Status MarkUnusable(const std::string& rig,
+                                    const SegmentKey& key,
+                                    const std::string& problem) = 0;
 
   virtual absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) = 0;
@@ -174,6 +200,9 @@ class Store {
   // Pending or running -> running, one attempt more.
   virtual absl::StatusOr<StoredRun> BeginRun(const std::string& rig,
                                              std::int64_t run) = 0;
+  // Running -> pending, the attempt not counted: an orderly stop gives it back.
+  virtual absl::StatusOr<StoredRun> ReleaseRun(const std::string& rig,
+                                               std::int64_t run) = 0;
   // Ends a running run with its calibration, stored as the next version:
   // active (the one before becomes superseded) or rejected. Drops data that
   // only the run referenced. May create the next run, as CommitScore does.
@@ -187,6 +216,9 @@ class Store {
                                            std::int64_t run,
                                            RunState state,
                                            const std::string& message) = 0;
+
+  // --- Events, oldest first. They are only ever appended.
+  virtual absl::StatusOr<Listed<StoredEvent>> ListEvents(const Page& page) = 0;
 };
 
 }  // namespace selfcal::server
