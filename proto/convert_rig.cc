@@ -1,0 +1,108 @@
+#include <utility>
+
+#include "proto/convert.h"
+#include "proto/resource_names.h"
+
+namespace selfcal {
+namespace {
+
+ImuNoise Value(const v1::ImuNoise& message) {
+  return {message.gyro_noise_density(),
+          message.accel_noise_density(),
+          message.gyro_bias_random_walk(),
+          message.accel_bias_random_walk()};
+}
+
+std::vector<ParameterGroup> ReadGroups(const v1::Rig& message) {
+  if (message.groups().empty()) return DefaultGroups();
+  std::vector<ParameterGroup> groups;
+  for (const v1::ParameterGroup& group : message.groups()) {
+    groups.push_back(
+        {group.group(), {group.patterns().begin(), group.patterns().end()}});
+  }
+  return groups;
+}
+
+std::vector<ComponentSetting> ReadPriorSigmas(const v1::Rig& message) {
+  std::vector<ComponentSetting> settings;
+  for (const v1::ComponentSetting& setting : message.prior_sigmas()) {
+    settings.push_back({setting.pattern(), setting.value()});
+  }
+  return settings;
+}
+
+// Zero, or absence where zero has a meaning, stands for the default.
+void ReadSettings(const v1::Rig& message, Rig* rig) {
+  rig->pixel_sigma_px = message.pixel_sigma_px();
+  if (message.gravity_mps2() != 0) rig->gravity_mps2 = message.gravity_mps2();
+  if (message.table_size() != 0) rig->table_size = message.table_size();
+  if (message.has_min_gain_nats()) rig->min_gain_nats = message.min_gain_nats();
+  if (message.has_retrigger_fraction()) {
+    rig->retrigger_fraction = message.retrigger_fraction();
+  }
+}
+
+}  // namespace
+
+v1::Rig ToProto(const Rig& rig) {
+  v1::Rig message;
+  message.set_name(RigName(rig.id));
+  *message.mutable_factory() = ToProto(rig.factory);
+  v1::ImuNoise* noise = message.mutable_imu_noise();
+  noise->set_gyro_noise_density(rig.imu_noise.gyro_noise_density);
+  noise->set_accel_noise_density(rig.imu_noise.accel_noise_density);
+  noise->set_gyro_bias_random_walk(rig.imu_noise.gyro_bias_random_walk);
+  noise->set_accel_bias_random_walk(rig.imu_noise.accel_bias_random_walk);
+  message.set_pixel_sigma_px(rig.pixel_sigma_px);
+  message.set_gravity_mps2(rig.gravity_mps2);
+  for (const ParameterGroup& group : rig.groups) {
+    v1::ParameterGroup* added = message.add_groups();
+    added->set_group(group.name);
+    added->mutable_patterns()->Add(group.patterns.begin(),
+                                   group.patterns.end());
+  }
+  for (const ComponentSetting& setting : rig.prior_sigmas) {
+    v1::ComponentSetting* added = message.add_prior_sigmas();
+    added->set_pattern(setting.pattern);
+    added->set_value(setting.value);
+  }
+  message.mutable_fixed()->Add(rig.fixed.begin(), rig.fixed.end());
+  message.set_table_size(rig.table_size);
+  message.set_min_gain_nats(rig.min_gain_nats);
+  message.set_retrigger_fraction(rig.retrigger_fraction);
+  return message;
+}
+
+std::vector<Violation> FromProto(const v1::Rig& message,
+                                 const std::string& prefix,
+                                 Rig* rig) {
+  std::vector<Violation> violations;
+  Rig read;
+  if (const auto id = ParseRigName(message.name())) {
+    read.id = *id;
+  } else {
+    violations.push_back(
+        {prefix + "name",
+         "send rigs/{rig}, {rig} of 1 to 63 characters of a-z, 0-9, _ and -"});
+  }
+  if (message.has_factory()) {
+    auto more =
+        FromProto(message.factory(), prefix + "factory.", &read.factory);
+    violations.insert(violations.end(), more.begin(), more.end());
+  } else {
+    violations.push_back({prefix + "factory", "is missing"});
+  }
+  if (message.has_imu_noise()) {
+    read.imu_noise = Value(message.imu_noise());
+  } else {
+    violations.push_back({prefix + "imu_noise", "is missing"});
+  }
+  ReadSettings(message, &read);
+  read.groups = ReadGroups(message);
+  read.prior_sigmas = ReadPriorSigmas(message);
+  read.fixed.assign(message.fixed().begin(), message.fixed().end());
+  if (violations.empty()) *rig = std::move(read);
+  return violations;
+}
+
+}  // namespace selfcal
