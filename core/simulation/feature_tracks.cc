@@ -1,0 +1,191 @@
+#include "core/simulation/feature_tracks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/simulation/random.h"
+#include "core/simulation/streams.h"
+
+namespace selfcal {
+namespace {
+
+// How many landmarks of the map are tried before a new one is made instead.
+constexpr int kRevisitAttempts = 30;
+// Keyframes after which a landmark counts as out of sight: a track that ended
+// does not resume.
+constexpr int kRevisitPause = 10;
+// A tracked landmark may come nearer, or go farther, than where new ones are
+// made, by this factor.
+constexpr double kDepthSlack = 2;
+
+bool InsideImage(const CameraCalibration& camera, const Eigen::Vector2d& z_px) {
+  return z_px.x() >= 0 && z_px.y() >= 0 && z_px.x() <= camera.width_px - 1 &&
+         z_px.y() <= camera.height_px - 1;
+}
+
+Eigen::Vector2d RandomPixel(const CameraCalibration& camera, Random* random) {
+  const double x = random->Uniform(0, camera.width_px - 1);
+  const double y = random->Uniform(0, camera.height_px - 1);
+  return {x, y};
+}
+
+class Tracker {
+ public:
+  Tracker(const Calibration& theta,
+          double pixel_sigma_px,
+          const SimulationOptions& options)
+      : theta_(theta),
+        options_(options),
+        pixel_sigma_px_(options.noise ? pixel_sigma_px : 0),
+        random_(options.seed, kTrackStream),
+        noise_(options.seed, kPixelNoiseStream),
+        outliers_(options.seed, kOutlierStream),
+        tracked_(theta.cameras.size()) {}
+
+  void Step(int keyframe, const KeyframeState& state) {
+    keyframe_ = keyframe;
+    state_ = &state;
+    for (int j = 0; j < cameras(); ++j) Continue(j);
+    for (int j = 0; j < cameras(); ++j) Refill(j);
+  }
+
+  FeatureTracks Take() && { return std::move(tracks_); }
+
+ private:
+  int cameras() const { return static_cast<int>(theta_.cameras.size()); }
+
+  // Observes the landmark again in each camera that tracks it, and ends tracks
+  // at random, at the border of the image and where the depth is left.
+  void Continue(int camera) {
+    std::vector<int> kept;
+    for (const int landmark : tracked_[camera]) {
+      const bool goes_on = !random_.Chance(1 / options_.mean_track_length);
+      if (goes_on && Observe(camera, landmark)) {
+        kept.push_back(landmark);
+      } else {
+        --trackers_[landmark];
+      }
+    }
+    tracked_[camera] = std::move(kept);
+  }
+
+  void Refill(int camera) {
+    // A pixel without a bearing, or a noisy one beyond the border, is no track:
+    // a bound on the attempts ends the loop in any case.
+    int attempts = 4 * options_.landmarks_in_view;
+    while (static_cast<int>(tracked_[camera].size()) <
+               options_.landmarks_in_view &&
+           attempts-- > 0) {
+      int landmark = -1;
+      if (random_.Chance(options_.revisit_fraction)) landmark = Revisit(camera);
+      if (landmark < 0) landmark = Create(camera);
+      if (landmark >= 0) Begin(landmark);
+    }
+  }
+
+  // A landmark that no camera tracks any more but this one sees, or -1.
+  int Revisit(int camera) {
+    if (tracks_.landmarks_G.empty()) return -1;
+    for (int attempt = 0; attempt < kRevisitAttempts; ++attempt) {
+      const auto landmark =
+          static_cast<int>(random_.Index(tracks_.landmarks_G.size()));
+      Eigen::Vector2d z_px;
+      if (trackers_[landmark] == 0 &&
+          keyframe_ - last_seen_[landmark] > kRevisitPause &&
+          Sees(camera, landmark, &z_px)) {
+        return landmark;
+      }
+    }
+    return -1;
+  }
+
+  // A new landmark at a random pixel, its depth uniform in the logarithm; -1
+  // where no point projects to the pixel.
+  int Create(int camera) {
+    const CameraCalibration& c = theta_.cameras[camera];
+    const Eigen::Vector2d z_px = RandomPixel(c, &random_);
+    const double depth_m = options_.min_depth_m *
+                           std::pow(options_.max_depth_m / options_.min_depth_m,
+                                    random_.Uniform());
+    Eigen::Vector3d bearing_C;
+    if (!Unproject(c, z_px, &bearing_C)) return -1;
+    const Eigen::Vector3d p_I =
+        c.q_CI.conjugate() * (depth_m * bearing_C - c.p_CI);
+    tracks_.landmarks_G.push_back(state_->q_GI * p_I + state_->p_GI);
+    trackers_.push_back(0);
+    last_seen_.push_back(-1);
+    return static_cast<int>(tracks_.landmarks_G.size()) - 1;
+  }
+
+  // Begins a track in every camera that sees the landmark.
+  void Begin(int landmark) {
+    for (int j = 0; j < cameras(); ++j) {
+      if (Observe(j, landmark)) {
+        tracked_[j].push_back(landmark);
+        ++trackers_[landmark];
+      }
+    }
+  }
+
+  // True pixel of a landmark; false where the camera does not see it.
+  bool Sees(int camera, int landmark, Eigen::Vector2d* z_px) const {
+    const CameraCalibration& c = theta_.cameras[camera];
+    const Eigen::Vector3d p_I = state_->q_GI.conjugate() *
+                                (tracks_.landmarks_G[landmark] - state_->p_GI);
+    const Eigen::Vector3d p_C = c.q_CI * p_I + c.p_CI;
+    const double depth_m = p_C.norm();
+    return depth_m > options_.min_depth_m / kDepthSlack &&
+           depth_m < options_.max_depth_m * kDepthSlack &&
+           Project(c, p_C, z_px, nullptr) && InsideImage(c, *z_px);
+  }
+
+  // Adds the observation unless its pixel, before or after noise, is outside.
+  bool Observe(int camera, int landmark) {
+    const CameraCalibration& c = theta_.cameras[camera];
+    FeatureObservation observation;
+    observation.keyframe = keyframe_;
+    observation.camera = camera;
+    observation.landmark = landmark;
+    if (!Sees(camera, landmark, &observation.true_px)) return false;
+    const double dx = noise_.Normal();
+    const double dy = noise_.Normal();
+    observation.measured_px =
+        observation.true_px + pixel_sigma_px_ * Eigen::Vector2d(dx, dy);
+    if (!InsideImage(c, observation.measured_px)) return false;
+    const Eigen::Vector2d elsewhere = RandomPixel(c, &outliers_);
+    if (outliers_.Chance(options_.outlier_fraction)) {
+      observation.measured_px = elsewhere;
+    }
+    last_seen_[landmark] = keyframe_;
+    tracks_.observations.push_back(observation);
+    return true;
+  }
+
+  const Calibration& theta_;
+  const SimulationOptions& options_;
+  const double pixel_sigma_px_;
+  Random random_;
+  Random noise_;
+  Random outliers_;
+  int keyframe_ = 0;
+  const KeyframeState* state_ = nullptr;
+  FeatureTracks tracks_;
+  std::vector<std::vector<int>> tracked_;  // landmarks in each camera
+  std::vector<int> trackers_;   // for each landmark: cameras that track it
+  std::vector<int> last_seen_;  // for each landmark: keyframe, or -1
+};
+
+}  // namespace
+
+FeatureTracks SimulateTracks(const Calibration& theta,
+                             double pixel_sigma_px,
+                             const std::vector<KeyframeState>& keyframes,
+                             const SimulationOptions& options) {
+  Tracker tracker(theta, pixel_sigma_px, options);
+  for (std::size_t k = 0; k < keyframes.size(); ++k) {
+    tracker.Step(static_cast<int>(k), keyframes[k]);
+  }
+  return std::move(tracker).Take();
+}
+
+}  // namespace selfcal

@@ -1,0 +1,101 @@
+#include "core/simulation/imu_readings.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/simulation/random.h"
+#include "core/simulation/streams.h"
+
+namespace selfcal {
+namespace {
+
+// Noise-free readings and what they were made of, biases still missing.
+ImuReadings PerfectReadings(const Rig& rig,
+                            const ImuCalibration& imu,
+                            const Trajectory& trajectory,
+                            double rate_hz) {
+  const Eigen::Matrix3d T_g = imu.T_g();
+  const Eigen::Matrix3d T_a_R_AI = imu.T_a() * imu.q_AI.toRotationMatrix();
+  const Eigen::Vector3d g(0, 0, -rig.gravity_mps2);
+  const auto end_ns =
+      static_cast<std::int64_t>(std::floor(trajectory.duration_s() * 1e9));
+  ImuReadings readings;
+  for (std::int64_t i = 0;; ++i) {
+    ImuSample sample;
+    sample.t_ns = std::llround(static_cast<double>(i) * 1e9 / rate_hz);
+    if (sample.t_ns > end_ns) return readings;
+    const BodyMotion motion =
+        trajectory.At(static_cast<double>(sample.t_ns) * 1e-9);
+    const Eigen::Vector3d f_I = motion.q_GI.conjugate() * (motion.a_GI - g);
+    sample.gyro = T_g * motion.w_I;
+    sample.accel = T_a_R_AI * f_I;
+    readings.noise_free.push_back(sample);
+    readings.w_I.push_back(motion.w_I);
+    readings.f_I.push_back(f_I);
+  }
+}
+
+}  // namespace
+
+ImuReadings SimulateImu(const Rig& rig,
+                        const ImuCalibration& imu,
+                        const Trajectory& trajectory,
+                        const SimulationOptions& options) {
+  ImuReadings readings =
+      PerfectReadings(rig, imu, trajectory, options.imu_rate_hz);
+  readings.measured = readings.noise_free;
+  Random noise(options.seed, kImuNoiseStream);
+  Random walk(options.seed, kBiasWalkStream);
+  const ImuNoise& density = rig.imu_noise;
+  const double on = options.noise ? 1 : 0;
+  const double to_sample = on * std::sqrt(options.imu_rate_hz);
+  const double to_step = on / std::sqrt(options.imu_rate_hz);
+  Eigen::Vector3d b_a = options.b_a0;
+  Eigen::Vector3d b_g = options.b_g0;
+  for (std::size_t i = 0; i < readings.measured.size(); ++i) {
+    readings.noise_free[i].gyro += b_g;
+    readings.noise_free[i].accel += b_a;
+    readings.measured[i] = readings.noise_free[i];
+    readings.measured[i].gyro +=
+        density.gyro_noise_density * to_sample * noise.Normal3();
+    readings.measured[i].accel +=
+        density.accel_noise_density * to_sample * noise.Normal3();
+    readings.b_a.push_back(b_a);
+    readings.b_g.push_back(b_g);
+    b_a += density.accel_bias_random_walk * to_step * walk.Normal3();
+    b_g += density.gyro_bias_random_walk * to_step * walk.Normal3();
+  }
+  return readings;
+}
+
+std::size_t SampleBefore(const std::vector<ImuSample>& samples,
+                         std::int64_t t_ns) {
+  const auto after = std::upper_bound(
+      samples.begin(),
+      samples.end(),
+      t_ns,
+      [](std::int64_t t, const ImuSample& sample) { return t < sample.t_ns; });
+  return static_cast<std::size_t>(after - samples.begin()) - 1;
+}
+
+KeyframeState TrueState(const Trajectory& trajectory,
+                        const ImuReadings& imu,
+                        std::int64_t t_ns) {
+  const BodyMotion motion = trajectory.At(static_cast<double>(t_ns) * 1e-9);
+  const std::size_t i = SampleBefore(imu.measured, t_ns);
+  const std::size_t j = std::min(i + 1, imu.measured.size() - 1);
+  const double step =
+      static_cast<double>(imu.measured[j].t_ns - imu.measured[i].t_ns);
+  const double u =
+      step > 0 ? static_cast<double>(t_ns - imu.measured[i].t_ns) / step : 0;
+  KeyframeState state;
+  state.t_ns = t_ns;
+  state.q_GI = motion.q_GI;
+  state.p_GI = motion.p_GI;
+  state.v_GI = motion.v_GI;
+  state.b_a = imu.b_a[i] + u * (imu.b_a[j] - imu.b_a[i]);
+  state.b_g = imu.b_g[i] + u * (imu.b_g[j] - imu.b_g[i]);
+  return state;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,171 @@
+#include "core/simulation/simulate.h"
+
+#include <cmath>
+#include <optional>
+
+#include "core/simulation/feature_tracks.h"
+#include "core/simulation/imu_readings.h"
+#include "core/simulation/random.h"
+#include "core/simulation/slam_landmarks.h"
+#include "core/simulation/slam_states.h"
+#include "core/simulation/streams.h"
+
+namespace selfcal {
+namespace {
+
+// Keyframes fall between IMU samples, at times that are not quite regular.
+constexpr double kKeyframeOffset_s = 1.7e-3;
+constexpr double kKeyframeJitter_s = 0.4e-3;
+
+std::vector<KeyframeState> TrueKeyframes(const Trajectory& trajectory,
+                                         const ImuReadings& imu,
+                                         const SimulationOptions& options) {
+  Random random(options.seed, kKeyframeTimeStream);
+  std::vector<KeyframeState> keyframes;
+  if (imu.measured.empty()) return keyframes;
+  for (int k = 0;; ++k) {
+    const double t_s = k / options.keyframe_rate_hz + kKeyframeOffset_s +
+                       random.Uniform(-kKeyframeJitter_s, kKeyframeJitter_s);
+    const std::int64_t t_ns = std::llround(t_s * 1e9);
+    if (t_ns > imu.measured.back().t_ns) return keyframes;
+    keyframes.push_back(TrueState(trajectory, imu, t_ns));
+  }
+}
+
+// All that was simulated over the session, before it is cut into segments.
+struct Recording {
+  ImuReadings imu;
+  std::vector<KeyframeState> truth;
+  std::vector<KeyframeState> slam;
+  FeatureTracks tracks;
+  std::vector<std::optional<Eigen::Vector3d>> slam_landmarks_G;
+};
+
+// Cuts segment after segment; begin and end are keyframes of the session.
+class Cutter {
+ public:
+  explicit Cutter(const Recording& recording)
+      : recording_(recording),
+        local_(recording.tracks.landmarks_G.size(), kUnseen) {}
+
+  // Must be called for one segment after the other; end > begin. The IMU
+  // samples reach to the keyframe `imu_end`.
+  void Cut(int begin,
+           int end,
+           int imu_end,
+           MotionSegment* segment,
+           MotionSegment* truth) {
+    CutStates(begin, end, imu_end, segment, truth);
+    const std::vector<FeatureObservation>& all = recording_.tracks.observations;
+    const std::size_t first = next_observation_;
+    while (next_observation_ < all.size() &&
+           all[next_observation_].keyframe < end) {
+      ++next_observation_;
+    }
+    CountObservations(first);
+    for (std::size_t i = first; i < next_observation_; ++i) {
+      AddObservation(all[i], begin, segment, truth);
+    }
+    for (std::size_t i = first; i < next_observation_; ++i) {
+      local_[all[i].landmark] = kUnseen;
+    }
+  }
+
+ private:
+  // A landmark's place in the segment that is being cut: its index, or the
+  // number of observations so far as kUnseen - n.
+  static constexpr int kUnseen = -1;
+
+  void CutStates(int begin,
+                 int end,
+                 int imu_end,
+                 MotionSegment* segment,
+                 MotionSegment* truth) const {
+    segment->keyframes.assign(recording_.slam.begin() + begin,
+                              recording_.slam.begin() + end);
+    truth->keyframes.assign(recording_.truth.begin() + begin,
+                            recording_.truth.begin() + end);
+    const std::vector<ImuSample>& imu = recording_.imu.measured;
+    const std::size_t from = SampleBefore(imu, recording_.truth[begin].t_ns);
+    const std::int64_t to_ns = recording_.truth[imu_end].t_ns;
+    std::size_t to = SampleBefore(imu, to_ns);
+    if (imu[to].t_ns < to_ns) ++to;
+    segment->imu.assign(imu.begin() + static_cast<std::ptrdiff_t>(from),
+                        imu.begin() + static_cast<std::ptrdiff_t>(to + 1));
+    const std::vector<ImuSample>& clean = recording_.imu.noise_free;
+    truth->imu.assign(clean.begin() + static_cast<std::ptrdiff_t>(from),
+                      clean.begin() + static_cast<std::ptrdiff_t>(to + 1));
+  }
+
+  void CountObservations(std::size_t first) {
+    for (std::size_t i = first; i < next_observation_; ++i) {
+      --local_[recording_.tracks.observations[i].landmark];
+    }
+  }
+
+  void AddObservation(const FeatureObservation& observation,
+                      int begin,
+                      MotionSegment* segment,
+                      MotionSegment* truth) {
+    const int m = observation.landmark;
+    const std::optional<Eigen::Vector3d>& p_G = recording_.slam_landmarks_G[m];
+    if (!p_G) return;
+    int& local = local_[m];
+    if (local < 0) {
+      if (kUnseen - local < kMinSegmentObservations) return;
+      local = static_cast<int>(segment->landmarks.size());
+      const auto id = static_cast<std::uint64_t>(m) + 1;
+      segment->landmarks.push_back({id, *p_G});
+      truth->landmarks.push_back({id, recording_.tracks.landmarks_G[m]});
+    }
+    const int k = observation.keyframe - begin;
+    segment->observations.push_back(
+        {k, observation.camera, local, observation.measured_px});
+    truth->observations.push_back(
+        {k, observation.camera, local, observation.true_px});
+  }
+
+  const Recording& recording_;
+  std::vector<int> local_;
+  std::size_t next_observation_ = 0;
+};
+
+}  // namespace
+
+SimulatedSession Simulate(const Rig& rig,
+                          const Calibration& theta_true,
+                          const Calibration& theta_slam,
+                          const Trajectory& trajectory,
+                          const std::string& session,
+                          const SimulationOptions& options) {
+  Recording recording;
+  recording.imu = SimulateImu(rig, theta_true.imu, trajectory, options);
+  recording.truth = TrueKeyframes(trajectory, recording.imu, options);
+  const int N = options.keyframes_per_segment;
+  const int segments = static_cast<int>(recording.truth.size()) / N;
+  recording.truth.resize(static_cast<std::size_t>(segments * N));
+  recording.tracks =
+      SimulateTracks(theta_true, rig.pixel_sigma_px, recording.truth, options);
+  recording.slam = SlamStates(
+      recording.truth, recording.imu, theta_true.imu, theta_slam.imu, options);
+  recording.slam_landmarks_G = TriangulateLandmarks(theta_slam,
+                                                    recording.slam,
+                                                    recording.tracks,
+                                                    rig.pixel_sigma_px,
+                                                    options);
+  SimulatedSession result;
+  Cutter cutter(recording);
+  for (int s = 0; s < segments; ++s) {
+    MotionSegment segment;
+    segment.key = {session, s};
+    MotionSegment truth = segment;
+    const int end = (s + 1) * N;
+    const int imu_end = s + 1 < segments ? end : end - 1;
+    cutter.Cut(s * N, end, imu_end, &segment, &truth);
+    result.segments.push_back(std::move(segment));
+    result.truth.push_back(std::move(truth));
+  }
+  return result;
+}
+
+}  // namespace selfcal
