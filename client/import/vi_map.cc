@@ -98,11 +98,9 @@ class MapReader {
   absl::Status CheckVertex(int i) const {
     const vi_map::Vertex& vertex = map_.vertices(i);
     const auto bad = [&](const char* field, int size) {
-      return Bad(folder_,
-                 fmt::format("vertices[{}].{}: needs {} numbers",
-                             i,
-                             field,
-                             size));
+      return Bad(
+          folder_,
+          fmt::format("vertices[{}].{}: needs {} numbers", i, field, size));
     };
     if (vertex.t_m_i_size() != 7) return bad("T_M_I", 7);
     if (vertex.v_m_size() != 3) return bad("v_M", 3);
@@ -159,12 +157,12 @@ class MapReader {
       }
       key = Key(edge->second->to());
     }
-    if (static_cast<int>(recording_.keyframes.size()) !=
-        map_.vertices_size()) {
-      return Bad(folder_,
-                 fmt::format("the chain from the root reaches {} of {} vertices",
-                             recording_.keyframes.size(),
-                             map_.vertices_size()));
+    if (static_cast<int>(recording_.keyframes.size()) != map_.vertices_size()) {
+      return Bad(
+          folder_,
+          fmt::format("the chain from the root reaches {} of {} vertices",
+                      recording_.keyframes.size(),
+                      map_.vertices_size()));
     }
     return absl::OkStatus();
   }
@@ -198,7 +196,8 @@ class MapReader {
                                   int camera,
                                   int vertex,
                                   ViMapKeyframe* keyframe) {
-    if (!IsValid(Key(frame.id())) || (frame.has_is_valid() && !frame.is_valid()))
+    if (!IsValid(Key(frame.id())) ||
+        (frame.has_is_valid() && !frame.is_valid()))
       return absl::OkStatus();
     const int n = frame.landmark_ids_size();
     if (frame.keypoint_measurements_size() != 2 * n ||
@@ -321,20 +320,26 @@ std::vector<MotionSegment> BuildSegments(const ViMapRecording& recording,
                                          const SegmentBuilderOptions& options) {
   SegmentBuilder builder(options);
   std::vector<MotionSegment> segments;
+  const auto take = [&] {
+    while (auto segment = builder.Take()) {
+      segments.push_back(*std::move(segment));
+    }
+  };
   std::size_t sample = 0;
   for (const ViMapKeyframe& keyframe : recording.keyframes) {
     while (sample < recording.imu.size() &&
            recording.imu[sample].t_ns <= keyframe.state.t_ns) {
       builder.AddImu(recording.imu[sample++]);
     }
-    if (auto segment =
-            builder.AddKeyframe(keyframe.state, keyframe.observations)) {
-      segments.push_back(*std::move(segment));
-    }
+    builder.AddKeyframe(keyframe.state, keyframe.observations);
+    take();
   }
-  if (auto segment = builder.Flush(options.keyframes)) {
-    segments.push_back(*std::move(segment));
+  while (sample < recording.imu.size()) {
+    builder.AddImu(recording.imu[sample++]);
   }
+  builder.Flush(options.seconds > 0 ? options.min_keyframes
+                                    : options.keyframes);
+  take();
   return segments;
 }
 

@@ -23,8 +23,8 @@ struct ViMapKeyframe {
 
 // One recording: a single unbroken chain of keyframes.
 struct ViMapRecording {
-  Rig rig;                 // id empty; factory = the stored calibration
-  std::string session;     // from the mission's id
+  Rig rig;              // id empty; factory = the stored calibration
+  std::string session;  // from the mission's id
   std::vector<ViMapKeyframe> keyframes;  // in time order
   std::vector<ImuSample> imu;            // one stream, duplicates dropped
 };
@@ -39,11 +39,11 @@ absl::StatusOr<ViMapRecording> ReadViMap(const std::string& folder,
                                          const ViMapOptions& options);
 
 // Several folders that continue each other.
-absl::StatusOr<ViMapRecording> ReadViMaps(const std::vector<std::string>& folders,
-                                          const ViMapOptions& options);
+absl::StatusOr<ViMapRecording> ReadViMaps(
+    const std::vector<std::string>& folders, const ViMapOptions& options);
 
-// Segments of the recording through SegmentBuilder; a rest of at least
-// min_keyframes keyframes becomes a shorter last one if keep_rest.
+// Segments of the recording through SegmentBuilder. The rest at its end that
+// does not fill a segment is left out.
 std::vector<MotionSegment> BuildSegments(const ViMapRecording& recording,
                                          const SegmentBuilderOptions& options);
 

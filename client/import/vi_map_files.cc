@@ -29,15 +29,14 @@ absl::StatusOr<std::string> Gunzip(const std::string& path) {
     const int n = gzread(file.get(), buffer.data(), buffer.size());
     if (n < 0) {
       int code = Z_OK;
-      return absl::DataLossError(fmt::format("{}: damaged gzip stream: {}",
-                                             path,
-                                             gzerror(file.get(), &code)));
+      return absl::DataLossError(fmt::format(
+          "{}: damaged gzip stream: {}", path, gzerror(file.get(), &code)));
     }
     if (n == 0) break;
     data.append(buffer.data(), static_cast<std::size_t>(n));
     if (data.size() > kMaxUncompressedBytes) {
-      return absl::InvalidArgumentError(
-          fmt::format("{}: more than 1 GiB uncompressed; not a map part", path));
+      return absl::InvalidArgumentError(fmt::format(
+          "{}: more than 1 GiB uncompressed; not a map part", path));
     }
   }
   // A truncated stream ends without an error from gzread, but is not complete.

@@ -23,13 +23,12 @@ YAML::Node Get(const YAML::Node& node, const std::string& key) {
 
 ImuNoise ReadNoise(const YAML::Node& imu) {
   const YAML::Node sigmas = Get(imu, "sigmas");
-  return {
-      .gyro_noise_density = Get(sigmas, "gyro_noise_density").as<double>(),
-      .accel_noise_density = Get(sigmas, "acc_noise_density").as<double>(),
-      .gyro_bias_random_walk =
-          Get(sigmas, "gyro_bias_random_walk_noise_density").as<double>(),
-      .accel_bias_random_walk =
-          Get(sigmas, "acc_bias_random_walk_noise_density").as<double>()};
+  return {.gyro_noise_density = Get(sigmas, "gyro_noise_density").as<double>(),
+          .accel_noise_density = Get(sigmas, "acc_noise_density").as<double>(),
+          .gyro_bias_random_walk =
+              Get(sigmas, "gyro_bias_random_walk_noise_density").as<double>(),
+          .accel_bias_random_walk =
+              Get(sigmas, "acc_bias_random_walk_noise_density").as<double>()};
 }
 
 DistortionModel ReadModel(const std::string& type) {
@@ -78,9 +77,8 @@ CameraCalibration ReadCamera(const YAML::Node& entry) {
   result.model = ReadModel(Get(distortion, "type").as<std::string>());
   const int size = DistortionSize(result.model);
   if (static_cast<int>(coefficients.size()) != size) {
-    throw SensorsError(fmt::format("distortion needs {} coefficients, not {}",
-                                   size,
-                                   coefficients.size()));
+    throw SensorsError(fmt::format(
+        "distortion needs {} coefficients, not {}", size, coefficients.size()));
   }
   result.distortion.resize(size);
   for (int i = 0; i < size; ++i) {

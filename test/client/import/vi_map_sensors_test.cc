@@ -1,0 +1,90 @@
+#include "client/import/vi_map_sensors.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace selfcal::client {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr char kSensors[] = R"(
+sensors:
+  - id: a
+    sensor_type: ODOMETRY_6DOF
+  - id: b
+    sensor_type: IMU
+    sigmas:
+      gyro_noise_density: 0.001
+      gyro_bias_random_walk_noise_density: 0.002
+      acc_noise_density: 0.003
+      acc_bias_random_walk_noise_density: 0.004
+    gravity_magnitude_mps2: 9.80
+  - id: c
+    sensor_type: NCAMERA
+    cameras:
+      - camera:
+          image_height: 480
+          image_width: 640
+          intrinsics: {data: [250, 251, 320, 240]}
+          distortion:
+            type: fisheye
+            parameters: {data: [0.9]}
+        T_B_C:
+          data:
+            - [0, -1, 0, 0.1]
+            - [1, 0, 0, 0.2]
+            - [0, 0, 1, 0.3]
+            - [0, 0, 0, 1]
+)";
+
+std::string Replaced(const std::string& from, const std::string& to) {
+  std::string text = kSensors;
+  return text.replace(text.find(from), from.size(), to);
+}
+
+std::string Error(const std::string& text) {
+  return std::string(ParseSensors(text, "sensors.yaml").status().message());
+}
+
+TEST(ParseSensors, ReadsNoiseCameraAndInvertsExtrinsics) {
+  const auto rig = ParseSensors(kSensors, "sensors.yaml");
+  ASSERT_TRUE(rig.ok()) << rig.status();
+  EXPECT_EQ(rig->imu_noise.gyro_noise_density, 0.001);
+  EXPECT_EQ(rig->imu_noise.gyro_bias_random_walk, 0.002);
+  EXPECT_EQ(rig->imu_noise.accel_noise_density, 0.003);
+  EXPECT_EQ(rig->imu_noise.accel_bias_random_walk, 0.004);
+  EXPECT_EQ(rig->gravity_mps2, 9.80);
+  ASSERT_EQ(rig->factory.cameras.size(), 1u);
+  const CameraCalibration& camera = rig->factory.cameras[0];
+  EXPECT_EQ(camera.f, Eigen::Vector2d(250, 251));
+  EXPECT_EQ(camera.c, Eigen::Vector2d(320, 240));
+  EXPECT_EQ(camera.width_px, 640);
+  EXPECT_EQ(camera.height_px, 480);
+  // T_CI takes the camera's place in B to its own origin.
+  EXPECT_LT((camera.q_CI * Eigen::Vector3d(0.1, 0.2, 0.3) + camera.p_CI).norm(),
+            1e-12);
+  EXPECT_LT((camera.q_CI * Eigen::Vector3d::UnitX() + Eigen::Vector3d::UnitY())
+                .norm(),
+            1e-12);
+}
+
+TEST(ParseSensors, EveryMistakeIsNamedWithTheFile) {
+  EXPECT_THAT(Error(Replaced("fisheye", "unknown")),
+              HasSubstr("sensors.yaml: distortion type 'unknown'"));
+  EXPECT_THAT(Error(Replaced("[0.9]", "[0.9, 1]")), HasSubstr("coefficients"));
+  EXPECT_THAT(Error(Replaced("gyro_noise_density", "x")),
+              HasSubstr("'gyro_noise_density' is missing"));
+  EXPECT_THAT(Error(Replaced("[1, 0, 0, 0.2]", "[2, 0, 0, 0.2]")),
+              HasSubstr("rigid"));
+  EXPECT_THAT(Error(Replaced("NCAMERA", "LIDAR")), HasSubstr("NCAMERA"));
+  EXPECT_THAT(Error("sensors: ["), HasSubstr("sensors.yaml"));
+  EXPECT_THAT(Error(""), HasSubstr("'sensors' is missing"));
+  EXPECT_THAT(Error(Replaced("250, 251", "250, nonsense")),
+              HasSubstr("sensors.yaml"));
+}
+
+}  // namespace
+}  // namespace selfcal::client
