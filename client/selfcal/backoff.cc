@@ -1,0 +1,23 @@
+#include "client/selfcal/backoff.h"
+
+#include <algorithm>
+
+namespace selfcal::client {
+
+Backoff::Backoff(std::chrono::milliseconds min,
+                 std::chrono::milliseconds max,
+                 std::uint64_t seed)
+    : min_(std::max(min, std::chrono::milliseconds(1))),
+      max_(std::max(max, min_)),
+      step_(min_),
+      random_(seed) {}
+
+std::chrono::milliseconds Backoff::Next() {
+  const auto step = step_;
+  step_ = step_ > max_ / 2 ? max_ : 2 * step_;
+  std::uniform_int_distribution<std::int64_t> jitter((step.count() + 1) / 2,
+                                                     step.count());
+  return std::chrono::milliseconds(jitter(random_));
+}
+
+}  // namespace selfcal::client

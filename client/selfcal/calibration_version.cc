@@ -1,0 +1,49 @@
+#include "client/selfcal/calibration_version.h"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "proto/convert.h"
+
+namespace selfcal::client {
+namespace {
+
+absl::Status Broken(const Violation& violation) {
+  return absl::DataLossError(
+      fmt::format("{}: {}", violation.field, violation.message));
+}
+
+}  // namespace
+
+absl::StatusOr<CalibrationVersion> ToCalibrationVersion(
+    const v1::Calibration& message) {
+  CalibrationVersion value;
+  value.version = message.version();
+  std::vector<Violation> violations =
+      FromProto(message.parameters(), "parameters.", &value.theta);
+  if (violations.empty()) violations = Validate(value.theta, "parameters");
+  if (!violations.empty()) return Broken(violations.front());
+
+  const int size = TangentSize(value.theta);
+  const int entries = size * (size + 1) / 2;
+  if (message.covariance_size() == 0) return value;
+  if (message.covariance_size() != entries) {
+    return Broken({"covariance",
+                   fmt::format("has {} entries, must have {}",
+                               message.covariance_size(),
+                               entries)});
+  }
+  value.covariance.resize(size, size);
+  int entry = 0;
+  for (int row = 0; row < size; ++row) {
+    for (int column = 0; column <= row; ++column) {
+      const double covariance = message.covariance(entry++);
+      value.covariance(row, column) = covariance;
+      value.covariance(column, row) = covariance;
+    }
+  }
+  return value;
+}
+
+}  // namespace selfcal::client

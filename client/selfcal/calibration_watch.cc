@@ -1,0 +1,145 @@
+#include <grpcpp/grpcpp.h>
+
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "client/selfcal/backoff.h"
+#include "client/selfcal/calibration_version.h"
+#include "client/selfcal/client.h"
+#include "client/selfcal/connection.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
+
+namespace selfcal::client {
+
+class CalibrationWatch::Impl {
+ public:
+  Impl(const ClientOptions& options, Callback callback)
+      : options_(options), callback_(std::move(callback)) {
+    try {
+      thread_ = std::thread([this] { Run(); });
+    } catch (const std::exception& error) {
+      connection_ = absl::ResourceExhaustedError(error.what());
+    }
+  }
+
+  ~Impl() {
+    {
+      std::lock_guard lock(mutex_);
+      stop_ = true;
+      if (context_ != nullptr) context_->TryCancel();
+    }
+    stopped_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  absl::Status connection_status() const {
+    std::lock_guard lock(mutex_);
+    return connection_;
+  }
+
+  std::uint64_t callback_failures() const {
+    std::lock_guard lock(mutex_);
+    return callback_failures_;
+  }
+
+ private:
+  void Run() {
+    Backoff backoff(
+        options_.min_backoff, options_.max_backoff, JitterSeed(this));
+    do {
+      bool answered = false;
+      const absl::Status status = TryWatch(&answered);
+      if (answered) backoff.Reset();
+      std::lock_guard lock(mutex_);
+      context_ = nullptr;
+      connection_ = status;
+    } while (WaitUnlessStopped(backoff.Next()));
+  }
+
+  bool WaitUnlessStopped(std::chrono::milliseconds wait) {
+    std::unique_lock lock(mutex_);
+    stopped_.wait_for(lock, wait, [this] { return stop_; });
+    return !stop_;
+  }
+
+  absl::Status TryWatch(bool* answered) {
+    try {
+      return Watch(answered);
+    } catch (const std::exception& error) {  // no memory
+      return absl::InternalError(error.what());
+    }
+  }
+
+  // One connection, from its beginning to its end, which is never a success.
+  absl::Status Watch(bool* answered) {
+    const auto stub =
+        v1::CalibrationService::NewStub(MakeChannel(options_.target));
+    const auto context = std::make_shared<grpc::ClientContext>();
+    {
+      std::lock_guard lock(mutex_);
+      if (stop_) return absl::CancelledError();
+      context_ = context;
+    }
+    v1::WatchCalibrationRequest request;
+    request.set_parent(RigName(options_.rig));
+    const auto stream = stub->WatchCalibration(context.get(), request);
+    v1::Calibration message;
+    while (stream->Read(&message)) {
+      *answered = true;
+      Tell(message);
+    }
+    const absl::Status status = ToAbsl(stream->Finish());
+    if (!status.ok()) return status;
+    return absl::UnavailableError("the daemon ended the stream");
+  }
+
+  void Tell(const v1::Calibration& message) {
+    const auto version = ToCalibrationVersion(message);
+    {
+      std::lock_guard lock(mutex_);
+      connection_ = version.status();
+    }
+    if (!version.ok() || last_told_ == version->version) return;
+    last_told_ = version->version;
+    if (!callback_) return;
+    try {
+      callback_(*version);
+    } catch (...) {
+      std::lock_guard lock(mutex_);
+      ++callback_failures_;
+    }
+  }
+
+  const ClientOptions options_;
+  const Callback callback_;
+  std::optional<std::int64_t> last_told_;  // by thread_ alone
+
+  mutable std::mutex mutex_;  // guards all below
+  std::condition_variable stopped_;
+  bool stop_ = false;
+  absl::Status connection_;
+  std::uint64_t callback_failures_ = 0;
+  std::shared_ptr<grpc::ClientContext> context_;  // while there is one
+
+  std::thread thread_;  // last: it uses all of the above
+};
+
+CalibrationWatch::CalibrationWatch(const ClientOptions& options,
+                                   Callback callback)
+    : impl_(std::make_unique<Impl>(options, std::move(callback))) {}
+CalibrationWatch::~CalibrationWatch() = default;
+
+absl::Status CalibrationWatch::connection_status() const {
+  return impl_->connection_status();
+}
+
+std::uint64_t CalibrationWatch::callback_failures() const {
+  return impl_->callback_failures();
+}
+
+}  // namespace selfcal::client
