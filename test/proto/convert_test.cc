@@ -1,0 +1,285 @@
+#include "proto/convert.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "test/proto/random_values.h"
+
+namespace selfcal {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::Field;
+using ::testing::IsEmpty;
+
+constexpr int kTrials = 500;
+
+// Equal to the bit: a zero differs from a negative zero.
+template <typename Vector>
+bool SameBits(const Vector& a, const Vector& b) {
+  return a.size() == b.size() &&
+         std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+}
+bool SameBits(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+  return SameBits(a.coeffs(), b.coeffs());
+}
+bool SameBits(double a, double b) {
+  return std::memcmp(&a, &b, sizeof(double)) == 0;
+}
+
+void ExpectSame(const Calibration& a, const Calibration& b) {
+  EXPECT_TRUE(SameBits(a.imu.s_g, b.imu.s_g));
+  EXPECT_TRUE(SameBits(a.imu.m_g, b.imu.m_g));
+  EXPECT_TRUE(SameBits(a.imu.s_a, b.imu.s_a));
+  EXPECT_TRUE(SameBits(a.imu.m_a, b.imu.m_a));
+  EXPECT_TRUE(SameBits(a.imu.q_AI, b.imu.q_AI));
+  ASSERT_EQ(a.cameras.size(), b.cameras.size());
+  for (std::size_t j = 0; j < a.cameras.size(); ++j) {
+    const CameraCalibration& x = a.cameras[j];
+    const CameraCalibration& y = b.cameras[j];
+    EXPECT_TRUE(SameBits(x.q_CI, y.q_CI));
+    EXPECT_TRUE(SameBits(x.p_CI, y.p_CI));
+    EXPECT_TRUE(SameBits(x.f, y.f));
+    EXPECT_TRUE(SameBits(x.c, y.c));
+    EXPECT_EQ(x.model, y.model);
+    EXPECT_TRUE(SameBits(x.distortion, y.distortion));
+    EXPECT_EQ(x.width_px, y.width_px);
+    EXPECT_EQ(x.height_px, y.height_px);
+  }
+}
+
+void ExpectSame(const Rig& a, const Rig& b) {
+  EXPECT_EQ(a.id, b.id);
+  ExpectSame(a.factory, b.factory);
+  EXPECT_EQ(std::memcmp(&a.imu_noise, &b.imu_noise, sizeof(ImuNoise)), 0);
+  EXPECT_TRUE(SameBits(a.pixel_sigma_px, b.pixel_sigma_px));
+  EXPECT_TRUE(SameBits(a.gravity_mps2, b.gravity_mps2));
+  ASSERT_EQ(a.groups.size(), b.groups.size());
+  for (std::size_t i = 0; i < a.groups.size(); ++i) {
+    EXPECT_EQ(a.groups[i].name, b.groups[i].name);
+    EXPECT_EQ(a.groups[i].patterns, b.groups[i].patterns);
+  }
+  ASSERT_EQ(a.prior_sigmas.size(), b.prior_sigmas.size());
+  for (std::size_t i = 0; i < a.prior_sigmas.size(); ++i) {
+    EXPECT_EQ(a.prior_sigmas[i].pattern, b.prior_sigmas[i].pattern);
+    EXPECT_TRUE(SameBits(a.prior_sigmas[i].value, b.prior_sigmas[i].value));
+  }
+  EXPECT_EQ(a.fixed, b.fixed);
+  EXPECT_EQ(a.table_size, b.table_size);
+  EXPECT_TRUE(SameBits(a.min_gain_nats, b.min_gain_nats));
+  EXPECT_TRUE(SameBits(a.retrigger_fraction, b.retrigger_fraction));
+}
+
+void ExpectSame(const MotionSegment& a, const MotionSegment& b) {
+  EXPECT_EQ(a.key, b.key);
+  EXPECT_EQ(a.calibration_version, b.calibration_version);
+  ASSERT_EQ(a.keyframes.size(), b.keyframes.size());
+  for (std::size_t k = 0; k < a.keyframes.size(); ++k) {
+    const KeyframeState& x = a.keyframes[k];
+    const KeyframeState& y = b.keyframes[k];
+    EXPECT_EQ(x.t_ns, y.t_ns);
+    EXPECT_TRUE(SameBits(x.q_GI, y.q_GI));
+    EXPECT_TRUE(SameBits(x.p_GI, y.p_GI));
+    EXPECT_TRUE(SameBits(x.v_GI, y.v_GI));
+    EXPECT_TRUE(SameBits(x.b_a, y.b_a));
+    EXPECT_TRUE(SameBits(x.b_g, y.b_g));
+  }
+  ASSERT_EQ(a.imu.size(), b.imu.size());
+  for (std::size_t k = 0; k < a.imu.size(); ++k) {
+    EXPECT_EQ(a.imu[k].t_ns, b.imu[k].t_ns);
+    EXPECT_TRUE(SameBits(a.imu[k].gyro, b.imu[k].gyro));
+    EXPECT_TRUE(SameBits(a.imu[k].accel, b.imu[k].accel));
+  }
+  ASSERT_EQ(a.landmarks.size(), b.landmarks.size());
+  for (std::size_t k = 0; k < a.landmarks.size(); ++k) {
+    EXPECT_EQ(a.landmarks[k].id, b.landmarks[k].id);
+    EXPECT_TRUE(SameBits(a.landmarks[k].p_G, b.landmarks[k].p_G));
+  }
+  ASSERT_EQ(a.observations.size(), b.observations.size());
+  for (std::size_t k = 0; k < a.observations.size(); ++k) {
+    const Observation& x = a.observations[k];
+    const Observation& y = b.observations[k];
+    EXPECT_EQ(x.keyframe, y.keyframe);
+    EXPECT_EQ(x.camera, y.camera);
+    EXPECT_EQ(x.landmark, y.landmark);
+    EXPECT_TRUE(SameBits(x.z_px, y.z_px));
+  }
+}
+
+// Over the wire and back.
+template <typename Value>
+void ExpectRoundTrip(const Value& value) {
+  auto sent = ToProto(value);
+  decltype(sent) received;
+  ASSERT_TRUE(received.ParseFromString(sent.SerializeAsString()));
+  Value back;
+  ASSERT_THAT(FromProto(received, "", &back), IsEmpty());
+  ExpectSame(value, back);
+}
+
+template <typename Message, typename Value>
+std::vector<std::string> FaultyFields(const Message& message, Value value) {
+  std::vector<std::string> fields;
+  for (const Violation& violation : FromProto(message, "x.", &value)) {
+    EXPECT_FALSE(violation.message.empty());
+    fields.push_back(violation.field);
+  }
+  return fields;
+}
+
+TEST(Convert, CalibrationKeepsEveryBitOverTheWire) {
+  RandomValues random(1);
+  for (int i = 0; i < kTrials; ++i) ExpectRoundTrip(random.Theta());
+}
+
+TEST(Convert, RigKeepsEveryBitOverTheWire) {
+  RandomValues random(2);
+  for (int i = 0; i < kTrials; ++i) ExpectRoundTrip(random.RigValue());
+}
+
+TEST(Convert, SegmentKeepsEveryBitOverTheWire) {
+  RandomValues random(3);
+  for (int i = 0; i < kTrials; ++i) ExpectRoundTrip(random.Segment());
+}
+
+TEST(Convert, NotANumberSurvivesSoThatValidationCanNameIt) {
+  MotionSegment segment;
+  segment.landmarks = {
+      {1, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())}};
+  MotionSegment back;
+  ASSERT_THAT(FromProto(ToProto(segment), "", &back), IsEmpty());
+  EXPECT_TRUE(back.landmarks[0].p_G.array().isNaN().all());
+}
+
+TEST(Convert, EveryColumnOfTheWrongLengthIsNamed) {
+  v1::MotionSegment message;
+  message.mutable_keyframes()->add_t_ns(1);
+  message.mutable_keyframes()->add_b_g(1);
+  message.mutable_imu()->add_gyro(1);
+  message.mutable_landmarks()->add_id(1);
+  message.mutable_observations()->add_z_px(1);
+  EXPECT_THAT(FaultyFields(message, MotionSegment()),
+              ElementsAre("x.keyframes.q_gi",
+                          "x.keyframes.p_gi",
+                          "x.keyframes.v_gi",
+                          "x.keyframes.b_a",
+                          "x.keyframes.b_g",
+                          "x.imu.gyro",
+                          "x.landmarks.p_g",
+                          "x.observations.z_px"));
+}
+
+TEST(Convert, OneColumnCutShortAnywhereIsRefused) {
+  RandomValues random(4);
+  for (int i = 0; i < kTrials; ++i) {
+    MotionSegment segment = random.Segment();
+    if (segment.keyframes.empty() || segment.observations.empty()) continue;
+    v1::MotionSegment message = ToProto(segment);
+    message.mutable_keyframes()->mutable_v_gi()->RemoveLast();
+    message.mutable_observations()->mutable_camera()->RemoveLast();
+    EXPECT_THAT(FaultyFields(message, MotionSegment()),
+                ElementsAre("x.keyframes.v_gi", "x.observations.camera"));
+  }
+}
+
+TEST(Convert, SegmentWithoutMomentsOrSamplesIsRefused) {
+  EXPECT_THAT(FaultyFields(v1::MotionSegment(), MotionSegment()),
+              ElementsAre("x.keyframes", "x.imu"));
+}
+
+TEST(Convert, AbsentCalibrationVersionMeansTheFactorys) {
+  v1::MotionSegment message = ToProto(MotionSegment());
+  message.clear_calibration_version();
+  MotionSegment segment;
+  segment.calibration_version = 7;
+  ASSERT_THAT(FromProto(message, "", &segment), IsEmpty());
+  EXPECT_EQ(segment.calibration_version, 1);
+}
+
+TEST(Convert, UnknownDistortionModelIsNamed) {
+  RandomValues random(5);
+  Calibration theta;
+  theta.cameras = {random.Camera(), random.Camera(), random.Camera()};
+  v1::CalibrationParameters message = ToProto(theta);
+  message.mutable_cameras(1)->set_distortion_model(
+      static_cast<v1::DistortionModel>(77));
+  message.mutable_cameras(2)->clear_distortion_model();
+  EXPECT_THAT(FaultyFields(message, Calibration()),
+              ElementsAre("x.cameras[1].distortion_model",
+                          "x.cameras[2].distortion_model"));
+}
+
+TEST(Convert, WrongNumberOfCoefficientsIsNamed) {
+  RandomValues random(6);
+  Calibration theta;
+  theta.cameras = {random.Camera()};
+  v1::CalibrationParameters message = ToProto(theta);
+  message.mutable_cameras(0)->add_distortion(0);
+  EXPECT_THAT(FaultyFields(message, Calibration()),
+              ElementsAre("x.cameras[0].distortion"));
+  for (int i = 0; i < 100000; ++i) {
+    message.mutable_cameras(0)->add_distortion(0);
+  }
+  EXPECT_THAT(FaultyFields(message, Calibration()),
+              ElementsAre("x.cameras[0].distortion"));
+}
+
+TEST(Convert, EveryMissingPartOfACalibrationIsNamed) {
+  v1::CalibrationParameters message;
+  message.add_cameras()->set_distortion_model(v1::DISTORTION_MODEL_FOV);
+  EXPECT_THAT(FaultyFields(message, Calibration()),
+              ElementsAre("x.imu",
+                          "x.cameras[0].q_ci",
+                          "x.cameras[0].p_ci",
+                          "x.cameras[0].f",
+                          "x.cameras[0].c",
+                          "x.cameras[0].distortion"));
+  message.Clear();
+  message.mutable_imu();
+  EXPECT_THAT(
+      FaultyFields(message, Calibration()),
+      ElementsAre(
+          "x.imu.s_g", "x.imu.m_g", "x.imu.s_a", "x.imu.m_a", "x.imu.q_ai"));
+}
+
+TEST(Convert, EveryMissingPartOfARigIsNamed) {
+  EXPECT_THAT(FaultyFields(v1::Rig(), Rig()),
+              ElementsAre("x.name", "x.factory", "x.imu_noise"));
+}
+
+TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
+  RandomValues random(7);
+  v1::Rig message = ToProto(random.RigValue());
+  message.clear_gravity_mps2();
+  message.clear_groups();
+  message.clear_table_size();
+  message.clear_min_gain_nats();
+  message.clear_retrigger_fraction();
+  Rig rig;
+  ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
+  const Rig defaults;
+  EXPECT_EQ(rig.gravity_mps2, defaults.gravity_mps2);
+  EXPECT_EQ(rig.table_size, defaults.table_size);
+  EXPECT_EQ(rig.min_gain_nats, defaults.min_gain_nats);
+  EXPECT_EQ(rig.retrigger_fraction, defaults.retrigger_fraction);
+  EXPECT_EQ(rig.groups.size(), DefaultGroups().size());
+  message.set_min_gain_nats(0);
+  ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
+  EXPECT_EQ(rig.min_gain_nats, 0);
+}
+
+TEST(Convert, ARefusedMessageLeavesTheValueAsItWas) {
+  RandomValues random(8);
+  const Calibration before = random.Theta();
+  Calibration theta = before;
+  v1::CalibrationParameters message = ToProto(random.Theta());
+  message.clear_imu();
+  ASSERT_FALSE(FromProto(message, "", &theta).empty());
+  ExpectSame(theta, before);
+}
+
+}  // namespace
+}  // namespace selfcal
