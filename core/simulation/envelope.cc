@@ -1,6 +1,7 @@
 #include "core/simulation/envelope.h"
 
 #include <algorithm>
+#include <iterator>
 
 namespace selfcal {
 

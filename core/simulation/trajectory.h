@@ -55,9 +55,11 @@ struct TimedPose {
 };
 
 struct SplineOptions {
-  // Motion faster than about 1 / (2 knot_spacing_s) is smoothed away, and with
-  // it the noise of single poses, which two derivatives would amplify.
-  double knot_spacing_s = 0.1;
+  // Motion faster than about 1 / (2 spacing) is smoothed away, and with it the
+  // noise of single poses. Position has wider knots: the IMU feels its second
+  // derivative, of rotation only the first.
+  double position_knots_s = 0.1;
+  double rotation_knots_s = 0.06;
   // Longest stretch without a pose that may be bridged, by the motion of least
   // jerk. Recordings with a motion capture system lose sight for about 1 s.
   double max_gap_s = 1.5;
@@ -67,7 +69,7 @@ struct SplineOptions {
 // least squares: all derivatives of BodyMotion are continuous, and so are the
 // next two. Time counts from the first pose. Returns null, and says why in
 // *error unless that is null, for fewer than 4 poses, values that are not
-// finite, times that do not increase, a gap, or a turn of more than 90 degrees
+// finite, times that do not increase, a gap, or a turn of more than 150 degrees
 // from one pose to the next.
 std::unique_ptr<Trajectory> MakeSpline(const std::vector<TimedPose>& poses,
                                        const SplineOptions& options = {},
