@@ -41,8 +41,14 @@ std::span<const double, Model::kSize> Coefficients(
                                                Model::kSize);
 }
 
-// Written so that NaN is not usable.
+// These two are false for NaN.
 bool Usable(double value) { return std::abs(value) <= kMaxParameter; }
+
+// Whether a ray through (xy, depth) is clear of the camera plane.
+bool InFront(const Eigen::Vector2d& xy, double depth) {
+  return std::abs(xy.x()) * kMinDepthRatio <= depth &&
+         std::abs(xy.y()) * kMinDepthRatio <= depth;
+}
 
 bool UsableParameters(const CameraCalibration& camera) {
   bool usable = Usable(camera.f.x()) && Usable(camera.f.y()) &&
@@ -118,9 +124,8 @@ bool Project(const CameraCalibration& camera,
              Eigen::Vector2d* z_px,
              ProjectionJacobians* jacobians) {
   const double z = p_C.z();
-  const double off_axis = p_C.head<2>().cwiseAbs().maxCoeff();
   if (!(z >= kMinDepth && z <= kMaxDepth)) return false;
-  if (!(off_axis * kMinDepthRatio <= z)) return false;
+  if (!InFront(p_C.head<2>(), z)) return false;
   if (!UsableParameters(camera)) return false;
   return Dispatch(camera, [&](auto model) {
     return ProjectWith<decltype(model)>(camera, p_C, z_px, jacobians);
@@ -139,7 +144,7 @@ bool Unproject(const CameraCalibration& camera,
     return Model::Undistort(Coefficients<Model>(camera), d, &u);
   });
   if (!inverted) return false;
-  if (!(u.cwiseAbs().maxCoeff() * kMinDepthRatio <= 1)) return false;
+  if (!InFront(u, 1)) return false;
   *bearing_C = u.homogeneous().normalized();
   return true;
 }

@@ -26,7 +26,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <span>
 
@@ -94,10 +93,9 @@ struct DistortionEquidistant {
                          double theta_d,
                          double* theta) {
     constexpr int kMaxIterations = 100;
-    // Two roundings of theta_d. Further off than a few of them where the
-    // bracket has closed means that the profile ends below theta_d.
-    const double tolerance =
-        8 * std::numeric_limits<double>::epsilon() * std::max(theta_d, 1e-300);
+    // The iteration ends at rounding, well below the error that is accepted; a
+    // larger one is left over where the profile ends below theta_d.
+    constexpr double kAccepted = 1e-12;
     double low = 0;
     double high = std::numbers::pi / 2;
     double x = std::min(theta_d, high);
@@ -106,16 +104,18 @@ struct DistortionEquidistant {
       const bool rises = ProfileRises(k, Q);
       const double P = 1 + Q * (k[0] + Q * (k[1] + Q * (k[2] + Q * k[3])));
       const double error = theta_d - x * P;
-      if (rises && std::abs(error) <= tolerance) {
-        *theta = x;
-        return true;
-      }
       (rises && error > 0 ? low : high) = x;
       const double slope =
           1 + Q * (3 * k[0] + Q * (5 * k[1] + Q * (7 * k[2] + Q * 9 * k[3])));
       const double newton = x + error / slope;
       const bool inside = rises && newton > low && newton < high;
-      x = inside ? newton : (low + high) / 2;
+      const double next = inside ? newton : low + (high - low) / 2;
+      const bool ended = (rises && newton == x) || next == low || next == high;
+      if (ended || i + 1 == kMaxIterations) {
+        *theta = x;
+        return rises && std::abs(error) <= kAccepted * theta_d;
+      }
+      x = next;
     }
     return false;
   }

@@ -79,13 +79,18 @@ struct DistortionRadialTangential {
                         Eigen::Vector2d* u) {
     constexpr int kMaxIterations = 100;
     constexpr int kMaxHalvings = 30;
-    const double tolerance = 1e-14 * (1 + d.stableNorm());
+    // Newton's method ends at rounding, well below the error that is accepted;
+    // a larger one is left over where the region ends before d.
+    constexpr double kRounding = 2e-16;
+    constexpr double kAccepted = 1e-12;
+    const double scale = 1 + d.stableNorm();
     Eigen::Vector2d point = Eigen::Vector2d::Zero();
     Eigen::Vector2d image;
     Eigen::Matrix2d J;
     if (!Distort(coefficients, point, &image, &J, nullptr)) return false;
     double error = (d - image).stableNorm();
-    for (int i = 0; i < kMaxIterations && error > 0; ++i) {
+    for (int i = 0; i < kMaxIterations && error > kRounding * d.stableNorm();
+         ++i) {
       Eigen::Vector2d step = J.inverse() * (d - image);
       bool better = false;
       for (int j = 0; j < kMaxHalvings && !better; ++j, step /= 2) {
@@ -109,7 +114,7 @@ struct DistortionRadialTangential {
       }
       if (!better) break;  // at rounding, or against the edge of the region
     }
-    if (!(error <= tolerance)) return false;
+    if (!(error <= kAccepted * scale)) return false;
     *u = point;
     return true;
   }

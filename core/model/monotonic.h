@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 namespace selfcal {
 
@@ -52,12 +53,11 @@ bool ProfileRises(const std::array<double, N>& k, double q) {
   // b_j = sum over i <= j of C(j, i) / C(N, i) a_i.
   std::array<double, N + 1> b;
   for (std::size_t j = 0; j <= N; ++j) {
-    b[j] = 0;
     double weight = 1;
-    for (std::size_t i = 0; i <= j; ++i) {
+    b[j] = a[0];
+    for (std::size_t i = 1; i <= j; ++i) {
+      weight *= static_cast<double>(j - i + 1) / static_cast<double>(N - i + 1);
       b[j] += weight * a[i];
-      weight *= static_cast<double>(j - i) / static_cast<double>(N - i);
-      if (i == N) break;
     }
   }
   constexpr int kHalvings = 40;

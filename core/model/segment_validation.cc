@@ -1,10 +1,10 @@
 // Validation of a motion segment, one function for one part of it.
 #include <algorithm>
+#include <compare>
 #include <cstdint>
-#include <cstdlib>
-#include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/model/calibration.h"
@@ -214,6 +214,7 @@ std::vector<std::int64_t> EarlierEquals(const std::vector<Key>& keys) {
 void CheckLandmarks(const MotionSegment& segment,
                     const SegmentLimits& limits,
                     ViolationList* list) {
+  if (list->cut()) return;
   const std::vector<Landmark>& landmarks = segment.landmarks;
   std::vector<std::uint64_t> ids;
   ids.reserve(landmarks.size());
@@ -259,6 +260,7 @@ void CheckObservations(const MotionSegment& segment,
                        const Calibration& theta,
                        const SegmentLimits& limits,
                        ViolationList* list) {
+  if (list->cut()) return;
   struct Key {
     std::int32_t keyframe, camera, landmark;
     auto operator<=>(const Key&) const = default;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -37,27 +38,23 @@ inline std::string ElementPath(std::string_view list,
 class ViolationList {
  public:
   explicit ViolationList(int max_violations)
-      : max_violations_(max_violations) {}
+      : max_violations_(std::max(max_violations, 0)) {}
 
   void Add(std::string field, std::string message) {
-    if (full()) {
-      more_ = true;
+    if (violations_.size() >= static_cast<std::size_t>(max_violations_)) {
+      cut_ = true;
       return;
     }
     violations_.push_back({std::move(field), std::move(message)});
   }
 
-  // Nothing more is listed: loops over long lists may end at the next one.
-  bool full() const {
-    return violations_.size() >= static_cast<std::size_t>(max_violations_);
-  }
-
-  // Whether something was left out.
-  bool cut() const { return more_; }
+  // Whether something was left out: nothing more will be listed, and loops
+  // over long lists may end.
+  bool cut() const { return cut_; }
 
   // The violations; if some were left out, the last entry says so.
   std::vector<Violation> Take() {
-    if (more_) {
+    if (cut_) {
       violations_.push_back({"",
                              "only the first " +
                                  std::to_string(max_violations_) +
@@ -68,7 +65,7 @@ class ViolationList {
 
  private:
   int max_violations_;
-  bool more_ = false;
+  bool cut_ = false;
   std::vector<Violation> violations_;
 };
 

@@ -1,0 +1,358 @@
+#include "core/model/camera.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "test/core/model/random_values.h"
+#include "test/core/numeric_jacobian.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kTrials = 3000;
+
+bool IsValid(const CameraCalibration& camera, const Eigen::Vector2d& u) {
+  Eigen::Vector2d z_px;
+  return Project(camera, u.homogeneous(), &z_px, nullptr);
+}
+
+// Radius in the normalised plane at which the valid region ends in a
+// direction, or `max_radius` if it reaches that far.
+double BorderRadius(const CameraCalibration& camera,
+                    const Eigen::Vector2d& direction,
+                    double max_radius) {
+  if (IsValid(camera, max_radius * direction)) return max_radius;
+  double inside = 0;
+  double outside = max_radius;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (inside + outside) / 2;
+    (IsValid(camera, middle * direction) ? inside : outside) = middle;
+  }
+  return inside;
+}
+
+Eigen::Vector2d RandomDirection2(RandomValues* random) {
+  const double angle = random->Uniform(0, 6.3);
+  return Eigen::Vector2d(std::cos(angle), std::sin(angle));
+}
+
+// A random point of the normalised plane up to `part` of the way to the border,
+// which is at most 3 (71 degrees) away; every fourth near the axis.
+Eigen::Vector2d RandomNormalised(const CameraCalibration& camera,
+                                 double part,
+                                 RandomValues* random) {
+  const Eigen::Vector2d direction = RandomDirection2(random);
+  if (random->Uniform(0, 1) < 0.25) {
+    return std::abs(random->SignedMagnitude(1e-12, 1e-2)) * direction;
+  }
+  const double border = BorderRadius(camera, direction, 3);
+  return random->Uniform(0, part) * border * direction;
+}
+
+CameraCalibration Moved(const CameraCalibration& camera,
+                        const Eigen::VectorXd& intrinsics) {
+  CameraCalibration moved = camera;
+  moved.f += intrinsics.head<2>();
+  moved.c += intrinsics.segment<2>(2);
+  moved.distortion += intrinsics.tail(camera.distortion.size());
+  return moved;
+}
+
+// With f = 1 and c = 0 the differences do not lose digits to large pixels.
+CameraCalibration InNormalisedPlane(CameraCalibration camera) {
+  camera.f.setOnes();
+  camera.c.setZero();
+  return camera;
+}
+
+void ExpectJacobiansHold(const CameraCalibration& camera,
+                         const Eigen::Vector3d& p_C,
+                         double step,
+                         double tolerance) {
+  Eigen::Vector2d z_px;
+  ProjectionJacobians jacobians;
+  ASSERT_TRUE(Project(camera, p_C, &z_px, &jacobians));
+  // Steps relative to the depth, as the pixel does not depend on the scale.
+  const double depth = p_C.z();
+  const auto by_point = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+    Eigen::Vector2d z;
+    EXPECT_TRUE(Project(camera, p_C + depth * d, &z, nullptr));
+    return z;
+  };
+  const auto by_intrinsics = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+    Eigen::Vector2d z;
+    EXPECT_TRUE(Project(Moved(camera, d), p_C, &z, nullptr));
+    return z;
+  };
+  const Eigen::MatrixXd point = NumericJacobian(by_point, 3, step);
+  const Eigen::MatrixXd intrinsics =
+      NumericJacobian(by_intrinsics, camera.IntrinsicsSize(), step);
+  ASSERT_EQ(jacobians.intrinsics.cols(), camera.IntrinsicsSize());
+  EXPECT_LT((depth * jacobians.point - point).norm(),
+            tolerance * (1 + point.norm()))
+      << "at " << p_C.transpose() << " with " << camera.distortion.transpose();
+  EXPECT_LT((jacobians.intrinsics - intrinsics).norm(),
+            tolerance * (1 + intrinsics.norm()))
+      << "at " << p_C.transpose() << " with " << camera.distortion.transpose();
+}
+
+class CameraTest : public testing::TestWithParam<DistortionModel> {};
+
+INSTANTIATE_TEST_SUITE_P(Models,
+                         CameraTest,
+                         testing::Values(DistortionModel::kFov,
+                                         DistortionModel::kRadialTangential,
+                                         DistortionModel::kEquidistant),
+                         [](const auto& model) {
+                           std::string name(DistortionName(model.param));
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+TEST_P(CameraTest, WithoutDistortionInTheModelOnTheAxisIsAPinhole) {
+  RandomValues random(1);
+  for (int i = 0; i < kTrials; ++i) {
+    CameraCalibration camera = random.Camera(GetParam());
+    const Eigen::Vector2d u = 1e-5 * random.Vector(2, 1);
+    Eigen::Vector2d z_px;
+    camera.distortion.setZero();
+    ASSERT_TRUE(Project(camera, u.homogeneous(), &z_px, nullptr));
+    // The next term of every model is of third order: 1e-15 here.
+    EXPECT_LT((z_px - camera.f.cwiseProduct(u) - camera.c).norm(), 1e-12);
+  }
+}
+
+TEST_P(CameraTest, PixelDoesNotDependOnTheScaleOfThePoint) {
+  RandomValues random(2);
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera = random.Camera(GetParam());
+    const Eigen::Vector3d p_C =
+        RandomNormalised(camera, 0.95, &random).homogeneous();
+    const double scale = std::abs(random.SignedMagnitude(1e-9, 1e9));
+    Eigen::Vector2d z_px;
+    Eigen::Vector2d scaled_z_px;
+    ProjectionJacobians jacobians;
+    ASSERT_TRUE(Project(camera, p_C, &z_px, &jacobians));
+    ASSERT_TRUE(Project(camera, scale * p_C, &scaled_z_px, nullptr));
+    // What rounding the point and the pixel may change.
+    EXPECT_LT((z_px - scaled_z_px).norm(),
+              1e-15 * (z_px.norm() + jacobians.point.norm() * p_C.norm()));
+  }
+}
+
+TEST_P(CameraTest, JacobiansAreTheDerivatives) {
+  RandomValues random(3);
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera =
+        InNormalisedPlane(random.Camera(GetParam()));
+    const Eigen::Vector2d u = RandomNormalised(camera, 0.95, &random);
+    const double depth = std::abs(random.SignedMagnitude(1e-3, 1e3));
+    ExpectJacobiansHold(camera, depth * u.homogeneous(), 1e-4, 1e-10);
+  }
+}
+
+TEST_P(CameraTest, JacobiansInPixelsAreThoseOfThePlaneTimesTheFocalLength) {
+  RandomValues random(4);
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera = random.Camera(GetParam());
+    const Eigen::Vector2d u = RandomNormalised(camera, 0.95, &random);
+    ExpectJacobiansHold(camera, u.homogeneous(), 1e-4, 1e-9);
+  }
+}
+
+TEST_P(CameraTest, JacobiansHoldUpToTheBorderOfTheRegion) {
+  RandomValues random(5);
+  int with_border = 0;
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera =
+        InNormalisedPlane(random.Camera(GetParam()));
+    const Eigen::Vector2d direction = RandomDirection2(&random);
+    const double border = BorderRadius(camera, direction, 3);
+    if (border < 3) ++with_border;
+    const Eigen::Vector2d u = border * (1 - 1e-2) * direction;
+    ExpectJacobiansHold(camera, u.homogeneous(), 1e-5, 1e-9);
+  }
+  if (GetParam() != DistortionModel::kFov) {
+    EXPECT_GT(with_border, 100);
+  }
+}
+
+TEST_P(CameraTest, JacobiansDoNotChangeThePixelOrTheValidity) {
+  RandomValues random(6);
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera = random.Camera(GetParam());
+    Eigen::Vector3d p_C = random.Vector(3, 1);
+    p_C.z() += 0.6;
+    Eigen::Vector2d with(0, 0);
+    Eigen::Vector2d without(0, 0);
+    ProjectionJacobians jacobians;
+    EXPECT_EQ(Project(camera, p_C, &with, &jacobians),
+              Project(camera, p_C, &without, nullptr));
+    EXPECT_EQ(with, without);
+  }
+}
+
+TEST_P(CameraTest, UnprojectInvertsProject) {
+  RandomValues random(7);
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera = random.Camera(GetParam());
+    const Eigen::Vector3d p_C =
+        RandomNormalised(camera, 0.95, &random).homogeneous();
+    Eigen::Vector2d z_px;
+    Eigen::Vector3d bearing_C;
+    ASSERT_TRUE(Project(camera, 7 * p_C, &z_px, nullptr));
+    ASSERT_TRUE(Unproject(camera, z_px, &bearing_C));
+    EXPECT_NEAR(bearing_C.norm(), 1, 1e-15);
+    EXPECT_LT((bearing_C - p_C.normalized()).norm(), 1e-11)
+        << p_C.transpose() << " with " << camera.distortion.transpose();
+  }
+}
+
+TEST_P(CameraTest, ProjectInvertsUnprojectUpToTheBorder) {
+  RandomValues random(8);
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera = random.Camera(GetParam());
+    const Eigen::Vector2d direction = RandomDirection2(&random);
+    const double border = BorderRadius(camera, direction, 3);
+    const double gap = std::abs(random.SignedMagnitude(1e-7, 1e-1));
+    Eigen::Vector2d z_px;
+    Eigen::Vector2d again_px;
+    Eigen::Vector3d bearing_C;
+    ASSERT_TRUE(Project(camera,
+                        (border * (1 - gap) * direction).homogeneous(),
+                        &z_px,
+                        nullptr));
+    ASSERT_TRUE(Unproject(camera, z_px, &bearing_C))
+        << gap << " with " << camera.distortion.transpose();
+    ASSERT_TRUE(Project(camera, bearing_C, &again_px, nullptr));
+    EXPECT_LT((z_px - again_px).norm(), 1e-9);
+  }
+}
+
+TEST_P(CameraTest, UnprojectOfAnyPixelIsInvertedOrRefused) {
+  RandomValues random(9);
+  int unprojected = 0;
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera = random.Camera(GetParam());
+    const Eigen::Vector2d z_px(random.Uniform(-500, 1200),
+                               random.Uniform(-500, 1000));
+    Eigen::Vector3d bearing_C;
+    if (!Unproject(camera, z_px, &bearing_C)) continue;
+    ++unprojected;
+    Eigen::Vector2d again_px;
+    ASSERT_TRUE(Project(camera, bearing_C, &again_px, nullptr));
+    EXPECT_LT((z_px - again_px).norm(), 1e-8);
+  }
+  EXPECT_GT(unprojected, kTrials / 3);
+}
+
+TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefused) {
+  RandomValues random(10);
+  for (int i = 0; i < kTrials; ++i) {
+    const CameraCalibration camera = random.Camera(GetParam());
+    Eigen::Vector3d p_C = random.Vector(3, 1);
+    p_C.z() = -std::abs(p_C.z());
+    if (i % 3 == 0) p_C.z() = 0;
+    if (i % 3 == 1) p_C.z() = 1e-8 * p_C.head<2>().norm();
+    const Eigen::Vector2d before(1, 2);
+    Eigen::Vector2d z_px = before;
+    EXPECT_FALSE(Project(camera, p_C, &z_px, nullptr));
+    EXPECT_EQ(z_px, before);
+  }
+}
+
+const std::vector<double>& ExtremeNumbers() {
+  using Limits = std::numeric_limits<double>;
+  static const std::vector<double> numbers = {0.0,
+                                              Limits::denorm_min(),
+                                              1e-310,
+                                              Limits::min(),
+                                              1e-160,
+                                              1e-12,
+                                              1.0,
+                                              1e12,
+                                              1e160,
+                                              1e300,
+                                              Limits::max(),
+                                              Limits::infinity(),
+                                              Limits::quiet_NaN()};
+  return numbers;
+}
+
+TEST_P(CameraTest, ExtremePointsNeverGiveWhatIsNotFinite) {
+  RandomValues random(11);
+  for (const double x : ExtremeNumbers()) {
+    for (const double y : ExtremeNumbers()) {
+      for (const double z : ExtremeNumbers()) {
+        const CameraCalibration camera = random.Camera(GetParam());
+        Eigen::Vector2d z_px;
+        ProjectionJacobians jacobians;
+        const Eigen::Vector3d p_C(random.Uniform(-1, 1) < 0 ? -x : x, y, z);
+        if (!Project(camera, p_C, &z_px, &jacobians)) continue;
+        EXPECT_TRUE(z_px.allFinite()) << p_C.transpose();
+        EXPECT_TRUE(jacobians.point.allFinite()) << p_C.transpose();
+        EXPECT_TRUE(jacobians.intrinsics.allFinite()) << p_C.transpose();
+      }
+    }
+  }
+}
+
+TEST_P(CameraTest, ExtremeParametersNeverGiveWhatIsNotFinite) {
+  RandomValues random(12);
+  for (int i = 0; i < 200; ++i) {
+    for (const double number : ExtremeNumbers()) {
+      CameraCalibration camera = random.Camera(GetParam());
+      const int which =
+          static_cast<int>(random.Uniform(0, camera.IntrinsicsSize()));
+      const double value = random.Uniform(-1, 1) < 0 ? -number : number;
+      if (which < 2) camera.f[which] = value;
+      if (which >= 2 && which < 4) camera.c[which - 2] = value;
+      if (which >= 4) camera.distortion[which - 4] = value;
+      Eigen::Vector2d z_px;
+      ProjectionJacobians jacobians;
+      if (Project(camera, Eigen::Vector3d(0.3, -0.2, 1), &z_px, &jacobians)) {
+        EXPECT_TRUE(z_px.allFinite());
+        EXPECT_TRUE(jacobians.point.allFinite());
+        EXPECT_TRUE(jacobians.intrinsics.allFinite());
+      }
+      Eigen::Vector3d bearing_C;
+      if (Unproject(camera, Eigen::Vector2d(100, 200), &bearing_C)) {
+        EXPECT_TRUE(bearing_C.allFinite());
+      }
+    }
+  }
+}
+
+TEST_P(CameraTest, ExtremePixelsNeverGiveWhatIsNotFinite) {
+  RandomValues random(13);
+  for (const double x : ExtremeNumbers()) {
+    for (const double y : ExtremeNumbers()) {
+      const CameraCalibration camera = random.Camera(GetParam());
+      const Eigen::Vector3d before(3, 4, 5);
+      Eigen::Vector3d bearing_C = before;
+      if (Unproject(camera, Eigen::Vector2d(x, -y), &bearing_C)) {
+        EXPECT_TRUE(bearing_C.allFinite());
+        EXPECT_NEAR(bearing_C.norm(), 1, 1e-15);
+      } else {
+        EXPECT_EQ(bearing_C, before);
+      }
+    }
+  }
+}
+
+TEST_P(CameraTest, WrongNumberOfCoefficientsIsRefused) {
+  RandomValues random(14);
+  CameraCalibration camera = random.Camera(GetParam());
+  camera.distortion.setZero(2);
+  Eigen::Vector2d z_px;
+  Eigen::Vector3d bearing_C;
+  EXPECT_FALSE(Project(camera, Eigen::Vector3d::UnitZ(), &z_px, nullptr));
+  EXPECT_FALSE(Unproject(camera, camera.c, &bearing_C));
+}
+
+}  // namespace
+}  // namespace selfcal

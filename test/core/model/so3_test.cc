@@ -1,0 +1,170 @@
+#include "core/model/so3.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "test/core/model/random_values.h"
+#include "test/core/numeric_jacobian.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kTrials = 2000;
+constexpr double kPi = std::numbers::pi;
+
+// Rotation vectors of every length up to `max_angle`: many near zero.
+Eigen::Vector3d RandomPhi(RandomValues* random, double max_angle) {
+  const double angle = random->Uniform(0, 1) < 0.5
+                           ? random->Uniform(0, max_angle)
+                           : std::abs(random->SignedMagnitude(1e-12, 0.1));
+  return angle * random->Direction();
+}
+
+TEST(Skew, IsTheCrossProduct) {
+  RandomValues random(1);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d a = random.Vector(3, 5);
+    const Eigen::Vector3d b = random.Vector(3, 5);
+    EXPECT_LT((Skew(a) * b - a.cross(b)).norm(), 1e-14);
+  }
+}
+
+TEST(Exp, TurnsAboutTheVectorByItsLength) {
+  RandomValues random(2);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d axis = random.Direction();
+    const double angle = random.Uniform(-10, 10);
+    const Eigen::Matrix3d expected =
+        Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+    const Eigen::Quaterniond q = Exp(angle * axis);
+    EXPECT_LT((q.toRotationMatrix() - expected).norm(), 1e-14);
+    EXPECT_NEAR(q.norm(), 1, 1e-15);
+  }
+}
+
+TEST(Exp, IsTheMatrixExponentialAcrossTheSeries) {
+  // Terms of the exponential series until they vanish: no switch in there.
+  RandomValues random(3);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d phi =
+        std::abs(random.SignedMagnitude(1e-12, 0.1)) * random.Direction();
+    Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
+    Eigen::Matrix3d term = Eigen::Matrix3d::Identity();
+    for (int n = 1; n < 20; ++n) {
+      term = term * Skew(phi) / n;
+      expected += term;
+    }
+    EXPECT_LT((Exp(phi).toRotationMatrix() - expected).norm(), 1e-15);
+  }
+}
+
+TEST(Log, InvertsExpBelowPi) {
+  RandomValues random(4);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d phi = RandomPhi(&random, kPi - 1e-9);
+    EXPECT_LE((Log(Exp(phi)) - phi).norm(), 2e-15 * phi.norm() + 1e-300);
+  }
+}
+
+TEST(Log, KeepsEveryDigitOfTinyRotations) {
+  RandomValues random(5);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d phi =
+        std::abs(random.SignedMagnitude(1e-300, 1e-3)) * random.Direction();
+    EXPECT_LE((Log(Exp(phi)) - phi).stableNorm(), 1e-15 * phi.stableNorm());
+  }
+  EXPECT_EQ(Log(Exp(Eigen::Vector3d::Zero())), Eigen::Vector3d::Zero());
+}
+
+TEST(Log, IsPreciseNearPi) {
+  RandomValues random(6);
+  for (int i = 0; i < kTrials; ++i) {
+    const double angle = kPi - std::abs(random.SignedMagnitude(1e-15, 1e-2));
+    const Eigen::Vector3d phi = angle * random.Direction();
+    EXPECT_LT((Log(Exp(phi)) - phi).norm(), 4e-15) << angle;
+  }
+}
+
+TEST(Log, TakesTheShorterWay) {
+  RandomValues random(7);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d axis = random.Direction();
+    const double angle = random.Uniform(kPi, 2 * kPi);
+    const Eigen::Vector3d phi = Log(Exp(angle * axis));
+    EXPECT_LE(phi.norm(), kPi);
+    EXPECT_LT((phi - (angle - 2 * kPi) * axis).norm(), 1e-14);
+  }
+}
+
+TEST(Log, IsTheSameForBothSignsOfTheQuaternion) {
+  RandomValues random(8);
+  for (int i = 0; i < kTrials; ++i) {
+    Eigen::Quaterniond q = random.Rotation();
+    if (i % 4 == 0) {  // by exactly pi
+      q.w() = 0;
+      q.normalize();
+    }
+    const Eigen::Quaterniond minus(-q.w(), -q.x(), -q.y(), -q.z());
+    EXPECT_EQ(Log(q), Log(minus));
+  }
+}
+
+TEST(RightJacobian, IsTheDerivativeOfExp) {
+  RandomValues random(9);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d phi = RandomPhi(&random, 2 * kPi);
+    const Eigen::MatrixXd numeric = NumericJacobian(
+        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+          return Log(Exp(phi).conjugate() * Exp(phi + d));
+        },
+        3,
+        1e-3);
+    EXPECT_LT((RightJacobian(phi) - numeric).norm(), 1e-11) << phi.norm();
+  }
+}
+
+TEST(RightJacobianInverse, IsTheDerivativeOfLog) {
+  RandomValues random(10);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d phi = RandomPhi(&random, kPi - 0.01);
+    const Eigen::MatrixXd numeric = NumericJacobian(
+        [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
+          return Log(Exp(phi) * Exp(d));
+        },
+        3,
+        1e-3);
+    EXPECT_LT((RightJacobianInverse(phi) - numeric).norm(), 1e-11)
+        << phi.norm();
+  }
+}
+
+TEST(RightJacobianInverse, InvertsTheRightJacobianUpToAndAtPi) {
+  RandomValues random(11);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d phi = i % 3 == 0
+                                    ? Eigen::Vector3d(kPi * random.Direction())
+                                    : RandomPhi(&random, kPi);
+    const Eigen::Matrix3d product =
+        RightJacobian(phi) * RightJacobianInverse(phi);
+    EXPECT_LT((product - Eigen::Matrix3d::Identity()).norm(), 5e-15)
+        << phi.norm();
+  }
+}
+
+TEST(RightJacobian, IsContinuousAcrossTheSwitchToTheSeries) {
+  RandomValues random(12);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d axis = random.Direction();
+    const Eigen::Vector3d below = 1e-2 * (1 - 1e-13) * axis;
+    const Eigen::Vector3d above = 1e-2 * (1 + 1e-13) * axis;
+    EXPECT_LT((RightJacobian(below) - RightJacobian(above)).norm(), 1e-14);
+    EXPECT_LT(
+        (RightJacobianInverse(below) - RightJacobianInverse(above)).norm(),
+        1e-14);
+  }
+}
+
+}  // namespace
+}  // namespace selfcal
