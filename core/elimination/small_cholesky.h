@@ -1,0 +1,49 @@
+// Cholesky factor of a small information matrix that is positive definite by
+// construction but may have lost that to rounding.
+//
+// A pivot can only be known to the rounding of what was added up and subtracted
+// on its diagonal, its mass. Where it falls below kPivotFloor of that, it is
+// raised to it: the direction gets the least information that can be told from
+// none, rather than a NaN or a random large variance. Well conditioned problems
+// are never touched.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal {
+
+inline constexpr double kPivotFloor = 1e-14;
+
+// Overwrites the lower triangle of *matrix (the upper is not read) by L with
+// L L^T = matrix. `mass` bounds each diagonal entry's terms from above; a
+// direction without any mass gets a unit pivot, which eliminates nothing.
+template <int N>
+void GuardedCholesky(const Eigen::Matrix<double, N, 1>& mass,
+                     Eigen::Matrix<double, N, N>* matrix) {
+  Eigen::Matrix<double, N, N>& L = *matrix;
+  for (int j = 0; j < N; ++j) {
+    double pivot = L(j, j);
+    for (int k = 0; k < j; ++k) pivot -= L(j, k) * L(j, k);
+    const double floor = mass(j) > 0 ? kPivotFloor * mass(j) : 1.0;
+    const double diagonal = std::sqrt(std::max(pivot, floor));
+    L(j, j) = diagonal;
+    for (int i = j + 1; i < N; ++i) {
+      double sum = L(i, j);
+      for (int k = 0; k < j; ++k) sum -= L(i, k) * L(j, k);
+      L(i, j) = sum / diagonal;
+    }
+  }
+}
+
+// Overwrites the rows x of *panel by L^-1 x: panel <- panel L^-T.
+template <int N, typename Panel>
+void SolvePanel(const Eigen::Matrix<double, N, N>& L, Panel&& panel) {
+  for (int j = 0; j < N; ++j) {
+    for (int k = 0; k < j; ++k) panel.col(j) -= L(j, k) * panel.col(k);
+    panel.col(j) *= 1 / L(j, j);
+  }
+}
+
+}  // namespace selfcal
