@@ -1,0 +1,25 @@
+// What the store keeps, as the messages of the contract.
+#pragma once
+
+#include "core/calibration/calibrate.h"
+#include "selfcal/v1/calibration_service.pb.h"
+#include "selfcal/v1/recalibration.pb.h"
+#include "selfcal/v1/rig.pb.h"
+#include "selfcal/v1/segment.pb.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+v1::Rig Encode(const StoredRig& rig);
+v1::Segment Encode(const StoredSegment& segment);
+v1::Table Encode(const std::string& rig, const Table& table);
+
+// With an estimate for each tangent component, sigmas from the covariance.
+v1::Calibration Encode(const StoredCalibration& calibration);
+
+// `calibration` is the one that the run produced, null if there is none yet.
+v1::Recalibration Encode(const StoredRun& run,
+                         const CalibrateProgress& progress,
+                         const StoredCalibration* calibration);
+
+}  // namespace selfcal::server

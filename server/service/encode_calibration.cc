@@ -1,0 +1,180 @@
+#include <algorithm>
+#include <cmath>
+
+#include "proto/convert.h"
+#include "proto/resource_names.h"
+#include "server/service/encode.h"
+#include "server/service/encode_parts.h"
+
+namespace selfcal::server {
+namespace {
+
+v1::Calibration::State EncodeState(CalibrationState state) {
+  switch (state) {
+    case CalibrationState::kActive:
+      return v1::Calibration::ACTIVE;
+    case CalibrationState::kSuperseded:
+      return v1::Calibration::SUPERSEDED;
+    case CalibrationState::kRejected:
+      return v1::Calibration::REJECTED;
+  }
+  return v1::Calibration::STATE_UNSPECIFIED;
+}
+
+v1::Recalibration::State EncodeState(RunState state) {
+  switch (state) {
+    case RunState::kPending:
+      return v1::Recalibration::PENDING;
+    case RunState::kRunning:
+      return v1::Recalibration::RUNNING;
+    case RunState::kSucceeded:
+      return v1::Recalibration::SUCCEEDED;
+    case RunState::kFailed:
+      return v1::Recalibration::FAILED;
+    case RunState::kCancelled:
+      return v1::Recalibration::CANCELLED;
+  }
+  return v1::Recalibration::STATE_UNSPECIFIED;
+}
+
+v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
+  switch (trigger) {
+    case RunTrigger::kTablesFull:
+      return v1::Recalibration::TABLES_FULL;
+    case RunTrigger::kTablesChanged:
+      return v1::Recalibration::TABLES_CHANGED;
+    case RunTrigger::kManual:
+      return v1::Recalibration::MANUAL;
+  }
+  return v1::Recalibration::TRIGGER_UNSPECIFIED;
+}
+
+std::string StatusName(CalibrateStatus status) {
+  switch (status) {
+    case CalibrateStatus::kConverged:
+      return "converged";
+    case CalibrateStatus::kNotConverged:
+      return "not converged";
+    case CalibrateStatus::kCancelled:
+      return "cancelled";
+    case CalibrateStatus::kFailed:
+      return "failed";
+  }
+  return "unknown";
+}
+
+void FillReport(const CalibrationResult& result,
+                double seconds,
+                v1::SolverReport* message) {
+  message->set_status(StatusName(result.status));
+  message->set_message(result.message);
+  message->set_iterations(result.iterations);
+  message->set_initial_cost(result.initial_cost);
+  message->set_final_cost(result.final_cost);
+  message->set_reprojection_rms_before_px(result.reprojection_rms_before_px);
+  message->set_reprojection_rms_after_px(result.reprojection_rms_after_px);
+  message->set_reprojection_median_before_px(
+      result.reprojection_median_before_px);
+  message->set_reprojection_median_after_px(
+      result.reprojection_median_after_px);
+  message->set_rank(result.rank);
+  message->set_components(result.rank +
+                          static_cast<int>(result.held_constant.size()));
+  AddDirections(result.held_constant, message->mutable_held_constant());
+  message->set_segments(result.segments);
+  message->set_partitions(result.partitions);
+  message->set_keyframes(result.keyframes);
+  message->set_landmarks(result.landmarks);
+  message->set_landmarks_dropped(result.landmarks_dropped);
+  message->set_observations(result.observations);
+  message->set_observations_dropped(result.observations_dropped);
+  message->set_seconds(seconds);
+}
+
+void FillEstimates(const StoredCalibration& calibration,
+                   v1::Calibration* message) {
+  const auto components = TangentComponents(calibration.theta);
+  const Eigen::VectorXd values = ReadableValues(calibration.theta);
+  const Eigen::MatrixXd& Sigma = calibration.covariance;
+  const auto size = static_cast<Eigen::Index>(components.size());
+  const bool has_covariance = Sigma.rows() == size && Sigma.cols() == size;
+  for (Eigen::Index i = 0; i < size; ++i) {
+    v1::ComponentEstimate* estimate = message->add_estimates();
+    estimate->set_component(components[i].name);
+    estimate->set_unit(components[i].unit);
+    estimate->set_value(values[i]);
+    if (!has_covariance) continue;
+    estimate->set_sigma(std::sqrt(std::max(Sigma(i, i), 0.0)));
+    for (Eigen::Index j = 0; j <= i; ++j) message->add_covariance(Sigma(i, j));
+  }
+}
+
+void FillProvenance(const StoredCalibration& calibration,
+                    v1::Calibration::Provenance* message) {
+  message->set_recalibration(ChildName(
+      calibration.rig, "recalibrations", std::to_string(*calibration.run)));
+  message->set_base_version(calibration.base_version);
+  for (const SegmentKey& key : calibration.segments) {
+    message->add_segments(SegmentName(calibration.rig, key));
+  }
+  message->set_program_version(calibration.program_version);
+}
+
+std::string CalibrationName(const std::string& rig, std::int64_t version) {
+  return ChildName(rig, "calibrations", std::to_string(version));
+}
+
+}  // namespace
+
+v1::Calibration Encode(const StoredCalibration& calibration) {
+  v1::Calibration message;
+  message.set_name(CalibrationName(calibration.rig, calibration.version));
+  message.set_version(calibration.version);
+  message.set_state(EncodeState(calibration.state));
+  SetTime(calibration.create_time_ns, message.mutable_create_time());
+  *message.mutable_parameters() = ToProto(calibration.theta);
+  FillEstimates(calibration, &message);
+  message.mutable_reasons()->Add(calibration.reasons.begin(),
+                                 calibration.reasons.end());
+  if (calibration.run) {
+    FillProvenance(calibration, message.mutable_provenance());
+  }
+  if (calibration.report) {
+    FillReport(
+        *calibration.report, calibration.seconds, message.mutable_solver());
+  }
+  return message;
+}
+
+v1::Recalibration Encode(const StoredRun& run,
+                         const CalibrateProgress& progress,
+                         const StoredCalibration* calibration) {
+  v1::Recalibration message;
+  message.set_name(
+      ChildName(run.rig, "recalibrations", std::to_string(run.run)));
+  message.set_state(EncodeState(run.state));
+  message.set_trigger(EncodeTrigger(run.trigger));
+  SetTime(run.create_time_ns, message.mutable_create_time());
+  if (run.end_time_ns != 0) {
+    SetTime(run.end_time_ns, message.mutable_end_time());
+  }
+  for (const SegmentKey& key : run.segments) {
+    message.add_segments(SegmentName(run.rig, key));
+  }
+  message.set_iteration(progress.iteration);
+  message.set_max_iterations(progress.max_iterations);
+  message.set_cost(progress.cost);
+  message.set_step_sigmas(progress.step_sigmas);
+  message.set_message(run.message);
+  message.set_attempts(run.attempts);
+  if (run.calibration_version != 0) {
+    message.set_calibration(CalibrationName(run.rig, run.calibration_version));
+  }
+  if (calibration != nullptr && calibration->report) {
+    FillReport(
+        *calibration->report, calibration->seconds, message.mutable_solver());
+  }
+  return message;
+}
+
+}  // namespace selfcal::server

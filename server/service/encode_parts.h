@@ -1,0 +1,34 @@
+// Parts that several messages contain; internal to server/service.
+#pragma once
+
+#include <google/protobuf/timestamp.pb.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "core/information/segment_information.h"
+#include "selfcal/v1/calibration.pb.h"
+
+namespace selfcal::server {
+
+inline void SetTime(std::int64_t time_ns, google::protobuf::Timestamp* time) {
+  constexpr std::int64_t kNanoseconds = 1'000'000'000;
+  time->set_seconds(time_ns / kNanoseconds);
+  time->set_nanos(static_cast<std::int32_t>(time_ns % kNanoseconds));
+}
+
+template <typename Repeated>
+void AddDirections(const std::vector<UnobservedDirection>& directions,
+                   Repeated* messages) {
+  for (const UnobservedDirection& direction : directions) {
+    v1::UnobservedDirection* message = messages->Add();
+    message->set_information_ratio(direction.information_ratio);
+    for (const UnobservedDirection::Part& part : direction.parts) {
+      v1::UnobservedDirection::Part* added = message->add_parts();
+      added->set_component(part.component);
+      added->set_weight(part.weight);
+    }
+  }
+}
+
+}  // namespace selfcal::server

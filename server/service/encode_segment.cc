@@ -1,0 +1,104 @@
+#include <algorithm>
+
+#include "proto/convert.h"
+#include "proto/resource_names.h"
+#include "server/service/encode.h"
+#include "server/service/encode_parts.h"
+
+namespace selfcal::server {
+namespace {
+
+v1::Segment::State EncodeState(SegmentState state) {
+  switch (state) {
+    case SegmentState::kStored:
+      return v1::Segment::STORED;
+    case SegmentState::kScored:
+      return v1::Segment::SCORED;
+    case SegmentState::kUnusable:
+      return v1::Segment::UNUSABLE;
+  }
+  return v1::Segment::STATE_UNSPECIFIED;
+}
+
+void FillScore(const GroupScore& score,
+               const std::vector<std::string>& tables,
+               v1::GroupScore* message) {
+  message->set_group(score.group);
+  message->set_size(score.size);
+  message->set_entropy_nats(score.entropy);
+  message->set_gain_nats(score.gain);
+  message->set_rank(score.rank);
+  AddDirections(score.unobserved, message->mutable_unobserved());
+  message->set_in_table(std::find(tables.begin(), tables.end(), score.group) !=
+                        tables.end());
+}
+
+void FillResiduals(const ResidualStatistics& residuals,
+                   v1::ResidualStatistics* message) {
+  message->set_observations(residuals.observations);
+  message->set_inliers(residuals.inliers);
+  message->set_not_projectable(residuals.not_projectable);
+  message->set_outliers(residuals.outliers);
+  message->set_landmarks(residuals.landmarks);
+  message->set_landmarks_used(residuals.landmarks_used);
+  message->set_reprojection_rms_px(residuals.reprojection_rms_px);
+  message->set_reprojection_median_px(residuals.reprojection_median_px);
+  message->mutable_inertial_rms()->Add(residuals.inertial_rms.begin(),
+                                       residuals.inertial_rms.end());
+  message->set_many_outliers(residuals.many_outliers);
+}
+
+}  // namespace
+
+v1::Rig Encode(const StoredRig& rig) {
+  v1::Rig message = ToProto(rig.rig);
+  SetTime(rig.create_time_ns, message.mutable_create_time());
+  return message;
+}
+
+v1::Segment Encode(const StoredSegment& segment) {
+  v1::Segment message;
+  message.set_name(SegmentName(segment.rig, segment.key));
+  message.set_state(EncodeState(segment.state));
+  message.set_has_data(segment.has_data);
+  message.set_payload_bytes(segment.payload_bytes);
+  SetTime(segment.receive_time_ns, message.mutable_receive_time());
+  message.set_keyframes(segment.keyframes);
+  message.set_imu_samples(segment.imu_samples);
+  message.set_landmarks(segment.landmarks);
+  message.set_observations(segment.observations);
+  message.set_calibration_version(segment.calibration_version);
+  message.set_start_ns(segment.start_ns);
+  message.set_end_ns(segment.end_ns);
+  message.set_sequence(segment.sequence);
+  message.set_problem(segment.problem);
+  if (!segment.information) return message;
+  const SegmentInformation& information = *segment.information;
+  for (const GroupScore& score : information.groups) {
+    FillScore(score, segment.tables, message.add_scores());
+  }
+  FillResiduals(information.residuals, message.mutable_residuals());
+  message.set_rank(information.rank);
+  message.set_components(information.rank +
+                         static_cast<int>(information.unobserved.size()));
+  AddDirections(information.unobserved, message.mutable_unobserved());
+  return message;
+}
+
+v1::Table Encode(const std::string& rig, const Table& table) {
+  v1::Table message;
+  message.set_name(ChildName(rig, "tables", table.group));
+  message.set_capacity(table.capacity);
+  for (const TableEntry& entry : table.entries) {
+    v1::Table::Entry* added = message.add_entries();
+    added->set_segment(SegmentName(rig, entry.key));
+    added->set_entropy_nats(entry.entropy);
+    added->set_gain_nats(entry.gain);
+    added->set_sequence(entry.sequence);
+  }
+  message.set_scored(table.scored);
+  message.set_starved(table.starved());
+  return message;
+}
+
+}  // namespace selfcal::server

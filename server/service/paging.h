@@ -1,0 +1,55 @@
+// Pages of lists: what a request may ask for, and how a response is filled.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+
+#include "server/service/errors.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+inline constexpr int kDefaultPageSize = 50;
+inline constexpr int kMaxPageSize = 1000;
+// A client receives at most 4 MiB unless it says otherwise: larger pages are
+// cut, which a paging client does not notice.
+inline constexpr std::size_t kMaxPageBytes = 3u << 20;
+
+// Fills *response with a page. `fetch` takes a Page and returns a
+// StatusOr<Listed<T>>; `add` takes a T and the response, and returns a
+// grpc::Status.
+template <typename Request, typename Response, typename Fetch, typename Add>
+grpc::Status FillPage(const Request& request,
+                      const std::string& parent,
+                      const Fetch& fetch,
+                      const Add& add,
+                      Response* response) {
+  if (request.page_size() < 0) {
+    return InvalidFields(
+        {{"page_size", "is negative; send 0 for the default of 50"}});
+  }
+  Page page;
+  page.token = request.page_token();
+  page.size = request.page_size() == 0
+                  ? kDefaultPageSize
+                  : std::min<int>(request.page_size(), kMaxPageSize);
+  for (;; page.size /= 2) {
+    const auto listed = fetch(page);
+    if (!listed.ok()) {
+      return ToGrpc(listed.status(), {"selfcal.v1.Rig", parent, "page_token"});
+    }
+    response->Clear();
+    for (const auto& item : listed->items) {
+      if (grpc::Status added = add(item, response); !added.ok()) return added;
+    }
+    response->set_next_page_token(listed->next_token);
+    if (page.size == 1 || response->ByteSizeLong() <= kMaxPageBytes) {
+      return grpc::Status::OK;
+    }
+  }
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,128 @@
+#include <algorithm>
+
+#include "proto/resource_names.h"
+#include "selfcal/v1/segment.grpc.pb.h"
+#include "server/service/encode.h"
+#include "server/service/errors.h"
+#include "server/service/paging.h"
+#include "server/service/segment_stream.h"
+#include "server/service/services.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr char kRigType[] = "selfcal.v1.Rig";
+constexpr char kSegmentType[] = "selfcal.v1.Segment";
+constexpr char kTableType[] = "selfcal.v1.Table";
+
+class SegmentService final : public v1::SegmentService::Service {
+ public:
+  explicit SegmentService(const ServiceContext& context) : context_(context) {}
+
+  grpc::Status StreamSegments(
+      grpc::ServerContext* call,
+      grpc::ServerReaderWriter<v1::StreamSegmentsResponse,
+                               v1::StreamSegmentsRequest>* stream) override {
+    return Guarded([&]() -> grpc::Status {
+      SegmentStream segments(context_, [call] { return call->IsCancelled(); });
+      v1::StreamSegmentsRequest request;
+      v1::StreamSegmentsResponse response;
+      while (stream->Read(&request)) {
+        const grpc::Status status = segments.Take(request, &response);
+        if (!status.ok()) return status;
+        if (!stream->Write(response)) return grpc::Status::CANCELLED;
+      }
+      return grpc::Status::OK;
+    });
+  }
+
+  grpc::Status ListSegments(grpc::ServerContext*,
+                            const v1::ListSegmentsRequest* request,
+                            v1::ListSegmentsResponse* response) override {
+    return Guarded([&]() -> grpc::Status {
+      const auto rig = ParseRigName(request->parent());
+      if (!rig) return BadName("parent", "rigs/{rig}");
+      return FillPage(
+          *request,
+          request->parent(),
+          [&](const Page& page) {
+            return context_.store->ListSegments(*rig, page);
+          },
+          [](const StoredSegment& segment, v1::ListSegmentsResponse* to) {
+            *to->add_segments() = Encode(segment);
+            return grpc::Status::OK;
+          },
+          response);
+    });
+  }
+
+  grpc::Status GetSegment(grpc::ServerContext*,
+                          const v1::GetSegmentRequest* request,
+                          v1::Segment* response) override {
+    return Guarded([&]() -> grpc::Status {
+      const auto parts = ParseSegmentName(request->name());
+      if (!parts) {
+        return BadName("name", "rigs/{rig}/segments/{session}~{index}");
+      }
+      const auto segment = context_.store->GetSegment(parts->rig, parts->key);
+      if (!segment.ok()) {
+        return ToGrpc(segment.status(), {kSegmentType, request->name(), {}});
+      }
+      *response = Encode(*segment);
+      return grpc::Status::OK;
+    });
+  }
+
+  grpc::Status ListTables(grpc::ServerContext*,
+                          const v1::ListTablesRequest* request,
+                          v1::ListTablesResponse* response) override {
+    return Guarded([&]() -> grpc::Status {
+      const auto rig = ParseRigName(request->parent());
+      if (!rig) return BadName("parent", "rigs/{rig}");
+      const auto tables = context_.store->GetTables(*rig);
+      if (!tables.ok()) {
+        return ToGrpc(tables.status(), {kRigType, request->parent(), {}});
+      }
+      for (const Table& table : *tables) {
+        *response->add_tables() = Encode(*rig, table);
+      }
+      return grpc::Status::OK;
+    });
+  }
+
+  grpc::Status GetTable(grpc::ServerContext*,
+                        const v1::GetTableRequest* request,
+                        v1::Table* response) override {
+    return Guarded([&]() -> grpc::Status {
+      const auto parts = ParseChildName(request->name(), "tables");
+      if (!parts) return BadName("name", "rigs/{rig}/tables/{group}");
+      const Subject subject{kTableType, request->name(), {}};
+      const auto tables = context_.store->GetTables(parts->rig);
+      if (!tables.ok()) return ToGrpc(tables.status(), subject);
+      const auto table =
+          std::find_if(tables->begin(), tables->end(), [&](const Table& t) {
+            return t.group == parts->id;
+          });
+      if (table == tables->end()) {
+        return ToGrpc(
+            absl::NotFoundError("the rig has no group of parameters '" +
+                                Shortened(parts->id, 100) + "'"),
+            subject);
+      }
+      *response = Encode(parts->rig, *table);
+      return grpc::Status::OK;
+    });
+  }
+
+ private:
+  ServiceContext context_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> MakeSegmentService(
+    const ServiceContext& context) {
+  return std::make_unique<SegmentService>(context);
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,96 @@
+#include "server/service/segment_stream.h"
+
+#include <utility>
+#include <vector>
+
+#include "proto/convert.h"
+#include "proto/field_paths.h"
+#include "proto/resource_names.h"
+#include "server/service/errors.h"
+
+namespace selfcal::server {
+namespace {
+
+// Longer sessions are refused; their echo need not be complete.
+constexpr std::size_t kMaxSessionEcho = 256;
+constexpr std::size_t kMaxDescription = 1000;
+
+void Reject(const std::vector<Violation>& violations,
+            v1::StreamSegmentsResponse* response) {
+  response->set_verdict(v1::StreamSegmentsResponse::REJECTED);
+  for (const Violation& violation : violations) {
+    v1::FieldViolation* added = response->add_violations();
+    added->set_field(SegmentFieldPath(violation.field));
+    added->set_description(Shortened(violation.message, kMaxDescription));
+  }
+}
+
+void FillVerdict(const SubmitResult& result,
+                 v1::StreamSegmentsResponse* response) {
+  switch (result.verdict) {
+    case SubmitResult::Verdict::kStored:
+      response->set_verdict(v1::StreamSegmentsResponse::STORED);
+      return;
+    case SubmitResult::Verdict::kDuplicate:
+      response->set_verdict(v1::StreamSegmentsResponse::DUPLICATE);
+      return;
+    case SubmitResult::Verdict::kRejected:
+      Reject(result.violations, response);
+      return;
+  }
+}
+
+}  // namespace
+
+SegmentStream::SegmentStream(const ServiceContext& context,
+                             std::function<bool()> cancelled)
+    : context_(context), cancelled_(std::move(cancelled)) {}
+
+bool SegmentStream::stopped() const { return context_.stopping->load(); }
+
+grpc::Status SegmentStream::Open(const std::string& parent) {
+  const auto rig = ParseRigName(parent);
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  const absl::Status found = context_.store->GetRig(*rig).status();
+  if (!found.ok()) {
+    return ToGrpc(found, {"selfcal.v1.Rig", parent, "parent"});
+  }
+  parent_ = parent;
+  rig_ = *rig;
+  return grpc::Status::OK;
+}
+
+grpc::Status SegmentStream::Take(const v1::StreamSegmentsRequest& request,
+                                 v1::StreamSegmentsResponse* response) {
+  response->Clear();
+  if (stopped()) return ShuttingDown();
+  if (parent_.empty()) {
+    if (grpc::Status open = Open(request.parent()); !open.ok()) return open;
+  }
+  response->set_session(
+      Shortened(request.segment().session(), kMaxSessionEcho));
+  response->set_index(request.segment().index());
+  if (!request.parent().empty() && request.parent() != parent_) {
+    Reject({{"parent",
+             "is another rig than that of the first message; open a stream "
+             "for each rig"}},
+           response);
+    return grpc::Status::OK;
+  }
+  MotionSegment segment;
+  const auto violations = FromProto(request.segment(), "", &segment);
+  if (!violations.empty()) {
+    Reject(violations, response);
+    return grpc::Status::OK;
+  }
+  const auto result = context_.pipeline->Submit(
+      rig_, segment, [this] { return stopped() || cancelled_(); });
+  if (!result.ok()) {
+    if (stopped()) return ShuttingDown();
+    return ToGrpc(result.status(), {"selfcal.v1.Rig", parent_, "segment"});
+  }
+  FillVerdict(*result, response);
+  return grpc::Status::OK;
+}
+
+}  // namespace selfcal::server

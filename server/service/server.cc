@@ -1,0 +1,136 @@
+#include "server/service/server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
+
+#include <atomic>
+#include <mutex>
+
+#include "server/service/services.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr const char* kServiceNames[] = {
+    "selfcal.v1.RigService",
+    "selfcal.v1.SegmentService",
+    "selfcal.v1.CalibrationService",
+    "selfcal.v1.RecalibrationService",
+};
+
+// Plugins of gRPC's builder are global and meant to be set once.
+void SetUpPlugins() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  });
+}
+
+void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
+  builder->SetMaxReceiveMessageSize(options.max_receive_bytes);
+  grpc::ResourceQuota quota("selfcal");
+  quota.SetMaxThreads(options.max_threads);
+  quota.Resize(static_cast<std::size_t>(options.max_memory_bytes));
+  builder->SetResourceQuota(quota);
+  // Two daemons on one port would share its calls without a word.
+  builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  // Readers that vanished without closing are noticed, and may ask likewise.
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 60'000);
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 20'000);
+  builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder->AddChannelArgument(
+      GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
+}
+
+// The address with the port that was taken in place of 0.
+std::string BoundAddress(const std::string& address, int port) {
+  if (address.starts_with("unix:")) return address;
+  return address.substr(0, address.rfind(':') + 1) + std::to_string(port);
+}
+
+class GrpcServer final : public Server {
+ public:
+  GrpcServer(Store* store, Pipeline* pipeline) {
+    const ServiceContext context{store, pipeline, &stopping_};
+    services_.push_back(MakeRigService(context));
+    services_.push_back(MakeSegmentService(context));
+    services_.push_back(MakeCalibrationService(context));
+    services_.push_back(MakeRecalibrationService(context));
+  }
+
+  ~GrpcServer() override { Shutdown(std::chrono::milliseconds(0)); }
+
+  absl::Status Start(const ServerOptions& options) {
+    SetUpPlugins();
+    grpc::ServerBuilder builder;
+    SetLimits(options, &builder);
+    std::vector<int> ports(options.listen.size(), 0);
+    for (std::size_t i = 0; i < ports.size(); ++i) {
+      builder.AddListeningPort(
+          options.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
+    }
+    for (const auto& service : services_)
+      builder.RegisterService(service.get());
+    server_ = builder.BuildAndStart();
+    std::string failed;
+    for (std::size_t i = 0; i < ports.size(); ++i) {
+      addresses_.push_back(BoundAddress(options.listen[i], ports[i]));
+      if (ports[i] <= 0) failed += " " + options.listen[i];
+    }
+    if (server_ == nullptr || !failed.empty()) {
+      return absl::UnavailableError(
+          "cannot listen on" + failed +
+          "; is the address free, the path writable and short enough?");
+    }
+    SetServing(true);
+    return absl::OkStatus();
+  }
+
+  const std::vector<std::string>& addresses() const override {
+    return addresses_;
+  }
+
+  void Shutdown(std::chrono::milliseconds deadline) override {
+    const std::lock_guard lock(shutdown_mutex_);
+    if (server_ == nullptr || stopping_.exchange(true)) return;
+    SetServing(false);
+    server_->Shutdown(std::chrono::system_clock::now() + deadline);
+    server_->Wait();
+  }
+
+ private:
+  void SetServing(bool serving) {
+    grpc::HealthCheckServiceInterface* health =
+        server_->GetHealthCheckService();
+    if (health == nullptr) return;
+    health->SetServingStatus(serving);
+    for (const char* name : kServiceNames) {
+      health->SetServingStatus(name, serving);
+    }
+  }
+
+  std::atomic<bool> stopping_ = false;
+  std::vector<std::unique_ptr<grpc::Service>> services_;
+  std::unique_ptr<grpc::Server> server_;
+  std::vector<std::string> addresses_;
+  std::mutex shutdown_mutex_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Server>> MakeServer(
+    Store* store, Pipeline* pipeline, const ServerOptions& options) {
+  if (options.listen.empty()) {
+    return absl::InvalidArgumentError("no address to listen on");
+  }
+  auto server = std::make_unique<GrpcServer>(store, pipeline);
+  if (absl::Status started = server->Start(options); !started.ok()) {
+    return started;
+  }
+  return server;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,22 @@
+// Ids that count: versions of calibrations, runs.
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <system_error>
+
+namespace selfcal::server {
+
+// A number from 1 on, written without anything else; nothing if it is not.
+inline std::optional<std::int64_t> ParseCount(const std::string& text) {
+  std::int64_t number = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, number);
+  if (error != std::errc() || rest != end || number < 1) return std::nullopt;
+  if (std::to_string(number) != text) return std::nullopt;
+  return number;
+}
+
+}  // namespace selfcal::server
