@@ -1,0 +1,171 @@
+// The propagated covariance against the scatter of integrals of noisy readings.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <utility>
+
+#include "core/factor/preintegration.h"
+#include "core/model/so3.h"
+#include "test/core/factor/analytic_motion.h"
+#include "test/core/factor/random_values.h"
+
+namespace selfcal {
+namespace {
+
+using Eigen::Vector3d;
+using Vector9d = Eigen::Matrix<double, 9, 1>;
+using Matrix9d = Eigen::Matrix<double, 9, 9>;
+
+constexpr int kTrials = 4000;
+
+struct Experiment {
+  AnalyticMotion motion;
+  ImuCalibration imu;
+  ImuNoise noise;
+  std::int64_t t1_ns;
+
+  ImuSample Reading(std::int64_t t_ns) const {
+    return motion.Reading(t_ns, imu, Vector3d::Zero(), Vector3d::Zero(), 9.81);
+  }
+  Preintegration Integrate(std::span<const ImuSample> samples,
+                           bool covariance) const {
+    return Preintegrate(samples,
+                        0,
+                        t1_ns,
+                        imu,
+                        Vector3d::Zero(),
+                        Vector3d::Zero(),
+                        noise,
+                        {.jacobians = false, .covariance = covariance});
+  }
+};
+
+Experiment RandomExperiment(RandomValues& random, std::int64_t t1_ns) {
+  return {.motion = AnalyticMotion(random),
+          .imu = random.Imu(),
+          .noise = {.gyro_noise_density = random.LogUniform(1e-4, 1e-3),
+                    .accel_noise_density = random.LogUniform(1e-3, 1e-2)},
+          .t1_ns = t1_ns};
+}
+
+// Noise of a sample that stands for an interval of period_ns.
+void AddNoise(RandomValues& random,
+              const ImuNoise& noise,
+              std::int64_t period_ns,
+              std::span<ImuSample> samples) {
+  const double root = std::sqrt(1e-9 * static_cast<double>(period_ns));
+  const Vector3d gyro = random.Normal3(noise.gyro_noise_density / root);
+  const Vector3d accel = random.Normal3(noise.accel_noise_density / root);
+  for (ImuSample& sample : samples) {
+    sample.gyro += gyro;
+    sample.accel += accel;
+  }
+}
+
+// Second moments of the errors of all trials, whitened by the covariance: the
+// identity, within the sampling error.
+template <class MakeNoisy>
+Matrix9d WhitenedMoments(const Experiment& experiment,
+                         std::span<const ImuSample> clean,
+                         const MakeNoisy& noisy) {
+  const Preintegration expected = experiment.Integrate(clean, true);
+  const Eigen::LLT<Matrix9d> llt(expected.covariance);
+  Matrix9d moments = Matrix9d::Zero();
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Preintegration measured = experiment.Integrate(noisy(), false);
+    Vector9d error;
+    error << Log(expected.Delta_R.conjugate() * measured.Delta_R),
+        measured.Delta_v - expected.Delta_v,
+        measured.Delta_p - expected.Delta_p;
+    const Vector9d white = llt.matrixL().solve(error);
+    moments += white * white.transpose();
+  }
+  return moments / kTrials;
+}
+
+// A mean of kTrials products of unit normal variables scatters by
+// 1 / sqrt(kTrials), or sqrt(2) times that on the diagonal. Of the 45 entries
+// the worst lies within four such sigmas with probability 0.997; `model` is how
+// far the sampled noise may differ from white noise in continuous time.
+void ExpectIdentity(const Matrix9d& moments, double model) {
+  const double sigma = 1 / std::sqrt(kTrials);
+  for (int i = 0; i < 9; ++i) {
+    for (int j = 0; j < i; ++j) {
+      EXPECT_NEAR(moments(i, j), 0, 4 * sigma + model) << i << ", " << j;
+    }
+    EXPECT_NEAR(moments(i, i), 1, 4 * std::sqrt(2) * sigma + model) << i;
+  }
+  // Their sum is the chi-square of all trials together.
+  EXPECT_NEAR(moments.trace(), 9, 4 * std::sqrt(18) * sigma + 9 * model);
+}
+
+TEST(PreintegrationNoise, CovarianceIsTheScatterUnderNoiseOnEachSample) {
+  RandomValues random(1);
+  // Half of the first and of the last sample lies outside of the interval,
+  // which is one part in 400 here.
+  const std::int64_t period_ns = 1'000'000;
+  const Experiment experiment = RandomExperiment(random, 400 * period_ns);
+  std::vector<ImuSample> clean;
+  for (int i = 0; i <= 400; ++i) {
+    clean.push_back(experiment.Reading(i * period_ns));
+  }
+  const Matrix9d moments = WhitenedMoments(experiment, clean, [&] {
+    std::vector<ImuSample> samples = clean;
+    for (ImuSample& sample : samples) {
+      AddNoise(random, experiment.noise, period_ns, {&sample, 1});
+    }
+    return samples;
+  });
+  ExpectIdentity(moments, 0.01);
+}
+
+TEST(PreintegrationNoise, CovarianceIsTheScatterUnderNoiseOfEachInterval) {
+  RandomValues random(2);
+  for (const auto& [period_ns, steps] :
+       {std::pair<std::int64_t, int>{5'000'000, 20}, {10'000'000, 100}}) {
+    const Experiment experiment = RandomExperiment(random, steps * period_ns);
+    // Two samples for each interval, one at its beginning and one just before
+    // its end, with the same noise.
+    std::vector<ImuSample> clean;
+    for (int i = 0; i <= steps; ++i) {
+      clean.push_back(experiment.Reading(i * period_ns));
+      clean.push_back(experiment.Reading((i + 1) * period_ns - 1));
+    }
+    const Matrix9d moments = WhitenedMoments(experiment, clean, [&] {
+      std::vector<ImuSample> samples = clean;
+      for (std::size_t i = 0; i < samples.size(); i += 2) {
+        AddNoise(random,
+                 experiment.noise,
+                 period_ns,
+                 std::span(samples).subspan(i, 2));
+      }
+      return samples;
+    });
+    // Noise that is constant over an interval moves the position a little less
+    // than white noise: the square of the number of steps.
+    ExpectIdentity(moments, 2.0 / (steps * steps));
+  }
+}
+
+TEST(PreintegrationNoise, DoesNotDependOnTheRateOfTheSamples) {
+  RandomValues random(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Experiment experiment = RandomExperiment(random, 200'000'000);
+    const auto covariance = [&](std::int64_t period_ns) -> Matrix9d {
+      std::vector<ImuSample> samples;
+      for (std::int64_t t = 0; t <= experiment.t1_ns; t += period_ns) {
+        samples.push_back(experiment.Reading(t));
+      }
+      return experiment.Integrate(samples, true).covariance;
+    };
+    // Whitened by the one, the other is the identity.
+    const Eigen::LLT<Matrix9d> llt(covariance(1'000'000));
+    const Matrix9d half = llt.matrixL().solve(covariance(10'000'000));
+    const Matrix9d white = llt.matrixL().solve(half.transpose());
+    EXPECT_LT((white - Matrix9d::Identity()).norm(), 0.01);
+  }
+}
+
+}  // namespace
+}  // namespace selfcal

@@ -1,0 +1,120 @@
+// Random arguments of factors, from a seed: any attitude, calibrations away
+// from nominal, IMU readings without any smoothness.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "core/model/calibration.h"
+#include "core/model/segment.h"
+#include "core/model/so3.h"
+
+namespace selfcal {
+
+class RandomValues {
+ public:
+  explicit RandomValues(unsigned seed) : engine_(seed) {}
+
+  double Uniform(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(engine_);
+  }
+  double LogUniform(double low, double high) {
+    return std::exp(Uniform(std::log(low), std::log(high)));
+  }
+  int Index(int count) {
+    return std::uniform_int_distribution<int>(0, count - 1)(engine_);
+  }
+  double Normal() { return normal_(engine_); }
+  Eigen::VectorXd NormalVector(int n) {
+    return Eigen::VectorXd::NullaryExpr(n, [this] { return Normal(); });
+  }
+  Eigen::Vector3d Normal3(double sigma) { return sigma * NormalVector(3); }
+
+  // Uniform over all rotations.
+  Eigen::Quaterniond Rotation() {
+    return Eigen::Quaterniond(Eigen::Vector4d(NormalVector(4).normalized()));
+  }
+
+  ImuCalibration Imu() {
+    ImuCalibration imu;
+    imu.s_g += Normal3(0.05);
+    imu.m_g = Normal3(0.05);
+    imu.s_a += Normal3(0.05);
+    imu.m_a = Normal3(0.05);
+    imu.q_AI = Rotation();
+    return imu;
+  }
+
+  CameraCalibration Camera(DistortionModel model) {
+    CameraCalibration camera;
+    camera.q_CI = Rotation();
+    camera.p_CI = Normal3(0.1);
+    camera.f = {Uniform(200, 500), Uniform(200, 500)};
+    camera.c = {Uniform(300, 340), Uniform(220, 260)};
+    camera.width_px = 640;
+    camera.height_px = 480;
+    camera.model = model;
+    switch (model) {
+      case DistortionModel::kFov:
+        camera.distortion.setConstant(1, Uniform(0.5, 1.0));
+        break;
+      case DistortionModel::kRadialTangential:
+        camera.distortion.resize(4);
+        camera.distortion << Uniform(-0.3, -0.2), Uniform(0.05, 0.1),
+            Uniform(-1e-3, 1e-3), Uniform(-1e-3, 1e-3);
+        break;
+      case DistortionModel::kEquidistant:
+        camera.distortion = 0.01 * NormalVector(4);
+        break;
+    }
+    return camera;
+  }
+
+  KeyframeState State(std::int64_t t_ns) {
+    return {.t_ns = t_ns,
+            .q_GI = Rotation(),
+            .p_GI = Normal3(5),
+            .v_GI = Normal3(2),
+            .b_a = Normal3(0.2),
+            .b_g = Normal3(0.02)};
+  }
+
+  // Raw readings, independent of each other, over [0, duration_s] and one more
+  // on either side of it; none falls on its ends.
+  std::vector<ImuSample> Samples(double rate_hz,
+                                 double duration_s,
+                                 double gyro_sigma = 2,
+                                 double accel_sigma = 10) {
+    std::vector<ImuSample> samples;
+    const auto period_ns = static_cast<std::int64_t>(1e9 / rate_hz);
+    const auto end_ns = static_cast<std::int64_t>(1e9 * duration_s);
+    auto t_ns = -static_cast<std::int64_t>(Uniform(0.05, 0.95) *
+                                           static_cast<double>(period_ns));
+    for (; t_ns < end_ns + period_ns; t_ns += period_ns) {
+      samples.push_back({t_ns, Normal3(gyro_sigma), Normal3(accel_sigma)});
+    }
+    return samples;
+  }
+
+ private:
+  std::mt19937_64 engine_;
+  std::normal_distribution<double> normal_;
+};
+
+inline constexpr DistortionModel kAllDistortionModels[] = {
+    DistortionModel::kFov,
+    DistortionModel::kRadialTangential,
+    DistortionModel::kEquidistant};
+
+// Largest difference of two matrices, relative to the size of each row.
+inline double RowwiseDifference(const Eigen::MatrixXd& a,
+                                const Eigen::MatrixXd& b) {
+  const Eigen::VectorXd size = b.rowwise().norm().array() + 1;
+  return (size.cwiseInverse().asDiagonal() * (a - b)).cwiseAbs().maxCoeff();
+}
+
+}  // namespace selfcal

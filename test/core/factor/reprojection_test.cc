@@ -1,0 +1,214 @@
+#include "core/factor/reprojection.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "test/core/factor/random_values.h"
+#include "test/core/numeric_jacobian.h"
+
+namespace selfcal {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+
+constexpr double kStep = 1e-4;
+constexpr double kTolerance = 1e-8;
+
+struct View {
+  Quaterniond q_GI;
+  Vector3d p_GI;
+  CameraCalibration camera;
+  Vector4d landmark_G;
+  Vector2d z_px;
+};
+
+// The homogeneous landmark that this view sees in the given direction of the
+// camera, at 1 / w metres.
+Vector4d LandmarkAt(const View& view, const Vector3d& bearing_C, double w) {
+  const Vector3d p_I =
+      view.camera.q_CI.conjugate() * (bearing_C - w * view.camera.p_CI);
+  Vector4d landmark;
+  landmark << view.q_GI * p_I + w * view.p_GI, w;
+  return landmark;
+}
+
+View RandomView(RandomValues& random, DistortionModel model) {
+  View view;
+  view.q_GI = random.Rotation();
+  view.p_GI = random.Normal3(5);
+  view.camera = random.Camera(model);
+  view.z_px = {random.Uniform(0, 640), random.Uniform(0, 480)};
+  return view;
+}
+
+// Moves one argument of the view by its part of the delta, and evaluates.
+enum class Argument { kPose, kCamera, kLandmark };
+
+VectorXd ResidualAt(const View& view,
+                    Argument argument,
+                    const VectorXd& delta) {
+  View moved = view;
+  if (argument == Argument::kPose) {
+    moved.q_GI = view.q_GI * Exp(delta.head<3>());
+    moved.p_GI += delta.tail<3>();
+  } else if (argument == Argument::kCamera) {
+    VectorXd theta_delta(kImuTangentSize + delta.size());
+    theta_delta << VectorXd::Zero(kImuTangentSize), delta;
+    moved.camera =
+        BoxPlus(Calibration{{}, {view.camera}}, theta_delta).cameras.front();
+  } else {
+    moved.landmark_G += delta;
+  }
+  Vector2d residual;
+  EXPECT_TRUE(Reproject(moved.q_GI,
+                        moved.p_GI,
+                        moved.camera,
+                        moved.landmark_G,
+                        moved.z_px,
+                        &residual,
+                        nullptr));
+  return residual;
+}
+
+void ExpectJacobiansMatch(const View& view) {
+  Vector2d residual;
+  ReprojectionJacobians J;
+  ASSERT_TRUE(Reproject(view.q_GI,
+                        view.p_GI,
+                        view.camera,
+                        view.landmark_G,
+                        view.z_px,
+                        &residual,
+                        &J));
+  EXPECT_EQ(ResidualAt(view, Argument::kLandmark, Vector4d::Zero()), residual);
+  const auto numeric = [&](Argument argument, int n) {
+    return NumericJacobian(
+        [&](const VectorXd& delta) {
+          return ResidualAt(view, argument, delta);
+        },
+        n,
+        kStep);
+  };
+  const int camera_size = CameraTangentSize(view.camera);
+  ASSERT_EQ(J.camera.cols(), camera_size);
+  EXPECT_LT(RowwiseDifference(J.pose, numeric(Argument::kPose, 6)), kTolerance);
+  EXPECT_LT(
+      RowwiseDifference(J.camera, numeric(Argument::kCamera, camera_size)),
+      kTolerance);
+  EXPECT_LT(RowwiseDifference(J.landmark, numeric(Argument::kLandmark, 4)),
+            kTolerance);
+}
+
+class ReprojectionOfEachModel : public testing::TestWithParam<DistortionModel> {
+};
+
+INSTANTIATE_TEST_SUITE_P(Models,
+                         ReprojectionOfEachModel,
+                         testing::ValuesIn(kAllDistortionModels),
+                         [](const auto& info) {
+                           std::string name(DistortionName(info.param));
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+TEST_P(ReprojectionOfEachModel, SeesALandmarkWhereItsPointProjects) {
+  RandomValues random(1);
+  for (int trial = 0; trial < 1000; ++trial) {
+    const View view = RandomView(random, GetParam());
+    const Vector3d p_C(random.Uniform(-1, 1), random.Uniform(-1, 1), 2);
+    Vector2d direct_px;
+    if (!Project(view.camera, p_C, &direct_px, nullptr)) continue;
+    const Vector3d p_G =
+        view.q_GI * (view.camera.q_CI.conjugate() * (p_C - view.camera.p_CI)) +
+        view.p_GI;
+    const double scale = random.LogUniform(1e-3, 1e3);
+    Vector2d residual;
+    ASSERT_TRUE(Reproject(view.q_GI,
+                          view.p_GI,
+                          view.camera,
+                          scale * p_G.homogeneous(),
+                          view.z_px,
+                          &residual,
+                          nullptr));
+    EXPECT_LT((residual - (direct_px - view.z_px)).norm(), 1e-9);
+  }
+}
+
+TEST_P(ReprojectionOfEachModel, JacobiansMatchDifferencesAtRandomStates) {
+  RandomValues random(2);
+  int seen = 0;
+  for (int trial = 0; trial < 1500; ++trial) {
+    View view = RandomView(random, GetParam());
+    Vector3d bearing_C;
+    if (!Unproject(view.camera, view.z_px, &bearing_C)) continue;
+    // From half a metre to beyond what parallax can tell, and infinity.
+    const double w = trial % 10 == 0 ? 0 : random.LogUniform(1e-6, 2);
+    view.landmark_G = LandmarkAt(view, bearing_C, w);
+    view.z_px += Vector2d(random.NormalVector(2));
+    ExpectJacobiansMatch(view);
+    if (HasFatalFailure()) return;
+    ++seen;
+  }
+  EXPECT_GT(seen, 1200);
+}
+
+TEST_P(ReprojectionOfEachModel, JacobiansMatchDifferencesNearTheAxis) {
+  RandomValues random(3);
+  for (int trial = 0; trial < 500; ++trial) {
+    View view = RandomView(random, GetParam());
+    const double off = trial % 5 == 0 ? 0 : random.LogUniform(1e-12, 1e-2);
+    const Vector3d bearing_C =
+        Vector3d(off * random.Normal(), off * random.Normal(), 1).normalized();
+    view.landmark_G = LandmarkAt(view, bearing_C, random.Uniform(0, 2));
+    ExpectJacobiansMatch(view);
+    if (HasFatalFailure()) return;
+  }
+}
+
+TEST(Reprojection, JacobiansMatchDifferencesWhereFovDistortionVanishes) {
+  RandomValues random(4);
+  for (int trial = 0; trial < 1000; ++trial) {
+    View view = RandomView(random, DistortionModel::kFov);
+    const double w = trial % 10 == 0 ? 0 : random.LogUniform(1e-9, 0.1);
+    view.camera.distortion[0] = trial % 2 == 0 ? w : -w;
+    Vector3d bearing_C;
+    if (!Unproject(view.camera, view.z_px, &bearing_C)) continue;
+    view.landmark_G = LandmarkAt(view, bearing_C, random.LogUniform(1e-6, 2));
+    ExpectJacobiansMatch(view);
+    if (HasFatalFailure()) return;
+  }
+}
+
+TEST_P(ReprojectionOfEachModel, ARefusedPointLeavesTheOutputsUntouched) {
+  RandomValues random(5);
+  for (int trial = 0; trial < 200; ++trial) {
+    View view = RandomView(random, GetParam());
+    const Vector3d behind_C(random.Normal(), random.Normal(), -1);
+    view.landmark_G = LandmarkAt(view, behind_C, random.Uniform(0, 2));
+    Vector2d residual(1, 2);
+    ReprojectionJacobians J;
+    J.pose.setConstant(3);
+    J.camera.setConstant(2, 5, 4);
+    J.landmark.setConstant(5);
+    EXPECT_FALSE(Reproject(view.q_GI,
+                           view.p_GI,
+                           view.camera,
+                           view.landmark_G,
+                           view.z_px,
+                           &residual,
+                           &J));
+    EXPECT_EQ(residual, Vector2d(1, 2));
+    EXPECT_TRUE((J.pose.array() == 3).all());
+    EXPECT_EQ(J.camera.cols(), 5);
+    EXPECT_TRUE((J.camera.array() == 4).all());
+    EXPECT_TRUE((J.landmark.array() == 5).all());
+  }
+}
+
+}  // namespace
+}  // namespace selfcal
