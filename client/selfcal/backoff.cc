@@ -3,12 +3,19 @@
 #include <algorithm>
 
 namespace selfcal::client {
+namespace {
+
+// Keeps every point in time that follows from a wait representable.
+constexpr std::chrono::hours kLongest{24};
+
+}  // namespace
 
 Backoff::Backoff(std::chrono::milliseconds min,
                  std::chrono::milliseconds max,
                  std::uint64_t seed)
-    : min_(std::max(min, std::chrono::milliseconds(1))),
-      max_(std::max(max, min_)),
+    : min_(std::clamp<std::chrono::milliseconds>(
+          min, std::chrono::milliseconds(1), kLongest)),
+      max_(std::clamp<std::chrono::milliseconds>(max, min_, kLongest)),
       step_(min_),
       random_(seed) {}
 

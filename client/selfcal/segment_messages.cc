@@ -16,7 +16,7 @@ std::vector<Violation> MakeRequest(const std::string& rig,
   if (std::any_of(session.begin(), session.end(), [](char c) {
         return c < ' ' || c > '~';
       })) {
-    return {{"key.session", "has a character that is not printable ASCII"}};
+    return {{"session", "has a character that is not printable ASCII"}};
   }
   request->set_parent(RigName(rig));
   *request->mutable_segment() = ToProto(segment);

@@ -71,7 +71,10 @@ class SegmentStream::Impl {
 
   absl::Status Drain(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
-    const bool done = changed_.wait_for(lock, timeout, [this] {
+    // Longer ones may not be representable as a point in time.
+    const auto wait = std::min<std::chrono::milliseconds>(
+        timeout, std::chrono::hours(24 * 365));
+    const bool done = changed_.wait_for(lock, wait, [this] {
       return !end_.ok() || (queue_.empty() && callbacks_due_ == 0);
     });
     if (!end_.ok()) return end_;

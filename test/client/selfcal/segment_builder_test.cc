@@ -1,0 +1,412 @@
+#include "client/selfcal/segment_builder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <random>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "core/model/calibration.h"
+
+namespace selfcal::client {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+
+// A random session: keyframes at uneven times, an IMU at about 200 Hz whose
+// samples do not fall on them, landmarks that come and go.
+struct Session {
+  std::vector<ImuSample> imu;
+  std::vector<KeyframeState> states;
+  std::vector<std::vector<KeyframeObservation>> observations;
+};
+
+Session RandomSession(std::mt19937& random, int keyframes) {
+  std::uniform_int_distribution<std::int64_t> keyframe_gap(40 * kMs, 200 * kMs);
+  std::uniform_int_distribution<std::int64_t> imu_gap(4 * kMs, 6 * kMs);
+  std::uniform_real_distribution<double> pixel(1, 600);
+  std::normal_distribution<double> normal;
+  Session session;
+  std::int64_t t = 1'000'000'000;
+  for (int k = 0; k < keyframes; ++k, t += keyframe_gap(random)) {
+    KeyframeState state;
+    state.t_ns = t;
+    state.p_GI = {normal(random), normal(random), normal(random)};
+    session.states.push_back(state);
+    std::vector<KeyframeObservation> seen;
+    for (std::uint64_t id = static_cast<std::uint64_t>(k);
+         id < static_cast<std::uint64_t>(k) + 12;
+         ++id) {
+      for (std::int32_t camera = 0; camera < 2; ++camera) {
+        if (random() % 4 == 0) continue;
+        seen.push_back({camera,
+                        id,
+                        {pixel(random), pixel(random) / 2},
+                        {normal(random), normal(random), 5}});
+      }
+    }
+    std::shuffle(seen.begin(), seen.end(), random);
+    session.observations.push_back(seen);
+  }
+  for (std::int64_t s = 1'000'000'000 - 3 * kMs; s < t; s += imu_gap(random)) {
+    session.imu.push_back({s,
+                           {normal(random), normal(random), normal(random)},
+                           {normal(random), normal(random), 9.81}});
+  }
+  return session;
+}
+
+Calibration TwoCameras() {
+  Calibration theta;
+  theta.cameras.resize(2);
+  for (CameraCalibration& camera : theta.cameras) {
+    camera.f = {300, 300};
+    camera.c = {320, 240};
+    camera.distortion << 0.9;
+    camera.width_px = 640;
+    camera.height_px = 480;
+  }
+  return theta;
+}
+
+void TakeAll(SegmentBuilder& builder, std::vector<MotionSegment>* segments) {
+  while (auto segment = builder.Take()) {
+    segments->push_back(*std::move(segment));
+  }
+}
+
+// Feeds both streams by time, the IMU late or early by `imu_delay_ns`.
+std::vector<MotionSegment> Build(const Session& session,
+                                 const SegmentBuilderOptions& options,
+                                 std::int64_t imu_delay_ns) {
+  SegmentBuilder builder(options);
+  std::vector<MotionSegment> segments;
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < session.states.size(); ++k) {
+    const std::int64_t now = session.states[k].t_ns - imu_delay_ns;
+    for (; next < session.imu.size() && session.imu[next].t_ns <= now; ++next) {
+      EXPECT_TRUE(builder.AddImu(session.imu[next]));
+      TakeAll(builder, &segments);
+    }
+    EXPECT_TRUE(
+        builder.AddKeyframe(session.states[k], session.observations[k]));
+    TakeAll(builder, &segments);
+  }
+  for (; next < session.imu.size(); ++next) builder.AddImu(session.imu[next]);
+  builder.Flush(2);
+  TakeAll(builder, &segments);
+  return segments;
+}
+
+SegmentBuilderOptions Options() {
+  SegmentBuilderOptions options;
+  options.session = "session";
+  return options;
+}
+
+std::vector<std::int64_t> Times(const std::vector<ImuSample>& samples) {
+  std::vector<std::int64_t> times;
+  for (const ImuSample& sample : samples) times.push_back(sample.t_ns);
+  return times;
+}
+
+// The samples from the last one at or before `begin` to the first one at or
+// after `end`, by looking at each.
+std::vector<std::int64_t> Covering(const std::vector<ImuSample>& imu,
+                                   std::int64_t begin,
+                                   std::int64_t end) {
+  std::vector<std::int64_t> times;
+  for (std::size_t i = 0; i < imu.size(); ++i) {
+    const bool is_before = i + 1 < imu.size() && imu[i + 1].t_ns <= begin;
+    const bool is_after = i > 0 && imu[i - 1].t_ns >= end;
+    if (!is_before && !is_after) times.push_back(imu[i].t_ns);
+  }
+  return times;
+}
+
+TEST(SegmentBuilder, PutsEveryKeyframeIntoExactlyOneSegment) {
+  std::mt19937 random(1);
+  for (int trial = 0; trial < 100; ++trial) {
+    const int keyframes = 2 + static_cast<int>(random() % 120);
+    const Session session = RandomSession(random, keyframes);
+    SegmentBuilderOptions options = Options();
+    options.keyframes = 2 + static_cast<int>(random() % 40);
+    options.first_index = 5;
+    const std::int64_t delay = (static_cast<int>(random() % 600) - 300) * kMs;
+    const auto segments = Build(session, options, delay);
+
+    std::vector<std::int64_t> times;
+    std::int64_t index = 5;
+    for (const MotionSegment& segment : segments) {
+      EXPECT_EQ(segment.key, (SegmentKey{"session", index++}));
+      for (const KeyframeState& state : segment.keyframes) {
+        times.push_back(state.t_ns);
+      }
+    }
+    // A single keyframe at the end is no segment.
+    const int rest = keyframes % options.keyframes;
+    ASSERT_EQ(times.size(),
+              static_cast<std::size_t>(rest == 1 ? keyframes - 1 : keyframes));
+    for (std::size_t k = 0; k < times.size(); ++k) {
+      EXPECT_EQ(times[k], session.states[k].t_ns);
+    }
+    for (std::size_t s = 0; s + 1 < segments.size(); ++s) {
+      EXPECT_EQ(segments[s].keyframes.size(),
+                static_cast<std::size_t>(options.keyframes));
+    }
+  }
+}
+
+TEST(SegmentBuilder, BuildsSegmentsThatAreValid) {
+  std::mt19937 random(2);
+  const Calibration theta = TwoCameras();
+  for (int trial = 0; trial < 60; ++trial) {
+    const Session session = RandomSession(random, 90);
+    SegmentBuilderOptions options = Options();
+    options.keyframes = 2 + static_cast<int>(random() % 40);
+    options.min_observations = static_cast<int>(random() % 6);
+    const std::int64_t delay = (static_cast<int>(random() % 600) - 300) * kMs;
+    for (const MotionSegment& segment : Build(session, options, delay)) {
+      const auto violations = Validate(segment, theta);
+      EXPECT_TRUE(violations.empty())
+          << violations.front().field << " " << violations.front().message;
+    }
+  }
+}
+
+TEST(SegmentBuilder, GivesEachSegmentTheSamplesUpToItsSuccessor) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 60; ++trial) {
+    const Session session = RandomSession(random, 100);
+    SegmentBuilderOptions options = Options();
+    options.keyframes = 2 + static_cast<int>(random() % 40);
+    const std::int64_t delay = (static_cast<int>(random() % 600) - 300) * kMs;
+    const auto segments = Build(session, options, delay);
+    std::size_t next = 0;
+    for (const MotionSegment& segment : segments) {
+      next += segment.keyframes.size();
+      const std::int64_t end =
+          session.states[std::min(next, session.states.size() - 1)].t_ns;
+      EXPECT_EQ(Times(segment.imu),
+                Covering(session.imu, segment.keyframes.front().t_ns, end));
+    }
+  }
+}
+
+TEST(SegmentBuilder, DoesNotDependOnWhetherTheImuLagsOrLeads) {
+  std::mt19937 random(4);
+  for (int trial = 0; trial < 30; ++trial) {
+    const Session session = RandomSession(random, 100);
+    const auto leading = Build(session, Options(), -300 * kMs);
+    const auto lagging = Build(session, Options(), 300 * kMs);
+    ASSERT_EQ(leading.size(), lagging.size());
+    for (std::size_t s = 0; s < leading.size(); ++s) {
+      EXPECT_EQ(leading[s].keyframes.size(), lagging[s].keyframes.size());
+      EXPECT_EQ(Times(leading[s].imu), Times(lagging[s].imu));
+      EXPECT_EQ(leading[s].observations.size(), lagging[s].observations.size());
+    }
+  }
+}
+
+TEST(SegmentBuilder, ClosesBySecondsWhenAsked) {
+  std::mt19937 random(5);
+  for (int trial = 0; trial < 30; ++trial) {
+    const Session session = RandomSession(random, 150);
+    SegmentBuilderOptions options = Options();
+    options.keyframes = 3;  // does not matter then
+    options.seconds = 2;
+    const auto segments = Build(session, options, 0);
+    ASSERT_GT(segments.size(), 3u);
+    for (std::size_t s = 0; s + 1 < segments.size(); ++s) {
+      const auto& keyframes = segments[s].keyframes;
+      const std::int64_t begin = keyframes.front().t_ns;
+      EXPECT_LT(keyframes.back().t_ns - begin, 2000 * kMs);
+      EXPECT_GE(segments[s + 1].keyframes.front().t_ns - begin, 2000 * kMs);
+    }
+  }
+}
+
+TEST(SegmentBuilder, KeepsExactlyTheObservationsOfLandmarksSeenOftenEnough) {
+  std::mt19937 random(6);
+  for (int trial = 0; trial < 30; ++trial) {
+    const Session session = RandomSession(random, 60);
+    SegmentBuilderOptions options = Options();
+    options.keyframes = 20;
+    options.min_observations = 7;
+    const auto segments = Build(session, options, 0);
+    ASSERT_EQ(segments.size(), 3u);
+    for (std::size_t s = 0; s < 3; ++s) {
+      std::map<std::uint64_t, int> seen;
+      std::map<std::uint64_t, Eigen::Vector3d> last;
+      for (std::size_t k = 20 * s; k < 20 * s + 20; ++k) {
+        for (const auto& observation : session.observations[k]) {
+          ++seen[observation.landmark_id];
+          last[observation.landmark_id] = observation.p_G;
+        }
+      }
+      std::map<std::uint64_t, int> kept;
+      for (const Observation& observation : segments[s].observations) {
+        const auto& landmark =
+            segments[s]
+                .landmarks[static_cast<std::size_t>(observation.landmark)];
+        ++kept[landmark.id];
+        EXPECT_EQ(landmark.p_G, last[landmark.id]);
+      }
+      std::erase_if(seen, [](const auto& entry) { return entry.second < 7; });
+      EXPECT_EQ(kept, seen);
+      EXPECT_EQ(segments[s].landmarks.size(), seen.size());
+    }
+  }
+}
+
+// Keyframes at 0, 100, 200 ms ... and an IMU sample on each of them and in the
+// middle between two.
+class RegularStream : public ::testing::Test {
+ protected:
+  void AddImuUntil(std::int64_t ms) {
+    for (; imu_ms_ <= ms; imu_ms_ += 50) builder_.AddImu({imu_ms_ * kMs});
+  }
+  bool AddKeyframe(std::int64_t ms,
+                   const std::vector<KeyframeObservation>& observations = {}) {
+    KeyframeState state;
+    state.t_ns = ms * kMs;
+    return builder_.AddKeyframe(state, observations);
+  }
+
+  static SegmentBuilderOptions FiveKeyframes() {
+    SegmentBuilderOptions options = Options();
+    options.keyframes = 5;
+    options.min_observations = 1;
+    options.min_keyframes = 3;
+    return options;
+  }
+
+  SegmentBuilder builder_{FiveKeyframes()};
+  std::int64_t imu_ms_ = 0;
+};
+
+TEST_F(RegularStream, WaitsForTheSampleThatReachesTheNextSegment) {
+  for (int k = 0; k < 6; ++k) ASSERT_TRUE(AddKeyframe(100 * k));
+  AddImuUntil(450);
+  EXPECT_FALSE(builder_.Take().has_value());
+  AddImuUntil(500);
+  const auto segment = builder_.Take();
+  ASSERT_TRUE(segment.has_value());
+  EXPECT_EQ(segment->keyframes.size(), 5u);
+  EXPECT_EQ(segment->imu.back().t_ns, 500 * kMs);
+  EXPECT_FALSE(builder_.Take().has_value());
+}
+
+TEST_F(RegularStream, RefusesAndCountsWhatIsOutOfOrder) {
+  AddImuUntil(1000);
+  ASSERT_TRUE(AddKeyframe(100));
+  EXPECT_FALSE(AddKeyframe(100));
+  EXPECT_FALSE(AddKeyframe(0));
+  EXPECT_FALSE(builder_.AddImu({1000 * kMs}));
+  EXPECT_FALSE(builder_.AddImu({0}));
+  for (int k = 2; k < 7; ++k) ASSERT_TRUE(AddKeyframe(100 * k));
+  const auto segment = builder_.Take();
+  ASSERT_TRUE(segment.has_value());
+  EXPECT_EQ(segment->keyframes.front().t_ns, 100 * kMs);
+  EXPECT_EQ(builder_.statistics().keyframes_refused, 2u);
+  EXPECT_EQ(builder_.statistics().imu_ignored, 2u);
+  builder_.Flush(2);
+  EXPECT_FALSE(AddKeyframe(600)) << "the order holds over a flush, too";
+}
+
+TEST_F(RegularStream, KeepsTheFirstOfTwoObservationsByOneCamera) {
+  AddImuUntil(1000);
+  AddKeyframe(0,
+              {{0, 7, {1, 1}, {1, 1, 1}},
+               {0, 7, {2, 2}, {2, 2, 2}},
+               {1, 7, {3, 3}, {3, 3, 3}}});
+  for (int k = 1; k < 6; ++k) AddKeyframe(100 * k);
+  const auto segment = builder_.Take();
+  ASSERT_TRUE(segment.has_value());
+  ASSERT_EQ(segment->observations.size(), 2u);
+  EXPECT_EQ(segment->observations[0].z_px, Eigen::Vector2d(1, 1));
+  EXPECT_EQ(segment->observations[1].camera, 1);
+  ASSERT_EQ(segment->landmarks.size(), 1u);
+  EXPECT_EQ(segment->landmarks[0].p_G, Eigen::Vector3d(3, 3, 3));
+}
+
+TEST_F(RegularStream, FlushesTheRestIfItIsLongEnough) {
+  AddImuUntil(1000);
+  for (int k = 0; k < 8; ++k) AddKeyframe(100 * k);
+  builder_.Flush(3);
+  EXPECT_EQ(builder_.Take()->keyframes.size(), 5u);
+  const auto rest = builder_.Take();
+  ASSERT_TRUE(rest.has_value());
+  EXPECT_EQ(rest->key.index, 1);
+  EXPECT_EQ(rest->keyframes.size(), 3u);
+  EXPECT_EQ(rest->imu.back().t_ns, 700 * kMs)
+      << "not joined with what comes after the loss of tracking";
+
+  for (int k = 8; k < 10; ++k) AddKeyframe(100 * k);
+  builder_.Flush(3);
+  EXPECT_FALSE(builder_.Take().has_value());
+  EXPECT_EQ(builder_.statistics().keyframes_dropped, 2u);
+  EXPECT_EQ(builder_.next_index(), 2) << "no index is left out";
+  builder_.Flush(0);
+  EXPECT_FALSE(builder_.Take().has_value()) << "nothing is no segment";
+}
+
+TEST_F(RegularStream, FlushLeavesOutKeyframesThatNoSampleCovers) {
+  AddImuUntil(350);
+  for (int k = 0; k < 5; ++k) AddKeyframe(100 * k);
+  builder_.Flush(2);
+  const auto rest = builder_.Take();
+  ASSERT_TRUE(rest.has_value());
+  EXPECT_EQ(rest->keyframes.back().t_ns, 300 * kMs);
+  EXPECT_EQ(builder_.statistics().keyframes_dropped, 1u);
+}
+
+TEST_F(RegularStream, DropsKeyframesBeforeTheFirstSample) {
+  imu_ms_ = 250;
+  for (int k = 0; k < 4; ++k) AddKeyframe(100 * k);
+  AddImuUntil(2000);
+  for (int k = 4; k < 9; ++k) AddKeyframe(100 * k);
+  const auto segment = builder_.Take();
+  ASSERT_TRUE(segment.has_value());
+  EXPECT_EQ(segment->keyframes.front().t_ns, 300 * kMs);
+  EXPECT_EQ(builder_.statistics().keyframes_dropped, 3u);
+}
+
+TEST_F(RegularStream, EndsASegmentAtAGapBetweenKeyframes) {
+  AddImuUntil(40'000);
+  for (int k = 0; k < 4; ++k) AddKeyframe(30'000 + 100 * k);
+  EXPECT_FALSE(builder_.Take().has_value());
+  AddImuUntil(60'000);
+  const auto rest = builder_.Take();
+  ASSERT_TRUE(rest.has_value()) << "nothing can continue it any more";
+  EXPECT_EQ(rest->keyframes.size(), 4u);
+  for (int k = 0; k < 4; ++k) AddKeyframe(58'000 + 100 * k);
+  AddKeyframe(68'400);
+  const auto next = builder_.Take();
+  ASSERT_TRUE(next.has_value());
+  EXPECT_EQ(next->keyframes.size(), 4u);
+  EXPECT_EQ(next->imu.front().t_ns, 58'000 * kMs);
+}
+
+TEST_F(RegularStream, SurvivesTheEndsOfTime) {
+  const auto lowest = std::numeric_limits<std::int64_t>::min();
+  const auto highest = std::numeric_limits<std::int64_t>::max();
+  SegmentBuilder builder(FiveKeyframes());
+  for (const std::int64_t t : {lowest, lowest + 1, highest - 1, highest}) {
+    EXPECT_TRUE(builder.AddImu({t}));
+    KeyframeState state;
+    state.t_ns = t;
+    EXPECT_TRUE(builder.AddKeyframe(state, {}));
+  }
+  builder.Flush(2);
+  EXPECT_EQ(builder.statistics().segments, 1u);
+  EXPECT_EQ(builder.statistics().keyframes_dropped, 2u);
+}
+
+}  // namespace
+}  // namespace selfcal::client
