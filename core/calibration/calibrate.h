@@ -41,9 +41,9 @@ using ProgressCallback = std::function<bool(const CalibrateProgress&)>;
 
 enum class CalibrateStatus {
   kConverged,
-  kNotConverged,    // max_iterations
+  kNotConverged,  // max_iterations
   kCancelled,
-  kFailed,          // the solver could not use the problem; see message
+  kFailed,  // the solver could not use the problem; see message
 };
 
 struct CalibrationResult {
@@ -66,9 +66,9 @@ struct CalibrationResult {
   int segments = 0;
   int partitions = 0;
   int keyframes = 0;
-  int landmarks = 0;          // variables, split ones counted each
+  int landmarks = 0;  // variables, split ones counted each
   int landmarks_dropped = 0;
-  int observations = 0;       // used
+  int observations = 0;  // used
   int observations_dropped = 0;
 };
 

@@ -1,0 +1,273 @@
+#include "core/calibration/calibrate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "core/calibration/partition.h"
+#include "core/calibration/problem.h"
+#include "core/calibration/screening.h"
+#include "core/calibration/solver.h"
+#include "core/calibration/subspace.h"
+#include "core/calibration/theta_information.h"
+
+namespace selfcal {
+namespace {
+
+// Bounds the rounds; they end by convergence after two to four as a rule.
+constexpr int kMaxRounds = 12;
+// The first round only has to come near enough to tell outliers.
+constexpr double kFirstTolerance = 1e-4;
+constexpr double kTolerance = 1e-9;
+// Largest undamped Gauss-Newton step of theta at convergence, in sigmas.
+constexpr double kMaxStepSigmas = 0.05;
+// Largest change of theta by a round at convergence, in sigmas.
+constexpr double kMaxRoundSigmas = 0.02;
+
+std::string CheckInput(const Rig& rig,
+                       const Calibration& theta_start,
+                       const std::vector<const MotionSegment*>& sorted) {
+  if (sorted.empty()) {
+    return "no segments to calibrate on";
+  }
+  if (!SameShape(rig.factory, theta_start)) {
+    return "the calibration to start from has other cameras than the rig";
+  }
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    if (sorted[i - 1]->key == sorted[i]->key) {
+      return "segment " + sorted[i]->key.session + "/" +
+             std::to_string(sorted[i]->key.index) + " is given twice";
+    }
+  }
+  return "";
+}
+
+// One calibration from start to end. Each round decides, from the present
+// estimate alone, which landmarks and observations to use and how the inertial
+// factors are whitened, then solves that problem; the rounds end when one no
+// longer moves theta. The end is thus a fixed point that does not remember the
+// way to it.
+class Calibrator {
+ public:
+  Calibrator(const Rig& rig,
+             const Calibration& theta_start,
+             const std::vector<const MotionSegment*>& segments,
+             const CalibrateOptions& options,
+             const ProgressCallback& progress)
+      : rig_(rig),
+        options_(options),
+        progress_(progress),
+        partitioning_(PartitionSegments(segments, options.merge_landmarks)),
+        problem_(FlattenSegments(rig, segments, partitioning_)),
+        // A prior is centred where d = 0.
+        reference_(options.use_prior ? rig.factory : theta_start),
+        start_d_(BoxMinus(theta_start, reference_)),
+        estimate_{start_d_, problem_.keyframes},
+        subspace_(WholeSubspace(rig)) {
+    result_.segments = static_cast<int>(segments.size());
+    result_.partitions = static_cast<int>(partitioning_.partitions.size());
+    result_.keyframes = static_cast<int>(problem_.keyframes.size());
+  }
+
+  CalibrationResult Run() {
+    Screen();
+    const ReprojectionStatistics before = Measure();
+    result_.reprojection_rms_before_px = before.rms_px;
+    result_.reprojection_median_before_px = before.median_px;
+    // At a start far from the optimum all residuals are large: what can be
+    // observed is judged without the weights that they would get.
+    if (!Inform(/*robust_weights=*/false)) {
+      return Fail("the states of the keyframes are not determined");
+    }
+    ChooseSubspace();
+    for (int round = 0; round < kMaxRounds; ++round) {
+      const Eigen::VectorXd d_before = estimate_.d;
+      const SolverOutcome outcome = Solve(round);
+      if (outcome.status == SolverStatus::kCancelled) {
+        result_.status = CalibrateStatus::kCancelled;
+        result_.message = "cancelled";
+        return std::move(result_);
+      }
+      if (outcome.status == SolverStatus::kFailed) {
+        return Fail(outcome.message);
+      }
+      if (!Inform(/*robust_weights=*/true)) {
+        return Fail("the states of the keyframes are not determined");
+      }
+      const double moved_sigmas =
+          LargestInSigmas(estimate_.d - d_before, covariance_d_);
+      const bool whole = ChooseSubspace();
+      if (round > 0 && whole && moved_sigmas < kMaxRoundSigmas &&
+          StepSigmas() < kMaxStepSigmas) {
+        result_.status = CalibrateStatus::kConverged;
+        break;
+      }
+      if (result_.iterations >= options_.max_iterations) {
+        break;
+      }
+      Screen();
+    }
+    return Finish();
+  }
+
+ private:
+  CalibrationResult Fail(const std::string& message) {
+    result_.status = CalibrateStatus::kFailed;
+    result_.message = message;
+    return std::move(result_);
+  }
+
+  Calibration Theta() const { return BoxPlus(reference_, estimate_.d); }
+
+  // Decides anew what the next round stands on.
+  void Screen() {
+    const Calibration theta = Theta();
+    screening_ =
+        ScreenLandmarks(rig_, theta, problem_, estimate_.keyframes, options_);
+    whitening_ =
+        WhitenInertialLinks(rig_, theta.imu, problem_, estimate_.keyframes);
+  }
+
+  ReprojectionStatistics Measure() const {
+    return MeasureReprojection(
+        rig_, Theta(), problem_, estimate_.keyframes, screening_.landmarks);
+  }
+
+  // Information and covariance of the offset d at the estimate. False if
+  // states are not determined.
+  bool Inform(bool robust_weights) {
+    const auto at_theta = LineariseTheta(rig_,
+                                         Theta(),
+                                         problem_,
+                                         estimate_.keyframes,
+                                         screening_.landmarks,
+                                         whitening_,
+                                         options_,
+                                         robust_weights);
+    if (!at_theta) {
+      return false;
+    }
+    information_ = ByOffset(*at_theta, ThetaByOffset(reference_, estimate_.d));
+    if (options_.use_prior) {
+      const Eigen::VectorXd sigmas = PriorSigmas(rig_);
+      for (const int i : FreeComponents(rig_)) {
+        const double prior = 1 / (sigmas(i) * sigmas(i));
+        information_.Lambda(i, i) += prior;
+        information_.eta(i) -= prior * estimate_.d(i);
+      }
+    }
+    covariance_d_ = SubspaceCovariance(rig_, subspace_, information_.Lambda);
+    return covariance_d_.allFinite();
+  }
+
+  // Holds what the data does not observe, at its start value. Returns whether
+  // the present subspace stays as large as it was.
+  bool ChooseSubspace() {
+    if (options_.use_prior) {
+      return true;
+    }
+    const auto held = static_cast<int>(subspace_.held.cols());
+    ThetaSubspace observed = ObservedSubspace(rig_, information_.Lambda, held);
+    const bool same = observed.held.cols() == held;
+    if (!same) {
+      subspace_ = std::move(observed);
+      estimate_.d =
+          start_d_ + ProjectOnSubspace(rig_, subspace_, estimate_.d - start_d_);
+      covariance_d_ = SubspaceCovariance(rig_, subspace_, information_.Lambda);
+    }
+    return same;
+  }
+
+  SolverOutcome Solve(int round_number) {
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    SolverRound round{.rig = rig_,
+                      .reference = reference_,
+                      .problem = problem_,
+                      .whitening = whitening_,
+                      .basis = basis,
+                      .options = options_};
+    round.max_iterations = options_.max_iterations - result_.iterations;
+    round.function_tolerance = round_number == 0 ? kFirstTolerance : kTolerance;
+    Eigen::VectorXd d_last = estimate_.d;
+    const auto report =
+        [&](int iteration, double cost, const Eigen::VectorXd& d) {
+          const double step = LargestInSigmas(d - d_last, covariance_d_);
+          d_last = d;
+          return !progress_ || progress_({result_.iterations + iteration,
+                                          options_.max_iterations,
+                                          cost,
+                                          step});
+        };
+    const SolverOutcome outcome =
+        SolveRound(round, report, &estimate_, &screening_.landmarks);
+    if (round_number == 0) {
+      result_.initial_cost = outcome.initial_cost;
+    }
+    result_.final_cost = outcome.final_cost;
+    result_.iterations += outcome.iterations;
+    return outcome;
+  }
+
+  double StepSigmas() const {
+    return LargestInSigmas(
+        SubspaceStep(rig_, subspace_, information_.Lambda, information_.eta),
+        covariance_d_);
+  }
+
+  CalibrationResult Finish() {
+    if (result_.status != CalibrateStatus::kConverged) {
+      result_.status = CalibrateStatus::kNotConverged;
+      result_.message = "the estimate still moves after " +
+                        std::to_string(result_.iterations) + " iterations";
+    }
+    result_.theta = Theta();
+    const Eigen::MatrixXd by_offset = ThetaByOffset(reference_, estimate_.d);
+    result_.covariance = by_offset * covariance_d_ * by_offset.transpose();
+    result_.rank = static_cast<int>(subspace_.estimated.cols());
+    result_.held_constant = subspace_.unobserved;
+    const ReprojectionStatistics after = Measure();
+    result_.reprojection_rms_after_px = after.rms_px;
+    result_.reprojection_median_after_px = after.median_px;
+    result_.landmarks = static_cast<int>(screening_.landmarks.size());
+    result_.landmarks_dropped = screening_.landmarks_dropped;
+    result_.observations = screening_.observations;
+    result_.observations_dropped = screening_.observations_dropped;
+    return std::move(result_);
+  }
+
+  const Rig& rig_;
+  const CalibrateOptions& options_;
+  const ProgressCallback& progress_;
+  Partitioning partitioning_;
+  CalibrationProblem problem_;
+  Calibration reference_;
+  Eigen::VectorXd start_d_;
+  CalibrationEstimate estimate_;
+  ThetaSubspace subspace_;
+  Screening screening_;
+  std::vector<InertialMatrix> whitening_;
+  SharedInformation information_;
+  Eigen::MatrixXd covariance_d_;
+  CalibrationResult result_;
+};
+
+}  // namespace
+
+CalibrationResult Calibrate(const Rig& rig,
+                            const Calibration& theta_start,
+                            const std::vector<MotionSegment>& segments,
+                            const CalibrateOptions& options,
+                            const ProgressCallback& progress) {
+  const std::vector<const MotionSegment*> sorted = SortByKey(segments);
+  const std::string problem = CheckInput(rig, theta_start, sorted);
+  if (!problem.empty()) {
+    CalibrationResult result;
+    result.message = problem;
+    result.theta = theta_start;
+    return result;
+  }
+  return Calibrator(rig, theta_start, sorted, options, progress).Run();
+}
+
+}  // namespace selfcal

@@ -1,0 +1,115 @@
+#include "core/calibration/problem.h"
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "core/factor/inertial.h"
+
+namespace selfcal {
+namespace {
+
+void AddInertialLinks(const MotionSegment& segment,
+                      int first_keyframe,
+                      std::vector<InertialLink>* links) {
+  for (std::size_t k = 1; k < segment.keyframes.size(); ++k) {
+    const int after = first_keyframe + static_cast<int>(k);
+    links->push_back({after - 1,
+                      after,
+                      SamplesBetween(segment.imu,
+                                     segment.keyframes[k - 1].t_ns,
+                                     segment.keyframes[k].t_ns)});
+  }
+}
+
+// Appends one track for each landmark of a partition, sorted by id.
+void AddTracks(const std::vector<const MotionSegment*>& segments,
+               const std::vector<int>& partition,
+               const std::vector<int>& first_keyframe,
+               std::vector<Track>* tracks) {
+  std::map<std::uint64_t, Track> by_id;
+  for (const int s : partition) {
+    for (const Observation& seen : segments[s]->observations) {
+      const std::uint64_t id = segments[s]->landmarks[seen.landmark].id;
+      Track& track = by_id[id];
+      track.id = id;
+      track.observations.push_back(
+          {first_keyframe[s] + seen.keyframe, seen.camera, seen.z_px});
+    }
+  }
+  for (auto& [id, track] : by_id) {
+    std::sort(track.observations.begin(),
+              track.observations.end(),
+              [](const TrackObservation& a, const TrackObservation& b) {
+                return std::tie(a.keyframe, a.camera) <
+                       std::tie(b.keyframe, b.camera);
+              });
+    tracks->push_back(std::move(track));
+  }
+}
+
+}  // namespace
+
+std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
+                                          std::int64_t t0_ns,
+                                          std::int64_t t1_ns) {
+  auto first = std::upper_bound(
+      imu.begin(), imu.end(), t0_ns, [](std::int64_t t, const ImuSample& s) {
+        return t < s.t_ns;
+      });
+  if (first != imu.begin()) {
+    --first;
+  }
+  auto last = std::lower_bound(
+      first, imu.end(), t1_ns, [](const ImuSample& s, std::int64_t t) {
+        return s.t_ns < t;
+      });
+  if (last != imu.end()) {
+    ++last;
+  }
+  return {first, last};
+}
+
+CalibrationProblem FlattenSegments(
+    const Rig& rig,
+    const std::vector<const MotionSegment*>& segments,
+    const Partitioning& partitioning) {
+  CalibrationProblem problem;
+  std::vector<int> first_keyframe;
+  std::vector<bool> starts_chain(segments.size(), true);
+  for (const MotionSegment* segment : segments) {
+    first_keyframe.push_back(static_cast<int>(problem.keyframes.size()));
+    AddInertialLinks(*segment, first_keyframe.back(), &problem.inertial_links);
+    problem.keyframes.insert(problem.keyframes.end(),
+                             segment->keyframes.begin(),
+                             segment->keyframes.end());
+  }
+  for (const SegmentJoint& joint : partitioning.joints) {
+    const int after = first_keyframe[joint.after];
+    problem.inertial_links.push_back(
+        {after - 1,
+         after,
+         SamplesBetween(segments[joint.before]->imu,
+                        problem.keyframes[after - 1].t_ns,
+                        problem.keyframes[after].t_ns)});
+    starts_chain[joint.after] = false;
+  }
+  for (const SegmentGap& gap : partitioning.gaps) {
+    const int after = first_keyframe[gap.after];
+    problem.bias_links.push_back(
+        {after - 1, after, BiasWalkSigmas(rig.imu_noise, gap.dt_s)});
+  }
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    if (starts_chain[s]) {
+      problem.chain_starts.push_back(first_keyframe[s]);
+    }
+  }
+  for (const std::vector<int>& partition : partitioning.partitions) {
+    problem.gauge_keyframes.push_back(first_keyframe[partition.front()]);
+    AddTracks(segments, partition, first_keyframe, &problem.tracks);
+  }
+  return problem;
+}
+
+}  // namespace selfcal

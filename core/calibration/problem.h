@@ -1,0 +1,73 @@
+// Variables and factors of a calibration, flattened out of its segments: what
+// the solver, the landmarks and the covariance all work on.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/calibration/partition.h"
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+// Keyframes are named by their index into CalibrationProblem::keyframes.
+struct TrackObservation {
+  int keyframe = 0;
+  int camera = 0;
+  Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
+};
+
+// One landmark as one partition sees it. A landmark seen in several partitions
+// is a track, and later a variable, for each.
+struct Track {
+  std::uint64_t id = 0;
+  std::vector<TrackObservation> observations;  // by (keyframe, camera)
+};
+
+// The IMU samples that cover the time between two keyframes.
+struct InertialLink {
+  int before = 0;
+  int after = 0;
+  std::span<const ImuSample> samples;  // of the segment, which must outlive it
+};
+
+// Two keyframes of one session between which others were removed.
+struct BiasLink {
+  int before = 0;
+  int after = 0;
+  Eigen::Matrix<double, 6, 1> sigmas;  // BiasWalkSigmas
+};
+
+struct CalibrationProblem {
+  std::vector<KeyframeState> keyframes;  // as the SLAM system estimated them
+  // First keyframe of each partition: carries the gauge.
+  std::vector<int> gauge_keyframes;
+  // First keyframe of each chain of inertial links.
+  std::vector<int> chain_starts;
+  std::vector<InertialLink> inertial_links;
+  std::vector<BiasLink> bias_links;
+  std::vector<Track> tracks;  // by (partition, id)
+};
+
+// The samples from the last at or before t0_ns to the first at or after t1_ns.
+std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
+                                          std::int64_t t0_ns,
+                                          std::int64_t t1_ns);
+
+// Segments as SortByKey gives them. They must outlive the result.
+CalibrationProblem FlattenSegments(
+    const Rig& rig,
+    const std::vector<const MotionSegment*>& segments,
+    const Partitioning& partitioning);
+
+// theta = reference [+] d, and the states of all keyframes.
+struct CalibrationEstimate {
+  Eigen::VectorXd d;
+  std::vector<KeyframeState> keyframes;
+};
+
+}  // namespace selfcal

@@ -1,0 +1,59 @@
+// Which landmarks and observations a round of the calibration stands on.
+//
+// Decided anew at every estimate, as a function of that estimate only: what was
+// dropped before may come back, and two ways to one optimum end with the same
+// set. Pure, any thread.
+#pragma once
+
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/calibration/problem.h"
+#include "core/calibration/triangulate.h"
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+// With two observations an error along the epipolar line cannot be seen.
+inline constexpr int kMinTrackObservations = 3;
+// In robust standard deviations, from the median of all residuals; never less
+// than so many times the pixel sigma of the rig.
+inline constexpr double kOutlierGate = 5.0;
+// A landmark of which more than this is outlying is no landmark.
+inline constexpr double kMaxOutlierFraction = 0.5;
+// Largest standard deviation of the inverse depth, in parts of itself.
+inline constexpr double kMaxDepthUncertainty = 0.5;
+
+struct ScreenedLandmark {
+  int track = 0;  // index into CalibrationProblem::tracks
+  LandmarkPlace place;
+  std::vector<int> used;  // indices into the track's observations
+};
+
+struct Screening {
+  std::vector<ScreenedLandmark> landmarks;
+  int landmarks_dropped = 0;
+  int observations = 0;  // used
+  int observations_dropped = 0;
+};
+
+struct ReprojectionStatistics {
+  double rms_px = 0;     // of the residual norms of what is used
+  double median_px = 0;  // of all observations of these tracks that project
+};
+
+Screening ScreenLandmarks(const Rig& rig,
+                          const Calibration& theta,
+                          const CalibrationProblem& problem,
+                          const std::vector<KeyframeState>& keyframes,
+                          const CalibrateOptions& options);
+
+ReprojectionStatistics MeasureReprojection(
+    const Rig& rig,
+    const Calibration& theta,
+    const CalibrationProblem& problem,
+    const std::vector<KeyframeState>& keyframes,
+    const std::vector<ScreenedLandmark>& landmarks);
+
+}  // namespace selfcal

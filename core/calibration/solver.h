@@ -1,0 +1,53 @@
+// One round of a calibration: Levenberg-Marquardt by Ceres on a fixed set of
+// landmarks and observations, with fixed whitening.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/calibration/problem.h"
+#include "core/calibration/screening.h"
+#include "core/factor/inertial.h"
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+struct SolverRound {
+  const Rig& rig;
+  const Calibration& reference;  // theta = reference [+] d
+  const CalibrationProblem& problem;
+  const std::vector<InertialMatrix>& whitening;
+  // D x r: the directions in which d may move (SubspaceManifold).
+  const Eigen::MatrixXd& basis;
+  const CalibrateOptions& options;
+  int max_iterations = 100;
+  double function_tolerance = 1e-9;
+};
+
+enum class SolverStatus { kConverged, kNotConverged, kCancelled, kFailed };
+
+struct SolverOutcome {
+  SolverStatus status = SolverStatus::kFailed;
+  std::string message;  // of Ceres, when it failed
+  int iterations = 0;
+  double initial_cost = 0;
+  double final_cost = 0;
+};
+
+// Called after each iteration with its number, the cost, and the present d;
+// false cancels.
+using SolverCallback =
+    std::function<bool(int iteration, double cost, const Eigen::VectorXd& d)>;
+
+// Improves the estimate and the places of the landmarks. When it fails or is
+// cancelled, both are as good as the last accepted step left them.
+SolverOutcome SolveRound(const SolverRound& round,
+                         const SolverCallback& callback,
+                         CalibrationEstimate* estimate,
+                         std::vector<ScreenedLandmark>* landmarks);
+
+}  // namespace selfcal

@@ -1,0 +1,149 @@
+#include "core/calibration/sparse_elimination.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+
+namespace selfcal {
+namespace {
+
+using Triplets = std::vector<Eigen::Triplet<double>>;
+
+// Appends a block of the lower triangle; the upper half of a block on the
+// diagonal is left out.
+template <class Block>
+void AppendLower(const Block& block, int row, int column, Triplets* triplets) {
+  for (int i = 0; i < block.rows(); ++i) {
+    for (int j = 0; j < block.cols(); ++j) {
+      if (row + i >= column + j) {
+        triplets->emplace_back(row + i, column + j, block(i, j));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+SparseElimination::SparseElimination(int keyframes, int shared_size)
+    : keyframes_(keyframes),
+      shared_size_(shared_size),
+      keyframe_shared_(
+          Eigen::MatrixXd::Zero(keyframes * kChainStateSize, shared_size + 1)),
+      shared_(Eigen::MatrixXd::Zero(shared_size + 1, shared_size + 1)) {
+  for (int k = 0; k < keyframes; ++k) {
+    states_[{k, k}].setZero();
+  }
+}
+
+void SparseElimination::AddPrior(int keyframe,
+                                 const ChainStateMatrix& information) {
+  states_[{keyframe, keyframe}] += information;
+}
+
+void SparseElimination::AddLink(int before, int after, const LinkRows& rows) {
+  states_[{before, before}] += rows.x0.transpose() * rows.x0;
+  states_[{after, after}] += rows.x1.transpose() * rows.x1;
+  const auto [link, created] =
+      states_.try_emplace({before, after}, ChainStateMatrix::Zero());
+  link->second += rows.x0.transpose() * rows.x1;
+
+  const auto columns = static_cast<int>(rows.shared.cols());
+  for (const int end : {before, after}) {
+    const ChainStateMatrix& x = end == before ? rows.x0 : rows.x1;
+    auto to =
+        keyframe_shared_.middleRows<kChainStateSize>(end * kChainStateSize);
+    to.middleCols(rows.shared_offset, columns) += x.transpose() * rows.shared;
+    to.col(shared_size_) -= x.transpose() * rows.residual;
+  }
+  shared_.block(rows.shared_offset, rows.shared_offset, columns, columns) +=
+      rows.shared.transpose() * rows.shared;
+  shared_.row(shared_size_).segment(rows.shared_offset, columns) -=
+      rows.residual.transpose() * rows.shared;
+}
+
+void SparseElimination::AddLandmark(std::span<const LandmarkRows> rows) {
+  using ByLandmark = Eigen::Matrix<double, kChainPoseSize, 3>;
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::MatrixX3d by_shared = Eigen::MatrixX3d::Zero(shared_size_ + 1, 3);
+  std::vector<std::pair<int, ByLandmark>> by_pose;
+  for (const LandmarkRows& row : rows) {
+    const auto columns = static_cast<int>(row.shared.cols());
+    H += row.landmark.transpose() * row.landmark;
+    by_shared.middleRows(row.shared_offset, columns) +=
+        row.shared.transpose() * row.landmark;
+    by_shared.row(shared_size_) -= row.residual.transpose() * row.landmark;
+    if (by_pose.empty() || by_pose.back().first != row.keyframe) {
+      by_pose.emplace_back(row.keyframe, ByLandmark::Zero());
+    }
+    by_pose.back().second += row.pose.transpose() * row.landmark;
+
+    poses_.try_emplace({row.keyframe, row.keyframe}, PoseBlock::Zero())
+        .first->second += row.pose.transpose() * row.pose;
+    auto to = keyframe_shared_.middleRows<kChainPoseSize>(row.keyframe *
+                                                          kChainStateSize);
+    to.middleCols(row.shared_offset, columns) +=
+        row.pose.transpose() * row.shared;
+    to.col(shared_size_) -= row.pose.transpose() * row.residual;
+    shared_.block(row.shared_offset, row.shared_offset, columns, columns) +=
+        row.shared.transpose() * row.shared;
+    shared_.row(shared_size_).segment(row.shared_offset, columns) -=
+        row.residual.transpose() * row.shared;
+  }
+
+  const Eigen::LLT<Eigen::Matrix3d> llt(H);
+  const auto upper = llt.matrixU();
+  // X <- X U^-1, so that X X^T is what the landmark takes with it.
+  upper.solveInPlace<Eigen::OnTheRight>(by_shared);
+  for (auto& [keyframe, block] : by_pose) {
+    upper.solveInPlace<Eigen::OnTheRight>(block);
+  }
+  shared_.noalias() -= by_shared * by_shared.transpose();
+  for (std::size_t i = 0; i < by_pose.size(); ++i) {
+    const auto& [k, block] = by_pose[i];
+    keyframe_shared_.middleRows<kChainPoseSize>(k * kChainStateSize)
+        .noalias() -= block * by_shared.transpose();
+    for (std::size_t j = i; j < by_pose.size(); ++j) {
+      const auto& [l, other] = by_pose[j];
+      poses_.try_emplace({k, l}, PoseBlock::Zero()).first->second.noalias() -=
+          block * other.transpose();
+    }
+  }
+}
+
+std::optional<SharedInformation> SparseElimination::Eliminate() const {
+  Triplets triplets;
+  for (const auto& [pair, block] : states_) {
+    AppendLower(block.transpose(),
+                pair.second * kChainStateSize,
+                pair.first * kChainStateSize,
+                &triplets);
+  }
+  for (const auto& [pair, block] : poses_) {
+    AppendLower(block.transpose(),
+                pair.second * kChainStateSize,
+                pair.first * kChainStateSize,
+                &triplets);
+  }
+  const int size = keyframes_ * kChainStateSize;
+  Eigen::SparseMatrix<double> H(size, size);
+  H.setFromTriplets(triplets.begin(), triplets.end());
+
+  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt(H);
+  if (llt.info() != Eigen::Success) {
+    return std::nullopt;
+  }
+  const Eigen::MatrixXd half =
+      llt.matrixL().solve(llt.permutationP() * keyframe_shared_);
+  Eigen::MatrixXd left = shared_;
+  left.triangularView<Eigen::Lower>() -= half.transpose() * half;
+  if (!left.allFinite()) {
+    return std::nullopt;
+  }
+  SharedInformation result;
+  result.Lambda = left.topLeftCorner(shared_size_, shared_size_)
+                      .selfadjointView<Eigen::Lower>();
+  result.eta = left.row(shared_size_).head(shared_size_).transpose();
+  return result;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,54 @@
+// What a whole calibration problem says about theta at one estimate: all
+// factors linearised and whitened, everything but theta eliminated.
+//
+// From it follow the covariance of theta, what the data cannot observe, and the
+// undamped Gauss-Newton step that tells whether the solver is done. Pure.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/calibration/problem.h"
+#include "core/calibration/screening.h"
+#include "core/elimination/chain_elimination.h"
+#include "core/factor/inertial.h"
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+// Square root information of every inertial link, in their order, at the given
+// estimate. It stays fixed while the estimate moves, within one round.
+std::vector<InertialMatrix> WhitenInertialLinks(
+    const Rig& rig,
+    const ImuCalibration& imu,
+    const CalibrationProblem& problem,
+    const std::vector<KeyframeState>& keyframes);
+
+// Lambda and eta in the tangent at theta, prior on theta not included. Robust
+// weights are applied as in iteratively reweighted least squares, if asked for:
+// for the Huber loss on normal residuals, the inverse of Lambda is then the
+// covariance of the estimate to 1 %. The weak priors of the score keep states
+// proper that nothing determines. Nothing if that still does not suffice.
+std::optional<SharedInformation> LineariseTheta(
+    const Rig& rig,
+    const Calibration& theta,
+    const CalibrationProblem& problem,
+    const std::vector<KeyframeState>& keyframes,
+    const std::vector<ScreenedLandmark>& landmarks,
+    const std::vector<InertialMatrix>& whitening,
+    const CalibrateOptions& options,
+    bool robust_weights);
+
+// The same information by the offset d from a reference (theta = reference [+]
+// d), in which the solver works.
+SharedInformation ByOffset(const SharedInformation& at_theta,
+                           const Eigen::MatrixXd& theta_by_offset);
+
+// The derivative of (reference [+] d) [-] theta by d, at theta = reference [+]
+// d: the identity but for the right Jacobians of rotations.
+Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
+                              const Eigen::VectorXd& d);
+
+}  // namespace selfcal
