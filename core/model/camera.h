@@ -47,9 +47,7 @@ struct CameraCalibration {
   int height_px = 0;
 
   // f, c and the distortion: the number of columns of d z / d intrinsics.
-  int IntrinsicsSize() const {
-    return 4 + static_cast<int>(distortion.size());
-  }
+  int IntrinsicsSize() const { return 4 + static_cast<int>(distortion.size()); }
 };
 
 // Derivatives of the pixel, in px per unit of the argument.
@@ -60,17 +58,18 @@ struct ProjectionJacobians {
 };
 
 // Projects p_C to the pixel *z_px, and fills *jacobians unless it is null.
-// Returns false, leaving both untouched, for a point at or behind the camera
-// plane, or outside the region in which the model is one-to-one. Does not look
-// at the borders of the image.
+// Returns false, leaving both untouched, for a point behind the camera plane or
+// within 1e-6 rad of it, for one outside the region in which the model is
+// one-to-one, and for points or parameters that are not finite or beyond
+// anything physical. Does not look at the borders of the image.
 bool Project(const CameraCalibration& camera,
              const Eigen::Vector3d& p_C,
              Eigen::Vector2d* z_px,
              ProjectionJacobians* jacobians);
 
-// The unit bearing in C of a pixel: the inverse of Project up to scale.
-// Returns false, leaving *bearing_C untouched, for a pixel that no point
-// projects to.
+// The unit bearing in C of a pixel: the inverse of Project up to scale, in
+// closed form for kFov, by a guarded Newton iteration for the others. Returns
+// false, leaving *bearing_C untouched, for a pixel that no point projects to.
 bool Unproject(const CameraCalibration& camera,
                const Eigen::Vector2d& z_px,
                Eigen::Vector3d* bearing_C);

@@ -58,8 +58,9 @@ struct Rig {
 };
 
 // Indices of the tangent components that match at least one pattern, sorted.
-std::vector<int> MatchComponents(const std::vector<TangentComponent>& components,
-                                 const std::vector<std::string>& patterns);
+std::vector<int> MatchComponents(
+    const std::vector<TangentComponent>& components,
+    const std::vector<std::string>& patterns);
 
 // Components of a group of this rig, sorted, without those held fixed.
 std::vector<int> GroupComponents(const Rig& rig, const ParameterGroup& group);
@@ -75,10 +76,13 @@ Eigen::VectorXd ReferenceSigmas(const Rig& rig);
 
 // Every violation: id, positive and finite numbers, unit quaternions, at least
 // one camera, image sizes, distortion in range, groups that match nothing or
-// share a name, patterns that match nothing, everything fixed.
+// share a name, patterns that match nothing, everything fixed. Names of groups
+// follow the rules of the id, and a group keeps at least one component that is
+// not fixed. Paths of the calibration begin with "factory".
 std::vector<Violation> Validate(const Rig& rig);
 
-// The same rules for a calibration alone; paths begin with `prefix`.
+// The same rules for a calibration alone; paths begin with `prefix` and a dot,
+// unless it is empty.
 std::vector<Violation> Validate(const Calibration& theta,
                                 const std::string& prefix);
 

@@ -43,7 +43,7 @@ struct ImuSample {
 };
 
 struct Landmark {
-  std::uint64_t id = 0;  // unique within a session
+  std::uint64_t id = 0;                           // unique within a session
   Eigen::Vector3d p_G = Eigen::Vector3d::Zero();  // [m]
 };
 
@@ -57,7 +57,7 @@ struct Observation {
 
 // Identity of a segment within a rig: the same key is the same segment.
 struct SegmentKey {
-  std::string session;
+  std::string session;     // 1 to 128 printable ASCII characters
   std::int64_t index = 0;  // counts the segments of the session from 0
 
   friend bool operator==(const SegmentKey&, const SegmentKey&) = default;
@@ -93,14 +93,15 @@ struct SegmentLimits {
   int max_landmarks = 200'000;
   int max_observations = 2'000'000;
   double quaternion_norm_tolerance = 1e-6;
-  double max_imu_gap_s = 0.5;       // between neighbouring samples
-  double max_keyframe_gap_s = 10;   // between neighbouring keyframes
-  double max_position_m = 1e6;      // keyframes and landmarks, from the origin
+  double max_imu_gap_s = 0.5;      // between neighbouring samples
+  double max_keyframe_gap_s = 10;  // between neighbouring keyframes
+  double max_position_m = 1e6;     // keyframes and landmarks, from the origin
   double max_speed_mps = 1e3;
-  double max_gyro_radps = 1e3;
+  double max_gyro_radps = 1e3;  // readings and biases
   double max_accel_mps2 = 1e4;
-  double pixel_margin_px = 1;       // outside the image
-  int max_violations = 100;         // the list is cut there, and says so
+  double pixel_margin_px = 1;  // outside the image
+  int max_violations = 100;    // the list is cut there; one more entry,
+                               // without a field, says so
 };
 
 struct Calibration;  // core/model/calibration.h
@@ -108,7 +109,10 @@ struct Calibration;  // core/model/calibration.h
 // Every violation of the rules above, in the order of the fields; empty means
 // that all other rooms can use the segment without looking again. `theta` tells
 // the number of cameras and the size of their images. Checks finiteness,
-// times, unit quaternions, indices, duplicates, cover by IMU samples, counts.
+// times, unit quaternions, indices, duplicates, cover by IMU samples, counts;
+// a list with too many elements is refused without looking at them. Samples may
+// reach at most max_keyframe_gap_s beyond the last keyframe, and times lie
+// within 4e18 ns of zero, so that their differences do not overflow.
 std::vector<Violation> Validate(const MotionSegment& segment,
                                 const Calibration& theta,
                                 const SegmentLimits& limits = {});

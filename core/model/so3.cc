@@ -5,8 +5,8 @@
 namespace selfcal {
 namespace {
 
-// Below this angle [rad] the first terms of a series are exact to rounding,
-// and above it the closed forms lose nothing that matters.
+// Below this angle [rad] the first terms of a series are exact to rounding (the
+// next one counts 1e-16 or less), and above it the closed forms lose nothing.
 constexpr double kSeriesAngle = 1e-2;
 
 // At a rotation by exactly pi both signs of q are equally short: take the one
@@ -31,8 +31,8 @@ Eigen::Quaterniond Exp(const Eigen::Vector3d& phi) {
   double cosine;
   double sine_by_angle;  // sin(angle / 2) / angle
   if (angle2 < kSeriesAngle * kSeriesAngle) {
-    cosine = 1 - angle2 / 8 * (1 - angle2 / 48 * (1 - angle2 / 120));
-    sine_by_angle = 0.5 - angle2 / 48 * (1 - angle2 / 80 * (1 - angle2 / 168));
+    cosine = 1 - angle2 / 8 * (1 - angle2 / 48);
+    sine_by_angle = 0.5 - angle2 / 48 * (1 - angle2 / 80);
   } else {
     const double angle = std::sqrt(angle2);
     cosine = std::cos(angle / 2);
@@ -53,8 +53,7 @@ Eigen::Vector3d Log(const Eigen::Quaterniond& q) {
   // near pi, the arc cosine near zero.
   if (n > kSeriesAngle * w) return 2 * std::atan2(n, w) / n * v;
   const double t2 = n * n / (w * w);  // tan^2(angle / 2)
-  return 2 / w *
-         (1 - t2 * (1.0 / 3 - t2 * (1.0 / 5 - t2 * (1.0 / 7 - t2 / 9)))) * v;
+  return 2 / w * (1 - t2 * (1.0 / 3 - t2 * (1.0 / 5 - t2 / 7))) * v;
 }
 
 Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& phi) {
@@ -62,8 +61,8 @@ Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& phi) {
   double a;  // (1 - cos) / angle^2
   double b;  // (angle - sin) / angle^3
   if (angle2 < kSeriesAngle * kSeriesAngle) {
-    a = 0.5 - angle2 / 24 * (1 - angle2 / 30 * (1 - angle2 / 56));
-    b = 1.0 / 6 - angle2 / 120 * (1 - angle2 / 42 * (1 - angle2 / 72));
+    a = 0.5 - angle2 / 24 * (1 - angle2 / 30);
+    b = 1.0 / 6 - angle2 / 120 * (1 - angle2 / 42);
   } else {
     const double angle = std::sqrt(angle2);
     const double half_sine = std::sin(angle / 2);
@@ -78,7 +77,7 @@ Eigen::Matrix3d RightJacobianInverse(const Eigen::Vector3d& phi) {
   const double angle2 = phi.squaredNorm();
   double c;  // (1 - angle / 2 cot(angle / 2)) / angle^2
   if (angle2 < kSeriesAngle * kSeriesAngle) {
-    c = 1.0 / 12 + angle2 / 720 * (1 + angle2 / 42 * (1 + angle2 / 40));
+    c = 1.0 / 12 + angle2 / 720 * (1 + angle2 / 42);
   } else {
     // With the half angle nothing is singular before 2 pi.
     const double half = std::sqrt(angle2) / 2;

@@ -1,0 +1,201 @@
+#include "core/model/calibration.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <string>
+
+#include "core/model/so3.h"
+#include "test/core/model/random_values.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kTrials = 1000;
+
+TEST(ImuCalibration, MatricesAreUpperTriangularAsDocumented) {
+  ImuCalibration imu;
+  imu.s_g = {1, 2, 3};
+  imu.m_g = {4, 5, 6};
+  imu.s_a = {7, 8, 9};
+  imu.m_a = {10, 11, 12};
+  Eigen::Matrix3d T_g;
+  T_g << 1, 4, 5, 0, 2, 6, 0, 0, 3;
+  Eigen::Matrix3d T_a;
+  T_a << 7, 10, 11, 0, 8, 12, 0, 0, 9;
+  EXPECT_EQ(imu.T_g(), T_g);
+  EXPECT_EQ(imu.T_a(), T_a);
+}
+
+TEST(Calibration, TangentSizesAddUp) {
+  RandomValues random(1);
+  const Calibration theta = random.Theta();
+  EXPECT_EQ(CameraTangentSize(theta.cameras[0]), 11);
+  EXPECT_EQ(CameraTangentSize(theta.cameras[1]), 14);
+  EXPECT_EQ(CameraTangentSize(theta.cameras[2]), 14);
+  EXPECT_EQ(CameraTangentOffset(theta, 0), 15);
+  EXPECT_EQ(CameraTangentOffset(theta, 1), 26);
+  EXPECT_EQ(CameraTangentOffset(theta, 2), 40);
+  EXPECT_EQ(TangentSize(theta), 54);
+}
+
+TEST(Calibration, BoxPlusOfZeroChangesNothing) {
+  RandomValues random(2);
+  const Calibration theta = random.Theta();
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(TangentSize(theta));
+  EXPECT_LT(BoxMinus(BoxPlus(theta, zero), theta).norm(), 1e-15);
+  EXPECT_LT(BoxMinus(theta, theta).norm(), 1e-15);
+}
+
+TEST(Calibration, BoxMinusInvertsBoxPlus) {
+  RandomValues random(3);
+  for (int i = 0; i < kTrials; ++i) {
+    const Calibration theta = random.Theta();
+    // Rotations by up to sqrt(3) 1.8 < pi.
+    const Eigen::VectorXd delta = random.Vector(TangentSize(theta), 1.8);
+    const Calibration moved = BoxPlus(theta, delta);
+    EXPECT_LT((BoxMinus(moved, theta) - delta).norm(), 1e-12);
+  }
+}
+
+TEST(Calibration, BoxPlusInvertsBoxMinus) {
+  RandomValues random(4);
+  for (int i = 0; i < kTrials; ++i) {
+    const Calibration a = random.Theta();
+    const Calibration b = random.Theta();
+    const Calibration again = BoxPlus(b, BoxMinus(a, b));
+    EXPECT_LT(BoxMinus(again, a).norm(), 1e-12);
+  }
+}
+
+TEST(Calibration, BoxPlusTurnsRotationsOnTheRightAndAddsTheRest) {
+  RandomValues random(5);
+  const Calibration theta = random.Theta();
+  const Eigen::VectorXd delta = random.Vector(TangentSize(theta), 0.5);
+  const Calibration moved = BoxPlus(theta, delta);
+  EXPECT_LT((moved.imu.s_g - theta.imu.s_g - delta.segment<3>(0)).norm(),
+            1e-15);
+  EXPECT_LT((moved.imu.m_g - theta.imu.m_g - delta.segment<3>(3)).norm(),
+            1e-15);
+  EXPECT_LT((moved.imu.s_a - theta.imu.s_a - delta.segment<3>(6)).norm(),
+            1e-15);
+  EXPECT_LT((moved.imu.m_a - theta.imu.m_a - delta.segment<3>(9)).norm(),
+            1e-15);
+  EXPECT_LT(moved.imu.q_AI.angularDistance(theta.imu.q_AI *
+                                           Exp(delta.segment<3>(12))),
+            1e-15);
+  const CameraCalibration& from = theta.cameras[1];
+  const CameraCalibration& to = moved.cameras[1];
+  EXPECT_LT(to.q_CI.angularDistance(from.q_CI * Exp(delta.segment<3>(26))),
+            1e-15);
+  EXPECT_LT((to.p_CI - from.p_CI - delta.segment<3>(29)).norm(), 1e-15);
+  EXPECT_LT((to.f - from.f - delta.segment<2>(32)).norm(), 1e-12);
+  EXPECT_LT((to.c - from.c - delta.segment<2>(34)).norm(), 1e-12);
+  EXPECT_LT((to.distortion - from.distortion - delta.segment<4>(36)).norm(),
+            1e-15);
+  EXPECT_EQ(to.width_px, from.width_px);
+  EXPECT_EQ(to.height_px, from.height_px);
+}
+
+TEST(Calibration, RotationsStayUnitAfterManySteps) {
+  RandomValues random(6);
+  Calibration theta = random.Theta();
+  for (int i = 0; i < 10000; ++i) {
+    theta = BoxPlus(theta, random.Vector(TangentSize(theta), 0.1));
+  }
+  EXPECT_NEAR(theta.imu.q_AI.norm(), 1, 1e-15);
+  EXPECT_NEAR(theta.cameras[0].q_CI.norm(), 1, 1e-15);
+}
+
+TEST(Calibration, ShapeIsTheNumberOfCamerasAndTheirModels) {
+  RandomValues random(7);
+  const Calibration theta = random.Theta();
+  EXPECT_TRUE(SameShape(theta, random.Theta()));
+  Calibration fewer = theta;
+  fewer.cameras.pop_back();
+  EXPECT_FALSE(SameShape(theta, fewer));
+  Calibration other = theta;
+  other.cameras[1] = random.Camera(DistortionModel::kEquidistant);
+  EXPECT_FALSE(SameShape(theta, other));
+}
+
+TEST(TangentComponents, AreAsManyAsTheTangentHasDimensions) {
+  RandomValues random(8);
+  const Calibration theta = random.Theta();
+  EXPECT_EQ(static_cast<int>(TangentComponents(theta).size()),
+            TangentSize(theta));
+}
+
+TEST(TangentComponents, NamesAreUnique) {
+  RandomValues random(9);
+  Calibration theta = random.Theta();
+  for (int j = 0; j < 10; ++j) theta.cameras.push_back(theta.cameras[j % 3]);
+  std::set<std::string> names;
+  for (const TangentComponent& component : TangentComponents(theta)) {
+    EXPECT_TRUE(names.insert(component.name).second) << component.name;
+  }
+}
+
+TEST(TangentComponents, StandAtTheOffsetsOfTheirBlocks) {
+  RandomValues random(10);
+  const Calibration theta = random.Theta();
+  const auto components = TangentComponents(theta);
+  const auto expect = [&](int i, const char* name, const char* unit) {
+    EXPECT_EQ(components[i].name, name);
+    EXPECT_EQ(components[i].unit, unit);
+  };
+  expect(kGyroScale, "imu.gyro.scale.x", "-");
+  expect(kGyroMisalignment + 1, "imu.gyro.misalignment.y", "-");
+  expect(kAccelScale + 2, "imu.accel.scale.z", "-");
+  expect(kAccelMisalignment, "imu.accel.misalignment.x", "-");
+  expect(kAccelRotation, "imu.q_AI.x", "rad");
+  const int cam0 = CameraTangentOffset(theta, 0);
+  expect(cam0 + kCameraRotation, "cam0.q_CI.x", "rad");
+  expect(cam0 + kCameraPosition + 2, "cam0.p_CI.z", "m");
+  expect(cam0 + kCameraIntrinsics, "cam0.focal.x", "px");
+  expect(cam0 + kCameraIntrinsics + 3, "cam0.principal.y", "px");
+  expect(cam0 + kCameraIntrinsics + 4, "cam0.distortion.w", "-");
+  const int cam1 = CameraTangentOffset(theta, 1);
+  expect(cam1 + kCameraIntrinsics + 4, "cam1.distortion.k1", "-");
+  expect(cam1 + kCameraIntrinsics + 7, "cam1.distortion.p2", "-");
+  const int cam2 = CameraTangentOffset(theta, 2);
+  expect(cam2 + kCameraIntrinsics + 7, "cam2.distortion.k4", "-");
+}
+
+TEST(TangentComponents, ReferenceSigmasAreEqualOnTheAxesOfABlock) {
+  RandomValues random(11);
+  const auto components = TangentComponents(random.Theta());
+  for (const TangentComponent& component : components) {
+    EXPECT_GT(component.sigma_ref, 0) << component.name;
+    const std::string block =
+        component.name.substr(0, component.name.rfind('.'));
+    for (const TangentComponent& other : components) {
+      // The coefficients of a distortion are no axes.
+      if (block.ends_with("distortion")) continue;
+      if (!other.name.starts_with(block + ".")) continue;
+      EXPECT_EQ(component.sigma_ref, other.sigma_ref) << component.name;
+    }
+  }
+}
+
+TEST(ReadableValues, AreTheNumbersAPersonWouldWrite) {
+  RandomValues random(12);
+  Calibration theta = random.Theta();
+  theta.imu.s_g = {1.01, 0.99, 1.02};
+  const Eigen::Vector3d phi(0.1, -0.2, 3.0);
+  theta.cameras[0].q_CI = Exp(phi);
+  theta.cameras[0].f = {255, 256};
+  theta.cameras[0].distortion[0] = 0.92;
+  const Eigen::VectorXd values = ReadableValues(theta);
+  ASSERT_EQ(values.size(), TangentSize(theta));
+  EXPECT_EQ(values.segment<3>(0), theta.imu.s_g);
+  EXPECT_LT((values.segment<3>(15) - phi).norm(), 1e-14);
+  EXPECT_EQ(values.segment<3>(18), theta.cameras[0].p_CI);
+  EXPECT_EQ(values[21], 255);
+  EXPECT_EQ(values[25], 0.92);
+}
+
+}  // namespace
+}  // namespace selfcal
