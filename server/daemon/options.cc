@@ -1,0 +1,52 @@
+#include "server/daemon/options.h"
+
+#include <CLI/CLI.hpp>
+
+namespace selfcal::server {
+namespace {
+
+constexpr int kUsageError = 2;
+constexpr int kMaxScoringThreads = 256;
+
+}  // namespace
+
+std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
+  CLI::App app(
+      "selfcald scores motion segments, keeps the most informative ones and "
+      "calibrates cameras and IMU on them.");
+  app.set_version_flag("--version", "selfcald " SELFCAL_VERSION);
+  app.set_config("--config", "", "Read options from a TOML file");
+  app.add_option("--state-dir",
+                 options->state_dir,
+                 "Folder of the database, the lock and the socket; created if "
+                 "it does not exist")
+      ->envname("STATE_DIRECTORY")
+      ->required();
+  app.add_option("--listen",
+                 options->listen,
+                 "Address, repeatable: unix:/path or host:port "
+                 "[unix:<state-dir>/selfcald.sock]. There is no "
+                 "authentication: do not listen on a network you do not trust");
+  app.add_option("--scoring-threads",
+                 options->scoring_threads,
+                 "Threads that score segments")
+      ->check(CLI::Range(1, kMaxScoringThreads))
+      ->capture_default_str();
+  app.add_option("--log-level", options->log_level, "What goes to stderr")
+      ->check(CLI::IsMember(
+          {"trace", "debug", "info", "warning", "error", "critical", "off"}))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kUsageError;
+  }
+  if (options->listen.empty()) {
+    const auto socket =
+        std::filesystem::absolute(options->state_dir) / "selfcald.sock";
+    options->listen.push_back("unix:" + socket.string());
+  }
+  return std::nullopt;
+}
+
+}  // namespace selfcal::server

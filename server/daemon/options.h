@@ -1,0 +1,22 @@
+// What selfcald is told at its start: flags, or a TOML file of the same names.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace selfcal::server {
+
+struct DaemonOptions {
+  std::filesystem::path state_dir;
+  std::vector<std::string> listen;  // "unix:/path" or "host:port"
+  int scoring_threads = 1;
+  std::string log_level = "info";
+};
+
+// Fills *options. Returns the exit code if the program ends here: 0 after
+// --help and --version, 2 after a mistake, which is explained on stderr.
+std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options);
+
+}  // namespace selfcal::server
