@@ -23,8 +23,8 @@ struct UnobservedDirection {
     std::string component;
     double weight;
   };
-  std::vector<Part> parts;    // largest first; at least 90 % of the square
-  double information_ratio;   // of the data against the prior, in [0, 1)
+  std::vector<Part> parts;   // largest first; at least 90 % of the square
+  double information_ratio;  // of the data against the prior, in [0, 1)
 };
 
 // The score of one group q of k components.
@@ -42,9 +42,9 @@ struct GroupScore {
 
 struct ResidualStatistics {
   int observations = 0;
-  int inliers = 0;         // used in the score
+  int inliers = 0;          // used in the score
   int not_projectable = 0;  // behind the camera or outside the model
-  int outliers = 0;        // beyond the gate
+  int outliers = 0;         // beyond the gate
   int landmarks = 0;
   int landmarks_used = 0;
   double reprojection_rms_px = 0;     // of the inliers
@@ -57,10 +57,10 @@ struct ResidualStatistics {
 };
 
 struct SegmentInformation {
-  Calibration theta0;       // linearisation point
-  Eigen::MatrixXd Lambda;   // D x D, of the data alone, prior not included
-  Eigen::VectorXd eta;      // D: Lambda (theta [-] theta0) = eta
-  int rank = 0;             // of the free components together
+  Calibration theta0;      // linearisation point
+  Eigen::MatrixXd Lambda;  // D x D, of the data alone, prior not included
+  Eigen::VectorXd eta;     // D: Lambda (theta [-] theta0) = eta
+  int rank = 0;            // of the free components together
   std::vector<UnobservedDirection> unobserved;
   std::vector<GroupScore> groups;  // in the order of rig.groups
   ResidualStatistics residuals;
