@@ -104,10 +104,10 @@ Waves DrawWaves(std::uint64_t seed) {
   struct Band {
     double low_hz, high_hz, accel_mps2, rate_radps;
   };
-  for (const Band& band : {Band{0.25, 0.5, 0.7, 0.35},
-                           Band{0.5, 0.9, 1.5, 0.7},
-                           Band{0.9, 1.4, 2.0, 0.7},
-                           Band{1.4, 2.0, 1.5, 0.4}}) {
+  for (const Band& band : {Band{0.25, 0.5, 0.7, 0.4},
+                           Band{0.5, 0.9, 1.5, 0.8},
+                           Band{0.9, 1.4, 2.0, 0.6},
+                           Band{1.4, 2.0, 1.5, 0.25}}) {
     waves.fast_p.Add(
         band.low_hz,
         band.high_hz,

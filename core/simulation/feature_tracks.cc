@@ -79,7 +79,7 @@ class Tracker {
       int landmark = -1;
       if (random_.Chance(options_.revisit_fraction)) landmark = Revisit(camera);
       if (landmark < 0) landmark = Create(camera);
-      if (landmark >= 0) Begin(landmark);
+      if (landmark >= 0) Begin(camera, landmark);
     }
   }
 
@@ -117,10 +117,13 @@ class Tracker {
     return static_cast<int>(tracks_.landmarks_G.size()) - 1;
   }
 
-  // Begins a track in every camera that sees the landmark.
-  void Begin(int landmark) {
+  // Begins a track in this camera, and in every other one that sees the
+  // landmark and has not got enough.
+  void Begin(int camera, int landmark) {
     for (int j = 0; j < cameras(); ++j) {
-      if (Observe(j, landmark)) {
+      const bool wants =
+          static_cast<int>(tracked_[j].size()) < options_.landmarks_in_view;
+      if ((j == camera || wants) && Observe(j, landmark)) {
         tracked_[j].push_back(landmark);
         ++trackers_[landmark];
       }

@@ -49,9 +49,9 @@ std::unique_ptr<Trajectory> MakeMixed(double duration_s, std::uint64_t seed);
 
 // A pose with its time, as in a line of a TUM file.
 struct TimedPose {
-  double t_s;
-  Eigen::Quaterniond q_GI;  // unit
-  Eigen::Vector3d p_GI;     // [m]
+  double t_s = 0;
+  Eigen::Quaterniond q_GI = Eigen::Quaterniond::Identity();  // unit
+  Eigen::Vector3d p_GI = Eigen::Vector3d::Zero();            // [m]
 };
 
 struct SplineOptions {

@@ -1,0 +1,189 @@
+#include "core/simulation/feature_tracks.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/simulation/imu_readings.h"
+#include "test/core/simulation/rigs.h"
+
+namespace selfcal {
+namespace {
+
+std::vector<KeyframeState> Keyframes(const Trajectory& trajectory) {
+  std::vector<KeyframeState> keyframes;
+  for (double t = 0; t < trajectory.duration_s(); t += 0.1) {
+    const BodyMotion motion = trajectory.At(t);
+    KeyframeState state;
+    state.q_GI = motion.q_GI;
+    state.p_GI = motion.p_GI;
+    keyframes.push_back(state);
+  }
+  return keyframes;
+}
+
+// Lengths of the stretches of neighbouring keyframes in which a camera sees a
+// landmark, and how many stretches each landmark has in camera 0.
+struct Lengths {
+  std::vector<int> lengths;
+  std::map<int, int> stretches;
+};
+
+Lengths TrackLengths(const FeatureTracks& tracks) {
+  Lengths result;
+  std::map<std::pair<int, int>, std::pair<int, int>> open;  // last, length
+  for (const FeatureObservation& z : tracks.observations) {
+    const std::pair<int, int> key(z.camera, z.landmark);
+    const auto it = open.find(key);
+    if (it != open.end() && it->second.first == z.keyframe - 1) {
+      it->second = {z.keyframe, it->second.second + 1};
+      continue;
+    }
+    if (it != open.end()) result.lengths.push_back(it->second.second);
+    open[key] = {z.keyframe, 1};
+    if (z.camera == 0) ++result.stretches[z.landmark];
+  }
+  for (const auto& [key, track] : open) {
+    result.lengths.push_back(track.second);
+  }
+  return result;
+}
+
+double Mean(const std::vector<int>& values) {
+  double sum = 0;
+  for (const int value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+TEST(FeatureTracksTest, WhereNothingLeavesTheImageLengthsAreGeometric) {
+  Rig rig = HandheldRig("a");
+  SimulationOptions options;
+  options.mean_track_length = 8;
+  options.noise = false;
+  const Lengths tracks = TrackLengths(
+      SimulateTracks(rig.factory, 0, Keyframes(*MakeRest(200)), options));
+  const auto n = static_cast<double>(tracks.lengths.size());
+  EXPECT_NEAR(Mean(tracks.lengths), 8, 5 * 8 / std::sqrt(n));
+  double ones = 0;
+  for (const int length : tracks.lengths) ones += length == 1;
+  EXPECT_NEAR(ones / n, 1.0 / 8, 5 * std::sqrt(0.11 / n));
+}
+
+TEST(FeatureTracksTest, MotionEndsTracksEarlier) {
+  const Rig rig = HandheldRig("a");
+  const Lengths tracks = TrackLengths(
+      SimulateTracks(rig.factory, 0.8, Keyframes(*MakeHandheld(60, 1, 1)), {}));
+  EXPECT_LT(Mean(tracks.lengths), 9.5);
+  EXPECT_GT(Mean(tracks.lengths), 5);
+}
+
+TEST(FeatureTracksTest, EachCameraSeesTheWantedNumberInEveryKeyframe) {
+  const Rig rig = StereoRig();
+  const auto keyframes = Keyframes(*MakeHandheld(30, 1, 2));
+  SimulationOptions options;
+  options.landmarks_in_view = 80;
+  const FeatureTracks tracks =
+      SimulateTracks(rig.factory, 0.8, keyframes, options);
+  std::map<std::pair<int, int>, int> seen;
+  for (const FeatureObservation& z : tracks.observations) {
+    ++seen[{z.keyframe, z.camera}];
+  }
+  ASSERT_EQ(seen.size(), 2 * keyframes.size());
+  for (const auto& [key, count] : seen) EXPECT_EQ(count, 80);
+}
+
+TEST(FeatureTracksTest, TheCamerasOfARigSeeTheSameLandmarks) {
+  const FeatureTracks tracks = SimulateTracks(
+      StereoRig().factory, 0.8, Keyframes(*MakeHandheld(20, 1, 2)), {});
+  std::map<int, std::pair<bool, bool>> cameras;
+  for (const FeatureObservation& z : tracks.observations) {
+    (z.camera == 0 ? cameras[z.landmark].first : cameras[z.landmark].second) =
+        true;
+  }
+  double both = 0;
+  for (const auto& [landmark, seen] : cameras) {
+    both += seen.first && seen.second;
+  }
+  EXPECT_GT(both / static_cast<double>(cameras.size()), 0.3);
+}
+
+TEST(FeatureTracksTest, AFractionOfTheLandmarksIsFoundAgainAfterAWhile) {
+  const Rig rig = HandheldRig("a");
+  const auto keyframes = Keyframes(*MakeHandheld(60, 1, 3));
+  SimulationOptions options;
+  const auto again = [&] {
+    double count = 0;
+    double all = 0;
+    for (const auto& [landmark, stretches] :
+         TrackLengths(SimulateTracks(rig.factory, 0.8, keyframes, options))
+             .stretches) {
+      count += stretches > 1;
+      ++all;
+    }
+    return count / all;
+  };
+  EXPECT_GT(again(), 0.02);
+  EXPECT_LT(again(), 0.15);
+  options.revisit_fraction = 0;
+  EXPECT_EQ(again(), 0);
+}
+
+TEST(FeatureTracksTest, EveryPixelLiesInsideTheImageOutliersToo) {
+  const Rig rig = StereoRig();
+  SimulationOptions options;
+  options.outlier_fraction = 0.1;
+  const FeatureTracks tracks = SimulateTracks(
+      rig.factory, 3, Keyframes(*MakeHandheld(20, 1, 4)), options);
+  for (const FeatureObservation& z : tracks.observations) {
+    const CameraCalibration& camera = rig.factory.cameras[z.camera];
+    for (const Eigen::Vector2d& z_px : {z.true_px, z.measured_px}) {
+      ASSERT_GE(z_px.minCoeff(), 0);
+      ASSERT_LE(z_px.x(), camera.width_px - 1);
+      ASSERT_LE(z_px.y(), camera.height_px - 1);
+    }
+  }
+}
+
+TEST(FeatureTracksTest, TheWantedFractionOfObservationsIsReplaced) {
+  const Rig rig = HandheldRig("a");
+  SimulationOptions options;
+  options.noise = false;
+  options.outlier_fraction = 0.07;
+  const FeatureTracks tracks = SimulateTracks(
+      rig.factory, 0.8, Keyframes(*MakeHandheld(60, 1, 5)), options);
+  double replaced = 0;
+  for (const FeatureObservation& z : tracks.observations) {
+    replaced += z.true_px != z.measured_px;
+  }
+  const auto n = static_cast<double>(tracks.observations.size());
+  EXPECT_NEAR(replaced / n, 0.07, 5 * std::sqrt(0.07 / n));
+}
+
+TEST(FeatureTracksTest, NewLandmarksLieBetweenTheDepthsOfTheOptions) {
+  const Rig rig = HandheldRig("a");
+  SimulationOptions options;
+  options.min_depth_m = 1;
+  options.max_depth_m = 4;
+  const auto keyframes = Keyframes(*MakeRest(1));
+  const FeatureTracks tracks =
+      SimulateTracks(rig.factory, 0, keyframes, options);
+  const CameraCalibration& camera = rig.factory.cameras[0];
+  const Eigen::Vector3d p_GC =
+      keyframes[0].p_GI -
+      keyframes[0].q_GI * (camera.q_CI.conjugate() * camera.p_CI);
+  double near = 0;
+  for (const Eigen::Vector3d& p_G : tracks.landmarks_G) {
+    const double depth_m = (p_G - p_GC).norm();
+    EXPECT_GE(depth_m, 1 - 1e-9);
+    EXPECT_LE(depth_m, 4 + 1e-9);
+    near += depth_m < 2;
+  }
+  // Uniform in the logarithm: half of them below the geometric mean.
+  const auto n = static_cast<double>(tracks.landmarks_G.size());
+  EXPECT_NEAR(near / n, 0.5, 2.5 / std::sqrt(n));
+}
+
+}  // namespace
+}  // namespace selfcal

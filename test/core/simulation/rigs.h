@@ -1,0 +1,57 @@
+// Rigs and truth for the tests of the simulation.
+#pragma once
+
+#include "core/model/so3.h"
+#include "core/simulation/simulate.h"
+
+namespace selfcal {
+
+// Two cameras side by side with the two other distortion models.
+inline Rig StereoRig() {
+  Rig rig = HandheldRig("stereo");
+  CameraCalibration left = rig.factory.cameras[0];
+  left.f = {460, 458};
+  left.c = {367, 249};
+  left.width_px = 752;
+  left.height_px = 480;
+  left.model = DistortionModel::kRadialTangential;
+  left.distortion = Eigen::Vector4d(-0.28, 0.07, 2e-4, 2e-5);
+  CameraCalibration right = left;
+  right.q_CI = Exp({0.01, -0.02, 0.005}) * left.q_CI;
+  right.p_CI.x() -= 0.11;
+  right.f = {275, 276};
+  right.c = {359, 270};
+  right.width_px = 720;
+  right.height_px = 540;
+  right.model = DistortionModel::kEquidistant;
+  right.distortion = Eigen::Vector4d(0.01, -0.005, 0.002, -0.0004);
+  rig.factory.cameras = {left, right};
+  return rig;
+}
+
+// Errors of the SLAM system all zero.
+inline SimulationOptions PerfectSlam() {
+  SimulationOptions options;
+  options.slam_rotation_rad = 0;
+  options.slam_position_m = 0;
+  options.slam_velocity_mps = 0;
+  options.slam_accel_bias_mps2 = 0;
+  options.slam_gyro_bias_radps = 0;
+  options.slam_landmark_relative = 0;
+  return options;
+}
+
+// A device moved vigorously, whose SLAM system believes a perturbed
+// calibration.
+inline SimulatedSession SimulateHandheld(const Rig& rig,
+                                         double duration_s,
+                                         const SimulationOptions& options) {
+  return Simulate(rig,
+                  rig.factory,
+                  PerturbCalibration(rig.factory, {}, options.seed),
+                  *MakeHandheld(duration_s, 1, options.seed),
+                  "session",
+                  options);
+}
+
+}  // namespace selfcal
