@@ -143,7 +143,7 @@ SimulatedSession Simulate(const Rig& rig,
   recording.truth = TrueKeyframes(trajectory, recording.imu, options);
   const int N = options.keyframes_per_segment;
   const int segments = static_cast<int>(recording.truth.size()) / N;
-  recording.truth.resize(static_cast<std::size_t>(segments * N));
+  recording.truth.resize(static_cast<std::size_t>(segments) * N);
   recording.tracks =
       SimulateTracks(theta_true, rig.pixel_sigma_px, recording.truth, options);
   recording.slam = SlamStates(

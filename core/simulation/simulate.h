@@ -64,8 +64,8 @@ struct SimulatedSession {
 // Segments of keyframes_per_segment fill the trajectory from its start; the
 // keyframes that are left at the end and fill no segment are left out. Times
 // count from the start of the trajectory; keyframes do not coincide with IMU
-// samples. theta_true and theta_slam must have the same shape (SameShape), the
-// rates and depths must be positive.
+// samples. theta_true and theta_slam must have the same shape (SameShape);
+// rates, depths, mean_track_length and keyframes_per_segment must be positive.
 SimulatedSession Simulate(const Rig& rig,
                           const Calibration& theta_true,
                           const Calibration& theta_slam,
