@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/information/segment_information.h"
 #include "core/model/segment.h"
 #include "server/store/store.h"
 
@@ -31,6 +32,23 @@ struct PipelineOptions {
   CalibrateOptions calibrate;
 };
 
+// What the pipeline computes with. Called from its threads; what they throw
+// ends the segment or the run, never the process.
+struct Estimators {
+  std::function<SegmentInformation(
+      const Rig& rig, const Calibration& theta0, const MotionSegment& segment)>
+      score;
+  std::function<CalibrationResult(const Rig& rig,
+                                  const Calibration& theta_start,
+                                  const std::vector<MotionSegment>& segments,
+                                  const CalibrateOptions& options,
+                                  const ProgressCallback& progress)>
+      calibrate;
+};
+
+// ScoreSegment and Calibrate of core.
+Estimators CoreEstimators();
+
 // The verdict on one segment; durable when it is kStored or kDuplicate.
 struct SubmitResult {
   enum class Verdict { kStored, kDuplicate, kRejected };
@@ -44,7 +62,10 @@ struct RunUpdate {
   CalibrateProgress progress;
 };
 
-// A subscription; destroying it ends it (no callback runs after that).
+// A subscription; destroying it ends it (no callback runs after that). It may
+// outlive the pipeline. Callbacks come from the pipeline's threads and hold
+// them up: they hand over and return, and neither destroy their own
+// subscription nor call the pipeline.
 class Subscription {
  public:
   virtual ~Subscription() = default;
@@ -62,14 +83,20 @@ class Pipeline {
 
   // Validates and stores one segment and wakes a worker. NOT_FOUND for an
   // unknown rig; errors of the store as they are. Blocks while the backlog is
-  // full, until `cancelled` returns true (then CANCELLED).
+  // full, until `cancelled` returns true (then CANCELLED). UNAVAILABLE while
+  // the pipeline is not started. The segment must have been estimated with a
+  // version of the rig that was not rejected.
   virtual absl::StatusOr<SubmitResult> Submit(
       const std::string& rig,
       const MotionSegment& segment,
       const std::function<bool()>& cancelled) = 0;
 
+  // On the tables as they are (Store::CreateManualRun).
   virtual absl::StatusOr<StoredRun> StartRecalibration(
       const std::string& rig) = 0;
+  // Returns once the run has ended. FAILED_PRECONDITION if it has ended another
+  // way; UNAVAILABLE if the pipeline stops meanwhile: the run then starts
+  // again.
   virtual absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
                                                         std::int64_t run) = 0;
 
@@ -88,7 +115,9 @@ class Pipeline {
 };
 
 // `store` must outlive the pipeline.
-std::unique_ptr<Pipeline> MakePipeline(Store* store,
-                                       const PipelineOptions& options);
+std::unique_ptr<Pipeline> MakePipeline(
+    Store* store,
+    const PipelineOptions& options,
+    Estimators estimators = CoreEstimators());
 
 }  // namespace selfcal::server

@@ -77,7 +77,7 @@ struct StoredCalibration {
   CalibrationState state = CalibrationState::kActive;
   std::int64_t create_time_ns = 0;
   Calibration theta;
-  Eigen::MatrixXd covariance;  // D x D
+  Eigen::MatrixXd covariance;        // D x D
   std::vector<std::string> reasons;  // why it was rejected
   std::optional<std::int64_t> run;   // that produced it
   std::int64_t base_version = 0;     // where the solver started, 0: none
@@ -96,9 +96,9 @@ struct StoredRun {
   RunState state = RunState::kPending;
   RunTrigger trigger = RunTrigger::kManual;
   std::int64_t create_time_ns = 0;
-  std::int64_t end_time_ns = 0;       // 0 until it has ended
-  std::int64_t base_version = 0;      // active when it was created
-  std::vector<SegmentKey> segments;   // the snapshot of the tables
+  std::int64_t end_time_ns = 0;      // 0 until it has ended
+  std::int64_t base_version = 0;     // active when it was created
+  std::vector<SegmentKey> segments;  // the snapshot of the tables
   int attempts = 0;
   std::int64_t calibration_version = 0;  // 0 until it succeeded
   std::string message;

@@ -1,0 +1,160 @@
+#include "server/pipeline/pipeline.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "server/pipeline/recalibration.h"
+#include "server/pipeline/scoring.h"
+#include "server/pipeline/watchers.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr char kVersionField[] = "calibration_version";
+
+// Wires the two kinds of threads, and does on the caller's thread what comes
+// before them.
+class PipelineImpl : public Pipeline {
+ public:
+  PipelineImpl(Store* store,
+               const PipelineOptions& options,
+               const Estimators& estimators)
+      : store_(store),
+        options_(options),
+        recalibrator_(
+            store, options, estimators, &calibration_watchers_, &run_watchers_),
+        scoring_(store, options, estimators, [this](const StoredRun& run) {
+          spdlog::info("run {} of rig {} is due", run.run, run.rig);
+          recalibrator_.Wake();
+        }) {}
+
+  absl::Status Start() override {
+    SELFCAL_RETURN_IF_ERROR(recalibrator_.Start());
+    const absl::Status status = scoring_.Start();
+    if (!status.ok()) {
+      recalibrator_.Stop();
+    }
+    return status;
+  }
+
+  void Stop() override {
+    scoring_.Stop();
+    recalibrator_.Stop();
+  }
+
+  absl::StatusOr<SubmitResult> Submit(
+      const std::string& rig,
+      const MotionSegment& segment,
+      const std::function<bool()>& cancelled) override {
+    SubmitResult result;
+    SELFCAL_ASSIGN_OR_RETURN(result.violations, Check(rig, segment));
+    if (!result.violations.empty()) {
+      return result;
+    }
+    SELFCAL_RETURN_IF_ERROR(scoring_.TakePlace(cancelled));
+    const absl::StatusOr<PutVerdict> verdict = store_->PutSegment(rig, segment);
+    if (!verdict.ok() || *verdict == PutVerdict::kDuplicate) {
+      scoring_.ReturnPlace();
+      SELFCAL_RETURN_IF_ERROR(verdict.status());
+      result.verdict = SubmitResult::Verdict::kDuplicate;
+      return result;
+    }
+    scoring_.FillPlace();
+    result.verdict = SubmitResult::Verdict::kStored;
+    return result;
+  }
+
+  absl::StatusOr<StoredRun> StartRecalibration(
+      const std::string& rig) override {
+    SELFCAL_ASSIGN_OR_RETURN(StoredRun run, store_->CreateManualRun(rig));
+    recalibrator_.Wake();
+    return run;
+  }
+
+  absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
+                                                std::int64_t run) override {
+    return recalibrator_.Cancel(rig, run);
+  }
+
+  absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
+      const std::string& rig,
+      std::function<void(const StoredCalibration&)> callback) override {
+    return calibration_watchers_.Watch(rig, std::move(callback), [&] {
+      return store_->GetActiveCalibration(rig);
+    });
+  }
+
+  absl::StatusOr<std::unique_ptr<Subscription>> WatchRun(
+      const std::string& rig,
+      std::int64_t run,
+      std::function<void(const RunUpdate&)> callback) override {
+    const auto now = [&]() -> absl::StatusOr<RunUpdate> {
+      SELFCAL_ASSIGN_OR_RETURN(StoredRun stored, store_->GetRun(rig, run));
+      return RunUpdate{std::move(stored), recalibrator_.ProgressOf(rig, run)};
+    };
+    return run_watchers_.Watch(RunTopic(rig, run), std::move(callback), now);
+  }
+
+ private:
+  // Every violation of a segment: those of its values, and the version that it
+  // names, which only the store knows.
+  absl::StatusOr<std::vector<Violation>> Check(const std::string& rig_name,
+                                               const MotionSegment& segment) {
+    SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(rig_name));
+    std::vector<Violation> violations =
+        Validate(segment, rig.rig.factory, options_.limits);
+    const bool names_version =
+        std::none_of(violations.begin(), violations.end(), [](const auto& v) {
+          return v.field == kVersionField;
+        });
+    if (!names_version) {
+      return violations;
+    }
+    const auto calibration =
+        store_->GetCalibration(rig_name, segment.calibration_version);
+    if (absl::IsNotFound(calibration.status())) {
+      violations.push_back(
+          {kVersionField,
+           fmt::format("the rig has no version {}; send the one that the "
+                       "states were estimated with",
+                       segment.calibration_version)});
+    } else if (!calibration.ok()) {
+      return calibration.status();
+    } else if (calibration->state == CalibrationState::kRejected) {
+      violations.push_back(
+          {kVersionField,
+           fmt::format("version {} was rejected and never published; send the "
+                       "one that the states were estimated with",
+                       segment.calibration_version)});
+    }
+    return violations;
+  }
+
+  Store* const store_;
+  const PipelineOptions options_;
+  Watchers<StoredCalibration> calibration_watchers_;
+  Watchers<RunUpdate> run_watchers_;
+  Recalibrator recalibrator_;
+  ScoringWorkers scoring_;
+};
+
+}  // namespace
+
+Estimators CoreEstimators() {
+  return {[](const Rig& rig, const Calibration& theta0, const auto& segment) {
+            return ScoreSegment(rig, theta0, segment);
+          },
+          Calibrate};
+}
+
+std::unique_ptr<Pipeline> MakePipeline(Store* store,
+                                       const PipelineOptions& options,
+                                       Estimators estimators) {
+  return std::make_unique<PipelineImpl>(store, options, estimators);
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,253 @@
+#include "server/pipeline/scoring.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <exception>
+#include <limits>
+
+#include "server/pipeline/retry.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// How late a waiting Submit notices that its caller has gone.
+constexpr std::chrono::milliseconds kCancelPoll{50};
+
+std::string Name(const Store::Unscored& claim) {
+  return fmt::format(
+      "segment {}~{} of rig {}", claim.key.session, claim.key.index, claim.rig);
+}
+
+bool IsFinite(const SegmentInformation& information) {
+  return information.Lambda.allFinite() && information.eta.allFinite();
+}
+
+}  // namespace
+
+ScoringWorkers::ScoringWorkers(Store* store,
+                               const PipelineOptions& options,
+                               Estimators estimators,
+                               std::function<void(const StoredRun&)> on_run)
+    : store_(store),
+      options_(options),
+      estimators_(std::move(estimators)),
+      on_run_(std::move(on_run)) {}
+
+ScoringWorkers::~ScoringWorkers() { Stop(); }
+
+absl::Status ScoringWorkers::Start() {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::vector<Store::Unscored> left,
+      store_->ListUnscored(std::numeric_limits<int>::max()));
+  const std::lock_guard lock(mutex_);
+  if (running_) {
+    return absl::FailedPreconditionError("scoring has been started already");
+  }
+  running_ = true;
+  backlog_ = static_cast<int>(left.size());
+  for (int k = 0; k < std::max(1, options_.scoring_threads); ++k) {
+    threads_.emplace_back([this] { Run(); });
+  }
+  return absl::OkStatus();
+}
+
+void ScoringWorkers::Stop() {
+  std::vector<std::thread> threads;
+  {
+    const std::lock_guard lock(mutex_);
+    running_ = false;
+    threads.swap(threads_);
+  }
+  changed_.notify_all();
+  for (std::thread& thread : threads) {
+    thread.join();
+  }
+}
+
+absl::Status ScoringWorkers::TakePlace(const std::function<bool()>& cancelled) {
+  std::unique_lock lock(mutex_);
+  while (running_ && backlog_ >= options_.max_backlog) {
+    lock.unlock();
+    const bool gone = cancelled && cancelled();
+    lock.lock();
+    if (gone) {
+      return absl::CancelledError("the caller has gone");
+    }
+    changed_.wait_for(lock, kCancelPoll);
+  }
+  if (!running_) {
+    return absl::UnavailableError("the daemon is stopping; send again later");
+  }
+  ++backlog_;
+  return absl::OkStatus();
+}
+
+void ScoringWorkers::FillPlace() {
+  {
+    const std::lock_guard lock(mutex_);
+    ++arrivals_;
+  }
+  changed_.notify_all();
+}
+
+void ScoringWorkers::ReturnPlace() {
+  {
+    const std::lock_guard lock(mutex_);
+    --backlog_;
+  }
+  changed_.notify_all();
+}
+
+void ScoringWorkers::Run() {
+  while (const std::optional<Claim> claim = NextClaim()) {
+    Process(*claim);
+  }
+}
+
+std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
+  Backoff backoff;
+  std::unique_lock lock(mutex_);
+  while (running_) {
+    // Listed under the lock: a segment is in the list, or its FillPlace is yet
+    // to come and wakes this thread.
+    const std::int64_t seen = arrivals_;
+    const auto unscored =
+        store_->ListUnscored(static_cast<int>(claimed_.size()) + 1);
+    if (!unscored.ok()) {
+      spdlog::error("cannot list what to score: {}",
+                    unscored.status().ToString());
+      changed_.wait_for(lock, backoff.Next(), [this] { return !running_; });
+      continue;
+    }
+    for (const Claim& candidate : *unscored) {
+      if (claimed_.emplace(candidate.rig, candidate.sequence).second) {
+        return candidate;
+      }
+    }
+    changed_.wait(lock, [&] { return !running_ || arrivals_ != seen; });
+  }
+  return std::nullopt;
+}
+
+void ScoringWorkers::Process(const Claim& claim) {
+  const auto score = Score(claim);
+  if (score && WaitForTurn(claim)) {
+    Commit(claim, *score);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    claimed_.erase({claim.rig, claim.sequence});
+    --backlog_;
+  }
+  changed_.notify_all();
+}
+
+std::optional<absl::StatusOr<SegmentInformation>> ScoringWorkers::Score(
+    const Claim& claim) {
+  absl::StatusOr<SegmentInformation> score = absl::UnknownError("");
+  const absl::Status status = Retry([&] {
+    try {
+      score = TryScore(claim);
+    } catch (const std::exception& error) {
+      score = absl::InternalError(
+          fmt::format("scoring it failed: {}", error.what()));
+    }
+    return score.status();
+  });
+  if (IsTransient(status)) {
+    return std::nullopt;
+  }
+  return score;
+}
+
+absl::StatusOr<SegmentInformation> ScoringWorkers::TryScore(
+    const Claim& claim) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(claim.rig));
+  SELFCAL_ASSIGN_OR_RETURN(const MotionSegment segment,
+                           store_->GetSegmentData(claim.rig, claim.key));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const StoredCalibration calibration,
+      store_->GetCalibration(claim.rig, segment.calibration_version));
+  SegmentInformation information =
+      estimators_.score(rig.rig, calibration.theta, segment);
+  if (!IsFinite(information)) {
+    return absl::InternalError("its information is not finite");
+  }
+  return information;
+}
+
+bool ScoringWorkers::WaitForTurn(const Claim& claim) {
+  std::unique_lock lock(mutex_);
+  const auto is_oldest = [&] {
+    const auto oldest = claimed_.lower_bound({claim.rig, 0});
+    return oldest->second == claim.sequence;
+  };
+  changed_.wait(lock, [&] { return !running_ || is_oldest(); });
+  return is_oldest();
+}
+
+void ScoringWorkers::Commit(const Claim& claim,
+                            const absl::StatusOr<SegmentInformation>& score) {
+  const absl::Status status =
+      score.ok() ? Retry([&] { return TryCommit(claim, *score); })
+                 : score.status();
+  if (!status.ok() && !IsTransient(status)) {
+    SetAside(claim, status);
+  }
+}
+
+absl::Status ScoringWorkers::TryCommit(const Claim& claim,
+                                       const SegmentInformation& information) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const ScoreCommit commit,
+      store_->CommitScore(claim.rig, claim.key, information));
+  spdlog::info("{} is scored; tables: [{}]",
+               Name(claim),
+               fmt::join(commit.tables, ", "));
+  if (commit.started_run) {
+    on_run_(*commit.started_run);
+  }
+  return absl::OkStatus();
+}
+
+void ScoringWorkers::SetAside(const Claim& claim, const absl::Status& why) {
+  const std::string problem(why.message());
+  spdlog::error("{} is set aside: {}", Name(claim), problem);
+  Backoff backoff;
+  for (;;) {
+    const absl::Status status =
+        store_->MarkUnusable(claim.rig, claim.key, problem);
+    if (status.ok() || absl::IsNotFound(status)) {
+      return;
+    }
+    spdlog::error("cannot set {} aside: {}", Name(claim), status.ToString());
+    if (!Pause(backoff.Next())) {
+      return;
+    }
+  }
+}
+
+absl::Status ScoringWorkers::Retry(const std::function<absl::Status()>& call) {
+  Backoff backoff;
+  for (;;) {
+    absl::Status status = call();
+    if (!IsTransient(status)) {
+      return status;
+    }
+    spdlog::warn("scoring waits: {}", status.ToString());
+    if (!Pause(backoff.Next())) {
+      return status;
+    }
+  }
+}
+
+bool ScoringWorkers::Pause(std::chrono::milliseconds time) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, time, [this] { return !running_; });
+  return running_;
+}
+
+}  // namespace selfcal::server

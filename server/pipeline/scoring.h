@@ -1,0 +1,84 @@
+// The threads that score: each claims the oldest segment that nobody has
+// claimed, scores it without a lock, and commits it when all older ones of its
+// rig are committed. What is claimed is known in memory only: after a crash the
+// store still lists it as unscored.
+//
+// A score is a function of what is stored (rig, the calibration version that
+// the segment names, segment), so that it comes out the same after a restart.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/pipeline/pipeline.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+class ScoringWorkers {
+ public:
+  // `on_run` is called on a worker for each run that a commit has started.
+  ScoringWorkers(Store* store,
+                 const PipelineOptions& options,
+                 Estimators estimators,
+                 std::function<void(const StoredRun&)> on_run);
+  ~ScoringWorkers();
+
+  absl::Status Start();
+  // Returns when every thread has ended, each after the segment at hand.
+  void Stop();
+
+  // Waits until there is room in the backlog and takes one place. CANCELLED,
+  // UNAVAILABLE as Pipeline::Submit.
+  absl::Status TakePlace(const std::function<bool()>& cancelled);
+  // The place is filled by a stored segment, or was not needed.
+  void FillPlace();
+  void ReturnPlace();
+
+ private:
+  using Claim = Store::Unscored;
+
+  void Run();
+  std::optional<Claim> NextClaim();
+  void Process(const Claim& claim);
+  // The information, or what is wrong with the segment. Nothing when stopping.
+  std::optional<absl::StatusOr<SegmentInformation>> Score(const Claim& claim);
+  absl::StatusOr<SegmentInformation> TryScore(const Claim& claim);
+  bool WaitForTurn(const Claim& claim);
+  void Commit(const Claim& claim,
+              const absl::StatusOr<SegmentInformation>& score);
+  absl::Status TryCommit(const Claim& claim,
+                         const SegmentInformation& information);
+  void SetAside(const Claim& claim, const absl::Status& why);
+  // Calls until it succeeds or fails for good; then, or when stopping, returns
+  // what came last.
+  absl::Status Retry(const std::function<absl::Status()>& call);
+  bool Pause(std::chrono::milliseconds time);  // false when stopping
+
+  Store* const store_;
+  const PipelineOptions options_;
+  const Estimators estimators_;
+  const std::function<void(const StoredRun&)> on_run_;
+
+  std::mutex mutex_;  // guards what follows
+  std::condition_variable changed_;
+  bool running_ = false;
+  int backlog_ = 0;            // places taken: stored and unscored, or about to
+  std::int64_t arrivals_ = 0;  // segments stored since the start
+  std::set<std::pair<std::string, std::int64_t>> claimed_;  // rig, sequence
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace selfcal::server

@@ -1,0 +1,120 @@
+// Who wants to be told, and telling them.
+//
+// Each watcher gets its first update on its own thread and the others from
+// whoever publishes, one at a time and in order: an update is told only if it
+// Follows the last one told.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/pipeline/pipeline.h"
+
+namespace selfcal::server {
+
+// Each version once, in order.
+inline bool Follows(const StoredCalibration& last,
+                    const StoredCalibration& next) {
+  return next.version > last.version;
+}
+
+// Nothing after the end of a run.
+inline bool Follows(const RunUpdate& last, const RunUpdate& /*next*/) {
+  return last.run.state == RunState::kPending ||
+         last.run.state == RunState::kRunning;
+}
+
+template <typename Update>
+class Watchers {
+ public:
+  using Callback = std::function<void(const Update&)>;
+
+  // Subscribes to `topic`. `now` tells how things are; it is called after the
+  // subscription stands, so that nothing is missed between the two.
+  absl::StatusOr<std::unique_ptr<Subscription>> Watch(
+      const std::string& topic,
+      Callback callback,
+      const std::function<absl::StatusOr<Update>()>& now) {
+    auto watcher = std::make_shared<Watcher>();
+    watcher->topic = topic;
+    watcher->callback = std::move(callback);
+    const std::lock_guard lock(watcher->mutex);
+    Add(watcher);
+    absl::StatusOr<Update> first = now();
+    if (!first.ok()) {
+      watcher->ended = true;
+      return first.status();
+    }
+    watcher->Tell(*first);
+    return std::unique_ptr<Subscription>(new Handle(watcher));
+  }
+
+  void Publish(const std::string& topic, const Update& update) {
+    for (const std::shared_ptr<Watcher>& watcher : Living()) {
+      const std::lock_guard lock(watcher->mutex);
+      if (!watcher->ended && watcher->topic == topic) {
+        watcher->Tell(update);
+      }
+    }
+  }
+
+ private:
+  struct Watcher {
+    std::mutex mutex;  // held while the callback runs
+    std::string topic;
+    Callback callback;
+    std::optional<Update> last;
+    bool ended = false;
+
+    void Tell(const Update& update) {
+      if (!last || Follows(*last, update)) {
+        last = update;
+        callback(update);
+      }
+    }
+  };
+
+  class Handle : public Subscription {
+   public:
+    explicit Handle(std::shared_ptr<Watcher> watcher)
+        : watcher_(std::move(watcher)) {}
+    ~Handle() override {
+      const std::lock_guard lock(watcher_->mutex);
+      watcher_->ended = true;
+      watcher_->callback = nullptr;
+    }
+
+   private:
+    std::shared_ptr<Watcher> watcher_;
+  };
+
+  void Add(const std::shared_ptr<Watcher>& watcher) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(watchers_, [](const auto& weak) { return weak.expired(); });
+    watchers_.push_back(watcher);
+  }
+
+  std::vector<std::shared_ptr<Watcher>> Living() {
+    const std::lock_guard lock(mutex_);
+    std::vector<std::shared_ptr<Watcher>> living;
+    for (const std::weak_ptr<Watcher>& weak : watchers_) {
+      if (std::shared_ptr<Watcher> watcher = weak.lock()) {
+        living.push_back(std::move(watcher));
+      }
+    }
+    return living;
+  }
+
+  std::mutex mutex_;
+  std::list<std::weak_ptr<Watcher>> watchers_;  // guarded by mutex_
+};
+
+}  // namespace selfcal::server

@@ -1,0 +1,128 @@
+// The record of a calibration and of the solver's report beside it.
+#include "proto/convert.h"
+#include "server/store/record_parts.h"
+#include "server/store/records.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+using store::SolverRecord;
+
+SolverRecord::Status ToRecord(CalibrateStatus status) {
+  switch (status) {
+    case CalibrateStatus::kConverged:
+      return SolverRecord::CONVERGED;
+    case CalibrateStatus::kNotConverged:
+      return SolverRecord::NOT_CONVERGED;
+    case CalibrateStatus::kCancelled:
+      return SolverRecord::CANCELLED;
+    case CalibrateStatus::kFailed:
+      return SolverRecord::FAILED;
+  }
+  return SolverRecord::STATUS_UNSPECIFIED;
+}
+
+CalibrateStatus FromRecord(SolverRecord::Status status) {
+  switch (status) {
+    case SolverRecord::CONVERGED:
+      return CalibrateStatus::kConverged;
+    case SolverRecord::NOT_CONVERGED:
+      return CalibrateStatus::kNotConverged;
+    case SolverRecord::CANCELLED:
+      return CalibrateStatus::kCancelled;
+    default:
+      return CalibrateStatus::kFailed;
+  }
+}
+
+// theta and covariance are those of the calibration, and stored once.
+void PutSolver(const CalibrationResult& result, SolverRecord* record) {
+  record->set_status(ToRecord(result.status));
+  record->set_message(result.message);
+  record->set_rank(result.rank);
+  PutDirections(result.held_constant, record->mutable_held_constant());
+  record->set_iterations(result.iterations);
+  record->set_initial_cost(result.initial_cost);
+  record->set_final_cost(result.final_cost);
+  record->set_reprojection_rms_before_px(result.reprojection_rms_before_px);
+  record->set_reprojection_rms_after_px(result.reprojection_rms_after_px);
+  record->set_reprojection_median_before_px(
+      result.reprojection_median_before_px);
+  record->set_reprojection_median_after_px(result.reprojection_median_after_px);
+  record->set_segments(result.segments);
+  record->set_partitions(result.partitions);
+  record->set_keyframes(result.keyframes);
+  record->set_landmarks(result.landmarks);
+  record->set_landmarks_dropped(result.landmarks_dropped);
+  record->set_observations(result.observations);
+  record->set_observations_dropped(result.observations_dropped);
+}
+
+CalibrationResult GetSolver(const SolverRecord& record) {
+  CalibrationResult result;
+  result.status = FromRecord(record.status());
+  result.message = record.message();
+  result.rank = record.rank();
+  result.held_constant = GetDirections(record.held_constant());
+  result.iterations = record.iterations();
+  result.initial_cost = record.initial_cost();
+  result.final_cost = record.final_cost();
+  result.reprojection_rms_before_px = record.reprojection_rms_before_px();
+  result.reprojection_rms_after_px = record.reprojection_rms_after_px();
+  result.reprojection_median_before_px = record.reprojection_median_before_px();
+  result.reprojection_median_after_px = record.reprojection_median_after_px();
+  result.segments = record.segments();
+  result.partitions = record.partitions();
+  result.keyframes = record.keyframes();
+  result.landmarks = record.landmarks();
+  result.landmarks_dropped = record.landmarks_dropped();
+  result.observations = record.observations();
+  result.observations_dropped = record.observations_dropped();
+  return result;
+}
+
+}  // namespace
+
+std::string SerializeCalibration(const StoredCalibration& calibration) {
+  store::CalibrationRecord record;
+  record.set_rig(calibration.rig);
+  record.set_version(calibration.version);
+  *record.mutable_theta() = ToProto(calibration.theta);
+  PutMatrix(calibration.covariance, record.mutable_covariance());
+  for (const std::string& reason : calibration.reasons) {
+    record.add_reasons(reason);
+  }
+  record.set_base_version(calibration.base_version);
+  record.set_program_version(calibration.program_version);
+  if (calibration.report) {
+    PutSolver(*calibration.report, record.mutable_solver());
+  }
+  record.set_seconds(calibration.seconds);
+  return record.SerializeAsString();
+}
+
+absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
+                                                   const std::string& what) {
+  store::CalibrationRecord record;
+  StoredCalibration calibration;
+  if (!record.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
+      !FromProto(record.theta(), "", &calibration.theta).empty() ||
+      !GetMatrix(record.covariance(), &calibration.covariance)) {
+    return DamagedRecord(what);
+  }
+  calibration.rig = record.rig();
+  calibration.version = record.version();
+  calibration.reasons.assign(record.reasons().begin(), record.reasons().end());
+  calibration.base_version = record.base_version();
+  calibration.program_version = record.program_version();
+  if (record.has_solver()) {
+    calibration.report = GetSolver(record.solver());
+    calibration.report->theta = calibration.theta;
+    calibration.report->covariance = calibration.covariance;
+  }
+  calibration.seconds = record.seconds();
+  return calibration;
+}
+
+}  // namespace selfcal::server

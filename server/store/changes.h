@@ -1,0 +1,46 @@
+// The changes of the store that touch several subjects at once, one transaction
+// each. What they mean stands at Store (store.h).
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+
+#include "server/store/statement.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+absl::StatusOr<ScoreCommit> CommitScoreRows(
+    Connection* db,
+    const std::string& rig,
+    const SegmentKey& key,
+    const SegmentInformation& information);
+
+absl::Status MarkUnusableRow(Connection* db,
+                             const std::string& rig,
+                             const SegmentKey& key,
+                             const std::string& problem);
+
+absl::StatusOr<StoredRun> CreateManualRunRow(Connection* db,
+                                             const std::string& rig);
+absl::StatusOr<StoredRun> BeginRunRow(Connection* db,
+                                      const std::string& rig,
+                                      std::int64_t run);
+absl::StatusOr<StoredRun> ReleaseRunRow(Connection* db,
+                                        const std::string& rig,
+                                        std::int64_t run);
+absl::StatusOr<StoredCalibration> FinishRunRow(
+    Connection* db,
+    const std::string& rig,
+    std::int64_t run,
+    const StoredCalibration& calibration);
+absl::StatusOr<StoredRun> EndRunRow(Connection* db,
+                                    const std::string& rig,
+                                    std::int64_t run,
+                                    RunState state,
+                                    const std::string& message);
+
+}  // namespace selfcal::server

@@ -1,0 +1,77 @@
+#include "server/store/record_parts.h"
+
+#include <fmt/format.h>
+
+namespace selfcal::server {
+namespace {
+
+using RowMajor =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+}  // namespace
+
+void PutMatrix(const Eigen::MatrixXd& matrix, store::MatrixRecord* record) {
+  record->set_rows(static_cast<int>(matrix.rows()));
+  record->set_columns(static_cast<int>(matrix.cols()));
+  record->mutable_values()->Resize(static_cast<int>(matrix.size()), 0.0);
+  Eigen::Map<RowMajor>(
+      record->mutable_values()->mutable_data(), matrix.rows(), matrix.cols()) =
+      matrix;
+}
+
+bool GetMatrix(const store::MatrixRecord& record, Eigen::MatrixXd* matrix) {
+  const std::int64_t rows = record.rows();
+  const std::int64_t columns = record.columns();
+  if (rows < 0 || columns < 0 || rows * columns != record.values_size()) {
+    return false;
+  }
+  *matrix = Eigen::Map<const RowMajor>(record.values().data(), rows, columns);
+  return true;
+}
+
+void PutVector(const Eigen::VectorXd& vector,
+               google::protobuf::RepeatedField<double>* values) {
+  values->Assign(vector.data(), vector.data() + vector.size());
+}
+
+Eigen::VectorXd GetVector(
+    const google::protobuf::RepeatedField<double>& values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), values.size());
+}
+
+void PutDirections(const std::vector<UnobservedDirection>& directions,
+                   DirectionMessages* messages) {
+  for (const UnobservedDirection& direction : directions) {
+    v1::UnobservedDirection* message = messages->Add();
+    message->set_information_ratio(direction.information_ratio);
+    for (const UnobservedDirection::Part& part : direction.parts) {
+      auto* part_message = message->add_parts();
+      part_message->set_component(part.component);
+      part_message->set_weight(part.weight);
+    }
+  }
+}
+
+std::vector<UnobservedDirection> GetDirections(
+    const DirectionMessages& messages) {
+  std::vector<UnobservedDirection> directions;
+  directions.reserve(messages.size());
+  for (const v1::UnobservedDirection& message : messages) {
+    UnobservedDirection direction;
+    direction.information_ratio = message.information_ratio();
+    for (const auto& part : message.parts()) {
+      direction.parts.push_back({part.component(), part.weight()});
+    }
+    directions.push_back(std::move(direction));
+  }
+  return directions;
+}
+
+absl::Status DamagedRecord(const std::string& what) {
+  return absl::DataLossError(
+      fmt::format("{} cannot be read: its record is malformed; restore the "
+                  "database from a backup",
+                  what));
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,36 @@
+// Parts that several records share: matrices, vectors, directions.
+#pragma once
+
+#include <absl/status/status.h>
+#include <google/protobuf/repeated_field.h>
+#include <google/protobuf/repeated_ptr_field.h>
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/information/segment_information.h"
+#include "selfcal/v1/calibration.pb.h"
+#include "server/store/records.pb.h"
+
+namespace selfcal::server {
+
+void PutMatrix(const Eigen::MatrixXd& matrix, store::MatrixRecord* record);
+// False if the sizes do not fit each other.
+bool GetMatrix(const store::MatrixRecord& record, Eigen::MatrixXd* matrix);
+
+void PutVector(const Eigen::VectorXd& vector,
+               google::protobuf::RepeatedField<double>* values);
+Eigen::VectorXd GetVector(
+    const google::protobuf::RepeatedField<double>& values);
+
+using DirectionMessages =
+    google::protobuf::RepeatedPtrField<v1::UnobservedDirection>;
+void PutDirections(const std::vector<UnobservedDirection>& directions,
+                   DirectionMessages* messages);
+std::vector<UnobservedDirection> GetDirections(
+    const DirectionMessages& messages);
+
+absl::Status DamagedRecord(const std::string& what);
+
+}  // namespace selfcal::server

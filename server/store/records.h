@@ -1,0 +1,31 @@
+// Between the values of the store and the bytes of its blobs
+// (records.proto). Doubles come back as they were, to the bit.
+//
+// The parsing functions return DATA_LOSS for bytes that are not what they
+// should be, naming `what`.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <string>
+#include <string_view>
+
+#include "core/information/segment_information.h"
+#include "core/model/rig.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+std::string SerializeRig(const Rig& rig);
+absl::StatusOr<Rig> ParseRig(std::string_view bytes, const std::string& what);
+
+std::string SerializeInformation(const SegmentInformation& information);
+absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
+                                                    const std::string& what);
+
+// All of it but state, create_time_ns, run and segments, which are columns.
+std::string SerializeCalibration(const StoredCalibration& calibration);
+absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
+                                                   const std::string& what);
+
+}  // namespace selfcal::server

@@ -1,0 +1,150 @@
+// How a run comes to be: asked for, or called for by the tables.
+#include <fmt/format.h>
+
+#include "server/store/calibrations.h"
+#include "server/store/clock.h"
+#include "server/store/events.h"
+#include "server/store/runs.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// The number of the newest run that fulfils a condition, 0 if there is none.
+absl::StatusOr<std::int64_t> NewestRun(Connection* db,
+                                       std::int64_t rig,
+                                       const std::string& condition) {
+  Statement read(
+      db,
+      "SELECT coalesce(max(run), 0) FROM runs WHERE rig = ?1 AND " + condition,
+      rig);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return found ? read.Int(0) : 0;
+}
+
+// What the trigger compares the tables with: the snapshot of the newest run,
+// however it ended, so that a failure is not repeated on the same data. Nothing
+// until the tables have started a run of their own: one that was asked for on
+// half-filled tables does not stand for the first full ones.
+absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
+    Connection* db, const RigRow& rig) {
+  std::optional<std::vector<SegmentKey>> keys;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t triggered,
+                           NewestRun(db, rig.rowid, "cause <> 3"));
+  if (triggered == 0) {
+    return keys;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest,
+                           NewestRun(db, rig.rowid, "1"));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
+                           ReadRun(db, rig.stored.rig.id, newest));
+  keys = run.segments;
+  return keys;
+}
+
+absl::Status InsertSnapshot(Connection* db,
+                            std::int64_t rig,
+                            const StoredRun& run) {
+  for (const SegmentKey& key : run.segments) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(db,
+                  "INSERT INTO run_segments (rig, run, segment) "
+                  "SELECT ?1, ?2, segment FROM segments "
+                  "WHERE rig = ?1 AND session = ?3 AND session_index = ?4",
+                  rig,
+                  run.run,
+                  key.session,
+                  key.index)
+            .Run());
+  }
+  return absl::OkStatus();
+}
+
+const char* TriggerText(RunTrigger trigger) {
+  switch (trigger) {
+    case RunTrigger::kTablesFull:
+      return "the tables are full";
+    case RunTrigger::kTablesChanged:
+      return "the tables have changed";
+    case RunTrigger::kManual:
+      break;
+  }
+  return "asked for";
+}
+
+}  // namespace
+
+absl::StatusOr<StoredRun> InsertRun(Connection* db,
+                                    const RigRow& rig,
+                                    const std::vector<Table>& tables,
+                                    RunTrigger trigger) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t unfinished,
+                           NewestRun(db, rig.rowid, "state IN (1, 2)"));
+  if (unfinished != 0) {
+    return absl::FailedPreconditionError(fmt::format(
+        "recalibration {} of rig {} is under way; wait for it or cancel it",
+        unfinished,
+        rig.stored.rig.id));
+  }
+  StoredRun run;
+  for (const TableEntry& entry : UnionOfTables(tables)) {
+    run.segments.push_back(entry.key);
+  }
+  if (run.segments.empty()) {
+    return absl::FailedPreconditionError(fmt::format(
+        "the tables of rig {} are empty; send segments with motion first",
+        rig.stored.rig.id));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest,
+                           NewestRun(db, rig.rowid, "1"));
+  SELFCAL_ASSIGN_OR_RETURN(run.base_version, ActiveVersion(db, rig.rowid));
+  run.rig = rig.stored.rig.id;
+  run.run = newest + 1;
+  run.trigger = trigger;
+  run.create_time_ns = NowNs();
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(db,
+                "INSERT INTO runs (rig, run, state, cause, create_time_ns, "
+                "  base_version) VALUES (?1, ?2, 1, ?3, ?4, ?5)",
+                rig.rowid,
+                run.run,
+                static_cast<int>(trigger) + 1,
+                run.create_time_ns,
+                run.base_version)
+          .Run());
+  SELFCAL_RETURN_IF_ERROR(InsertSnapshot(db, rig.rowid, run));
+  SELFCAL_RETURN_IF_ERROR(AppendEvent(db,
+                                      run.rig,
+                                      EventKind::kRunStarted,
+                                      fmt::format("run {} on {} segments: {}",
+                                                  run.run,
+                                                  run.segments.size(),
+                                                  TriggerText(trigger))));
+  return run;
+}
+
+absl::StatusOr<std::optional<StoredRun>> MaybeInsertRun(
+    Connection* db, const RigRow& rig, const std::vector<Table>& tables) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t unfinished,
+                           NewestRun(db, rig.rowid, "state IN (1, 2)"));
+  std::optional<StoredRun> started;
+  if (unfinished != 0) {
+    return started;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const auto last_run, LastRunKeys(db, rig));
+  const Trigger trigger = EvaluateTrigger(rig.stored.rig, tables, last_run);
+  if (trigger == Trigger::kNone) {
+    return started;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(
+      started,
+      InsertRun(db,
+                rig,
+                tables,
+                trigger == Trigger::kTablesFull ? RunTrigger::kTablesFull
+                                                : RunTrigger::kTablesChanged));
+  return started;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,143 @@
+#include "server/store/runs.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+
+#include "server/store/events.h"
+#include "server/store/paging.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr char kColumns[] =
+    "SELECT g.id, r.run, r.state, r.cause, r.create_time_ns, r.end_time_ns, "
+    "  r.base_version, r.attempts, r.calibration_version, r.message, r.rig "
+    "FROM runs r JOIN rigs g USING (rig) ";
+
+absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
+                                                     std::int64_t rig,
+                                                     std::int64_t run) {
+  Statement read(db,
+                 "SELECT s.session, s.session_index FROM run_segments x "
+                 "JOIN segments s USING (segment) "
+                 "WHERE x.rig = ?1 AND x.run = ?2 ORDER BY s.sequence",
+                 rig,
+                 run);
+  std::vector<SegmentKey> keys;
+  while (read.Next()) {
+    keys.push_back({read.Text(0), read.Int(1)});
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return keys;
+}
+
+absl::StatusOr<StoredRun> RunFromRow(Connection* db, const Statement& row) {
+  StoredRun run;
+  run.rig = row.Text(0);
+  run.run = row.Int(1);
+  run.state = static_cast<RunState>(row.Int(2) - 1);
+  run.trigger = static_cast<RunTrigger>(row.Int(3) - 1);
+  run.create_time_ns = row.Int(4);
+  run.end_time_ns = row.Int(5);
+  run.base_version = row.Int(6);
+  run.attempts = static_cast<int>(row.Int(7));
+  run.calibration_version = row.Int(8);
+  run.message = row.Text(9);
+  SELFCAL_ASSIGN_OR_RETURN(run.segments,
+                           ReadSnapshot(db, row.Int(10), run.run));
+  return run;
+}
+
+absl::StatusOr<std::vector<StoredRun>> ReadAll(Connection* db,
+                                               Statement* read) {
+  std::vector<StoredRun> runs;
+  while (read->Next()) {
+    SELFCAL_ASSIGN_OR_RETURN(StoredRun run, RunFromRow(db, *read));
+    runs.push_back(std::move(run));
+  }
+  SELFCAL_RETURN_IF_ERROR(read->status());
+  return runs;
+}
+
+std::string EndText(const StoredRun& run) {
+  switch (run.state) {
+    case RunState::kSucceeded:
+      return fmt::format(
+          "run {} produced version {}", run.run, run.calibration_version);
+    case RunState::kCancelled:
+      return fmt::format("run {} was cancelled: {}", run.run, run.message);
+    default:
+      return fmt::format("run {} failed: {}", run.run, run.message);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<StoredRun> ReadRun(Connection* db,
+                                  const std::string& rig,
+                                  std::int64_t run) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  Statement read(db,
+                 std::string(kColumns) + "WHERE r.rig = ?1 AND r.run = ?2",
+                 rig_id,
+                 run);
+  SELFCAL_ASSIGN_OR_RETURN(std::vector<StoredRun> runs, ReadAll(db, &read));
+  if (runs.empty()) {
+    return absl::NotFoundError(
+        fmt::format("rig {} has no recalibration {}", rig, run));
+  }
+  return std::move(runs.front());
+}
+
+absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
+                                              const std::string& rig,
+                                              const Page& page) {
+  const std::string list = "runs/" + rig;
+  SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  const int size = PageSize(page);
+  Statement read(db,
+                 std::string(kColumns) +
+                     "WHERE r.rig = ?1 AND r.run < ?2 "
+                     "ORDER BY r.run DESC LIMIT ?3",
+                 rig_id,
+                 before.value_or(INT64_MAX),
+                 size + 1);
+  Listed<StoredRun> listed;
+  SELFCAL_ASSIGN_OR_RETURN(listed.items, ReadAll(db, &read));
+  CutPage(
+      list, size, [](const auto& item) { return item.run; }, &listed);
+  return listed;
+}
+
+absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(Connection* db) {
+  Statement read(db,
+                 std::string(kColumns) +
+                     "WHERE r.state IN (1, 2) "
+                     "ORDER BY r.create_time_ns, r.rig, r.run");
+  return ReadAll(db, &read);
+}
+
+absl::Status UpdateRun(Connection* db, std::int64_t rig, const StoredRun& run) {
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(db,
+                "UPDATE runs SET state = ?3, attempts = ?4, end_time_ns = ?5, "
+                "  calibration_version = ?6, message = ?7 "
+                "WHERE rig = ?1 AND run = ?2",
+                rig,
+                run.run,
+                static_cast<int>(run.state) + 1,
+                run.attempts,
+                run.end_time_ns,
+                run.calibration_version,
+                run.message)
+          .Run());
+  if (run.end_time_ns == 0) {
+    return absl::OkStatus();
+  }
+  return AppendEvent(db, run.rig, EventKind::kRunEnded, EndText(run));
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,149 @@
+// StoredSegment from its rows, one or a page of them; and the writing of the
+// information that is read here.
+#include <fmt/format.h>
+
+#include <cstdint>
+
+#include "server/store/checksum.h"
+#include "server/store/paging.h"
+#include "server/store/records.h"
+#include "server/store/rigs.h"
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr char kColumns[] =
+    "SELECT s.segment, s.session, s.session_index, s.sequence, s.state, "
+    "  s.problem, s.receive_time_ns, s.calibration_version, s.start_ns, "
+    "  s.end_ns, s.keyframes, s.imu_samples, s.landmarks, s.observations, "
+    "  i.information, i.sha256, "
+    "  (SELECT length(p.data) FROM payloads p WHERE p.segment = s.segment) "
+    "FROM segments s LEFT JOIN segment_information i USING (segment) ";
+
+StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
+  StoredSegment segment;
+  segment.rig = rig;
+  segment.key = {row.Text(1), row.Int(2)};
+  segment.sequence = row.Int(3);
+  segment.state = static_cast<SegmentState>(row.Int(4) - 1);
+  segment.problem = row.Text(5);
+  segment.receive_time_ns = row.Int(6);
+  segment.calibration_version = row.Int(7);
+  segment.start_ns = row.Int(8);
+  segment.end_ns = row.Int(9);
+  segment.keyframes = static_cast<int>(row.Int(10));
+  segment.imu_samples = static_cast<int>(row.Int(11));
+  segment.landmarks = static_cast<int>(row.Int(12));
+  segment.observations = static_cast<int>(row.Int(13));
+  segment.has_data = !row.IsNull(16);
+  segment.payload_bytes = row.Int(16);
+  return segment;
+}
+
+// Fills all that it can; the status tells about the information.
+absl::Status FillFromRow(Connection* db,
+                         const Statement& row,
+                         const std::string& rig,
+                         StoredSegment* segment) {
+  *segment = MetadataFromRow(row, rig);
+  SELFCAL_ASSIGN_OR_RETURN(segment->tables, TablesOfSegment(db, row.Int(0)));
+  if (row.IsNull(14)) {
+    return absl::OkStatus();
+  }
+  const std::string what =
+      "the information of " + SegmentText(rig, segment->key);
+  const std::string bytes = row.Text(14);
+  SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(15), what));
+  SELFCAL_ASSIGN_OR_RETURN(segment->information, ParseInformation(bytes, what));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
+                                          const std::string& rig,
+                                          const SegmentKey& key) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  Statement read(db,
+                 std::string(kColumns) +
+                     "WHERE s.rig = ?1 AND s.session = ?2 "
+                     "AND s.session_index = ?3",
+                 rig_id,
+                 key.session,
+                 key.index);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  if (!found) {
+    return absl::NotFoundError(SegmentText(rig, key) + " was never received");
+  }
+  StoredSegment segment;
+  SELFCAL_RETURN_IF_ERROR(FillFromRow(db, read, rig, &segment));
+  return segment;
+}
+
+absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
+                                                      const std::string& rig,
+                                                      const Page& page) {
+  const std::string list = "segments/" + rig;
+  SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  const int size = PageSize(page);
+  Statement read(db,
+                 std::string(kColumns) +
+                     "WHERE s.rig = ?1 AND s.sequence < ?2 "
+                     "ORDER BY s.sequence DESC LIMIT ?3",
+                 rig_id,
+                 before.value_or(INT64_MAX),
+                 size + 1);
+  Listed<StoredSegment> listed;
+  while (read.Next()) {
+    StoredSegment segment;
+    const absl::Status status = FillFromRow(db, read, rig, &segment);
+    if (absl::IsDataLoss(status)) {
+      segment.problem = std::string(status.message());
+    } else if (!status.ok()) {
+      return status;
+    }
+    listed.items.push_back(std::move(segment));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  CutPage(
+      list, size, [](const auto& item) { return item.sequence; }, &listed);
+  return listed;
+}
+
+absl::Status WriteScore(Connection* db,
+                        std::int64_t segment,
+                        const SegmentInformation& information) {
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(db, "UPDATE segments SET state = 2 WHERE segment = ?1", segment)
+          .Run());
+  const std::string bytes = SerializeInformation(information);
+  const std::string sha256 = Sha256(bytes);
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(db,
+                "INSERT INTO segment_information (segment, information, "
+                "  sha256) VALUES (?1, ?2, ?3)",
+                segment,
+                BlobView{bytes},
+                BlobView{sha256})
+          .Run());
+  for (const GroupScore& score : information.groups) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(db,
+                  "INSERT INTO segment_scores (segment, group_name, entropy, "
+                  "  gain, rank) VALUES (?1, ?2, ?3, ?4, ?5)",
+                  segment,
+                  score.group,
+                  score.entropy,
+                  score.gain,
+                  score.rank)
+            .Run());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,152 @@
+#include "server/store/segment_rows.h"
+
+#include <fmt/format.h>
+
+#include "server/store/clock.h"
+#include "server/store/rigs.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::Status InsertMetadata(Connection* db,
+                            std::int64_t rig,
+                            const MotionSegment& segment) {
+  return Statement(
+             db,
+             "INSERT INTO segments (rig, session, session_index, sequence, "
+             "  state, receive_time_ns, calibration_version, start_ns, end_ns, "
+             "  keyframes, imu_samples, landmarks, observations) "
+             "VALUES (?1, ?2, ?3, (SELECT coalesce(max(sequence), 0) + 1 "
+             "    FROM segments WHERE rig = ?1), "
+             "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+             rig,
+             segment.key.session,
+             segment.key.index,
+             NowNs(),
+             segment.calibration_version,
+             segment.keyframes.empty() ? 0 : segment.keyframes.front().t_ns,
+             segment.keyframes.empty() ? 0 : segment.keyframes.back().t_ns,
+             static_cast<std::int64_t>(segment.keyframes.size()),
+             static_cast<std::int64_t>(segment.imu.size()),
+             static_cast<std::int64_t>(segment.landmarks.size()),
+             static_cast<std::int64_t>(segment.observations.size()))
+      .Run();
+}
+
+}  // namespace
+
+std::string SegmentText(const std::string& rig, const SegmentKey& key) {
+  return fmt::format("segment {}~{} of rig {}", key.session, key.index, rig);
+}
+
+absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
+                                         const std::string& rig,
+                                         const MotionSegment& segment,
+                                         const Payload& payload) {
+  Transaction transaction(db);
+  SELFCAL_RETURN_IF_ERROR(transaction.status());
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  const auto existing = FindSegment(db, rig_id, segment.key);
+  if (existing.ok()) {
+    return PutVerdict::kDuplicate;
+  }
+  if (!absl::IsNotFound(existing.status())) {
+    return existing.status();
+  }
+  SELFCAL_RETURN_IF_ERROR(InsertMetadata(db, rig_id, segment));
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(db,
+                "INSERT INTO payloads (segment, rig, data, raw_bytes, sha256) "
+                "VALUES (?1, ?2, ?3, ?4, ?5)",
+                std::int64_t{sqlite3_last_insert_rowid(db->handle())},
+                rig_id,
+                BlobView{payload.data},
+                payload.raw_bytes,
+                BlobView{payload.sha256})
+          .Run());
+  SELFCAL_RETURN_IF_ERROR(transaction.Commit());
+  return PutVerdict::kStored;
+}
+
+absl::StatusOr<SegmentRow> FindSegment(Connection* db,
+                                       std::int64_t rig,
+                                       const SegmentKey& key) {
+  Statement read(db,
+                 "SELECT segment, sequence, state FROM segments "
+                 "WHERE rig = ?1 AND session = ?2 AND session_index = ?3",
+                 rig,
+                 key.session,
+                 key.index);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  if (!found) {
+    return absl::NotFoundError(fmt::format(
+        "segment {}~{} was never received", key.session, key.index));
+  }
+  return SegmentRow{
+      read.Int(0), read.Int(1), static_cast<SegmentState>(read.Int(2) - 1)};
+}
+
+absl::StatusOr<Payload> ReadPayload(Connection* db,
+                                    const std::string& rig,
+                                    const SegmentKey& key) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row, FindSegment(db, rig_id, key));
+  Statement read(
+      db,
+      "SELECT data, raw_bytes, sha256 FROM payloads WHERE segment = ?1",
+      row.rowid);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  if (!found) {
+    return absl::FailedPreconditionError(
+        fmt::format("the data of {} was dropped: no table and no run needs it",
+                    SegmentText(rig, key)));
+  }
+  return Payload{read.Text(0), read.Int(1), read.Text(2)};
+}
+
+absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
+                                                              int limit) {
+  Statement read(db,
+                 "SELECT r.id, s.session, s.session_index, s.sequence "
+                 "FROM segments s JOIN rigs r USING (rig) "
+                 "WHERE s.state = 1 ORDER BY s.segment LIMIT ?1",
+                 limit);
+  std::vector<Store::Unscored> unscored;
+  while (read.Next()) {
+    unscored.push_back(
+        {read.Text(0), {read.Text(1), read.Int(2)}, read.Int(3)});
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return unscored;
+}
+
+absl::Status WriteProblem(Connection* db,
+                          std::int64_t segment,
+                          const std::string& problem) {
+  return Statement(db,
+                   "UPDATE segments SET state = 3, problem = ?2 "
+                   "WHERE segment = ?1",
+                   segment,
+                   problem)
+      .Run();
+}
+
+absl::Status DropUnreferencedPayloads(Connection* db, std::int64_t rig) {
+  return Statement(
+             db,
+             "DELETE FROM payloads WHERE rig = ?1 "
+             "AND NOT EXISTS (SELECT 1 FROM segments s "
+             "  WHERE s.segment = payloads.segment AND s.state = 1) "
+             "AND NOT EXISTS (SELECT 1 FROM table_entries e "
+             "  WHERE e.segment = payloads.segment) "
+             "AND NOT EXISTS (SELECT 1 FROM run_segments x "
+             "  JOIN runs r ON r.rig = x.rig AND r.run = x.run "
+             "  WHERE x.segment = payloads.segment AND r.state IN (1, 2))",
+             rig)
+      .Run();
+}
+
+}  // namespace selfcal::server

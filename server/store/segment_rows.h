@@ -1,0 +1,72 @@
+// Segments in the database: metadata, data, information.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/store/payload.h"
+#include "server/store/statement.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+struct SegmentRow {
+  std::int64_t rowid = 0;
+  std::int64_t sequence = 0;
+  SegmentState state = SegmentState::kStored;
+};
+
+// "segment <session>~<index> of rig <rig>", for messages.
+std::string SegmentText(const std::string& rig, const SegmentKey& key);
+
+// In one transaction. NOT_FOUND for the rig.
+absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
+                                         const std::string& rig,
+                                         const MotionSegment& segment,
+                                         const Payload& payload);
+
+// NOT_FOUND.
+absl::StatusOr<SegmentRow> FindSegment(Connection* db,
+                                       std::int64_t rig,
+                                       const SegmentKey& key);
+
+// DATA_LOSS if its information is damaged.
+absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
+                                          const std::string& rig,
+                                          const SegmentKey& key);
+
+// Newest first. Damaged information leaves a `problem` instead, so that one
+// bad row does not hide the others.
+absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
+                                                      const std::string& rig,
+                                                      const Page& page);
+
+// FAILED_PRECONDITION if the data was dropped.
+absl::StatusOr<Payload> ReadPayload(Connection* db,
+                                    const std::string& rig,
+                                    const SegmentKey& key);
+
+absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
+                                                              int limit);
+
+// The rest runs inside a transaction of the caller.
+
+// Stored -> scored, with its information and the scores of its groups.
+absl::Status WriteScore(Connection* db,
+                        std::int64_t segment,
+                        const SegmentInformation& information);
+
+// Any state -> unusable.
+absl::Status WriteProblem(Connection* db,
+                          std::int64_t segment,
+                          const std::string& problem);
+
+// Drops the data of every segment of the rig that neither waits for its score
+// nor is in a table or an unfinished run.
+absl::Status DropUnreferencedPayloads(Connection* db, std::int64_t rig);
+
+}  // namespace selfcal::server

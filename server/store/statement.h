@@ -1,0 +1,106 @@
+// A thin owner of SQLite handles: connections, statements, transactions.
+//
+// A connection and everything made from it may be used by one thread at a time.
+// Errors of SQLite become canonical ones with a sentence that says what to do
+// (SqliteStatus). A statement keeps its first error: bind, step and read, then
+// ask for the status once.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <sqlite3.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace selfcal::server {
+
+// Bytes that are bound as a BLOB. Does not own them.
+struct BlobView {
+  std::string_view bytes;
+};
+
+class Connection {
+ public:
+  // `flags` as for sqlite3_open_v2.
+  static absl::StatusOr<Connection> Open(const std::string& path, int flags);
+
+  // Runs one or several statements that return nothing.
+  absl::Status Execute(const std::string& sql);
+
+  // The canonical error of a result code, with SQLite's own words; OK for
+  // SQLITE_OK, SQLITE_ROW and SQLITE_DONE.
+  absl::Status StatusOf(int code, std::string_view what) const;
+
+  sqlite3* handle() const { return handle_.get(); }
+
+ private:
+  struct Close {
+    void operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
+  };
+  explicit Connection(sqlite3* handle) : handle_(handle) {}
+  std::unique_ptr<sqlite3, Close> handle_;
+};
+
+class Statement {
+ public:
+  // Prepares `sql` and binds the arguments to ?1, ?2, ...
+  template <typename... Args>
+  Statement(Connection* connection, std::string_view sql, const Args&... args)
+      : connection_(connection) {
+    Prepare(sql);
+    int index = 0;
+    (Bind(++index, args), ...);
+  }
+  ~Statement() { sqlite3_finalize(statement_); }
+  Statement(const Statement&) = delete;
+  Statement& operator=(const Statement&) = delete;
+
+  // Steps. True: there is a row to read. False: at the end, or an error.
+  bool Next();
+  // Steps to the end.
+  absl::Status Run();
+  const absl::Status& status() const { return status_; }
+
+  // Columns of the row, from 0.
+  std::int64_t Int(int column) const;
+  double Double(int column) const;
+  std::string Text(int column) const;  // of a TEXT or a BLOB
+  bool IsNull(int column) const;
+
+ private:
+  void Prepare(std::string_view sql);
+  void Bind(int index, std::int64_t value);
+  void Bind(int index, int value);
+  void Bind(int index, double value);
+  void Bind(int index, std::string_view value);
+  void Bind(int index, const std::string& value);
+  void Bind(int index, BlobView value);
+  void Check(int code);
+
+  Connection* connection_;
+  sqlite3_stmt* statement_ = nullptr;
+  absl::Status status_;
+};
+
+// BEGIN IMMEDIATE; rolls back unless committed.
+class Transaction {
+ public:
+  explicit Transaction(Connection* connection);
+  ~Transaction();
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+
+  // Whether it could begin.
+  const absl::Status& status() const { return status_; }
+  absl::Status Commit();
+
+ private:
+  Connection* connection_;
+  absl::Status status_;
+  bool open_ = false;
+};
+
+}  // namespace selfcal::server

@@ -1,0 +1,20 @@
+// The store on SQLite: one file, one connection that reads and writes, under a
+// mutex. (SQLite before 3.51.3 can corrupt its write-ahead log where several
+// connections write or checkpoint at once; here only one ever does.)
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <memory>
+#include <string>
+
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+// Opens the database at `path`, or creates it in a folder that exists. Errors
+// as OpenDatabase (database.h). One process for one file: the caller holds a
+// lock on its state folder.
+absl::StatusOr<std::unique_ptr<Store>> MakeSqliteStore(const std::string& path);
+
+}  // namespace selfcal::server

@@ -1,0 +1,128 @@
+#include "server/store/table_rows.h"
+
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::Status ReadEntries(Connection* db, std::int64_t rig, Table* table) {
+  Statement read(db,
+                 "SELECT s.session, s.session_index, s.sequence, e.entropy, "
+                 "  e.gain "
+                 "FROM table_entries e JOIN segments s USING (segment) "
+                 "WHERE e.rig = ?1 AND e.group_name = ?2 "
+                 "ORDER BY e.entropy, s.sequence",
+                 rig,
+                 table->group);
+  while (read.Next()) {
+    table->entries.push_back({{read.Text(0), read.Int(1)},
+                              read.Int(2),
+                              read.Double(3),
+                              read.Double(4)});
+  }
+  return read.status();
+}
+
+}  // namespace
+
+absl::Status InsertTables(Connection* db,
+                          std::int64_t rig,
+                          const std::vector<Table>& tables) {
+  int position = 0;
+  for (const Table& table : tables) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(db,
+                  "INSERT INTO tables (rig, group_name, position, capacity, "
+                  "  scored) VALUES (?1, ?2, ?3, ?4, 0)",
+                  rig,
+                  table.group,
+                  position++,
+                  table.capacity)
+            .Run());
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<Table>> ReadTables(Connection* db,
+                                              std::int64_t rig) {
+  Statement read(db,
+                 "SELECT group_name, capacity, scored FROM tables "
+                 "WHERE rig = ?1 ORDER BY position",
+                 rig);
+  std::vector<Table> tables;
+  while (read.Next()) {
+    Table table;
+    table.group = read.Text(0);
+    table.capacity = static_cast<int>(read.Int(1));
+    table.scored = read.Int(2);
+    SELFCAL_RETURN_IF_ERROR(ReadEntries(db, rig, &table));
+    tables.push_back(std::move(table));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return tables;
+}
+
+absl::StatusOr<bool> OfferToTable(Connection* db,
+                                  std::int64_t rig,
+                                  std::int64_t segment,
+                                  const TableEntry& candidate,
+                                  double min_gain_nats,
+                                  Table* table) {
+  const TableChange change = Offer(candidate, min_gain_nats, table);
+  SELFCAL_RETURN_IF_ERROR(Statement(db,
+                                    "UPDATE tables SET scored = ?3 "
+                                    "WHERE rig = ?1 AND group_name = ?2",
+                                    rig,
+                                    table->group,
+                                    table->scored)
+                              .Run());
+  if (change.evicted) {
+    SELFCAL_ASSIGN_OR_RETURN(const SegmentRow evicted,
+                             FindSegment(db, rig, change.evicted->key));
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(db,
+                  "DELETE FROM table_entries "
+                  "WHERE rig = ?1 AND group_name = ?2 AND segment = ?3",
+                  rig,
+                  table->group,
+                  evicted.rowid)
+            .Run());
+  }
+  if (change.inserted) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(db,
+                  "INSERT INTO table_entries (rig, group_name, segment, "
+                  "  entropy, gain) VALUES (?1, ?2, ?3, ?4, ?5)",
+                  rig,
+                  table->group,
+                  segment,
+                  candidate.entropy,
+                  candidate.gain)
+            .Run());
+  }
+  return change.inserted;
+}
+
+absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
+                                                         std::int64_t segment) {
+  Statement read(db,
+                 "SELECT t.group_name FROM table_entries e "
+                 "JOIN tables t ON t.rig = e.rig "
+                 "  AND t.group_name = e.group_name "
+                 "WHERE e.segment = ?1 ORDER BY t.position",
+                 segment);
+  std::vector<std::string> groups;
+  while (read.Next()) {
+    groups.push_back(read.Text(0));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return groups;
+}
+
+absl::Status RemoveFromTables(Connection* db, std::int64_t segment) {
+  return Statement(db, "DELETE FROM table_entries WHERE segment = ?1", segment)
+      .Run();
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,40 @@
+// The tables of the most informative segments, in the database.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/selection/tables.h"
+#include "server/store/statement.h"
+
+namespace selfcal::server {
+
+// New ones, empty.
+absl::Status InsertTables(Connection* db,
+                          std::int64_t rig,
+                          const std::vector<Table>& tables);
+
+// In the order of the rig's groups, entries sorted as Table says.
+absl::StatusOr<std::vector<Table>> ReadTables(Connection* db, std::int64_t rig);
+
+// Offers one scored segment to `table` (core/selection) and writes what that
+// changed. Says whether the segment entered.
+absl::StatusOr<bool> OfferToTable(Connection* db,
+                                  std::int64_t rig,
+                                  std::int64_t segment,
+                                  const TableEntry& candidate,
+                                  double min_gain_nats,
+                                  Table* table);
+
+// Groups whose table holds the segment, in the order of the rig.
+absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
+                                                         std::int64_t segment);
+
+// Takes a segment out of every table.
+absl::Status RemoveFromTables(Connection* db, std::int64_t segment);
+
+}  // namespace selfcal::server
