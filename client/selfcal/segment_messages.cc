@@ -13,6 +13,9 @@ std::vector<Violation> MakeRequest(const std::string& rig,
                                    const MotionSegment& segment,
                                    v1::StreamSegmentsRequest* request) {
   const std::string& session = segment.key.session;
+  if (session.size() > kMaxSessionBytes) {
+    return {{"session", fmt::format("has {} characters", session.size())}};
+  }
   if (std::any_of(session.begin(), session.end(), [](char c) {
         return c < ' ' || c > '~';
       })) {

@@ -16,6 +16,8 @@ namespace selfcal::client {
 
 // What the daemon takes in one message.
 inline constexpr std::size_t kMaxRequestBytes = 64u << 20;
+// The longest name of a session that its acknowledgements repeat in full.
+inline constexpr std::size_t kMaxSessionBytes = 256;
 
 // Fills *request, or says why the segment cannot be sent.
 std::vector<Violation> MakeRequest(const std::string& rig,

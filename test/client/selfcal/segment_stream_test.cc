@@ -301,11 +301,12 @@ TEST_F(SegmentStreamTest, RefusesWhatNoMessageCanCarry) {
   ASSERT_TRUE(stream.Send(Segment(1, "not\xff utf-8")));
   ASSERT_TRUE(stream.Send(std::move(large)));
   ASSERT_TRUE(stream.Send(Segment(3)));
+  ASSERT_TRUE(stream.Send(Segment(4, std::string(300, 'x'))));
   ASSERT_TRUE(stream.Drain(kLong).ok());
   EXPECT_EQ(daemon_.stored(), (std::set<SegmentKey>{{"walk", 0}, {"walk", 3}}));
-  EXPECT_EQ(stream.statistics().rejected, 2u);
+  EXPECT_EQ(stream.statistics().rejected, 3u);
   for (const Acknowledgement& ack : acks_.all()) {
-    const bool refused = ack.key.index == 1 || ack.key.index == 2;
+    const bool refused = ack.key.index % 3 != 0;
     EXPECT_EQ(ack.verdict, refused ? Verdict::kRejected : Verdict::kStored);
     EXPECT_EQ(ack.violations.size(), refused ? 1u : 0u);
   }

@@ -1,0 +1,105 @@
+#include "client/cli/calibration_report.h"
+
+#include <fmt/format.h>
+
+#include "client/cli/text.h"
+
+namespace selfcal::client {
+namespace {
+
+void AddProvenance(const v1::Calibration::Provenance& provenance,
+                   Facts* facts) {
+  facts->Add("recalibration", LastPart(provenance.recalibration()));
+  facts->Add("started from",
+             fmt::format("version {}", provenance.base_version()));
+  std::string segments;
+  for (const std::string& segment : provenance.segments()) {
+    segments += (segments.empty() ? "" : " ") + LastPart(segment);
+  }
+  facts->Add("segments", segments);
+  facts->Add("program", provenance.program_version());
+}
+
+void AddSolver(const v1::SolverReport& solver, Facts* facts) {
+  facts->Add("solver",
+             solver.message().empty()
+                 ? solver.status()
+                 : solver.status() + ": " + solver.message());
+  facts->Add("iterations",
+             fmt::format("{} in {:.1f} s, cost {:.6g} -> {:.6g}",
+                         solver.iterations(),
+                         solver.seconds(),
+                         solver.initial_cost(),
+                         solver.final_cost()));
+  facts->Add("reprojection",
+             fmt::format("median {:.3f} -> {:.3f} px, rms {:.3f} -> {:.3f} px",
+                         solver.reprojection_median_before_px(),
+                         solver.reprojection_median_after_px(),
+                         solver.reprojection_rms_before_px(),
+                         solver.reprojection_rms_after_px()));
+  facts->Add("problem",
+             fmt::format("{} segments, {} partitions, {} keyframes, {} "
+                         "landmarks ({} dropped), {} observations ({} dropped)",
+                         solver.segments(),
+                         solver.partitions(),
+                         solver.keyframes(),
+                         solver.landmarks(),
+                         solver.landmarks_dropped(),
+                         solver.observations(),
+                         solver.observations_dropped()));
+  facts->Add("observed directions",
+             fmt::format("{} of {}", solver.rank(), solver.components()));
+  for (const auto& direction : solver.held_constant()) {
+    facts->Add("held constant", DirectionText(direction));
+  }
+}
+
+}  // namespace
+
+Facts DescribeCalibration(const v1::Calibration& calibration) {
+  Facts facts;
+  facts.Add("version", fmt::format("{}", calibration.version()));
+  facts.Add("state", StateText(calibration.state()));
+  facts.Add("created", TimeText(calibration.create_time()));
+  for (const std::string& reason : calibration.reasons()) {
+    facts.Add("rejected because", reason);
+  }
+  if (calibration.has_provenance()) {
+    AddProvenance(calibration.provenance(), &facts);
+  } else {
+    facts.Add("origin", "factory");
+  }
+  if (calibration.has_solver()) AddSolver(calibration.solver(), &facts);
+  return facts;
+}
+
+Table CalibrationValues(const v1::Calibration& calibration) {
+  Table table({{"component"}, {"value", true}, {"unit"}, {"sigma", true}});
+  for (const v1::ComponentEstimate& estimate : calibration.estimates()) {
+    table.Add({estimate.component(),
+               ValueText(estimate.value(), estimate.sigma()),
+               estimate.unit(),
+               SigmaText(estimate.sigma())});
+  }
+  return table;
+}
+
+std::string OriginText(const v1::Calibration& calibration) {
+  if (!calibration.has_provenance()) return "factory";
+  const v1::SolverReport& solver = calibration.solver();
+  return fmt::format("{}, {} segments, rms {:.3f} -> {:.3f} px",
+                     solver.status(),
+                     solver.segments(),
+                     solver.reprojection_rms_before_px(),
+                     solver.reprojection_rms_after_px());
+}
+
+std::string CalibrationLine(const v1::Calibration& calibration) {
+  return fmt::format("{}\t{}\t{}\t{}",
+                     calibration.version(),
+                     StateText(calibration.state()),
+                     TimeText(calibration.create_time()),
+                     OriginText(calibration));
+}
+
+}  // namespace selfcal::client

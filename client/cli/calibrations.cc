@@ -1,0 +1,126 @@
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "client/cli/calibration_report.h"
+#include "client/cli/commands.h"
+#include "client/cli/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Service = v1::CalibrationService::StubInterface;
+
+int List(Context* context, const std::string& rig) {
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  v1::ListCalibrationsRequest request;
+  request.set_parent(RigName(rig));
+  v1::ListCalibrationsResponse calibrations;
+  const auto status = CallForAllPages<Service>(
+      stub.get(), &Service::ListCalibrations, request, &calibrations);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(calibrations);
+    return kDone;
+  }
+  Table table(
+      {{"version", true}, {"state"}, {"created"}, {"origin"}, {"reasons"}});
+  for (const v1::Calibration& calibration : calibrations.calibrations()) {
+    table.Add({fmt::format("{}", calibration.version()),
+               StateText(calibration.state()),
+               TimeText(calibration.create_time()),
+               OriginText(calibration),
+               fmt::format("{}", fmt::join(calibration.reasons(), " "))});
+  }
+  context->Print(table);
+  return kDone;
+}
+
+int Show(Context* context, const std::string& rig, const std::string& version) {
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  v1::GetCalibrationRequest request;
+  request.set_name(ChildName(rig, "calibrations", version));
+  v1::Calibration calibration;
+  const auto status = Call<Service>(
+      stub.get(), &Service::GetCalibration, request, &calibration);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(calibration);
+    return kDone;
+  }
+  context->Print(DescribeCalibration(calibration));
+  if (context->terminal) PrintText("\n");
+  context->Print(CalibrationValues(calibration));
+  return kDone;
+}
+
+// Until `count` have come, or, if it is 0, until the daemon ends it.
+int Watch(Context* context, const std::string& rig, std::int64_t count) {
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  grpc::ClientContext call;
+  v1::WatchCalibrationRequest request;
+  request.set_parent(RigName(rig));
+  const auto stream = stub->WatchCalibration(&call, request);
+  v1::Calibration calibration;
+  for (std::int64_t seen = 1; stream->Read(&calibration); ++seen) {
+    if (context->json) {
+      context->PrintJson(calibration, true);
+    } else {
+      PrintText(CalibrationLine(calibration) + "\n");
+    }
+    if (seen == count) {
+      call.TryCancel();
+      return kDone;
+    }
+  }
+  grpc::Status status = stream->Finish();
+  if (status.ok()) {
+    status = {grpc::StatusCode::UNAVAILABLE, "it ended the stream"};
+  }
+  return Fail(*context, status);
+}
+
+}  // namespace
+
+void AddCalibrationCommands(CLI::App* app, Context* context) {
+  CLI::App* calibrations =
+      app->add_subcommand("calibrations", "Show versions of the calibration");
+  calibrations->require_subcommand(1);
+  const auto rig = std::make_shared<std::string>();
+
+  CLI::App* list =
+      calibrations->add_subcommand("list", "List the versions, newest first");
+  list->add_option("RIG", *rig)->required();
+  list->callback([context, rig] {
+    context->command = [context, rig] { return List(context, *rig); };
+  });
+
+  const auto version = std::make_shared<std::string>("active");
+  CLI::App* show = calibrations->add_subcommand("show", "Show a version");
+  show->add_option("RIG", *rig)->required();
+  show->add_option("VERSION", *version, "A number, or active")
+      ->capture_default_str();
+  show->callback([context, rig, version] {
+    context->command = [context, rig, version] {
+      return Show(context, *rig, *version);
+    };
+  });
+
+  const auto count = std::make_shared<std::int64_t>(0);
+  CLI::App* watch = calibrations->add_subcommand(
+      "watch", "Print the active version at once, then each new one");
+  watch->add_option("RIG", *rig)->required();
+  watch->add_option("--count", *count, "End after this many")
+      ->check(CLI::PositiveNumber);
+  watch->callback([context, rig, count] {
+    context->command = [context, rig, count] {
+      return Watch(context, *rig, *count);
+    };
+  });
+}
+
+}  // namespace selfcal::client

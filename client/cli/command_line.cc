@@ -1,0 +1,61 @@
+#include <unistd.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "client/cli/commands.h"
+
+namespace selfcal::client {
+namespace {
+
+constexpr char kFooter[] =
+    "On a terminal the output is a table. Into a pipe it is one record a line, "
+    "its fields\nseparated by tabs, without a header. With --json it is the "
+    "contract's message in\nproto3 JSON: one document, or one line each for "
+    "import and calibrations watch.\n\n"
+    "Exit codes: 0 done; 1 the daemon refused, or what was asked for failed; 2 "
+    "wrong\nusage or unusable input; 3 the daemon cannot be reached.";
+
+void AddGlobalOptions(CLI::App* app, Context* context) {
+  app->set_version_flag("--version", "selfcal " SELFCAL_VERSION);
+  app->add_option("--target", context->target, "Address of the daemon")
+      ->envname("SELFCAL_TARGET")
+      ->capture_default_str();
+  app->add_flag("--json", context->json, "Print JSON");
+  app->require_subcommand(1);
+  app->fallthrough();  // global options may come after the command, too
+  app->footer(kFooter);
+}
+
+}  // namespace
+
+int RunCommandLine(int argc, const char* const* argv) {
+  try {
+    Context context;
+    context.terminal = isatty(STDOUT_FILENO) == 1;
+    CLI::App app("selfcal feeds and inspects selfcald.", "selfcal");
+    AddGlobalOptions(&app, &context);
+    AddRigCommands(&app, &context);
+    AddImportCommand(&app, &context);
+    AddSegmentCommands(&app, &context);
+    AddTablesCommand(&app, &context);
+    AddRecalibrateCommand(&app, &context);
+    AddCalibrationCommands(&app, &context);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      return app.exit(error) == 0 ? kDone : kUsage;
+    }
+    const int code = context.command();
+    if (code == kDone && (std::fflush(stdout) != 0 || std::ferror(stdout))) {
+      PrintError("the output could not be written");
+      return kFailed;
+    }
+    return code;
+  } catch (const std::exception& error) {
+    PrintError(error.what());
+    return kFailed;
+  }
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,21 @@
+// The commands by noun; each adds itself to the command line. `context` must
+// outlive the command line.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "client/cli/context.h"
+
+namespace selfcal::client {
+
+void AddRigCommands(CLI::App* app, Context* context);
+void AddImportCommand(CLI::App* app, Context* context);
+void AddSegmentCommands(CLI::App* app, Context* context);
+void AddTablesCommand(CLI::App* app, Context* context);
+void AddRecalibrateCommand(CLI::App* app, Context* context);
+void AddCalibrationCommands(CLI::App* app, Context* context);
+
+// The whole command line; returns the exit code.
+int RunCommandLine(int argc, const char* const* argv);
+
+}  // namespace selfcal::client

@@ -1,0 +1,114 @@
+#include "client/cli/context.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <cstdio>
+
+#include "client/selfcal/connection.h"
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+constexpr std::chrono::seconds kDeadline{30};
+
+// The violated fields of the error's details, a line each.
+std::string Violations(const grpc::Status& status) {
+  google::rpc::Status details;
+  if (!details.ParseFromString(status.error_details())) return "";
+  std::string lines;
+  for (const auto& detail : details.details()) {
+    google::rpc::BadRequest request;
+    if (!detail.Is<google::rpc::BadRequest>() || !detail.UnpackTo(&request)) {
+      continue;
+    }
+    for (const auto& violation : request.field_violations()) {
+      lines +=
+          violation.field().empty()
+              ? fmt::format("\n  {}", violation.description())
+              : fmt::format(
+                    "\n  {}: {}", violation.field(), violation.description());
+    }
+  }
+  return lines;
+}
+
+}  // namespace
+
+std::shared_ptr<grpc::Channel> Context::Channel() {
+  if (channel_ == nullptr) channel_ = MakeChannel(target);
+  return channel_;
+}
+
+void Context::Print(const Table& table) const {
+  PrintText(terminal ? table.Aligned() : table.Tabbed());
+}
+
+void Context::Print(const Facts& facts) const {
+  PrintText(terminal ? facts.Aligned() : facts.Tabbed());
+}
+
+void Context::PrintJson(const google::protobuf::Message& message,
+                        bool line) const {
+  PrintText(ToJson(message, line));
+}
+
+std::string ToJson(const google::protobuf::Message& message, bool line) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  options.always_print_primitive_fields = true;
+  options.add_whitespace = !line;
+  std::string json;
+  const auto status =
+      google::protobuf::util::MessageToJsonString(message, &json, options);
+  if (!status.ok()) {
+    PrintError(fmt::format("cannot write as JSON: {}", status.ToString()));
+  }
+  if (json.empty() || json.back() != '\n') json += '\n';
+  return json;
+}
+
+void PrintText(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  std::fflush(stdout);
+}
+
+void PrintError(std::string_view text) {
+  const std::string line = fmt::format("selfcal: {}\n", text);
+  std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+int Fail(const Context& context, const grpc::Status& status) {
+  if (IsUnreachable(status)) {
+    PrintError(
+        fmt::format("the daemon at {} does not answer: {}\n"
+                    "  Is selfcald running? Another address: --target, or "
+                    "SELFCAL_TARGET in the environment.",
+                    context.target,
+                    status.error_message()));
+    return kUnreachable;
+  }
+  const std::string violations = Violations(status);
+  PrintError(violations.empty()
+                 ? status.error_message()
+                 : "the daemon refused the request:" + violations);
+  return kFailed;
+}
+
+int FailInput(const absl::Status& status) {
+  PrintError(std::string(status.message().data(), status.message().size()));
+  return kUsage;
+}
+
+bool IsUnreachable(const grpc::Status& status) {
+  return status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+         status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+}
+
+void SetDeadline(grpc::ClientContext* call) {
+  call->set_deadline(std::chrono::system_clock::now() + kDeadline);
+}
+
+}  // namespace selfcal::client

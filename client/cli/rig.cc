@@ -1,0 +1,195 @@
+#include <fmt/format.h>
+
+#include <cctype>
+#include <memory>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/cli/rig_input.h"
+#include "client/cli/text.h"
+#include "core/model/calibration.h"
+#include "proto/convert.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/rig.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Service = v1::RigService::StubInterface;
+
+std::string CameraText(const v1::CameraCalibration& camera) {
+  std::string model = v1::DistortionModel_Name(camera.distortion_model());
+  constexpr std::string_view kPrefix = "DISTORTION_MODEL_";
+  if (model.rfind(kPrefix, 0) == 0) model.erase(0, kPrefix.size());
+  for (char& c : model) {
+    c = c == '_' ? '-' : static_cast<char>(std::tolower(c));
+  }
+  return fmt::format(
+      "{} x {} px, {}", camera.width_px(), camera.height_px(), model);
+}
+
+std::string GroupText(const v1::ParameterGroup& group) {
+  return fmt::format("{}: {}", group.group(), fmt::join(group.patterns(), " "));
+}
+
+Facts Describe(const v1::Rig& rig) {
+  Facts facts;
+  facts.Add("rig", LastPart(rig.name()));
+  facts.Add("created", TimeText(rig.create_time()));
+  for (const auto& camera : rig.factory().cameras()) {
+    facts.Add("camera", CameraText(camera));
+  }
+  const v1::ImuNoise& noise = rig.imu_noise();
+  facts.Add("gyro noise",
+            fmt::format("{:g} rad/s/sqrt(Hz)", noise.gyro_noise_density()));
+  facts.Add("accel noise",
+            fmt::format("{:g} m/s^2/sqrt(Hz)", noise.accel_noise_density()));
+  facts.Add(
+      "gyro bias walk",
+      fmt::format("{:g} rad/s^2/sqrt(Hz)", noise.gyro_bias_random_walk()));
+  facts.Add("accel bias walk",
+            fmt::format("{:g} m/s^3/sqrt(Hz)", noise.accel_bias_random_walk()));
+  facts.Add("pixel sigma", fmt::format("{:g} px", rig.pixel_sigma_px()));
+  facts.Add("gravity", fmt::format("{:g} m/s^2", rig.gravity_mps2()));
+  for (const auto& group : rig.groups()) {
+    facts.Add("group", GroupText(group));
+  }
+  for (const auto& prior : rig.prior_sigmas()) {
+    facts.Add("prior sigma",
+              fmt::format("{}: {:g}", prior.pattern(), prior.value()));
+  }
+  for (const auto& pattern : rig.fixed()) facts.Add("fixed", pattern);
+  facts.Add("table size", fmt::format("{}", rig.table_size()));
+  facts.Add("minimum gain", fmt::format("{:g} nat", rig.min_gain_nats()));
+  facts.Add("retrigger fraction",
+            fmt::format("{:g}", rig.retrigger_fraction()));
+  return facts;
+}
+
+// Empty if the message cannot be read.
+Table FactoryValues(const v1::Rig& rig) {
+  Table table({{"factory"}, {"value", true}, {"unit"}});
+  Calibration theta;
+  if (!FromProto(rig.factory(), "", &theta).empty()) return table;
+  const auto components = TangentComponents(theta);
+  const Eigen::VectorXd values = ReadableValues(theta);
+  for (std::size_t i = 0; i < components.size(); ++i) {
+    table.Add({components[i].name,
+               ValueText(values[static_cast<Eigen::Index>(i)], 0),
+               components[i].unit});
+  }
+  return table;
+}
+
+void PrintRig(const Context& context, const v1::Rig& rig) {
+  if (context.json) return context.PrintJson(rig);
+  context.Print(Describe(rig));
+  if (context.terminal) PrintText("\n");
+  context.Print(FactoryValues(rig));
+}
+
+int Create(Context* context, const RigInput& input) {
+  const auto rig = ReadRig(input);
+  if (!rig.ok()) return FailInput(rig.status());
+  const auto stub = v1::RigService::NewStub(context->Channel());
+  v1::CreateRigRequest request;
+  *request.mutable_rig() = *rig;
+  v1::Rig created;
+  const auto status =
+      Call<Service>(stub.get(), &Service::CreateRig, request, &created);
+  if (!status.ok()) return Fail(*context, status);
+  PrintRig(*context, created);
+  return kDone;
+}
+
+int List(Context* context) {
+  const auto stub = v1::RigService::NewStub(context->Channel());
+  v1::ListRigsResponse rigs;
+  const auto status = CallForAllPages<Service>(
+      stub.get(), &Service::ListRigs, v1::ListRigsRequest(), &rigs);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(rigs);
+    return kDone;
+  }
+  Table table({{"rig"}, {"cameras", true}, {"table size", true}, {"created"}});
+  for (const v1::Rig& rig : rigs.rigs()) {
+    table.Add({LastPart(rig.name()),
+               fmt::format("{}", rig.factory().cameras_size()),
+               fmt::format("{}", rig.table_size()),
+               TimeText(rig.create_time())});
+  }
+  context->Print(table);
+  return kDone;
+}
+
+int Show(Context* context, const std::string& id) {
+  const auto stub = v1::RigService::NewStub(context->Channel());
+  v1::GetRigRequest request;
+  request.set_name(RigName(id));
+  v1::Rig rig;
+  const auto status =
+      Call<Service>(stub.get(), &Service::GetRig, request, &rig);
+  if (!status.ok()) return Fail(*context, status);
+  PrintRig(*context, rig);
+  return kDone;
+}
+
+void AddOverrides(CLI::App* create, RigInput* input) {
+  create->add_option("--id", input->id, "The rig's id, instead of the file's");
+  create->add_option("--pixel-sigma", input->pixel_sigma_px, "[px]");
+  create->add_option("--gyro-noise", input->gyro_noise, "[rad/s/sqrt(Hz)]");
+  create->add_option("--accel-noise", input->accel_noise, "[m/s^2/sqrt(Hz)]");
+  create->add_option(
+      "--gyro-bias-walk", input->gyro_bias_walk, "[rad/s^2/sqrt(Hz)]");
+  create->add_option(
+      "--accel-bias-walk", input->accel_bias_walk, "[m/s^3/sqrt(Hz)]");
+  create->add_option("--gravity", input->gravity_mps2, "[m/s^2]");
+  create->add_option(
+      "--table-size", input->table_size, "Segments that a table keeps");
+  create->add_option("--min-gain",
+                     input->min_gain_nats,
+                     "What a segment must gain to enter a table [nat]");
+  create->add_option("--retrigger-fraction",
+                     input->retrigger_fraction,
+                     "Part of the tables that must be new for another run");
+  create->add_option("--fixed",
+                     input->fixed,
+                     "Never estimate the components of this name, '*' at "
+                     "either end stands for anything; repeatable");
+}
+
+}  // namespace
+
+void AddRigCommands(CLI::App* app, Context* context) {
+  CLI::App* rig = app->add_subcommand("rig", "Create and show rigs");
+  rig->require_subcommand(1);
+
+  CLI::App* create = rig->add_subcommand(
+      "create", "Create a rig; its factory calibration becomes version 1");
+  const auto input = std::make_shared<RigInput>();
+  CLI::Option_group* source = create->add_option_group("source");
+  source->add_option("FILE",
+                     input->file,
+                     "selfcal.v1.Rig in proto3 JSON; - is standard input");
+  source->add_option(
+      "--vi-map", input->vi_map, "Take the rig from this maplab VI-map");
+  source->require_option(1);
+  AddOverrides(create, input.get());
+  create->callback([context, input] {
+    context->command = [context, input] { return Create(context, *input); };
+  });
+
+  CLI::App* list = rig->add_subcommand("list", "List the rigs");
+  list->callback(
+      [context] { context->command = [context] { return List(context); }; });
+
+  CLI::App* show = rig->add_subcommand("show", "Show a rig");
+  const auto id = std::make_shared<std::string>();
+  show->add_option("RIG", *id)->required();
+  show->callback([context, id] {
+    context->command = [context, id] { return Show(context, *id); };
+  });
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,85 @@
+#include "client/cli/rig_input.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "client/import/vi_map.h"
+#include "proto/convert.h"
+#include "proto/resource_names.h"
+
+namespace selfcal::client {
+namespace {
+
+absl::StatusOr<std::string> ReadFile(const std::string& name) {
+  if (name == "-") {
+    return std::string(std::istreambuf_iterator<char>(std::cin), {});
+  }
+  std::ifstream file(name, std::ios::binary);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  if (!file) {
+    return absl::NotFoundError(fmt::format("cannot read {}", name));
+  }
+  return text;
+}
+
+absl::StatusOr<v1::Rig> ReadBase(const RigInput& input) {
+  if (!input.vi_map.empty()) {
+    absl::StatusOr<ViMapRecording> recording = ReadViMap(input.vi_map, {});
+    if (!recording.ok()) return recording.status();
+    return ToProto(recording->rig);
+  }
+  const auto json = ReadFile(input.file);
+  if (!json.ok()) return json.status();
+  auto rig = ParseRig(*json);
+  if (!rig.ok()) {
+    return absl::InvalidArgumentError(
+        fmt::format("{}: {}",
+                    input.file,
+                    std::string(rig.status().message().data(),
+                                rig.status().message().size())));
+  }
+  return rig;
+}
+
+}  // namespace
+
+absl::StatusOr<v1::Rig> ParseRig(const std::string& json) {
+  v1::Rig rig;
+  const auto status = google::protobuf::util::JsonStringToMessage(json, &rig);
+  if (status.ok()) return rig;
+  return absl::InvalidArgumentError(
+      fmt::format("is not a selfcal.v1.Rig in JSON: {}", status.ToString()));
+}
+
+absl::StatusOr<v1::Rig> ReadRig(const RigInput& input) {
+  absl::StatusOr<v1::Rig> rig = ReadBase(input);
+  if (!rig.ok()) return rig;
+  if (input.id) rig->set_name(RigName(*input.id));
+  if (input.pixel_sigma_px) rig->set_pixel_sigma_px(*input.pixel_sigma_px);
+  if (input.gravity_mps2) rig->set_gravity_mps2(*input.gravity_mps2);
+  if (input.table_size) rig->set_table_size(*input.table_size);
+  if (input.min_gain_nats) rig->set_min_gain_nats(*input.min_gain_nats);
+  if (input.retrigger_fraction) {
+    rig->set_retrigger_fraction(*input.retrigger_fraction);
+  }
+  v1::ImuNoise noise = rig->imu_noise();
+  if (input.gyro_noise) noise.set_gyro_noise_density(*input.gyro_noise);
+  if (input.accel_noise) noise.set_accel_noise_density(*input.accel_noise);
+  if (input.gyro_bias_walk) {
+    noise.set_gyro_bias_random_walk(*input.gyro_bias_walk);
+  }
+  if (input.accel_bias_walk) {
+    noise.set_accel_bias_random_walk(*input.accel_bias_walk);
+  }
+  const bool any_noise = input.gyro_noise || input.accel_noise ||
+                         input.gyro_bias_walk || input.accel_bias_walk;
+  if (any_noise) *rig->mutable_imu_noise() = noise;
+  rig->mutable_fixed()->Add(input.fixed.begin(), input.fixed.end());
+  return rig;
+}
+
+}  // namespace selfcal::client

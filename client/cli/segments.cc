@@ -1,0 +1,183 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/cli/commands.h"
+#include "client/cli/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/segment.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Service = v1::SegmentService::StubInterface;
+
+std::string SecondsText(const v1::Segment& segment) {
+  return fmt::format(
+      "{:.2f}",
+      static_cast<double>(segment.end_ns() - segment.start_ns()) * 1e-9);
+}
+
+// Groups of the rig, in its order, as any scored segment names them.
+std::vector<std::string> Groups(const v1::ListSegmentsResponse& segments) {
+  std::vector<std::string> groups;
+  for (const v1::Segment& segment : segments.segments()) {
+    if (segment.scores().empty()) continue;
+    for (const auto& score : segment.scores()) groups.push_back(score.group());
+    break;
+  }
+  return groups;
+}
+
+// "-12.3", with a star if the segment is in the group's table.
+std::string EntropyText(const v1::Segment& segment, const std::string& group) {
+  for (const v1::GroupScore& score : segment.scores()) {
+    if (score.group() != group) continue;
+    return fmt::format(
+        "{:.2f}{}", score.entropy_nats(), score.in_table() ? "*" : " ");
+  }
+  return "- ";
+}
+
+Table ListTable(const v1::ListSegmentsResponse& segments) {
+  std::vector<Column> columns = {{"segment"},
+                                 {"state"},
+                                 {"data", true},
+                                 {"keyframes", true},
+                                 {"seconds", true},
+                                 {"landmarks", true},
+                                 {"observations", true}};
+  const auto groups = Groups(segments);
+  for (const std::string& group : groups) {
+    columns.push_back({"H(" + group + ") ", true});
+  }
+  Table table(std::move(columns));
+  for (const v1::Segment& segment : segments.segments()) {
+    std::vector<std::string> row = {
+        LastPart(segment.name()),
+        StateText(segment.state()),
+        segment.has_data() ? BytesText(segment.payload_bytes()) : "-",
+        fmt::format("{}", segment.keyframes()),
+        SecondsText(segment),
+        fmt::format("{}", segment.landmarks()),
+        fmt::format("{}", segment.observations())};
+    for (const std::string& group : groups) {
+      row.push_back(EntropyText(segment, group));
+    }
+    table.Add(std::move(row));
+  }
+  return table;
+}
+
+Facts Describe(const v1::Segment& segment) {
+  Facts facts;
+  facts.Add("segment", LastPart(segment.name()));
+  facts.Add("state", StateText(segment.state()));
+  if (!segment.problem().empty()) facts.Add("problem", segment.problem());
+  facts.Add("received", TimeText(segment.receive_time()));
+  facts.Add("data",
+            segment.has_data() ? BytesText(segment.payload_bytes()) : "-");
+  facts.Add("calibration", fmt::format("{}", segment.calibration_version()));
+  facts.Add("seconds", SecondsText(segment));
+  facts.Add("keyframes", fmt::format("{}", segment.keyframes()));
+  facts.Add("IMU samples", fmt::format("{}", segment.imu_samples()));
+  facts.Add("landmarks", fmt::format("{}", segment.landmarks()));
+  facts.Add("observations", fmt::format("{}", segment.observations()));
+  if (!segment.has_residuals()) return facts;
+  const v1::ResidualStatistics& residuals = segment.residuals();
+  facts.Add("inliers",
+            fmt::format("{}{}",
+                        residuals.inliers(),
+                        residuals.many_outliers() ? " (many outliers)" : ""));
+  facts.Add("reprojection median",
+            fmt::format("{:.3f} px", residuals.reprojection_median_px()));
+  facts.Add("reprojection rms",
+            fmt::format("{:.3f} px", residuals.reprojection_rms_px()));
+  facts.Add("observed directions",
+            fmt::format("{} of {}", segment.rank(), segment.components()));
+  return facts;
+}
+
+Table Scores(const v1::Segment& segment) {
+  Table table({{"group"},
+               {"H [nat]", true},
+               {"gain [nat]", true},
+               {"rank", true},
+               {"in table"}});
+  for (const v1::GroupScore& score : segment.scores()) {
+    table.Add({score.group(),
+               fmt::format("{:.3f}", score.entropy_nats()),
+               fmt::format("{:.3f}", score.gain_nats()),
+               fmt::format("{}/{}", score.rank(), score.size()),
+               score.in_table() ? "yes" : "no"});
+  }
+  return table;
+}
+
+int List(Context* context, const std::string& rig) {
+  const auto stub = v1::SegmentService::NewStub(context->Channel());
+  v1::ListSegmentsRequest request;
+  request.set_parent(RigName(rig));
+  v1::ListSegmentsResponse segments;
+  const auto status = CallForAllPages<Service>(
+      stub.get(), &Service::ListSegments, request, &segments);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(segments);
+  } else {
+    context->Print(ListTable(segments));
+  }
+  return kDone;
+}
+
+int Show(Context* context, const std::string& rig, const std::string& id) {
+  const auto stub = v1::SegmentService::NewStub(context->Channel());
+  v1::GetSegmentRequest request;
+  request.set_name(ChildName(rig, "segments", LastPart(id)));
+  v1::Segment segment;
+  const auto status =
+      Call<Service>(stub.get(), &Service::GetSegment, request, &segment);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(segment);
+    return kDone;
+  }
+  context->Print(Describe(segment));
+  if (segment.scores().empty()) return kDone;
+  if (context->terminal) PrintText("\n");
+  context->Print(Scores(segment));
+  for (const auto& direction : segment.unobserved()) {
+    PrintText(context->terminal ? "not observed: " : "not observed\t");
+    PrintText(DirectionText(direction) + "\n");
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void AddSegmentCommands(CLI::App* app, Context* context) {
+  CLI::App* segments = app->add_subcommand("segments", "Show segments");
+  segments->require_subcommand(1);
+
+  const auto rig = std::make_shared<std::string>();
+  CLI::App* list = segments->add_subcommand(
+      "list",
+      "List the segments of a rig, newest first, with the entropy of each "
+      "group (lower is richer, * is in its table)");
+  list->add_option("RIG", *rig)->required();
+  list->callback([context, rig] {
+    context->command = [context, rig] { return List(context, *rig); };
+  });
+
+  const auto id = std::make_shared<std::string>();
+  CLI::App* show = segments->add_subcommand("show", "Show a segment");
+  show->add_option("RIG", *rig)->required();
+  show->add_option("SEGMENT", *id, "As in the list: session~index")->required();
+  show->callback([context, rig, id] {
+    context->command = [context, rig, id] { return Show(context, *rig, *id); };
+  });
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,40 @@
+// Values of the contract in words and numbers for people.
+#pragma once
+
+#include <google/protobuf/timestamp.pb.h>
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "selfcal/v1/calibration.pb.h"
+#include "selfcal/v1/calibration_service.pb.h"
+#include "selfcal/v1/recalibration.pb.h"
+#include "selfcal/v1/segment.pb.h"
+
+namespace selfcal::client {
+
+// "2026-11-21 04:10:03" in UTC, or "-" without a time.
+std::string TimeText(const google::protobuf::Timestamp& time);
+
+// "1.4 MB".
+std::string BytesText(std::int64_t bytes);
+
+// A value with as many decimals as a sigma of two digits has; six significant
+// digits without a sigma.
+std::string ValueText(double value, double sigma);
+std::string SigmaText(double sigma);
+
+// What follows the last '/': "walk~3" of "rigs/a/segments/walk~3".
+std::string LastPart(std::string_view name);
+
+std::string StateText(v1::Calibration::State state);
+std::string StateText(v1::Segment::State state);
+std::string StateText(v1::Recalibration::State state);
+std::string TriggerText(v1::Recalibration::Trigger trigger);
+
+// "imu.gyro.scale.x", or for a combination "0.71 imu.accel.scale.x - 0.70
+// cam0.p_CI.z"; in brackets what the data says against what was known before.
+std::string DirectionText(const v1::UnobservedDirection& direction);
+
+}  // namespace selfcal::client
