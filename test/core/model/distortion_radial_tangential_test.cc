@@ -55,6 +55,24 @@ TEST(DistortionRadialTangential, RegionDoesNotBeginAgainBeyondItsBorder) {
   for (double r = border; r < 20; r += 1e-2) EXPECT_FALSE(IsValid(k, {r, 0}));
 }
 
+TEST(DistortionRadialTangential, RegionEndsWhereTangentialTermsFoldThePlane) {
+  // On the x axis d_x = x + 3 p2 x^2 turns round at x = -1 / (6 p2), on the y
+  // axis d_y at y = -1 / (6 p1); the radial profile rises everywhere.
+  RandomValues random(4);
+  for (int i = 0; i < kTrials; ++i) {
+    const double p = random.Uniform(-0.2, -0.01);
+    const double border = -1 / (6 * p);
+    for (const double part : {0.1, 0.5, 0.999}) {
+      EXPECT_TRUE(IsValid({0, 0, 0, p}, {part * border, 0}));
+      EXPECT_TRUE(IsValid({0, 0, p, 0}, {0, part * border}));
+    }
+    for (const double part : {1.001, 2.0, 2.9, 3.1, 10.0}) {
+      EXPECT_FALSE(IsValid({0, 0, 0, p}, {part * border, 0}));
+      EXPECT_FALSE(IsValid({0, 0, p, 0}, {0, part * border}));
+    }
+  }
+}
+
 TEST(DistortionRadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
   // What Undistort finds for the image of a point of the region is that point.
   RandomValues random(2);
@@ -75,6 +93,28 @@ TEST(DistortionRadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
     ++checked;
   }
   EXPECT_GT(checked, kTrials / 3);
+}
+
+TEST(DistortionRadialTangential, UndistortFindsItsWayOverFlatParts) {
+  RandomValues random(5);
+  for (int i = 0; i < kTrials; ++i) {
+    // The slope ((q / a - 1)^2 + c) / (1 + c) is small around r^2 = q = a: from
+    // there, an undamped step goes far off, and may go round in circles.
+    const double a = random.Uniform(0.1, 2);
+    const double c = std::abs(random.SignedMagnitude(1e-3, 1));
+    const Coefficients k = {
+        -2 / (a * (1 + c)) / 3, 1 / (a * a * (1 + c)) / 5, 0, 0};
+    const double r = random.Uniform(0, 3) * std::sqrt(a);
+    const double q = r * r;
+    const double slope = 1 + 3 * k[0] * q + 5 * k[1] * q * q;
+    const Eigen::Vector2d u = r * random.Vector(2, 1).normalized();
+    Eigen::Vector2d d;
+    ASSERT_TRUE(
+        DistortionRadialTangential::Distort(k, u, &d, nullptr, nullptr));
+    Eigen::Vector2d again;
+    ASSERT_TRUE(DistortionRadialTangential::Undistort(k, d, &again));
+    EXPECT_LT((again - u).norm(), 1e-14 * (1 + 1 / slope)) << r << " " << c;
+  }
 }
 
 TEST(DistortionRadialTangential, UndistortRefusesRadiiBeyondTheLargest) {
