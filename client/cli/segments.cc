@@ -135,7 +135,7 @@ int List(Context* context, const std::string& rig) {
 int Show(Context* context, const std::string& rig, const std::string& id) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::GetSegmentRequest request;
-  request.set_name(ChildName(rig, "segments", LastPart(id)));
+  request.set_name(RigName(rig) + "/segments/" + LastPart(id));
   v1::Segment segment;
   const auto status =
       Call<Service>(stub.get(), &Service::GetSegment, request, &segment);

@@ -1,0 +1,213 @@
+// A daemon with canned answers, for the tests of the commands.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
+#include "selfcal/v1/recalibration.grpc.pb.h"
+#include "selfcal/v1/rig.grpc.pb.h"
+#include "selfcal/v1/segment.grpc.pb.h"
+
+namespace selfcal::client {
+
+// INVALID_ARGUMENT with details, as the daemon sends it.
+inline grpc::Status BadField(const std::string& field,
+                             const std::string& description) {
+  google::rpc::BadRequest request;
+  auto* violation = request.add_field_violations();
+  violation->set_field(field);
+  violation->set_description(description);
+  google::rpc::Status status;
+  status.set_code(3);
+  status.add_details()->PackFrom(request);
+  return {grpc::StatusCode::INVALID_ARGUMENT,
+          "bad request",
+          status.SerializeAsString()};
+}
+
+struct CannedDaemon final : v1::RigService::Service,
+                            v1::SegmentService::Service,
+                            v1::CalibrationService::Service,
+                            v1::RecalibrationService::Service {
+  // What it answers, and what it was asked.
+  std::vector<v1::Rig> rigs;
+  std::vector<v1::Segment> segments;
+  v1::ListTablesResponse tables;
+  std::vector<v1::Calibration> calibrations;  // the last is active
+  std::vector<v1::Recalibration> run;         // as it goes on
+  grpc::Status refusal;                       // of CreateRig
+  std::string last_name;
+  std::int64_t reject_index = -1;      // of the segments that are sent
+  std::atomic<int> broken_watches{0};  // that many end before the run does
+
+  CannedDaemon() {
+    static std::atomic<int> count{0};
+    target = "unix:" + ::testing::TempDir() + "selfcal-canned-" +
+             std::to_string(getpid()) + "-" + std::to_string(count++) + ".sock";
+    grpc::ServerBuilder builder;
+    builder.AddListeningPort(target, grpc::InsecureServerCredentials());
+    builder.RegisterService(static_cast<v1::RigService::Service*>(this));
+    builder.RegisterService(static_cast<v1::SegmentService::Service*>(this));
+    builder.RegisterService(
+        static_cast<v1::CalibrationService::Service*>(this));
+    builder.RegisterService(
+        static_cast<v1::RecalibrationService::Service*>(this));
+    server = builder.BuildAndStart();
+  }
+  ~CannedDaemon() override {
+    server->Shutdown(std::chrono::system_clock::now());
+    server->Wait();
+  }
+
+  // Pages of two, whatever was asked for.
+  template <typename Request, typename Items, typename Response, typename Add>
+  static void Page(const Request& request,
+                   const Items& items,
+                   Response* response,
+                   const Add& add) {
+    const std::size_t begin =
+        request.page_token().empty() ? 0 : std::stoul(request.page_token());
+    const std::size_t end = std::min(begin + 2, items.size());
+    for (std::size_t i = begin; i < end; ++i) add(items[i]);
+    if (end < items.size()) {
+      response->set_next_page_token(std::to_string(end));
+    }
+  }
+
+  grpc::Status CreateRig(grpc::ServerContext*,
+                         const v1::CreateRigRequest* request,
+                         v1::Rig* response) override {
+    if (!refusal.ok()) return refusal;
+    rigs.push_back(request->rig());
+    *response = request->rig();
+    return grpc::Status::OK;
+  }
+  grpc::Status GetRig(grpc::ServerContext*,
+                      const v1::GetRigRequest* request,
+                      v1::Rig* response) override {
+    for (const v1::Rig& rig : rigs) {
+      if (rig.name() != request->name()) continue;
+      *response = rig;
+      return grpc::Status::OK;
+    }
+    return {grpc::StatusCode::NOT_FOUND, request->name() + " does not exist"};
+  }
+  grpc::Status ListRigs(grpc::ServerContext*,
+                        const v1::ListRigsRequest* request,
+                        v1::ListRigsResponse* response) override {
+    Page(*request, rigs, response, [&](const v1::Rig& rig) {
+      *response->add_rigs() = rig;
+    });
+    return grpc::Status::OK;
+  }
+
+  grpc::Status StreamSegments(
+      grpc::ServerContext*,
+      grpc::ServerReaderWriter<v1::StreamSegmentsResponse,
+                               v1::StreamSegmentsRequest>* stream) override {
+    v1::StreamSegmentsRequest request;
+    while (stream->Read(&request)) {
+      const v1::MotionSegment& segment = request.segment();
+      v1::StreamSegmentsResponse response;
+      response.set_session(segment.session());
+      response.set_index(segment.index());
+      response.set_verdict(v1::StreamSegmentsResponse::STORED);
+      if (segment.index() == reject_index) {
+        response.set_verdict(v1::StreamSegmentsResponse::REJECTED);
+        auto* violation = response.add_violations();
+        violation->set_field("keyframes[3].q_gi");
+        violation->set_description("norm is 0.9");
+      }
+      stream->Write(response);
+    }
+    return grpc::Status::OK;
+  }
+  grpc::Status ListSegments(grpc::ServerContext*,
+                            const v1::ListSegmentsRequest* request,
+                            v1::ListSegmentsResponse* response) override {
+    last_name = request->parent();
+    Page(*request, segments, response, [&](const v1::Segment& segment) {
+      *response->add_segments() = segment;
+    });
+    return grpc::Status::OK;
+  }
+  grpc::Status GetSegment(grpc::ServerContext*,
+                          const v1::GetSegmentRequest* request,
+                          v1::Segment* response) override {
+    last_name = request->name();
+    if (segments.empty()) return {grpc::StatusCode::NOT_FOUND, "no segment"};
+    *response = segments.front();
+    return grpc::Status::OK;
+  }
+  grpc::Status ListTables(grpc::ServerContext*,
+                          const v1::ListTablesRequest*,
+                          v1::ListTablesResponse* response) override {
+    *response = tables;
+    return grpc::Status::OK;
+  }
+
+  grpc::Status GetCalibration(grpc::ServerContext*,
+                              const v1::GetCalibrationRequest* request,
+                              v1::Calibration* response) override {
+    last_name = request->name();
+    if (calibrations.empty()) return {grpc::StatusCode::NOT_FOUND, "none"};
+    *response = calibrations.back();
+    return grpc::Status::OK;
+  }
+  grpc::Status ListCalibrations(
+      grpc::ServerContext*,
+      const v1::ListCalibrationsRequest* request,
+      v1::ListCalibrationsResponse* response) override {
+    Page(*request, calibrations, response, [&](const v1::Calibration& one) {
+      *response->add_calibrations() = one;
+    });
+    return grpc::Status::OK;
+  }
+  grpc::Status WatchCalibration(
+      grpc::ServerContext*,
+      const v1::WatchCalibrationRequest*,
+      grpc::ServerWriter<v1::Calibration>* writer) override {
+    for (const v1::Calibration& calibration : calibrations) {
+      writer->Write(calibration);
+    }
+    return {grpc::StatusCode::UNAVAILABLE, "the daemon is stopping"};
+  }
+
+  grpc::Status StartRecalibration(grpc::ServerContext*,
+                                  const v1::StartRecalibrationRequest*,
+                                  v1::Recalibration* response) override {
+    if (run.empty()) {
+      return {grpc::StatusCode::FAILED_PRECONDITION,
+              "the tables are empty; send segments first"};
+    }
+    *response = run.front();
+    return grpc::Status::OK;
+  }
+  grpc::Status WatchRecalibration(
+      grpc::ServerContext*,
+      const v1::WatchRecalibrationRequest* request,
+      grpc::ServerWriter<v1::Recalibration>* writer) override {
+    EXPECT_EQ(request->name(), run.front().name());
+    writer->Write(run.front());
+    if (broken_watches-- > 0) {
+      return {grpc::StatusCode::UNAVAILABLE, "the daemon is stopping"};
+    }
+    for (const v1::Recalibration& update : run) writer->Write(update);
+    return grpc::Status::OK;
+  }
+
+  std::string target;
+  std::unique_ptr<grpc::Server> server;
+};
+
+}  // namespace selfcal::client

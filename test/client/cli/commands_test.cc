@@ -1,0 +1,418 @@
+#include "client/cli/commands.h"
+
+#include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "core/model/rig.h"
+#include "proto/convert.h"
+#include "test/client/cli/canned_daemon.h"
+
+namespace selfcal::client {
+namespace {
+
+using testing::HasSubstr;
+
+struct Outcome {
+  int code;
+  std::string out;
+  std::string err;
+};
+
+Outcome Selfcal(const std::vector<std::string>& arguments) {
+  std::vector<const char*> argv = {"selfcal"};
+  for (const std::string& argument : arguments) {
+    argv.push_back(argument.c_str());
+  }
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  const int code = RunCommandLine(static_cast<int>(argv.size()), argv.data());
+  std::string out = testing::internal::GetCapturedStdout();
+  return {code, std::move(out), testing::internal::GetCapturedStderr()};
+}
+
+Rig ARig(const std::string& id) {
+  Rig rig;
+  rig.id = id;
+  rig.factory.cameras.resize(1);
+  CameraCalibration& camera = rig.factory.cameras[0];
+  camera.f = {255, 256};
+  camera.c = {320, 240};
+  camera.distortion << 0.9;
+  camera.width_px = 640;
+  camera.height_px = 480;
+  return rig;
+}
+
+class Commands : public ::testing::Test {
+ protected:
+  Outcome Selfcal(std::vector<std::string> arguments) const {
+    arguments.push_back("--target");
+    arguments.push_back(daemon_.target);
+    return client::Selfcal(arguments);
+  }
+  // The document on stdout as a message.
+  template <typename Message>
+  static Message Parse(const std::string& json) {
+    Message message;
+    const auto status =
+        google::protobuf::util::JsonStringToMessage(json, &message);
+    EXPECT_TRUE(status.ok()) << status.ToString() << json;
+    return message;
+  }
+  static std::string WriteFile(const std::string& text) {
+    const std::string name = testing::TempDir() + "selfcal-cli-rig.json";
+    std::ofstream(name) << text;
+    return name;
+  }
+
+  CannedDaemon daemon_;
+};
+
+TEST_F(Commands, WrongUsageExitsWithTwo) {
+  for (const std::vector<std::string>& line :
+       std::vector<std::vector<std::string>>{{},
+                                             {"nonsense"},
+                                             {"rig"},
+                                             {"rig", "show"},
+                                             {"rig", "create"},
+                                             {"rig", "list", "--nonsense"},
+                                             {"import", "a"},
+                                             {"import", "a", "/nowhere"},
+                                             {"rig", "create", "/nowhere"}}) {
+    const Outcome outcome = Selfcal(line);
+    EXPECT_EQ(outcome.code, 2) << testing::PrintToString(line);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_NE(outcome.err, "");
+  }
+}
+
+TEST_F(Commands, HelpIsNoError) {
+  EXPECT_EQ(Selfcal({"--help"}).code, 0);
+  EXPECT_THAT(Selfcal({"import", "--help"}).out, HasSubstr("--keyframes"));
+}
+
+TEST(CommandsAlone, ADaemonThatIsAwayExitsWithThree) {
+  const std::string target = "unix:" + testing::TempDir() + "nobody.sock";
+  for (const std::vector<std::string>& line :
+       std::vector<std::vector<std::string>>{{"rig", "list"},
+                                             {"rig", "show", "a"},
+                                             {"segments", "list", "a"},
+                                             {"segments", "show", "a", "b~0"},
+                                             {"tables", "a"},
+                                             {"recalibrate", "a"},
+                                             {"calibrations", "list", "a"},
+                                             {"calibrations", "show", "a"},
+                                             {"calibrations", "watch", "a"}}) {
+    std::vector<std::string> with_target = line;
+    with_target.insert(with_target.end(), {"--target", target});
+    const Outcome outcome = Selfcal(with_target);
+    EXPECT_EQ(outcome.code, 3) << testing::PrintToString(line);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_THAT(outcome.err, HasSubstr("Is selfcald running?"));
+    EXPECT_THAT(outcome.err, HasSubstr(target));
+  }
+}
+
+TEST_F(Commands, CreatesARigFromAFileWithOverrides) {
+  const std::string file = WriteFile(ToJson(ToProto(ARig("from_file")), false));
+  const Outcome outcome = Selfcal({"rig",
+                                   "create",
+                                   file,
+                                   "--id",
+                                   "device",
+                                   "--pixel-sigma",
+                                   "0.8",
+                                   "--gyro-bias-walk",
+                                   "5e-5",
+                                   "--accel-bias-walk",
+                                   "2e-3",
+                                   "--fixed",
+                                   "imu.gyro.*",
+                                   "--fixed",
+                                   "*.focal.x"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  ASSERT_EQ(daemon_.rigs.size(), 1u);
+  v1::Rig expected = ToProto(ARig("device"));
+  expected.set_pixel_sigma_px(0.8);
+  expected.mutable_imu_noise()->set_gyro_bias_random_walk(5e-5);
+  expected.mutable_imu_noise()->set_accel_bias_random_walk(2e-3);
+  expected.add_fixed("imu.gyro.*");
+  expected.add_fixed("*.focal.x");
+  EXPECT_EQ(daemon_.rigs[0].SerializeAsString(), expected.SerializeAsString());
+  EXPECT_THAT(outcome.out, HasSubstr("rig\tdevice\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255\tpx\n"));
+}
+
+TEST_F(Commands, NamesTheFieldOfAFileThatItCannotRead) {
+  const Outcome unknown =
+      Selfcal({"rig", "create", WriteFile(R"({"factroy": {}})")});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("factroy"));
+  EXPECT_THAT(unknown.err, HasSubstr("selfcal-cli-rig.json"));
+  EXPECT_EQ(Selfcal({"rig", "create", WriteFile("{")}).code, 2);
+  EXPECT_TRUE(daemon_.rigs.empty());
+}
+
+TEST_F(Commands, PrintsEveryViolatedFieldOfARefusal) {
+  daemon_.refusal = BadField("rig.pixel_sigma_px", "is -1; must be positive");
+  const Outcome outcome = Selfcal({"rig", "create", WriteFile("{}")});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(outcome.err,
+              HasSubstr("\n  rig.pixel_sigma_px: is -1; must be positive\n"));
+}
+
+TEST_F(Commands, ListsEveryPage) {
+  for (const char* id : {"a", "b", "c", "d", "e"}) {
+    daemon_.rigs.push_back(ToProto(ARig(id)));
+  }
+  const Outcome lines = Selfcal({"rig", "list"});
+  EXPECT_EQ(lines.code, 0);
+  EXPECT_EQ(std::count(lines.out.begin(), lines.out.end(), '\n'), 5);
+  EXPECT_EQ(lines.out.substr(0, 2), "a\t");
+  const auto message =
+      Parse<v1::ListRigsResponse>(Selfcal({"rig", "list", "--json"}).out);
+  ASSERT_EQ(message.rigs_size(), 5);
+  EXPECT_EQ(message.rigs(4).name(), "rigs/e");
+  EXPECT_EQ(message.next_page_token(), "");
+}
+
+TEST_F(Commands, JsonIsTheMessageOfTheContract) {
+  daemon_.rigs.push_back(ToProto(ARig("device")));
+  const Outcome outcome = Selfcal({"--json", "rig", "show", "device"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out, HasSubstr("\"pixel_sigma_px\": 1"));
+  EXPECT_EQ(Parse<v1::Rig>(outcome.out).SerializeAsString(),
+            daemon_.rigs[0].SerializeAsString());
+}
+
+TEST_F(Commands, ARefusalExitsWithOne) {
+  const Outcome outcome = Selfcal({"rig", "show", "nobody"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(outcome.err, "selfcal: rigs/nobody does not exist\n");
+}
+
+v1::Segment ScoredSegment(int index) {
+  v1::Segment segment;
+  segment.set_name("rigs/device/segments/walk~" + std::to_string(index));
+  segment.set_state(v1::Segment::SCORED);
+  segment.set_end_ns(3'900'000'000);
+  segment.set_keyframes(40);
+  for (const char* group : {"imu", "camera"}) {
+    v1::GroupScore* score = segment.add_scores();
+    score->set_group(group);
+    score->set_entropy_nats(-12.345);
+    score->set_in_table(std::string(group) == "imu");
+  }
+  auto* part = segment.add_unobserved()->add_parts();
+  part->set_component("imu.gyro.scale.x");
+  part->set_weight(1);
+  return segment;
+}
+
+TEST_F(Commands, ListsSegmentsWithTheirEntropies) {
+  for (int i = 2; i >= 0; --i) daemon_.segments.push_back(ScoredSegment(i));
+  daemon_.segments[0].clear_scores();
+  daemon_.segments[0].set_state(v1::Segment::STORED);
+  const Outcome outcome = Selfcal({"segments", "list", "device"});
+  EXPECT_EQ(daemon_.last_name, "rigs/device");
+  EXPECT_EQ(outcome.out,
+            "walk~2\tstored\t-\t40\t3.90\t0\t0\t- \t- \n"
+            "walk~1\tscored\t-\t40\t3.90\t0\t0\t-12.35*\t-12.35 \n"
+            "walk~0\tscored\t-\t40\t3.90\t0\t0\t-12.35*\t-12.35 \n");
+}
+
+TEST_F(Commands, ShowsASegmentAndWhatItDoesNotObserve) {
+  daemon_.segments.push_back(ScoredSegment(0));
+  const Outcome outcome = Selfcal({"segments", "show", "device", "walk~0"});
+  EXPECT_EQ(daemon_.last_name, "rigs/device/segments/walk~0");
+  EXPECT_THAT(outcome.out, HasSubstr("not observed\timu.gyro.scale.x"));
+  EXPECT_THAT(outcome.out, HasSubstr("imu\t-12.345\t"));
+  const Outcome json =
+      Selfcal({"segments", "show", "device", "walk~0", "--json"});
+  EXPECT_EQ(Parse<v1::Segment>(json.out).SerializeAsString(),
+            daemon_.segments[0].SerializeAsString());
+}
+
+TEST_F(Commands, PrintsTheEntriesOfTheTables) {
+  v1::Table* table = daemon_.tables.add_tables();
+  table->set_name("rigs/device/tables/imu");
+  for (int i = 0; i < 2; ++i) {
+    auto* entry = table->add_entries();
+    entry->set_segment("rigs/device/segments/walk~" + std::to_string(i));
+    entry->set_entropy_nats(-10 + i);
+    entry->set_gain_nats(5 - i);
+  }
+  const Outcome outcome = Selfcal({"tables", "device"});
+  EXPECT_EQ(outcome.out,
+            "imu\t1\twalk~0\t-10.000000\t5.000000\n"
+            "imu\t2\twalk~1\t-9.000000\t4.000000\n");
+}
+
+v1::Calibration Version(std::int64_t version) {
+  v1::Calibration calibration;
+  calibration.set_version(version);
+  calibration.set_state(v1::Calibration::ACTIVE);
+  auto* estimate = calibration.add_estimates();
+  estimate->set_component("cam0.focal.x");
+  estimate->set_unit("px");
+  estimate->set_value(255.1234);
+  estimate->set_sigma(0.034);
+  if (version == 1) return calibration;
+  calibration.mutable_provenance()->set_base_version(version - 1);
+  calibration.mutable_solver()->set_status("converged");
+  auto* part = calibration.mutable_solver()->add_held_constant()->add_parts();
+  part->set_component("cam0.p_CI.z");
+  part->set_weight(1);
+  return calibration;
+}
+
+TEST_F(Commands, ShowsACalibrationWithItsOriginAndValues) {
+  daemon_.calibrations = {Version(1), Version(2)};
+  const Outcome outcome = Selfcal({"calibrations", "show", "device"});
+  EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/active");
+  EXPECT_THAT(outcome.out, HasSubstr("version\t2\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("started from\tversion 1\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("held constant\tcam0.p_CI.z"));
+  EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255.123\tpx\t0.034\n"));
+  Selfcal({"calibrations", "show", "device", "7"});
+  EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/7");
+}
+
+TEST_F(Commands, WatchPrintsALineForEachVersion) {
+  daemon_.calibrations = {Version(1), Version(2), Version(3)};
+  const Outcome some =
+      Selfcal({"calibrations", "watch", "device", "--count", "2"});
+  EXPECT_EQ(some.code, 0);
+  EXPECT_EQ(std::count(some.out.begin(), some.out.end(), '\n'), 2);
+  EXPECT_EQ(some.out.substr(0, 9), "1\tactive\t");
+
+  const Outcome all = Selfcal({"calibrations", "watch", "device", "--json"});
+  EXPECT_EQ(all.code, 3) << "the daemon went away";
+  std::istringstream lines(all.out);
+  std::string line;
+  for (std::int64_t version = 1; version <= 3; ++version) {
+    ASSERT_TRUE(std::getline(lines, line));
+    EXPECT_EQ(Parse<v1::Calibration>(line).version(), version);
+  }
+}
+
+class RecalibrateCommand : public Commands {
+ protected:
+  RecalibrateCommand() {
+    v1::Recalibration run;
+    run.set_name("rigs/device/recalibrations/1");
+    run.set_state(v1::Recalibration::PENDING);
+    daemon_.run.push_back(run);
+    run.set_state(v1::Recalibration::RUNNING);
+    daemon_.run.push_back(run);
+    run.set_state(v1::Recalibration::SUCCEEDED);
+    run.set_calibration("rigs/device/calibrations/2");
+    daemon_.run.push_back(run);
+    daemon_.calibrations = {Version(1), Version(2)};
+  }
+};
+
+TEST_F(RecalibrateCommand, WaitsForTheEndAndShowsTheValues) {
+  const Outcome outcome = Selfcal({"recalibrate", "device"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "") << "no progress bar but on a terminal";
+  EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/2");
+  EXPECT_THAT(outcome.out, HasSubstr("state\tsucceeded\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255.123\tpx\t0.034\n"));
+}
+
+TEST_F(RecalibrateCommand, OutlivesTheConnection) {
+  daemon_.broken_watches = 2;
+  const Outcome outcome = Selfcal({"recalibrate", "device", "--json"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(Parse<v1::Recalibration>(outcome.out).state(),
+            v1::Recalibration::SUCCEEDED);
+}
+
+TEST_F(RecalibrateCommand, ReturnsAtOnceIfAskedTo) {
+  const Outcome outcome = Selfcal({"recalibrate", "device", "--no-wait"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out, HasSubstr("state\tpending\n"));
+}
+
+TEST_F(RecalibrateCommand, ExitsWithOneIfTheResultWasRejected) {
+  daemon_.calibrations[1].set_state(v1::Calibration::REJECTED);
+  daemon_.calibrations[1].add_reasons("held-out segments fit worse");
+  const Outcome outcome = Selfcal({"recalibrate", "device"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("held-out segments fit worse"));
+}
+
+TEST_F(RecalibrateCommand, ExitsWithOneIfItFailedOrCouldNotStart) {
+  daemon_.run[2].set_state(v1::Recalibration::FAILED);
+  daemon_.run[2].set_message("no segment has enough inliers");
+  const Outcome failed = Selfcal({"recalibrate", "device"});
+  EXPECT_EQ(failed.code, 1);
+  EXPECT_THAT(failed.err, HasSubstr("no segment has enough inliers"));
+  daemon_.run.clear();
+  const Outcome refused = Selfcal({"recalibrate", "device"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("the tables are empty"));
+}
+
+class ImportCommand : public Commands {
+ protected:
+  void SetUp() override {
+    const char* folder = std::getenv("SELFCAL_TEST_DATA");
+    map_ = std::string(folder != nullptr ? folder : SELFCAL_TEST_DATA_DEFAULT) +
+           "/tango_handheld";
+    if (!std::filesystem::is_directory(map_)) {
+      GTEST_SKIP() << map_ << " is missing; name the folder of recordings in "
+                   << "SELFCAL_TEST_DATA";
+    }
+    daemon_.rigs.push_back(ToProto(ARig("device")));
+  }
+  std::string map_;
+};
+
+TEST_F(ImportCommand, SendsEverySegmentOfARecording) {
+  const Outcome outcome =
+      Selfcal({"import", "device", map_, "--session", "walk"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  std::string expected;
+  for (int i = 0; i < 14; ++i) {
+    expected += "walk\t" + std::to_string(i) + "\tSTORED\n";
+  }
+  EXPECT_EQ(outcome.out, expected);
+}
+
+TEST_F(ImportCommand, ReportsARejectionAndExitsWithOne) {
+  daemon_.reject_index = 2;
+  const Outcome outcome = Selfcal({"import", "device", map_, "--json"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("\n  keyframes[3].q_gi: norm is 0.9\n"));
+  std::istringstream lines(outcome.out);
+  std::string line;
+  for (int i = 0; i < 14; ++i) {
+    ASSERT_TRUE(std::getline(lines, line));
+    const auto response = Parse<v1::StreamSegmentsResponse>(line);
+    EXPECT_EQ(response.index(), i);
+    EXPECT_EQ(response.verdict(),
+              i == 2 ? v1::StreamSegmentsResponse::REJECTED
+                     : v1::StreamSegmentsResponse::STORED);
+  }
+}
+
+TEST_F(ImportCommand, ExitsWithOneForARigThatDoesNotExist) {
+  const Outcome outcome = Selfcal({"import", "nobody", map_});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(outcome.err, HasSubstr("rigs/nobody does not exist"));
+}
+
+}  // namespace
+}  // namespace selfcal::client
