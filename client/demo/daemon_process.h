@@ -1,0 +1,35 @@
+// selfcald as a child process that the demo may kill.
+#pragma once
+
+#include <absl/status/statusor.h>
+#include <sys/types.h>
+
+#include <memory>
+#include <string>
+
+namespace selfcal::client {
+
+class DaemonProcess {
+ public:
+  // Starts `binary` on `state_dir` (its output goes to `state_dir`/log) and
+  // waits until it serves. UNAVAILABLE with the end of the log if it does not.
+  static absl::StatusOr<std::unique_ptr<DaemonProcess>> Start(
+      const std::string& binary, const std::string& state_dir);
+  ~DaemonProcess();  // SIGTERM, and waits
+  DaemonProcess(const DaemonProcess&) = delete;
+  DaemonProcess& operator=(const DaemonProcess&) = delete;
+
+  // SIGKILL, and waits for the end.
+  void Kill();
+
+  const std::string& target() const { return target_; }  // as gRPC names it
+  pid_t pid() const { return pid_; }
+
+ private:
+  DaemonProcess(pid_t pid, std::string target);
+
+  pid_t pid_;
+  const std::string target_;
+};
+
+}  // namespace selfcal::client
