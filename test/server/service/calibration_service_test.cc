@@ -1,0 +1,201 @@
+#include "test/server/service/service_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+class CalibrationServiceTest : public ServiceTest {
+ protected:
+  // A rig whose second version is active.
+  Rig AddCalibrated() {
+    Rig rig = AddScored(1);
+    const auto run = store_->CreateManualRun(rig.id);
+    EXPECT_TRUE(run.ok()) << run.status();
+    FinishRun(rig, run->run);
+    return rig;
+  }
+
+  grpc::Status Get(const std::string& name, v1::Calibration* calibration) {
+    Context context;
+    v1::GetCalibrationRequest request;
+    request.set_name(name);
+    return calibrations_->GetCalibration(&context, request, calibration);
+  }
+
+  grpc::Status List(const std::string& parent,
+                    int size,
+                    const std::string& token,
+                    v1::ListCalibrationsResponse* response) {
+    Context context;
+    v1::ListCalibrationsRequest request;
+    request.set_parent(parent);
+    request.set_page_size(size);
+    request.set_page_token(token);
+    return calibrations_->ListCalibrations(&context, request, response);
+  }
+
+  std::unique_ptr<grpc::ClientReader<v1::Calibration>> Watch(
+      Context* context, const std::string& parent) {
+    v1::WatchCalibrationRequest request;
+    request.set_parent(parent);
+    return calibrations_->WatchCalibration(context, request);
+  }
+};
+
+TEST_F(CalibrationServiceTest, VersionShowsEstimatesWithSigmas) {
+  const Rig rig = AddCalibrated();
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  const auto components = TangentComponents(rig.factory);
+  const Eigen::VectorXd values = ReadableValues(rig.factory);
+  const int size = static_cast<int>(components.size());
+  ASSERT_EQ(read.estimates_size(), size);
+  for (int i = 0; i < size; ++i) {
+    EXPECT_EQ(read.estimates(i).component(), components[i].name);
+    EXPECT_EQ(read.estimates(i).unit(), components[i].unit);
+    EXPECT_EQ(read.estimates(i).value(), values[i]);
+    EXPECT_EQ(read.estimates(i).sigma(), 2);
+  }
+  EXPECT_EQ(read.covariance_size(), size * (size + 1) / 2);
+}
+
+TEST_F(CalibrationServiceTest, VersionShowsWhereItCameFrom) {
+  AddCalibrated();
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  EXPECT_EQ(read.version(), 2);
+  EXPECT_EQ(read.state(), v1::Calibration::ACTIVE);
+  EXPECT_EQ(read.provenance().recalibration(), "rigs/r/recalibrations/1");
+  EXPECT_EQ(read.provenance().base_version(), 1);
+  EXPECT_EQ(read.provenance().program_version(), "test");
+  EXPECT_THAT(read.provenance().segments(), ElementsAre("rigs/r/segments/s~0"));
+  EXPECT_EQ(read.solver().status(), "converged");
+  EXPECT_EQ(read.solver().iterations(), 7);
+}
+
+TEST_F(CalibrationServiceTest, ActiveIsTheNewestThatWasPublished) {
+  AddCalibrated();
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/active", &read).ok());
+  EXPECT_EQ(read.name(), "rigs/r/calibrations/2");
+  ASSERT_TRUE(Get("rigs/r/calibrations/1", &read).ok());
+  EXPECT_EQ(read.state(), v1::Calibration::SUPERSEDED);
+}
+
+TEST_F(CalibrationServiceTest, VersionThatDoesNotExistIsNotFound) {
+  v1::Calibration read;
+  ExpectNotFound(Get("rigs/r/calibrations/active", &read),
+                 "rigs/r/calibrations/active");
+  AddRig();
+  ExpectNotFound(Get("rigs/r/calibrations/7", &read), "rigs/r/calibrations/7");
+}
+
+TEST_F(CalibrationServiceTest, WhatIsNoNameIsRefused) {
+  AddRig();
+  v1::Calibration read;
+  for (const std::string name : {"rigs/r",
+                                 "rigs/r/calibrations/",
+                                 "rigs/r/calibrations/0",
+                                 "rigs/r/calibrations/-1",
+                                 "rigs/r/calibrations/01",
+                                 "rigs/r/calibrations/newest",
+                                 "rigs/r/calibrations/99999999999999999999"}) {
+    EXPECT_THAT(BadFields(Get(name, &read)), ElementsAre("name")) << name;
+  }
+}
+
+TEST_F(CalibrationServiceTest, PagesHoldEveryVersionNewestFirst) {
+  AddCalibrated();
+  v1::ListCalibrationsResponse page;
+  ASSERT_TRUE(List("rigs/r", 1, "", &page).ok());
+  ASSERT_EQ(page.calibrations_size(), 1);
+  EXPECT_EQ(page.calibrations(0).version(), 2);
+  const std::string token = page.next_page_token();
+  ASSERT_TRUE(List("rigs/r", 1, token, &page).ok());
+  ASSERT_EQ(page.calibrations_size(), 1);
+  EXPECT_EQ(page.calibrations(0).version(), 1);
+}
+
+TEST_F(CalibrationServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
+  v1::ListCalibrationsResponse page;
+  EXPECT_THAT(BadFields(List("", 0, "", &page)), ElementsAre("parent"));
+  ExpectNotFound(List("rigs/r", 0, "", &page), "rigs/r");
+  AddRig();
+  EXPECT_THAT(BadFields(List("rigs/r", -1, "", &page)),
+              ElementsAre("page_size"));
+  EXPECT_THAT(BadFields(List("rigs/r", 1, "x", &page)),
+              ElementsAre("page_token"));
+}
+
+TEST_F(CalibrationServiceTest, WatchBeginsWithTheActiveAndGetsTheNext) {
+  const Rig rig = AddScored(1);
+  Context context;
+  const auto reader = Watch(&context, "rigs/r");
+  v1::Calibration seen;
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 1);
+  const auto run = store_->CreateManualRun(rig.id);
+  ASSERT_TRUE(run.ok());
+  pipeline_->Publish(FinishRun(rig, run->run));
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 2);
+  context.TryCancel();
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_TRUE(Eventually([&] { return pipeline_->watchers() == 0; }));
+}
+
+TEST_F(CalibrationServiceTest, EveryWatcherGetsTheNewVersion) {
+  AddRig();
+  StoredCalibration next = *store_->GetActiveCalibration("r");
+  next.version = 2;
+  std::array<Context, 2> contexts;
+  std::array<std::unique_ptr<grpc::ClientReader<v1::Calibration>>, 2> readers;
+  v1::Calibration seen;
+  for (int i = 0; i < 2; ++i) {
+    readers[i] = Watch(&contexts[i], "rigs/r");
+    ASSERT_TRUE(readers[i]->Read(&seen));
+    EXPECT_EQ(seen.version(), 1);
+  }
+  pipeline_->Publish(next);
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(readers[i]->Read(&seen));
+    EXPECT_EQ(seen.version(), 2);
+    contexts[i].TryCancel();
+    readers[i]->Finish();
+  }
+}
+
+TEST_F(CalibrationServiceTest, SlowWatcherEndsUpWithTheNewest) {
+  AddRig();
+  StoredCalibration next = *store_->GetActiveCalibration("r");
+  Context context;
+  const auto reader = Watch(&context, "rigs/r");
+  v1::Calibration seen;
+  ASSERT_TRUE(reader->Read(&seen));
+  for (next.version = 2; next.version <= 3000; ++next.version) {
+    pipeline_->Publish(next);
+  }
+  std::int64_t before = 1;
+  while (before < 3000 && reader->Read(&seen)) {
+    EXPECT_GT(seen.version(), before);
+    before = seen.version();
+  }
+  EXPECT_EQ(before, 3000);
+  context.TryCancel();
+  reader->Finish();
+}
+
+TEST_F(CalibrationServiceTest, WatchOfAnUnknownRigIsRefused) {
+  v1::Calibration seen;
+  Context unknown;
+  const auto reader = Watch(&unknown, "rigs/r");
+  EXPECT_FALSE(reader->Read(&seen));
+  ExpectNotFound(reader->Finish(), "rigs/r");
+  Context malformed;
+  EXPECT_THAT(BadFields(Watch(&malformed, "r")->Finish()),
+              ElementsAre("parent"));
+}
+
+}  // namespace
+}  // namespace selfcal::server

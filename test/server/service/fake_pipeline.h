@@ -1,0 +1,131 @@
+// A pipeline that stores without scoring, and whose publications, progress and
+// errors are those that a test asks for.
+#pragma once
+
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "server/pipeline/pipeline.h"
+
+namespace selfcal::server {
+
+class FakePipeline final : public Pipeline {
+ public:
+  explicit FakePipeline(Store* store) : store_(store) {}
+
+  absl::Status Start() override { return absl::OkStatus(); }
+  void Stop() override {}
+
+  // Replaces what Submit does after validation.
+  std::function<absl::StatusOr<SubmitResult>(const std::function<bool()>&)>
+      submit_hook;
+
+  absl::StatusOr<SubmitResult> Submit(
+      const std::string& rig,
+      const MotionSegment& segment,
+      const std::function<bool()>& cancelled) override {
+    if (submit_hook) return submit_hook(cancelled);
+    const auto stored = store_->GetRig(rig);
+    if (!stored.ok()) return stored.status();
+    auto violations = Validate(segment, stored->rig.factory);
+    if (!violations.empty()) {
+      return SubmitResult{SubmitResult::Verdict::kRejected, violations};
+    }
+    const auto put = store_->PutSegment(rig, segment);
+    if (!put.ok()) return put.status();
+    return SubmitResult{*put == PutVerdict::kStored
+                            ? SubmitResult::Verdict::kStored
+                            : SubmitResult::Verdict::kDuplicate,
+                        {}};
+  }
+
+  absl::StatusOr<StoredRun> StartRecalibration(
+      const std::string& rig) override {
+    return store_->CreateManualRun(rig);
+  }
+
+  absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
+                                                std::int64_t run) override {
+    auto ended = store_->EndRun(rig, run, RunState::kCancelled, "by hand");
+    if (ended.ok()) Tell({*ended, {}});
+    return ended;
+  }
+
+  absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
+      const std::string& rig,
+      std::function<void(const StoredCalibration&)> callback) override {
+    const std::lock_guard lock(mutex_);
+    const auto active = store_->GetActiveCalibration(rig);
+    if (!active.ok()) return active.status();
+    callback(*active);
+    return Subscribe(&calibration_watchers_, std::move(callback));
+  }
+
+  absl::StatusOr<std::unique_ptr<Subscription>> WatchRun(
+      const std::string& rig,
+      std::int64_t run,
+      std::function<void(const RunUpdate&)> callback) override {
+    const std::lock_guard lock(mutex_);
+    const auto stored = store_->GetRun(rig, run);
+    if (!stored.ok()) return stored.status();
+    callback({*stored, {}});
+    return Subscribe(&run_watchers_, std::move(callback));
+  }
+
+  void Publish(const StoredCalibration& calibration) {
+    const std::lock_guard lock(mutex_);
+    for (const auto& watcher : calibration_watchers_) watcher(calibration);
+  }
+
+  void Tell(const RunUpdate& update) {
+    const std::lock_guard lock(mutex_);
+    for (const auto& watcher : run_watchers_) watcher(update);
+  }
+
+  std::size_t watchers() {
+    const std::lock_guard lock(mutex_);
+    return calibration_watchers_.size() + run_watchers_.size();
+  }
+
+ private:
+  template <typename T>
+  using Watchers = std::list<std::function<void(const T&)>>;
+
+  template <typename T>
+  class Registration final : public Subscription {
+   public:
+    Registration(std::mutex* mutex,
+                 Watchers<T>* watchers,
+                 typename Watchers<T>::iterator place)
+        : mutex_(mutex), watchers_(watchers), place_(place) {}
+    ~Registration() override {
+      const std::lock_guard lock(*mutex_);
+      watchers_->erase(place_);
+    }
+
+   private:
+    std::mutex* mutex_;
+    Watchers<T>* watchers_;
+    typename Watchers<T>::iterator place_;
+  };
+
+  // With the mutex held.
+  template <typename T>
+  std::unique_ptr<Subscription> Subscribe(
+      Watchers<T>* watchers, std::function<void(const T&)> callback) {
+    watchers->push_back(std::move(callback));
+    return std::make_unique<Registration<T>>(
+        &mutex_, watchers, std::prev(watchers->end()));
+  }
+
+  Store* store_;
+  std::mutex mutex_;
+  Watchers<StoredCalibration> calibration_watchers_;
+  Watchers<RunUpdate> run_watchers_;
+};
+
+}  // namespace selfcal::server

@@ -1,0 +1,175 @@
+#include "test/server/service/service_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+class SegmentServiceTest : public ServiceTest {
+ protected:
+  grpc::Status Get(const std::string& name, v1::Segment* segment) {
+    Context context;
+    v1::GetSegmentRequest request;
+    request.set_name(name);
+    return segments_->GetSegment(&context, request, segment);
+  }
+
+  grpc::Status List(const std::string& parent,
+                    int size,
+                    const std::string& token,
+                    v1::ListSegmentsResponse* response) {
+    Context context;
+    v1::ListSegmentsRequest request;
+    request.set_parent(parent);
+    request.set_page_size(size);
+    request.set_page_token(token);
+    return segments_->ListSegments(&context, request, response);
+  }
+
+  grpc::Status Table(const std::string& name, v1::Table* table) {
+    Context context;
+    v1::GetTableRequest request;
+    request.set_name(name);
+    return segments_->GetTable(&context, request, table);
+  }
+
+  grpc::Status Tables(const std::string& parent,
+                      v1::ListTablesResponse* response) {
+    Context context;
+    v1::ListTablesRequest request;
+    request.set_parent(parent);
+    return segments_->ListTables(&context, request, response);
+  }
+};
+
+TEST_F(SegmentServiceTest, StoredSegmentShowsItsCountsAndNoScore) {
+  const Rig rig = AddRig();
+  MotionSegment segment = TestSegments(rig, 1, "a b~c")[0];
+  ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+  v1::Segment read;
+  ASSERT_TRUE(Get("rigs/r/segments/a%20b%7Ec~0", &read).ok());
+  EXPECT_EQ(read.name(), "rigs/r/segments/a%20b%7Ec~0");
+  EXPECT_EQ(read.state(), v1::Segment::STORED);
+  EXPECT_TRUE(read.has_data());
+  EXPECT_GT(read.payload_bytes(), 0);
+  EXPECT_GT(read.receive_time().seconds(), 1'600'000'000);
+  EXPECT_EQ(read.keyframes(), static_cast<int>(segment.keyframes.size()));
+  EXPECT_EQ(read.imu_samples(), static_cast<int>(segment.imu.size()));
+  EXPECT_EQ(read.landmarks(), static_cast<int>(segment.landmarks.size()));
+  EXPECT_EQ(read.observations(), static_cast<int>(segment.observations.size()));
+  EXPECT_EQ(read.start_ns(), segment.keyframes.front().t_ns);
+  EXPECT_EQ(read.end_ns(), segment.keyframes.back().t_ns);
+  EXPECT_EQ(read.sequence(), 1);
+  EXPECT_EQ(read.scores_size(), 0);
+}
+
+TEST_F(SegmentServiceTest, ScoredSegmentShowsItsScoresAndTables) {
+  const Rig rig = AddScored(1);
+  v1::Segment read;
+  ASSERT_TRUE(Get("rigs/r/segments/s~0", &read).ok());
+  EXPECT_EQ(read.state(), v1::Segment::SCORED);
+  ASSERT_EQ(read.scores_size(), static_cast<int>(rig.groups.size()));
+  int components = 0;
+  for (int i = 0; i < read.scores_size(); ++i) {
+    EXPECT_EQ(read.scores(i).group(), rig.groups[i].name);
+    EXPECT_EQ(read.scores(i).entropy_nats(), -10);
+    EXPECT_EQ(read.scores(i).gain_nats(), 10);
+    EXPECT_TRUE(read.scores(i).in_table());
+    components += read.scores(i).size();
+  }
+  EXPECT_EQ(components, TangentSize(rig.factory));
+  EXPECT_EQ(read.components(), TangentSize(rig.factory));
+}
+
+TEST_F(SegmentServiceTest, UnusableSegmentSaysWhy) {
+  const Rig rig = AddRig();
+  const MotionSegment segment = TestSegments(rig, 1)[0];
+  ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+  ASSERT_TRUE(store_->MarkUnusable("r", segment.key, "broken").ok());
+  v1::Segment read;
+  ASSERT_TRUE(Get("rigs/r/segments/s~0", &read).ok());
+  EXPECT_EQ(read.state(), v1::Segment::UNUSABLE);
+  EXPECT_EQ(read.problem(), "broken");
+}
+
+TEST_F(SegmentServiceTest, SegmentThatDoesNotExistIsNotFound) {
+  v1::Segment read;
+  ExpectNotFound(Get("rigs/r/segments/s~0", &read), "rigs/r/segments/s~0");
+  AddRig();
+  ExpectNotFound(Get("rigs/r/segments/s~0", &read), "rigs/r/segments/s~0");
+  ExpectNotFound(Get("rigs/r/segments/%FF%00~0", &read),
+                 "rigs/r/segments/%FF%00~0");
+}
+
+TEST_F(SegmentServiceTest, WhatIsNoNameIsRefused) {
+  v1::Segment read;
+  for (const std::string name : {"", "rigs/r", "rigs/r/segments/s"}) {
+    EXPECT_THAT(BadFields(Get(name, &read)), ElementsAre("name"));
+  }
+  v1::ListSegmentsResponse page;
+  EXPECT_THAT(BadFields(List("r", 0, "", &page)), ElementsAre("parent"));
+  v1::Table table;
+  EXPECT_THAT(BadFields(Table("rigs/r/tables/", &table)), ElementsAre("name"));
+  v1::ListTablesResponse tables;
+  EXPECT_THAT(BadFields(Tables("rigs/", &tables)), ElementsAre("parent"));
+}
+
+TEST_F(SegmentServiceTest, PagesHoldEverySegmentOnceNewestFirst) {
+  for (const MotionSegment& segment : TestSegments(AddRig(), 5)) {
+    ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+  }
+  std::vector<std::int64_t> sequences;
+  std::string token;
+  int pages = 0;
+  do {
+    v1::ListSegmentsResponse page;
+    ASSERT_TRUE(List("rigs/r", 2, token, &page).ok());
+    for (const auto& s : page.segments()) sequences.push_back(s.sequence());
+    token = page.next_page_token();
+  } while (!token.empty() && ++pages < 10);
+  EXPECT_THAT(sequences, ElementsAre(5, 4, 3, 2, 1));
+}
+
+TEST_F(SegmentServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
+  v1::ListSegmentsResponse page;
+  ExpectNotFound(List("rigs/r", 0, "", &page), "rigs/r");
+  AddRig();
+  EXPECT_THAT(BadFields(List("rigs/r", -7, "", &page)),
+              ElementsAre("page_size"));
+  EXPECT_THAT(BadFields(List("rigs/r", 7, "%", &page)),
+              ElementsAre("page_token"));
+}
+
+TEST_F(SegmentServiceTest, TablesShowTheRichestFirst) {
+  const Rig rig = AddScored(3);
+  v1::ListTablesResponse response;
+  ASSERT_TRUE(Tables("rigs/r", &response).ok());
+  ASSERT_EQ(response.tables_size(), static_cast<int>(rig.groups.size()));
+  for (int i = 0; i < response.tables_size(); ++i) {
+    const v1::Table& table = response.tables(i);
+    EXPECT_EQ(table.name(), "rigs/r/tables/" + rig.groups[i].name);
+    EXPECT_EQ(table.capacity(), 2);
+    EXPECT_EQ(table.scored(), 3);
+    EXPECT_FALSE(table.starved());
+    ASSERT_EQ(table.entries_size(), 2);
+    EXPECT_EQ(table.entries(0).segment(), "rigs/r/segments/s~2");
+    EXPECT_EQ(table.entries(0).entropy_nats(), -12);
+    EXPECT_EQ(table.entries(0).gain_nats(), 12);
+    EXPECT_EQ(table.entries(1).segment(), "rigs/r/segments/s~1");
+    v1::Table one;
+    ASSERT_TRUE(Table(table.name(), &one).ok());
+    EXPECT_EQ(one.SerializeAsString(), table.SerializeAsString());
+  }
+}
+
+TEST_F(SegmentServiceTest, TableOfAnUnknownGroupOrRigIsNotFound) {
+  v1::Table table;
+  ExpectNotFound(Table("rigs/r/tables/imu", &table), "rigs/r/tables/imu");
+  AddRig();
+  ExpectNotFound(Table("rigs/r/tables/gnss", &table), "rigs/r/tables/gnss");
+  v1::ListTablesResponse tables;
+  ExpectNotFound(Tables("rigs/nobody", &tables), "rigs/nobody");
+}
+
+}  // namespace
+}  // namespace selfcal::server

@@ -1,0 +1,241 @@
+#include <limits>
+
+#include "test/server/service/service_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::StartsWith;
+using Response = v1::StreamSegmentsResponse;
+
+// One StreamSegments call.
+class Stream {
+ public:
+  explicit Stream(v1::SegmentService::Stub* stub)
+      : stream_(stub->StreamSegments(&context_)) {}
+
+  // The verdict on one message; unspecified if the stream has ended.
+  Response Send(const v1::StreamSegmentsRequest& request) {
+    Response response;
+    if (stream_->Write(request)) stream_->Read(&response);
+    return response;
+  }
+  Response Send(const MotionSegment& segment,
+                const std::string& parent = "rigs/r") {
+    v1::StreamSegmentsRequest request;
+    request.set_parent(parent);
+    *request.mutable_segment() = ToProto(segment);
+    return Send(request);
+  }
+
+  void Write(const MotionSegment& segment) {
+    v1::StreamSegmentsRequest request;
+    request.set_parent("rigs/r");
+    *request.mutable_segment() = ToProto(segment);
+    stream_->Write(request);
+  }
+
+  grpc::Status Finish() {
+    stream_->WritesDone();
+    return stream_->Finish();
+  }
+  grpc::ClientContext& context() { return context_; }
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::StreamSegmentsRequest, Response>>
+      stream_;
+};
+
+std::vector<std::string> Fields(const Response& response) {
+  EXPECT_EQ(response.verdict(), Response::REJECTED);
+  std::vector<std::string> fields;
+  for (const auto& violation : response.violations()) {
+    EXPECT_FALSE(violation.description().empty());
+    fields.push_back(violation.field());
+  }
+  return fields;
+}
+
+using SegmentStreamTest = ServiceTest;
+
+TEST_F(SegmentStreamTest, EverySegmentIsAnsweredInOrderAndStored) {
+  const Rig rig = AddRig();
+  const auto segments = TestSegments(rig, 3);
+  Stream stream(segments_.get());
+  for (const MotionSegment& segment : segments) {
+    const Response response = stream.Send(segment);
+    EXPECT_EQ(response.verdict(), Response::STORED);
+    EXPECT_EQ(response.session(), segment.key.session);
+    EXPECT_EQ(response.index(), segment.key.index);
+    EXPECT_TRUE(store_->GetSegment("r", segment.key).ok());
+  }
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, SecondTimeIsADuplicate) {
+  const auto segments = TestSegments(AddRig(), 1);
+  Stream stream(segments_.get());
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::STORED);
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::DUPLICATE);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, MalformedSegmentIsRejectedAndTheStreamGoesOn) {
+  const auto segments = TestSegments(AddRig(), 2);
+  Stream stream(segments_.get());
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::STORED);
+
+  MotionSegment bad = segments[1];
+  bad.keyframes[3].q_GI.w() += 1;
+  bad.observations[2].z_px.x() = std::numeric_limits<double>::quiet_NaN();
+  bad.observations[4].landmark = 1'000'000;
+  std::swap(bad.imu[5], bad.imu[6]);
+  const Response rejected = stream.Send(bad);
+  EXPECT_EQ(rejected.session(), bad.key.session);
+  EXPECT_EQ(rejected.index(), bad.key.index);
+  const auto fields = Fields(rejected);
+  EXPECT_THAT(fields, Contains("keyframes[3].q_gi"));
+  EXPECT_THAT(fields, Contains("observations[2].z_px"));
+  EXPECT_THAT(fields, Contains("observations[4].landmark"));
+  EXPECT_THAT(fields, Contains(StartsWith("imu[6].t_ns")));
+
+  EXPECT_EQ(stream.Send(segments[1]).verdict(), Response::STORED);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, WrongShapeIsRejectedAndTheStreamGoesOn) {
+  const auto segments = TestSegments(AddRig(), 1);
+  Stream stream(segments_.get());
+  v1::StreamSegmentsRequest request;
+  request.set_parent("rigs/r");
+  EXPECT_THAT(Fields(stream.Send(request)), ElementsAre("keyframes", "imu"));
+  *request.mutable_segment() = ToProto(segments[0]);
+  request.mutable_segment()
+      ->mutable_observations()
+      ->mutable_z_px()
+      ->RemoveLast();
+  EXPECT_THAT(Fields(stream.Send(request)), ElementsAre("observations.z_px"));
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::STORED);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, HugeSessionIsRejectedWithoutBeingEchoedWhole) {
+  auto segments = TestSegments(AddRig(), 1);
+  segments[0].key.session = std::string(8 << 20, 'x');
+  Stream stream(segments_.get());
+  const Response response = stream.Send(segments[0]);
+  EXPECT_THAT(Fields(response), ElementsAre("session"));
+  EXPECT_LT(response.ByteSizeLong(), 10'000u);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, LaterMessagesMayLeaveOutTheRig) {
+  const auto segments = TestSegments(AddRig(), 2);
+  Stream stream(segments_.get());
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::STORED);
+  EXPECT_EQ(stream.Send(segments[1], "").verdict(), Response::STORED);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, SegmentForAnotherRigIsRejectedAndTheStreamGoesOn) {
+  const auto segments = TestSegments(AddRig(), 2);
+  AddRig("other");
+  Stream stream(segments_.get());
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::STORED);
+  EXPECT_THAT(Fields(stream.Send(segments[1], "rigs/other")),
+              ElementsAre("parent"));
+  EXPECT_EQ(stream.Send(segments[1]).verdict(), Response::STORED);
+  EXPECT_TRUE(stream.Finish().ok());
+  EXPECT_FALSE(store_->GetSegment("other", segments[1].key).ok());
+}
+
+TEST_F(SegmentStreamTest, UnknownRigEndsTheStream) {
+  const auto segments = TestSegments(TestRig("r"), 1);
+  Stream stream(segments_.get());
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::VERDICT_UNSPECIFIED);
+  ExpectNotFound(stream.Finish(), "rigs/r");
+  Stream malformed(segments_.get());
+  malformed.Send(MotionSegment(), "rigs/r");
+  ExpectNotFound(malformed.Finish(), "rigs/r");
+}
+
+TEST_F(SegmentStreamTest, FirstMessageWithoutARigEndsTheStream) {
+  const auto segments = TestSegments(AddRig(), 1);
+  for (const std::string parent : {"", "r", "rigs/r/segments/s~0"}) {
+    Stream stream(segments_.get());
+    stream.Send(segments[0], parent);
+    EXPECT_THAT(BadFields(stream.Finish()), ElementsAre("parent"));
+  }
+}
+
+TEST_F(SegmentStreamTest, EmptyStreamIsOk) {
+  Stream stream(segments_.get());
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, FullDiskEndsTheStreamAndSaysWhenToRetry) {
+  const auto segments = TestSegments(AddRig(), 1);
+  pipeline_->submit_hook = [](const auto&) {
+    return absl::ResourceExhaustedError("disk full");
+  };
+  Stream stream(segments_.get());
+  stream.Send(segments[0]);
+  const grpc::Status status = stream.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_GT(DetailOf<google::rpc::RetryInfo>(status).retry_delay().seconds(),
+            0);
+}
+
+TEST_F(SegmentStreamTest, CallerThatLeavesFreesAWaitingSubmit) {
+  const auto segments = TestSegments(AddRig(), 1);
+  std::atomic<int> waiting = 0;
+  std::atomic<int> freed = 0;
+  pipeline_->submit_hook = [&](const std::function<bool()>& cancelled) {
+    ++waiting;
+    if (Eventually(cancelled)) ++freed;
+    return absl::CancelledError("");
+  };
+  Stream stream(segments_.get());
+  stream.Write(segments[0]);
+  ASSERT_TRUE(Eventually([&] { return waiting == 1; }));
+  stream.context().TryCancel();
+  EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_TRUE(Eventually([&] { return freed == 1; }));
+}
+
+TEST_F(SegmentStreamTest, ExceptionEndsTheCallAndNotTheServer) {
+  const auto segments = TestSegments(AddRig(), 1);
+  pipeline_->submit_hook = [](const auto&) -> absl::StatusOr<SubmitResult> {
+    throw std::bad_alloc();
+  };
+  Stream stream(segments_.get());
+  stream.Send(segments[0]);
+  EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  pipeline_->submit_hook = [](const auto&) -> absl::StatusOr<SubmitResult> {
+    throw std::logic_error("a mistake");
+  };
+  Stream second(segments_.get());
+  second.Send(segments[0]);
+  EXPECT_EQ(second.Finish().error_code(), grpc::StatusCode::INTERNAL);
+  pipeline_->submit_hook = nullptr;
+  Stream third(segments_.get());
+  EXPECT_EQ(third.Send(segments[0]).verdict(), Response::STORED);
+  EXPECT_TRUE(third.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, MessageOverTheLimitIsRefused) {
+  ServerOptions options;
+  options.max_receive_bytes = 10'000;
+  StartServer(options);
+  const auto segments = TestSegments(AddRig(), 1);
+  ASSERT_GT(ToProto(segments[0]).ByteSizeLong(), 10'000u);
+  Stream stream(segments_.get());
+  stream.Send(segments[0]);
+  EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+}
+
+}  // namespace
+}  // namespace selfcal::server
