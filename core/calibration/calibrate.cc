@@ -19,7 +19,7 @@ namespace {
 constexpr int kMaxRounds = 12;
 // The first round only has to come near enough to tell outliers.
 constexpr double kFirstTolerance = 1e-4;
-constexpr double kTolerance = 1e-9;
+constexpr double kTolerance = 1e-8;
 // Largest undamped Gauss-Newton step of theta at convergence, in sigmas.
 constexpr double kMaxStepSigmas = 0.05;
 // Largest change of theta by a round at convergence, in sigmas.

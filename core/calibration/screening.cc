@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -33,18 +34,46 @@ std::vector<int> Within(const std::vector<double>& norms_px, double gate_px) {
 
 bool EnoughLeft(const std::vector<int>& used, const Track& track) {
   const auto n = static_cast<double>(track.observations.size());
-  return static_cast<int>(used.size()) >= kMinTrackObservations &&
+  return used.size() >= kMinTrackObservations &&
          static_cast<double>(used.size()) >= (1 - kMaxOutlierFraction) * n;
 }
 
-bool DepthIsKnown(const Eigen::Matrix3d& information, double rho) {
-  const Eigen::LDLT<Eigen::Matrix3d> ldlt(information);
-  if (!(rho > 0) || ldlt.info() != Eigen::Success ||
-      !(ldlt.vectorD().minCoeff() > 0)) {
-    return false;
+// What all landmarks are judged by.
+struct Thresholds {
+  double gate_px;
+  double max_inverse_depth_sigma;  // [1/m]
+};
+
+Thresholds FindThresholds(
+    const LandmarkScene& scene,
+    const CalibrationProblem& problem,
+    const std::vector<std::optional<LandmarkPlace>>& places) {
+  std::vector<double> norms_px;
+  std::vector<double> inverse_depths;
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    if (!places[t]) {
+      continue;
+    }
+    for (const double norm :
+         ResidualNorms(scene, problem.tracks[t], places[t]->Homogeneous())) {
+      if (std::isfinite(norm)) {
+        norms_px.push_back(norm);
+      }
+    }
+    inverse_depths.push_back(std::abs(places[t]->inverse_depth.z()));
   }
+  return {
+      kOutlierGate * std::max(scene.pixel_sigma_px,
+                              Median(std::move(norms_px)) / kMedianOfRayleigh),
+      kMaxDepthUncertainty * Median(std::move(inverse_depths))};
+}
+
+double InverseDepthSigma(const Eigen::Matrix3d& information) {
+  const Eigen::LDLT<Eigen::Matrix3d> ldlt(information);
   const double variance = ldlt.solve(Eigen::Vector3d::UnitZ().eval())(2);
-  return variance > 0 && std::sqrt(variance) <= kMaxDepthUncertainty * rho;
+  return ldlt.isPositive() && variance > 0
+             ? std::sqrt(variance)
+             : std::numeric_limits<double>::infinity();
 }
 
 // Settles one landmark: which observations are within the gate of the place
@@ -52,31 +81,27 @@ bool DepthIsKnown(const Eigen::Matrix3d& information, double rho) {
 std::optional<ScreenedLandmark> Settle(const LandmarkScene& scene,
                                        const Track& track,
                                        const CalibrateOptions& options,
-                                       double gate_px,
+                                       const Thresholds& thresholds,
                                        LandmarkPlace place) {
-  ScreenedLandmark landmark;
-  landmark.used =
-      Within(ResidualNorms(scene, track, place.Homogeneous()), gate_px);
-  Eigen::Matrix3d information;
+  const auto within_gate = [&] {
+    return Within(ResidualNorms(scene, track, place.Homogeneous()),
+                  thresholds.gate_px);
+  };
+  std::vector<int> used = within_gate();
+  double sigma = 0;
   for (int pass = 0; pass < 2; ++pass) {
-    if (!EnoughLeft(landmark.used, track)) {
+    if (!EnoughLeft(used, track)) {
       return std::nullopt;
     }
-    information = RefinePlace(
-        scene, track, landmark.used, options.loss, options.loss_scale, &place);
-    std::vector<int> used =
-        Within(ResidualNorms(scene, track, place.Homogeneous()), gate_px);
-    if (used == landmark.used) {
-      break;
-    }
-    landmark.used = std::move(used);
+    sigma = InverseDepthSigma(RefinePlace(
+        scene, track, used, options.loss, options.loss_scale, &place));
+    used = within_gate();
   }
-  if (!EnoughLeft(landmark.used, track) ||
-      !DepthIsKnown(information, place.inverse_depth.z())) {
+  if (!EnoughLeft(used, track) ||
+      !(sigma <= thresholds.max_inverse_depth_sigma)) {
     return std::nullopt;
   }
-  landmark.place = place;
-  return landmark;
+  return ScreenedLandmark{0, place, std::move(used)};
 }
 
 }  // namespace
@@ -88,41 +113,28 @@ Screening ScreenLandmarks(const Rig& rig,
                           const CalibrateOptions& options) {
   const LandmarkScene scene{theta, keyframes, rig.pixel_sigma_px};
   std::vector<std::optional<LandmarkPlace>> places(problem.tracks.size());
-  std::vector<double> norms_px;
-  for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
-    const Track& track = problem.tracks[t];
-    if (static_cast<int>(track.observations.size()) < kMinTrackObservations) {
-      continue;
-    }
-    places[t] = TriangulateTrack(scene, track);
-    if (places[t]) {
-      for (const double norm :
-           ResidualNorms(scene, track, places[t]->Homogeneous())) {
-        if (std::isfinite(norm)) {
-          norms_px.push_back(norm);
-        }
-      }
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    if (problem.tracks[t].observations.size() >= kMinTrackObservations) {
+      places[t] = TriangulateTrack(scene, problem.tracks[t]);
     }
   }
+  const Thresholds thresholds = FindThresholds(scene, problem, places);
 
   Screening result;
-  const double gate_px =
-      kOutlierGate * std::max(rig.pixel_sigma_px,
-                              Median(std::move(norms_px)) / kMedianOfRayleigh);
-  for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
+  for (std::size_t t = 0; t < places.size(); ++t) {
     const Track& track = problem.tracks[t];
+    const auto observed = static_cast<int>(track.observations.size());
     std::optional<ScreenedLandmark> landmark;
     if (places[t]) {
-      landmark = Settle(scene, track, options, gate_px, *places[t]);
+      landmark = Settle(scene, track, options, thresholds, *places[t]);
     }
-    const int observed = static_cast<int>(track.observations.size());
     if (!landmark) {
       ++result.landmarks_dropped;
       result.observations_dropped += observed;
       continue;
     }
     landmark->track = static_cast<int>(t);
-    const int used = static_cast<int>(landmark->used.size());
+    const auto used = static_cast<int>(landmark->used.size());
     result.observations += used;
     result.observations_dropped += observed - used;
     result.landmarks.push_back(std::move(*landmark));

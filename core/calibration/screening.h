@@ -5,6 +5,7 @@
 // set. Pure, any thread.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
@@ -16,13 +17,17 @@
 namespace selfcal {
 
 // With two observations an error along the epipolar line cannot be seen.
-inline constexpr int kMinTrackObservations = 3;
+inline constexpr std::size_t kMinTrackObservations = 3;
 // In robust standard deviations, from the median of all residuals; never less
 // than so many times the pixel sigma of the rig.
 inline constexpr double kOutlierGate = 5.0;
 // A landmark of which more than this is outlying is no landmark.
 inline constexpr double kMaxOutlierFraction = 0.5;
-// Largest standard deviation of the inverse depth, in parts of itself.
+
+// A landmark is dropped where its inverse depth is less certain than this part
+// of the median inverse depth of the scene: it has next to no parallax, as all
+// landmarks of a device at rest. Compared with the scene, not with itself: the
+// latter keeps of two such landmarks the one that noise moved nearer.
 inline constexpr double kMaxDepthUncertainty = 0.5;
 
 struct ScreenedLandmark {

@@ -179,7 +179,15 @@ class Builder {
   }
 
   void AddLandmarks(const std::vector<ScreenedLandmark>& landmarks) {
+    // Two rows, as all others of a landmark have: Ceres' elimination is faster
+    // where sizes are uniform.
+    Eigen::Matrix<double, 2, 3> far = Eigen::Matrix<double, 2, 3>::Zero();
+    far(0, 2) = 1 / kInverseDepthSigma;
     for (std::size_t i = 0; i < landmarks.size(); ++i) {
+      problem_.AddResidualBlock(
+          MakePriorCost(far, Eigen::Vector3d::Zero()).release(),
+          nullptr,
+          places_[i].data());
       const Track& track = round_.problem.tracks[landmarks[i].track];
       for (const int index : landmarks[i].used) {
         const TrackObservation& seen = track.observations[index];

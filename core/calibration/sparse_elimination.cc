@@ -61,10 +61,14 @@ void SparseElimination::AddLink(int before, int after, const LinkRows& rows) {
       rows.residual.transpose() * rows.shared;
 }
 
-void SparseElimination::AddLandmark(std::span<const LandmarkRows> rows) {
+void SparseElimination::AddLandmark(std::span<const LandmarkRows> rows,
+                                    double prior_information,
+                                    double prior_residual) {
   using ByLandmark = Eigen::Matrix<double, kChainPoseSize, 3>;
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::MatrixX3d by_shared = Eigen::MatrixX3d::Zero(shared_size_ + 1, 3);
+  H(2, 2) = prior_information;
+  by_shared(shared_size_, 2) = -prior_information * prior_residual;
   std::vector<std::pair<int, ByLandmark>> by_pose;
   for (const LandmarkRows& row : rows) {
     const auto columns = static_cast<int>(row.shared.cols());

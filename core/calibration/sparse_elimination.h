@@ -30,8 +30,12 @@ class SparseElimination {
   void AddLink(int before, int after, const LinkRows& rows);
 
   // Adds and eliminates one landmark. `rows` are all of its rows, sorted by
-  // keyframe; they must determine it.
-  void AddLandmark(std::span<const LandmarkRows> rows);
+  // keyframe. The prior has the given information about the third coordinate,
+  // and its residual there; rows and prior together must determine the
+  // landmark.
+  void AddLandmark(std::span<const LandmarkRows> rows,
+                   double prior_information,
+                   double prior_residual);
 
   // Eliminates all keyframes. Nothing if the states are not determined.
   std::optional<SharedInformation> Eliminate() const;

@@ -134,7 +134,9 @@ void AddLandmarks(const Rig& rig,
                       scale * jacobians.landmark * by_place});
     }
     if (rows.size() >= 2) {
-      elimination->AddLandmark(rows);
+      elimination->AddLandmark(rows,
+                               Information(kInverseDepthSigma),
+                               landmark.place.inverse_depth.z());
     }
   }
 }

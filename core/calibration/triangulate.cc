@@ -64,7 +64,8 @@ std::optional<Eigen::Vector4d> IntersectRays(const Ray& a, const Ray& b) {
   if (baseline2 == 0) {
     return std::nullopt;
   }
-  const double rho = std::max(kMinInverseDepth, -u.dot(v) / baseline2);
+  const double rho =
+      std::clamp(-u.dot(v) / baseline2, kMinInverseDepth, kInverseDepthSigma);
   Eigen::Vector4d point;
   point << rho * a.center_G + a.bearing_G, rho;
   return point;
@@ -104,6 +105,11 @@ Linearised Linearise(const LandmarkScene& scene,
   by_place.topLeftCorner<3, 2>() = place.anchor.R_GA.leftCols<2>();
   by_place.topRightCorner<3, 1>() = place.anchor.a_G;
   by_place.bottomRows<1>() = Eigen::RowVector3d::UnitZ();
+  const double prior = 1 / (kInverseDepthSigma * kInverseDepthSigma);
+  const double rho = place.inverse_depth.z();
+  sum.cost = prior * rho * rho;
+  sum.H(2, 2) = prior;
+  sum.g(2) = prior * rho;
   Eigen::Vector2d r;
   ReprojectionJacobians jacobians;
   for (const int index : used) {

@@ -18,6 +18,12 @@
 
 namespace selfcal {
 
+// Standard deviation [1/m] of a prior on every landmark's inverse depth,
+// centred at infinity: nothing is seen from much nearer than 0.1 m. It is far
+// too weak to move what has any parallax, and keeps a landmark that loses its
+// parallax within a round, as that of a device at rest, from running away.
+inline constexpr double kInverseDepthSigma = 10;
+
 // What landmarks are measured against.
 struct LandmarkScene {
   const Calibration& theta;
@@ -44,8 +50,8 @@ std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
                                               const Track& track);
 
 // Minimises the robust reprojection cost of the observations `used` (indices
-// into the track) by damped Gauss-Newton. Returns the information matrix of
-// (alpha, beta, rho) at the end, in which residuals count by their weights.
+// into the track), and the prior on inverse depth, by damped Gauss-Newton.
+// Returns the information matrix of (alpha, beta, rho) at the end.
 Eigen::Matrix3d RefinePlace(const LandmarkScene& scene,
                             const Track& track,
                             std::span<const int> used,
