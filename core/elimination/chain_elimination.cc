@@ -1,5 +1,6 @@
 #include "core/elimination/chain_elimination.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 
 #include "core/elimination/small_cholesky.h"
@@ -20,10 +21,8 @@ void ChainElimination::Start(int shared_size) {
   const int fixed = pose(0);
   if (front_.rows() < fixed) {
     front_.resize(fixed, fixed);
-    mass_.resize(fixed);
   }
   front_.topLeftCorner(fixed, fixed).setZero();
-  mass_.head(fixed).setZero();
   OpenSlots(1);
 }
 
@@ -35,19 +34,17 @@ void ChainElimination::OpenSlots(int slots) {
   if (front_.rows() < new_size) {
     const int capacity = std::max<int>(new_size, 2 * front_.rows());
     front_.conservativeResize(capacity, capacity);
-    mass_.conservativeResize(capacity);
   }
   front_.block(old_size, 0, new_size - old_size, new_size).setZero();
-  mass_.segment(old_size, new_size - old_size).setZero();
 }
 
-void ChainElimination::AddPrior(const ChainStateVector& information) {
-  const auto add = [&](int at, const auto& diagonal) {
-    front_.diagonal().segment(at, diagonal.size()) += diagonal;
-    mass_.segment(at, diagonal.size()) += diagonal;
-  };
-  add(pose(0), information.head<kPose>());
-  add(motion(), information.tail<kMotion>());
+void ChainElimination::AddPrior(const ChainStateMatrix& information) {
+  front_.block<kPose, kPose>(pose(0), pose(0)) +=
+      information.topLeftCorner<kPose, kPose>();
+  front_.block<kPose, kMotion>(pose(0), motion()) +=
+      information.topRightCorner<kPose, kMotion>();
+  front_.block<kMotion, kMotion>(motion(), motion()) +=
+      information.bottomRightCorner<kMotion, kMotion>();
 }
 
 void ChainElimination::AddRun(int begin, int end) {
@@ -86,7 +83,6 @@ void ChainElimination::AddToFront(const LandmarkRows& rows, int pose) {
   const int size = static_cast<int>(J.cols());
   const Eigen::Matrix<double, kPose, 2> pose_t = rows.pose.transpose();
   front_.block<kPose, kPose>(pose, pose) += pose_t * rows.pose;
-  mass_.segment<kPose>(pose) += rows.pose.colwise().squaredNorm();
   front_.block<kPose, 1>(pose, rhs()) += pose_t * r;
   for (int c = 0; c < size; ++c) {
     const Eigen::Vector2d column = J.col(c);
@@ -144,7 +140,7 @@ void ChainElimination::AddLandmark(std::span<const LandmarkRows> rows,
     AddToPanel(row, at);
     H += row.landmark.transpose() * row.landmark;
   }
-  GuardedCholesky<3>(H.diagonal(), &H);
+  GuardedCholesky<3>(&H);
   for (const Run& run : runs_) {
     SolvePanel<3>(H,
                   landmark_panel_.middleRows(run.begin, run.end - run.begin));
@@ -152,118 +148,142 @@ void ChainElimination::AddLandmark(std::span<const LandmarkRows> rows,
   SubtractLandmarkPanel();
 }
 
+// Takes the current state out of the front: returns its information, leaves its
+// coupling with what stays in coupling_, in the places after CloseGap().
+ChainStateMatrix ChainElimination::TakeCurrent() {
+  ChainStateMatrix current;
+  current.topLeftCorner<kPose, kPose>() =
+      front_.block<kPose, kPose>(pose(0), pose(0))
+          .selfadjointView<Eigen::Lower>();
+  current.bottomRightCorner<kMotion, kMotion>() =
+      front_.block<kMotion, kMotion>(motion(), motion())
+          .selfadjointView<Eigen::Lower>();
+  current.topRightCorner<kPose, kMotion>() =
+      front_.block<kPose, kMotion>(pose(0), motion());
+  current.bottomLeftCorner<kMotion, kPose>() =
+      current.topRightCorner<kPose, kMotion>().transpose();
+
+  const int shared = shared_size_ + 1;
+  const int poses = (slots_ - 1) * kPose;
+  if (coupling_.rows() < front_.rows()) {
+    coupling_.resize(front_.rows(), Eigen::NoChange);
+    solution_.resize(front_.rows(), Eigen::NoChange);
+    product_.resize(front_.rows(), Eigen::NoChange);
+  }
+  auto of_pose = coupling_.leftCols<kPose>();
+  auto of_motion = coupling_.rightCols<kMotion>();
+  of_pose.topRows(shared) = front_.block(pose(0), 0, kPose, shared).transpose();
+  of_motion.topRows(shared) =
+      front_.block(motion(), 0, kMotion, shared).transpose();
+  coupling_.middleRows<kMotion>(motion()).setZero();
+  of_pose.middleRows(pose(0), poses) =
+      front_.block(pose(1), pose(0), poses, kPose);
+  of_motion.middleRows(pose(0), poses) =
+      front_.block(pose(1), motion(), poses, kMotion);
+  CloseGap();
+  return current;
+}
+
+// Moves the poses up by one and clears the place of the motion. Every entry
+// moves up and left, so ascending order never overwrites what is still to be
+// read.
+void ChainElimination::CloseGap() {
+  const int poses = (slots_ - 1) * kPose;
+  const auto move_column = [&](int to, int from, int row) {
+    const double* source = &front_.coeffRef(row + kPose, from);
+    std::copy(
+        source, source + (pose(0) + poses - row), &front_.coeffRef(row, to));
+  };
+  for (int c = 0; c < motion(); ++c) {
+    front_.col(c).segment<kMotion>(motion()).setZero();
+    move_column(c, c, pose(0));
+  }
+  front_.block(motion(), motion(), kMotion + poses, kMotion).setZero();
+  for (int c = pose(0); c < pose(0) + poses; ++c) {
+    move_column(c, c + kPose, c);
+  }
+  --slots_;
+}
+
+// Solves the link for the current state,
+//   x0 = A e + G^T (shared, 1, motion and pose of the next),
+// with its noise e of unit information, and puts that into the quadratic form
+//   x0^T S x0 + 2 x0^T Y^T z
+// where S is `current` and Y coupling_. Leaves G in solution_ and the coupling
+// of x0 with z in coupling_; returns A.
+ChainStateMatrix ChainElimination::Substitute(const LinkRows& link,
+                                              const ChainStateMatrix& current) {
+  const int shared = static_cast<int>(link.shared.cols());
+  // Rows of different kinds differ by many orders: equilibrated before LU.
+  const ChainStateVector scale =
+      link.x0.rowwise().lpNorm<Eigen::Infinity>().cwiseInverse();
+  const Eigen::PartialPivLU<ChainStateMatrix> lu(scale.asDiagonal() * link.x0);
+  const auto solve = [&](const auto& rows) {
+    return lu.solve(scale.asDiagonal() * rows).eval();
+  };
+  const int fixed = pose(1);
+  auto G = solution_.topRows(fixed);
+  G.setZero();
+  G.middleRows(link.shared_offset, shared) = -solve(link.shared).transpose();
+  G.row(rhs()) = -solve(link.residual).transpose();
+  const ChainStateMatrix next = -solve(link.x1).transpose();
+  G.middleRows<kMotion>(motion()) = next.bottomRows<kMotion>();
+  G.middleRows<kPose>(pose(0)) = next.topRows<kPose>();
+
+  // G S G^T + G Y^T + Y G^T = G H^T + H G^T with H = Y + G S / 2, below the
+  // diagonal; G has rows in the first `fixed` places only.
+  const auto half = (0.5 * (G * current)).eval();
+  coupling_.topRows(fixed) += half;
+  const auto H = coupling_.topRows(fixed);
+  auto top = front_.topLeftCorner(fixed, fixed);
+  top.triangularView<Eigen::Lower>() += G * H.transpose();
+  top.triangularView<Eigen::Lower>() += H * G.transpose();
+  const int rest = size() - fixed;
+  const auto add_below = [&](int begin, int columns) {
+    front_.block(fixed, begin, rest, columns).noalias() +=
+        coupling_.middleRows(fixed, rest) *
+        solution_.middleRows(begin, columns).transpose();
+  };
+  add_below(link.shared_offset, shared);
+  add_below(rhs(), fixed - rhs());
+  coupling_.topRows(fixed) += half;
+  return solve(ChainStateMatrix::Identity());
+}
+
+// front -= product product^T on the lower triangle.
+void ChainElimination::SubtractStatePanel() {
+  front_.topLeftCorner(size(), size())
+      .selfadjointView<Eigen::Lower>()
+      .rankUpdate(product_.topRows(size()), -1.0);
+}
+
 void ChainElimination::Advance(const LinkRows& link) {
   OpenSlots(2);
-  // In the order of the front, so that only the lower triangle is written.
-  struct Part {
-    int at;
-    Eigen::Matrix<double, kState, Eigen::Dynamic> J;
-  };
-  const Part parts[] = {
-      {link.shared_offset, link.shared},
-      {rhs(), link.residual},
-      {motion(), link.x0.rightCols<kMotion>()},
-      {next_motion(), link.x1.rightCols<kMotion>()},
-      {pose(0), link.x0.leftCols<kPose>()},
-      {pose(1), link.x1.leftCols<kPose>()},
-  };
-  for (const Part& row : parts) {
-    for (const Part& column : parts) {
-      if (column.at > row.at) break;
-      front_.block(row.at, column.at, row.J.cols(), column.J.cols()) +=
-          row.J.transpose() * column.J;
-    }
-    mass_.segment(row.at, row.J.cols()) += row.J.colwise().squaredNorm();
-  }
-  EliminateCurrent();
+  const ChainStateMatrix current = TakeCurrent();
+  const ChainStateMatrix A = Substitute(link, current);
+  ChainStateMatrix L =
+      ChainStateMatrix::Identity() + A.transpose() * current * A;
+  GuardedCholesky<kState>(&L);
+  // L^-1 A^T, transposed.
+  const ChainStateMatrix root =
+      L.triangularView<Eigen::Lower>().solve(A.transpose()).transpose();
+  product_.topRows(size()).noalias() = coupling_.topRows(size()) * root;
+  SubtractStatePanel();
   ++current_;
 }
 
 SharedInformation ChainElimination::Finish() {
-  EliminateCurrent();
+  ChainStateMatrix L = TakeCurrent();
+  GuardedCholesky<kState>(&L);
+  auto panel = product_.topRows(size());
+  panel = coupling_.topRows(size());
+  SolvePanel<kState>(L, panel);
+  SubtractStatePanel();
   SharedInformation result;
   result.Lambda = front_.topLeftCorner(shared_size_, shared_size_)
                       .selfadjointView<Eigen::Lower>();
   result.eta = -front_.row(rhs()).head(shared_size_).transpose();
   return result;
-}
-
-// Columns of the current keyframe against all that stays, with rows already in
-// the places they have after CloseGap().
-void ChainElimination::GatherPanel() {
-  const int shared = shared_size_ + 1;
-  const int after = size() - kPose;
-  const int poses = after - pose(0);
-  state_panel_.resize(std::max<int>(state_panel_.rows(), after),
-                      Eigen::NoChange);
-  auto at_motion = state_panel_.leftCols<kMotion>();
-  auto at_pose = state_panel_.rightCols<kPose>();
-  at_motion.topRows(shared) =
-      front_.block(motion(), 0, kMotion, shared).transpose();
-  at_pose.topRows(shared) = front_.block(pose(0), 0, kPose, shared).transpose();
-  at_motion.middleRows<kMotion>(motion()) =
-      front_.block<kMotion, kMotion>(next_motion(), motion());
-  at_pose.middleRows<kMotion>(motion()) =
-      front_.block<kPose, kMotion>(pose(0), next_motion()).transpose();
-  state_panel_.middleRows<kMotion>(next_motion()).setZero();
-  at_motion.middleRows(pose(0), poses) =
-      front_.block(pose(1), motion(), poses, kMotion);
-  at_pose.middleRows(pose(0), poses) =
-      front_.block(pose(1), pose(0), poses, kPose);
-}
-
-// Takes the current keyframe out of the front: the next one's motion and poses
-// move up, and the place of the motion after it is empty. Every entry moves up
-// and left, so ascending order never overwrites what is still to be read.
-void ChainElimination::CloseGap() {
-  const int poses = (slots_ - 1) * kPose;
-  const auto move_column = [&](int to, int from) {
-    const auto move_rows = [&](int row_to, int row_from, int count) {
-      const double* source = &front_.coeffRef(row_from, from);
-      std::copy(source, source + count, &front_.coeffRef(row_to, to));
-    };
-    if (to < motion()) {
-      move_rows(motion(), next_motion(), kMotion);
-    } else if (to < next_motion()) {
-      move_rows(to, from, next_motion() - to);
-    }
-    if (to < next_motion()) {
-      front_.col(to).segment<kMotion>(next_motion()).setZero();
-      move_rows(pose(0), pose(1), poses);
-    } else {
-      move_rows(to, from, pose(0) + poses - to);
-    }
-  };
-  for (int c = 0; c < motion(); ++c) move_column(c, c);
-  for (int c = motion(); c < next_motion(); ++c) move_column(c, c + kMotion);
-  front_.block(next_motion(), next_motion(), kMotion + poses, kMotion)
-      .setZero();
-  for (int c = pose(0); c < pose(0) + poses; ++c) move_column(c, c + kPose);
-  mass_.segment<kMotion>(motion()) =
-      mass_.segment<kMotion>(next_motion()).eval();
-  mass_.segment<kMotion>(next_motion()).setZero();
-  mass_.segment(pose(0), poses) = mass_.segment(pose(1), poses).eval();
-  --slots_;
-}
-
-void ChainElimination::EliminateCurrent() {
-  ChainStateMatrix L;
-  L.topLeftCorner<kMotion, kMotion>() =
-      front_.block<kMotion, kMotion>(motion(), motion());
-  L.bottomLeftCorner<kPose, kMotion>() =
-      front_.block<kPose, kMotion>(pose(0), motion());
-  L.bottomRightCorner<kPose, kPose>() =
-      front_.block<kPose, kPose>(pose(0), pose(0));
-  ChainStateVector mass;
-  mass << mass_.segment<kMotion>(motion()), mass_.segment<kPose>(pose(0));
-  GuardedCholesky<kState>(mass, &L);
-  GatherPanel();
-  CloseGap();
-  auto panel = state_panel_.topRows(size());
-  SolvePanel<kState>(L, panel);
-  front_.topLeftCorner(size(), size())
-      .selfadjointView<Eigen::Lower>()
-      .rankUpdate(panel, -1.0);
 }
 
 }  // namespace selfcal

@@ -46,7 +46,8 @@ struct LandmarkRows {
 };
 
 // Fifteen whitened rows between a keyframe and the next, and a run of shared
-// parameters that begins at shared_offset.
+// parameters that begins at shared_offset. x0 must be invertible: the next
+// state, the shared parameters and the noise determine the state before.
 struct LinkRows {
   int shared_offset = 0;
   ChainStateVector residual;
@@ -70,9 +71,9 @@ class ChainElimination {
   // The keyframe that is eliminated next.
   int current() const { return current_; }
 
-  // Adds a diagonal prior on the current keyframe's state, centred at the
-  // linearisation point.
-  void AddPrior(const ChainStateVector& information);
+  // Adds a prior on the current keyframe's state, centred at the linearisation
+  // point. Symmetric, positive semidefinite.
+  void AddPrior(const ChainStateMatrix& information);
 
   // Adds and eliminates one landmark. `rows` are all of its rows, sorted by
   // keyframe, the first at or after the current keyframe. prior_information is
@@ -81,8 +82,8 @@ class ChainElimination {
   void AddLandmark(std::span<const LandmarkRows> rows,
                    double prior_information);
 
-  // Adds the rows between the current keyframe and the next, eliminates the
-  // current one, and goes on to the next.
+  // Eliminates the current keyframe by the rows between it and the next, and
+  // goes on to that.
   void Advance(const LinkRows& link);
 
   // Eliminates the last keyframe. The object needs a Start() after that.
@@ -95,12 +96,11 @@ class ChainElimination {
     int end;
   };
 
-  // Places in the front: [shared | rhs | motion | next motion | poses ...].
+  // Places in the front: [shared | rhs | motion | poses ...].
   int rhs() const { return shared_size_; }
   int motion() const { return shared_size_ + 1; }
-  int next_motion() const { return motion() + kChainMotionSize; }
   int pose(int slot) const {
-    return next_motion() + kChainMotionSize + slot * kChainPoseSize;
+    return motion() + kChainMotionSize + slot * kChainPoseSize;
   }
   int size() const { return pose(slots_); }
 
@@ -110,9 +110,11 @@ class ChainElimination {
   void AddToFront(const LandmarkRows& rows, int pose);
   void AddToPanel(const LandmarkRows& rows, int pose);
   void SubtractLandmarkPanel();
-  void EliminateCurrent();
-  void GatherPanel();
+  ChainStateMatrix TakeCurrent();
   void CloseGap();
+  ChainStateMatrix Substitute(const LinkRows& link,
+                              const ChainStateMatrix& current);
+  void SubtractStatePanel();
 
   int shared_size_ = 0;
   int current_ = 0;
@@ -120,10 +122,12 @@ class ChainElimination {
   // Lower triangle of the front's information matrix; allocated larger than
   // size() so that it seldom grows.
   Eigen::MatrixXd front_;
-  // What was added to each diagonal entry, for GuardedCholesky.
-  Eigen::VectorXd mass_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> landmark_panel_;
-  Eigen::Matrix<double, Eigen::Dynamic, kChainStateSize> state_panel_;
+  // One row for each of the front.
+  using StatePanel = Eigen::Matrix<double, Eigen::Dynamic, kChainStateSize>;
+  StatePanel coupling_;  // of the current state with the front
+  StatePanel solution_;  // of the current state in terms of the front
+  StatePanel product_;
   std::vector<Run> runs_;
 };
 

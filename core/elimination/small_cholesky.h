@@ -1,11 +1,10 @@
 // Cholesky factor of a small information matrix that is positive definite by
 // construction but may have lost that to rounding.
 //
-// A pivot can only be known to the rounding of what was added up and subtracted
-// on its diagonal, its mass. Where it falls below kPivotFloor of that, it is
-// raised to it: the direction gets the least information that can be told from
-// none, rather than a NaN or a random large variance. Well conditioned problems
-// are never touched.
+// A pivot is known to the rounding of its diagonal entry. Where it falls below
+// kPivotFloor of that, it is raised to it: the direction gets the least
+// information that can be told from none, rather than a NaN or a random large
+// variance. Well conditioned problems are never touched.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,16 +16,16 @@ namespace selfcal {
 inline constexpr double kPivotFloor = 1e-14;
 
 // Overwrites the lower triangle of *matrix (the upper is not read) by L with
-// L L^T = matrix. `mass` bounds each diagonal entry's terms from above; a
-// direction without any mass gets a unit pivot, which eliminates nothing.
+// L L^T = matrix. A direction without any information gets a unit pivot, which
+// eliminates nothing.
 template <int N>
-void GuardedCholesky(const Eigen::Matrix<double, N, 1>& mass,
-                     Eigen::Matrix<double, N, N>* matrix) {
+void GuardedCholesky(Eigen::Matrix<double, N, N>* matrix) {
   Eigen::Matrix<double, N, N>& L = *matrix;
   for (int j = 0; j < N; ++j) {
-    double pivot = L(j, j);
+    const double mass = L(j, j);
+    double pivot = mass;
     for (int k = 0; k < j; ++k) pivot -= L(j, k) * L(j, k);
-    const double floor = mass(j) > 0 ? kPivotFloor * mass(j) : 1.0;
+    const double floor = mass > 0 ? kPivotFloor * mass : 1.0;
     const double diagonal = std::sqrt(std::max(pivot, floor));
     L(j, j) = diagonal;
     for (int i = j + 1; i < N; ++i) {

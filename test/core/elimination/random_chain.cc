@@ -1,5 +1,6 @@
 #include "test/core/elimination/random_chain.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 
@@ -14,6 +15,15 @@ void FillNormal(std::mt19937* random, Matrix* matrix) {
       (*matrix)(i, j) = normal(*random);
     }
   }
+}
+
+// Links as those of a motion: neither growing nor shrinking along the chain.
+ChainStateMatrix NearRotation(std::mt19937* random) {
+  ChainStateMatrix A;
+  FillNormal(random, &A);
+  const ChainStateMatrix Q = A.householderQr().householderQ();
+  FillNormal(random, &A);
+  return 4 * Q + 0.2 * A;
 }
 
 LandmarkRows RandomRows(int keyframe,
@@ -55,13 +65,13 @@ Chain RandomChain(const ChainShape& shape, std::mt19937* random) {
   chain.shared_size = kLinkShared + shape.cameras * shape.camera_size;
   chain.landmark_prior = 1e-2;
   for (int k = 0; k < shape.keyframes; ++k) {
-    chain.priors.push_back(ChainStateVector::Constant(1e-2));
+    chain.priors.push_back(1e-2 * ChainStateMatrix::Identity());
     if (k + 1 < shape.keyframes) {
       LinkRows link;
       link.shared.resize(kChainStateSize, kLinkShared);
       FillNormal(random, &link.residual);
-      FillNormal(random, &link.x0);
-      FillNormal(random, &link.x1);
+      link.x0 = NearRotation(random);
+      link.x1 = NearRotation(random);
       FillNormal(random, &link.shared);
       chain.links.push_back(link);
     }
@@ -103,10 +113,10 @@ DenseProblem MakeDense(const Chain& chain) {
   for (; row < states; ++row) {
     dense.J(row, row) = std::sqrt(chain.landmark_prior);
   }
-  for (const ChainStateVector& prior : chain.priors) {
-    for (int i = 0; i < kChainStateSize; ++i, ++row) {
-      dense.J(row, row) = std::sqrt(prior(i));
-    }
+  for (const ChainStateMatrix& prior : chain.priors) {
+    dense.J.block<kChainStateSize, kChainStateSize>(row, row) =
+        prior.llt().matrixU();
+    row += kChainStateSize;
   }
   for (int m = 0; m < landmarks; ++m) {
     for (const LandmarkRows& a : chain.landmarks[m]) {
@@ -132,15 +142,18 @@ DenseProblem MakeDense(const Chain& chain) {
 
 SharedInformation DenseReference(const Chain& chain) {
   const DenseProblem dense = MakeDense(chain);
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(dense.J);
+  using Matrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+  const Eigen::HouseholderQR<Matrix> qr(dense.J.cast<long double>());
   const int columns = static_cast<int>(dense.J.cols());
   const int D = chain.shared_size;
-  const Eigen::MatrixXd R = qr.matrixQR()
-                                .topRows(columns)
-                                .bottomRightCorner(D, D)
-                                .triangularView<Eigen::Upper>();
-  const Eigen::VectorXd c = qr.householderQ().transpose() * dense.r;
-  return {R.transpose() * R, -R.transpose() * c.segment(columns - D, D)};
+  const Matrix R = qr.matrixQR()
+                       .topRows(columns)
+                       .bottomRightCorner(D, D)
+                       .triangularView<Eigen::Upper>();
+  const Matrix c = (qr.householderQ().transpose() * dense.r.cast<long double>())
+                       .middleRows(columns - D, D);
+  return {(R.transpose() * R).cast<double>(),
+          (-R.transpose() * c).cast<double>()};
 }
 
 }  // namespace selfcal

@@ -12,7 +12,7 @@ namespace selfcal {
 struct Chain {
   int shared_size = 0;
   std::vector<LinkRows> links;  // one less than keyframes
-  std::vector<ChainStateVector> priors;
+  std::vector<ChainStateMatrix> priors;
   // Sorted by the first keyframe of each.
   std::vector<std::vector<LandmarkRows>> landmarks;
   double landmark_prior = 0;
@@ -42,7 +42,8 @@ struct DenseProblem {
 };
 DenseProblem MakeDense(const Chain& chain);
 
-// Marginal information of the last `shared_size` columns, by Householder QR.
+// Marginal information of the last `shared_size` columns, by Householder QR in
+// extended precision.
 SharedInformation DenseReference(const Chain& chain);
 
 }  // namespace selfcal
