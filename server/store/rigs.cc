@@ -74,11 +74,11 @@ absl::StatusOr<StoredRig> CreateRigRow(Connection* db, const Rig& rig) {
           .Run());
   const std::int64_t rowid = sqlite3_last_insert_rowid(db->handle());
   SELFCAL_RETURN_IF_ERROR(InsertTables(db, rowid, MakeTables(rig)));
+  SELFCAL_RETURN_IF_ERROR(
+      AppendEvent(db, rig.id, EventKind::kRigCreated, "created"));
   StoredCalibration factory = FactoryCalibration(rig);
   factory.create_time_ns = stored.create_time_ns;
   SELFCAL_RETURN_IF_ERROR(InsertCalibration(db, rowid, factory));
-  SELFCAL_RETURN_IF_ERROR(
-      AppendEvent(db, rig.id, EventKind::kRigCreated, "created"));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());
   return stored;
 }

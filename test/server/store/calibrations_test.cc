@@ -1,0 +1,137 @@
+#include "test/server/store/store_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+class CalibrationsTest : public StoreTest {
+ protected:
+  // Fills the tables of a new rig, which starts its first run, and begins it.
+  Rig RigWithRun(const std::string& id) {
+    const Rig rig = CreateTestRig(id);
+    for (int k = 0; k < rig.table_size; ++k) {
+      Put(id, k);
+      Score(rig, k, k);
+    }
+    EXPECT_TRUE(store_->BeginRun(id, 1).ok());
+    return rig;
+  }
+
+  static StoredCalibration Candidate(const Rig& rig) {
+    StoredCalibration calibration;
+    calibration.theta = rig.factory;
+    calibration.theta.cameras[0].f.x() += 1.0 / 3;
+    const int size = TangentSize(rig.factory);
+    calibration.covariance = Eigen::MatrixXd::Identity(size, size) / 7;
+    calibration.covariance(0, 1) = 1.0 / 11;
+    calibration.program_version = "1.2.3";
+    calibration.seconds = 0.1;
+    CalibrationResult report;
+    report.status = CalibrateStatus::kConverged;
+    report.message = "fine";
+    report.iterations = 12;
+    report.final_cost = 1.0 / 9;
+    report.rank = size - 1;
+    report.held_constant = {{{{"imu.gyro.scale.x", 1.0}}, 0.2}};
+    report.observations = 1234;
+    calibration.report = report;
+    return calibration;
+  }
+};
+SELFCAL_STORE_TEST_SUITE(CalibrationsTest);
+
+TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
+  const Rig rig = RigWithRun("a");
+  const StoredCalibration candidate = Candidate(rig);
+  const auto finished = store_->FinishRun("a", 1, candidate);
+  ASSERT_TRUE(finished.ok()) << finished.status();
+  EXPECT_EQ(finished->version, 2);
+  Reopen();
+  const auto stored = store_->GetActiveCalibration("a");
+  ASSERT_TRUE(stored.ok()) << stored.status();
+  EXPECT_EQ(stored->version, 2);
+  EXPECT_EQ(stored->run, 1);
+  EXPECT_EQ(stored->base_version, 1);
+  EXPECT_THAT(stored->segments,
+              ElementsAre(SegmentKey{"s", 0}, SegmentKey{"s", 1}));
+  EXPECT_EQ(stored->program_version, "1.2.3");
+  EXPECT_EQ(stored->seconds, 0.1);
+  EXPECT_EQ(stored->create_time_ns, finished->create_time_ns);
+  ExpectSameCalibration(stored->theta, candidate.theta);
+  EXPECT_EQ(stored->covariance, candidate.covariance);
+  ASSERT_TRUE(stored->report.has_value());
+  EXPECT_EQ(stored->report->status, CalibrateStatus::kConverged);
+  EXPECT_EQ(stored->report->message, "fine");
+  EXPECT_EQ(stored->report->iterations, 12);
+  EXPECT_EQ(stored->report->final_cost, 1.0 / 9);
+  EXPECT_EQ(stored->report->observations, 1234);
+  ASSERT_EQ(stored->report->held_constant.size(), 1u);
+  ExpectSameCalibration(stored->report->theta, candidate.theta);
+}
+
+TEST_P(CalibrationsTest, ActiveOneSupersedesTheOneBefore) {
+  const Rig rig = RigWithRun("a");
+  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  EXPECT_EQ(store_->GetCalibration("a", 1)->state,
+            CalibrationState::kSuperseded);
+  EXPECT_EQ(store_->GetCalibration("a", 2)->state, CalibrationState::kActive);
+  const auto run = store_->GetRun("a", 1);
+  EXPECT_EQ(run->state, RunState::kSucceeded);
+  EXPECT_EQ(run->calibration_version, 2);
+  EXPECT_GT(run->end_time_ns, 0);
+}
+
+TEST_P(CalibrationsTest, RejectedOneIsKeptWithItsReasons) {
+  const Rig rig = RigWithRun("a");
+  StoredCalibration candidate = Candidate(rig);
+  candidate.state = CalibrationState::kRejected;
+  candidate.reasons = {"too far", "too vague"};
+  ASSERT_TRUE(store_->FinishRun("a", 1, candidate).ok());
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
+  const auto rejected = store_->GetCalibration("a", 2);
+  EXPECT_EQ(rejected->state, CalibrationState::kRejected);
+  EXPECT_THAT(rejected->reasons, ElementsAre("too far", "too vague"));
+  EXPECT_EQ(store_->GetRun("a", 1)->state, RunState::kSucceeded);
+  std::vector<EventKind> kinds;
+  const auto events = store_->ListEvents({});
+  ASSERT_TRUE(events.ok());
+  for (const auto& event : events->items) {
+    kinds.push_back(event.kind);
+  }
+  EXPECT_THAT(kinds,
+              ElementsAre(EventKind::kRigCreated,
+                          EventKind::kCalibrationPublished,
+                          EventKind::kRunStarted,
+                          EventKind::kCalibrationRejected,
+                          EventKind::kRunEnded));
+}
+
+TEST_P(CalibrationsTest, VersionsAreListedNewestFirst) {
+  const Rig rig = RigWithRun("a");
+  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  const auto first = store_->ListCalibrations("a", {1, ""});
+  ASSERT_TRUE(first.ok());
+  EXPECT_EQ(first->items.front().version, 2);
+  const auto second = store_->ListCalibrations("a", {1, first->next_token});
+  EXPECT_EQ(second->items.front().version, 1);
+  EXPECT_TRUE(second->next_token.empty());
+  EXPECT_TRUE(absl::IsNotFound(store_->GetCalibration("a", 3).status()));
+}
+
+TEST_P(CalibrationsTest, OnlyARunningRunCanProduceOne) {
+  const Rig rig = CreateTestRig("a");
+  Put("a", 0);
+  Score(rig, 0, 1.0);
+  ASSERT_TRUE(store_->CreateManualRun("a").ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(
+      store_->FinishRun("a", 1, Candidate(rig)).status()));
+  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(
+      store_->FinishRun("a", 1, Candidate(rig)).status()));
+  EXPECT_EQ(store_->ListCalibrations("a", {})->items.size(), 2u);
+}
+
+}  // namespace
+}  // namespace selfcal::server

@@ -1,0 +1,202 @@
+#include "server/store/database.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "server/store/checksum.h"
+#include "server/store/database_file.h"
+#include "server/store/store_sqlite.h"
+#include "test/server/store/temp_folder.h"
+
+namespace selfcal::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Migration kFirst{
+    "0001_first.sql", "aa", "CREATE TABLE one (x INTEGER) STRICT;"};
+constexpr Migration kSecond{"0002_second.sql",
+                            "bb",
+                            "CREATE TABLE two (y INTEGER) STRICT;"
+                            "INSERT INTO one VALUES (7);"};
+constexpr Migration kBroken{
+    "0002_broken.sql", "cc", "INSERT INTO one VALUES (8); SELECT nonsense;"};
+
+std::int64_t Read(Connection* db, const std::string& sql) {
+  Statement statement(db, sql);
+  EXPECT_TRUE(statement.Next()) << sql << ": " << statement.status();
+  return statement.Int(0);
+}
+
+std::string Hex(const std::string& bytes) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::string hex;
+  for (const unsigned char byte : bytes) {
+    hex += kDigits[byte >> 4];
+    hex += kDigits[byte & 15];
+  }
+  return hex;
+}
+
+class DatabaseTest : public ::testing::Test {
+ protected:
+  absl::StatusOr<Connection> Open(std::vector<Migration> migrations) {
+    return OpenDatabase(path_, migrations);
+  }
+
+  // Opens what must be refused, and compares the files before and after.
+  absl::Status OpenRefused(std::vector<Migration> migrations) {
+    const std::string before = ReadBytes(path_);
+    const absl::Status status = Open(migrations).status();
+    EXPECT_FALSE(status.ok());
+    EXPECT_EQ(ReadBytes(path_), before);
+    EXPECT_FALSE(fs::exists(path_ + ".new"));
+    return status;
+  }
+
+  TempFolder folder_;
+  const std::string path_ = folder_.File("test.db");
+};
+
+TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
+  // A released file never changes: add a migration, do not edit one.
+  const auto migrations = EmbeddedMigrations();
+  ASSERT_EQ(migrations.size(), 1u);
+  EXPECT_EQ(migrations[0].name, "0001_initial.sql");
+  EXPECT_EQ(
+      migrations[0].sha256,
+      "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
+  EXPECT_EQ(Hex(Sha256(migrations[0].sql)), migrations[0].sha256);
+}
+
+TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
+  auto db = Open({kFirst, kSecond});
+  ASSERT_TRUE(db.ok()) << db.status();
+  EXPECT_EQ(Read(&*db, "PRAGMA application_id"), kApplicationId);
+  EXPECT_EQ(Read(&*db, "PRAGMA user_version"), 2);
+  EXPECT_EQ(Read(&*db, "SELECT count(*) FROM schema_migrations"), 2);
+  EXPECT_FALSE(fs::exists(path_ + ".new"));
+}
+
+TEST_F(DatabaseTest, RunsWithTheSettingsThatKeepThePromises) {
+  auto db = Open({kFirst});
+  ASSERT_TRUE(db.ok()) << db.status();
+  EXPECT_EQ(Read(&*db, "PRAGMA synchronous"), 2);
+  EXPECT_EQ(Read(&*db, "PRAGMA foreign_keys"), 1);
+  EXPECT_EQ(Read(&*db, "PRAGMA trusted_schema"), 0);
+  EXPECT_EQ(Read(&*db, "PRAGMA recursive_triggers"), 1);
+  Statement mode(&*db, "PRAGMA journal_mode");
+  ASSERT_TRUE(mode.Next());
+  EXPECT_EQ(mode.Text(0), "wal");
+}
+
+TEST_F(DatabaseTest, OlderDatabaseIsMigratedAfterABackup) {
+  ASSERT_TRUE(Open({kFirst}).ok());
+  auto db = Open({kFirst, kSecond});
+  ASSERT_TRUE(db.ok()) << db.status();
+  EXPECT_EQ(Read(&*db, "PRAGMA user_version"), 2);
+  EXPECT_EQ(Read(&*db, "SELECT x FROM one"), 7);
+  const std::string backup = path_ + ".backup-v1";
+  ASSERT_TRUE(fs::exists(backup));
+  auto old = OpenDatabase(backup, std::vector<Migration>{kFirst});
+  ASSERT_TRUE(old.ok()) << old.status();
+  EXPECT_EQ(Read(&*old, "PRAGMA user_version"), 1);
+  EXPECT_EQ(Read(&*old, "SELECT count(*) FROM one"), 0);
+}
+
+TEST_F(DatabaseTest, FailedMigrationChangesNothing) {
+  ASSERT_TRUE(Open({kFirst}).ok());
+  const absl::Status status = Open({kFirst, kBroken}).status();
+  EXPECT_FALSE(status.ok());
+  EXPECT_NE(std::string(status.message()).find("0002_broken.sql"),
+            std::string::npos);
+  auto db = Open({kFirst});
+  ASSERT_TRUE(db.ok()) << db.status();
+  EXPECT_EQ(Read(&*db, "SELECT count(*) FROM one"), 0);
+  EXPECT_EQ(Read(&*db, "PRAGMA user_version"), 1);
+}
+
+TEST_F(DatabaseTest, NewerDatabaseIsRefusedAndUntouched) {
+  ASSERT_TRUE(Open({kFirst, kSecond}).ok());
+  const absl::Status status = OpenRefused({kFirst});
+  EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+  EXPECT_TRUE(Open({kFirst, kSecond}).ok());
+}
+
+TEST_F(DatabaseTest, NewerDatabaseInItsLogIsRefusedAndUntouched) {
+  ASSERT_TRUE(Open({kFirst}).ok());
+  // The version is in the log alone, as after a kill.
+  {
+    auto db = Connection::Open(path_, SQLITE_OPEN_READWRITE);
+    ASSERT_TRUE(db.ok());
+    ASSERT_TRUE(db->Execute("PRAGMA user_version = 9").ok());
+    fs::copy(path_, path_ + ".copy");
+    fs::copy(path_ + "-wal", path_ + ".copy-wal");
+  }
+  fs::rename(path_ + ".copy", path_);
+  fs::rename(path_ + ".copy-wal", path_ + "-wal");
+  const std::string log = ReadBytes(path_ + "-wal");
+  EXPECT_TRUE(absl::IsFailedPrecondition(OpenRefused({kFirst})));
+  EXPECT_EQ(ReadBytes(path_ + "-wal"), log);
+}
+
+TEST_F(DatabaseTest, ChangedMigrationIsRefused) {
+  ASSERT_TRUE(Open({kFirst}).ok());
+  Migration changed = kFirst;
+  changed.sha256 = "ab";
+  EXPECT_TRUE(absl::IsFailedPrecondition(OpenRefused({changed})));
+  EXPECT_TRUE(absl::IsFailedPrecondition(OpenRefused({changed, kSecond})));
+}
+
+TEST_F(DatabaseTest, ForeignFilesAreRefusedAndUntouched) {
+  for (const std::string& bytes :
+       {std::string("hello, this is not a database at all"),
+        std::string(5000, 'x'),
+        std::string(),
+        std::string("SQLite format 3\0", 16),
+        std::string(200, '\0')}) {
+    WriteBytes(path_, bytes);
+    EXPECT_TRUE(absl::IsFailedPrecondition(OpenRefused({kFirst})));
+  }
+}
+
+TEST_F(DatabaseTest, DatabaseOfAnotherProgramIsRefusedAndUntouched) {
+  {
+    auto db =
+        Connection::Open(path_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+    ASSERT_TRUE(db.ok());
+    ASSERT_TRUE(
+        db->Execute("PRAGMA application_id = 77; CREATE TABLE t (a)").ok());
+  }
+  EXPECT_TRUE(absl::IsFailedPrecondition(OpenRefused({kFirst})));
+}
+
+TEST_F(DatabaseTest, TruncatedDatabaseIsRefusedAndUntouched) {
+  ASSERT_TRUE(Open({kFirst, kSecond}).ok());
+  const std::string whole = ReadBytes(path_);
+  for (const std::size_t size : {std::size_t{4096}, whole.size() / 2}) {
+    WriteBytes(path_, whole.substr(0, size));
+    EXPECT_TRUE(absl::IsDataLoss(OpenRefused({kFirst, kSecond})));
+  }
+}
+
+TEST_F(DatabaseTest, LogWithoutItsDatabaseIsRefused) {
+  WriteBytes(path_ + "-wal", "commits of a database that was moved away");
+  EXPECT_TRUE(absl::IsFailedPrecondition(Open({kFirst}).status()));
+  EXPECT_FALSE(fs::exists(path_));
+}
+
+TEST_F(DatabaseTest, LeftoverOfAKilledCreationIsNoObstacle) {
+  WriteBytes(path_ + ".new", "half a database");
+  WriteBytes(path_ + ".new-journal", "half a journal");
+  EXPECT_TRUE(Open({kFirst}).ok());
+}
+
+TEST_F(DatabaseTest, MissingFolderIsUnavailable) {
+  EXPECT_TRUE(absl::IsUnavailable(
+      MakeSqliteStore(folder_.File("missing/selfcal.db")).status()));
+}
+
+}  // namespace
+}  // namespace selfcal::server

@@ -1,0 +1,126 @@
+// What every engine of the store must pass: tests take the fixture StoreTest
+// and name SELFCAL_STORE_TEST_SUITE once in their file. Another engine adds
+// itself to Engines().
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/store/store.h"
+#include "server/store/store_sqlite.h"
+#include "test/server/store/fake_information.h"
+#include "test/server/store/temp_folder.h"
+#include "test/server/test_segments.h"
+
+namespace selfcal::server {
+
+struct Engine {
+  std::string name;
+  std::function<absl::StatusOr<std::unique_ptr<Store>>(const TempFolder&)> open;
+};
+
+inline std::vector<Engine> Engines() {
+  return {{"Sqlite", [](const TempFolder& folder) {
+             return MakeSqliteStore(folder.File("selfcal.db"));
+           }}};
+}
+
+class StoreTest : public ::testing::TestWithParam<Engine> {
+ protected:
+  StoreTest() { Reopen(); }
+
+  // As a restart of the daemon does.
+  void Reopen() {
+    store_.reset();
+    auto opened = GetParam().open(folder_);
+    ASSERT_TRUE(opened.ok()) << opened.status();
+    store_ = *std::move(opened);
+  }
+
+  Rig CreateTestRig(const std::string& id) {
+    const Rig rig = TestRig(id);
+    EXPECT_TRUE(store_->CreateRig(rig).ok());
+    return rig;
+  }
+
+  // A valid segment of little data with its own key.
+  static MotionSegment Segment(std::int64_t index,
+                               const std::string& session = "s") {
+    static const std::vector<MotionSegment> kSegments =
+        TestSegments(TestRig("any"), 1);
+    MotionSegment segment = kSegments.front();
+    segment.key = {session, index};
+    return segment;
+  }
+
+  void Put(const std::string& rig, std::int64_t index) {
+    const auto verdict = store_->PutSegment(rig, Segment(index));
+    ASSERT_TRUE(verdict.ok()) << verdict.status();
+    ASSERT_EQ(*verdict, PutVerdict::kStored);
+  }
+
+  ScoreCommit Score(const Rig& rig,
+                    std::int64_t index,
+                    double entropy,
+                    double gain = 5) {
+    const auto commit = store_->CommitScore(
+        rig.id,
+        {"s", index},
+        FakeInformation(rig, entropy, gain, static_cast<unsigned>(index)));
+    EXPECT_TRUE(commit.ok()) << commit.status();
+    return commit.value_or(ScoreCommit());
+  }
+
+  bool HasData(const std::string& rig, std::int64_t index) {
+    const auto segment = store_->GetSegment(rig, {"s", index});
+    EXPECT_TRUE(segment.ok()) << segment.status();
+    const auto data = store_->GetSegmentData(rig, {"s", index});
+    EXPECT_EQ(segment->has_data, data.ok());
+    EXPECT_EQ(segment->has_data, segment->payload_bytes > 0);
+    return data.ok();
+  }
+
+  std::vector<std::int64_t> TableIndices(const std::string& rig, int table) {
+    std::vector<std::int64_t> indices;
+    const auto tables = store_->GetTables(rig);
+    EXPECT_TRUE(tables.ok()) << tables.status();
+    for (const TableEntry& entry : (*tables)[table].entries) {
+      indices.push_back(entry.key.index);
+    }
+    return indices;
+  }
+
+  TempFolder folder_;
+  std::unique_ptr<Store> store_;
+};
+
+#define SELFCAL_STORE_TEST_SUITE(fixture)                                      \
+  INSTANTIATE_TEST_SUITE_P(                                                    \
+      Engines, fixture, ::testing::ValuesIn(Engines()), [](const auto& info) { \
+        return info.param.name;                                                \
+      })
+
+// Two theta of the same shape, equal to the bit.
+inline void ExpectSameCalibration(const Calibration& a, const Calibration& b) {
+  ASSERT_TRUE(SameShape(a, b));
+  EXPECT_EQ(a.imu.s_g, b.imu.s_g);
+  EXPECT_EQ(a.imu.m_g, b.imu.m_g);
+  EXPECT_EQ(a.imu.s_a, b.imu.s_a);
+  EXPECT_EQ(a.imu.m_a, b.imu.m_a);
+  EXPECT_EQ(a.imu.q_AI.coeffs(), b.imu.q_AI.coeffs());
+  for (std::size_t k = 0; k < a.cameras.size(); ++k) {
+    EXPECT_EQ(a.cameras[k].q_CI.coeffs(), b.cameras[k].q_CI.coeffs());
+    EXPECT_EQ(a.cameras[k].p_CI, b.cameras[k].p_CI);
+    EXPECT_EQ(a.cameras[k].f, b.cameras[k].f);
+    EXPECT_EQ(a.cameras[k].c, b.cameras[k].c);
+    EXPECT_EQ(a.cameras[k].distortion, b.cameras[k].distortion);
+    EXPECT_EQ(a.cameras[k].width_px, b.cameras[k].width_px);
+  }
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,76 @@
+// Against a model: the best of everything scored so far, sorted from scratch.
+#include <algorithm>
+#include <random>
+
+#include "test/server/store/store_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using TablesPropertyTest = StoreTest;
+SELFCAL_STORE_TEST_SUITE(TablesPropertyTest);
+
+std::vector<TableEntry> BestOf(std::vector<TableEntry> all,
+                               double min_gain,
+                               int capacity) {
+  std::erase_if(all, [&](const auto& entry) { return entry.gain < min_gain; });
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
+    return a.entropy < b.entropy;
+  });
+  if (static_cast<int>(all.size()) > capacity) all.resize(capacity);
+  return all;
+}
+
+TEST_P(TablesPropertyTest, TablesHoldTheBestAndTheirDataAlways) {
+  std::mt19937 random(5);
+  // Few values, so that ties happen.
+  std::uniform_int_distribution<int> level(0, 9);
+  for (int trial = 0; trial < 4; ++trial) {
+    Rig rig = TestRig("rig" + std::to_string(trial));
+    rig.table_size = 1 + trial;
+    ASSERT_TRUE(store_->CreateRig(rig).ok());
+    std::vector<std::vector<TableEntry>> offered(rig.groups.size());
+    for (int k = 0; k < 30; ++k) {
+      Put(rig.id, k);
+      SegmentInformation information = FakeInformation(rig, 0);
+      for (std::size_t g = 0; g < rig.groups.size(); ++g) {
+        information.groups[g].entropy = level(random);
+        information.groups[g].gain = level(random) / 3.0;
+        offered[g].push_back({{"s", k},
+                              k + 1,
+                              information.groups[g].entropy,
+                              information.groups[g].gain});
+      }
+      const auto commit = store_->CommitScore(rig.id, {"s", k}, information);
+      ASSERT_TRUE(commit.ok()) << commit.status();
+      if (commit->started_run) {
+        ASSERT_TRUE(
+            store_
+                ->EndRun(
+                    rig.id, commit->started_run->run, RunState::kCancelled, "")
+                .ok());
+      }
+      if (k % 7 == 3) Reopen();
+      const auto tables = store_->GetTables(rig.id);
+      ASSERT_TRUE(tables.ok());
+      std::vector<bool> referenced(k + 1, false);
+      for (std::size_t g = 0; g < rig.groups.size(); ++g) {
+        const auto best = BestOf(offered[g], rig.min_gain_nats, rig.table_size);
+        ASSERT_EQ((*tables)[g].entries, best) << "after " << k;
+        ASSERT_EQ((*tables)[g].scored, k + 1);
+        for (const TableEntry& entry : best) {
+          referenced[entry.key.index] = true;
+        }
+      }
+      const auto segments = store_->ListSegments(rig.id, {1000, ""});
+      ASSERT_TRUE(segments.ok());
+      for (const StoredSegment& segment : segments->items) {
+        ASSERT_EQ(segment.has_data, referenced[segment.key.index])
+            << segment.key.index << " after " << k;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::server
