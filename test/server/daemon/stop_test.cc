@@ -1,0 +1,43 @@
+#include "server/daemon/stop.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <cstdlib>
+#include <thread>
+
+namespace selfcal::server {
+namespace {
+
+using std::chrono::hours;
+using std::chrono::milliseconds;
+
+TEST(StopDeathTest, DeadlineEndsAStopThatHangs) {
+  EXPECT_EXIT(
+      {
+        const StopDeadline deadline(milliseconds(20));
+        std::this_thread::sleep_for(hours(1));
+      },
+      ::testing::ExitedWithCode(EXIT_FAILURE),
+      "did not stop");
+}
+
+TEST(Stop, DeadlineLetsAStopInTimePass) {
+  const StopDeadline deadline(hours(1));
+}
+
+TEST(StopDeathTest, BlockedSignalIsReceivedInsteadOfEndingTheProcess) {
+  for (const int signal : {SIGTERM, SIGINT}) {
+    EXPECT_EXIT(
+        {
+          BlockStopSignals();
+          raise(signal);
+          std::_Exit(WaitForStop() == signal ? 3 : 4);
+        },
+        ::testing::ExitedWithCode(3),
+        "");
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::server
