@@ -42,11 +42,16 @@ struct Experiment {
 };
 
 Experiment RandomExperiment(RandomValues& random, std::int64_t t1_ns) {
-  return {.motion = AnalyticMotion(random),
-          .imu = random.Imu(),
-          .noise = {.gyro_noise_density = random.LogUniform(1e-4, 1e-3),
-                    .accel_noise_density = random.LogUniform(1e-3, 1e-2)},
-          .t1_ns = t1_ns};
+  Experiment experiment{.motion = AnalyticMotion(random),
+                        .imu = random.Imu(),
+                        .noise = {},
+                        .t1_ns = t1_ns};
+  // Intrinsics that the noise cannot pass through unchanged.
+  experiment.imu.s_g += random.Normal3(0.3);
+  experiment.imu.s_a += random.Normal3(0.3);
+  experiment.noise.gyro_noise_density = random.LogUniform(1e-4, 1e-3);
+  experiment.noise.accel_noise_density = random.LogUniform(1e-3, 1e-2);
+  return experiment;
 }
 
 // Noise of a sample that stands for an interval of period_ns.
