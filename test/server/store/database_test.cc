@@ -64,9 +64,8 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   const auto migrations = EmbeddedMigrations();
   ASSERT_EQ(migrations.size(), 1u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
-  EXPECT_EQ(
-      migrations[0].sha256,
-      "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
+  EXPECT_EQ(migrations[0].sha256,
+            "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
   EXPECT_EQ(Hex(Sha256(migrations[0].sql)), migrations[0].sha256);
 }
 

@@ -1,0 +1,141 @@
+// A pipeline on a store in a temporary folder, whose estimators are those that
+// a test gives it: quick, and able to wait, fail or throw.
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/pipeline/pipeline.h"
+#include "server/store/store_sqlite.h"
+#include "test/server/store/fake_information.h"
+#include "test/server/store/temp_folder.h"
+#include "test/server/test_segments.h"
+
+namespace selfcal::server {
+
+// Waits for what other threads bring about; false if it never comes.
+inline bool Eventually(const std::function<bool()>& condition) {
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (std::chrono::steady_clock::now() < deadline) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return false;
+}
+
+class PipelineTest : public ::testing::Test {
+ protected:
+  PipelineTest() {
+    estimators_.score =
+        [](const Rig& rig, const Calibration&, const MotionSegment& segment) {
+          return FakeInformation(rig, EntropyOf(segment.key.index));
+        };
+    estimators_.calibrate = [](const Rig& rig,
+                               const Calibration& start,
+                               const std::vector<MotionSegment>&,
+                               const CalibrateOptions&,
+                               const ProgressCallback& progress) {
+      if (!progress({1, 2, 1.0, 1.0})) return Cancelled(start);
+      return Converged(rig, start);
+    };
+    OpenStore();
+  }
+  ~PipelineTest() override { pipeline_.reset(); }
+
+  static double EntropyOf(std::int64_t index) {
+    return static_cast<double>(index * 37 % 11);
+  }
+
+  static CalibrationResult Converged(const Rig& rig, const Calibration& start) {
+    CalibrationResult result;
+    result.status = CalibrateStatus::kConverged;
+    result.theta = start;
+    result.theta.cameras[0].f.x() += 0.5;
+    result.covariance = PriorSigmas(rig).cwiseAbs2().asDiagonal();
+    return result;
+  }
+
+  static CalibrationResult Cancelled(const Calibration& start) {
+    CalibrationResult result;
+    result.status = CalibrateStatus::kCancelled;
+    result.theta = start;
+    return result;
+  }
+
+  void OpenStore() {
+    store_.reset();
+    auto store = MakeSqliteStore(folder_.File("selfcal.db"));
+    ASSERT_TRUE(store.ok()) << store.status();
+    store_ = *std::move(store);
+  }
+
+  // Ends the pipeline, if there is one, and makes one of the estimators.
+  void MakeOne() {
+    pipeline_.reset();
+    pipeline_ = MakePipeline(store_.get(), options_, estimators_);
+  }
+  void StartOne() {
+    MakeOne();
+    const absl::Status status = pipeline_->Start();
+    ASSERT_TRUE(status.ok()) << status;
+  }
+  // As a crash and a start of the daemon.
+  void Restart() {
+    pipeline_.reset();
+    OpenStore();
+    StartOne();
+  }
+
+  Rig CreateRig(const std::string& id = "a") {
+    const Rig rig = TestRig(id);
+    EXPECT_TRUE(store_->CreateRig(rig).ok());
+    return rig;
+  }
+
+  static MotionSegment Segment(std::int64_t index) {
+    static const std::vector<MotionSegment> kSegments =
+        TestSegments(TestRig("any"), 1);
+    MotionSegment segment = kSegments.front();
+    segment.key.index = index;
+    return segment;
+  }
+
+  SubmitResult::Verdict Submit(std::int64_t index,
+                               const std::string& rig = "a") {
+    const auto result =
+        pipeline_->Submit(rig, Segment(index), [] { return false; });
+    EXPECT_TRUE(result.ok()) << result.status();
+    if (!result.ok()) return SubmitResult::Verdict::kRejected;
+    for (const Violation& violation : result->violations) {
+      ADD_FAILURE() << violation.field << ": " << violation.message;
+    }
+    return result->verdict;
+  }
+
+  bool AllScored() {
+    return Eventually([&] { return store_->ListUnscored(1)->empty(); });
+  }
+  bool RunIs(RunState state, std::int64_t run = 1) {
+    return Eventually([&] {
+      const auto stored = store_->GetRun("a", run);
+      return stored.ok() && stored->state == state;
+    });
+  }
+
+  TempFolder folder_;
+  std::unique_ptr<Store> store_;
+  PipelineOptions options_;
+  Estimators estimators_;
+  std::unique_ptr<Pipeline> pipeline_;
+};
+
+}  // namespace selfcal::server

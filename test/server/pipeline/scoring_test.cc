@@ -1,0 +1,142 @@
+#include <map>
+#include <random>
+#include <stdexcept>
+
+#include "server/store/statement.h"
+#include "test/server/pipeline/pipeline_test.h"
+
+namespace selfcal::server {
+namespace {
+
+class ScoringTest : public PipelineTest {
+ protected:
+  void DamageData(std::int64_t index) {
+    store_.reset();
+    auto db =
+        Connection::Open(folder_.File("selfcal.db"), SQLITE_OPEN_READWRITE);
+    ASSERT_TRUE(db.ok());
+    ASSERT_TRUE(
+        Statement(&*db,
+                  "UPDATE payloads SET data = x'00' WHERE segment = "
+                  "(SELECT segment FROM segments WHERE session_index = ?1)",
+                  index)
+            .Run()
+            .ok());
+    db = absl::UnknownError("closed");
+    OpenStore();
+  }
+};
+
+TEST_F(ScoringTest, WhatWasStoredBeforeTheStartIsScored) {
+  CreateRig();
+  CreateRig("b");
+  for (int k = 0; k < 5; ++k) {
+    ASSERT_TRUE(store_->PutSegment("a", Segment(k)).ok());
+    ASSERT_TRUE(store_->PutSegment("b", Segment(k)).ok());
+  }
+  OpenStore();
+  StartOne();
+  EXPECT_TRUE(AllScored());
+  EXPECT_EQ((*store_->GetTables("a"))[0].scored, 5);
+  EXPECT_EQ((*store_->GetTables("b"))[0].scored, 5);
+}
+
+TEST_F(ScoringTest, StopInTheMiddleLosesNothing) {
+  CreateRig();
+  options_.scoring_threads = 2;
+  options_.max_backlog = 100;
+  for (int round = 0; round < 6; ++round) {
+    Restart();
+    for (int k = 0; k < 4; ++k) Submit(4 * round + k);
+  }
+  Restart();
+  EXPECT_TRUE(AllScored());
+  EXPECT_EQ((*store_->GetTables("a"))[0].scored, 24);
+}
+
+TEST_F(ScoringTest, TablesDoNotDependOnTheNumberOfThreads) {
+  options_.max_backlog = 100;
+  // The later ones are done first, if they may.
+  estimators_.score = [](const Rig& rig, const auto&, const auto& segment) {
+    std::this_thread::sleep_for(
+        std::chrono::milliseconds((40 - segment.key.index) / 4));
+    return FakeInformation(rig, static_cast<double>(segment.key.index % 3));
+  };
+  std::vector<std::vector<TableEntry>> results;
+  for (const int threads : {1, 4}) {
+    options_.scoring_threads = threads;
+    const Rig rig = CreateRig("rig" + std::to_string(threads));
+    StartOne();
+    for (int k = 0; k < 40; ++k) Submit(k, rig.id);
+    ASSERT_TRUE(AllScored());
+    pipeline_->Stop();
+    const auto tables = store_->GetTables(rig.id);
+    ASSERT_TRUE(tables.ok()) << tables.status();
+    for (const Table& table : *tables) {
+      results.push_back(table.entries);
+    }
+  }
+  const std::size_t groups = results.size() / 2;
+  for (std::size_t g = 0; g < groups; ++g) {
+    EXPECT_EQ(results[g], results[g + groups]);
+    EXPECT_EQ(results[g].size(), 2u);
+  }
+}
+
+TEST_F(ScoringTest, ScoreIsTakenAtTheVersionThatTheSegmentNames) {
+  const Rig rig = CreateRig();
+  std::atomic<double> used{0};
+  estimators_.score = [&](const Rig& r, const Calibration& theta, const auto&) {
+    used = theta.cameras[0].f.x();
+    return FakeInformation(r, 1.0);
+  };
+  StartOne();
+  Submit(0);
+  Submit(1);  // fills the tables: version 2 comes
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  EXPECT_EQ(used, rig.factory.cameras[0].f.x());
+  Submit(2);  // names version 1 still
+  ASSERT_TRUE(AllScored());
+  EXPECT_EQ(used, rig.factory.cameras[0].f.x());
+  MotionSegment newer = Segment(3);
+  newer.calibration_version = 2;
+  ASSERT_TRUE(pipeline_->Submit("a", newer, nullptr).ok());
+  ASSERT_TRUE(AllScored());
+  EXPECT_EQ(used, rig.factory.cameras[0].f.x() + 0.5);
+}
+
+TEST_F(ScoringTest, DamagedSegmentDoesNotHoldUpTheOthers) {
+  CreateRig();
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE(store_->PutSegment("a", Segment(k)).ok());
+  }
+  DamageData(1);
+  StartOne();
+  ASSERT_TRUE(AllScored());
+  EXPECT_EQ(store_->GetSegment("a", {"s", 0})->state, SegmentState::kScored);
+  EXPECT_EQ(store_->GetSegment("a", {"s", 1})->state, SegmentState::kUnusable);
+  EXPECT_EQ(store_->GetSegment("a", {"s", 2})->state, SegmentState::kScored);
+  EXPECT_FALSE(store_->GetSegment("a", {"s", 1})->problem.empty());
+}
+
+TEST_F(ScoringTest, WhatScoringThrowsOrCannotCountSetsTheSegmentAside) {
+  CreateRig();
+  estimators_.score = [](const Rig& rig, const auto&, const auto& segment) {
+    if (segment.key.index == 0) throw std::runtime_error("singular");
+    SegmentInformation information = FakeInformation(rig, 1.0);
+    if (segment.key.index == 1) {
+      information.Lambda(0, 0) = std::numeric_limits<double>::quiet_NaN();
+    }
+    return information;
+  };
+  StartOne();
+  for (int k = 0; k < 3; ++k) Submit(k);
+  ASSERT_TRUE(AllScored());
+  EXPECT_NE(store_->GetSegment("a", {"s", 0})->problem.find("singular"),
+            std::string::npos);
+  EXPECT_EQ(store_->GetSegment("a", {"s", 1})->state, SegmentState::kUnusable);
+  EXPECT_EQ(store_->GetSegment("a", {"s", 2})->state, SegmentState::kScored);
+}
+
+}  // namespace
+}  // namespace selfcal::server

@@ -1,0 +1,91 @@
+#include <mutex>
+#include <set>
+
+#include "test/server/pipeline/pipeline_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using SubmitTest = PipelineTest;
+using Verdict = SubmitResult::Verdict;
+
+TEST_F(SubmitTest, StoredThenDuplicate) {
+  CreateRig();
+  StartOne();
+  EXPECT_EQ(Submit(0), Verdict::kStored);
+  EXPECT_EQ(Submit(0), Verdict::kDuplicate);
+  ASSERT_TRUE(AllScored());
+  EXPECT_EQ(Submit(0), Verdict::kDuplicate);
+  EXPECT_EQ(store_->ListSegments("a", {})->items.size(), 1u);
+}
+
+TEST_F(SubmitTest, UnknownRigIsNotFound) {
+  StartOne();
+  EXPECT_TRUE(
+      absl::IsNotFound(pipeline_->Submit("x", Segment(0), nullptr).status()));
+}
+
+TEST_F(SubmitTest, RejectionNamesEveryFieldAndStoresNothing) {
+  CreateRig();
+  StartOne();
+  MotionSegment bad = Segment(0);
+  bad.calibration_version = 7;
+  bad.keyframes[2].q_GI.coeffs() *= 1.1;
+  const auto result = pipeline_->Submit("a", bad, nullptr);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->verdict, Verdict::kRejected);
+  std::set<std::string> fields;
+  for (const Violation& violation : result->violations) {
+    fields.insert(violation.field);
+  }
+  EXPECT_EQ(fields.count("calibration_version"), 1u);
+  EXPECT_EQ(fields.size(), 2u);
+  EXPECT_TRUE(store_->ListSegments("a", {})->items.empty());
+}
+
+TEST_F(SubmitTest, VersionBelowOneIsNamedOnce) {
+  CreateRig();
+  StartOne();
+  MotionSegment bad = Segment(0);
+  bad.calibration_version = 0;
+  const auto result = pipeline_->Submit("a", bad, nullptr);
+  ASSERT_TRUE(result.ok()) << result.status();
+  ASSERT_EQ(result->violations.size(), 1u);
+  EXPECT_EQ(result->violations[0].field, "calibration_version");
+}
+
+TEST_F(SubmitTest, NotStartedOrStoppedIsUnavailable) {
+  CreateRig();
+  MakeOne();
+  EXPECT_TRUE(absl::IsUnavailable(
+      pipeline_->Submit("a", Segment(0), nullptr).status()));
+  ASSERT_TRUE(pipeline_->Start().ok());
+  EXPECT_EQ(Submit(0), Verdict::kStored);
+  pipeline_->Stop();
+  EXPECT_TRUE(absl::IsUnavailable(
+      pipeline_->Submit("a", Segment(1), nullptr).status()));
+}
+
+TEST_F(SubmitTest, WaitsWhileTheBacklogIsFullUntilCancelled) {
+  CreateRig();
+  options_.max_backlog = 3;
+  std::mutex gate;
+  gate.lock();
+  estimators_.score = [&](const Rig& rig, const auto&, const auto& segment) {
+    const std::lock_guard wait(gate);
+    return FakeInformation(rig, EntropyOf(segment.key.index));
+  };
+  StartOne();
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(Submit(k), Verdict::kStored);
+  int asked = 0;
+  const auto cancelled =
+      pipeline_->Submit("a", Segment(3), [&] { return ++asked > 2; });
+  EXPECT_TRUE(absl::IsCancelled(cancelled.status())) << cancelled.status();
+  EXPECT_EQ(store_->ListSegments("a", {})->items.size(), 3u);
+  gate.unlock();
+  EXPECT_EQ(Submit(3), Verdict::kStored);  // now there is room
+  EXPECT_TRUE(AllScored());
+}
+
+}  // namespace
+}  // namespace selfcal::server

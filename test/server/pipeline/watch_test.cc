@@ -1,0 +1,161 @@
+#include <mutex>
+
+#include "test/server/pipeline/pipeline_test.h"
+
+namespace selfcal::server {
+namespace {
+
+// What a watcher was told, in order.
+template <typename T>
+class Told {
+ public:
+  void Add(T value) {
+    const std::lock_guard lock(mutex_);
+    values_.push_back(std::move(value));
+  }
+  std::vector<T> values() {
+    const std::lock_guard lock(mutex_);
+    return values_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<T> values_;
+};
+
+class WatchTest : public PipelineTest {
+ protected:
+  std::unique_ptr<Subscription> Watch(Told<std::int64_t>* told) {
+    auto subscription = pipeline_->WatchCalibration(
+        "a", [told](const StoredCalibration& c) { told->Add(c.version); });
+    EXPECT_TRUE(subscription.ok()) << subscription.status();
+    return *std::move(subscription);
+  }
+
+  void Recalibrate(std::int64_t run) {
+    ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+    ASSERT_TRUE(RunIs(RunState::kSucceeded, run));
+  }
+};
+
+TEST_F(WatchTest, EachVersionIsToldOnceInOrder) {
+  CreateRig();
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  Told<std::int64_t> early;
+  Told<std::int64_t> late;
+  const auto first = Watch(&early);
+  EXPECT_THAT(early.values(), ::testing::ElementsAre(1));  // at once
+  Recalibrate(1);
+  Recalibrate(2);
+  const auto second = Watch(&late);
+  Recalibrate(3);
+  ASSERT_TRUE(Eventually([&] { return late.values().size() == 2; }));
+  ASSERT_TRUE(Eventually([&] { return early.values().size() == 4; }));
+  EXPECT_THAT(early.values(), ::testing::ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(late.values(), ::testing::ElementsAre(3, 4));
+}
+
+TEST_F(WatchTest, WatchersThatComeDuringPublicationsMissNothing) {
+  CreateRig();
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  std::vector<std::unique_ptr<Told<std::int64_t>>> told;
+  std::vector<std::unique_ptr<Subscription>> subscriptions;
+  for (int run = 1; run <= 5; ++run) {
+    ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+    while (store_->GetRun("a", run)->state != RunState::kSucceeded) {
+      told.push_back(std::make_unique<Told<std::int64_t>>());
+      subscriptions.push_back(Watch(told.back().get()));
+    }
+  }
+  for (const auto& one : told) {
+    ASSERT_TRUE(Eventually([&] { return one->values().back() == 6; }));
+    const std::vector<std::int64_t> versions = one->values();
+    for (std::size_t k = 1; k < versions.size(); ++k) {
+      EXPECT_EQ(versions[k], versions[k - 1] + 1);
+    }
+  }
+}
+
+TEST_F(WatchTest, NothingIsToldAfterTheEndOfASubscription) {
+  CreateRig();
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  Told<std::int64_t> told;
+  auto subscription = Watch(&told);
+  subscription.reset();
+  Recalibrate(1);
+  EXPECT_THAT(told.values(), ::testing::ElementsAre(1));
+  auto survivor = Watch(&told);
+  pipeline_.reset();  // the pipeline may go first
+  survivor.reset();
+}
+
+TEST_F(WatchTest, UnknownRigAndRunAreNotFound) {
+  CreateRig();
+  StartOne();
+  EXPECT_TRUE(absl::IsNotFound(
+      pipeline_->WatchCalibration("x", [](const auto&) {}).status()));
+  EXPECT_TRUE(absl::IsNotFound(
+      pipeline_->WatchRun("a", 1, [](const auto&) {}).status()));
+}
+
+TEST_F(WatchTest, RunIsToldFromItsStateToItsEnd) {
+  CreateRig();
+  std::mutex gate;
+  gate.lock();
+  estimators_.calibrate = [&](const Rig& rig,
+                              const Calibration& start,
+                              const auto&,
+                              const auto&,
+                              const ProgressCallback& progress) {
+    const std::lock_guard wait(gate);
+    for (int k = 1; k <= 3; ++k) progress({k, 3, 10.0 / k, 1.0});
+    return Converged(rig, start);
+  };
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+  ASSERT_TRUE(RunIs(RunState::kRunning));
+  Told<RunUpdate> told;
+  const auto subscription = pipeline_->WatchRun(
+      "a", 1, [&](const RunUpdate& update) { told.Add(update); });
+  ASSERT_TRUE(subscription.ok());
+  ASSERT_FALSE(told.values().empty());
+  EXPECT_EQ(told.values().front().run.state, RunState::kRunning);
+  gate.unlock();
+  ASSERT_TRUE(Eventually(
+      [&] { return told.values().back().run.state == RunState::kSucceeded; }));
+  std::vector<int> iterations;
+  for (const RunUpdate& update : told.values()) {
+    if (update.run.state == RunState::kRunning &&
+        update.progress.iteration > 0) {
+      iterations.push_back(update.progress.iteration);
+    }
+  }
+  EXPECT_THAT(iterations, ::testing::ElementsAre(1, 2, 3));
+  EXPECT_EQ(told.values().back().run.calibration_version, 2);
+  EXPECT_EQ(told.values().back().progress.iteration, 3);
+}
+
+TEST_F(WatchTest, EndedRunIsToldOnce) {
+  CreateRig();
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  Recalibrate(1);
+  Told<RunUpdate> told;
+  const auto subscription = pipeline_->WatchRun(
+      "a", 1, [&](const RunUpdate& update) { told.Add(update); });
+  Recalibrate(2);
+  ASSERT_EQ(told.values().size(), 1u);
+  EXPECT_EQ(told.values()[0].run.state, RunState::kSucceeded);
+}
+
+}  // namespace
+}  // namespace selfcal::server
