@@ -20,7 +20,9 @@
 // is positive definite.
 //
 // The inverse has no closed form. Newton's method on d(u) = d, started on the
-// axis, with steps halved until they stay in the region and lower the error.
+// axis, with steps halved until they stay in the region and lower the error:
+// the error falls at every step, so the iteration ends, also for a d without
+// an inverse, against the edge of the region.
 #pragma once
 
 #include <Eigen/Core>

@@ -12,8 +12,6 @@ bool Matches(std::string_view name, std::string_view pattern) {
   if (open_begin) pattern.remove_prefix(1);
   const bool open_end = pattern.ends_with('*');
   if (open_end) pattern.remove_suffix(1);
-  // "*" alone was its begin and its end.
-  if (open_begin && pattern.empty()) return true;
   if (open_begin && open_end) return name.find(pattern) != name.npos;
   if (open_begin) return name.ends_with(pattern);
   if (open_end) return name.starts_with(pattern);

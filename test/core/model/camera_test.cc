@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -248,6 +249,32 @@ TEST_P(CameraTest, UnprojectOfAnyPixelIsInvertedOrRefused) {
     EXPECT_LT((z_px - again_px).norm(), 1e-8);
   }
   EXPECT_GT(unprojected, kTrials / 3);
+}
+
+TEST(Unproject, RefusesPixelsOfRaysThatProjectRefuses) {
+  // The FOV model maps the whole half space into the radius pi / (2 w).
+  RandomValues random(15);
+  int unprojected = 0;
+  int refused = 0;
+  for (int i = 0; i < kTrials; ++i) {
+    CameraCalibration camera =
+        InNormalisedPlane(random.Camera(DistortionModel::kFov));
+    camera.distortion[0] = random.Uniform(0.5, 1.3);
+    const double edge = std::numbers::pi / 2 / camera.distortion[0];
+    const double gap = std::abs(random.SignedMagnitude(1e-10, 1e-3));
+    const Eigen::Vector2d z_px = edge * (1 - gap) * RandomDirection2(&random);
+    Eigen::Vector3d bearing_C;
+    if (Unproject(camera, z_px, &bearing_C)) {
+      Eigen::Vector2d again_px;
+      EXPECT_TRUE(Project(camera, bearing_C, &again_px, nullptr)) << gap;
+      EXPECT_LT((again_px - z_px).norm(), 1e-14);
+      ++unprojected;
+    } else {
+      ++refused;
+    }
+  }
+  EXPECT_GT(unprojected, kTrials / 10);
+  EXPECT_GT(refused, kTrials / 10);
 }
 
 TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefused) {

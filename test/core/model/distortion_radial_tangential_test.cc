@@ -98,8 +98,8 @@ TEST(DistortionRadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
 TEST(DistortionRadialTangential, UndistortFindsItsWayOverFlatParts) {
   RandomValues random(5);
   for (int i = 0; i < kTrials; ++i) {
-    // The slope ((q / a - 1)^2 + c) / (1 + c) is small around r^2 = q = a: from
-    // there, an undamped step goes far off, and may go round in circles.
+    // The slope ((q / a - 1)^2 + c) / (1 + c) is small around r^2 = q = a: a
+    // full Newton step from there goes far off.
     const double a = random.Uniform(0.1, 2);
     const double c = std::abs(random.SignedMagnitude(1e-3, 1));
     const Coefficients k = {
