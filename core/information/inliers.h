@@ -21,8 +21,8 @@ struct InlierSelection {
   ResidualStatistics statistics;
 };
 
-// Moves each landmark by a few Gauss-Newton steps with the keyframes held, so
-// that the noise of a landmark does not hide which of its observations is
+// Moves each landmark by up to two Gauss-Newton steps with the keyframes held,
+// so that the noise of a landmark does not hide which of its observations is
 // wrong; then leaves out what does not project, what lies further than
 // options.outlier_gate robust standard deviations (from the median residual of
 // the segment, at least pixel_sigma_px) from its prediction, and landmarks with

@@ -12,35 +12,38 @@ namespace {
 
 constexpr int kKinds = kStateTangentSize / 3;
 
-using PoseBasis = Eigen::Matrix<double, kChainPoseSize, kChainPoseSize>;
+// The gauge is a prior as well: the rest of the problem does not depend on it,
+// so any proper one gives what removing its four directions does. This size
+// keeps the numbers near those of the inertial factors.
+constexpr double kGaugeSigma_m = 1e-3;
+constexpr double kGaugeSigma_rad = 1e-3;
 
-// Weak prior information of a keyframe's state.
-ChainStateVector StatePrior() {
-  const auto information = [](double sigma) {
-    return Eigen::Vector3d::Constant(1 / (sigma * sigma));
-  };
+double Information(double sigma) { return 1 / (sigma * sigma); }
+
+// Weak prior on velocity and biases.
+ChainStateMatrix MotionPrior() {
   ChainStateVector prior = ChainStateVector::Zero();
-  prior.segment<3>(kStateVelocity) = information(kVelocityPriorSigma_mps);
-  prior.segment<3>(kStateAccelBias) = information(kAccelBiasPriorSigma_mps2);
-  prior.segment<3>(kStateGyroBias) = information(kGyroBiasPriorSigma_radps);
-  return prior;
+  prior.segment<3>(kStateVelocity)
+      .setConstant(Information(kVelocityPriorSigma_mps));
+  prior.segment<3>(kStateAccelBias)
+      .setConstant(Information(kAccelBiasPriorSigma_mps2));
+  prior.segment<3>(kStateGyroBias)
+      .setConstant(Information(kGyroBiasPriorSigma_radps));
+  return prior.asDiagonal();
 }
 
-// The keyframe with the gauge has two unknowns of its pose left: the first two,
-// roll and pitch about the horizontal axes of G. Its other four are without any
-// rows and get a unit prior, which eliminates nothing.
-ChainStateVector GaugePrior() {
-  ChainStateVector prior = StatePrior();
-  prior.head<2>().setConstant(1 / (kTiltPriorSigma_rad * kTiltPriorSigma_rad));
-  prior.segment<4>(2).setOnes();
+// Holds position and rotation about gravity; the tilt weakly.
+ChainStateMatrix GaugePrior(const KeyframeState& x) {
+  ChainStateMatrix prior = ChainStateMatrix::Zero();
+  const Eigen::Matrix3d R_IG = x.q_GI.toRotationMatrix().transpose();
+  const double tilt = Information(kTiltPriorSigma_rad);
+  const Eigen::Vector3d rotation_G(tilt, tilt, Information(kGaugeSigma_rad));
+  prior.block<3, 3>(kStateRotation, kStateRotation) =
+      R_IG * rotation_G.asDiagonal() * R_IG.transpose();
+  prior.diagonal()
+      .segment<3>(kStatePosition)
+      .setConstant(Information(kGaugeSigma_m));
   return prior;
-}
-
-PoseBasis GaugeBasis(const KeyframeState& x) {
-  PoseBasis basis = PoseBasis::Zero();
-  basis.topLeftCorner<3, 2>() =
-      x.q_GI.toRotationMatrix().transpose().leftCols<2>();
-  return basis;
 }
 
 // One walk through a segment.
@@ -58,7 +61,6 @@ class Linearisation {
         selection_(selection),
         scale_(theta_scale),
         gauge_(gauge_keyframe),
-        gauge_basis_(GaugeBasis(segment.keyframes[gauge_keyframe])),
         tracks_(segment.keyframes.size()) {
     for (int j = 0; j < static_cast<int>(theta0.cameras.size()); ++j) {
       camera_offsets_.push_back(CameraTangentOffset(theta0, j));
@@ -70,7 +72,10 @@ class Linearisation {
     const int keyframes = static_cast<int>(segment_.keyframes.size());
     elimination_.Start(static_cast<int>(scale_.size()));
     for (int k = 0; k < keyframes; ++k) {
-      elimination_.AddPrior(k == gauge_ ? GaugePrior() : StatePrior());
+      if (k == 0) elimination_.AddPrior(MotionPrior());
+      if (k == gauge_) {
+        elimination_.AddPrior(GaugePrior(segment_.keyframes[k]));
+      }
       for (const std::span<const int> track : tracks_[k]) AddTrack(track);
       if (k + 1 < keyframes) elimination_.Advance(Link(k));
     }
@@ -127,9 +132,6 @@ class Linearisation {
     rows.shared_offset = camera_offsets_[observation.camera];
     rows.residual = weight * r;
     rows.pose = weight * J.pose;
-    if (observation.keyframe == gauge_) {
-      rows.pose = (rows.pose * gauge_basis_).eval();
-    }
     rows.landmark = weight * J.landmark.leftCols<3>();
     rows.shared = weight * J.camera;
     for (int c = 0; c < rows.shared.cols(); ++c) {
@@ -155,8 +157,6 @@ class Linearisation {
     rows.residual = W * r;
     rows.x0 = W * J.x0;
     rows.x1 = W * J.x1;
-    if (k == gauge_) ApplyGauge(&rows.x0);
-    if (k + 1 == gauge_) ApplyGauge(&rows.x1);
     rows.shared = W * J.theta * scale_.head<kImuTangentSize>().asDiagonal();
     for (int kind = 0; kind < kKinds; ++kind) {
       inertial_squares_[kind] +=
@@ -165,18 +165,12 @@ class Linearisation {
     return rows;
   }
 
-  void ApplyGauge(ChainStateMatrix* J) const {
-    J->leftCols<kChainPoseSize>() =
-        (J->leftCols<kChainPoseSize>() * gauge_basis_).eval();
-  }
-
   const Rig& rig_;
   const Calibration& theta0_;
   const MotionSegment& segment_;
   const InlierSelection& selection_;
   const Eigen::VectorXd& scale_;
   const int gauge_;
-  const PoseBasis gauge_basis_;
   std::vector<std::vector<std::span<const int>>> tracks_;
   std::vector<int> camera_offsets_;
   std::vector<LandmarkRows> rows_;

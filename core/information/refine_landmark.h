@@ -11,7 +11,7 @@
 namespace selfcal {
 
 // The landmark p_G [m] that lowers the Huber cost of its observations (indices
-// into segment.observations), starting from start_G: at most a few damped
+// into segment.observations), starting from start_G: at most two damped
 // Gauss-Newton steps. Its distance is held weakly, to about half of itself, so
 // that a point without parallax stays where it was. Never loses an observation
 // that projected at the start; returns start_G where no step helps.

@@ -36,9 +36,7 @@ struct NormalisedInformation {
         prior(PriorSigmas(rig)),
         reference(ReferenceSigmas(rig)) {
     const Eigen::VectorXd scale = prior(free);
-    const Eigen::MatrixXd scaled =
-        scale.asDiagonal() * Lambda(free, free) * scale.asDiagonal();
-    information = 0.5 * (scaled + scaled.transpose());
+    information = (scale * scale.transpose()).cwiseProduct(Lambda(free, free));
     for (const TangentComponent& component : TangentComponents(rig.factory)) {
       names.push_back(component.name);
     }

@@ -18,7 +18,8 @@ Eigen::MatrixXd WithoutNegativePart(const Eigen::MatrixXd& Lambda) {
   const Eigen::MatrixXd root =
       eigen.eigenvectors() *
       eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-  return root * root.transpose();
+  const Eigen::MatrixXd product = root * root.transpose();
+  return product.selfadjointView<Eigen::Lower>();
 }
 
 }  // namespace
@@ -45,8 +46,9 @@ SegmentInformation ScoreSegment(const Rig& rig,
       WithoutNegativePart(linearised.theta.Lambda(free, free));
   const Eigen::VectorXd unit = prior(free).cwiseInverse();
   result.Lambda = Eigen::MatrixXd::Zero(prior.size(), prior.size());
+  // Coefficient by coefficient, so that it stays symmetric to the bit.
   result.Lambda(free, free) =
-      unit.asDiagonal() * normalised * unit.asDiagonal();
+      (unit * unit.transpose()).cwiseProduct(normalised);
   result.eta = Eigen::VectorXd::Zero(prior.size());
   result.eta(free) = unit.cwiseProduct(linearised.theta.eta(free));
 

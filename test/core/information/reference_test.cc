@@ -1,0 +1,143 @@
+// The structured score against two slow ways to the same numbers.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <random>
+
+#include "core/information/linearisation.h"
+#include "core/information/segment_information.h"
+#include "core/model/calibration.h"
+#include "test/core/information/test_segments.h"
+#include "test/reference/ceres_covariance_reference.h"
+#include "test/reference/segment_jacobian.h"
+#include "test/reference/sparse_qr_reference.h"
+
+namespace selfcal {
+namespace {
+
+constexpr double kAgreement_nat = 1e-8;
+
+struct Case {
+  Rig rig;
+  Calibration theta0;
+  MotionSegment segment;
+  int gauge = 0;
+};
+
+// Truth, and a SLAM system with a factory calibration and noise.
+std::vector<Case> WellConditionedCases() {
+  std::vector<Case> cases;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Case c;
+    c.rig = seed % 2 ? HandheldRig("handheld") : TwoCameraRig();
+    c.theta0 = c.rig.factory;
+    SimulationOptions options;
+    options.keyframes_per_segment = seed == 1 ? 40 : 20;
+    c.segment = MovingSegment(c.rig, seed, options);
+    c.gauge = static_cast<int>(seed) - 1;
+    cases.push_back(c);
+
+    options.seed = seed;
+    c.theta0 = PerturbCalibration(c.rig.factory, {}, seed);
+    c.segment =
+        OneSegment(c.rig, c.theta0, *MakeHandheld(4.1, 1, seed), options).slam;
+    cases.push_back(c);
+  }
+  // Some parameters held by the rig.
+  cases[0].rig.fixed = {"cam0.distortion.*", "imu.q_AI.y"};
+  return cases;
+}
+
+Eigen::VectorXd ThetaScale(const Rig& rig) {
+  const std::vector<int> free = FreeComponents(rig);
+  Eigen::VectorXd scale = Eigen::VectorXd::Zero(PriorSigmas(rig).size());
+  scale(free) = PriorSigmas(rig)(free);
+  return scale;
+}
+
+TEST(ScoreAgainstReference, EqualsTheSparseQrOfTheWholeJacobian) {
+  for (const Case& c : WellConditionedCases()) {
+    ScoreOptions options;
+    options.gauge_keyframe = c.gauge;
+    const SegmentInformation score =
+        ScoreSegment(c.rig, c.theta0, c.segment, options);
+    const InlierSelection selection =
+        SelectInliers(c.theta0, c.rig.pixel_sigma_px, c.segment, options);
+    const ThetaRoot root = SparseQrReference(BuildSegmentJacobian(
+        c.rig, c.theta0, c.segment, selection, ThetaScale(c.rig), c.gauge));
+    const std::vector<double> entropies = ReferenceEntropies(c.rig, root.R);
+    ASSERT_EQ(score.groups.size(), entropies.size());
+    for (std::size_t q = 0; q < entropies.size(); ++q) {
+      EXPECT_NEAR(score.groups[q].entropy, entropies[q], kAgreement_nat);
+    }
+    // In units of the prior.
+    const std::vector<int> free = FreeComponents(c.rig);
+    const Eigen::VectorXd unit = PriorSigmas(c.rig)(free);
+    const Eigen::MatrixXd Lambda =
+        unit.asDiagonal() * score.Lambda(free, free) * unit.asDiagonal();
+    const Eigen::MatrixXd expected = root.R.transpose() * root.R;
+    EXPECT_LT((Lambda - expected).norm(), 1e-9 * expected.norm());
+    const Eigen::VectorXd eta = unit.cwiseProduct(score.eta(free));
+    const Eigen::VectorXd expected_eta = -root.R.transpose() * root.c;
+    EXPECT_LT((eta - expected_eta).norm(),
+              1e-7 * expected_eta.norm() + 1e-7 * expected.norm());
+  }
+}
+
+TEST(ScoreAgainstReference, EqualsCeresCovariance) {
+  for (const Case& c : WellConditionedCases()) {
+    ScoreOptions options;
+    options.gauge_keyframe = c.gauge;
+    const SegmentInformation score =
+        ScoreSegment(c.rig, c.theta0, c.segment, options);
+    const InlierSelection selection =
+        SelectInliers(c.theta0, c.rig.pixel_sigma_px, c.segment, options);
+    const Eigen::MatrixXd posterior =
+        CeresPosterior(c.rig, c.theta0, c.segment, selection, c.gauge);
+    ASSERT_GT(posterior.size(), 0);
+    const std::vector<int> free = FreeComponents(c.rig);
+    const Eigen::VectorXd prior = PriorSigmas(c.rig);
+    const Eigen::VectorXd reference = ReferenceSigmas(c.rig);
+    for (std::size_t q = 0; q < c.rig.groups.size(); ++q) {
+      const std::vector<int> components =
+          GroupComponents(c.rig, c.rig.groups[q]);
+      std::vector<int> at;
+      for (const int i : components) {
+        at.push_back(static_cast<int>(
+            std::lower_bound(free.begin(), free.end(), i) - free.begin()));
+      }
+      const Eigen::VectorXd sigma_ref =
+          reference(components).cwiseQuotient(prior(components));
+      EXPECT_NEAR(score.groups[q].entropy,
+                  Entropy(posterior(at, at), sigma_ref),
+                  kAgreement_nat);
+    }
+  }
+}
+
+// eta is what moves theta towards the truth: linearised off the truth, with
+// states that are true, its step differs by just that from the step at the
+// truth (which is not zero: the IMU is sampled, its integral is not exact).
+TEST(ScoreAgainstReference, TheStepFromEtaTakesBackAnErrorOfTheta) {
+  const Rig rig = HandheldRig("handheld");
+  const Eigen::VectorXd sigma = ReferenceSigmas(rig);
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal(0, 1e-3);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const MotionSegment segment = MovingSegment(rig, seed);
+    const auto step = [&](const Calibration& theta0) {
+      const SegmentInformation score = ScoreSegment(rig, theta0, segment);
+      const Eigen::MatrixXd Lambda =
+          sigma.asDiagonal() * score.Lambda * sigma.asDiagonal();
+      return Lambda.ldlt().solve(sigma.cwiseProduct(score.eta)).eval();
+    };
+    Eigen::VectorXd error(sigma.size());
+    for (double& x : error) x = normal(random);
+    const Calibration off = BoxPlus(rig.factory, sigma.cwiseProduct(error));
+    const Eigen::VectorXd taken_back = step(rig.factory) - step(off);
+    EXPECT_LT((taken_back - error).norm(), 0.05 * error.norm());
+  }
+}
+
+}  // namespace
+}  // namespace selfcal
