@@ -31,14 +31,23 @@ std::vector<std::string> Groups(const v1::ListSegmentsResponse& segments) {
   return groups;
 }
 
-// "-12.3", with a star if the segment is in the group's table.
 std::string EntropyText(const v1::Segment& segment, const std::string& group) {
   for (const v1::GroupScore& score : segment.scores()) {
-    if (score.group() != group) continue;
-    return fmt::format(
-        "{:.2f}{}", score.entropy_nats(), score.in_table() ? "*" : " ");
+    if (score.group() == group) {
+      return fmt::format("{:.2f}", score.entropy_nats());
+    }
   }
-  return "- ";
+  return "-";
+}
+
+// The groups whose tables hold the segment.
+std::string TablesText(const v1::Segment& segment) {
+  std::string text;
+  for (const v1::GroupScore& score : segment.scores()) {
+    if (!score.in_table()) continue;
+    text += (text.empty() ? "" : ",") + score.group();
+  }
+  return text.empty() ? "-" : text;
 }
 
 Table ListTable(const v1::ListSegmentsResponse& segments) {
@@ -51,8 +60,9 @@ Table ListTable(const v1::ListSegmentsResponse& segments) {
                                  {"observations", true}};
   const auto groups = Groups(segments);
   for (const std::string& group : groups) {
-    columns.push_back({"H(" + group + ") ", true});
+    columns.push_back({"H(" + group + ")", true});
   }
+  columns.push_back({"in tables"});
   Table table(std::move(columns));
   for (const v1::Segment& segment : segments.segments()) {
     std::vector<std::string> row = {
@@ -66,6 +76,7 @@ Table ListTable(const v1::ListSegmentsResponse& segments) {
     for (const std::string& group : groups) {
       row.push_back(EntropyText(segment, group));
     }
+    row.push_back(TablesText(segment));
     table.Add(std::move(row));
   }
   return table;
@@ -165,7 +176,7 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   CLI::App* list = segments->add_subcommand(
       "list",
       "List the segments of a rig, newest first, with the entropy of each "
-      "group (lower is richer, * is in its table)");
+      "group [nat] (lower is richer) and the tables that hold it");
   list->add_option("RIG", *rig)->required();
   list->callback([context, rig] {
     context->command = [context, rig] { return List(context, *rig); };

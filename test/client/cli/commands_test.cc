@@ -225,9 +225,9 @@ TEST_F(Commands, ListsSegmentsWithTheirEntropies) {
   const Outcome outcome = Selfcal({"segments", "list", "device"});
   EXPECT_EQ(daemon_.last_name, "rigs/device");
   EXPECT_EQ(outcome.out,
-            "walk~2\tstored\t-\t40\t3.90\t0\t0\t- \t- \n"
-            "walk~1\tscored\t-\t40\t3.90\t0\t0\t-12.35*\t-12.35 \n"
-            "walk~0\tscored\t-\t40\t3.90\t0\t0\t-12.35*\t-12.35 \n");
+            "walk~2\tstored\t-\t40\t3.90\t0\t0\t-\t-\t-\n"
+            "walk~1\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\n"
+            "walk~0\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\n");
 }
 
 TEST_F(Commands, ShowsASegmentAndWhatItDoesNotObserve) {
