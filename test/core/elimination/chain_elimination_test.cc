@@ -26,7 +26,7 @@ void ExpectEqualsDense(const Chain& chain, ChainElimination* elimination) {
 TEST(ChainElimination, EqualsDenseQrOnRandomChains) {
   std::mt19937 random(1);
   ChainElimination elimination;  // one workspace for all of them
-  for (int trial = 0; trial < 60; ++trial) {
+  for (int trial = 0; trial < 36; ++trial) {
     ChainShape shape;
     shape.keyframes = 2 + trial % 9;
     shape.cameras = 1 + trial % 3;
