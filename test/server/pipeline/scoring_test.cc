@@ -54,7 +54,7 @@ TEST_F(ScoringTest, StopInTheMiddleLosesNothing) {
   EXPECT_EQ((*store_->GetTables("a"))[0].scored, 24);
 }
 
-TEST_F(ScoringTest, TablesDoNotDependOnTheNumberOfThreads) {
+TEST_F(ScoringTest, TablesAndRunsDoNotDependOnTheNumberOfThreads) {
   options_.max_backlog = 100;
   // The later ones are done first, if they may.
   estimators_.score = [](const Rig& rig, const auto&, const auto& segment) {
@@ -70,6 +70,9 @@ TEST_F(ScoringTest, TablesDoNotDependOnTheNumberOfThreads) {
     for (int k = 0; k < 40; ++k) Submit(k, rig.id);
     ASSERT_TRUE(AllScored());
     pipeline_->Stop();
+    // Committed in order, the first two start the first run.
+    EXPECT_THAT(store_->GetRun(rig.id, 1)->segments,
+                ::testing::ElementsAre(SegmentKey{"s", 0}, SegmentKey{"s", 1}));
     const auto tables = store_->GetTables(rig.id);
     ASSERT_TRUE(tables.ok()) << tables.status();
     for (const Table& table : *tables) {
