@@ -22,6 +22,10 @@ constexpr double kFirstTolerance = 1e-4;
 constexpr double kTolerance = 1e-8;
 // Largest undamped Gauss-Newton step of theta at convergence, in sigmas.
 constexpr double kMaxStepSigmas = 0.05;
+// A round ends when theta made so many steps below so many sigmas in a row:
+// landmarks of little weight may go on slipping for long, and move nothing.
+constexpr int kSmallSteps = 3;
+constexpr double kSmallStepSigmas = 0.005;
 // Largest change of theta by a round at convergence, in sigmas.
 constexpr double kMaxRoundSigmas = 0.02;
 
@@ -77,7 +81,7 @@ class Calibrator {
     result_.reprojection_median_before_px = before.median_px;
     // At a start far from the optimum all residuals are large: what can be
     // observed is judged without the weights that they would get.
-    if (!Inform(/*robust_weights=*/false)) {
+    if (!Inform(/*loss=*/nullptr)) {
       return Fail("the states of the keyframes are not determined");
     }
     ChooseSubspace();
@@ -92,7 +96,7 @@ class Calibrator {
       if (outcome.status == SolverStatus::kFailed) {
         return Fail(outcome.message);
       }
-      if (!Inform(/*robust_weights=*/true)) {
+      if (!Inform(&screening_.loss)) {
         return Fail("the states of the keyframes are not determined");
       }
       const double moved_sigmas =
@@ -136,15 +140,14 @@ class Calibrator {
 
   // Information and covariance of the offset d at the estimate. False if
   // states are not determined.
-  bool Inform(bool robust_weights) {
+  bool Inform(const RobustLoss* loss) {
     const auto at_theta = LineariseTheta(rig_,
                                          Theta(),
                                          problem_,
                                          estimate_.keyframes,
                                          screening_.landmarks,
                                          whitening_,
-                                         options_,
-                                         robust_weights);
+                                         loss);
     if (!at_theta) {
       return false;
     }
@@ -186,18 +189,29 @@ class Calibrator {
                       .problem = problem_,
                       .whitening = whitening_,
                       .basis = basis,
-                      .options = options_};
+                      .loss = screening_.loss,
+                      .use_prior = options_.use_prior,
+                      .threads = options_.threads};
     round.max_iterations = options_.max_iterations - result_.iterations;
     round.function_tolerance = round_number == 0 ? kFirstTolerance : kTolerance;
     Eigen::VectorXd d_last = estimate_.d;
+    int small_steps = 0;
     const auto report =
         [&](int iteration, double cost, const Eigen::VectorXd& d) {
           const double step = LargestInSigmas(d - d_last, covariance_d_);
           d_last = d;
-          return !progress_ || progress_({result_.iterations + iteration,
-                                          options_.max_iterations,
-                                          cost,
-                                          step});
+          // A rejected step does not move theta, and counts for nothing.
+          if (step > 0) {
+            small_steps = step < kSmallStepSigmas ? small_steps + 1 : 0;
+          }
+          if (progress_ && !progress_({result_.iterations + iteration,
+                                       options_.max_iterations,
+                                       cost,
+                                       step})) {
+            return SolverSignal::kCancel;
+          }
+          return small_steps >= kSmallSteps ? SolverSignal::kEnough
+                                            : SolverSignal::kGoOn;
         };
     const SolverOutcome outcome =
         SolveRound(round, report, &estimate_, &screening_.landmarks);

@@ -1,39 +1,28 @@
-// The robust loss on reprojection residuals, as weights; the solver applies the
-// same loss by Ceres' own classes.
+// The robust loss on reprojection residuals, as the solver, the landmarks and
+// the covariance use it alike.
 #pragma once
 
-#include <cmath>
+#include <limits>
 
 #include "core/calibration/calibrate.h"
 
 namespace selfcal {
 
-// rho'(s) of a squared norm s [sigma^2]: the weight of a residual in the normal
-// equations. Huber: sqrt(s) up to `scale` counts fully. Cauchy:
-// rho = scale^2 log(1 + s / scale^2).
-inline double LossWeight(LossKind kind, double scale, double s) {
-  switch (kind) {
-    case LossKind::kHuber:
-      return s <= scale * scale ? 1.0 : scale / std::sqrt(s);
-    case LossKind::kCauchy:
-      return 1.0 / (1.0 + s / (scale * scale));
-    case LossKind::kNone:
-      break;
-  }
-  return 1.0;
-}
+// A loss rho(s) of a squared norm s [sigma^2], with rho(s) = s for small s.
+//   Huber:  weight rho'(s) = min(1, scale / sqrt(s));
+//   Cauchy: weight 1 / (1 + s / scale^2).
+// From 0.6 of the gate on, the weight falls linearly in s to zero at the gate,
+// and rho stays constant beyond. An observation at the gate thus has no
+// influence, and whether it counts as within or beyond changes nothing: else
+// single observations near it decide between optima a tenth of a sigma apart,
+// each consistent with itself. The gate must be at least twice the scale.
+struct RobustLoss {
+  LossKind kind = LossKind::kHuber;
+  double scale = 2.0;                                     // [sigma]
+  double gate = std::numeric_limits<double>::infinity();  // [sigma]
 
-// rho(s), for comparing two places of one landmark.
-inline double LossValue(LossKind kind, double scale, double s) {
-  switch (kind) {
-    case LossKind::kHuber:
-      return s <= scale * scale ? s : 2 * scale * std::sqrt(s) - scale * scale;
-    case LossKind::kCauchy:
-      return scale * scale * std::log1p(s / (scale * scale));
-    case LossKind::kNone:
-      break;
-  }
-  return s;
-}
+  double Weight(double s) const;
+  double Value(double s) const;
+};
 
 }  // namespace selfcal

@@ -40,12 +40,13 @@ bool EnoughLeft(const std::vector<int>& used, const Track& track) {
 
 // What all landmarks are judged by.
 struct Thresholds {
-  double gate_px;
+  RobustLoss loss;
   double max_inverse_depth_sigma;  // [1/m]
 };
 
 Thresholds FindThresholds(
     const LandmarkScene& scene,
+    const CalibrateOptions& options,
     const CalibrationProblem& problem,
     const std::vector<std::optional<LandmarkPlace>>& places) {
   std::vector<double> norms_px;
@@ -62,10 +63,13 @@ Thresholds FindThresholds(
     }
     inverse_depths.push_back(std::abs(places[t]->inverse_depth.z()));
   }
-  return {
-      kOutlierGate * std::max(scene.pixel_sigma_px,
-                              Median(std::move(norms_px)) / kMedianOfRayleigh),
-      kMaxDepthUncertainty * Median(std::move(inverse_depths))};
+  const double robust_sigmas =
+      Median(std::move(norms_px)) / kMedianOfRayleigh / scene.pixel_sigma_px;
+  return {{.kind = options.loss,
+           .scale = options.loss_scale,
+           .gate = std::max(kOutlierGate * std::max(1.0, robust_sigmas),
+                            2 * options.loss_scale)},
+          kMaxDepthUncertainty * Median(std::move(inverse_depths))};
 }
 
 double InverseDepthSigma(const Eigen::Matrix3d& information) {
@@ -80,12 +84,11 @@ double InverseDepthSigma(const Eigen::Matrix3d& information) {
 // that those within the gate give.
 std::optional<ScreenedLandmark> Settle(const LandmarkScene& scene,
                                        const Track& track,
-                                       const CalibrateOptions& options,
                                        const Thresholds& thresholds,
                                        LandmarkPlace place) {
   const auto within_gate = [&] {
     return Within(ResidualNorms(scene, track, place.Homogeneous()),
-                  thresholds.gate_px);
+                  thresholds.loss.gate * scene.pixel_sigma_px);
   };
   std::vector<int> used = within_gate();
   double sigma = 0;
@@ -93,8 +96,8 @@ std::optional<ScreenedLandmark> Settle(const LandmarkScene& scene,
     if (!EnoughLeft(used, track)) {
       return std::nullopt;
     }
-    sigma = InverseDepthSigma(RefinePlace(
-        scene, track, used, options.loss, options.loss_scale, &place));
+    sigma = InverseDepthSigma(
+        RefinePlace(scene, track, used, thresholds.loss, &place));
     used = within_gate();
   }
   if (!EnoughLeft(used, track) ||
@@ -118,15 +121,16 @@ Screening ScreenLandmarks(const Rig& rig,
       places[t] = TriangulateTrack(scene, problem.tracks[t]);
     }
   }
-  const Thresholds thresholds = FindThresholds(scene, problem, places);
+  const Thresholds thresholds = FindThresholds(scene, options, problem, places);
 
   Screening result;
+  result.loss = thresholds.loss;
   for (std::size_t t = 0; t < places.size(); ++t) {
     const Track& track = problem.tracks[t];
     const auto observed = static_cast<int>(track.observations.size());
     std::optional<ScreenedLandmark> landmark;
     if (places[t]) {
-      landmark = Settle(scene, track, options, thresholds, *places[t]);
+      landmark = Settle(scene, track, thresholds, *places[t]);
     }
     if (!landmark) {
       ++result.landmarks_dropped;

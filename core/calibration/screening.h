@@ -37,6 +37,7 @@ struct ScreenedLandmark {
 };
 
 struct Screening {
+  RobustLoss loss;  // with the gate of this estimate
   std::vector<ScreenedLandmark> landmarks;
   int landmarks_dropped = 0;
   int observations = 0;  // used

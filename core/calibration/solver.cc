@@ -37,17 +37,21 @@ void FromBlocks(const KeyframeBlocks& blocks, KeyframeState* x) {
   x->b_g = vb.tail<3>();
 }
 
-std::unique_ptr<ceres::LossFunction> MakeLoss(const CalibrateOptions& options) {
-  switch (options.loss) {
-    case LossKind::kHuber:
-      return std::make_unique<ceres::HuberLoss>(options.loss_scale);
-    case LossKind::kCauchy:
-      return std::make_unique<ceres::CauchyLoss>(options.loss_scale);
-    case LossKind::kNone:
-      break;
+// rho'' is given as zero, so that Ceres weights residuals as in iteratively
+// reweighted least squares, as it does for every loss that is concave.
+class CeresLoss final : public ceres::LossFunction {
+ public:
+  explicit CeresLoss(const RobustLoss& loss) : loss_(loss) {}
+
+  void Evaluate(double s, double rho[3]) const override {
+    rho[0] = loss_.Value(s);
+    rho[1] = loss_.Weight(s);
+    rho[2] = 0;
   }
-  return nullptr;
-}
+
+ private:
+  RobustLoss loss_;
+};
 
 // The Ceres problem of one round, with the memory it works on.
 class Builder {
@@ -59,7 +63,7 @@ class Builder {
         d_(estimate.d),
         rotation_(MakeRotationManifold()),
         gauge_(MakeGaugeRotationManifold()),
-        loss_(MakeLoss(round.options)),
+        loss_(round.loss),
         problem_(ProblemOptions()) {
     for (const KeyframeState& x : estimate.keyframes) {
       keyframes_.push_back(ToBlocks(x));
@@ -119,7 +123,7 @@ class Builder {
       subspace_ = MakeSubspaceManifold(round_.basis);
       problem_.SetManifold(d_.data(), subspace_.get());
     }
-    if (!round_.options.use_prior) {
+    if (!round_.use_prior) {
       return;
     }
     // The reference is the factory's calibration, so the prior's mean is d = 0.
@@ -198,7 +202,7 @@ class Builder {
                                  round_.rig.pixel_sigma_px,
                                  landmarks[i].place.anchor)
                 .release(),
-            loss_.get(),
+            &loss_,
             d_.data(),
             keyframes_[seen.keyframe].q.data(),
             keyframes_[seen.keyframe].p.data(),
@@ -214,7 +218,7 @@ class Builder {
   std::unique_ptr<ceres::Manifold> rotation_;
   std::unique_ptr<ceres::Manifold> gauge_;
   std::unique_ptr<ceres::Manifold> subspace_;
-  std::unique_ptr<ceres::LossFunction> loss_;
+  CeresLoss loss_;
   ceres::Problem problem_;
 };
 
@@ -225,9 +229,15 @@ class ProgressAdapter final : public ceres::IterationCallback {
 
   ceres::CallbackReturnType operator()(
       const ceres::IterationSummary& summary) override {
-    const bool go_on =
-        !callback_ || callback_(summary.iteration, summary.cost, d_);
-    return go_on ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
+    switch (callback_(summary.iteration, summary.cost, d_)) {
+      case SolverSignal::kEnough:
+        return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+      case SolverSignal::kCancel:
+        return ceres::SOLVER_ABORT;
+      case SolverSignal::kGoOn:
+        break;
+    }
+    return ceres::SOLVER_CONTINUE;
   }
 
  private:
@@ -237,20 +247,21 @@ class ProgressAdapter final : public ceres::IterationCallback {
 
 ceres::Solver::Options SolverOptions(const SolverRound& round) {
   ceres::Solver::Options options;
-  options.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
+  // Powell's dogleg rather than Levenberg-Marquardt. On recordings with heavy
+  // tails the residuals' own curvature doubles that of Gauss-Newton along the
+  // weakest directions (tilt, scale, biases). A full step then overshoots and
+  // the damping that prevents it slows every weak direction: 100 iterations and
+  // more, where dogleg, which shortens the step, takes 10.
+  options.trust_region_strategy_type = ceres::DOGLEG;
+  options.dogleg_type = ceres::TRADITIONAL_DOGLEG;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
-  options.num_threads = std::max(1, round.options.threads);
+  options.num_threads = std::max(1, round.threads);
   options.max_num_iterations = round.max_iterations;
   options.function_tolerance = round.function_tolerance;
   // Done is told by the cost and by the Gauss-Newton step of theta; a small
   // step of all parameters together tells nothing.
   options.parameter_tolerance = 1e-16;
   options.gradient_tolerance = 1e-16;
-  // Tilt, scale and biases are weak directions: the damping must be able to
-  // fall far below them.
-  options.initial_trust_region_radius = 1e6;
-  options.max_trust_region_radius = 1e20;
-  options.min_lm_diagonal = 1e-9;
   options.jacobi_scaling = true;
   options.update_state_every_iteration = true;
   options.logging_type = ceres::SILENT;

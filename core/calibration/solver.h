@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/calibrate.h"
 #include "core/calibration/problem.h"
+#include "core/calibration/robust_loss.h"
 #include "core/calibration/screening.h"
 #include "core/factor/inertial.h"
 #include "core/model/calibration.h"
@@ -23,7 +23,9 @@ struct SolverRound {
   const std::vector<InertialMatrix>& whitening;
   // D x r: the directions in which d may move (SubspaceManifold).
   const Eigen::MatrixXd& basis;
-  const CalibrateOptions& options;
+  const RobustLoss& loss;  // on reprojection residuals
+  bool use_prior = false;  // PriorSigmas(rig) about d = 0
+  int threads = 1;
   int max_iterations = 100;
   double function_tolerance = 1e-9;
 };
@@ -38,10 +40,16 @@ struct SolverOutcome {
   double final_cost = 0;
 };
 
-// Called after each iteration with its number, the cost, and the present d;
-// false cancels.
-using SolverCallback =
-    std::function<bool(int iteration, double cost, const Eigen::VectorXd& d)>;
+// What the caller says after an iteration.
+enum class SolverSignal {
+  kGoOn,
+  kEnough,  // ends the round as converged
+  kCancel,
+};
+
+// Called after each iteration with its number, the cost, and the present d.
+using SolverCallback = std::function<SolverSignal(
+    int iteration, double cost, const Eigen::VectorXd& d)>;
 
 // Improves the estimate and the places of the landmarks. When it fails or is
 // cancelled, both are as good as the last accepted step left them.

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "core/calibration/robust_loss.h"
 #include "core/calibration/sparse_elimination.h"
 #include "core/factor/reprojection.h"
 #include "core/information/weak_priors.h"
@@ -90,13 +89,16 @@ void AddBiasLinks(const CalibrationProblem& problem,
   }
 }
 
+// Below it an observation counts as beyond the gate: a landmark must not stand
+// on what has all but no weight.
+constexpr double kLeastWeight = 1e-6;
+
 void AddLandmarks(const Rig& rig,
                   const Calibration& theta,
                   const CalibrationProblem& problem,
                   const std::vector<KeyframeState>& keyframes,
                   const std::vector<ScreenedLandmark>& landmarks,
-                  const CalibrateOptions& options,
-                  bool robust_weights,
+                  const RobustLoss* loss,
                   SparseElimination* elimination) {
   std::vector<LandmarkRows> rows;
   ReprojectionJacobians jacobians;
@@ -122,9 +124,12 @@ void AddLandmarks(const Rig& rig,
         continue;
       }
       double scale = 1 / rig.pixel_sigma_px;
-      if (robust_weights) {
-        scale *= std::sqrt(LossWeight(
-            options.loss, options.loss_scale, (scale * r).squaredNorm()));
+      if (loss != nullptr) {
+        const double weight = loss->Weight((scale * r).squaredNorm());
+        if (weight < kLeastWeight) {
+          continue;
+        }
+        scale *= std::sqrt(weight);
       }
       rows.push_back({seen.keyframe,
                       CameraTangentOffset(theta, seen.camera),
@@ -172,21 +177,13 @@ std::optional<SharedInformation> LineariseTheta(
     const std::vector<KeyframeState>& keyframes,
     const std::vector<ScreenedLandmark>& landmarks,
     const std::vector<InertialMatrix>& whitening,
-    const CalibrateOptions& options,
-    bool robust_weights) {
+    const RobustLoss* loss) {
   SparseElimination elimination(static_cast<int>(keyframes.size()),
                                 TangentSize(theta));
   AddPriors(problem, keyframes, &elimination);
   AddInertialLinks(rig, theta.imu, problem, keyframes, whitening, &elimination);
   AddBiasLinks(problem, keyframes, &elimination);
-  AddLandmarks(rig,
-               theta,
-               problem,
-               keyframes,
-               landmarks,
-               options,
-               robust_weights,
-               &elimination);
+  AddLandmarks(rig, theta, problem, keyframes, landmarks, loss, &elimination);
   return elimination.Eliminate();
 }
 

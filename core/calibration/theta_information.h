@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/calibration/calibrate.h"
 #include "core/calibration/problem.h"
+#include "core/calibration/robust_loss.h"
 #include "core/calibration/screening.h"
 #include "core/elimination/chain_elimination.h"
 #include "core/factor/inertial.h"
@@ -26,11 +26,12 @@ std::vector<InertialMatrix> WhitenInertialLinks(
     const CalibrationProblem& problem,
     const std::vector<KeyframeState>& keyframes);
 
-// Lambda and eta in the tangent at theta, prior on theta not included. Robust
-// weights are applied as in iteratively reweighted least squares, if asked for:
+// Lambda and eta in the tangent at theta, prior on theta not included. With
+// a loss, residuals are weighted as in iteratively reweighted least squares:
 // for the Huber loss on normal residuals, the inverse of Lambda is then the
-// covariance of the estimate to 1 %. The weak priors of the score keep states
-// proper that nothing determines. Nothing if that still does not suffice.
+// covariance of the estimate to 1 %. Without (null), all count fully. The weak
+// priors of the score keep states proper that nothing determines. Nothing if
+// that still does not suffice.
 std::optional<SharedInformation> LineariseTheta(
     const Rig& rig,
     const Calibration& theta,
@@ -38,8 +39,7 @@ std::optional<SharedInformation> LineariseTheta(
     const std::vector<KeyframeState>& keyframes,
     const std::vector<ScreenedLandmark>& landmarks,
     const std::vector<InertialMatrix>& whitening,
-    const CalibrateOptions& options,
-    bool robust_weights);
+    const RobustLoss* loss);
 
 // The same information by the offset d from a reference (theta = reference [+]
 // d), in which the solver works.

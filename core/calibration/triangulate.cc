@@ -6,7 +6,6 @@
 #include <limits>
 #include <numeric>
 
-#include "core/calibration/robust_loss.h"
 #include "core/factor/reprojection.h"
 #include "core/model/camera.h"
 
@@ -96,8 +95,7 @@ struct Linearised {
 Linearised Linearise(const LandmarkScene& scene,
                      const Track& track,
                      std::span<const int> used,
-                     LossKind loss,
-                     double loss_scale,
+                     const RobustLoss& loss,
                      const LandmarkPlace& place) {
   Linearised sum;
   const Eigen::Vector4d point_G = place.Homogeneous();
@@ -128,8 +126,8 @@ Linearised Linearise(const LandmarkScene& scene,
     r /= scene.pixel_sigma_px;
     const Eigen::Matrix<double, 2, 3> J =
         jacobians.landmark * by_place / scene.pixel_sigma_px;
-    const double weight = LossWeight(loss, loss_scale, r.squaredNorm());
-    sum.cost += LossValue(loss, loss_scale, r.squaredNorm());
+    const double weight = loss.Weight(r.squaredNorm());
+    sum.cost += loss.Value(r.squaredNorm());
     sum.H += weight * J.transpose() * J;
     sum.g += weight * J.transpose() * r;
   }
@@ -162,10 +160,9 @@ std::vector<double> ResidualNorms(const LandmarkScene& scene,
 Eigen::Matrix3d RefinePlace(const LandmarkScene& scene,
                             const Track& track,
                             std::span<const int> used,
-                            LossKind loss,
-                            double loss_scale,
+                            const RobustLoss& loss,
                             LandmarkPlace* place) {
-  Linearised here = Linearise(scene, track, used, loss, loss_scale, *place);
+  Linearised here = Linearise(scene, track, used, loss, *place);
   double damping = 1e-6;
   for (int i = 0; i < kMaxSteps; ++i) {
     Eigen::Matrix3d H = here.H;
@@ -178,8 +175,7 @@ Eigen::Matrix3d RefinePlace(const LandmarkScene& scene,
     }
     LandmarkPlace next = *place;
     next.inverse_depth += step;
-    const Linearised there =
-        Linearise(scene, track, used, loss, loss_scale, next);
+    const Linearised there = Linearise(scene, track, used, loss, next);
     if (there.projected >= here.projected && there.cost < here.cost) {
       *place = next;
       here = there;
@@ -219,12 +215,12 @@ std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
   std::iota(all.begin(), all.end(), 0);
   const double robust_sigmas =
       std::max(1.0, best_px / kMedianOfRayleigh / scene.pixel_sigma_px);
-  RefinePlace(scene,
-              track,
-              all,
-              LossKind::kCauchy,
-              kSearchLossScale * robust_sigmas,
-              &place);
+  RefinePlace(
+      scene,
+      track,
+      all,
+      {.kind = LossKind::kCauchy, .scale = kSearchLossScale * robust_sigmas},
+      &place);
   return place;
 }
 

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "core/calibration/calibrate.h"
 #include "core/calibration/problem.h"
+#include "core/calibration/robust_loss.h"
 #include "core/factor/ceres_factors.h"
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
@@ -55,8 +55,7 @@ std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
 Eigen::Matrix3d RefinePlace(const LandmarkScene& scene,
                             const Track& track,
                             std::span<const int> used,
-                            LossKind loss,
-                            double loss_scale,
+                            const RobustLoss& loss,
                             LandmarkPlace* place);
 
 // Norm of each residual [px]; infinite where the place does not project.

@@ -1,0 +1,76 @@
+#include "core/calibration/robust_loss.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal {
+namespace {
+
+// Where the weight begins to fall, in parts of the gate.
+constexpr double kTaperBegin = 0.6;
+
+double Square(double x) { return x * x; }
+
+double PlainWeight(LossKind kind, double scale, double s) {
+  switch (kind) {
+    case LossKind::kHuber:
+      return s <= Square(scale) ? 1.0 : scale / std::sqrt(s);
+    case LossKind::kCauchy:
+      return 1.0 / (1.0 + s / Square(scale));
+    case LossKind::kNone:
+      break;
+  }
+  return 1.0;
+}
+
+double PlainValue(LossKind kind, double scale, double s) {
+  switch (kind) {
+    case LossKind::kHuber:
+      return s <= Square(scale) ? s : 2 * scale * std::sqrt(s) - Square(scale);
+    case LossKind::kCauchy:
+      return Square(scale) * std::log1p(s / Square(scale));
+    case LossKind::kNone:
+      break;
+  }
+  return s;
+}
+
+// An antiderivative of PlainWeight(s) (end - s); for Huber, where s is over
+// scale^2.
+double TaperedIntegral(LossKind kind, double scale, double end, double s) {
+  const double b = Square(scale);
+  switch (kind) {
+    case LossKind::kHuber:
+      return 2 * scale * std::sqrt(s) * (end - s / 3);
+    case LossKind::kCauchy:
+      return b * ((end + b) * std::log(b + s) - s);
+    case LossKind::kNone:
+      break;
+  }
+  return s * (end - s / 2);
+}
+
+}  // namespace
+
+double RobustLoss::Weight(double s) const {
+  const double weight = PlainWeight(kind, scale, s);
+  const double begin = Square(kTaperBegin * gate);
+  if (s <= begin) {
+    return weight;
+  }
+  const double end = Square(gate);
+  return weight * std::max(0.0, (end - s) / (end - begin));
+}
+
+double RobustLoss::Value(double s) const {
+  const double begin = Square(kTaperBegin * gate);
+  if (s <= begin) {
+    return PlainValue(kind, scale, s);
+  }
+  const double end = Square(gate);
+  const double tapered = TaperedIntegral(kind, scale, end, std::min(s, end)) -
+                         TaperedIntegral(kind, scale, end, begin);
+  return PlainValue(kind, scale, begin) + tapered / (end - begin);
+}
+
+}  // namespace selfcal
