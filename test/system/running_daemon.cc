@@ -1,0 +1,96 @@
+#include "test/system/running_daemon.h"
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <thread>
+
+namespace selfcal::client {
+namespace {
+
+bool HasEnded(const v1::Recalibration& run) {
+  return run.state() != v1::Recalibration::PENDING &&
+         run.state() != v1::Recalibration::RUNNING;
+}
+
+// Errors of a connection are waited out: the daemon may be starting.
+bool IsIdle(DaemonView& view, std::size_t segments) {
+  const auto state = view.GetState();
+  if (!state.ok() || state->segments.size() != segments) return false;
+  for (const v1::Segment& segment : state->segments) {
+    if (segment.state() == v1::Segment::STORED) return false;
+  }
+  // The last score and the run that it triggers are one transaction.
+  const auto runs = view.GetRuns();
+  if (!runs.ok()) return false;
+  for (const v1::Recalibration& run : *runs) {
+    if (!HasEnded(run)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+ScratchFolder::ScratchFolder() {
+  std::string pattern = ::testing::TempDir() + "/selfcal_XXXXXX";
+  if (mkdtemp(pattern.data()) == nullptr) {
+    std::perror("mkdtemp");
+    std::abort();
+  }
+  root_ = pattern;
+  state_dir_ = root_ / "state";
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(root_, ignored);
+}
+
+std::string ScratchFolder::target() const {
+  return "unix:" + state_dir_ + "/selfcald.sock";
+}
+
+std::unique_ptr<DaemonProcess> ScratchFolder::StartDaemon() const {
+  auto daemon = DaemonProcess::Start(SELFCAL_DAEMON, state_dir_);
+  if (!daemon.ok()) {
+    std::fprintf(stderr, "%s\n", daemon.status().ToString().c_str());
+    std::abort();
+  }
+  return *std::move(daemon);
+}
+
+bool WaitUntil(double seconds, const std::function<bool()>& done) {
+  using Clock = std::chrono::steady_clock;
+  const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
+  while (!done()) {
+    if (Clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return true;
+}
+
+absl::Status WaitUntilIdle(DaemonView& view,
+                           std::size_t segments,
+                           double seconds) {
+  if (WaitUntil(seconds, [&] { return IsIdle(view, segments); })) {
+    return absl::OkStatus();
+  }
+  return absl::DeadlineExceededError("not all is scored and calibrated");
+}
+
+std::string LastPart(const std::string& name) {
+  return name.substr(name.rfind('/') + 1);
+}
+
+const v1::GroupScore* FindScore(const v1::Segment& segment,
+                                const std::string& group) {
+  for (const v1::GroupScore& score : segment.scores()) {
+    if (score.group() == group) return &score;
+  }
+  return nullptr;
+}
+
+}  // namespace selfcal::client
