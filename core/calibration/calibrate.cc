@@ -17,6 +17,9 @@ namespace {
 
 // Bounds the rounds; they end by convergence after two to four as a rule.
 constexpr int kMaxRounds = 12;
+// From this round on landmarks only leave: one at the limit of what is used may
+// otherwise come and go for ever.
+constexpr int kSettlingRound = 3;
 // The first round only has to come near enough to tell outliers.
 constexpr double kFirstTolerance = 1e-4;
 constexpr double kTolerance = 1e-8;
@@ -75,7 +78,7 @@ class Calibrator {
   }
 
   CalibrationResult Run() {
-    Screen();
+    Screen(0);
     const ReprojectionStatistics before = Measure();
     result_.reprojection_rms_before_px = before.rms_px;
     result_.reprojection_median_before_px = before.median_px;
@@ -110,7 +113,7 @@ class Calibrator {
       if (result_.iterations >= options_.max_iterations) {
         break;
       }
-      Screen();
+      Screen(round + 1);
     }
     return Finish();
   }
@@ -125,10 +128,14 @@ class Calibrator {
   Calibration Theta() const { return BoxPlus(reference_, estimate_.d); }
 
   // Decides anew what the next round stands on.
-  void Screen() {
+  void Screen(int round) {
     const Calibration theta = Theta();
-    screening_ =
+    Screening screening =
         ScreenLandmarks(rig_, theta, problem_, estimate_.keyframes, options_);
+    if (round >= kSettlingRound) {
+      KeepCommonLandmarks(screening_, &screening);
+    }
+    screening_ = std::move(screening);
     whitening_ =
         WhitenInertialLinks(rig_, theta.imu, problem_, estimate_.keyframes);
   }

@@ -146,6 +146,27 @@ Screening ScreenLandmarks(const Rig& rig,
   return result;
 }
 
+void KeepCommonLandmarks(const Screening& before, Screening* screening) {
+  // Both lists are in the order of the tracks.
+  const auto had = [&](const ScreenedLandmark& landmark) {
+    return std::binary_search(
+        before.landmarks.begin(),
+        before.landmarks.end(),
+        landmark,
+        [](const auto& a, const auto& b) { return a.track < b.track; });
+  };
+  std::erase_if(screening->landmarks, [&](const ScreenedLandmark& landmark) {
+    if (had(landmark)) {
+      return false;
+    }
+    const auto used = static_cast<int>(landmark.used.size());
+    ++screening->landmarks_dropped;
+    screening->observations -= used;
+    screening->observations_dropped += used;
+    return true;
+  });
+}
+
 ReprojectionStatistics MeasureReprojection(
     const Rig& rig,
     const Calibration& theta,

@@ -55,6 +55,9 @@ Screening ScreenLandmarks(const Rig& rig,
                           const std::vector<KeyframeState>& keyframes,
                           const CalibrateOptions& options);
 
+// Leaves out of *screening the landmarks that `before` did not have.
+void KeepCommonLandmarks(const Screening& before, Screening* screening);
+
 ReprojectionStatistics MeasureReprojection(
     const Rig& rig,
     const Calibration& theta,

@@ -1,4 +1,4 @@
-// One round of a calibration: Levenberg-Marquardt by Ceres on a fixed set of
+// One round of a calibration: dogleg by Ceres on a fixed set of
 // landmarks and observations, with fixed whitening.
 #pragma once
 
