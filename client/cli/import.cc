@@ -235,8 +235,7 @@ void AddImportCommand(CLI::App* app, Context* context) {
       ->check(CLI::Range(0.001, 1e6))
       ->capture_default_str();
   import->callback([context, options] {
-    context->command = [context, options] {
-      return Import(context, *options);
+    context->command = [context, options] { return Import(context, *options);
 };
 }  // namespace selfcal::client
 );

@@ -1,5 +1,5 @@
 // Recalibration on a set of segments (section IV-C of the paper): partitions,
-// gauge, landmark splitting, bias factors over gaps, Levenberg-Marquardt.
+// gauge, landmark splitting, bias factors over gaps, solved by Ceres.
 //
 // Deterministic for one thread. Any thread may call; the progress callback is
 // called on the calling thread.

@@ -1,0 +1,203 @@
+#include "core/calibration/calibrate.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/model/so3.h"
+#include "core/simulation/simulate.h"
+
+namespace selfcal {
+namespace {
+
+// A rig whose factory calibration is wrong, and segments of its motion.
+struct Scenario {
+  Rig rig;
+  Calibration truth;
+  std::vector<MotionSegment> segments;
+};
+
+SimulationOptions SmallOptions(std::uint64_t seed) {
+  SimulationOptions options;
+  options.seed = seed;
+  options.keyframes_per_segment = 15;
+  options.landmarks_in_view = 60;
+  return options;
+}
+
+Scenario Simulated(const Rig& rig,
+                   const SimulationOptions& options,
+                   int segments) {
+  Scenario s{rig, rig.factory, {}};
+  // The same wrong factory calibration for every seed: one device.
+  s.rig.factory = PerturbCalibration(s.truth, {}, 1);
+  const double seconds =
+      segments * options.keyframes_per_segment / options.keyframe_rate_hz + 0.5;
+  s.segments = Simulate(s.rig,
+                        s.truth,
+                        s.rig.factory,
+                        *MakeHandheld(seconds, 1.0, options.seed),
+                        "session",
+                        options)
+                   .segments;
+  return s;
+}
+
+// |error| of each component of the estimate, in its own sigma.
+Eigen::VectorXd ErrorSigmas(const CalibrationResult& result,
+                            const Calibration& truth) {
+  return BoxMinus(result.theta, truth).cwiseAbs().array() /
+         result.covariance.diagonal().cwiseSqrt().array();
+}
+
+// Squared error of the whole vector in units of its covariance: chi-square
+// distributed. 99.9 % of it lies below n + 3.09 sqrt(2 n) + 5.7
+// (Cornish-Fisher).
+void ExpectConsistent(const CalibrationResult& result,
+                      const Calibration& truth) {
+  const Eigen::VectorXd error = BoxMinus(result.theta, truth);
+  const double n = static_cast<double>(error.size());
+  EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)),
+            n + 3.09 * std::sqrt(2 * n) + 5.7);
+}
+
+TEST(Calibrate, WithoutNoiseFindsTheTruth) {
+  SimulationOptions options = SmallOptions(1);
+  options.noise = false;
+  options.imu_rate_hz =
+      800;  // the integration's own error falls with its square
+  const Scenario s = Simulated(HandheldRig("r"), options, 4);
+  const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  EXPECT_EQ(result.rank, 26);
+  const Eigen::VectorXd start =
+      BoxMinus(s.rig.factory, s.truth).cwiseAbs().array() /
+      result.covariance.diagonal().cwiseSqrt().array();
+  EXPECT_GT(start.maxCoeff(), 10) << "the start must be far away";
+  EXPECT_LT(ErrorSigmas(result, s.truth).maxCoeff(), 0.1);
+  EXPECT_LT(result.reprojection_rms_after_px, 0.02);
+}
+
+TEST(Calibrate, OrderOfSegmentsDoesNotMatter) {
+  Scenario s = Simulated(HandheldRig("r"), SmallOptions(2), 4);
+  const CalibrationResult a = Calibrate(s.rig, s.rig.factory, s.segments);
+  std::reverse(s.segments.begin(), s.segments.end());
+  std::swap(s.segments[0], s.segments[2]);
+  const CalibrationResult b = Calibrate(s.rig, s.rig.factory, s.segments);
+  EXPECT_EQ(BoxMinus(a.theta, b.theta), Eigen::VectorXd::Zero(26));
+  EXPECT_EQ(a.covariance, b.covariance);
+}
+
+TEST(Calibrate, SeveralSessionsAndGapsShareOnlyTheta) {
+  Scenario s = Simulated(HandheldRig("r"), SmallOptions(3), 6);
+  s.segments.erase(s.segments.begin() + 2, s.segments.begin() + 4);
+  Scenario other = Simulated(HandheldRig("r"), SmallOptions(4), 2);
+  for (MotionSegment& segment : other.segments) {
+    segment.key.session = "another";
+    s.segments.push_back(segment);
+  }
+  const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  EXPECT_GE(result.partitions, 2);
+  EXPECT_EQ(result.segments, 6);
+  EXPECT_EQ(result.keyframes, 6 * 15);
+  ExpectConsistent(result, s.truth);
+}
+
+TEST(Calibrate, TwoCamerasWithOtherDistortionModels) {
+  Rig rig = HandheldRig("r");
+  CameraCalibration second = rig.factory.cameras[0];
+  second.model = DistortionModel::kRadialTangential;
+  second.distortion.resize(4);
+  second.distortion << -0.05, 0.01, 2e-4, -1e-4;
+  second.f = {420, 421};
+  second.p_CI += Eigen::Vector3d(0.08, 0.01, 0);
+  second.q_CI = Exp(Eigen::Vector3d(0.05, -0.1, 0.02)) * second.q_CI;
+  rig.factory.cameras.push_back(second);
+  const Scenario s = Simulated(rig, SmallOptions(5), 4);
+  const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  ASSERT_EQ(result.covariance.rows(), TangentSize(rig.factory));
+  ExpectConsistent(result, s.truth);
+}
+
+TEST(Calibrate, OutliersAreLeftOut) {
+  SimulationOptions options = SmallOptions(6);
+  options.outlier_fraction = 0.1;
+  const Scenario s = Simulated(HandheldRig("r"), options, 5);
+  const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  EXPECT_GT(result.observations_dropped, 0.08 * result.observations);
+  ExpectConsistent(result, s.truth);
+}
+
+TEST(Calibrate, FixedComponentsStay) {
+  Rig rig = HandheldRig("r");
+  rig.fixed = {"imu.q_AI.*", "cam0.distortion.w"};
+  const Scenario s = Simulated(rig, SmallOptions(7), 4);
+  const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
+  const Eigen::VectorXd moved = BoxMinus(result.theta, s.rig.factory);
+  for (const int i :
+       MatchComponents(TangentComponents(rig.factory), rig.fixed)) {
+    EXPECT_NEAR(moved[i], 0, 1e-12);
+    EXPECT_EQ(result.covariance(i, i), 0);
+  }
+  EXPECT_EQ(result.rank, 22);
+}
+
+TEST(Calibrate, DeviceAtRestKeepsWhatItCannotKnow) {
+  Scenario s = Simulated(HandheldRig("r"), SmallOptions(8), 1);
+  s.segments =
+      Simulate(
+          s.rig, s.truth, s.rig.factory, *MakeRest(6), "rest", SmallOptions(8))
+          .segments;
+  const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
+  ASSERT_NE(result.status, CalibrateStatus::kFailed) << result.message;
+  EXPECT_TRUE(result.covariance.allFinite());
+  EXPECT_FALSE(result.held_constant.empty());
+  EXPECT_EQ(result.rank + static_cast<int>(result.held_constant.size()), 26);
+  // Nothing about the gyroscope's scale can be known: it keeps its prior.
+  const Eigen::VectorXd prior = PriorSigmas(s.rig);
+  for (int i = kGyroScale; i < kGyroScale + 6; ++i) {
+    EXPECT_GT(std::sqrt(result.covariance(i, i)), 0.7 * prior[i]);
+  }
+}
+
+TEST(Calibrate, CancelsAtOnce) {
+  const Scenario s = Simulated(HandheldRig("r"), SmallOptions(9), 3);
+  int calls = 0;
+  const CalibrationResult result = Calibrate(
+      s.rig, s.rig.factory, s.segments, {}, [&](const CalibrateProgress&) {
+        return ++calls < 3;
+      });
+  EXPECT_EQ(result.status, CalibrateStatus::kCancelled);
+  EXPECT_EQ(calls, 3);
+}
+
+TEST(Calibrate, InputThatCannotBeUsedSaysWhy) {
+  const Scenario s = Simulated(HandheldRig("r"), SmallOptions(10), 1);
+  EXPECT_EQ(Calibrate(s.rig, s.rig.factory, {}).status,
+            CalibrateStatus::kFailed);
+  const CalibrationResult twice =
+      Calibrate(s.rig, s.rig.factory, {s.segments[0], s.segments[0]});
+  EXPECT_EQ(twice.status, CalibrateStatus::kFailed);
+  EXPECT_NE(twice.message.find("given twice"), std::string::npos);
+}
+
+TEST(Calibrate, PriorPullsTowardsTheFactory) {
+  Scenario s = Simulated(HandheldRig("r"), SmallOptions(11), 2);
+  s.rig.prior_sigmas = {{"cam0.focal.*", 1e-3}};
+  CalibrateOptions options;
+  options.use_prior = true;
+  const CalibrationResult result =
+      Calibrate(s.rig, s.truth, s.segments, options);
+  const double f = s.rig.factory.cameras[0].f.x();
+  EXPECT_NEAR(result.theta.cameras[0].f.x(), f, 0.01);
+}
+
+}  // namespace
+}  // namespace selfcal
