@@ -33,7 +33,7 @@ DaemonState Import(const Device& device, const ScratchFolder& folder) {
   return view.GetState().value_or(DaemonState());
 }
 
-// Lowest entropy of the first segment above the highest of the others.
+// Entropy of the first segment above the highest of the others [nat].
 double EntropyLead(const std::vector<v1::Segment>& segments,
                    const std::string& group) {
   double highest = -std::numeric_limits<double>::infinity();

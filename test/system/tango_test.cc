@@ -2,6 +2,7 @@
 // segments speak for all.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <iostream>
 
 #include "client/demo/device.h"
