@@ -59,6 +59,11 @@ class MapReader {
                       &MapReader::WalkChain}) {
       if (absl::Status status = (this->*step)(); !status.ok()) return status;
     }
+    if (!sigmas_px_.empty()) {
+      const auto middle = sigmas_px_.begin() + sigmas_px_.size() / 2;
+      std::nth_element(sigmas_px_.begin(), middle, sigmas_px_.end());
+      recording_.rig.pixel_sigma_px = *middle;
+    }
     return std::move(recording_);
   }
 
@@ -220,6 +225,9 @@ class MapReader {
         continue;
       }
       if (landmark->second.id == 0) landmark->second.id = next_landmark_id_++;
+      if (frame.keypoint_measurement_sigmas_size() == n) {
+        sigmas_px_.push_back(frame.keypoint_measurement_sigmas(k));
+      }
       keyframe->observations.push_back(
           {camera, landmark->second.id, z_px, landmark->second.p_M});
     }
@@ -246,6 +254,7 @@ class MapReader {
   std::uint64_t next_landmark_id_;
   vi_map::ViMap map_;
   ViMapRecording recording_;
+  std::vector<double> sigmas_px_;  // of the observations that are used
   std::map<IdKey, int> vertex_index_;
   std::map<IdKey, const vi_map::ViwlsEdge*> edge_from_;
   std::map<IdKey, MapLandmark> landmarks_;

@@ -99,6 +99,7 @@ TEST(ReadViMap, TangoRecordingHasItsKnownFigures) {
   const auto recording = ReadViMap(folder, {});
   ASSERT_TRUE(recording.ok()) << recording.status();
   EXPECT_EQ(recording->keyframes.size(), 581u);
+  EXPECT_EQ(recording->rig.pixel_sigma_px, 0.8);
   EXPECT_NEAR(Median(ReprojectionErrors(*recording)), 0.68, 0.02);
 
   std::vector<double> rotation, velocity, position;
