@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <utility>
 
 #include "proto/convert.h"
 
@@ -32,6 +33,27 @@ std::string LastPart(const std::string& name) {
 std::string Short(const std::string& segment_name) {
   const std::string id = LastPart(segment_name);
   return id.size() <= 16 ? id : "..." + id.substr(id.size() - 13);
+}
+
+// The components that the estimate knows least, against what was known before
+// it: "cam0.p_CI.y 0.33" has a third of the factory's sigma left.
+std::string LeastKnown(const v1::Calibration& factory,
+                       const v1::Calibration& estimate) {
+  std::vector<std::pair<double, std::string>> ratios;
+  for (int i = 0; i < estimate.estimates_size(); ++i) {
+    const double prior = factory.estimates(i).sigma();
+    if (prior > 0) {
+      ratios.emplace_back(estimate.estimates(i).sigma() / prior,
+                          estimate.estimates(i).component());
+    }
+  }
+  std::sort(ratios.rbegin(), ratios.rend());
+  std::string words;
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, ratios.size()); ++i) {
+    words += fmt::format(
+        "{}{} {:.2g}", i == 0 ? "" : ", ", ratios[i].second, ratios[i].first);
+  }
+  return words;
 }
 
 std::string DirectionInWords(const v1::UnobservedDirection& direction) {
@@ -220,6 +242,9 @@ void Report::Result(const v1::Calibration& factory,
     json_["parameters"].push_back(row);
   }
   json_["calibration"] = ToJson(estimate);
+  json_["least_known"] = LeastKnown(factory, estimate);
+  Line("least known, as sigma over the factory's: " +
+       LeastKnown(factory, estimate));
   if (!truth) return;
   const int n = estimate.estimates_size();
   Line(

@@ -16,6 +16,8 @@ std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
       "calibrates cameras and IMU on them.");
   app.set_version_flag("--version", "selfcald " SELFCAL_VERSION);
   app.set_config("--config", "", "Read options from a TOML file");
+  // A misspelt key must not be taken for a default.
+  app.allow_config_extras(CLI::config_extras_mode::error);
   app.add_option("--state-dir",
                  options->state_dir,
                  "Folder of the database, the lock and the socket; created if "

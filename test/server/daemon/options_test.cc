@@ -63,6 +63,12 @@ TEST_F(OptionsTest, FileGivesWhatFlagsDoNot) {
   EXPECT_EQ(options_.scoring_threads, 2);
 }
 
+TEST_F(OptionsTest, MisspeltNameInTheFileIsAMistake) {
+  const std::string file = ::testing::TempDir() + "selfcald_misspelt.toml";
+  std::ofstream(file) << "state-dir = \"/from/file\"\nscoring-treads = 3\n";
+  EXPECT_EQ(Parse({"--config", file}), 2);
+}
+
 TEST_F(OptionsTest, MistakesEndWithTwo) {
   EXPECT_EQ(Parse({}), 2);
   EXPECT_EQ(Parse({"--state-dir", "s", "--no-such-flag"}), 2);
