@@ -198,15 +198,16 @@ void Report::Result(const v1::Calibration& factory,
                     const v1::Calibration& estimate,
                     const std::optional<Calibration>& truth) {
   EndProgress();
-  Eigen::VectorXd truth_values, error;
-  if (truth) {
-    truth_values = ReadableValues(*truth);
-    Calibration theta;
-    if (!FromProto(estimate.parameters(), "", &theta).empty()) {
-      return Fail("the daemon's calibration cannot be read");
-    }
-    error = BoxMinus(theta, *truth);
+  // Differences are taken in the tangent: a rotation near pi has two vectors.
+  Calibration before_theta, after_theta;
+  if (!FromProto(factory.parameters(), "", &before_theta).empty() ||
+      !FromProto(estimate.parameters(), "", &after_theta).empty()) {
+    return Fail("the daemon's calibration cannot be read");
   }
+  const Eigen::VectorXd difference =
+      BoxMinus(after_theta, truth ? *truth : before_theta);
+  Eigen::VectorXd truth_values;
+  if (truth) truth_values = ReadableValues(*truth);
   Line(fmt::format("{:<26}{:>5}{:>12}{:>12}{:>12}{:>11}{:>9}",
                    "parameter",
                    "unit",
@@ -220,8 +221,7 @@ void Report::Result(const v1::Calibration& factory,
   for (int i = 0; i < estimate.estimates_size(); ++i) {
     const v1::ComponentEstimate& after = estimate.estimates(i);
     const double before = factory.estimates(i).value();
-    const double sigmas =
-        (truth ? error[i] : after.value() - before) / after.sigma();
+    const double sigmas = difference[i] / after.sigma();
     within_3 += std::abs(sigmas) <= 3;
     largest = std::max(largest, std::abs(sigmas));
     Line(fmt::format("{:<26}{:>5}{:>12}{:>12.5f}{:>12.5f}{:>11.2g}{:>9.2f}",
