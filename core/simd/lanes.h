@@ -1,0 +1,173 @@
+// W numbers that are computed together: the scalar type with which the
+// mathematics of this project is instantiated to fill the vector units.
+//
+// A function template over T works on one value with T = double and on W
+// independent ones with T = Lanes<W>. What would be a branch on a value is a
+// Mask, and Select() takes of both outcomes the right one for each lane; for
+// double, a Mask is a bool. This file is the only one that knows the vector
+// instructions. Usable as the scalar of Eigen's matrices.
+//
+// Code that is compiled for wider units than the rest of the program must not
+// share inline functions with it: the linker keeps one copy of each, and may
+// keep the one that not every machine can run. Everything instantiated there
+// has Lanes<W> in its name, with a W that only that translation unit uses.
+#pragma once
+
+#if defined(__AVX512F__) || defined(__AVX__)
+#include <immintrin.h>
+#endif
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+
+namespace selfcal {
+
+template <int W>
+struct LaneMask {
+  using Register __attribute__((vector_size(8 * W))) = std::int64_t;
+  Register bits;  // of each lane, all or none
+
+  friend LaneMask operator&&(LaneMask a, LaneMask b) {
+    return {a.bits & b.bits};
+  }
+  friend LaneMask operator||(LaneMask a, LaneMask b) {
+    return {a.bits | b.bits};
+  }
+  friend LaneMask operator!(LaneMask a) { return {~a.bits}; }
+  bool operator[](int lane) const { return bits[lane] != 0; }
+};
+
+template <int W>
+struct Lanes {
+  using Register __attribute__((vector_size(8 * W))) = double;
+  Register v;
+
+  Lanes() = default;
+  // The same value in each lane; implicit, so that formulae read as written.
+  Lanes(double x) : v(x - Register{}) {}
+  explicit Lanes(Register r) : v(r) {}
+
+  double operator[](int lane) const { return v[lane]; }
+  void Set(int lane, double x) { v[lane] = x; }
+
+  Lanes& operator+=(Lanes b) { return v += b.v, *this; }
+  Lanes& operator-=(Lanes b) { return v -= b.v, *this; }
+  Lanes& operator*=(Lanes b) { return v *= b.v, *this; }
+  Lanes& operator/=(Lanes b) { return v /= b.v, *this; }
+  friend Lanes operator+(Lanes a, Lanes b) { return Lanes(a.v + b.v); }
+  friend Lanes operator-(Lanes a, Lanes b) { return Lanes(a.v - b.v); }
+  friend Lanes operator*(Lanes a, Lanes b) { return Lanes(a.v * b.v); }
+  friend Lanes operator/(Lanes a, Lanes b) { return Lanes(a.v / b.v); }
+  friend Lanes operator-(Lanes a) { return Lanes(-a.v); }
+  friend LaneMask<W> operator<(Lanes a, Lanes b) { return {a.v < b.v}; }
+  friend LaneMask<W> operator<=(Lanes a, Lanes b) { return {a.v <= b.v}; }
+  friend LaneMask<W> operator>(Lanes a, Lanes b) { return {a.v > b.v}; }
+  friend LaneMask<W> operator>=(Lanes a, Lanes b) { return {a.v >= b.v}; }
+};
+
+template <int W>
+Lanes<W> Select(LaneMask<W> mask, Lanes<W> if_true, Lanes<W> if_false) {
+  return Lanes<W>(mask.bits ? if_true.v : if_false.v);
+}
+
+template <int W>
+bool All(LaneMask<W> mask) {
+  std::int64_t all = -1;
+  for (int i = 0; i < W; ++i) all &= mask.bits[i];
+  return all != 0;
+}
+
+template <int W>
+bool Any(LaneMask<W> mask) {
+  return !All(!mask);
+}
+
+template <int W>
+Lanes<W> Sqrt(Lanes<W> x) {
+#if defined(__AVX512F__)
+  if constexpr (W == 8) return Lanes<W>(_mm512_sqrt_pd(x.v));
+#endif
+#if defined(__AVX__)
+  if constexpr (W == 4) return Lanes<W>(_mm256_sqrt_pd(x.v));
+#endif
+  Lanes<W> root;
+  for (int i = 0; i < W; ++i) root.v[i] = __builtin_sqrt(x.v[i]);
+  return root;
+}
+
+// W neighbours in memory, at any alignment.
+template <int W>
+Lanes<W> Load(const double* from) {
+  Lanes<W> x;
+  __builtin_memcpy(&x.v, from, sizeof(x.v));
+  return x;
+}
+
+template <int W>
+void Store(Lanes<W> x, double* to) {
+  __builtin_memcpy(to, &x.v, sizeof(x.v));
+}
+
+template <int W>
+double Sum(Lanes<W> x) {
+  double sum = 0;
+  for (int i = 0; i < W; ++i) sum += x.v[i];
+  return sum;
+}
+
+// The same for one value.
+inline double Select(bool mask, double if_true, double if_false) {
+  return mask ? if_true : if_false;
+}
+inline bool All(bool mask) { return mask; }
+inline bool Any(bool mask) { return mask; }
+inline double Sqrt(double x) { return std::sqrt(x); }
+
+template <typename T>
+T Abs(T x) {
+  return Select(x < T(0), -x, x);
+}
+template <typename T>
+T Max(T a, T b) {
+  return Select(a < b, b, a);
+}
+template <typename T>
+T Min(T a, T b) {
+  return Select(b < a, b, a);
+}
+
+// f of each lane by itself: for what seldom happens.
+template <int W, typename Function>
+Lanes<W> ForEachLane(Lanes<W> x, Function f) {
+  Lanes<W> result;
+  for (int i = 0; i < W; ++i) result.v[i] = f(x.v[i]);
+  return result;
+}
+template <typename Function>
+double ForEachLane(double x, Function f) {
+  return f(x);
+}
+
+}  // namespace selfcal
+
+namespace Eigen {
+
+template <int W>
+struct NumTraits<selfcal::Lanes<W>> : GenericNumTraits<double> {
+  using Real = selfcal::Lanes<W>;
+  using NonInteger = selfcal::Lanes<W>;
+  using Literal = selfcal::Lanes<W>;
+  using Nested = selfcal::Lanes<W>;
+  enum {
+    IsComplex = 0,
+    IsInteger = 0,
+    IsSigned = 1,
+    RequireInitialization = 0,
+    ReadCost = 1,
+    AddCost = 1,
+    MulCost = 1
+  };
+};
+
+}  // namespace Eigen

@@ -1,0 +1,37 @@
+// Which vector units this machine has: the kernels of the project are compiled
+// once for each width, and one of them is picked at run time.
+//
+// A file that defines kernels is listed under LANES of its room and compiled
+// for each width, with SELFCAL_LANES numbers in a vector.
+#pragma once
+
+#include <string_view>
+
+namespace selfcal {
+
+enum class VectorWidth {
+  k2 = 2,  // 128 bit: every x86-64 (SSE2) and aarch64
+  k4 = 4,  // 256 bit: AVX2 with FMA
+  k8 = 8,  // 512 bit: AVX-512 F, DQ and VL
+};
+
+// The widest that this machine and this program have.
+VectorWidth WidestVectors();
+
+// Whether it can be used here.
+bool HasVectors(VectorWidth width);
+
+std::string_view VectorWidthName(VectorWidth width);
+
+// Calls f.operator()<W>() for the width; one that was not compiled for this
+// architecture runs as the portable one.
+template <typename Function>
+decltype(auto) WithLanes(VectorWidth width, Function&& f) {
+#if defined(__x86_64__)
+  if (width == VectorWidth::k8) return f.template operator()<8>();
+  if (width == VectorWidth::k4) return f.template operator()<4>();
+#endif
+  return f.template operator()<2>();
+}
+
+}  // namespace selfcal
