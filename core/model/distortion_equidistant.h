@@ -34,64 +34,60 @@
 
 namespace selfcal {
 
-struct DistortionEquidistant {
+class DistortionEquidistant {
+ public:
   static constexpr int kSize = 4;
 
-  // d = distort(u), with derivatives by u and by (k1 .. k4) unless null.
-  // Returns false and sets nothing where the model is not one-to-one.
-  static bool Distort(std::span<const double, kSize> coefficients,
-                      const Eigen::Vector2d& u,
-                      Eigen::Vector2d* d,
-                      Eigen::Matrix2d* d_by_u,
-                      Eigen::Matrix<double, 2, kSize>* d_by_coefficients) {
-    const std::array<double, 4> k = Array(coefficients);
-    const double q = u.squaredNorm();
-    const ValueAndDerivative g = AtanRatio(q);
-    const double Q = q * g.value * g.value;
-    if (!ProfileRises(k, Q)) return false;
+  explicit DistortionEquidistant(std::span<const double, kSize> k)
+      : k_{k[0], k[1], k[2], k[3]} {}
 
-    const double P = 1 + Q * (k[0] + Q * (k[1] + Q * (k[2] + Q * k[3])));
-    const double s = g.value * P;
+  // d = distort(u), with derivatives by u and by (k1 .. k4) unless null. False
+  // where the model is not one-to-one; what is set there means nothing. T is
+  // double or Lanes.
+  template <typename T>
+  auto Distort(const Eigen::Matrix<T, 2, 1>& u,
+               Eigen::Matrix<T, 2, 1>* d,
+               Eigen::Matrix<T, 2, 2>* d_by_u,
+               Eigen::Matrix<T, 2, kSize>* d_by_coefficients) const {
+    const T q = u[0] * u[0] + u[1] * u[1];
+    const ValueAndDerivative<T> g = AtanRatio(q);
+    const T Q = q * g.value * g.value;
+    const T P = 1.0 + Q * (k_[0] + Q * (k_[1] + Q * (k_[2] + Q * k_[3])));
+    const T s = g.value * P;
     *d = s * u;
     if (d_by_u != nullptr) {
-      const double P_by_Q =
-          k[0] + Q * (2 * k[1] + Q * (3 * k[2] + Q * 4 * k[3]));
-      const double s_by_q =
-          g.derivative * P + g.value * P_by_Q * g.value / (1 + q);
-      *d_by_u = 2 * s_by_q * u * u.transpose();
-      d_by_u->diagonal().array() += s;
+      const T P_by_Q =
+          k_[0] + Q * (2 * k_[1] + Q * (3 * k_[2] + Q * (4 * k_[3])));
+      const T twice_s_by_q =
+          2.0 * (g.derivative * P + g.value * P_by_Q * g.value / (1.0 + q));
+      const T off_diagonal = twice_s_by_q * u[0] * u[1];
+      *d_by_u << s + twice_s_by_q * u[0] * u[0], off_diagonal, off_diagonal,
+          s + twice_s_by_q * u[1] * u[1];
     }
     if (d_by_coefficients != nullptr) {
-      Eigen::Vector2d column = g.value * u;
+      Eigen::Matrix<T, 2, 1> column = g.value * u;
       for (int i = 0; i < kSize; ++i) {
         column *= Q;
         d_by_coefficients->col(i) = column;
       }
     }
-    return true;
+    return ProfileRises(k_, Q);
   }
 
   // The inverse of Distort. Returns false and sets nothing where there is none.
-  static bool Undistort(std::span<const double, kSize> coefficients,
-                        const Eigen::Vector2d& d,
-                        Eigen::Vector2d* u) {
+  bool Undistort(const Eigen::Vector2d& d, Eigen::Vector2d* u) const {
     const double theta_d = d.stableNorm();
     double theta;
-    if (!SolveAngle(Array(coefficients), theta_d, &theta)) return false;
+    if (!SolveAngle(theta_d, &theta)) return false;
     // Near the axis the ratio of the two radii is 1, which 0/0 does not say.
     *u = theta_d > 0 ? Eigen::Vector2d(std::tan(theta) * (d / theta_d)) : d;
     return true;
   }
 
  private:
-  static std::array<double, 4> Array(std::span<const double, kSize> k) {
-    return {k[0], k[1], k[2], k[3]};
-  }
-
   // theta in [0, pi/2] with theta_d(theta) = theta_d, in the rising part.
-  static bool SolveAngle(const std::array<double, 4>& k,
-                         double theta_d,
-                         double* theta) {
+  bool SolveAngle(double theta_d, double* theta) const {
+    const std::array<double, 4>& k = k_;
     constexpr int kMaxIterations = 100;
     // The iteration ends at rounding, well below the error that is accepted; a
     // larger one is left over where the profile ends below theta_d.
@@ -119,6 +115,8 @@ struct DistortionEquidistant {
     }
     return false;
   }
+
+  std::array<double, 4> k_;
 };
 
 }  // namespace selfcal

@@ -32,48 +32,58 @@
 
 namespace selfcal {
 
-struct DistortionFov {
+class DistortionFov {
+ public:
   static constexpr int kSize = 1;
 
-  // d = distort(u), with derivatives by u and by (w) unless null. Returns false
-  // and sets nothing where the model is not defined.
-  static bool Distort(std::span<const double, kSize> coefficients,
-                      const Eigen::Vector2d& u,
-                      Eigen::Vector2d* d,
-                      Eigen::Matrix2d* d_by_u,
-                      Eigen::Matrix<double, 2, kSize>* d_by_coefficients) {
-    const double w = coefficients[0];
-    if (!(std::abs(w) < std::numbers::pi)) return false;
-    const double r2 = u.squaredNorm();
-    const ValueAndDerivative A = TanRatio(w / 2);
-    const double t = A.value * w / 2;
-    const ValueAndDerivative g = AtanRatio(4 * t * t * r2);
-    const double s = A.value * g.value;
+  explicit DistortionFov(std::span<const double, kSize> coefficients)
+      : DistortionFov(coefficients[0]) {}
+  explicit DistortionFov(double w)
+      : w_(w),
+        valid_(std::abs(w) < std::numbers::pi),
+        A_(TanRatio(valid_ ? w / 2 : 0)),
+        t_(A_.value * w / 2) {}
+
+  // d = distort(u), with derivatives by u and by (w) unless null. False where
+  // the model is not defined; what is set there means nothing. T is double or
+  // Lanes.
+  template <typename T>
+  auto Distort(const Eigen::Matrix<T, 2, 1>& u,
+               Eigen::Matrix<T, 2, 1>* d,
+               Eigen::Matrix<T, 2, 2>* d_by_u,
+               Eigen::Matrix<T, 2, kSize>* d_by_coefficients) const {
+    const T r2 = u[0] * u[0] + u[1] * u[1];
+    const double q_by_r2 = 4 * t_ * t_;
+    const ValueAndDerivative<T> g = AtanRatio<T>(q_by_r2 * r2);
+    const T s = A_.value * g.value;
     *d = s * u;
     if (d_by_u != nullptr) {
-      const double s_by_r2 = A.value * g.derivative * 4 * t * t;
-      *d_by_u = 2 * s_by_r2 * u * u.transpose();
-      d_by_u->diagonal().array() += s;
+      const T twice_s_by_r2 = 2 * A_.value * q_by_r2 * g.derivative;
+      const T off_diagonal = twice_s_by_r2 * u[0] * u[1];
+      *d_by_u << s + twice_s_by_r2 * u[0] * u[0], off_diagonal, off_diagonal,
+          s + twice_s_by_r2 * u[1] * u[1];
     }
     if (d_by_coefficients != nullptr) {
-      const double s_by_w = A.derivative / 2 * g.value +
-                            A.value * g.derivative * 4 * t * (1 + t * t) * r2;
+      const T s_by_w = A_.derivative / 2 * g.value +
+                       A_.value * (4 * t_ * (1 + t_ * t_)) * g.derivative * r2;
       *d_by_coefficients = s_by_w * u;
     }
-    return true;
+    return T(valid_ ? 1 : 0) > T(0);
   }
 
   // The inverse of Distort. Returns false and sets nothing where there is none.
-  static bool Undistort(std::span<const double, kSize> coefficients,
-                        const Eigen::Vector2d& d,
-                        Eigen::Vector2d* u) {
-    const double w = coefficients[0];
-    if (!(std::abs(w) < std::numbers::pi)) return false;
-    const double angle = d.stableNorm() * std::abs(w);
-    if (!(angle < std::numbers::pi / 2)) return false;
-    *u = TanRatio(angle).value / TanRatio(w / 2).value * d;
+  bool Undistort(const Eigen::Vector2d& d, Eigen::Vector2d* u) const {
+    const double angle = d.stableNorm() * std::abs(w_);
+    if (!(valid_ && angle < std::numbers::pi / 2)) return false;
+    *u = TanRatio(angle).value / A_.value * d;
     return true;
   }
+
+ private:
+  double w_;
+  bool valid_;
+  ValueAndDerivative<double> A_;
+  double t_;  // tan(w / 2)
 };
 
 }  // namespace selfcal

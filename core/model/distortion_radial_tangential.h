@@ -35,50 +35,49 @@
 
 namespace selfcal {
 
-struct DistortionRadialTangential {
+class DistortionRadialTangential {
+ public:
   static constexpr int kSize = 4;
 
+  explicit DistortionRadialTangential(
+      std::span<const double, kSize> coefficients)
+      : radial_{coefficients[0], coefficients[1]},
+        p1_(coefficients[2]),
+        p2_(coefficients[3]) {}
+
   // d = distort(u), with derivatives by u and by (k1, k2, p1, p2) unless null.
-  // Returns false and sets nothing where the model is not one-to-one.
-  static bool Distort(std::span<const double, kSize> coefficients,
-                      const Eigen::Vector2d& u,
-                      Eigen::Vector2d* d,
-                      Eigen::Matrix2d* d_by_u,
-                      Eigen::Matrix<double, 2, kSize>* d_by_coefficients) {
-    const double k1 = coefficients[0];
-    const double k2 = coefficients[1];
-    const double p1 = coefficients[2];
-    const double p2 = coefficients[3];
-    const double x = u.x();
-    const double y = u.y();
-    const double r2 = u.squaredNorm();
-    if (!ProfileRises(std::array{k1, k2}, r2)) return false;
-
-    const double L = 1 + r2 * (k1 + r2 * k2);
-    const double L_by_r2 = k1 + 2 * k2 * r2;
-    Eigen::Matrix2d J;
-    J(0, 0) = L + 2 * L_by_r2 * x * x + 2 * p1 * y + 6 * p2 * x;
-    J(1, 1) = L + 2 * L_by_r2 * y * y + 6 * p1 * y + 2 * p2 * x;
-    J(0, 1) = 2 * (L_by_r2 * x * y + p1 * x + p2 * y);
+  // False where the model is not one-to-one; what is set there means nothing.
+  // T is double or Lanes.
+  template <typename T>
+  auto Distort(const Eigen::Matrix<T, 2, 1>& u,
+               Eigen::Matrix<T, 2, 1>* d,
+               Eigen::Matrix<T, 2, 2>* d_by_u,
+               Eigen::Matrix<T, 2, kSize>* d_by_coefficients) const {
+    const double k1 = radial_[0], k2 = radial_[1];
+    const T x = u[0], y = u[1];
+    const T r2 = x * x + y * y;
+    const T L = 1.0 + r2 * (k1 + r2 * k2);
+    const T twice_L_by_r2 = 2 * k1 + 4 * k2 * r2;
+    Eigen::Matrix<T, 2, 2> J;
+    J(0, 0) = L + twice_L_by_r2 * x * x + 2 * p1_ * y + 6 * p2_ * x;
+    J(1, 1) = L + twice_L_by_r2 * y * y + 6 * p1_ * y + 2 * p2_ * x;
+    J(0, 1) = twice_L_by_r2 * x * y + 2 * p1_ * x + 2 * p2_ * y;
     J(1, 0) = J(0, 1);
-    if (!(J.trace() > 0 && J.determinant() > 0)) return false;
 
-    d->x() = x * L + 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
-    d->y() = y * L + 2 * p2 * x * y + p1 * (r2 + 2 * y * y);
+    (*d)[0] = x * L + 2 * p1_ * x * y + p2_ * (r2 + 2.0 * x * x);
+    (*d)[1] = y * L + 2 * p2_ * x * y + p1_ * (r2 + 2.0 * y * y);
     if (d_by_u != nullptr) *d_by_u = J;
     if (d_by_coefficients != nullptr) {
-      d_by_coefficients->col(0) = r2 * u;
-      d_by_coefficients->col(1) = r2 * r2 * u;
-      d_by_coefficients->col(2) << 2 * x * y, r2 + 2 * y * y;
-      d_by_coefficients->col(3) << r2 + 2 * x * x, 2 * x * y;
+      const T xy = 2.0 * x * y;
+      *d_by_coefficients << r2 * x, r2 * r2 * x, xy, r2 + 2.0 * x * x, r2 * y,
+          r2 * r2 * y, r2 + 2.0 * y * y, xy;
     }
-    return true;
+    return ProfileRises(radial_, r2) && J(0, 0) + J(1, 1) > T(0) &&
+           J(0, 0) * J(1, 1) - J(0, 1) * J(1, 0) > T(0);
   }
 
   // The inverse of Distort. Returns false and sets nothing where there is none.
-  static bool Undistort(std::span<const double, kSize> coefficients,
-                        const Eigen::Vector2d& d,
-                        Eigen::Vector2d* u) {
+  bool Undistort(const Eigen::Vector2d& d, Eigen::Vector2d* u) const {
     constexpr int kMaxIterations = 100;
     constexpr int kMaxHalvings = 30;
     // Newton's method ends at rounding, well below the error that is accepted;
@@ -89,7 +88,7 @@ struct DistortionRadialTangential {
     Eigen::Vector2d point = Eigen::Vector2d::Zero();
     Eigen::Vector2d image;
     Eigen::Matrix2d J;
-    if (!Distort(coefficients, point, &image, &J, nullptr)) return false;
+    if (!Distort<double>(point, &image, &J, nullptr)) return false;
     double error = (d - image).stableNorm();
     for (int i = 0; i < kMaxIterations && error > kRounding * d.stableNorm();
          ++i) {
@@ -99,11 +98,8 @@ struct DistortionRadialTangential {
         const Eigen::Vector2d candidate = point + step;
         Eigen::Vector2d candidate_image;
         Eigen::Matrix2d candidate_J;
-        if (!Distort(coefficients,
-                     candidate,
-                     &candidate_image,
-                     &candidate_J,
-                     nullptr)) {
+        if (!Distort<double>(
+                candidate, &candidate_image, &candidate_J, nullptr)) {
           continue;
         }
         const double candidate_error = (d - candidate_image).stableNorm();
@@ -120,6 +116,10 @@ struct DistortionRadialTangential {
     *u = point;
     return true;
   }
+
+ private:
+  std::array<double, 2> radial_;
+  double p1_, p2_;
 };
 
 }  // namespace selfcal

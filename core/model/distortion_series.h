@@ -7,38 +7,74 @@
 //   h'(x) = (1 + tan^2(x) - h) / x
 //
 // Written in q = r^2, g is smooth through zero, so that no model divides by a
-// radius. The closed forms of the derivatives cancel near zero: they lose
-// eps / q and eps / x^2. The series are used below the points where both meet
-// at about 1e-13.
+// radius. In vectors the angle is halved twice, atan(x) = 2 atan(x / (1 + s))
+// with s = sqrt(1 + x^2), after which the series is short for every q; in
+// squares,
+//
+//   q -> (s - 1) / (s + 1),   g(q) = 2 / (1 + s) g((s - 1) / (s + 1)).
+//
+// The closed forms of the derivatives cancel near zero: they lose eps / q and
+// eps / x^2. Series are used below the points where both meet at about 1e-13.
 #pragma once
 
 #include <cmath>
 
+#include "core/simd/lanes.h"
+
 namespace selfcal {
 
+template <typename T>
 struct ValueAndDerivative {
-  double value;
-  double derivative;
+  T value;
+  T derivative;
 };
 
-// g and dg/dq for q >= 0.
-inline ValueAndDerivative AtanRatio(double q) {
+// g for q >= 0, to rounding.
+inline double AtanRatioValue(double q) {
   if (q < 1e-2) {
     double value = 0;
-    double derivative = 0;
-    for (int n = 9; n >= 0; --n) {  // Horner's rule, for both at once
-      derivative = derivative * q + value;
-      value = value * q + (n % 2 == 0 ? 1.0 : -1.0) / (2 * n + 1);
-    }
-    return {value, derivative};
+    for (int n = 9; n >= 0; --n) value = 1.0 / (2 * n + 1) - value * q;
+    return value;
   }
   const double root = std::sqrt(q);
-  const double value = std::atan(root) / root;
-  return {value, (1 / (1 + q) - value) / (2 * q)};
+  return std::atan(root) / root;
+}
+
+// The library has no arc tangent of vectors. To a few roundings.
+template <int W>
+Lanes<W> AtanRatioValue(Lanes<W> q) {
+  Lanes<W> halved = q;  // below tan^2(pi / 8) = 0.172 in the end
+  Lanes<W> factor = 4.0;
+  for (int i = 0; i < 2; ++i) {
+    const Lanes<W> s = Sqrt(1.0 + halved);
+    const Lanes<W> inverse = 1.0 / (1.0 + s);
+    factor *= inverse;
+    halved = (s - 1.0) * inverse;
+  }
+  Lanes<W> series = 1.0 / 43;
+  for (int n = 20; n >= 0; --n) series = 1.0 / (2 * n + 1) - halved * series;
+  return factor * series;
+}
+
+// g and dg/dq for q >= 0. T is double or Lanes.
+template <typename T>
+ValueAndDerivative<T> AtanRatio(T q) {
+  const T value = AtanRatioValue(q);
+  const auto near_zero = q < T(1e-2);
+  T derivative(0);
+  if (Any(near_zero)) {
+    for (int n = 8; n >= 0; --n) {
+      derivative =
+          derivative * q + (n % 2 == 0 ? -1.0 : 1.0) * (n + 1.0) / (2 * n + 3);
+    }
+  }
+  const T divisor = Select(near_zero, T(1), 2.0 * q);
+  return {value,
+          Select(near_zero, derivative, (1.0 / (1.0 + q) - value) / divisor)};
 }
 
 // h and dh/dx for |x| < pi/2.
-inline ValueAndDerivative TanRatio(double x) {
+inline ValueAndDerivative<double> TanRatio(double x) {
   const double x2 = x * x;
   if (x2 < 2.5e-3) {
     const double value =

@@ -6,6 +6,8 @@
 #include <array>
 #include <cstddef>
 
+#include "core/simd/lanes.h"
+
 namespace selfcal {
 
 // True if the polynomial with Bernstein coefficients b on [0, 1] is positive
@@ -32,36 +34,33 @@ bool PositiveInBernsteinForm(const std::array<double, N>& b, int halvings) {
          PositiveInBernsteinForm(right, halvings - 1);
 }
 
+// True if the polynomial with the coefficients a[0] .. a[degree] is positive on
+// [0, 1]. The degree is 2 or 4.
+bool PositiveOnUnitInterval(const double* a, int degree);
+
 // True if the derivative of r (1 + sum k_i r^(2i)) is positive on [0, r], with
 // q = r^2: the polynomial 1 + sum (2i + 1) k_i q^i on [0, q]. False if anything
-// is not a number.
-template <std::size_t N>
-bool ProfileRises(const std::array<double, N>& k, double q) {
+// is not a number. T is double or Lanes.
+template <std::size_t N, typename T>
+auto ProfileRises(const std::array<double, N>& k, T q) {
   // Scaled to [0, 1]; no power of q is computed that is not needed.
-  std::array<double, N + 1> a;
-  a[0] = 1;
-  double power = 1;
-  double negative = 0;
+  std::array<T, N + 1> a;
+  a[0] = T(1);
+  T power(1);
+  T negative(0);
   for (std::size_t i = 1; i <= N; ++i) {
     power *= q;
     a[i] = static_cast<double>(2 * i + 1) * k[i - 1] * power;
-    if (!(a[i] >= 0)) negative += a[i];
+    negative += Select(a[i] >= T(0), T(0), a[i]);
   }
   // Nearly every point of a real lens is decided here.
-  if (1 + negative > 0) return true;
-
-  // b_j = sum over i <= j of C(j, i) / C(N, i) a_i.
-  std::array<double, N + 1> b;
-  for (std::size_t j = 0; j <= N; ++j) {
-    double weight = 1;
-    b[j] = a[0];
-    for (std::size_t i = 1; i <= j; ++i) {
-      weight *= static_cast<double>(j - i + 1) / static_cast<double>(N - i + 1);
-      b[j] += weight * a[i];
-    }
-  }
-  constexpr int kHalvings = 40;
-  return PositiveInBernsteinForm(b, kHalvings);
+  const auto surely = 1.0 + negative > T(0);
+  if (All(surely)) return surely;
+  return surely || AskEachLane<T>([&](int lane) {
+           double of_lane[N + 1];
+           for (std::size_t i = 0; i <= N; ++i) of_lane[i] = Lane(a[i], lane);
+           return PositiveOnUnitInterval(of_lane, static_cast<int>(N));
+         });
 }
 
 }  // namespace selfcal

@@ -23,9 +23,14 @@
 
 namespace selfcal {
 
+template <typename Number, int W>
+struct VectorRegister {
+  typedef Number Type __attribute__((vector_size(sizeof(Number) * W)));
+};
+
 template <int W>
 struct LaneMask {
-  using Register __attribute__((vector_size(8 * W))) = std::int64_t;
+  using Register = typename VectorRegister<std::int64_t, W>::Type;
   Register bits;  // of each lane, all or none
 
   friend LaneMask operator&&(LaneMask a, LaneMask b) {
@@ -40,7 +45,7 @@ struct LaneMask {
 
 template <int W>
 struct Lanes {
-  using Register __attribute__((vector_size(8 * W))) = double;
+  using Register = typename VectorRegister<double, W>::Type;
   Register v;
 
   Lanes() = default;
@@ -137,16 +142,47 @@ T Min(T a, T b) {
   return Select(b < a, b, a);
 }
 
-// f of each lane by itself: for what seldom happens.
-template <int W, typename Function>
-Lanes<W> ForEachLane(Lanes<W> x, Function f) {
-  Lanes<W> result;
-  for (int i = 0; i < W; ++i) result.v[i] = f(x.v[i]);
-  return result;
+// One lane, and a mask from a question about each lane: for what seldom
+// happens. A double has one lane.
+template <int W>
+double Lane(Lanes<W> x, int lane) {
+  return x.v[lane];
 }
-template <typename Function>
-double ForEachLane(double x, Function f) {
-  return f(x);
+inline double Lane(double x, int) { return x; }
+
+template <typename T>
+struct LaneTraits {
+  static constexpr int kWidth = 1;
+  using Mask = bool;
+};
+template <int W>
+struct LaneTraits<Lanes<W>> {
+  static constexpr int kWidth = W;
+  using Mask = LaneMask<W>;
+};
+
+template <typename T, typename Predicate>
+typename LaneTraits<T>::Mask AskEachLane(Predicate predicate) {
+  if constexpr (LaneTraits<T>::kWidth == 1) {
+    return predicate(0);
+  } else {
+    typename LaneTraits<T>::Mask mask;
+    for (int i = 0; i < LaneTraits<T>::kWidth; ++i) {
+      mask.bits[i] = predicate(i) ? -1 : 0;
+    }
+    return mask;
+  }
+}
+
+// f of each lane by itself.
+template <typename T, typename Function>
+T ForEachLane(T x, Function f) {
+  if constexpr (LaneTraits<T>::kWidth == 1) {
+    return f(x);
+  } else {
+    for (int i = 0; i < LaneTraits<T>::kWidth; ++i) x.v[i] = f(x.v[i]);
+    return x;
+  }
 }
 
 }  // namespace selfcal

@@ -29,8 +29,8 @@ TEST(DistortionEquidistant, IsTheFormula) {
     double theta_d = theta;
     for (int j = 0; j < 4; ++j) theta_d += k[j] * std::pow(theta, 2 * j + 3);
     Eigen::Vector2d d;
-    ASSERT_TRUE(DistortionEquidistant::Distort(
-        k, AtAngle(theta, direction), &d, nullptr, nullptr));
+    ASSERT_TRUE(DistortionEquidistant(k).Distort<double>(
+        AtAngle(theta, direction), &d, nullptr, nullptr));
     EXPECT_LT((d - theta_d * direction).norm(), 1e-14);
   }
 }
@@ -43,15 +43,15 @@ TEST(DistortionEquidistant, RegionEndsWhereTheProfileStopsRising) {
     const Coefficients k = {-1 / (3 * border * border), 0, 0, 0};
     const Eigen::Vector2d direction = random.Vector(2, 1).normalized();
     Eigen::Vector2d d;
-    EXPECT_TRUE(DistortionEquidistant::Distort(
-        k, AtAngle(border - 1e-9, direction), &d, nullptr, nullptr));
-    EXPECT_FALSE(DistortionEquidistant::Distort(
-        k, AtAngle(border + 1e-9, direction), &d, nullptr, nullptr));
+    EXPECT_TRUE(DistortionEquidistant(k).Distort<double>(
+        AtAngle(border - 1e-9, direction), &d, nullptr, nullptr));
+    EXPECT_FALSE(DistortionEquidistant(k).Distort<double>(
+        AtAngle(border + 1e-9, direction), &d, nullptr, nullptr));
     // The profile ends at 2/3 of the angle.
-    EXPECT_TRUE(DistortionEquidistant::Undistort(
-        k, (2 * border / 3 - 1e-6) * direction, &d));
-    EXPECT_FALSE(DistortionEquidistant::Undistort(
-        k, (2 * border / 3 + 1e-6) * direction, &d));
+    EXPECT_TRUE(DistortionEquidistant(k).Undistort(
+        (2 * border / 3 - 1e-6) * direction, &d));
+    EXPECT_FALSE(DistortionEquidistant(k).Undistort(
+        (2 * border / 3 + 1e-6) * direction, &d));
   }
 }
 
@@ -67,10 +67,11 @@ TEST(DistortionEquidistant, UndistortFindsTheAngleOfEveryRisingProfile) {
         1 + Q * (3 * k[0] + Q * (5 * k[1] + Q * (7 * k[2] + Q * 9 * k[3])));
     const Eigen::Vector2d u = AtAngle(theta, random.Vector(2, 1).normalized());
     Eigen::Vector2d d;
-    if (!DistortionEquidistant::Distort(k, u, &d, nullptr, nullptr)) continue;
+    if (!DistortionEquidistant(k).Distort<double>(u, &d, nullptr, nullptr))
+      continue;
     if (slope < 0.01) continue;  // ill-conditioned
     Eigen::Vector2d again;
-    ASSERT_TRUE(DistortionEquidistant::Undistort(k, d, &again));
+    ASSERT_TRUE(DistortionEquidistant(k).Undistort(d, &again));
     const double angle = std::atan(again.norm());
     EXPECT_NEAR(angle, theta, 3e-15 * theta / slope * (1 + slope));
     EXPECT_LT((again.normalized() - u.normalized()).norm(), 1e-14);
@@ -84,12 +85,12 @@ TEST(DistortionEquidistant, TheAxisIsItsOwnImage) {
   Eigen::Vector2d d;
   Eigen::Matrix2d J;
   Eigen::Matrix<double, 2, 4> J_k;
-  ASSERT_TRUE(
-      DistortionEquidistant::Distort(k, Eigen::Vector2d::Zero(), &d, &J, &J_k));
+  ASSERT_TRUE(DistortionEquidistant(k).Distort<double>(
+      Eigen::Vector2d::Zero(), &d, &J, &J_k));
   EXPECT_EQ(d, Eigen::Vector2d::Zero());
   EXPECT_EQ(J, Eigen::Matrix2d::Identity());
   EXPECT_TRUE(J_k.isZero(0));
-  ASSERT_TRUE(DistortionEquidistant::Undistort(k, Eigen::Vector2d::Zero(), &d));
+  ASSERT_TRUE(DistortionEquidistant(k).Undistort(Eigen::Vector2d::Zero(), &d));
   EXPECT_EQ(d, Eigen::Vector2d::Zero());
 }
 

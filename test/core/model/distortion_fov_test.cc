@@ -40,8 +40,8 @@ struct Result {
 Result Distort(double w, const Eigen::Vector2d& u) {
   Result result;
   const std::array<double, 1> k = {w};
-  EXPECT_TRUE(
-      DistortionFov::Distort(k, u, &result.d, &result.by_u, &result.by_w));
+  EXPECT_TRUE(DistortionFov(k).Distort<double>(
+      u, &result.d, &result.by_u, &result.by_w));
   return result;
 }
 
@@ -130,8 +130,7 @@ TEST(DistortionFov, UndistortInvertsDistortForEveryOpeningAngle) {
     const double r = std::abs(random.SignedMagnitude(1e-15, 3));
     const Eigen::Vector2d u = r * random.Vector(2, 1).normalized();
     Eigen::Vector2d again;
-    ASSERT_TRUE(DistortionFov::Undistort(
-        std::array<double, 1>{w}, Distort(w, u).d, &again));
+    ASSERT_TRUE(DistortionFov(w).Undistort(Distort(w, u).d, &again));
     // The slope of tan at r_d w magnifies rounding.
     const double t = 2 * r * std::tan(w / 2);
     EXPECT_LT((again - u).norm(), 3e-15 * r * (1 + t * t)) << w << " " << r;
@@ -147,9 +146,9 @@ TEST(DistortionFov, UndistortRefusesRadiiThatNoPointHas) {
     const double limit = std::numbers::pi / 2 / std::abs(w);
     const Eigen::Vector2d direction = random.Vector(2, 1).normalized();
     EXPECT_TRUE(
-        DistortionFov::Undistort(k, limit * (1 - 1e-12) * direction, &u));
+        DistortionFov(k).Undistort(limit * (1 - 1e-12) * direction, &u));
     EXPECT_FALSE(
-        DistortionFov::Undistort(k, limit * (1 + 1e-12) * direction, &u));
+        DistortionFov(k).Undistort(limit * (1 + 1e-12) * direction, &u));
   }
 }
 
@@ -158,8 +157,9 @@ TEST(DistortionFov, RefusesOpeningAnglesOfPiAndMore) {
   Eigen::Vector2d d;
   for (const double w : {std::numbers::pi, -std::numbers::pi, 4.0, 1e300}) {
     const std::array<double, 1> k = {w};
-    EXPECT_FALSE(DistortionFov::Distort(k, u, &d, nullptr, nullptr)) << w;
-    EXPECT_FALSE(DistortionFov::Undistort(k, u, &d)) << w;
+    EXPECT_FALSE(DistortionFov(k).Distort<double>(u, &d, nullptr, nullptr))
+        << w;
+    EXPECT_FALSE(DistortionFov(k).Undistort(u, &d)) << w;
   }
 }
 

@@ -15,7 +15,7 @@ using Coefficients = std::array<double, 4>;
 
 bool IsValid(const Coefficients& k, const Eigen::Vector2d& u) {
   Eigen::Vector2d d;
-  return DistortionRadialTangential::Distort(k, u, &d, nullptr, nullptr);
+  return DistortionRadialTangential(k).Distort<double>(u, &d, nullptr, nullptr);
 }
 
 TEST(DistortionRadialTangential, IsTheFormula) {
@@ -25,8 +25,8 @@ TEST(DistortionRadialTangential, IsTheFormula) {
   const double r2 = 0.25;
   const double radial = 1 - 0.28 * r2 + 0.07 * r2 * r2;
   Eigen::Vector2d d;
-  ASSERT_TRUE(
-      DistortionRadialTangential::Distort(k, {x, y}, &d, nullptr, nullptr));
+  ASSERT_TRUE(DistortionRadialTangential(k).Distort<double>(
+      {x, y}, &d, nullptr, nullptr));
   EXPECT_NEAR(
       d.x(), x * radial + 2 * 2e-4 * x * y - 3e-4 * (r2 + 2 * x * x), 1e-16);
   EXPECT_NEAR(
@@ -85,10 +85,11 @@ TEST(DistortionRadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
     const Eigen::Vector2d u = random.Vector(2, 2);
     Eigen::Vector2d d;
     Eigen::Matrix2d J;
-    if (!DistortionRadialTangential::Distort(k, u, &d, &J, nullptr)) continue;
+    if (!DistortionRadialTangential(k).Distort<double>(u, &d, &J, nullptr))
+      continue;
     if (J.determinant() < 1e-3) continue;  // ill-conditioned
     Eigen::Vector2d again;
-    ASSERT_TRUE(DistortionRadialTangential::Undistort(k, d, &again));
+    ASSERT_TRUE(DistortionRadialTangential(k).Undistort(d, &again));
     EXPECT_LT((again - u).norm(), 1e-11);
     ++checked;
   }
@@ -110,9 +111,9 @@ TEST(DistortionRadialTangential, UndistortFindsItsWayOverFlatParts) {
     const Eigen::Vector2d u = r * random.Vector(2, 1).normalized();
     Eigen::Vector2d d;
     ASSERT_TRUE(
-        DistortionRadialTangential::Distort(k, u, &d, nullptr, nullptr));
+        DistortionRadialTangential(k).Distort<double>(u, &d, nullptr, nullptr));
     Eigen::Vector2d again;
-    ASSERT_TRUE(DistortionRadialTangential::Undistort(k, d, &again));
+    ASSERT_TRUE(DistortionRadialTangential(k).Undistort(d, &again));
     EXPECT_LT((again - u).norm(), 1e-14 * (1 + 1 / slope)) << r << " " << c;
   }
 }
@@ -126,12 +127,12 @@ TEST(DistortionRadialTangential, UndistortRefusesRadiiBeyondTheLargest) {
     const Eigen::Vector2d direction = random.Vector(2, 1).normalized();
     const Coefficients k = {k1, 0, 0, 0};
     Eigen::Vector2d u;
-    EXPECT_TRUE(DistortionRadialTangential::Undistort(
-        k, largest * (1 - 1e-6) * direction, &u));
-    EXPECT_FALSE(DistortionRadialTangential::Undistort(
-        k, largest * (1 + 1e-6) * direction, &u));
+    EXPECT_TRUE(DistortionRadialTangential(k).Undistort(
+        largest * (1 - 1e-6) * direction, &u));
+    EXPECT_FALSE(DistortionRadialTangential(k).Undistort(
+        largest * (1 + 1e-6) * direction, &u));
     EXPECT_FALSE(
-        DistortionRadialTangential::Undistort(k, largest * 10 * direction, &u));
+        DistortionRadialTangential(k).Undistort(largest * 10 * direction, &u));
   }
 }
 
