@@ -54,16 +54,17 @@ bool Project(const CameraCalibration& camera,
              Eigen::Vector2d* z_px,
              ProjectionJacobians* jacobians) {
   if (!UsableParameters(camera)) return false;
+  const Pinhole pinhole = PinholeOf(camera);
   return VisitDistortion(camera, [&](const auto& model) {
     constexpr int kSize = std::decay_t<decltype(model)>::kSize;
     Eigen::Vector2d z;
     if (jacobians == nullptr) {
-      if (!ProjectWith<double>(camera, model, p_C, &z, nullptr)) return false;
+      if (!ProjectWith<double>(pinhole, model, p_C, &z, nullptr)) return false;
       *z_px = z;
       return true;
     }
     ProjectionParts<double, kSize> parts;
-    if (!ProjectWith<double>(camera, model, p_C, &z, &parts)) return false;
+    if (!ProjectWith<double>(pinhole, model, p_C, &z, &parts)) return false;
     *z_px = z;
     jacobians->point = parts.point;
     jacobians->intrinsics.resize(2, 4 + kSize);

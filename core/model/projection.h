@@ -46,6 +46,15 @@ auto VisitDistortion(const CameraCalibration& camera, const Visitor& visit)
   return {};
 }
 
+// z = f d + c, as plain numbers.
+struct Pinhole {
+  double f[2];
+  double c[2];
+};
+inline Pinhole PinholeOf(const CameraCalibration& camera) {
+  return {{camera.f.x(), camera.f.y()}, {camera.c.x(), camera.c.y()}};
+}
+
 // What the derivatives of a pixel z = f d + c consist of. By f they are d on
 // the diagonal, by c the identity.
 template <typename T, int kSize>
@@ -59,7 +68,7 @@ struct ProjectionParts {
 // set means nothing, where Project() of camera.h says so; the parameters of the
 // camera are not looked at.
 template <typename T, class Model>
-auto ProjectWith(const CameraCalibration& camera,
+auto ProjectWith(const Pinhole& pinhole,
                  const Model& model,
                  const Eigen::Matrix<T, 3, 1>& p_C,
                  Eigen::Matrix<T, 2, 1>* z_px,
@@ -72,17 +81,17 @@ auto ProjectWith(const CameraCalibration& camera,
   const T inverse_depth = 1.0 / Select(in_front, depth, T(1));
   const Eigen::Matrix<T, 2, 1> u(inverse_depth * p_C[0],
                                  inverse_depth * p_C[1]);
-  const T fx(camera.f[0]), fy(camera.f[1]);
+  const T fx(pinhole.f[0]), fy(pinhole.f[1]);
   Eigen::Matrix<T, 2, 1> d;
   if (parts == nullptr) {
     const auto valid = model.template Distort<T>(u, &d, nullptr, nullptr);
-    *z_px << fx * d[0] + camera.c[0], fy * d[1] + camera.c[1];
+    *z_px << fx * d[0] + pinhole.c[0], fy * d[1] + pinhole.c[1];
     return in_front && valid;
   }
   Eigen::Matrix<T, 2, 2> d_by_u;
   const auto valid =
       model.template Distort<T>(u, &d, &d_by_u, &parts->distortion);
-  *z_px << fx * d[0] + camera.c[0], fy * d[1] + camera.c[1];
+  *z_px << fx * d[0] + pinhole.c[0], fy * d[1] + pinhole.c[1];
   parts->d = d;
   parts->distortion.row(0) *= fx;
   parts->distortion.row(1) *= fy;

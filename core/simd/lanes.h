@@ -4,18 +4,15 @@
 // A function template over T works on one value with T = double and on W
 // independent ones with T = Lanes<W>. What would be a branch on a value is a
 // Mask, and Select() takes of both outcomes the right one for each lane; for
-// double, a Mask is a bool. This file is the only one that knows the vector
-// instructions. Usable as the scalar of Eigen's matrices.
+// double, a Mask is a bool. Written in the vector types of the compiler,
+// without instructions of any machine. Usable as the scalar of Eigen's
+// matrices.
 //
 // Code that is compiled for wider units than the rest of the program must not
 // share inline functions with it: the linker keeps one copy of each, and may
 // keep the one that not every machine can run. Everything instantiated there
 // has Lanes<W> in its name, with a W that only that translation unit uses.
 #pragma once
-
-#if defined(__AVX512F__) || defined(__AVX__)
-#include <immintrin.h>
-#endif
 
 #include <Eigen/Core>
 #include <cmath>
@@ -90,12 +87,6 @@ bool Any(LaneMask<W> mask) {
 
 template <int W>
 Lanes<W> Sqrt(Lanes<W> x) {
-#if defined(__AVX512F__)
-  if constexpr (W == 8) return Lanes<W>(_mm512_sqrt_pd(x.v));
-#endif
-#if defined(__AVX__)
-  if constexpr (W == 4) return Lanes<W>(_mm256_sqrt_pd(x.v));
-#endif
   Lanes<W> root;
   for (int i = 0; i < W; ++i) root.v[i] = __builtin_sqrt(x.v[i]);
   return root;
@@ -119,6 +110,27 @@ double Sum(Lanes<W> x) {
   double sum = 0;
   for (int i = 0; i < W; ++i) sum += x.v[i];
   return sum;
+}
+
+// W vectors as rows become W vectors as columns.
+template <int W>
+void Transpose(Lanes<W>* block) {
+  using Indices = typename VectorRegister<std::int64_t, W>::Type;
+  for (int step = 1; step < W; step *= 2) {
+    // Blocks of step x step off the diagonal change places.
+    Indices upper{}, lower{};
+    for (int i = 0; i < W; ++i) {
+      upper[i] = i & step ? W + i - step : i;
+      lower[i] = i & step ? W + i : i + step;
+    }
+    for (int i = 0; i < W; ++i) {
+      if (i & step) continue;
+      const auto a = block[i].v;
+      const auto b = block[i + step].v;
+      block[i].v = __builtin_shuffle(a, b, upper);
+      block[i + step].v = __builtin_shuffle(a, b, lower);
+    }
+  }
 }
 
 // The same for one value.

@@ -1,0 +1,83 @@
+#include "core/factor/reprojection_batch.h"
+
+#include "core/factor/reprojection_lanes.h"
+
+namespace selfcal {
+namespace {
+
+void CopyByRows(const Eigen::Matrix3d& M, double* to) {
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> map(to);
+  map = M;
+}
+
+RunGeometry GeometryOf(const ObservationRun& run) {
+  RunGeometry geometry;
+  CopyByRows(run.keyframe->q_GI.toRotationMatrix().transpose(), geometry.R_IG);
+  Eigen::Map<Eigen::Vector3d>(geometry.p_GI) = run.keyframe->p_GI;
+  CopyByRows(run.camera->q_CI.toRotationMatrix(), geometry.R_CI);
+  Eigen::Map<Eigen::Vector3d>(geometry.p_CI) = run.camera->p_CI;
+  geometry.pinhole = PinholeOf(*run.camera);
+  return geometry;
+}
+
+// Calls function<Kernels>(geometry, model) with the kernels for the width and
+// the model.
+template <typename Function>
+void WithKernels(VectorWidth width,
+                 const ObservationRun& run,
+                 const Function& function) {
+  if (run.count == 0) return;
+  const RunGeometry geometry = GeometryOf(run);
+  VisitDistortion(*run.camera, [&](const auto& model) {
+    using Model = std::decay_t<decltype(model)>;
+    WithLanes(width, [&]<int W>() {
+      function.template operator()<ReprojectionLanes<W, Model>>(geometry,
+                                                                model);
+    });
+    return true;
+  });
+}
+
+}  // namespace
+
+void ReprojectionBatch::Linearise(const ObservationRun& run,
+                                  const double* points,
+                                  double sigma_px,
+                                  const double* weights,
+                                  double* rows) const {
+  WithKernels(
+      width_, run, [&]<class Kernels>(const auto& geometry, const auto& model) {
+        Kernels::Linearise(
+            geometry, model, run, points, sigma_px, weights, rows);
+      });
+}
+
+void ReprojectionBatch::AddLandmarkSums(const ObservationRun& run,
+                                        const double* points,
+                                        double sigma_px,
+                                        double huber_sigmas,
+                                        double* squares_px2,
+                                        LandmarkSums* sums) const {
+  WithKernels(
+      width_, run, [&]<class Kernels>(const auto& geometry, const auto& model) {
+        Kernels::AddLandmarkSums(geometry,
+                                 model,
+                                 run,
+                                 points,
+                                 sigma_px,
+                                 huber_sigmas,
+                                 squares_px2,
+                                 sums);
+      });
+}
+
+void ReprojectionBatch::Squares(const ObservationRun& run,
+                                const double* points,
+                                double* squares_px2) const {
+  WithKernels(
+      width_, run, [&]<class Kernels>(const auto& geometry, const auto& model) {
+        Kernels::Squares(geometry, model, run, points, squares_px2);
+      });
+}
+
+}  // namespace selfcal

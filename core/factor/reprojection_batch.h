@@ -1,0 +1,93 @@
+// The reprojection factors of one keyframe and camera, several at a time.
+//
+// A whitened factor has only a few distinct columns (reprojection.h): with
+// X = p_G,
+//   by the pose:     [turn | pos]                (rotation 3, position 3)
+//   by the landmark:       -pos
+//   by the camera:   [-turn | own]               (rotation 3, the rest)
+// and these are what is written. Each factor gives two rows of numbers
+//   [turn 3 | pos 3 | own n - 3 | residual | zeros up to the stride]
+// with n the camera's tangent. A factor without weight gives zeros.
+//
+// Pure functions of their arguments, any thread.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "core/model/calibration.h"
+#include "core/model/segment.h"
+#include "core/simd/vector_width.h"
+
+namespace selfcal {
+
+// Columns of a row.
+inline constexpr int kRowTurn = 0;
+inline constexpr int kRowPosition = 3;
+inline constexpr int kRowOwn = 6;
+inline constexpr int RowResidual(int camera_size) { return camera_size + 3; }
+// Doubles from one row to the next: whole vectors of any width.
+inline constexpr int RowStride(int camera_size) {
+  return (camera_size + 4 + 7) / 8 * 8;
+}
+inline constexpr int kMaxRowStride = RowStride(6 + kMaxIntrinsics);
+
+// The observations of one keyframe by one camera, as arrays.
+struct ObservationRun {
+  const KeyframeState* keyframe = nullptr;
+  const CameraCalibration* camera = nullptr;
+  int count = 0;
+  const std::int32_t* landmarks = nullptr;  // indices into points
+  const double* z_px = nullptr;             // 2 each
+};
+
+// Sums over the observations of a landmark that its refinement needs.
+struct LandmarkSums {
+  // Weighted J^T J (00 10 11 20 21 22) and J^T r, cost of the robust losses
+  // [sigma^2], and the number of observations that project.
+  double values[11] = {};
+
+  double H(int i, int j) const {
+    return values[i * (i + 1) / 2 + j];
+  }  // j <= i
+  double g(int i) const { return values[6 + i]; }
+  double cost() const { return values[9]; }
+  double projected() const { return values[10]; }
+};
+
+class ReprojectionBatch {
+ public:
+  explicit ReprojectionBatch(VectorWidth width = WidestVectors())
+      : width_(width) {}
+
+  // Writes 2 count rows of RowStride(n) doubles. `points` are p_G, 3 doubles
+  // each. The factors are multiplied by `weights`, one for each observation, or
+  // where it is null by 1 / sigma_px. `rows` has room for 2 (count + 7) rows.
+  void Linearise(const ObservationRun& run,
+                 const double* points,
+                 double sigma_px,
+                 const double* weights,
+                 double* rows) const;
+
+  // Adds to the sums of each landmark under a Huber loss of huber_sigmas, and
+  // writes the squared norm of each residual [px^2]; negative where the point
+  // cannot be projected.
+  void AddLandmarkSums(const ObservationRun& run,
+                       const double* points,
+                       double sigma_px,
+                       double huber_sigmas,
+                       double* squares_px2,
+                       LandmarkSums* sums) const;
+
+  // Only the squared norms.
+  void Squares(const ObservationRun& run,
+               const double* points,
+               double* squares_px2) const;
+
+  VectorWidth width() const { return width_; }
+
+ private:
+  VectorWidth width_;
+};
+
+}  // namespace selfcal

@@ -1,0 +1,219 @@
+#include "core/factor/reprojection_lanes.h"
+
+#include "core/simd/lanes.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kLanes = SELFCAL_LANES;
+using T = Lanes<kLanes>;
+using Vector2 = Eigen::Matrix<T, 2, 1>;
+using Vector3 = Eigen::Matrix<T, 3, 1>;
+using Matrix23 = Eigen::Matrix<T, 2, 3>;
+
+// Observations first .. first + kLanes of a run; beyond its end, the last one.
+struct Batch {
+  Vector3 p_G;
+  Vector2 z_px;
+  std::int32_t landmarks[kLanes];
+};
+
+Batch Gather(const ObservationRun& run, const double* points, int first) {
+  Batch batch;
+  for (int i = 0; i < kLanes; ++i) {
+    const int at = first + i < run.count ? first + i : run.count - 1;
+    batch.landmarks[i] = run.landmarks[at];
+    const double* p = points + 3 * run.landmarks[at];
+    for (int j = 0; j < 3; ++j) batch.p_G[j].Set(i, p[j]);
+    for (int j = 0; j < 2; ++j) batch.z_px[j].Set(i, run.z_px[2 * at + j]);
+  }
+  return batch;
+}
+
+// M v for a matrix by rows.
+Vector3 Turn(const double* M, const Vector3& v) {
+  return {M[0] * v[0] + M[1] * v[1] + M[2] * v[2],
+          M[3] * v[0] + M[4] * v[1] + M[5] * v[2],
+          M[6] * v[0] + M[7] * v[1] + M[8] * v[2]};
+}
+
+Vector3 ToBody(const RunGeometry& geometry, const Vector3& p_G) {
+  const Vector3 from_body(p_G[0] - geometry.p_GI[0],
+                          p_G[1] - geometry.p_GI[1],
+                          p_G[2] - geometry.p_GI[2]);
+  return Turn(geometry.R_IG, from_body);
+}
+
+Vector3 ToCamera(const RunGeometry& geometry, const Vector3& p_I) {
+  const Vector3 turned = Turn(geometry.R_CI, p_I);
+  return {turned[0] + geometry.p_CI[0],
+          turned[1] + geometry.p_CI[1],
+          turned[2] + geometry.p_CI[2]};
+}
+
+// J M for a matrix by rows.
+Matrix23 Times(const Matrix23& J, const double* M) {
+  Matrix23 product;
+  for (int r = 0; r < 2; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      product(r, c) = J(r, 0) * M[c] + J(r, 1) * M[3 + c] + J(r, 2) * M[6 + c];
+    }
+  }
+  return product;
+}
+
+// What a batch needs of its residuals, with the derivative by p_I.
+template <class Model>
+struct Evaluated {
+  LaneMask<kLanes> valid;
+  Vector3 p_I;
+  Vector2 r_px;
+  ProjectionParts<T, Model::kSize> parts;
+  Matrix23 by_p_I;
+};
+
+template <class Model>
+Evaluated<Model> Evaluate(const RunGeometry& geometry,
+                          const Model& model,
+                          const Batch& batch) {
+  Evaluated<Model> e;
+  e.p_I = ToBody(geometry, batch.p_G);
+  Vector2 z_px;
+  e.valid = ProjectWith<T>(
+      geometry.pinhole, model, ToCamera(geometry, e.p_I), &z_px, &e.parts);
+  e.r_px = Vector2(z_px[0] - batch.z_px[0], z_px[1] - batch.z_px[1]);
+  e.by_p_I = Times(e.parts.point, geometry.R_CI);
+  return e;
+}
+
+// The part of `values` that belongs to the run.
+void StorePart(T values, int first, int count, double* to) {
+  if (first + kLanes <= count) {
+    Store(values, to + first);
+    return;
+  }
+  for (int i = 0; first + i < count; ++i) to[first + i] = values[i];
+}
+
+}  // namespace
+
+template <int W, class Model>
+void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
+                                            const Model& model,
+                                            const ObservationRun& run,
+                                            const double* points,
+                                            double sigma_px,
+                                            const double* weights,
+                                            double* rows) {
+  constexpr int kOwn = 3 + 4 + Model::kSize;  // p_CI, f, c, distortion
+  constexpr int kStride = RowStride(3 + kOwn);
+  for (int first = 0; first < run.count; first += W) {
+    const Evaluated<Model> e =
+        Evaluate(geometry, model, Gather(run, points, first));
+    T weight = 1 / sigma_px;
+    if (weights != nullptr) {
+      for (int i = 0; i < W; ++i) {
+        weight.Set(i, first + i < run.count ? weights[first + i] : 0);
+      }
+    }
+    const Matrix23 by_X = Times(e.by_p_I, geometry.R_IG);
+    for (int r = 0; r < 2; ++r) {
+      T columns[kStride];
+      for (T& column : columns) column = 0.0;
+      const T x = e.by_p_I(r, 0), y = e.by_p_I(r, 1), z = e.by_p_I(r, 2);
+      columns[kRowTurn + 0] = y * e.p_I[2] - z * e.p_I[1];
+      columns[kRowTurn + 1] = z * e.p_I[0] - x * e.p_I[2];
+      columns[kRowTurn + 2] = x * e.p_I[1] - y * e.p_I[0];
+      for (int c = 0; c < 3; ++c) {
+        columns[kRowPosition + c] = -by_X(r, c);
+        columns[kRowOwn + c] = e.parts.point(r, c);
+      }
+      columns[kRowOwn + 3 + r] = e.parts.d[r];
+      columns[kRowOwn + 5 + r] = 1.0;
+      for (int c = 0; c < Model::kSize; ++c) {
+        columns[kRowOwn + 7 + c] = e.parts.distortion(r, c);
+      }
+      columns[RowResidual(3 + kOwn)] = e.r_px[r];
+      for (int c = 0; c <= RowResidual(3 + kOwn); ++c) {
+        columns[c] = Select(e.valid, weight * columns[c], T(0.0));
+      }
+      for (int c = 0; c < kStride; c += W) {
+        Transpose(columns + c);
+        for (int i = 0; i < W; ++i) {
+          Store(columns[c + i], rows + (2 * (first + i) + r) * kStride + c);
+        }
+      }
+    }
+  }
+}
+
+template <int W, class Model>
+void ReprojectionLanes<W, Model>::AddLandmarkSums(const RunGeometry& geometry,
+                                                  const Model& model,
+                                                  const ObservationRun& run,
+                                                  const double* points,
+                                                  double sigma_px,
+                                                  double huber_sigmas,
+                                                  double* squares_px2,
+                                                  LandmarkSums* sums) {
+  const double inverse_sigma = 1 / sigma_px;
+  for (int first = 0; first < run.count; first += W) {
+    const Batch batch = Gather(run, points, first);
+    const Evaluated<Model> e = Evaluate(geometry, model, batch);
+    const Matrix23 by_X = Times(e.by_p_I, geometry.R_IG);
+    const T square = e.r_px[0] * e.r_px[0] + e.r_px[1] * e.r_px[1];
+    StorePart(Select(e.valid, square, T(-1.0)), first, run.count, squares_px2);
+    const T norm = Sqrt(square) * inverse_sigma;
+    const auto inside = norm <= T(huber_sigmas);
+    const T weight =
+        Select(inside, T(1.0), huber_sigmas / Max(norm, T(1e-300)));
+    const T cost =
+        Select(inside, norm * norm, huber_sigmas * (2.0 * norm - huber_sigmas));
+    const T w =
+        Select(e.valid, weight * (inverse_sigma * inverse_sigma), T(0.0));
+    T sum[11];
+    int at = 0;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        sum[at++] = w * (by_X(0, i) * by_X(0, j) + by_X(1, i) * by_X(1, j));
+      }
+    }
+    for (int i = 0; i < 3; ++i) {
+      sum[at++] = w * (by_X(0, i) * e.r_px[0] + by_X(1, i) * e.r_px[1]);
+    }
+    sum[at++] = Select(e.valid, cost, T(0.0));
+    sum[at++] = Select(e.valid, T(1.0), T(0.0));
+    for (int i = 0; i < W && first + i < run.count; ++i) {
+      double* to = sums[batch.landmarks[i]].values;
+      for (int n = 0; n < 11; ++n) to[n] += sum[n][i];
+    }
+  }
+}
+
+template <int W, class Model>
+void ReprojectionLanes<W, Model>::Squares(const RunGeometry& geometry,
+                                          const Model& model,
+                                          const ObservationRun& run,
+                                          const double* points,
+                                          double* squares_px2) {
+  for (int first = 0; first < run.count; first += W) {
+    const Batch batch = Gather(run, points, first);
+    Vector2 z_px;
+    const auto valid =
+        ProjectWith<T>(geometry.pinhole,
+                       model,
+                       ToCamera(geometry, ToBody(geometry, batch.p_G)),
+                       &z_px,
+                       nullptr);
+    const T x = z_px[0] - batch.z_px[0];
+    const T y = z_px[1] - batch.z_px[1];
+    StorePart(
+        Select(valid, x * x + y * y, T(-1.0)), first, run.count, squares_px2);
+  }
+}
+
+template struct ReprojectionLanes<kLanes, DistortionFov>;
+template struct ReprojectionLanes<kLanes, DistortionRadialTangential>;
+template struct ReprojectionLanes<kLanes, DistortionEquidistant>;
+
+}  // namespace selfcal

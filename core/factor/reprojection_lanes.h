@@ -1,0 +1,43 @@
+// The kernels behind reprojection_batch.h, for one vector width. Internal to
+// core/factor.
+#pragma once
+
+#include "core/factor/reprojection_batch.h"
+#include "core/model/projection.h"
+
+namespace selfcal {
+
+// The pose and the camera as plain numbers; matrices by rows.
+struct RunGeometry {
+  double R_IG[9];
+  double p_GI[3];
+  double R_CI[9];
+  double p_CI[3];
+  Pinhole pinhole;
+};
+
+template <int W, class Model>
+struct ReprojectionLanes {
+  static void Linearise(const RunGeometry& geometry,
+                        const Model& model,
+                        const ObservationRun& run,
+                        const double* points,
+                        double sigma_px,
+                        const double* weights,
+                        double* rows);
+  static void AddLandmarkSums(const RunGeometry& geometry,
+                              const Model& model,
+                              const ObservationRun& run,
+                              const double* points,
+                              double sigma_px,
+                              double huber_sigmas,
+                              double* squares_px2,
+                              LandmarkSums* sums);
+  static void Squares(const RunGeometry& geometry,
+                      const Model& model,
+                      const ObservationRun& run,
+                      const double* points,
+                      double* squares_px2);
+};
+
+}  // namespace selfcal

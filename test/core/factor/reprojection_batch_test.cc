@@ -1,0 +1,183 @@
+// The kernels against the plain function, for every width of this machine.
+#include "core/factor/reprojection_batch.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/factor/reprojection.h"
+#include "test/core/factor/random_values.h"
+
+namespace selfcal {
+namespace {
+
+constexpr double kSigma_px = 0.8;
+// Relative; the kernels fuse products with sums and have an arc tangent of
+// their own.
+constexpr double kTolerance = 1e-12;
+
+std::vector<VectorWidth> Widths() {
+  std::vector<VectorWidth> widths;
+  for (const VectorWidth width :
+       {VectorWidth::k2, VectorWidth::k4, VectorWidth::k8}) {
+    if (HasVectors(width)) widths.push_back(width);
+  }
+  return widths;
+}
+
+// Points in front of a camera and some behind it, in an order of their own.
+struct Scene {
+  KeyframeState keyframe;
+  CameraCalibration camera;
+  std::vector<double> points;
+  std::vector<std::int32_t> landmarks;
+  std::vector<double> z_px;
+
+  ObservationRun Run() const {
+    return {&keyframe,
+            &camera,
+            static_cast<int>(landmarks.size()),
+            landmarks.data(),
+            z_px.data()};
+  }
+  Eigen::Vector3d Point(int observation) const {
+    return Eigen::Vector3d::Map(&points[3 * landmarks[observation]]);
+  }
+};
+
+Scene RandomScene(RandomValues& random, DistortionModel model, int count) {
+  Scene scene;
+  scene.keyframe.q_GI = random.Rotation();
+  scene.keyframe.p_GI = random.Normal3(5);
+  scene.camera = random.Camera(model);
+  for (int i = 0; i < count; ++i) {
+    const double depth = random.Uniform(0, 1) < 0.1 ? -1 : random.Uniform(1, 9);
+    const Eigen::Vector3d p_C(depth * random.Uniform(-0.7, 0.7),
+                              depth * random.Uniform(-0.7, 0.7),
+                              depth);
+    const Eigen::Vector3d p_I =
+        scene.camera.q_CI.conjugate() * (p_C - scene.camera.p_CI);
+    const Eigen::Vector3d p_G = scene.keyframe.q_GI * p_I + scene.keyframe.p_GI;
+    scene.points.insert(scene.points.end(), p_G.data(), p_G.data() + 3);
+    scene.landmarks.push_back(count - 1 - i);
+    scene.z_px.push_back(random.Uniform(0, 640));
+    scene.z_px.push_back(random.Uniform(0, 480));
+  }
+  return scene;
+}
+
+// Calls check(scene, batch) for all models, widths and lengths of a run.
+template <typename Check>
+void ForRandomScenes(unsigned seed, const Check& check) {
+  RandomValues random(seed);
+  for (const DistortionModel model : {DistortionModel::kFov,
+                                      DistortionModel::kRadialTangential,
+                                      DistortionModel::kEquidistant}) {
+    for (const int count : {1, 2, 3, 7, 8, 9, 50}) {
+      const Scene scene = RandomScene(random, model, count);
+      for (const VectorWidth width : Widths()) {
+        SCOPED_TRACE(VectorWidthName(width));
+        check(scene, ReprojectionBatch(width), random);
+      }
+    }
+  }
+}
+
+bool Evaluate(const Scene& scene,
+              int i,
+              Eigen::Vector2d* r,
+              ReprojectionJacobians* J) {
+  return Reproject(scene.keyframe.q_GI,
+                   scene.keyframe.p_GI,
+                   scene.camera,
+                   scene.Point(i).homogeneous(),
+                   Eigen::Vector2d::Map(&scene.z_px[2 * i]),
+                   r,
+                   J);
+}
+
+TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
+  int behind = 0;
+  ForRandomScenes(1, [&](const Scene& scene, const auto& batch, auto& random) {
+    const ObservationRun run = scene.Run();
+    const int size = CameraTangentSize(scene.camera);
+    const int stride = RowStride(size);
+    std::vector<double> weights(run.count);
+    for (double& weight : weights) weight = random.Uniform(0, 2);
+    for (const bool weighted : {false, true}) {
+      std::vector<double> rows(2 * (run.count + 7) * stride, 7.0);
+      batch.Linearise(run,
+                      scene.points.data(),
+                      kSigma_px,
+                      weighted ? weights.data() : nullptr,
+                      rows.data());
+      for (int i = 0; i < run.count; ++i) {
+        Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(2, stride);
+        Eigen::Vector2d r;
+        ReprojectionJacobians J;
+        if (Evaluate(scene, i, &r, &J)) {
+          expected.leftCols(6) = J.pose;
+          expected.middleCols(kRowOwn, size - 3) = J.camera.rightCols(size - 3);
+          expected.col(RowResidual(size)) = r;
+          expected *= weighted ? weights[i] : 1 / kSigma_px;
+          EXPECT_EQ(J.camera.leftCols(3), -J.pose.leftCols(3));
+          EXPECT_EQ(J.landmark.leftCols(3), -J.pose.rightCols(3));
+        } else {
+          ++behind;
+        }
+        const Eigen::Map<
+            const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>>
+            actual(&rows[2 * i * stride], 2, stride);
+        EXPECT_LE((actual - expected).norm(), kTolerance * expected.norm());
+      }
+    }
+  });
+  EXPECT_GT(behind, 50);
+}
+
+TEST(ReprojectionBatch, SumsOfLandmarksAreThoseOfTheHuberLoss) {
+  constexpr double kHuber = 2;
+  ForRandomScenes(2, [&](const Scene& scene, const auto& batch, auto&) {
+    const ObservationRun run = scene.Run();
+    std::vector<LandmarkSums> sums(run.count);
+    std::vector<double> squares(run.count), again(run.count);
+    batch.AddLandmarkSums(run,
+                          scene.points.data(),
+                          kSigma_px,
+                          kHuber,
+                          squares.data(),
+                          sums.data());
+    batch.Squares(run, scene.points.data(), again.data());
+    for (int i = 0; i < run.count; ++i) {
+      const LandmarkSums& sum = sums[run.landmarks[i]];
+      Eigen::Vector2d r;
+      ReprojectionJacobians J;
+      if (!Evaluate(scene, i, &r, &J)) {
+        EXPECT_EQ(squares[i], -1);
+        EXPECT_EQ(again[i], -1);
+        for (const double value : sum.values) EXPECT_EQ(value, 0);
+        continue;
+      }
+      EXPECT_NEAR(squares[i], r.squaredNorm(), kTolerance * r.squaredNorm());
+      EXPECT_NEAR(again[i], r.squaredNorm(), kTolerance * r.squaredNorm());
+      const Eigen::Matrix<double, 2, 3> J_l =
+          J.landmark.leftCols<3>() / kSigma_px;
+      const double e = r.norm() / kSigma_px;
+      const double weight = e > kHuber ? kHuber / e : 1;
+      const Eigen::Matrix3d H = weight * J_l.transpose() * J_l;
+      const Eigen::Vector3d g = weight / kSigma_px * J_l.transpose() * r;
+      for (int a = 0; a < 3; ++a) {
+        EXPECT_NEAR(sum.g(a), g(a), kTolerance * g.norm());
+        for (int b = 0; b <= a; ++b) {
+          EXPECT_NEAR(sum.H(a, b), H(a, b), kTolerance * H.norm());
+        }
+      }
+      const double cost = e > kHuber ? kHuber * (2 * e - kHuber) : e * e;
+      EXPECT_NEAR(sum.cost(), cost, kTolerance * cost);
+      EXPECT_EQ(sum.projected(), 1);
+    }
+  });
+}
+
+}  // namespace
+}  // namespace selfcal
