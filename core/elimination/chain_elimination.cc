@@ -1,8 +1,10 @@
 #include "core/elimination/chain_elimination.h"
 
-#include <Eigen/LU>
 #include <algorithm>
+#include <cassert>
+#include <cstring>
 
+#include "core/elimination/landmark_rows.h"
 #include "core/elimination/small_cholesky.h"
 
 namespace selfcal {
@@ -11,279 +13,579 @@ namespace {
 constexpr int kPose = kChainPoseSize;
 constexpr int kMotion = kChainMotionSize;
 constexpr int kState = kChainStateSize;
+// Places in the front.
+constexpr int kMotionPlace = kChainLinkShared;
+constexpr int kLandmarkPlace = kMotionPlace + kMotion;
+static_assert(kLandmarkPlace % 8 == 0);
+// Zeros that must follow what counts in a panel: the rows of the largest tile.
+constexpr int kZeros = 3 * kPanelPad;
+
+int WholeVectors(int size) { return (size + 7) / 8 * 8; }
+
+template <typename Number>
+void GrowTo(std::size_t size, std::vector<Number>* buffer) {
+  if (buffer->size() < size) buffer->resize(size);
+}
+
+void Zero(double* begin, std::size_t size) {
+  std::memset(begin, 0, size * sizeof(double));
+}
 
 }  // namespace
 
-void ChainElimination::Start(int shared_size) {
-  shared_size_ = shared_size;
-  current_ = 0;
-  slots_ = 0;
-  const int fixed = pose(0);
-  if (front_.rows() < fixed) {
-    front_.resize(fixed, fixed);
+void ChainElimination::LayOut(const ChainShape& shape) {
+  camera_sizes_.assign(shape.camera_sizes.begin(), shape.camera_sizes.end());
+  camera_offsets_.clear();
+  sums_offsets_.clear();
+  landmark_shared_ = 0;
+  sums_size_ = 0;
+  int largest_row = 0;
+  for (const int size : camera_sizes_) {
+    camera_offsets_.push_back(landmark_shared_);
+    landmark_shared_ += size;
+    sums_offsets_.push_back(sums_size_);
+    sums_size_ += 3 * RowsStride(size);
+    largest_row = std::max(largest_row, RowsStride(size));
   }
-  front_.topLeftCorner(fixed, fixed).setZero();
-  OpenSlots(1);
+  constant_ = kLandmarkPlace + landmark_shared_;
+  fixed_ = WholeVectors(constant_ + 1);
+  GrowTo(static_cast<std::size_t>(largest_row) * (largest_row + kPanelPad),
+         &gram_);
+
+  const int slots = structure_.max_slots();
+  places_ = std::max(places_, 2 * slots);
+  front_stride_ = fixed_ + places_ * kPose + kZeros;
+  GrowTo(static_cast<std::size_t>(front_stride_) * (fixed_ + places_ * kPose),
+         &front_);
+  // Only what is fixed: poses are cleared as they enter.
+  for (int j = 0; j < fixed_; ++j) Zero(&Front(0, j), fixed_ + kPanelPad);
+  panel_stride_ = fixed_ + WholeVectors(slots * kPose) + kZeros;
+  for (auto* panel : {&coupling_, &substituted_, &product_, &half_}) {
+    GrowTo(static_cast<std::size_t>(kState) * panel_stride_, panel);
+  }
+  GrowTo(static_cast<std::size_t>(fixed_ + kPose + kPanelPad) *
+             ChainTransition::kColumns,
+         &link_terms_);
+
+  keyframe_stride_ = kPose + landmark_shared_ + 1;
+  const std::size_t sums =
+      static_cast<std::size_t>(shape.keyframes) * kPose * keyframe_stride_;
+  keyframe_sums_.assign(sums, 0);
+  shared_sums_.assign((landmark_shared_ + 1) * (landmark_shared_ + 1), 0);
+}
+
+void ChainElimination::PlacePanels(const ChainShape& shape) {
+  landmarks_count_ = shape.tracks.size() - 1;
+  const std::size_t landmarks = landmarks_count_;
+  GrowTo(landmarks, &panel_of_landmark_);
+  GrowTo(6 * landmarks, &roots_);
+  sums_.assign(landmarks * sums_size_, 0);
+  landmark_priors_.assign(landmarks * 9, 0);
+  GrowTo(shape.track_keyframes.size(), &landmark_of_observation_);
+  for (std::size_t m = 0; m < landmarks; ++m) {
+    std::fill(landmark_of_observation_.begin() + shape.tracks[m],
+              landmark_of_observation_.begin() + shape.tracks[m + 1],
+              static_cast<int>(m));
+  }
+  const int shared = fixed_ - kLandmarkPlace;
+  std::size_t end = 0;
+  for (int k = 0; k < shape.keyframes; ++k) {
+    const std::span<const int> group = structure_.Landmarks(k);
+    if (group.empty()) continue;
+    const int longest = structure_.Slots(group.front()) * kPose;
+    const int stride = shared + WholeVectors(longest) + kZeros;
+    for (const int m : group) {
+      panel_of_landmark_[m] = {end, stride};
+      end += static_cast<std::size_t>(3) * stride;
+    }
+  }
+  GrowTo(end, &panels_);
+  for (std::size_t m = 0; m < landmarks; ++m) {
+    const Panel& panel = panel_of_landmark_[m];
+    const int poses = structure_.Slots(static_cast<int>(m)) * kPose + kZeros;
+    for (int j = 0; j < 3; ++j) {
+      Zero(&panels_[panel.begin + j * panel.stride + shared], poses);
+    }
+  }
+}
+
+void ChainElimination::Start(const ChainShape& shape, Record record) {
+  structure_.Find(shape.keyframes, shape.tracks, shape.track_keyframes);
+  LayOut(shape);
+  PlacePanels(shape);
+  record_ = record;
+  steps_.clear();
+  products_.clear();
+  first_place_ = 0;
+  slots_ = 0;
+  current_ = 0;
+  begun_ = false;
+}
+
+// Adds the products of all columns of a run, which are in gram_, to those of
+// the keyframe and of the camera that they stand for.
+void ChainElimination::ExpandGram(int keyframe, int camera) {
+  const int size = camera_sizes_[camera];
+  const int offset = camera_offsets_[camera];
+  const int residual = RowsResidual(size);
+  const int stride = RowsStride(size) + kPanelPad;
+  const auto gram = [&](int i, int j) {
+    return i >= j ? gram_[j * stride + i] : gram_[i * stride + j];
+  };
+  for (int i = 0; i < kPose; ++i) {
+    double* row = &keyframe_sums_[(keyframe * kPose + i) * keyframe_stride_];
+    for (int j = 0; j <= i; ++j) row[j] += gram(i, j);
+    double* shared = row + kPose + offset;
+    for (int c = 0; c < 3; ++c) shared[c] -= gram(i, kRowsTurn + c);
+    for (int c = 3; c < size; ++c) shared[c] += gram(kRowsOwn + c - 3, i);
+    row[kPose + landmark_shared_] += gram(residual, i);
+  }
+  const int rows = landmark_shared_ + 1;
+  const auto column = [](int c) {
+    return c < 3 ? kRowsTurn + c : kRowsOwn + c - 3;
+  };
+  for (int j = 0; j < size; ++j) {
+    double* to = &shared_sums_[(offset + j) * rows];
+    for (int i = j; i < size; ++i) {
+      const double product = gram(column(i), column(j));
+      to[offset + i] += (i < 3) == (j < 3) ? product : -product;
+    }
+    const double product = gram(residual, column(j));
+    to[landmark_shared_] += j < 3 ? -product : product;
+  }
+}
+
+void ChainElimination::AddObservations(int keyframe,
+                                       int camera,
+                                       const double* rows,
+                                       std::span<const int> observations) {
+  const int size = camera_sizes_[camera];
+  const int stride = RowsStride(size);
+  const int gram_stride = stride + kPanelPad;
+  const int count = static_cast<int>(observations.size());
+  GrowTo(observations.size(), &targets_);
+  const int shared = fixed_ - kLandmarkPlace;
+  for (int i = 0; i < count; ++i) {
+    const int o = observations[i];
+    const int m = landmark_of_observation_[o];
+    const Panel& panel = panel_of_landmark_[m];
+    targets_[i] = {&sums_[m * sums_size_ + sums_offsets_[camera]],
+                   &panels_[panel.begin + shared + structure_.Slot(o) * kPose],
+                   panel.stride};
+  }
+  Zero(gram_.data(), static_cast<std::size_t>(gram_stride) * stride);
+  WithKernels([&](auto kernels) {
+    kernels.AddLandmarkProducts(rows, stride, count, targets_.data());
+    kernels.AddSquare(1,
+                      {rows, stride},
+                      RowsResidual(size) + 1,
+                      2 * count,
+                      nullptr,
+                      1,
+                      {gram_.data(), gram_stride});
+  });
+  ExpandGram(keyframe, camera);
+}
+
+void ChainElimination::AddLandmarkPrior(int landmark,
+                                        const Eigen::Matrix3d& H,
+                                        const Eigen::Vector3d& g) {
+  double* prior = &landmark_priors_[9 * landmark];
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j <= i; ++j) prior[i * (i + 1) / 2 + j] += H(i, j);
+    prior[6 + i] += g(i);
+  }
 }
 
 void ChainElimination::OpenSlots(int slots) {
-  if (slots <= slots_) return;
-  const int old_size = size();
-  slots_ = slots;
-  const int new_size = size();
-  if (front_.rows() < new_size) {
-    const int capacity = std::max<int>(new_size, 2 * front_.rows());
-    front_.conservativeResize(capacity, capacity);
+  if (first_place_ + slots > places_) {
+    // All move to the first places; every entry moves up or left, so that
+    // ascending order never overwrites what is still to be read.
+    const int from = Pose(0), to = fixed_, size = PosesSize();
+    for (int j = 0; j < fixed_; ++j) {
+      std::memmove(&Front(to, j), &Front(from, j), size * sizeof(double));
+    }
+    for (int j = 0; j < size; ++j) {
+      std::memmove(&Front(to + j, to + j),
+                   &Front(from + j, from + j),
+                   (size - j) * sizeof(double));
+    }
+    first_place_ = 0;
   }
-  front_.block(old_size, 0, new_size - old_size, new_size).setZero();
+  const int begin = Pose(slots_);
+  const int size = (slots - slots_) * kPose + kPanelPad;
+  for (int j = 0; j < fixed_; ++j) Zero(&Front(begin, j), size);
+  for (int j = Pose(0); j < Pose(slots); ++j) Zero(&Front(begin, j), size);
+  slots_ = slots;
+}
+
+// The panel of a landmark from its sums, and the root of its information.
+void ChainElimination::PreparePanel(int landmark, double* panel, int stride) {
+  const double* prior = &landmark_priors_[9 * landmark];
+  Eigen::Matrix3d H;
+  for (int j = 0; j < 3; ++j) {
+    double* row = panel + j * stride;
+    Zero(row, fixed_ - kLandmarkPlace);
+    for (int i = 0; i <= j; ++i) H(j, i) = prior[j * (j + 1) / 2 + i];
+    row[landmark_shared_] = prior[6 + j];
+    for (std::size_t c = 0; c < camera_sizes_.size(); ++c) {
+      const int size = camera_sizes_[c];
+      const double* sums = &sums_[landmark * sums_size_ + sums_offsets_[c] +
+                                  j * RowsStride(size)];
+      double* shared = row + camera_offsets_[c];
+      for (int i = 0; i < 3; ++i) shared[i] = -sums[kRowsTurn + i];
+      for (int i = 3; i < size; ++i) shared[i] = sums[kRowsOwn + i - 3];
+      row[landmark_shared_] += sums[RowsResidual(size)];
+      for (int i = 0; i <= j; ++i) H(j, i) -= sums[kRowsPosition + i];
+    }
+  }
+  GuardedCholesky<3>(&H);
+  double* root = &roots_[6 * landmark];
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < i; ++j) root[i * (i + 1) / 2 + j] = H(i, j);
+    root[i * (i + 1) / 2 + i] = 1 / H(i, i);
+  }
+}
+
+void ChainElimination::EliminateLandmarks() {
+  const std::span<const int> group = structure_.Landmarks(current_);
+  if (group.empty()) return;
+  const Panel& first = panel_of_landmark_[group.front()];
+  const int stride = first.stride;
+  const int shared = fixed_ - kLandmarkPlace;
+  const int slots = structure_.Slots(group.front());
+  const int depth = 3 * static_cast<int>(group.size());
+  depths_.assign(slots, 0);
+  for (const int m : group) depths_[structure_.Slots(m) - 1] += 3;
+  for (int s = slots - 1; s > 0; --s) depths_[s - 1] += depths_[s];
+  for (const int m : group) {
+    PreparePanel(m, &panels_[panel_of_landmark_[m].begin], stride);
+  }
+  const double* panel = &panels_[first.begin];
+  const ConstPanel by_shared = {panel, stride};
+  const ConstPanel by_pose = {panel + shared, stride};
+  WithKernels([&](auto kernels) {
+    for (const int m : group) {
+      kernels.SolveThreeRows(&roots_[6 * m],
+                             &panels_[panel_of_landmark_[m].begin],
+                             stride,
+                             shared + structure_.Slots(m) * kPose);
+    }
+    kernels.AddSquare(-1,
+                      by_shared,
+                      shared,
+                      depth,
+                      nullptr,
+                      1,
+                      FrontAt(kLandmarkPlace, kLandmarkPlace));
+    kernels.AddStaircase(-1,
+                         by_pose,
+                         slots * kPose,
+                         depths_.data(),
+                         kPose,
+                         by_shared,
+                         landmark_shared_ + 1,
+                         FrontAt(Pose(0), kLandmarkPlace));
+    kernels.AddSquare(-1,
+                      by_pose,
+                      slots * kPose,
+                      0,
+                      depths_.data(),
+                      kPose,
+                      FrontAt(Pose(0), Pose(0)));
+  });
+}
+
+// Brings the pose in `slot` to slot 1, and that to `slot`.
+void ChainElimination::SwapPoses(int slot) {
+  if (slot == 1) return;
+  const auto entry = [&](int i, int j) -> double& {
+    return i >= j ? Front(i, j) : Front(j, i);
+  };
+  const int a = Pose(1), b = Pose(slot), end = Pose(slots_);
+  for (int n = 0; n < kPose; ++n) {
+    // The rest of the front, but for the two blocks themselves.
+    for (int j = 0; j < end; ++j) {
+      if (j >= fixed_ && j < Pose(0)) continue;
+      if ((j >= a && j < a + kPose) || (j >= b && j < b + kPose)) continue;
+      std::swap(entry(a + n, j), entry(b + n, j));
+    }
+    for (int j = 0; j <= n; ++j)
+      std::swap(Front(a + n, a + j), Front(b + n, b + j));
+    for (int j = 0; j < n; ++j)
+      std::swap(Front(b + n, a + j), Front(b + j, a + n));
+  }
+}
+
+void ChainElimination::BeginKeyframe() {
+  if (begun_) return;
+  begun_ = true;
+  OpenSlots(static_cast<int>(structure_.Poses(current_).size()));
+  const int pose = Pose(0);
+  for (int i = 0; i < kPose; ++i) {
+    const double* row =
+        &keyframe_sums_[(current_ * kPose + i) * keyframe_stride_];
+    for (int j = 0; j <= i; ++j) Front(pose + i, pose + j) += row[j];
+    for (int c = 0; c <= landmark_shared_; ++c) {
+      Front(pose + i, kLandmarkPlace + c) += row[kPose + c];
+    }
+  }
+  EliminateLandmarks();
+  SwapPoses(structure_.SwapWithNext(current_));
 }
 
 void ChainElimination::AddPrior(const ChainStateMatrix& information) {
-  front_.block<kPose, kPose>(pose(0), pose(0)) +=
-      information.topLeftCorner<kPose, kPose>();
-  front_.block<kPose, kMotion>(pose(0), motion()) +=
-      information.topRightCorner<kPose, kMotion>();
-  front_.block<kMotion, kMotion>(motion(), motion()) +=
-      information.bottomRightCorner<kMotion, kMotion>();
-}
-
-void ChainElimination::AddRun(int begin, int end) {
-  if (!runs_.empty() && runs_.back().end == begin) {
-    runs_.back().end = end;
-  } else {
-    runs_.push_back({begin, end});
-  }
-}
-
-// The parts of the front that a landmark touches, ascending and disjoint.
-void ChainElimination::FindRuns(std::span<const LandmarkRows> rows) {
-  runs_.clear();
-  for (const LandmarkRows& row : rows) {
-    const int begin = row.shared_offset;
-    const Run run{begin, begin + static_cast<int>(row.shared.cols())};
-    const auto at = std::lower_bound(
-        runs_.begin(), runs_.end(), run, [](const Run& a, const Run& b) {
-          return a.begin < b.begin;
-        });
-    if (at == runs_.end() || at->begin != begin) runs_.insert(at, run);
-  }
-  AddRun(rhs(), rhs() + 1);
-  int last = -1;
-  for (const LandmarkRows& row : rows) {
-    const int slot = row.keyframe - current_;
-    if (slot != last) AddRun(pose(slot), pose(slot + 1));
-    last = slot;
-  }
-}
-
-void ChainElimination::AddToFront(const LandmarkRows& rows, int pose) {
-  const auto& J = rows.shared;
-  const auto& r = rows.residual;
-  const int offset = rows.shared_offset;
-  const int size = static_cast<int>(J.cols());
-  const Eigen::Matrix<double, kPose, 2> pose_t = rows.pose.transpose();
-  front_.block<kPose, kPose>(pose, pose) += pose_t * rows.pose;
-  front_.block<kPose, 1>(pose, rhs()) += pose_t * r;
-  for (int c = 0; c < size; ++c) {
-    const Eigen::Vector2d column = J.col(c);
-    double* front = &front_.coeffRef(offset, offset + c);
-    for (int i = c; i < size; ++i) {
-      front[i] += J(0, i) * column(0) + J(1, i) * column(1);
+  BeginKeyframe();
+  const int pose = Pose(0);
+  for (int i = 0; i < kPose; ++i) {
+    for (int j = 0; j <= i; ++j) Front(pose + i, pose + j) += information(i, j);
+    for (int j = 0; j < kMotion; ++j) {
+      Front(pose + i, kMotionPlace + j) += information(i, kPose + j);
     }
-    front_(rhs(), offset + c) += r.dot(column);
-    front_.block<kPose, 1>(pose, offset + c) += pose_t * column;
   }
-}
-
-void ChainElimination::AddToPanel(const LandmarkRows& rows, int pose) {
-  const auto& J = rows.shared;
-  landmark_panel_.block<kPose, 3>(pose, 0) +=
-      rows.pose.transpose() * rows.landmark;
-  landmark_panel_.row(rhs()) += rows.residual.transpose() * rows.landmark;
-  for (int c = 0; c < J.cols(); ++c) {
-    landmark_panel_.row(rows.shared_offset + c) +=
-        J.col(c).transpose() * rows.landmark;
-  }
-}
-
-// front -= panel panel^T on the touched parts of the lower triangle.
-void ChainElimination::SubtractLandmarkPanel() {
-  for (auto columns = runs_.begin(); columns != runs_.end(); ++columns) {
-    for (int c = columns->begin; c < columns->end; ++c) {
-      const Eigen::Vector3d w = landmark_panel_.row(c);
-      for (auto rows = columns; rows != runs_.end(); ++rows) {
-        const int begin = std::max(c, rows->begin);
-        const int count = rows->end - begin;
-        front_.col(c).segment(begin, count) -=
-            w(0) * landmark_panel_.col(0).segment(begin, count) +
-            w(1) * landmark_panel_.col(1).segment(begin, count) +
-            w(2) * landmark_panel_.col(2).segment(begin, count);
-      }
+  for (int i = 0; i < kMotion; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      Front(kMotionPlace + i, kMotionPlace + j) +=
+          information(kPose + i, kPose + j);
     }
   }
 }
 
-void ChainElimination::AddLandmark(std::span<const LandmarkRows> rows,
-                                   double prior_information) {
-  OpenSlots(rows.back().keyframe - current_ + 1);
-  FindRuns(rows);
-  if (landmark_panel_.rows() < front_.rows()) {
-    landmark_panel_.resize(front_.rows(), 3);
+// Moves the current state from the front to information_ and coupling_, the
+// latter in the places of what stays; its motion leaves zeros for the next.
+void ChainElimination::TakeState() {
+  const int pose = Pose(0);
+  const int rest = PosesSize() - kPose;
+  ChainStateMatrix& S = information_;
+  for (int i = 0; i < kPose; ++i) {
+    double* y = Row(&coupling_, i);
+    for (int j = 0; j < fixed_; ++j) y[j] = Front(pose + i, j);
+    for (int j = 0; j < kMotion; ++j) S(kPose + j, i) = y[kMotionPlace + j];
+    for (int j = i; j < kPose; ++j) S(j, i) = Front(pose + j, pose + i);
+    std::copy_n(&Front(pose + kPose, pose + i), rest, y + fixed_);
   }
-  for (const Run& run : runs_) {
-    landmark_panel_.middleRows(run.begin, run.end - run.begin).setZero();
+  for (int m = 0; m < kMotion; ++m) {
+    const int at = kMotionPlace + m;
+    double* y = Row(&coupling_, kPose + m);
+    for (int j = 0; j < at; ++j) y[j] = Front(at, j);
+    for (int j = at; j < fixed_; ++j) y[j] = Front(j, at);
+    for (int j = m; j < kMotion; ++j)
+      S(kPose + j, kPose + m) = y[kMotionPlace + j];
+    std::copy_n(&Front(pose + kPose, at), rest, y + fixed_);
+    for (int j = 0; j < at; ++j) Front(at, j) = 0;
+    Zero(&Front(at, at), fixed_ - at);
+    Zero(&Front(pose, at), rest + kPose);
   }
-  Eigen::Matrix3d H = prior_information * Eigen::Matrix3d::Identity();
-  for (const LandmarkRows& row : rows) {
-    const int at = pose(row.keyframe - current_);
-    AddToFront(row, at);
-    AddToPanel(row, at);
-    H += row.landmark.transpose() * row.landmark;
+  S.triangularView<Eigen::StrictlyUpper>() = S.transpose();
+  for (int k = 0; k < kState; ++k) {
+    double* y = Row(&coupling_, k);
+    Zero(y + kMotionPlace, kMotion);
+    Zero(y + fixed_ + rest, kZeros);
   }
-  GuardedCholesky<3>(&H);
-  for (const Run& run : runs_) {
-    SolvePanel<3>(H,
-                  landmark_panel_.middleRows(run.begin, run.end - run.begin));
-  }
-  SubtractLandmarkPanel();
-}
-
-// Takes the current state out of the front: returns its information, leaves its
-// coupling with what stays in coupling_, in the places after CloseGap().
-ChainStateMatrix ChainElimination::TakeCurrent() {
-  ChainStateMatrix current;
-  current.topLeftCorner<kPose, kPose>() =
-      front_.block<kPose, kPose>(pose(0), pose(0))
-          .selfadjointView<Eigen::Lower>();
-  current.bottomRightCorner<kMotion, kMotion>() =
-      front_.block<kMotion, kMotion>(motion(), motion())
-          .selfadjointView<Eigen::Lower>();
-  current.topRightCorner<kPose, kMotion>() =
-      front_.block<kPose, kMotion>(pose(0), motion());
-  current.bottomLeftCorner<kMotion, kPose>() =
-      current.topRightCorner<kPose, kMotion>().transpose();
-
-  const int shared = shared_size_ + 1;
-  const int poses = (slots_ - 1) * kPose;
-  if (coupling_.rows() < front_.rows()) {
-    coupling_.resize(front_.rows(), Eigen::NoChange);
-    solution_.resize(front_.rows(), Eigen::NoChange);
-    product_.resize(front_.rows(), Eigen::NoChange);
-  }
-  auto of_pose = coupling_.leftCols<kPose>();
-  auto of_motion = coupling_.rightCols<kMotion>();
-  of_pose.topRows(shared) = front_.block(pose(0), 0, kPose, shared).transpose();
-  of_motion.topRows(shared) =
-      front_.block(motion(), 0, kMotion, shared).transpose();
-  coupling_.middleRows<kMotion>(motion()).setZero();
-  of_pose.middleRows(pose(0), poses) =
-      front_.block(pose(1), pose(0), poses, kPose);
-  of_motion.middleRows(pose(0), poses) =
-      front_.block(pose(1), motion(), poses, kMotion);
-  CloseGap();
-  return current;
-}
-
-// Moves the poses up by one and clears the place of the motion. Every entry
-// moves up and left, so ascending order never overwrites what is still to be
-// read.
-void ChainElimination::CloseGap() {
-  const int poses = (slots_ - 1) * kPose;
-  const auto move_column = [&](int to, int from, int row) {
-    const double* source = &front_.coeffRef(row + kPose, from);
-    std::copy(
-        source, source + (pose(0) + poses - row), &front_.coeffRef(row, to));
-  };
-  for (int c = 0; c < motion(); ++c) {
-    front_.col(c).segment<kMotion>(motion()).setZero();
-    move_column(c, c, pose(0));
-  }
-  front_.block(motion(), motion(), kMotion + poses, kMotion).setZero();
-  for (int c = pose(0); c < pose(0) + poses; ++c) {
-    move_column(c, c + kPose, c);
-  }
+  ++first_place_;
   --slots_;
 }
 
-// Solves the link for the current state,
-//   x0 = A e + G^T (shared, 1, motion and pose of the next),
-// with its noise e of unit information, and puts that into the quadratic form
-//   x0^T S x0 + 2 x0^T Y^T z
-// where S is `current` and Y coupling_. Leaves G in solution_ and the coupling
-// of x0 with z in coupling_; returns A.
-ChainStateMatrix ChainElimination::Substitute(const LinkRows& link,
-                                              const ChainStateMatrix& current) {
-  const int shared = static_cast<int>(link.shared.cols());
-  // Rows of different kinds differ by many orders: equilibrated before LU.
-  const ChainStateVector scale =
-      link.x0.rowwise().lpNorm<Eigen::Infinity>().cwiseInverse();
-  const Eigen::PartialPivLU<ChainStateMatrix> lu(scale.asDiagonal() * link.x0);
-  const auto solve = [&](const auto& rows) {
-    return lu.solve(scale.asDiagonal() * rows).eval();
+// Puts x0 = A e + G z into x0^T S x0 + 2 x0^T Y z, and keeps Z = Y + S G.
+// G^T S G + G^T Y + Y^T G = G^T H + H^T G with H = Y + S G / 2.
+void ChainElimination::Substitute(const ChainTransition& link) {
+  alignas(64) double by_S[kState][32] = {};
+  const int size = fixed_ + PosesSize();
+  for (int k = 0; k < kState; ++k) {
+    std::copy_n(Row(&coupling_, k), size + kZeros, Row(&substituted_, k));
+    std::copy_n(Row(&coupling_, k), fixed_ + kPose, Row(&half_, k));
+    Zero(Row(&half_, k) + fixed_ + kPose, kPanelPad);
+  }
+  WithKernels([&](auto kernels) {
+    kernels.AddProduct(1,
+                       {&link.G[0][0], 32},
+                       ChainTransition::kColumns,
+                       {information_.data(), kState},
+                       kState,
+                       kState,
+                       {&by_S[0][0], 32});
+  });
+  const auto add = [&](double factor, const double* terms, double* to) {
+    for (int c = 0; c < kLandmarkPlace; ++c) to[c] += factor * terms[c];
+    to[constant_] += factor * terms[ChainTransition::kConstant];
+    for (int c = 0; c < kPose; ++c) {
+      to[fixed_ + c] += factor * terms[ChainTransition::kNextPose + c];
+    }
   };
-  const int fixed = pose(1);
-  auto G = solution_.topRows(fixed);
-  G.setZero();
-  G.middleRows(link.shared_offset, shared) = -solve(link.shared).transpose();
-  G.row(rhs()) = -solve(link.residual).transpose();
-  const ChainStateMatrix next = -solve(link.x1).transpose();
-  G.middleRows<kMotion>(motion()) = next.bottomRows<kMotion>();
-  G.middleRows<kPose>(pose(0)) = next.topRows<kPose>();
+  for (int k = 0; k < kState; ++k) {
+    add(1, by_S[k], Row(&substituted_, k));
+    add(0.5, by_S[k], Row(&half_, k));
+  }
 
-  // G S G^T + G Y^T + Y G^T = G H^T + H G^T with H = Y + G S / 2, below the
-  // diagonal; G has rows in the first `fixed` places only.
-  const auto half = (0.5 * (G * current)).eval();
-  coupling_.topRows(fixed) += half;
-  const auto H = coupling_.topRows(fixed);
-  auto top = front_.topLeftCorner(fixed, fixed);
-  top.triangularView<Eigen::Lower>() += G * H.transpose();
-  top.triangularView<Eigen::Lower>() += H * G.transpose();
-  const int rest = size() - fixed;
-  const auto add_below = [&](int begin, int columns) {
-    front_.block(fixed, begin, rest, columns).noalias() +=
-        coupling_.middleRows(fixed, rest) *
-        solution_.middleRows(begin, columns).transpose();
+  // H^T G over what is fixed and the next pose, both ways round.
+  const int size_f = fixed_ + kPose;
+  const int stride = size_f + kPanelPad;
+  Zero(link_terms_.data(),
+       static_cast<std::size_t>(stride) * ChainTransition::kColumns);
+  WithKernels([&](auto kernels) {
+    kernels.AddProduct(1,
+                       {half_.data(), panel_stride_},
+                       size_f,
+                       {&link.G[0][0], 32},
+                       ChainTransition::kColumns,
+                       kState,
+                       {link_terms_.data(), stride});
+  });
+  const int pose = Pose(0);
+  const auto place = [&](int i) { return i < fixed_ ? i : pose + i - fixed_; };
+  const auto fold = [&](int column, int to) {
+    const double* terms = &link_terms_[column * stride];
+    const int at = place(to);
+    for (int i = 0; i < to; ++i) Front(at, place(i)) += terms[i];
+    Front(at, at) += 2 * terms[to];
+    for (int i = to + 1; i < size_f; ++i) Front(place(i), at) += terms[i];
   };
-  add_below(link.shared_offset, shared);
-  add_below(rhs(), fixed - rhs());
-  coupling_.topRows(fixed) += half;
-  return solve(ChainStateMatrix::Identity());
+  for (int c = 0; c < kLandmarkPlace; ++c) fold(c, c);
+  fold(ChainTransition::kConstant, constant_);
+  for (int c = 0; c < kPose; ++c) {
+    fold(ChainTransition::kNextPose + c, fixed_ + c);
+  }
+
+  // Y^T G between the other poses and these.
+  const int rest = PosesSize() - kPose;
+  if (rest == 0) return;
+  const ConstPanel others = {coupling_.data() + size_f, panel_stride_};
+  WithKernels([&](auto kernels) {
+    const auto add_rest = [&](int column, int columns, int to) {
+      kernels.AddProduct(1,
+                         others,
+                         rest,
+                         {&link.G[0][column], 32},
+                         columns,
+                         kState,
+                         FrontAt(pose + kPose, to));
+    };
+    add_rest(0, kLandmarkPlace, 0);
+    add_rest(ChainTransition::kConstant, 1, constant_);
+    add_rest(ChainTransition::kNextPose, kPose, pose);
+  });
 }
 
-// front -= product product^T on the lower triangle.
-void ChainElimination::SubtractStatePanel() {
-  front_.topLeftCorner(size(), size())
-      .selfadjointView<Eigen::Lower>()
-      .rankUpdate(product_.topRows(size()), -1.0);
-}
-
-void ChainElimination::Advance(const LinkRows& link) {
-  OpenSlots(2);
-  const ChainStateMatrix current = TakeCurrent();
-  const ChainStateMatrix A = Substitute(link, current);
-  ChainStateMatrix L =
-      ChainStateMatrix::Identity() + A.transpose() * current * A;
+// root = A L^-T with L L^T = I + A^T S A.
+void ChainElimination::FindRoot(const ChainTransition& link) {
+  using RowMajor = Eigen::Matrix<double, kState, 16, Eigen::RowMajor>;
+  const auto A = Eigen::Map<const RowMajor>(&link.A[0][0]).leftCols<kState>();
+  ChainStateMatrix L = ChainStateMatrix::Identity();
+  L.noalias() += A.transpose() * (information_ * A);
   GuardedCholesky<kState>(&L);
-  // L^-1 A^T, transposed.
   const ChainStateMatrix root =
-      L.triangularView<Eigen::Lower>().solve(A.transpose()).transpose();
-  product_.topRows(size()).noalias() = coupling_.topRows(size()) * root;
-  SubtractStatePanel();
-  ++current_;
+      L.triangularView<Eigen::Lower>().solve(A.transpose());
+  Eigen::Map<RowMajor>(&root_[0][0]).leftCols<kState>() = root.transpose();
 }
 
-SharedInformation ChainElimination::Finish() {
-  ChainStateMatrix L = TakeCurrent();
+// Takes P^T P from the front, for P = root^T Z.
+void ChainElimination::Eliminate(const std::vector<double>& terms) {
+  const int size = fixed_ + PosesSize();
+  for (int k = 0; k < kState; ++k) Zero(Row(&product_, k), size + kZeros);
+  const int pose = Pose(0);
+  const ConstPanel by_fixed = {product_.data(), panel_stride_};
+  const ConstPanel by_pose = {product_.data() + fixed_, panel_stride_};
+  WithKernels([&](auto kernels) {
+    kernels.AddProduct(1,
+                       {terms.data(), panel_stride_},
+                       size,
+                       {&root_[0][0], 16},
+                       kState,
+                       kState,
+                       {product_.data(), panel_stride_});
+    kernels.AddSquare(-1, by_fixed, fixed_, kState, nullptr, 1, FrontAt(0, 0));
+    kernels.AddProduct(-1,
+                       by_pose,
+                       PosesSize(),
+                       by_fixed,
+                       constant_ + 1,
+                       kState,
+                       FrontAt(pose, 0));
+    kernels.AddSquare(
+        -1, by_pose, PosesSize(), kState, nullptr, 1, FrontAt(pose, pose));
+  });
+}
+
+void ChainElimination::RecordStep(const ChainTransition* link) {
+  if (record_ == Record::kNothing) return;
+  const int size = fixed_ + PosesSize();
+  Step& step = steps_.emplace_back();
+  step.product = products_.size();
+  step.stride = size;
+  step.linked = link != nullptr;
+  if (link != nullptr) step.link = *link;
+  std::memcpy(step.root, root_, sizeof(root_));
+  for (int k = 0; k < kState; ++k) {
+    const double* row = Row(&product_, k);
+    products_.insert(products_.end(), row, row + size);
+  }
+}
+
+void ChainElimination::Advance(const ChainTransition& link) {
+  BeginKeyframe();
+  TakeState();
+  Substitute(link);
+  FindRoot(link);
+  Eliminate(substituted_);
+  RecordStep(&link);
+  ++current_;
+  begun_ = false;
+}
+
+// Eliminates the state that was taken by its own information alone.
+void ChainElimination::EliminateByItself() {
+  ChainStateMatrix L = information_;
   GuardedCholesky<kState>(&L);
-  auto panel = product_.topRows(size());
-  panel = coupling_.topRows(size());
-  SolvePanel<kState>(L, panel);
-  SubtractStatePanel();
-  SharedInformation result;
-  result.Lambda = front_.topLeftCorner(shared_size_, shared_size_)
-                      .selfadjointView<Eigen::Lower>();
-  result.eta = -front_.row(rhs()).head(shared_size_).transpose();
-  return result;
+  const ChainStateMatrix inverse =
+      L.triangularView<Eigen::Lower>().solve(ChainStateMatrix::Identity());
+  // By rows, L^-T.
+  for (int i = 0; i < kState; ++i) {
+    for (int j = 0; j < kState; ++j) root_[i][j] = inverse(j, i);
+  }
+  Eliminate(coupling_);
+  RecordStep(nullptr);
+}
+
+void ChainElimination::Advance(const MotionLink& link) {
+  BeginKeyframe();
+  TakeState();
+  for (int m = 0; m < kMotion; ++m) {
+    const int at = kMotionPlace + m;
+    information_(kPose + m, kPose + m) += link.w0[m] * link.w0[m];
+    Row(&coupling_, kPose + m)[at] = link.w0[m] * link.w1[m];
+    Row(&coupling_, kPose + m)[constant_] += link.w0[m] * link.residual[m];
+    Front(at, at) += link.w1[m] * link.w1[m];
+    Front(constant_, at) += link.w1[m] * link.residual[m];
+  }
+  EliminateByItself();
+  ++current_;
+  begun_ = false;
+}
+
+void ChainElimination::Finish(SharedInformation* result) {
+  BeginKeyframe();
+  TakeState();
+  EliminateByItself();
+  const int size = shared_size();
+  result->Lambda.resize(size, size);
+  result->eta.resize(size);
+  const auto place = [](int i) {
+    return i < kChainLinkShared ? i : i + kChainMotionSize;
+  };
+  for (int j = 0; j < size; ++j) {
+    const int c = j - kChainLinkShared;
+    const int rows = landmark_shared_ + 1;
+    const double* sums = c < 0 ? nullptr : &shared_sums_[c * rows];
+    for (int i = j; i < size; ++i) {
+      double sum = Front(place(i), place(j));
+      if (sums != nullptr) sum += sums[i - kChainLinkShared];
+      result->Lambda(i, j) = sum;
+      result->Lambda(j, i) = sum;
+    }
+    double constant = Front(constant_, place(j));
+    if (sums != nullptr) constant += sums[landmark_shared_];
+    result->eta(j) = -constant;
+  }
 }
 
 }  // namespace selfcal

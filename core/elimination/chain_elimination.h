@@ -1,25 +1,36 @@
 // Elimination of a chain of keyframes and its landmarks down to the parameters
 // that all of them share (section IV-A of the paper, step 2): from whitened,
-// linearised factors to Lambda and eta of those parameters. Knows nothing of
-// what the parameters are.
+// linearised factors to Lambda and eta of those parameters; and back, from a
+// step of those parameters to the steps of all else. Knows nothing of what the
+// parameters are.
 //
-// Minimised is the sum of |r + J d|^2 over all rows plus the priors d^T I d.
-// The unknowns are eliminated in time order: a landmark when the oldest
-// keyframe that sees it is reached, into the window of the keyframes that see
-// it; then that keyframe, leaving
-//   [shared | right-hand side | velocity and biases of the next | poses in
-//   view]
-// as one dense symmetric front. For tracks of bounded length the cost is linear
-// in the number of keyframes; a track through the whole chain is as good, and
-// costs a front as wide as the chain.
+// Minimised is the sum of |r + J d|^2 over all factors plus the priors. The
+// order is that of chain_structure.h. What remains at any time is one dense
+// symmetric front
+//   [link parameters | motion of a keyframe | landmark parameters | 1 | poses]
+// where the motion (velocity and biases) is that of the current keyframe. For
+// tracks of bounded length the cost is linear in the number of keyframes; a
+// track through the whole chain is as good, and costs a front as wide as the
+// chain.
+//
+// A link between a keyframe and the next comes solved for the earlier state,
+//   x0 = A e + G z,
+// e white of unit information: the noise is eliminated instead of squared rows,
+// so that nothing weak is lost beside what is known 10^7 times better.
 //
 // One object is a workspace for one chain at a time: Start() begins the next
-// and keeps the memory. Not for use by two threads at once. Deterministic.
+// and keeps the memory, so that nothing is allocated once it has seen the
+// largest. Not for use by two threads at once. Deterministic for one width of
+// vectors.
 #pragma once
 
 #include <Eigen/Core>
 #include <span>
 #include <vector>
+
+#include "core/elimination/chain_structure.h"
+#include "core/elimination/dense_lanes.h"
+#include "core/simd/vector_width.h"
 
 namespace selfcal {
 
@@ -27,33 +38,29 @@ namespace selfcal {
 inline constexpr int kChainPoseSize = 6;
 inline constexpr int kChainMotionSize = 9;
 inline constexpr int kChainStateSize = kChainPoseSize + kChainMotionSize;
-// Shared parameters that one landmark row can depend on.
-inline constexpr int kMaxRowShared = 16;
+// Shared parameters that links depend on; they come first.
+inline constexpr int kChainLinkShared = 15;
 
 using ChainStateVector = Eigen::Matrix<double, kChainStateSize, 1>;
 using ChainStateMatrix =
     Eigen::Matrix<double, kChainStateSize, kChainStateSize>;
 
-// Two whitened rows that connect one landmark, the pose of one keyframe, and a
-// run of shared parameters that begins at shared_offset.
-struct LandmarkRows {
-  int keyframe = 0;
-  int shared_offset = 0;
-  Eigen::Vector2d residual;
-  Eigen::Matrix<double, 2, kChainPoseSize> pose;
-  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxRowShared> shared;
-  Eigen::Matrix<double, 2, 3> landmark;
+// A link, by rows of the state of the earlier keyframe.
+struct ChainTransition {
+  // By the link parameters 15, the motion 9 of the next keyframe, the constant,
+  // the pose 6 of the next; one zero.
+  static constexpr int kNextMotion = kChainLinkShared;
+  static constexpr int kConstant = kNextMotion + kChainMotionSize;
+  static constexpr int kNextPose = kConstant + 1;
+  static constexpr int kColumns = kNextPose + kChainPoseSize;
+  double G[kChainStateSize][32];
+  double A[kChainStateSize][16];  // by e; one zero
 };
 
-// Fifteen whitened rows between a keyframe and the next, and a run of shared
-// parameters that begins at shared_offset. x0 must be invertible: the next
-// state, the shared parameters and the noise determine the state before.
-struct LinkRows {
-  int shared_offset = 0;
-  ChainStateVector residual;
-  ChainStateMatrix x0;  // by the keyframe's state
-  ChainStateMatrix x1;  // by the next one's
-  Eigen::Matrix<double, kChainStateSize, Eigen::Dynamic> shared;
+// Rows (w0 x0 + w1 x1 + r) on the motion alone: for states that no IMU samples
+// connect. One row for each component; w0 = w1 = 0 says nothing.
+struct MotionLink {
+  Eigen::Matrix<double, kChainMotionSize, 1> w0, w1, residual;
 };
 
 // What the chain says about the shared parameters: minimising over all else
@@ -63,72 +70,140 @@ struct SharedInformation {
   Eigen::VectorXd eta;
 };
 
+// Who sees what: as ChainStructure::Find takes it, and for each camera the
+// number of its parameters. Their order is that of the cameras, after the link
+// parameters.
+struct ChainShape {
+  int keyframes = 0;
+  std::span<const int> camera_sizes;
+  std::span<const int> tracks;
+  std::span<const int> track_keyframes;
+};
+
 class ChainElimination {
  public:
-  // Begins a chain at keyframe 0.
-  void Start(int shared_size);
+  explicit ChainElimination(VectorWidth width = WidestVectors())
+      : width_(width) {}
 
-  // The keyframe that is eliminated next.
-  int current() const { return current_; }
+  // Begins a chain. Where steps are to be found later, Record says so.
+  enum class Record { kNothing, kSteps };
+  void Start(const ChainShape& shape, Record record = Record::kNothing);
 
-  // Adds a prior on the current keyframe's state, centred at the linearisation
-  // point. Symmetric, positive semidefinite.
+  // First, in any order: the factors of one keyframe and camera, as rows of
+  // landmark_rows.h; `observations` are indices into track_keyframes.
+  void AddObservations(int keyframe,
+                       int camera,
+                       const double* rows,
+                       std::span<const int> observations);
+  // x^T H x + 2 g^T x for a landmark.
+  void AddLandmarkPrior(int landmark,
+                        const Eigen::Matrix3d& H,
+                        const Eigen::Vector3d& g);
+
+  // Then for each keyframe in turn: its prior x^T H x, if it has one, and the
+  // link to the next, or nothing between them, or the end.
   void AddPrior(const ChainStateMatrix& information);
+  void Advance(const ChainTransition& link);
+  void Advance(const MotionLink& link);
+  void Finish(SharedInformation* result);
 
-  // Adds and eliminates one landmark. `rows` are all of its rows, sorted by
-  // keyframe, the first at or after the current keyframe. prior_information is
-  // that of each of its coordinates [1 / unit^2], centred at the linearisation
-  // point.
-  void AddLandmark(std::span<const LandmarkRows> rows,
-                   double prior_information);
+  // After Finish(), with Record::kSteps: the steps that minimise, given that of
+  // the shared parameters. 15 for each keyframe, 3 for each landmark.
+  void FindSteps(const Eigen::VectorXd& shared,
+                 std::vector<ChainStateVector>* states,
+                 std::vector<Eigen::Vector3d>* landmarks) const;
 
-  // Eliminates the current keyframe by the rows between it and the next, and
-  // goes on to that.
-  void Advance(const LinkRows& link);
-
-  // Eliminates the last keyframe. The object needs a Start() after that.
-  SharedInformation Finish();
+  int shared_size() const { return kChainLinkShared + landmark_shared_; }
 
  private:
-  // A run of indices of the front.
-  struct Run {
-    int begin;
-    int end;
-  };
-
-  // Places in the front: [shared | rhs | motion | poses ...].
-  int rhs() const { return shared_size_; }
-  int motion() const { return shared_size_ + 1; }
-  int pose(int slot) const {
-    return motion() + kChainMotionSize + slot * kChainPoseSize;
-  }
-  int size() const { return pose(slots_); }
-
+  void LayOut(const ChainShape& shape);
+  void PlacePanels(const ChainShape& shape);
+  void ExpandGram(int keyframe, int camera);
+  void BeginKeyframe();
   void OpenSlots(int slots);
-  void AddRun(int begin, int end);
-  void FindRuns(std::span<const LandmarkRows> rows);
-  void AddToFront(const LandmarkRows& rows, int pose);
-  void AddToPanel(const LandmarkRows& rows, int pose);
-  void SubtractLandmarkPanel();
-  ChainStateMatrix TakeCurrent();
-  void CloseGap();
-  ChainStateMatrix Substitute(const LinkRows& link,
-                              const ChainStateMatrix& current);
-  void SubtractStatePanel();
+  void EliminateLandmarks();
+  void PreparePanel(int landmark, double* panel, int stride);
+  void SwapPoses(int slot);
+  void TakeState();
+  void Substitute(const ChainTransition& link);
+  void FindRoot(const ChainTransition& link);
+  void Eliminate(const std::vector<double>& terms);
+  void EliminateByItself();
+  void RecordStep(const ChainTransition* link);
 
-  int shared_size_ = 0;
+  double* Row(std::vector<double>* panel, int k) const {
+    return panel->data() + k * panel_stride_;
+  }
+  double& Front(int i, int j) { return front_[j * front_stride_ + i]; }
+  Target FrontAt(int i, int j) { return {&Front(i, j), front_stride_}; }
+  int Pose(int slot) const {
+    return fixed_ + (first_place_ + slot) * kChainPoseSize;
+  }
+  int PosesSize() const { return slots_ * kChainPoseSize; }
+
+  template <typename Function>
+  void WithKernels(const Function& function) const {
+    WithLanes(width_, [&]<int W>() { function(DenseLanes<W>()); });
+  }
+
+  VectorWidth width_;
+  ChainStructure structure_;
+  Record record_ = Record::kNothing;
+
+  // Layout. The front begins with fixed_ places for what is not a pose: link
+  // parameters, motion, landmark parameters, the constant, up to whole vectors.
+  std::vector<int> camera_sizes_, camera_offsets_;
+  int landmark_shared_ = 0;
+  int constant_ = 0;
+  int fixed_ = 0;
+
+  // Of each landmark: for each camera 3 rows of sums; its panel of 3 rows over
+  // the front from the landmark parameters on; the Cholesky factor of its
+  // information, with inverse diagonal.
+  struct Panel {
+    std::size_t begin;
+    int stride;
+  };
+  std::vector<double> sums_, panels_, landmark_priors_, roots_;
+  std::vector<Panel> panel_of_landmark_;
+  std::vector<int> sums_offsets_;
+  int sums_size_ = 0;
+  std::vector<int> landmark_of_observation_;
+  std::size_t landmarks_count_ = 0;
+  std::vector<LandmarkTarget> targets_;
+  std::vector<int> depths_;
+  std::vector<double> gram_;
+  // Of each keyframe, 6 rows by its pose, landmark parameters and constant.
+  std::vector<double> keyframe_sums_;
+  int keyframe_stride_ = 0;
+  // Of landmark parameters and constant, lower triangle by columns.
+  std::vector<double> shared_sums_;
+
+  // The front, lower triangle by columns, with room for `places_` poses.
+  std::vector<double> front_;
+  int front_stride_ = 0;
+  int places_ = 0;
+  int first_place_ = 0;  // of slot 0
+  int slots_ = 0;
   int current_ = 0;
-  int slots_ = 0;  // poses in the front
-  // Lower triangle of the front's information matrix; allocated larger than
-  // size() so that it seldom grows.
-  Eigen::MatrixXd front_;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> landmark_panel_;
-  // One row for each of the front.
-  using StatePanel = Eigen::Matrix<double, Eigen::Dynamic, kChainStateSize>;
-  StatePanel coupling_;  // of the current state with the front
-  StatePanel solution_;  // of the current state in terms of the front
-  StatePanel product_;
-  std::vector<Run> runs_;
+  bool begun_ = false;
+
+  // The state that is eliminated: its information S; panels of 15 rows over
+  // the front: coupling Y, Z = Y + S G, P = root^T Z; and Y + S G / 2.
+  ChainStateMatrix information_;
+  alignas(64) double root_[kChainStateSize][16];  // A L^-T
+  int panel_stride_ = 0;
+  std::vector<double> coupling_, substituted_, product_, half_, link_terms_;
+
+  struct Step {
+    std::size_t product;  // of its P in products_
+    int stride;
+    double root[kChainStateSize][16];
+    bool linked;
+    ChainTransition link;
+  };
+  std::vector<Step> steps_;
+  std::vector<double> products_;
 };
 
 }  // namespace selfcal

@@ -1,13 +1,7 @@
 // The reprojection factors of one keyframe and camera, several at a time.
 //
-// A whitened factor has only a few distinct columns (reprojection.h): with
-// X = p_G,
-//   by the pose:     [turn | pos]                (rotation 3, position 3)
-//   by the landmark:       -pos
-//   by the camera:   [-turn | own]               (rotation 3, the rest)
-// and these are what is written. Each factor gives two rows of numbers
-//   [turn 3 | pos 3 | own n - 3 | residual | zeros up to the stride]
-// with n the camera's tangent. A factor without weight gives zeros.
+// What is written are the rows of core/elimination/landmark_rows.h: a whitened
+// factor has few columns that differ. A factor without weight gives zeros.
 //
 // Pure functions of their arguments, any thread.
 #pragma once
@@ -15,22 +9,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include "core/elimination/landmark_rows.h"
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
 #include "core/simd/vector_width.h"
 
 namespace selfcal {
-
-// Columns of a row.
-inline constexpr int kRowTurn = 0;
-inline constexpr int kRowPosition = 3;
-inline constexpr int kRowOwn = 6;
-inline constexpr int RowResidual(int camera_size) { return camera_size + 3; }
-// Doubles from one row to the next: whole vectors of any width.
-inline constexpr int RowStride(int camera_size) {
-  return (camera_size + 4 + 7) / 8 * 8;
-}
-inline constexpr int kMaxRowStride = RowStride(6 + kMaxIntrinsics);
 
 // The observations of one keyframe by one camera, as arrays.
 struct ObservationRun {
@@ -60,7 +44,7 @@ class ReprojectionBatch {
   explicit ReprojectionBatch(VectorWidth width = WidestVectors())
       : width_(width) {}
 
-  // Writes 2 count rows of RowStride(n) doubles. `points` are p_G, 3 doubles
+  // Writes 2 count rows of RowsStride(n) doubles. `points` are p_G, 3 doubles
   // each. The factors are multiplied by `weights`, one for each observation, or
   // where it is null by 1 / sigma_px. `rows` has room for 2 (count + 7) rows.
   void Linearise(const ObservationRun& run,

@@ -106,7 +106,7 @@ void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
                                             const double* weights,
                                             double* rows) {
   constexpr int kOwn = 3 + 4 + Model::kSize;  // p_CI, f, c, distortion
-  constexpr int kStride = RowStride(3 + kOwn);
+  constexpr int kStride = RowsStride(3 + kOwn);
   for (int first = 0; first < run.count; first += W) {
     const Evaluated<Model> e =
         Evaluate(geometry, model, Gather(run, points, first));
@@ -121,20 +121,20 @@ void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
       T columns[kStride];
       for (T& column : columns) column = 0.0;
       const T x = e.by_p_I(r, 0), y = e.by_p_I(r, 1), z = e.by_p_I(r, 2);
-      columns[kRowTurn + 0] = y * e.p_I[2] - z * e.p_I[1];
-      columns[kRowTurn + 1] = z * e.p_I[0] - x * e.p_I[2];
-      columns[kRowTurn + 2] = x * e.p_I[1] - y * e.p_I[0];
+      columns[kRowsTurn + 0] = y * e.p_I[2] - z * e.p_I[1];
+      columns[kRowsTurn + 1] = z * e.p_I[0] - x * e.p_I[2];
+      columns[kRowsTurn + 2] = x * e.p_I[1] - y * e.p_I[0];
       for (int c = 0; c < 3; ++c) {
-        columns[kRowPosition + c] = -by_X(r, c);
-        columns[kRowOwn + c] = e.parts.point(r, c);
+        columns[kRowsPosition + c] = -by_X(r, c);
+        columns[kRowsOwn + c] = e.parts.point(r, c);
       }
-      columns[kRowOwn + 3 + r] = e.parts.d[r];
-      columns[kRowOwn + 5 + r] = 1.0;
+      columns[kRowsOwn + 3 + r] = e.parts.d[r];
+      columns[kRowsOwn + 5 + r] = 1.0;
       for (int c = 0; c < Model::kSize; ++c) {
-        columns[kRowOwn + 7 + c] = e.parts.distortion(r, c);
+        columns[kRowsOwn + 7 + c] = e.parts.distortion(r, c);
       }
-      columns[RowResidual(3 + kOwn)] = e.r_px[r];
-      for (int c = 0; c <= RowResidual(3 + kOwn); ++c) {
+      columns[RowsResidual(3 + kOwn)] = e.r_px[r];
+      for (int c = 0; c <= RowsResidual(3 + kOwn); ++c) {
         columns[c] = Select(e.valid, weight * columns[c], T(0.0));
       }
       for (int c = 0; c < kStride; c += W) {

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <random>
+#include <vector>
 
 #include "test/core/elimination/random_chain.h"
 
@@ -23,43 +26,92 @@ void ExpectEqualsDense(const Chain& chain, ChainElimination* elimination) {
   EXPECT_TRUE(actual.Lambda == actual.Lambda.transpose());
 }
 
-TEST(ChainElimination, EqualsDenseQrOnRandomChains) {
-  std::mt19937 random(1);
-  ChainElimination elimination;  // one workspace for all of them
+std::vector<RandomChainShape> Shapes() {
+  std::vector<RandomChainShape> shapes;
   for (int trial = 0; trial < 36; ++trial) {
-    ChainShape shape;
+    RandomChainShape shape;
     shape.keyframes = 2 + trial % 9;
-    shape.cameras = 1 + trial % 3;
-    shape.camera_size = 11 + trial % 4;
+    shape.camera_sizes.assign(1 + trial % 3, 11 + trial % 4);
+    shape.camera_sizes.back() = 11;
     shape.max_track = 1 + trial % 7;
     shape.landmarks_per_keyframe = trial % 5;
-    ExpectEqualsDense(RandomChain(shape, &random), &elimination);
+    shape.found_again = trial % 2 == 0 ? 0 : 0.3;
+    shape.motion_links = trial % 3 == 0 ? 0.2 : 0;
+    shapes.push_back(shape);
   }
+  return shapes;
+}
+
+// Calls check(elimination) for every width of this machine.
+template <typename Check>
+void ForAllWidths(const Check& check) {
+  for (const VectorWidth width :
+       {VectorWidth::k2, VectorWidth::k4, VectorWidth::k8}) {
+    if (!HasVectors(width)) continue;
+    SCOPED_TRACE(VectorWidthName(width));
+    ChainElimination elimination(width);
+    check(&elimination);
+  }
+}
+
+TEST(ChainElimination, EqualsDenseQrOnRandomChains) {
+  // One workspace for all of them.
+  ForAllWidths([](ChainElimination* elimination) {
+    std::mt19937 random(1);
+    for (const RandomChainShape& shape : Shapes()) {
+      ExpectEqualsDense(RandomChain(shape, &random), elimination);
+    }
+  });
+}
+
+TEST(ChainElimination, FindsTheStepsThatMinimise) {
+  ForAllWidths([](ChainElimination* elimination) {
+    std::mt19937 random(9);
+    for (const RandomChainShape& shape : Shapes()) {
+      const Chain chain = RandomChain(shape, &random);
+      Eliminate(chain, elimination, ChainElimination::Record::kSteps);
+      // Any step of the shared parameters.
+      const int D = chain.shared_size();
+      const Eigen::VectorXd shared = Eigen::VectorXd::LinSpaced(D, -1, 2);
+      const DenseProblem dense = MakeDense(chain);
+      const Eigen::Index others = dense.J.cols() - D;
+      const Eigen::VectorXd expected =
+          -dense.J.leftCols(others).householderQr().solve(
+              dense.r + dense.J.rightCols(D) * shared);
+      std::vector<ChainStateVector> states;
+      std::vector<Eigen::Vector3d> landmarks;
+      elimination->FindSteps(shared, &states, &landmarks);
+      Eigen::VectorXd actual(expected.size());
+      Eigen::Index at = 0;
+      for (const auto& x : landmarks) actual.segment<3>(3 * at++) = x;
+      at *= 3;
+      for (const auto& x : states) {
+        actual.segment<kChainStateSize>(at) = x;
+        at += kChainStateSize;
+      }
+      EXPECT_LT(RelativeError(actual, expected), 1e-8);
+    }
+  });
 }
 
 TEST(ChainElimination, TracksThroughTheWholeChainAreEliminated) {
   std::mt19937 random(2);
-  ChainShape shape;
+  RandomChainShape shape;
   shape.keyframes = 12;
   shape.max_track = 1;
   Chain chain = RandomChain(shape, &random);
   shape.max_track = 12;
   shape.seen = 1;
-  Chain long_tracks = RandomChain(shape, &random);
-  // The longest goes first, so that later ones are shorter than the front.
-  std::swap(
-      chain.landmarks.front(),
-      *std::max_element(
-          long_tracks.landmarks.begin(),
-          long_tracks.landmarks.begin() + shape.landmarks_per_keyframe,
-          [](const auto& a, const auto& b) { return a.size() < b.size(); }));
+  for (auto& track : RandomChain(shape, &random).landmarks) {
+    if (track.size() > 8) chain.landmarks.push_back(track);
+  }
   ChainElimination elimination;
   ExpectEqualsDense(chain, &elimination);
 }
 
 TEST(ChainElimination, OneKeyframeNeedsNoLink) {
   std::mt19937 random(3);
-  ChainShape shape;
+  RandomChainShape shape;
   shape.keyframes = 1;
   ChainElimination elimination;
   ExpectEqualsDense(RandomChain(shape, &random), &elimination);
@@ -67,10 +119,10 @@ TEST(ChainElimination, OneKeyframeNeedsNoLink) {
 
 TEST(ChainElimination, AReusedWorkspaceGivesTheSameBits) {
   std::mt19937 random(4);
-  const Chain chain = RandomChain({}, &random);
-  ChainShape larger;
+  const Chain chain = RandomChain(RandomChainShape(), &random);
+  RandomChainShape larger;
   larger.keyframes = 20;
-  larger.cameras = 2;
+  larger.camera_sizes = {11, 14};
   ChainElimination fresh;
   const SharedInformation expected = Eliminate(chain, &fresh);
   ChainElimination reused;
@@ -83,7 +135,7 @@ TEST(ChainElimination, AReusedWorkspaceGivesTheSameBits) {
 TEST(ChainElimination, APriorMayCoupleAllUnknownsOfAKeyframe) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
-  Chain chain = RandomChain({}, &random);
+  Chain chain = RandomChain(RandomChainShape(), &random);
   for (ChainStateMatrix& prior : chain.priors) {
     ChainStateMatrix root;
     for (auto& x : root.reshaped()) x = normal(random);
@@ -97,12 +149,12 @@ TEST(ChainElimination, LeavingRowsOutNeverAddsInformation) {
   std::mt19937 random(6);
   ChainElimination elimination;
   for (int trial = 0; trial < 30; ++trial) {
-    const Chain chain = RandomChain({}, &random);
+    const Chain chain = RandomChain(RandomChainShape(), &random);
     const Eigen::MatrixXd all = Eliminate(chain, &elimination).Lambda;
     Chain less = chain;
     std::bernoulli_distribution drop(0.2);
     for (auto& track : less.landmarks) {
-      std::erase_if(track, [&](const LandmarkRows& rows) {
+      std::erase_if(track, [&](const ChainObservation& rows) {
         return &rows != &track.front() && drop(random);
       });
     }
@@ -119,8 +171,8 @@ TEST(ChainElimination, LeavingRowsOutNeverAddsInformation) {
 TEST(ChainElimination, TightLinksLoseNoPrecision) {
   std::mt19937 random(7);
   for (const double tightness : {1e3, 1e6, 1e9, 1e12}) {
-    Chain chain = RandomChain({}, &random);
-    for (LinkRows& link : chain.links) {
+    Chain chain = RandomChain(RandomChainShape(), &random);
+    for (ChainRows& link : chain.links) {
       // Biases that hardly walk.
       link.x0.bottomRows<6>().setZero();
       link.x1.bottomRows<6>().setZero();
@@ -144,9 +196,10 @@ TEST(ChainElimination, TightLinksLoseNoPrecision) {
 
 TEST(ChainElimination, AnUnknownWithoutInformationIsLeftOut) {
   std::mt19937 random(8);
-  Chain chain = RandomChain({}, &random);
+  Chain chain = RandomChain(RandomChainShape(), &random);
   chain.landmark_prior = 0;
-  for (LandmarkRows& rows : chain.landmarks[2]) rows.landmark.setZero();
+  chain.landmark_prior_slope.setZero();
+  for (ChainObservation& rows : chain.landmarks[2]) rows.position.setZero();
   for (auto& track : chain.landmarks) {
     // Three coordinates need at least two observations.
     while (track.size() < 2) track.push_back(track.front());

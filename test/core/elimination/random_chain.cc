@@ -1,8 +1,13 @@
 #include "test/core/elimination/random_chain.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/elimination/landmark_rows.h"
 
 namespace selfcal {
 namespace {
@@ -26,81 +31,192 @@ ChainStateMatrix NearRotation(std::mt19937* random) {
   return 4 * Q + 0.2 * A;
 }
 
-LandmarkRows RandomRows(int keyframe,
-                        int camera,
-                        const ChainShape& shape,
-                        std::mt19937* random) {
-  LandmarkRows rows;
-  rows.keyframe = keyframe;
-  rows.shared_offset = kLinkShared + camera * shape.camera_size;
-  rows.shared.resize(2, shape.camera_size);
-  FillNormal(random, &rows.residual);
-  FillNormal(random, &rows.pose);
-  FillNormal(random, &rows.shared);
-  FillNormal(random, &rows.landmark);
-  return rows;
+ChainObservation RandomObservation(int keyframe,
+                                   int camera,
+                                   const RandomChainShape& shape,
+                                   std::mt19937* random) {
+  ChainObservation observation;
+  observation.keyframe = keyframe;
+  observation.camera = camera;
+  observation.own.resize(2, shape.camera_sizes[camera] - 3);
+  FillNormal(random, &observation.residual);
+  FillNormal(random, &observation.turn);
+  FillNormal(random, &observation.own);
+  FillNormal(random, &observation.position);
+  return observation;
 }
 
-std::vector<LandmarkRows> RandomTrack(int first,
-                                      const ChainShape& shape,
-                                      std::mt19937* random) {
+std::vector<ChainObservation> RandomTrack(int first,
+                                          const RandomChainShape& shape,
+                                          std::mt19937* random) {
   std::uniform_int_distribution<int> length(1, shape.max_track);
   std::bernoulli_distribution seen(shape.seen);
   const int end = std::min(shape.keyframes, first + length(*random));
-  std::vector<LandmarkRows> rows;
+  std::vector<ChainObservation> track;
   for (int k = first; k < end; ++k) {
-    for (int camera = 0; camera < shape.cameras; ++camera) {
+    const int cameras = static_cast<int>(shape.camera_sizes.size());
+    for (int camera = 0; camera < cameras; ++camera) {
       if ((k == first && camera == 0) || seen(*random)) {
-        rows.push_back(RandomRows(k, camera, shape, random));
+        track.push_back(RandomObservation(k, camera, shape, random));
       }
     }
   }
-  return rows;
+  if (end < shape.keyframes &&
+      std::bernoulli_distribution(shape.found_again)(*random)) {
+    std::uniform_int_distribution<int> again(end, shape.keyframes - 1);
+    track.push_back(RandomObservation(again(*random), 0, shape, random));
+  }
+  return track;
+}
+
+// What a factor is a derivative by.
+Eigen::Matrix<double, 2, 6> ByPose(const ChainObservation& observation) {
+  Eigen::Matrix<double, 2, 6> J;
+  J << observation.turn, observation.position;
+  return J;
+}
+Eigen::Matrix2Xd ByCamera(const ChainObservation& observation) {
+  Eigen::Matrix2Xd J(2, 3 + observation.own.cols());
+  J << -observation.turn, observation.own;
+  return J;
+}
+
+ChainTransition Solve(const ChainRows& rows) {
+  // Rows of different kinds differ by many orders: equilibrated before LU.
+  const ChainStateVector scale =
+      rows.x0.rowwise().lpNorm<Eigen::Infinity>().cwiseInverse();
+  const Eigen::PartialPivLU<ChainStateMatrix> lu(scale.asDiagonal() * rows.x0);
+  const auto solve = [&](const auto& columns) {
+    return lu.solve(scale.asDiagonal() * columns).eval();
+  };
+  ChainTransition link = {};
+  Eigen::Map<Eigen::Matrix<double, kChainStateSize, 32, Eigen::RowMajor>> G(
+      &link.G[0][0]);
+  Eigen::Map<Eigen::Matrix<double, kChainStateSize, 16, Eigen::RowMajor>> A(
+      &link.A[0][0]);
+  A.leftCols<15>() = solve(ChainStateMatrix::Identity());
+  G.leftCols<15>() = -solve(rows.shared);
+  const ChainStateMatrix next = -solve(rows.x1);
+  G.middleCols<9>(ChainTransition::kNextMotion) = next.rightCols<9>();
+  G.col(ChainTransition::kConstant) = -solve(rows.residual);
+  G.middleCols<6>(ChainTransition::kNextPose) = next.leftCols<6>();
+  return link;
+}
+
+// The observations of one keyframe and camera, in a form to hand over.
+void AddObservations(const Chain& chain,
+                     int keyframe,
+                     int camera,
+                     ChainElimination* elimination) {
+  const int size = chain.camera_sizes[camera];
+  const int stride = RowsStride(size);
+  std::vector<double> rows;
+  std::vector<int> indices;
+  int index = 0;
+  for (const auto& track : chain.landmarks) {
+    for (const ChainObservation& observation : track) {
+      if (observation.keyframe == keyframe && observation.camera == camera) {
+        for (int r = 0; r < 2; ++r) {
+          Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(stride);
+          row.segment<3>(kRowsTurn) = observation.turn.row(r);
+          row.segment<3>(kRowsPosition) = observation.position.row(r);
+          row.segment(kRowsOwn, size - 3) = observation.own.row(r);
+          row(RowsResidual(size)) = observation.residual(r);
+          rows.insert(rows.end(), row.data(), row.data() + stride);
+        }
+        indices.push_back(index);
+      }
+      ++index;
+    }
+  }
+  rows.resize(rows.size() + 2 * kPanelPad * stride);
+  elimination->AddObservations(keyframe, camera, rows.data(), indices);
 }
 
 }  // namespace
 
-Chain RandomChain(const ChainShape& shape, std::mt19937* random) {
+int Chain::shared_size() const {
+  return std::accumulate(
+      camera_sizes.begin(), camera_sizes.end(), kChainLinkShared);
+}
+
+Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
   Chain chain;
-  chain.shared_size = kLinkShared + shape.cameras * shape.camera_size;
+  chain.camera_sizes = shape.camera_sizes;
   chain.landmark_prior = 1e-2;
+  chain.landmark_prior_slope = {0.01, -0.02, 0.03};
+  std::bernoulli_distribution motion(shape.motion_links);
   for (int k = 0; k < shape.keyframes; ++k) {
     chain.priors.push_back(1e-2 * ChainStateMatrix::Identity());
     if (k + 1 < shape.keyframes) {
-      LinkRows link;
-      link.shared.resize(kChainStateSize, kLinkShared);
+      ChainRows link;
       FillNormal(random, &link.residual);
       link.x0 = NearRotation(random);
       link.x1 = NearRotation(random);
       FillNormal(random, &link.shared);
       chain.links.push_back(link);
+      chain.motion_links.push_back(std::nullopt);
+      if (motion(*random)) {
+        MotionLink gap;
+        FillNormal(random, &gap.w0);
+        FillNormal(random, &gap.w1);
+        FillNormal(random, &gap.residual);
+        chain.motion_links.back() = gap;
+      }
     }
     for (int i = 0; i < shape.landmarks_per_keyframe; ++i) {
       chain.landmarks.push_back(RandomTrack(k, shape, random));
     }
   }
+  // In any order.
+  std::shuffle(chain.landmarks.begin(), chain.landmarks.end(), *random);
   return chain;
 }
 
-SharedInformation Eliminate(const Chain& chain, ChainElimination* elimination) {
-  elimination->Start(chain.shared_size);
-  auto landmark = chain.landmarks.begin();
+SharedInformation Eliminate(const Chain& chain,
+                            ChainElimination* elimination,
+                            ChainElimination::Record record) {
+  std::vector<int> tracks = {0};
+  std::vector<int> keyframes;
+  for (const auto& track : chain.landmarks) {
+    for (const ChainObservation& observation : track) {
+      keyframes.push_back(observation.keyframe);
+    }
+    tracks.push_back(static_cast<int>(keyframes.size()));
+  }
+  elimination->Start({chain.keyframes(), chain.camera_sizes, tracks, keyframes},
+                     record);
+  for (int k = 0; k < chain.keyframes(); ++k) {
+    for (int camera = 0; camera < static_cast<int>(chain.camera_sizes.size());
+         ++camera) {
+      AddObservations(chain, k, camera, elimination);
+    }
+  }
+  for (int m = 0; m < static_cast<int>(chain.landmarks.size()); ++m) {
+    elimination->AddLandmarkPrior(
+        m,
+        chain.landmark_prior * Eigen::Matrix3d::Identity(),
+        chain.landmark_prior_slope);
+  }
   for (int k = 0; k < chain.keyframes(); ++k) {
     elimination->AddPrior(chain.priors[k]);
-    for (; landmark != chain.landmarks.end() && landmark->front().keyframe == k;
-         ++landmark) {
-      elimination->AddLandmark(*landmark, chain.landmark_prior);
+    if (k + 1 == chain.keyframes()) break;
+    if (chain.motion_links[k]) {
+      elimination->Advance(*chain.motion_links[k]);
+    } else {
+      elimination->Advance(Solve(chain.links[k]));
     }
-    if (k + 1 < chain.keyframes()) elimination->Advance(chain.links[k]);
   }
-  return elimination->Finish();
+  SharedInformation result;
+  elimination->Finish(&result);
+  return result;
 }
 
 DenseProblem MakeDense(const Chain& chain) {
   const int landmarks = static_cast<int>(chain.landmarks.size());
   const int states = 3 * landmarks;
   const int shared = states + kChainStateSize * chain.keyframes();
-  const int columns = shared + chain.shared_size;
+  const int columns = shared + chain.shared_size();
   // Rows of zeros below, so that there are never fewer rows than columns.
   int rows = columns + kChainStateSize * static_cast<int>(chain.links.size());
   for (const auto& track : chain.landmarks) {
@@ -109,32 +225,45 @@ DenseProblem MakeDense(const Chain& chain) {
   DenseProblem dense;
   dense.J = Eigen::MatrixXd::Zero(rows, columns);
   dense.r = Eigen::VectorXd::Zero(rows);
+  const double root = std::sqrt(chain.landmark_prior);
   int row = 0;
   for (; row < states; ++row) {
-    dense.J(row, row) = std::sqrt(chain.landmark_prior);
+    dense.J(row, row) = root;
+    dense.r(row) = chain.landmark_prior_slope(row % 3) / root;
   }
   for (const ChainStateMatrix& prior : chain.priors) {
     dense.J.block<kChainStateSize, kChainStateSize>(row, row) =
         prior.llt().matrixU();
     row += kChainStateSize;
   }
+  std::vector<int> offsets = {shared + kChainLinkShared};
+  for (const int size : chain.camera_sizes) {
+    offsets.push_back(offsets.back() + size);
+  }
   for (int m = 0; m < landmarks; ++m) {
-    for (const LandmarkRows& a : chain.landmarks[m]) {
-      dense.J.block<2, 3>(row, 3 * m) = a.landmark;
-      dense.J.block<2, 6>(row, states + kChainStateSize * a.keyframe) = a.pose;
-      dense.J.block(row, shared + a.shared_offset, 2, a.shared.cols()) =
-          a.shared;
+    for (const ChainObservation& a : chain.landmarks[m]) {
+      dense.J.block<2, 3>(row, 3 * m) = -a.position;
+      dense.J.block<2, 6>(row, states + kChainStateSize * a.keyframe) =
+          ByPose(a);
+      dense.J.block(row, offsets[a.camera], 2, 3 + a.own.cols()) = ByCamera(a);
       dense.r.segment<2>(row) = a.residual;
       row += 2;
     }
   }
   for (std::size_t k = 0; k < chain.links.size(); ++k, row += kChainStateSize) {
-    const LinkRows& a = chain.links[k];
     const int at = states + kChainStateSize * static_cast<int>(k);
+    if (chain.motion_links[k]) {
+      const MotionLink& a = *chain.motion_links[k];
+      dense.J.block<9, 9>(row, at + kChainPoseSize) = a.w0.asDiagonal();
+      dense.J.block<9, 9>(row, at + kChainStateSize + kChainPoseSize) =
+          a.w1.asDiagonal();
+      dense.r.segment<9>(row) = a.residual;
+      continue;
+    }
+    const ChainRows& a = chain.links[k];
     dense.J.block<15, 15>(row, at) = a.x0;
     dense.J.block<15, 15>(row, at + kChainStateSize) = a.x1;
-    dense.J.block(row, shared + a.shared_offset, 15, a.shared.cols()) =
-        a.shared;
+    dense.J.block<15, 15>(row, shared) = a.shared;
     dense.r.segment<15>(row) = a.residual;
   }
   return dense;
@@ -145,7 +274,7 @@ SharedInformation DenseReference(const Chain& chain) {
   using Matrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   const Eigen::HouseholderQR<Matrix> qr(dense.J.cast<long double>());
   const int columns = static_cast<int>(dense.J.cols());
-  const int D = chain.shared_size;
+  const int D = chain.shared_size();
   const Matrix R = qr.matrixQR()
                        .topRows(columns)
                        .bottomRightCorner(D, D)

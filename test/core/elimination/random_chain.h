@@ -1,7 +1,8 @@
-// Random chains of whitened rows, and the same problem as one dense matrix.
+// Random chains of whitened factors, and the same problem as one dense matrix.
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -9,31 +10,53 @@
 
 namespace selfcal {
 
-struct Chain {
-  int shared_size = 0;
-  std::vector<LinkRows> links;  // one less than keyframes
-  std::vector<ChainStateMatrix> priors;
-  // Sorted by the first keyframe of each.
-  std::vector<std::vector<LandmarkRows>> landmarks;
-  double landmark_prior = 0;
-
-  int keyframes() const { return static_cast<int>(priors.size()); }
+// A factor of landmark_rows.h.
+struct ChainObservation {
+  int keyframe = 0;
+  int camera = 0;
+  Eigen::Matrix<double, 2, 3> turn, position;
+  Eigen::Matrix2Xd own;
+  Eigen::Vector2d residual;
 };
 
-struct ChainShape {
+// Rows between a keyframe and the next.
+struct ChainRows {
+  ChainStateVector residual;
+  ChainStateMatrix x0, x1;
+  Eigen::Matrix<double, kChainStateSize, kChainLinkShared> shared;
+};
+
+struct Chain {
+  std::vector<int> camera_sizes;
+  std::vector<ChainRows> links;  // one less than keyframes
+  // Instead of the rows, where there are none between two keyframes.
+  std::vector<std::optional<MotionLink>> motion_links;
+  std::vector<ChainStateMatrix> priors;
+  std::vector<std::vector<ChainObservation>> landmarks;
+  double landmark_prior = 0;             // information
+  Eigen::Vector3d landmark_prior_slope;  // g of x^T H x + 2 g^T x
+
+  int keyframes() const { return static_cast<int>(priors.size()); }
+  int shared_size() const;
+};
+
+struct RandomChainShape {
   int keyframes = 8;
-  int cameras = 1;
-  int camera_size = 11;
+  std::vector<int> camera_sizes = {11};
   int landmarks_per_keyframe = 4;
   int max_track = 5;  // keyframes from the first to the last that sees it
   double seen = 0.8;  // of the keyframes within a track
+  // Tracks that are seen once more, from any keyframe after them.
+  double found_again = 0;
+  double motion_links = 0;  // in place of links
 };
 
-inline constexpr int kLinkShared = 15;
+Chain RandomChain(const RandomChainShape& shape, std::mt19937* random);
 
-Chain RandomChain(const ChainShape& shape, std::mt19937* random);
-
-SharedInformation Eliminate(const Chain& chain, ChainElimination* elimination);
+SharedInformation Eliminate(
+    const Chain& chain,
+    ChainElimination* elimination,
+    ChainElimination::Record record = ChainElimination::Record::kNothing);
 
 // All rows as one matrix; columns: landmarks, states in time order, shared.
 struct DenseProblem {
@@ -42,8 +65,8 @@ struct DenseProblem {
 };
 DenseProblem MakeDense(const Chain& chain);
 
-// Marginal information of the last `shared_size` columns, by Householder QR in
-// extended precision.
+// Marginal information of the shared columns, by Householder QR in extended
+// precision.
 SharedInformation DenseReference(const Chain& chain);
 
 }  // namespace selfcal

@@ -101,7 +101,7 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
   ForRandomScenes(1, [&](const Scene& scene, const auto& batch, auto& random) {
     const ObservationRun run = scene.Run();
     const int size = CameraTangentSize(scene.camera);
-    const int stride = RowStride(size);
+    const int stride = RowsStride(size);
     std::vector<double> weights(run.count);
     for (double& weight : weights) weight = random.Uniform(0, 2);
     for (const bool weighted : {false, true}) {
@@ -117,8 +117,8 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
         ReprojectionJacobians J;
         if (Evaluate(scene, i, &r, &J)) {
           expected.leftCols(6) = J.pose;
-          expected.middleCols(kRowOwn, size - 3) = J.camera.rightCols(size - 3);
-          expected.col(RowResidual(size)) = r;
+          expected.middleCols(kRowsOwn, size - 3) = J.camera.rightCols(size - 3);
+          expected.col(RowsResidual(size)) = r;
           expected *= weighted ? weights[i] : 1 / kSigma_px;
           EXPECT_EQ(J.camera.leftCols(3), -J.pose.leftCols(3));
           EXPECT_EQ(J.landmark.leftCols(3), -J.pose.rightCols(3));

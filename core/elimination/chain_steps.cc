@@ -1,0 +1,91 @@
+// The way back through a chain: from a step of the shared parameters to the
+// steps of all that was eliminated.
+#include <Eigen/Core>
+
+#include "core/elimination/chain_elimination.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kPose = kChainPoseSize;
+constexpr int kMotion = kChainMotionSize;
+constexpr int kState = kChainStateSize;
+constexpr int kMotionPlace = kChainLinkShared;
+constexpr int kLandmarkPlace = kMotionPlace + kMotion;
+
+using RowMajorRoot = Eigen::Matrix<double, kState, 16, Eigen::RowMajor>;
+using RowMajorLink = Eigen::Matrix<double, kState, 32, Eigen::RowMajor>;
+using RowMajorPanel =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+}  // namespace
+
+void ChainElimination::FindSteps(
+    const Eigen::VectorXd& shared,
+    std::vector<ChainStateVector>* states,
+    std::vector<Eigen::Vector3d>* landmarks) const {
+  const int keyframes = structure_.keyframes();
+  states->resize(keyframes);
+  landmarks->resize(landmarks_count_);
+  // Values in the places of a panel.
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(panel_stride_);
+  z.head(kChainLinkShared) = shared.head(kChainLinkShared);
+  z.segment(kLandmarkPlace, landmark_shared_) = shared.tail(landmark_shared_);
+  z(constant_) = 1;
+
+  for (int k = keyframes - 1; k >= 0; --k) {
+    const Step& step = steps_[k];
+    const std::span<const int> poses = structure_.Poses(k);
+    for (std::size_t s = 1; s < poses.size(); ++s) {
+      z.segment<kPose>(fixed_ + (s - 1) * kPose) =
+          (*states)[poses[s]].head<kPose>();
+    }
+    if (k + 1 < keyframes) {
+      z.segment<kMotion>(kMotionPlace) = (*states)[k + 1].tail<kMotion>();
+    }
+    const Eigen::Map<const RowMajorPanel> P(
+        &products_[step.product], kState, step.stride);
+    const auto root =
+        Eigen::Map<const RowMajorRoot>(&step.root[0][0]).leftCols<kState>();
+    ChainStateVector& x = (*states)[k];
+    x = -(root * (P * z.head(step.stride)));
+    if (step.linked) {
+      const Eigen::Map<const RowMajorLink> G(&step.link.G[0][0]);
+      x += G.leftCols<kLandmarkPlace>() * z.head<kLandmarkPlace>() +
+           G.col(ChainTransition::kConstant) +
+           G.middleCols<kPose>(ChainTransition::kNextPose) *
+               (*states)[k + 1].head<kPose>();
+    }
+  }
+
+  for (int k = 0; k < keyframes; ++k) {
+    // The order of slots when the landmarks went.
+    const std::span<const int> poses = structure_.Poses(k);
+    const int swap = structure_.SwapWithNext(k);
+    for (std::size_t s = 0; s < poses.size(); ++s) {
+      const auto slot = static_cast<int>(s);
+      const int from = slot == 1 ? swap : slot == swap ? 1 : slot;
+      z.segment<kPose>(fixed_ + slot * kPose) =
+          (*states)[poses[from]].head<kPose>();
+    }
+    for (const int m : structure_.Landmarks(k)) {
+      const Panel& panel = panel_of_landmark_[m];
+      const int shared_places = fixed_ - kLandmarkPlace;
+      const int size = shared_places + structure_.Slots(m) * kPose;
+      Eigen::Vector3d y;
+      for (int j = 0; j < 3; ++j) {
+        const Eigen::Map<const Eigen::VectorXd> row(
+            &panels_[panel.begin + j * panel.stride], size);
+        y(j) = row.dot(z.segment(kLandmarkPlace, size));
+      }
+      // L^T x = -y, the diagonal of L inverted.
+      const double* L = &roots_[6 * m];
+      Eigen::Vector3d& x = (*landmarks)[m];
+      x(2) = -y(2) * L[5];
+      x(1) = (-y(1) - L[4] * x(2)) * L[2];
+      x(0) = (-y(0) - L[1] * x(1) - L[3] * x(2)) * L[0];
+    }
+  }
+}
+
+}  // namespace selfcal

@@ -1,0 +1,209 @@
+#include "core/elimination/dense_lanes.h"
+
+#include "core/elimination/landmark_rows.h"
+#include "core/simd/lanes.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kLanes = SELFCAL_LANES;
+using T = Lanes<kLanes>;
+
+// Rows of a tile in vectors, and its columns: with as many sums, rows and one
+// factor a tile fills 16 registers.
+constexpr int kTileVectors = 3;
+constexpr int kTileColumns = 4;
+
+// One tile of V vectors by N columns.
+template <int V, int N>
+inline void AddTile(double sign,
+                    const double* a,
+                    int a_stride,
+                    const double* b,
+                    int b_stride,
+                    int depth,
+                    double* to,
+                    int to_stride) {
+  T sums[N][V];
+  for (int n = 0; n < N; ++n) {
+    for (int v = 0; v < V; ++v) sums[n][v] = 0.0;
+  }
+  for (int k = 0; k < depth; ++k) {
+    T rows[V];
+    for (int v = 0; v < V; ++v) rows[v] = Load<kLanes>(a + v * kLanes);
+    for (int n = 0; n < N; ++n) {
+      const T factor = b[n];
+      for (int v = 0; v < V; ++v) sums[n][v] += rows[v] * factor;
+    }
+    a += a_stride;
+    b += b_stride;
+  }
+  const T signs = sign;
+  for (int n = 0; n < N; ++n) {
+    for (int v = 0; v < V; ++v) {
+      double* place = to + n * to_stride + v * kLanes;
+      Store(Load<kLanes>(place) + signs * sums[n][v], place);
+    }
+  }
+}
+
+template <int N>
+inline void AddColumns(double sign,
+                       ConstPanel a,
+                       int begin,
+                       int end,
+                       const int* depths,
+                       int depth_step,
+                       int depth,
+                       ConstPanel b,
+                       int column,
+                       Target to) {
+  const double* factors = b.data + column;
+  double* place = to.data + column * to.stride;
+  for (int i = begin; i < end;) {
+    const int d = depths == nullptr ? depth : depths[i / depth_step];
+    const int vectors = (end - i + kLanes - 1) / kLanes;
+    const auto tile = [&]<int V>() {
+      AddTile<V, N>(sign,
+                    a.data + i,
+                    a.stride,
+                    factors,
+                    b.stride,
+                    d,
+                    place + i,
+                    to.stride);
+      i += V * kLanes;
+    };
+    if (d == 0) return;  // and so it is for all rows to come
+    if (vectors >= kTileVectors) {
+      tile.template operator()<kTileVectors>();
+    } else if (vectors == 2) {
+      tile.template operator()<2>();
+    } else {
+      tile.template operator()<1>();
+    }
+  }
+}
+
+// All rows, or if lower those from the vector that holds the diagonal on.
+void AddAll(double sign,
+            ConstPanel a,
+            int rows,
+            const int* depths,
+            int depth_step,
+            int depth,
+            ConstPanel b,
+            int columns,
+            bool lower,
+            Target to) {
+  int column = 0;
+  for (; column + kTileColumns <= columns; column += kTileColumns) {
+    AddColumns<kTileColumns>(sign,
+                             a,
+                             lower ? column / kLanes * kLanes : 0,
+                             rows,
+                             depths,
+                             depth_step,
+                             depth,
+                             b,
+                             column,
+                             to);
+  }
+  for (; column < columns; ++column) {
+    AddColumns<1>(sign,
+                  a,
+                  lower ? column / kLanes * kLanes : 0,
+                  rows,
+                  depths,
+                  depth_step,
+                  depth,
+                  b,
+                  column,
+                  to);
+  }
+}
+
+}  // namespace
+
+template <int W>
+void DenseLanes<W>::AddProduct(double sign,
+                               ConstPanel a,
+                               int rows,
+                               ConstPanel b,
+                               int columns,
+                               int depth,
+                               Target to) {
+  AddAll(sign, a, rows, nullptr, 1, depth, b, columns, false, to);
+}
+
+template <int W>
+void DenseLanes<W>::AddSquare(double sign,
+                              ConstPanel a,
+                              int size,
+                              int depth,
+                              const int* depths,
+                              int depth_step,
+                              Target to) {
+  AddAll(sign, a, size, depths, depth_step, depth, a, size, true, to);
+}
+
+template <int W>
+void DenseLanes<W>::AddStaircase(double sign,
+                                 ConstPanel a,
+                                 int rows,
+                                 const int* depths,
+                                 int depth_step,
+                                 ConstPanel b,
+                                 int columns,
+                                 Target to) {
+  AddAll(sign, a, rows, depths, depth_step, 0, b, columns, false, to);
+}
+
+template <int W>
+void DenseLanes<W>::AddLandmarkProducts(const double* rows,
+                                        int stride,
+                                        int count,
+                                        const LandmarkTarget* targets) {
+  for (int i = 0; i < count; ++i) {
+    const double* x = rows + 2 * i * stride;
+    const double* y = x + stride;
+    const LandmarkTarget& to = targets[i];
+    for (int j = 0; j < 3; ++j) {
+      const T by_x = -x[kRowsPosition + j];
+      const T by_y = -y[kRowsPosition + j];
+      double* sums = to.sums + j * stride;
+      double first[kRowsOwn + W];
+      for (int c = 0; c < stride; c += W) {
+        const T product = by_x * Load<W>(x + c) + by_y * Load<W>(y + c);
+        Store(Load<W>(sums + c) + product, sums + c);
+        if (c < kRowsOwn) Store(product, first + c);
+      }
+      double* poses = to.poses + j * to.pose_stride;
+      for (int c = 0; c < kRowsOwn; ++c) poses[c] += first[c];
+    }
+  }
+}
+
+template <int W>
+void DenseLanes<W>::SolveThreeRows(const double* L,
+                                   double* panel,
+                                   int stride,
+                                   int n) {
+  const T l00 = L[0], l10 = L[1], l11 = L[2], l20 = L[3], l21 = L[4],
+          l22 = L[5];
+  double* x = panel;
+  double* y = panel + stride;
+  double* z = panel + 2 * stride;
+  for (int i = 0; i < n; i += W) {
+    const T a = Load<W>(x + i) * l00;
+    const T b = (Load<W>(y + i) - l10 * a) * l11;
+    const T c = (Load<W>(z + i) - l20 * a - l21 * b) * l22;
+    Store(a, x + i);
+    Store(b, y + i);
+    Store(c, z + i);
+  }
+}
+
+template struct DenseLanes<kLanes>;
+
+}  // namespace selfcal

@@ -1,0 +1,79 @@
+// The dense kernels of the elimination for one vector width. Internal to
+// core/elimination.
+//
+// A panel is a matrix by rows; its rows are summed over. All sizes are those of
+// what counts: where vectors reach beyond, up to kPanelPad numbers more are
+// read and written, and whatever is written there is a sum with what was read,
+// so that a panel must hold zeros there, and a target room.
+#pragma once
+
+namespace selfcal {
+
+inline constexpr int kPanelPad = 8;
+
+struct ConstPanel {
+  const double* data;
+  int stride;  // from one row to the next
+};
+
+// By columns.
+struct Target {
+  double* data;
+  int stride;  // from one column to the next
+};
+
+// Where the products of one landmark's factor go.
+struct LandmarkTarget {
+  double* sums;   // 3 rows of the stride of the factors
+  double* poses;  // 3 rows of a panel, pose_stride apart
+  int pose_stride;
+};
+
+template <int W>
+struct DenseLanes {
+  // to(i, j) += sign sum_k a(k, i) b(k, j), for i < rows, j < columns,
+  // k < depth.
+  static void AddProduct(double sign,
+                         ConstPanel a,
+                         int rows,
+                         ConstPanel b,
+                         int columns,
+                         int depth,
+                         Target to);
+
+  // The same with a = b on and below the diagonal; what is above is
+  // overwritten by anything. Where depths is not null, rows of `a` from
+  // depths[i / depth_step] on are zero in the column i, and depths never rises.
+  static void AddSquare(double sign,
+                        ConstPanel a,
+                        int size,
+                        int depth,
+                        const int* depths,
+                        int depth_step,
+                        Target to);
+
+  // AddProduct with such depths for the columns of a.
+  static void AddStaircase(double sign,
+                           ConstPanel a,
+                           int rows,
+                           const int* depths,
+                           int depth_step,
+                           ConstPanel b,
+                           int columns,
+                           Target to);
+
+  // For each pair of rows x, y (reprojection factors of landmark_rows.h):
+  //   product(j, c) = x_l(j) x(c) + y_l(j) y(c),   x_l = -x[kRowsPosition ...],
+  // j < 3: added to the sums of its target, and its first six columns to the
+  // panel at its pose.
+  static void AddLandmarkProducts(const double* rows,
+                                  int stride,
+                                  int count,
+                                  const LandmarkTarget* targets);
+
+  // Overwrites the columns x of a panel of 3 rows by L^-1 x, for L lower
+  // triangular (00 10 11 20 21 22), 1 / L_ii on the diagonal.
+  static void SolveThreeRows(const double* L, double* panel, int stride, int n);
+};
+
+}  // namespace selfcal
