@@ -8,9 +8,9 @@
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
 #include "test/core/information/test_segments.h"
-#include "test/reference/ceres_covariance_reference.h"
+#include "test/reference/ceres_segment.h"
 #include "test/reference/segment_jacobian.h"
-#include "test/reference/sparse_qr_reference.h"
+#include "test/reference/sparse_qr.h"
 
 namespace selfcal {
 namespace {
@@ -63,8 +63,10 @@ TEST(ScoreAgainstReference, EqualsTheSparseQrOfTheWholeJacobian) {
         ScoreSegment(c.rig, c.theta0, c.segment, options);
     const InlierSelection selection =
         SelectInliers(c.theta0, c.rig.pixel_sigma_px, c.segment, options);
-    const ThetaRoot root = SparseQrReference(BuildSegmentJacobian(
+    SparseQr qr(BuildSegmentJacobian(
         c.rig, c.theta0, c.segment, selection, ThetaScale(c.rig), c.gauge));
+    qr.Factorise();
+    const ThetaRoot root = qr.Root();
     const std::vector<double> entropies = ReferenceEntropies(c.rig, root.R);
     ASSERT_EQ(score.groups.size(), entropies.size());
     for (std::size_t q = 0; q < entropies.size(); ++q) {
@@ -93,7 +95,8 @@ TEST(ScoreAgainstReference, EqualsCeresCovariance) {
     const InlierSelection selection =
         SelectInliers(c.theta0, c.rig.pixel_sigma_px, c.segment, options);
     const Eigen::MatrixXd posterior =
-        CeresPosterior(c.rig, c.theta0, c.segment, selection, c.gauge);
+        CeresSegment(c.rig, c.theta0, c.segment, selection, c.gauge)
+            .Posterior();
     ASSERT_GT(posterior.size(), 0);
     const std::vector<int> free = FreeComponents(c.rig);
     const Eigen::VectorXd prior = PriorSigmas(c.rig);
