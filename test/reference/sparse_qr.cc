@@ -1,10 +1,12 @@
 #include "test/reference/sparse_qr.h"
 
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <SuiteSparseQR.hpp>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace selfcal {
 namespace {
@@ -122,6 +124,39 @@ std::vector<double> ReferenceEntropies(const Rig& rig,
                         triangle.diagonal().cwiseAbs().array().log().sum());
   }
   return entropies;
+}
+
+ReferenceInformation ReferenceDirections(const Rig& rig,
+                                         const Eigen::MatrixXd& R) {
+  const auto squares = [](const Eigen::MatrixXd& triangle) -> Eigen::VectorXd {
+    return Eigen::JacobiSVD<Eigen::MatrixXd>(triangle)
+        .singularValues()
+        .array()
+        .square();
+  };
+  const std::vector<int> free = FreeComponents(rig);
+  const Eigen::Index D = R.cols();
+  Eigen::MatrixXd stacked(R.rows() + D, D);
+  stacked << R, Eigen::MatrixXd::Identity(D, D);
+  ReferenceInformation result;
+  // Rows that a deficient R does not have are zero.
+  Eigen::MatrixXd square = Eigen::MatrixXd::Zero(D, D);
+  square.topRows(R.rows()) = R;
+  result.whole = squares(square);
+  for (const ParameterGroup& group : rig.groups) {
+    // The group goes last: the end of the triangle is what is left for it.
+    const std::vector<int> last = GroupComponents(rig, group);
+    std::vector<int> order(D);
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_partition(order.begin(), order.end(), [&](int i) {
+      return !std::binary_search(last.begin(), last.end(), free[i]);
+    });
+    const auto k = static_cast<Eigen::Index>(last.size());
+    const Eigen::MatrixXd triangle =
+        UpperTriangle(stacked(Eigen::all, order)).bottomRightCorner(k, k);
+    result.groups.emplace_back(squares(triangle).array() - 1);
+  }
+  return result;
 }
 
 }  // namespace selfcal

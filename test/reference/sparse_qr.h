@@ -21,7 +21,7 @@ struct ThetaRoot {
 
 enum class RankDetection {
   kDefault,  // drops columns below SuiteSparseQR's default tolerance
-  kNone,     // R has theta_size rows
+  kNone,     // R has as many rows as there are, at most theta_size
 };
 
 // One Jacobian. Its pattern is analysed once; it may be factorised many times.
@@ -46,5 +46,16 @@ class SparseQr {
 // free components, with the prior: by QR alone, never squaring R.
 std::vector<double> ReferenceEntropies(const Rig& rig,
                                        const Eigen::MatrixXd& R);
+
+// Information of the data against that of the prior along its principal
+// directions, of the free components together and of every group of the rig,
+// from R_theta in units of the prior: by QR and singular values alone.
+struct ReferenceInformation {
+  Eigen::VectorXd whole;
+  std::vector<Eigen::VectorXd> groups;
+};
+
+ReferenceInformation ReferenceDirections(const Rig& rig,
+                                         const Eigen::MatrixXd& R);
 
 }  // namespace selfcal
