@@ -1,9 +1,11 @@
-#include "test/reference/ceres_covariance_reference.h"
+#include "test/reference/ceres_segment.h"
 
 #include <ceres/covariance.h>
+#include <ceres/crs_matrix.h>
 #include <ceres/problem.h>
 
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "core/factor/ceres_factors.h"
@@ -117,13 +119,21 @@ void AddFactors(const Rig& rig,
 
 }  // namespace
 
-Eigen::MatrixXd CeresPosterior(const Rig& rig,
-                               const Calibration& theta0,
-                               const MotionSegment& segment,
-                               const InlierSelection& selection,
-                               int gauge_keyframe) {
-  Blocks b = MakeBlocks(theta0, segment, selection);
+struct CeresSegment::Model {
+  Blocks blocks;
   ceres::Problem problem;
+  Eigen::Index theta_size = 0;  // of its tangent
+};
+
+CeresSegment::CeresSegment(const Rig& rig,
+                           const Calibration& theta0,
+                           const MotionSegment& segment,
+                           const InlierSelection& selection,
+                           int gauge_keyframe)
+    : model_(std::make_unique<Model>()) {
+  Blocks& b = model_->blocks;
+  ceres::Problem& problem = model_->problem;
+  b = MakeBlocks(theta0, segment, selection);
   AddFactors(rig, theta0, segment, selection, &b, &problem);
   AddPriors(rig, gauge_keyframe, &b, &problem);
   for (int k = 0; k < static_cast<int>(b.q.size()); ++k) {
@@ -134,24 +144,41 @@ Eigen::MatrixXd CeresPosterior(const Rig& rig,
   problem.SetParameterBlockConstant(b.p[gauge_keyframe].data());
   const std::vector<int> free = FreeComponents(rig);
   const Eigen::VectorXd prior = PriorSigmas(rig);
-  const auto size = static_cast<Eigen::Index>(free.size());
-  Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(prior.size(), size);
-  for (Eigen::Index i = 0; i < size; ++i) basis(free[i], i) = prior(free[i]);
+  model_->theta_size = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd basis =
+      Eigen::MatrixXd::Zero(prior.size(), model_->theta_size);
+  for (Eigen::Index i = 0; i < model_->theta_size; ++i) {
+    basis(free[i], i) = prior(free[i]);
+  }
   problem.SetManifold(b.theta.data(), MakeSubspaceManifold(basis).release());
+}
 
+CeresSegment::~CeresSegment() = default;
+
+Eigen::MatrixXd CeresSegment::Posterior() {
   ceres::Covariance::Options options;
   options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
   options.algorithm_type = ceres::SPARSE_QR;
   options.num_threads = 1;
   ceres::Covariance covariance(options);
-  std::vector<std::pair<const double*, const double*>> wanted = {
-      {b.theta.data(), b.theta.data()}};
-  if (!covariance.Compute(wanted, &problem)) return {};
+  const double* theta = model_->blocks.theta.data();
+  const std::vector<std::pair<const double*, const double*>> wanted = {
+      {theta, theta}};
+  if (!covariance.Compute(wanted, &model_->problem)) return {};
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> result(
-      size, size);
-  covariance.GetCovarianceBlockInTangentSpace(
-      b.theta.data(), b.theta.data(), result.data());
+      model_->theta_size, model_->theta_size);
+  covariance.GetCovarianceBlockInTangentSpace(theta, theta, result.data());
   return result;
+}
+
+bool CeresSegment::Evaluate() {
+  ceres::Problem::EvaluateOptions options;
+  options.num_threads = 1;
+  double cost = 0;
+  std::vector<double> residuals;
+  ceres::CRSMatrix jacobian;
+  return model_->problem.Evaluate(
+      options, &cost, &residuals, nullptr, &jacobian);
 }
 
 }  // namespace selfcal
