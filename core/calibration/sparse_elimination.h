@@ -18,6 +18,30 @@
 
 namespace selfcal {
 
+// Shared parameters that one landmark row can depend on.
+inline constexpr int kMaxRowShared = 16;
+
+// Two whitened rows that connect one landmark, the pose of one keyframe, and a
+// run of shared parameters that begins at shared_offset.
+struct LandmarkRows {
+  int keyframe = 0;
+  int shared_offset = 0;
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, kChainPoseSize> pose;
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxRowShared> shared;
+  Eigen::Matrix<double, 2, 3> landmark;
+};
+
+// Fifteen whitened rows between a keyframe and the next, and a run of shared
+// parameters that begins at shared_offset.
+struct LinkRows {
+  int shared_offset = 0;
+  ChainStateVector residual;
+  ChainStateMatrix x0;  // by the keyframe's state
+  ChainStateMatrix x1;  // by the next one's
+  Eigen::Matrix<double, kChainStateSize, Eigen::Dynamic> shared;
+};
+
 class SparseElimination {
  public:
   SparseElimination(int keyframes, int shared_size);

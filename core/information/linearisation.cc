@@ -1,10 +1,9 @@
 #include "core/information/linearisation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 
-#include "core/factor/inertial.h"
-#include "core/factor/reprojection.h"
 #include "core/information/weak_priors.h"
 
 namespace selfcal {
@@ -46,149 +45,131 @@ ChainStateMatrix GaugePrior(const KeyframeState& x) {
   return prior;
 }
 
-// One walk through a segment.
-class Linearisation {
- public:
-  Linearisation(const Rig& rig,
-                const Calibration& theta0,
-                const MotionSegment& segment,
-                const InlierSelection& selection,
-                const Eigen::VectorXd& theta_scale,
-                int gauge_keyframe)
-      : rig_(rig),
-        theta0_(theta0),
-        segment_(segment),
-        selection_(selection),
-        scale_(theta_scale),
-        gauge_(gauge_keyframe),
-        tracks_(segment.keyframes.size()) {
-    for (int j = 0; j < static_cast<int>(theta0.cameras.size()); ++j) {
-      camera_offsets_.push_back(CameraTangentOffset(theta0, j));
-    }
-    FindTracks();
-  }
-
-  LinearisedSegment Run() {
-    const int keyframes = static_cast<int>(segment_.keyframes.size());
-    elimination_.Start(static_cast<int>(scale_.size()));
-    for (int k = 0; k < keyframes; ++k) {
-      if (k == 0) elimination_.AddPrior(MotionPrior());
-      if (k == gauge_) {
-        elimination_.AddPrior(GaugePrior(segment_.keyframes[k]));
-      }
-      for (const std::span<const int> track : tracks_[k]) AddTrack(track);
-      if (k + 1 < keyframes) elimination_.Advance(Link(k));
-    }
-    LinearisedSegment result;
-    result.theta = elimination_.Finish();
-    for (const double sum : inertial_squares_) {
-      result.inertial_rms.push_back(std::sqrt(sum / (3.0 * (keyframes - 1))));
-    }
-    return result;
-  }
-
- private:
-  // Inliers are sorted by landmark, then keyframe: each run of a landmark is
-  // filed under the first keyframe that sees it.
-  void FindTracks() {
-    const std::span<const int> inliers = selection_.inliers;
-    for (std::size_t begin = 0; begin < inliers.size();) {
-      const Observation& first = segment_.observations[inliers[begin]];
-      std::size_t end = begin + 1;
-      while (end < inliers.size() &&
-             segment_.observations[inliers[end]].landmark == first.landmark) {
-        ++end;
-      }
-      tracks_[first.keyframe].push_back(inliers.subspan(begin, end - begin));
-      begin = end;
-    }
-  }
-
-  void AddTrack(std::span<const int> track) {
-    rows_.clear();
-    for (const int index : track) AddRows(segment_.observations[index]);
-    if (rows_.empty()) return;
-    elimination_.AddLandmark(
-        rows_, 1 / (kLandmarkPriorSigma_m * kLandmarkPriorSigma_m));
-  }
-
-  void AddRows(const Observation& observation) {
-    const KeyframeState& x = segment_.keyframes[observation.keyframe];
-    const Eigen::Vector3d& p_G = selection_.landmarks[observation.landmark];
-    Eigen::Vector2d r;
-    ReprojectionJacobians J;
-    if (!Reproject(x.q_GI,
-                   x.p_GI,
-                   theta0_.cameras[observation.camera],
-                   p_G.homogeneous(),
-                   observation.z_px,
-                   &r,
-                   &J)) {
-      return;
-    }
-    const double weight = 1 / rig_.pixel_sigma_px;
-    LandmarkRows& rows = rows_.emplace_back();
-    rows.keyframe = observation.keyframe;
-    rows.shared_offset = camera_offsets_[observation.camera];
-    rows.residual = weight * r;
-    rows.pose = weight * J.pose;
-    rows.landmark = weight * J.landmark.leftCols<3>();
-    rows.shared = weight * J.camera;
-    for (int c = 0; c < rows.shared.cols(); ++c) {
-      rows.shared.col(c) *= scale_(rows.shared_offset + c);
-    }
-  }
-
-  LinkRows Link(int k) {
-    const KeyframeState& x0 = segment_.keyframes[k];
-    const KeyframeState& x1 = segment_.keyframes[k + 1];
-    InertialJacobians J;
-    InertialMatrix covariance;
-    const InertialResidual r = EvaluateInertial(segment_.imu,
-                                                x0,
-                                                x1,
-                                                theta0_.imu,
-                                                rig_.imu_noise,
-                                                rig_.gravity_mps2,
-                                                &J,
-                                                &covariance);
-    const InertialMatrix W = SquareRootInformation(covariance);
-    LinkRows rows;
-    rows.residual = W * r;
-    rows.x0 = W * J.x0;
-    rows.x1 = W * J.x1;
-    rows.shared = W * J.theta * scale_.head<kImuTangentSize>().asDiagonal();
-    for (int kind = 0; kind < kKinds; ++kind) {
-      inertial_squares_[kind] +=
-          rows.residual.segment<3>(3 * kind).squaredNorm();
-    }
-    return rows;
-  }
-
-  const Rig& rig_;
-  const Calibration& theta0_;
-  const MotionSegment& segment_;
-  const InlierSelection& selection_;
-  const Eigen::VectorXd& scale_;
-  const int gauge_;
-  std::vector<std::vector<std::span<const int>>> tracks_;
-  std::vector<int> camera_offsets_;
-  std::vector<LandmarkRows> rows_;
-  ChainElimination elimination_;
-  double inertial_squares_[kKinds] = {};
-};
-
 }  // namespace
 
-LinearisedSegment EliminateSegment(const Rig& rig,
-                                   const Calibration& theta0,
-                                   const MotionSegment& segment,
-                                   const InlierSelection& selection,
-                                   const Eigen::VectorXd& theta_scale,
-                                   int gauge_keyframe) {
-  return Linearisation(
-             rig, theta0, segment, selection, theta_scale, gauge_keyframe)
-      .Run();
+void SegmentLineariser::FindTracks(const MotionSegment& segment,
+                                   const InlierSelection& selection) {
+  points_.resize(3 * selection.landmarks.size());
+  for (std::size_t m = 0; m < selection.landmarks.size(); ++m) {
+    Eigen::Vector3d::Map(&points_[3 * m]) = selection.landmarks[m];
+  }
+  tracks_.clear();
+  track_keyframes_.clear();
+  factor_of_observation_.assign(segment.observations.size(), -1);
+  int landmark = -1;
+  for (const int index : selection.inliers) {
+    const Observation& o = segment.observations[index];
+    const int factor = static_cast<int>(track_keyframes_.size());
+    if (o.landmark != landmark) tracks_.push_back(factor);
+    landmark = o.landmark;
+    factor_of_observation_[index] = factor;
+    track_keyframes_.push_back(o.keyframe);
+  }
+  tracks_.push_back(static_cast<int>(track_keyframes_.size()));
+}
+
+void SegmentLineariser::LineariseViews(const Rig& rig,
+                                       const Calibration& theta0,
+                                       const MotionSegment& segment,
+                                       const ObservationOrder& order) {
+  runs_.Select(segment, order.ByView(), [&](int index) {
+    return factor_of_observation_[index] >= 0;
+  });
+  factors_.clear();
+  for (const int index : runs_.indices()) {
+    factors_.push_back(factor_of_observation_[index]);
+  }
+  rows_begin_.clear();
+  std::size_t end = 0;
+  for (const ObservationRuns::Run& run : runs_.runs()) {
+    rows_begin_.push_back(end);
+    end += static_cast<std::size_t>(2 * (run.end - run.begin)) *
+           RowsStride(camera_sizes_[run.camera]);
+  }
+  // The kernels may write whole vectors beyond the last.
+  constexpr int kBeyond = 2 * 8 * RowsStride(6 + kMaxIntrinsics);
+  if (rows_.size() < end + kBeyond) rows_.resize(end + kBeyond);
+  for (std::size_t i = 0; i < rows_begin_.size(); ++i) {
+    reprojection_.Linearise(runs_.Arrays(runs_.runs()[i], segment, theta0),
+                            points_.data(),
+                            rig.pixel_sigma_px,
+                            nullptr,
+                            &rows_[rows_begin_[i]]);
+  }
+}
+
+void SegmentLineariser::LineariseLinks(const Rig& rig,
+                                       const Calibration& theta0,
+                                       const MotionSegment& segment) {
+  links_.clear();
+  for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
+    links_.push_back(
+        {&segment.keyframes[k], &segment.keyframes[k + 1], segment.imu});
+  }
+  roots_.resize(std::max(roots_.size(), links_.size()));
+  transitions_.resize(std::max(transitions_.size(), links_.size()));
+  inertial_.Linearise(links_,
+                      theta0.imu,
+                      rig.imu_noise,
+                      rig.gravity_mps2,
+                      std::span(roots_).first(links_.size()),
+                      /*compute_roots=*/true,
+                      transitions_.data());
+  double squares[kKinds] = {};
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    for (int j = 0; j < kStateTangentSize; ++j) {
+      const double r = transitions_[i].whitened[j];
+      squares[j / 3] += r * r;
+    }
+  }
+  result_.inertial_rms.clear();
+  for (const double sum : squares) {
+    result_.inertial_rms.push_back(
+        std::sqrt(sum / (3.0 * static_cast<double>(links_.size()))));
+  }
+}
+
+void SegmentLineariser::Linearise(const Rig& rig,
+                                  const Calibration& theta0,
+                                  const MotionSegment& segment,
+                                  const InlierSelection& selection,
+                                  const ObservationOrder& order) {
+  camera_sizes_.clear();
+  for (const CameraCalibration& camera : theta0.cameras) {
+    camera_sizes_.push_back(CameraTangentSize(camera));
+  }
+  FindTracks(segment, selection);
+  LineariseViews(rig, theta0, segment, order);
+  LineariseLinks(rig, theta0, segment);
+}
+
+const LinearisedSegment& SegmentLineariser::Eliminate(
+    const MotionSegment& segment, int gauge_keyframe) {
+  const int keyframes = static_cast<int>(segment.keyframes.size());
+  elimination_.Start({keyframes, camera_sizes_, tracks_, track_keyframes_});
+  for (std::size_t i = 0; i < rows_begin_.size(); ++i) {
+    const ObservationRuns::Run& run = runs_.runs()[i];
+    elimination_.AddObservations(
+        run.keyframe,
+        run.camera,
+        &rows_[rows_begin_[i]],
+        std::span<const int>(factors_).subspan(run.begin, run.end - run.begin));
+  }
+  const Eigen::Matrix3d landmark_prior =
+      Information(kLandmarkPriorSigma_m) * Eigen::Matrix3d::Identity();
+  for (std::size_t m = 0; m + 1 < tracks_.size(); ++m) {
+    elimination_.AddLandmarkPrior(
+        static_cast<int>(m), landmark_prior, Eigen::Vector3d::Zero());
+  }
+  for (int k = 0; k < keyframes; ++k) {
+    if (k == 0) elimination_.AddPrior(MotionPrior());
+    if (k == gauge_keyframe) {
+      elimination_.AddPrior(GaugePrior(segment.keyframes[k]));
+    }
+    if (k + 1 < keyframes) elimination_.Advance(transitions_[k]);
+  }
+  elimination_.Finish(&result_.theta);
+  return result_;
 }
 
 }  // namespace selfcal

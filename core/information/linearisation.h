@@ -1,12 +1,15 @@
-// The whitened, linearised factors of a segment, handed to the elimination in
-// the order it needs (section IV-A, steps 1 and 2). Pure, any thread.
+// The whitened, linearised factors of a segment, handed to the elimination
+// (section IV-A, steps 1 and 2). Pure, deterministic for one width of vectors.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
 #include "core/elimination/chain_elimination.h"
+#include "core/factor/inertial_batch.h"
+#include "core/factor/reprojection_batch.h"
 #include "core/information/inliers.h"
+#include "core/information/observation_order.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
@@ -14,22 +17,62 @@
 namespace selfcal {
 
 struct LinearisedSegment {
-  SharedInformation theta;  // in units of theta_scale
+  SharedInformation theta;  // of all of its tangent, in its units
   // Root mean square of the whitened inertial residuals, by kind (rotation,
   // velocity, position, b_a, b_g).
   std::vector<double> inertial_rms;
 };
 
-// Linearises the inliers, all inertial factors and the weak priors of
-// weak_priors.h at the segment's states, the selection's landmarks and theta0,
-// and eliminates everything but theta. theta_scale is the unit of each tangent
-// component; 0 leaves a component out. The keyframe gauge_keyframe is held in
-// position and in rotation about gravity.
-LinearisedSegment EliminateSegment(const Rig& rig,
-                                   const Calibration& theta0,
-                                   const MotionSegment& segment,
-                                   const InlierSelection& selection,
-                                   const Eigen::VectorXd& theta_scale,
-                                   int gauge_keyframe);
+// A workspace for one thread: nothing is allocated once it has seen the largest
+// segment.
+class SegmentLineariser {
+ public:
+  explicit SegmentLineariser(VectorWidth width = WidestVectors())
+      : reprojection_(width), inertial_(width), elimination_(width) {}
+
+  // Linearises the inliers, all inertial factors and the weak priors of
+  // weak_priors.h at the segment's states, the selection's landmarks and
+  // theta0. `order` is that of the segment.
+  void Linearise(const Rig& rig,
+                 const Calibration& theta0,
+                 const MotionSegment& segment,
+                 const InlierSelection& selection,
+                 const ObservationOrder& order);
+
+  // Eliminates everything but theta from what was linearised. The keyframe
+  // gauge_keyframe is held in position and in rotation about gravity. The
+  // result is good until the next call.
+  const LinearisedSegment& Eliminate(const MotionSegment& segment,
+                                     int gauge_keyframe);
+
+ private:
+  void FindTracks(const MotionSegment& segment,
+                  const InlierSelection& selection);
+  void LineariseViews(const Rig& rig,
+                      const Calibration& theta0,
+                      const MotionSegment& segment,
+                      const ObservationOrder& order);
+  void LineariseLinks(const Rig& rig,
+                      const Calibration& theta0,
+                      const MotionSegment& segment);
+
+  ReprojectionBatch reprojection_;
+  InertialBatch inertial_;
+  ChainElimination elimination_;
+  LinearisedSegment result_;
+
+  ObservationRuns runs_;
+  std::vector<double> points_;  // p_G of the landmarks, 3 each
+  std::vector<int> camera_sizes_;
+  // The inliers as the elimination counts them: by landmark.
+  std::vector<int> tracks_, track_keyframes_;
+  std::vector<int> factor_of_observation_;  // -1 for what is no inlier
+  std::vector<int> factors_;                // by view
+  std::vector<double> rows_;                // by view
+  std::vector<std::size_t> rows_begin_;     // of each run
+  std::vector<InertialLinkStates> links_;
+  std::vector<InertialNoiseRoot> roots_;
+  std::vector<InertialTransition> transitions_;
+};
 
 }  // namespace selfcal

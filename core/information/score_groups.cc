@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/information/group_scorer.h"
 #include "core/information/segment_information.h"
-#include "core/information/unobserved.h"
 
 namespace selfcal {
 namespace {
@@ -18,116 +18,111 @@ constexpr double kShare = 1e-6;
 
 // 1/2 ln det of a symmetric positive definite matrix.
 double HalfLogDet(const Eigen::MatrixXd& matrix) {
-  const Eigen::LLT<Eigen::MatrixXd> llt(matrix);
-  return llt.matrixLLT().diagonal().array().log().sum();
+  DefiniteMatrix definite;
+  definite.Factor(matrix);
+  return definite.HalfLogDet();
 }
 
-Eigen::MatrixXd Inverse(const Eigen::MatrixXd& matrix) {
-  const auto identity = Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols());
-  const Eigen::MatrixXd inverse =
-      Eigen::LLT<Eigen::MatrixXd>(matrix).solve(identity);
-  return 0.5 * (inverse + inverse.transpose());
+double Constant(std::size_t k) {
+  return static_cast<double>(k) / 2 *
+         std::log(2 * std::numbers::pi * std::numbers::e);
 }
 
-// The free components of a rig, and Lambda over them in units of the prior.
-struct NormalisedInformation {
-  NormalisedInformation(const Rig& rig, const Eigen::MatrixXd& Lambda)
-      : free(FreeComponents(rig)),
-        prior(PriorSigmas(rig)),
-        reference(ReferenceSigmas(rig)) {
-    const Eigen::VectorXd scale = prior(free);
-    information = (scale * scale.transpose()).cwiseProduct(Lambda(free, free));
-    for (const TangentComponent& component : TangentComponents(rig.factory)) {
-      names.push_back(component.name);
-    }
-  }
-
-  // Positions of a group's components among the free ones.
-  std::vector<int> Positions(const std::vector<int>& components) const {
-    std::vector<int> positions;
-    for (const int component : components) {
-      const auto at = std::lower_bound(free.begin(), free.end(), component);
-      positions.push_back(static_cast<int>(at - free.begin()));
-    }
-    return positions;
-  }
-
-  std::vector<int> free;
-  Eigen::VectorXd prior;      // of all components
-  Eigen::VectorXd reference;  // of all components
-  Eigen::MatrixXd information;
-  std::vector<std::string> names;  // of all components
-};
-
-// Entropy of a covariance in units of the prior, normalised by sigma_ref.
-double NormalisedEntropy(const Eigen::MatrixXd& covariance,
-                         const Eigen::VectorXd& prior,
-                         const Eigen::VectorXd& reference) {
-  return Entropy(covariance, reference.cwiseQuotient(prior));
-}
-
-GroupScore ScoreGroup(const NormalisedInformation& normalised,
-                      const Eigen::MatrixXd& posterior,
-                      const std::string& name,
-                      const std::vector<int>& components) {
-  GroupScore score;
-  score.group = name;
-  score.size = static_cast<int>(components.size());
-  if (components.empty()) return score;
-  const std::vector<int> at = normalised.Positions(components);
-  const Eigen::MatrixXd covariance = posterior(at, at);
-  score.entropy = NormalisedEntropy(covariance,
-                                    normalised.prior(components),
-                                    normalised.reference(components));
-  score.gain = std::max(0.0, -HalfLogDet(covariance));
-  std::vector<std::string> names;
-  for (const int component : components) {
-    names.push_back(normalised.names[component]);
-  }
-  const Eigen::MatrixXd gained =
-      Inverse(covariance) - Eigen::MatrixXd::Identity(score.size, score.size);
-  Observability observability = AnalyseObservability(gained, names);
-  score.rank = observability.rank;
-  score.unobserved = std::move(observability.unobserved);
-  return score;
+// Of the free components, in units of the prior.
+Eigen::MatrixXd Normalise(const RigComponents& components,
+                          const Eigen::MatrixXd& Lambda) {
+  const std::vector<int>& free = components.free();
+  const Eigen::VectorXd scale = components.prior()(free);
+  return (scale * scale.transpose()).cwiseProduct(Lambda(free, free));
 }
 
 }  // namespace
 
+const Eigen::MatrixXd& DefiniteMatrix::Inverse() {
+  inverse_.setIdentity(llt_.rows(), llt_.cols());
+  llt_.solveInPlace(inverse_);
+  symmetric_ = inverse_.transpose();
+  symmetric_ = 0.5 * (symmetric_ + inverse_);
+  return symmetric_;
+}
+
+void GroupScorer::Observe(const Eigen::MatrixXd& information,
+                          std::span<const std::string> names,
+                          int* rank,
+                          std::vector<UnobservedDirection>* unobserved,
+                          DefiniteMatrix* workspace) {
+  unobserved->clear();
+  *rank = static_cast<int>(information.rows());
+  // All eigenvalues are above 1 if and only if this is positive definite.
+  less_one_ = information;
+  less_one_.diagonal().array() -= 1;
+  if (workspace->Factor(less_one_)) return;
+  Observability observability = AnalyseObservability(information, names);
+  *rank = observability.rank;
+  *unobserved = std::move(observability.unobserved);
+}
+
+void GroupScorer::Score(const RigComponents& components,
+                        const Eigen::MatrixXd& information,
+                        std::vector<GroupScore>* scores) {
+  const std::vector<RigComponents::Group>& groups = components.groups();
+  groups_.resize(groups.size());
+  scores->resize(groups.size());
+  posterior_information_ = information;
+  posterior_information_.diagonal().array() += 1;
+  posterior_.Factor(posterior_information_);
+  const Eigen::MatrixXd& posterior = posterior_.Inverse();
+  for (std::size_t q = 0; q < groups.size(); ++q) {
+    const RigComponents::Group& group = groups[q];
+    GroupWorkspace& workspace = groups_[q];
+    GroupScore& score = (*scores)[q];
+    score.group = group.name;
+    score.size = static_cast<int>(group.at.size());
+    score.entropy = 0;
+    score.gain = 0;
+    score.rank = 0;
+    score.unobserved.clear();
+    if (group.at.empty()) continue;
+    workspace.covariance = posterior(group.at, group.at);
+    workspace.posterior.Factor(workspace.covariance);
+    const double half_log_det = workspace.posterior.HalfLogDet();
+    score.entropy = Constant(group.at.size()) + half_log_det + group.log_scale;
+    score.gain = std::max(0.0, -half_log_det);
+    workspace.gained = workspace.posterior.Inverse();
+    workspace.gained.diagonal().array() -= 1;
+    Observe(workspace.gained,
+            group.names,
+            &score.rank,
+            &score.unobserved,
+            &workspace.observed);
+  }
+}
+
 double Entropy(const Eigen::MatrixXd& Sigma, const Eigen::VectorXd& sigma_ref) {
   const Eigen::VectorXd scale = sigma_ref.cwiseInverse();
-  const double k = static_cast<double>(Sigma.rows());
-  return k / 2 * std::log(2 * std::numbers::pi * std::numbers::e) +
+  return Constant(Sigma.rows()) +
          HalfLogDet(scale.asDiagonal() * Sigma * scale.asDiagonal());
 }
 
 std::vector<GroupScore> ScoreGroups(const Rig& rig,
                                     const Eigen::MatrixXd& Lambda) {
-  const NormalisedInformation normalised(rig, Lambda);
-  const auto size = normalised.information.rows();
-  const Eigen::MatrixXd posterior =
-      Inverse(normalised.information + Eigen::MatrixXd::Identity(size, size));
+  const RigComponents components(rig);
   std::vector<GroupScore> scores;
-  for (const ParameterGroup& group : rig.groups) {
-    scores.push_back(ScoreGroup(
-        normalised, posterior, group.name, GroupComponents(rig, group)));
-  }
+  GroupScorer().Score(components, Normalise(components, Lambda), &scores);
   return scores;
 }
 
 std::vector<std::optional<double>> EntropiesWithoutPrior(
     const Rig& rig, const Eigen::MatrixXd& Lambda) {
-  const NormalisedInformation normalised(rig, Lambda);
+  const RigComponents components(rig);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      normalised.information);
+      Normalise(components, Lambda));
   const auto null = (eigen.eigenvalues().array() < kUndetermined).count();
   const auto seen = eigen.eigenvalues().size() - null;
   std::vector<std::optional<double>> entropies;
-  for (const ParameterGroup& group : rig.groups) {
-    const std::vector<int> components = GroupComponents(rig, group);
-    const std::vector<int> at = normalised.Positions(components);
-    const Eigen::MatrixXd U = eigen.eigenvectors()(at, Eigen::all);
-    if (components.empty() ||
+  for (const RigComponents::Group& group : components.groups()) {
+    const Eigen::MatrixXd U = eigen.eigenvectors()(group.at, Eigen::all);
+    if (group.at.empty() ||
         (null > 0 && U.leftCols(null).cwiseAbs().maxCoeff() > kShare)) {
       entropies.push_back(std::nullopt);
       continue;
@@ -135,9 +130,8 @@ std::vector<std::optional<double>> EntropiesWithoutPrior(
     const Eigen::MatrixXd root =
         U.rightCols(seen) *
         eigen.eigenvalues().tail(seen).cwiseSqrt().cwiseInverse().asDiagonal();
-    entropies.push_back(NormalisedEntropy(root * root.transpose(),
-                                          normalised.prior(components),
-                                          normalised.reference(components)));
+    entropies.push_back(Constant(group.at.size()) +
+                        HalfLogDet(root * root.transpose()) + group.log_scale);
   }
   return entropies;
 }

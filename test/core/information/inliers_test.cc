@@ -9,7 +9,6 @@
 #include <tuple>
 
 #include "core/factor/reprojection.h"
-#include "core/information/refine_landmark.h"
 #include "test/core/information/test_segments.h"
 
 namespace selfcal {
@@ -166,42 +165,42 @@ double AppearanceError(const Rig& rig,
   return std::sqrt(sum / static_cast<double>(track.size() - 1));
 }
 
-TEST(RefineLandmark, BringsANoisyLandmarkBackAlthoughOneObservationIsWrong) {
+TEST(SelectInliers, BringsNoisyLandmarksBackAlthoughOneObservationIsWrong) {
   const Rig rig = HandheldRig("handheld");
   const MotionSegment truth = MovingSegment(rig, 7);
   std::vector<std::vector<int>> tracks(truth.landmarks.size());
   for (int i = 0; i < static_cast<int>(truth.observations.size()); ++i) {
     tracks[truth.observations[i].landmark].push_back(i);
   }
+  std::erase_if(tracks, [](const auto& track) { return track.size() < 8; });
   std::mt19937 random(2);
   std::normal_distribution<double> normal(0, 0.05);
-  int tried = 0, good = 0;
-  for (std::size_t m = 0; m < tracks.size(); ++m) {
-    if (tracks[m].size() < 8) continue;
-    MotionSegment segment = truth;
-    const int wrong = tracks[m][2];
-    segment.observations[wrong].z_px += Eigen::Vector2d(60, -45);
-    const int first = segment.observations[tracks[m][0]].keyframe;
+  MotionSegment segment = truth;
+  for (const std::vector<int>& track : tracks) {
+    segment.observations[track[2]].z_px += Eigen::Vector2d(60, -45);
+    const Observation& first = segment.observations[track[0]];
+    Eigen::Vector3d& p_G = segment.landmarks[first.landmark].p_G;
     const double distance_m =
-        (truth.landmarks[m].p_G - truth.keyframes[first].p_GI).norm();
-    const Eigen::Vector3d start_G =
-        truth.landmarks[m].p_G + distance_m * Eigen::Vector3d(normal(random),
-                                                              normal(random),
-                                                              normal(random));
-    const double before_px =
-        AppearanceError(rig, truth, tracks[m], wrong, start_G);
-    const Eigen::Vector3d refined_G = RefineLandmark(
-        rig.factory, rig.pixel_sigma_px, segment, tracks[m], start_G);
-    ASSERT_TRUE(refined_G.allFinite());
-    ++tried;
-    good += AppearanceError(rig, truth, tracks[m], wrong, refined_G) <
-            0.3 * before_px + 0.5;
+        (p_G - truth.keyframes[first.keyframe].p_GI).norm();
+    p_G += distance_m *
+           Eigen::Vector3d(normal(random), normal(random), normal(random));
   }
-  ASSERT_GT(tried, 50);
-  EXPECT_GT(good, 0.95 * tried);
+  const InlierSelection selection = Select(rig, segment);
+  int good = 0;
+  for (const std::vector<int>& track : tracks) {
+    const int landmark = segment.observations[track[0]].landmark;
+    const auto error_px = [&](const Eigen::Vector3d& p_G) {
+      return AppearanceError(rig, truth, track, track[2], p_G);
+    };
+    ASSERT_TRUE(selection.landmarks[landmark].allFinite());
+    good += error_px(selection.landmarks[landmark]) <
+            0.3 * error_px(segment.landmarks[landmark].p_G) + 0.5;
+  }
+  ASSERT_GT(tracks.size(), 50u);
+  EXPECT_GT(good, 0.95 * static_cast<double>(tracks.size()));
 }
 
-TEST(RefineLandmark, WithoutParallaxKeepsTheDistance) {
+TEST(SelectInliers, WithoutParallaxKeepsTheDistance) {
   const Rig rig = HandheldRig("handheld");
   const MotionSegment segment = RestingSegment(rig, 8);
   const InlierSelection selection = Select(rig, segment);

@@ -1,0 +1,68 @@
+// The scores that follow from the information of theta alone. A workspace:
+// nothing is allocated for a rig whose groups have the sizes of the last one,
+// where every direction is observed.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/information/rig_components.h"
+#include "core/information/segment_information.h"
+#include "core/information/unobserved.h"
+
+namespace selfcal {
+
+// Symmetric positive definite matrices of one size.
+class DefiniteMatrix {
+ public:
+  // False, and nothing else may be asked, where it is not positive definite.
+  template <class Matrix>
+  bool Factor(const Matrix& matrix) {
+    llt_.compute(matrix);
+    return llt_.info() == Eigen::Success;
+  }
+  // 1/2 ln det.
+  double HalfLogDet() const {
+    return llt_.matrixLLT().diagonal().array().log().sum();
+  }
+  const Eigen::MatrixXd& Inverse();
+
+ private:
+  Eigen::LLT<Eigen::MatrixXd> llt_;
+  Eigen::MatrixXd inverse_, symmetric_;
+};
+
+class GroupScorer {
+ public:
+  // `information` is that of the free components in units of the prior,
+  // symmetric, positive semidefinite.
+  void Score(const RigComponents& components,
+             const Eigen::MatrixXd& information,
+             std::vector<GroupScore>* scores);
+
+  // Of a block of such information: AnalyseObservability without its price
+  // where every direction is observed.
+  void Observe(const Eigen::MatrixXd& information,
+               std::span<const std::string> names,
+               int* rank,
+               std::vector<UnobservedDirection>* unobserved,
+               DefiniteMatrix* workspace);
+
+ private:
+  struct GroupWorkspace {
+    Eigen::MatrixXd covariance;
+    DefiniteMatrix posterior;
+    Eigen::MatrixXd gained;
+    DefiniteMatrix observed;
+  };
+
+  Eigen::MatrixXd posterior_information_;
+  DefiniteMatrix posterior_;
+  std::vector<GroupWorkspace> groups_;
+  Eigen::MatrixXd less_one_;
+};
+
+}  // namespace selfcal

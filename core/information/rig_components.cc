@@ -1,0 +1,64 @@
+#include "core/information/rig_components.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal {
+
+RigComponents::RigComponents(const Rig& rig)
+    : group_settings_(rig.groups),
+      prior_sigmas_(rig.prior_sigmas),
+      fixed_(rig.fixed),
+      free_(FreeComponents(rig)),
+      prior_(PriorSigmas(rig)) {
+  for (const CameraCalibration& camera : rig.factory.cameras) {
+    models_.push_back(camera.model);
+  }
+  const std::vector<TangentComponent> components =
+      TangentComponents(rig.factory);
+  const Eigen::VectorXd reference = ReferenceSigmas(rig);
+  for (const int i : free_) free_names_.push_back(components[i].name);
+  for (const ParameterGroup& settings : rig.groups) {
+    Group group;
+    group.name = settings.name;
+    for (const int i : GroupComponents(rig, settings)) {
+      const auto at = std::lower_bound(free_.begin(), free_.end(), i);
+      group.at.push_back(static_cast<int>(at - free_.begin()));
+      group.names.push_back(components[i].name);
+      group.log_scale += std::log(prior_(i) / reference(i));
+    }
+    groups_.push_back(std::move(group));
+  }
+}
+
+bool RigComponents::Fits(const Rig& rig) const {
+  const auto same_group = [](const ParameterGroup& a, const ParameterGroup& b) {
+    return a.name == b.name && a.patterns == b.patterns;
+  };
+  const auto same_setting = [](const ComponentSetting& a,
+                               const ComponentSetting& b) {
+    return a.pattern == b.pattern && a.value == b.value;
+  };
+  const auto same_model = [](DistortionModel model,
+                             const CameraCalibration& camera) {
+    return model == camera.model;
+  };
+  return !models_.empty() && fixed_ == rig.fixed &&
+         std::equal(models_.begin(),
+                    models_.end(),
+                    rig.factory.cameras.begin(),
+                    rig.factory.cameras.end(),
+                    same_model) &&
+         std::equal(group_settings_.begin(),
+                    group_settings_.end(),
+                    rig.groups.begin(),
+                    rig.groups.end(),
+                    same_group) &&
+         std::equal(prior_sigmas_.begin(),
+                    prior_sigmas_.end(),
+                    rig.prior_sigmas.begin(),
+                    rig.prior_sigmas.end(),
+                    same_setting);
+}
+
+}  // namespace selfcal

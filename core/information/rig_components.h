@@ -1,0 +1,47 @@
+// What a score needs of a rig, found once: its free components, their scales,
+// names and groups.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+class RigComponents {
+ public:
+  struct Group {
+    std::string name;
+    std::vector<int> at;             // among the free components, sorted
+    std::vector<std::string> names;  // of its components
+    double log_scale = 0;            // sum of ln(prior / reference)
+  };
+
+  RigComponents() = default;
+  explicit RigComponents(const Rig& rig);
+
+  // Whether this is what the rig's constructor would give.
+  bool Fits(const Rig& rig) const;
+
+  int size() const { return static_cast<int>(prior_.size()); }
+  const std::vector<int>& free() const { return free_; }
+  const std::vector<std::string>& free_names() const { return free_names_; }
+  const Eigen::VectorXd& prior() const { return prior_; }  // of all components
+  const std::vector<Group>& groups() const { return groups_; }
+
+ private:
+  // What all of this follows from.
+  std::vector<DistortionModel> models_;
+  std::vector<ParameterGroup> group_settings_;
+  std::vector<ComponentSetting> prior_sigmas_;
+  std::vector<std::string> fixed_;
+
+  std::vector<int> free_;
+  std::vector<std::string> free_names_;
+  Eigen::VectorXd prior_;
+  std::vector<Group> groups_;
+};
+
+}  // namespace selfcal
