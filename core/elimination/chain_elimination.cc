@@ -212,11 +212,15 @@ void ChainElimination::OpenSlots(int slots) {
     }
     first_place_ = 0;
   }
-  const int begin = Pose(slots_);
-  const int size = (slots - slots_) * kPose + kPanelPad;
-  for (int j = 0; j < fixed_; ++j) Zero(&Front(begin, j), size);
-  for (int j = Pose(0); j < Pose(slots); ++j) Zero(&Front(begin, j), size);
-  slots_ = slots;
+  for (; slots_ < slots; ++slots_) {
+    const int row = Pose(slots_);
+    const auto clear = [&](int column) {
+      double* entries = &Front(row, column);
+      for (int i = 0; i < kPose; ++i) entries[i] = 0;
+    };
+    for (int j = 0; j < fixed_; ++j) clear(j);
+    for (int j = Pose(0); j < row + kPose; ++j) clear(j);
+  }
 }
 
 // The panel of a landmark from its sums, and the root of its information.
@@ -389,7 +393,7 @@ void ChainElimination::TakeState() {
 // Puts x0 = A e + G z into x0^T S x0 + 2 x0^T Y z, and keeps Z = Y + S G.
 // G^T S G + G^T Y + Y^T G = G^T H + H^T G with H = Y + S G / 2.
 void ChainElimination::Substitute(const ChainTransition& link) {
-  alignas(64) double by_S[kState][32] = {};
+  alignas(64) double by_S[kState][32];
   const int size = fixed_ + PosesSize();
   for (int k = 0; k < kState; ++k) {
     std::copy_n(Row(&coupling_, k), size + kZeros, Row(&substituted_, k));
@@ -397,8 +401,7 @@ void ChainElimination::Substitute(const ChainTransition& link) {
     Zero(Row(&half_, k) + fixed_ + kPose, kPanelPad);
   }
   WithKernels([&](auto kernels) {
-    kernels.AddProduct(1,
-                       {&link.G[0][0], 32},
+    kernels.SetProduct({&link.G[0][0], 32},
                        ChainTransition::kColumns,
                        {information_.data(), kState},
                        kState,
@@ -420,11 +423,8 @@ void ChainElimination::Substitute(const ChainTransition& link) {
   // H^T G over what is fixed and the next pose, both ways round.
   const int size_f = fixed_ + kPose;
   const int stride = size_f + kPanelPad;
-  Zero(link_terms_.data(),
-       static_cast<std::size_t>(stride) * ChainTransition::kColumns);
   WithKernels([&](auto kernels) {
-    kernels.AddProduct(1,
-                       {half_.data(), panel_stride_},
+    kernels.SetProduct({half_.data(), panel_stride_},
                        size_f,
                        {&link.G[0][0], 32},
                        ChainTransition::kColumns,
@@ -466,28 +466,48 @@ void ChainElimination::Substitute(const ChainTransition& link) {
   });
 }
 
-// root = A L^-T with L L^T = I + A^T S A.
-void ChainElimination::FindRoot(const ChainTransition& link) {
-  using RowMajor = Eigen::Matrix<double, kState, 16, Eigen::RowMajor>;
-  const auto A = Eigen::Map<const RowMajor>(&link.A[0][0]).leftCols<kState>();
-  ChainStateMatrix L = ChainStateMatrix::Identity();
-  L.noalias() += A.transpose() * (information_ * A);
-  GuardedCholesky<kState>(&L);
-  const ChainStateMatrix root =
-      L.triangularView<Eigen::Lower>().solve(A.transpose());
-  Eigen::Map<RowMajor>(&root_[0][0]).leftCols<kState>() = root.transpose();
+// root_ = A L^-T with L L^T = M, by rows; A is the transpose of `panel`.
+void ChainElimination::FindRoot(double (*M)[16], double (*panel)[16]) {
+  WithKernels([&](auto kernels) {
+    kernels.FactorAndSolve(kState, &M[0][0], 16, &panel[0][0], 16, kState);
+  });
+  for (int i = 0; i < kState; ++i) {
+    for (int j = 0; j < kState; ++j) root_[i][j] = panel[j][i];
+  }
+}
+
+// M = I + A^T S A.
+void ChainElimination::FindRootOf(const ChainTransition& link) {
+  alignas(64) double by_S[kState][16];
+  alignas(64) double M[kState][16];
+  alignas(64) double panel[kState][16];
+  const ConstPanel A = {&link.A[0][0], 16};
+  WithKernels([&](auto kernels) {
+    kernels.SetProduct(A,
+                       kState,
+                       {information_.data(), kState},
+                       kState,
+                       kState,
+                       {&by_S[0][0], 16});
+    kernels.SetProduct(
+        {&by_S[0][0], 16}, kState, A, kState, kState, {&M[0][0], 16});
+  });
+  for (int i = 0; i < kState; ++i) {
+    M[i][i] += 1;
+    for (int j = 0; j < kState; ++j) panel[i][j] = link.A[j][i];
+  }
+  FindRoot(M, panel);
 }
 
 // Takes P^T P from the front, for P = root^T Z.
 void ChainElimination::Eliminate(const std::vector<double>& terms) {
   const int size = fixed_ + PosesSize();
-  for (int k = 0; k < kState; ++k) Zero(Row(&product_, k), size + kZeros);
   const int pose = Pose(0);
   const ConstPanel by_fixed = {product_.data(), panel_stride_};
   const ConstPanel by_pose = {product_.data() + fixed_, panel_stride_};
+  for (int k = 0; k < kState; ++k) Zero(Row(&product_, k) + size, kZeros);
   WithKernels([&](auto kernels) {
-    kernels.AddProduct(1,
-                       {terms.data(), panel_stride_},
+    kernels.SetProduct({terms.data(), panel_stride_},
                        size,
                        {&root_[0][0], 16},
                        kState,
@@ -525,7 +545,7 @@ void ChainElimination::Advance(const ChainTransition& link) {
   BeginKeyframe();
   TakeState();
   Substitute(link);
-  FindRoot(link);
+  FindRootOf(link);
   Eliminate(substituted_);
   RecordStep(&link);
   ++current_;
@@ -534,14 +554,13 @@ void ChainElimination::Advance(const ChainTransition& link) {
 
 // Eliminates the state that was taken by its own information alone.
 void ChainElimination::EliminateByItself() {
-  ChainStateMatrix L = information_;
-  GuardedCholesky<kState>(&L);
-  const ChainStateMatrix inverse =
-      L.triangularView<Eigen::Lower>().solve(ChainStateMatrix::Identity());
-  // By rows, L^-T.
+  alignas(64) double M[kState][16] = {};
+  alignas(64) double panel[kState][16] = {};
   for (int i = 0; i < kState; ++i) {
-    for (int j = 0; j < kState; ++j) root_[i][j] = inverse(j, i);
+    for (int j = 0; j < kState; ++j) M[i][j] = information_(i, j);
+    panel[i][i] = 1;
   }
+  FindRoot(M, panel);
   Eliminate(coupling_);
   RecordStep(nullptr);
 }

@@ -126,7 +126,8 @@ class ChainElimination {
   void SwapPoses(int slot);
   void TakeState();
   void Substitute(const ChainTransition& link);
-  void FindRoot(const ChainTransition& link);
+  void FindRoot(double (*M)[16], double (*panel)[16]);
+  void FindRootOf(const ChainTransition& link);
   void Eliminate(const std::vector<double>& terms);
   void EliminateByItself();
   void RecordStep(const ChainTransition* link);

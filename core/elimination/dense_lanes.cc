@@ -1,6 +1,7 @@
 #include "core/elimination/dense_lanes.h"
 
 #include "core/elimination/landmark_rows.h"
+#include "core/elimination/small_cholesky.h"
 #include "core/simd/lanes.h"
 
 namespace selfcal {
@@ -13,6 +14,9 @@ using T = Lanes<kLanes>;
 // factor a tile fills 16 registers.
 constexpr int kTileVectors = 3;
 constexpr int kTileColumns = 4;
+
+// What becomes of a sum: it is written (kSet), or it is added with a sign.
+constexpr double kSet = 0;
 
 // One tile of V vectors by N columns.
 template <int V, int N>
@@ -42,7 +46,9 @@ inline void AddTile(double sign,
   for (int n = 0; n < N; ++n) {
     for (int v = 0; v < V; ++v) {
       double* place = to + n * to_stride + v * kLanes;
-      Store(Load<kLanes>(place) + signs * sums[n][v], place);
+      Store(
+          sign == kSet ? sums[n][v] : Load<kLanes>(place) + signs * sums[n][v],
+          place);
     }
   }
 }
@@ -126,6 +132,12 @@ void AddAll(double sign,
 }  // namespace
 
 template <int W>
+void DenseLanes<W>::SetProduct(
+    ConstPanel a, int rows, ConstPanel b, int columns, int depth, Target to) {
+  AddAll(kSet, a, rows, nullptr, 1, depth, b, columns, false, to);
+}
+
+template <int W>
 void DenseLanes<W>::AddProduct(double sign,
                                ConstPanel a,
                                int rows,
@@ -172,14 +184,51 @@ void DenseLanes<W>::AddLandmarkProducts(const double* rows,
       const T by_x = -x[kRowsPosition + j];
       const T by_y = -y[kRowsPosition + j];
       double* sums = to.sums + j * stride;
-      double first[kRowsOwn + W];
+      double* poses = to.poses + j * to.pose_stride;
       for (int c = 0; c < stride; c += W) {
         const T product = by_x * Load<W>(x + c) + by_y * Load<W>(y + c);
         Store(Load<W>(sums + c) + product, sums + c);
-        if (c < kRowsOwn) Store(product, first + c);
+        if (c + W <= kRowsOwn) {
+          Store(Load<W>(poses + c) + product, poses + c);
+        } else {
+          for (int i = 0; c + i < kRowsOwn; ++i) poses[c + i] += product[i];
+        }
       }
-      double* poses = to.poses + j * to.pose_stride;
-      for (int c = 0; c < kRowsOwn; ++c) poses[c] += first[c];
+    }
+  }
+}
+
+template <int W>
+void DenseLanes<W>::FactorAndSolve(int n,
+                                   double* matrix,
+                                   int stride,
+                                   double* panel,
+                                   int panel_stride,
+                                   int columns) {
+  constexpr int kLargest = 16;
+  double masses[kLargest];
+  for (int j = 0; j < n; ++j) masses[j] = matrix[j * stride + j];
+  for (int j = 0; j < n; ++j) {
+    double* row = matrix + j * stride;
+    const double floor = masses[j] > 0 ? kPivotFloor * masses[j] : 1.0;
+    const double pivot = row[j] > floor ? row[j] : floor;
+    const double inverse = 1 / __builtin_sqrt(pivot);
+    const T scale = inverse;
+    const int begin = j / W * W;
+    for (int c = begin; c < n; c += W) Store(scale * Load<W>(row + c), row + c);
+    row[j] = pivot * inverse;
+    double* x = panel + j * panel_stride;
+    for (int c = 0; c < columns; c += W) Store(scale * Load<W>(x + c), x + c);
+    for (int i = j + 1; i < n; ++i) {
+      const T factor = row[i];
+      double* other = matrix + i * stride;
+      for (int c = i / W * W; c < n; c += W) {
+        Store(Load<W>(other + c) - factor * Load<W>(row + c), other + c);
+      }
+      double* y = panel + i * panel_stride;
+      for (int c = 0; c < columns; c += W) {
+        Store(Load<W>(y + c) - factor * Load<W>(x + c), y + c);
+      }
     }
   }
 }

@@ -31,8 +31,11 @@ struct LandmarkTarget {
 
 template <int W>
 struct DenseLanes {
-  // to(i, j) += sign sum_k a(k, i) b(k, j), for i < rows, j < columns,
-  // k < depth.
+  // to(i, j) = sum_k a(k, i) b(k, j), for i < rows, j < columns, k < depth.
+  static void SetProduct(
+      ConstPanel a, int rows, ConstPanel b, int columns, int depth, Target to);
+
+  // to(i, j) += sign sum_k a(k, i) b(k, j).
   static void AddProduct(double sign,
                          ConstPanel a,
                          int rows,
@@ -70,6 +73,17 @@ struct DenseLanes {
                                   int stride,
                                   int count,
                                   const LandmarkTarget* targets);
+
+  // Factors a symmetric matrix of n rows (n <= 16, `stride` apart, whole
+  // vectors) as U^T U, its upper triangle becoming U, with the guard of
+  // small_cholesky.h, and overwrites the columns x of a panel of n rows by
+  // U^-T x.
+  static void FactorAndSolve(int n,
+                             double* matrix,
+                             int stride,
+                             double* panel,
+                             int panel_stride,
+                             int columns);
 
   // Overwrites the columns x of a panel of 3 rows by L^-1 x, for L lower
   // triangular (00 10 11 20 21 22), 1 / L_ii on the diagonal.
