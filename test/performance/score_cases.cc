@@ -4,9 +4,7 @@
 
 #include <string>
 
-#include "core/factor/inertial.h"
-#include "core/factor/reprojection.h"
-#include "core/information/segment_information.h"
+#include "core/information/linearisation.h"
 #include "core/simd/vector_width.h"
 #include "test/performance/cases.h"
 #include "test/performance/scene.h"
@@ -57,51 +55,23 @@ Measurement AgainstCeresEvaluate(const TimingOptions& options) {
                       options);
 }
 
-// Residuals, Jacobians and whitening of all factors of a segment.
-void Linearise(const Scene& scene,
-               const MotionSegment& segment,
-               const InlierSelection& selection) {
-  const Rig& rig = scene.rig;
-  const Calibration& theta0 = rig.factory;
-  Eigen::Vector2d r;
-  ReprojectionJacobians reprojection;
-  for (const int index : selection.inliers) {
-    const Observation& o = segment.observations[index];
-    const KeyframeState& x = segment.keyframes[o.keyframe];
-    Reproject(x.q_GI,
-              x.p_GI,
-              theta0.cameras[o.camera],
-              selection.landmarks[o.landmark].homogeneous(),
-              o.z_px,
-              &r,
-              &reprojection);
-    benchmark::DoNotOptimize(r);
-    benchmark::DoNotOptimize(reprojection);
-  }
-  InertialJacobians inertial;
-  InertialMatrix covariance;
-  for (std::size_t k = 0; k + 1 < segment.keyframes.size(); ++k) {
-    benchmark::DoNotOptimize(EvaluateInertial(segment.imu,
-                                              segment.keyframes[k],
-                                              segment.keyframes[k + 1],
-                                              theta0.imu,
-                                              rig.imu_noise,
-                                              rig.gravity_mps2,
-                                              &inertial,
-                                              &covariance));
-    benchmark::DoNotOptimize(inertial);
-    benchmark::DoNotOptimize(SquareRootInformation(covariance));
-  }
-}
-
 Measurement AgainstLinearisation(const TimingOptions& options) {
   const Scene scene = MakeScene();
   const MotionSegment& segment = scene.segments.front();
   const InlierSelection selection = Select(scene, segment);
-  return CompareTimes(
-      ScoreOf(scene, WidestVectors()),
-      {"linearisation", [&] { Linearise(scene, segment, selection); }},
-      options);
+  ObservationOrder order;
+  order.Find(segment, static_cast<int>(scene.rig.factory.cameras.size()));
+  SegmentLineariser lineariser;
+  return CompareTimes(ScoreOf(scene, WidestVectors()),
+                      {"linearisation",
+                       [&] {
+                         lineariser.Linearise(scene.rig,
+                                              scene.rig.factory,
+                                              segment,
+                                              selection,
+                                              order);
+                       }},
+                      options);
 }
 
 }  // namespace
