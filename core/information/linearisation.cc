@@ -48,7 +48,8 @@ ChainStateMatrix GaugePrior(const KeyframeState& x) {
 }  // namespace
 
 void SegmentLineariser::FindTracks(const MotionSegment& segment,
-                                   const InlierSelection& selection) {
+                                   const InlierSelection& selection,
+                                   const ObservationOrder& order) {
   points_.resize(3 * selection.landmarks.size());
   for (std::size_t m = 0; m < selection.landmarks.size(); ++m) {
     Eigen::Vector3d::Map(&points_[3 * m]) = selection.landmarks[m];
@@ -66,12 +67,6 @@ void SegmentLineariser::FindTracks(const MotionSegment& segment,
     track_keyframes_.push_back(o.keyframe);
   }
   tracks_.push_back(static_cast<int>(track_keyframes_.size()));
-}
-
-void SegmentLineariser::LineariseViews(const Rig& rig,
-                                       const Calibration& theta0,
-                                       const MotionSegment& segment,
-                                       const ObservationOrder& order) {
   runs_.Select(segment, order.ByView(), [&](int index) {
     return factor_of_observation_[index] >= 0;
   });
@@ -79,22 +74,27 @@ void SegmentLineariser::LineariseViews(const Rig& rig,
   for (const int index : runs_.indices()) {
     factors_.push_back(factor_of_observation_[index]);
   }
-  rows_begin_.clear();
-  std::size_t end = 0;
+}
+
+// Calls use(run, rows) for the rows of each keyframe and camera, while they are
+// near.
+template <typename Use>
+void SegmentLineariser::LineariseViews(const Rig& rig,
+                                       const Calibration& theta0,
+                                       const MotionSegment& segment,
+                                       const Use& use) {
   for (const ObservationRuns::Run& run : runs_.runs()) {
-    rows_begin_.push_back(end);
-    end += static_cast<std::size_t>(2 * (run.end - run.begin)) *
-           RowsStride(camera_sizes_[run.camera]);
-  }
-  // The kernels may write whole vectors beyond the last.
-  constexpr int kBeyond = 2 * 8 * RowsStride(6 + kMaxIntrinsics);
-  if (rows_.size() < end + kBeyond) rows_.resize(end + kBeyond);
-  for (std::size_t i = 0; i < rows_begin_.size(); ++i) {
-    reprojection_.Linearise(runs_.Arrays(runs_.runs()[i], segment, theta0),
+    // The kernels may write a whole vector beyond the last.
+    const std::size_t rows = 2 * (run.end - run.begin + kPanelPad);
+    const std::size_t size =
+        rows * RowsStride(CameraTangentSize(theta0.cameras[run.camera]));
+    if (rows_.size() < size) rows_.resize(size);
+    reprojection_.Linearise(runs_.Arrays(run, segment, theta0),
                             points_.data(),
                             rig.pixel_sigma_px,
                             nullptr,
-                            &rows_[rows_begin_[i]]);
+                            rows_.data());
+    use(run, rows_.data());
   }
 }
 
@@ -129,32 +129,42 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
   }
 }
 
-void SegmentLineariser::Linearise(const Rig& rig,
-                                  const Calibration& theta0,
-                                  const MotionSegment& segment,
-                                  const InlierSelection& selection,
-                                  const ObservationOrder& order) {
-  camera_sizes_.clear();
-  for (const CameraCalibration& camera : theta0.cameras) {
-    camera_sizes_.push_back(CameraTangentSize(camera));
-  }
-  FindTracks(segment, selection);
-  LineariseViews(rig, theta0, segment, order);
+void SegmentLineariser::LineariseAlone(const Rig& rig,
+                                       const Calibration& theta0,
+                                       const MotionSegment& segment,
+                                       const InlierSelection& selection,
+                                       const ObservationOrder& order) {
+  FindTracks(segment, selection, order);
+  LineariseViews(rig, theta0, segment, [](const auto&, const double*) {});
   LineariseLinks(rig, theta0, segment);
 }
 
 const LinearisedSegment& SegmentLineariser::Eliminate(
-    const MotionSegment& segment, int gauge_keyframe) {
+    const Rig& rig,
+    const Calibration& theta0,
+    const MotionSegment& segment,
+    const InlierSelection& selection,
+    const ObservationOrder& order,
+    int gauge_keyframe) {
+  camera_sizes_.clear();
+  for (const CameraCalibration& camera : theta0.cameras) {
+    camera_sizes_.push_back(CameraTangentSize(camera));
+  }
+  FindTracks(segment, selection, order);
   const int keyframes = static_cast<int>(segment.keyframes.size());
   elimination_.Start({keyframes, camera_sizes_, tracks_, track_keyframes_});
-  for (std::size_t i = 0; i < rows_begin_.size(); ++i) {
-    const ObservationRuns::Run& run = runs_.runs()[i];
-    elimination_.AddObservations(
-        run.keyframe,
-        run.camera,
-        &rows_[rows_begin_[i]],
-        std::span<const int>(factors_).subspan(run.begin, run.end - run.begin));
-  }
+  LineariseViews(rig,
+                 theta0,
+                 segment,
+                 [&](const ObservationRuns::Run& run, const double* rows) {
+                   elimination_.AddObservations(
+                       run.keyframe,
+                       run.camera,
+                       rows,
+                       std::span<const int>(factors_).subspan(
+                           run.begin, run.end - run.begin));
+                 });
+  LineariseLinks(rig, theta0, segment);
   const Eigen::Matrix3d landmark_prior =
       Information(kLandmarkPriorSigma_m) * Eigen::Matrix3d::Identity();
   for (std::size_t m = 0; m + 1 < tracks_.size(); ++m) {

@@ -32,26 +32,32 @@ class SegmentLineariser {
 
   // Linearises the inliers, all inertial factors and the weak priors of
   // weak_priors.h at the segment's states, the selection's landmarks and
-  // theta0. `order` is that of the segment.
-  void Linearise(const Rig& rig,
-                 const Calibration& theta0,
-                 const MotionSegment& segment,
-                 const InlierSelection& selection,
-                 const ObservationOrder& order);
-
-  // Eliminates everything but theta from what was linearised. The keyframe
-  // gauge_keyframe is held in position and in rotation about gravity. The
-  // result is good until the next call.
-  const LinearisedSegment& Eliminate(const MotionSegment& segment,
+  // theta0, and eliminates everything but theta. The keyframe gauge_keyframe is
+  // held in position and in rotation about gravity. `order` is that of the
+  // segment. The result is good until the next call.
+  const LinearisedSegment& Eliminate(const Rig& rig,
+                                     const Calibration& theta0,
+                                     const MotionSegment& segment,
+                                     const InlierSelection& selection,
+                                     const ObservationOrder& order,
                                      int gauge_keyframe);
+
+  // The same factors without their elimination: what a benchmark compares with.
+  void LineariseAlone(const Rig& rig,
+                      const Calibration& theta0,
+                      const MotionSegment& segment,
+                      const InlierSelection& selection,
+                      const ObservationOrder& order);
 
  private:
   void FindTracks(const MotionSegment& segment,
-                  const InlierSelection& selection);
+                  const InlierSelection& selection,
+                  const ObservationOrder& order);
+  template <typename Use>
   void LineariseViews(const Rig& rig,
                       const Calibration& theta0,
                       const MotionSegment& segment,
-                      const ObservationOrder& order);
+                      const Use& use);
   void LineariseLinks(const Rig& rig,
                       const Calibration& theta0,
                       const MotionSegment& segment);
@@ -68,8 +74,7 @@ class SegmentLineariser {
   std::vector<int> tracks_, track_keyframes_;
   std::vector<int> factor_of_observation_;  // -1 for what is no inlier
   std::vector<int> factors_;                // by view
-  std::vector<double> rows_;                // by view
-  std::vector<std::size_t> rows_begin_;     // of each run
+  std::vector<double> rows_;                // of one run
   std::vector<InertialLinkStates> links_;
   std::vector<InertialNoiseRoot> roots_;
   std::vector<InertialTransition> transitions_;

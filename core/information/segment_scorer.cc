@@ -28,9 +28,8 @@ void SegmentScorer::Score(const Rig& rig,
   order_.Find(segment, static_cast<int>(theta0.cameras.size()));
   const InlierSelection& selection =
       selector_.Select(theta0, rig.pixel_sigma_px, segment, order_, options);
-  lineariser_.Linearise(rig, theta0, segment, selection, order_);
-  const LinearisedSegment& linearised =
-      lineariser_.Eliminate(segment, options.gauge_keyframe);
+  const LinearisedSegment& linearised = lineariser_.Eliminate(
+      rig, theta0, segment, selection, order_, options.gauge_keyframe);
   result->theta0 = theta0;
   result->residuals = selection.statistics;
   result->residuals.inertial_rms = linearised.inertial_rms;

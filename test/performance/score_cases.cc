@@ -62,16 +62,14 @@ Measurement AgainstLinearisation(const TimingOptions& options) {
   ObservationOrder order;
   order.Find(segment, static_cast<int>(scene.rig.factory.cameras.size()));
   SegmentLineariser lineariser;
-  return CompareTimes(ScoreOf(scene, WidestVectors()),
-                      {"linearisation",
-                       [&] {
-                         lineariser.Linearise(scene.rig,
-                                              scene.rig.factory,
-                                              segment,
-                                              selection,
-                                              order);
-                       }},
-                      options);
+  return CompareTimes(
+      ScoreOf(scene, WidestVectors()),
+      {"linearisation",
+       [&] {
+         lineariser.LineariseAlone(
+             scene.rig, scene.rig.factory, segment, selection, order);
+       }},
+      options);
 }
 
 }  // namespace
