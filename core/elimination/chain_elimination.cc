@@ -17,6 +17,8 @@ constexpr int kState = kChainStateSize;
 constexpr int kMotionPlace = kChainLinkShared;
 constexpr int kLandmarkPlace = kMotionPlace + kMotion;
 static_assert(kLandmarkPlace % 8 == 0);
+static_assert(kTransitionConstant == kLandmarkPlace);
+constexpr int kLinkColumns = kTransitionNextPose + kPose;
 // Zeros that must follow what counts in a panel: the rows of the largest tile.
 constexpr int kZeros = 3 * kPanelPad;
 
@@ -64,7 +66,7 @@ void ChainElimination::LayOut(const ChainShape& shape) {
     GrowTo(static_cast<std::size_t>(kState) * panel_stride_, panel);
   }
   GrowTo(static_cast<std::size_t>(fixed_ + kPose + kPanelPad) *
-             ChainTransition::kColumns,
+             kLinkColumns,
          &link_terms_);
 
   keyframe_stride_ = kPose + landmark_shared_ + 1;
@@ -402,7 +404,7 @@ void ChainElimination::Substitute(const ChainTransition& link) {
   }
   WithKernels([&](auto kernels) {
     kernels.SetProduct({&link.G[0][0], 32},
-                       ChainTransition::kColumns,
+                       kLinkColumns,
                        {information_.data(), kState},
                        kState,
                        kState,
@@ -410,9 +412,9 @@ void ChainElimination::Substitute(const ChainTransition& link) {
   });
   const auto add = [&](double factor, const double* terms, double* to) {
     for (int c = 0; c < kLandmarkPlace; ++c) to[c] += factor * terms[c];
-    to[constant_] += factor * terms[ChainTransition::kConstant];
+    to[constant_] += factor * terms[kTransitionConstant];
     for (int c = 0; c < kPose; ++c) {
-      to[fixed_ + c] += factor * terms[ChainTransition::kNextPose + c];
+      to[fixed_ + c] += factor * terms[kTransitionNextPose + c];
     }
   };
   for (int k = 0; k < kState; ++k) {
@@ -427,7 +429,7 @@ void ChainElimination::Substitute(const ChainTransition& link) {
     kernels.SetProduct({half_.data(), panel_stride_},
                        size_f,
                        {&link.G[0][0], 32},
-                       ChainTransition::kColumns,
+                       kLinkColumns,
                        kState,
                        {link_terms_.data(), stride});
   });
@@ -441,9 +443,9 @@ void ChainElimination::Substitute(const ChainTransition& link) {
     for (int i = to + 1; i < size_f; ++i) Front(place(i), at) += terms[i];
   };
   for (int c = 0; c < kLandmarkPlace; ++c) fold(c, c);
-  fold(ChainTransition::kConstant, constant_);
+  fold(kTransitionConstant, constant_);
   for (int c = 0; c < kPose; ++c) {
-    fold(ChainTransition::kNextPose + c, fixed_ + c);
+    fold(kTransitionNextPose + c, fixed_ + c);
   }
 
   // Y^T G between the other poses and these.
@@ -461,8 +463,8 @@ void ChainElimination::Substitute(const ChainTransition& link) {
                          FrontAt(pose + kPose, to));
     };
     add_rest(0, kLandmarkPlace, 0);
-    add_rest(ChainTransition::kConstant, 1, constant_);
-    add_rest(ChainTransition::kNextPose, kPose, pose);
+    add_rest(kTransitionConstant, 1, constant_);
+    add_rest(kTransitionNextPose, kPose, pose);
   });
 }
 

@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "core/elimination/chain_structure.h"
+#include "core/elimination/chain_transition.h"
 #include "core/elimination/dense_lanes.h"
 #include "core/simd/vector_width.h"
 
@@ -44,18 +45,6 @@ inline constexpr int kChainLinkShared = 15;
 using ChainStateVector = Eigen::Matrix<double, kChainStateSize, 1>;
 using ChainStateMatrix =
     Eigen::Matrix<double, kChainStateSize, kChainStateSize>;
-
-// A link, by rows of the state of the earlier keyframe.
-struct ChainTransition {
-  // By the link parameters 15, the motion 9 of the next keyframe, the constant,
-  // the pose 6 of the next; one zero.
-  static constexpr int kNextMotion = kChainLinkShared;
-  static constexpr int kConstant = kNextMotion + kChainMotionSize;
-  static constexpr int kNextPose = kConstant + 1;
-  static constexpr int kColumns = kNextPose + kChainPoseSize;
-  double G[kChainStateSize][32];
-  double A[kChainStateSize][16];  // by e; one zero
-};
 
 // Rows (w0 x0 + w1 x1 + r) on the motion alone: for states that no IMU samples
 // connect. One row for each component; w0 = w1 = 0 says nothing.

@@ -52,8 +52,8 @@ void ChainElimination::FindSteps(
     if (step.linked) {
       const Eigen::Map<const RowMajorLink> G(&step.link.G[0][0]);
       x += G.leftCols<kLandmarkPlace>() * z.head<kLandmarkPlace>() +
-           G.col(ChainTransition::kConstant) +
-           G.middleCols<kPose>(ChainTransition::kNextPose) *
+           G.col(kTransitionConstant) +
+           G.middleCols<kPose>(kTransitionNextPose) *
                (*states)[k + 1].head<kPose>();
     }
   }

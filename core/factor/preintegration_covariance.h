@@ -3,43 +3,52 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 
 #include "core/factor/preintegration_step.h"
 
 namespace selfcal::preintegration {
 
+// Lower triangle of *m += a b^T, and of *m += [..] for a product that is
+// symmetric.
+template <typename T, typename A, typename B>
+void AddSymmetric(const A& a, const B& b, Matrix3<T>* m) {
+  for (int c = 0; c < 3; ++c) {
+    for (int r = c; r < 3; ++r) {
+      (*m)(r, c) += a(r, 0) * b(c, 0) + a(r, 1) * b(c, 1) + a(r, 2) * b(c, 2);
+    }
+  }
+}
+
 // Covariance of (psi, Delta_v, Delta_p), by blocks; psi is the left
 // perturbation of the rotation.
+template <typename T>
 class MotionCovariance {
  public:
   // Over a step the errors become (psi, v - dv x psi, p + h v - dp x psi).
-  void Propagate(const Stage& s) {
-    const Matrix3d p_r = pr_ + s.h * vr_ - Cross(s.dp, rr_);
-    const Matrix3d v_r = vr_ - Cross(s.dv, rr_);
-    const Matrix3d r_v = vr_.transpose();
-    const Matrix3d r_p = pr_.transpose();
+  void Propagate(const Stage<T>& s) {
+    const Matrix3<T> p_r = pr_ + s.h * vr_ - Cross<T, 3>(s.dp, rr_);
+    const Matrix3<T> v_r = vr_ - Cross<T, 3>(s.dv, rr_);
+    const Matrix3<T> r_v = vr_.transpose();
+    const Matrix3<T> r_p = pr_.transpose();
     // Of the new with the old first, then with the new.
-    const Matrix3d p_v = pv_ + s.h * vv_ - Cross(s.dp, r_v);
-    const Matrix3d p_p = pp_ + s.h * pv_.transpose() - Cross(s.dp, r_p);
-    vv_ += TimesSkew(v_r, s.dv) - Cross(s.dv, r_v);
-    pv_ = p_v + TimesSkew(p_r, s.dv);
-    pp_ = p_p + s.h * p_v + TimesSkew(p_r, s.dp);
+    const Matrix3<T> p_v = pv_ + s.h * vv_ - Cross<T, 3>(s.dp, r_v);
+    const Matrix3<T> p_p = pp_ + s.h * pv_.transpose() - Cross<T, 3>(s.dp, r_p);
+    vv_ += TimesSkew<T>(v_r, s.dv) - Cross<T, 3>(s.dv, r_v);
+    pv_ = p_v + TimesSkew<T>(p_r, s.dv);
+    pp_ = p_p + s.h * p_v + TimesSkew<T>(p_r, s.dp);
     pr_ = p_r;
     vr_ = v_r;
   }
 
-  // Noise that is constant over the step. turn_m and turn_1: derivative of the
-  // rotation in the middle and at the end by it.
-  void AddGyroNoise(const Stage& s,
-                    const Matrix3d& turn_m,
-                    const Matrix3d& turn_1,
-                    double density) {
-    const double sigma = density / std::sqrt(s.h);
-    const Matrix3d f_m = Cross(s.f_m, turn_m);
-    const Matrix3d r = sigma * turn_1;
-    const Matrix3d v = (-sigma * s.h / 6) * (4 * f_m + Cross(s.f_1, turn_1));
-    const Matrix3d p = (-sigma * s.h * s.h / 3) * f_m;
+  // Noise of the raw gyroscope that is constant over the step.
+  void AddGyroNoise(const Stage<T>& s,
+                    const RateResponse<T>& response,
+                    const Matrix3<T>& T_g_inverse,
+                    T density) {
+    const Matrix3<T> noise = Sigma(s, density) * T_g_inverse;
+    const Matrix3<T> r = response.psi.template leftCols<3>() * noise;
+    const Matrix3<T> v = response.v.template leftCols<3>() * noise;
+    const Matrix3<T> p = response.p.template leftCols<3>() * noise;
     rr_ += r * r.transpose();
     vr_ += v * r.transpose();
     pr_ += p * r.transpose();
@@ -49,40 +58,41 @@ class MotionCovariance {
   }
 
   // `correction` is the derivative of the force in the body by the raw reading.
-  void AddAccelNoise(const Stage& s,
-                     const Matrix3d& correction,
-                     double density) {
-    const double sigma = density / std::sqrt(s.h);
-    const Matrix3d v =
-        (sigma * s.h / 6) * (s.R_0 + 4 * s.R_m + s.R_1) * correction;
-    const Matrix3d p =
-        (sigma * s.h * s.h / 6) * (s.R_0 + 2 * s.R_m) * correction;
-    const Matrix3d vv = v * v.transpose();
+  void AddAccelNoise(const Stage<T>& s,
+                     const ForceResponse<T>& response,
+                     const Matrix3<T>& correction,
+                     T density) {
+    const Matrix3<T> noise = Sigma(s, density) * correction;
+    const Matrix3<T> v = response.v * noise;
+    const Matrix3<T> p = response.p * noise;
+    const Matrix3<T> vv = v * v.transpose();
     vv_ += vv;
     pv_ += p * v.transpose();
     // White noise is not constant over the step: about its mean it moves the
     // position by density^2 h^3 / 12 more. Without that, a single step would
     // tie velocity and position together and leave the covariance singular.
-    pp_ += p * p.transpose() + s.h * s.h / 12 * vv;
+    pp_ += p * p.transpose() + s.h * s.h * (1.0 / 12) * vv;
   }
 
-  // With the rotation perturbed on the right, in the order of Preintegration.
-  Eigen::Matrix<double, 9, 9> Result(const Matrix3d& R) const {
-    const Matrix3d v_r = vr_ * R;
-    const Matrix3d p_r = pr_ * R;
-    Eigen::Matrix<double, 9, 9> covariance;
-    covariance << R.transpose() * rr_ * R, v_r.transpose(), p_r.transpose(),
-        v_r, vv_, pv_.transpose(), p_r, pv_, pp_;
-    return covariance;
-  }
+  const Matrix3<T>& rr() const { return rr_; }
+  const Matrix3<T>& vr() const { return vr_; }
+  const Matrix3<T>& pr() const { return pr_; }
+  const Matrix3<T>& vv() const { return vv_; }
+  const Matrix3<T>& pv() const { return pv_; }
+  const Matrix3<T>& pp() const { return pp_; }
 
  private:
-  Matrix3d rr_ = Matrix3d::Zero();
-  Matrix3d vr_ = Matrix3d::Zero();
-  Matrix3d pr_ = Matrix3d::Zero();
-  Matrix3d vv_ = Matrix3d::Zero();
-  Matrix3d pv_ = Matrix3d::Zero();
-  Matrix3d pp_ = Matrix3d::Zero();
+  // Of the mean over the step. What it is multiplied with vanishes with h.
+  static T Sigma(const Stage<T>& s, T density) {
+    return density / Sqrt(Max(s.h, T(1e-30)));
+  }
+
+  Matrix3<T> rr_ = Matrix3<T>::Zero();
+  Matrix3<T> vr_ = Matrix3<T>::Zero();
+  Matrix3<T> pr_ = Matrix3<T>::Zero();
+  Matrix3<T> vv_ = Matrix3<T>::Zero();
+  Matrix3<T> pv_ = Matrix3<T>::Zero();
+  Matrix3<T> pp_ = Matrix3<T>::Zero();
 };
 
 }  // namespace selfcal::preintegration

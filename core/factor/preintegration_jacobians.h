@@ -5,101 +5,119 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "core/factor/preintegration.h"
 #include "core/factor/preintegration_step.h"
+#include "core/model/calibration.h"
 
 namespace selfcal::preintegration {
 
-// Derivatives by (b_g 3, s_g 3, m_g 3).
-using GyroJacobian = Eigen::Matrix<double, 3, 9>;
+// Of (psi, Delta_v, Delta_p), psi the left perturbation of the rotation, by
+// (b_a 3, b_g 3) and by theta_i in the order of calibration.h.
+template <typename T>
+struct MotionDerivatives {
+  Eigen::Matrix<T, 9, 6> bias;
+  Eigen::Matrix<T, 9, kImuTangentSize> theta;
+};
 
-// A corrected rate w = T^-1 (w~ - b) changes with (b, s, m) as it would if the
-// raw reading changed by -(I, dT/ds w, dT/dm w); T is upper triangular with s
-// on the diagonal and m above it.
-inline GyroJacobian ByGyroParameters(const Turn& turn,
-                                     const Vector3d& w_0,
-                                     const Vector3d& w_1) {
-  const auto column = [&](int row_of_T, int column_of_T) -> Vector3d {
-    return -turn.by_0.col(row_of_T) * w_0[column_of_T] -
-           turn.by_1.col(row_of_T) * w_1[column_of_T];
-  };
-  GyroJacobian J;
-  J << -turn.by_both(), column(0, 0), column(1, 1), column(2, 2), column(0, 1),
-      column(0, 2), column(1, 2);
-  return J;
-}
-
-// Derivatives of the motion by all parameters of both sensors; the rotation's,
-// psi, on the left.
+template <typename T>
 class MotionJacobians {
  public:
-  // dpsi_m and dpsi_1: what the step adds to psi in its middle and at its end.
-  // A force turns with its rotation, d f = psi x f.
-  void AddGyro(const Stage& s,
-               const GyroJacobian& dpsi_m,
-               const GyroJacobian& dpsi_1) {
-    const GyroJacobian f_m = Cross(s.f_m, dpsi_m);
-    p_gyro_ += s.h * v_gyro_ - Cross(s.dp, psi_) - s.h * s.h / 3 * f_m;
-    v_gyro_ -= Cross(s.dv, psi_) + s.h / 6 * (4 * f_m + Cross(s.f_1, dpsi_1));
-    psi_ += dpsi_1;
+  void AddGyro(const Stage<T>& s, const RateResponse<T>& response) {
+    for (int c = 0; c < 9; ++c) {
+      const Vector3<T> psi = psi_.col(c);
+      const Vector3<T> v = v_gyro_.col(c);
+      p_gyro_.col(c) += s.h * v - s.dp.cross(psi) + response.p.col(c);
+      v_gyro_.col(c) = v - s.dv.cross(psi) + response.v.col(c);
+      psi_.col(c) = psi + response.psi.col(c);
+    }
   }
 
-  void AddAccel(const Stage& s, const Reading& r0, const Reading& r1) {
-    AddForce(s, 1, 1, 0);
-    for (int i = 0; i < 3; ++i) AddForce(s, r0.h_A[i], r1.h_A[i], 1 + i);
+  void AddAccel(const Stage<T>& s,
+                const ForceResponse<T>& response,
+                const Reading<T>& r0,
+                const Reading<T>& r1) {
+    p_accel_[0] += s.h * v_accel_[0] + response.p;
+    v_accel_[0] += response.v;
+    const T sixth = s.h * (1.0 / 6);
+    for (int i = 0; i < 3; ++i) {
+      const T a_0 = sixth * r0.h_A[i];
+      const T a_1 = sixth * r1.h_A[i];
+      const T a_m = a_0 + a_1;  // half of what the middle weighs
+      Matrix3<T>& v = v_accel_[1 + i];
+      p_accel_[1 + i] += s.h * v + s.h * a_0 * s.R_0 + s.h * a_m * s.R_m;
+      v += a_0 * s.R_0 + 2.0 * a_m * s.R_m + a_1 * s.R_1;
+    }
   }
 
-  // `correction` is R_AI^T T_a^-1.
-  void Write(const Matrix3d& R,
-             const Matrix3d& R_IA,
-             const Matrix3d& correction,
-             Preintegration* result) const {
-    Eigen::Matrix<double, 9, 9> gyro;
-    gyro << R.transpose() * psi_, v_gyro_, p_gyro_;
-    result->J_bias.rightCols<3>() = gyro.leftCols<3>();
-    result->J_theta.middleCols<6>(kGyroScale) = gyro.rightCols<6>();
-    WriteAccel(v_accel_, R_IA, correction, 3, result);
-    WriteAccel(p_accel_, R_IA, correction, 6, result);
+  // `accel_correction` is R_AI^T T_a^-1.
+  MotionDerivatives<T> Result(const Correction<T>& correction,
+                              const Matrix3<T>& accel_correction) const {
+    MotionDerivatives<T> result;
+    const auto write_gyro = [&](const RateColumns<T>& by_rates, int row) {
+      WriteGyro(by_rates, correction.T_g_inverse, row, &result);
+    };
+    write_gyro(psi_, 0);
+    write_gyro(v_gyro_, 3);
+    write_gyro(p_gyro_, 6);
+    result.bias.template topLeftCorner<3, 3>().setZero();
+    result.theta.template block<3, 9>(0, kAccelScale).setZero();
+    WriteAccel(v_accel_, correction.R_IA, accel_correction, 3, &result);
+    WriteAccel(p_accel_, correction.R_IA, accel_correction, 6, &result);
+    return result;
   }
 
  private:
-  using Forces = std::array<Matrix3d, 4>;
+  using Forces = std::array<Matrix3<T>, 4>;
 
-  void AddForce(const Stage& s, double h_0, double h_1, int k) {
-    const Matrix3d a_0 = h_0 * s.R_0;
-    const Matrix3d a_m = (h_0 + h_1) * s.R_m;  // twice that of the middle
-    p_accel_[k] += s.h * v_accel_[k] + s.h * s.h / 6 * (a_0 + a_m);
-    v_accel_[k] += s.h / 6 * (a_0 + 2 * a_m + h_1 * s.R_1);
+  // A corrected rate w = B (w~ - b), B = T_g^-1, changes with (b, s, m) by
+  // -B (db + dT w).
+  static void WriteGyro(const RateColumns<T>& J,
+                        const Matrix3<T>& B,
+                        int row,
+                        MotionDerivatives<T>* result) {
+    result->bias.template block<3, 3>(row, 3) =
+        -J.template leftCols<3>().lazyProduct(B);
+    auto theta = result->theta.template middleRows<3>(row);
+    theta.col(kGyroScale + 0) = -B(0, 0) * J.col(3);
+    theta.col(kGyroScale + 1) = -B(0, 1) * J.col(6) - B(1, 1) * J.col(4);
+    theta.col(kGyroScale + 2) =
+        -B(0, 2) * J.col(7) - B(1, 2) * J.col(8) - B(2, 2) * J.col(5);
+    theta.col(kGyroMisalignment + 0) = -B(0, 0) * J.col(6);
+    theta.col(kGyroMisalignment + 1) = -B(0, 0) * J.col(7);
+    theta.col(kGyroMisalignment + 2) = -B(0, 1) * J.col(7) - B(1, 1) * J.col(8);
   }
 
   static void WriteAccel(const Forces& M,
-                         const Matrix3d& R_IA,
-                         const Matrix3d& B,
+                         const Matrix3<T>& R_IA,
+                         const Matrix3<T>& B,
                          int row,
-                         Preintegration* result) {
-    result->J_bias.block<3, 3>(row, 0) = -M[0] * B;
-    auto theta = result->J_theta.middleRows<3>(row);
-    theta.col(kAccelScale + 0) = -M[1] * B.col(0);
-    theta.col(kAccelScale + 1) = -M[2] * B.col(1);
-    theta.col(kAccelScale + 2) = -M[3] * B.col(2);
-    theta.col(kAccelMisalignment + 0) = -M[2] * B.col(0);
-    theta.col(kAccelMisalignment + 1) = -M[3] * B.col(0);
-    theta.col(kAccelMisalignment + 2) = -M[3] * B.col(1);
+                         MotionDerivatives<T>* result) {
+    result->bias.template block<3, 3>(row, 0) = -M[0].lazyProduct(B);
+    auto theta = result->theta.template middleRows<3>(row);
+    const auto product = [&](int k, int column) -> Vector3<T> {
+      return M[k].lazyProduct(B.col(column));
+    };
+    theta.col(kAccelScale + 0) = -product(1, 0);
+    theta.col(kAccelScale + 1) = -product(2, 1);
+    theta.col(kAccelScale + 2) = -product(3, 2);
+    theta.col(kAccelMisalignment + 0) = -product(2, 0);
+    theta.col(kAccelMisalignment + 1) = -product(3, 0);
+    theta.col(kAccelMisalignment + 2) = -product(3, 1);
     // (R_AI Exp(d))^T h = f + [f]x d.
-    theta.middleCols<3>(kAccelRotation) = TimesSkew(M[1], R_IA.col(0)) +
-                                          TimesSkew(M[2], R_IA.col(1)) +
-                                          TimesSkew(M[3], R_IA.col(2));
+    theta.template middleCols<3>(kAccelRotation) =
+        TimesSkew<T>(M[1], R_IA.col(0)) + TimesSkew<T>(M[2], R_IA.col(1)) +
+        TimesSkew<T>(M[3], R_IA.col(2));
   }
 
-  // By (b_g, s_g, m_g).
-  GyroJacobian psi_ = GyroJacobian::Zero();
-  GyroJacobian v_gyro_ = GyroJacobian::Zero();
-  GyroJacobian p_gyro_ = GyroJacobian::Zero();
+  RateColumns<T> psi_ = RateColumns<T>::Zero();
+  RateColumns<T> v_gyro_ = RateColumns<T>::Zero();
+  RateColumns<T> p_gyro_ = RateColumns<T>::Zero();
   // Integral and double integral of R h_k, for h_k in (1, h_A). A derivative of
   // f is a fixed matrix times one of these four, so these eight matrices carry
   // the derivatives by all accelerometer parameters.
-  Forces v_accel_ = {
-      Matrix3d::Zero(), Matrix3d::Zero(), Matrix3d::Zero(), Matrix3d::Zero()};
+  Forces v_accel_ = {Matrix3<T>::Zero(),
+                     Matrix3<T>::Zero(),
+                     Matrix3<T>::Zero(),
+                     Matrix3<T>::Zero()};
   Forces p_accel_ = v_accel_;
 };
 

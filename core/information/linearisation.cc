@@ -112,9 +112,10 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
                       theta0.imu,
                       rig.imu_noise,
                       rig.gravity_mps2,
+                      Eigen::Matrix<double, kImuTangentSize, 1>::Ones().eval()
+                          .data(),
                       std::span(roots_).first(links_.size()),
-                      /*compute_roots=*/true,
-                      transitions_.data());
+                      std::span(transitions_).first(links_.size()));
   double squares[kKinds] = {};
   for (std::size_t i = 0; i < links_.size(); ++i) {
     for (int j = 0; j < kStateTangentSize; ++j) {

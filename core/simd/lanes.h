@@ -133,6 +133,15 @@ void Transpose(Lanes<W>* block) {
   }
 }
 
+// to[l][i] = rows[i][l], for W rows.
+template <int W>
+void StoreTransposed(const Lanes<W>* rows, double* const* to) {
+  Lanes<W> block[W];
+  for (int i = 0; i < W; ++i) block[i] = rows[i];
+  Transpose(block);
+  for (int i = 0; i < W; ++i) Store(block[i], to[i]);
+}
+
 // The same for one value.
 inline double Select(bool mask, double if_true, double if_false) {
   return mask ? if_true : if_false;

@@ -97,9 +97,9 @@ ChainTransition Solve(const ChainRows& rows) {
   A.leftCols<15>() = solve(ChainStateMatrix::Identity());
   G.leftCols<15>() = -solve(rows.shared);
   const ChainStateMatrix next = -solve(rows.x1);
-  G.middleCols<9>(ChainTransition::kNextMotion) = next.rightCols<9>();
-  G.col(ChainTransition::kConstant) = -solve(rows.residual);
-  G.middleCols<6>(ChainTransition::kNextPose) = next.leftCols<6>();
+  G.middleCols<9>(kTransitionNextVelocity) = next.rightCols<9>();
+  G.col(kTransitionConstant) = -solve(rows.residual);
+  G.middleCols<6>(kTransitionNextPose) = next.leftCols<6>();
   return link;
 }
 

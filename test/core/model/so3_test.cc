@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/model/so3_lanes.h"
 #include "test/core/model/random_values.h"
 #include "test/core/numeric_jacobian.h"
 
@@ -49,10 +50,10 @@ TEST(Exp, IsTheMatrixExponentialAcrossTheSeries) {
   RandomValues random(3);
   for (int i = 0; i < kTrials; ++i) {
     const Eigen::Vector3d phi =
-        std::abs(random.SignedMagnitude(1e-12, 0.1)) * random.Direction();
+        std::abs(random.SignedMagnitude(1e-12, 1)) * random.Direction();
     Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
     Eigen::Matrix3d term = Eigen::Matrix3d::Identity();
-    for (int n = 1; n < 20; ++n) {
+    for (int n = 1; n < 25; ++n) {
       term = term * Skew(phi) / n;
       expected += term;
     }
@@ -153,16 +154,96 @@ TEST(RightJacobianInverse, InvertsTheRightJacobianUpToAndAtPi) {
   }
 }
 
-TEST(RightJacobian, IsContinuousAcrossTheSwitchToTheSeries) {
+TEST(So3, IsContinuousAcrossTheSwitchToTheSeries) {
   RandomValues random(12);
   for (int i = 0; i < kTrials; ++i) {
     const Eigen::Vector3d axis = random.Direction();
-    const Eigen::Vector3d below = 1e-2 * (1 - 1e-13) * axis;
-    const Eigen::Vector3d above = 1e-2 * (1 + 1e-13) * axis;
-    EXPECT_LT((RightJacobian(below) - RightJacobian(above)).norm(), 1e-14);
+    const Eigen::Vector3d below = kSeriesAngle * (1 - 1e-13) * axis;
+    const Eigen::Vector3d above = kSeriesAngle * (1 + 1e-13) * axis;
+    EXPECT_LT((Exp(below).coeffs() - Exp(above).coeffs()).norm(), 1e-13);
+    EXPECT_LT((RightJacobian(below) - RightJacobian(above)).norm(), 1e-13);
     EXPECT_LT(
         (RightJacobianInverse(below) - RightJacobianInverse(above)).norm(),
-        1e-14);
+        1e-13);
+  }
+}
+
+using Two = Lanes<2>;
+
+// One of the rotations in each lane.
+Eigen::Matrix<Two, 3, 1> Both(const Eigen::Vector3d& a,
+                              const Eigen::Vector3d& b) {
+  Eigen::Matrix<Two, 3, 1> both;
+  for (int i = 0; i < 3; ++i) {
+    both[i].Set(0, a[i]);
+    both[i].Set(1, b[i]);
+  }
+  return both;
+}
+
+template <typename Many, typename One>
+double LaneDifference(const Many& many, int lane, const One& one) {
+  double sum = 0;
+  for (int i = 0; i < one.size(); ++i) {
+    sum += std::abs(many.coeff(i)[lane] - one.coeff(i));
+  }
+  return sum;
+}
+
+TEST(So3, IsTheSameInEachLane) {
+  // Short and long rotations beside each other, and signs.
+  RandomValues random(13);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d phi[2] = {RandomPhi(&random, kPi),
+                                    RandomPhi(&random, 5)};
+    const Eigen::Matrix<Two, 3, 1> both = Both(phi[0], phi[1]);
+    const Eigen::Quaternion<Two> q = Exp(both);
+    const Eigen::Matrix<Two, 3, 1> log = Log(q);
+    const auto skew = Skew(both);
+    const auto J = RightJacobian(both);
+    const auto J_inverse = RightJacobianInverse(both);
+    for (int lane = 0; lane < 2; ++lane) {
+      const Eigen::Vector3d& p = phi[lane];
+      EXPECT_EQ(LaneDifference(skew.reshaped(), lane, Skew(p).reshaped()), 0);
+      EXPECT_LT(LaneDifference(q.coeffs(), lane, Exp(p).coeffs()), 4e-15);
+      EXPECT_LT(LaneDifference(log, lane, Log(Exp(p))), 1e-14);
+      EXPECT_LT(LaneDifference(J.reshaped(), lane, RightJacobian(p).reshaped()),
+                4e-15);
+      EXPECT_LE(
+          LaneDifference(
+              J_inverse.reshaped(), lane, RightJacobianInverse(p).reshaped()),
+          4e-15 * RightJacobianInverse(p).norm());
+    }
+  }
+}
+
+TEST(So3, OfTinyRotationsEachLaneKeepsEveryDigit) {
+  RandomValues random(14);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Vector3d phi[2] = {
+        std::abs(random.SignedMagnitude(1e-300, 1e-3)) * random.Direction(),
+        Eigen::Vector3d::Zero()};
+    const Eigen::Matrix<Two, 3, 1> log = Log(Exp(Both(phi[0], phi[1])));
+    EXPECT_LE(LaneDifference(log, 0, phi[0]), 4e-15 * phi[0].stableNorm());
+    EXPECT_EQ(LaneDifference(log, 1, phi[1]), 0);
+  }
+}
+
+TEST(So3, ByExactlyPiEachLaneTakesTheSameSignAsOne) {
+  RandomValues random(15);
+  for (int i = 0; i < kTrials; ++i) {
+    const Eigen::Quaterniond one(
+        Eigen::Vector4d(random.Direction().homogeneous().cwiseProduct(
+                            Eigen::Vector4d(1, i % 3 == 0 ? 0 : 1, 1, 0)))
+            .normalized());
+    Eigen::Quaternion<Two> both;
+    for (int k = 0; k < 4; ++k) {
+      both.coeffs()[k].Set(0, one.coeffs()[k]);
+      both.coeffs()[k].Set(1, -one.coeffs()[k]);
+    }
+    const Eigen::Matrix<Two, 3, 1> log = Log(both);
+    EXPECT_LT(LaneDifference(log, 0, Log(one)), 4e-15);
+    EXPECT_LT(LaneDifference(log, 1, Log(one)), 4e-15);
   }
 }
 

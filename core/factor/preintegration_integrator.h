@@ -1,0 +1,121 @@
+// Walks over the steps of the scheme of preintegration.h and accumulates the
+// motion, its derivatives and its covariance. Internal to core/factor.
+//
+// T is double, or Lanes for several intervals at once. Everything is expressed
+// in the body frame of the first keyframe, with rotations perturbed on their
+// left.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "core/factor/preintegration.h"
+#include "core/factor/preintegration_covariance.h"
+#include "core/factor/preintegration_jacobians.h"
+#include "core/factor/preintegration_step.h"
+
+namespace selfcal::preintegration {
+
+// As in Preintegration.
+template <typename T>
+struct Motion {
+  Eigen::Quaternion<T> Delta_R{T(1), T(0), T(0), T(0)};
+  Vector3<T> Delta_v = Vector3<T>::Zero();
+  Vector3<T> Delta_p = Vector3<T>::Zero();
+};
+
+template <typename T>
+class Integrator {
+ public:
+  // Begins at a reading.
+  Integrator(const Correction<T>& correction,
+             const ImuNoise& noise,
+             const PreintegrationParts& parts,
+             const Reading<T>& first)
+      : parts_(parts),
+        gyro_density_(noise.gyro_noise_density),
+        accel_density_(noise.accel_noise_density),
+        correction_(correction),
+        accel_correction_(correction.R_IA * correction.T_a_inverse),
+        reading_(first),
+        f_(first.f) {}
+
+  // To the next reading, h [s] later.
+  void Step(const Reading<T>& next, T h) {
+    const T h2 = h * h;
+    const Turn<T> turn_m(
+        h * (3.0 / 8), h * (1.0 / 8), h2 * (1.0 / 96), reading_, next);
+    const Turn<T> turn_1(
+        h * (1.0 / 2), h * (1.0 / 2), h2 * (1.0 / 12), reading_, next);
+    Stage<T> s;
+    s.h = h;
+    s.R_0 = R_;
+    const Matrix3<T> A_m = turn_m.LeftJacobian(R_);
+    // Exp(phi) = I + J_l(phi) [phi]x.
+    s.R_m = R_ + TimesSkew<T>(A_m, turn_m.phi);
+    Turned(turn_1.phi);
+    s.R_1 = R_;
+    s.f_m = s.R_m * (0.5 * (reading_.f + next.f));
+    s.f_1 = s.R_1 * next.f;
+    s.dv = h * (1.0 / 6) * (f_ + 4.0 * s.f_m + s.f_1);
+    s.dp = h2 * (1.0 / 6) * (f_ + 2.0 * s.f_m);
+
+    if (parts_.jacobians || parts_.covariance) {
+      Propagate(s, turn_m, A_m, turn_1, next);
+    }
+    motion_.Delta_p += h * motion_.Delta_v + s.dp;
+    motion_.Delta_v += s.dv;
+    reading_ = next;
+    f_ = s.f_1;
+  }
+
+  const Motion<T>& motion() const { return motion_; }
+  const Matrix3<T>& Delta_R() const { return R_; }
+  MotionDerivatives<T> Derivatives() const {
+    return jacobians_.Result(correction_, accel_correction_);
+  }
+  const MotionCovariance<T>& covariance() const { return covariance_; }
+
+ private:
+  // The norm stays one to rounding: where it is off by e, it is off by 3/8 e^2
+  // after that.
+  void Turned(const Vector3<T>& phi) {
+    Eigen::Quaternion<T>& q = motion_.Delta_R;
+    q = q * Exp(phi);
+    q.coeffs() *= 1.5 - 0.5 * q.coeffs().squaredNorm();
+    R_ = q.toRotationMatrix();
+  }
+
+  void Propagate(const Stage<T>& s,
+                 const Turn<T>& turn_m,
+                 const Matrix3<T>& A_m,
+                 const Turn<T>& turn_1,
+                 const Reading<T>& next) {
+    const RateResponse<T> rates = RespondToRates(s, turn_m, A_m, turn_1);
+    const ForceResponse<T> force = RespondToForce(s);
+    if (parts_.jacobians) {
+      jacobians_.AddGyro(s, rates);
+      jacobians_.AddAccel(s, force, reading_, next);
+    }
+    if (parts_.covariance) {
+      covariance_.Propagate(s);
+      covariance_.AddGyroNoise(
+          s, rates, correction_.T_g_inverse, gyro_density_);
+      covariance_.AddAccelNoise(s, force, accel_correction_, accel_density_);
+    }
+  }
+
+  const PreintegrationParts parts_;
+  const T gyro_density_, accel_density_;
+  const Correction<T> correction_;
+  const Matrix3<T> accel_correction_;
+
+  Reading<T> reading_;  // at the end of the last step
+  Vector3<T> f_;        // its force, in the frame of the first keyframe
+  Motion<T> motion_;
+  Matrix3<T> R_ = Matrix3<T>::Identity();
+  MotionJacobians<T> jacobians_;
+  MotionCovariance<T> covariance_;
+};
+
+}  // namespace selfcal::preintegration
