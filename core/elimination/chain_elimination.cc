@@ -65,8 +65,7 @@ void ChainElimination::LayOut(const ChainShape& shape) {
   for (auto* panel : {&coupling_, &substituted_, &product_, &half_}) {
     GrowTo(static_cast<std::size_t>(kState) * panel_stride_, panel);
   }
-  GrowTo(static_cast<std::size_t>(fixed_ + kPose + kPanelPad) *
-             kLinkColumns,
+  GrowTo(static_cast<std::size_t>(fixed_ + kPose + kPanelPad) * kLinkColumns,
          &link_terms_);
 
   keyframe_stride_ = kPose + landmark_shared_ + 1;

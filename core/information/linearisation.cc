@@ -108,14 +108,14 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
   }
   roots_.resize(std::max(roots_.size(), links_.size()));
   transitions_.resize(std::max(transitions_.size(), links_.size()));
-  inertial_.Linearise(links_,
-                      theta0.imu,
-                      rig.imu_noise,
-                      rig.gravity_mps2,
-                      Eigen::Matrix<double, kImuTangentSize, 1>::Ones().eval()
-                          .data(),
-                      std::span(roots_).first(links_.size()),
-                      std::span(transitions_).first(links_.size()));
+  inertial_.Linearise(
+      links_,
+      theta0.imu,
+      rig.imu_noise,
+      rig.gravity_mps2,
+      Eigen::Matrix<double, kImuTangentSize, 1>::Ones().eval().data(),
+      std::span(roots_).first(links_.size()),
+      std::span(transitions_).first(links_.size()));
   double squares[kKinds] = {};
   for (std::size_t i = 0; i < links_.size(); ++i) {
     for (int j = 0; j < kStateTangentSize; ++j) {
