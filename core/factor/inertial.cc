@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "core/factor/inertial_terms.h"
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -11,34 +12,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Offsets in the residual; the first three as in Preintegration.
-constexpr int kRotation = 0;
-constexpr int kVelocity = 3;
-constexpr int kPosition = 6;
-constexpr int kAccelBias = 9;
-constexpr int kGyroBias = 12;
-
-// What the two states say about the motion between them, in the body frame of
-// the first, gravity taken out.
-struct StateMotion {
-  Eigen::Quaterniond q_01;
-  Vector3d v;
-  Vector3d p;
-};
-
-StateMotion MotionBetween(const KeyframeState& x0,
-                          const KeyframeState& x1,
-                          double dt,
-                          double gravity_mps2) {
-  const Vector3d g(0, 0, -gravity_mps2);
-  const Eigen::Quaterniond q_IG = x0.q_GI.conjugate();
-  return {q_IG * x1.q_GI,
-          q_IG * (x1.v_GI - x0.v_GI - dt * g),
-          q_IG * (x1.p_GI - x0.p_GI - dt * x0.v_GI - 0.5 * dt * dt * g)};
-}
-
 void FillJacobians(const KeyframeState& x0,
-                   const StateMotion& motion,
+                   const StateMotion<double>& motion,
                    const Preintegration& imu,
                    const Vector3d& rotation_residual,
                    InertialJacobians* jacobians) {
@@ -48,32 +23,33 @@ void FillJacobians(const KeyframeState& x0,
 
   InertialMatrix& J1 = jacobians->x1;
   J1.setZero();
-  J1.block<3, 3>(kRotation, kStateRotation) = J_inverse;
-  J1.block<3, 3>(kVelocity, kStateVelocity) = R_IG;
-  J1.block<3, 3>(kPosition, kStatePosition) = R_IG;
-  J1.block<3, 3>(kAccelBias, kStateAccelBias) = I;
-  J1.block<3, 3>(kGyroBias, kStateGyroBias) = I;
+  J1.block<3, 3>(kResidualRotation, kStateRotation) = J_inverse;
+  J1.block<3, 3>(kResidualVelocity, kStateVelocity) = R_IG;
+  J1.block<3, 3>(kResidualPosition, kStatePosition) = R_IG;
+  J1.block<3, 3>(kResidualAccelBias, kStateAccelBias) = I;
+  J1.block<3, 3>(kResidualGyroBias, kStateGyroBias) = I;
 
   InertialMatrix& J0 = jacobians->x0;
   J0 = -J1;
-  J0.block<3, 3>(kRotation, kStateRotation) =
+  J0.block<3, 3>(kResidualRotation, kStateRotation) =
       -J_inverse * motion.q_01.toRotationMatrix().transpose();
-  J0.block<3, 3>(kVelocity, kStateRotation) = Skew(motion.v);
-  J0.block<3, 3>(kPosition, kStateRotation) = Skew(motion.p);
-  J0.block<3, 3>(kPosition, kStateVelocity) = -imu.dt_s * R_IG;
+  J0.block<3, 3>(kResidualVelocity, kStateRotation) = Skew(motion.v);
+  J0.block<3, 3>(kResidualPosition, kStateRotation) = Skew(motion.p);
+  J0.block<3, 3>(kResidualPosition, kStateVelocity) = -imu.dt_s * R_IG;
 
   // Log(Exp(-d) E) = Log(E) - J_l^-1 d for d on the right of Delta_R, and
   // J_l^-1(phi) = J_r^-1(-phi).
   const Matrix3d by_Delta_R = -RightJacobianInverse(-rotation_residual);
   static_assert(kStateGyroBias == kStateAccelBias + 3);
-  J0.block<3, 6>(kRotation, kStateAccelBias) =
+  J0.block<3, 6>(kResidualRotation, kStateAccelBias) =
       by_Delta_R * imu.J_bias.topRows<3>();
-  J0.block<6, 6>(kVelocity, kStateAccelBias) = -imu.J_bias.bottomRows<6>();
+  J0.block<6, 6>(kResidualVelocity, kStateAccelBias) =
+      -imu.J_bias.bottomRows<6>();
 
   InertialMatrix& J_theta = jacobians->theta;
   J_theta.setZero();
   J_theta.topRows<3>() = by_Delta_R * imu.J_theta.topRows<3>();
-  J_theta.middleRows<6>(kVelocity) = -imu.J_theta.bottomRows<6>();
+  J_theta.middleRows<6>(kResidualVelocity) = -imu.J_theta.bottomRows<6>();
 }
 
 InertialMatrix ResidualCovariance(const Preintegration& imu,
@@ -106,16 +82,10 @@ InertialResidual EvaluateInertial(std::span<const ImuSample> samples,
                                      .covariance = covariance != nullptr};
   const Preintegration measured = Preintegrate(
       samples, x0.t_ns, x1.t_ns, imu, x0.b_a, x0.b_g, noise, parts);
-  const StateMotion motion = MotionBetween(x0, x1, measured.dt_s, gravity_mps2);
-
-  InertialResidual residual;
-  const Vector3d rotation = Log(measured.Delta_R.conjugate() * motion.q_01);
-  residual.segment<3>(kRotation) = rotation;
-  residual.segment<3>(kVelocity) = motion.v - measured.Delta_v;
-  residual.segment<3>(kPosition) = motion.p - measured.Delta_p;
-  residual.segment<3>(kAccelBias) = x1.b_a - x0.b_a;
-  residual.segment<3>(kGyroBias) = x1.b_g - x0.b_g;
-
+  const StateMotion<double> motion =
+      MotionBetween(x0, x1, measured.dt_s, gravity_mps2);
+  const InertialResidual residual = ResidualOf(x0, x1, motion, measured);
+  const Vector3d rotation = residual.segment<3>(kResidualRotation);
   if (jacobians != nullptr) {
     FillJacobians(x0, motion, measured, rotation, jacobians);
   }

@@ -15,10 +15,10 @@ Preintegration Result(const Integrator<double>& integrator,
                       double dt_s) {
   Preintegration result;
   result.dt_s = dt_s;
-  result.Delta_R = integrator.Delta_R();
-  result.Delta_v = integrator.Delta_v();
-  result.Delta_p = integrator.Delta_p();
-  const Eigen::Matrix3d R = integrator.Delta_R_matrix();
+  result.Delta_R = integrator.motion().Delta_R;
+  result.Delta_v = integrator.motion().Delta_v;
+  result.Delta_p = integrator.motion().Delta_p;
+  const Eigen::Matrix3d& R = integrator.Delta_R();
   if (parts.jacobians) {
     const MotionDerivatives<double> by = integrator.Derivatives();
     result.J_bias << R.transpose() * by.bias.topRows<3>(),

@@ -16,6 +16,14 @@
 
 namespace selfcal::preintegration {
 
+// As in Preintegration.
+template <typename T>
+struct Motion {
+  Eigen::Quaternion<T> Delta_R{T(1), T(0), T(0), T(0)};
+  Vector3<T> Delta_v = Vector3<T>::Zero();
+  Vector3<T> Delta_p = Vector3<T>::Zero();
+};
+
 template <typename T>
 class Integrator {
  public:
@@ -55,16 +63,14 @@ class Integrator {
     if (parts_.jacobians || parts_.covariance) {
       Propagate(s, turn_m, A_m, turn_1, next);
     }
-    Delta_p_ += h * Delta_v_ + s.dp;
-    Delta_v_ += s.dv;
+    motion_.Delta_p += h * motion_.Delta_v + s.dp;
+    motion_.Delta_v += s.dv;
     reading_ = next;
     f_ = s.f_1;
   }
 
-  const Eigen::Quaternion<T>& Delta_R() const { return Delta_R_; }
-  const Matrix3<T>& Delta_R_matrix() const { return R_; }
-  const Vector3<T>& Delta_v() const { return Delta_v_; }
-  const Vector3<T>& Delta_p() const { return Delta_p_; }
+  const Motion<T>& motion() const { return motion_; }
+  const Matrix3<T>& Delta_R() const { return R_; }
   MotionDerivatives<T> Derivatives() const {
     return jacobians_.Result(correction_, accel_correction_);
   }
@@ -74,9 +80,10 @@ class Integrator {
   // The norm stays one to rounding: where it is off by e, it is off by 3/8 e^2
   // after that.
   void Turned(const Vector3<T>& phi) {
-    Delta_R_ = Delta_R_ * Exp(phi);
-    Delta_R_.coeffs() *= 1.5 - 0.5 * Delta_R_.coeffs().squaredNorm();
-    R_ = Delta_R_.toRotationMatrix();
+    Eigen::Quaternion<T>& q = motion_.Delta_R;
+    q = q * Exp(phi);
+    q.coeffs() *= 1.5 - 0.5 * q.coeffs().squaredNorm();
+    R_ = q.toRotationMatrix();
   }
 
   void Propagate(const Stage<T>& s,
@@ -105,9 +112,8 @@ class Integrator {
 
   Reading<T> reading_;  // at the end of the last step
   Vector3<T> f_;        // its force, in the frame of the first keyframe
-  Eigen::Quaternion<T> Delta_R_{T(1), T(0), T(0), T(0)};
+  Motion<T> motion_;
   Matrix3<T> R_ = Matrix3<T>::Identity();
-  Vector3<T> Delta_v_ = Vector3<T>::Zero(), Delta_p_ = Vector3<T>::Zero();
   MotionJacobians<T> jacobians_;
   MotionCovariance<T> covariance_;
 };

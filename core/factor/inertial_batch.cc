@@ -1,0 +1,179 @@
+#include "core/factor/inertial_batch.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cassert>
+
+#include "core/factor/inertial_kernel.h"
+#include "core/factor/preintegration_readings.h"
+
+namespace selfcal {
+namespace {
+
+using inertial::KernelInput;
+using inertial::kReadingSize;
+
+template <int W>
+void SetState(const KeyframeState& x,
+              int lane,
+              double (&numbers)[inertial::kStateNumbers][W]) {
+  Eigen::Matrix<double, inertial::kStateNumbers, 1> all;
+  all << x.q_GI.coeffs(), x.p_GI, x.v_GI, x.b_a, x.b_g;
+  for (int i = 0; i < all.size(); ++i) numbers[i][lane] = all[i];
+}
+
+template <int W>
+void SetIntrinsics(const ImuCalibration& imu, KernelInput<W>* input) {
+  using Eigen::Map, Eigen::Matrix3d;
+  Map<Matrix3d>(input->T_g_inverse) = imu.T_g().inverse();
+  Map<Matrix3d>(input->T_a_inverse) = imu.T_a().inverse();
+  Map<Matrix3d>(input->R_IA) = imu.q_AI.toRotationMatrix().transpose();
+}
+
+}  // namespace
+
+template <int W>
+int InertialBatch::GatherReadings(std::span<const InertialLinkStates> links) {
+  constexpr int kRow = kReadingSize * W;
+  constexpr int kChunk = sizeof(Chunk) / sizeof(double);
+  const auto row = [&](int index) {
+    const std::size_t end = (static_cast<std::size_t>(index) + 1) * kRow;
+    const std::size_t chunks = (end + kChunk - 1) / kChunk;
+    if (readings_.size() < chunks) readings_.resize(2 * chunks);
+    return readings_.data()->values + end - kRow;
+  };
+  int counts[W];
+  for (int lane = 0; lane < W; ++lane) {
+    const InertialLinkStates& link = links[lane];
+    int count = 0;
+    const auto add = [&](const ImuSample& sample, double h) {
+      double* to = row(count) + lane;
+      to[0] = h;
+      for (int i = 0; i < 3; ++i) {
+        to[(1 + i) * W] = sample.gyro[i];
+        to[(4 + i) * W] = sample.accel[i];
+      }
+      ++count;
+    };
+    preintegration::VisitReadings(
+        link.samples, link.x0->t_ns, link.x1->t_ns, add);
+    counts[lane] = count;
+  }
+  const int rows = *std::max_element(counts, counts + W);
+  // Steps of length zero after the last of the shorter ones.
+  for (int lane = 0; lane < W; ++lane) {
+    const double* last = row(counts[lane] - 1) + lane;
+    for (int i = counts[lane]; i < rows; ++i) {
+      double* to = row(i) + lane;
+      to[0] = 0;
+      for (int k = 1; k < kReadingSize; ++k) to[k * W] = last[k * W];
+    }
+  }
+  return rows;
+}
+
+template <class Function>
+void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
+                                 const ImuCalibration& imu,
+                                 double gravity_mps2,
+                                 const Function& run) {
+  WithLanes(width_, [&]<int W>() {
+    KernelInput<W> input;
+    SetIntrinsics<W>(imu, &input);
+    input.gravity_mps2 = gravity_mps2;
+    for (std::size_t first = 0; first < links.size(); first += W) {
+      const std::size_t count = std::min<std::size_t>(W, links.size() - first);
+      // Lanes without a link repeat the last.
+      InertialLinkStates group[W];
+      for (std::size_t lane = 0; lane < W; ++lane) {
+        const InertialLinkStates& link =
+            links[first + std::min(lane, count - 1)];
+        group[lane] = link;
+        SetState<W>(*link.x0, lane, input.x0);
+        SetState<W>(*link.x1, lane, input.x1);
+        input.dt_s[lane] = static_cast<double>(link.x1->t_ns - link.x0->t_ns) *
+                           preintegration::kSecondsPerNanosecond;
+      }
+      input.rows = GatherReadings<W>(group);
+      input.readings = readings_.data()->values;
+      run.template operator()<W>(input, first, count);
+    }
+  });
+}
+
+void InertialBatch::Linearise(std::span<const InertialLinkStates> links,
+                              const ImuCalibration& imu,
+                              const ImuNoise& noise,
+                              double gravity_mps2,
+                              const double* theta_scale,
+                              std::span<InertialNoiseRoot> roots,
+                              std::span<InertialTransition> out) {
+  assert(roots.size() == links.size() && out.size() == links.size());
+  ForEachGroup(
+      links,
+      imu,
+      gravity_mps2,
+      [&]<int W>(
+          const KernelInput<W>& input, std::size_t first, std::size_t n) {
+        InertialNoiseRoot* root[W];
+        InertialTransition* transition[W];
+        for (std::size_t lane = 0; lane < W; ++lane) {
+          root[lane] = lane < n ? &roots[first + lane] : &unused_root_;
+          transition[lane] =
+              lane < n ? &out[first + lane] : &unused_transition_;
+        }
+        inertial::LineariseLinks<W>(
+            input, noise, theta_scale, root, transition);
+      });
+}
+
+void InertialBatch::LineariseWithRoots(
+    std::span<const InertialLinkStates> links,
+    const ImuCalibration& imu,
+    double gravity_mps2,
+    const double* theta_scale,
+    std::span<const InertialNoiseRoot> roots,
+    std::span<InertialTransition> out) {
+  assert(roots.size() == links.size() && out.size() == links.size());
+  ForEachGroup(
+      links,
+      imu,
+      gravity_mps2,
+      [&]<int W>(
+          const KernelInput<W>& input, std::size_t first, std::size_t n) {
+        const InertialNoiseRoot* root[W];
+        InertialTransition* transition[W];
+        for (std::size_t lane = 0; lane < W; ++lane) {
+          root[lane] = &roots[first + std::min(lane, n - 1)];
+          transition[lane] =
+              lane < n ? &out[first + lane] : &unused_transition_;
+        }
+        inertial::LineariseLinksWithRoots<W>(
+            input, theta_scale, root, transition);
+      });
+}
+
+void InertialBatch::Residuals(std::span<const InertialLinkStates> links,
+                              const ImuCalibration& imu,
+                              double gravity_mps2,
+                              std::span<const InertialNoiseRoot> roots,
+                              std::span<InertialResidual> whitened) {
+  assert(roots.size() == links.size() && whitened.size() == links.size());
+  ForEachGroup(
+      links,
+      imu,
+      gravity_mps2,
+      [&]<int W>(
+          const KernelInput<W>& input, std::size_t first, std::size_t n) {
+        const InertialNoiseRoot* root[W];
+        double* to[W];
+        for (std::size_t lane = 0; lane < W; ++lane) {
+          root[lane] = &roots[first + std::min(lane, n - 1)];
+          to[lane] = lane < n ? whitened[first + lane].data()
+                              : unused_transition_.whitened;
+        }
+        inertial::WhitenedResiduals<W>(input, root, to);
+      });
+}
+
+}  // namespace selfcal

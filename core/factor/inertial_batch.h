@@ -1,0 +1,112 @@
+// The inertial factors of many links between keyframes, several at a time in
+// the lanes of the machine's vectors, in the form that the elimination of a
+// chain of keyframes needs: solved for the earlier state.
+//
+// The factor r + J0 x0 + J1 x1 + Jt theta of inertial.h, whose covariance is
+// U U^T with U upper triangular, equals U e with e of unit covariance. J0 is
+// invertible, and
+//
+//   x0 = A e + G z,   A = J0^-1 U,   G = -J0^-1 [Jt | J1 motion | r | J1 pose]
+//
+// with z = (theta_i 15, velocity and biases of the later state 9, 1, its pose
+// 6). The same numbers as EvaluateInertial gives, to rounding.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "core/factor/inertial.h"
+#include "core/simd/vector_width.h"
+
+namespace selfcal {
+
+// Offsets in z, and the number of its columns, the last of which is zero.
+inline constexpr int kTransitionTheta = 0;
+inline constexpr int kTransitionNextVelocity = 15;
+inline constexpr int kTransitionNextAccelBias = 18;
+inline constexpr int kTransitionNextGyroBias = 21;
+inline constexpr int kTransitionConstant = 24;
+inline constexpr int kTransitionNextPose = 25;
+inline constexpr int kTransitionColumns = 32;
+// Columns of A, the last of which is zero.
+inline constexpr int kTransitionNoise = 16;
+
+// Rows of G and A: the state in the order of segment.h.
+struct InertialTransition {
+  alignas(64) double G[15][kTransitionColumns];
+  double A[15][kTransitionNoise];
+  double whitened[15];  // U^-1 r, in the order of the residual
+};
+
+// U, in the order of the residual: U^-1 is SquareRootInformation of its
+// covariance. Where that is singular to rounding, pivots are raised to 1e-14 of
+// their variance.
+struct InertialNoiseRoot {
+  double motion[9][9];  // upper triangular
+  double bias[6];       // diagonal
+};
+
+// The arguments of EvaluateInertial that differ from link to link.
+struct InertialLinkStates {
+  const KeyframeState* x0;
+  const KeyframeState* x1;
+  std::span<const ImuSample> samples;
+};
+
+// A workspace: keeps its memory from call to call. Not for use by two threads
+// at once. Results do not depend on which links stand beside each other by more
+// than rounding, and are the same at every call.
+class InertialBatch {
+ public:
+  explicit InertialBatch(VectorWidth width) : width_(width) {}
+
+  // Fills roots and out, one for each link. Columns of theta_i are multiplied
+  // by theta_scale (15).
+  void Linearise(std::span<const InertialLinkStates> links,
+                 const ImuCalibration& imu,
+                 const ImuNoise& noise,
+                 double gravity_mps2,
+                 const double* theta_scale,
+                 std::span<InertialNoiseRoot> roots,
+                 std::span<InertialTransition> out);
+
+  // The same with noise as it was found elsewhere.
+  void LineariseWithRoots(std::span<const InertialLinkStates> links,
+                          const ImuCalibration& imu,
+                          double gravity_mps2,
+                          const double* theta_scale,
+                          std::span<const InertialNoiseRoot> roots,
+                          std::span<InertialTransition> out);
+
+  // U^-1 r alone.
+  void Residuals(std::span<const InertialLinkStates> links,
+                 const ImuCalibration& imu,
+                 double gravity_mps2,
+                 std::span<const InertialNoiseRoot> roots,
+                 std::span<InertialResidual> whitened);
+
+ private:
+  struct alignas(64) Chunk {
+    double values[8];
+  };
+
+  // Calls run.operator()<W>(kernel input, first link, number of links) for each
+  // group of W links.
+  template <class Function>
+  void ForEachGroup(std::span<const InertialLinkStates> links,
+                    const ImuCalibration& imu,
+                    double gravity_mps2,
+                    const Function& run);
+
+  // Lays the readings of W links side by side; returns the number of rows.
+  template <int W>
+  int GatherReadings(std::span<const InertialLinkStates> links);
+
+  VectorWidth width_;
+  std::vector<Chunk> readings_;
+  InertialTransition unused_transition_;  // of lanes without a link
+  InertialNoiseRoot unused_root_;
+};
+
+}  // namespace selfcal

@@ -1,0 +1,210 @@
+#include "core/factor/inertial_kernel.h"
+
+#include "core/factor/inertial_transition.h"
+#include "core/factor/preintegration_integrator.h"
+#include "core/simd/lanes.h"
+
+namespace selfcal::inertial {
+namespace {
+
+using preintegration::Correction;
+using preintegration::Integrator;
+
+template <int W>
+Vector3<Lanes<W>> LoadVector(const double* from) {
+  return {Load<W>(from), Load<W>(from + W), Load<W>(from + 2 * W)};
+}
+
+template <int W>
+Matrix3<Lanes<W>> SameMatrix(const double* columns) {
+  Matrix3<Lanes<W>> m;
+  for (int i = 0; i < 9; ++i) m(i % 3, i / 3) = Lanes<W>(columns[i]);
+  return m;
+}
+
+template <int W>
+State<Lanes<W>> LoadState(const double (&x)[kStateNumbers][W]) {
+  return {.q_GI = {Load<W>(x[3]), Load<W>(x[0]), Load<W>(x[1]), Load<W>(x[2])},
+          .p_GI = LoadVector<W>(x[4]),
+          .v_GI = LoadVector<W>(x[7]),
+          .b_a = LoadVector<W>(x[10]),
+          .b_g = LoadVector<W>(x[13])};
+}
+
+// The links as far as the residual.
+template <int W>
+struct Link {
+  using T = Lanes<W>;
+
+  Link(const KernelInput<W>& input,
+       const ImuNoise& noise,
+       const PreintegrationParts& parts)
+      : x0(LoadState<W>(input.x0)),
+        x1(LoadState<W>(input.x1)),
+        dt(Load<W>(input.dt_s)),
+        correct{.b_a = x0.b_a,
+                .b_g = x0.b_g,
+                .T_g_inverse = SameMatrix<W>(input.T_g_inverse),
+                .T_a_inverse = SameMatrix<W>(input.T_a_inverse),
+                .R_IA = SameMatrix<W>(input.R_IA)},
+        integrator(correct, noise, parts, Corrected(input.readings)) {
+    const double* row = input.readings;
+    for (int i = 1; i < input.rows; ++i) {
+      row += kReadingSize * W;
+      integrator.Step(Corrected(row), Load<W>(row));
+    }
+    motion = MotionBetween<T>(x0, x1, dt, T(input.gravity_mps2));
+    residual = ResidualOf<T>(x0, x1, motion, integrator.motion());
+  }
+
+  preintegration::Reading<T> Corrected(const double* row) const {
+    return correct(LoadVector<W>(row + W), LoadVector<W>(row + 4 * W));
+  }
+
+  const State<T> x0, x1;
+  const T dt;
+  const Correction<T> correct;
+  Integrator<T> integrator;
+  StateMotion<T> motion;
+  Eigen::Matrix<T, 15, 1> residual;
+};
+
+template <int W>
+NoiseRoot<Lanes<W>> LoadRoot(const InertialNoiseRoot* const* roots) {
+  NoiseRoot<Lanes<W>> root;
+  for (int l = 0; l < W; ++l) {
+    for (int i = 0; i < 9; ++i) {
+      for (int j = i; j < 9; ++j) {
+        root.motion(i, j).Set(l, roots[l]->motion[i][j]);
+      }
+    }
+    for (int i = 0; i < 6; ++i) root.bias[i].Set(l, roots[l]->bias[i]);
+  }
+  return root;
+}
+
+template <int W>
+void StoreRoot(const NoiseRoot<Lanes<W>>& root,
+               InertialNoiseRoot* const* roots) {
+  for (int l = 0; l < W; ++l) {
+    for (int i = 0; i < 9; ++i) {
+      for (int j = 0; j < 9; ++j) {
+        roots[l]->motion[i][j] = j < i ? 0.0 : root.motion(i, j)[l];
+      }
+    }
+    for (int i = 0; i < 6; ++i) roots[l]->bias[i] = root.bias[i][l];
+  }
+}
+
+template <int W>
+NoiseRoot<Lanes<W>> RootOf(const Link<W>& link, const ImuNoise& noise) {
+  using T = Lanes<W>;
+  NoiseRoot<T> root;
+  const Vector3<T> r = link.residual.template segment<3>(kResidualRotation);
+  const Matrix3<T> by_psi =
+      RightJacobianInverse<T>(-r) * link.integrator.Delta_R().transpose();
+  RootOfMotionCovariance(link.integrator.covariance(), by_psi, &root.motion);
+  const T root_dt = Sqrt(link.dt);
+  for (int i = 0; i < 3; ++i) {
+    root.bias[i] = noise.accel_bias_random_walk * root_dt;
+    root.bias[3 + i] = noise.gyro_bias_random_walk * root_dt;
+  }
+  return root;
+}
+
+template <int W>
+void StoreTransition(const MotionRows<Lanes<W>>& rows,
+                     const NoiseRoot<Lanes<W>>& root,
+                     const Eigen::Matrix<Lanes<W>, 15, 1>& residual,
+                     InertialTransition* const* out) {
+  for (int i = 0; i < 9; ++i) {
+    double* to[W];
+    for (int c = 0; c < kTransitionColumns; c += W) {
+      for (int l = 0; l < W; ++l) to[l] = out[l]->G[i] + c;
+      StoreTransposed<W>(rows.G[i] + c, to);
+    }
+    for (int c = 0; c < kTransitionNoise; c += W) {
+      for (int l = 0; l < W; ++l) to[l] = out[l]->A[i] + c;
+      StoreTransposed<W>(rows.A[i] + c, to);
+    }
+  }
+  const Eigen::Matrix<Lanes<W>, 15, 1> white = Whiten(root, residual);
+  for (int l = 0; l < W; ++l) {
+    for (int i = 0; i < 6; ++i) {
+      double* G = out[l]->G[kStateAccelBias + i];
+      double* A = out[l]->A[kStateAccelBias + i];
+      for (int c = 0; c < kTransitionColumns; ++c) G[c] = 0;
+      for (int c = 0; c < kTransitionNoise; ++c) A[c] = 0;
+      G[kTransitionNextAccelBias + i] = 1;
+      G[kTransitionConstant] = residual[kResidualAccelBias + i][l];
+      A[9 + i] = -root.bias[i][l];
+    }
+    for (int i = 0; i < 15; ++i) out[l]->whitened[i] = white[i][l];
+  }
+}
+
+template <int W>
+void SolveAndStore(const Link<W>& link,
+                   const NoiseRoot<Lanes<W>>& root,
+                   const double* theta_scale,
+                   InertialTransition* const* out) {
+  using T = Lanes<W>;
+  const TransitionSolver<T> solver(
+      link.x0.q_GI.toRotationMatrix(), link.motion, link.dt, link.residual);
+  MotionRows<T> rows;
+  solver.Solve(link.integrator.Derivatives(), root, theta_scale, &rows);
+  StoreTransition<W>(rows, root, link.residual, out);
+}
+
+}  // namespace
+
+template <int W>
+void LineariseLinks(const KernelInput<W>& input,
+                    const ImuNoise& noise,
+                    const double* theta_scale,
+                    InertialNoiseRoot* const* roots,
+                    InertialTransition* const* out) {
+  const Link<W> link(input, noise, {.jacobians = true, .covariance = true});
+  const NoiseRoot<Lanes<W>> root = RootOf<W>(link, noise);
+  StoreRoot<W>(root, roots);
+  SolveAndStore<W>(link, root, theta_scale, out);
+}
+
+template <int W>
+void LineariseLinksWithRoots(const KernelInput<W>& input,
+                             const double* theta_scale,
+                             const InertialNoiseRoot* const* roots,
+                             InertialTransition* const* out) {
+  const Link<W> link(
+      input, ImuNoise(), {.jacobians = true, .covariance = false});
+  SolveAndStore<W>(link, LoadRoot<W>(roots), theta_scale, out);
+}
+
+template <int W>
+void WhitenedResiduals(const KernelInput<W>& input,
+                       const InertialNoiseRoot* const* roots,
+                       double* const* whitened) {
+  const Link<W> link(
+      input, ImuNoise(), {.jacobians = false, .covariance = false});
+  const auto white = Whiten(LoadRoot<W>(roots), link.residual);
+  for (int l = 0; l < W; ++l) {
+    for (int i = 0; i < 15; ++i) whitened[l][i] = white[i][l];
+  }
+}
+
+using Input = KernelInput<SELFCAL_LANES>;
+using Roots = InertialNoiseRoot* const*;
+using ConstRoots = const InertialNoiseRoot* const*;
+using Transitions = InertialTransition* const*;
+
+template void LineariseLinks<SELFCAL_LANES>(
+    const Input&, const ImuNoise&, const double*, Roots, Transitions);
+template void LineariseLinksWithRoots<SELFCAL_LANES>(const Input&,
+                                                     const double*,
+                                                     ConstRoots,
+                                                     Transitions);
+template void WhitenedResiduals<SELFCAL_LANES>(const Input&,
+                                               ConstRoots,
+                                               double* const*);
+
+}  // namespace selfcal::inertial

@@ -1,0 +1,54 @@
+// What InertialBatch has computed for W links at once. Internal to core/factor.
+//
+// Defined in inertial_kernel.cc, which is compiled once for each W. Plain
+// numbers only: an inline function of a library's container, compiled there for
+// wider vectors, could become everyone's copy.
+#pragma once
+
+#include "core/factor/inertial_batch.h"
+
+namespace selfcal::inertial {
+
+// Of a row of readings: length of the step before it [s], gyro 3, accel 3. The
+// first has length zero.
+constexpr int kReadingSize = 7;
+// q_GI (x, y, z, w), p_GI, v_GI, b_a, b_g.
+constexpr int kStateNumbers = 16;
+
+// The numbers of the W links stand side by side.
+template <int W>
+struct KernelInput {
+  int rows = 0;
+  const double* readings = nullptr;  // rows x kReadingSize x W
+  double x0[kStateNumbers][W];
+  double x1[kStateNumbers][W];
+  double dt_s[W];
+  // Of all links; by columns.
+  double T_g_inverse[9];
+  double T_a_inverse[9];
+  double R_IA[9];
+  double gravity_mps2 = 0;
+};
+
+// Fills out, and the roots from the noise.
+template <int W>
+void LineariseLinks(const KernelInput<W>& input,
+                    const ImuNoise& noise,
+                    const double* theta_scale,
+                    InertialNoiseRoot* const* roots,
+                    InertialTransition* const* out);
+
+// Fills out with the roots as given.
+template <int W>
+void LineariseLinksWithRoots(const KernelInput<W>& input,
+                             const double* theta_scale,
+                             const InertialNoiseRoot* const* roots,
+                             InertialTransition* const* out);
+
+// Fills 15 numbers of each link.
+template <int W>
+void WhitenedResiduals(const KernelInput<W>& input,
+                       const InertialNoiseRoot* const* roots,
+                       double* const* whitened);
+
+}  // namespace selfcal::inertial

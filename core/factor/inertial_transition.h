@@ -1,0 +1,211 @@
+// The linearised inertial factor solved for the earlier state, as a template
+// over the scalar, for several links at once. Internal to core/factor.
+//
+// With rows as in inertial.h and psi, v, p the derivatives of the measured
+// motion (psi a left perturbation of Delta_R), the Jacobian by the earlier
+// state has an inverse in closed form. Where the residual changes by y,
+//
+//   rotation  theta = -R_01 J_r(r) y_rotation
+//   velocity  R_GI (v_01 x theta - y_velocity)
+//   position  R_GI (p_01 x theta - y_position) - dt velocity
+//
+// gives the change of the state that makes up for -y, for y without a part in
+// the biases. For the derivatives of the measured motion, y_rotation is
+// -J_l(r)^-1 Delta_R^T psi, and theta becomes -psi.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/factor/inertial_batch.h"
+#include "core/factor/inertial_terms.h"
+#include "core/factor/preintegration_covariance.h"
+#include "core/factor/preintegration_jacobians.h"
+
+namespace selfcal::inertial {
+
+using preintegration::Matrix3;
+using preintegration::Vector3;
+
+// The members that the residual needs.
+template <typename T>
+struct State {
+  Eigen::Quaternion<T> q_GI;
+  Vector3<T> p_GI, v_GI, b_a, b_g;
+};
+
+// As InertialNoiseRoot: U with U U^T the covariance of the residual.
+template <typename T>
+struct NoiseRoot {
+  Eigen::Matrix<T, 9, 9> motion;  // upper triangle; the lower is not set
+  Eigen::Matrix<T, 6, 1> bias;
+};
+
+// A pivot is raised to this part of its variance, where rounding left less.
+constexpr double kPivotFloor = 1e-14;
+
+// Overwrites the upper triangle of C by U with U U^T = C; never NaN. Where
+// rounding left C far from a covariance, no entry of U exceeds the standard
+// deviation of its row.
+template <typename T>
+void UpperRoot(Eigen::Matrix<T, 9, 9>* C) {
+  Eigen::Matrix<T, 9, 9>& U = *C;
+  Eigen::Matrix<T, 9, 1> sigma;
+  for (int i = 0; i < 9; ++i) sigma[i] = Sqrt(Max(U(i, i), T(1e-300)));
+  for (int j = 8; j >= 0; --j) {
+    T pivot = U(j, j);
+    for (int k = j + 1; k < 9; ++k) pivot -= U(j, k) * U(j, k);
+    U(j, j) = Sqrt(Max(pivot, kPivotFloor * sigma[j] * sigma[j]));
+    const T inverse = 1.0 / U(j, j);
+    for (int i = 0; i < j; ++i) {
+      T sum = U(i, j);
+      for (int k = j + 1; k < 9; ++k) sum -= U(i, k) * U(j, k);
+      U(i, j) = Max(-sigma[i], Min(sigma[i], sum * inverse));
+    }
+  }
+}
+
+// `by_psi` is the derivative of the rotation residual by psi, up to its sign.
+template <typename T>
+void RootOfMotionCovariance(
+    const preintegration::MotionCovariance<T>& covariance,
+    const Matrix3<T>& by_psi,
+    Eigen::Matrix<T, 9, 9>* root) {
+  const Matrix3<T> r_r = by_psi * covariance.rr();
+  root->template block<3, 3>(0, 0) = r_r * by_psi.transpose();
+  root->template block<3, 3>(0, 3) = by_psi * covariance.vr().transpose();
+  root->template block<3, 3>(0, 6) = by_psi * covariance.pr().transpose();
+  root->template block<3, 3>(3, 3) = covariance.vv();
+  root->template block<3, 3>(3, 6) = covariance.pv().transpose();
+  root->template block<3, 3>(6, 6) = covariance.pp();
+  UpperRoot(root);
+}
+
+// U^-1 r.
+template <typename T>
+Eigen::Matrix<T, 15, 1> Whiten(const NoiseRoot<T>& root,
+                               const Eigen::Matrix<T, 15, 1>& residual) {
+  Eigen::Matrix<T, 15, 1> white;
+  for (int i = 8; i >= 0; --i) {
+    T sum = residual[i];
+    for (int k = i + 1; k < 9; ++k) sum -= root.motion(i, k) * white[k];
+    white[i] = sum / root.motion(i, i);
+  }
+  for (int i = 0; i < 6; ++i) white[9 + i] = residual[9 + i] / root.bias[i];
+  return white;
+}
+
+// The rows of the motion in InertialTransition, a row's columns side by side.
+template <typename T>
+struct MotionRows {
+  T G[9][kTransitionColumns];
+  T A[9][kTransitionNoise];
+};
+
+template <typename T>
+class TransitionSolver {
+ public:
+  TransitionSolver(const Matrix3<T>& R_GI,
+                   const StateMotion<T>& motion,
+                   T dt,
+                   const Eigen::Matrix<T, 15, 1>& residual)
+      : R_GI_(R_GI),
+        R_01_(motion.q_01.toRotationMatrix()),
+        v_(motion.v),
+        p_(motion.p),
+        dt_(dt),
+        residual_(residual) {}
+
+  // theta_scale: 15 numbers.
+  void Solve(const preintegration::MotionDerivatives<T>& by,
+             const NoiseRoot<T>& root,
+             const double* theta_scale,
+             MotionRows<T>* rows) const {
+    for (int c = 0; c < kImuTangentSize; ++c) {
+      const Eigen::Matrix<T, 9, 1> x = OfMeasured(by.theta.col(c));
+      Write<kTransitionColumns>(T(theta_scale[c]) * x, c, rows->G);
+    }
+    const Eigen::Matrix<T, 15, 1>& r = residual_;
+    Eigen::Matrix<T, 9, 1> constant =
+        Carry(R_01_ * r.template segment<3>(kResidualRotation),
+              -r.template segment<3>(kResidualVelocity),
+              -r.template segment<3>(kResidualPosition));
+    for (int c = 0; c < 6; ++c) {
+      const Eigen::Matrix<T, 9, 1> x = OfMeasured(by.bias.col(c));
+      Write<kTransitionColumns>(x, kTransitionNextAccelBias + c, rows->G);
+      Write<kTransitionNoise>(-root.bias[c] * x, 9 + c, rows->A);
+      constant += r[kResidualAccelBias + c] * x;
+    }
+    Write<kTransitionColumns>(constant, kTransitionConstant, rows->G);
+    WriteNextMotion(rows);
+    WriteNoise(root, rows);
+    for (int i = 0; i < 9; ++i) {
+      rows->G[i][kTransitionColumns - 1] = T(0);
+      rows->A[i][kTransitionNoise - 1] = T(0);
+    }
+  }
+
+ private:
+  // Rotation, position, velocity.
+  using Column = Eigen::Matrix<T, 9, 1>;
+
+  Column Carry(const Vector3<T>& theta,
+               const Vector3<T>& y_velocity,
+               const Vector3<T>& y_position) const {
+    Column x;
+    const Vector3<T> velocity = R_GI_ * (v_.cross(theta) - y_velocity);
+    x.template segment<3>(kStateRotation) = theta;
+    x.template segment<3>(kStateVelocity) = velocity;
+    x.template segment<3>(kStatePosition) =
+        R_GI_ * (p_.cross(theta) - y_position) - dt_ * velocity;
+    return x;
+  }
+
+  Column OfMeasured(const Eigen::Matrix<T, 9, 1>& derivative) const {
+    return Carry(-derivative.template head<3>(),
+                 derivative.template segment<3>(3),
+                 derivative.template tail<3>());
+  }
+
+  template <int columns>
+  static void Write(const Column& x, int column, T (*rows)[columns]) {
+    for (int i = 0; i < 9; ++i) rows[i][column] = x[i];
+  }
+
+  // Pose and velocity of the next state.
+  void WriteNextMotion(MotionRows<T>* rows) const {
+    const Vector3<T> zero = Vector3<T>::Zero();
+    for (int c = 0; c < 3; ++c) {
+      Write<kTransitionColumns>(Carry(R_01_.col(c), zero, zero),
+                                kTransitionNextPose + kStateRotation + c,
+                                rows->G);
+      Column x = Column::Zero();
+      x[kStatePosition + c] = T(1);
+      Write<kTransitionColumns>(
+          x, kTransitionNextPose + kStatePosition + c, rows->G);
+      x[kStatePosition + c] = -dt_;
+      x[kStateVelocity + c] = T(1);
+      Write<kTransitionColumns>(x, kTransitionNextVelocity + c, rows->G);
+    }
+  }
+
+  void WriteNoise(const NoiseRoot<T>& root, MotionRows<T>* rows) const {
+    const Vector3<T> phi = residual_.template segment<3>(kResidualRotation);
+    const Matrix3<T> turn = -R_01_ * RightJacobian<T>(phi);
+    for (int c = 0; c < 9; ++c) {
+      Column u = Column::Zero();
+      for (int i = 0; i <= c; ++i) u[i] = root.motion(i, c);
+      Write<kTransitionNoise>(Carry(turn * u.template head<3>(),
+                                    u.template segment<3>(kResidualVelocity),
+                                    u.template segment<3>(kResidualPosition)),
+                              c,
+                              rows->A);
+    }
+  }
+
+  const Matrix3<T> R_GI_, R_01_;
+  const Vector3<T> v_, p_;
+  const T dt_;
+  const Eigen::Matrix<T, 15, 1>& residual_;
+};
+
+}  // namespace selfcal::inertial
