@@ -43,21 +43,23 @@ struct NoiseRoot {
 // A pivot is raised to this part of its variance, where rounding left less.
 constexpr double kPivotFloor = 1e-14;
 
-// Overwrites the upper triangle of C by U with U U^T = C; never NaN.
+// Overwrites the upper triangle of C by U with U U^T = C; never NaN. Where
+// rounding left C far from a covariance, no entry of U exceeds the standard
+// deviation of its row.
 template <typename T>
 void UpperRoot(Eigen::Matrix<T, 9, 9>* C) {
   Eigen::Matrix<T, 9, 9>& U = *C;
+  Eigen::Matrix<T, 9, 1> sigma;
+  for (int i = 0; i < 9; ++i) sigma[i] = Sqrt(Max(U(i, i), T(1e-300)));
   for (int j = 8; j >= 0; --j) {
-    const T variance = U(j, j);
-    T pivot = variance;
+    T pivot = U(j, j);
     for (int k = j + 1; k < 9; ++k) pivot -= U(j, k) * U(j, k);
-    pivot = Max(pivot, Max(kPivotFloor * variance, T(1e-300)));
-    U(j, j) = Sqrt(pivot);
+    U(j, j) = Sqrt(Max(pivot, kPivotFloor * sigma[j] * sigma[j]));
     const T inverse = 1.0 / U(j, j);
     for (int i = 0; i < j; ++i) {
       T sum = U(i, j);
       for (int k = j + 1; k < 9; ++k) sum -= U(i, k) * U(j, k);
-      U(i, j) = sum * inverse;
+      U(i, j) = Max(-sigma[i], Min(sigma[i], sum * inverse));
     }
   }
 }

@@ -2,7 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Cholesky>
-#include <algorithm>
+#include <string>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
@@ -25,6 +25,18 @@ Scene MakeCalibrationScene() { return MakeScene({.segments = 8, .every = 2}); }
 TimingOptions Fewer(TimingOptions options) {
   options.repetitions = (options.repetitions + 4) / 5;
   return options;
+}
+
+// A whole calibration from the factory's.
+TimedFunction CalibrationOf(const std::string& name,
+                            const Scene& scene,
+                            const CalibrateOptions& options,
+                            int* iterations) {
+  return {name, [&scene, options, iterations] {
+            *iterations =
+                Calibrate(scene.rig, scene.rig.factory, scene.segments, options)
+                    .iterations;
+          }};
 }
 
 // The optimum of the sum of what the segments say and of the prior.
@@ -79,11 +91,7 @@ Measurement CovarianceAgainstIteration(const TimingOptions& options) {
          benchmark::DoNotOptimize(
              SubspaceCovariance(rig, WholeSubspace(rig), information->Lambda));
        }},
-      {"calibration",
-       [&] {
-         iterations =
-             Calibrate(rig, rig.factory, scene.segments, calibrate).iterations;
-       }},
+      CalibrationOf("calibration", scene, calibrate, &iterations),
       Fewer(options));
   result.ratio *= iterations;
   result.figures["iterations"] = iterations;
