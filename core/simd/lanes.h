@@ -17,7 +17,6 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
-#include <utility>
 
 namespace selfcal {
 
@@ -104,36 +103,6 @@ Lanes<W> Load(const double* from) {
 template <int W>
 void Store(Lanes<W> x, double* to) {
   __builtin_memcpy(to, &x.v, sizeof(x.v));
-}
-
-// For Transpose(): of two rows, the even or the odd blocks of `block` numbers.
-template <int block, bool odd, int W, int... lanes>
-Lanes<W> TakeBlocks(Lanes<W> a,
-                    Lanes<W> b,
-                    std::integer_sequence<int, lanes...>) {
-  return Lanes<W>(__builtin_shufflevector(
-      a.v,
-      b.v,
-      ((lanes & block) == 0 ? lanes + (odd ? block : 0)
-                            : W + lanes - (odd ? 0 : block))...));
-}
-
-// to[l][i] = rows[i][l], for W rows.
-template <int W, int block = 1>
-void StoreTransposed(const Lanes<W>* rows, double* const* to) {
-  if constexpr (block == W) {
-    for (int i = 0; i < W; ++i) Store(rows[i], to[i]);
-  } else {
-    constexpr auto kLanes = std::make_integer_sequence<int, W>();
-    Lanes<W> mixed[W];
-    for (int i = 0; i < W; ++i) {
-      if ((i & block) != 0) continue;
-      mixed[i] = TakeBlocks<block, false>(rows[i], rows[i + block], kLanes);
-      mixed[i + block] =
-          TakeBlocks<block, true>(rows[i], rows[i + block], kLanes);
-    }
-    StoreTransposed<W, 2 * block>(mixed, to);
-  }
 }
 
 template <int W>
