@@ -22,6 +22,8 @@ constexpr int kLinkColumns = kTransitionNextPose + kPose;
 // Zeros that must follow what counts in a panel: the rows of the largest tile.
 constexpr int kZeros = 3 * kPanelPad;
 
+constexpr int kPlacesBetweenMoves = 8;
+
 int WholeVectors(int size) { return (size + 7) / 8 * 8; }
 
 template <typename Number>
@@ -55,7 +57,10 @@ void ChainElimination::LayOut(const ChainShape& shape) {
          &gram_);
 
   const int slots = structure_.max_slots();
-  places_ = std::max(places_, 2 * slots);
+  // The front moves on by a place with each keyframe, and back where it ends.
+  places_ = std::max(
+      places_,
+      std::min(shape.keyframes, slots + slots / 4 + kPlacesBetweenMoves));
   front_stride_ = fixed_ + places_ * kPose + kZeros;
   GrowTo(static_cast<std::size_t>(front_stride_) * (fixed_ + places_ * kPose),
          &front_);

@@ -59,10 +59,8 @@ class GroupScorer {
     DefiniteMatrix observed;
   };
 
-  Eigen::MatrixXd posterior_information_;
   DefiniteMatrix posterior_;
   std::vector<GroupWorkspace> groups_;
-  Eigen::MatrixXd less_one_;
 };
 
 }  // namespace selfcal

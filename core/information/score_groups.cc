@@ -54,9 +54,8 @@ void GroupScorer::Observe(const Eigen::MatrixXd& information,
   unobserved->clear();
   *rank = static_cast<int>(information.rows());
   // All eigenvalues are above 1 if and only if this is positive definite.
-  less_one_ = information;
-  less_one_.diagonal().array() -= 1;
-  if (workspace->Factor(less_one_)) return;
+  const auto one = Eigen::MatrixXd::Identity(*rank, *rank);
+  if (workspace->Factor(information - one)) return;
   Observability observability = AnalyseObservability(information, names);
   *rank = observability.rank;
   *unobserved = std::move(observability.unobserved);
@@ -68,9 +67,8 @@ void GroupScorer::Score(const RigComponents& components,
   const std::vector<RigComponents::Group>& groups = components.groups();
   groups_.resize(groups.size());
   scores->resize(groups.size());
-  posterior_information_ = information;
-  posterior_information_.diagonal().array() += 1;
-  posterior_.Factor(posterior_information_);
+  posterior_.Factor(information + Eigen::MatrixXd::Identity(
+                                      information.rows(), information.cols()));
   const Eigen::MatrixXd& posterior = posterior_.Inverse();
   for (std::size_t q = 0; q < groups.size(); ++q) {
     const RigComponents::Group& group = groups[q];
@@ -83,7 +81,12 @@ void GroupScorer::Score(const RigComponents& components,
     score.rank = 0;
     score.unobserved.clear();
     if (group.at.empty()) continue;
-    workspace.covariance = posterior(group.at, group.at);
+    workspace.covariance.resize(score.size, score.size);
+    for (int i = 0; i < score.size; ++i) {
+      for (int j = 0; j < score.size; ++j) {
+        workspace.covariance(i, j) = posterior(group.at[i], group.at[j]);
+      }
+    }
     workspace.posterior.Factor(workspace.covariance);
     const double half_log_det = workspace.posterior.HalfLogDet();
     score.entropy = Constant(group.at.size()) + half_log_det + group.log_scale;

@@ -59,7 +59,9 @@ class Tracker {
   void Continue(int camera) {
     std::vector<int> kept;
     for (const int landmark : tracked_[camera]) {
-      const bool goes_on = !random_.Chance(1 / options_.mean_track_length);
+      const bool goes_on =
+          !random_.Chance(1 / options_.mean_track_length) &&
+          keyframe_ - begun_[landmark] < options_.max_track_length;
       if (goes_on && Observe(camera, landmark)) {
         kept.push_back(landmark);
       } else {
@@ -114,12 +116,14 @@ class Tracker {
     tracks_.landmarks_G.push_back(state_->q_GI * p_I + state_->p_GI);
     trackers_.push_back(0);
     last_seen_.push_back(-1);
+    begun_.push_back(keyframe_);
     return static_cast<int>(tracks_.landmarks_G.size()) - 1;
   }
 
   // Begins a track in this camera, and in every other one that sees the
   // landmark and has not got enough.
   void Begin(int camera, int landmark) {
+    begun_[landmark] = keyframe_;
     for (int j = 0; j < cameras(); ++j) {
       const bool wants =
           static_cast<int>(tracked_[j].size()) < options_.landmarks_in_view;
@@ -176,6 +180,7 @@ class Tracker {
   std::vector<std::vector<int>> tracked_;  // landmarks in each camera
   std::vector<int> trackers_;   // for each landmark: cameras that track it
   std::vector<int> last_seen_;  // for each landmark: keyframe, or -1
+  std::vector<int> begun_;      // for each landmark: keyframe
 };
 
 }  // namespace

@@ -25,8 +25,9 @@ struct SimulationOptions {
   int keyframes_per_segment = 40;
   int landmarks_in_view = 120;  // about, for each keyframe and camera
   // Keyframes in a row in which a landmark is seen, geometrically distributed,
-  // unless it leaves the image before.
+  // unless it leaves the image before, or reaches the maximum.
   double mean_track_length = 10;
+  int max_track_length = 1'000'000;
   // Of new tracks: landmarks that were seen before, as a map finds them again.
   double revisit_fraction = 0.1;
   double min_depth_m = 0.5;  // of a landmark where it is first seen

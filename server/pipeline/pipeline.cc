@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/information/segment_scorer.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/scoring.h"
 #include "server/pipeline/watchers.h"
@@ -145,8 +146,19 @@ class PipelineImpl : public Pipeline {
 }  // namespace
 
 Estimators CoreEstimators() {
-  return {[](const Rig& rig, const Calibration& theta0, const auto& segment) {
-            return ScoreSegment(rig, theta0, segment);
+  return {[](const Rig& rig,
+             const Calibration& theta0,
+             const MotionSegment& segment) {
+            // What a very long segment needs is not kept.
+            constexpr std::size_t kMaxKeptKeyframes = 200;
+            if (segment.keyframes.size() > kMaxKeptKeyframes) {
+              return ScoreSegment(rig, theta0, segment);
+            }
+            // One workspace for each thread that scores.
+            thread_local SegmentScorer scorer;
+            SegmentInformation information;
+            scorer.Score(rig, theta0, segment, {}, &information);
+            return information;
           },
           Calibrate};
 }

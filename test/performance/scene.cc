@@ -18,6 +18,7 @@ Scene MakeScene(const SceneOptions& options) {
   simulation.keyframes_per_segment = options.keyframes;
   simulation.landmarks_in_view = options.landmarks_in_view;
   simulation.mean_track_length = 20;
+  simulation.max_track_length = 20;
   Scene scene;
   scene.rig = HandheldRig("benchmark");
   const Calibration truth = scene.rig.factory;

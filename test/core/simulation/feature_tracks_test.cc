@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -69,6 +70,17 @@ TEST(FeatureTracksTest, WhereNothingLeavesTheImageLengthsAreGeometric) {
   double ones = 0;
   for (const int length : tracks.lengths) ones += length == 1;
   EXPECT_NEAR(ones / n, 1.0 / 8, 5 * std::sqrt(0.11 / n));
+}
+
+TEST(FeatureTracksTest, NoTrackIsLongerThanTheMaximum) {
+  const Rig rig = HandheldRig("a");
+  SimulationOptions options;
+  options.mean_track_length = 8;
+  options.max_track_length = 6;
+  options.revisit_fraction = 0;
+  const Lengths tracks = TrackLengths(
+      SimulateTracks(rig.factory, 0, Keyframes(*MakeRest(60)), options));
+  EXPECT_EQ(*std::max_element(tracks.lengths.begin(), tracks.lengths.end()), 6);
 }
 
 TEST(FeatureTracksTest, MotionEndsTracksEarlier) {
