@@ -18,6 +18,8 @@ constexpr int kMotionPlace = kChainLinkShared;
 constexpr int kLandmarkPlace = kMotionPlace + kMotion;
 static_assert(kLandmarkPlace % 8 == 0);
 static_assert(kTransitionConstant == kLandmarkPlace);
+// The state in whole tiles.
+constexpr int kTileState = 16;
 constexpr int kLinkColumns = kTransitionNextPose + kPose;
 // Zeros that must follow what counts in a panel: the rows of the largest tile.
 constexpr int kZeros = 3 * kPanelPad;
@@ -62,13 +64,14 @@ void ChainElimination::LayOut(const ChainShape& shape) {
       places_,
       std::min(shape.keyframes, slots + slots / 4 + kPlacesBetweenMoves));
   front_stride_ = fixed_ + places_ * kPose + kZeros;
-  GrowTo(static_cast<std::size_t>(front_stride_) * (fixed_ + places_ * kPose),
+  GrowTo(static_cast<std::size_t>(front_stride_) *
+             (fixed_ + places_ * kPose + kPanelPad),
          &front_);
   // Only what is fixed: poses are cleared as they enter.
   for (int j = 0; j < fixed_; ++j) Zero(&Front(0, j), fixed_ + kPanelPad);
   panel_stride_ = fixed_ + WholeVectors(slots * kPose) + kZeros;
   for (auto* panel : {&coupling_, &substituted_, &product_, &half_}) {
-    GrowTo(static_cast<std::size_t>(kState) * panel_stride_, panel);
+    GrowTo(static_cast<std::size_t>(kTileState) * panel_stride_, panel);
   }
   GrowTo(static_cast<std::size_t>(fixed_ + kPose + kPanelPad) * kLinkColumns,
          &link_terms_);
@@ -366,7 +369,7 @@ void ChainElimination::AddPrior(const ChainStateMatrix& information) {
 void ChainElimination::TakeState() {
   const int pose = Pose(0);
   const int rest = PosesSize() - kPose;
-  ChainStateMatrix& S = information_;
+  auto S = information_.topLeftCorner<kState, kState>();
   for (int i = 0; i < kPose; ++i) {
     double* y = Row(&coupling_, i);
     for (int j = 0; j < fixed_; ++j) y[j] = Front(pose + i, j);
@@ -399,7 +402,7 @@ void ChainElimination::TakeState() {
 // Puts x0 = A e + G z into x0^T S x0 + 2 x0^T Y z, and keeps Z = Y + S G.
 // G^T S G + G^T Y + Y^T G = G^T H + H^T G with H = Y + S G / 2.
 void ChainElimination::Substitute(const ChainTransition& link) {
-  alignas(64) double by_S[kState][32];
+  alignas(64) double by_S[kTileState][32];
   const int size = fixed_ + PosesSize();
   for (int k = 0; k < kState; ++k) {
     std::copy_n(Row(&coupling_, k), size + kZeros, Row(&substituted_, k));
@@ -409,8 +412,8 @@ void ChainElimination::Substitute(const ChainTransition& link) {
   WithKernels([&](auto kernels) {
     kernels.SetProduct({&link.G[0][0], 32},
                        kLinkColumns,
-                       {information_.data(), kState},
-                       kState,
+                       {information_.data(), kTileState},
+                       kTileState,
                        kState,
                        {&by_S[0][0], 32});
   });
@@ -484,19 +487,19 @@ void ChainElimination::FindRoot(double (*M)[16], double (*panel)[16]) {
 
 // M = I + A^T S A.
 void ChainElimination::FindRootOf(const ChainTransition& link) {
-  alignas(64) double by_S[kState][16];
-  alignas(64) double M[kState][16];
+  alignas(64) double by_S[kTileState][16];
+  alignas(64) double M[kTileState][16];
   alignas(64) double panel[kState][16];
   const ConstPanel A = {&link.A[0][0], 16};
   WithKernels([&](auto kernels) {
     kernels.SetProduct(A,
                        kState,
-                       {information_.data(), kState},
-                       kState,
+                       {information_.data(), kTileState},
+                       kTileState,
                        kState,
                        {&by_S[0][0], 16});
     kernels.SetProduct(
-        {&by_S[0][0], 16}, kState, A, kState, kState, {&M[0][0], 16});
+        {&by_S[0][0], 16}, kState, A, kTileState, kState, {&M[0][0], 16});
   });
   for (int i = 0; i < kState; ++i) {
     M[i][i] += 1;
@@ -516,7 +519,7 @@ void ChainElimination::Eliminate(const std::vector<double>& terms) {
     kernels.SetProduct({terms.data(), panel_stride_},
                        size,
                        {&root_[0][0], 16},
-                       kState,
+                       kTileState,
                        kState,
                        {product_.data(), panel_stride_});
     kernels.AddSquare(-1, by_fixed, fixed_, kState, nullptr, 1, FrontAt(0, 0));

@@ -180,8 +180,10 @@ class ChainElimination {
 
   // The state that is eliminated: its information S; panels of 15 rows over
   // the front: coupling Y, Z = Y + S G, P = root^T Z; and Y + S G / 2.
-  ChainStateMatrix information_;
-  alignas(64) double root_[kChainStateSize][16];  // A L^-T
+  // One zero more, so that tiles are whole.
+  Eigen::Matrix<double, 16, 16> information_ =
+      Eigen::Matrix<double, 16, 16>::Zero();
+  alignas(64) double root_[kChainStateSize][16] = {};  // A L^-T
   int panel_stride_ = 0;
   std::vector<double> coupling_, substituted_, product_, half_, link_terms_;
 

@@ -103,6 +103,9 @@ void AddAll(double sign,
             bool lower,
             Target to) {
   int column = 0;
+  // Of a square, the columns that fill the last tile are zeros as well.
+  if (lower)
+    columns = (columns + kTileColumns - 1) / kTileColumns * kTileColumns;
   for (; column + kTileColumns <= columns; column += kTileColumns) {
     AddColumns<kTileColumns>(sign,
                              a,

@@ -42,7 +42,8 @@ void InlierSelector::StartLandmarks(const MotionSegment& segment,
     const int first = segment.observations[track.front()].keyframe;
     const double distance_m =
         std::max(1e-3, (p_G - segment.keyframes[first].p_GI).norm());
-    distance_priors_[m] = std::pow(kDistancePrior * distance_m, -2);
+    const double sigma_m = kDistancePrior * distance_m;
+    distance_priors_[m] = 1 / (sigma_m * sigma_m);
   }
 }
 

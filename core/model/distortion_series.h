@@ -51,8 +51,15 @@ Lanes<W> AtanRatioValue(Lanes<W> q) {
     factor *= inverse;
     halved = (s - 1.0) * inverse;
   }
-  Lanes<W> series = 1.0 / 43;
-  for (int n = 20; n >= 0; --n) series = 1.0 / (2 * n + 1) - halved * series;
+  // Even and odd terms apart, which do not wait for each other.
+  const Lanes<W> square = halved * halved;
+  Lanes<W> even = 1.0 / 41;
+  Lanes<W> odd = 1.0 / 43;
+  for (int n = 18; n >= 0; n -= 2) {
+    even = 1.0 / (2 * n + 1) + square * even;
+    odd = 1.0 / (2 * n + 3) + square * odd;
+  }
+  const Lanes<W> series = even - halved * odd;
   return factor * series;
 }
 
@@ -68,9 +75,9 @@ ValueAndDerivative<T> AtanRatio(T q) {
           derivative * q + (n % 2 == 0 ? -1.0 : 1.0) * (n + 1.0) / (2 * n + 3);
     }
   }
-  const T divisor = Select(near_zero, T(1), 2.0 * q);
+  const T divisor = Select(near_zero, T(1), 2.0 * q * (1.0 + q));
   return {value,
-          Select(near_zero, derivative, (1.0 / (1.0 + q) - value) / divisor)};
+          Select(near_zero, derivative, (1.0 - value * (1.0 + q)) / divisor)};
 }
 
 // h and dh/dx for |x| < pi/2.
