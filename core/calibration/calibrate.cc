@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 #include "core/calibration/partition.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/screening.h"
 #include "core/calibration/solver.h"
+#include "core/calibration/structured_solver.h"
 #include "core/calibration/subspace.h"
 #include "core/calibration/theta_information.h"
 
@@ -17,9 +17,6 @@ namespace {
 
 // Bounds the rounds; they end by convergence after two to four as a rule.
 constexpr int kMaxRounds = 12;
-// From this round on landmarks only leave: one at the limit of what is used may
-// otherwise come and go for ever.
-constexpr int kSettlingRound = 3;
 // The first round only has to come near enough to tell outliers.
 constexpr double kFirstTolerance = 1e-4;
 constexpr double kTolerance = 1e-8;
@@ -50,6 +47,9 @@ std::string CheckInput(const Rig& rig,
   return "";
 }
 
+constexpr char kNotDetermined[] =
+    "the states of the keyframes are not determined";
+
 // One calibration from start to end. Each round decides, from the present
 // estimate alone, which landmarks and observations to use and how the inertial
 // factors are whitened, then solves that problem; the rounds end when one no
@@ -78,29 +78,59 @@ class Calibrator {
   }
 
   CalibrationResult Run() {
-    Screen(0);
+    Screen(nullptr);
     const ReprojectionStatistics before = Measure();
     result_.reprojection_rms_before_px = before.rms_px;
     result_.reprojection_median_before_px = before.median_px;
-    // At a start far from the optimum all residuals are large: what can be
-    // observed is judged without the weights that they would get.
-    if (!Inform(/*loss=*/nullptr)) {
-      return Fail("the states of the keyframes are not determined");
+    if (!FindSubspace()) {
+      return Fail(kNotDetermined);
     }
-    ChooseSubspace();
+    return options_.solver == SolverKind::kStructured ? RunSteps()
+                                                      : RunRounds();
+  }
+
+ private:
+  // One step a round.
+  CalibrationResult RunSteps() {
+    result_.initial_cost = result_.final_cost = linearised_.cost;
+    if (!Report(0)) {
+      return Cancel();
+    }
+    for (;;) {
+      const double undamped_sigmas = StepSigmas();
+      const StepOutcome step = Step();
+      if (!Report(moved_sigmas_)) {
+        return Cancel();
+      }
+      if (undamped_sigmas < kMaxStepSigmas) {
+        result_.status = CalibrateStatus::kConverged;
+        break;
+      }
+      if (!step.lower || result_.iterations >= options_.max_iterations) {
+        break;
+      }
+      do {
+        Screen(&screening_);
+        if (!Inform(&screening_.loss)) {
+          return Fail(kNotDetermined);
+        }
+      } while (!ChooseSubspace());
+    }
+    return Finish();
+  }
+
+  CalibrationResult RunRounds() {
     for (int round = 0; round < kMaxRounds; ++round) {
       const Eigen::VectorXd d_before = estimate_.d;
       const SolverOutcome outcome = Solve(round);
       if (outcome.status == SolverStatus::kCancelled) {
-        result_.status = CalibrateStatus::kCancelled;
-        result_.message = "cancelled";
-        return std::move(result_);
+        return Cancel();
       }
       if (outcome.status == SolverStatus::kFailed) {
         return Fail(outcome.message);
       }
       if (!Inform(&screening_.loss)) {
-        return Fail("the states of the keyframes are not determined");
+        return Fail(kNotDetermined);
       }
       const double moved_sigmas =
           LargestInSigmas(estimate_.d - d_before, covariance_d_);
@@ -113,12 +143,24 @@ class Calibrator {
       if (result_.iterations >= options_.max_iterations) {
         break;
       }
-      Screen(round + 1);
+      Screen(nullptr);
     }
     return Finish();
   }
 
- private:
+  bool Report(double step_sigmas) const {
+    return !progress_ || progress_({result_.iterations,
+                                    options_.max_iterations,
+                                    result_.final_cost,
+                                    step_sigmas});
+  }
+
+  CalibrationResult Cancel() {
+    result_.status = CalibrateStatus::kCancelled;
+    result_.message = "cancelled";
+    return std::move(result_);
+  }
+
   CalibrationResult Fail(const std::string& message) {
     result_.status = CalibrateStatus::kFailed;
     result_.message = message;
@@ -128,14 +170,10 @@ class Calibrator {
   Calibration Theta() const { return BoxPlus(reference_, estimate_.d); }
 
   // Decides anew what the next round stands on.
-  void Screen(int round) {
+  void Screen(const Screening* before) {
     const Calibration theta = Theta();
-    Screening screening =
-        ScreenLandmarks(rig_, theta, problem_, estimate_.keyframes, options_);
-    if (round >= kSettlingRound) {
-      KeepCommonLandmarks(screening_, &screening);
-    }
-    screening_ = std::move(screening);
+    screening_ = ScreenLandmarks(
+        rig_, theta, problem_, estimate_.keyframes, options_, before);
     whitening_ =
         WhitenInertialLinks(rig_, theta.imu, problem_, estimate_.keyframes);
   }
@@ -148,27 +186,36 @@ class Calibrator {
   // Information and covariance of the offset d at the estimate. False if
   // states are not determined.
   bool Inform(const RobustLoss* loss) {
-    const auto at_theta = LineariseTheta(rig_,
-                                         Theta(),
-                                         problem_,
-                                         estimate_.keyframes,
-                                         screening_.landmarks,
-                                         whitening_,
-                                         loss);
-    if (!at_theta) {
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    if (!LineariseRound(Round(basis),
+                        estimate_,
+                        screening_.landmarks,
+                        loss,
+                        &linearised_)) {
       return false;
     }
-    information_ = ByOffset(*at_theta, ThetaByOffset(reference_, estimate_.d));
-    if (options_.use_prior) {
-      const Eigen::VectorXd sigmas = PriorSigmas(rig_);
-      for (const int i : FreeComponents(rig_)) {
-        const double prior = 1 / (sigmas(i) * sigmas(i));
-        information_.Lambda(i, i) += prior;
-        information_.eta(i) -= prior * estimate_.d(i);
-      }
-    }
+    information_ = linearised_.by_offset;
     covariance_d_ = SubspaceCovariance(rig_, subspace_, information_.Lambda);
     return covariance_d_.allFinite();
+  }
+
+  // At a start far from the optimum all residuals are large: what can be
+  // observed is judged without the weights that they get. As weights only take
+  // information away, there is nothing to judge if all is observed with them.
+  bool FindSubspace() {
+    if (!Inform(&screening_.loss)) {
+      return false;
+    }
+    if (ChooseSubspace()) {
+      return true;
+    }
+    subspace_ = WholeSubspace(rig_);
+    estimate_.d = start_d_;
+    if (!Inform(nullptr)) {
+      return false;
+    }
+    ChooseSubspace();
+    return Inform(&screening_.loss);
   }
 
   // Holds what the data does not observe, at its start value. Returns whether
@@ -189,16 +236,31 @@ class Calibrator {
     return same;
   }
 
+  SolverRound Round(const Eigen::MatrixXd& basis) const {
+    return {.rig = rig_,
+            .reference = reference_,
+            .problem = problem_,
+            .whitening = whitening_,
+            .basis = basis,
+            .loss = screening_.loss,
+            .use_prior = options_.use_prior,
+            .threads = options_.threads};
+  }
+
+  StepOutcome Step() {
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    const Eigen::VectorXd d_before = estimate_.d;
+    const StepOutcome step =
+        TakeStep(Round(basis), linearised_, &estimate_, &screening_.landmarks);
+    result_.final_cost = step.cost;
+    ++result_.iterations;
+    moved_sigmas_ = LargestInSigmas(estimate_.d - d_before, covariance_d_);
+    return step;
+  }
+
   SolverOutcome Solve(int round_number) {
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
-    SolverRound round{.rig = rig_,
-                      .reference = reference_,
-                      .problem = problem_,
-                      .whitening = whitening_,
-                      .basis = basis,
-                      .loss = screening_.loss,
-                      .use_prior = options_.use_prior,
-                      .threads = options_.threads};
+    SolverRound round = Round(basis);
     round.max_iterations = options_.max_iterations - result_.iterations;
     round.function_tolerance = round_number == 0 ? kFirstTolerance : kTolerance;
     Eigen::VectorXd d_last = estimate_.d;
@@ -220,8 +282,8 @@ class Calibrator {
           return small_steps >= kSmallSteps ? SolverSignal::kEnough
                                             : SolverSignal::kGoOn;
         };
-    const SolverOutcome outcome =
-        SolveRound(round, report, &estimate_, &screening_.landmarks);
+    const SolverOutcome outcome = SolveRound(
+        options_.solver, round, report, &estimate_, &screening_.landmarks);
     if (round_number == 0) {
       result_.initial_cost = outcome.initial_cost;
     }
@@ -268,8 +330,10 @@ class Calibrator {
   ThetaSubspace subspace_;
   Screening screening_;
   std::vector<InertialMatrix> whitening_;
+  LinearisedRound linearised_;
   SharedInformation information_;
   Eigen::MatrixXd covariance_d_;
+  double moved_sigmas_ = 0;  // by the last step
   CalibrationResult result_;
 };
 

@@ -19,6 +19,12 @@ namespace selfcal {
 
 enum class LossKind { kNone, kHuber, kCauchy };
 
+// Both lead to the same calibration.
+enum class SolverKind {
+  kStructured,  // Gauss-Newton on the structure of the problem: fast
+  kCeres,
+};
+
 struct CalibrateOptions {
   LossKind loss = LossKind::kHuber;
   double loss_scale = 2.0;  // in sigmas
@@ -26,7 +32,8 @@ struct CalibrateOptions {
   bool use_prior = false;
   int max_iterations = 100;
   int merge_landmarks = 15;  // partitions that share more are merged
-  int threads = 1;
+  SolverKind solver = SolverKind::kStructured;
+  int threads = 1;  // of Ceres
 };
 
 struct CalibrateProgress {

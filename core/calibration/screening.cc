@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -64,7 +65,7 @@ Thresholds FindThresholds(
     inverse_depths.push_back(std::abs(places[t]->inverse_depth.z()));
   }
   const double robust_sigmas =
-      Median(std::move(norms_px)) / kMedianOfRayleigh / scene.pixel_sigma_px;
+      Median(std::move(norms_px)) / kMedianOfRayleigh / scene.pixel_sigma_px();
   return {{.kind = options.loss,
            .scale = options.loss_scale,
            .gate = std::max(kOutlierGate * std::max(1.0, robust_sigmas),
@@ -80,47 +81,30 @@ double InverseDepthSigma(const Eigen::Matrix3d& information) {
              : std::numeric_limits<double>::infinity();
 }
 
-// Settles one landmark: which observations are within the gate of the place
-// that those within the gate give.
+// Settles one landmark: its place, and which observations are within the gate
+// of it.
 std::optional<ScreenedLandmark> Settle(const LandmarkScene& scene,
                                        const Track& track,
                                        const Thresholds& thresholds,
                                        LandmarkPlace place) {
-  const auto within_gate = [&] {
-    return Within(ResidualNorms(scene, track, place.Homogeneous()),
-                  thresholds.loss.gate * scene.pixel_sigma_px);
-  };
-  std::vector<int> used = within_gate();
-  double sigma = 0;
-  for (int pass = 0; pass < 2; ++pass) {
-    if (!EnoughLeft(used, track)) {
-      return std::nullopt;
-    }
-    sigma = InverseDepthSigma(
-        RefinePlace(scene, track, used, thresholds.loss, &place));
-    used = within_gate();
-  }
-  if (!EnoughLeft(used, track) ||
-      !(sigma <= thresholds.max_inverse_depth_sigma)) {
+  std::vector<int> all(track.observations.size());
+  std::iota(all.begin(), all.end(), 0);
+  const double sigma = InverseDepthSigma(
+      RefinePlace(scene, track, all, thresholds.loss, {}, &place).information);
+  const double weight = 2 * (1 - sigma / thresholds.max_inverse_depth_sigma);
+  std::vector<int> used =
+      Within(ResidualNorms(scene, track, place.Homogeneous()),
+             thresholds.loss.gate * scene.pixel_sigma_px());
+  if (!EnoughLeft(used, track) || !(weight > 0)) {
     return std::nullopt;
   }
-  return ScreenedLandmark{0, place, std::move(used)};
+  return ScreenedLandmark{0, place, std::min(weight, 1.0), std::move(used)};
 }
 
-}  // namespace
-
-Screening ScreenLandmarks(const Rig& rig,
-                          const Calibration& theta,
-                          const CalibrationProblem& problem,
-                          const std::vector<KeyframeState>& keyframes,
-                          const CalibrateOptions& options) {
-  const LandmarkScene scene{theta, keyframes, rig.pixel_sigma_px};
-  std::vector<std::optional<LandmarkPlace>> places(problem.tracks.size());
-  for (std::size_t t = 0; t < places.size(); ++t) {
-    if (problem.tracks[t].observations.size() >= kMinTrackObservations) {
-      places[t] = TriangulateTrack(scene, problem.tracks[t]);
-    }
-  }
+Screening Screen(const LandmarkScene& scene,
+                 const CalibrationProblem& problem,
+                 const CalibrateOptions& options,
+                 const std::vector<std::optional<LandmarkPlace>>& places) {
   const Thresholds thresholds = FindThresholds(scene, options, problem, places);
 
   Screening result;
@@ -146,25 +130,45 @@ Screening ScreenLandmarks(const Rig& rig,
   return result;
 }
 
-void KeepCommonLandmarks(const Screening& before, Screening* screening) {
-  // Both lists are in the order of the tracks.
-  const auto had = [&](const ScreenedLandmark& landmark) {
-    return std::binary_search(
-        before.landmarks.begin(),
-        before.landmarks.end(),
-        landmark,
-        [](const auto& a, const auto& b) { return a.track < b.track; });
-  };
-  std::erase_if(screening->landmarks, [&](const ScreenedLandmark& landmark) {
-    if (had(landmark)) {
-      return false;
+// Where a track was, anchored anew, if all of it lies within the gate there.
+std::optional<LandmarkPlace> PlaceBefore(const LandmarkScene& scene,
+                                         const Track& track,
+                                         const LandmarkPlace& before,
+                                         double gate_px) {
+  const Eigen::Vector4d point_G = before.Homogeneous();
+  const std::vector<double> norms_px = ResidualNorms(scene, track, point_G);
+  if (*std::max_element(norms_px.begin(), norms_px.end()) > gate_px) {
+    return std::nullopt;
+  }
+  return PlaceAt(scene, track, point_G);
+}
+
+}  // namespace
+
+Screening ScreenLandmarks(const Rig& rig,
+                          const Calibration& theta,
+                          const CalibrationProblem& problem,
+                          const std::vector<KeyframeState>& keyframes,
+                          const CalibrateOptions& options,
+                          const Screening* before) {
+  const LandmarkScene scene(theta, keyframes, rig.pixel_sigma_px);
+  std::vector<std::optional<LandmarkPlace>> places(problem.tracks.size());
+  if (before != nullptr) {
+    for (const ScreenedLandmark& landmark : before->landmarks) {
+      places[landmark.track] =
+          PlaceBefore(scene,
+                      problem.tracks[landmark.track],
+                      landmark.place,
+                      before->loss.gate * rig.pixel_sigma_px);
     }
-    const auto used = static_cast<int>(landmark.used.size());
-    ++screening->landmarks_dropped;
-    screening->observations -= used;
-    screening->observations_dropped += used;
-    return true;
-  });
+  }
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    const Track& track = problem.tracks[t];
+    if (!places[t] && track.observations.size() >= kMinTrackObservations) {
+      places[t] = TriangulateTrack(scene, track);
+    }
+  }
+  return Screen(scene, problem, options, places);
 }
 
 ReprojectionStatistics MeasureReprojection(
@@ -173,7 +177,7 @@ ReprojectionStatistics MeasureReprojection(
     const CalibrationProblem& problem,
     const std::vector<KeyframeState>& keyframes,
     const std::vector<ScreenedLandmark>& landmarks) {
-  const LandmarkScene scene{theta, keyframes, rig.pixel_sigma_px};
+  const LandmarkScene scene(theta, keyframes, rig.pixel_sigma_px);
   std::vector<double> projected_px;
   double sum_of_squares = 0;
   int used = 0;

@@ -27,12 +27,16 @@ inline constexpr double kMaxOutlierFraction = 0.5;
 // A landmark is dropped where its inverse depth is less certain than this part
 // of the median inverse depth of the scene: it has next to no parallax, as all
 // landmarks of a device at rest. Compared with the scene, not with itself: the
-// latter keeps of two such landmarks the one that noise moved nearer.
+// latter keeps of two such landmarks the one that noise moved nearer. From half
+// of that on its weight falls to zero, so that one at the limit makes no
+// difference: else it may come and go for ever.
 inline constexpr double kMaxDepthUncertainty = 0.5;
 
 struct ScreenedLandmark {
   int track = 0;  // index into CalibrationProblem::tracks
   LandmarkPlace place;
+  // In (0, 1], on all that the landmark contributes.
+  double weight = 1;
   std::vector<int> used;  // indices into the track's observations
 };
 
@@ -49,14 +53,15 @@ struct ReprojectionStatistics {
   double median_px = 0;  // of all observations of these tracks that project
 };
 
+// Tracks are triangulated from their observations alone; but those that, where
+// `before` has them, lie within its gate with all of their observations, are
+// taken from there: the outcome is the same, much sooner.
 Screening ScreenLandmarks(const Rig& rig,
                           const Calibration& theta,
                           const CalibrationProblem& problem,
                           const std::vector<KeyframeState>& keyframes,
-                          const CalibrateOptions& options);
-
-// Leaves out of *screening the landmarks that `before` did not have.
-void KeepCommonLandmarks(const Screening& before, Screening* screening);
+                          const CalibrateOptions& options,
+                          const Screening* before);
 
 ReprojectionStatistics MeasureReprojection(
     const Rig& rig,

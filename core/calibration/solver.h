@@ -1,5 +1,6 @@
-// One round of a calibration: dogleg by Ceres on a fixed set of
-// landmarks and observations, with fixed whitening.
+// One round of a calibration: the minimum over theta, keyframes and landmarks
+// of a fixed set of landmarks and observations, with fixed whitening. Two ways
+// to the same minimum: structured_solver.h, and Ceres.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/calibrate.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/robust_loss.h"
 #include "core/calibration/screening.h"
@@ -25,8 +27,9 @@ struct SolverRound {
   const Eigen::MatrixXd& basis;
   const RobustLoss& loss;  // on reprojection residuals
   bool use_prior = false;  // PriorSigmas(rig) about d = 0
-  int threads = 1;
+  int threads = 1;         // of Ceres
   int max_iterations = 100;
+  // Done when an iteration takes less than this part off the cost.
   double function_tolerance = 1e-9;
 };
 
@@ -34,7 +37,7 @@ enum class SolverStatus { kConverged, kNotConverged, kCancelled, kFailed };
 
 struct SolverOutcome {
   SolverStatus status = SolverStatus::kFailed;
-  std::string message;  // of Ceres, when it failed
+  std::string message;  // why, when it failed
   int iterations = 0;
   double initial_cost = 0;
   double final_cost = 0;
@@ -53,7 +56,8 @@ using SolverCallback = std::function<SolverSignal(
 
 // Improves the estimate and the places of the landmarks. When it fails or is
 // cancelled, both are as good as the last accepted step left them.
-SolverOutcome SolveRound(const SolverRound& round,
+SolverOutcome SolveRound(SolverKind kind,
+                         const SolverRound& round,
                          const SolverCallback& callback,
                          CalibrationEstimate* estimate,
                          std::vector<ScreenedLandmark>* landmarks);

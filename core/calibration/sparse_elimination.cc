@@ -1,8 +1,6 @@
 #include "core/calibration/sparse_elimination.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
 
 namespace selfcal {
 namespace {
@@ -24,15 +22,17 @@ void AppendLower(const Block& block, int row, int column, Triplets* triplets) {
 
 }  // namespace
 
-SparseElimination::SparseElimination(int keyframes, int shared_size)
-    : keyframes_(keyframes),
-      shared_size_(shared_size),
-      keyframe_shared_(
-          Eigen::MatrixXd::Zero(keyframes * kChainStateSize, shared_size + 1)),
-      shared_(Eigen::MatrixXd::Zero(shared_size + 1, shared_size + 1)) {
+void SparseElimination::Start(int keyframes, int shared_size) {
+  keyframes_ = keyframes;
+  shared_size_ = shared_size;
+  landmarks_.clear();
+  states_.clear();
+  poses_.clear();
   for (int k = 0; k < keyframes; ++k) {
     states_[{k, k}].setZero();
   }
+  keyframe_shared_.setZero(keyframes * kChainStateSize, shared_size + 1);
+  shared_.setZero(shared_size + 1, shared_size + 1);
 }
 
 void SparseElimination::AddPrior(int keyframe,
@@ -64,12 +64,11 @@ void SparseElimination::AddLink(int before, int after, const LinkRows& rows) {
 void SparseElimination::AddLandmark(std::span<const LandmarkRows> rows,
                                     double prior_information,
                                     double prior_residual) {
-  using ByLandmark = Eigen::Matrix<double, kChainPoseSize, 3>;
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  Eigen::MatrixX3d by_shared = Eigen::MatrixX3d::Zero(shared_size_ + 1, 3);
+  auto& [L, by_shared, by_pose] = landmarks_.emplace_back();
+  by_shared.setZero(shared_size_ + 1, 3);
   H(2, 2) = prior_information;
   by_shared(shared_size_, 2) = -prior_information * prior_residual;
-  std::vector<std::pair<int, ByLandmark>> by_pose;
   for (const LandmarkRows& row : rows) {
     const auto columns = static_cast<int>(row.shared.cols());
     H += row.landmark.transpose() * row.landmark;
@@ -95,6 +94,7 @@ void SparseElimination::AddLandmark(std::span<const LandmarkRows> rows,
   }
 
   const Eigen::LLT<Eigen::Matrix3d> llt(H);
+  L = llt.matrixL();
   const auto upper = llt.matrixU();
   // X <- X U^-1, so that X X^T is what the landmark takes with it.
   upper.solveInPlace<Eigen::OnTheRight>(by_shared);
@@ -114,7 +114,7 @@ void SparseElimination::AddLandmark(std::span<const LandmarkRows> rows,
   }
 }
 
-std::optional<SharedInformation> SparseElimination::Eliminate() const {
+std::optional<SharedInformation> SparseElimination::Eliminate() {
   Triplets triplets;
   for (const auto& [pair, block] : states_) {
     AppendLower(block.transpose(),
@@ -132,22 +132,50 @@ std::optional<SharedInformation> SparseElimination::Eliminate() const {
   Eigen::SparseMatrix<double> H(size, size);
   H.setFromTriplets(triplets.begin(), triplets.end());
 
-  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt(H);
-  if (llt.info() != Eigen::Success) {
+  llt_.compute(H);
+  if (llt_.info() != Eigen::Success) {
     return std::nullopt;
   }
   const Eigen::MatrixXd half =
-      llt.matrixL().solve(llt.permutationP() * keyframe_shared_);
-  Eigen::MatrixXd left = shared_;
-  left.triangularView<Eigen::Lower>() -= half.transpose() * half;
-  if (!left.allFinite()) {
+      llt_.matrixL().solve(llt_.permutationP() * keyframe_shared_);
+  shared_.triangularView<Eigen::Lower>() -= half.transpose() * half;
+  if (!shared_.allFinite()) {
     return std::nullopt;
   }
   SharedInformation result;
-  result.Lambda = left.topLeftCorner(shared_size_, shared_size_)
+  result.Lambda = shared_.topLeftCorner(shared_size_, shared_size_)
                       .selfadjointView<Eigen::Lower>();
-  result.eta = left.row(shared_size_).head(shared_size_).transpose();
+  result.eta = shared_.row(shared_size_).head(shared_size_).transpose();
   return result;
+}
+
+std::vector<ChainStateVector> SparseElimination::KeyframeSteps(
+    const Eigen::VectorXd& shared_step) const {
+  const Eigen::VectorXd all =
+      llt_.solve(keyframe_shared_.col(shared_size_) -
+                 keyframe_shared_.leftCols(shared_size_) * shared_step);
+  std::vector<ChainStateVector> steps(keyframes_);
+  for (int k = 0; k < keyframes_; ++k) {
+    steps[k] = all.segment<kChainStateSize>(k * kChainStateSize);
+  }
+  return steps;
+}
+
+std::vector<Eigen::Vector3d> SparseElimination::LandmarkSteps(
+    const Eigen::VectorXd& shared_step,
+    const std::vector<ChainStateVector>& keyframe_steps) const {
+  std::vector<Eigen::Vector3d> steps;
+  steps.reserve(landmarks_.size());
+  for (const auto& [L, by_shared, by_pose] : landmarks_) {
+    Eigen::Vector3d step =
+        by_shared.row(shared_size_).transpose() -
+        by_shared.topRows(shared_size_).transpose() * shared_step;
+    for (const auto& [k, block] : by_pose) {
+      step -= block.transpose() * keyframe_steps[k].head<kChainPoseSize>();
+    }
+    steps.push_back(L.transpose().triangularView<Eigen::Upper>().solve(step));
+  }
+  return steps;
 }
 
 }  // namespace selfcal

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "core/calibration/sparse_elimination.h"
 #include "core/factor/reprojection.h"
 #include "core/information/weak_priors.h"
 #include "core/model/so3.h"
@@ -12,14 +11,15 @@ namespace {
 
 double Information(double sigma) { return 1 / (sigma * sigma); }
 
-// The gauge is four exactly free directions, so that holding them with any
-// strength changes nothing else: one of the size of the other terms.
-constexpr double kGaugeSigma_m = 1e-3;
-constexpr double kGaugeSigma_rad = 1e-3;
+// The gauge is four free directions, so that holding them with any strength
+// changes nothing else: one of the size of the other terms, yet so strong that
+// the landmarks' priors, which are about fixed places, do not move them.
+constexpr double kGaugeSigma_m = 1e-5;
+constexpr double kGaugeSigma_rad = 1e-5;
 
 void AddPriors(const CalibrationProblem& problem,
                const std::vector<KeyframeState>& keyframes,
-               SparseElimination* elimination) {
+               SparseElimination* system) {
   ChainStateMatrix weak = ChainStateMatrix::Zero();
   weak.diagonal().segment<3>(kStateRotation).array() =
       Information(kTiltPriorSigma_rad);
@@ -30,7 +30,7 @@ void AddPriors(const CalibrationProblem& problem,
   weak.diagonal().segment<3>(kStateGyroBias).array() =
       Information(kGyroBiasPriorSigma_radps);
   for (const int k : problem.chain_starts) {
-    elimination->AddPrior(k, weak);
+    system->AddPrior(k, weak);
   }
   for (const int k : problem.gauge_keyframes) {
     ChainStateMatrix gauge = ChainStateMatrix::Zero();
@@ -40,7 +40,7 @@ void AddPriors(const CalibrationProblem& problem,
         Information(kGaugeSigma_rad) * up_I * up_I.transpose();
     gauge.diagonal().segment<3>(kStatePosition).array() =
         Information(kGaugeSigma_m);
-    elimination->AddPrior(k, gauge);
+    system->AddPrior(k, gauge);
   }
 }
 
@@ -49,7 +49,7 @@ void AddInertialLinks(const Rig& rig,
                       const CalibrationProblem& problem,
                       const std::vector<KeyframeState>& keyframes,
                       const std::vector<InertialMatrix>& whitening,
-                      SparseElimination* elimination) {
+                      SparseElimination* system) {
   LinkRows rows;
   InertialJacobians jacobians;
   for (std::size_t i = 0; i < problem.inertial_links.size(); ++i) {
@@ -65,13 +65,13 @@ void AddInertialLinks(const Rig& rig,
     rows.x0 = whitening[i] * jacobians.x0;
     rows.x1 = whitening[i] * jacobians.x1;
     rows.shared = whitening[i] * jacobians.theta;
-    elimination->AddLink(link.before, link.after, rows);
+    system->AddLink(link.before, link.after, rows);
   }
 }
 
 void AddBiasLinks(const CalibrationProblem& problem,
                   const std::vector<KeyframeState>& keyframes,
-                  SparseElimination* elimination) {
+                  SparseElimination* system) {
   LinkRows rows;
   rows.shared.resize(kChainStateSize, 0);
   for (const BiasLink& link : problem.bias_links) {
@@ -85,7 +85,7 @@ void AddBiasLinks(const CalibrationProblem& problem,
     rows.x1.setZero();
     rows.x1.diagonal().tail<6>() = weight;
     rows.x0 = -rows.x1;
-    elimination->AddLink(link.before, link.after, rows);
+    system->AddLink(link.before, link.after, rows);
   }
 }
 
@@ -93,17 +93,19 @@ void AddBiasLinks(const CalibrationProblem& problem,
 // on what has all but no weight.
 constexpr double kLeastWeight = 1e-6;
 
-void AddLandmarks(const Rig& rig,
-                  const Calibration& theta,
-                  const CalibrationProblem& problem,
-                  const std::vector<KeyframeState>& keyframes,
-                  const std::vector<ScreenedLandmark>& landmarks,
-                  const RobustLoss* loss,
-                  SparseElimination* elimination) {
+std::vector<int> AddLandmarks(const Rig& rig,
+                              const Calibration& theta,
+                              const CalibrationProblem& problem,
+                              const std::vector<KeyframeState>& keyframes,
+                              const std::vector<ScreenedLandmark>& landmarks,
+                              const RobustLoss* loss,
+                              SparseElimination* system) {
+  std::vector<int> added;
   std::vector<LandmarkRows> rows;
   ReprojectionJacobians jacobians;
   Eigen::Vector2d r;
-  for (const ScreenedLandmark& landmark : landmarks) {
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const ScreenedLandmark& landmark = landmarks[i];
     const Track& track = problem.tracks[landmark.track];
     const LandmarkAnchor& anchor = landmark.place.anchor;
     const Eigen::Vector4d point_G = landmark.place.Homogeneous();
@@ -123,27 +125,28 @@ void AddLandmarks(const Rig& rig,
                      &jacobians)) {
         continue;
       }
-      double scale = 1 / rig.pixel_sigma_px;
-      if (loss != nullptr) {
-        const double weight = loss->Weight((scale * r).squaredNorm());
-        if (weight < kLeastWeight) {
-          continue;
-        }
-        scale *= std::sqrt(weight);
+      r /= rig.pixel_sigma_px;
+      const double weight = loss != nullptr ? loss->Weight(r.squaredNorm()) : 1;
+      if (weight < kLeastWeight) {
+        continue;
       }
+      const double root = std::sqrt(landmark.weight * weight);
+      const double scale = root / rig.pixel_sigma_px;
       rows.push_back({seen.keyframe,
                       CameraTangentOffset(theta, seen.camera),
-                      scale * r,
+                      root * r,
                       scale * jacobians.pose,
                       scale * jacobians.camera,
                       scale * jacobians.landmark * by_place});
     }
     if (rows.size() >= 2) {
-      elimination->AddLandmark(rows,
-                               Information(kInverseDepthSigma),
-                               landmark.place.inverse_depth.z());
+      system->AddLandmark(rows,
+                          landmark.weight * Information(kInverseDepthSigma),
+                          landmark.place.inverse_depth.z());
+      added.push_back(static_cast<int>(i));
     }
   }
+  return added;
 }
 
 }  // namespace
@@ -170,21 +173,19 @@ std::vector<InertialMatrix> WhitenInertialLinks(
   return whitening;
 }
 
-std::optional<SharedInformation> LineariseTheta(
+std::vector<int> LineariseProblem(
     const Rig& rig,
     const Calibration& theta,
     const CalibrationProblem& problem,
     const std::vector<KeyframeState>& keyframes,
     const std::vector<ScreenedLandmark>& landmarks,
     const std::vector<InertialMatrix>& whitening,
-    const RobustLoss* loss) {
-  SparseElimination elimination(static_cast<int>(keyframes.size()),
-                                TangentSize(theta));
-  AddPriors(problem, keyframes, &elimination);
-  AddInertialLinks(rig, theta.imu, problem, keyframes, whitening, &elimination);
-  AddBiasLinks(problem, keyframes, &elimination);
-  AddLandmarks(rig, theta, problem, keyframes, landmarks, loss, &elimination);
-  return elimination.Eliminate();
+    const RobustLoss* loss,
+    SparseElimination* system) {
+  AddPriors(problem, keyframes, system);
+  AddInertialLinks(rig, theta.imu, problem, keyframes, whitening, system);
+  AddBiasLinks(problem, keyframes, system);
+  return AddLandmarks(rig, theta, problem, keyframes, landmarks, loss, system);
 }
 
 SharedInformation ByOffset(const SharedInformation& at_theta,

@@ -8,34 +8,30 @@
 
 namespace selfcal::preintegration {
 
-// Lower triangle of *m += a b^T, and of *m += [..] for a product that is
-// symmetric.
-template <typename T, typename A, typename B>
-void AddSymmetric(const A& a, const B& b, Matrix3<T>* m) {
-  for (int c = 0; c < 3; ++c) {
-    for (int r = c; r < 3; ++r) {
-      (*m)(r, c) += a(r, 0) * b(c, 0) + a(r, 1) * b(c, 1) + a(r, 2) * b(c, 2);
-    }
-  }
-}
-
 // Covariance of (psi, Delta_v, Delta_p), by blocks; psi is the left
-// perturbation of the rotation.
+// perturbation of the rotation. Of the blocks on the diagonal, the lower
+// triangles.
 template <typename T>
 class MotionCovariance {
  public:
   // Over a step the errors become (psi, v - dv x psi, p + h v - dp x psi).
   void Propagate(const Stage<T>& s) {
-    const Matrix3<T> p_r = pr_ + s.h * vr_ - Cross<T, 3>(s.dp, rr_);
-    const Matrix3<T> v_r = vr_ - Cross<T, 3>(s.dv, rr_);
+    const Matrix3<T> r_r = Symmetric(rr_);
+    const Matrix3<T> v_v = Symmetric(vv_);
+    const Matrix3<T> p_r = pr_ + s.h * vr_ - Cross<T, 3>(s.dp, r_r);
+    const Matrix3<T> v_r = vr_ - Cross<T, 3>(s.dv, r_r);
     const Matrix3<T> r_v = vr_.transpose();
     const Matrix3<T> r_p = pr_.transpose();
     // Of the new with the old first, then with the new.
-    const Matrix3<T> p_v = pv_ + s.h * vv_ - Cross<T, 3>(s.dp, r_v);
-    const Matrix3<T> p_p = pp_ + s.h * pv_.transpose() - Cross<T, 3>(s.dp, r_p);
-    vv_ += TimesSkew<T>(v_r, s.dv) - Cross<T, 3>(s.dv, r_v);
+    const Matrix3<T> p_v = pv_ + s.h * v_v - Cross<T, 3>(s.dp, r_v);
+    const Matrix3<T> v_v_added =
+        TimesSkew<T>(v_r, s.dv) - Cross<T, 3>(s.dv, r_v);
+    const Matrix3<T> p_p_added = s.h * (pv_.transpose() + p_v) +
+                                 TimesSkew<T>(p_r, s.dp) -
+                                 Cross<T, 3>(s.dp, r_p);
+    vv_.template triangularView<Eigen::Lower>() += v_v_added;
+    pp_.template triangularView<Eigen::Lower>() += p_p_added;
     pv_ = p_v + TimesSkew<T>(p_r, s.dv);
-    pp_ = p_p + s.h * p_v + TimesSkew<T>(p_r, s.dp);
     pr_ = p_r;
     vr_ = v_r;
   }
@@ -46,15 +42,15 @@ class MotionCovariance {
                     const Matrix3<T>& T_g_inverse,
                     T density) {
     const Matrix3<T> noise = Sigma(s, density) * T_g_inverse;
-    const Matrix3<T> r = response.psi.template leftCols<3>() * noise;
-    const Matrix3<T> v = response.v.template leftCols<3>() * noise;
-    const Matrix3<T> p = response.p.template leftCols<3>() * noise;
-    rr_ += r * r.transpose();
-    vr_ += v * r.transpose();
-    pr_ += p * r.transpose();
-    vv_ += v * v.transpose();
-    pv_ += p * v.transpose();
-    pp_ += p * p.transpose();
+    const Matrix3<T> r = response.psi.template leftCols<3>().lazyProduct(noise);
+    const Matrix3<T> v = response.v.template leftCols<3>().lazyProduct(noise);
+    const Matrix3<T> p = response.p.template leftCols<3>().lazyProduct(noise);
+    AddLower(r, &rr_);
+    vr_ += v.lazyProduct(r.transpose());
+    pr_ += p.lazyProduct(r.transpose());
+    AddLower(v, &vv_);
+    pv_ += p.lazyProduct(v.transpose());
+    AddLower(p, &pp_);
   }
 
   // `correction` is the derivative of the force in the body by the raw reading.
@@ -63,28 +59,47 @@ class MotionCovariance {
                      const Matrix3<T>& correction,
                      T density) {
     const Matrix3<T> noise = Sigma(s, density) * correction;
-    const Matrix3<T> v = response.v * noise;
-    const Matrix3<T> p = response.p * noise;
-    const Matrix3<T> vv = v * v.transpose();
+    const Matrix3<T> v = response.v.lazyProduct(noise);
+    const Matrix3<T> p = response.p.lazyProduct(noise);
+    Matrix3<T> vv = Matrix3<T>::Zero();
+    AddLower(v, &vv);
     vv_ += vv;
-    pv_ += p * v.transpose();
+    pv_ += p.lazyProduct(v.transpose());
+    AddLower(p, &pp_);
     // White noise is not constant over the step: about its mean it moves the
     // position by density^2 h^3 / 12 more. Without that, a single step would
     // tie velocity and position together and leave the covariance singular.
-    pp_ += p * p.transpose() + s.h * s.h * (1.0 / 12) * vv;
+    pp_ += s.h * s.h * (1.0 / 12) * vv;
   }
 
-  const Matrix3<T>& rr() const { return rr_; }
+  Matrix3<T> rr() const { return Symmetric(rr_); }
   const Matrix3<T>& vr() const { return vr_; }
   const Matrix3<T>& pr() const { return pr_; }
-  const Matrix3<T>& vv() const { return vv_; }
+  Matrix3<T> vv() const { return Symmetric(vv_); }
   const Matrix3<T>& pv() const { return pv_; }
-  const Matrix3<T>& pp() const { return pp_; }
+  Matrix3<T> pp() const { return Symmetric(pp_); }
 
  private:
   // Of the mean over the step. What it is multiplied with vanishes with h.
   static T Sigma(const Stage<T>& s, T density) {
     return density / Sqrt(Max(s.h, T(1e-30)));
+  }
+
+  // The lower triangle of *m += a a^T.
+  static void AddLower(const Matrix3<T>& a, Matrix3<T>* m) {
+    for (int c = 0; c < 3; ++c) {
+      for (int r = c; r < 3; ++r) {
+        (*m)(r, c) += a(r, 0) * a(c, 0) + a(r, 1) * a(c, 1) + a(r, 2) * a(c, 2);
+      }
+    }
+  }
+
+  static Matrix3<T> Symmetric(const Matrix3<T>& lower) {
+    Matrix3<T> m;
+    for (int c = 0; c < 3; ++c) {
+      for (int r = c; r < 3; ++r) m(r, c) = m(c, r) = lower(r, c);
+    }
+    return m;
   }
 
   Matrix3<T> rr_ = Matrix3<T>::Zero();

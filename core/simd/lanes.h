@@ -75,6 +75,12 @@ Lanes<W> Select(LaneMask<W> mask, Lanes<W> if_true, Lanes<W> if_false) {
 
 template <int W>
 bool All(LaneMask<W> mask) {
+#if defined(__AVX512DQ__)
+  if constexpr (W == 8) return _mm512_movepi64_mask((__m512i)mask.bits) == 0xff;
+#endif
+#if defined(__AVX__)
+  if constexpr (W == 4) return _mm256_movemask_pd((__m256d)mask.bits) == 0xf;
+#endif
   std::int64_t all = -1;
   for (int i = 0; i < W; ++i) all &= mask.bits[i];
   return all != 0;

@@ -1,0 +1,315 @@
+#include "core/calibration/ceres_solver.h"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include "core/factor/ceres_factors.h"
+
+namespace selfcal {
+namespace {
+
+// The double arrays that Ceres moves, one of each for a keyframe.
+struct KeyframeBlocks {
+  std::array<double, 4> q;  // x, y, z, w
+  std::array<double, 3> p;
+  std::array<double, 9> vb;
+};
+
+KeyframeBlocks ToBlocks(const KeyframeState& x) {
+  KeyframeBlocks blocks;
+  Eigen::Map<Eigen::Vector4d>(blocks.q.data()) = x.q_GI.coeffs();
+  Eigen::Map<Eigen::Vector3d>(blocks.p.data()) = x.p_GI;
+  Eigen::Map<Eigen::Matrix<double, 9, 1>>(blocks.vb.data()) << x.v_GI, x.b_a,
+      x.b_g;
+  return blocks;
+}
+
+void FromBlocks(const KeyframeBlocks& blocks, KeyframeState* x) {
+  x->q_GI.coeffs() = Eigen::Map<const Eigen::Vector4d>(blocks.q.data());
+  x->q_GI.normalize();
+  x->p_GI = Eigen::Map<const Eigen::Vector3d>(blocks.p.data());
+  const Eigen::Map<const Eigen::Matrix<double, 9, 1>> vb(blocks.vb.data());
+  x->v_GI = vb.head<3>();
+  x->b_a = vb.segment<3>(3);
+  x->b_g = vb.tail<3>();
+}
+
+// rho'' is given as zero, so that Ceres weights residuals as in iteratively
+// reweighted least squares, as it does for every loss that is concave.
+class CeresLoss final : public ceres::LossFunction {
+ public:
+  CeresLoss(const RobustLoss& loss, double weight)
+      : loss_(loss), weight_(weight) {}
+
+  void Evaluate(double s, double rho[3]) const override {
+    rho[0] = weight_ * loss_.Value(s);
+    rho[1] = weight_ * loss_.Weight(s);
+    rho[2] = 0;
+  }
+
+ private:
+  RobustLoss loss_;
+  double weight_;
+};
+
+// The Ceres problem of one round, with the memory it works on.
+class Builder {
+ public:
+  Builder(const SolverRound& round,
+          const CalibrationEstimate& estimate,
+          const std::vector<ScreenedLandmark>& landmarks)
+      : round_(round),
+        d_(estimate.d),
+        rotation_(MakeRotationManifold()),
+        gauge_(MakeGaugeRotationManifold()),
+        problem_(ProblemOptions()) {
+    for (const KeyframeState& x : estimate.keyframes) {
+      keyframes_.push_back(ToBlocks(x));
+    }
+    for (const ScreenedLandmark& landmark : landmarks) {
+      places_.push_back(landmark.place.inverse_depth);
+    }
+    AddTheta();
+    AddKeyframes();
+    AddLinks();
+    AddLandmarks(landmarks);
+  }
+
+  ceres::Problem* problem() { return &problem_; }
+  const Eigen::VectorXd& d() const { return d_; }
+
+  // Landmarks go first, each by itself.
+  std::shared_ptr<ceres::ParameterBlockOrdering> Ordering() {
+    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (Eigen::Vector3d& place : places_) {
+      ordering->AddElementToGroup(place.data(), 0);
+    }
+    for (KeyframeBlocks& x : keyframes_) {
+      ordering->AddElementToGroup(x.q.data(), 1);
+      ordering->AddElementToGroup(x.p.data(), 1);
+      ordering->AddElementToGroup(x.vb.data(), 1);
+    }
+    ordering->AddElementToGroup(d_.data(), 2);
+    return ordering;
+  }
+
+  void Read(CalibrationEstimate* estimate,
+            std::vector<ScreenedLandmark>* landmarks) const {
+    estimate->d = d_;
+    for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+      FromBlocks(keyframes_[k], &estimate->keyframes[k]);
+    }
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      (*landmarks)[i].place.inverse_depth = places_[i];
+    }
+  }
+
+ private:
+  static ceres::Problem::Options ProblemOptions() {
+    ceres::Problem::Options options;
+    // Losses and manifolds are shared between blocks and owned here.
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+
+  void AddTheta() {
+    problem_.AddParameterBlock(d_.data(), static_cast<int>(d_.size()));
+    if (round_.basis.cols() == 0) {
+      problem_.SetParameterBlockConstant(d_.data());
+    } else {
+      subspace_ = MakeSubspaceManifold(round_.basis);
+      problem_.SetManifold(d_.data(), subspace_.get());
+    }
+    if (!round_.use_prior) {
+      return;
+    }
+    // The reference is the factory's calibration, so the prior's mean is d = 0.
+    const std::vector<int> free = FreeComponents(round_.rig);
+    const Eigen::VectorXd sigmas = PriorSigmas(round_.rig);
+    Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(free.size(), d_.size());
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      weights(static_cast<int>(i), free[i]) = 1 / sigmas(free[i]);
+    }
+    problem_.AddResidualBlock(
+        MakePriorCost(weights, Eigen::VectorXd::Zero(d_.size())).release(),
+        nullptr,
+        d_.data());
+  }
+
+  void AddKeyframes() {
+    for (KeyframeBlocks& x : keyframes_) {
+      problem_.AddParameterBlock(x.q.data(), 4, rotation_.get());
+      problem_.AddParameterBlock(x.p.data(), 3);
+      problem_.AddParameterBlock(x.vb.data(), 9);
+    }
+    for (const int k : round_.problem.gauge_keyframes) {
+      problem_.SetManifold(keyframes_[k].q.data(), gauge_.get());
+      problem_.SetParameterBlockConstant(keyframes_[k].p.data());
+    }
+  }
+
+  void AddLinks() {
+    const std::vector<InertialLink>& links = round_.problem.inertial_links;
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      KeyframeBlocks& a = keyframes_[links[i].before];
+      KeyframeBlocks& b = keyframes_[links[i].after];
+      const auto& states = round_.problem.keyframes;
+      problem_.AddResidualBlock(MakeInertialCost(round_.reference,
+                                                 links[i].samples,
+                                                 states[links[i].before].t_ns,
+                                                 states[links[i].after].t_ns,
+                                                 round_.rig.imu_noise,
+                                                 round_.rig.gravity_mps2,
+                                                 round_.whitening[i])
+                                    .release(),
+                                nullptr,
+                                d_.data(),
+                                a.q.data(),
+                                a.p.data(),
+                                a.vb.data(),
+                                b.q.data(),
+                                b.p.data(),
+                                b.vb.data());
+    }
+    for (const BiasLink& link : round_.problem.bias_links) {
+      problem_.AddResidualBlock(MakeBiasWalkCost(link.sigmas).release(),
+                                nullptr,
+                                keyframes_[link.before].vb.data(),
+                                keyframes_[link.after].vb.data());
+    }
+  }
+
+  void AddLandmarks(const std::vector<ScreenedLandmark>& landmarks) {
+    // Two rows, as all others of a landmark have: Ceres' elimination is faster
+    // where sizes are uniform.
+    Eigen::Matrix<double, 2, 3> far = Eigen::Matrix<double, 2, 3>::Zero();
+    losses_.reserve(landmarks.size());  // Ceres keeps pointers
+    for (std::size_t i = 0; i < landmarks.size(); ++i) {
+      far(0, 2) = std::sqrt(landmarks[i].weight) / kInverseDepthSigma;
+      losses_.emplace_back(round_.loss, landmarks[i].weight);
+      problem_.AddResidualBlock(
+          MakePriorCost(far, Eigen::Vector3d::Zero()).release(),
+          nullptr,
+          places_[i].data());
+      const Track& track = round_.problem.tracks[landmarks[i].track];
+      for (const int index : landmarks[i].used) {
+        const TrackObservation& seen = track.observations[index];
+        problem_.AddResidualBlock(
+            MakeReprojectionCost(round_.reference,
+                                 seen.camera,
+                                 seen.z_px,
+                                 round_.rig.pixel_sigma_px,
+                                 landmarks[i].place.anchor)
+                .release(),
+            &losses_.back(),
+            d_.data(),
+            keyframes_[seen.keyframe].q.data(),
+            keyframes_[seen.keyframe].p.data(),
+            places_[i].data());
+      }
+    }
+  }
+
+  const SolverRound& round_;
+  Eigen::VectorXd d_;
+  std::vector<KeyframeBlocks> keyframes_;
+  std::vector<Eigen::Vector3d> places_;
+  std::unique_ptr<ceres::Manifold> rotation_;
+  std::unique_ptr<ceres::Manifold> gauge_;
+  std::unique_ptr<ceres::Manifold> subspace_;
+  std::vector<CeresLoss> losses_;  // one of each landmark
+  ceres::Problem problem_;
+};
+
+class ProgressAdapter final : public ceres::IterationCallback {
+ public:
+  ProgressAdapter(const SolverCallback& callback, const Eigen::VectorXd& d)
+      : callback_(callback), d_(d) {}
+
+  ceres::CallbackReturnType operator()(
+      const ceres::IterationSummary& summary) override {
+    switch (callback_(summary.iteration, summary.cost, d_)) {
+      case SolverSignal::kEnough:
+        return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+      case SolverSignal::kCancel:
+        return ceres::SOLVER_ABORT;
+      case SolverSignal::kGoOn:
+        break;
+    }
+    return ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const SolverCallback& callback_;
+  const Eigen::VectorXd& d_;
+};
+
+ceres::Solver::Options SolverOptions(const SolverRound& round) {
+  ceres::Solver::Options options;
+  // Powell's dogleg rather than Levenberg-Marquardt. On recordings with heavy
+  // tails the residuals' own curvature doubles that of Gauss-Newton along the
+  // weakest directions (tilt, scale, biases). A full step then overshoots and
+  // the damping that prevents it slows every weak direction: 100 iterations and
+  // more, where dogleg, which shortens the step, takes 10.
+  options.trust_region_strategy_type = ceres::DOGLEG;
+  options.dogleg_type = ceres::TRADITIONAL_DOGLEG;
+  options.linear_solver_type = ceres::SPARSE_SCHUR;
+  options.num_threads = std::max(1, round.threads);
+  options.max_num_iterations = round.max_iterations;
+  options.function_tolerance = round.function_tolerance;
+  // Done is told by the cost and by the Gauss-Newton step of theta; a small
+  // step of all parameters together tells nothing.
+  options.parameter_tolerance = 1e-16;
+  options.gradient_tolerance = 1e-16;
+  options.jacobi_scaling = true;
+  options.update_state_every_iteration = true;
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
+}  // namespace
+
+SolverOutcome SolveRoundByCeres(const SolverRound& round,
+                                const SolverCallback& callback,
+                                CalibrationEstimate* estimate,
+                                std::vector<ScreenedLandmark>* landmarks) {
+  Builder builder(round, *estimate, *landmarks);
+  ceres::Solver::Options options = SolverOptions(round);
+  options.linear_solver_ordering = builder.Ordering();
+  ProgressAdapter adapter(callback, builder.d());
+  options.callbacks.push_back(&adapter);
+
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, builder.problem(), &summary);
+  builder.Read(estimate, landmarks);
+
+  SolverOutcome outcome;
+  outcome.iterations =
+      std::max(0, static_cast<int>(summary.iterations.size()) - 1);
+  outcome.initial_cost = summary.initial_cost;
+  outcome.final_cost = summary.final_cost;
+  outcome.message = summary.message;
+  switch (summary.termination_type) {
+    case ceres::CONVERGENCE:
+    case ceres::USER_SUCCESS:
+      outcome.status = SolverStatus::kConverged;
+      break;
+    case ceres::NO_CONVERGENCE:
+      outcome.status = SolverStatus::kNotConverged;
+      break;
+    case ceres::USER_FAILURE:
+      outcome.status = SolverStatus::kCancelled;
+      break;
+    case ceres::FAILURE:
+      outcome.status = SolverStatus::kFailed;
+      break;
+  }
+  return outcome;
+}
+
+}  // namespace selfcal

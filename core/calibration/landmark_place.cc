@@ -1,0 +1,173 @@
+#include "core/calibration/landmark_place.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/model/camera.h"
+
+namespace selfcal {
+namespace {
+
+// A change of inverse depth that is small against it.
+constexpr double kMaxRelativeStep = 0.5;
+
+struct Linearised {
+  double cost = 0;
+  int projected = 0;
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+};
+
+Linearised Linearise(const LandmarkScene& scene,
+                     const Track& track,
+                     std::span<const int> used,
+                     const RobustLoss& loss,
+                     const LandmarkPlace& place) {
+  Linearised sum;
+  const Eigen::Vector4d point_G = place.Homogeneous();
+  const double prior = 1 / (kInverseDepthSigma * kInverseDepthSigma);
+  const double rho = place.inverse_depth.z();
+  sum.cost = prior * rho * rho;
+  sum.H(2, 2) = prior;
+  sum.g(2) = prior * rho;
+  const double scale = 1 / scene.pixel_sigma_px();
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 3> by_p_C;
+  Eigen::Matrix3d p_C_by_place;
+  for (const int index : used) {
+    const TrackObservation& seen = track.observations[index];
+    if (!scene.Residual(seen, point_G, &r, &by_p_C)) {
+      sum.cost += loss.Value(kNotProjectedSigmas * kNotProjectedSigmas);
+      continue;
+    }
+    ++sum.projected;
+    r *= scale;
+    const Eigen::Matrix3d& R_CG = scene.R_CG(seen);
+    p_C_by_place.leftCols<2>() = R_CG * place.anchor.R_GA.leftCols<2>();
+    p_C_by_place.col(2) = R_CG * place.anchor.a_G + scene.p_CG(seen);
+    const Eigen::Matrix<double, 2, 3> J = scale * by_p_C * p_C_by_place;
+    const double s = r.squaredNorm();
+    const double weight = loss.Weight(s);
+    sum.cost += loss.Value(s);
+    sum.H += weight * J.transpose() * J;
+    sum.g += weight * J.transpose() * r;
+  }
+  return sum;
+}
+
+}  // namespace
+
+LandmarkScene::LandmarkScene(const Calibration& theta,
+                             std::span<const KeyframeState> keyframes,
+                             double pixel_sigma_px)
+    : theta_(theta), pixel_sigma_px_(pixel_sigma_px) {
+  views_.reserve(keyframes.size() * theta.cameras.size());
+  for (const KeyframeState& x : keyframes) {
+    for (const CameraCalibration& camera : theta.cameras) {
+      const Eigen::Matrix3d R_CG =
+          (camera.q_CI * x.q_GI.conjugate()).toRotationMatrix();
+      views_.push_back({R_CG, camera.p_CI - R_CG * x.p_GI});
+    }
+  }
+}
+
+bool LandmarkScene::Residual(const TrackObservation& seen,
+                             const Eigen::Vector4d& point_G,
+                             Eigen::Vector2d* residual_px,
+                             Eigen::Matrix<double, 2, 3>* by_p_C) const {
+  const View& view = views_[Index(seen)];
+  const Eigen::Vector3d p_C =
+      view.R_CG * point_G.head<3>() + point_G(3) * view.p_CG;
+  ProjectionJacobians jacobians;
+  Eigen::Vector2d z_px;
+  if (!Project(camera(seen), p_C, &z_px, by_p_C ? &jacobians : nullptr)) {
+    return false;
+  }
+  *residual_px = z_px - seen.z_px;
+  if (by_p_C) {
+    *by_p_C = jacobians.point;
+  }
+  return true;
+}
+
+void LandmarkPlace::Move(const Eigen::Vector3d& step) {
+  const double rho = inverse_depth.z();
+  if (std::abs(step.z()) > kMaxRelativeStep * rho) {
+    inverse_depth += step;
+    return;
+  }
+  // x / rho is the point in the anchor's frame, with x = (alpha, beta, 1).
+  const Eigen::Vector3d x = inverse_depth.head<2>().homogeneous();
+  Eigen::Vector3d point = x - x * (step.z() / rho);
+  point.head<2>() += step.head<2>();
+  inverse_depth << point.head<2>() / point.z(), rho / point.z();
+}
+
+LandmarkPlace PlaceAt(const LandmarkScene& scene,
+                      const Track& track,
+                      const Eigen::Vector4d& point_G) {
+  const TrackObservation& first = track.observations.front();
+  LandmarkPlace place;
+  place.anchor.a_G = -(scene.R_CG(first).transpose() * scene.p_CG(first));
+  const Eigen::Vector3d ray = point_G.head<3>() - point_G(3) * place.anchor.a_G;
+  place.anchor.R_GA =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), ray)
+          .toRotationMatrix();
+  place.inverse_depth = {0, 0, point_G(3) / ray.norm()};
+  return place;
+}
+
+RefinedPlace RefinePlace(const LandmarkScene& scene,
+                         const Track& track,
+                         std::span<const int> used,
+                         const RobustLoss& loss,
+                         const RefineLimits& limits,
+                         LandmarkPlace* place) {
+  Linearised here = Linearise(scene, track, used, loss, *place);
+  double damping = 1e-6;
+  // Beyond the loss's scale the cost curves less than Gauss-Newton has it, so
+  // that single steps crawl: while they gain more than was predicted, they are
+  // stretched.
+  double stretch = 1;
+  for (int i = 0; i < limits.steps; ++i) {
+    Eigen::Matrix3d H = here.H;
+    H.diagonal() *= 1 + damping;
+    H.diagonal().array() += std::numeric_limits<double>::min();
+    const Eigen::Vector3d step = -H.ldlt().solve(here.g);
+    if (!step.allFinite() || -step.dot(here.g) < limits.decrease) {
+      break;
+    }
+    LandmarkPlace next = *place;
+    next.inverse_depth += stretch * step;
+    const Linearised there = Linearise(scene, track, used, loss, next);
+    if (there.projected >= here.projected && there.cost < here.cost) {
+      const double predicted = -stretch * (2 - stretch) * step.dot(here.g);
+      stretch = here.cost - there.cost > predicted ? 2 * stretch : 1;
+      *place = next;
+      here = there;
+      damping *= 0.1;
+    } else {
+      stretch = 1;
+      damping = std::max(damping * 100, 1e-3);
+    }
+  }
+  return {here.H, here.cost};
+}
+
+std::vector<double> ResidualNorms(const LandmarkScene& scene,
+                                  const Track& track,
+                                  const Eigen::Vector4d& point_G) {
+  std::vector<double> norms;
+  norms.reserve(track.observations.size());
+  Eigen::Vector2d r;
+  for (const TrackObservation& seen : track.observations) {
+    norms.push_back(scene.Residual(seen, point_G, &r, nullptr)
+                        ? r.norm()
+                        : std::numeric_limits<double>::infinity());
+  }
+  return norms;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,283 @@
+#include "core/calibration/structured_solver.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/calibration/landmark_place.h"
+#include "core/calibration/theta_information.h"
+#include "core/model/so3.h"
+
+namespace selfcal {
+namespace {
+
+// Another length than the first is tried where the parabola through it has its
+// minimum further away than this part of it.
+constexpr double kLengthTolerance = 0.25;
+constexpr double kMaxStretch = 2;
+constexpr double kMinShortening = 0.1;
+constexpr int kMaxTrials = 10;
+// Landmarks at a point that is tried may together lack this part of what the
+// step promises.
+constexpr double kRefineDecrease = 1e-4;
+
+// Of theta's tangent, on the free components.
+Eigen::VectorXd PriorInformation(const Rig& rig) {
+  const Eigen::VectorXd sigmas = PriorSigmas(rig);
+  Eigen::VectorXd information = Eigen::VectorXd::Zero(sigmas.size());
+  for (const int i : FreeComponents(rig)) {
+    information(i) = 1 / (sigmas(i) * sigmas(i));
+  }
+  return information;
+}
+
+void Move(const ChainStateVector& step, KeyframeState* x) {
+  x->q_GI = (x->q_GI * Exp(step.segment<3>(kStateRotation))).normalized();
+  x->p_GI += step.segment<3>(kStatePosition);
+  x->v_GI += step.segment<3>(kStateVelocity);
+  x->b_a += step.segment<3>(kStateAccelBias);
+  x->b_g += step.segment<3>(kStateGyroBias);
+}
+
+// The undamped step of everything.
+struct Direction {
+  Eigen::VectorXd d;
+  std::vector<ChainStateVector> keyframes;
+  std::vector<Eigen::Vector3d> landmarks;  // of those in the system
+  // The cost falls by this, per unit of length, at the beginning of the way,
+  // and by half of it on the whole, if the problem is as linear as it looks.
+  double slope = 0;
+};
+
+Direction GaussNewton(const SolverRound& round,
+                      const LinearisedRound& linearised) {
+  const auto& [Lambda, eta] = linearised.by_offset;
+  Direction direction;
+  direction.d = Eigen::VectorXd::Zero(eta.size());
+  if (round.basis.cols() > 0) {
+    const Eigen::MatrixXd reduced =
+        round.basis.transpose() * Lambda * round.basis;
+    direction.d =
+        round.basis * reduced.ldlt().solve(round.basis.transpose() * eta);
+  }
+  const Eigen::VectorXd theta_step = linearised.theta_by_offset * direction.d;
+  direction.keyframes = linearised.system.KeyframeSteps(theta_step);
+  direction.landmarks =
+      linearised.system.LandmarkSteps(theta_step, direction.keyframes);
+  direction.slope = linearised.system.decrease() + 2 * eta.dot(direction.d) -
+                    direction.d.dot(Lambda * direction.d);
+  return direction;
+}
+
+// How far the parabola through the start, with its slope, and the point at
+// `length`, where the cost is higher by `rise`, has its minimum: within bounds.
+double NextLength(double length, double rise, double slope) {
+  const double curvature =
+      2 * (rise + length * slope) / (length * length * slope);
+  return curvature * kMaxStretch * length < 1
+             ? kMaxStretch * length
+             : std::max(1 / curvature, kMinShortening * length);
+}
+
+// A point on the way, with what it costs.
+struct Trial {
+  CalibrationEstimate estimate;
+  std::vector<LandmarkPlace> places;
+  double cost = 0;
+};
+
+double MotionSquares(const SolverRound& round,
+                     const Calibration& theta,
+                     const std::vector<KeyframeState>& keyframes) {
+  double sum = 0;
+  for (std::size_t i = 0; i < round.problem.inertial_links.size(); ++i) {
+    const InertialLink& link = round.problem.inertial_links[i];
+    sum += (round.whitening[i] * EvaluateInertial(link.samples,
+                                                  keyframes[link.before],
+                                                  keyframes[link.after],
+                                                  theta.imu,
+                                                  round.rig.imu_noise,
+                                                  round.rig.gravity_mps2,
+                                                  nullptr,
+                                                  nullptr))
+               .squaredNorm();
+  }
+  for (const BiasLink& link : round.problem.bias_links) {
+    const KeyframeState& a = keyframes[link.before];
+    const KeyframeState& b = keyframes[link.after];
+    Eigen::Matrix<double, 6, 1> walk;
+    walk << b.b_a - a.b_a, b.b_g - a.b_g;
+    sum += walk.cwiseQuotient(link.sigmas).squaredNorm();
+  }
+  return sum;
+}
+
+double Evaluate(const SolverRound& round,
+                const CalibrationEstimate& estimate,
+                const std::vector<ScreenedLandmark>& landmarks,
+                const RefineLimits& limits,
+                std::vector<LandmarkPlace>* places) {
+  const Calibration theta = BoxPlus(round.reference, estimate.d);
+  double sum = MotionSquares(round, theta, estimate.keyframes);
+  if (round.use_prior) {
+    sum += estimate.d.cwiseAbs2().dot(PriorInformation(round.rig));
+  }
+  const LandmarkScene scene(
+      theta, estimate.keyframes, round.rig.pixel_sigma_px);
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    sum += landmarks[i].weight *
+           RefinePlace(scene,
+                       round.problem.tracks[landmarks[i].track],
+                       landmarks[i].used,
+                       round.loss,
+                       limits,
+                       &(*places)[i])
+               .cost;
+  }
+  return sum / 2;
+}
+
+std::vector<LandmarkPlace> Places(
+    const std::vector<ScreenedLandmark>& landmarks) {
+  std::vector<LandmarkPlace> places;
+  places.reserve(landmarks.size());
+  for (const ScreenedLandmark& landmark : landmarks) {
+    places.push_back(landmark.place);
+  }
+  return places;
+}
+
+}  // namespace
+
+double RoundCost(const SolverRound& round,
+                 const CalibrationEstimate& estimate,
+                 const std::vector<ScreenedLandmark>& landmarks) {
+  std::vector<LandmarkPlace> places = Places(landmarks);
+  return Evaluate(round, estimate, landmarks, {.steps = 0}, &places);
+}
+
+bool LineariseRound(const SolverRound& round,
+                    const CalibrationEstimate& estimate,
+                    const std::vector<ScreenedLandmark>& landmarks,
+                    const RobustLoss* loss,
+                    LinearisedRound* result) {
+  const Calibration theta = BoxPlus(round.reference, estimate.d);
+  result->theta_by_offset = ThetaByOffset(round.reference, estimate.d);
+  result->system.Start(static_cast<int>(estimate.keyframes.size()),
+                       TangentSize(theta));
+  result->landmarks = LineariseProblem(round.rig,
+                                       theta,
+                                       round.problem,
+                                       estimate.keyframes,
+                                       landmarks,
+                                       round.whitening,
+                                       loss,
+                                       &result->system);
+  const auto at_theta = result->system.Eliminate();
+  if (!at_theta) {
+    return false;
+  }
+  result->by_offset = ByOffset(*at_theta, result->theta_by_offset);
+  if (round.use_prior) {
+    const Eigen::VectorXd prior = PriorInformation(round.rig);
+    result->by_offset.Lambda.diagonal() += prior;
+    result->by_offset.eta -= prior.cwiseProduct(estimate.d);
+  }
+  result->cost = RoundCost(round, estimate, landmarks);
+  return true;
+}
+
+StepOutcome TakeStep(const SolverRound& round,
+                     const LinearisedRound& linearised,
+                     CalibrationEstimate* estimate,
+                     std::vector<ScreenedLandmark>* landmarks) {
+  const Direction direction = GaussNewton(round, linearised);
+  const std::vector<LandmarkPlace> places = Places(*landmarks);
+  const RefineLimits limits{.decrease =
+                                kRefineDecrease * direction.slope /
+                                static_cast<double>(landmarks->size() + 1)};
+  const auto at = [&](double length) {
+    Trial trial{*estimate, places, 0};
+    trial.estimate.d += length * direction.d;
+    for (std::size_t k = 0; k < direction.keyframes.size(); ++k) {
+      Move(length * direction.keyframes[k], &trial.estimate.keyframes[k]);
+    }
+    for (std::size_t i = 0; i < direction.landmarks.size(); ++i) {
+      trial.places[linearised.landmarks[i]].Move(length *
+                                                 direction.landmarks[i]);
+    }
+    trial.cost =
+        Evaluate(round, trial.estimate, *landmarks, limits, &trial.places);
+    return trial;
+  };
+
+  double length = 1;
+  Trial best = at(length);
+  double next =
+      NextLength(length, best.cost - linearised.cost, direction.slope);
+  bool lower = best.cost < linearised.cost;
+  if (!lower || std::abs(next - length) > kLengthTolerance * length) {
+    for (int i = 0; i < kMaxTrials && (i == 0 || !lower); ++i) {
+      length = next;
+      Trial trial = at(length);
+      next = NextLength(length, trial.cost - linearised.cost, direction.slope);
+      if (trial.cost < best.cost) {
+        best = std::move(trial);
+      }
+      lower = best.cost < linearised.cost;
+    }
+  }
+  if (!lower) {
+    return {false, linearised.cost};
+  }
+  *estimate = std::move(best.estimate);
+  for (std::size_t i = 0; i < landmarks->size(); ++i) {
+    (*landmarks)[i].place = best.places[i];
+  }
+  return {true, best.cost};
+}
+
+SolverOutcome SolveRoundByStructure(const SolverRound& round,
+                                    const SolverCallback& callback,
+                                    CalibrationEstimate* estimate,
+                                    std::vector<ScreenedLandmark>* landmarks) {
+  SolverOutcome outcome;
+  LinearisedRound linearised;
+  const auto end = [&](SolverStatus status) {
+    outcome.status = status;
+    return outcome;
+  };
+  for (;; ++outcome.iterations) {
+    if (!LineariseRound(
+            round, *estimate, *landmarks, &round.loss, &linearised)) {
+      outcome.message = "the states of the keyframes are not determined";
+      return end(SolverStatus::kFailed);
+    }
+    const double last_cost = outcome.final_cost;
+    outcome.final_cost = linearised.cost;
+    if (outcome.iterations == 0) {
+      outcome.initial_cost = linearised.cost;
+    }
+    switch (callback(outcome.iterations, linearised.cost, estimate->d)) {
+      case SolverSignal::kEnough:
+        return end(SolverStatus::kConverged);
+      case SolverSignal::kCancel:
+        return end(SolverStatus::kCancelled);
+      case SolverSignal::kGoOn:
+        break;
+    }
+    if (outcome.iterations > 0 &&
+        last_cost - linearised.cost <= round.function_tolerance * last_cost) {
+      return end(SolverStatus::kConverged);
+    }
+    if (outcome.iterations == round.max_iterations) {
+      return end(SolverStatus::kNotConverged);
+    }
+    if (!TakeStep(round, linearised, estimate, landmarks).lower) {
+      return end(SolverStatus::kConverged);
+    }
+  }
+}
+
+}  // namespace selfcal

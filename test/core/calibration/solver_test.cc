@@ -1,0 +1,313 @@
+// Both ways to solve a round lead to the same minimum, and it is one.
+#include "core/calibration/solver.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "core/calibration/partition.h"
+#include "core/calibration/structured_solver.h"
+#include "core/calibration/subspace.h"
+#include "core/calibration/theta_information.h"
+#include "core/model/so3.h"
+#include "core/simulation/simulate.h"
+
+namespace selfcal {
+namespace {
+
+SimulationOptions SmallOptions(std::uint64_t seed) {
+  SimulationOptions options;
+  options.seed = seed;
+  options.keyframes_per_segment = 12;
+  options.landmarks_in_view = 40;
+  return options;
+}
+
+// Segments of one session of a rig whose factory calibration is wrong.
+std::vector<MotionSegment> Walk(const Rig& rig,
+                                const Calibration& truth,
+                                const SimulationOptions& options,
+                                int segments) {
+  const double seconds =
+      segments * options.keyframes_per_segment / options.keyframe_rate_hz + 0.5;
+  return Simulate(rig,
+                  truth,
+                  rig.factory,
+                  *MakeHandheld(seconds, 1.0, options.seed),
+                  "session",
+                  options)
+      .segments;
+}
+
+Rig WrongRig(Rig rig) {
+  rig.factory = PerturbCalibration(rig.factory, {}, 1);
+  return rig;
+}
+
+// A round as a calibration would pose it first, from a start near the minimum.
+class Posed {
+ public:
+  Posed(const Rig& rig,
+        const Calibration& start,
+        std::vector<MotionSegment> segments,
+        const CalibrateOptions& options = {})
+      : rig_(rig),
+        reference_(options.use_prior ? rig.factory : start),
+        segments_(std::move(segments)),
+        sorted_(SortByKey(segments_)),
+        partitioning_(PartitionSegments(sorted_, options.merge_landmarks)),
+        problem_(FlattenSegments(rig, sorted_, partitioning_)),
+        start_{BoxMinus(start, reference_), problem_.keyframes},
+        screening_(ScreenLandmarks(
+            rig, start, problem_, problem_.keyframes, options, nullptr)),
+        whitening_(
+            WhitenInertialLinks(rig, start.imu, problem_, problem_.keyframes)),
+        subspace_(WholeSubspace(rig)),
+        use_prior_(options.use_prior) {}
+
+  // Holds the directions in which the data says least.
+  void Hold(int directions) {
+    basis_ = TangentBasis(rig_, subspace_);
+    LinearisedRound linearised;
+    ASSERT_TRUE(LineariseRound(
+        Round(), start_, screening_.landmarks, nullptr, &linearised));
+    subspace_ = ObservedSubspace(rig_, linearised.by_offset.Lambda, directions);
+    ASSERT_EQ(subspace_.held.cols(), directions);
+  }
+
+  // Solves both ways, and expects the same of them.
+  void ExpectSameMinimum() {
+    basis_ = TangentBasis(rig_, subspace_);
+    const Solved structured = Solve(SolverKind::kStructured);
+    const Solved ceres = Solve(SolverKind::kCeres);
+    ASSERT_EQ(structured.outcome.status, SolverStatus::kConverged);
+    ASSERT_EQ(ceres.outcome.status, SolverStatus::kConverged);
+    EXPECT_NEAR(structured.outcome.initial_cost,
+                ceres.outcome.initial_cost,
+                1e-9 * ceres.outcome.initial_cost);
+    EXPECT_GT(ceres.outcome.initial_cost, 1.5 * ceres.outcome.final_cost)
+        << "the start must be away from the minimum";
+    EXPECT_NEAR(structured.outcome.final_cost,
+                ceres.outcome.final_cost,
+                1e-6 * ceres.outcome.final_cost);
+    EXPECT_LT(structured.outcome.iterations, ceres.outcome.iterations);
+    EXPECT_LT(LargestInSigmas(structured.estimate.d - ceres.estimate.d,
+                              Covariance(structured)),
+              1e-3);
+    ExpectMinimum(structured);
+  }
+
+  const CalibrationProblem& problem() const { return problem_; }
+  const Partitioning& partitioning() const { return partitioning_; }
+  const ThetaSubspace& subspace() const { return subspace_; }
+  const Screening& screening() const { return screening_; }
+  Screening* mutable_screening() { return &screening_; }
+
+ private:
+  struct Solved {
+    SolverOutcome outcome;
+    CalibrationEstimate estimate;
+    std::vector<ScreenedLandmark> landmarks;
+  };
+
+  SolverRound Round() const {
+    return {.rig = rig_,
+            .reference = reference_,
+            .problem = problem_,
+            .whitening = whitening_,
+            .basis = basis_,
+            .loss = screening_.loss,
+            .use_prior = use_prior_,
+            .threads = 1,
+            .max_iterations = 300,
+            .function_tolerance = 1e-12};
+  }
+
+  Solved Solve(SolverKind kind) const {
+    Solved solved{{}, start_, screening_.landmarks};
+    const auto go_on = [](int, double, const Eigen::VectorXd&) {
+      return SolverSignal::kGoOn;
+    };
+    solved.outcome =
+        SolveRound(kind, Round(), go_on, &solved.estimate, &solved.landmarks);
+    return solved;
+  }
+
+  Eigen::MatrixXd Covariance(const Solved& solved) const {
+    LinearisedRound linearised;
+    EXPECT_TRUE(LineariseRound(Round(),
+                               solved.estimate,
+                               solved.landmarks,
+                               &screening_.loss,
+                               &linearised));
+    return SubspaceCovariance(rig_, subspace_, linearised.by_offset.Lambda);
+  }
+
+  // Along each direction of theta, each coordinate of some keyframes and of
+  // some landmarks, differences of the cost show no slope: its minimum is not a
+  // fiftieth of the step h away.
+  void ExpectMinimum(const Solved& solved) const {
+    const auto expect_middle = [&](const auto& move, double h) {
+      const auto cost = [&](double by) {
+        Solved moved = solved;
+        move(by, &moved);
+        return RoundCost(Round(), moved.estimate, moved.landmarks);
+      };
+      const double slope =
+          (8 * (cost(h) - cost(-h)) - (cost(2 * h) - cost(-2 * h))) / (12 * h);
+      const double curvature = (cost(h) + cost(-h) - 2 * cost(0)) / (h * h);
+      ASSERT_GT(curvature, 0);
+      EXPECT_LT(std::abs(slope / curvature), 0.02 * h);
+    };
+    for (int i = 0; i < basis_.cols(); ++i) {
+      const Eigen::VectorXd direction = basis_.col(i);
+      expect_middle(
+          [&](double by, Solved* s) { s->estimate.d += by * direction; }, 1e-4);
+    }
+    const int keyframes = static_cast<int>(problem_.keyframes.size());
+    for (const int k : {1, keyframes / 2, keyframes - 1}) {
+      for (int i = 0; i < 3; ++i) {
+        const Eigen::Vector3d axis = Eigen::Vector3d::Unit(i);
+        const auto state = [&](Solved* s) -> KeyframeState& {
+          return s->estimate.keyframes[k];
+        };
+        expect_middle(
+            [&](double by, Solved* s) {
+              state(s).q_GI = state(s).q_GI * Exp(by * axis);
+            },
+            1e-5);
+        expect_middle([&](double by, Solved* s) { state(s).p_GI += by * axis; },
+                      1e-4);
+        expect_middle([&](double by, Solved* s) { state(s).v_GI += by * axis; },
+                      1e-3);
+        expect_middle([&](double by, Solved* s) { state(s).b_a += by * axis; },
+                      1e-2);
+        expect_middle([&](double by, Solved* s) { state(s).b_g += by * axis; },
+                      1e-4);
+      }
+    }
+    for (const std::size_t i : {std::size_t{0}, solved.landmarks.size() / 2}) {
+      for (int j = 0; j < 3; ++j) {
+        expect_middle(
+            [&](double by, Solved* s) {
+              s->landmarks[i].place.inverse_depth(j) += by;
+            },
+            1e-3);
+      }
+    }
+  }
+
+  const Rig rig_;
+  const Calibration reference_;
+  const std::vector<MotionSegment> segments_;
+  const std::vector<const MotionSegment*> sorted_;
+  const Partitioning partitioning_;
+  const CalibrationProblem problem_;
+  const CalibrationEstimate start_;
+  Screening screening_;
+  const std::vector<InertialMatrix> whitening_;
+  ThetaSubspace subspace_;
+  const bool use_prior_;
+  Eigen::MatrixXd basis_;
+};
+
+// theta is at the truth, the states are as a SLAM system gave them.
+Posed Simple(const CalibrateOptions& options,
+             const SimulationOptions& simulation,
+             const Rig& true_rig = HandheldRig("r")) {
+  const Rig rig = WrongRig(true_rig);
+  return {rig,
+          true_rig.factory,
+          Walk(rig, true_rig.factory, simulation, 3),
+          options};
+}
+
+TEST(Solvers, AgreeWithoutALoss) {
+  Simple({.loss = LossKind::kNone}, SmallOptions(1)).ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWithHuber) {
+  Simple({.loss = LossKind::kHuber}, SmallOptions(2)).ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWithCauchyAndOutliers) {
+  SimulationOptions simulation = SmallOptions(3);
+  simulation.outlier_fraction = 0.05;
+  Simple({.loss = LossKind::kCauchy}, simulation).ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWithFixedComponents) {
+  Rig rig = HandheldRig("r");
+  rig.fixed = {"imu.q_AI.*", "cam0.distortion.w"};
+  Simple({}, SmallOptions(4), rig).ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWithAPrior) {
+  Rig rig = HandheldRig("r");
+  rig.prior_sigmas = {{"cam0.focal.*", 1e-2}};
+  Simple({.use_prior = true}, SmallOptions(5), rig).ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWithDirectionsHeld) {
+  Posed posed = Simple({}, SmallOptions(6));
+  posed.Hold(3);
+  posed.ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeOnWeightedLandmarks) {
+  Posed posed = Simple({}, SmallOptions(7));
+  for (std::size_t i = 0; i < posed.screening().landmarks.size(); i += 2) {
+    posed.mutable_screening()->landmarks[i].weight = 0.3;
+  }
+  posed.ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeAcrossGapsAndSessions) {
+  const Rig rig = WrongRig(HandheldRig("r"));
+  const Calibration truth = HandheldRig("r").factory;
+  SimulationOptions simulation = SmallOptions(8);
+  simulation.revisit_fraction = 0;
+  std::vector<MotionSegment> segments = Walk(rig, truth, simulation, 4);
+  segments.erase(segments.begin() + 1, segments.begin() + 3);
+  simulation.seed = 9;
+  for (MotionSegment& segment : Walk(rig, truth, simulation, 2)) {
+    segment.key.session = "another";
+    segments.push_back(segment);
+  }
+  Posed posed(rig, truth, segments);
+  EXPECT_EQ(posed.problem().bias_links.size(), 1u);
+  EXPECT_EQ(posed.partitioning().joints.size(), 1u);
+  EXPECT_EQ(posed.partitioning().partitions.size(), 3u);
+  posed.ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWhereLandmarksConnectDistantKeyframes) {
+  const Rig rig = WrongRig(HandheldRig("r"));
+  const Calibration truth = HandheldRig("r").factory;
+  SimulationOptions simulation = SmallOptions(10);
+  simulation.revisit_fraction = 0.5;
+  std::vector<MotionSegment> segments = Walk(rig, truth, simulation, 4);
+  segments.erase(segments.begin() + 1, segments.begin() + 3);
+  Posed posed(rig, truth, segments, {.merge_landmarks = 0});
+  EXPECT_EQ(posed.partitioning().partitions.size(), 1u);
+  EXPECT_EQ(posed.problem().chain_starts.size(), 2u);
+  posed.ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWithTwoCameras) {
+  Rig rig = HandheldRig("r");
+  CameraCalibration second = rig.factory.cameras[0];
+  second.model = DistortionModel::kRadialTangential;
+  second.distortion.resize(4);
+  second.distortion << -0.05, 0.01, 2e-4, -1e-4;
+  second.f = {420, 421};
+  second.p_CI += Eigen::Vector3d(0.08, 0.01, 0);
+  second.q_CI = Exp(Eigen::Vector3d(0.05, -0.1, 0.02)) * second.q_CI;
+  rig.factory.cameras.push_back(second);
+  Simple({}, SmallOptions(11), rig).ExpectSameMinimum();
+}
+
+}  // namespace
+}  // namespace selfcal
