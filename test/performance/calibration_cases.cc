@@ -9,6 +9,7 @@
 #include "core/calibration/partition.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/screening.h"
+#include "core/calibration/sparse_elimination.h"
 #include "core/calibration/subspace.h"
 #include "core/calibration/theta_information.h"
 #include "core/information/segment_information.h"
@@ -73,26 +74,31 @@ Measurement CovarianceAgainstIteration(const TimingOptions& options) {
   const Partitioning partitioning =
       PartitionSegments(sorted, calibrate.merge_landmarks);
   const CalibrationProblem problem = FlattenSegments(rig, sorted, partitioning);
-  const Screening screening =
-      ScreenLandmarks(rig, rig.factory, problem, problem.keyframes, calibrate);
+  const Screening screening = ScreenLandmarks(
+      rig, rig.factory, problem, problem.keyframes, calibrate, nullptr);
   const std::vector<InertialMatrix> whitening =
       WhitenInertialLinks(rig, rig.factory.imu, problem, problem.keyframes);
+  SparseElimination system;
   int iterations = 0;
-  Measurement result = CompareTimes(
-      {"covariance",
-       [&] {
-         const auto information = LineariseTheta(rig,
-                                                 rig.factory,
-                                                 problem,
-                                                 problem.keyframes,
-                                                 screening.landmarks,
-                                                 whitening,
-                                                 &screening.loss);
-         benchmark::DoNotOptimize(
-             SubspaceCovariance(rig, WholeSubspace(rig), information->Lambda));
-       }},
-      CalibrationOf("calibration", scene, calibrate, &iterations),
-      Fewer(options));
+  Measurement result =
+      CompareTimes({"covariance",
+                    [&] {
+                      system.Start(static_cast<int>(problem.keyframes.size()),
+                                   TangentSize(rig.factory));
+                      LineariseProblem(rig,
+                                       rig.factory,
+                                       problem,
+                                       problem.keyframes,
+                                       screening.landmarks,
+                                       whitening,
+                                       &screening.loss,
+                                       &system);
+                      const auto information = system.Eliminate();
+                      benchmark::DoNotOptimize(SubspaceCovariance(
+                          rig, WholeSubspace(rig), information->Lambda));
+                    }},
+                   CalibrationOf("calibration", scene, calibrate, &iterations),
+                   Fewer(options));
   result.ratio *= iterations;
   result.figures["iterations"] = iterations;
   return result;
