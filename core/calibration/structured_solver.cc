@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "core/calibration/landmark_place.h"
@@ -44,7 +45,7 @@ void Move(const ChainStateVector& step, KeyframeState* x) {
 struct Direction {
   Eigen::VectorXd d;
   std::vector<ChainStateVector> keyframes;
-  std::vector<Eigen::Vector3d> landmarks;  // of those in the system
+  std::vector<Eigen::Vector3d> landmarks;
   // The cost falls by this, per unit of length, at the beginning of the way,
   // and by half of it on the whole, if the problem is as linear as it looks.
   double slope = 0;
@@ -52,7 +53,8 @@ struct Direction {
 
 Direction GaussNewton(const SolverRound& round,
                       const LinearisedRound& linearised) {
-  const auto& [Lambda, eta] = linearised.by_offset;
+  const Eigen::MatrixXd& Lambda = linearised.by_offset.Lambda;
+  const Eigen::VectorXd& eta = linearised.by_offset.eta;
   Direction direction;
   direction.d = Eigen::VectorXd::Zero(eta.size());
   if (round.basis.cols() > 0) {
@@ -62,9 +64,8 @@ Direction GaussNewton(const SolverRound& round,
         round.basis * reduced.ldlt().solve(round.basis.transpose() * eta);
   }
   const Eigen::VectorXd theta_step = linearised.theta_by_offset * direction.d;
-  direction.keyframes = linearised.system.KeyframeSteps(theta_step);
-  direction.landmarks =
-      linearised.system.LandmarkSteps(theta_step, direction.keyframes);
+  linearised.system.FindSteps(
+      theta_step, &direction.keyframes, &direction.landmarks);
   direction.slope = linearised.system.decrease() + 2 * eta.dot(direction.d) -
                     direction.d.dot(Lambda * direction.d);
   return direction;
@@ -87,22 +88,39 @@ struct Trial {
   double cost = 0;
 };
 
+// U with U^-1 = W.
+InertialNoiseRoot RootOf(const InertialMatrix& W) {
+  const Eigen::Matrix<double, 9, 9> U =
+      W.topLeftCorner<9, 9>().triangularView<Eigen::Upper>().solve(
+          Eigen::Matrix<double, 9, 9>::Identity());
+  InertialNoiseRoot root;
+  for (int i = 0; i < 9; ++i) {
+    for (int j = 0; j < 9; ++j) root.motion[i][j] = U(i, j);
+  }
+  for (int i = 0; i < 6; ++i) root.bias[i] = 1 / W(9 + i, 9 + i);
+  return root;
+}
+
+std::vector<InertialNoiseRoot> RootsOf(const SolverRound& round) {
+  std::vector<InertialNoiseRoot> roots;
+  for (const InertialMatrix& W : round.whitening) roots.push_back(RootOf(W));
+  return roots;
+}
+
 double MotionSquares(const SolverRound& round,
+                     std::span<const InertialNoiseRoot> roots,
                      const Calibration& theta,
                      const std::vector<KeyframeState>& keyframes) {
-  double sum = 0;
-  for (std::size_t i = 0; i < round.problem.inertial_links.size(); ++i) {
-    const InertialLink& link = round.problem.inertial_links[i];
-    sum += (round.whitening[i] * EvaluateInertial(link.samples,
-                                                  keyframes[link.before],
-                                                  keyframes[link.after],
-                                                  theta.imu,
-                                                  round.rig.imu_noise,
-                                                  round.rig.gravity_mps2,
-                                                  nullptr,
-                                                  nullptr))
-               .squaredNorm();
+  std::vector<InertialLinkStates> links;
+  for (const InertialLink& link : round.problem.inertial_links) {
+    links.push_back(
+        {&keyframes[link.before], &keyframes[link.after], link.samples});
   }
+  std::vector<InertialResidual> residuals(links.size());
+  InertialBatch(WidestVectors())
+      .Residuals(links, theta.imu, round.rig.gravity_mps2, roots, residuals);
+  double sum = 0;
+  for (const InertialResidual& r : residuals) sum += r.squaredNorm();
   for (const BiasLink& link : round.problem.bias_links) {
     const KeyframeState& a = keyframes[link.before];
     const KeyframeState& b = keyframes[link.after];
@@ -114,12 +132,13 @@ double MotionSquares(const SolverRound& round,
 }
 
 double Evaluate(const SolverRound& round,
+                std::span<const InertialNoiseRoot> roots,
                 const CalibrationEstimate& estimate,
                 const std::vector<ScreenedLandmark>& landmarks,
                 const RefineLimits& limits,
                 std::vector<LandmarkPlace>* places) {
   const Calibration theta = BoxPlus(round.reference, estimate.d);
-  double sum = MotionSquares(round, theta, estimate.keyframes);
+  double sum = MotionSquares(round, roots, theta, estimate.keyframes);
   if (round.use_prior) {
     sum += estimate.d.cwiseAbs2().dot(PriorInformation(round.rig));
   }
@@ -154,7 +173,8 @@ double RoundCost(const SolverRound& round,
                  const CalibrationEstimate& estimate,
                  const std::vector<ScreenedLandmark>& landmarks) {
   std::vector<LandmarkPlace> places = Places(landmarks);
-  return Evaluate(round, estimate, landmarks, {.steps = 0}, &places);
+  return Evaluate(
+      round, RootsOf(round), estimate, landmarks, {.steps = 0}, &places);
 }
 
 bool LineariseRound(const SolverRound& round,
@@ -164,21 +184,19 @@ bool LineariseRound(const SolverRound& round,
                     LinearisedRound* result) {
   const Calibration theta = BoxPlus(round.reference, estimate.d);
   result->theta_by_offset = ThetaByOffset(round.reference, estimate.d);
-  result->system.Start(static_cast<int>(estimate.keyframes.size()),
-                       TangentSize(theta));
-  result->landmarks = LineariseProblem(round.rig,
-                                       theta,
-                                       round.problem,
-                                       estimate.keyframes,
-                                       landmarks,
-                                       round.whitening,
-                                       loss,
-                                       &result->system);
-  const auto at_theta = result->system.Eliminate();
-  if (!at_theta) {
+  result->roots = RootsOf(round);
+  result->system.Linearise(round.rig,
+                           theta,
+                           round.problem,
+                           estimate.keyframes,
+                           landmarks,
+                           result->roots,
+                           loss);
+  const SharedInformation& at_theta = result->system.information();
+  if (!at_theta.Lambda.allFinite() || !at_theta.eta.allFinite()) {
     return false;
   }
-  result->by_offset = ByOffset(*at_theta, result->theta_by_offset);
+  result->by_offset = ByOffset(at_theta, result->theta_by_offset);
   if (round.use_prior) {
     const Eigen::VectorXd prior = PriorInformation(round.rig);
     result->by_offset.Lambda.diagonal() += prior;
@@ -204,11 +222,14 @@ StepOutcome TakeStep(const SolverRound& round,
       Move(length * direction.keyframes[k], &trial.estimate.keyframes[k]);
     }
     for (std::size_t i = 0; i < direction.landmarks.size(); ++i) {
-      trial.places[linearised.landmarks[i]].Move(length *
-                                                 direction.landmarks[i]);
+      trial.places[i].Move(length * direction.landmarks[i]);
     }
-    trial.cost =
-        Evaluate(round, trial.estimate, *landmarks, limits, &trial.places);
+    trial.cost = Evaluate(round,
+                          linearised.roots,
+                          trial.estimate,
+                          *landmarks,
+                          limits,
+                          &trial.places);
     return trial;
   };
 

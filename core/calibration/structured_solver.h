@@ -11,18 +11,18 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "core/calibration/linear_system.h"
 #include "core/calibration/solver.h"
-#include "core/calibration/sparse_elimination.h"
 
 namespace selfcal {
 
 // A round, linearised at an estimate. Its memory serves the next one.
 struct LinearisedRound {
-  SparseElimination system;         // of theta's tangent; eliminated
-  std::vector<int> landmarks;       // those that are in the system
-  Eigen::MatrixXd theta_by_offset;  // ThetaByOffset at the estimate
-  SharedInformation by_offset;      // of d, prior on theta included
-  double cost = 0;                  // RoundCost
+  LinearSystem system;                   // of theta's tangent
+  std::vector<InertialNoiseRoot> roots;  // of the inertial links
+  Eigen::MatrixXd theta_by_offset;       // ThetaByOffset at the estimate
+  SharedInformation by_offset;           // of d, prior on theta included
+  double cost = 0;                       // RoundCost
 };
 
 // What a round minimises: half of the sum of all losses and squares.

@@ -597,6 +597,7 @@ void ChainElimination::Finish(SharedInformation* result) {
   const int size = shared_size();
   result->Lambda.resize(size, size);
   result->eta.resize(size);
+  result->constant = Front(constant_, constant_);
   const auto place = [](int i) {
     return i < kChainLinkShared ? i : i + kChainMotionSize;
   };

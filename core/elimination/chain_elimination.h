@@ -53,10 +53,12 @@ struct MotionLink {
 };
 
 // What the chain says about the shared parameters: minimising over all else
-// leaves d^T Lambda d - 2 eta^T d + const.
+// leaves d^T Lambda d - 2 eta^T d + constant + r, with r the squares of the
+// residuals of all factors but transitions, and the constant at most theirs.
 struct SharedInformation {
   Eigen::MatrixXd Lambda;  // symmetric
   Eigen::VectorXd eta;
+  double constant = 0;
 };
 
 // Who sees what: as ChainStructure::Find takes it, and for each camera the

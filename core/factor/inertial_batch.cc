@@ -105,7 +105,6 @@ void InertialBatch::Linearise(std::span<const InertialLinkStates> links,
                               const ImuCalibration& imu,
                               const ImuNoise& noise,
                               double gravity_mps2,
-                              const double* theta_scale,
                               std::span<InertialNoiseRoot> roots,
                               std::span<InertialTransition> out) {
   assert(roots.size() == links.size() && out.size() == links.size());
@@ -122,8 +121,7 @@ void InertialBatch::Linearise(std::span<const InertialLinkStates> links,
           transition[lane] =
               lane < n ? &out[first + lane] : &unused_transition_;
         }
-        inertial::LineariseLinks<W>(
-            input, noise, theta_scale, root, transition);
+        inertial::LineariseLinks<W>(input, noise, root, transition);
       });
 }
 
@@ -131,7 +129,6 @@ void InertialBatch::LineariseWithRoots(
     std::span<const InertialLinkStates> links,
     const ImuCalibration& imu,
     double gravity_mps2,
-    const double* theta_scale,
     std::span<const InertialNoiseRoot> roots,
     std::span<InertialTransition> out) {
   assert(roots.size() == links.size() && out.size() == links.size());
@@ -148,8 +145,7 @@ void InertialBatch::LineariseWithRoots(
           transition[lane] =
               lane < n ? &out[first + lane] : &unused_transition_;
         }
-        inertial::LineariseLinksWithRoots<W>(
-            input, theta_scale, root, transition);
+        inertial::LineariseLinksWithRoots<W>(input, root, transition);
       });
 }
 

@@ -48,13 +48,11 @@ class InertialBatch {
  public:
   explicit InertialBatch(VectorWidth width) : width_(width) {}
 
-  // Fills roots and out, one for each link. Columns of theta_i are multiplied
-  // by theta_scale (15).
+  // Fills roots and out, one for each link.
   void Linearise(std::span<const InertialLinkStates> links,
                  const ImuCalibration& imu,
                  const ImuNoise& noise,
                  double gravity_mps2,
-                 const double* theta_scale,
                  std::span<InertialNoiseRoot> roots,
                  std::span<InertialTransition> out);
 
@@ -62,7 +60,6 @@ class InertialBatch {
   void LineariseWithRoots(std::span<const InertialLinkStates> links,
                           const ImuCalibration& imu,
                           double gravity_mps2,
-                          const double* theta_scale,
                           std::span<const InertialNoiseRoot> roots,
                           std::span<InertialTransition> out);
 

@@ -146,13 +146,12 @@ void StoreTransition(const MotionRows<Lanes<W>>& rows,
 template <int W>
 void SolveAndStore(const Link<W>& link,
                    const NoiseRoot<Lanes<W>>& root,
-                   const double* theta_scale,
                    InertialTransition* const* out) {
   using T = Lanes<W>;
   const TransitionSolver<T> solver(
       link.x0.q_GI.toRotationMatrix(), link.motion, link.dt, link.residual);
   MotionRows<T> rows;
-  solver.Solve(link.integrator.Derivatives(), root, theta_scale, &rows);
+  solver.Solve(link.integrator.Derivatives(), root, &rows);
   StoreTransition<W>(rows, root, link.residual, out);
 }
 
@@ -161,23 +160,21 @@ void SolveAndStore(const Link<W>& link,
 template <int W>
 void LineariseLinks(const KernelInput<W>& input,
                     const ImuNoise& noise,
-                    const double* theta_scale,
                     InertialNoiseRoot* const* roots,
                     InertialTransition* const* out) {
   const Link<W> link(input, noise, {.jacobians = true, .covariance = true});
   const NoiseRoot<Lanes<W>> root = RootOf<W>(link, noise);
   StoreRoot<W>(root, roots);
-  SolveAndStore<W>(link, root, theta_scale, out);
+  SolveAndStore<W>(link, root, out);
 }
 
 template <int W>
 void LineariseLinksWithRoots(const KernelInput<W>& input,
-                             const double* theta_scale,
                              const InertialNoiseRoot* const* roots,
                              InertialTransition* const* out) {
   const Link<W> link(
       input, ImuNoise(), {.jacobians = true, .covariance = false});
-  SolveAndStore<W>(link, LoadRoot<W>(roots), theta_scale, out);
+  SolveAndStore<W>(link, LoadRoot<W>(roots), out);
 }
 
 template <int W>
@@ -198,9 +195,8 @@ using ConstRoots = const InertialNoiseRoot* const*;
 using Transitions = InertialTransition* const*;
 
 template void LineariseLinks<SELFCAL_LANES>(
-    const Input&, const ImuNoise&, const double*, Roots, Transitions);
+    const Input&, const ImuNoise&, Roots, Transitions);
 template void LineariseLinksWithRoots<SELFCAL_LANES>(const Input&,
-                                                     const double*,
                                                      ConstRoots,
                                                      Transitions);
 template void WhitenedResiduals<SELFCAL_LANES>(const Input&,

@@ -34,14 +34,12 @@ struct KernelInput {
 template <int W>
 void LineariseLinks(const KernelInput<W>& input,
                     const ImuNoise& noise,
-                    const double* theta_scale,
                     InertialNoiseRoot* const* roots,
                     InertialTransition* const* out);
 
 // Fills out with the roots as given.
 template <int W>
 void LineariseLinksWithRoots(const KernelInput<W>& input,
-                             const double* theta_scale,
                              const InertialNoiseRoot* const* roots,
                              InertialTransition* const* out);
 

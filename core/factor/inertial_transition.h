@@ -115,14 +115,12 @@ class TransitionSolver {
         dt_(dt),
         residual_(residual) {}
 
-  // theta_scale: 15 numbers.
   void Solve(const preintegration::MotionDerivatives<T>& by,
              const NoiseRoot<T>& root,
-             const double* theta_scale,
              MotionRows<T>* rows) const {
     for (int c = 0; c < kImuTangentSize; ++c) {
       const Eigen::Matrix<T, 9, 1> x = OfMeasured(by.theta.col(c));
-      Write<kTransitionColumns>(T(theta_scale[c]) * x, c, rows->G);
+      Write<kTransitionColumns>(x, c, rows->G);
     }
     const Eigen::Matrix<T, 15, 1>& r = residual_;
     Eigen::Matrix<T, 9, 1> constant =

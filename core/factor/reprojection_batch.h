@@ -44,8 +44,9 @@ class ReprojectionBatch {
   explicit ReprojectionBatch(VectorWidth width = WidestVectors())
       : width_(width) {}
 
-  // Writes 2 count rows of RowsStride(n) doubles. `points` are p_G, 3 doubles
-  // each. The factors are multiplied by `weights`, one for each observation, or
+  // Writes 2 count rows of RowsStride(n) doubles. `points` are homogeneous, 4
+  // doubles (X, w) each with p_G = X / w; rows are by the pose, the camera, and
+  // by p_G. The factors are multiplied by `weights`, one for each observation, or
   // where it is null by 1 / sigma_px. `rows` has room for 2 (count + 7) rows.
   void Linearise(const ObservationRun& run,
                  const double* points,
@@ -53,7 +54,7 @@ class ReprojectionBatch {
                  const double* weights,
                  double* rows) const;
 
-  // Adds to the sums of each landmark under a Huber loss of huber_sigmas, and
+  // Adds to the sums of each landmark, by X, under a Huber loss of huber_sigmas, and
   // writes the squared norm of each residual [px^2]; negative where the point
   // cannot be projected.
   void AddLandmarkSums(const ObservationRun& run,

@@ -13,7 +13,8 @@ using Matrix23 = Eigen::Matrix<T, 2, 3>;
 
 // Observations first .. first + kLanes of a run; beyond its end, the last one.
 struct Batch {
-  Vector3 p_G;
+  Vector3 X;  // homogeneous (X, w)
+  T w;
   Vector2 z_px;
   std::int32_t landmarks[kLanes];
 };
@@ -23,8 +24,9 @@ Batch Gather(const ObservationRun& run, const double* points, int first) {
   for (int i = 0; i < kLanes; ++i) {
     const int at = first + i < run.count ? first + i : run.count - 1;
     batch.landmarks[i] = run.landmarks[at];
-    const double* p = points + 3 * run.landmarks[at];
-    for (int j = 0; j < 3; ++j) batch.p_G[j].Set(i, p[j]);
+    const double* point = points + 4 * run.landmarks[at];
+    for (int j = 0; j < 3; ++j) batch.X[j].Set(i, point[j]);
+    batch.w.Set(i, point[3]);
     for (int j = 0; j < 2; ++j) batch.z_px[j].Set(i, run.z_px[2 * at + j]);
   }
   return batch;
@@ -37,18 +39,19 @@ Vector3 Turn(const double* M, const Vector3& v) {
           M[6] * v[0] + M[7] * v[1] + M[8] * v[2]};
 }
 
-Vector3 ToBody(const RunGeometry& geometry, const Vector3& p_G) {
-  const Vector3 from_body(p_G[0] - geometry.p_GI[0],
-                          p_G[1] - geometry.p_GI[1],
-                          p_G[2] - geometry.p_GI[2]);
+// In the body and in the camera frame, both times w.
+Vector3 ToBody(const RunGeometry& geometry, const Batch& batch) {
+  const Vector3 from_body(batch.X[0] - batch.w * geometry.p_GI[0],
+                          batch.X[1] - batch.w * geometry.p_GI[1],
+                          batch.X[2] - batch.w * geometry.p_GI[2]);
   return Turn(geometry.R_IG, from_body);
 }
 
-Vector3 ToCamera(const RunGeometry& geometry, const Vector3& p_I) {
+Vector3 ToCamera(const RunGeometry& geometry, const Vector3& p_I, T w) {
   const Vector3 turned = Turn(geometry.R_CI, p_I);
-  return {turned[0] + geometry.p_CI[0],
-          turned[1] + geometry.p_CI[1],
-          turned[2] + geometry.p_CI[2]};
+  return {turned[0] + w * geometry.p_CI[0],
+          turned[1] + w * geometry.p_CI[1],
+          turned[2] + w * geometry.p_CI[2]};
 }
 
 // J M for a matrix by rows.
@@ -77,10 +80,10 @@ Evaluated<Model> Evaluate(const RunGeometry& geometry,
                           const Model& model,
                           const Batch& batch) {
   Evaluated<Model> e;
-  e.p_I = ToBody(geometry, batch.p_G);
+  e.p_I = ToBody(geometry, batch);
   Vector2 z_px;
   e.valid = ProjectWith<T>(
-      geometry.pinhole, model, ToCamera(geometry, e.p_I), &z_px, &e.parts);
+      geometry.pinhole, model, ToCamera(geometry, e.p_I, batch.w), &z_px, &e.parts);
   e.r_px = Vector2(z_px[0] - batch.z_px[0], z_px[1] - batch.z_px[1]);
   e.by_p_I = Times(e.parts.point, geometry.R_CI);
   return e;
@@ -108,8 +111,8 @@ void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
   constexpr int kOwn = 3 + 4 + Model::kSize;  // p_CI, f, c, distortion
   constexpr int kStride = RowsStride(3 + kOwn);
   for (int first = 0; first < run.count; first += W) {
-    const Evaluated<Model> e =
-        Evaluate(geometry, model, Gather(run, points, first));
+    const Batch batch = Gather(run, points, first);
+    const Evaluated<Model> e = Evaluate(geometry, model, batch);
     T weight = 1 / sigma_px;
     if (weights != nullptr) {
       for (int i = 0; i < W; ++i) {
@@ -125,8 +128,8 @@ void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
       columns[kRowsTurn + 1] = z * e.p_I[0] - x * e.p_I[2];
       columns[kRowsTurn + 2] = x * e.p_I[1] - y * e.p_I[0];
       for (int c = 0; c < 3; ++c) {
-        columns[kRowsPosition + c] = -by_X(r, c);
-        columns[kRowsOwn + c] = e.parts.point(r, c);
+        columns[kRowsPosition + c] = -batch.w * by_X(r, c);
+        columns[kRowsOwn + c] = batch.w * e.parts.point(r, c);
       }
       columns[kRowsOwn + 3 + r] = e.parts.d[r];
       columns[kRowsOwn + 5 + r] = 1.0;
@@ -202,7 +205,7 @@ void ReprojectionLanes<W, Model>::Squares(const RunGeometry& geometry,
     const auto valid =
         ProjectWith<T>(geometry.pinhole,
                        model,
-                       ToCamera(geometry, ToBody(geometry, batch.p_G)),
+                       ToCamera(geometry, ToBody(geometry, batch), batch.w),
                        &z_px,
                        nullptr);
     const T x = z_px[0] - batch.z_px[0];

@@ -1,6 +1,7 @@
 #include "core/information/inliers.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -27,7 +28,7 @@ void InlierSelector::StartLandmarks(const MotionSegment& segment,
                                     const ObservationOrder& order) {
   const std::size_t landmarks = segment.landmarks.size();
   result_.landmarks.resize(landmarks);
-  trial_points_.resize(3 * landmarks);
+  trial_points_.resize(4 * landmarks);
   distance_priors_.assign(landmarks, 0);
   moving_.assign(landmarks, 1);
   sums_.resize(landmarks);
@@ -36,7 +37,7 @@ void InlierSelector::StartLandmarks(const MotionSegment& segment,
   for (std::size_t m = 0; m < landmarks; ++m) {
     const Eigen::Vector3d& p_G = segment.landmarks[m].p_G;
     result_.landmarks[m] = p_G;
-    Eigen::Vector3d::Map(&trial_points_[3 * m]) = p_G;
+    Eigen::Vector4d::Map(&trial_points_[4 * m]) = p_G.homogeneous();
     const std::span<const int> track = order.Track(static_cast<int>(m));
     if (track.empty()) continue;
     const int first = segment.observations[track.front()].keyframe;
@@ -90,7 +91,7 @@ bool InlierSelector::ProposeSteps(const MotionSegment& segment) {
     const Eigen::Vector3d step =
         -H.selfadjointView<Eigen::Lower>().llt().solve(g);
     if (!step.allFinite() || -step.dot(g) < kNegligibleDecrease) continue;
-    Eigen::Vector3d::Map(&trial_points_[3 * m]) = p_G + step;
+    Eigen::Vector3d::Map(&trial_points_[4 * m]) = p_G + step;
     moving_[m] = 1;
     any = true;
   }
@@ -108,7 +109,7 @@ void InlierSelector::TakeSteps(const ObservationOrder& order) {
       moving_[m] = 0;
       continue;
     }
-    result_.landmarks[m] = Eigen::Vector3d::Map(&trial_points_[3 * m]);
+    result_.landmarks[m] = Eigen::Vector3d::Map(&trial_points_[4 * m]);
     sums_[m] = next;
     for (const int index : order.Track(static_cast<int>(m))) {
       squares_[index] = new_squares_[index];

@@ -1,5 +1,6 @@
 #include "core/information/linearisation.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -50,9 +51,10 @@ ChainStateMatrix GaugePrior(const KeyframeState& x) {
 void SegmentLineariser::FindTracks(const MotionSegment& segment,
                                    const InlierSelection& selection,
                                    const ObservationOrder& order) {
-  points_.resize(3 * selection.landmarks.size());
+  points_.resize(4 * selection.landmarks.size());
   for (std::size_t m = 0; m < selection.landmarks.size(); ++m) {
-    Eigen::Vector3d::Map(&points_[3 * m]) = selection.landmarks[m];
+    Eigen::Vector4d::Map(&points_[4 * m]) =
+        selection.landmarks[m].homogeneous();
   }
   tracks_.clear();
   track_keyframes_.clear();
@@ -108,14 +110,12 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
   }
   roots_.resize(std::max(roots_.size(), links_.size()));
   transitions_.resize(std::max(transitions_.size(), links_.size()));
-  inertial_.Linearise(
-      links_,
-      theta0.imu,
-      rig.imu_noise,
-      rig.gravity_mps2,
-      Eigen::Matrix<double, kImuTangentSize, 1>::Ones().eval().data(),
-      std::span(roots_).first(links_.size()),
-      std::span(transitions_).first(links_.size()));
+  inertial_.Linearise(links_,
+                      theta0.imu,
+                      rig.imu_noise,
+                      rig.gravity_mps2,
+                      std::span(roots_).first(links_.size()),
+                      std::span(transitions_).first(links_.size()));
   double squares[kKinds] = {};
   for (std::size_t i = 0; i < links_.size(); ++i) {
     for (int j = 0; j < kStateTangentSize; ++j) {

@@ -68,7 +68,7 @@ class SegmentLineariser {
   LinearisedSegment result_;
 
   ObservationRuns runs_;
-  std::vector<double> points_;  // p_G of the landmarks, 3 each
+  std::vector<double> points_;  // homogeneous p_G of the landmarks, 4 each
   std::vector<int> camera_sizes_;
   // The inliers as the elimination counts them: by landmark.
   std::vector<int> tracks_, track_keyframes_;

@@ -9,7 +9,7 @@
 #include "core/calibration/partition.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/screening.h"
-#include "core/calibration/sparse_elimination.h"
+#include "core/calibration/structured_solver.h"
 #include "core/calibration/subspace.h"
 #include "core/calibration/theta_information.h"
 #include "core/information/segment_information.h"
@@ -78,27 +78,30 @@ Measurement CovarianceAgainstIteration(const TimingOptions& options) {
       rig, rig.factory, problem, problem.keyframes, calibrate, nullptr);
   const std::vector<InertialMatrix> whitening =
       WhitenInertialLinks(rig, rig.factory.imu, problem, problem.keyframes);
-  SparseElimination system;
+  const Eigen::MatrixXd whole = TangentBasis(rig, WholeSubspace(rig));
+  const Eigen::VectorXd d = Eigen::VectorXd::Zero(TangentSize(rig.factory));
+  const SolverRound round{.rig = rig,
+                          .reference = rig.factory,
+                          .problem = problem,
+                          .whitening = whitening,
+                          .basis = whole,
+                          .loss = screening.loss};
+  LinearisedRound linearised;
+  LineariseRound(round,
+                 {d, problem.keyframes},
+                 screening.landmarks,
+                 &screening.loss,
+                 &linearised);
+  // What is left to do when an iteration has eliminated down to theta.
   int iterations = 0;
-  Measurement result =
-      CompareTimes({"covariance",
-                    [&] {
-                      system.Start(static_cast<int>(problem.keyframes.size()),
-                                   TangentSize(rig.factory));
-                      LineariseProblem(rig,
-                                       rig.factory,
-                                       problem,
-                                       problem.keyframes,
-                                       screening.landmarks,
-                                       whitening,
-                                       &screening.loss,
-                                       &system);
-                      const auto information = system.Eliminate();
-                      benchmark::DoNotOptimize(SubspaceCovariance(
-                          rig, WholeSubspace(rig), information->Lambda));
-                    }},
-                   CalibrationOf("calibration", scene, calibrate, &iterations),
-                   Fewer(options));
+  Measurement result = CompareTimes(
+      {"covariance",
+       [&] {
+         benchmark::DoNotOptimize(SubspaceCovariance(
+             rig, WholeSubspace(rig), linearised.by_offset.Lambda));
+       }},
+      CalibrationOf("calibration", scene, calibrate, &iterations),
+      Fewer(options));
   result.ratio *= iterations;
   result.figures["iterations"] = iterations;
   return result;

@@ -74,7 +74,6 @@ struct Problem {
   ImuCalibration imu;
   ImuNoise noise;
   std::vector<Link> links;
-  Eigen::Matrix<double, kImuTangentSize, 1> theta_scale;
 
   std::vector<InertialLinkStates> States() const {
     std::vector<InertialLinkStates> states;
@@ -88,8 +87,6 @@ struct Problem {
 Problem RandomProblem(RandomValues& random, int count) {
   Problem problem;
   problem.imu = random.Imu();
-  problem.theta_scale =
-      (0.5 * random.NormalVector(kImuTangentSize)).array().exp();
   for (int i = 0; i < count; ++i) {
     const double angle =
         i % 3 == 0 ? random.Uniform(0, 3.1) : random.LogUniform(1e-6, 0.1);
@@ -115,7 +112,6 @@ Result Linearise(InertialBatch* batch, const Problem& problem) {
                    problem.imu,
                    problem.noise,
                    kGravity,
-                   problem.theta_scale.data(),
                    result.roots,
                    result.transitions);
   return result;
@@ -169,8 +165,7 @@ TEST_P(InertialBatchTest, SolvesEachFactorForTheEarlierState) {
                                                   &J,
                                                   &covariance);
       Transition z = Transition::Zero();
-      z.leftCols<kImuTangentSize>() =
-          J.theta * problem.theta_scale.asDiagonal();
+      z.leftCols<kImuTangentSize>() = J.theta;
       z.middleCols<9>(kTransitionNextVelocity) = J.x1.rightCols<9>();
       z.col(kTransitionConstant) = r;
       z.middleCols<6>(kTransitionNextPose) = J.x1.leftCols<6>();
@@ -219,12 +214,8 @@ TEST_P(InertialBatchTest, TakesRootsAsGiven) {
   const Result expected = Linearise(&batch, louder);
   std::vector<InertialTransition> transitions(problem.links.size());
   std::vector<InertialResidual> whitened(problem.links.size());
-  batch.LineariseWithRoots(problem.States(),
-                           problem.imu,
-                           kGravity,
-                           problem.theta_scale.data(),
-                           expected.roots,
-                           transitions);
+  batch.LineariseWithRoots(
+      problem.States(), problem.imu, kGravity, expected.roots, transitions);
   batch.Residuals(
       problem.States(), problem.imu, kGravity, expected.roots, whitened);
   for (std::size_t i = 0; i < problem.links.size(); ++i) {

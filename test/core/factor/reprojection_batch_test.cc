@@ -40,8 +40,8 @@ struct Scene {
             landmarks.data(),
             z_px.data()};
   }
-  Eigen::Vector3d Point(int observation) const {
-    return Eigen::Vector3d::Map(&points[3 * landmarks[observation]]);
+  Eigen::Vector4d Point(int observation) const {
+    return Eigen::Vector4d::Map(&points[4 * landmarks[observation]]);
   }
 };
 
@@ -58,7 +58,10 @@ Scene RandomScene(RandomValues& random, DistortionModel model, int count) {
     const Eigen::Vector3d p_I =
         scene.camera.q_CI.conjugate() * (p_C - scene.camera.p_CI);
     const Eigen::Vector3d p_G = scene.keyframe.q_GI * p_I + scene.keyframe.p_GI;
-    scene.points.insert(scene.points.end(), p_G.data(), p_G.data() + 3);
+    // Any scale that does not turn it around; infinity is 1e6 m away.
+    const double w = random.LogUniform(1e-6, 10);
+    const Eigen::Vector4d point = w * p_G.homogeneous();
+    scene.points.insert(scene.points.end(), point.data(), point.data() + 4);
     scene.landmarks.push_back(count - 1 - i);
     scene.z_px.push_back(random.Uniform(0, 640));
     scene.z_px.push_back(random.Uniform(0, 480));
@@ -90,7 +93,7 @@ bool Evaluate(const Scene& scene,
   return Reproject(scene.keyframe.q_GI,
                    scene.keyframe.p_GI,
                    scene.camera,
-                   scene.Point(i).homogeneous(),
+                   scene.Point(i),
                    Eigen::Vector2d::Map(&scene.z_px[2 * i]),
                    r,
                    J);
@@ -117,11 +120,16 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
         ReprojectionJacobians J;
         if (Evaluate(scene, i, &r, &J)) {
           expected.leftCols(6) = J.pose;
-          expected.middleCols(kRowsOwn, size - 3) = J.camera.rightCols(size - 3);
+          expected.middleCols(kRowsOwn, size - 3) =
+              J.camera.rightCols(size - 3);
           expected.col(RowsResidual(size)) = r;
           expected *= weighted ? weights[i] : 1 / kSigma_px;
           EXPECT_EQ(J.camera.leftCols(3), -J.pose.leftCols(3));
-          EXPECT_EQ(J.landmark.leftCols(3), -J.pose.rightCols(3));
+          // By p_G = X / w.
+          const Eigen::MatrixXd by_p_G =
+              scene.Point(i)[3] * J.landmark.leftCols(3);
+          EXPECT_LE((by_p_G + J.pose.rightCols(3)).norm(),
+                    kTolerance * by_p_G.norm());
         } else {
           ++behind;
         }

@@ -1,0 +1,376 @@
+#include "core/calibration/linear_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/information/weak_priors.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kNone = -1;
+// Below it an observation counts as beyond the gate: a landmark must not stand
+// on what has all but no weight.
+constexpr double kLeastWeight = 1e-6;
+constexpr int kMinObservations = 2;
+// A landmark is never taken to be further away than 1 / this [m].
+constexpr double kLeastInverseDepth = 1e-9;
+
+// The gauge is four free directions, so that holding them with any strength
+// changes nothing else: one of the size of the other terms, yet so strong that
+// the landmarks' priors, which are about fixed places, do not move them.
+constexpr double kGaugeSigma_m = 1e-5;
+constexpr double kGaugeSigma_rad = 1e-5;
+
+double Information(double sigma) { return 1 / (sigma * sigma); }
+
+ChainStateMatrix WeakPrior() {
+  ChainStateMatrix weak = ChainStateMatrix::Zero();
+  weak.diagonal().segment<3>(kStateRotation).array() =
+      Information(kTiltPriorSigma_rad);
+  weak.diagonal().segment<3>(kStateVelocity).array() =
+      Information(kVelocityPriorSigma_mps);
+  weak.diagonal().segment<3>(kStateAccelBias).array() =
+      Information(kAccelBiasPriorSigma_mps2);
+  weak.diagonal().segment<3>(kStateGyroBias).array() =
+      Information(kGyroBiasPriorSigma_radps);
+  return weak;
+}
+
+// Position and rotation about gravity.
+ChainStateMatrix GaugePrior(const KeyframeState& x) {
+  ChainStateMatrix gauge = ChainStateMatrix::Zero();
+  const Eigen::Vector3d up_I = x.q_GI.conjugate() * Eigen::Vector3d::UnitZ();
+  gauge.block<3, 3>(kStateRotation, kStateRotation) =
+      Information(kGaugeSigma_rad) * up_I * up_I.transpose();
+  gauge.diagonal().segment<3>(kStatePosition).array() =
+      Information(kGaugeSigma_m);
+  return gauge;
+}
+
+MotionLink WalkBetween(const BiasLink& link,
+                       const KeyframeState& a,
+                       const KeyframeState& b) {
+  MotionLink walk;
+  const Eigen::Matrix<double, 6, 1> weight = link.sigmas.cwiseInverse();
+  walk.w1.setZero();
+  walk.w1.tail<6>() = weight;
+  walk.w0 = -walk.w1;
+  walk.residual.setZero();
+  walk.residual.segment<3>(kStateAccelBias - kChainPoseSize) = b.b_a - a.b_a;
+  walk.residual.segment<3>(kStateGyroBias - kChainPoseSize) = b.b_g - a.b_g;
+  walk.residual.tail<6>().array() *= weight.array();
+  return walk;
+}
+
+MotionLink Nothing() {
+  MotionLink link;
+  link.w0.setZero();
+  link.w1.setZero();
+  link.residual.setZero();
+  return link;
+}
+
+// By (alpha, beta, rho), of a step of p_G = a + R (alpha, beta, 1) / rho.
+Eigen::Vector3d PlaceStep(const LandmarkPlace& place,
+                          double rho,
+                          const Eigen::Vector3d& step_G) {
+  const Eigen::Vector3d q = rho * (place.anchor.R_GA.transpose() * step_G);
+  return {q.x() - place.inverse_depth.x() * q.z(),
+          q.y() - place.inverse_depth.y() * q.z(),
+          -rho * q.z()};
+}
+
+double UsedInverseDepth(const LandmarkPlace& place) {
+  const double rho = place.inverse_depth.z();
+  return std::abs(rho) < kLeastInverseDepth ? kLeastInverseDepth : rho;
+}
+
+}  // namespace
+
+std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem) {
+  const int keyframes = static_cast<int>(problem.keyframes.size());
+  std::vector<bool> joined(keyframes, false);  // with the next
+  for (const InertialLink& link : problem.inertial_links) {
+    joined[link.before] = true;
+  }
+  for (const BiasLink& link : problem.bias_links) joined[link.before] = true;
+  for (const Track& track : problem.tracks) {
+    if (track.observations.empty()) continue;
+    std::fill(joined.begin() + track.observations.front().keyframe,
+              joined.begin() + track.observations.back().keyframe,
+              true);
+  }
+  std::vector<KeyframeChain> chains;
+  for (int k = 0; k < keyframes; ++k) {
+    if (k == 0 || !joined[k - 1]) chains.push_back({k, k});
+    chains.back().end = k + 1;
+  }
+  return chains;
+}
+
+void LinearSystem::StartChains(const CalibrationProblem& problem, int cameras) {
+  const std::vector<KeyframeChain> ranges = FindChains(problem);
+  while (chains_.size() < ranges.size()) chains_.emplace_back(width_);
+  chains_.erase(chains_.begin() + static_cast<std::ptrdiff_t>(ranges.size()),
+                chains_.end());
+  const std::size_t keyframes = problem.keyframes.size();
+  chain_of_keyframe_.resize(keyframes);
+  for (std::size_t c = 0; c < ranges.size(); ++c) {
+    chains_[c].range = ranges[c];
+    chains_[c].landmarks.clear();
+    chains_[c].tracks.assign(1, 0);
+    chains_[c].track_keyframes.clear();
+    std::fill(chain_of_keyframe_.begin() + ranges[c].begin,
+              chain_of_keyframe_.begin() + ranges[c].end,
+              static_cast<int>(c));
+  }
+  inertial_after_.assign(keyframes, kNone);
+  walk_after_.assign(keyframes, kNone);
+  for (std::size_t i = 0; i < problem.inertial_links.size(); ++i) {
+    inertial_after_[problem.inertial_links[i].before] = static_cast<int>(i);
+  }
+  for (std::size_t i = 0; i < problem.bias_links.size(); ++i) {
+    walk_after_[problem.bias_links[i].before] = static_cast<int>(i);
+  }
+  priors_.assign(keyframes, ChainStateMatrix::Zero());
+  has_prior_.assign(keyframes, false);
+  for (const int k : problem.chain_starts) {
+    priors_[k] += WeakPrior();
+    has_prior_[k] = true;
+  }
+  for (const int k : problem.gauge_keyframes) {
+    priors_[k] += GaugePrior((*keyframes_)[k]);
+    has_prior_[k] = true;
+  }
+  view_begin_.assign(keyframes * cameras + 2, 0);
+}
+
+void LinearSystem::PlaceLandmarks(
+    const std::vector<ScreenedLandmark>& landmarks) {
+  points_.resize(4 * landmarks.size());
+  places_.clear();
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    LandmarkPlace place = landmarks[i].place;
+    place.inverse_depth.z() = UsedInverseDepth(place);
+    Eigen::Vector4d::Map(&points_[4 * i]) = place.Homogeneous();
+    places_.push_back(place);
+  }
+}
+
+// All observations that are used, by landmark, and their order by view.
+void LinearSystem::SortByView(const CalibrationProblem& problem,
+                              const std::vector<ScreenedLandmark>& landmarks) {
+  const int cameras = static_cast<int>(camera_sizes_.size());
+  seen_.clear();
+  seen_begin_.assign(1, 0);
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const Track& track = problem.tracks[landmarks[i].track];
+    for (const int index : landmarks[i].used) {
+      const TrackObservation& o = track.observations[index];
+      seen_.push_back(
+          {o.keyframe * cameras + o.camera, static_cast<int>(i), o.z_px});
+    }
+    seen_begin_.push_back(static_cast<int>(seen_.size()));
+  }
+  for (const Seen& seen : seen_) ++view_begin_[seen.view + 2];
+  for (std::size_t v = 2; v < view_begin_.size(); ++v) {
+    view_begin_[v] += view_begin_[v - 1];
+  }
+  by_view_.resize(seen_.size());
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    by_view_[view_begin_[seen_[i].view + 1]++] = static_cast<int>(i);
+  }
+}
+
+template <typename Keep>
+ObservationRun LinearSystem::Gather(int view, const Keep& keep) {
+  landmarks_of_view_.clear();
+  seen_of_view_.clear();
+  z_px_.clear();
+  for (int i = view_begin_[view]; i < view_begin_[view + 1]; ++i) {
+    const Seen& seen = seen_[by_view_[i]];
+    if (!keep(seen)) continue;
+    seen_of_view_.push_back(by_view_[i]);
+    landmarks_of_view_.push_back(seen.landmark);
+    z_px_.push_back(seen.z_px.x());
+    z_px_.push_back(seen.z_px.y());
+  }
+  const int cameras = static_cast<int>(camera_sizes_.size());
+  return {&(*keyframes_)[view / cameras],
+          &theta_->cameras[view % cameras],
+          static_cast<int>(seen_of_view_.size()),
+          landmarks_of_view_.data(),
+          z_px_.data()};
+}
+
+void LinearSystem::Weigh(const std::vector<ScreenedLandmark>& landmarks,
+                         const RobustLoss* loss) {
+  const double inverse_sigma = 1 / rig_->pixel_sigma_px;
+  for (int view = 0; view + 2 < static_cast<int>(view_begin_.size()); ++view) {
+    const ObservationRun run = Gather(view, [](const Seen&) { return true; });
+    squares_px2_.resize(std::max<std::size_t>(squares_px2_.size(), run.count));
+    reprojection_.Squares(run, points_.data(), squares_px2_.data());
+    for (int i = 0; i < run.count; ++i) {
+      Seen& seen = seen_[seen_of_view_[i]];
+      const double s = squares_px2_[i] * inverse_sigma * inverse_sigma;
+      if (!(s >= 0)) continue;  // does not project
+      const double weight = loss != nullptr ? loss->Weight(s) : 1;
+      if (weight < kLeastWeight) continue;
+      seen.weight =
+          std::sqrt(landmarks[seen.landmark].weight * weight) * inverse_sigma;
+    }
+  }
+}
+
+// The tracks of each chain, of landmarks that enough observations hold.
+void LinearSystem::FindTracks() {
+  const int cameras = static_cast<int>(camera_sizes_.size());
+  for (std::size_t m = 0; m + 1 < seen_begin_.size(); ++m) {
+    const std::span<Seen> track(seen_.data() + seen_begin_[m],
+                                seen_begin_[m + 1] - seen_begin_[m]);
+    const auto held = std::count_if(
+        track.begin(), track.end(), [](auto& seen) { return seen.weight > 0; });
+    if (held < kMinObservations) continue;
+    Chain& chain = chains_[chain_of_keyframe_[track.front().view / cameras]];
+    for (Seen& seen : track) {
+      if (seen.weight == 0) continue;
+      seen.factor = static_cast<int>(chain.track_keyframes.size());
+      chain.track_keyframes.push_back(seen.view / cameras - chain.range.begin);
+    }
+    chain.tracks.push_back(static_cast<int>(chain.track_keyframes.size()));
+    chain.landmarks.push_back(static_cast<int>(m));
+  }
+}
+
+void LinearSystem::AddViews(Chain* chain) {
+  const int cameras = static_cast<int>(camera_sizes_.size());
+  for (int view = chain->range.begin * cameras;
+       view < chain->range.end * cameras;
+       ++view) {
+    const ObservationRun run =
+        Gather(view, [](const Seen& seen) { return seen.factor != kNone; });
+    if (run.count == 0) continue;
+    weights_.clear();
+    factors_.clear();
+    for (const int i : seen_of_view_) {
+      weights_.push_back(seen_[i].weight);
+      factors_.push_back(seen_[i].factor);
+    }
+    const int camera = view % cameras;
+    const std::size_t size = static_cast<std::size_t>(2) *
+                             (run.count + kPanelPad) *
+                             RowsStride(camera_sizes_[camera]);
+    if (rows_.size() < size) rows_.resize(size);
+    reprojection_.Linearise(run,
+                            points_.data(),
+                            rig_->pixel_sigma_px,
+                            weights_.data(),
+                            rows_.data());
+    chain->elimination.AddObservations(
+        view / cameras - chain->range.begin, camera, rows_.data(), factors_);
+  }
+}
+
+// That of triangulate.h on inverse depth, by p_G.
+void LinearSystem::AddLandmarkPriors(
+    const std::vector<ScreenedLandmark>& landmarks, Chain* chain) {
+  for (std::size_t m = 0; m < chain->landmarks.size(); ++m) {
+    const int i = chain->landmarks[m];
+    const double rho = places_[i].inverse_depth.z();
+    const Eigen::Vector3d rho_by_p = -rho * rho * places_[i].anchor.R_GA.col(2);
+    const double prior = landmarks[i].weight * Information(kInverseDepthSigma);
+    chain->elimination.AddLandmarkPrior(static_cast<int>(m),
+                                        prior * rho_by_p * rho_by_p.transpose(),
+                                        prior * rho * rho_by_p);
+  }
+}
+
+void LinearSystem::EliminateKeyframes(const CalibrationProblem& problem,
+                                      Chain* chain) {
+  const std::vector<KeyframeState>& x = *keyframes_;
+  for (int k = chain->range.begin; k < chain->range.end; ++k) {
+    if (has_prior_[k]) chain->elimination.AddPrior(priors_[k]);
+    if (k + 1 == chain->range.end) break;
+    if (inertial_after_[k] != kNone) {
+      chain->elimination.Advance(transitions_[inertial_after_[k]]);
+    } else if (walk_after_[k] != kNone) {
+      chain->elimination.Advance(
+          WalkBetween(problem.bias_links[walk_after_[k]], x[k], x[k + 1]));
+    } else {
+      chain->elimination.Advance(Nothing());
+    }
+  }
+  chain->elimination.Finish(&of_chain_);
+}
+
+void LinearSystem::Linearise(const Rig& rig,
+                             const Calibration& theta,
+                             const CalibrationProblem& problem,
+                             const std::vector<KeyframeState>& keyframes,
+                             const std::vector<ScreenedLandmark>& landmarks,
+                             std::span<const InertialNoiseRoot> roots,
+                             const RobustLoss* loss) {
+  rig_ = &rig;
+  theta_ = &theta;
+  keyframes_ = &keyframes;
+  camera_sizes_.clear();
+  for (const CameraCalibration& camera : theta.cameras) {
+    camera_sizes_.push_back(CameraTangentSize(camera));
+  }
+  StartChains(problem, static_cast<int>(camera_sizes_.size()));
+  PlaceLandmarks(landmarks);
+  SortByView(problem, landmarks);
+  Weigh(landmarks, loss);
+  FindTracks();
+
+  links_.clear();
+  for (const InertialLink& link : problem.inertial_links) {
+    links_.push_back(
+        {&keyframes[link.before], &keyframes[link.after], link.samples});
+  }
+  transitions_.resize(links_.size());
+  inertial_.LineariseWithRoots(
+      links_, theta.imu, rig.gravity_mps2, roots, transitions_);
+  decrease_ = 0;
+  for (const InertialTransition& transition : transitions_) {
+    for (const double r : transition.whitened) decrease_ += r * r;
+  }
+
+  const int size = TangentSize(theta);
+  information_.Lambda.setZero(size, size);
+  information_.eta.setZero(size);
+  for (Chain& chain : chains_) {
+    chain.elimination.Start({chain.range.end - chain.range.begin,
+                             camera_sizes_,
+                             chain.tracks,
+                             chain.track_keyframes},
+                            ChainElimination::Record::kSteps);
+    AddViews(&chain);
+    AddLandmarkPriors(landmarks, &chain);
+    EliminateKeyframes(problem, &chain);
+    information_.Lambda += of_chain_.Lambda;
+    information_.eta += of_chain_.eta;
+    decrease_ -= of_chain_.constant;
+  }
+}
+
+void LinearSystem::FindSteps(const Eigen::VectorXd& theta_step,
+                             std::vector<ChainStateVector>* keyframes,
+                             std::vector<Eigen::Vector3d>* landmarks) const {
+  keyframes->clear();
+  landmarks->assign(places_.size(), Eigen::Vector3d::Zero());
+  std::vector<ChainStateVector> of_chain;
+  std::vector<Eigen::Vector3d> points;
+  for (const Chain& chain : chains_) {
+    chain.elimination.FindSteps(theta_step, &of_chain, &points);
+    keyframes->insert(keyframes->end(), of_chain.begin(), of_chain.end());
+    for (std::size_t m = 0; m < chain.landmarks.size(); ++m) {
+      const LandmarkPlace& place = places_[chain.landmarks[m]];
+      (*landmarks)[chain.landmarks[m]] =
+          PlaceStep(place, place.inverse_depth.z(), points[m]);
+    }
+  }
+}
+
+}  // namespace selfcal

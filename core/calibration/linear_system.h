@@ -1,0 +1,136 @@
+// A whole calibration problem, linearised at one estimate and eliminated down
+// to theta by ChainElimination, one chain for each stretch of keyframes that
+// nothing connects with the next; and the way back from a step of theta to the
+// steps of all else. Deterministic.
+//
+// Minimised is
+//   F(d) = sum |r + J d|^2 over all factors + the priors
+// over the steps d of the keyframes (15 each), of the landmarks and of theta's
+// tangent. Theta has no prior in here: the caller adds his to Lambda, chooses
+// its step, within a subspace or shortened, and asks for the rest.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/calibration/problem.h"
+#include "core/calibration/robust_loss.h"
+#include "core/calibration/screening.h"
+#include "core/elimination/chain_elimination.h"
+#include "core/factor/inertial_batch.h"
+#include "core/factor/reprojection_batch.h"
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+// Keyframes [begin, end) of a problem that links and landmarks connect with
+// each other and with no others.
+struct KeyframeChain {
+  int begin = 0;
+  int end = 0;
+};
+
+std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem);
+
+class LinearSystem {
+ public:
+  explicit LinearSystem(VectorWidth width = WidestVectors())
+      : reprojection_(width), inertial_(width), width_(width) {}
+
+  // Linearises all factors, whitened, and the gauge at the estimate, and
+  // eliminates. With a loss, residuals are weighted as in iteratively
+  // reweighted least squares: for the Huber loss on normal residuals, the
+  // inverse of Lambda is then the covariance of the estimate to 1 %. Without
+  // (null), all count fully. The weak priors of the score keep states proper
+  // that nothing determines; centred at the estimate, they move nothing.
+  // Landmarks that do not have two observations left to stand on are left out.
+  // What was linearised before is forgotten, its memory kept.
+  void Linearise(const Rig& rig,
+                 const Calibration& theta,
+                 const CalibrationProblem& problem,
+                 const std::vector<KeyframeState>& keyframes,
+                 const std::vector<ScreenedLandmark>& landmarks,
+                 std::span<const InertialNoiseRoot> roots,
+                 const RobustLoss* loss);
+
+  // Of theta's tangent. Not finite where the factors are not.
+  const SharedInformation& information() const { return information_; }
+
+  // What the best steps of keyframes and landmarks take off F while theta
+  // stays; with a step s of it, F falls by
+  //   decrease + 2 eta^T s - s^T Lambda s.
+  double decrease() const { return decrease_; }
+
+  // The steps that minimise F for a step of theta: of the keyframes, and of the
+  // landmarks by (alpha, beta, rho), zero for those that were left out.
+  void FindSteps(const Eigen::VectorXd& theta_step,
+                 std::vector<ChainStateVector>* keyframes,
+                 std::vector<Eigen::Vector3d>* landmarks) const;
+
+ private:
+  struct Chain {
+    explicit Chain(VectorWidth width) : elimination(width) {}
+
+    KeyframeChain range;
+    ChainElimination elimination;
+    std::vector<int> landmarks;  // indices into those of the problem
+    std::vector<int> tracks, track_keyframes;
+  };
+  // An observation that is used.
+  struct Seen {
+    int view;  // keyframe and camera
+    int landmark;
+    Eigen::Vector2d z_px;
+    double weight = 0;  // of its rows; 0: it says nothing
+    int factor = -1;    // index into the tracks of its chain
+  };
+
+  void StartChains(const CalibrationProblem& problem, int cameras);
+  void PlaceLandmarks(const std::vector<ScreenedLandmark>& landmarks);
+  void SortByView(const CalibrationProblem& problem,
+                  const std::vector<ScreenedLandmark>& landmarks);
+  void Weigh(const std::vector<ScreenedLandmark>& landmarks,
+             const RobustLoss* loss);
+  void FindTracks();
+  void AddViews(Chain* chain);
+  void AddLandmarkPriors(const std::vector<ScreenedLandmark>& landmarks,
+                         Chain* chain);
+  void EliminateKeyframes(const CalibrationProblem& problem, Chain* chain);
+  // The observations of a view that `keep` wants, as arrays.
+  template <typename Keep>
+  ObservationRun Gather(int view, const Keep& keep);
+
+  ReprojectionBatch reprojection_;
+  InertialBatch inertial_;
+  VectorWidth width_;
+  std::vector<Chain> chains_;
+  SharedInformation information_, of_chain_;
+  double decrease_ = 0;
+
+  // Of the estimate at hand.
+  const Rig* rig_ = nullptr;
+  const Calibration* theta_ = nullptr;
+  const std::vector<KeyframeState>* keyframes_ = nullptr;
+  std::vector<int> camera_sizes_;
+  std::vector<ChainStateMatrix> priors_;
+  std::vector<bool> has_prior_;
+
+  std::vector<double> points_;  // homogeneous, 4 for each landmark
+  std::vector<LandmarkPlace> places_;
+  std::vector<Seen> seen_;  // by landmark
+  std::vector<int> seen_begin_;
+  std::vector<int> by_view_, view_begin_;
+  std::vector<int> chain_of_keyframe_;
+  std::vector<InertialLinkStates> links_;
+  std::vector<InertialTransition> transitions_;
+  std::vector<int> inertial_after_, walk_after_;  // links to the next, or -1
+  // Of one view.
+  std::vector<std::int32_t> landmarks_of_view_;
+  std::vector<int> seen_of_view_, factors_;
+  std::vector<double> z_px_, squares_px2_, weights_, rows_;
+};
+
+}  // namespace selfcal
