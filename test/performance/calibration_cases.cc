@@ -55,6 +55,22 @@ Calibration FusedCalibration(const Scene& scene) {
   return BoxPlus(rig.factory, Lambda.llt().solve(eta));
 }
 
+Measurement StructuredAgainstCeres(const TimingOptions& options) {
+  const Scene scene = MakeCalibrationScene();
+  CalibrateOptions ceres, structured;
+  ceres.solver = SolverKind::kCeres;
+  structured.solver = SolverKind::kStructured;
+  int ceres_iterations = 0;
+  int structured_iterations = 0;
+  Measurement result = CompareTimes(
+      CalibrationOf("Ceres", scene, ceres, &ceres_iterations),
+      CalibrationOf("structured", scene, structured, &structured_iterations),
+      Fewer(options));
+  result.figures["Ceres iterations"] = ceres_iterations;
+  result.figures["structured iterations"] = structured_iterations;
+  return result;
+}
+
 Measurement IterationsFromFused(const TimingOptions&) {
   const Scene scene = MakeCalibrationScene();
   const CalibrationResult fused =
@@ -110,7 +126,11 @@ Measurement CovarianceAgainstIteration(const TimingOptions& options) {
 }  // namespace
 
 std::vector<Case> CalibrationCases() {
-  return {{.name = "iterations from the fused information",
+  return {{.name = "calibrate 8 segments against Ceres SPARSE_SCHUR",
+           .must = 8,
+           .goal = 12,
+           .measure = StructuredAgainstCeres},
+          {.name = "iterations from the fused information",
            .must = 3,
            .goal = 2,
            .higher_is_better = false,

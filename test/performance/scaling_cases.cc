@@ -37,9 +37,10 @@ Measurement TwoThreadsAgainstOne(const TimingOptions& options) {
 }
 
 Measurement CompareScenes(const SceneOptions& larger,
+                          const SceneOptions& reference,
                           const TimingOptions& options) {
   const Scene a = MakeScene(larger);
-  const Scene b = MakeScene();
+  const Scene b = MakeScene(reference);
   TimedFunction score_a = ScoreOf(a, WidestVectors());
   TimedFunction score_b = ScoreOf(b, WidestVectors());
   score_a.name = "larger";
@@ -70,17 +71,25 @@ std::vector<Case> ScalingCases() {
        .must = 1.9,
        .goal = 1.95,
        .measure = TwoThreadsAgainstOne},
-      {.name = "score: 80 keyframes against 40",
+      {.name = "score: 160 keyframes against 80",
        .higher_is_better = false,
        .measure =
            [](const TimingOptions& options) {
-             return CompareScenes({.keyframes = 80}, options);
+             // At a fixed track length.
+             constexpr int kTrack = 20;
+             return CompareScenes({.keyframes = 160,
+                                   .max_track_length = kTrack,
+                                   .revisit_fraction = 0},
+                                  {.keyframes = 80,
+                                   .max_track_length = kTrack,
+                                   .revisit_fraction = 0},
+                                  options);
            }},
       {.name = "score: twice the observations",
        .higher_is_better = false,
        .measure =
            [](const TimingOptions& options) {
-             return CompareScenes({.landmarks_in_view = 260}, options);
+             return CompareScenes({.landmarks_in_view = 260}, {}, options);
            }},
   };
   for (const VectorWidth width : {VectorWidth::k4, VectorWidth::k8}) {

@@ -18,7 +18,8 @@ Scene MakeScene(const SceneOptions& options) {
   simulation.keyframes_per_segment = options.keyframes;
   simulation.landmarks_in_view = options.landmarks_in_view;
   simulation.mean_track_length = 20;
-  simulation.max_track_length = 20;
+  simulation.max_track_length = options.max_track_length;
+  simulation.revisit_fraction = options.revisit_fraction;
   Scene scene;
   scene.rig = HandheldRig("benchmark");
   const Calibration truth = scene.rig.factory;

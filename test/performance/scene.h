@@ -17,6 +17,9 @@ struct SceneOptions {
   int every = 1;  // of so many segments of the session, one is used
   int keyframes = 40;
   int landmarks_in_view = 130;
+  // Keyframes; and of new tracks, landmarks that were seen before.
+  int max_track_length = 1'000'000;
+  double revisit_fraction = 0.1;
 };
 
 struct Scene {
