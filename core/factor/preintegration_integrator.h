@@ -40,9 +40,8 @@ class Integrator {
         reading_(first),
         f_(first.f) {}
 
-  // To the next reading, h [s] later. Everything in one function: called one by
-  // one, its parts pass their matrices through memory.
-  [[gnu::flatten]] void Step(const Reading<T>& next, T h) {
+  // To the next reading, h [s] later.
+  SELFCAL_FLATTEN void Step(const Reading<T>& next, T h) {
     const T h2 = h * h;
     const Turn<T> turn_m(
         h * (3.0 / 8), h * (1.0 / 8), h2 * (1.0 / 96), reading_, next);

@@ -18,6 +18,15 @@
 #include <cmath>
 #include <cstdint>
 
+// Compiles what a function calls into it: called one by one, the parts of a
+// kernel pass their matrices through memory. With the checks of a sanitizer in
+// between, the compiler would take minutes for that.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SELFCAL_FLATTEN
+#else
+#define SELFCAL_FLATTEN [[gnu::flatten]]
+#endif
+
 namespace selfcal {
 
 template <typename Number, int W>
