@@ -15,9 +15,10 @@ constexpr int kMotion = kChainMotionSize;
 constexpr int kState = kChainStateSize;
 // Places in the front.
 constexpr int kMotionPlace = kChainLinkShared;
-constexpr int kLandmarkPlace = kMotionPlace + kMotion;
-static_assert(kLandmarkPlace % 8 == 0);
-static_assert(kTransitionConstant == kLandmarkPlace);
+constexpr int kKeptPlace = kMotionPlace + kMotion;
+static_assert(kKeptPlace % 8 == 0);
+static_assert(kTransitionConstant == kKeptPlace);
+constexpr int kEliminated = -1;
 // The state in whole tiles.
 constexpr int kTileState = 16;
 constexpr int kLinkColumns = kTransitionNextPose + kPose;
@@ -53,7 +54,9 @@ void ChainElimination::LayOut(const ChainShape& shape) {
     sums_size_ += 3 * RowsStride(size);
     largest_row = std::max(largest_row, RowsStride(size));
   }
-  constant_ = kLandmarkPlace + landmark_shared_;
+  kept_ = shape.kept;
+  landmark_place_ = kKeptPlace + WholeVectors(kept_);
+  constant_ = landmark_place_ + landmark_shared_;
   fixed_ = WholeVectors(constant_ + 1);
   GrowTo(static_cast<std::size_t>(largest_row) * (largest_row + kPanelPad),
          &gram_);
@@ -86,6 +89,10 @@ void ChainElimination::LayOut(const ChainShape& shape) {
 void ChainElimination::PlacePanels(const ChainShape& shape) {
   landmarks_count_ = shape.tracks.size() - 1;
   const std::size_t landmarks = landmarks_count_;
+  kept_landmarks_.assign(landmarks, kEliminated);
+  std::copy(shape.kept_landmarks.begin(),
+            shape.kept_landmarks.end(),
+            kept_landmarks_.begin());
   GrowTo(landmarks, &panel_of_landmark_);
   GrowTo(6 * landmarks, &roots_);
   sums_.assign(landmarks * sums_size_, 0);
@@ -96,7 +103,7 @@ void ChainElimination::PlacePanels(const ChainShape& shape) {
               landmark_of_observation_.begin() + shape.tracks[m + 1],
               static_cast<int>(m));
   }
-  const int shared = fixed_ - kLandmarkPlace;
+  const int shared = fixed_ - landmark_place_;
   std::size_t end = 0;
   for (int k = 0; k < shape.keyframes; ++k) {
     const std::span<const int> group = structure_.Landmarks(k);
@@ -173,7 +180,7 @@ void ChainElimination::AddObservations(int keyframe,
   const int gram_stride = stride + kPanelPad;
   const int count = static_cast<int>(observations.size());
   GrowTo(observations.size(), &targets_);
-  const int shared = fixed_ - kLandmarkPlace;
+  const int shared = fixed_ - landmark_place_;
   for (int i = 0; i < count; ++i) {
     const int o = observations[i];
     const int m = landmark_of_observation_[o];
@@ -232,13 +239,15 @@ void ChainElimination::OpenSlots(int slots) {
   }
 }
 
-// The panel of a landmark from its sums, and the root of its information.
-void ChainElimination::PreparePanel(int landmark, double* panel, int stride) {
+// The panel of a landmark from its sums. Returns its information.
+Eigen::Matrix3d ChainElimination::PreparePanel(int landmark,
+                                               double* panel,
+                                               int stride) {
   const double* prior = &landmark_priors_[9 * landmark];
   Eigen::Matrix3d H;
   for (int j = 0; j < 3; ++j) {
     double* row = panel + j * stride;
-    Zero(row, fixed_ - kLandmarkPlace);
+    Zero(row, fixed_ - landmark_place_);
     for (int i = 0; i <= j; ++i) H(j, i) = prior[j * (j + 1) / 2 + i];
     row[landmark_shared_] = prior[6 + j];
     for (std::size_t c = 0; c < camera_sizes_.size(); ++c) {
@@ -252,12 +261,43 @@ void ChainElimination::PreparePanel(int landmark, double* panel, int stride) {
       for (int i = 0; i <= j; ++i) H(j, i) -= sums[kRowsPosition + i];
     }
   }
-  GuardedCholesky<3>(&H);
+  H.triangularView<Eigen::StrictlyUpper>() = H.transpose();
+  return H;
+}
+
+void ChainElimination::SetRoot(int landmark, Eigen::Matrix3d information) {
+  Eigen::Matrix3d& L = information;
+  GuardedCholesky<3>(&L);
   double* root = &roots_[6 * landmark];
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < i; ++j) root[i * (i + 1) / 2 + j] = H(i, j);
-    root[i * (i + 1) / 2 + i] = 1 / H(i, i);
+    for (int j = 0; j < i; ++j) root[i * (i + 1) / 2 + j] = L(i, j);
+    root[i * (i + 1) / 2 + i] = 1 / L(i, i);
   }
+}
+
+// Puts a landmark that is kept into the front, instead of eliminating it; its
+// panel eliminates nothing.
+void ChainElimination::KeepLandmark(int landmark,
+                                    const Eigen::Matrix3d& information,
+                                    double* panel,
+                                    int stride) {
+  const int place = kKeptPlace + kept_landmarks_[landmark];
+  const int shared = fixed_ - landmark_place_;
+  const int poses = structure_.Slots(landmark) * kPose;
+  for (int j = 0; j < 3; ++j) {
+    double* row = panel + j * stride;
+    for (int i = j; i < 3; ++i) {
+      Front(place + i, place + j) += information(i, j);
+    }
+    for (int c = 0; c <= landmark_shared_; ++c) {
+      Front(landmark_place_ + c, place + j) += row[c];
+    }
+    for (int i = 0; i < poses; ++i) {
+      Front(Pose(0) + i, place + j) += row[shared + i];
+    }
+    Zero(row, shared + poses);
+  }
+  SetRoot(landmark, Eigen::Matrix3d::Identity());
 }
 
 void ChainElimination::EliminateLandmarks() {
@@ -265,14 +305,20 @@ void ChainElimination::EliminateLandmarks() {
   if (group.empty()) return;
   const Panel& first = panel_of_landmark_[group.front()];
   const int stride = first.stride;
-  const int shared = fixed_ - kLandmarkPlace;
+  const int shared = fixed_ - landmark_place_;
   const int slots = structure_.Slots(group.front());
   const int depth = 3 * static_cast<int>(group.size());
   depths_.assign(slots, 0);
   for (const int m : group) depths_[structure_.Slots(m) - 1] += 3;
   for (int s = slots - 1; s > 0; --s) depths_[s - 1] += depths_[s];
   for (const int m : group) {
-    PreparePanel(m, &panels_[panel_of_landmark_[m].begin], stride);
+    double* panel = &panels_[panel_of_landmark_[m].begin];
+    const Eigen::Matrix3d information = PreparePanel(m, panel, stride);
+    if (kept_landmarks_[m] == kEliminated) {
+      SetRoot(m, information);
+    } else {
+      KeepLandmark(m, information, panel, stride);
+    }
   }
   const double* panel = &panels_[first.begin];
   const ConstPanel by_shared = {panel, stride};
@@ -290,7 +336,7 @@ void ChainElimination::EliminateLandmarks() {
                       depth,
                       nullptr,
                       1,
-                      FrontAt(kLandmarkPlace, kLandmarkPlace));
+                      FrontAt(landmark_place_, landmark_place_));
     kernels.AddStaircase(-1,
                          by_pose,
                          slots * kPose,
@@ -298,7 +344,7 @@ void ChainElimination::EliminateLandmarks() {
                          kPose,
                          by_shared,
                          landmark_shared_ + 1,
-                         FrontAt(Pose(0), kLandmarkPlace));
+                         FrontAt(Pose(0), landmark_place_));
     kernels.AddSquare(-1,
                       by_pose,
                       slots * kPose,
@@ -340,7 +386,7 @@ void ChainElimination::BeginKeyframe() {
         &keyframe_sums_[(current_ * kPose + i) * keyframe_stride_];
     for (int j = 0; j <= i; ++j) Front(pose + i, pose + j) += row[j];
     for (int c = 0; c <= landmark_shared_; ++c) {
-      Front(pose + i, kLandmarkPlace + c) += row[kPose + c];
+      Front(pose + i, landmark_place_ + c) += row[kPose + c];
     }
   }
   EliminateLandmarks();
@@ -361,6 +407,20 @@ void ChainElimination::AddPrior(const ChainStateMatrix& information) {
       Front(kMotionPlace + i, kMotionPlace + j) +=
           information(kPose + i, kPose + j);
     }
+  }
+}
+
+void ChainElimination::AddKeptBias(int kept, const KeptBiasRows& rows) {
+  BeginKeyframe();
+  for (int m = 0; m < rows.residual.size(); ++m) {
+    const int bias = kMotionPlace + 3 + m;
+    const int place = kKeptPlace + kept + m;
+    const double a = rows.by_bias[m], b = rows.by_kept[m];
+    Front(bias, bias) += a * a;
+    Front(place, bias) += a * b;
+    Front(place, place) += b * b;
+    Front(constant_, bias) += a * rows.residual[m];
+    Front(constant_, place) += b * rows.residual[m];
   }
 }
 
@@ -418,7 +478,7 @@ void ChainElimination::Substitute(const ChainTransition& link) {
                        {&by_S[0][0], 32});
   });
   const auto add = [&](double factor, const double* terms, double* to) {
-    for (int c = 0; c < kLandmarkPlace; ++c) to[c] += factor * terms[c];
+    for (int c = 0; c < kKeptPlace; ++c) to[c] += factor * terms[c];
     to[constant_] += factor * terms[kTransitionConstant];
     for (int c = 0; c < kPose; ++c) {
       to[fixed_ + c] += factor * terms[kTransitionNextPose + c];
@@ -449,7 +509,7 @@ void ChainElimination::Substitute(const ChainTransition& link) {
     Front(at, at) += 2 * terms[to];
     for (int i = to + 1; i < size_f; ++i) Front(place(i), at) += terms[i];
   };
-  for (int c = 0; c < kLandmarkPlace; ++c) fold(c, c);
+  for (int c = 0; c < kKeptPlace; ++c) fold(c, c);
   fold(kTransitionConstant, constant_);
   for (int c = 0; c < kPose; ++c) {
     fold(kTransitionNextPose + c, fixed_ + c);
@@ -469,7 +529,7 @@ void ChainElimination::Substitute(const ChainTransition& link) {
                          kState,
                          FrontAt(pose + kPose, to));
     };
-    add_rest(0, kLandmarkPlace, 0);
+    add_rest(0, kKeptPlace, 0);
     add_rest(kTransitionConstant, 1, constant_);
     add_rest(kTransitionNextPose, kPose, pose);
   });
@@ -574,46 +634,37 @@ void ChainElimination::EliminateByItself() {
   RecordStep(nullptr);
 }
 
-void ChainElimination::Advance(const MotionLink& link) {
-  BeginKeyframe();
-  TakeState();
-  for (int m = 0; m < kMotion; ++m) {
-    const int at = kMotionPlace + m;
-    information_(kPose + m, kPose + m) += link.w0[m] * link.w0[m];
-    Row(&coupling_, kPose + m)[at] = link.w0[m] * link.w1[m];
-    Row(&coupling_, kPose + m)[constant_] += link.w0[m] * link.residual[m];
-    Front(at, at) += link.w1[m] * link.w1[m];
-    Front(constant_, at) += link.w1[m] * link.residual[m];
-  }
-  EliminateByItself();
-  ++current_;
-  begun_ = false;
+int ChainElimination::Place(int shared) const {
+  if (shared < kChainLinkShared) return shared;
+  const int landmark = shared - kChainLinkShared;
+  return landmark < landmark_shared_ ? landmark_place_ + landmark
+                                     : kKeptPlace + landmark - landmark_shared_;
 }
 
 void ChainElimination::Finish(SharedInformation* result) {
   BeginKeyframe();
   TakeState();
   EliminateByItself();
+  // What cameras alone have in common was summed aside.
+  const int rows = landmark_shared_ + 1;
+  for (int j = 0; j < landmark_shared_; ++j) {
+    for (int i = j; i < rows; ++i) {
+      Front(landmark_place_ + i, landmark_place_ + j) +=
+          shared_sums_[j * rows + i];
+    }
+  }
   const int size = shared_size();
   result->Lambda.resize(size, size);
   result->eta.resize(size);
   result->constant = Front(constant_, constant_);
-  const auto place = [](int i) {
-    return i < kChainLinkShared ? i : i + kChainMotionSize;
-  };
   for (int j = 0; j < size; ++j) {
-    const int c = j - kChainLinkShared;
-    const int rows = landmark_shared_ + 1;
-    const double* sums = c < 0 ? nullptr : &shared_sums_[c * rows];
     for (int i = j; i < size; ++i) {
-      double sum = Front(place(i), place(j));
-      if (sums != nullptr) sum += sums[i - kChainLinkShared];
-      result->Lambda(i, j) = sum;
-      result->Lambda(j, i) = sum;
+      const int a = Place(i), b = Place(j);
+      const double information = Front(std::max(a, b), std::min(a, b));
+      result->Lambda(i, j) = information;
+      result->Lambda(j, i) = information;
     }
-    double constant = Front(constant_, place(j));
-    if (sums != nullptr) constant += sums[landmark_shared_];
-    result->eta(j) = -constant;
+    result->eta(j) = -Front(constant_, Place(j));
   }
 }
 

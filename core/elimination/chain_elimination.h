@@ -7,8 +7,11 @@
 // Minimised is the sum of |r + J d|^2 over all factors plus the priors. The
 // order is that of chain_structure.h. What remains at any time is one dense
 // symmetric front
-//   [link parameters | motion of a keyframe | landmark parameters | 1 | poses]
-// where the motion (velocity and biases) is that of the current keyframe. For
+//   [link parameters | motion of a keyframe | kept | landmark parameters | 1 |
+//    poses]
+// where the motion (velocity and biases) is that of the current keyframe, and
+// what is kept is shared with other chains: landmarks that they see as well,
+// and biases that walk from one to the next. For
 // tracks of bounded length the cost is linear in the number of keyframes; a
 // track through the whole chain is as good, and costs a front as wide as the
 // chain.
@@ -46,10 +49,10 @@ using ChainStateVector = Eigen::Matrix<double, kChainStateSize, 1>;
 using ChainStateMatrix =
     Eigen::Matrix<double, kChainStateSize, kChainStateSize>;
 
-// Rows (w0 x0 + w1 x1 + r) on the motion alone: for states that no IMU samples
-// connect. One row for each component; w0 = w1 = 0 says nothing.
-struct MotionLink {
-  Eigen::Matrix<double, kChainMotionSize, 1> w0, w1, residual;
+// Six rows (by_bias b + by_kept x + residual), one for each component of the
+// biases of a keyframe and of six kept unknowns x.
+struct KeptBiasRows {
+  Eigen::Matrix<double, 6, 1> by_bias, by_kept, residual;
 };
 
 // What the chain says about the shared parameters: minimising over all else
@@ -69,6 +72,10 @@ struct ChainShape {
   std::span<const int> camera_sizes;
   std::span<const int> tracks;
   std::span<const int> track_keyframes;
+  // Number of kept unknowns; and of each landmark the first of its three, or -1
+  // where it is eliminated. Empty: all are.
+  int kept = 0;
+  std::span<const int> kept_landmarks = {};
 };
 
 class ChainElimination {
@@ -91,11 +98,11 @@ class ChainElimination {
                         const Eigen::Matrix3d& H,
                         const Eigen::Vector3d& g);
 
-  // Then for each keyframe in turn: its prior x^T H x, if it has one, and the
-  // link to the next, or nothing between them, or the end.
+  // Then for each keyframe in turn: its prior x^T H x, rows with kept unknowns,
+  // if it has any, and the link to the next, or the end.
   void AddPrior(const ChainStateMatrix& information);
+  void AddKeptBias(int kept, const KeptBiasRows& rows);
   void Advance(const ChainTransition& link);
-  void Advance(const MotionLink& link);
   void Finish(SharedInformation* result);
 
   // After Finish(), with Record::kSteps: the steps that minimise, given that of
@@ -104,7 +111,10 @@ class ChainElimination {
                  std::vector<ChainStateVector>* states,
                  std::vector<Eigen::Vector3d>* landmarks) const;
 
-  int shared_size() const { return kChainLinkShared + landmark_shared_; }
+  // Link parameters, landmark parameters, what is kept.
+  int shared_size() const {
+    return kChainLinkShared + landmark_shared_ + kept_;
+  }
 
  private:
   void LayOut(const ChainShape& shape);
@@ -113,7 +123,12 @@ class ChainElimination {
   void BeginKeyframe();
   void OpenSlots(int slots);
   void EliminateLandmarks();
-  void PreparePanel(int landmark, double* panel, int stride);
+  Eigen::Matrix3d PreparePanel(int landmark, double* panel, int stride);
+  void SetRoot(int landmark, Eigen::Matrix3d information);
+  void KeepLandmark(int landmark,
+                    const Eigen::Matrix3d& information,
+                    double* panel,
+                    int stride);
   void SwapPoses(int slot);
   void TakeState();
   void Substitute(const ChainTransition& link);
@@ -132,6 +147,8 @@ class ChainElimination {
     return fixed_ + (first_place_ + slot) * kChainPoseSize;
   }
   int PosesSize() const { return slots_ * kChainPoseSize; }
+  // Of a shared parameter.
+  int Place(int shared) const;
 
   template <typename Function>
   void WithKernels(const Function& function) const {
@@ -146,6 +163,8 @@ class ChainElimination {
   // parameters, motion, landmark parameters, the constant, up to whole vectors.
   std::vector<int> camera_sizes_, camera_offsets_;
   int landmark_shared_ = 0;
+  int kept_ = 0;
+  int landmark_place_ = 0;
   int constant_ = 0;
   int fixed_ = 0;
 
@@ -158,6 +177,7 @@ class ChainElimination {
   };
   std::vector<double> sums_, panels_, landmark_priors_, roots_;
   std::vector<Panel> panel_of_landmark_;
+  std::vector<int> kept_landmarks_;  // -1: eliminated
   std::vector<int> sums_offsets_;
   int sums_size_ = 0;
   std::vector<int> landmark_of_observation_;

@@ -11,7 +11,7 @@ constexpr int kPose = kChainPoseSize;
 constexpr int kMotion = kChainMotionSize;
 constexpr int kState = kChainStateSize;
 constexpr int kMotionPlace = kChainLinkShared;
-constexpr int kLandmarkPlace = kMotionPlace + kMotion;
+constexpr int kKeptPlace = kMotionPlace + kMotion;
 
 using RowMajorRoot = Eigen::Matrix<double, kState, 16, Eigen::RowMajor>;
 using RowMajorLink = Eigen::Matrix<double, kState, 32, Eigen::RowMajor>;
@@ -29,8 +29,7 @@ void ChainElimination::FindSteps(
   landmarks->resize(landmarks_count_);
   // Values in the places of a panel.
   Eigen::VectorXd z = Eigen::VectorXd::Zero(panel_stride_);
-  z.head(kChainLinkShared) = shared.head(kChainLinkShared);
-  z.segment(kLandmarkPlace, landmark_shared_) = shared.tail(landmark_shared_);
+  for (int i = 0; i < shared_size(); ++i) z(Place(i)) = shared(i);
   z(constant_) = 1;
 
   for (int k = keyframes - 1; k >= 0; --k) {
@@ -51,7 +50,7 @@ void ChainElimination::FindSteps(
     x = -(root * (P * z.head(step.stride)));
     if (step.linked) {
       const Eigen::Map<const RowMajorLink> G(&step.link.G[0][0]);
-      x += G.leftCols<kLandmarkPlace>() * z.head<kLandmarkPlace>() +
+      x += G.leftCols<kKeptPlace>() * z.head<kKeptPlace>() +
            G.col(kTransitionConstant) +
            G.middleCols<kPose>(kTransitionNextPose) *
                (*states)[k + 1].head<kPose>();
@@ -69,14 +68,18 @@ void ChainElimination::FindSteps(
           (*states)[poses[from]].head<kPose>();
     }
     for (const int m : structure_.Landmarks(k)) {
+      if (kept_landmarks_[m] >= 0) {
+        (*landmarks)[m] = z.segment<3>(kKeptPlace + kept_landmarks_[m]);
+        continue;
+      }
       const Panel& panel = panel_of_landmark_[m];
-      const int shared_places = fixed_ - kLandmarkPlace;
+      const int shared_places = fixed_ - landmark_place_;
       const int size = shared_places + structure_.Slots(m) * kPose;
       Eigen::Vector3d y;
       for (int j = 0; j < 3; ++j) {
         const Eigen::Map<const Eigen::VectorXd> row(
             &panels_[panel.begin + j * panel.stride], size);
-        y(j) = row.dot(z.segment(kLandmarkPlace, size));
+        y(j) = row.dot(z.segment(landmark_place_, size));
       }
       // L^T x = -y, the diagonal of L inverted.
       const double* L = &roots_[6 * m];

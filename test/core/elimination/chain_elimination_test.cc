@@ -36,7 +36,7 @@ std::vector<RandomChainShape> Shapes() {
     shape.max_track = 1 + trial % 7;
     shape.landmarks_per_keyframe = trial % 5;
     shape.found_again = trial % 2 == 0 ? 0 : 0.3;
-    shape.motion_links = trial % 3 == 0 ? 0.2 : 0;
+    shape.kept = trial % 3 == 0 ? 0.3 : 0;
     shapes.push_back(shape);
   }
   return shapes;
@@ -83,7 +83,14 @@ TEST(ChainElimination, FindsTheStepsThatMinimise) {
       elimination->FindSteps(shared, &states, &landmarks);
       Eigen::VectorXd actual(expected.size());
       Eigen::Index at = 0;
-      for (const auto& x : landmarks) actual.segment<3>(3 * at++) = x;
+      for (const auto& x : landmarks) {
+        const int kept = chain.kept_landmarks[at];
+        if (kept >= 0) {
+          EXPECT_EQ(x, shared.segment<3>(D - chain.kept + kept));
+        }
+        actual.segment<3>(3 * at++) =
+            kept < 0 ? x : Eigen::Vector3d::Zero().eval();
+      }
       at *= 3;
       for (const auto& x : states) {
         actual.segment<kChainStateSize>(at) = x;
@@ -103,7 +110,9 @@ TEST(ChainElimination, TracksThroughTheWholeChainAreEliminated) {
   shape.max_track = 12;
   shape.seen = 1;
   for (auto& track : RandomChain(shape, &random).landmarks) {
-    if (track.size() > 8) chain.landmarks.push_back(track);
+    if (track.size() <= 8) continue;
+    chain.landmarks.push_back(track);
+    chain.kept_landmarks.push_back(-1);
   }
   ChainElimination elimination;
   ExpectEqualsDense(chain, &elimination);

@@ -137,7 +137,7 @@ void AddObservations(const Chain& chain,
 
 int Chain::shared_size() const {
   return std::accumulate(
-      camera_sizes.begin(), camera_sizes.end(), kChainLinkShared);
+      camera_sizes.begin(), camera_sizes.end(), kChainLinkShared + kept);
 }
 
 Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
@@ -145,7 +145,6 @@ Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
   chain.camera_sizes = shape.camera_sizes;
   chain.landmark_prior = 1e-2;
   chain.landmark_prior_slope = {0.01, -0.02, 0.03};
-  std::bernoulli_distribution motion(shape.motion_links);
   for (int k = 0; k < shape.keyframes; ++k) {
     chain.priors.push_back(1e-2 * ChainStateMatrix::Identity());
     if (k + 1 < shape.keyframes) {
@@ -155,14 +154,6 @@ Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
       link.x1 = NearRotation(random);
       FillNormal(random, &link.shared);
       chain.links.push_back(link);
-      chain.motion_links.push_back(std::nullopt);
-      if (motion(*random)) {
-        MotionLink gap;
-        FillNormal(random, &gap.w0);
-        FillNormal(random, &gap.w1);
-        FillNormal(random, &gap.residual);
-        chain.motion_links.back() = gap;
-      }
     }
     for (int i = 0; i < shape.landmarks_per_keyframe; ++i) {
       chain.landmarks.push_back(RandomTrack(k, shape, random));
@@ -170,6 +161,22 @@ Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
   }
   // In any order.
   std::shuffle(chain.landmarks.begin(), chain.landmarks.end(), *random);
+  chain.kept_landmarks.assign(chain.landmarks.size(), -1);
+  if (shape.kept == 0) return chain;
+  for (int& kept : chain.kept_landmarks) {
+    if (!std::bernoulli_distribution(shape.kept)(*random)) continue;
+    kept = chain.kept;
+    chain.kept += 3;
+  }
+  const auto rows = [&] {
+    KeptBiasRows result;
+    FillNormal(random, &result.by_bias);
+    FillNormal(random, &result.by_kept);
+    FillNormal(random, &result.residual);
+    return result;
+  };
+  chain.kept_bias = {rows(), rows()};
+  chain.kept += 6;
   return chain;
 }
 
@@ -184,7 +191,12 @@ SharedInformation Eliminate(const Chain& chain,
     }
     tracks.push_back(static_cast<int>(keyframes.size()));
   }
-  elimination->Start({chain.keyframes(), chain.camera_sizes, tracks, keyframes},
+  elimination->Start({chain.keyframes(),
+                      chain.camera_sizes,
+                      tracks,
+                      keyframes,
+                      chain.kept,
+                      chain.kept_landmarks},
                      record);
   for (int k = 0; k < chain.keyframes(); ++k) {
     for (int camera = 0; camera < static_cast<int>(chain.camera_sizes.size());
@@ -200,10 +212,13 @@ SharedInformation Eliminate(const Chain& chain,
   }
   for (int k = 0; k < chain.keyframes(); ++k) {
     elimination->AddPrior(chain.priors[k]);
-    if (k + 1 == chain.keyframes()) break;
-    if (chain.motion_links[k]) {
-      elimination->Advance(*chain.motion_links[k]);
-    } else {
+    if (chain.kept_bias && k == 0) {
+      elimination->AddKeptBias(chain.kept - 6, chain.kept_bias->first);
+    }
+    if (chain.kept_bias && k + 1 == chain.keyframes()) {
+      elimination->AddKeptBias(chain.kept - 6, chain.kept_bias->second);
+    }
+    if (k + 1 < chain.keyframes()) {
       elimination->Advance(Solve(chain.links[k]));
     }
   }
@@ -218,7 +233,8 @@ DenseProblem MakeDense(const Chain& chain) {
   const int shared = states + kChainStateSize * chain.keyframes();
   const int columns = shared + chain.shared_size();
   // Rows of zeros below, so that there are never fewer rows than columns.
-  int rows = columns + kChainStateSize * static_cast<int>(chain.links.size());
+  int rows =
+      columns + 12 + kChainStateSize * static_cast<int>(chain.links.size());
   for (const auto& track : chain.landmarks) {
     rows += 2 * static_cast<int>(track.size());
   }
@@ -227,9 +243,17 @@ DenseProblem MakeDense(const Chain& chain) {
   dense.r = Eigen::VectorXd::Zero(rows);
   const double root = std::sqrt(chain.landmark_prior);
   int row = 0;
-  for (; row < states; ++row) {
-    dense.J(row, row) = root;
-    dense.r(row) = chain.landmark_prior_slope(row % 3) / root;
+  const int kept = columns - chain.kept;
+  // First column of a landmark. One that is kept leaves its own without
+  // anything but a unit row, so that its step there is zero.
+  const auto column = [&](int m) {
+    return chain.kept_landmarks[m] < 0 ? 3 * m : kept + chain.kept_landmarks[m];
+  };
+  for (int m = 0; m < landmarks; ++m) {
+    for (int i = 0; i < 3; ++i, ++row) {
+      dense.J(row, column(m) + i) = root;
+      dense.r(row) = chain.landmark_prior_slope(i) / root;
+    }
   }
   for (const ChainStateMatrix& prior : chain.priors) {
     dense.J.block<kChainStateSize, kChainStateSize>(row, row) =
@@ -242,7 +266,7 @@ DenseProblem MakeDense(const Chain& chain) {
   }
   for (int m = 0; m < landmarks; ++m) {
     for (const ChainObservation& a : chain.landmarks[m]) {
-      dense.J.block<2, 3>(row, 3 * m) = -a.position;
+      dense.J.block<2, 3>(row, column(m)) = -a.position;
       dense.J.block<2, 6>(row, states + kChainStateSize * a.keyframe) =
           ByPose(a);
       dense.J.block(row, offsets[a.camera], 2, 3 + a.own.cols()) = ByCamera(a);
@@ -252,19 +276,27 @@ DenseProblem MakeDense(const Chain& chain) {
   }
   for (std::size_t k = 0; k < chain.links.size(); ++k, row += kChainStateSize) {
     const int at = states + kChainStateSize * static_cast<int>(k);
-    if (chain.motion_links[k]) {
-      const MotionLink& a = *chain.motion_links[k];
-      dense.J.block<9, 9>(row, at + kChainPoseSize) = a.w0.asDiagonal();
-      dense.J.block<9, 9>(row, at + kChainStateSize + kChainPoseSize) =
-          a.w1.asDiagonal();
-      dense.r.segment<9>(row) = a.residual;
-      continue;
-    }
     const ChainRows& a = chain.links[k];
     dense.J.block<15, 15>(row, at) = a.x0;
     dense.J.block<15, 15>(row, at + kChainStateSize) = a.x1;
     dense.J.block<15, 15>(row, shared) = a.shared;
     dense.r.segment<15>(row) = a.residual;
+  }
+  if (chain.kept_bias) {
+    const auto add = [&](int keyframe, const KeptBiasRows& rows) {
+      const int at = states + kChainStateSize * keyframe + 9;
+      dense.J.block<6, 6>(row, at) = rows.by_bias.asDiagonal();
+      dense.J.block<6, 6>(row, columns - 6) = rows.by_kept.asDiagonal();
+      dense.r.segment<6>(row) = rows.residual;
+      row += 6;
+    };
+    add(0, chain.kept_bias->first);
+    add(chain.keyframes() - 1, chain.kept_bias->second);
+  }
+  // The unknowns that kept landmarks do not use.
+  for (int m = 0; m < landmarks; ++m) {
+    if (chain.kept_landmarks[m] < 0) continue;
+    for (int i = 0; i < 3; ++i, ++row) dense.J(row, 3 * m + i) = 1;
   }
   return dense;
 }

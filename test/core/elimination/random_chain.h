@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "core/elimination/chain_elimination.h"
@@ -29,12 +30,15 @@ struct ChainRows {
 struct Chain {
   std::vector<int> camera_sizes;
   std::vector<ChainRows> links;  // one less than keyframes
-  // Instead of the rows, where there are none between two keyframes.
-  std::vector<std::optional<MotionLink>> motion_links;
   std::vector<ChainStateMatrix> priors;
   std::vector<std::vector<ChainObservation>> landmarks;
   double landmark_prior = 0;             // information
   Eigen::Vector3d landmark_prior_slope;  // g of x^T H x + 2 g^T x
+  // Landmarks that are kept, by three unknowns each; after them six unknowns
+  // that rows connect with the biases of the first and the last keyframe.
+  std::vector<int> kept_landmarks;  // first unknown of each, or -1
+  int kept = 0;
+  std::optional<std::pair<KeptBiasRows, KeptBiasRows>> kept_bias;
 
   int keyframes() const { return static_cast<int>(priors.size()); }
   int shared_size() const;
@@ -48,7 +52,7 @@ struct RandomChainShape {
   double seen = 0.8;  // of the keyframes within a track
   // Tracks that are seen once more, from any keyframe after them.
   double found_again = 0;
-  double motion_links = 0;  // in place of links
+  double kept = 0;  // part of the landmarks; if any, biases as well
 };
 
 Chain RandomChain(const RandomChainShape& shape, std::mt19937* random);
