@@ -48,27 +48,19 @@ ChainStateMatrix GaugePrior(const KeyframeState& x) {
   return gauge;
 }
 
-MotionLink WalkBetween(const BiasLink& link,
-                       const KeyframeState& a,
-                       const KeyframeState& b) {
-  MotionLink walk;
-  const Eigen::Matrix<double, 6, 1> weight = link.sigmas.cwiseInverse();
-  walk.w1.setZero();
-  walk.w1.tail<6>() = weight;
-  walk.w0 = -walk.w1;
-  walk.residual.setZero();
-  walk.residual.segment<3>(kStateAccelBias - kChainPoseSize) = b.b_a - a.b_a;
-  walk.residual.segment<3>(kStateGyroBias - kChainPoseSize) = b.b_g - a.b_g;
-  walk.residual.tail<6>().array() *= weight.array();
-  return walk;
-}
-
-MotionLink Nothing() {
-  MotionLink link;
-  link.w0.setZero();
-  link.w1.setZero();
-  link.residual.setZero();
-  return link;
+// Half of a walk from a to b, between the biases of one of them and those in
+// its middle: twice the information, and half of what the whole is off.
+KeptBiasRows HalfWalk(const BiasLink& link,
+                      const KeyframeState& a,
+                      const KeyframeState& b,
+                      double sign_of_bias) {
+  const Eigen::Matrix<double, 6, 1> weight =
+      std::sqrt(2.0) * link.sigmas.cwiseInverse();
+  Eigen::Matrix<double, 6, 1> off;
+  off << b.b_a - a.b_a, b.b_g - a.b_g;
+  return {.by_bias = sign_of_bias * weight,
+          .by_kept = -sign_of_bias * weight,
+          .residual = 0.5 * weight.cwiseProduct(off)};
 }
 
 // By (alpha, beta, rho), of a step of p_G = a + R (alpha, beta, 1) / rho.
@@ -94,13 +86,6 @@ std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem) {
   for (const InertialLink& link : problem.inertial_links) {
     joined[link.before] = true;
   }
-  for (const BiasLink& link : problem.bias_links) joined[link.before] = true;
-  for (const Track& track : problem.tracks) {
-    if (track.observations.empty()) continue;
-    std::fill(joined.begin() + track.observations.front().keyframe,
-              joined.begin() + track.observations.back().keyframe,
-              true);
-  }
   std::vector<KeyframeChain> chains;
   for (int k = 0; k < keyframes; ++k) {
     if (k == 0 || !joined[k - 1]) chains.push_back({k, k});
@@ -121,17 +106,17 @@ void LinearSystem::StartChains(const CalibrationProblem& problem, int cameras) {
     chains_[c].landmarks.clear();
     chains_[c].tracks.assign(1, 0);
     chains_[c].track_keyframes.clear();
+    chains_[c].kept_landmarks.clear();
+    chains_[c].interface.clear();
+    chains_[c].walk_in = kNone;
+    chains_[c].walk_out = kNone;
     std::fill(chain_of_keyframe_.begin() + ranges[c].begin,
               chain_of_keyframe_.begin() + ranges[c].end,
               static_cast<int>(c));
   }
   inertial_after_.assign(keyframes, kNone);
-  walk_after_.assign(keyframes, kNone);
   for (std::size_t i = 0; i < problem.inertial_links.size(); ++i) {
     inertial_after_[problem.inertial_links[i].before] = static_cast<int>(i);
-  }
-  for (std::size_t i = 0; i < problem.bias_links.size(); ++i) {
-    walk_after_[problem.bias_links[i].before] = static_cast<int>(i);
   }
   priors_.assign(keyframes, ChainStateMatrix::Zero());
   has_prior_.assign(keyframes, false);
@@ -223,23 +208,80 @@ void LinearSystem::Weigh(const std::vector<ScreenedLandmark>& landmarks,
   }
 }
 
+// The kept unknowns of a chain that stand at `place` in the interface.
+int LinearSystem::KeepInChain(int place, int size, Chain* chain) {
+  const int kept = static_cast<int>(chain->interface.size());
+  for (int i = 0; i < size; ++i) chain->interface.push_back(place + i);
+  return kept;
+}
+
+void LinearSystem::AddToTrack(int chain_index,
+                              int landmark,
+                              std::span<Seen> track) {
+  const int cameras = static_cast<int>(camera_sizes_.size());
+  Chain& chain = chains_[chain_index];
+  for (Seen& seen : track) {
+    if (seen.weight == 0) continue;
+    seen.factor = static_cast<int>(chain.track_keyframes.size());
+    chain.track_keyframes.push_back(seen.view / cameras - chain.range.begin);
+  }
+  chain.tracks.push_back(static_cast<int>(chain.track_keyframes.size()));
+  chain.landmarks.push_back(landmark);
+  const int place = interface_of_landmark_[landmark];
+  chain.kept_landmarks.push_back(
+      place == kNone ? kNone : KeepInChain(place, 3, &chain));
+}
+
 // The tracks of each chain, of landmarks that enough observations hold.
 void LinearSystem::FindTracks() {
   const int cameras = static_cast<int>(camera_sizes_.size());
+  interface_of_landmark_.assign(seen_begin_.size() - 1, kNone);
   for (std::size_t m = 0; m + 1 < seen_begin_.size(); ++m) {
     const std::span<Seen> track(seen_.data() + seen_begin_[m],
                                 seen_begin_[m + 1] - seen_begin_[m]);
-    const auto held = std::count_if(
-        track.begin(), track.end(), [](auto& seen) { return seen.weight > 0; });
-    if (held < kMinObservations) continue;
-    Chain& chain = chains_[chain_of_keyframe_[track.front().view / cameras]];
-    for (Seen& seen : track) {
+    int held = 0;
+    int first = kNone, last = kNone;  // chains that hold it
+    const auto chain_of = [&](const Seen& seen) {
+      return chain_of_keyframe_[seen.view / cameras];
+    };
+    for (const Seen& seen : track) {
       if (seen.weight == 0) continue;
-      seen.factor = static_cast<int>(chain.track_keyframes.size());
-      chain.track_keyframes.push_back(seen.view / cameras - chain.range.begin);
+      ++held;
+      last = chain_of(seen);
+      if (first == kNone) first = last;
     }
-    chain.tracks.push_back(static_cast<int>(chain.track_keyframes.size()));
-    chain.landmarks.push_back(static_cast<int>(m));
+    if (held < kMinObservations) continue;
+    if (first != last) {
+      interface_of_landmark_[m] = interface_size_;
+      interface_size_ += 3;
+    }
+    // In parts by chain, those without weight left out.
+    for (std::size_t begin = 0; begin < track.size();) {
+      std::size_t end = begin + 1;
+      while (end < track.size() &&
+             chain_of(track[end]) == chain_of(track[begin])) {
+        ++end;
+      }
+      const std::span<Seen> part = track.subspan(begin, end - begin);
+      if (std::any_of(part.begin(), part.end(), [](const Seen& seen) {
+            return seen.weight > 0;
+          })) {
+        AddToTrack(chain_of(part.front()), static_cast<int>(m), part);
+      }
+      begin = end;
+    }
+  }
+}
+
+void LinearSystem::KeepWalks(const CalibrationProblem& problem) {
+  interface_of_walk_.clear();
+  for (const BiasLink& link : problem.bias_links) {
+    interface_of_walk_.push_back(interface_size_);
+    Chain& before = chains_[chain_of_keyframe_[link.before]];
+    Chain& after = chains_[chain_of_keyframe_[link.after]];
+    before.walk_out = KeepInChain(interface_size_, 6, &before);
+    after.walk_in = KeepInChain(interface_size_, 6, &after);
+    interface_size_ += 6;
   }
 }
 
@@ -272,36 +314,99 @@ void LinearSystem::AddViews(Chain* chain) {
   }
 }
 
-// That of triangulate.h on inverse depth, by p_G.
+// That of landmark_place.h on inverse depth.
+LinearSystem::LandmarkPrior LinearSystem::PriorOf(
+    const std::vector<ScreenedLandmark>& landmarks, int landmark) const {
+  const LandmarkPlace& place = places_[landmark];
+  const double rho = place.inverse_depth.z();
+  const Eigen::Vector3d rho_by_p = -rho * rho * place.anchor.R_GA.col(2);
+  const double information =
+      landmarks[landmark].weight * Information(kInverseDepthSigma);
+  return {information * rho_by_p * rho_by_p.transpose(),
+          information * rho * rho_by_p};
+}
+
 void LinearSystem::AddLandmarkPriors(
     const std::vector<ScreenedLandmark>& landmarks, Chain* chain) {
   for (std::size_t m = 0; m < chain->landmarks.size(); ++m) {
-    const int i = chain->landmarks[m];
-    const double rho = places_[i].inverse_depth.z();
-    const Eigen::Vector3d rho_by_p = -rho * rho * places_[i].anchor.R_GA.col(2);
-    const double prior = landmarks[i].weight * Information(kInverseDepthSigma);
-    chain->elimination.AddLandmarkPrior(static_cast<int>(m),
-                                        prior * rho_by_p * rho_by_p.transpose(),
-                                        prior * rho * rho_by_p);
+    if (chain->kept_landmarks[m] != kNone) continue;
+    const LandmarkPrior prior = PriorOf(landmarks, chain->landmarks[m]);
+    chain->elimination.AddLandmarkPrior(static_cast<int>(m), prior.H, prior.g);
   }
 }
 
 void LinearSystem::EliminateKeyframes(const CalibrationProblem& problem,
                                       Chain* chain) {
   const std::vector<KeyframeState>& x = *keyframes_;
+  const auto walk_at = [&](int kept) -> const BiasLink& {
+    const auto at = std::find(interface_of_walk_.begin(),
+                              interface_of_walk_.end(),
+                              chain->interface[kept]);
+    return problem.bias_links[at - interface_of_walk_.begin()];
+  };
+  const auto keep_half = [&](int kept, double sign_of_bias) {
+    const BiasLink& link = walk_at(kept);
+    chain->elimination.AddKeptBias(
+        kept, HalfWalk(link, x[link.before], x[link.after], sign_of_bias));
+  };
   for (int k = chain->range.begin; k < chain->range.end; ++k) {
     if (has_prior_[k]) chain->elimination.AddPrior(priors_[k]);
-    if (k + 1 == chain->range.end) break;
-    if (inertial_after_[k] != kNone) {
-      chain->elimination.Advance(transitions_[inertial_after_[k]]);
-    } else if (walk_after_[k] != kNone) {
-      chain->elimination.Advance(
-          WalkBetween(problem.bias_links[walk_after_[k]], x[k], x[k + 1]));
-    } else {
-      chain->elimination.Advance(Nothing());
+    if (k == chain->range.begin && chain->walk_in != kNone) {
+      keep_half(chain->walk_in, 1);
     }
+    if (k + 1 == chain->range.end) break;
+    chain->elimination.Advance(transitions_[inertial_after_[k]]);
   }
+  if (chain->walk_out != kNone) keep_half(chain->walk_out, -1);
   chain->elimination.Finish(&of_chain_);
+}
+
+// Adds what a chain says about theta and the interface.
+void LinearSystem::AddChain(const Chain& chain) {
+  const Eigen::Index D = information_.eta.size();
+  const Eigen::MatrixXd& Lambda = of_chain_.Lambda;
+  const Eigen::VectorXd& eta = of_chain_.eta;
+  information_.Lambda += Lambda.topLeftCorner(D, D);
+  information_.eta += eta.head(D);
+  decrease_ -= of_chain_.constant;
+  const std::vector<int>& at = chain.interface;
+  for (std::size_t j = 0; j < at.size(); ++j) {
+    const Eigen::Index column = D + static_cast<Eigen::Index>(j);
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      interface_(at[i], at[j]) +=
+          Lambda(D + static_cast<Eigen::Index>(i), column);
+    }
+    interface_theta_.row(at[j]) += Lambda.col(column).head(D).transpose();
+    interface_eta_(at[j]) += eta(column);
+  }
+}
+
+// Eliminates the interface.
+void LinearSystem::SolveInterface(
+    const std::vector<ScreenedLandmark>& landmarks) {
+  if (interface_size_ == 0) return;
+  for (std::size_t m = 0; m < interface_of_landmark_.size(); ++m) {
+    const int at = interface_of_landmark_[m];
+    if (at == kNone) continue;
+    const LandmarkPrior prior = PriorOf(landmarks, static_cast<int>(m));
+    interface_.block<3, 3>(at, at) += prior.H;
+    interface_eta_.segment<3>(at) -= prior.g;
+  }
+  interface_root_.compute(interface_);
+  // A landmark next to infinity may lose what its depth is known by to
+  // rounding: it gets the least that can be told from none.
+  for (double add = 1e-14; interface_root_.info() != Eigen::Success && add < 1;
+       add *= 10) {
+    interface_.diagonal() *= 1 + add;
+    interface_root_.compute(interface_);
+  }
+  const Eigen::MatrixXd by_theta = interface_root_.solve(interface_theta_);
+  const Eigen::VectorXd at_rest = interface_root_.solve(interface_eta_);
+  information_.Lambda -= interface_theta_.transpose() * by_theta;
+  information_.Lambda =
+      (0.5 * (information_.Lambda + information_.Lambda.transpose())).eval();
+  information_.eta -= interface_theta_.transpose() * at_rest;
+  decrease_ += interface_eta_.dot(at_rest);
 }
 
 void LinearSystem::Linearise(const Rig& rig,
@@ -322,7 +427,9 @@ void LinearSystem::Linearise(const Rig& rig,
   PlaceLandmarks(landmarks);
   SortByView(problem, landmarks);
   Weigh(landmarks, loss);
+  interface_size_ = 0;
   FindTracks();
+  KeepWalks(problem);
 
   links_.clear();
   for (const InertialLink& link : problem.inertial_links) {
@@ -340,19 +447,23 @@ void LinearSystem::Linearise(const Rig& rig,
   const int size = TangentSize(theta);
   information_.Lambda.setZero(size, size);
   information_.eta.setZero(size);
+  interface_.setZero(interface_size_, interface_size_);
+  interface_theta_.setZero(interface_size_, size);
+  interface_eta_.setZero(interface_size_);
   for (Chain& chain : chains_) {
     chain.elimination.Start({chain.range.end - chain.range.begin,
                              camera_sizes_,
                              chain.tracks,
-                             chain.track_keyframes},
+                             chain.track_keyframes,
+                             static_cast<int>(chain.interface.size()),
+                             chain.kept_landmarks},
                             ChainElimination::Record::kSteps);
     AddViews(&chain);
     AddLandmarkPriors(landmarks, &chain);
     EliminateKeyframes(problem, &chain);
-    information_.Lambda += of_chain_.Lambda;
-    information_.eta += of_chain_.eta;
-    decrease_ -= of_chain_.constant;
+    AddChain(chain);
   }
+  SolveInterface(landmarks);
 }
 
 void LinearSystem::FindSteps(const Eigen::VectorXd& theta_step,
@@ -360,10 +471,19 @@ void LinearSystem::FindSteps(const Eigen::VectorXd& theta_step,
                              std::vector<Eigen::Vector3d>* landmarks) const {
   keyframes->clear();
   landmarks->assign(places_.size(), Eigen::Vector3d::Zero());
+  Eigen::VectorXd interface(interface_size_);
+  if (interface_size_ > 0) {
+    interface =
+        interface_root_.solve(interface_eta_ - interface_theta_ * theta_step);
+  }
+  Eigen::VectorXd shared;
   std::vector<ChainStateVector> of_chain;
   std::vector<Eigen::Vector3d> points;
   for (const Chain& chain : chains_) {
-    chain.elimination.FindSteps(theta_step, &of_chain, &points);
+    const auto kept = static_cast<Eigen::Index>(chain.interface.size());
+    shared.resize(theta_step.size() + kept);
+    shared << theta_step, interface(chain.interface);
+    chain.elimination.FindSteps(shared, &of_chain, &points);
     keyframes->insert(keyframes->end(), of_chain.begin(), of_chain.end());
     for (std::size_t m = 0; m < chain.landmarks.size(); ++m) {
       const LandmarkPlace& place = places_[chain.landmarks[m]];

@@ -1,7 +1,12 @@
 // A whole calibration problem, linearised at one estimate and eliminated down
-// to theta by ChainElimination, one chain for each stretch of keyframes that
-// nothing connects with the next; and the way back from a step of theta to the
-// steps of all else. Deterministic.
+// to theta; and the way back from a step of theta to the steps of all else.
+// Deterministic.
+//
+// Keyframes that IMU samples connect form a chain, eliminated by
+// ChainElimination. What connects chains is kept by them: landmarks that
+// several of them see, and for each gap over which biases walk their value in
+// the middle of the walk, so that each end is tied to it by half of the
+// variance. Together with theta these make a small dense system, the interface.
 //
 // Minimised is
 //   F(d) = sum |r + J d|^2 over all factors + the priors
@@ -10,6 +15,7 @@
 // its step, within a subspace or shortened, and asks for the rest.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <memory>
 #include <span>
@@ -26,8 +32,7 @@
 
 namespace selfcal {
 
-// Keyframes [begin, end) of a problem that links and landmarks connect with
-// each other and with no others.
+// Keyframes [begin, end) of a problem that inertial links connect.
 struct KeyframeChain {
   int begin = 0;
   int end = 0;
@@ -78,6 +83,14 @@ class LinearSystem {
     ChainElimination elimination;
     std::vector<int> landmarks;  // indices into those of the problem
     std::vector<int> tracks, track_keyframes;
+    // Of each landmark, the first of its kept unknowns, or -1; and of all kept
+    // unknowns their place in the interface.
+    std::vector<int> kept_landmarks;
+    std::vector<int> interface;
+    // Kept unknowns of the walks into its first and out of its last keyframe,
+    // or -1.
+    int walk_in = -1;
+    int walk_out = -1;
   };
   // An observation that is used.
   struct Seen {
@@ -89,6 +102,11 @@ class LinearSystem {
   };
 
   void StartChains(const CalibrationProblem& problem, int cameras);
+  void AddToTrack(int chain, int landmark, std::span<Seen> seen);
+  int KeepInChain(int place, int size, Chain* chain);
+  void KeepWalks(const CalibrationProblem& problem);
+  void AddChain(const Chain& chain);
+  void SolveInterface(const std::vector<ScreenedLandmark>& landmarks);
   void PlaceLandmarks(const std::vector<ScreenedLandmark>& landmarks);
   void SortByView(const CalibrationProblem& problem,
                   const std::vector<ScreenedLandmark>& landmarks);
@@ -96,6 +114,13 @@ class LinearSystem {
              const RobustLoss* loss);
   void FindTracks();
   void AddViews(Chain* chain);
+  // Of a landmark, by p_G: H and g of x^T H x + 2 g^T x.
+  struct LandmarkPrior {
+    Eigen::Matrix3d H;
+    Eigen::Vector3d g;
+  };
+  LandmarkPrior PriorOf(const std::vector<ScreenedLandmark>& landmarks,
+                        int landmark) const;
   void AddLandmarkPriors(const std::vector<ScreenedLandmark>& landmarks,
                          Chain* chain);
   void EliminateKeyframes(const CalibrationProblem& problem, Chain* chain);
@@ -126,7 +151,14 @@ class LinearSystem {
   std::vector<int> chain_of_keyframe_;
   std::vector<InertialLinkStates> links_;
   std::vector<InertialTransition> transitions_;
-  std::vector<int> inertial_after_, walk_after_;  // links to the next, or -1
+  std::vector<int> inertial_after_;  // link to the next, or -1
+  // The interface: of each landmark its first unknown, or -1; of each bias link
+  // its first; its information with theta, and its root.
+  std::vector<int> interface_of_landmark_, interface_of_walk_;
+  int interface_size_ = 0;
+  Eigen::MatrixXd interface_, interface_theta_;
+  Eigen::VectorXd interface_eta_;
+  Eigen::LLT<Eigen::MatrixXd> interface_root_;
   // Of one view.
   std::vector<std::int32_t> landmarks_of_view_;
   std::vector<int> seen_of_view_, factors_;
