@@ -92,7 +92,7 @@ struct RefineLimits {
   int steps = 30;
   // What the next step would take off the cost [sigma^2]: far below a sigma of
   // the place it changes nothing that is measured.
-  double decrease = 1e-16;
+  double decrease = 1e-8;
 };
 
 struct RefinedPlace {

@@ -18,6 +18,9 @@ constexpr int kMaxRays = 5;
 constexpr double kSearchLossScale = 2.0;
 // A point further away than this is given by its direction alone.
 constexpr double kMinInverseDepth = 1e-4;
+// A place from which half of the observations lie so near is not improved upon
+// by further pairs, only by refinement.
+constexpr double kEnoughSigmas = 2.0;
 constexpr double kMedianOfRayleigh = 1.1774100225154747;
 
 struct Ray {
@@ -69,19 +72,24 @@ std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
   const std::vector<Ray> rays = SpreadRays(scene, track);
   double best_px = std::numeric_limits<double>::infinity();
   Eigen::Vector4d best_G = Eigen::Vector4d::UnitZ();
-  for (std::size_t a = 0; a < rays.size(); ++a) {
-    for (std::size_t b = 0; b < rays.size(); ++b) {
-      const auto point_G =
-          a == b ? std::nullopt : IntersectRays(rays[a], rays[b]);
-      if (!point_G) {
-        continue;
-      }
-      const double median_px =
-          MedianNorm(ResidualNorms(scene, track, *point_G));
-      if (median_px < best_px) {
-        best_px = median_px;
-        best_G = *point_G;
-      }
+  const double enough_px = kEnoughSigmas * scene.pixel_sigma_px();
+  const auto try_pair = [&](const Ray& a, const Ray& b) {
+    const auto point_G = IntersectRays(a, b);
+    if (!point_G) {
+      return;
+    }
+    const double median_px = MedianNorm(ResidualNorms(scene, track, *point_G));
+    if (median_px < best_px) {
+      best_px = median_px;
+      best_G = *point_G;
+    }
+  };
+  // From the pairs furthest apart on.
+  const auto count = rays.size();
+  for (std::size_t apart = count; apart-- > 1 && best_px > enough_px;) {
+    for (std::size_t a = 0; a + apart < count && best_px > enough_px; ++a) {
+      try_pair(rays[a], rays[a + apart]);
+      try_pair(rays[a + apart], rays[a]);
     }
   }
   if (!std::isfinite(best_px)) {

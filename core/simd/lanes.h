@@ -17,6 +17,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 // Compiles what a function calls into it: called one by one, the parts of a
 // kernel pass their matrices through memory. With the checks of a sanitizer in
@@ -127,30 +128,35 @@ double Sum(Lanes<W> x) {
   return sum;
 }
 
+// For Transpose(): blocks of step x step off the diagonal of a and b change
+// places.
+template <int step, int W, int... lanes>
+void SwapBlocks(Lanes<W>* a,
+                Lanes<W>* b,
+                std::integer_sequence<int, lanes...>) {
+  const Lanes<W> upper(__builtin_shufflevector(
+      a->v, b->v, ((lanes & step) != 0 ? W + lanes - step : lanes)...));
+  b->v = __builtin_shufflevector(
+      a->v, b->v, ((lanes & step) != 0 ? W + lanes : lanes + step)...);
+  *a = upper;
+}
+
 // W vectors as rows become W vectors as columns.
-template <int W>
-void Transpose(Lanes<W>* block) {
-  using Indices = typename VectorRegister<std::int64_t, W>::Type;
-  for (int step = 1; step < W; step *= 2) {
-    // Blocks of step x step off the diagonal change places.
-    Indices upper{}, lower{};
+template <int W, int step = 1>
+SELFCAL_FLATTEN void Transpose(Lanes<W>* block) {
+  if constexpr (step < W) {
     for (int i = 0; i < W; ++i) {
-      upper[i] = i & step ? W + i - step : i;
-      lower[i] = i & step ? W + i : i + step;
+      if ((i & step) != 0) continue;
+      SwapBlocks<step>(
+          block + i, block + i + step, std::make_integer_sequence<int, W>());
     }
-    for (int i = 0; i < W; ++i) {
-      if (i & step) continue;
-      const auto a = block[i].v;
-      const auto b = block[i + step].v;
-      block[i].v = __builtin_shuffle(a, b, upper);
-      block[i + step].v = __builtin_shuffle(a, b, lower);
-    }
+    Transpose<W, 2 * step>(block);
   }
 }
 
 // to[l][i] = rows[i][l], for W rows.
 template <int W>
-void StoreTransposed(const Lanes<W>* rows, double* const* to) {
+SELFCAL_FLATTEN void StoreTransposed(const Lanes<W>* rows, double* const* to) {
   Lanes<W> block[W];
   for (int i = 0; i < W; ++i) block[i] = rows[i];
   Transpose(block);
