@@ -515,23 +515,17 @@ void ChainElimination::Substitute(const ChainTransition& link) {
     fold(kTransitionNextPose + c, fixed_ + c);
   }
 
-  // Y^T G between the other poses and these.
+  // Y^T G between the other poses and the next one.
   const int rest = PosesSize() - kPose;
   if (rest == 0) return;
-  const ConstPanel others = {coupling_.data() + size_f, panel_stride_};
   WithKernels([&](auto kernels) {
-    const auto add_rest = [&](int column, int columns, int to) {
-      kernels.AddProduct(1,
-                         others,
-                         rest,
-                         {&link.G[0][column], 32},
-                         columns,
-                         kState,
-                         FrontAt(pose + kPose, to));
-    };
-    add_rest(0, kKeptPlace, 0);
-    add_rest(kTransitionConstant, 1, constant_);
-    add_rest(kTransitionNextPose, kPose, pose);
+    kernels.AddProduct(1,
+                       {coupling_.data() + size_f, panel_stride_},
+                       rest,
+                       {&link.G[0][kTransitionNextPose], 32},
+                       kPose,
+                       kState,
+                       FrontAt(pose + kPose, pose));
   });
 }
 
@@ -541,7 +535,10 @@ void ChainElimination::FindRoot(double (*M)[16], double (*panel)[16]) {
     kernels.FactorAndSolve(kState, &M[0][0], 16, &panel[0][0], 16, kState);
   });
   for (int i = 0; i < kState; ++i) {
-    for (int j = 0; j < kState; ++j) root_[i][j] = panel[j][i];
+    for (int j = 0; j < kState; ++j) {
+      root_[i][j] = panel[j][i];
+      root_transposed_[i][j] = panel[i][j];
+    }
   }
 }
 
@@ -568,7 +565,8 @@ void ChainElimination::FindRootOf(const ChainTransition& link) {
   FindRoot(M, panel);
 }
 
-// Takes P^T P from the front, for P = root^T Z.
+// P = root^T Z, and takes P^T P from the front, but for the poses with what is
+// fixed.
 void ChainElimination::Eliminate(const std::vector<double>& terms) {
   const int size = fixed_ + PosesSize();
   const int pose = Pose(0);
@@ -583,15 +581,47 @@ void ChainElimination::Eliminate(const std::vector<double>& terms) {
                        kState,
                        {product_.data(), panel_stride_});
     kernels.AddSquare(-1, by_fixed, fixed_, kState, nullptr, 1, FrontAt(0, 0));
+    kernels.AddSquare(
+        -1, by_pose, PosesSize(), kState, nullptr, 1, FrontAt(pose, pose));
+  });
+}
+
+// What Eliminate() leaves: of the next pose, whose G is in the front already,
+// -P^T P; and of all others, whose Z is Y,
+//   Y^T G - P^T P = Y^T (G - root P).
+void ChainElimination::AddPosesWithFixed(const ChainTransition& link) {
+  alignas(64) double next[kState][16] = {};
+  for (int k = 0; k < kState; ++k) {
+    std::copy_n(Row(&product_, k) + fixed_, kPose, next[k]);
+    Zero(Row(&half_, k), fixed_);
+    std::copy_n(link.G[k], kKeptPlace, Row(&half_, k));
+    Row(&half_, k)[constant_] = link.G[k][kTransitionConstant];
+  }
+  const ConstPanel by_fixed = {product_.data(), panel_stride_};
+  const int pose = Pose(0);
+  WithKernels([&](auto kernels) {
     kernels.AddProduct(-1,
-                       by_pose,
-                       PosesSize(),
+                       {&next[0][0], 16},
+                       kPose,
                        by_fixed,
                        constant_ + 1,
                        kState,
                        FrontAt(pose, 0));
-    kernels.AddSquare(
-        -1, by_pose, PosesSize(), kState, nullptr, 1, FrontAt(pose, pose));
+    if (PosesSize() == kPose) return;
+    kernels.AddProduct(-1,
+                       by_fixed,
+                       fixed_,
+                       {&root_transposed_[0][0], 16},
+                       kTileState,
+                       kState,
+                       {half_.data(), panel_stride_});
+    kernels.AddProduct(1,
+                       {coupling_.data() + fixed_ + kPose, panel_stride_},
+                       PosesSize() - kPose,
+                       {half_.data(), panel_stride_},
+                       constant_ + 1,
+                       kState,
+                       FrontAt(pose + kPose, 0));
   });
 }
 
@@ -616,6 +646,7 @@ void ChainElimination::Advance(const ChainTransition& link) {
   Substitute(link);
   FindRootOf(link);
   Eliminate(substituted_);
+  AddPosesWithFixed(link);
   RecordStep(&link);
   ++current_;
   begun_ = false;

@@ -135,6 +135,7 @@ class ChainElimination {
   void FindRoot(double (*M)[16], double (*panel)[16]);
   void FindRootOf(const ChainTransition& link);
   void Eliminate(const std::vector<double>& terms);
+  void AddPosesWithFixed(const ChainTransition& link);
   void EliminateByItself();
   void RecordStep(const ChainTransition* link);
 
@@ -206,6 +207,7 @@ class ChainElimination {
   Eigen::Matrix<double, 16, 16> information_ =
       Eigen::Matrix<double, 16, 16>::Zero();
   alignas(64) double root_[kChainStateSize][16] = {};  // A L^-T
+  alignas(64) double root_transposed_[kChainStateSize][16] = {};
   int panel_stride_ = 0;
   std::vector<double> coupling_, substituted_, product_, half_, link_terms_;
 

@@ -1,9 +1,10 @@
 #include "core/information/inliers.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+
+#include "core/elimination/small_cholesky.h"
 
 namespace selfcal {
 namespace {
@@ -88,8 +89,10 @@ bool InlierSelector::ProposeSteps(const MotionSegment& segment) {
       H(i, i) += prior;
       g(i) = sums.g(i) + prior * (p_G[i] - segment.landmarks[m].p_G[i]);
     }
+    GuardedCholesky<3>(&H);
     const Eigen::Vector3d step =
-        -H.selfadjointView<Eigen::Lower>().llt().solve(g);
+        -H.transpose().triangularView<Eigen::Upper>().solve(
+            H.triangularView<Eigen::Lower>().solve(g));
     if (!step.allFinite() || -step.dot(g) < kNegligibleDecrease) continue;
     Eigen::Vector3d::Map(&trial_points_[4 * m]) = p_G + step;
     moving_[m] = 1;

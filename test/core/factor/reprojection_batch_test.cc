@@ -94,7 +94,7 @@ bool Evaluate(const Scene& scene,
                    scene.keyframe.p_GI,
                    scene.camera,
                    scene.Point(i),
-                   Eigen::Vector2d::Map(&scene.z_px[2 * i]),
+                   Eigen::Vector2d(scene.z_px[2 * i], scene.z_px[2 * i + 1]),
                    r,
                    J);
 }
