@@ -3,15 +3,13 @@
 #include <Eigen/Core>
 
 #include "core/elimination/chain_elimination.h"
+#include "core/elimination/chain_places.h"
 
 namespace selfcal {
-namespace {
 
-constexpr int kPose = kChainPoseSize;
-constexpr int kMotion = kChainMotionSize;
-constexpr int kState = kChainStateSize;
-constexpr int kMotionPlace = kChainLinkShared;
-constexpr int kKeptPlace = kMotionPlace + kMotion;
+using namespace chain;
+
+namespace {
 
 using RowMajorRoot = Eigen::Matrix<double, kState, 16, Eigen::RowMajor>;
 using RowMajorLink = Eigen::Matrix<double, kState, 32, Eigen::RowMajor>;

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/elimination/small_cholesky.h"
 
@@ -120,15 +121,46 @@ void InlierSelector::TakeSteps(const ObservationOrder& order) {
   }
 }
 
-// Of the norms [px]; zero where nothing projects.
+// Of the norms [px]; zero where nothing projects. All but what lies about the
+// median of a sample is counted, not sorted.
 double InlierSelector::MedianOfProjected() {
+  constexpr std::size_t kStep = 29;
   sorted_.clear();
-  std::copy_if(
-      squares_.begin(), squares_.end(), std::back_inserter(sorted_), Projects);
-  if (sorted_.empty()) return 0;
-  const auto middle = sorted_.begin() + sorted_.size() / 2;
-  std::nth_element(sorted_.begin(), middle, sorted_.end());
-  return std::sqrt(*middle);
+  for (std::size_t i = 0; i < squares_.size(); i += kStep) {
+    if (Projects(squares_[i])) sorted_.push_back(squares_[i]);
+  }
+  double low = 0;
+  double high = std::numeric_limits<double>::infinity();
+  if (sorted_.size() > 64) {
+    const auto quantile = [&](double part) {
+      const auto at =
+          sorted_.begin() + static_cast<std::ptrdiff_t>(
+                                part * static_cast<double>(sorted_.size()));
+      std::nth_element(sorted_.begin(), at, sorted_.end());
+      return *at;
+    };
+    low = quantile(0.35);
+    high = quantile(0.65);
+  }
+  for (;;) {
+    sorted_.clear();
+    std::size_t below = 0, projected = 0;
+    for (const double square : squares_) {
+      projected += Projects(square);
+      below += Projects(square) && square < low;
+      if (square >= low && square <= high) sorted_.push_back(square);
+    }
+    if (projected == 0) return 0;
+    const std::size_t middle = projected / 2;
+    if (middle >= below && middle < below + sorted_.size()) {
+      const auto at =
+          sorted_.begin() + static_cast<std::ptrdiff_t>(middle - below);
+      std::nth_element(sorted_.begin(), at, sorted_.end());
+      return std::sqrt(*at);
+    }
+    low = 0;
+    high = std::numeric_limits<double>::infinity();
+  }
 }
 
 void InlierSelector::Classify(double gate_px,

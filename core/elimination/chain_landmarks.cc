@@ -1,0 +1,243 @@
+// Landmarks of a chain: from the rows of their factors to their elimination.
+#include <algorithm>
+
+#include "core/elimination/chain_elimination.h"
+#include "core/elimination/chain_places.h"
+#include "core/elimination/landmark_rows.h"
+#include "core/elimination/small_cholesky.h"
+
+namespace selfcal {
+
+using namespace chain;
+
+void ChainElimination::PlacePanels(const ChainShape& shape) {
+  landmarks_count_ = shape.tracks.size() - 1;
+  const std::size_t landmarks = landmarks_count_;
+  kept_landmarks_.assign(landmarks, kEliminated);
+  std::copy(shape.kept_landmarks.begin(),
+            shape.kept_landmarks.end(),
+            kept_landmarks_.begin());
+  GrowTo(landmarks, &panel_of_landmark_);
+  GrowTo(6 * landmarks, &roots_);
+  sums_.assign(landmarks * sums_size_, 0);
+  landmark_priors_.assign(landmarks * 9, 0);
+  GrowTo(shape.track_keyframes.size(), &landmark_of_observation_);
+  for (std::size_t m = 0; m < landmarks; ++m) {
+    std::fill(landmark_of_observation_.begin() + shape.tracks[m],
+              landmark_of_observation_.begin() + shape.tracks[m + 1],
+              static_cast<int>(m));
+  }
+  const int shared = fixed_ - landmark_place_;
+  std::size_t end = 0;
+  for (int k = 0; k < shape.keyframes; ++k) {
+    const std::span<const int> group = structure_.Landmarks(k);
+    if (group.empty()) continue;
+    const int longest = structure_.Slots(group.front()) * kPose;
+    const int stride = shared + WholeVectors(longest) + kZeros;
+    for (const int m : group) {
+      panel_of_landmark_[m] = {end, stride};
+      end += static_cast<std::size_t>(3) * stride;
+    }
+  }
+  GrowTo(end, &panels_);
+  for (std::size_t m = 0; m < landmarks; ++m) {
+    const Panel& panel = panel_of_landmark_[m];
+    const int poses = structure_.Slots(static_cast<int>(m)) * kPose + kZeros;
+    for (int j = 0; j < 3; ++j) {
+      Zero(&panels_[panel.begin + j * panel.stride + shared], poses);
+    }
+  }
+}
+
+// Adds the products of all columns of a run, which are in gram_, to those of
+// the keyframe and of the camera that they stand for.
+void ChainElimination::ExpandGram(int keyframe, int camera) {
+  const int size = camera_sizes_[camera];
+  const int offset = camera_offsets_[camera];
+  const int residual = RowsResidual(size);
+  const int stride = RowsStride(size) + kPanelPad;
+  const auto gram = [&](int i, int j) {
+    return i >= j ? gram_[j * stride + i] : gram_[i * stride + j];
+  };
+  for (int i = 0; i < kPose; ++i) {
+    double* row = &keyframe_sums_[(keyframe * kPose + i) * keyframe_stride_];
+    for (int j = 0; j <= i; ++j) row[j] += gram(i, j);
+    double* shared = row + kPose + offset;
+    for (int c = 0; c < 3; ++c) shared[c] -= gram(i, kRowsTurn + c);
+    for (int c = 3; c < size; ++c) shared[c] += gram(kRowsOwn + c - 3, i);
+    row[kPose + landmark_shared_] += gram(residual, i);
+  }
+  const int rows = landmark_shared_ + 1;
+  const auto column = [](int c) {
+    return c < 3 ? kRowsTurn + c : kRowsOwn + c - 3;
+  };
+  for (int j = 0; j < size; ++j) {
+    double* to = &shared_sums_[(offset + j) * rows];
+    for (int i = j; i < size; ++i) {
+      const double product = gram(column(i), column(j));
+      to[offset + i] += (i < 3) == (j < 3) ? product : -product;
+    }
+    const double product = gram(residual, column(j));
+    to[landmark_shared_] += j < 3 ? -product : product;
+  }
+}
+
+void ChainElimination::AddObservations(int keyframe,
+                                       int camera,
+                                       const double* rows,
+                                       std::span<const int> observations) {
+  const int size = camera_sizes_[camera];
+  const int stride = RowsStride(size);
+  const int gram_stride = stride + kPanelPad;
+  const int count = static_cast<int>(observations.size());
+  GrowTo(observations.size(), &targets_);
+  const int shared = fixed_ - landmark_place_;
+  for (int i = 0; i < count; ++i) {
+    const int o = observations[i];
+    const int m = landmark_of_observation_[o];
+    const Panel& panel = panel_of_landmark_[m];
+    targets_[i] = {&sums_[m * sums_size_ + sums_offsets_[camera]],
+                   &panels_[panel.begin + shared + structure_.Slot(o) * kPose],
+                   panel.stride};
+  }
+  Zero(gram_.data(), static_cast<std::size_t>(gram_stride) * stride);
+  WithKernels([&](auto kernels) {
+    kernels.AddLandmarkProducts(rows, stride, count, targets_.data());
+    kernels.AddSquare(1,
+                      {rows, stride},
+                      RowsResidual(size) + 1,
+                      2 * count,
+                      nullptr,
+                      1,
+                      {gram_.data(), gram_stride});
+  });
+  ExpandGram(keyframe, camera);
+}
+
+void ChainElimination::AddLandmarkPrior(int landmark,
+                                        const Eigen::Matrix3d& H,
+                                        const Eigen::Vector3d& g) {
+  double* prior = &landmark_priors_[9 * landmark];
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j <= i; ++j) prior[i * (i + 1) / 2 + j] += H(i, j);
+    prior[6 + i] += g(i);
+  }
+}
+
+// The panel of a landmark from its sums. Returns its information.
+Eigen::Matrix3d ChainElimination::PreparePanel(int landmark,
+                                               double* panel,
+                                               int stride) {
+  const double* prior = &landmark_priors_[9 * landmark];
+  Eigen::Matrix3d H;
+  for (int j = 0; j < 3; ++j) {
+    double* row = panel + j * stride;
+    Zero(row, fixed_ - landmark_place_);
+    for (int i = 0; i <= j; ++i) H(j, i) = prior[j * (j + 1) / 2 + i];
+    row[landmark_shared_] = prior[6 + j];
+    for (std::size_t c = 0; c < camera_sizes_.size(); ++c) {
+      const int size = camera_sizes_[c];
+      const double* sums = &sums_[landmark * sums_size_ + sums_offsets_[c] +
+                                  j * RowsStride(size)];
+      double* shared = row + camera_offsets_[c];
+      for (int i = 0; i < 3; ++i) shared[i] = -sums[kRowsTurn + i];
+      for (int i = 3; i < size; ++i) shared[i] = sums[kRowsOwn + i - 3];
+      row[landmark_shared_] += sums[RowsResidual(size)];
+      for (int i = 0; i <= j; ++i) H(j, i) -= sums[kRowsPosition + i];
+    }
+  }
+  H.triangularView<Eigen::StrictlyUpper>() = H.transpose();
+  return H;
+}
+
+void ChainElimination::SetRoot(int landmark, Eigen::Matrix3d information) {
+  Eigen::Matrix3d& L = information;
+  GuardedCholesky<3>(&L);
+  double* root = &roots_[6 * landmark];
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < i; ++j) root[i * (i + 1) / 2 + j] = L(i, j);
+    root[i * (i + 1) / 2 + i] = 1 / L(i, i);
+  }
+}
+
+// Puts a landmark that is kept into the front, instead of eliminating it; its
+// panel eliminates nothing.
+void ChainElimination::KeepLandmark(int landmark,
+                                    const Eigen::Matrix3d& information,
+                                    double* panel,
+                                    int stride) {
+  const int place = kKeptPlace + kept_landmarks_[landmark];
+  const int shared = fixed_ - landmark_place_;
+  const int poses = structure_.Slots(landmark) * kPose;
+  for (int j = 0; j < 3; ++j) {
+    double* row = panel + j * stride;
+    for (int i = j; i < 3; ++i) {
+      Front(place + i, place + j) += information(i, j);
+    }
+    for (int c = 0; c <= landmark_shared_; ++c) {
+      Front(landmark_place_ + c, place + j) += row[c];
+    }
+    for (int i = 0; i < poses; ++i) {
+      Front(Pose(0) + i, place + j) += row[shared + i];
+    }
+    Zero(row, shared + poses);
+  }
+  SetRoot(landmark, Eigen::Matrix3d::Identity());
+}
+
+void ChainElimination::EliminateLandmarks() {
+  const std::span<const int> group = structure_.Landmarks(current_);
+  if (group.empty()) return;
+  const Panel& first = panel_of_landmark_[group.front()];
+  const int stride = first.stride;
+  const int shared = fixed_ - landmark_place_;
+  const int slots = structure_.Slots(group.front());
+  const int depth = 3 * static_cast<int>(group.size());
+  depths_.assign(slots, 0);
+  for (const int m : group) depths_[structure_.Slots(m) - 1] += 3;
+  for (int s = slots - 1; s > 0; --s) depths_[s - 1] += depths_[s];
+  for (const int m : group) {
+    double* panel = &panels_[panel_of_landmark_[m].begin];
+    const Eigen::Matrix3d information = PreparePanel(m, panel, stride);
+    if (kept_landmarks_[m] == kEliminated) {
+      SetRoot(m, information);
+    } else {
+      KeepLandmark(m, information, panel, stride);
+    }
+  }
+  const double* panel = &panels_[first.begin];
+  const ConstPanel by_shared = {panel, stride};
+  const ConstPanel by_pose = {panel + shared, stride};
+  WithKernels([&](auto kernels) {
+    for (const int m : group) {
+      kernels.SolveThreeRows(&roots_[6 * m],
+                             &panels_[panel_of_landmark_[m].begin],
+                             stride,
+                             shared + structure_.Slots(m) * kPose);
+    }
+    kernels.AddSquare(-1,
+                      by_shared,
+                      shared,
+                      depth,
+                      nullptr,
+                      1,
+                      FrontAt(landmark_place_, landmark_place_));
+    kernels.AddStaircase(-1,
+                         by_pose,
+                         slots * kPose,
+                         depths_.data(),
+                         kPose,
+                         by_shared,
+                         landmark_shared_ + 1,
+                         FrontAt(Pose(0), landmark_place_));
+    kernels.AddSquare(-1,
+                      by_pose,
+                      slots * kPose,
+                      0,
+                      depths_.data(),
+                      kPose,
+                      FrontAt(Pose(0), Pose(0)));
+  });
+}
+
+}  // namespace selfcal

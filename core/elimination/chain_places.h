@@ -1,0 +1,41 @@
+// Places in the front of ChainElimination, and its memory. Internal to
+// core/elimination.
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <vector>
+
+#include "core/elimination/chain_elimination.h"
+
+namespace selfcal::chain {
+
+inline constexpr int kPose = kChainPoseSize;
+inline constexpr int kMotion = kChainMotionSize;
+inline constexpr int kState = kChainStateSize;
+// Places in the front.
+inline constexpr int kMotionPlace = kChainLinkShared;
+inline constexpr int kKeptPlace = kMotionPlace + kMotion;
+static_assert(kKeptPlace % 8 == 0);
+static_assert(kTransitionConstant == kKeptPlace);
+inline constexpr int kEliminated = -1;
+// The state in whole tiles.
+inline constexpr int kTileState = 16;
+inline constexpr int kLinkColumns = kTransitionNextPose + kPose;
+// Zeros that must follow what counts in a panel: the rows of the largest tile.
+inline constexpr int kZeros = 3 * kPanelPad;
+
+inline constexpr int kPlacesBetweenMoves = 8;
+
+inline int WholeVectors(int size) { return (size + 7) / 8 * 8; }
+
+template <typename Number>
+void GrowTo(std::size_t size, std::vector<Number>* buffer) {
+  if (buffer->size() < size) buffer->resize(size);
+}
+
+inline void Zero(double* begin, std::size_t size) {
+  std::memset(begin, 0, size * sizeof(double));
+}
+
+}  // namespace selfcal::chain
