@@ -51,6 +51,7 @@ int Serve(const DaemonOptions& options) {
   PipelineOptions pipeline_options;
   pipeline_options.scoring_threads = options.scoring_threads;
   pipeline_options.program_version = SELFCAL_VERSION;
+  pipeline_options.calibrate.solver = options.solver;
   const auto pipeline = MakePipeline(store->get(), pipeline_options);
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);

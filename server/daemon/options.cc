@@ -1,6 +1,8 @@
 #include "server/daemon/options.h"
 
 #include <CLI/CLI.hpp>
+#include <map>
+#include <string>
 
 namespace selfcal::server {
 namespace {
@@ -34,6 +36,13 @@ std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
                  "Threads that score segments")
       ->check(CLI::Range(1, kMaxScoringThreads))
       ->capture_default_str();
+  app.add_option("--solver",
+                 options->solver,
+                 "What solves recalibrations; both lead to the same minimum")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, SolverKind>{
+          {"structured", SolverKind::kStructured},
+          {"ceres", SolverKind::kCeres}}))
+      ->default_str("structured");
   app.add_option("--log-level", options->log_level, "What goes to stderr")
       ->check(CLI::IsMember(
           {"trace", "debug", "info", "warning", "error", "critical", "off"}))

@@ -6,12 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/calibrate.h"
+
 namespace selfcal::server {
 
 struct DaemonOptions {
   std::filesystem::path state_dir;
   std::vector<std::string> listen;  // "unix:/path" or "host:port"
   int scoring_threads = 1;
+  SolverKind solver = SolverKind::kStructured;
   std::string log_level = "info";
 };
 

@@ -116,13 +116,15 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
                       rows.data());
       for (int i = 0; i < run.count; ++i) {
         Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(2, stride);
-        Eigen::Vector2d r;
+        Eigen::Vector2d r(0, 0);
         ReprojectionJacobians J;
         if (Evaluate(scene, i, &r, &J)) {
           expected.leftCols(6) = J.pose;
           expected.middleCols(kRowsOwn, size - 3) =
               J.camera.rightCols(size - 3);
-          expected.col(RowsResidual(size)) = r;
+          for (int row = 0; row < 2; ++row) {
+            expected(row, RowsResidual(size)) = r[row];
+          }
           expected *= weighted ? weights[i] : 1 / kSigma_px;
           EXPECT_EQ(J.camera.leftCols(3), -J.pose.leftCols(3));
           // By p_G = X / w.
@@ -158,7 +160,7 @@ TEST(ReprojectionBatch, SumsOfLandmarksAreThoseOfTheHuberLoss) {
     batch.Squares(run, scene.points.data(), again.data());
     for (int i = 0; i < run.count; ++i) {
       const LandmarkSums& sum = sums[run.landmarks[i]];
-      Eigen::Vector2d r;
+      Eigen::Vector2d r(0, 0);
       ReprojectionJacobians J;
       if (!Evaluate(scene, i, &r, &J)) {
         EXPECT_EQ(squares[i], -1);

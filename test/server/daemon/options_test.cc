@@ -32,7 +32,17 @@ TEST_F(OptionsTest, StateFolderAloneIsEnough) {
   EXPECT_THAT(options_.listen,
               ElementsAre("unix:/var/lib/selfcal/selfcald.sock"));
   EXPECT_EQ(options_.scoring_threads, 1);
+  EXPECT_EQ(options_.solver, SolverKind::kStructured);
   EXPECT_EQ(options_.log_level, "info");
+}
+
+TEST_F(OptionsTest, SolverHasAName) {
+  EXPECT_EQ(Parse({"--state-dir", "s", "--solver", "ceres"}), std::nullopt);
+  EXPECT_EQ(options_.solver, SolverKind::kCeres);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--solver", "structured"}),
+            std::nullopt);
+  EXPECT_EQ(options_.solver, SolverKind::kStructured);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--solver", "other"}), 2);
 }
 
 TEST_F(OptionsTest, AddressesAreRepeatable) {
