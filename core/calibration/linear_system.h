@@ -76,6 +76,8 @@ class LinearSystem {
                  std::vector<Eigen::Vector3d>* landmarks) const;
 
  private:
+  static constexpr int kNone = -1;
+
   struct Chain {
     explicit Chain(VectorWidth width) : elimination(width) {}
 
