@@ -28,6 +28,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -142,7 +143,9 @@ class ChainElimination {
   double* Row(std::vector<double>* panel, int k) const {
     return panel->data() + k * panel_stride_;
   }
-  double& Front(int i, int j) { return front_[j * front_stride_ + i]; }
+  double& Front(int i, int j) {
+    return front_[static_cast<std::size_t>(j) * front_stride_ + i];
+  }
   Target FrontAt(int i, int j) { return {&Front(i, j), front_stride_}; }
   int Pose(int slot) const {
     return fixed_ + (first_place_ + slot) * kChainPoseSize;
@@ -161,7 +164,8 @@ class ChainElimination {
   Record record_ = Record::kNothing;
 
   // Layout. The front begins with fixed_ places for what is not a pose: link
-  // parameters, motion, landmark parameters, the constant, up to whole vectors.
+  // parameters, motion, what is kept, landmark parameters, the constant, up to
+  // whole vectors.
   std::vector<int> camera_sizes_, camera_offsets_;
   int landmark_shared_ = 0;
   int kept_ = 0;
