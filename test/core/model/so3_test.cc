@@ -158,13 +158,13 @@ TEST(So3, IsContinuousAcrossTheSwitchToTheSeries) {
   RandomValues random(12);
   for (int i = 0; i < kTrials; ++i) {
     const Eigen::Vector3d axis = random.Direction();
-    const Eigen::Vector3d below = kSeriesAngle * (1 - 1e-13) * axis;
-    const Eigen::Vector3d above = kSeriesAngle * (1 + 1e-13) * axis;
-    EXPECT_LT((Exp(below).coeffs() - Exp(above).coeffs()).norm(), 1e-13);
-    EXPECT_LT((RightJacobian(below) - RightJacobian(above)).norm(), 1e-13);
+    const Eigen::Vector3d below = kSeriesAngle * (1 - 4e-15) * axis;
+    const Eigen::Vector3d above = kSeriesAngle * (1 + 4e-15) * axis;
+    EXPECT_LT((Exp(below).coeffs() - Exp(above).coeffs()).norm(), 1e-14);
+    EXPECT_LT((RightJacobian(below) - RightJacobian(above)).norm(), 1e-14);
     EXPECT_LT(
         (RightJacobianInverse(below) - RightJacobianInverse(above)).norm(),
-        1e-13);
+        1e-14);
   }
 }
 
