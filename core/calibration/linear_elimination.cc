@@ -61,26 +61,19 @@ void LinearSystem::AddLandmarkPriors(
 void LinearSystem::EliminateKeyframes(const CalibrationProblem& problem,
                                       Chain* chain) {
   const std::vector<KeyframeState>& x = *keyframes_;
-  const auto walk_at = [&](int kept) -> const BiasLink& {
-    const auto at = std::find(interface_of_walk_.begin(),
-                              interface_of_walk_.end(),
-                              chain->interface[kept]);
-    return problem.bias_links[at - interface_of_walk_.begin()];
-  };
-  const auto keep_half = [&](int kept, double sign_of_bias) {
-    const BiasLink& link = walk_at(kept);
+  const auto keep_half = [&](const Chain::Walk& walk, double sign_of_bias) {
+    if (walk.link == kNone) return;
+    const BiasLink& link = problem.bias_links[walk.link];
     chain->elimination.AddKeptBias(
-        kept, HalfWalk(link, x[link.before], x[link.after], sign_of_bias));
+        walk.kept, HalfWalk(link, x[link.before], x[link.after], sign_of_bias));
   };
   for (int k = chain->range.begin; k < chain->range.end; ++k) {
     if (has_prior_[k]) chain->elimination.AddPrior(priors_[k]);
-    if (k == chain->range.begin && chain->walk_in != kNone) {
-      keep_half(chain->walk_in, 1);
-    }
+    if (k == chain->range.begin) keep_half(chain->walk_in, 1);
     if (k + 1 == chain->range.end) break;
     chain->elimination.Advance(transitions_[inertial_after_[k]]);
   }
-  if (chain->walk_out != kNone) keep_half(chain->walk_out, -1);
+  keep_half(chain->walk_out, -1);
   chain->elimination.Finish(&of_chain_);
 }
 

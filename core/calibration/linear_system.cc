@@ -82,8 +82,8 @@ void LinearSystem::StartChains(const CalibrationProblem& problem, int cameras) {
     chains_[c].track_keyframes.clear();
     chains_[c].kept_landmarks.clear();
     chains_[c].interface.clear();
-    chains_[c].walk_in = kNone;
-    chains_[c].walk_out = kNone;
+    chains_[c].walk_in = {};
+    chains_[c].walk_out = {};
     std::fill(chain_of_keyframe_.begin() + ranges[c].begin,
               chain_of_keyframe_.begin() + ranges[c].end,
               static_cast<int>(c));
@@ -248,13 +248,13 @@ void LinearSystem::FindTracks() {
 }
 
 void LinearSystem::KeepWalks(const CalibrationProblem& problem) {
-  interface_of_walk_.clear();
-  for (const BiasLink& link : problem.bias_links) {
-    interface_of_walk_.push_back(interface_size_);
+  for (std::size_t i = 0; i < problem.bias_links.size(); ++i) {
+    const BiasLink& link = problem.bias_links[i];
+    const int index = static_cast<int>(i);
     Chain& before = chains_[chain_of_keyframe_[link.before]];
     Chain& after = chains_[chain_of_keyframe_[link.after]];
-    before.walk_out = KeepInChain(interface_size_, 6, &before);
-    after.walk_in = KeepInChain(interface_size_, 6, &after);
+    before.walk_out = {index, KeepInChain(interface_size_, 6, &before)};
+    after.walk_in = {index, KeepInChain(interface_size_, 6, &after)};
     interface_size_ += 6;
   }
 }

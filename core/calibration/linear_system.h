@@ -89,10 +89,13 @@ class LinearSystem {
     // unknowns their place in the interface.
     std::vector<int> kept_landmarks;
     std::vector<int> interface;
-    // Kept unknowns of the walks into its first and out of its last keyframe,
-    // or -1.
-    int walk_in = -1;
-    int walk_out = -1;
+    // The walks into its first and out of its last keyframe: the bias link, or
+    // -1, and its first kept unknown.
+    struct Walk {
+      int link = kNone;
+      int kept = 0;
+    };
+    Walk walk_in, walk_out;
   };
   // An observation that is used.
   struct Seen {
@@ -154,9 +157,9 @@ class LinearSystem {
   std::vector<InertialLinkStates> links_;
   std::vector<InertialTransition> transitions_;
   std::vector<int> inertial_after_;  // link to the next, or -1
-  // The interface: of each landmark its first unknown, or -1; of each bias link
-  // its first; its information with theta, and its root.
-  std::vector<int> interface_of_landmark_, interface_of_walk_;
+  // The interface: of each landmark its first unknown, or -1; its information
+  // with theta, and its root.
+  std::vector<int> interface_of_landmark_;
   int interface_size_ = 0;
   Eigen::MatrixXd interface_, interface_theta_;
   Eigen::VectorXd interface_eta_;

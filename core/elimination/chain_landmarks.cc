@@ -107,8 +107,6 @@ void ChainElimination::AddObservations(int keyframe,
                       {rows, stride},
                       RowsResidual(size) + 1,
                       2 * count,
-                      nullptr,
-                      1,
                       {gram_.data(), gram_stride});
   });
   ExpandGram(keyframe, camera);
@@ -219,24 +217,17 @@ void ChainElimination::EliminateLandmarks() {
                       by_shared,
                       shared,
                       depth,
-                      nullptr,
-                      1,
                       FrontAt(landmark_place_, landmark_place_));
-    kernels.AddStaircase(-1,
-                         by_pose,
-                         slots * kPose,
-                         depths_.data(),
-                         kPose,
-                         by_shared,
-                         landmark_shared_ + 1,
-                         FrontAt(Pose(0), landmark_place_));
-    kernels.AddSquare(-1,
-                      by_pose,
-                      slots * kPose,
-                      0,
-                      depths_.data(),
-                      kPose,
-                      FrontAt(Pose(0), Pose(0)));
+    const Depth stairs(depths_.data(), kPose);
+    kernels.AddProduct(-1,
+                       by_pose,
+                       slots * kPose,
+                       by_shared,
+                       landmark_shared_ + 1,
+                       stairs,
+                       FrontAt(Pose(0), landmark_place_));
+    kernels.AddSquare(
+        -1, by_pose, slots * kPose, stairs, FrontAt(Pose(0), Pose(0)));
   });
 }
 

@@ -166,9 +166,8 @@ void ChainElimination::Eliminate(const std::vector<double>& terms) {
                        kTileState,
                        kState,
                        {product_.data(), panel_stride_});
-    kernels.AddSquare(-1, by_fixed, fixed_, kState, nullptr, 1, FrontAt(0, 0));
-    kernels.AddSquare(
-        -1, by_pose, PosesSize(), kState, nullptr, 1, FrontAt(pose, pose));
+    kernels.AddSquare(-1, by_fixed, fixed_, kState, FrontAt(0, 0));
+    kernels.AddSquare(-1, by_pose, PosesSize(), kState, FrontAt(pose, pose));
   });
 }
 

@@ -4,12 +4,10 @@
 
 namespace selfcal {
 
-// Columns of G: z = (link parameters 15, velocity and biases 9 of the next
-// keyframe, the constant 1, pose 6 of the next); the last is zero.
-inline constexpr int kTransitionTheta = 0;
+// Columns of G: z = (link parameters 15, velocity 3, b_a 3 and b_g 3 of the
+// next keyframe, the constant 1, pose 6 of the next); the last is zero.
 inline constexpr int kTransitionNextVelocity = 15;
 inline constexpr int kTransitionNextAccelBias = 18;
-inline constexpr int kTransitionNextGyroBias = 21;
 inline constexpr int kTransitionConstant = 24;
 inline constexpr int kTransitionNextPose = 25;
 inline constexpr int kTransitionColumns = 32;

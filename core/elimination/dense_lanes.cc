@@ -53,21 +53,21 @@ inline void AddTile(double sign,
   }
 }
 
+// N columns from `column` on, for the rows from `begin` on.
 template <int N>
 inline void AddColumns(double sign,
                        ConstPanel a,
                        int begin,
                        int end,
-                       const int* depths,
-                       int depth_step,
-                       int depth,
+                       Depth depth,
                        ConstPanel b,
                        int column,
                        Target to) {
   const double* factors = b.data + column;
   double* place = to.data + column * to.stride;
   for (int i = begin; i < end;) {
-    const int d = depths == nullptr ? depth : depths[i / depth_step];
+    const int d =
+        depth.by_step == nullptr ? depth.all : depth.by_step[i / depth.step];
     const int vectors = (end - i + kLanes - 1) / kLanes;
     const auto tile = [&]<int V>() {
       AddTile<V, N>(sign,
@@ -91,53 +91,12 @@ inline void AddColumns(double sign,
   }
 }
 
-// All rows, or if lower those from the vector that holds the diagonal on.
-void AddAll(double sign,
-            ConstPanel a,
-            int rows,
-            const int* depths,
-            int depth_step,
-            int depth,
-            ConstPanel b,
-            int columns,
-            bool lower,
-            Target to) {
-  int column = 0;
-  // Of a square, the columns that fill the last tile are zeros as well.
-  if (lower)
-    columns = (columns + kTileColumns - 1) / kTileColumns * kTileColumns;
-  for (; column + kTileColumns <= columns; column += kTileColumns) {
-    AddColumns<kTileColumns>(sign,
-                             a,
-                             lower ? column / kLanes * kLanes : 0,
-                             rows,
-                             depths,
-                             depth_step,
-                             depth,
-                             b,
-                             column,
-                             to);
-  }
-  for (; column < columns; ++column) {
-    AddColumns<1>(sign,
-                  a,
-                  lower ? column / kLanes * kLanes : 0,
-                  rows,
-                  depths,
-                  depth_step,
-                  depth,
-                  b,
-                  column,
-                  to);
-  }
-}
-
 }  // namespace
 
 template <int W>
 void DenseLanes<W>::SetProduct(
-    ConstPanel a, int rows, ConstPanel b, int columns, int depth, Target to) {
-  AddAll(kSet, a, rows, nullptr, 1, depth, b, columns, false, to);
+    ConstPanel a, int rows, ConstPanel b, int columns, Depth depth, Target to) {
+  AddProduct(kSet, a, rows, b, columns, depth, to);
 }
 
 template <int W>
@@ -146,32 +105,26 @@ void DenseLanes<W>::AddProduct(double sign,
                                int rows,
                                ConstPanel b,
                                int columns,
-                               int depth,
+                               Depth depth,
                                Target to) {
-  AddAll(sign, a, rows, nullptr, 1, depth, b, columns, false, to);
+  int column = 0;
+  for (; column + kTileColumns <= columns; column += kTileColumns) {
+    AddColumns<kTileColumns>(sign, a, 0, rows, depth, b, column, to);
+  }
+  for (; column < columns; ++column) {
+    AddColumns<1>(sign, a, 0, rows, depth, b, column, to);
+  }
 }
 
+// Rows from the vector that holds the diagonal on. The columns that fill the
+// last tile are zeros as well.
 template <int W>
-void DenseLanes<W>::AddSquare(double sign,
-                              ConstPanel a,
-                              int size,
-                              int depth,
-                              const int* depths,
-                              int depth_step,
-                              Target to) {
-  AddAll(sign, a, size, depths, depth_step, depth, a, size, true, to);
-}
-
-template <int W>
-void DenseLanes<W>::AddStaircase(double sign,
-                                 ConstPanel a,
-                                 int rows,
-                                 const int* depths,
-                                 int depth_step,
-                                 ConstPanel b,
-                                 int columns,
-                                 Target to) {
-  AddAll(sign, a, rows, depths, depth_step, 0, b, columns, false, to);
+void DenseLanes<W>::AddSquare(
+    double sign, ConstPanel a, int size, Depth depth, Target to) {
+  for (int column = 0; column < size; column += kTileColumns) {
+    AddColumns<kTileColumns>(
+        sign, a, column / kLanes * kLanes, size, depth, a, column, to);
+  }
 }
 
 template <int W>

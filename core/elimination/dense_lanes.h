@@ -29,11 +29,27 @@ struct LandmarkTarget {
   int pose_stride;
 };
 
+// Rows of a panel that are summed over: for its column i all of them, or of a
+// staircase by_step[i / step], which never rises.
+struct Depth {
+  Depth(int all) : all(all) {}
+  Depth(const int* by_step, int step) : by_step(by_step), step(step) {}
+
+  int all = 0;
+  const int* by_step = nullptr;
+  int step = 1;
+};
+
 template <int W>
 struct DenseLanes {
-  // to(i, j) = sum_k a(k, i) b(k, j), for i < rows, j < columns, k < depth.
-  static void SetProduct(
-      ConstPanel a, int rows, ConstPanel b, int columns, int depth, Target to);
+  // to(i, j) = sum_k a(k, i) b(k, j), for i < rows, j < columns, k < depth of
+  // i.
+  static void SetProduct(ConstPanel a,
+                         int rows,
+                         ConstPanel b,
+                         int columns,
+                         Depth depth,
+                         Target to);
 
   // to(i, j) += sign sum_k a(k, i) b(k, j).
   static void AddProduct(double sign,
@@ -41,29 +57,13 @@ struct DenseLanes {
                          int rows,
                          ConstPanel b,
                          int columns,
-                         int depth,
+                         Depth depth,
                          Target to);
 
   // The same with a = b on and below the diagonal; what is above is
-  // overwritten by anything. Where depths is not null, rows of `a` from
-  // depths[i / depth_step] on are zero in the column i, and depths never rises.
-  static void AddSquare(double sign,
-                        ConstPanel a,
-                        int size,
-                        int depth,
-                        const int* depths,
-                        int depth_step,
-                        Target to);
-
-  // AddProduct with such depths for the columns of a.
-  static void AddStaircase(double sign,
-                           ConstPanel a,
-                           int rows,
-                           const int* depths,
-                           int depth_step,
-                           ConstPanel b,
-                           int columns,
-                           Target to);
+  // overwritten by anything.
+  static void AddSquare(
+      double sign, ConstPanel a, int size, Depth depth, Target to);
 
   // For each pair of rows x, y (reprojection factors of landmark_rows.h):
   //   product(j, c) = x_l(j) x(c) + y_l(j) y(c),   x_l = -x[kRowsPosition ...],

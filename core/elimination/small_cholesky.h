@@ -36,13 +36,4 @@ void GuardedCholesky(Eigen::Matrix<double, N, N>* matrix) {
   }
 }
 
-// Overwrites the rows x of *panel by L^-1 x: panel <- panel L^-T.
-template <int N, typename Panel>
-void SolvePanel(const Eigen::Matrix<double, N, N>& L, Panel&& panel) {
-  for (int j = 0; j < N; ++j) {
-    for (int k = 0; k < j; ++k) panel.col(j) -= L(j, k) * panel.col(k);
-    panel.col(j) *= 1 / L(j, j);
-  }
-}
-
 }  // namespace selfcal

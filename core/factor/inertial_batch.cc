@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cassert>
 
 #include "core/factor/inertial_kernel.h"
@@ -28,6 +29,31 @@ void SetIntrinsics(const ImuCalibration& imu, KernelInput<W>* input) {
   Map<Matrix3d>(input->T_g_inverse) = imu.T_g().inverse();
   Map<Matrix3d>(input->T_a_inverse) = imu.T_a().inverse();
   Map<Matrix3d>(input->R_IA) = imu.q_AI.toRotationMatrix().transpose();
+}
+
+// Items first .. first + n of W lanes. The others read the last of them, and
+// write to one that nobody uses.
+template <int W, typename Item>
+std::array<const Item*, W> Inputs(std::span<const Item> items,
+                                  std::size_t first,
+                                  std::size_t n) {
+  std::array<const Item*, W> lanes;
+  for (std::size_t lane = 0; lane < W; ++lane) {
+    lanes[lane] = &items[first + std::min(lane, n - 1)];
+  }
+  return lanes;
+}
+
+template <int W, typename Item>
+std::array<Item*, W> Outputs(std::span<Item> items,
+                             std::size_t first,
+                             std::size_t n,
+                             Item* unused) {
+  std::array<Item*, W> lanes;
+  for (std::size_t lane = 0; lane < W; ++lane) {
+    lanes[lane] = lane < n ? &items[first + lane] : unused;
+  }
+  return lanes;
 }
 
 }  // namespace
@@ -114,14 +140,11 @@ void InertialBatch::Linearise(std::span<const InertialLinkStates> links,
       gravity_mps2,
       [&]<int W>(
           const KernelInput<W>& input, std::size_t first, std::size_t n) {
-        InertialNoiseRoot* root[W];
-        InertialTransition* transition[W];
-        for (std::size_t lane = 0; lane < W; ++lane) {
-          root[lane] = lane < n ? &roots[first + lane] : &unused_root_;
-          transition[lane] =
-              lane < n ? &out[first + lane] : &unused_transition_;
-        }
-        inertial::LineariseLinks<W>(input, noise, root, transition);
+        inertial::LineariseLinks<W>(
+            input,
+            noise,
+            Outputs<W>(roots, first, n, &unused_root_).data(),
+            Outputs<W>(out, first, n, &unused_transition_).data());
       });
 }
 
@@ -138,14 +161,10 @@ void InertialBatch::LineariseWithRoots(
       gravity_mps2,
       [&]<int W>(
           const KernelInput<W>& input, std::size_t first, std::size_t n) {
-        const InertialNoiseRoot* root[W];
-        InertialTransition* transition[W];
-        for (std::size_t lane = 0; lane < W; ++lane) {
-          root[lane] = &roots[first + std::min(lane, n - 1)];
-          transition[lane] =
-              lane < n ? &out[first + lane] : &unused_transition_;
-        }
-        inertial::LineariseLinksWithRoots<W>(input, root, transition);
+        inertial::LineariseLinksWithRoots<W>(
+            input,
+            Inputs<W>(roots, first, n).data(),
+            Outputs<W>(out, first, n, &unused_transition_).data());
       });
 }
 
@@ -161,14 +180,13 @@ void InertialBatch::Residuals(std::span<const InertialLinkStates> links,
       gravity_mps2,
       [&]<int W>(
           const KernelInput<W>& input, std::size_t first, std::size_t n) {
-        const InertialNoiseRoot* root[W];
         double* to[W];
         for (std::size_t lane = 0; lane < W; ++lane) {
-          root[lane] = &roots[first + std::min(lane, n - 1)];
           to[lane] = lane < n ? whitened[first + lane].data()
                               : unused_transition_.whitened;
         }
-        inertial::WhitenedResiduals<W>(input, root, to);
+        inertial::WhitenedResiduals<W>(
+            input, Inputs<W>(roots, first, n).data(), to);
       });
 }
 

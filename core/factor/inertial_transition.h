@@ -16,6 +16,7 @@
 
 #include <Eigen/Core>
 
+#include "core/elimination/small_cholesky.h"
 #include "core/factor/inertial_batch.h"
 #include "core/factor/inertial_terms.h"
 #include "core/factor/preintegration_covariance.h"
@@ -39,9 +40,6 @@ struct NoiseRoot {
   Eigen::Matrix<T, 9, 9> motion;  // upper triangle; the lower is not set
   Eigen::Matrix<T, 6, 1> bias;
 };
-
-// A pivot is raised to this part of its variance, where rounding left less.
-constexpr double kPivotFloor = 1e-14;
 
 // Overwrites the upper triangle of C by U with U U^T = C; never NaN. Where
 // rounding left C far from a covariance, no entry of U exceeds the standard

@@ -46,17 +46,18 @@ class ReprojectionBatch {
 
   // Writes 2 count rows of RowsStride(n) doubles. `points` are homogeneous, 4
   // doubles (X, w) each with p_G = X / w; rows are by the pose, the camera, and
-  // by p_G. The factors are multiplied by `weights`, one for each observation, or
-  // where it is null by 1 / sigma_px. `rows` has room for 2 (count + 7) rows.
+  // by p_G. The factors are multiplied by `weights`, one for each observation,
+  // or where it is null by 1 / sigma_px. `rows` has room for 2 (count + 7)
+  // rows.
   void Linearise(const ObservationRun& run,
                  const double* points,
                  double sigma_px,
                  const double* weights,
                  double* rows) const;
 
-  // Adds to the sums of each landmark, by X, under a Huber loss of huber_sigmas, and
-  // writes the squared norm of each residual [px^2]; negative where the point
-  // cannot be projected.
+  // Adds to the sums of each landmark, by X, under a Huber loss of
+  // huber_sigmas, and writes the squared norm of each residual [px^2]; negative
+  // where the point cannot be projected.
   void AddLandmarkSums(const ObservationRun& run,
                        const double* points,
                        double sigma_px,
@@ -68,8 +69,6 @@ class ReprojectionBatch {
   void Squares(const ObservationRun& run,
                const double* points,
                double* squares_px2) const;
-
-  VectorWidth width() const { return width_; }
 
  private:
   VectorWidth width_;

@@ -4,9 +4,9 @@
 // A function template over T works on one value with T = double and on W
 // independent ones with T = Lanes<W>. What would be a branch on a value is a
 // Mask, and Select() takes of both outcomes the right one for each lane; for
-// double, a Mask is a bool. Written in the vector types of the compiler,
-// without instructions of any machine. Usable as the scalar of Eigen's
-// matrices.
+// double, a Mask is a bool. Written in the vector types of the compiler; where
+// those are slow, this file, and no other, names instructions of a machine.
+// Usable as the scalar of Eigen's matrices.
 //
 // Code that is compiled for wider units than the rest of the program must not
 // share inline functions with it: the linker keeps one copy of each, and may
@@ -119,13 +119,6 @@ Lanes<W> Load(const double* from) {
 template <int W>
 void Store(Lanes<W> x, double* to) {
   __builtin_memcpy(to, &x.v, sizeof(x.v));
-}
-
-template <int W>
-double Sum(Lanes<W> x) {
-  double sum = 0;
-  for (int i = 0; i < W; ++i) sum += x.v[i];
-  return sum;
 }
 
 // For Transpose(): blocks of step x step off the diagonal of a and b change
