@@ -1,0 +1,157 @@
+#include "test/evaluation/statistics.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/model/so3.h"
+
+namespace selfcal {
+namespace {
+
+// Ranks from 1, ties with their mean.
+std::vector<double> Ranks(const std::vector<double>& values) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return values[a] < values[b];
+  });
+  std::vector<double> ranks(values.size());
+  for (std::size_t begin = 0; begin < order.size();) {
+    std::size_t end = begin;
+    while (end < order.size() && values[order[end]] == values[order[begin]]) {
+      ++end;
+    }
+    const double rank = 0.5 * static_cast<double>(begin + 1 + end);
+    for (std::size_t i = begin; i < end; ++i) ranks[order[i]] = rank;
+    begin = end;
+  }
+  return ranks;
+}
+
+// Regularised lower incomplete gamma function P(a, x): its series below a + 1,
+// beyond it one minus the continued fraction of Q by the method of Lentz
+// (Abramowitz and Stegun 6.5.29, 6.5.31).
+double IncompleteGamma(double a, double x) {
+  if (x <= 0) return 0;
+  constexpr double kEpsilon = 1e-15;
+  const double scale = std::exp(-x + a * std::log(x) - std::lgamma(a));
+  if (x < a + 1) {
+    double term = 1 / a;
+    double sum = term;
+    for (double n = a + 1; term > kEpsilon * sum; ++n) {
+      term *= x / n;
+      sum += term;
+    }
+    return scale * sum;
+  }
+  double b = x + 1 - a;
+  double c = 1e300;
+  double d = 1 / b;
+  double fraction = d;
+  for (double i = 1;; ++i) {
+    const double numerator = -i * (i - a);
+    b += 2;
+    d = 1 / (numerator * d + b);
+    c = b + numerator / c;
+    fraction *= c * d;
+    if (std::abs(c * d - 1) < kEpsilon) return 1 - scale * fraction;
+  }
+}
+
+}  // namespace
+
+double Mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) /
+         static_cast<double>(values.size());
+}
+
+double Rms(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value * value;
+  return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+double Quantile(std::vector<double> values, double p) {
+  std::sort(values.begin(), values.end());
+  const double at = p * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::size_t>(at);
+  const std::size_t high = std::min(low + 1, values.size() - 1);
+  const double part = at - static_cast<double>(low);
+  return (1 - part) * values[low] + part * values[high];
+}
+
+double MedianOf(const std::vector<double>& values) {
+  return Quantile(values, 0.5);
+}
+
+double StandardDeviation(const std::vector<double>& values) {
+  const double mean = Mean(values);
+  double sum = 0;
+  for (const double value : values) sum += (value - mean) * (value - mean);
+  return std::sqrt(sum / static_cast<double>(values.size() - 1));
+}
+
+double RankCorrelation(const std::vector<double>& a,
+                       const std::vector<double>& b) {
+  const std::vector<double> ranks_a = Ranks(a);
+  const std::vector<double> ranks_b = Ranks(b);
+  const double mean = 0.5 * static_cast<double>(a.size() + 1);
+  double aa = 0;
+  double bb = 0;
+  double ab = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double da = ranks_a[i] - mean;
+    const double db = ranks_b[i] - mean;
+    aa += da * da;
+    bb += db * db;
+    ab += da * db;
+  }
+  return ab / std::sqrt(aa * bb);
+}
+
+double ChiSquareCdf(double x, double dof) {
+  return IncompleteGamma(dof / 2, x / 2);
+}
+
+double ChiSquareQuantile(double p, double dof) {
+  double low = 0;
+  double high = dof + 1;
+  while (ChiSquareCdf(high, dof) < p) high *= 2;
+  while (high - low > 1e-12 * high) {
+    const double middle = 0.5 * (low + high);
+    if (middle <= low || middle >= high) break;
+    (ChiSquareCdf(middle, dof) < p ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+std::pair<double, double> NeesBounds(double dof, int runs, double probability) {
+  const double tail = 0.5 * (1 - probability);
+  return {ChiSquareQuantile(tail, dof * runs) / runs,
+          ChiSquareQuantile(1 - tail, dof * runs) / runs};
+}
+
+Eigen::Quaterniond AverageRotation(
+    const std::vector<Eigen::Quaterniond>& rotations) {
+  Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+  for (const Eigen::Quaterniond& q : rotations) {
+    sum += q.coeffs() * q.coeffs().transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
+  return Eigen::Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3)));
+}
+
+RotationSpread SpreadOfRotations(
+    const std::vector<Eigen::Quaterniond>& rotations) {
+  const Eigen::Quaterniond mean = AverageRotation(rotations);
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  for (const Eigen::Quaterniond& q : rotations) {
+    squares += Log(mean.conjugate() * q).cwiseAbs2();
+  }
+  squares /= static_cast<double>(rotations.size() - 1);
+  return {squares.cwiseSqrt(), std::sqrt(squares.sum())};
+}
+
+}  // namespace selfcal

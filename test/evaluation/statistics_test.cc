@@ -1,0 +1,114 @@
+#include "test/evaluation/statistics.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/model/so3.h"
+#include "core/simulation/random.h"
+
+namespace selfcal {
+namespace {
+
+TEST(Statistics, OfSmallSets) {
+  const std::vector<double> values = {4, 1, 3, 2};
+  EXPECT_DOUBLE_EQ(Mean(values), 2.5);
+  EXPECT_DOUBLE_EQ(Rms(values), std::sqrt(7.5));
+  EXPECT_DOUBLE_EQ(StandardDeviation(values), std::sqrt(5.0 / 3));
+  EXPECT_DOUBLE_EQ(MedianOf(values), 2.5);
+  EXPECT_DOUBLE_EQ(Quantile(values, 0), 1);
+  EXPECT_DOUBLE_EQ(Quantile(values, 1), 4);
+  EXPECT_DOUBLE_EQ(Quantile(values, 0.25), 1.75);
+  EXPECT_DOUBLE_EQ(MedianOf({7}), 7);
+}
+
+TEST(RankCorrelation, SeesOrderAlone) {
+  EXPECT_DOUBLE_EQ(RankCorrelation({1, 2, 3, 4}, {1, 10, 100, 1000}), 1);
+  EXPECT_DOUBLE_EQ(RankCorrelation({1, 2, 3, 4}, {4, 3, 2, -7}), -1);
+  // 1 - 6 sum d^2 / (n (n^2 - 1)) without ties.
+  EXPECT_NEAR(RankCorrelation({1, 2, 3, 4, 5}, {2, 1, 4, 3, 5}), 0.8, 1e-12);
+  // Ranks (1.5, 1.5, 3) and (1, 2, 3).
+  EXPECT_NEAR(
+      RankCorrelation({5, 5, 6}, {1, 2, 3}), 1.5 / std::sqrt(3.0), 1e-12);
+}
+
+TEST(ChiSquare, AgreesWithItsClosedForms) {
+  for (const double x : {0.01, 0.5, 1.0, 3.0, 10.0, 50.0}) {
+    EXPECT_NEAR(ChiSquareCdf(x, 1), std::erf(std::sqrt(x / 2)), 1e-13);
+    EXPECT_NEAR(ChiSquareCdf(x, 2), 1 - std::exp(-x / 2), 1e-13);
+    EXPECT_NEAR(ChiSquareCdf(x, 4), 1 - std::exp(-x / 2) * (1 + x / 2), 1e-13);
+  }
+  EXPECT_EQ(ChiSquareCdf(0, 3), 0);
+}
+
+// Tables of the distribution.
+TEST(ChiSquare, AgreesWithTables) {
+  EXPECT_NEAR(ChiSquareQuantile(0.95, 1), 3.841459, 1e-6);
+  EXPECT_NEAR(ChiSquareQuantile(0.99, 10), 23.209251, 1e-6);
+  EXPECT_NEAR(ChiSquareQuantile(0.025, 26), 13.843905, 1e-6);
+  EXPECT_NEAR(ChiSquareQuantile(0.975, 26), 41.923170, 1e-6);
+  EXPECT_NEAR(ChiSquareQuantile(0.5, 100), 99.334129, 1e-6);
+}
+
+TEST(ChiSquare, QuantileInvertsTheDistribution) {
+  for (const double dof : {0.5, 1.0, 7.0, 26.0, 2600.0}) {
+    for (const double p : {1e-6, 0.025, 0.5, 0.975, 1 - 1e-6}) {
+      EXPECT_NEAR(ChiSquareCdf(ChiSquareQuantile(p, dof), dof), p, 1e-10);
+    }
+  }
+}
+
+TEST(NeesBounds, NarrowWithTheRuns) {
+  const auto [low, high] = NeesBounds(26, 1, 0.95);
+  EXPECT_NEAR(low, 13.843905, 1e-6);
+  EXPECT_NEAR(high, 41.923170, 1e-6);
+  const auto [low_100, high_100] = NeesBounds(26, 100, 0.95);
+  // Normal with variance 2 dof / runs, nearly.
+  EXPECT_NEAR(low_100, 26 - 1.96 * std::sqrt(0.52), 0.03);
+  EXPECT_NEAR(high_100, 26 + 1.96 * std::sqrt(0.52), 0.03);
+}
+
+TEST(AverageRotation, OfTwoIsHalfWay) {
+  const Eigen::Quaterniond a = Exp({0.3, -0.2, 0.9});
+  const Eigen::Vector3d step(0.4, 0.2, -0.3);
+  const Eigen::Quaterniond b = a * Exp(step);
+  // The other sign is the same rotation.
+  const Eigen::Quaterniond minus_b(-b.coeffs());
+  const Eigen::Quaterniond mean = AverageRotation({a, minus_b});
+  EXPECT_LT(Log(mean.conjugate() * a * Exp(step / 2)).norm(), 1e-12);
+}
+
+TEST(AverageRotation, TurnsWithItsRotations) {
+  Random random(1, 99);
+  std::vector<Eigen::Quaterniond> rotations;
+  std::vector<Eigen::Quaterniond> turned;
+  const Eigen::Quaterniond turn = Exp({2, -1, 0.5});
+  for (int i = 0; i < 7; ++i) {
+    rotations.push_back(Exp(0.5 * random.Direction()));
+    turned.push_back(turn * rotations.back());
+  }
+  const Eigen::Quaterniond mean = AverageRotation(rotations);
+  EXPECT_LT(Log((turn * mean).conjugate() * AverageRotation(turned)).norm(),
+            1e-12);
+}
+
+TEST(SpreadOfRotations, IsThatOfTheAnglesDrawn) {
+  Random random(2, 99);
+  const Eigen::Quaterniond mean = Exp({1, 2, -0.5});
+  const Eigen::Vector3d sigma(0.01, 0.02, 0.005);
+  std::vector<Eigen::Quaterniond> rotations;
+  for (int i = 0; i < 5000; ++i) {
+    const Eigen::Vector3d delta = sigma.cwiseProduct(
+        Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal()));
+    rotations.push_back(mean * Exp(delta));
+  }
+  const RotationSpread spread = SpreadOfRotations(rotations);
+  EXPECT_LT(
+      (spread.axes_rad - sigma).cwiseQuotient(sigma).cwiseAbs().maxCoeff(),
+      0.03);
+  EXPECT_NEAR(spread.angle_rad, spread.axes_rad.norm(), 1e-15);
+  EXPECT_LT(Log(mean.conjugate() * AverageRotation(rotations)).norm(), 1e-3);
+}
+
+}  // namespace
+}  // namespace selfcal
