@@ -1,0 +1,137 @@
+#include "core/change/consistency.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "core/change/chi_square.h"
+
+namespace selfcal {
+namespace {
+
+// As everywhere: a direction is observed if the data says more than the prior.
+constexpr double kObserved = 1.0;
+
+// Eigenvectors of a symmetric matrix with their eigenvalues, of those observed.
+struct Observed {
+  explicit Observed(const Eigen::MatrixXd& information) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+    const auto count = (eigen.eigenvalues().array() >= kObserved).count();
+    values = eigen.eigenvalues().tail(count);
+    directions = eigen.eigenvectors().rightCols(count);
+  }
+  Eigen::VectorXd values;
+  Eigen::MatrixXd directions;
+};
+
+ConsistencyTest TestNormal(const Eigen::VectorXd& delta,
+                           const Eigen::MatrixXd& covariance) {
+  ConsistencyTest test;
+  test.degrees = static_cast<int>(delta.size());
+  if (test.degrees == 0) return test;
+  test.statistic = std::max(0.0, delta.dot(covariance.ldlt().solve(delta)));
+  test.probability = ChiSquareTail(test.statistic, test.degrees);
+  return test;
+}
+
+}  // namespace
+
+OffsetInformation& OffsetInformation::operator+=(
+    const OffsetInformation& other) {
+  Lambda += other.Lambda;
+  eta += other.eta;
+  return *this;
+}
+
+OffsetInformation& OffsetInformation::operator-=(
+    const OffsetInformation& other) {
+  Lambda -= other.Lambda;
+  eta -= other.eta;
+  return *this;
+}
+
+ConsistencyTester::ConsistencyTester(const Rig& rig,
+                                     const KnownCalibration& active,
+                                     double inflation)
+    : theta_(active.theta),
+      inflation_(inflation),
+      free_(FreeComponents(rig)),
+      prior_(PriorSigmas(rig)(free_)),
+      reference_(ReferenceSigmas(rig)(free_)) {
+  const Eigen::VectorXd scale = prior_.cwiseInverse();
+  Sigma_ = inflation * scale.asDiagonal() * active.covariance(free_, free_) *
+           scale.asDiagonal();
+  for (const ParameterGroup& settings : rig.groups) {
+    Group group{settings.name, {}};
+    for (const int i : GroupComponents(rig, settings)) {
+      const auto at = std::lower_bound(free_.begin(), free_.end(), i);
+      group.at.push_back(static_cast<int>(at - free_.begin()));
+    }
+    groups_.push_back(std::move(group));
+  }
+}
+
+bool ConsistencyTester::Accepts(const SegmentInformation& information) const {
+  const int size = TangentSize(theta_);
+  if (information.residuals.many_outliers ||
+      !SameShape(information.theta0, theta_) ||
+      information.Lambda.rows() != size || information.Lambda.cols() != size ||
+      information.eta.size() != size || !information.Lambda.allFinite() ||
+      !information.eta.allFinite()) {
+    return false;
+  }
+  const Eigen::VectorXd offset = BoxMinus(information.theta0, theta_)(free_);
+  return (offset.cwiseAbs().array() <= kMaxLinearisation * reference_.array())
+      .all();
+}
+
+OffsetInformation ConsistencyTester::Offset(
+    const SegmentInformation& information) const {
+  const Eigen::MatrixXd Lambda = information.Lambda(free_, free_);
+  const Eigen::VectorXd at = BoxMinus(information.theta0, theta_)(free_);
+  const Eigen::VectorXd eta = information.eta(free_) + Lambda * at;
+  return {prior_.asDiagonal() * Lambda * prior_.asDiagonal() / inflation_,
+          prior_.cwiseProduct(eta) / inflation_};
+}
+
+ConsistencyTest ConsistencyTester::Test(const OffsetInformation& offset) const {
+  const Observed observed(offset.Lambda);
+  const Eigen::MatrixXd& U = observed.directions;
+  const Eigen::VectorXd variances = observed.values.cwiseInverse();
+  const Eigen::VectorXd delta =
+      variances.cwiseProduct(U.transpose() * offset.eta);
+  Eigen::MatrixXd covariance = U.transpose() * Sigma_ * U;
+  covariance.diagonal() += variances;
+  return TestNormal(delta, covariance);
+}
+
+// With the rig's prior about the active calibration, so that what the segment
+// does not observe can be marginalised:
+//   delta = K eta, K = (Lambda + 1)^-1, eta ~ N(0, Lambda + Lambda Sigma
+//   Lambda)
+// whose distribution without a change holds exactly, the prior notwithstanding.
+std::vector<GroupConsistency> ConsistencyTester::TestGroups(
+    const OffsetInformation& offset) const {
+  const Eigen::Index size = offset.eta.size();
+  const Eigen::MatrixXd& Lambda = offset.Lambda;
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size, size);
+  const Eigen::MatrixXd K = (Lambda + one).ldlt().solve(one);
+  const Eigen::VectorXd delta = K * offset.eta;
+  const Eigen::MatrixXd covariance =
+      K * (Lambda + Lambda * Sigma_ * Lambda) * K.transpose();
+  std::vector<GroupConsistency> tests;
+  for (const Group& group : groups_) {
+    const auto k = static_cast<Eigen::Index>(group.at.size());
+    const Eigen::MatrixXd posterior = K(group.at, group.at);
+    const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(k, k);
+    const Observed observed(posterior.ldlt().solve(identity) - identity);
+    const Eigen::MatrixXd& V = observed.directions;
+    tests.push_back(
+        {group.name,
+         TestNormal(V.transpose() * delta(group.at),
+                    V.transpose() * covariance(group.at, group.at) * V)});
+  }
+  return tests;
+}
+
+}  // namespace selfcal
