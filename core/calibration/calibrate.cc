@@ -31,12 +31,19 @@ constexpr double kMaxRoundSigmas = 0.02;
 
 std::string CheckInput(const Rig& rig,
                        const Calibration& theta_start,
+                       const std::optional<ThetaPrior>& prior,
                        const std::vector<const MotionSegment*>& sorted) {
   if (sorted.empty()) {
     return "no segments to calibrate on";
   }
   if (!SameShape(rig.factory, theta_start)) {
     return "the calibration to start from has other cameras than the rig";
+  }
+  if (prior && (!SameShape(rig.factory, prior->centre) ||
+                prior->information.rows() != TangentSize(rig.factory) ||
+                prior->information.cols() != TangentSize(rig.factory) ||
+                !prior->information.allFinite())) {
+    return "the prior on theta does not have the shape of the rig";
   }
   for (std::size_t i = 1; i < sorted.size(); ++i) {
     if (sorted[i - 1]->key == sorted[i]->key) {
@@ -68,7 +75,7 @@ class Calibrator {
         partitioning_(PartitionSegments(segments, options.merge_landmarks)),
         problem_(FlattenSegments(rig, segments, partitioning_)),
         // A prior is centred where d = 0.
-        reference_(options.use_prior ? rig.factory : theta_start),
+        reference_(options.prior ? options.prior->centre : theta_start),
         start_d_(BoxMinus(theta_start, reference_)),
         estimate_{start_d_, problem_.keyframes},
         subspace_(WholeSubspace(rig)) {
@@ -221,9 +228,6 @@ class Calibrator {
   // Holds what the data does not observe, at its start value. Returns whether
   // the present subspace stays as large as it was.
   bool ChooseSubspace() {
-    if (options_.use_prior) {
-      return true;
-    }
     const auto held = static_cast<int>(subspace_.held.cols());
     ThetaSubspace observed = ObservedSubspace(rig_, information_.Lambda, held);
     const bool same = observed.held.cols() == held;
@@ -243,7 +247,8 @@ class Calibrator {
             .whitening = whitening_,
             .basis = basis,
             .loss = screening_.loss,
-            .use_prior = options_.use_prior,
+            .prior_information =
+                options_.prior ? &options_.prior->information : nullptr,
             .threads = options_.threads};
   }
 
@@ -345,7 +350,8 @@ CalibrationResult Calibrate(const Rig& rig,
                             const CalibrateOptions& options,
                             const ProgressCallback& progress) {
   const std::vector<const MotionSegment*> sorted = SortByKey(segments);
-  const std::string problem = CheckInput(rig, theta_start, sorted);
+  const std::string problem =
+      CheckInput(rig, theta_start, options.prior, sorted);
   if (!problem.empty()) {
     CalibrationResult result;
     result.message = problem;

@@ -7,9 +7,11 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/calibration/theta_prior.h"
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
@@ -28,8 +30,10 @@ enum class SolverKind {
 struct CalibrateOptions {
   LossKind loss = LossKind::kHuber;
   double loss_scale = 2.0;  // in sigmas
-  // Prior on theta from PriorSigmas(rig), centred at rig.factory.
-  bool use_prior = false;
+  // What is known about theta besides the segments: FactoryPrior(rig), or what
+  // an earlier calibration says about some of it. What neither it nor the data
+  // determines is held.
+  std::optional<ThetaPrior> prior = std::nullopt;
   int max_iterations = 100;
   int merge_landmarks = 15;  // partitions that share more are merged
   SolverKind solver = SolverKind::kStructured;

@@ -2,6 +2,7 @@
 
 #include <ceres/ceres.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -55,6 +56,16 @@ class CeresLoss final : public ceres::LossFunction {
   RobustLoss loss_;
   double weight_;
 };
+
+// W with W^T W = information, which may be singular.
+Eigen::MatrixXd PriorWeights(const Rig& rig,
+                             const Eigen::MatrixXd& information) {
+  const Eigen::VectorXd sigmas = PriorSigmas(rig);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      sigmas.asDiagonal() * information * sigmas.asDiagonal());
+  return eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
+         eigen.eigenvectors().transpose() * sigmas.cwiseInverse().asDiagonal();
+}
 
 // The Ceres problem of one round, with the memory it works on.
 class Builder {
@@ -125,16 +136,11 @@ class Builder {
       subspace_ = MakeSubspaceManifold(round_.basis);
       problem_.SetManifold(d_.data(), subspace_.get());
     }
-    if (!round_.use_prior) {
+    if (round_.prior_information == nullptr) {
       return;
     }
-    // The reference is the factory's calibration, so the prior's mean is d = 0.
-    const std::vector<int> free = FreeComponents(round_.rig);
-    const Eigen::VectorXd sigmas = PriorSigmas(round_.rig);
-    Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(free.size(), d_.size());
-    for (std::size_t i = 0; i < free.size(); ++i) {
-      weights(static_cast<int>(i), free[i]) = 1 / sigmas(free[i]);
-    }
+    const Eigen::MatrixXd weights =
+        PriorWeights(round_.rig, *round_.prior_information);
     problem_.AddResidualBlock(
         MakePriorCost(weights, Eigen::VectorXd::Zero(d_.size())).release(),
         nullptr,

@@ -26,8 +26,9 @@ struct SolverRound {
   // D x r: the directions in which d may move (SubspaceManifold).
   const Eigen::MatrixXd& basis;
   const RobustLoss& loss;  // on reprojection residuals
-  bool use_prior = false;  // PriorSigmas(rig) about d = 0
-  int threads = 1;         // of Ceres
+  // Of theta about d = 0, D x D; null: no prior.
+  const Eigen::MatrixXd* prior_information = nullptr;
+  int threads = 1;  // of Ceres
   int max_iterations = 100;
   // Done when an iteration takes less than this part off the cost.
   double function_tolerance = 1e-9;

@@ -27,16 +27,6 @@ constexpr int kMaxTrials = 10;
 // step promises.
 constexpr double kRefineDecrease = 1e-4;
 
-// Of theta's tangent, on the free components.
-Eigen::VectorXd PriorInformation(const Rig& rig) {
-  const Eigen::VectorXd sigmas = PriorSigmas(rig);
-  Eigen::VectorXd information = Eigen::VectorXd::Zero(sigmas.size());
-  for (const int i : FreeComponents(rig)) {
-    information(i) = 1 / (sigmas(i) * sigmas(i));
-  }
-  return information;
-}
-
 void Move(const ChainStateVector& step, KeyframeState* x) {
   x->q_GI = (x->q_GI * Exp(step.segment<3>(kStateRotation))).normalized();
   x->p_GI += step.segment<3>(kStatePosition);
@@ -144,8 +134,8 @@ double Evaluate(const SolverRound& round,
                 std::vector<LandmarkPlace>* places) {
   const Calibration theta = BoxPlus(round.reference, estimate.d);
   double sum = MotionSquares(round, roots, theta, estimate.keyframes);
-  if (round.use_prior) {
-    sum += estimate.d.cwiseAbs2().dot(PriorInformation(round.rig));
+  if (round.prior_information != nullptr) {
+    sum += estimate.d.dot(*round.prior_information * estimate.d);
   }
   const LandmarkScene scene(
       theta, estimate.keyframes, round.rig.pixel_sigma_px);
@@ -202,10 +192,9 @@ bool LineariseRound(const SolverRound& round,
     return false;
   }
   result->by_offset = ByOffset(at_theta, result->theta_by_offset);
-  if (round.use_prior) {
-    const Eigen::VectorXd prior = PriorInformation(round.rig);
-    result->by_offset.Lambda.diagonal() += prior;
-    result->by_offset.eta -= prior.cwiseProduct(estimate.d);
+  if (round.prior_information != nullptr) {
+    result->by_offset.Lambda += *round.prior_information;
+    result->by_offset.eta -= *round.prior_information * estimate.d;
   }
   result->cost = RoundCost(round, estimate, landmarks);
   return true;

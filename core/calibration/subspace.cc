@@ -11,8 +11,9 @@
 namespace selfcal {
 namespace {
 
-// Just below an information of 1, by more than rounding.
-constexpr double kAtThreshold = 1 - 1e-9;
+// Just below an information of 1, by more than rounding: where the prior is
+// part of the information, it is 1 without any data.
+constexpr double kAtThreshold = 1 - 1e-4;
 
 // Prior sigmas, zero for what the rig holds fixed.
 Eigen::VectorXd FreeSigmas(const Rig& rig) {
@@ -65,7 +66,7 @@ ThetaSubspace ObservedSubspace(const Rig& rig,
   const Eigen::MatrixXd directions = whole.estimated * eigen.eigenvectors();
   const auto size = static_cast<int>(directions.cols());
   int held = std::min(min_held, size);
-  while (held < size && eigen.eigenvalues()(held) < 1) {
+  while (held < size && eigen.eigenvalues()(held) < kAtThreshold) {
     ++held;
   }
   ThetaSubspace subspace;
@@ -75,6 +76,8 @@ ThetaSubspace ObservedSubspace(const Rig& rig,
   // others, as one at the threshold.
   Eigen::VectorXd information = eigen.eigenvalues();
   information.head(held) = information.head(held).cwiseMin(kAtThreshold);
+  information.tail(size - held) =
+      information.tail(size - held).cwiseMax(1 / kAtThreshold);
   subspace.unobserved =
       AnalyseObservability(eigen.eigenvectors() * information.asDiagonal() *
                                eigen.eigenvectors().transpose(),

@@ -192,7 +192,7 @@ TEST(Calibrate, PriorPullsTowardsTheFactory) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(11), 2);
   s.rig.prior_sigmas = {{"cam0.focal.*", 1e-3}};
   CalibrateOptions options;
-  options.use_prior = true;
+  options.prior = FactoryPrior(s.rig);
   const CalibrationResult result =
       Calibrate(s.rig, s.truth, s.segments, options);
   const double f = s.rig.factory.cameras[0].f.x();

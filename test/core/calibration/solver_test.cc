@@ -54,7 +54,7 @@ class Posed {
         std::vector<MotionSegment> segments,
         const CalibrateOptions& options = {})
       : rig_(rig),
-        reference_(options.use_prior ? rig.factory : start),
+        reference_(options.prior ? options.prior->centre : start),
         segments_(std::move(segments)),
         sorted_(SortByKey(segments_)),
         partitioning_(PartitionSegments(sorted_, options.merge_landmarks)),
@@ -65,7 +65,7 @@ class Posed {
         whitening_(
             WhitenInertialLinks(rig, start.imu, problem_, problem_.keyframes)),
         subspace_(WholeSubspace(rig)),
-        use_prior_(options.use_prior) {}
+        prior_(options.prior) {}
 
   // Holds the directions in which the data says least.
   void Hold(int directions) {
@@ -119,7 +119,7 @@ class Posed {
             .whitening = whitening_,
             .basis = basis_,
             .loss = screening_.loss,
-            .use_prior = use_prior_,
+            .prior_information = prior_ ? &prior_->information : nullptr,
             .threads = 1,
             .max_iterations = 300,
             .function_tolerance = 1e-12};
@@ -211,7 +211,7 @@ class Posed {
   Screening screening_;
   const std::vector<InertialMatrix> whitening_;
   ThetaSubspace subspace_;
-  const bool use_prior_;
+  const std::optional<ThetaPrior> prior_;
   Eigen::MatrixXd basis_;
 };
 
@@ -249,7 +249,8 @@ TEST(Solvers, AgreeWithFixedComponents) {
 TEST(Solvers, AgreeWithAPrior) {
   Rig rig = HandheldRig("r");
   rig.prior_sigmas = {{"cam0.focal.*", 1e-2}};
-  Simple({.use_prior = true}, SmallOptions(5), rig).ExpectSameMinimum();
+  Simple({.prior = FactoryPrior(WrongRig(rig))}, SmallOptions(5), rig)
+      .ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeWithDirectionsHeld) {
