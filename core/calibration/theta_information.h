@@ -26,9 +26,4 @@ std::vector<InertialMatrix> WhitenInertialLinks(
 SharedInformation ByOffset(const SharedInformation& at_theta,
                            const Eigen::MatrixXd& theta_by_offset);
 
-// The derivative of (reference [+] d) [-] theta by d, at theta = reference [+]
-// d: the identity but for the right Jacobians of rotations.
-Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
-                              const Eigen::VectorXd& d);
-
 }  // namespace selfcal

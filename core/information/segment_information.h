@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/information/landmark_sketch.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
@@ -64,6 +65,7 @@ struct SegmentInformation {
   std::vector<UnobservedDirection> unobserved;
   std::vector<GroupScore> groups;  // in the order of rig.groups
   ResidualStatistics residuals;
+  LandmarkSketch landmarks;  // that are used
 };
 
 struct ScoreOptions {

@@ -33,6 +33,7 @@ void SegmentScorer::Score(const Rig& rig,
   result->theta0 = theta0;
   result->residuals = selection.statistics;
   result->residuals.inertial_rms = linearised.inertial_rms;
+  SketchLandmarks(segment, selection.inliers, &result->landmarks);
 
   // In units of the prior, over the free components.
   const std::vector<int>& free = components_.free();

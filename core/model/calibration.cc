@@ -92,6 +92,21 @@ Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b) {
   return delta;
 }
 
+Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
+                              const Eigen::VectorXd& d) {
+  const int size = TangentSize(reference);
+  Eigen::MatrixXd derivative = Eigen::MatrixXd::Identity(size, size);
+  const auto set_rotation = [&](int offset) {
+    derivative.block<3, 3>(offset, offset) =
+        RightJacobian(d.segment<3>(offset));
+  };
+  set_rotation(kAccelRotation);
+  for (int j = 0; j < static_cast<int>(reference.cameras.size()); ++j) {
+    set_rotation(CameraTangentOffset(reference, j) + kCameraRotation);
+  }
+  return derivative;
+}
+
 bool SameShape(const Calibration& a, const Calibration& b) {
   if (a.cameras.size() != b.cameras.size()) return false;
   for (std::size_t j = 0; j < a.cameras.size(); ++j) {

@@ -79,6 +79,12 @@ Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta);
 // distortion models (SameShape). Rotations give Log(R_b^T R_a).
 Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b);
 
+// The derivative of (reference [+] d) [-] theta by d, at theta = reference [+]
+// d: the identity but for the right Jacobians of rotations. Turned round, it
+// takes what is known about the offset from one point to that from another.
+Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
+                              const Eigen::VectorXd& d);
+
 // Same number of cameras, each with the same distortion model.
 bool SameShape(const Calibration& a, const Calibration& b);
 

@@ -1,0 +1,131 @@
+#include "core/information/fusion.h"
+
+#include <Eigen/Cholesky>
+
+#include "core/information/rig_components.h"
+#include "core/information/unobserved.h"
+
+namespace selfcal {
+namespace {
+
+// The coordinates of rotations are curved: the step is repeated from where it
+// led to until it is this small, in sigmas of the prior.
+constexpr double kSmallStep = 1e-9;
+constexpr int kMaxSteps = 20;
+
+class FusionProblem {
+ public:
+  FusionProblem(const Rig& rig, std::span<const SegmentInformation> segments)
+      : rig_(rig), components_(rig), segments_(segments) {
+    prior_.theta0 = rig.factory;
+    prior_.Lambda = components_.prior().cwiseAbs2().cwiseInverse().asDiagonal();
+    prior_.eta.setZero(components_.size());
+  }
+
+  FusedEstimate Solve() {
+    FusedEstimate result;
+    result.theta = rig_.factory;
+    for (int i = 0; i < kMaxSteps; ++i) {
+      Linearise(result.theta);
+      const Eigen::VectorXd step = posterior_.solve(posterior_eta_);
+      Eigen::VectorXd delta = Eigen::VectorXd::Zero(components_.size());
+      delta(components_.free()) = InTheirUnits(step);
+      result.theta = BoxPlus(result.theta, delta);
+      if (step.lpNorm<Eigen::Infinity>() < kSmallStep) break;
+    }
+    Describe(&result);
+    return result;
+  }
+
+ private:
+  // Of the free components, in units of the prior, about `point`.
+  ThetaInformation Normalised(const SegmentInformation& information,
+                              const Calibration& point) const {
+    const ThetaInformation there = Transport(information, point);
+    const Eigen::VectorXd scale = components_.prior()(components_.free());
+    return {scale.asDiagonal() *
+                there.Lambda(components_.free(), components_.free()) *
+                scale.asDiagonal(),
+            scale.cwiseProduct(there.eta(components_.free()))};
+  }
+
+  Eigen::VectorXd InTheirUnits(const Eigen::VectorXd& normalised) const {
+    return normalised.cwiseProduct(components_.prior()(components_.free()));
+  }
+
+  void Linearise(const Calibration& point) {
+    const ThetaInformation prior = Normalised(prior_, point);
+    sum_.setZero(prior.eta.size(), prior.eta.size());
+    posterior_eta_ = prior.eta;
+    parts_.clear();
+    for (const SegmentInformation& segment : segments_) {
+      parts_.push_back(Normalised(segment, point));
+      sum_ += parts_.back().Lambda;
+      posterior_eta_ += parts_.back().eta;
+    }
+    posterior_.compute(sum_ + prior.Lambda);
+  }
+
+  void Describe(FusedEstimate* result) {
+    Linearise(result->theta);
+    const auto size = sum_.rows();
+    const Eigen::MatrixXd covariance =
+        posterior_.solve(Eigen::MatrixXd::Identity(size, size));
+    result->covariance.setZero(components_.size(), components_.size());
+    const Eigen::VectorXd scale = InTheirUnits(Eigen::VectorXd::Ones(size));
+    result->covariance(components_.free(), components_.free()) =
+        scale.asDiagonal() * (0.5 * (covariance + covariance.transpose())) *
+        scale.asDiagonal();
+    Observability observability =
+        AnalyseObservability(sum_, components_.free_names());
+    result->rank = observability.rank;
+    result->unobserved = std::move(observability.unobserved);
+    result->segments = static_cast<int>(segments_.size());
+    result->heterogeneity = Heterogeneity(covariance);
+  }
+
+  // At the estimate, a segment's eta is what it would still move. Of covariance
+  // L - L C L if all is as modelled, with C that of the estimate; so a
+  // quadratic form of any weight has a known expectation. The weight (L + 1)^-1
+  // takes each direction by how well the segment knows it against the prior.
+  double Heterogeneity(const Eigen::MatrixXd& covariance) const {
+    double sum = 0;
+    double expected = 0;
+    for (const ThetaInformation& part : parts_) {
+      const Eigen::MatrixXd& L = part.Lambda;
+      const Eigen::LLT<Eigen::MatrixXd> weight(
+          L + Eigen::MatrixXd::Identity(L.rows(), L.cols()));
+      sum += part.eta.dot(weight.solve(part.eta));
+      expected += weight.solve(L - L * covariance * L).trace();
+    }
+    return expected > 0 ? sum / expected : 0;
+  }
+
+  const Rig& rig_;
+  const RigComponents components_;
+  const std::span<const SegmentInformation> segments_;
+  SegmentInformation prior_;  // that of the rig, as if a segment had shown it
+
+  // About the point of the last Linearise().
+  std::vector<ThetaInformation> parts_;
+  Eigen::MatrixXd sum_;  // of the segments
+  Eigen::LLT<Eigen::MatrixXd> posterior_;
+  Eigen::VectorXd posterior_eta_;
+};
+
+}  // namespace
+
+ThetaInformation Transport(const SegmentInformation& information,
+                           const Calibration& point) {
+  const Eigen::VectorXd b = BoxMinus(point, information.theta0);
+  const Eigen::MatrixXd M = ThetaByOffset(information.theta0, b).inverse();
+  return {M.transpose() * information.Lambda * M,
+          M.transpose() * (information.eta - information.Lambda * b)};
+}
+
+FusedEstimate Fuse(const Rig& rig,
+                   std::span<const SegmentInformation> segments) {
+  return FusionProblem(rig, segments).Solve();
+}
+
+}  // namespace selfcal

@@ -1,0 +1,235 @@
+#include "core/information/fusion.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <random>
+
+#include "core/model/so3.h"
+#include "test/core/information/test_segments.h"
+
+namespace selfcal {
+namespace {
+
+Eigen::VectorXd Normal(int size, std::mt19937* random) {
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd values(size);
+  for (double& x : values) x = normal(*random);
+  return values;
+}
+
+// What a linear segment says that was scored at theta0 where theta is the
+// truth: information of a given rank, in units of the prior, with its noise.
+SegmentInformation LinearSegment(const Rig& rig,
+                                 const Calibration& theta0,
+                                 const Calibration& theta,
+                                 int rank,
+                                 double scale,
+                                 double noise,
+                                 std::mt19937* random) {
+  const int size = TangentSize(theta0);
+  const Eigen::VectorXd unit = PriorSigmas(rig).cwiseInverse();
+  Eigen::MatrixXd root(rank, size);
+  for (auto& x : root.reshaped()) x = scale * Normal(1, random)[0];
+  root = root * unit.asDiagonal();
+  SegmentInformation information;
+  information.theta0 = theta0;
+  information.Lambda = root.transpose() * root;
+  information.eta = information.Lambda * BoxMinus(theta, theta0) +
+                    noise * root.transpose() * Normal(rank, random);
+  return information;
+}
+
+Calibration Moved(const Rig& rig,
+                  const Calibration& theta,
+                  double sigmas,
+                  std::mt19937* random) {
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  return BoxPlus(theta,
+                 sigmas * prior.cwiseProduct(
+                              Normal(static_cast<int>(prior.size()), random)));
+}
+
+TEST(Transport, ToItsOwnPointChangesNothing) {
+  std::mt19937 random(1);
+  const Rig rig = TwoCameraRig();
+  const SegmentInformation information =
+      LinearSegment(rig, rig.factory, rig.factory, 20, 5, 1, &random);
+  const ThetaInformation same = Transport(information, rig.factory);
+  EXPECT_TRUE(same.Lambda.isApprox(information.Lambda, 1e-12));
+  EXPECT_TRUE(same.eta.isApprox(information.eta, 1e-12));
+}
+
+// The cost 1/2 |theta [-] theta0 - d|^2_Lambda as a function on the manifold
+// does not depend on the point about which it is written: its gradient and, at
+// its minimum, its curvature are those of differences.
+TEST(Transport, KeepsTheGradientOfTheCost) {
+  std::mt19937 random(2);
+  const Rig rig = HandheldRig("handheld");
+  const int size = TangentSize(rig.factory);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Calibration theta0 = Moved(rig, rig.factory, 1, &random);
+    const Calibration truth = Moved(rig, rig.factory, 1, &random);
+    const Calibration point = Moved(rig, rig.factory, 1, &random);
+    const SegmentInformation information =
+        LinearSegment(rig, theta0, truth, size, 3, 1, &random);
+    const auto cost = [&](const Calibration& theta) {
+      const Eigen::VectorXd d = BoxMinus(theta, theta0);
+      return 0.5 * d.dot(information.Lambda * d) - information.eta.dot(d);
+    };
+    const ThetaInformation there = Transport(information, point);
+    const Eigen::VectorXd unit = PriorSigmas(rig);
+    for (int i = 0; i < size; ++i) {
+      Eigen::VectorXd step = Eigen::VectorXd::Zero(size);
+      step[i] = 1e-4 * unit[i];
+      const double slope =
+          (cost(BoxPlus(point, step)) - cost(BoxPlus(point, -step))) / 2e-4;
+      const double scale = unit[i] * there.eta.cwiseAbs().maxCoeff();
+      EXPECT_NEAR(slope, -there.eta[i] * unit[i], 1e-6 * (1 + scale));
+    }
+  }
+}
+
+// Without noise, wherever each was linearised, all agree on the truth.
+TEST(Fuse, FindsTheTruthOfLinearSegmentsScoredAtDifferentCalibrations) {
+  std::mt19937 random(3);
+  for (const Rig& rig : {HandheldRig("handheld"), TwoCameraRig()}) {
+    const Calibration truth = Moved(rig, rig.factory, 0.5, &random);
+    std::vector<SegmentInformation> segments;
+    for (int i = 0; i < 12; ++i) {
+      const Calibration theta0 = Moved(rig, rig.factory, 0.3, &random);
+      segments.push_back(
+          LinearSegment(rig, theta0, truth, 10, 1e5, 0, &random));
+    }
+    const FusedEstimate fused = Fuse(rig, segments);
+    EXPECT_EQ(fused.rank, TangentSize(rig.factory));
+    EXPECT_TRUE(fused.unobserved.empty());
+    EXPECT_EQ(fused.segments, 12);
+    const Eigen::VectorXd error =
+        BoxMinus(fused.theta, truth).cwiseQuotient(PriorSigmas(rig));
+    EXPECT_LT(error.lpNorm<Eigen::Infinity>(), 1e-7);
+  }
+}
+
+// Truth drawn from the prior, noise as modelled: the estimate errs as its
+// covariance says, and the segments differ as their information says.
+TEST(Fuse, IsConsistentWhereAllIsLinear) {
+  std::mt19937 random(4);
+  const Rig rig = HandheldRig("handheld");
+  const int size = TangentSize(rig.factory);
+  constexpr int kTrials = 300;
+  double nees = 0, heterogeneity = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Calibration truth = Moved(rig, rig.factory, 1, &random);
+    std::vector<SegmentInformation> segments;
+    for (int i = 0; i < 5; ++i) {
+      const Calibration theta0 = Moved(rig, truth, 0.3, &random);
+      segments.push_back(LinearSegment(rig, theta0, truth, 9, 4, 1, &random));
+    }
+    const FusedEstimate fused = Fuse(rig, segments);
+    const Eigen::VectorXd error = BoxMinus(truth, fused.theta);
+    nees += error.dot(fused.covariance.llt().solve(error)) / kTrials;
+    heterogeneity += fused.heterogeneity / kTrials;
+  }
+  // A mean of chi-squares of `size`: five standard errors.
+  EXPECT_NEAR(nees, size, 5 * std::sqrt(2.0 * size / kTrials));
+  EXPECT_NEAR(heterogeneity, 1, 0.05);
+}
+
+TEST(Fuse, HeterogeneityIsTheFactorOfTheVariance) {
+  std::mt19937 random(5);
+  const Rig rig = HandheldRig("handheld");
+  for (const double noise : {0.5, 1.0, 3.0}) {
+    double mean = 0;
+    for (int trial = 0; trial < 50; ++trial) {
+      std::vector<SegmentInformation> segments;
+      for (int i = 0; i < 10; ++i) {
+        segments.push_back(LinearSegment(
+            rig, rig.factory, rig.factory, 20, 30, noise, &random));
+      }
+      mean += Fuse(rig, segments).heterogeneity / 50;
+    }
+    EXPECT_NEAR(mean, noise * noise, 0.1 * noise * noise);
+  }
+}
+
+TEST(Fuse, WithoutSegmentsIsThePrior) {
+  const Rig rig = HandheldRig("handheld");
+  const FusedEstimate fused = Fuse(rig, {});
+  EXPECT_EQ(fused.rank, 0);
+  EXPECT_EQ(fused.segments, 0);
+  EXPECT_EQ(fused.heterogeneity, 0);
+  EXPECT_EQ(static_cast<int>(fused.unobserved.size()),
+            TangentSize(rig.factory));
+  EXPECT_EQ(BoxMinus(fused.theta, rig.factory).norm(), 0);
+  const Eigen::MatrixXd prior = PriorSigmas(rig).cwiseAbs2().asDiagonal();
+  EXPECT_TRUE(fused.covariance.isApprox(prior, 1e-12));
+}
+
+TEST(Fuse, WhatTheRigHoldsFixedStays) {
+  std::mt19937 random(6);
+  Rig rig = HandheldRig("handheld");
+  rig.fixed = {"imu.*", "cam0.p_CI.x"};
+  const std::vector<int> free = FreeComponents(rig);
+  std::vector<SegmentInformation> segments;
+  for (int i = 0; i < 3; ++i) {
+    SegmentInformation information =
+        LinearSegment(rig, rig.factory, rig.factory, 26, 10, 1, &random);
+    const std::vector<int> fixed =
+        MatchComponents(TangentComponents(rig.factory), rig.fixed);
+    for (const int k : fixed) {
+      information.Lambda.row(k).setZero();
+      information.Lambda.col(k).setZero();
+      information.eta[k] = 0;
+    }
+    segments.push_back(information);
+  }
+  const FusedEstimate fused = Fuse(rig, segments);
+  EXPECT_EQ(fused.rank, static_cast<int>(free.size()));
+  const Eigen::VectorXd moved = BoxMinus(fused.theta, rig.factory);
+  for (const int k :
+       MatchComponents(TangentComponents(rig.factory), rig.fixed)) {
+    EXPECT_EQ(moved[k], 0);
+    EXPECT_EQ(fused.covariance(k, k), 0);
+  }
+  EXPECT_GT(moved.norm(), 0);
+}
+
+// Real factors, a SLAM system that is right: one step from a calibration that
+// is slightly off leads to the truth within a few sigma, a smaller error than
+// the step itself.
+TEST(Fuse, StepsToTheTruthOfSimulatedSegments) {
+  const Rig rig = HandheldRig("handheld");
+  CalibrationError error;
+  error.focal_relative *= 0.1;
+  error.principal_point_px *= 0.1;
+  error.distortion_relative *= 0.1;
+  error.camera_rotation_rad *= 0.1;
+  error.camera_position_m *= 0.1;
+  error.scale *= 0.1;
+  error.misalignment *= 0.1;
+  error.accel_rotation_rad *= 0.1;
+  const Calibration theta_slam = PerturbCalibration(rig.factory, error, 3);
+  Rig sold = rig;
+  sold.factory = theta_slam;
+  const SimulatedSession session = Simulate(
+      rig, rig.factory, theta_slam, *MakeHandheld(40.1, 1, 3), "session", {});
+  std::vector<SegmentInformation> segments;
+  for (const MotionSegment& segment : session.segments) {
+    segments.push_back(ScoreSegment(sold, theta_slam, segment));
+  }
+  ASSERT_EQ(segments.size(), 10u);
+  const FusedEstimate fused = Fuse(sold, segments);
+  EXPECT_EQ(fused.rank, TangentSize(rig.factory));
+  const Eigen::VectorXd scale = PriorSigmas(rig).cwiseInverse();
+  const double before =
+      scale.cwiseProduct(BoxMinus(theta_slam, rig.factory)).norm();
+  const double after =
+      scale.cwiseProduct(BoxMinus(fused.theta, rig.factory)).norm();
+  EXPECT_LT(after, before / 2);
+}
+
+}  // namespace
+}  // namespace selfcal
