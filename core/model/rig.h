@@ -37,6 +37,18 @@ struct ComponentSetting {
   double value = 0;
 };
 
+// Which segments are kept.
+enum class Selection {
+  kTables,  // the paper's: for each group those of lowest entropy
+  // One set for all of theta, by its joint information (core/selection).
+  kJointD,
+  kJointA,
+  kJointE,
+};
+
+// The name of the one table of a rig with a joint selection.
+inline constexpr char kJointTable[] = "joint";
+
 struct Rig {
   std::string id;  // [a-z0-9_-]{1,63}
   Calibration factory;
@@ -49,6 +61,8 @@ struct Rig {
   std::vector<ComponentSetting> prior_sigmas;
   // Patterns of components that are never estimated.
   std::vector<std::string> fixed;
+  Selection selection = Selection::kTables;
+  // N: segments of a table. A joint set holds N for each group.
   int table_size = 8;
   // A segment enters a table only if it gains at least this for the group.
   double min_gain_nats = 1.0;
@@ -78,7 +92,8 @@ Eigen::VectorXd ReferenceSigmas(const Rig& rig);
 // one camera, image sizes, distortion in range, groups that match nothing or
 // share a name, patterns that match nothing, everything fixed. Names of groups
 // follow the rules of the id, and a group keeps at least one component that is
-// not fixed. Paths of the calibration begin with "factory".
+// not fixed; with a joint selection, none is named as its table. Paths of the
+// calibration begin with "factory".
 std::vector<Violation> Validate(const Rig& rig);
 
 // The same rules for a calibration alone; paths begin with `prefix` and a dot,

@@ -95,6 +95,10 @@ void CheckGroups(const Rig& rig,
       list->Add(name_field, name_fault);
     } else if (!names.insert(group.name).second) {
       list->Add(name_field, "'" + group.name + "' names two groups");
+    } else if (rig.selection != Selection::kTables &&
+               group.name == kJointTable) {
+      list->Add(name_field,
+                "'" + group.name + "' names the table of a joint selection");
     }
     CheckPatterns(components, patterns_field, group.patterns, list);
     if (group.patterns.empty()) {

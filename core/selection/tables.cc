@@ -7,16 +7,11 @@
 namespace selfcal {
 namespace {
 
-// Richer first; the older of two that are as rich, so that a replay of the same
-// segments in the same order gives the same table.
-bool Better(const TableEntry& a, const TableEntry& b) {
-  if (a.entropy != b.entropy) {
-    return a.entropy < b.entropy;
+bool Ready(const Rig& rig, const std::vector<Table>& tables) {
+  if (rig.selection != Selection::kTables) {
+    return !tables.empty() &&
+           static_cast<int>(tables[0].entries.size()) >= rig.table_size;
   }
-  return a.sequence < b.sequence;
-}
-
-bool Ready(const std::vector<Table>& tables) {
   bool any_full = false;
   for (const Table& table : tables) {
     if (!table.full() && !table.starved()) {
@@ -29,8 +24,22 @@ bool Ready(const std::vector<Table>& tables) {
 
 }  // namespace
 
+bool Better(const TableEntry& a, const TableEntry& b) {
+  if (a.entropy != b.entropy) {
+    return a.entropy < b.entropy;
+  }
+  return a.sequence < b.sequence;
+}
+
 std::vector<Table> MakeTables(const Rig& rig) {
   std::vector<Table> tables;
+  if (rig.selection != Selection::kTables) {
+    Table table;
+    table.group = kJointTable;
+    table.capacity = static_cast<int>(rig.groups.size()) * rig.table_size;
+    tables.push_back(std::move(table));
+    return tables;
+  }
   tables.reserve(rig.groups.size());
   for (const ParameterGroup& group : rig.groups) {
     Table table;
@@ -91,7 +100,7 @@ Trigger EvaluateTrigger(
     const Rig& rig,
     const std::vector<Table>& tables,
     const std::optional<std::vector<SegmentKey>>& last_run) {
-  if (!Ready(tables)) {
+  if (!Ready(rig, tables)) {
     return Trigger::kNone;
   }
   if (!last_run) {

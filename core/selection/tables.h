@@ -22,10 +22,14 @@ struct TableEntry {
   friend bool operator==(const TableEntry&, const TableEntry&) = default;
 };
 
+// The order of a table: richer first; the older of two that are as rich, so
+// that a replay of the same segments in the same order gives the same table.
+bool Better(const TableEntry& a, const TableEntry& b);
+
 struct Table {
   std::string group;
   int capacity = 0;                 // N_q
-  std::vector<TableEntry> entries;  // sorted by (entropy, sequence)
+  std::vector<TableEntry> entries;  // sorted by Better()
   std::int64_t scored = 0;          // segments that were offered
 
   bool full() const { return static_cast<int>(entries.size()) >= capacity; }
@@ -35,7 +39,9 @@ struct Table {
   }
 };
 
-// Empty tables of a rig, one for each of its groups.
+// Empty tables of a rig: one for each of its groups; with a joint selection one
+// for all, whose entries are those that Offer() of joint_selection.h keeps, by
+// the entropy of all of theta.
 std::vector<Table> MakeTables(const Rig& rig);
 
 struct TableChange {
@@ -63,9 +69,11 @@ enum class Trigger {
 
 // Whether a run should start. `last_run` holds the keys that the last run used,
 // nothing if there was none. Tables are ready when each is full or starved, and
-// at least one is full. Then the first run starts, and a later one when,
-// counted over all tables, at least rig.retrigger_fraction of the entries (and
-// at least one) are of segments that the last run did not use.
+// at least one is full; that of a joint selection, which is as large as all
+// tables of the groups together, is as soon as one of those would be. Then the
+// first run starts, and a later one when, counted over all tables, at least
+// rig.retrigger_fraction of the entries (and at least one) are of segments that
+// the last run did not use.
 Trigger EvaluateTrigger(const Rig& rig,
                         const std::vector<Table>& tables,
                         const std::optional<std::vector<SegmentKey>>& last_run);

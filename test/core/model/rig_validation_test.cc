@@ -162,6 +162,18 @@ TEST(ValidateRig, GroupThatIsFixedWholeIsRefused) {
   EXPECT_THAT(Validate(rig), IsEmpty());
 }
 
+TEST(ValidateRig, NoGroupIsNamedAsTheTableOfAJointSelection) {
+  Rig rig = ValidRig();
+  rig.groups[1].name = "joint";
+  EXPECT_TRUE(Validate(rig).empty());
+  rig.selection = Selection::kJointD;
+  const auto violations = Validate(rig);
+  ASSERT_EQ(violations.size(), 1u);
+  EXPECT_EQ(violations[0].field, "groups[1].name");
+  rig.groups[1].name = "camera";
+  EXPECT_TRUE(Validate(rig).empty());
+}
+
 TEST(ValidateRig, NeedsAGroup) {
   Rig rig = ValidRig();
   rig.groups.clear();

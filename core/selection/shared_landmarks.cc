@@ -1,0 +1,178 @@
+#include "core/selection/shared_landmarks.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace selfcal {
+namespace {
+
+constexpr double kGap_nats = 0.005;
+constexpr int kMaxRounds = 100;
+
+// What one candidate sees of one landmark.
+struct Entry {
+  int session;  // by the order in which they appear
+  std::uint64_t id;
+  int candidate;
+  double share;
+};
+
+// The sessions of the candidates as numbers.
+std::vector<int> NumberSessions(std::span<const Candidate* const> candidates) {
+  std::map<std::string, int> numbers;
+  std::vector<int> sessions;
+  for (const Candidate* candidate : candidates) {
+    const int next = static_cast<int>(numbers.size());
+    sessions.push_back(
+        numbers.emplace(candidate->key.session, next).first->second);
+  }
+  return sessions;
+}
+
+// Those of each candidate with its share of the observations, as far as the
+// sketches of all candidates of its session are whole; by landmark.
+std::vector<Entry> ComparableEntries(
+    std::span<const Candidate* const> candidates) {
+  const std::vector<int> sessions = NumberSessions(candidates);
+  std::vector<std::uint64_t> known(candidates.size(),
+                                   std::numeric_limits<std::uint64_t>::max());
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    std::uint64_t& whole = known[sessions[i]];
+    whole = std::min(whole, KnownUpTo(candidates[i]->landmarks));
+  }
+  std::vector<Entry> entries;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const std::size_t begin = entries.size();
+    double observations = 0;
+    for (const LandmarkSketch::Entry& entry :
+         candidates[i]->landmarks.entries) {
+      if (LandmarkHash(entry.id) > known[sessions[i]]) break;
+      observations += entry.observations;
+      entries.push_back({sessions[i],
+                         entry.id,
+                         static_cast<int>(i),
+                         static_cast<double>(entry.observations)});
+    }
+    for (std::size_t k = begin; k < entries.size(); ++k) {
+      entries[k].share /= observations;
+    }
+  }
+  std::sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.session, a.id, a.candidate) <
+           std::tie(b.session, b.id, b.candidate);
+  });
+  return entries;
+}
+
+}  // namespace
+
+SharedLandmarks::SharedLandmarks(std::span<const Candidate* const> candidates)
+    : candidates_(candidates.begin(), candidates.end()),
+      alone_(candidates.size(), 1) {
+  const std::vector<Entry> entries = ComparableEntries(candidates);
+  for (auto begin = entries.begin(); begin != entries.end();) {
+    const auto end = std::find_if(begin, entries.end(), [&](const Entry& e) {
+      return e.session != begin->session || e.id != begin->id;
+    });
+    if (end - begin > 1) {
+      Sights sights;
+      for (auto it = begin; it != end; ++it) {
+        sights.push_back({it->candidate, it->share});
+        alone_[it->candidate] -= it->share;
+      }
+      shared_.push_back(std::move(sights));
+    }
+    begin = end;
+  }
+  // What is left by rounding is nothing.
+  for (double& share : alone_) {
+    if (share < 1e-12) share = 0;
+  }
+}
+
+Eigen::MatrixXd SharedLandmarks::Weighted(
+    std::span<const int> members, std::span<const double> weights) const {
+  const auto size =
+      candidates_.empty() ? 0 : candidates_[0]->information.rows();
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Identity(size, size);
+  for (const int i : members) sum += weights[i] * candidates_[i]->information;
+  return sum;
+}
+
+Eigen::MatrixXd SharedLandmarks::Sum(std::span<const int> members) const {
+  return Weighted(members, std::vector<double>(candidates_.size(), 1));
+}
+
+Eigen::MatrixXd SharedLandmarks::Information(
+    std::span<const int> members) const {
+  std::vector<char> is_member(candidates_.size(), 0);
+  for (const int i : members) is_member[i] = 1;
+  std::vector<double> base = alone_;
+  // Of the landmarks that several members see: parts a_im beside the shares.
+  std::vector<Sights> contested;
+  std::vector<std::vector<double>> parts;
+  for (const Sights& sights : shared_) {
+    Sights seen;
+    std::copy_if(sights.begin(),
+                 sights.end(),
+                 std::back_inserter(seen),
+                 [&](const Sight& s) { return is_member[s.candidate] != 0; });
+    if (seen.size() == 1) base[seen[0].candidate] += seen[0].share;
+    if (seen.size() < 2) continue;
+    parts.emplace_back(seen.size(), 1.0 / static_cast<double>(seen.size()));
+    contested.push_back(std::move(seen));
+  }
+
+  // The determinant is a polynomial in the parts with coefficients that are not
+  // negative, so that the growth transform of Baum and Eagon (1967) raises it
+  // with every round: each part times its derivative, scaled back to sum one.
+  std::vector<double> weights, slopes(candidates_.size());
+  for (int round = 0;; ++round) {
+    weights = base;
+    for (std::size_t m = 0; m < contested.size(); ++m) {
+      for (std::size_t k = 0; k < contested[m].size(); ++k) {
+        weights[contested[m][k].candidate] +=
+            parts[m][k] * contested[m][k].share;
+      }
+    }
+    Eigen::MatrixXd information = Weighted(members, weights);
+    if (contested.empty() || round == kMaxRounds) return information;
+    const Eigen::MatrixXd covariance = information.llt().solve(
+        Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+    for (const int i : members) {
+      slopes[i] =
+          0.5 * covariance.cwiseProduct(candidates_[i]->information).sum();
+    }
+    // 1/2 ln det is concave: no allotment exceeds this one by more than the
+    // gap.
+    double gap = 0;
+    for (std::size_t m = 0; m < contested.size(); ++m) {
+      double best = 0;
+      double now = 0;
+      for (std::size_t k = 0; k < contested[m].size(); ++k) {
+        const Sight& sight = contested[m][k];
+        const double slope = slopes[sight.candidate] * sight.share;
+        best = std::max(best, slope);
+        parts[m][k] *= slope;
+        now += parts[m][k];
+      }
+      gap += best - now;
+      // Where nobody gains by it, it does not matter whose it is.
+      for (double& part : parts[m]) {
+        part =
+            now > 0 ? part / now : 1.0 / static_cast<double>(parts[m].size());
+      }
+    }
+    if (gap < kGap_nats) return information;
+  }
+}
+
+}  // namespace selfcal
