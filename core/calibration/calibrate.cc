@@ -11,6 +11,7 @@
 #include "core/calibration/structured_solver.h"
 #include "core/calibration/subspace.h"
 #include "core/calibration/theta_information.h"
+#include "core/calibration/track_noise.h"
 
 namespace selfcal {
 namespace {
@@ -28,6 +29,9 @@ constexpr int kSmallSteps = 3;
 constexpr double kSmallStepSigmas = 0.005;
 // Largest change of theta by a round at convergence, in sigmas.
 constexpr double kMaxRoundSigmas = 0.02;
+// Pixel errors that make sigmas of theta larger by less than this part are
+// weighted as independent ones.
+constexpr double kLeastTrackNoise = 0.05;
 
 std::string CheckInput(const Rig& rig,
                        const Calibration& theta_start,
@@ -85,6 +89,16 @@ class Calibrator {
   }
 
   CalibrationResult Run() {
+    if (Start() && Solve() && WeighTracks()) {
+      Finish();
+    }
+    return std::move(result_);
+  }
+
+ private:
+  // What follows returns false where the calibration ends without a result:
+  // cancelled, or failed.
+  bool Start() {
     Screen(nullptr);
     const ReprojectionStatistics before = Measure();
     result_.reprojection_rms_before_px = before.rms_px;
@@ -92,14 +106,41 @@ class Calibrator {
     if (!FindSubspace()) {
       return Fail(kNotDetermined);
     }
-    return options_.solver == SolverKind::kStructured ? RunSteps()
-                                                      : RunRounds();
+    result_.initial_cost = result_.final_cost = linearised_.cost;
+    return true;
   }
 
- private:
+  bool Solve() {
+    result_.status = CalibrateStatus::kNotConverged;
+    return options_.solver == SolverKind::kStructured ? SolveBySteps()
+                                                      : SolveByRounds();
+  }
+
+  // What the errors have in common along tracks is known only now that they
+  // are small: the minimum moves a little when tracks are weighted by it.
+  bool WeighTracks() {
+    if (!options_.correlated_tracks ||
+        result_.status != CalibrateStatus::kConverged) {
+      return true;
+    }
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    const double factor = TrackNoiseFactor(
+        Round(basis), linearised_, estimate_, screening_.landmarks);
+    if (factor < 1 + kLeastTrackNoise) {
+      return true;
+    }
+    result_.track_noise_factor = factor;
+    SetTrackNoise(factor, &screening_);
+    Screen(&screening_);
+    if (!Inform(&screening_.loss)) {
+      return Fail(kNotDetermined);
+    }
+    ChooseSubspace();
+    return Solve();
+  }
+
   // One step a round.
-  CalibrationResult RunSteps() {
-    result_.initial_cost = result_.final_cost = linearised_.cost;
+  bool SolveBySteps() {
     if (!Report(0)) {
       return Cancel();
     }
@@ -123,13 +164,13 @@ class Calibrator {
         }
       } while (!ChooseSubspace());
     }
-    return Finish();
+    return true;
   }
 
-  CalibrationResult RunRounds() {
+  bool SolveByRounds() {
     for (int round = 0; round < kMaxRounds; ++round) {
       const Eigen::VectorXd d_before = estimate_.d;
-      const SolverOutcome outcome = Solve(round);
+      const SolverOutcome outcome = SolveOneRound(round);
       if (outcome.status == SolverStatus::kCancelled) {
         return Cancel();
       }
@@ -152,7 +193,7 @@ class Calibrator {
       }
       Screen(nullptr);
     }
-    return Finish();
+    return true;
   }
 
   bool Report(double step_sigmas) const {
@@ -162,16 +203,16 @@ class Calibrator {
                                     step_sigmas});
   }
 
-  CalibrationResult Cancel() {
+  bool Cancel() {
     result_.status = CalibrateStatus::kCancelled;
     result_.message = "cancelled";
-    return std::move(result_);
+    return false;
   }
 
-  CalibrationResult Fail(const std::string& message) {
+  bool Fail(const std::string& message) {
     result_.status = CalibrateStatus::kFailed;
     result_.message = message;
-    return std::move(result_);
+    return false;
   }
 
   Calibration Theta() const { return BoxPlus(reference_, estimate_.d); }
@@ -181,6 +222,7 @@ class Calibrator {
     const Calibration theta = Theta();
     screening_ = ScreenLandmarks(
         rig_, theta, problem_, estimate_.keyframes, options_, before);
+    SetTrackNoise(result_.track_noise_factor, &screening_);
     whitening_ =
         WhitenInertialLinks(rig_, theta.imu, problem_, estimate_.keyframes);
   }
@@ -263,7 +305,7 @@ class Calibrator {
     return step;
   }
 
-  SolverOutcome Solve(int round_number) {
+  SolverOutcome SolveOneRound(int round_number) {
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
     SolverRound round = Round(basis);
     round.max_iterations = options_.max_iterations - result_.iterations;
@@ -303,7 +345,7 @@ class Calibrator {
         covariance_d_);
   }
 
-  CalibrationResult Finish() {
+  void Finish() {
     if (result_.status != CalibrateStatus::kConverged) {
       result_.status = CalibrateStatus::kNotConverged;
       result_.message = "the estimate still moves after " +
@@ -314,6 +356,10 @@ class Calibrator {
     result_.covariance = by_offset * covariance_d_ * by_offset.transpose();
     result_.rank = static_cast<int>(subspace_.estimated.cols());
     result_.held_constant = subspace_.unobserved;
+    // As the cost before: not weighted by what is known of tracks since.
+    SetTrackNoise(1, &screening_);
+    result_.final_cost = RoundCost(
+        Round(TangentBasis(rig_, subspace_)), estimate_, screening_.landmarks);
     const ReprojectionStatistics after = Measure();
     result_.reprojection_rms_after_px = after.rms_px;
     result_.reprojection_median_after_px = after.median_px;
@@ -321,7 +367,6 @@ class Calibrator {
     result_.landmarks_dropped = screening_.landmarks_dropped;
     result_.observations = screening_.observations;
     result_.observations_dropped = screening_.observations_dropped;
-    return std::move(result_);
   }
 
   const Rig& rig_;

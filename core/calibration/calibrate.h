@@ -35,6 +35,9 @@ struct CalibrateOptions {
   // determines is held.
   std::optional<ThetaPrior> prior = std::nullopt;
   int max_iterations = 100;
+  // Measures how far the pixel errors of a track go together, and weights them
+  // by what that leaves of them (track_noise.h).
+  bool correlated_tracks = true;
   int merge_landmarks = 15;  // partitions that share more are merged
   SolverKind solver = SolverKind::kStructured;
   int threads = 1;  // of Ceres
@@ -74,6 +77,9 @@ struct CalibrationResult {
   double reprojection_rms_after_px = 0;
   double reprojection_median_before_px = 0;
   double reprojection_median_after_px = 0;
+  // The pixel sigma was taken so many times larger than the rig's; 0 in results
+  // from before it was measured.
+  double track_noise_factor = 1;
   int segments = 0;
   int partitions = 0;
   int keyframes = 0;

@@ -23,6 +23,19 @@ double PlainWeight(LossKind kind, double scale, double s) {
   return 1.0;
 }
 
+// s times the derivative of PlainWeight by s.
+double PlainSlope(LossKind kind, double scale, double s) {
+  switch (kind) {
+    case LossKind::kHuber:
+      return s <= Square(scale) ? 0.0 : -scale / (2 * std::sqrt(s));
+    case LossKind::kCauchy:
+      return -s * Square(scale) / Square(s + Square(scale));
+    case LossKind::kNone:
+      break;
+  }
+  return 0;
+}
+
 double PlainValue(LossKind kind, double scale, double s) {
   switch (kind) {
     case LossKind::kHuber:
@@ -60,6 +73,17 @@ double RobustLoss::Weight(double s) const {
   }
   const double end = Square(gate);
   return weight * std::max(0.0, (end - s) / (end - begin));
+}
+
+double RobustLoss::Curvature(double s) const {
+  const double weight = PlainWeight(kind, scale, s);
+  const double plain = weight + PlainSlope(kind, scale, s);
+  const double begin = Square(kTaperBegin * gate);
+  if (s <= begin) {
+    return plain;
+  }
+  const double end = Square(gate);
+  return s < end ? (plain * (end - s) - weight * s) / (end - begin) : 0.0;
 }
 
 double RobustLoss::Value(double s) const {

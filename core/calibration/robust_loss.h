@@ -22,6 +22,9 @@ struct RobustLoss {
   double gate = std::numeric_limits<double>::infinity();  // [sigma]
 
   double Weight(double s) const;
+  // d(s Weight(s)) / ds: what a change of the residual changes the gradient by,
+  // on average over its direction in the plane. Weight(s) for small s.
+  double Curvature(double s) const;
   double Value(double s) const;
 };
 

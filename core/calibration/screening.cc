@@ -39,30 +39,37 @@ bool EnoughLeft(const std::vector<int>& used, const Track& track) {
          static_cast<double>(used.size()) >= (1 - kMaxOutlierFraction) * n;
 }
 
+// Where a track may be.
+struct TrackPlaces {
+  std::optional<LandmarkPlace> found;
+  // Where it was before, where that is to be tried as well.
+  std::optional<LandmarkPlace> other;
+};
+
 // What all landmarks are judged by.
 struct Thresholds {
   RobustLoss loss;
   double max_inverse_depth_sigma;  // [1/m]
 };
 
-Thresholds FindThresholds(
-    const LandmarkScene& scene,
-    const CalibrateOptions& options,
-    const CalibrationProblem& problem,
-    const std::vector<std::optional<LandmarkPlace>>& places) {
+Thresholds FindThresholds(const LandmarkScene& scene,
+                          const CalibrateOptions& options,
+                          const CalibrationProblem& problem,
+                          const std::vector<TrackPlaces>& places) {
   std::vector<double> norms_px;
   std::vector<double> inverse_depths;
   for (std::size_t t = 0; t < places.size(); ++t) {
-    if (!places[t]) {
+    if (!places[t].found) {
       continue;
     }
+    const LandmarkPlace& place = *places[t].found;
     for (const double norm :
-         ResidualNorms(scene, problem.tracks[t], places[t]->Homogeneous())) {
+         ResidualNorms(scene, problem.tracks[t], place.Homogeneous())) {
       if (std::isfinite(norm)) {
         norms_px.push_back(norm);
       }
     }
-    inverse_depths.push_back(std::abs(places[t]->inverse_depth.z()));
+    inverse_depths.push_back(std::abs(place.inverse_depth.z()));
   }
   const double robust_sigmas =
       Median(std::move(norms_px)) / kMedianOfRayleigh / scene.pixel_sigma_px();
@@ -81,30 +88,45 @@ double InverseDepthSigma(const Eigen::Matrix3d& information) {
              : std::numeric_limits<double>::infinity();
 }
 
-// Settles one landmark: its place, and which observations are within the gate
-// of it.
-std::optional<ScreenedLandmark> Settle(const LandmarkScene& scene,
-                                       const Track& track,
-                                       const Thresholds& thresholds,
-                                       LandmarkPlace place) {
+// The place of a landmark at a minimum of its cost.
+struct SettledPlace {
+  LandmarkPlace place;
+  RefinedPlace refined;
+};
+
+SettledPlace SettlePlace(const LandmarkScene& scene,
+                         const Track& track,
+                         const RobustLoss& loss,
+                         const LandmarkPlace& start) {
   std::vector<int> all(track.observations.size());
   std::iota(all.begin(), all.end(), 0);
-  const double sigma = InverseDepthSigma(
-      RefinePlace(scene, track, all, thresholds.loss, {}, &place).information);
+  SettledPlace settled{start, {}};
+  settled.refined = RefinePlace(scene, track, all, loss, {}, &settled.place);
+  return settled;
+}
+
+// Whether a landmark is used, and which of its observations: those within the
+// gate of its place.
+std::optional<ScreenedLandmark> Judge(const LandmarkScene& scene,
+                                      const Track& track,
+                                      const Thresholds& thresholds,
+                                      const SettledPlace& settled) {
+  const double sigma = InverseDepthSigma(settled.refined.information);
   const double weight = 2 * (1 - sigma / thresholds.max_inverse_depth_sigma);
   std::vector<int> used =
-      Within(ResidualNorms(scene, track, place.Homogeneous()),
+      Within(ResidualNorms(scene, track, settled.place.Homogeneous()),
              thresholds.loss.gate * scene.pixel_sigma_px());
   if (!EnoughLeft(used, track) || !(weight > 0)) {
     return std::nullopt;
   }
-  return ScreenedLandmark{0, place, std::min(weight, 1.0), std::move(used)};
+  return ScreenedLandmark{
+      0, settled.place, std::min(weight, 1.0), std::move(used)};
 }
 
 Screening Screen(const LandmarkScene& scene,
                  const CalibrationProblem& problem,
                  const CalibrateOptions& options,
-                 const std::vector<std::optional<LandmarkPlace>>& places) {
+                 const std::vector<TrackPlaces>& places) {
   const Thresholds thresholds = FindThresholds(scene, options, problem, places);
 
   Screening result;
@@ -113,8 +135,15 @@ Screening Screen(const LandmarkScene& scene,
     const Track& track = problem.tracks[t];
     const auto observed = static_cast<int>(track.observations.size());
     std::optional<ScreenedLandmark> landmark;
-    if (places[t]) {
-      landmark = Settle(scene, track, thresholds, *places[t]);
+    if (places[t].found) {
+      SettledPlace settled =
+          SettlePlace(scene, track, thresholds.loss, *places[t].found);
+      if (places[t].other) {
+        SettledPlace other =
+            SettlePlace(scene, track, thresholds.loss, *places[t].other);
+        if (other.refined.cost < settled.refined.cost) settled = other;
+      }
+      landmark = Judge(scene, track, thresholds, settled);
     }
     if (!landmark) {
       ++result.landmarks_dropped;
@@ -130,20 +159,56 @@ Screening Screen(const LandmarkScene& scene,
   return result;
 }
 
-// Where a track was, anchored anew, if all of it lies within the gate there.
-std::optional<LandmarkPlace> PlaceBefore(const LandmarkScene& scene,
-                                         const Track& track,
-                                         const LandmarkPlace& before,
-                                         double gate_px) {
+// No landmark gets a larger weight than before, and none that was dropped comes
+// back.
+void OnlyFall(const CalibrationProblem& problem,
+              const Screening& before,
+              Screening* now) {
+  std::vector<double> weights(problem.tracks.size(), 0);
+  for (const ScreenedLandmark& landmark : before.landmarks) {
+    weights[landmark.track] = landmark.weight;
+  }
+  const auto back = [&](const ScreenedLandmark& landmark) {
+    return weights[landmark.track] == 0;
+  };
+  for (ScreenedLandmark& landmark : now->landmarks) {
+    landmark.weight = std::min(landmark.weight, weights[landmark.track]);
+    if (!back(landmark)) continue;
+    const auto used = static_cast<int>(landmark.used.size());
+    ++now->landmarks_dropped;
+    now->observations -= used;
+    now->observations_dropped += used;
+  }
+  std::erase_if(now->landmarks, back);
+}
+
+// Where a track was, anchored anew; as the place that was found where all of it
+// lies within the gate there.
+TrackPlaces PlacesBefore(const LandmarkScene& scene,
+                         const Track& track,
+                         const LandmarkPlace& before,
+                         double gate_px,
+                         bool keep_other) {
   const Eigen::Vector4d point_G = before.Homogeneous();
   const std::vector<double> norms_px = ResidualNorms(scene, track, point_G);
-  if (*std::max_element(norms_px.begin(), norms_px.end()) > gate_px) {
-    return std::nullopt;
+  TrackPlaces places;
+  if (*std::max_element(norms_px.begin(), norms_px.end()) <= gate_px) {
+    places.found = PlaceAt(scene, track, point_G);
+  } else if (keep_other) {
+    places.other = PlaceAt(scene, track, point_G);
   }
-  return PlaceAt(scene, track, point_G);
+  return places;
 }
 
 }  // namespace
+
+void SetTrackNoise(double factor, Screening* screening) {
+  const double ratio = screening->track_noise_factor / factor;
+  for (ScreenedLandmark& landmark : screening->landmarks) {
+    landmark.weight *= ratio * ratio;
+  }
+  screening->track_noise_factor = factor;
+}
 
 Screening ScreenLandmarks(const Rig& rig,
                           const Calibration& theta,
@@ -152,23 +217,35 @@ Screening ScreenLandmarks(const Rig& rig,
                           const CalibrateOptions& options,
                           const Screening* before) {
   const LandmarkScene scene(theta, keyframes, rig.pixel_sigma_px);
-  std::vector<std::optional<LandmarkPlace>> places(problem.tracks.size());
+  std::vector<TrackPlaces> places(problem.tracks.size());
+  const int screenings = before != nullptr ? before->screenings + 1 : 1;
+  const bool settle = screenings > kFreeScreenings;
   if (before != nullptr) {
     for (const ScreenedLandmark& landmark : before->landmarks) {
       places[landmark.track] =
-          PlaceBefore(scene,
-                      problem.tracks[landmark.track],
-                      landmark.place,
-                      before->loss.gate * rig.pixel_sigma_px);
+          PlacesBefore(scene,
+                       problem.tracks[landmark.track],
+                       landmark.place,
+                       before->loss.gate * rig.pixel_sigma_px,
+                       settle);
     }
   }
   for (std::size_t t = 0; t < places.size(); ++t) {
     const Track& track = problem.tracks[t];
-    if (!places[t] && track.observations.size() >= kMinTrackObservations) {
-      places[t] = TriangulateTrack(scene, track);
+    if (!places[t].found &&
+        track.observations.size() >= kMinTrackObservations) {
+      places[t].found = TriangulateTrack(scene, track);
     }
   }
-  return Screen(scene, problem, options, places);
+  Screening result = Screen(scene, problem, options, places);
+  result.screenings = screenings;
+  if (before != nullptr) {
+    SetTrackNoise(before->track_noise_factor, &result);
+  }
+  if (settle) {
+    OnlyFall(problem, *before, &result);
+  }
+  return result;
 }
 
 ReprojectionStatistics MeasureReprojection(

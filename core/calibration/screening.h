@@ -2,7 +2,10 @@
 //
 // Decided anew at every estimate, as a function of that estimate only: what was
 // dropped before may come back, and two ways to one optimum end with the same
-// set. Pure, any thread.
+// set. Where that goes on for long, the estimate and what it stands on chase
+// each other: a track has two minima and changes over, or the landmarks of a
+// device at rest support the very motion that gives them parallax. Then the
+// history decides, so that it ends. Pure, any thread.
 #pragma once
 
 #include <cstddef>
@@ -32,6 +35,10 @@ inline constexpr double kMaxOutlierFraction = 0.5;
 // difference: else it may come and go for ever.
 inline constexpr double kMaxDepthUncertainty = 0.5;
 
+// After so many screenings, each from the one before, weights only fall, and a
+// track leaves a minimum only for a lower one.
+inline constexpr int kFreeScreenings = 10;
+
 struct ScreenedLandmark {
   int track = 0;  // index into CalibrationProblem::tracks
   LandmarkPlace place;
@@ -46,7 +53,13 @@ struct Screening {
   int landmarks_dropped = 0;
   int observations = 0;  // used
   int observations_dropped = 0;
+  int screenings = 1;  // that led to this one
+  double track_noise_factor = 1;
 };
+
+// Takes the pixel errors for so many times larger (track_noise.h), instead of
+// what the factor was before.
+void SetTrackNoise(double factor, Screening* screening);
 
 struct ReprojectionStatistics {
   double rms_px = 0;     // of the residual norms of what is used
@@ -55,7 +68,8 @@ struct ReprojectionStatistics {
 
 // Tracks are triangulated from their observations alone; but those that, where
 // `before` has them, lie within its gate with all of their observations, are
-// taken from there: the outcome is the same, much sooner.
+// taken from there: the outcome is the same, much sooner. The track noise is
+// that of `before`.
 Screening ScreenLandmarks(const Rig& rig,
                           const Calibration& theta,
                           const CalibrationProblem& problem,

@@ -40,7 +40,8 @@ class Tracker {
         random_(options.seed, kTrackStream),
         noise_(options.seed, kPixelNoiseStream),
         outliers_(options.seed, kOutlierStream),
-        tracked_(theta.cameras.size()) {}
+        tracked_(theta.cameras.size()),
+        errors_(theta.cameras.size()) {}
 
   void Step(int keyframe, const KeyframeState& state) {
     keyframe_ = keyframe;
@@ -146,6 +147,22 @@ class Tracker {
            Project(c, p_C, z_px, nullptr) && InsideImage(c, *z_px);
   }
 
+  // Of the next pixel of a track, in sigmas: a random walk that forgets.
+  Eigen::Vector2d NextError(int camera, int landmark) {
+    std::vector<TrackError>& errors = errors_[camera];
+    if (errors.size() < begun_.size()) errors.resize(begun_.size());
+    TrackError& last = errors[landmark];
+    const double dx = noise_.Normal();
+    const double dy = noise_.Normal();
+    Eigen::Vector2d error(dx, dy);
+    if (last.keyframe == keyframe_ - 1) {
+      const double rho = options_.pixel_correlation;
+      error = rho * last.error + std::sqrt(1 - rho * rho) * error;
+    }
+    last = {keyframe_, error};
+    return error;
+  }
+
   // Adds the observation unless its pixel, before or after noise, is outside.
   bool Observe(int camera, int landmark) {
     const CameraCalibration& c = theta_.cameras[camera];
@@ -154,10 +171,8 @@ class Tracker {
     observation.camera = camera;
     observation.landmark = landmark;
     if (!Sees(camera, landmark, &observation.true_px)) return false;
-    const double dx = noise_.Normal();
-    const double dy = noise_.Normal();
     observation.measured_px =
-        observation.true_px + pixel_sigma_px_ * Eigen::Vector2d(dx, dy);
+        observation.true_px + pixel_sigma_px_ * NextError(camera, landmark);
     if (!InsideImage(c, observation.measured_px)) return false;
     const Eigen::Vector2d elsewhere = RandomPixel(c, &outliers_);
     if (outliers_.Chance(options_.outlier_fraction)) {
@@ -177,7 +192,12 @@ class Tracker {
   int keyframe_ = 0;
   const KeyframeState* state_ = nullptr;
   FeatureTracks tracks_;
-  std::vector<std::vector<int>> tracked_;  // landmarks in each camera
+  struct TrackError {
+    int keyframe = -2;  // that saw it last
+    Eigen::Vector2d error = Eigen::Vector2d::Zero();
+  };
+  std::vector<std::vector<int>> tracked_;        // landmarks in each camera
+  std::vector<std::vector<TrackError>> errors_;  // of them
   std::vector<int> trackers_;   // for each landmark: cameras that track it
   std::vector<int> last_seen_;  // for each landmark: keyframe, or -1
   std::vector<int> begun_;      // for each landmark: keyframe

@@ -33,6 +33,9 @@ struct SimulationOptions {
   double min_depth_m = 0.5;  // of a landmark where it is first seen
   double max_depth_m = 8;
   double outlier_fraction = 0;  // observations replaced by a random pixel
+  // Of the pixel error of a track with that in the keyframe before, in [0, 1):
+  // real trackers drift, errors go together along a track.
+  double pixel_correlation = 0;
   bool noise = true;            // false: perfect sensors, biases constant
   // Errors of the SLAM system, one standard deviation. Most of each drifts
   // slowly, a small part is new with every keyframe.

@@ -22,6 +22,26 @@ TEST(RobustLoss, WeightIsTheDerivativeOfTheValue) {
   }
 }
 
+TEST(RobustLoss, CurvatureIsTheDerivativeOfTheGradient) {
+  for (const RobustLoss& loss : kLosses) {
+    const double corners[] = {std::pow(loss.scale, 2),
+                              std::pow(0.6 * loss.gate, 2),
+                              std::pow(loss.gate, 2)};
+    for (double s = 0.05; s < 150; s *= 1.07) {
+      const double h = 1e-5 * s;
+      bool at_corner = false;
+      for (const double corner : corners) {
+        at_corner = at_corner || std::abs(s - corner) < 2 * h;
+      }
+      if (at_corner) continue;
+      const double slope =
+          ((s + h) * loss.Weight(s + h) - (s - h) * loss.Weight(s - h)) /
+          (2 * h);
+      EXPECT_NEAR(slope, loss.Curvature(s), 1e-4) << "s = " << s;
+    }
+  }
+}
+
 TEST(RobustLoss, SmallResidualsCountFully) {
   for (const RobustLoss& loss : kLosses) {
     EXPECT_NEAR(loss.Weight(1e-9), 1, 1e-8);

@@ -1,0 +1,184 @@
+#include "core/calibration/track_noise.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include "core/calibration/landmark_place.h"
+#include "core/factor/reprojection.h"
+
+namespace selfcal {
+namespace {
+
+// With fewer residuals to spare nothing is said.
+constexpr int kLeastRedundancy = 100;
+
+using PoseSteps = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+// Steps of theta of one sigma each in independent directions, and the steps of
+// every keyframe's pose that go along.
+struct Directions {
+  Eigen::MatrixXd theta;
+  std::vector<PoseSteps> poses;
+};
+
+Directions FindDirections(const SolverRound& round,
+                          const LinearisedRound& linearised) {
+  const Eigen::MatrixXd reduced =
+      round.basis.transpose() * linearised.by_offset.Lambda * round.basis;
+  const Eigen::LLT<Eigen::MatrixXd> llt(reduced);
+  Directions directions;
+  directions.theta = linearised.theta_by_offset * round.basis *
+                     llt.matrixU().solve(Eigen::MatrixXd::Identity(
+                         reduced.rows(), reduced.cols()));
+  const Eigen::Index count = directions.theta.cols();
+  std::vector<ChainStateVector> at_rest, moved;
+  std::vector<Eigen::Vector3d> landmarks;
+  linearised.system.FindSteps(
+      Eigen::VectorXd::Zero(directions.theta.rows()), &at_rest, &landmarks);
+  directions.poses.assign(at_rest.size(), PoseSteps(6, count));
+  for (Eigen::Index j = 0; j < count; ++j) {
+    linearised.system.FindSteps(directions.theta.col(j), &moved, &landmarks);
+    for (std::size_t k = 0; k < moved.size(); ++k) {
+      directions.poses[k].col(j) = (moved[k] - at_rest[k]).head<6>();
+    }
+  }
+  return directions;
+}
+
+// Sums over the observations of one landmark, or of all.
+struct TrackSums {
+  double scatter = 0;      // |g|^2 over the directions
+  double information = 0;  // trace, the landmark eliminated
+  // Of the weight and of the curvature of the loss, each times how strongly
+  // the observation depends on the directions.
+  double weight = 0, curvature = 0;
+  int observations = 0;
+};
+
+// By (alpha, beta, rho), of the homogeneous point.
+Eigen::Matrix<double, 4, 3> PointByPlace(const LandmarkPlace& place) {
+  Eigen::Matrix<double, 4, 3> by_place = Eigen::Matrix<double, 4, 3>::Zero();
+  by_place.topLeftCorner<3, 2>() = place.anchor.R_GA.leftCols<2>();
+  by_place.col(2) << place.anchor.a_G, 1;
+  return by_place;
+}
+
+class TrackSummer {
+ public:
+  TrackSummer(const SolverRound& round,
+              const CalibrationEstimate& estimate,
+              const Directions& directions)
+      : round_(round),
+        theta_(BoxPlus(round.reference, estimate.d)),
+        keyframes_(estimate.keyframes),
+        directions_(directions) {}
+
+  TrackSums Sum(const ScreenedLandmark& landmark) const {
+    const Eigen::Index D = directions_.theta.cols();
+    const Track& track = round_.problem.tracks[landmark.track];
+    const Eigen::Vector4d point_G = landmark.place.Homogeneous();
+    const Eigen::Matrix<double, 4, 3> by_place = PointByPlace(landmark.place);
+    TrackSums sums;
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(D);
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    H(2, 2) = 1 / (kInverseDepthSigma * kInverseDepthSigma);
+    Eigen::Matrix<double, 3, Eigen::Dynamic> coupling =
+        Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, D);
+    for (const int index : landmark.used) {
+      const std::optional<Row> row = RowOf(track.observations[index], point_G);
+      if (!row) continue;
+      const double s = row->r.squaredNorm();
+      const double weight = round_.loss.Weight(s);
+      const Eigen::Matrix<double, 2, 3> by_landmark = row->by_point * by_place;
+      const double square = row->along.squaredNorm();
+      gradient += weight * row->along.transpose() * row->r;
+      H += weight * by_landmark.transpose() * by_landmark;
+      coupling += weight * by_landmark.transpose() * row->along;
+      sums.weight += weight * square;
+      sums.curvature += round_.loss.Curvature(s) * square;
+      ++sums.observations;
+    }
+    const double w = landmark.weight;
+    const double absorbed =
+        coupling.cwiseProduct(H.ldlt().solve(coupling)).sum();
+    sums.scatter = w * w * gradient.squaredNorm();
+    sums.information = w * (sums.weight - absorbed);
+    sums.weight *= w;
+    sums.curvature *= w;
+    return sums;
+  }
+
+ private:
+  // A residual in sigmas, with its derivatives by the homogeneous point and
+  // along the directions.
+  struct Row {
+    Eigen::Vector2d r;
+    Eigen::Matrix<double, 2, 4> by_point;
+    Eigen::Matrix<double, 2, Eigen::Dynamic> along;
+  };
+
+  std::optional<Row> RowOf(const TrackObservation& seen,
+                           const Eigen::Vector4d& point_G) const {
+    const KeyframeState& x = keyframes_[seen.keyframe];
+    ReprojectionJacobians jacobians;
+    Row row;
+    if (!Reproject(x.q_GI,
+                   x.p_GI,
+                   theta_.cameras[seen.camera],
+                   point_G,
+                   seen.z_px,
+                   &row.r,
+                   &jacobians)) {
+      return std::nullopt;
+    }
+    const double scale = 1 / round_.rig.pixel_sigma_px;
+    row.r *= scale;
+    row.by_point = scale * jacobians.landmark;
+    row.along = scale * (jacobians.camera *
+                             directions_.theta.middleRows(
+                                 CameraTangentOffset(theta_, seen.camera),
+                                 jacobians.camera.cols()) +
+                         jacobians.pose * directions_.poses[seen.keyframe]);
+    return row;
+  }
+
+  const SolverRound& round_;
+  const Calibration theta_;
+  const std::vector<KeyframeState>& keyframes_;
+  const Directions& directions_;
+};
+
+}  // namespace
+
+double TrackNoiseFactor(const SolverRound& round,
+                        const LinearisedRound& linearised,
+                        const CalibrationEstimate& estimate,
+                        const std::vector<ScreenedLandmark>& landmarks) {
+  if (round.basis.cols() == 0) return 1;
+  const Directions directions = FindDirections(round, linearised);
+  const TrackSummer summer(round, estimate, directions);
+  TrackSums all;
+  for (const ScreenedLandmark& landmark : landmarks) {
+    const TrackSums sums = summer.Sum(landmark);
+    all.scatter += sums.scatter;
+    all.information += sums.information;
+    all.weight += sums.weight;
+    all.curvature += sums.curvature;
+    all.observations += sums.observations;
+  }
+  // Keyframes and theta follow the errors and leave residuals smaller.
+  const double residuals = 2.0 * all.observations - 3.0 * landmarks.size();
+  const double absorbed = 6.0 * estimate.keyframes.size() + round.basis.cols();
+  if (!(residuals - absorbed > kLeastRedundancy) || !(all.information > 0) ||
+      !(all.curvature > 0)) {
+    return 1;
+  }
+  const double stiffness = all.curvature / all.weight;
+  return std::sqrt(all.scatter / all.information * residuals /
+                   (residuals - absorbed)) /
+         stiffness;
+}
+
+}  // namespace selfcal

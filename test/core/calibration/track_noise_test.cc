@@ -1,0 +1,98 @@
+// Pixel errors that go together along a track are noticed, and sigmas stay
+// honest.
+#include "core/calibration/track_noise.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cstdint>
+#include <cstdio>
+
+#include "core/calibration/calibrate.h"
+#include "core/simulation/simulate.h"
+
+namespace selfcal {
+namespace {
+
+struct Outcome {
+  CalibrationResult result;
+  double nees = 0;
+};
+
+// A simulated device whose rig takes its pixels to be `believed` times as noisy
+// as they are.
+Outcome CalibrateDevice(std::uint64_t seed,
+                        double pixel_correlation,
+                        double believed,
+                        const CalibrateOptions& options) {
+  Rig rig = HandheldRig("simulated");
+  const Calibration truth = rig.factory;
+  rig.factory = PerturbCalibration(truth, {}, seed);
+  SimulationOptions simulation;
+  simulation.seed = seed;
+  simulation.pixel_correlation = pixel_correlation;
+  const auto session = Simulate(
+      rig, truth, rig.factory, *MakeMixed(17, seed), "session", simulation);
+  rig.pixel_sigma_px *= believed;
+  Outcome outcome{Calibrate(rig, rig.factory, session.segments, options), 0};
+  const Eigen::VectorXd error = BoxMinus(outcome.result.theta, truth);
+  outcome.nees = error.dot(outcome.result.covariance.ldlt().solve(error));
+  return outcome;
+}
+
+TEST(TrackNoise, IndependentErrorsAreLeftAlone) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const CalibrationResult result = CalibrateDevice(seed, 0, 1, {}).result;
+    ASSERT_EQ(result.status, CalibrateStatus::kConverged);
+    EXPECT_EQ(result.track_noise_factor, 1) << "seed " << seed;
+  }
+}
+
+// Of the sigmas of one result against those of another, geometric mean.
+double SigmaRatio(const CalibrationResult& a, const CalibrationResult& b) {
+  const Eigen::ArrayXd ratios =
+      a.covariance.diagonal().array() / b.covariance.diagonal().array();
+  return std::exp(0.5 * ratios.log().mean());
+}
+
+TEST(TrackNoise, SigmasStayHonestWhenThePixelSigmaIsTooSmall) {
+  for (const LossKind loss :
+       {LossKind::kNone, LossKind::kHuber, LossKind::kCauchy}) {
+    CalibrateOptions options;
+    options.loss = loss;
+    const CalibrationResult right = CalibrateDevice(4, 0, 1, options).result;
+    const CalibrationResult small = CalibrateDevice(4, 0, 0.5, options).result;
+    ASSERT_EQ(small.status, CalibrateStatus::kConverged);
+    EXPECT_GT(small.track_noise_factor, 1.2);
+    // A loss at half the scale makes less of the data, by a few percent. Where
+    // weights fall as fast as Cauchy's, those of residuals, which landmarks
+    // have made smaller, claim more than those of the errors would.
+    const double ratio = SigmaRatio(small, right);
+    EXPECT_GT(ratio, loss == LossKind::kCauchy ? 0.85 : 0.95)
+        << "loss " << static_cast<int>(loss);
+    EXPECT_LT(ratio, 1.2) << "loss " << static_cast<int>(loss);
+    if (loss == LossKind::kNone) {
+      EXPECT_NEAR(small.track_noise_factor, 2, 0.1);
+    }
+  }
+}
+
+TEST(TrackNoise, SigmasStayHonestWhenTracksDrift) {
+  constexpr int kSeeds = 6;
+  double with = 0, without = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const Outcome weighted = CalibrateDevice(seed, 0.8, 1, {});
+    ASSERT_EQ(weighted.result.status, CalibrateStatus::kConverged);
+    with += weighted.nees;
+    without += CalibrateDevice(seed, 0.8, 1, {.correlated_tracks = false}).nees;
+  }
+  // 99.9 % of the chi-square distribution with 6 x 26 degrees of freedom.
+  EXPECT_LT(with, 215.7);
+  EXPECT_GT(without, 215.7);
+  std::printf("mean NEES of 26: %.1f, unweighted %.1f\n",
+              with / kSeeds,
+              without / kSeeds);
+}
+
+}  // namespace
+}  // namespace selfcal
