@@ -47,6 +47,11 @@ void AddSolver(const v1::SolverReport& solver, Facts* facts) {
                          solver.landmarks_dropped(),
                          solver.observations(),
                          solver.observations_dropped()));
+  if (solver.track_noise_factor() > 1) {
+    facts->Add("pixel errors along tracks",
+               fmt::format("count as {:.2f} times the rig's sigma",
+                           solver.track_noise_factor()));
+  }
   facts->Add("observed directions",
              fmt::format("{} of {}", solver.rank(), solver.components()));
   for (const auto& direction : solver.held_constant()) {

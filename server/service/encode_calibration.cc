@@ -88,6 +88,7 @@ void FillReport(const CalibrationResult& result,
   message->set_landmarks_dropped(result.landmarks_dropped);
   message->set_observations(result.observations);
   message->set_observations_dropped(result.observations_dropped);
+  message->set_track_noise_factor(result.track_noise_factor);
   message->set_seconds(seconds);
 }
 

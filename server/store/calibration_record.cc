@@ -57,6 +57,7 @@ void PutSolver(const CalibrationResult& result, SolverRecord* record) {
   record->set_landmarks_dropped(result.landmarks_dropped);
   record->set_observations(result.observations);
   record->set_observations_dropped(result.observations_dropped);
+  record->set_track_noise_factor(result.track_noise_factor);
 }
 
 CalibrationResult GetSolver(const SolverRecord& record) {
@@ -79,6 +80,7 @@ CalibrationResult GetSolver(const SolverRecord& record) {
   result.landmarks_dropped = record.landmarks_dropped();
   result.observations = record.observations();
   result.observations_dropped = record.observations_dropped();
+  result.track_noise_factor = record.track_noise_factor();
   return result;
 }
 

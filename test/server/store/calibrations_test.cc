@@ -35,6 +35,7 @@ class CalibrationsTest : public StoreTest {
     report.rank = size - 1;
     report.held_constant = {{{{"imu.gyro.scale.x", 1.0}}, 0.2}};
     report.observations = 1234;
+    report.track_noise_factor = 1.0 / 0.7;
     calibration.report = report;
     return calibration;
   }
@@ -66,6 +67,7 @@ TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   EXPECT_EQ(stored->report->iterations, 12);
   EXPECT_EQ(stored->report->final_cost, 1.0 / 9);
   EXPECT_EQ(stored->report->observations, 1234);
+  EXPECT_EQ(stored->report->track_noise_factor, 1.0 / 0.7);
   ASSERT_EQ(stored->report->held_constant.size(), 1u);
   ExpectSameCalibration(stored->report->theta, candidate.theta);
 }
