@@ -82,6 +82,7 @@ void FillCamera(const CameraCalibration& camera,
                                      camera.distortion.end());
   message->set_width_px(camera.width_px);
   message->set_height_px(camera.height_px);
+  message->set_time_offset_s(camera.time_offset_s);
 }
 
 void ReadDistortion(const v1::CameraCalibration& message,
@@ -121,6 +122,7 @@ void ReadCamera(const v1::CameraCalibration& message,
   camera->c = Value(message.c());
   camera->width_px = message.width_px();
   camera->height_px = message.height_px();
+  camera->time_offset_s = message.time_offset_s();
   ReadDistortion(message, prefix, camera, violations);
 }
 

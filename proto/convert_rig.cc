@@ -14,7 +14,9 @@ ImuNoise Value(const v1::ImuNoise& message) {
 }
 
 std::vector<ParameterGroup> ReadGroups(const v1::Rig& message) {
-  if (message.groups().empty()) return DefaultGroups();
+  if (message.groups().empty()) {
+    return DefaultGroups(message.estimate_time_offset());
+  }
   std::vector<ParameterGroup> groups;
   for (const v1::ParameterGroup& group : message.groups()) {
     groups.push_back(
@@ -40,6 +42,7 @@ void ReadSettings(const v1::Rig& message, Rig* rig) {
   if (message.has_retrigger_fraction()) {
     rig->retrigger_fraction = message.retrigger_fraction();
   }
+  rig->estimate_time_offset = message.estimate_time_offset();
 }
 
 }  // namespace
@@ -70,6 +73,7 @@ v1::Rig ToProto(const Rig& rig) {
   message.set_table_size(rig.table_size);
   message.set_min_gain_nats(rig.min_gain_nats);
   message.set_retrigger_fraction(rig.retrigger_fraction);
+  message.set_estimate_time_offset(rig.estimate_time_offset);
   return message;
 }
 

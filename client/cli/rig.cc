@@ -59,6 +59,7 @@ Facts Describe(const v1::Rig& rig) {
               fmt::format("{}: {:g}", prior.pattern(), prior.value()));
   }
   for (const auto& pattern : rig.fixed()) facts.Add("fixed", pattern);
+  facts.Add("time offset", rig.estimate_time_offset() ? "estimated" : "known");
   facts.Add("table size", fmt::format("{}", rig.table_size()));
   facts.Add("minimum gain", fmt::format("{:g} nat", rig.min_gain_nats()));
   facts.Add("retrigger fraction",
@@ -157,6 +158,10 @@ void AddOverrides(CLI::App* create, RigInput* input) {
                      input->fixed,
                      "Never estimate the components of this name, '*' at "
                      "either end stands for anything; repeatable");
+  create->add_flag("--estimate-time-offset",
+                   input->estimate_time_offset,
+                   "Estimate the time offset of each camera, instead of "
+                   "holding it as the factory has it");
 }
 
 }  // namespace

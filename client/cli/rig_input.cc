@@ -30,7 +30,9 @@ absl::StatusOr<v1::Rig> ReadBase(const RigInput& input) {
   if (!input.vi_map.empty()) {
     absl::StatusOr<ViMapRecording> recording = ReadViMap(input.vi_map, {});
     if (!recording.ok()) return recording.status();
-    return ToProto(recording->rig);
+    v1::Rig rig = ToProto(recording->rig);
+    rig.clear_groups();  // a VI-map has none: the daemon knows the default
+    return rig;
   }
   const auto json = ReadFile(input.file);
   if (!json.ok()) return json.status();
@@ -79,6 +81,7 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input) {
                          input.gyro_bias_walk || input.accel_bias_walk;
   if (any_noise) *rig->mutable_imu_noise() = noise;
   rig->mutable_fixed()->Add(input.fixed.begin(), input.fixed.end());
+  if (input.estimate_time_offset) rig->set_estimate_time_offset(true);
   return rig;
 }
 

@@ -26,6 +26,7 @@ struct RigInput {
   std::optional<double> min_gain_nats;
   std::optional<double> retrigger_fraction;
   std::vector<std::string> fixed;
+  bool estimate_time_offset = false;
 };
 
 // INVALID_ARGUMENT and NOT_FOUND for what cannot be read, with the file's name.

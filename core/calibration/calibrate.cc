@@ -220,16 +220,21 @@ class Calibrator {
   // Decides anew what the next round stands on.
   void Screen(const Screening* before) {
     const Calibration theta = Theta();
+    MeasureMotions(rig_, theta, problem_, estimate_.keyframes, &motions_);
     screening_ = ScreenLandmarks(
-        rig_, theta, problem_, estimate_.keyframes, options_, before);
+        rig_, theta, problem_, estimate_.keyframes, motions_, options_, before);
     SetTrackNoise(result_.track_noise_factor, &screening_);
     whitening_ =
         WhitenInertialLinks(rig_, theta.imu, problem_, estimate_.keyframes);
   }
 
   ReprojectionStatistics Measure() const {
-    return MeasureReprojection(
-        rig_, Theta(), problem_, estimate_.keyframes, screening_.landmarks);
+    return MeasureReprojection(rig_,
+                               Theta(),
+                               problem_,
+                               estimate_.keyframes,
+                               motions_,
+                               screening_.landmarks);
   }
 
   // Information and covariance of the offset d at the estimate. False if
@@ -286,6 +291,7 @@ class Calibrator {
     return {.rig = rig_,
             .reference = reference_,
             .problem = problem_,
+            .motions = motions_,
             .whitening = whitening_,
             .basis = basis,
             .loss = screening_.loss,
@@ -378,6 +384,7 @@ class Calibrator {
   Eigen::VectorXd start_d_;
   CalibrationEstimate estimate_;
   ThetaSubspace subspace_;
+  KeyframeMotions motions_;
   Screening screening_;
   std::vector<InertialMatrix> whitening_;
   LinearisedRound linearised_;

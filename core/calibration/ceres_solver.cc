@@ -210,7 +210,8 @@ class Builder {
                                  seen.camera,
                                  seen.z_px,
                                  round_.rig.pixel_sigma_px,
-                                 landmarks[i].place.anchor)
+                                 landmarks[i].place.anchor,
+                                 round_.motions.At(seen.keyframe, seen.camera))
                 .release(),
             &losses_.back(),
             d_.data(),

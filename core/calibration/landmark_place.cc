@@ -61,14 +61,25 @@ Linearised Linearise(const LandmarkScene& scene,
 
 LandmarkScene::LandmarkScene(const Calibration& theta,
                              std::span<const KeyframeState> keyframes,
+                             const KeyframeMotions& motions,
                              double pixel_sigma_px)
     : theta_(theta), pixel_sigma_px_(pixel_sigma_px) {
   views_.reserve(keyframes.size() * theta.cameras.size());
-  for (const KeyframeState& x : keyframes) {
-    for (const CameraCalibration& camera : theta.cameras) {
+  const int cameras = static_cast<int>(theta.cameras.size());
+  for (int k = 0; k < static_cast<int>(keyframes.size()); ++k) {
+    for (int j = 0; j < cameras; ++j) {
+      const CameraCalibration& camera = theta.cameras[j];
+      Eigen::Quaterniond q_GI = keyframes[k].q_GI;
+      Eigen::Vector3d p_GI = keyframes[k].p_GI;
+      if (const KeyframeMotion* motion = motions.At(k, j)) {
+        const ExposurePose exposure =
+            MovePose(q_GI, p_GI, *motion, camera.time_offset_s);
+        q_GI = exposure.q_GI;
+        p_GI = exposure.p_GI;
+      }
       const Eigen::Matrix3d R_CG =
-          (camera.q_CI * x.q_GI.conjugate()).toRotationMatrix();
-      views_.push_back({R_CG, camera.p_CI - R_CG * x.p_GI});
+          (camera.q_CI * q_GI.conjugate()).toRotationMatrix();
+      views_.push_back({R_CG, camera.p_CI - R_CG * p_GI});
     }
   }
 }

@@ -11,6 +11,7 @@
 #include "core/calibration/problem.h"
 #include "core/calibration/robust_loss.h"
 #include "core/factor/ceres_factors.h"
+#include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
 
@@ -28,6 +29,7 @@ class LandmarkScene {
   // theta must outlive the scene.
   LandmarkScene(const Calibration& theta,
                 std::span<const KeyframeState> keyframes,
+                const KeyframeMotions& motions,
                 double pixel_sigma_px);
 
   double pixel_sigma_px() const { return pixel_sigma_px_; }

@@ -129,12 +129,14 @@ void LinearSystem::Linearise(const Rig& rig,
                              const Calibration& theta,
                              const CalibrationProblem& problem,
                              const std::vector<KeyframeState>& keyframes,
+                             const KeyframeMotions& motions,
                              const std::vector<ScreenedLandmark>& landmarks,
                              std::span<const InertialNoiseRoot> roots,
                              const RobustLoss* loss) {
   rig_ = &rig;
   theta_ = &theta;
   keyframes_ = &keyframes;
+  motions_ = &motions;
   camera_sizes_.clear();
   for (const CameraCalibration& camera : theta.cameras) {
     camera_sizes_.push_back(CameraTangentSize(camera));

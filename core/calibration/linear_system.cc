@@ -160,7 +160,8 @@ ObservationRun LinearSystem::Gather(int view, const Keep& keep) {
           &theta_->cameras[view % cameras],
           static_cast<int>(seen_of_view_.size()),
           landmarks_of_view_.data(),
-          z_px_.data()};
+          z_px_.data(),
+          motions_->At(view / cameras, view % cameras)};
 }
 
 void LinearSystem::Weigh(const std::vector<ScreenedLandmark>& landmarks,
@@ -283,8 +284,12 @@ void LinearSystem::AddViews(Chain* chain) {
                             rig_->pixel_sigma_px,
                             weights_.data(),
                             rows_.data());
-    chain->elimination.AddObservations(
-        view / cameras - chain->range.begin, camera, rows_.data(), factors_);
+    const auto turn = PoseTurn(run);
+    chain->elimination.AddObservations(view / cameras - chain->range.begin,
+                                       camera,
+                                       rows_.data(),
+                                       factors_,
+                                       turn ? &*turn : nullptr);
   }
 }
 

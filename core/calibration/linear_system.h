@@ -26,6 +26,7 @@
 #include "core/calibration/screening.h"
 #include "core/elimination/chain_elimination.h"
 #include "core/factor/inertial_batch.h"
+#include "core/factor/keyframe_motion.h"
 #include "core/factor/reprojection_batch.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
@@ -57,6 +58,7 @@ class LinearSystem {
                  const Calibration& theta,
                  const CalibrationProblem& problem,
                  const std::vector<KeyframeState>& keyframes,
+                 const KeyframeMotions& motions,
                  const std::vector<ScreenedLandmark>& landmarks,
                  std::span<const InertialNoiseRoot> roots,
                  const RobustLoss* loss);
@@ -144,6 +146,7 @@ class LinearSystem {
   const Rig* rig_ = nullptr;
   const Calibration* theta_ = nullptr;
   const std::vector<KeyframeState>* keyframes_ = nullptr;
+  const KeyframeMotions* motions_ = nullptr;
   std::vector<int> camera_sizes_;
   std::vector<ChainStateMatrix> priors_;
   std::vector<bool> has_prior_;

@@ -84,6 +84,7 @@ CalibrationProblem FlattenSegments(
     problem.keyframes.insert(problem.keyframes.end(),
                              segment->keyframes.begin(),
                              segment->keyframes.end());
+    problem.samples.resize(problem.keyframes.size(), segment->imu);
   }
   for (const SegmentJoint& joint : partitioning.joints) {
     const int after = first_keyframe[joint.after];
@@ -110,6 +111,17 @@ CalibrationProblem FlattenSegments(
     AddTracks(segments, partition, first_keyframe, &problem.tracks);
   }
   return problem;
+}
+
+void MeasureMotions(const Rig& rig,
+                    const Calibration& theta,
+                    const CalibrationProblem& problem,
+                    std::span<const KeyframeState> keyframes,
+                    KeyframeMotions* motions) {
+  motions->Measure(
+      rig, theta, EstimatedTimeOffsets(rig), keyframes, [&](std::size_t k) {
+        return problem.samples[k];
+      });
 }
 
 }  // namespace selfcal

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/calibration/partition.h"
+#include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
@@ -44,6 +45,8 @@ struct BiasLink {
 
 struct CalibrationProblem {
   std::vector<KeyframeState> keyframes;  // as the SLAM system estimated them
+  // About each keyframe, those of its segment, which must outlive them.
+  std::vector<std::span<const ImuSample>> samples;
   // First keyframe of each partition: carries the gauge.
   std::vector<int> gauge_keyframes;
   // First keyframe of each chain of inertial links.
@@ -63,6 +66,13 @@ CalibrationProblem FlattenSegments(
     const Rig& rig,
     const std::vector<const MotionSegment*>& segments,
     const Partitioning& partitioning);
+
+// The motions about all keyframes at an estimate.
+void MeasureMotions(const Rig& rig,
+                    const Calibration& theta,
+                    const CalibrationProblem& problem,
+                    std::span<const KeyframeState> keyframes,
+                    KeyframeMotions* motions);
 
 // theta = reference [+] d, and the states of all keyframes.
 struct CalibrationEstimate {

@@ -214,9 +214,10 @@ Screening ScreenLandmarks(const Rig& rig,
                           const Calibration& theta,
                           const CalibrationProblem& problem,
                           const std::vector<KeyframeState>& keyframes,
+                          const KeyframeMotions& motions,
                           const CalibrateOptions& options,
                           const Screening* before) {
-  const LandmarkScene scene(theta, keyframes, rig.pixel_sigma_px);
+  const LandmarkScene scene(theta, keyframes, motions, rig.pixel_sigma_px);
   std::vector<TrackPlaces> places(problem.tracks.size());
   const int screenings = before != nullptr ? before->screenings + 1 : 1;
   const bool settle = screenings > kFreeScreenings;
@@ -253,8 +254,9 @@ ReprojectionStatistics MeasureReprojection(
     const Calibration& theta,
     const CalibrationProblem& problem,
     const std::vector<KeyframeState>& keyframes,
+    const KeyframeMotions& motions,
     const std::vector<ScreenedLandmark>& landmarks) {
-  const LandmarkScene scene(theta, keyframes, rig.pixel_sigma_px);
+  const LandmarkScene scene(theta, keyframes, motions, rig.pixel_sigma_px);
   std::vector<double> projected_px;
   double sum_of_squares = 0;
   int used = 0;

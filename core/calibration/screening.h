@@ -14,6 +14,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/triangulate.h"
+#include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 
@@ -74,6 +75,7 @@ Screening ScreenLandmarks(const Rig& rig,
                           const Calibration& theta,
                           const CalibrationProblem& problem,
                           const std::vector<KeyframeState>& keyframes,
+                          const KeyframeMotions& motions,
                           const CalibrateOptions& options,
                           const Screening* before);
 
@@ -82,6 +84,7 @@ ReprojectionStatistics MeasureReprojection(
     const Calibration& theta,
     const CalibrationProblem& problem,
     const std::vector<KeyframeState>& keyframes,
+    const KeyframeMotions& motions,
     const std::vector<ScreenedLandmark>& landmarks);
 
 }  // namespace selfcal

@@ -1,6 +1,7 @@
 // One round of a calibration: the minimum over theta, keyframes and landmarks
-// of a fixed set of landmarks and observations, with fixed whitening. Two ways
-// to the same minimum: structured_solver.h, and Ceres.
+// of a fixed set of landmarks and observations, with fixed whitening and fixed
+// motions about the keyframes. Two ways to the same minimum:
+// structured_solver.h, and Ceres.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,6 +14,7 @@
 #include "core/calibration/robust_loss.h"
 #include "core/calibration/screening.h"
 #include "core/factor/inertial.h"
+#include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 
@@ -22,6 +24,7 @@ struct SolverRound {
   const Rig& rig;
   const Calibration& reference;  // theta = reference [+] d
   const CalibrationProblem& problem;
+  const KeyframeMotions& motions;  // at the estimate that the round starts from
   const std::vector<InertialMatrix>& whitening;
   // D x r: the directions in which d may move (SubspaceManifold).
   const Eigen::MatrixXd& basis;

@@ -138,7 +138,7 @@ double Evaluate(const SolverRound& round,
     sum += estimate.d.dot(*round.prior_information * estimate.d);
   }
   const LandmarkScene scene(
-      theta, estimate.keyframes, round.rig.pixel_sigma_px);
+      theta, estimate.keyframes, round.motions, round.rig.pixel_sigma_px);
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     sum += landmarks[i].weight *
            RefinePlace(scene,
@@ -184,6 +184,7 @@ bool LineariseRound(const SolverRound& round,
                            theta,
                            round.problem,
                            estimate.keyframes,
+                           round.motions,
                            landmarks,
                            result->roots,
                            loss);

@@ -88,12 +88,16 @@ class ChainElimination {
   enum class Record { kNothing, kSteps };
   void Start(const ChainShape& shape, Record record = Record::kNothing);
 
+  using PoseRotation = Eigen::Matrix<double, kChainPoseSize, 3>;
+
   // First, in any order: the factors of one keyframe and camera, as rows of
-  // landmark_rows.h; `observations` are indices into track_keyframes.
+  // landmark_rows.h; `observations` are indices into track_keyframes. The
+  // matrix B of these rows; null: [1; 0].
   void AddObservations(int keyframe,
                        int camera,
                        const double* rows,
-                       std::span<const int> observations);
+                       std::span<const int> observations,
+                       const PoseRotation* by_rotation = nullptr);
   // x^T H x + 2 g^T x for a landmark.
   void AddLandmarkPrior(int landmark,
                         const Eigen::Matrix3d& H,
@@ -120,7 +124,9 @@ class ChainElimination {
  private:
   void LayOut(const ChainShape& shape);
   void PlacePanels(const ChainShape& shape);
-  void ExpandGram(int keyframe, int camera);
+  void ExpandGram(int keyframe, int camera, const PoseRotation* by_rotation);
+  void CollectPoses(int count);
+  void SpreadPoses(int count, const PoseRotation& by_rotation);
   void BeginKeyframe();
   void OpenSlots(int slots);
   void EliminateLandmarks();
@@ -188,6 +194,12 @@ class ChainElimination {
   std::vector<int> landmark_of_observation_;
   std::size_t landmarks_count_ = 0;
   std::vector<LandmarkTarget> targets_;
+  struct PosePanel {
+    double* data;
+    int stride;
+  };
+  std::vector<PosePanel> panels_of_poses_;
+  std::vector<double> own_poses_;
   std::vector<int> depths_;
   std::vector<double> gram_;
   // Of each keyframe, 6 rows by its pose, landmark parameters and constant.

@@ -51,7 +51,9 @@ void ChainElimination::PlacePanels(const ChainShape& shape) {
 
 // Adds the products of all columns of a run, which are in gram_, to those of
 // the keyframe and of the camera that they stand for.
-void ChainElimination::ExpandGram(int keyframe, int camera) {
+void ChainElimination::ExpandGram(int keyframe,
+                                  int camera,
+                                  const PoseRotation* by_rotation) {
   const int size = camera_sizes_[camera];
   const int offset = camera_offsets_[camera];
   const int residual = RowsResidual(size);
@@ -59,13 +61,33 @@ void ChainElimination::ExpandGram(int keyframe, int camera) {
   const auto gram = [&](int i, int j) {
     return i >= j ? gram_[j * stride + i] : gram_[i * stride + j];
   };
-  for (int i = 0; i < kPose; ++i) {
-    double* row = &keyframe_sums_[(keyframe * kPose + i) * keyframe_stride_];
-    for (int j = 0; j <= i; ++j) row[j] += gram(i, j);
-    double* shared = row + kPose + offset;
-    for (int c = 0; c < 3; ++c) shared[c] -= gram(i, kRowsTurn + c);
-    for (int c = 3; c < size; ++c) shared[c] += gram(kRowsOwn + c - 3, i);
-    row[kPose + landmark_shared_] += gram(residual, i);
+  // by_pose(i, c): pose i and column c; poses(i, j): two of the pose.
+  const auto add_pose = [&](const auto& by_pose, const auto& poses) {
+    for (int i = 0; i < kPose; ++i) {
+      double* row = &keyframe_sums_[(keyframe * kPose + i) * keyframe_stride_];
+      for (int j = 0; j <= i; ++j) row[j] += poses(i, j);
+      double* shared = row + kPose + offset;
+      for (int c = 0; c < 3; ++c) shared[c] -= by_pose(i, kRowsTurn + c);
+      for (int c = 3; c < size; ++c) shared[c] += by_pose(i, kRowsOwn + c - 3);
+      row[kPose + landmark_shared_] += by_pose(i, residual);
+    }
+  };
+  if (by_rotation == nullptr) {
+    add_pose(gram, gram);
+  } else {
+    Eigen::Matrix<double, kPose, kPose> turn;
+    turn.setIdentity();
+    turn.leftCols<3>() = *by_rotation;
+    const auto by_pose = [&](int i, int c) {
+      double sum = 0;
+      for (int n = 0; n < kPose; ++n) sum += turn(n, i) * gram(n, c);
+      return sum;
+    };
+    add_pose(by_pose, [&](int i, int j) {
+      double sum = 0;
+      for (int n = 0; n < kPose; ++n) sum += by_pose(i, n) * turn(n, j);
+      return sum;
+    });
   }
   const int rows = landmark_shared_ + 1;
   const auto column = [](int c) {
@@ -85,7 +107,8 @@ void ChainElimination::ExpandGram(int keyframe, int camera) {
 void ChainElimination::AddObservations(int keyframe,
                                        int camera,
                                        const double* rows,
-                                       std::span<const int> observations) {
+                                       std::span<const int> observations,
+                                       const PoseRotation* by_rotation) {
   const int size = camera_sizes_[camera];
   const int stride = RowsStride(size);
   const int gram_stride = stride + kPanelPad;
@@ -100,6 +123,7 @@ void ChainElimination::AddObservations(int keyframe,
                    &panels_[panel.begin + shared + structure_.Slot(o) * kPose],
                    panel.stride};
   }
+  if (by_rotation != nullptr) CollectPoses(count);
   Zero(gram_.data(), static_cast<std::size_t>(gram_stride) * stride);
   WithKernels([&](auto kernels) {
     kernels.AddLandmarkProducts(rows, stride, count, targets_.data());
@@ -109,7 +133,32 @@ void ChainElimination::AddObservations(int keyframe,
                       2 * count,
                       {gram_.data(), gram_stride});
   });
-  ExpandGram(keyframe, camera);
+  if (by_rotation != nullptr) SpreadPoses(count, *by_rotation);
+  ExpandGram(keyframe, camera, by_rotation);
+}
+
+// Lets the products by the pose of each factor go to a panel of its own, until
+// they have been turned.
+void ChainElimination::CollectPoses(int count) {
+  GrowTo(static_cast<std::size_t>(count), &panels_of_poses_);
+  own_poses_.assign(static_cast<std::size_t>(count) * 3 * kOwnPoseStride, 0);
+  for (int i = 0; i < count; ++i) {
+    panels_of_poses_[i] = {targets_[i].poses, targets_[i].pose_stride};
+    targets_[i].poses = &own_poses_[i * 3 * kOwnPoseStride];
+    targets_[i].pose_stride = kOwnPoseStride;
+  }
+}
+
+void ChainElimination::SpreadPoses(int count, const PoseRotation& by_rotation) {
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const double* from = targets_[i].poses + j * kOwnPoseStride;
+      double* to = panels_of_poses_[i].data + j * panels_of_poses_[i].stride;
+      Eigen::Map<Eigen::RowVector3d>(to + kRowsTurn) +=
+          Eigen::Map<const Eigen::Matrix<double, 1, kPose>>(from) * by_rotation;
+      for (int c = kRowsPosition; c < kRowsOwn; ++c) to[c] += from[c];
+    }
+  }
 }
 
 void ChainElimination::AddLandmarkPrior(int landmark,

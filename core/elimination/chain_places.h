@@ -27,7 +27,10 @@ inline constexpr int kZeros = 3 * kPanelPad;
 
 inline constexpr int kPlacesBetweenMoves = 8;
 
-inline int WholeVectors(int size) { return (size + 7) / 8 * 8; }
+inline constexpr int WholeVectors(int size) { return (size + 7) / 8 * 8; }
+
+// Of the products of one factor by its pose, on their own.
+inline constexpr int kOwnPoseStride = WholeVectors(kPose);
 
 template <typename Number>
 void GrowTo(std::size_t size, std::vector<Number>* buffer) {

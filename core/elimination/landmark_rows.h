@@ -7,6 +7,9 @@
 //   by the pose of the keyframe   [turn | position],
 //   by the landmark               -position,
 //   by n shared parameters        [-turn | own].
+// Where the body moves on from its keyframe before it sees, turn and position
+// are those of the pose that sees, and by the turn of the keyframe the rows are
+// [turn | position] B with some 6 x 3 matrix B.
 #pragma once
 
 namespace selfcal {

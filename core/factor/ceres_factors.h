@@ -38,13 +38,15 @@ struct LandmarkAnchor {
 
 // Blocks (theta, q, p, l); 2 residuals, divided by sigma_px. Where the point
 // cannot be projected, the residual and its Jacobians are zero: such an
-// observation says nothing, and the caller counts it.
+// observation says nothing, and the caller counts it. The motion is copied;
+// null as in Reproject.
 std::unique_ptr<ceres::CostFunction> MakeReprojectionCost(
     const Calibration& theta_reference,
     int camera,
     const Eigen::Vector2d& z_px,
     double sigma_px,
-    const std::optional<LandmarkAnchor>& anchor);
+    const std::optional<LandmarkAnchor>& anchor,
+    const KeyframeMotion* motion = nullptr);
 
 // Blocks (theta, q0, p0, vb0, q1, p1, vb1); 15 residuals, whitened by the given
 // square root information, which stays fixed while the factor lives: the noise

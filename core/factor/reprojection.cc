@@ -18,12 +18,16 @@ bool Reproject(const Eigen::Quaterniond& q_GI,
                const Eigen::Vector4d& landmark_G,
                const Eigen::Vector2d& z_px,
                Eigen::Vector2d* residual_px,
-               ReprojectionJacobians* jacobians) {
-  const Matrix3d R_IG = q_GI.toRotationMatrix().transpose();
+               ReprojectionJacobians* jacobians,
+               const KeyframeMotion* motion) {
+  const ExposurePose exposure =
+      motion != nullptr ? MovePose(q_GI, p_GI, *motion, camera.time_offset_s)
+                        : PoseAtRest(q_GI, p_GI);
+  const Matrix3d R_IG = exposure.q_GI.toRotationMatrix().transpose();
   const Matrix3d R_CI = camera.q_CI.toRotationMatrix();
   const double w = landmark_G[3];
   // The landmark in the body and in the camera frame, both times w.
-  const Vector3d p_I = R_IG * (landmark_G.head<3>() - w * p_GI);
+  const Vector3d p_I = R_IG * (landmark_G.head<3>() - w * exposure.p_GI);
   const Vector3d p_C = R_CI * p_I + w * camera.p_CI;
 
   Vector2d predicted_px;
@@ -42,15 +46,20 @@ bool Reproject(const Eigen::Quaterniond& q_GI,
   // R_GI Exp(d) turns p_I by -d, R_CI Exp(d) turns it by d.
   const Matrix23d by_turn = by_p_I * Skew(p_I);
 
-  jacobians->pose.leftCols<3>() = by_turn;
-  jacobians->pose.rightCols<3>() = -w * by_X;
+  Eigen::Matrix<double, 2, 6> by_exposure;
+  by_exposure << by_turn, -w * by_X;
+  jacobians->pose.leftCols<3>() = by_exposure * exposure.by_rotation;
+  jacobians->pose.rightCols<3>() = by_exposure.rightCols<3>();
   jacobians->landmark.leftCols<3>() = by_X;
-  jacobians->landmark.col(3) = projection.point * camera.p_CI - by_X * p_GI;
+  jacobians->landmark.col(3) =
+      projection.point * camera.p_CI - by_X * exposure.p_GI;
   const int intrinsics = camera.IntrinsicsSize();
-  jacobians->camera.resize(2, kCameraIntrinsics + intrinsics);
+  jacobians->camera.resize(2, CameraTangentSize(camera));
   jacobians->camera.middleCols<3>(kCameraRotation) = -by_turn;
   jacobians->camera.middleCols<3>(kCameraPosition) = w * projection.point;
-  jacobians->camera.rightCols(intrinsics) = projection.intrinsics;
+  jacobians->camera.middleCols(kCameraIntrinsics, intrinsics) =
+      projection.intrinsics;
+  jacobians->camera.rightCols<1>() = by_exposure * exposure.by_offset;
   return true;
 }
 

@@ -2,7 +2,9 @@
 //
 // A landmark is a homogeneous point (X, w) in G: p_G = X / w, so that infinity
 // (w = 0) is harmless. Its image in the camera is
-//   p_C ~ R_CI R_GI^T (X - w p_GI) + w p_CI,   residual = project(p_C) - z.
+//   p_C ~ R_CI R_GI^T (X - w p_GI) + w p_CI,   residual = project(p_C) - z,
+// with the body's pose at the exposure: the keyframe's, or where a motion is
+// given, the keyframe's moved by it to the camera's time offset.
 // The scale must not change its sign with w: (X, w) is the direction of X as w
 // falls to zero, and (-X, -w) lies behind a camera that sees (X, w).
 // Not whitened: the caller divides by the pixel sigma. Pure, any thread.
@@ -12,6 +14,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
 
 namespace selfcal {
@@ -19,8 +22,9 @@ namespace selfcal {
 struct ReprojectionJacobians {
   // By the keyframe's pose (q_GI 3, p_GI 3), right perturbation.
   Eigen::Matrix<double, 2, 6> pose;
-  // By the camera's tangent (q_CI 3, p_CI 3, f 2, c 2, distortion).
-  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 6 + kMaxIntrinsics> camera;
+  // By the camera's tangent (q_CI 3, p_CI 3, f 2, c 2, distortion, time
+  // offset); zero by the offset without a motion.
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 7 + kMaxIntrinsics> camera;
   // By (X, w). With w = 1 the first three columns are by p_G.
   Eigen::Matrix<double, 2, 4> landmark;
 };
@@ -34,6 +38,7 @@ bool Reproject(const Eigen::Quaterniond& q_GI,
                const Eigen::Vector4d& landmark_G,
                const Eigen::Vector2d& z_px,
                Eigen::Vector2d* residual_px,
-               ReprojectionJacobians* jacobians);
+               ReprojectionJacobians* jacobians,
+               const KeyframeMotion* motion = nullptr);
 
 }  // namespace selfcal

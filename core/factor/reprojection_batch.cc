@@ -10,10 +10,19 @@ void CopyByRows(const Eigen::Matrix3d& M, double* to) {
   map = M;
 }
 
+ExposurePose ExposureOf(const ObservationRun& run) {
+  const KeyframeState& x = *run.keyframe;
+  if (run.motion == nullptr) return PoseAtRest(x.q_GI, x.p_GI);
+  return MovePose(x.q_GI, x.p_GI, *run.motion, run.camera->time_offset_s);
+}
+
 RunGeometry GeometryOf(const ObservationRun& run) {
   RunGeometry geometry;
-  CopyByRows(run.keyframe->q_GI.toRotationMatrix().transpose(), geometry.R_IG);
-  Eigen::Map<Eigen::Vector3d>(geometry.p_GI) = run.keyframe->p_GI;
+  const ExposurePose exposure = ExposureOf(run);
+  CopyByRows(exposure.q_GI.toRotationMatrix().transpose(), geometry.R_IG);
+  Eigen::Map<Eigen::Vector3d>(geometry.p_GI) = exposure.p_GI;
+  Eigen::Map<Eigen::Matrix<double, 6, 1>>(geometry.by_offset) =
+      exposure.by_offset;
   CopyByRows(run.camera->q_CI.toRotationMatrix(), geometry.R_CI);
   Eigen::Map<Eigen::Vector3d>(geometry.p_CI) = run.camera->p_CI;
   geometry.pinhole = PinholeOf(*run.camera);
@@ -39,6 +48,11 @@ void WithKernels(VectorWidth width,
 }
 
 }  // namespace
+
+std::optional<Eigen::Matrix<double, 6, 3>> PoseTurn(const ObservationRun& run) {
+  if (run.motion == nullptr) return std::nullopt;
+  return ExposureOf(run).by_rotation;
+}
 
 void ReprojectionBatch::Linearise(const ObservationRun& run,
                                   const double* points,

@@ -2,14 +2,17 @@
 //
 // What is written are the rows of core/elimination/landmark_rows.h: a whitened
 // factor has few columns that differ. A factor without weight gives zeros.
+// Where the body is moved to the exposure, they turn as PoseTurn says.
 //
 // Pure functions of their arguments, any thread.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 
 #include "core/elimination/landmark_rows.h"
+#include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
 #include "core/simd/vector_width.h"
@@ -23,7 +26,14 @@ struct ObservationRun {
   int count = 0;
   const std::int32_t* landmarks = nullptr;  // indices into points
   const double* z_px = nullptr;             // 2 each
+  // To the exposure of the camera; null: it is that of the keyframe, and rows
+  // are zero by the time offset.
+  const KeyframeMotion* motion = nullptr;
 };
+
+// What the rows by the pose at the exposure are multiplied with to be those by
+// the turn of the keyframe; nothing where the poses are the same.
+std::optional<Eigen::Matrix<double, 6, 3>> PoseTurn(const ObservationRun& run);
 
 // Sums over the observations of a landmark that its refinement needs.
 struct LandmarkSums {

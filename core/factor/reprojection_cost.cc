@@ -22,13 +22,15 @@ class ReprojectionCost final : public ceres::CostFunction {
                    int camera,
                    const Vector2d& z_px,
                    double sigma_px,
-                   const std::optional<LandmarkAnchor>& anchor)
+                   const std::optional<LandmarkAnchor>& anchor,
+                   const KeyframeMotion* motion)
       : camera_reference_(theta_reference.cameras[camera]),
         camera_offset_(CameraTangentOffset(theta_reference, camera)),
         theta_size_(TangentSize(theta_reference)),
         z_px_(z_px),
         inverse_sigma_(1 / sigma_px),
         anchor_(anchor) {
+    if (motion != nullptr) motion_ = *motion;
     set_num_residuals(2);
     *mutable_parameter_block_sizes() = {theta_size_, 4, 3, 3};
   }
@@ -52,7 +54,8 @@ class ReprojectionCost final : public ceres::CostFunction {
                   landmark_G,
                   z_px_,
                   &residual_px,
-                  jacobians == nullptr ? nullptr : &J);
+                  jacobians == nullptr ? nullptr : &J,
+                  motion_ ? &*motion_ : nullptr);
     Map<Vector2d> r(residuals);
     r = inverse_sigma_ * residual_px;
     if (jacobians == nullptr) return true;
@@ -114,6 +117,7 @@ class ReprojectionCost final : public ceres::CostFunction {
   const Vector2d z_px_;
   const double inverse_sigma_;
   const std::optional<LandmarkAnchor> anchor_;
+  std::optional<KeyframeMotion> motion_;
 };
 
 }  // namespace
@@ -136,9 +140,10 @@ std::unique_ptr<ceres::CostFunction> MakeReprojectionCost(
     int camera,
     const Eigen::Vector2d& z_px,
     double sigma_px,
-    const std::optional<LandmarkAnchor>& anchor) {
+    const std::optional<LandmarkAnchor>& anchor,
+    const KeyframeMotion* motion) {
   return std::make_unique<ReprojectionCost>(
-      theta_reference, camera, z_px, sigma_px, anchor);
+      theta_reference, camera, z_px, sigma_px, anchor, motion);
 }
 
 }  // namespace selfcal

@@ -82,8 +82,11 @@ Evaluated<Model> Evaluate(const RunGeometry& geometry,
   Evaluated<Model> e;
   e.p_I = ToBody(geometry, batch);
   Vector2 z_px;
-  e.valid = ProjectWith<T>(
-      geometry.pinhole, model, ToCamera(geometry, e.p_I, batch.w), &z_px, &e.parts);
+  e.valid = ProjectWith<T>(geometry.pinhole,
+                           model,
+                           ToCamera(geometry, e.p_I, batch.w),
+                           &z_px,
+                           &e.parts);
   e.r_px = Vector2(z_px[0] - batch.z_px[0], z_px[1] - batch.z_px[1]);
   e.by_p_I = Times(e.parts.point, geometry.R_CI);
   return e;
@@ -108,7 +111,8 @@ void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
                                             double sigma_px,
                                             const double* weights,
                                             double* rows) {
-  constexpr int kOwn = 3 + 4 + Model::kSize;  // p_CI, f, c, distortion
+  // p_CI, f, c, distortion, time offset
+  constexpr int kOwn = 3 + 4 + Model::kSize + 1;
   constexpr int kStride = RowsStride(3 + kOwn);
   for (int first = 0; first < run.count; first += W) {
     const Batch batch = Gather(run, points, first);
@@ -136,6 +140,11 @@ void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
       for (int c = 0; c < Model::kSize; ++c) {
         columns[kRowsOwn + 7 + c] = e.parts.distortion(r, c);
       }
+      T by_offset = 0.0;
+      for (int c = 0; c < 6; ++c) {
+        by_offset = by_offset + geometry.by_offset[c] * columns[kRowsTurn + c];
+      }
+      columns[kRowsOwn + kOwn - 1] = by_offset;
       columns[RowsResidual(3 + kOwn)] = e.r_px[r];
       for (int c = 0; c <= RowsResidual(3 + kOwn); ++c) {
         columns[c] = Select(e.valid, weight * columns[c], T(0.0));

@@ -7,12 +7,13 @@
 
 namespace selfcal {
 
-// The pose and the camera as plain numbers; matrices by rows.
+// The pose at the exposure and the camera as plain numbers; matrices by rows.
 struct RunGeometry {
   double R_IG[9];
   double p_GI[3];
   double R_CI[9];
   double p_CI[3];
+  double by_offset[6];  // of the pose by the time offset
   Pinhole pinhole;
 };
 

@@ -54,6 +54,7 @@ void InlierSelector::StartLandmarks(const MotionSegment& segment,
 void InlierSelector::Evaluate(const Calibration& theta0,
                               double pixel_sigma_px,
                               const MotionSegment& segment,
+                              const KeyframeMotions& motions,
                               const ObservationOrder& order) {
   runs_.Select(segment, order.ByView(), [&](int index) {
     return moving_[segment.observations[index].landmark] != 0;
@@ -62,7 +63,7 @@ void InlierSelector::Evaluate(const Calibration& theta0,
   for (const ObservationRuns::Run& run : runs_.runs()) {
     trial_squares_.resize(
         std::max<std::size_t>(trial_squares_.size(), run.end - run.begin));
-    kernels_.AddLandmarkSums(runs_.Arrays(run, segment, theta0),
+    kernels_.AddLandmarkSums(runs_.Arrays(run, segment, theta0, motions),
                              trial_points_.data(),
                              pixel_sigma_px,
                              kHuberSigmas,
@@ -200,17 +201,18 @@ void InlierSelector::Classify(double gate_px,
 const InlierSelection& InlierSelector::Select(const Calibration& theta0,
                                               double pixel_sigma_px,
                                               const MotionSegment& segment,
+                                              const KeyframeMotions& motions,
                                               const ObservationOrder& order,
                                               const ScoreOptions& options) {
   StartLandmarks(segment, order);
-  Evaluate(theta0, pixel_sigma_px, segment, order);
+  Evaluate(theta0, pixel_sigma_px, segment, motions, order);
   sums_.swap(trial_sums_);
   squares_.swap(new_squares_);
   for (std::size_t m = 0; m < moving_.size(); ++m) {
     moving_[m] = order.Track(static_cast<int>(m)).size() >= 2;
   }
   for (int i = 0; i < kMaxSteps && ProposeSteps(segment); ++i) {
-    Evaluate(theta0, pixel_sigma_px, segment, order);
+    Evaluate(theta0, pixel_sigma_px, segment, motions, order);
     TakeSteps(order);
   }
 
@@ -233,14 +235,18 @@ const InlierSelection& InlierSelector::Select(const Calibration& theta0,
   return result_;
 }
 
-InlierSelection SelectInliers(const Calibration& theta0,
-                              double pixel_sigma_px,
+InlierSelection SelectInliers(const Rig& rig,
+                              const Calibration& theta0,
                               const MotionSegment& segment,
                               const ScoreOptions& options) {
   ObservationOrder order;
   order.Find(segment, static_cast<int>(theta0.cameras.size()));
-  return InlierSelector().Select(
-      theta0, pixel_sigma_px, segment, order, options);
+  return InlierSelector().Select(theta0,
+                                 rig.pixel_sigma_px,
+                                 segment,
+                                 SegmentMotions(rig, theta0, segment),
+                                 order,
+                                 options);
 }
 
 }  // namespace selfcal

@@ -6,10 +6,12 @@
 #include <span>
 #include <vector>
 
+#include "core/factor/keyframe_motion.h"
 #include "core/factor/reprojection_batch.h"
 #include "core/information/observation_order.h"
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
+#include "core/model/rig.h"
 #include "core/model/segment.h"
 
 namespace selfcal {
@@ -42,10 +44,12 @@ class InlierSelector {
   explicit InlierSelector(VectorWidth width = WidestVectors())
       : kernels_(width) {}
 
-  // `order` is that of the segment. The result is good until the next call.
+  // `motions` and `order` are those of the segment. The result is good until
+  // the next call.
   const InlierSelection& Select(const Calibration& theta0,
                                 double pixel_sigma_px,
                                 const MotionSegment& segment,
+                                const KeyframeMotions& motions,
                                 const ObservationOrder& order,
                                 const ScoreOptions& options);
 
@@ -53,6 +57,7 @@ class InlierSelector {
   void Evaluate(const Calibration& theta0,
                 double pixel_sigma_px,
                 const MotionSegment& segment,
+                const KeyframeMotions& motions,
                 const ObservationOrder& order);
   void StartLandmarks(const MotionSegment& segment,
                       const ObservationOrder& order);
@@ -77,8 +82,8 @@ class InlierSelector {
 };
 
 // The same for one segment.
-InlierSelection SelectInliers(const Calibration& theta0,
-                              double pixel_sigma_px,
+InlierSelection SelectInliers(const Rig& rig,
+                              const Calibration& theta0,
                               const MotionSegment& segment,
                               const ScoreOptions& options);
 

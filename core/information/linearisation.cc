@@ -78,12 +78,13 @@ void SegmentLineariser::FindTracks(const MotionSegment& segment,
   }
 }
 
-// Calls use(run, rows) for the rows of each keyframe and camera, while they are
-// near.
+// Calls use(run, arrays, rows) for the rows of each keyframe and camera, while
+// they are near.
 template <typename Use>
 void SegmentLineariser::LineariseViews(const Rig& rig,
                                        const Calibration& theta0,
                                        const MotionSegment& segment,
+                                       const KeyframeMotions& motions,
                                        const Use& use) {
   for (const ObservationRuns::Run& run : runs_.runs()) {
     // The kernels may write a whole vector beyond the last.
@@ -91,12 +92,10 @@ void SegmentLineariser::LineariseViews(const Rig& rig,
     const std::size_t size =
         rows * RowsStride(CameraTangentSize(theta0.cameras[run.camera]));
     if (rows_.size() < size) rows_.resize(size);
-    reprojection_.Linearise(runs_.Arrays(run, segment, theta0),
-                            points_.data(),
-                            rig.pixel_sigma_px,
-                            nullptr,
-                            rows_.data());
-    use(run, rows_.data());
+    const ObservationRun arrays = runs_.Arrays(run, segment, theta0, motions);
+    reprojection_.Linearise(
+        arrays, points_.data(), rig.pixel_sigma_px, nullptr, rows_.data());
+    use(run, arrays, rows_.data());
   }
 }
 
@@ -133,10 +132,11 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
 void SegmentLineariser::LineariseAlone(const Rig& rig,
                                        const Calibration& theta0,
                                        const MotionSegment& segment,
+                                       const KeyframeMotions& motions,
                                        const InlierSelection& selection,
                                        const ObservationOrder& order) {
   FindTracks(segment, selection, order);
-  LineariseViews(rig, theta0, segment, [](const auto&, const double*) {});
+  LineariseViews(rig, theta0, segment, motions, [](const auto&...) {});
   LineariseLinks(rig, theta0, segment);
 }
 
@@ -144,6 +144,7 @@ const LinearisedSegment& SegmentLineariser::Eliminate(
     const Rig& rig,
     const Calibration& theta0,
     const MotionSegment& segment,
+    const KeyframeMotions& motions,
     const InlierSelection& selection,
     const ObservationOrder& order,
     int gauge_keyframe) {
@@ -157,13 +158,18 @@ const LinearisedSegment& SegmentLineariser::Eliminate(
   LineariseViews(rig,
                  theta0,
                  segment,
-                 [&](const ObservationRuns::Run& run, const double* rows) {
+                 motions,
+                 [&](const ObservationRuns::Run& run,
+                     const ObservationRun& arrays,
+                     const double* rows) {
+                   const auto turn = PoseTurn(arrays);
                    elimination_.AddObservations(
                        run.keyframe,
                        run.camera,
                        rows,
                        std::span<const int>(factors_).subspan(
-                           run.begin, run.end - run.begin));
+                           run.begin, run.end - run.begin),
+                       turn ? &*turn : nullptr);
                  });
   LineariseLinks(rig, theta0, segment);
   const Eigen::Matrix3d landmark_prior =

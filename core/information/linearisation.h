@@ -7,6 +7,7 @@
 
 #include "core/elimination/chain_elimination.h"
 #include "core/factor/inertial_batch.h"
+#include "core/factor/keyframe_motion.h"
 #include "core/factor/reprojection_batch.h"
 #include "core/information/inliers.h"
 #include "core/information/observation_order.h"
@@ -33,11 +34,12 @@ class SegmentLineariser {
   // Linearises the inliers, all inertial factors and the weak priors of
   // weak_priors.h at the segment's states, the selection's landmarks and
   // theta0, and eliminates everything but theta. The keyframe gauge_keyframe is
-  // held in position and in rotation about gravity. `order` is that of the
-  // segment. The result is good until the next call.
+  // held in position and in rotation about gravity. `motions` and `order` are
+  // those of the segment. The result is good until the next call.
   const LinearisedSegment& Eliminate(const Rig& rig,
                                      const Calibration& theta0,
                                      const MotionSegment& segment,
+                                     const KeyframeMotions& motions,
                                      const InlierSelection& selection,
                                      const ObservationOrder& order,
                                      int gauge_keyframe);
@@ -46,6 +48,7 @@ class SegmentLineariser {
   void LineariseAlone(const Rig& rig,
                       const Calibration& theta0,
                       const MotionSegment& segment,
+                      const KeyframeMotions& motions,
                       const InlierSelection& selection,
                       const ObservationOrder& order);
 
@@ -57,6 +60,7 @@ class SegmentLineariser {
   void LineariseViews(const Rig& rig,
                       const Calibration& theta0,
                       const MotionSegment& segment,
+                      const KeyframeMotions& motions,
                       const Use& use);
   void LineariseLinks(const Rig& rig,
                       const Calibration& theta0,

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/factor/keyframe_motion.h"
 #include "core/factor/reprojection_batch.h"
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
@@ -74,12 +75,14 @@ class ObservationRuns {
 
   ObservationRun Arrays(const Run& run,
                         const MotionSegment& segment,
-                        const Calibration& theta) const {
+                        const Calibration& theta,
+                        const KeyframeMotions& motions) const {
     return {&segment.keyframes[run.keyframe],
             &theta.cameras[run.camera],
             run.end - run.begin,
             landmarks_.data() + run.begin,
-            z_px_.data() + 2 * run.begin};
+            z_px_.data() + 2 * run.begin,
+            motions.At(run.keyframe, run.camera)};
   }
 
  private:

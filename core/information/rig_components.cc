@@ -9,8 +9,10 @@ RigComponents::RigComponents(const Rig& rig)
     : group_settings_(rig.groups),
       prior_sigmas_(rig.prior_sigmas),
       fixed_(rig.fixed),
+      estimate_time_offset_(rig.estimate_time_offset),
       free_(FreeComponents(rig)),
-      prior_(PriorSigmas(rig)) {
+      prior_(PriorSigmas(rig)),
+      estimated_time_offsets_(EstimatedTimeOffsets(rig)) {
   for (const CameraCalibration& camera : rig.factory.cameras) {
     models_.push_back(camera.model);
   }
@@ -44,6 +46,7 @@ bool RigComponents::Fits(const Rig& rig) const {
     return model == camera.model;
   };
   return !models_.empty() && fixed_ == rig.fixed &&
+         estimate_time_offset_ == rig.estimate_time_offset &&
          std::equal(models_.begin(),
                     models_.end(),
                     rig.factory.cameras.begin(),

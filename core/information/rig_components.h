@@ -29,6 +29,10 @@ class RigComponents {
   const std::vector<int>& free() const { return free_; }
   const std::vector<std::string>& free_names() const { return free_names_; }
   const Eigen::VectorXd& prior() const { return prior_; }  // of all components
+  // Of each camera.
+  const std::vector<char>& estimated_time_offsets() const {
+    return estimated_time_offsets_;
+  }
   const std::vector<Group>& groups() const { return groups_; }
 
  private:
@@ -37,10 +41,12 @@ class RigComponents {
   std::vector<ParameterGroup> group_settings_;
   std::vector<ComponentSetting> prior_sigmas_;
   std::vector<std::string> fixed_;
+  bool estimate_time_offset_ = false;
 
   std::vector<int> free_;
   std::vector<std::string> free_names_;
   Eigen::VectorXd prior_;
+  std::vector<char> estimated_time_offsets_;
   std::vector<Group> groups_;
 };
 

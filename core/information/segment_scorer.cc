@@ -26,10 +26,21 @@ void SegmentScorer::Score(const Rig& rig,
                           SegmentInformation* result) {
   if (!components_.Fits(rig)) components_ = RigComponents(rig);
   order_.Find(segment, static_cast<int>(theta0.cameras.size()));
-  const InlierSelection& selection =
-      selector_.Select(theta0, rig.pixel_sigma_px, segment, order_, options);
-  const LinearisedSegment& linearised = lineariser_.Eliminate(
-      rig, theta0, segment, selection, order_, options.gauge_keyframe);
+  motions_.Measure(rig,
+                   theta0,
+                   components_.estimated_time_offsets(),
+                   segment.keyframes,
+                   [&](std::size_t) { return std::span(segment.imu); });
+  const InlierSelection& selection = selector_.Select(
+      theta0, rig.pixel_sigma_px, segment, motions_, order_, options);
+  const LinearisedSegment& linearised =
+      lineariser_.Eliminate(rig,
+                            theta0,
+                            segment,
+                            motions_,
+                            selection,
+                            order_,
+                            options.gauge_keyframe);
   result->theta0 = theta0;
   result->residuals = selection.statistics;
   result->residuals.inertial_rms = linearised.inertial_rms;

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "core/factor/keyframe_motion.h"
 #include "core/information/group_scorer.h"
 #include "core/information/inliers.h"
 #include "core/information/linearisation.h"
@@ -29,6 +30,7 @@ class SegmentScorer {
 
  private:
   ObservationOrder order_;
+  KeyframeMotions motions_;
   InlierSelector selector_;
   SegmentLineariser lineariser_;
   RigComponents components_;

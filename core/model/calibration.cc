@@ -32,7 +32,7 @@ Eigen::Matrix3d ImuCalibration::T_a() const {
 }
 
 int CameraTangentSize(const CameraCalibration& camera) {
-  return kCameraIntrinsics + camera.IntrinsicsSize();
+  return kCameraIntrinsics + camera.IntrinsicsSize() + 1;
 }
 
 int CameraTangentOffset(const Calibration& theta, int camera) {
@@ -41,6 +41,10 @@ int CameraTangentOffset(const Calibration& theta, int camera) {
     offset += CameraTangentSize(theta.cameras[j]);
   }
   return offset;
+}
+
+int TimeOffsetComponent(const Calibration& theta, int camera) {
+  return CameraTangentOffset(theta, camera + 1) - 1;
 }
 
 int TangentSize(const Calibration& theta) {
@@ -63,7 +67,9 @@ Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta) {
     camera.p_CI += part.segment<3>(kCameraPosition);
     camera.f += part.segment<2>(kCameraIntrinsics);
     camera.c += part.segment<2>(kCameraIntrinsics + 2);
-    camera.distortion += part.tail(camera.distortion.size());
+    camera.distortion +=
+        part.segment(kCameraDistortion, camera.distortion.size());
+    camera.time_offset_s += part(part.size() - 1);
     offset += CameraTangentSize(camera);
   }
   return moved;
@@ -86,7 +92,9 @@ Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b) {
     part.segment<3>(kCameraPosition) = to.p_CI - from.p_CI;
     part.segment<2>(kCameraIntrinsics) = to.f - from.f;
     part.segment<2>(kCameraIntrinsics + 2) = to.c - from.c;
-    part.tail(from.distortion.size()) = to.distortion - from.distortion;
+    part.segment(kCameraDistortion, from.distortion.size()) =
+        to.distortion - from.distortion;
+    part(part.size() - 1) = to.time_offset_s - from.time_offset_s;
     offset += CameraTangentSize(from);
   }
   return delta;
@@ -133,6 +141,7 @@ Eigen::VectorXd ReadableValues(const Calibration& theta) {
     camera.f.setZero();
     camera.c.setZero();
     camera.distortion.setZero();
+    camera.time_offset_s = 0;
   }
   return BoxMinus(theta, zero);
 }

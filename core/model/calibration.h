@@ -1,11 +1,12 @@
 // theta: everything that selfcal estimates about a device, as one value with a
 // tangent space of named components.
 //
-// Order of the tangent, 15 + sum over cameras of (6 + 4 + distortion):
+// Order of the tangent, 15 + sum over cameras of (6 + 4 + distortion + 1):
 //   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3;
-//   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n.
+//   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1.
 // Rotations are perturbed on the right (so3.h), all else is added.
-// Source: Schneider et al., ICRA 2017, sections III-B and III-C.
+// Source: Schneider et al., ICRA 2017, sections III-B and III-C; the time
+// offset goes beyond it.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,6 +32,7 @@ inline constexpr int kAccelRotation = 12;
 inline constexpr int kCameraRotation = 0;
 inline constexpr int kCameraPosition = 3;
 inline constexpr int kCameraIntrinsics = 6;
+inline constexpr int kCameraDistortion = kCameraIntrinsics + 4;
 
 // theta_i: gyro reads T_g w + b_g, accelerometer T_a R_AI f_I + b_a.
 struct ImuCalibration {
@@ -55,7 +57,7 @@ struct Calibration {
 // project: every table, message and export takes them from here.
 struct TangentComponent {
   std::string name;  // "imu.gyro.scale.x", "cam0.focal.x", "cam0.p_CI.x"
-  std::string unit;  // "-", "rad", "m", "px"
+  std::string unit;  // "-", "rad", "m", "px", "s"
   // Expected standard deviation after one reference segment, in `unit`; the
   // same on the axes of a block, so that an entropy does not depend on how a
   // frame is turned.
@@ -68,6 +70,8 @@ int TangentSize(const Calibration& theta);
 // Dimension of camera j's part of the tangent, and where it begins.
 int CameraTangentSize(const CameraCalibration& camera);
 int CameraTangentOffset(const Calibration& theta, int camera);
+// Where camera j's time offset is: the last of its part.
+int TimeOffsetComponent(const Calibration& theta, int camera);
 
 // The components in the order of the tangent.
 std::vector<TangentComponent> TangentComponents(const Calibration& theta);

@@ -18,6 +18,7 @@ constexpr double kMaxPosition_m = 1e3;
 constexpr double kMaxFocal_px = 1e6;
 constexpr double kMaxPrincipal_px = 1e6;
 constexpr double kMaxCoefficient = 1e3;
+constexpr double kMaxTimeOffset_s = 0.5;
 constexpr int kMaxImageSize_px = 100'000;
 
 void AddIf(const std::string& field, std::string fault, ViolationList* list) {
@@ -83,6 +84,10 @@ void CheckCamera(const CameraCalibration& camera,
   AddIf(path + ".f", PositiveFault(camera.f, kMaxFocal_px), list);
   AddIf(path + ".c", SizeFault(camera.c, kMaxPrincipal_px), list);
   AddIf(path + ".distortion", DistortionFault(camera), list);
+  AddIf(path + ".time_offset_s",
+        SizeFault(Eigen::Matrix<double, 1, 1>(camera.time_offset_s),
+                  kMaxTimeOffset_s),
+        list);
   AddIf(path + ".width_px", ImageSizeFault(camera.width_px), list);
   AddIf(path + ".height_px", ImageSizeFault(camera.height_px), list);
 }
@@ -92,7 +97,7 @@ void CheckCamera(const CameraCalibration& camera,
 std::vector<Violation> Validate(const Calibration& theta,
                                 const std::string& prefix) {
   // More cannot come from at most kMaxCameras cameras.
-  ViolationList list(8 * (kMaxCameras + 1));
+  ViolationList list(9 * (kMaxCameras + 1));
   const std::string begin = prefix.empty() ? "" : prefix + ".";
   CheckImu(theta.imu, begin + "imu", &list);
   const std::string cameras = begin + "cameras";

@@ -43,6 +43,9 @@ struct CameraCalibration {
   Eigen::Vector2d c = Eigen::Vector2d::Zero();     // [px]
   DistortionModel model = DistortionModel::kFov;
   DistortionVector distortion = DistortionVector::Zero(1);
+  // t_imu = t_camera + time_offset_s: an image with the stamp t was exposed at
+  // t + time_offset_s on the clock of the IMU.
+  double time_offset_s = 0;
   int width_px = 0;  // of the image; constant, never estimated
   int height_px = 0;
 

@@ -7,6 +7,8 @@
 namespace selfcal {
 namespace {
 
+constexpr char kTimeOffsets[] = "*.time_offset";
+
 bool Matches(std::string_view name, std::string_view pattern) {
   const bool open_begin = pattern.starts_with('*');
   if (open_begin) pattern.remove_prefix(1);
@@ -29,14 +31,23 @@ std::vector<int> Without(const std::vector<int>& all,
   return rest;
 }
 
+std::vector<int> HeldComponents(
+    const Rig& rig, const std::vector<TangentComponent>& components) {
+  std::vector<std::string> patterns = rig.fixed;
+  if (!rig.estimate_time_offset) patterns.push_back(kTimeOffsets);
+  return MatchComponents(components, patterns);
+}
+
 }  // namespace
 
-std::vector<ParameterGroup> DefaultGroups() {
-  return {
+std::vector<ParameterGroup> DefaultGroups(bool estimate_time_offset) {
+  std::vector<ParameterGroup> groups = {
       {"imu", {"imu.*"}},
       {"camera", {"*.focal.*", "*.principal.*", "*.distortion.*"}},
       {"extrinsics", {"*.q_CI.*", "*.p_CI.*"}},
   };
+  if (estimate_time_offset) groups.push_back({"time", {kTimeOffsets}});
+  return groups;
 }
 
 std::vector<int> MatchComponents(
@@ -57,11 +68,21 @@ std::vector<int> MatchComponents(
 std::vector<int> GroupComponents(const Rig& rig, const ParameterGroup& group) {
   const auto components = TangentComponents(rig.factory);
   return Without(MatchComponents(components, group.patterns),
-                 MatchComponents(components, rig.fixed));
+                 HeldComponents(rig, components));
 }
 
 std::vector<int> FreeComponents(const Rig& rig) {
   return GroupComponents(rig, {"", {"*"}});
+}
+
+std::vector<char> EstimatedTimeOffsets(const Rig& rig) {
+  const std::vector<int> free = FreeComponents(rig);
+  std::vector<char> estimated;
+  for (int j = 0; j < static_cast<int>(rig.factory.cameras.size()); ++j) {
+    estimated.push_back(std::binary_search(
+        free.begin(), free.end(), TimeOffsetComponent(rig.factory, j)));
+  }
+  return estimated;
 }
 
 Eigen::VectorXd PriorSigmas(const Rig& rig) {

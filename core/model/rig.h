@@ -28,8 +28,9 @@ struct ParameterGroup {
 };
 
 // The paper's three: "imu", "camera" (f, c, distortion of every camera) and
-// "extrinsics" (q_CI, p_CI of every camera).
-std::vector<ParameterGroup> DefaultGroups();
+// "extrinsics" (q_CI, p_CI of every camera); and where time offsets are
+// estimated "time" (of every camera).
+std::vector<ParameterGroup> DefaultGroups(bool estimate_time_offset = false);
 
 // A value given to all components that match a pattern.
 struct ComponentSetting {
@@ -61,6 +62,8 @@ struct Rig {
   std::vector<ComponentSetting> prior_sigmas;
   // Patterns of components that are never estimated.
   std::vector<std::string> fixed;
+  // Without it every camera's time offset is known: held as if it were fixed.
+  bool estimate_time_offset = false;
   Selection selection = Selection::kTables;
   // N: segments of a table. A joint set holds N for each group.
   int table_size = 8;
@@ -81,6 +84,9 @@ std::vector<int> GroupComponents(const Rig& rig, const ParameterGroup& group);
 
 // Components that are estimated (not fixed), sorted.
 std::vector<int> FreeComponents(const Rig& rig);
+
+// Of each camera whether its time offset is estimated.
+std::vector<char> EstimatedTimeOffsets(const Rig& rig);
 
 // Prior standard deviation of every tangent component, in its unit.
 Eigen::VectorXd PriorSigmas(const Rig& rig);

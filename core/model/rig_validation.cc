@@ -78,6 +78,15 @@ void CheckPatterns(const std::vector<TangentComponent>& components,
   }
 }
 
+// For a group of time offsets where these are not estimated.
+std::string TimeOffsetHint(const Rig& rig, const ParameterGroup& group) {
+  Rig estimating = rig;
+  estimating.estimate_time_offset = true;
+  return GroupComponents(estimating, group).empty()
+             ? ""
+             : ", or set estimate_time_offset";
+}
+
 void CheckGroups(const Rig& rig,
                  const std::vector<TangentComponent>& components,
                  ViolationList* list) {
@@ -106,7 +115,8 @@ void CheckGroups(const Rig& rig,
     } else if (!MatchComponents(components, group.patterns).empty() &&
                GroupComponents(rig, group).empty()) {
       list->Add(patterns_field,
-                "all components of the group are held fixed; drop the group");
+                "all components of the group are held fixed; drop the group" +
+                    TimeOffsetHint(rig, group));
     }
   }
 }

@@ -20,6 +20,9 @@ constexpr double kSigmaCameraRotation = 5e-3;
 constexpr double kSigmaCameraPosition = 1.3e-2;
 constexpr double kSigmaPixels = 1.5;  // of f and c
 constexpr double kSigmaFov = 2.7e-3;
+// The median over simulated segments of a hand-held device that is moved as
+// calmly as those.
+constexpr double kSigmaTimeOffset = 6e-4;
 // Chosen, not measured: what moves a point at the edge of a usual image by
 // about as many pixels as kSigmaPixels. They shift every entropy of a group by
 // one constant and rank nothing.
@@ -76,6 +79,7 @@ void AppendCamera(const std::string& name,
   Append(name + ".focal", xy, "px", kSigmaPixels, c);
   Append(name + ".principal", xy, "px", kSigmaPixels, c);
   AppendDistortion(name + ".distortion", camera.model, c);
+  c->push_back({name + ".time_offset", "s", kSigmaTimeOffset});
 }
 
 }  // namespace

@@ -33,8 +33,10 @@ class Tracker {
  public:
   Tracker(const Calibration& theta,
           double pixel_sigma_px,
+          const Exposures& exposures,
           const SimulationOptions& options)
       : theta_(theta),
+        exposures_(exposures),
         options_(options),
         pixel_sigma_px_(options.noise ? pixel_sigma_px : 0),
         random_(options.seed, kTrackStream),
@@ -43,9 +45,8 @@ class Tracker {
         tracked_(theta.cameras.size()),
         errors_(theta.cameras.size()) {}
 
-  void Step(int keyframe, const KeyframeState& state) {
+  void Step(int keyframe) {
     keyframe_ = keyframe;
-    state_ = &state;
     for (int j = 0; j < cameras(); ++j) Continue(j);
     for (int j = 0; j < cameras(); ++j) Refill(j);
   }
@@ -114,7 +115,8 @@ class Tracker {
     if (!Unproject(c, z_px, &bearing_C)) return -1;
     const Eigen::Vector3d p_I =
         c.q_CI.conjugate() * (depth_m * bearing_C - c.p_CI);
-    tracks_.landmarks_G.push_back(state_->q_GI * p_I + state_->p_GI);
+    const KeyframeState& x = exposures_[camera][keyframe_];
+    tracks_.landmarks_G.push_back(x.q_GI * p_I + x.p_GI);
     trackers_.push_back(0);
     last_seen_.push_back(-1);
     begun_.push_back(keyframe_);
@@ -138,8 +140,9 @@ class Tracker {
   // True pixel of a landmark; false where the camera does not see it.
   bool Sees(int camera, int landmark, Eigen::Vector2d* z_px) const {
     const CameraCalibration& c = theta_.cameras[camera];
-    const Eigen::Vector3d p_I = state_->q_GI.conjugate() *
-                                (tracks_.landmarks_G[landmark] - state_->p_GI);
+    const KeyframeState& x = exposures_[camera][keyframe_];
+    const Eigen::Vector3d p_I =
+        x.q_GI.conjugate() * (tracks_.landmarks_G[landmark] - x.p_GI);
     const Eigen::Vector3d p_C = c.q_CI * p_I + c.p_CI;
     const double depth_m = p_C.norm();
     return depth_m > options_.min_depth_m / kDepthSlack &&
@@ -184,13 +187,13 @@ class Tracker {
   }
 
   const Calibration& theta_;
+  const Exposures& exposures_;
   const SimulationOptions& options_;
   const double pixel_sigma_px_;
   Random random_;
   Random noise_;
   Random outliers_;
   int keyframe_ = 0;
-  const KeyframeState* state_ = nullptr;
   FeatureTracks tracks_;
   struct TrackError {
     int keyframe = -2;  // that saw it last
@@ -207,11 +210,11 @@ class Tracker {
 
 FeatureTracks SimulateTracks(const Calibration& theta,
                              double pixel_sigma_px,
-                             const std::vector<KeyframeState>& keyframes,
+                             const Exposures& exposures,
                              const SimulationOptions& options) {
-  Tracker tracker(theta, pixel_sigma_px, options);
-  for (std::size_t k = 0; k < keyframes.size(); ++k) {
-    tracker.Step(static_cast<int>(k), keyframes[k]);
+  Tracker tracker(theta, pixel_sigma_px, exposures, options);
+  for (std::size_t k = 0; k < exposures.front().size(); ++k) {
+    tracker.Step(static_cast<int>(k));
   }
   return std::move(tracker).Take();
 }

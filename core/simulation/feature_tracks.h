@@ -7,6 +7,7 @@
 
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
+#include "core/simulation/exposures.h"
 #include "core/simulation/simulate.h"
 
 namespace selfcal {
@@ -24,11 +25,11 @@ struct FeatureTracks {
   std::vector<FeatureObservation> observations;  // in order of the keyframes
 };
 
-// Tracks over all keyframes, given their true states. Every pixel, true and
+// Tracks over all keyframes, given their true exposures. Every pixel, true and
 // measured, lies inside the image.
 FeatureTracks SimulateTracks(const Calibration& theta,
                              double pixel_sigma_px,
-                             const std::vector<KeyframeState>& keyframes,
+                             const Exposures& exposures,
                              const SimulationOptions& options);
 
 }  // namespace selfcal

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/simulation/exposures.h"
 #include "core/simulation/feature_tracks.h"
 #include "core/simulation/imu_readings.h"
 #include "core/simulation/random.h"
@@ -19,15 +20,18 @@ constexpr double kKeyframeJitter_s = 0.4e-3;
 
 std::vector<KeyframeState> TrueKeyframes(const Trajectory& trajectory,
                                          const ImuReadings& imu,
+                                         const TimeMargins& margins,
                                          const SimulationOptions& options) {
   Random random(options.seed, kKeyframeTimeStream);
   std::vector<KeyframeState> keyframes;
   if (imu.measured.empty()) return keyframes;
   for (int k = 0;; ++k) {
     const double t_s = k / options.keyframe_rate_hz + kKeyframeOffset_s +
-                       random.Uniform(-kKeyframeJitter_s, kKeyframeJitter_s);
+                       random.Uniform(-kKeyframeJitter_s, kKeyframeJitter_s) +
+                       margins.before_s;
     const std::int64_t t_ns = std::llround(t_s * 1e9);
-    if (t_ns > imu.measured.back().t_ns) return keyframes;
+    const std::int64_t last_ns = t_ns + std::llround(margins.after_s * 1e9);
+    if (last_ns > imu.measured.back().t_ns) return keyframes;
     keyframes.push_back(TrueState(trajectory, imu, t_ns));
   }
 }
@@ -140,19 +144,34 @@ SimulatedSession Simulate(const Rig& rig,
                           const SimulationOptions& options) {
   Recording recording;
   recording.imu = SimulateImu(rig, theta_true.imu, trajectory, options);
-  recording.truth = TrueKeyframes(trajectory, recording.imu, options);
+  recording.truth = TrueKeyframes(trajectory,
+                                  recording.imu,
+                                  ExposureMargins(theta_true, theta_slam),
+                                  options);
   const int N = options.keyframes_per_segment;
   const int segments = static_cast<int>(recording.truth.size()) / N;
   recording.truth.resize(static_cast<std::size_t>(segments) * N);
-  recording.tracks =
-      SimulateTracks(theta_true, rig.pixel_sigma_px, recording.truth, options);
-  recording.slam = SlamStates(
-      recording.truth, recording.imu, theta_true.imu, theta_slam.imu, options);
-  recording.slam_landmarks_G = TriangulateLandmarks(theta_slam,
-                                                    recording.slam,
-                                                    recording.tracks,
-                                                    rig.pixel_sigma_px,
-                                                    options);
+  recording.tracks = SimulateTracks(
+      theta_true,
+      rig.pixel_sigma_px,
+      TrueExposures(theta_true, recording.truth, trajectory, recording.imu),
+      options);
+  const double delay_s = KeyframeDelay(theta_true, theta_slam);
+  const std::vector<KeyframeState> meant =
+      StatesLater(recording.truth, trajectory, recording.imu, delay_s);
+  recording.slam =
+      SlamStates(meant, recording.imu, theta_true.imu, theta_slam.imu, options);
+  recording.slam_landmarks_G =
+      TriangulateLandmarks(theta_slam,
+                           SlamExposures(theta_slam,
+                                         recording.slam,
+                                         meant,
+                                         delay_s,
+                                         trajectory,
+                                         recording.imu),
+                           recording.tracks,
+                           rig.pixel_sigma_px,
+                           options);
   SimulatedSession result;
   Cutter cutter(recording);
   for (int s = 0; s < segments; ++s) {

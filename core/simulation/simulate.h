@@ -63,13 +63,17 @@ struct SimulatedSession {
 // Simulates a session of a rig whose true calibration is theta_true, while the
 // SLAM system believes theta_slam: its landmarks are triangulated under that
 // belief, and its biases absorb what it gets wrong on average. Noise, pixel
-// sigma and gravity are those of the rig.
+// sigma and gravity are those of the rig. Images are exposed later than the
+// time of their keyframe by the true time offset of their camera; where the
+// SLAM system believes in another one, its states are those of its images
+// rather than those of the IMU.
 //
 // Segments of keyframes_per_segment fill the trajectory from its start; the
 // keyframes that are left at the end and fill no segment are left out. Times
 // count from the start of the trajectory; keyframes do not coincide with IMU
-// samples. theta_true and theta_slam must have the same shape (SameShape);
-// rates, depths, mean_track_length and keyframes_per_segment must be positive.
+// samples, and all exposures lie within these. theta_true and theta_slam must
+// have the same shape (SameShape); rates, depths, mean_track_length and
+// keyframes_per_segment must be positive.
 SimulatedSession Simulate(const Rig& rig,
                           const Calibration& theta_true,
                           const Calibration& theta_slam,

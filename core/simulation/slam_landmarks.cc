@@ -117,14 +117,15 @@ std::optional<Eigen::Vector3d> Triangulate(const std::vector<View>& views,
 
 std::vector<std::optional<Eigen::Vector3d>> TriangulateLandmarks(
     const Calibration& theta_slam,
-    const std::vector<KeyframeState>& slam_states,
+    const Exposures& slam_exposures,
     const FeatureTracks& tracks,
     double pixel_sigma_px,
     const SimulationOptions& options) {
   const std::size_t count = tracks.landmarks_G.size();
   std::vector<std::vector<View>> views(count);
   for (const FeatureObservation& observation : tracks.observations) {
-    const KeyframeState& state = slam_states[observation.keyframe];
+    const KeyframeState& state =
+        slam_exposures[observation.camera][observation.keyframe];
     views[observation.landmark].push_back(
         MakeView(theta_slam, state, observation));
   }

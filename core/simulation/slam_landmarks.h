@@ -1,5 +1,5 @@
 // Landmarks as a SLAM system would triangulate them: from its measured pixels,
-// its own poses and its own calibration.
+// its own poses at the exposures and its own calibration.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,6 +8,7 @@
 
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
+#include "core/simulation/exposures.h"
 #include "core/simulation/feature_tracks.h"
 #include "core/simulation/simulate.h"
 
@@ -22,7 +23,7 @@ namespace selfcal {
 // parallax, as at rest, that alone gives the depth.
 std::vector<std::optional<Eigen::Vector3d>> TriangulateLandmarks(
     const Calibration& theta_slam,
-    const std::vector<KeyframeState>& slam_states,
+    const Exposures& slam_exposures,
     const FeatureTracks& tracks,
     double pixel_sigma_px,
     const SimulationOptions& options);

@@ -113,6 +113,7 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
       !GetMatrix(record.covariance(), &calibration.covariance)) {
     return DamagedRecord(what);
   }
+  AddTimeOffsets(calibration.theta, &calibration.covariance);
   calibration.rig = record.rig();
   calibration.version = record.version();
   calibration.reasons.assign(record.reasons().begin(), record.reasons().end());

@@ -2,13 +2,46 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace selfcal::server {
 namespace {
 
 using RowMajor =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+// Where the components of a tangent without time offsets are; empty if `size`
+// is not that of one.
+std::vector<int> WithoutTimeOffsets(const Calibration& theta,
+                                    Eigen::Index size) {
+  const int cameras = static_cast<int>(theta.cameras.size());
+  std::vector<int> places;
+  if (size != TangentSize(theta) - cameras) return places;
+  for (int i = 0; i < TangentSize(theta); ++i) places.push_back(i);
+  for (int j = cameras; j-- > 0;) {
+    places.erase(places.begin() + TimeOffsetComponent(theta, j));
+  }
+  return places;
+}
+
 }  // namespace
+
+void AddTimeOffsets(const Calibration& theta, Eigen::MatrixXd* matrix) {
+  const std::vector<int> places = WithoutTimeOffsets(theta, matrix->rows());
+  if (places.empty() || matrix->cols() != matrix->rows()) return;
+  const int size = TangentSize(theta);
+  Eigen::MatrixXd larger = Eigen::MatrixXd::Zero(size, size);
+  larger(places, places) = *matrix;
+  *matrix = std::move(larger);
+}
+
+void AddTimeOffsets(const Calibration& theta, Eigen::VectorXd* vector) {
+  const std::vector<int> places = WithoutTimeOffsets(theta, vector->size());
+  if (places.empty()) return;
+  Eigen::VectorXd larger = Eigen::VectorXd::Zero(TangentSize(theta));
+  larger(places) = *vector;
+  *vector = std::move(larger);
+}
 
 void PutMatrix(const Eigen::MatrixXd& matrix, store::MatrixRecord* record) {
   record->set_rows(static_cast<int>(matrix.rows()));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/information/segment_information.h"
+#include "core/model/calibration.h"
 #include "selfcal/v1/calibration.pb.h"
 #include "server/store/records.pb.h"
 
@@ -18,6 +19,11 @@ namespace selfcal::server {
 void PutMatrix(const Eigen::MatrixXd& matrix, store::MatrixRecord* record);
 // False if the sizes do not fit each other.
 bool GetMatrix(const store::MatrixRecord& record, Eigen::MatrixXd* matrix);
+
+// Of theta's tangent, as it was before cameras had a time offset: gets zeros
+// for that of each camera, which was known. Otherwise unchanged.
+void AddTimeOffsets(const Calibration& theta, Eigen::MatrixXd* matrix);
+void AddTimeOffsets(const Calibration& theta, Eigen::VectorXd* vector);
 
 void PutVector(const Eigen::VectorXd& vector,
                google::protobuf::RepeatedField<double>* values);

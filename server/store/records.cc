@@ -110,6 +110,8 @@ absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
     return DamagedRecord(what);
   }
   information.eta = GetVector(record.eta());
+  AddTimeOffsets(information.theta0, &information.Lambda);
+  AddTimeOffsets(information.theta0, &information.eta);
   information.rank = record.rank();
   information.unobserved = GetDirections(record.unobserved());
   for (const v1::GroupScore& group : record.groups()) {

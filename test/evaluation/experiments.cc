@@ -6,6 +6,7 @@ namespace selfcal {
 void RunDatasets(Context* context);
 void RunRecordedChoice(Context* context);
 void RunRecordings(Context* context);
+void RunSensors(Context* context);
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> all = {
@@ -18,6 +19,9 @@ const std::vector<Experiment>& Experiments() {
       {"recorded_choice",
        "which choice of segments does best on a real recording",
        RunRecordedChoice},
+      {"sensors",
+       "one, two and four cameras, with time offsets known, estimated, ignored",
+       RunSensors},
   };
   return all;
 }

@@ -98,6 +98,7 @@ class FirstRound {
                                    rig_.factory,
                                    problem_,
                                    problem_.keyframes,
+                                   motions_,
                                    CalibrateOptions(),
                                    nullptr)),
         whitening_(WhitenInertialLinks(
@@ -108,6 +109,7 @@ class FirstRound {
     return {.rig = rig_,
             .reference = rig_.factory,
             .problem = problem_,
+            .motions = motions_,
             .whitening = whitening_,
             .basis = basis_,
             .loss = loss_,
@@ -156,6 +158,7 @@ class FirstRound {
   const Rig& rig_;
   const std::vector<const MotionSegment*> sorted_;
   const CalibrationProblem problem_;
+  const KeyframeMotions motions_;  // none: no camera has an offset
   const Screening screening_;
   const RobustLoss loss_;
   const std::vector<InertialMatrix> whitening_;

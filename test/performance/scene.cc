@@ -60,8 +60,7 @@ std::string Describe(const Scene& scene) {
 }
 
 InlierSelection Select(const Scene& scene, const MotionSegment& segment) {
-  return SelectInliers(
-      scene.rig.factory, scene.rig.pixel_sigma_px, segment, ScoreOptions());
+  return SelectInliers(scene.rig, scene.rig.factory, segment, ScoreOptions());
 }
 
 }  // namespace selfcal

@@ -28,7 +28,8 @@ struct Scene {
 };
 
 // With the defaults, one segment of 40 keyframes, about 400 landmarks, about
-// 5,000 observations and 4 s of IMU at 200 Hz; theta has 26 components.
+// 5,000 observations and 4 s of IMU at 200 Hz; 26 components of theta are
+// estimated.
 Scene MakeScene(const SceneOptions& options = {});
 
 // Size of the first segment, in one line.

@@ -67,7 +67,7 @@ Measurement AgainstLinearisation(const TimingOptions& options) {
       {"linearisation",
        [&] {
          lineariser.LineariseAlone(
-             scene.rig, scene.rig.factory, segment, selection, order);
+             scene.rig, scene.rig.factory, segment, {}, selection, order);
        }},
       options);
 }

@@ -48,6 +48,7 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
     EXPECT_TRUE(SameBits(x.distortion, y.distortion));
     EXPECT_EQ(x.width_px, y.width_px);
     EXPECT_EQ(x.height_px, y.height_px);
+    EXPECT_TRUE(SameBits(x.time_offset_s, y.time_offset_s));
   }
 }
 
@@ -71,6 +72,7 @@ void ExpectSame(const Rig& a, const Rig& b) {
   EXPECT_EQ(a.table_size, b.table_size);
   EXPECT_TRUE(SameBits(a.min_gain_nats, b.min_gain_nats));
   EXPECT_TRUE(SameBits(a.retrigger_fraction, b.retrigger_fraction));
+  EXPECT_EQ(a.estimate_time_offset, b.estimate_time_offset);
 }
 
 void ExpectSame(const MotionSegment& a, const MotionSegment& b) {
@@ -258,6 +260,7 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   message.clear_table_size();
   message.clear_min_gain_nats();
   message.clear_retrigger_fraction();
+  message.clear_estimate_time_offset();
   Rig rig;
   ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
   const Rig defaults;
@@ -265,7 +268,12 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   EXPECT_EQ(rig.table_size, defaults.table_size);
   EXPECT_EQ(rig.min_gain_nats, defaults.min_gain_nats);
   EXPECT_EQ(rig.retrigger_fraction, defaults.retrigger_fraction);
+  EXPECT_FALSE(rig.estimate_time_offset);
   EXPECT_EQ(rig.groups.size(), DefaultGroups().size());
+  message.set_estimate_time_offset(true);
+  ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
+  ASSERT_EQ(rig.groups.size(), 4u);
+  EXPECT_EQ(rig.groups.back().name, "time");
   message.set_min_gain_nats(0);
   ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
   EXPECT_EQ(rig.min_gain_nats, 0);

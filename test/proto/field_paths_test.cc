@@ -41,6 +41,7 @@ TEST(FieldPaths, WhatValidationSaysOfARigIsAFieldOfTheMessage) {
   rig.factory.cameras.resize(1);
   rig.factory.cameras[0].q_CI.w() = 2;
   rig.factory.cameras[0].p_CI.x() = 1e9;
+  rig.factory.cameras[0].time_offset_s = 2;
   rig.factory.imu.q_AI.w() = 2;
   rig.imu_noise = {0, 0, 0, 0};
   rig.gravity_mps2 = -1;

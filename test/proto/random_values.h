@@ -55,6 +55,7 @@ class RandomValues {
     for (double& k : camera.distortion) k = Double();
     camera.width_px = Int(0, 10000);
     camera.height_px = Int(0, 10000);
+    camera.time_offset_s = Double();
     return camera;
   }
 
@@ -83,6 +84,7 @@ class RandomValues {
     rig.table_size = Int(1, 100);
     rig.min_gain_nats = Double();
     rig.retrigger_fraction = Double();
+    rig.estimate_time_offset = Int(0, 1) == 1;
     return rig;
   }
 

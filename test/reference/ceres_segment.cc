@@ -73,11 +73,16 @@ void AddFactors(const Rig& rig,
                 const InlierSelection& selection,
                 Blocks* b,
                 ceres::Problem* problem) {
+  const KeyframeMotions motions = SegmentMotions(rig, theta0, segment);
   for (const int index : selection.inliers) {
     const Observation& o = segment.observations[index];
     problem->AddResidualBlock(
-        MakeReprojectionCost(
-            theta0, o.camera, o.z_px, rig.pixel_sigma_px, std::nullopt)
+        MakeReprojectionCost(theta0,
+                             o.camera,
+                             o.z_px,
+                             rig.pixel_sigma_px,
+                             std::nullopt,
+                             motions.At(o.keyframe, o.camera))
             .release(),
         nullptr,
         b->theta.data(),

@@ -23,7 +23,8 @@ class Assembly {
         segment_(segment),
         selection_(selection),
         scale_(theta_scale),
-        gauge_(gauge) {
+        gauge_(gauge),
+        motions_(SegmentMotions(rig, theta0, segment)) {
     for (const int index : selection.inliers) {
       landmark_columns_.try_emplace(
           segment.observations[index].landmark,
@@ -120,7 +121,8 @@ class Assembly {
                    p_G.homogeneous(),
                    observation.z_px,
                    &r,
-                   &J)) {
+                   &J,
+                   motions_.At(observation.keyframe, observation.camera))) {
       return;
     }
     const double w = 1 / rig_.pixel_sigma_px;
@@ -159,6 +161,7 @@ class Assembly {
   const InlierSelection& selection_;
   const Eigen::VectorXd& scale_;
   const int gauge_;
+  const KeyframeMotions motions_;
   std::map<int, int> landmark_columns_;
   std::vector<int> state_columns_;
   std::vector<int> theta_columns_;

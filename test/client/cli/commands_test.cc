@@ -137,7 +137,8 @@ TEST_F(Commands, CreatesARigFromAFileWithOverrides) {
                                    "--fixed",
                                    "imu.gyro.*",
                                    "--fixed",
-                                   "*.focal.x"});
+                                   "*.focal.x",
+                                   "--estimate-time-offset"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   ASSERT_EQ(daemon_.rigs.size(), 1u);
   v1::Rig expected = ToProto(ARig("device"));
@@ -146,9 +147,12 @@ TEST_F(Commands, CreatesARigFromAFileWithOverrides) {
   expected.mutable_imu_noise()->set_accel_bias_random_walk(2e-3);
   expected.add_fixed("imu.gyro.*");
   expected.add_fixed("*.focal.x");
+  expected.set_estimate_time_offset(true);
   EXPECT_EQ(daemon_.rigs[0].SerializeAsString(), expected.SerializeAsString());
   EXPECT_THAT(outcome.out, HasSubstr("rig\tdevice\n"));
   EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255\tpx\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("cam0.time_offset\t0\ts\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("time offset\testimated\n"));
 }
 
 TEST_F(Commands, NamesTheFieldOfAFileThatItCannotRead) {

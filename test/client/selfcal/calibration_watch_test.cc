@@ -30,7 +30,7 @@ v1::Calibration Version(std::int64_t version) {
   v1::Calibration message;
   message.set_version(version);
   *message.mutable_parameters() = ToProto(theta);
-  for (int i = 0; i < 26 * 27 / 2; ++i) message.add_covariance(i);
+  for (int i = 0; i < 27 * 28 / 2; ++i) message.add_covariance(i);
   return message;
 }
 
@@ -170,12 +170,12 @@ TEST(CalibrationVersion, UnpacksTheCovariance) {
   const auto version = ToCalibrationVersion(Version(3));
   ASSERT_TRUE(version.ok());
   EXPECT_EQ(version->version, 3);
-  ASSERT_EQ(version->covariance.rows(), 26);
+  ASSERT_EQ(version->covariance.rows(), 27);
   EXPECT_EQ(version->covariance, version->covariance.transpose());
   EXPECT_EQ(version->covariance(0, 0), 0);
   EXPECT_EQ(version->covariance(1, 0), 1);
   EXPECT_EQ(version->covariance(1, 1), 2);
-  EXPECT_EQ(version->covariance(25, 25), 26 * 27 / 2 - 1);
+  EXPECT_EQ(version->covariance(26, 26), 27 * 28 / 2 - 1);
 }
 
 TEST(CalibrationVersion, NamesWhatIsWrong) {

@@ -60,8 +60,14 @@ class Posed {
         partitioning_(PartitionSegments(sorted_, options.merge_landmarks)),
         problem_(FlattenSegments(rig, sorted_, partitioning_)),
         start_{BoxMinus(start, reference_), problem_.keyframes},
-        screening_(ScreenLandmarks(
-            rig, start, problem_, problem_.keyframes, options, nullptr)),
+        motions_(Motions(rig, start, problem_)),
+        screening_(ScreenLandmarks(rig,
+                                   start,
+                                   problem_,
+                                   problem_.keyframes,
+                                   motions_,
+                                   options,
+                                   nullptr)),
         whitening_(
             WhitenInertialLinks(rig, start.imu, problem_, problem_.keyframes)),
         subspace_(WholeSubspace(rig)),
@@ -112,10 +118,19 @@ class Posed {
     std::vector<ScreenedLandmark> landmarks;
   };
 
+  static KeyframeMotions Motions(const Rig& rig,
+                                 const Calibration& theta,
+                                 const CalibrationProblem& problem) {
+    KeyframeMotions motions;
+    MeasureMotions(rig, theta, problem, problem.keyframes, &motions);
+    return motions;
+  }
+
   SolverRound Round() const {
     return {.rig = rig_,
             .reference = reference_,
             .problem = problem_,
+            .motions = motions_,
             .whitening = whitening_,
             .basis = basis_,
             .loss = screening_.loss,
@@ -208,6 +223,7 @@ class Posed {
   const Partitioning partitioning_;
   const CalibrationProblem problem_;
   const CalibrationEstimate start_;
+  const KeyframeMotions motions_;
   Screening screening_;
   const std::vector<InertialMatrix> whitening_;
   ThetaSubspace subspace_;
@@ -299,7 +315,7 @@ TEST(Solvers, AgreeWhereLandmarksConnectDistantKeyframes) {
   posed.ExpectSameMinimum();
 }
 
-TEST(Solvers, AgreeWithTwoCameras) {
+Rig TwoCameraRig() {
   Rig rig = HandheldRig("r");
   CameraCalibration second = rig.factory.cameras[0];
   second.model = DistortionModel::kRadialTangential;
@@ -309,7 +325,30 @@ TEST(Solvers, AgreeWithTwoCameras) {
   second.p_CI += Eigen::Vector3d(0.08, 0.01, 0);
   second.q_CI = Exp(Eigen::Vector3d(0.05, -0.1, 0.02)) * second.q_CI;
   rig.factory.cameras.push_back(second);
-  Simple({}, SmallOptions(11), rig).ExpectSameMinimum();
+  return rig;
+}
+
+TEST(Solvers, AgreeWithTwoCameras) {
+  Simple({}, SmallOptions(11), TwoCameraRig()).ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWithKnownTimeOffsets) {
+  Rig rig = TwoCameraRig();
+  rig.factory.cameras[0].time_offset_s = 0.02;
+  rig.factory.cameras[1].time_offset_s = -0.013;
+  Simple({}, SmallOptions(12), rig).ExpectSameMinimum();
+}
+
+TEST(Solvers, AgreeWithEstimatedTimeOffsets) {
+  Rig rig = TwoCameraRig();
+  rig.estimate_time_offset = true;
+  rig.factory.cameras[0].time_offset_s = 0.02;
+  // The first is known, the second estimated from where it does not move.
+  rig.fixed = {"cam0.time_offset"};
+  Simple({}, SmallOptions(13), rig).ExpectSameMinimum();
+  rig.fixed.clear();
+  rig.factory.cameras[1].time_offset_s = -0.013;
+  Simple({}, SmallOptions(14), rig).ExpectSameMinimum();
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ std::vector<RandomChainShape> Shapes() {
     shape.landmarks_per_keyframe = trial % 5;
     shape.found_again = trial % 2 == 0 ? 0 : 0.3;
     shape.kept = trial % 3 == 0 ? 0.3 : 0;
+    shape.turned = trial % 4 < 2;
     shapes.push_back(shape);
   }
   return shapes;

@@ -73,6 +73,7 @@ std::vector<ChainObservation> RandomTrack(int first,
 Eigen::Matrix<double, 2, 6> ByPose(const ChainObservation& observation) {
   Eigen::Matrix<double, 2, 6> J;
   J << observation.turn, observation.position;
+  J.leftCols<3>() = (J * observation.by_rotation).eval();
   return J;
 }
 Eigen::Matrix2Xd ByCamera(const ChainObservation& observation) {
@@ -112,6 +113,8 @@ void AddObservations(const Chain& chain,
   const int stride = RowsStride(size);
   std::vector<double> rows;
   std::vector<int> indices;
+  ChainElimination::PoseRotation by_rotation =
+      ChainElimination::PoseRotation::Identity();
   int index = 0;
   for (const auto& track : chain.landmarks) {
     for (const ChainObservation& observation : track) {
@@ -125,12 +128,36 @@ void AddObservations(const Chain& chain,
           rows.insert(rows.end(), row.data(), row.data() + stride);
         }
         indices.push_back(index);
+        by_rotation = observation.by_rotation;
       }
       ++index;
     }
   }
   rows.resize(rows.size() + 2 * kPanelPad * stride);
-  elimination->AddObservations(keyframe, camera, rows.data(), indices);
+  elimination->AddObservations(
+      keyframe,
+      camera,
+      rows.data(),
+      indices,
+      by_rotation.isIdentity(0) ? nullptr : &by_rotation);
+}
+
+// Draws what each keyframe has for the cameras of odd number.
+void TurnPoses(std::mt19937* random, Chain* chain) {
+  for (int k = 0; k < chain->keyframes(); ++k) {
+    const auto cameras = static_cast<int>(chain->camera_sizes.size());
+    for (int camera = 1; camera < cameras; camera += 2) {
+      ChainElimination::PoseRotation by_rotation;
+      FillNormal(random, &by_rotation);
+      for (auto& track : chain->landmarks) {
+        for (ChainObservation& observation : track) {
+          if (observation.keyframe == k && observation.camera == camera) {
+            observation.by_rotation = by_rotation;
+          }
+        }
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -159,6 +186,7 @@ Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
       chain.landmarks.push_back(RandomTrack(k, shape, random));
     }
   }
+  if (shape.turned) TurnPoses(random, &chain);
   // In any order.
   std::shuffle(chain.landmarks.begin(), chain.landmarks.end(), *random);
   chain.kept_landmarks.assign(chain.landmarks.size(), -1);

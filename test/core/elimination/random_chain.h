@@ -18,6 +18,9 @@ struct ChainObservation {
   Eigen::Matrix<double, 2, 3> turn, position;
   Eigen::Matrix2Xd own;
   Eigen::Vector2d residual;
+  // By the turn of the keyframe it is [turn | position] by_rotation.
+  ChainElimination::PoseRotation by_rotation =
+      ChainElimination::PoseRotation::Identity();
 };
 
 // Rows between a keyframe and the next.
@@ -52,7 +55,8 @@ struct RandomChainShape {
   double seen = 0.8;  // of the keyframes within a track
   // Tracks that are seen once more, from any keyframe after them.
   double found_again = 0;
-  double kept = 0;  // part of the landmarks; if any, biases as well
+  double kept = 0;      // part of the landmarks; if any, biases as well
+  bool turned = false;  // each keyframe and every second camera on its own
 };
 
 Chain RandomChain(const RandomChainShape& shape, std::mt19937* random);

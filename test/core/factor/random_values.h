@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
 #include "core/model/so3.h"
@@ -72,6 +73,15 @@ class RandomValues {
         break;
     }
     return camera;
+  }
+
+  // About some milliseconds after a keyframe.
+  KeyframeMotion Motion() {
+    return {.dt_s = Uniform(-0.03, 0.03),
+            .turn = Exp(Normal3(0.05)),
+            .shift_I = Normal3(0.03),
+            .w_I = Normal3(2),
+            .v_I = Normal3(1)};
   }
 
   KeyframeState State(std::int64_t t_ns) {

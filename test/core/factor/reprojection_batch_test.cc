@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <vector>
 
 #include "core/factor/reprojection.h"
@@ -32,24 +33,32 @@ struct Scene {
   std::vector<double> points;
   std::vector<std::int32_t> landmarks;
   std::vector<double> z_px;
+  std::optional<KeyframeMotion> motion;
 
+  const KeyframeMotion* Motion() const { return motion ? &*motion : nullptr; }
   ObservationRun Run() const {
     return {&keyframe,
             &camera,
             static_cast<int>(landmarks.size()),
             landmarks.data(),
-            z_px.data()};
+            z_px.data(),
+            Motion()};
   }
   Eigen::Vector4d Point(int observation) const {
     return Eigen::Vector4d::Map(&points[4 * landmarks[observation]]);
   }
 };
 
-Scene RandomScene(RandomValues& random, DistortionModel model, int count) {
+Scene RandomScene(RandomValues& random,
+                  DistortionModel model,
+                  int count,
+                  bool moves) {
   Scene scene;
   scene.keyframe.q_GI = random.Rotation();
   scene.keyframe.p_GI = random.Normal3(5);
   scene.camera = random.Camera(model);
+  scene.camera.time_offset_s = random.Uniform(-0.03, 0.03);
+  if (moves) scene.motion = random.Motion();
   for (int i = 0; i < count; ++i) {
     const double depth = random.Uniform(0, 1) < 0.1 ? -1 : random.Uniform(1, 9);
     const Eigen::Vector3d p_C(depth * random.Uniform(-0.7, 0.7),
@@ -77,10 +86,12 @@ void ForRandomScenes(unsigned seed, const Check& check) {
                                       DistortionModel::kRadialTangential,
                                       DistortionModel::kEquidistant}) {
     for (const int count : {1, 2, 3, 7, 8, 9, 50}) {
-      const Scene scene = RandomScene(random, model, count);
-      for (const VectorWidth width : Widths()) {
-        SCOPED_TRACE(VectorWidthName(width));
-        check(scene, ReprojectionBatch(width), random);
+      for (const bool moves : {false, true}) {
+        const Scene scene = RandomScene(random, model, count, moves);
+        for (const VectorWidth width : Widths()) {
+          SCOPED_TRACE(VectorWidthName(width));
+          check(scene, ReprojectionBatch(width), random);
+        }
       }
     }
   }
@@ -96,7 +107,8 @@ bool Evaluate(const Scene& scene,
                    scene.Point(i),
                    Eigen::Vector2d(scene.z_px[2 * i], scene.z_px[2 * i + 1]),
                    r,
-                   J);
+                   J,
+                   scene.Motion());
 }
 
 TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
@@ -104,6 +116,8 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
   ForRandomScenes(1, [&](const Scene& scene, const auto& batch, auto& random) {
     const ObservationRun run = scene.Run();
     const int size = CameraTangentSize(scene.camera);
+    const auto turn = PoseTurn(run);
+    EXPECT_EQ(turn.has_value(), scene.motion.has_value());
     const int stride = RowsStride(size);
     std::vector<double> weights(run.count);
     for (double& weight : weights) weight = random.Uniform(0, 2);
@@ -119,14 +133,21 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
         Eigen::Vector2d r(0, 0);
         ReprojectionJacobians J;
         if (Evaluate(scene, i, &r, &J)) {
-          expected.leftCols(6) = J.pose;
+          expected.leftCols(3) = -J.camera.leftCols(3);
+          expected.middleCols(3, 3) = J.pose.rightCols(3);
           expected.middleCols(kRowsOwn, size - 3) =
               J.camera.rightCols(size - 3);
           for (int row = 0; row < 2; ++row) {
             expected(row, RowsResidual(size)) = r[row];
           }
           expected *= weighted ? weights[i] : 1 / kSigma_px;
-          EXPECT_EQ(J.camera.leftCols(3), -J.pose.leftCols(3));
+          Eigen::Matrix<double, 2, 6> by_exposure;
+          by_exposure << -J.camera.leftCols(3), J.pose.rightCols(3);
+          const Eigen::MatrixXd by_turn =
+              turn ? Eigen::MatrixXd(by_exposure * *turn)
+                   : Eigen::MatrixXd(by_exposure.leftCols(3));
+          EXPECT_LE((J.pose.leftCols(3) - by_turn).norm(),
+                    kTolerance * by_turn.norm());
           // By p_G = X / w.
           const Eigen::MatrixXd by_p_G =
               scene.Point(i)[3] * J.landmark.leftCols(3);

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "core/factor/ceres_factors.h"
 #include "test/core/factor/cost_function_checks.h"
 #include "test/core/factor/random_values.h"
@@ -26,6 +28,9 @@ struct View {
   Vector3d p_G;  // of the landmark
   Vector2d z_px;
   VectorXd delta;  // of theta, from the reference
+  std::optional<KeyframeMotion> motion;
+
+  const KeyframeMotion* Motion() const { return motion ? &*motion : nullptr; }
 
   Calibration Theta() const { return BoxPlus(reference, delta); }
 };
@@ -46,6 +51,7 @@ View RandomView(RandomValues& random) {
   view.p_G =
       view.q_GI * (camera.q_CI.conjugate() * (p_C - camera.p_CI)) + view.p_GI;
   view.z_px = camera.c + Vector2d(10 * random.NormalVector(2));
+  if (random.Index(2) == 0) view.motion = random.Motion();
   view.delta = 0.005 * random.NormalVector(TangentSize(view.reference));
   // A rotation far from the reference, that a derivative by the offset differs
   // from one by the rotation.
@@ -77,8 +83,12 @@ TEST(ReprojectionCost, IsThePlainFactorDividedBySigma) {
   RandomValues random(1);
   for (int trial = 0; trial < 1000; ++trial) {
     const View view = RandomView(random);
-    const auto cost = MakeReprojectionCost(
-        view.reference, view.camera, view.z_px, kSigma, std::nullopt);
+    const auto cost = MakeReprojectionCost(view.reference,
+                                           view.camera,
+                                           view.z_px,
+                                           kSigma,
+                                           std::nullopt,
+                                           view.Motion());
     const VectorXd residuals =
         EvaluateCost(*cost, BlocksOf(view, view.p_G), false).residuals;
     Vector2d plain_px;
@@ -88,12 +98,13 @@ TEST(ReprojectionCost, IsThePlainFactorDividedBySigma) {
                           view.p_G.homogeneous(),
                           view.z_px,
                           &plain_px,
-                          nullptr));
+                          nullptr,
+                          view.Motion()));
     EXPECT_LT((residuals - plain_px / kSigma).norm(), 1e-10);
 
     const LandmarkAnchor anchor = RandomAnchor(random, view.p_G);
     const auto anchored = MakeReprojectionCost(
-        view.reference, view.camera, view.z_px, kSigma, anchor);
+        view.reference, view.camera, view.z_px, kSigma, anchor, view.Motion());
     const VectorXd same =
         EvaluateCost(
             *anchored, BlocksOf(view, anchor.FromPoint(view.p_G)), false)
@@ -109,8 +120,12 @@ TEST(ReprojectionCost, JacobiansMatchDifferencesThroughBothManifolds) {
   for (int trial = 0; trial < 1000; ++trial) {
     const View view = RandomView(random);
     const auto* manifold = trial % 2 == 0 ? full.get() : gauge.get();
-    const auto cost = MakeReprojectionCost(
-        view.reference, view.camera, view.z_px, kSigma, std::nullopt);
+    const auto cost = MakeReprojectionCost(view.reference,
+                                           view.camera,
+                                           view.z_px,
+                                           kSigma,
+                                           std::nullopt,
+                                           view.Motion());
     ExpectJacobiansMatch(*cost,
                          BlocksOf(view, view.p_G),
                          {nullptr, manifold, nullptr, nullptr},
@@ -118,7 +133,7 @@ TEST(ReprojectionCost, JacobiansMatchDifferencesThroughBothManifolds) {
                          kTolerance);
     const LandmarkAnchor anchor = RandomAnchor(random, view.p_G);
     const auto anchored = MakeReprojectionCost(
-        view.reference, view.camera, view.z_px, kSigma, anchor);
+        view.reference, view.camera, view.z_px, kSigma, anchor, view.Motion());
     const Blocks blocks = BlocksOf(view, anchor.FromPoint(view.p_G));
     ExpectJacobiansMatch(*anchored,
                          blocks,
@@ -141,7 +156,7 @@ TEST(ReprojectionCost, ALandmarkAtInfinityIsAnOrdinaryValue) {
     anchor.R_GA = (view.q_GI * camera.q_CI.conjugate()).toRotationMatrix();
     anchor.a_G = view.p_GI;
     const auto cost = MakeReprojectionCost(
-        view.reference, view.camera, view.z_px, kSigma, anchor);
+        view.reference, view.camera, view.z_px, kSigma, anchor, view.Motion());
     const Vector3d landmark(
         random.Uniform(-0.3, 0.3), random.Uniform(-0.3, 0.3), 0);
     ExpectJacobiansMatch(*cost,
@@ -156,13 +171,18 @@ TEST(ReprojectionCost, ALandmarkAtInfinityIsAnOrdinaryValue) {
 TEST(ReprojectionCost, APointBehindTheCameraIsZeroWithItsJacobians) {
   RandomValues random(4);
   for (int trial = 0; trial < 200; ++trial) {
-    const View view = RandomView(random);
+    View view = RandomView(random);
+    view.motion.reset();
     const CameraCalibration camera = view.Theta().cameras[view.camera];
     const Vector3d p_C(random.Normal(), random.Normal(), -1);
     const Vector3d p_G =
         view.q_GI * (camera.q_CI.conjugate() * (p_C - camera.p_CI)) + view.p_GI;
-    const auto cost = MakeReprojectionCost(
-        view.reference, view.camera, view.z_px, kSigma, std::nullopt);
+    const auto cost = MakeReprojectionCost(view.reference,
+                                           view.camera,
+                                           view.z_px,
+                                           kSigma,
+                                           std::nullopt,
+                                           view.Motion());
     const CostEvaluation at = EvaluateCost(*cost, BlocksOf(view, p_G), true);
     EXPECT_EQ(at.residuals.norm(), 0);
     for (const auto& J : at.jacobians) EXPECT_EQ(J.norm(), 0);

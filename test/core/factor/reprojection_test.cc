@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 #include "test/core/factor/random_values.h"
 #include "test/core/numeric_jacobian.h"
@@ -25,6 +26,9 @@ struct View {
   CameraCalibration camera;
   Vector4d landmark_G;
   Vector2d z_px;
+  std::optional<KeyframeMotion> motion;
+
+  const KeyframeMotion* Motion() const { return motion ? &*motion : nullptr; }
 };
 
 // The homogeneous landmark that this view sees in the given direction of the
@@ -32,8 +36,13 @@ struct View {
 Vector4d LandmarkAt(const View& view, const Vector3d& bearing_C, double w) {
   const Vector3d p_I =
       view.camera.q_CI.conjugate() * (bearing_C - w * view.camera.p_CI);
+  const ExposurePose pose =
+      MovePose(view.q_GI,
+               view.p_GI,
+               view.motion.value_or(KeyframeMotion()),
+               view.motion ? view.camera.time_offset_s : 0);
   Vector4d landmark;
-  landmark << view.q_GI * p_I + w * view.p_GI, w;
+  landmark << pose.q_GI * p_I + w * pose.p_GI, w;
   return landmark;
 }
 
@@ -42,6 +51,7 @@ View RandomView(RandomValues& random, DistortionModel model) {
   view.q_GI = random.Rotation();
   view.p_GI = random.Normal3(5);
   view.camera = random.Camera(model);
+  view.camera.time_offset_s = random.Uniform(-0.03, 0.03);
   view.z_px = {random.Uniform(0, 640), random.Uniform(0, 480)};
   return view;
 }
@@ -71,7 +81,8 @@ VectorXd ResidualAt(const View& view,
                         moved.landmark_G,
                         moved.z_px,
                         &residual,
-                        nullptr));
+                        nullptr,
+                        moved.Motion()));
   return residual;
 }
 
@@ -84,7 +95,8 @@ void ExpectJacobiansMatch(const View& view) {
                         view.landmark_G,
                         view.z_px,
                         &residual,
-                        &J));
+                        &J,
+                        view.Motion()));
   EXPECT_EQ(ResidualAt(view, Argument::kLandmark, Vector4d::Zero()), residual);
   const auto numeric = [&](Argument argument, int n) {
     return NumericJacobian(
@@ -144,6 +156,7 @@ TEST_P(ReprojectionOfEachModel, JacobiansMatchDifferencesAtRandomStates) {
   int seen = 0;
   for (int trial = 0; trial < 1500; ++trial) {
     View view = RandomView(random, GetParam());
+    if (trial % 2 == 0) view.motion = random.Motion();
     Vector3d bearing_C;
     if (!Unproject(view.camera, view.z_px, &bearing_C)) continue;
     // From half a metre to beyond what parallax can tell, and infinity.
@@ -181,6 +194,34 @@ TEST(Reprojection, JacobiansMatchDifferencesWhereFovDistortionVanishes) {
     view.landmark_G = LandmarkAt(view, bearing_C, random.LogUniform(1e-6, 2));
     ExpectJacobiansMatch(view);
     if (HasFatalFailure()) return;
+  }
+}
+
+TEST_P(ReprojectionOfEachModel, WithAMotionIsThatOfTheMovedPose) {
+  RandomValues random(6);
+  for (int trial = 0; trial < 200; ++trial) {
+    View view = RandomView(random, GetParam());
+    view.motion = random.Motion();
+    view.landmark_G = LandmarkAt(view, {0.1, -0.2, 1}, random.Uniform(0, 2));
+    const ExposurePose pose =
+        MovePose(view.q_GI, view.p_GI, *view.motion, view.camera.time_offset_s);
+    Vector2d moved, there;
+    const auto at = [&](const Quaterniond& q_GI,
+                        const Vector3d& p_GI,
+                        const KeyframeMotion* motion,
+                        Vector2d* residual) {
+      return Reproject(q_GI,
+                       p_GI,
+                       view.camera,
+                       view.landmark_G,
+                       view.z_px,
+                       residual,
+                       nullptr,
+                       motion);
+    };
+    ASSERT_TRUE(at(view.q_GI, view.p_GI, view.Motion(), &moved));
+    ASSERT_TRUE(at(pose.q_GI, pose.p_GI, nullptr, &there));
+    EXPECT_LT((moved - there).norm(), 1e-9);
   }
 }
 

@@ -15,7 +15,7 @@ namespace selfcal {
 namespace {
 
 InlierSelection Select(const Rig& rig, const MotionSegment& segment) {
-  return SelectInliers(rig.factory, rig.pixel_sigma_px, segment, {});
+  return SelectInliers(rig, rig.factory, segment, {});
 }
 
 TEST(SelectInliers, KeepsEverythingOfAPerfectSegmentAndMovesNothing) {
@@ -45,8 +45,7 @@ TEST(SelectInliers, FindsGrossOutliersUnderAWrongCalibration) {
     const Calibration theta = PerturbCalibration(rig.factory, {}, seed);
     const SegmentPair pair =
         OneSegment(rig, theta, *MakeHandheld(4.1, 1, seed), options);
-    const InlierSelection selection =
-        SelectInliers(theta, rig.pixel_sigma_px, pair.slam, {});
+    const InlierSelection selection = SelectInliers(rig, theta, pair.slam, {});
     const std::set<int> inliers(selection.inliers.begin(),
                                 selection.inliers.end());
     for (int i = 0; i < static_cast<int>(pair.slam.observations.size()); ++i) {

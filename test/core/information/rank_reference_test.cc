@@ -79,13 +79,12 @@ ReferenceInformation Reference(const RandomSegment& s,
   scale(free) = prior(free);
   // Without dropping columns: all rank is decided in units of the prior.
   SparseQr qr(
-      BuildSegmentJacobian(
-          s.rig,
-          s.theta0,
-          s.segment,
-          SelectInliers(s.theta0, s.rig.pixel_sigma_px, s.segment, options),
-          scale,
-          s.gauge),
+      BuildSegmentJacobian(s.rig,
+                           s.theta0,
+                           s.segment,
+                           SelectInliers(s.rig, s.theta0, s.segment, options),
+                           scale,
+                           s.gauge),
       RankDetection::kNone);
   qr.Factorise();
   return ReferenceDirections(s.rig, qr.Root().R);

@@ -25,6 +25,33 @@ struct Case {
   int gauge = 0;
 };
 
+// Two cameras with time offsets: known, estimated at another value, and one of
+// each, which begins where the pose does not move.
+std::vector<Case> TimeOffsetCases() {
+  std::vector<Case> cases;
+  for (std::uint64_t seed = 5; seed <= 7; ++seed) {
+    Case c;
+    c.rig = TwoCameraRig();
+    c.rig.factory.cameras[0].time_offset_s = 0.02;
+    c.rig.factory.cameras[1].time_offset_s = seed == 7 ? 0 : -0.013;
+    if (seed > 5) {
+      c.rig.estimate_time_offset = true;
+      c.rig.groups = DefaultGroups(true);
+    }
+    if (seed == 7) c.rig.fixed = {"cam0.time_offset"};
+    c.theta0 = PerturbCalibration(c.rig.factory, {}, seed);
+    if (seed == 6) c.theta0.cameras[1].time_offset_s -= 0.002;
+    SimulationOptions options;
+    options.seed = seed;
+    options.keyframes_per_segment = 20;
+    c.segment =
+        OneSegment(c.rig, c.theta0, *MakeHandheld(2.2, 1, seed), options).slam;
+    c.gauge = static_cast<int>(seed) - 5;
+    cases.push_back(c);
+  }
+  return cases;
+}
+
 // Truth, and a SLAM system with a factory calibration and noise.
 std::vector<Case> WellConditionedCases() {
   std::vector<Case> cases;
@@ -46,6 +73,7 @@ std::vector<Case> WellConditionedCases() {
   }
   // Some parameters held by the rig.
   cases[0].rig.fixed = {"cam0.distortion.*", "imu.q_AI.y"};
+  for (const Case& c : TimeOffsetCases()) cases.push_back(c);
   return cases;
 }
 
@@ -63,7 +91,7 @@ TEST(ScoreAgainstReference, EqualsTheSparseQrOfTheWholeJacobian) {
     const SegmentInformation score =
         ScoreSegment(c.rig, c.theta0, c.segment, options);
     const InlierSelection selection =
-        SelectInliers(c.theta0, c.rig.pixel_sigma_px, c.segment, options);
+        SelectInliers(c.rig, c.theta0, c.segment, options);
     SparseQr qr(BuildSegmentJacobian(
         c.rig, c.theta0, c.segment, selection, ThetaScale(c.rig), c.gauge));
     qr.Factorise();
@@ -96,7 +124,7 @@ TEST(ScoreAgainstReference, EqualsCeresCovariance) {
     const SegmentInformation score =
         ScoreSegment(c.rig, c.theta0, c.segment, options);
     const InlierSelection selection =
-        SelectInliers(c.theta0, c.rig.pixel_sigma_px, c.segment, options);
+        SelectInliers(c.rig, c.theta0, c.segment, options);
     const Eigen::MatrixXd posterior =
         CeresSegment(c.rig, c.theta0, c.segment, selection, c.gauge)
             .Posterior();
@@ -125,7 +153,8 @@ TEST(ScoreAgainstReference, EqualsCeresCovariance) {
 // states that are true, its step differs by just that from the step at the
 // truth (which is not zero: the IMU is sampled, its integral is not exact).
 TEST(ScoreAgainstReference, TheStepFromEtaTakesBackAnErrorOfTheta) {
-  const Rig rig = HandheldRig("handheld");
+  Rig rig = HandheldRig("handheld");
+  rig.estimate_time_offset = true;
   const Eigen::VectorXd sigma = ReferenceSigmas(rig);
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0, 1e-3);

@@ -19,6 +19,16 @@ Eigen::MatrixXd RandomInformation(int size, int rank, std::mt19937* random) {
   return root.transpose() * root;
 }
 
+// The size of the tangent with one FOV camera.
+constexpr int kSize = 27;
+
+// With the time offset, that nothing is held fixed.
+Rig EstimatingAll() {
+  Rig rig = HandheldRig("handheld");
+  rig.estimate_time_offset = true;
+  return rig;
+}
+
 // A Lambda that is `information` in units of the rig's prior.
 Eigen::MatrixXd InTangentUnits(const Rig& rig,
                                const Eigen::MatrixXd& information) {
@@ -56,7 +66,7 @@ TEST(Entropy, SigmaRefShiftsEveryCovarianceByTheSameConstant) {
 
 TEST(ScoreGroups, NoInformationGainsExactlyNothing) {
   const Rig rig = HandheldRig("handheld");
-  const auto scores = ScoreGroups(rig, Eigen::MatrixXd::Zero(26, 26));
+  const auto scores = ScoreGroups(rig, Eigen::MatrixXd::Zero(kSize, kSize));
   ASSERT_EQ(scores.size(), 3u);
   for (const GroupScore& score : scores) {
     EXPECT_EQ(score.gain, 0);
@@ -75,13 +85,13 @@ TEST(ScoreGroups, NoInformationGainsExactlyNothing) {
 }
 
 TEST(ScoreGroups, GainIsTheEntropyOfThePriorMinusThatOfThePosterior) {
-  Rig rig = HandheldRig("handheld");
+  Rig rig = EstimatingAll();
   rig.prior_sigmas = {{"imu.*", 0.02}, {"*.focal.*", 5}};
   std::mt19937 random(2);
-  const auto prior = ScoreGroups(rig, Eigen::MatrixXd::Zero(26, 26));
+  const auto prior = ScoreGroups(rig, Eigen::MatrixXd::Zero(kSize, kSize));
   for (int rank = 1; rank < 40; rank += 3) {
     const Eigen::MatrixXd Lambda =
-        InTangentUnits(rig, 10 * RandomInformation(26, rank, &random));
+        InTangentUnits(rig, 10 * RandomInformation(kSize, rank, &random));
     const auto scores = ScoreGroups(rig, Lambda);
     const Eigen::VectorXd information =
         PriorSigmas(rig).cwiseAbs2().cwiseInverse();
@@ -102,7 +112,7 @@ TEST(ScoreGroups, GainIsTheEntropyOfThePriorMinusThatOfThePosterior) {
 
 TEST(ScoreGroups, ADirectionCountsAsObservedFromTheInformationOfThePriorOn) {
   Rig rig = HandheldRig("handheld");
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(26, 26);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(kSize, kSize);
   information(2, 2) = 1.01;
   information(5, 5) = 0.99;
   const auto scores = ScoreGroups(rig, InTangentUnits(rig, information));
@@ -121,22 +131,22 @@ TEST(ScoreGroups, ADirectionCountsAsObservedFromTheInformationOfThePriorOn) {
 }
 
 TEST(ScoreGroups, GroupsMayOverlap) {
-  Rig rig = HandheldRig("handheld");
+  Rig rig = EstimatingAll();
   rig.groups = {{"all", {"*"}}, {"focal", {"*.focal.*"}}};
   std::mt19937 random(3);
   const Eigen::MatrixXd Lambda =
-      InTangentUnits(rig, RandomInformation(26, 40, &random));
+      InTangentUnits(rig, RandomInformation(kSize, 40, &random));
   const auto scores = ScoreGroups(rig, Lambda);
-  EXPECT_EQ(scores[0].size, 26);
+  EXPECT_EQ(scores[0].size, kSize);
   EXPECT_EQ(scores[1].size, 2);
   EXPECT_GE(scores[0].gain, scores[1].gain);
 }
 
 TEST(EntropiesWithoutPrior, AreThoseOfTheInverseOfLambda) {
-  const Rig rig = HandheldRig("handheld");
+  const Rig rig = EstimatingAll();
   std::mt19937 random(4);
   const Eigen::MatrixXd Lambda =
-      InTangentUnits(rig, RandomInformation(26, 60, &random));
+      InTangentUnits(rig, RandomInformation(kSize, 60, &random));
   const Eigen::MatrixXd Sigma = Lambda.inverse();
   const auto entropies = EntropiesWithoutPrior(rig, Lambda);
   ASSERT_EQ(entropies.size(), 3u);
@@ -149,18 +159,18 @@ TEST(EntropiesWithoutPrior, AreThoseOfTheInverseOfLambda) {
 }
 
 TEST(EntropiesWithoutPrior, OnlyAnUndeterminedGroupHasNone) {
-  const Rig rig = HandheldRig("handheld");
+  const Rig rig = EstimatingAll();
   std::mt19937 random(5);
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(26, 26);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(kSize, kSize);
   // Extrinsics and camera are determined, the gyroscope is not.
-  information.bottomRightCorner(20, 20) = RandomInformation(20, 40, &random);
+  information.bottomRightCorner(21, 21) = RandomInformation(21, 40, &random);
   const auto entropies =
       EntropiesWithoutPrior(rig, InTangentUnits(rig, information));
   EXPECT_FALSE(entropies[0].has_value());
   EXPECT_TRUE(entropies[1].has_value());
   EXPECT_TRUE(entropies[2].has_value());
   for (const auto& entropy :
-       EntropiesWithoutPrior(rig, Eigen::MatrixXd::Zero(26, 26))) {
+       EntropiesWithoutPrior(rig, Eigen::MatrixXd::Zero(kSize, kSize))) {
     EXPECT_FALSE(entropy.has_value());
   }
 }

@@ -32,13 +32,15 @@ TEST(ImuCalibration, MatricesAreUpperTriangularAsDocumented) {
 TEST(Calibration, TangentSizesAddUp) {
   RandomValues random(1);
   const Calibration theta = random.Theta();
-  EXPECT_EQ(CameraTangentSize(theta.cameras[0]), 11);
-  EXPECT_EQ(CameraTangentSize(theta.cameras[1]), 14);
-  EXPECT_EQ(CameraTangentSize(theta.cameras[2]), 14);
+  EXPECT_EQ(CameraTangentSize(theta.cameras[0]), 12);
+  EXPECT_EQ(CameraTangentSize(theta.cameras[1]), 15);
+  EXPECT_EQ(CameraTangentSize(theta.cameras[2]), 15);
   EXPECT_EQ(CameraTangentOffset(theta, 0), 15);
-  EXPECT_EQ(CameraTangentOffset(theta, 1), 26);
-  EXPECT_EQ(CameraTangentOffset(theta, 2), 40);
-  EXPECT_EQ(TangentSize(theta), 54);
+  EXPECT_EQ(CameraTangentOffset(theta, 1), 27);
+  EXPECT_EQ(CameraTangentOffset(theta, 2), 42);
+  EXPECT_EQ(TimeOffsetComponent(theta, 0), 26);
+  EXPECT_EQ(TimeOffsetComponent(theta, 2), 56);
+  EXPECT_EQ(TangentSize(theta), 57);
 }
 
 TEST(Calibration, BoxPlusOfZeroChangesNothing) {
@@ -88,13 +90,14 @@ TEST(Calibration, BoxPlusTurnsRotationsOnTheRightAndAddsTheRest) {
             1e-15);
   const CameraCalibration& from = theta.cameras[1];
   const CameraCalibration& to = moved.cameras[1];
-  EXPECT_LT(to.q_CI.angularDistance(from.q_CI * Exp(delta.segment<3>(26))),
+  EXPECT_LT(to.q_CI.angularDistance(from.q_CI * Exp(delta.segment<3>(27))),
             1e-15);
-  EXPECT_LT((to.p_CI - from.p_CI - delta.segment<3>(29)).norm(), 1e-15);
-  EXPECT_LT((to.f - from.f - delta.segment<2>(32)).norm(), 1e-12);
-  EXPECT_LT((to.c - from.c - delta.segment<2>(34)).norm(), 1e-12);
-  EXPECT_LT((to.distortion - from.distortion - delta.segment<4>(36)).norm(),
+  EXPECT_LT((to.p_CI - from.p_CI - delta.segment<3>(30)).norm(), 1e-15);
+  EXPECT_LT((to.f - from.f - delta.segment<2>(33)).norm(), 1e-12);
+  EXPECT_LT((to.c - from.c - delta.segment<2>(35)).norm(), 1e-12);
+  EXPECT_LT((to.distortion - from.distortion - delta.segment<4>(37)).norm(),
             1e-15);
+  EXPECT_NEAR(to.time_offset_s, from.time_offset_s + delta[41], 1e-15);
   EXPECT_EQ(to.width_px, from.width_px);
   EXPECT_EQ(to.height_px, from.height_px);
 }
@@ -156,12 +159,14 @@ TEST(TangentComponents, StandAtTheOffsetsOfTheirBlocks) {
   expect(cam0 + kCameraPosition + 2, "cam0.p_CI.z", "m");
   expect(cam0 + kCameraIntrinsics, "cam0.focal.x", "px");
   expect(cam0 + kCameraIntrinsics + 3, "cam0.principal.y", "px");
-  expect(cam0 + kCameraIntrinsics + 4, "cam0.distortion.w", "-");
+  expect(cam0 + kCameraDistortion, "cam0.distortion.w", "-");
+  expect(TimeOffsetComponent(theta, 0), "cam0.time_offset", "s");
   const int cam1 = CameraTangentOffset(theta, 1);
   expect(cam1 + kCameraIntrinsics + 4, "cam1.distortion.k1", "-");
   expect(cam1 + kCameraIntrinsics + 7, "cam1.distortion.p2", "-");
   const int cam2 = CameraTangentOffset(theta, 2);
   expect(cam2 + kCameraIntrinsics + 7, "cam2.distortion.k4", "-");
+  expect(TimeOffsetComponent(theta, 2), "cam2.time_offset", "s");
 }
 
 TEST(TangentComponents, ReferenceSigmasAreEqualOnTheAxesOfABlock) {
@@ -172,8 +177,10 @@ TEST(TangentComponents, ReferenceSigmasAreEqualOnTheAxesOfABlock) {
     const std::string block =
         component.name.substr(0, component.name.rfind('.'));
     for (const TangentComponent& other : components) {
-      // The coefficients of a distortion are no axes.
+      // The coefficients of a distortion are no axes, and what a camera has
+      // but one of is no block.
       if (block.ends_with("distortion")) continue;
+      if (component.name.ends_with("time_offset")) continue;
       if (!other.name.starts_with(block + ".")) continue;
       EXPECT_EQ(component.sigma_ref, other.sigma_ref) << component.name;
     }
@@ -188,6 +195,7 @@ TEST(ReadableValues, AreTheNumbersAPersonWouldWrite) {
   theta.cameras[0].q_CI = Exp(phi);
   theta.cameras[0].f = {255, 256};
   theta.cameras[0].distortion[0] = 0.92;
+  theta.cameras[0].time_offset_s = -0.003;
   const Eigen::VectorXd values = ReadableValues(theta);
   ASSERT_EQ(values.size(), TangentSize(theta));
   EXPECT_EQ(values.segment<3>(0), theta.imu.s_g);
@@ -195,6 +203,7 @@ TEST(ReadableValues, AreTheNumbersAPersonWouldWrite) {
   EXPECT_EQ(values.segment<3>(18), theta.cameras[0].p_CI);
   EXPECT_EQ(values[21], 255);
   EXPECT_EQ(values[25], 0.92);
+  EXPECT_EQ(values[26], -0.003);
 }
 
 }  // namespace

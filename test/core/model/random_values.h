@@ -85,6 +85,9 @@ class RandomValues {
     theta.cameras = {Camera(DistortionModel::kFov),
                      Camera(DistortionModel::kRadialTangential),
                      Camera(DistortionModel::kEquidistant)};
+    for (CameraCalibration& camera : theta.cameras) {
+      camera.time_offset_s = Uniform(-0.03, 0.03);
+    }
     return theta;
   }
 

@@ -66,21 +66,60 @@ TEST(MatchComponents, SeveralPatternsGiveEachComponentOnceInOrder) {
                       {"*.q_CI.*", "imu.gyro.*", "imu.gyro.scale.x", "cam0.*"});
   EXPECT_TRUE(std::is_sorted(matched.begin(), matched.end()));
   EXPECT_EQ(std::adjacent_find(matched.begin(), matched.end()), matched.end());
-  EXPECT_EQ(matched.size(), 6u + 11 + 3 + 3);
+  EXPECT_EQ(matched.size(), 6u + 12 + 3 + 3);
 }
 
-TEST(DefaultGroups, CoverTheTangentExactlyOnce) {
-  const Rig rig = RandomRig();
-  std::vector<int> all;
-  std::vector<std::string> names;
-  for (const ParameterGroup& group : rig.groups) {
-    names.push_back(group.name);
-    for (const int i : GroupComponents(rig, group)) all.push_back(i);
+// Names of the groups, and all of their components, sorted.
+struct AllGroups {
+  explicit AllGroups(const Rig& rig) {
+    for (const ParameterGroup& group : rig.groups) {
+      names.push_back(group.name);
+      for (const int i : GroupComponents(rig, group)) components.push_back(i);
+    }
+    std::sort(components.begin(), components.end());
   }
-  EXPECT_THAT(names, ElementsAre("imu", "camera", "extrinsics"));
-  std::sort(all.begin(), all.end());
-  ASSERT_EQ(static_cast<int>(all.size()), TangentSize(rig.factory));
-  for (int i = 0; i < TangentSize(rig.factory); ++i) EXPECT_EQ(all[i], i);
+  std::vector<std::string> names;
+  std::vector<int> components;
+};
+
+TEST(DefaultGroups, CoverAllThatIsEstimatedExactlyOnce) {
+  const Rig rig = RandomRig();
+  const AllGroups groups(rig);
+  EXPECT_THAT(groups.names, ElementsAre("imu", "camera", "extrinsics"));
+  EXPECT_EQ(groups.components, FreeComponents(rig));
+}
+
+TEST(DefaultGroups, HaveTimeOffsetsInOneOfTheirOwnWhereTheyAreEstimated) {
+  Rig rig = RandomRig();
+  rig.estimate_time_offset = true;
+  rig.groups = DefaultGroups(true);
+  const AllGroups groups(rig);
+  EXPECT_THAT(groups.names, ElementsAre("imu", "camera", "extrinsics", "time"));
+  EXPECT_EQ(groups.components, FreeComponents(rig));
+  EXPECT_EQ(static_cast<int>(groups.components.size()),
+            TangentSize(rig.factory));
+  EXPECT_THAT(GroupComponents(rig, rig.groups[3]),
+              ElementsAre(TimeOffsetComponent(rig.factory, 0),
+                          TimeOffsetComponent(rig.factory, 1),
+                          TimeOffsetComponent(rig.factory, 2)));
+}
+
+TEST(TimeOffsets, AreKnownUnlessTheRigEstimatesThem) {
+  Rig rig = RandomRig();
+  const auto free = [&](int camera) {
+    const std::vector<int> all = FreeComponents(rig);
+    return std::binary_search(
+        all.begin(), all.end(), TimeOffsetComponent(rig.factory, camera));
+  };
+  for (int j = 0; j < 3; ++j) EXPECT_FALSE(free(j));
+  EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(0, 0, 0));
+  rig.estimate_time_offset = true;
+  EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(1, 1, 1));
+  // Of one camera against which the others are found.
+  rig.fixed = {"cam0.time_offset"};
+  EXPECT_FALSE(free(0));
+  EXPECT_TRUE(free(1));
+  EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(0, 1, 1));
 }
 
 TEST(FixedComponents, AreInNoGroupAndNotFree) {
@@ -98,7 +137,8 @@ TEST(FixedComponents, AreInNoGroupAndNotFree) {
     expect_free(GroupComponents(rig, group));
   }
   expect_free(FreeComponents(rig));
-  EXPECT_EQ(FreeComponents(rig).size(), components.size() - 7);
+  // And the time offsets.
+  EXPECT_EQ(FreeComponents(rig).size(), components.size() - 7 - 3);
 }
 
 TEST(PriorSigmas, AreTenReferenceSigmasWithoutASetting) {

@@ -62,6 +62,8 @@ std::vector<Corruption> Corruptions() {
        [](Rig* r) { r->factory.cameras[0].distortion[0] = 3.2; }},
       {"factory.cameras[1].c",
        [](Rig* r) { r->factory.cameras[1].c.y() = kInfinity; }},
+      {"factory.cameras[1].time_offset_s",
+       [](Rig* r) { r->factory.cameras[1].time_offset_s = -0.6; }},
       {"factory.cameras[1].width_px",
        [](Rig* r) { r->factory.cameras[1].width_px = 0; }},
       {"factory.cameras[2].distortion",
@@ -172,6 +174,17 @@ TEST(ValidateRig, NoGroupIsNamedAsTheTableOfAJointSelection) {
   EXPECT_EQ(violations[0].field, "groups[1].name");
   rig.groups[1].name = "camera";
   EXPECT_TRUE(Validate(rig).empty());
+}
+
+TEST(ValidateRig, GroupOfTimeOffsetsThatAreKnownIsRefusedWithAHint) {
+  Rig rig = ValidRig();
+  rig.groups = DefaultGroups(true);
+  const std::vector<Violation> violations = Validate(rig);
+  ASSERT_THAT(Fields(violations), ElementsAre("groups[3].patterns"));
+  EXPECT_THAT(violations[0].message,
+              testing::HasSubstr("estimate_time_offset"));
+  rig.estimate_time_offset = true;
+  EXPECT_THAT(Validate(rig), IsEmpty());
 }
 
 TEST(ValidateRig, NeedsAGroup) {

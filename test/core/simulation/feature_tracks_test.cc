@@ -58,13 +58,24 @@ double Mean(const std::vector<int>& values) {
   return sum / static_cast<double>(values.size());
 }
 
+// Of cameras without a time offset.
+FeatureTracks Tracks(const Rig& rig,
+                     double pixel_sigma_px,
+                     const std::vector<KeyframeState>& keyframes,
+                     const SimulationOptions& options) {
+  return SimulateTracks(rig.factory,
+                        pixel_sigma_px,
+                        Exposures(rig.factory.cameras.size(), keyframes),
+                        options);
+}
+
 TEST(FeatureTracksTest, WhereNothingLeavesTheImageLengthsAreGeometric) {
   Rig rig = HandheldRig("a");
   SimulationOptions options;
   options.mean_track_length = 8;
   options.noise = false;
-  const Lengths tracks = TrackLengths(
-      SimulateTracks(rig.factory, 0, Keyframes(*MakeRest(200)), options));
+  const Lengths tracks =
+      TrackLengths(Tracks(rig, 0, Keyframes(*MakeRest(200)), options));
   const auto n = static_cast<double>(tracks.lengths.size());
   EXPECT_NEAR(Mean(tracks.lengths), 8, 5 * 8 / std::sqrt(n));
   double ones = 0;
@@ -78,15 +89,15 @@ TEST(FeatureTracksTest, NoTrackIsLongerThanTheMaximum) {
   options.mean_track_length = 8;
   options.max_track_length = 6;
   options.revisit_fraction = 0;
-  const Lengths tracks = TrackLengths(
-      SimulateTracks(rig.factory, 0, Keyframes(*MakeRest(60)), options));
+  const Lengths tracks =
+      TrackLengths(Tracks(rig, 0, Keyframes(*MakeRest(60)), options));
   EXPECT_EQ(*std::max_element(tracks.lengths.begin(), tracks.lengths.end()), 6);
 }
 
 TEST(FeatureTracksTest, MotionEndsTracksEarlier) {
   const Rig rig = HandheldRig("a");
-  const Lengths tracks = TrackLengths(
-      SimulateTracks(rig.factory, 0.8, Keyframes(*MakeHandheld(60, 1, 1)), {}));
+  const Lengths tracks =
+      TrackLengths(Tracks(rig, 0.8, Keyframes(*MakeHandheld(60, 1, 1)), {}));
   EXPECT_LT(Mean(tracks.lengths), 9.5);
   EXPECT_GT(Mean(tracks.lengths), 5);
 }
@@ -96,8 +107,7 @@ TEST(FeatureTracksTest, EachCameraSeesTheWantedNumberInEveryKeyframe) {
   const auto keyframes = Keyframes(*MakeHandheld(30, 1, 2));
   SimulationOptions options;
   options.landmarks_in_view = 80;
-  const FeatureTracks tracks =
-      SimulateTracks(rig.factory, 0.8, keyframes, options);
+  const FeatureTracks tracks = Tracks(rig, 0.8, keyframes, options);
   std::map<std::pair<int, int>, int> seen;
   for (const FeatureObservation& z : tracks.observations) {
     ++seen[{z.keyframe, z.camera}];
@@ -107,8 +117,8 @@ TEST(FeatureTracksTest, EachCameraSeesTheWantedNumberInEveryKeyframe) {
 }
 
 TEST(FeatureTracksTest, TheCamerasOfARigSeeTheSameLandmarks) {
-  const FeatureTracks tracks = SimulateTracks(
-      StereoRig().factory, 0.8, Keyframes(*MakeHandheld(20, 1, 2)), {});
+  const FeatureTracks tracks =
+      Tracks(StereoRig(), 0.8, Keyframes(*MakeHandheld(20, 1, 2)), {});
   std::map<int, std::pair<bool, bool>> cameras;
   for (const FeatureObservation& z : tracks.observations) {
     (z.camera == 0 ? cameras[z.landmark].first : cameras[z.landmark].second) =
@@ -129,8 +139,7 @@ TEST(FeatureTracksTest, AFractionOfTheLandmarksIsFoundAgainAfterAWhile) {
     double count = 0;
     double all = 0;
     for (const auto& [landmark, stretches] :
-         TrackLengths(SimulateTracks(rig.factory, 0.8, keyframes, options))
-             .stretches) {
+         TrackLengths(Tracks(rig, 0.8, keyframes, options)).stretches) {
       count += stretches > 1;
       ++all;
     }
@@ -146,8 +155,8 @@ TEST(FeatureTracksTest, EveryPixelLiesInsideTheImageOutliersToo) {
   const Rig rig = StereoRig();
   SimulationOptions options;
   options.outlier_fraction = 0.1;
-  const FeatureTracks tracks = SimulateTracks(
-      rig.factory, 3, Keyframes(*MakeHandheld(20, 1, 4)), options);
+  const FeatureTracks tracks =
+      Tracks(rig, 3, Keyframes(*MakeHandheld(20, 1, 4)), options);
   for (const FeatureObservation& z : tracks.observations) {
     const CameraCalibration& camera = rig.factory.cameras[z.camera];
     for (const Eigen::Vector2d& z_px : {z.true_px, z.measured_px}) {
@@ -163,8 +172,8 @@ TEST(FeatureTracksTest, TheWantedFractionOfObservationsIsReplaced) {
   SimulationOptions options;
   options.noise = false;
   options.outlier_fraction = 0.07;
-  const FeatureTracks tracks = SimulateTracks(
-      rig.factory, 0.8, Keyframes(*MakeHandheld(60, 1, 5)), options);
+  const FeatureTracks tracks =
+      Tracks(rig, 0.8, Keyframes(*MakeHandheld(60, 1, 5)), options);
   double replaced = 0;
   for (const FeatureObservation& z : tracks.observations) {
     replaced += z.true_px != z.measured_px;
@@ -179,8 +188,7 @@ TEST(FeatureTracksTest, NewLandmarksLieBetweenTheDepthsOfTheOptions) {
   options.min_depth_m = 1;
   options.max_depth_m = 4;
   const auto keyframes = Keyframes(*MakeRest(1));
-  const FeatureTracks tracks =
-      SimulateTracks(rig.factory, 0, keyframes, options);
+  const FeatureTracks tracks = Tracks(rig, 0, keyframes, options);
   const CameraCalibration& camera = rig.factory.cameras[0];
   const Eigen::Vector3d p_GC =
       keyframes[0].p_GI -

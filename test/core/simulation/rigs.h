@@ -1,6 +1,8 @@
 // Rigs and truth for the tests of the simulation.
 #pragma once
 
+#include <string>
+
 #include "core/model/so3.h"
 #include "core/simulation/simulate.h"
 
@@ -26,6 +28,25 @@ inline Rig StereoRig() {
   right.model = DistortionModel::kEquidistant;
   right.distortion = Eigen::Vector4d(0.01, -0.005, 0.002, -0.0004);
   rig.factory.cameras = {left, right};
+  return rig;
+}
+
+// One to four cameras of all models: two that look ahead, 11 cm apart and with
+// much in common, then one to the left and one to the right.
+inline Rig RigOfCameras(int cameras) {
+  Rig rig = HandheldRig("cameras-" + std::to_string(cameras));
+  const CameraCalibration first = rig.factory.cameras[0];
+  const CameraCalibration beside = StereoRig().factory.cameras[1];
+  CameraCalibration left = StereoRig().factory.cameras[0];
+  left.q_CI = left.q_CI * Exp({0, 0, -1.4});
+  left.p_CI = {0.01, 0.02, -0.04};
+  CameraCalibration right = first;
+  right.q_CI = Exp({-0.01, 0.02, 0}) * first.q_CI * Exp({0, 0, 1.3});
+  right.p_CI = {-0.02, 0.03, -0.05};
+  right.f = {261, 262};
+  right.distortion[0] = 0.88;
+  rig.factory.cameras = {first, beside, left, right};
+  rig.factory.cameras.resize(cameras);
   return rig;
 }
 

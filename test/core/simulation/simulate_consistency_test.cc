@@ -13,17 +13,20 @@ namespace {
 
 Eigen::Vector2d Residual(const MotionSegment& segment,
                          const Calibration& theta,
-                         const Observation& observation) {
+                         const Observation& observation,
+                         const KeyframeMotions& motions = {}) {
   const KeyframeState& x = segment.keyframes[observation.keyframe];
   const Eigen::Vector3d& p_G = segment.landmarks[observation.landmark].p_G;
   Eigen::Vector2d residual_px;
-  const bool projected = Reproject(x.q_GI,
-                                   x.p_GI,
-                                   theta.cameras[observation.camera],
-                                   p_G.homogeneous(),
-                                   observation.z_px,
-                                   &residual_px,
-                                   nullptr);
+  const bool projected =
+      Reproject(x.q_GI,
+                x.p_GI,
+                theta.cameras[observation.camera],
+                p_G.homogeneous(),
+                observation.z_px,
+                &residual_px,
+                nullptr,
+                motions.At(observation.keyframe, observation.camera));
   EXPECT_TRUE(projected);
   return residual_px;
 }
@@ -65,6 +68,42 @@ TEST(SimulateConsistencyTest, WithoutNoisePixelsAreThoseOfTheFactor) {
       }
     }
   }
+}
+
+// Cameras that are exposed before and after the keyframes.
+Rig LateRig() {
+  Rig rig = StereoRig();
+  rig.factory.cameras[0].time_offset_s = 0.03;
+  rig.factory.cameras[1].time_offset_s = -0.02;
+  return rig;
+}
+
+// What the factor makes of the IMU's samples is the model's error: for offsets
+// of 30 ms it is far below the noise of a pixel, but for the first keyframe of
+// a segment, before which there are no samples.
+TEST(SimulateConsistencyTest, WithATimeOffsetPixelsAreThoseOfTheMovedPose) {
+  const Rig rig = LateRig();
+  SimulationOptions options;
+  options.noise = false;
+  const SimulatedSession session = SimulateHandheld(rig, 20, options);
+  double first = 0, others = 0;
+  int count = 0, first_count = 0;
+  for (const MotionSegment& truth : session.truth) {
+    const KeyframeMotions motions = SegmentMotions(rig, rig.factory, truth);
+    for (const Observation& z : truth.observations) {
+      const double square =
+          Residual(truth, rig.factory, z, motions).squaredNorm();
+      if (z.keyframe == 0) {
+        ++first_count;
+        first += square;
+        continue;
+      }
+      ++count;
+      others += square;
+    }
+  }
+  EXPECT_LT(std::sqrt(others / count), 0.02 * rig.pixel_sigma_px);
+  EXPECT_LT(std::sqrt(first / first_count), 0.5 * rig.pixel_sigma_px);
 }
 
 TEST(SimulateConsistencyTest, WithoutNoiseReadingsAreThoseOfTheFactor) {
@@ -158,6 +197,28 @@ TEST(SimulateConsistencyTest, StartsNearEnoughForAnEstimator) {
   // More than the noise, for the SLAM system is wrong; but of its order.
   EXPECT_GT(std::sqrt(sum / count), rig.pixel_sigma_px);
   EXPECT_LT(std::sqrt(sum / count), 5 * rig.pixel_sigma_px);
+}
+
+TEST(SimulateConsistencyTest, ASlamSystemWithoutTheOffsetFollowsItsImages) {
+  Rig rig = HandheldRig("late");
+  const Calibration slam = rig.factory;
+  rig.factory.cameras[0].time_offset_s = 0.02;
+  SimulationOptions options = PerfectSlam();
+  options.noise = false;
+  const SimulatedSession session = Simulate(
+      rig, rig.factory, slam, *MakeHandheld(20, 1, 2), "session", options);
+  double sum = 0;
+  double count = 0;
+  for (const MotionSegment& segment : session.segments) {
+    for (const Observation& z : segment.observations) {
+      sum += Residual(segment, slam, z).squaredNorm();
+      ++count;
+    }
+  }
+  // Its motion from keyframe to keyframe is not that of its IMU; pixels agree.
+  EXPECT_LT(std::sqrt(sum / count), 1e-3);
+  EXPECT_GT(InertialRms(session.segments, rig)[0],
+            10 * InertialRms(session.truth, rig)[0]);
 }
 
 TEST(SimulateConsistencyTest, APerfectSlamSystemHandsOverTheTruth) {

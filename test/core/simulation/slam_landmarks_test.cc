@@ -49,7 +49,7 @@ struct Scene {
 
   std::vector<std::optional<Eigen::Vector3d>> Triangulate(
       const SimulationOptions& options) const {
-    return TriangulateLandmarks(rig.factory, states, tracks, 0.8, options);
+    return TriangulateLandmarks(rig.factory, {states}, tracks, 0.8, options);
   }
 };
 

@@ -72,6 +72,26 @@ TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   ExpectSameCalibration(stored->report->theta, candidate.theta);
 }
 
+// As one that was stored before cameras had a time offset.
+TEST_P(CalibrationsTest, OldVersionHasKnownTimeOffsets) {
+  const Rig rig = RigWithRun("a");
+  StoredCalibration candidate = Candidate(rig);
+  const int offset = TimeOffsetComponent(rig.factory, 0);
+  const int size = TangentSize(rig.factory);
+  ASSERT_EQ(offset, size - 1) << "one camera";
+  const Eigen::MatrixXd old =
+      candidate.covariance.topLeftCorner(size - 1, size - 1);
+  candidate.covariance = old;
+  ASSERT_TRUE(store_->FinishRun("a", 1, candidate).ok());
+  const auto stored = store_->GetActiveCalibration("a");
+  ASSERT_TRUE(stored.ok()) << stored.status();
+  ASSERT_EQ(stored->covariance.rows(), size);
+  EXPECT_EQ(stored->covariance.topLeftCorner(size - 1, size - 1), old);
+  EXPECT_TRUE(stored->covariance.row(offset).isZero(0));
+  EXPECT_TRUE(stored->covariance.col(offset).isZero(0));
+  EXPECT_EQ(stored->report->covariance, stored->covariance);
+}
+
 TEST_P(CalibrationsTest, ActiveOneSupersedesTheOneBefore) {
   const Rig rig = RigWithRun("a");
   ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());

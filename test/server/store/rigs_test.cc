@@ -13,6 +13,8 @@ TEST_P(RigsTest, RigComesBackToTheBitAfterReopening) {
   rig.fixed = {"imu.gyro.misalignment.*"};
   rig.min_gain_nats = 0.3;
   rig.retrigger_fraction = 0.7;
+  rig.factory.cameras[0].time_offset_s = 1.0 / 77;
+  rig.estimate_time_offset = true;
   const auto created = store_->CreateRig(rig);
   ASSERT_TRUE(created.ok()) << created.status();
   Reopen();
@@ -26,6 +28,7 @@ TEST_P(RigsTest, RigComesBackToTheBitAfterReopening) {
   EXPECT_EQ(stored->rig.fixed, rig.fixed);
   EXPECT_EQ(stored->rig.min_gain_nats, 0.3);
   EXPECT_EQ(stored->rig.retrigger_fraction, 0.7);
+  EXPECT_TRUE(stored->rig.estimate_time_offset);
   EXPECT_EQ(stored->rig.table_size, rig.table_size);
   EXPECT_EQ(stored->rig.groups.size(), rig.groups.size());
 }
@@ -42,7 +45,8 @@ TEST_P(RigsTest, FactoryIsVersionOneWithTheTolerancesAsCovariance) {
   EXPECT_FALSE(factory->report.has_value());
   ExpectSameCalibration(factory->theta, rig.factory);
   Eigen::VectorXd variances = PriorSigmas(rig).cwiseAbs2();
-  variances.head(3).setZero();  // the fixed ones
+  variances.head(3).setZero();                         // the fixed ones
+  variances(TimeOffsetComponent(rig.factory, 0)) = 0;  // known
   EXPECT_EQ(factory->covariance, Eigen::MatrixXd(variances.asDiagonal()));
 }
 

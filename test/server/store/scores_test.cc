@@ -39,6 +39,29 @@ TEST_P(ScoresTest, InformationComesBackToTheBitAfterReopening) {
   EXPECT_EQ(stored.residuals.inertial_rms, information.residuals.inertial_rms);
 }
 
+// As it was stored before cameras had a time offset.
+TEST_P(ScoresTest, OldInformationSaysNothingAboutTimeOffsets) {
+  const Rig rig = CreateTestRig("a");
+  Put("a", 0);
+  SegmentInformation information = FakeInformation(rig, 1, 2, 78);
+  const int size = TangentSize(rig.factory);
+  ASSERT_EQ(TimeOffsetComponent(rig.factory, 0), size - 1) << "one camera";
+  const Eigen::MatrixXd old =
+      information.Lambda.topLeftCorner(size - 1, size - 1);
+  information.Lambda = old;
+  information.eta.conservativeResize(size - 1);
+  ASSERT_TRUE(store_->CommitScore("a", {"s", 0}, information).ok());
+  const auto segment = store_->GetSegment("a", {"s", 0});
+  ASSERT_TRUE(segment.ok()) << segment.status();
+  const SegmentInformation& stored = *segment->information;
+  ASSERT_EQ(stored.Lambda.rows(), size);
+  EXPECT_EQ(stored.Lambda.topLeftCorner(size - 1, size - 1), old);
+  EXPECT_TRUE(stored.Lambda.row(size - 1).isZero(0));
+  ASSERT_EQ(stored.eta.size(), size);
+  EXPECT_EQ(stored.eta.head(size - 1), information.eta);
+  EXPECT_EQ(stored.eta(size - 1), 0);
+}
+
 TEST_P(ScoresTest, EvictionDropsTheDataAndKeepsTheInformation) {
   const Rig rig = CreateTestRig("a");  // tables of 2
   for (int k = 0; k < 3; ++k) Put("a", k);

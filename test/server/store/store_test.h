@@ -119,6 +119,7 @@ inline void ExpectSameCalibration(const Calibration& a, const Calibration& b) {
     EXPECT_EQ(a.cameras[k].f, b.cameras[k].f);
     EXPECT_EQ(a.cameras[k].c, b.cameras[k].c);
     EXPECT_EQ(a.cameras[k].distortion, b.cameras[k].distortion);
+    EXPECT_EQ(a.cameras[k].time_offset_s, b.cameras[k].time_offset_s);
     EXPECT_EQ(a.cameras[k].width_px, b.cameras[k].width_px);
   }
 }

@@ -1,0 +1,219 @@
+#include "core/factor/keyframe_motion.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <iterator>
+
+#include "core/model/so3.h"
+
+namespace selfcal {
+namespace {
+
+using Eigen::Vector3d;
+
+// Rates are smoothed over so long on either side, and over so many samples.
+constexpr double kHalfWindow_s = 0.015;
+constexpr std::ptrdiff_t kMinSamples = 4;
+// The line is followed no further than this beyond the samples.
+constexpr double kReach_s = 0.03;
+// A rate is shrunk by this multiple of its noise, as squares, of three axes:
+// noise alone is larger 3 times in 100.
+constexpr double kNoiseSquares = 3 * 3;
+
+// Readings about a keyframe, free of what the IMU does to them. Times [s] count
+// from the keyframe.
+class Readings {
+ public:
+  Readings(std::span<const ImuSample> samples,
+           const KeyframeState& x,
+           const ImuCalibration& imu)
+      : samples_(samples),
+        x_(x),
+        gyro_(imu.T_g().inverse()),
+        accel_(imu.q_AI.toRotationMatrix().transpose() * imu.T_a().inverse()) {}
+
+  struct Reading {
+    Vector3d w_I, f_I;
+  };
+
+  // Time of the sample after (dt > 0), or before, the given time; dt where that
+  // is nearer.
+  double Next(double t_s, double dt_s) const {
+    const auto at = dt_s > 0 ? After(t_s) : Before(t_s);
+    if (at < 0 || at >= std::ssize(samples_)) return dt_s;
+    return dt_s > 0 ? std::min(Time(at), dt_s) : std::max(Time(at), dt_s);
+  }
+
+  Reading Interpolate(double t_s) const {
+    const std::ptrdiff_t after = After(t_s);
+    if (after == 0 || after == std::ssize(samples_)) return Smooth(t_s);
+    const double begin_s = Time(after - 1);
+    const double part = (t_s - begin_s) / (Time(after) - begin_s);
+    const ImuSample& a = samples_[after - 1];
+    const ImuSample& b = samples_[after];
+    return Correct(a.gyro + part * (b.gyro - a.gyro),
+                   a.accel + part * (b.accel - a.accel));
+  }
+
+  // The line through the samples about the time, or those nearest to it.
+  Reading Smooth(double t_s) const {
+    double variance_Hz;
+    return Smooth(t_s, &variance_Hz);
+  }
+
+  // Smooth, as far as it stands out of white noise.
+  Vector3d Rate(double t_s, double noise_density) const {
+    double variance_Hz;
+    const Vector3d w_I = Smooth(t_s, &variance_Hz).w_I;
+    const double noise =
+        kNoiseSquares * noise_density * noise_density * variance_Hz;
+    return std::max(0.0, 1 - noise / w_I.squaredNorm()) * w_I;
+  }
+
+ private:
+  // *variance_Hz is that of a result for a noise density of one.
+  Reading Smooth(double t_s, double* variance_Hz) const {
+    const double first_s = Time(0);
+    const double last_s = Time(std::ssize(samples_) - 1);
+    const double center_s = std::clamp(t_s, first_s, last_s);
+    std::ptrdiff_t begin = Before(center_s - kHalfWindow_s) + 1;
+    std::ptrdiff_t end = After(center_s + kHalfWindow_s);
+    while (end - begin < kMinSamples && end - begin < std::ssize(samples_)) {
+      const bool earlier =
+          end == std::ssize(samples_) ||
+          (begin > 0 && center_s - Time(begin - 1) < Time(end) - center_s);
+      earlier ? --begin : ++end;
+    }
+    double mean_s = 0;
+    Vector3d gyro = Vector3d::Zero(), accel = Vector3d::Zero();
+    const auto count = static_cast<double>(end - begin);
+    for (std::ptrdiff_t i = begin; i < end; ++i) {
+      mean_s += Time(i) / count;
+      gyro += samples_[i].gyro / count;
+      accel += samples_[i].accel / count;
+    }
+    double square = 0;
+    Vector3d gyro_slope = Vector3d::Zero(), accel_slope = Vector3d::Zero();
+    for (std::ptrdiff_t i = begin; i < end; ++i) {
+      const double s = Time(i) - mean_s;
+      square += s * s;
+      gyro_slope += s * samples_[i].gyro;
+      accel_slope += s * samples_[i].accel;
+    }
+    const double at_s = std::clamp(t_s, first_s - kReach_s, last_s + kReach_s);
+    const double along = square > 0 ? (at_s - mean_s) / square : 0;
+    const double rate_Hz =
+        end - begin > 1 ? (count - 1) / (Time(end - 1) - Time(begin)) : 0;
+    *variance_Hz = rate_Hz * (1 / count + along * along * square);
+    return Correct(gyro + along * gyro_slope, accel + along * accel_slope);
+  }
+
+  double Time(std::ptrdiff_t i) const {
+    return static_cast<double>(samples_[i].t_ns - x_.t_ns) * 1e-9;
+  }
+  // First sample later than the time.
+  std::ptrdiff_t After(double t_s) const {
+    const auto later = [&](double t, const ImuSample& sample) {
+      return t < static_cast<double>(sample.t_ns - x_.t_ns) * 1e-9;
+    };
+    return std::upper_bound(samples_.begin(), samples_.end(), t_s, later) -
+           samples_.begin();
+  }
+  // Last sample earlier than the time.
+  std::ptrdiff_t Before(double t_s) const {
+    const auto earlier = [&](const ImuSample& sample, double t) {
+      return static_cast<double>(sample.t_ns - x_.t_ns) * 1e-9 < t;
+    };
+    return std::lower_bound(samples_.begin(), samples_.end(), t_s, earlier) -
+           samples_.begin() - 1;
+  }
+  Reading Correct(const Vector3d& gyro, const Vector3d& accel) const {
+    return {gyro_ * (gyro - x_.b_g), accel_ * (accel - x_.b_a)};
+  }
+
+  std::span<const ImuSample> samples_;
+  const KeyframeState& x_;
+  Eigen::Matrix3d gyro_, accel_;
+};
+
+}  // namespace
+
+KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
+                             const KeyframeState& x,
+                             const ImuCalibration& imu,
+                             const ImuNoise& noise,
+                             double gravity_mps2,
+                             double dt_s) {
+  const Readings readings(samples, x, imu);
+  const Eigen::Matrix3d R_IG = x.q_GI.toRotationMatrix().transpose();
+  const Vector3d g_I = R_IG * Vector3d(0, 0, -gravity_mps2);
+  KeyframeMotion motion;
+  motion.dt_s = dt_s;
+  motion.v_I = R_IG * x.v_GI;
+  motion.w_I = readings.Rate(dt_s, noise.gyro_noise_density);
+  if (dt_s == 0) return motion;
+  Readings::Reading here = readings.Interpolate(0);
+  Vector3d a_I = here.f_I + g_I;
+  for (double t_s = 0; t_s != dt_s;) {
+    const double next_s = readings.Next(t_s, dt_s);
+    const double h = next_s - t_s;
+    const Readings::Reading there = readings.Interpolate(next_s);
+    motion.turn = motion.turn * Exp(0.5 * h * (here.w_I + there.w_I));
+    const Vector3d next_a_I = motion.turn * there.f_I + g_I;
+    motion.shift_I += h * motion.v_I + h * h / 6 * (2 * a_I + next_a_I);
+    motion.v_I += h / 2 * (a_I + next_a_I);
+    t_s = next_s;
+    here = there;
+    a_I = next_a_I;
+  }
+  return motion;
+}
+
+ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
+                      const Vector3d& p_GI,
+                      const KeyframeMotion& motion,
+                      double time_offset_s) {
+  const double dt_s = time_offset_s - motion.dt_s;
+  const Eigen::Quaterniond turn = motion.turn * Exp(dt_s * motion.w_I);
+  const Vector3d shift_I = motion.shift_I + dt_s * motion.v_I;
+  const Eigen::Matrix3d R_GI = q_GI.toRotationMatrix();
+  ExposurePose pose;
+  pose.q_GI = q_GI * turn;
+  pose.p_GI = p_GI + R_GI * shift_I;
+  pose.by_rotation << turn.toRotationMatrix().transpose(),
+      -R_GI * Skew(shift_I);
+  pose.by_offset << motion.w_I, R_GI * motion.v_I;
+  return pose;
+}
+
+ExposurePose PoseAtRest(const Eigen::Quaterniond& q_GI, const Vector3d& p_GI) {
+  ExposurePose pose{q_GI, p_GI, {}, Eigen::Matrix<double, 6, 1>::Zero()};
+  pose.by_rotation << Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Zero();
+  return pose;
+}
+
+void KeyframeMotions::FindCameras(const Calibration& theta,
+                                  std::span<const char> estimated) {
+  index_.assign(theta.cameras.size(), -1);
+  stride_ = 0;
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    if (estimated[j] || theta.cameras[j].time_offset_s != 0) {
+      index_[j] = stride_++;
+    }
+  }
+  if (stride_ == 0) index_.clear();
+}
+
+KeyframeMotions SegmentMotions(const Rig& rig,
+                               const Calibration& theta,
+                               const MotionSegment& segment) {
+  KeyframeMotions motions;
+  motions.Measure(rig,
+                  theta,
+                  EstimatedTimeOffsets(rig),
+                  segment.keyframes,
+                  [&](std::size_t) { return std::span(segment.imu); });
+  return motions;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,120 @@
+// The motion of the body about a keyframe, as the IMU measured it: what takes
+// the keyframe's pose to the instant at which a camera was exposed, where the
+// camera's clock is off from that of the IMU (CameraCalibration).
+//
+// The samples between the keyframe's time and the exposure are integrated under
+// the estimate at hand. The result is a constant while factors are linearised
+// about that estimate: a pose that moves by the offset alone,
+//   q_GI(t + dt) = q_GI turn Exp(w_I (dt - dt0)),
+//   p_GI(t + dt) = p_GI + R_GI (shift_I + v_I (dt - dt0)).
+// It goes with the body, so that where the keyframes of a problem are moved and
+// turned about gravity together, nothing changes. Residuals have exact
+// derivatives by the pose and by the offset, and none by biases, velocity and
+// IMU intrinsics through the motion. What is left out is small (a velocity that
+// is off by 1 cm/s moves the camera by 0.2 mm in 20 ms), and moves no estimate
+// in the mean: the motion is measured anew at each new estimate, where the
+// residuals are those of the whole model; left out are terms of the weights
+// that the residuals of the optimum get.
+//
+// Pure functions, any thread.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <span>
+#include <vector>
+
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+// About the time dt_s after that of the keyframe.
+struct KeyframeMotion {
+  double dt_s = 0;
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d shift_I = Eigen::Vector3d::Zero();  // [m], in I at t
+  Eigen::Vector3d w_I = Eigen::Vector3d::Zero();      // [rad/s], in I there
+  Eigen::Vector3d v_I = Eigen::Vector3d::Zero();      // [m/s], in I at t
+};
+
+// From the samples about the keyframe, in order of time, at least one, with the
+// biases of the state. Beyond the first and the last sample the line through
+// those nearest is followed, but not far. The rate w_I falls to zero where it
+// does not stand out of the noise of the gyroscope: else a device at rest would
+// seem to show its offset.
+KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
+                             const KeyframeState& x,
+                             const ImuCalibration& imu,
+                             const ImuNoise& noise,
+                             double gravity_mps2,
+                             double dt_s);
+
+// Pose of the body at the exposure, and its derivatives: of the tangent of that
+// pose (rotation 3, position 3) by the rotation of the keyframe, and by the
+// offset. By the keyframe's position it is (0, 1).
+struct ExposurePose {
+  Eigen::Quaterniond q_GI;
+  Eigen::Vector3d p_GI;
+  Eigen::Matrix<double, 6, 3> by_rotation;
+  Eigen::Matrix<double, 6, 1> by_offset;
+};
+
+ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
+                      const Eigen::Vector3d& p_GI,
+                      const KeyframeMotion& motion,
+                      double time_offset_s);
+
+// Without a motion, where nothing depends on the offset.
+ExposurePose PoseAtRest(const Eigen::Quaterniond& q_GI,
+                        const Eigen::Vector3d& p_GI);
+
+// The motions of all keyframes, for those cameras that need them. Measuring
+// again keeps the memory.
+class KeyframeMotions {
+ public:
+  // Null: the camera is exposed at the keyframe's time, and that is known.
+  const KeyframeMotion* At(int keyframe, int camera) const {
+    if (index_.empty() || index_[camera] < 0) return nullptr;
+    return &motions_[keyframe * stride_ + index_[camera]];
+  }
+
+  // `estimated` says of each camera whether its offset is estimated;
+  // samples(k) are those about keyframe k.
+  template <typename Samples>
+  void Measure(const Rig& rig,
+               const Calibration& theta,
+               std::span<const char> estimated,
+               std::span<const KeyframeState> keyframes,
+               const Samples& samples) {
+    FindCameras(theta, estimated);
+    if (index_.empty()) return;
+    motions_.resize(keyframes.size() * stride_);
+    for (std::size_t k = 0; k < keyframes.size(); ++k) {
+      for (std::size_t j = 0; j < index_.size(); ++j) {
+        if (index_[j] < 0) continue;
+        motions_[k * stride_ + index_[j]] =
+            MeasureMotion(samples(k),
+                          keyframes[k],
+                          theta.imu,
+                          rig.imu_noise,
+                          rig.gravity_mps2,
+                          theta.cameras[j].time_offset_s);
+      }
+    }
+  }
+
+ private:
+  void FindCameras(const Calibration& theta, std::span<const char> estimated);
+
+  std::vector<int> index_;  // by camera; empty if none needs one
+  int stride_ = 0;
+  std::vector<KeyframeMotion> motions_;
+};
+
+KeyframeMotions SegmentMotions(const Rig& rig,
+                               const Calibration& theta,
+                               const MotionSegment& segment);
+
+}  // namespace selfcal

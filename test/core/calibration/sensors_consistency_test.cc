@@ -1,0 +1,197 @@
+// Rigs of several cameras, with time offsets, of which some parameters are
+// known: is the estimate right, and as sure as it says? Against truth.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <numeric>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/information/segment_information.h"
+#include "core/simulation/simulate.h"
+#include "test/core/simulation/rigs.h"
+
+namespace selfcal {
+namespace {
+
+using ::testing::ElementsAre;
+
+// Time offsets of the cameras in truth; the factory believes in none.
+constexpr double kTimeOffsets_s[] = {0.02, -0.015, 0.008, -0.003};
+
+Rig LateRig(int cameras) {
+  Rig rig = RigOfCameras(cameras);
+  for (int j = 0; j < cameras; ++j) {
+    rig.factory.cameras[j].time_offset_s = kTimeOffsets_s[j];
+  }
+  return rig;
+}
+
+// What the rig estimates, against truth.
+struct Errors {
+  Eigen::VectorXd error;
+  Eigen::MatrixXd covariance;
+
+  double Nees() const { return error.dot(covariance.ldlt().solve(error)); }
+  int Within(double sigmas) const {
+    return static_cast<int>((error.cwiseAbs().array() <=
+                             sigmas * covariance.diagonal().cwiseSqrt().array())
+                                .count());
+  }
+};
+
+// `rig` has the factory's calibration; `truth` what it is in truth.
+Errors CalibrateSimulated(const Rig& rig,
+                          const Calibration& truth,
+                          std::uint64_t seed) {
+  SimulationOptions options;
+  options.seed = seed;
+  options.landmarks_in_view = 60;
+  options.keyframes_per_segment = 30;
+  const SimulatedSession session = Simulate(
+      rig, truth, rig.factory, *MakeHandheld(12.5, 1, seed), "s", options);
+  EXPECT_EQ(session.segments.size(), 4u);
+  const CalibrationResult result =
+      Calibrate(rig, rig.factory, session.segments);
+  EXPECT_EQ(result.status, CalibrateStatus::kConverged)
+      << "seed " << seed << ": " << result.message;
+  const std::vector<int> free = FreeComponents(rig);
+  EXPECT_EQ(result.rank, static_cast<int>(free.size()));
+  return {BoxMinus(result.theta, truth)(free), result.covariance(free, free)};
+}
+
+// Of some seeds together: the sum of NEES within 99.9 % of its chi-square
+// distribution (Wilson and Hilferty), 3 sigma at least as often as of
+// normal errors.
+template <typename Run>
+void ExpectConsistent(int seeds, const Run& run) {
+  double nees = 0;
+  int components = 0, within = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Errors errors = run(static_cast<std::uint64_t>(seed));
+    const auto size = static_cast<int>(errors.error.size());
+    std::printf("seed %d: NEES %.1f of %d\n", seed, errors.Nees(), size);
+    nees += errors.Nees();
+    components += size;
+    within += errors.Within(3);
+  }
+  const double n = components;
+  const auto quantile = [&](double z) {
+    return n * std::pow(1 - 2 / (9 * n) + z * std::sqrt(2 / (9 * n)), 3);
+  };
+  EXPECT_GT(nees, quantile(-3.29));
+  EXPECT_LT(nees, quantile(3.29));
+  EXPECT_GE(within, 0.985 * components);
+}
+
+class Cameras : public testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(Rigs, Cameras, testing::Values(1, 2, 4));
+
+TEST_P(Cameras, OfKnownTimeOffsetsAreFoundWithinTheirSigmas) {
+  const Calibration truth = LateRig(GetParam()).factory;
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = LateRig(GetParam());
+    rig.factory = PerturbCalibration(truth, {}, seed);
+    return CalibrateSimulated(rig, truth, seed);
+  });
+}
+
+TEST_P(Cameras, AreFoundWithTheirTimeOffsets) {
+  const Calibration truth = LateRig(GetParam()).factory;
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = RigOfCameras(GetParam());
+    rig.factory = PerturbCalibration(rig.factory, {}, seed);
+    rig.estimate_time_offset = true;
+    rig.groups = DefaultGroups(true);
+    const Errors errors = CalibrateSimulated(rig, truth, seed);
+    const std::vector<int> free = FreeComponents(rig);
+    for (int j = 0; j < GetParam(); ++j) {
+      const int at = static_cast<int>(
+          std::find(free.begin(), free.end(), TimeOffsetComponent(truth, j)) -
+          free.begin());
+      const double sigma = std::sqrt(errors.covariance(at, at));
+      EXPECT_LT(std::abs(errors.error(at)), 3.3 * sigma);
+      EXPECT_LT(sigma, 5e-4);
+    }
+    return errors;
+  });
+}
+
+// Others of the same rig are as well known, and found as well.
+TEST(FreeParameters, AreThoseThatTheRigChooses) {
+  Rig chosen = LateRig(2);
+  chosen.fixed = {"imu.*", "cam0.p_CI.*"};
+  chosen.groups.erase(chosen.groups.begin());  // imu
+  const Calibration truth = chosen.factory;
+  const std::vector<int> free = FreeComponents(chosen);
+  EXPECT_EQ(static_cast<int>(free.size()), (6 + 5 - 3) + (6 + 8));
+  ASSERT_THAT(Validate(chosen), testing::IsEmpty());
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = chosen;
+    rig.factory.cameras = PerturbCalibration(truth, {}, seed).cameras;
+    rig.factory.cameras[0].p_CI = truth.cameras[0].p_CI;
+    return CalibrateSimulated(rig, truth, seed);
+  });
+}
+
+TEST(Groups, OfFourCamerasHaveAllTheirParts) {
+  Rig rig = LateRig(4);
+  rig.estimate_time_offset = true;
+  rig.groups = DefaultGroups(true);
+  SimulationOptions options;
+  options.landmarks_in_view = 60;
+  const SimulatedSession session = Simulate(
+      rig, rig.factory, rig.factory, *MakeHandheld(4.5, 1, 1), "s", options);
+  const SegmentInformation score =
+      ScoreSegment(rig, rig.factory, session.segments.front());
+  std::vector<std::string> names;
+  std::vector<int> sizes;
+  for (const GroupScore& group : score.groups) {
+    names.push_back(group.group);
+    sizes.push_back(group.size);
+    EXPECT_GT(group.gain, 1) << group.group;
+    EXPECT_TRUE(std::isfinite(group.entropy)) << group.group;
+  }
+  EXPECT_THAT(names, ElementsAre("imu", "camera", "extrinsics", "time"));
+  // FOV 1, equidistant 4, radial-tangential 4, FOV 1.
+  EXPECT_THAT(sizes, ElementsAre(15, 4 * 4 + 10, 4 * 6, 4));
+  EXPECT_EQ(score.rank, 15 + 26 + 24 + 4);
+}
+
+// A rig that believes in another gravity than that where it moves finds the
+// difference in the scale of its accelerometer, far beyond its sigma.
+TEST(Gravity, IsTheScaleOfTheAccelerometer) {
+  Rig rig = HandheldRig("r");
+  const Calibration truth = rig.factory;
+  rig.gravity_mps2 = 9.83;
+  SimulationOptions options;
+  const SimulatedSession session =
+      Simulate(rig, truth, truth, *MakeHandheld(16.5, 1, 1), "s", options);
+  const auto scales = [&](double gravity_mps2) {
+    Rig believed = rig;
+    believed.gravity_mps2 = gravity_mps2;
+    return Calibrate(believed, truth, session.segments);
+  };
+  const CalibrationResult right = scales(9.83);
+  const CalibrationResult wrong = scales(9.78);
+  ASSERT_EQ(right.status, CalibrateStatus::kConverged);
+  ASSERT_EQ(wrong.status, CalibrateStatus::kConverged);
+  const double expected = 9.83 / 9.78 - 1;
+  for (int i = 0; i < 3; ++i) {
+    const double sigma =
+        std::sqrt(right.covariance(kAccelScale + i, kAccelScale + i));
+    EXPECT_LT(std::abs(right.theta.imu.s_a[i] - truth.imu.s_a[i]), 3 * sigma);
+    EXPECT_GT(wrong.theta.imu.s_a[i] - right.theta.imu.s_a[i], 5 * sigma);
+    EXPECT_NEAR(wrong.theta.imu.s_a[i] / right.theta.imu.s_a[i] - 1,
+                expected,
+                0.1 * expected);
+  }
+}
+
+}  // namespace
+}  // namespace selfcal

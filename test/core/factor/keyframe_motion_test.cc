@@ -1,0 +1,194 @@
+#include "core/factor/keyframe_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "test/core/factor/analytic_motion.h"
+#include "test/core/factor/random_values.h"
+
+namespace selfcal {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kGravity = 9.83;
+constexpr std::int64_t kPeriod_ns = 5'000'000;
+constexpr std::int64_t kKeyframe_ns = 501'700'000;
+
+// A keyframe of a shaken device with the samples about it.
+struct Scene {
+  explicit Scene(RandomValues& random)
+      : motion(random), imu(random.Imu()), x(motion.State(kKeyframe_ns)) {
+    x.b_a = random.Normal3(0.2);
+    x.b_g = random.Normal3(0.02);
+    samples = motion.Readings(
+        0, 1'000'000'000, kPeriod_ns, imu, x.b_a, x.b_g, kGravity);
+  }
+
+  KeyframeMotion Measure(double dt_s) const {
+    return MeasureMotion(samples, x, imu, {}, kGravity, dt_s);
+  }
+  KeyframeState Truth(double dt_s) const {
+    return motion.State(kKeyframe_ns + std::llround(dt_s * 1e9));
+  }
+
+  AnalyticMotion motion;
+  ImuCalibration imu;
+  KeyframeState x;
+  std::vector<ImuSample> samples;
+};
+
+// Of a camera of f = 500 px in the body's origin: how far the farthest pixels
+// of points at a distance of 1 m are off, as a bound.
+double ErrorPixels(const ExposurePose& pose, const KeyframeState& truth) {
+  return 500 * (Log(pose.q_GI.conjugate() * truth.q_GI).norm() +
+                (pose.p_GI - truth.p_GI).norm());
+}
+
+TEST(MeasureMotion, TakesThePoseToTheExposure) {
+  RandomValues random(1);
+  for (int trial = 0; trial < 500; ++trial) {
+    const Scene scene(random);
+    const double dt_s = random.Uniform(-0.03, 0.03);
+    const KeyframeMotion motion = scene.Measure(dt_s);
+    const KeyframeState truth = scene.Truth(dt_s);
+    const ExposurePose pose =
+        MovePose(scene.x.q_GI, scene.x.p_GI, motion, dt_s);
+    EXPECT_LT(ErrorPixels(pose, truth), 0.02);
+    EXPECT_LT((scene.x.q_GI * motion.v_I - truth.v_GI).norm(), 1e-3);
+    // A rate that is off by 1 % makes the offset's sigma that much wrong.
+    const double h_s = 1e-4;
+    const Vector3d w_I =
+        Log(truth.q_GI.conjugate() * scene.Truth(dt_s + h_s).q_GI) / h_s;
+    EXPECT_LT((motion.w_I - w_I).norm(), 0.01 * (1 + w_I.norm()));
+  }
+}
+
+// Within an iteration the offset moves along the tangent.
+TEST(MeasureMotion, IsFollowedAlongItsRatesToOtherOffsets) {
+  RandomValues random(2);
+  for (int trial = 0; trial < 500; ++trial) {
+    const Scene scene(random);
+    const double dt_s = random.Uniform(-0.03, 0.03);
+    const double by_s = random.Uniform(-0.001, 0.001);
+    const ExposurePose pose =
+        MovePose(scene.x.q_GI, scene.x.p_GI, scene.Measure(dt_s), dt_s + by_s);
+    EXPECT_LT(ErrorPixels(pose, scene.Truth(dt_s + by_s)), 0.05);
+  }
+}
+
+TEST(MeasureMotion, GoesOnWhereTheSamplesEnd) {
+  RandomValues random(3);
+  double sum_px2 = 0;
+  constexpr int kTrials = 500;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Scene scene(random);
+    const bool after = trial % 2 == 0;
+    std::erase_if(scene.samples, [&](const ImuSample& sample) {
+      return after ? sample.t_ns > kKeyframe_ns + kPeriod_ns
+                   : sample.t_ns < kKeyframe_ns - kPeriod_ns;
+    });
+    const double dt_s = (after ? 1 : -1) * random.Uniform(0, 0.03);
+    const ExposurePose pose =
+        MovePose(scene.x.q_GI, scene.x.p_GI, scene.Measure(dt_s), dt_s);
+    const double error_px = ErrorPixels(pose, scene.Truth(dt_s));
+    sum_px2 += error_px * error_px;
+  }
+  EXPECT_LT(std::sqrt(sum_px2 / kTrials), 0.3);
+}
+
+TEST(MeasureMotion, WithoutAnOffsetThePoseStays) {
+  RandomValues random(4);
+  const Scene scene(random);
+  const KeyframeMotion motion = scene.Measure(0);
+  const ExposurePose pose = MovePose(scene.x.q_GI, scene.x.p_GI, motion, 0);
+  EXPECT_EQ(pose.q_GI.coeffs(), scene.x.q_GI.coeffs());
+  EXPECT_EQ(pose.p_GI, scene.x.p_GI);
+  EXPECT_TRUE(pose.by_rotation.isIdentity(0));
+  EXPECT_LT((pose.by_offset.tail<3>() - scene.x.v_GI).norm(), 1e-14);
+}
+
+TEST(MeasureMotion, HoldsASingleSample) {
+  RandomValues random(5);
+  Scene scene(random);
+  scene.samples.resize(1);
+  const KeyframeMotion motion = scene.Measure(0.01);
+  const Vector3d w_I =
+      scene.imu.T_g().inverse() * (scene.samples[0].gyro - scene.x.b_g);
+  EXPECT_LT((motion.w_I - w_I).norm(), 1e-12);
+  EXPECT_LT((Log(motion.turn) - 0.01 * w_I).norm(), 1e-12);
+}
+
+// A device at rest shows nothing of its offset, however often it is looked at.
+TEST(MeasureMotion, NoiseAloneIsNoRate) {
+  RandomValues random(8);
+  const ImuNoise noise;
+  const double sigma = noise.gyro_noise_density * std::sqrt(200.0);
+  double measured = 0;
+  double noisy = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    std::vector<ImuSample> samples;
+    for (std::int64_t i = 0; i < 40; ++i) {
+      samples.push_back(
+          {i * kPeriod_ns, random.Normal3(sigma), Vector3d(0, 0, kGravity)});
+    }
+    const KeyframeState x{.t_ns = 101'000'000};
+    measured +=
+        MeasureMotion(samples, x, {}, noise, kGravity, 0).w_I.squaredNorm();
+    // Smoothed over six samples.
+    noisy += 3 * sigma * sigma / 6;
+  }
+  EXPECT_LT(measured, 0.01 * noisy);
+  EXPECT_GT(measured, 0);
+}
+
+TEST(MeasureMotion, IsTheSameAtAnyHeading) {
+  RandomValues random(6);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Scene scene(random);
+    const double yaw = random.Uniform(-3, 3);
+    const Eigen::Quaterniond turn = Exp(Vector3d(0, 0, yaw));
+    KeyframeState turned = scene.x;
+    turned.q_GI = turn * turned.q_GI;
+    turned.v_GI = turn * turned.v_GI;
+    const KeyframeMotion a = scene.Measure(0.02);
+    const KeyframeMotion b =
+        MeasureMotion(scene.samples, turned, scene.imu, {}, kGravity, 0.02);
+    EXPECT_LT((b.shift_I - a.shift_I).norm(), 1e-12);
+    EXPECT_LT((b.v_I - a.v_I).norm(), 1e-12);
+    EXPECT_LT((b.w_I - a.w_I).norm(), 1e-12);
+  }
+}
+
+TEST(KeyframeMotions, AreOfTheCamerasThatNeedThem) {
+  RandomValues random(7);
+  const Scene scene(random);
+  Calibration theta;
+  theta.imu = scene.imu;
+  for (int j = 0; j < 3; ++j) {
+    theta.cameras.push_back(random.Camera(DistortionModel::kFov));
+  }
+  theta.cameras[2].time_offset_s = 0.01;
+  const std::vector<KeyframeState> keyframes = {scene.x, scene.x};
+  const auto samples = [&](std::size_t) { return std::span(scene.samples); };
+  KeyframeMotions motions;
+  const std::vector<char> second = {0, 1, 0};
+  motions.Measure(Rig(), theta, second, keyframes, samples);
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(motions.At(k, 0), nullptr);
+    ASSERT_NE(motions.At(k, 1), nullptr);
+    EXPECT_EQ(motions.At(k, 1)->dt_s, 0);
+    ASSERT_NE(motions.At(k, 2), nullptr);
+    EXPECT_EQ(motions.At(k, 2)->dt_s, 0.01);
+  }
+  theta.cameras[2].time_offset_s = 0;
+  const std::vector<char> none = {0, 0, 0};
+  motions.Measure(Rig(), theta, none, keyframes, samples);
+  for (int j = 0; j < 3; ++j) EXPECT_EQ(motions.At(0, j), nullptr);
+}
+
+}  // namespace
+}  // namespace selfcal
