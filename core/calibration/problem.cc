@@ -58,16 +58,12 @@ std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
       imu.begin(), imu.end(), t0_ns, [](std::int64_t t, const ImuSample& s) {
         return t < s.t_ns;
       });
-  if (first != imu.begin()) {
-    --first;
-  }
   auto last = std::lower_bound(
       first, imu.end(), t1_ns, [](const ImuSample& s, std::int64_t t) {
         return s.t_ns < t;
       });
-  if (last != imu.end()) {
-    ++last;
-  }
+  first -= std::min<std::ptrdiff_t>(2, first - imu.begin());
+  last += std::min<std::ptrdiff_t>(2, imu.end() - last);
   return {first, last};
 }
 

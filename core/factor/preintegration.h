@@ -2,14 +2,16 @@
 // with its derivatives by the biases and the 15 IMU intrinsics and its
 // covariance.
 //
-// Scheme. Raw readings are linear between samples, hence so are the corrected
+// Scheme. Raw readings, less h^2/12 of their second derivative, are linear
+// between samples, hence so are the corrected
 //   w = T_g^-1 (w~ - b_g),   f = R_AI^T T_a^-1 (a~ - b_a).
 // Over a step of h from (w_0, f_0) to (w_1, f_1):
 //   rotation by Exp(h (w_0 + w_1) / 2 + h^2 (w_0 x w_1) / 12), the fourth order
 //   Magnus expansion; velocity and position by Simpson's rule, with the
 //   rotation at the middle from the same expansion over half a step.
-// For linear readings that is of fourth order in h; on smooth motion the error
-// is that of the linear interpolation, of second order.
+// That is of fourth order in h on smooth motion, with samples at least one step
+// beyond both ends; the parts of a step at ends between samples are of third,
+// and what neighbouring intervals get wrong there cancels.
 //
 // The derivatives are those of this scheme, exactly. The noise of each sensor
 // is white in continuous time: over a step its mean has the variance
@@ -57,8 +59,8 @@ struct PreintegrationParts {
 
 // Integrates from t0_ns to t1_ns >= t0_ns, the end points interpolated. The
 // samples (at least one) must cover the interval, which Validate(segment)
-// ensures, and may reach beyond it; beyond the first and the last sample their
-// readings are held.
+// ensures, and should reach one sample further on either side; beyond the first
+// and the last sample their readings are held.
 Preintegration Preintegrate(std::span<const ImuSample> samples,
                             std::int64_t t0_ns,
                             std::int64_t t1_ns,
