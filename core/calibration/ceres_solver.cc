@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <memory>
 
 #include "core/factor/ceres_factors.h"
@@ -194,17 +195,16 @@ class Builder {
     // Two rows, as all others of a landmark have: Ceres' elimination is faster
     // where sizes are uniform.
     Eigen::Matrix<double, 2, 3> far = Eigen::Matrix<double, 2, 3>::Zero();
-    losses_.reserve(landmarks.size());  // Ceres keeps pointers
     for (std::size_t i = 0; i < landmarks.size(); ++i) {
       far(0, 2) = std::sqrt(landmarks[i].weight) / kInverseDepthSigma;
-      losses_.emplace_back(round_.loss, landmarks[i].weight);
       problem_.AddResidualBlock(
           MakePriorCost(far, Eigen::Vector3d::Zero()).release(),
           nullptr,
           places_[i].data());
       const Track& track = round_.problem.tracks[landmarks[i].track];
-      for (const int index : landmarks[i].used) {
-        const TrackObservation& seen = track.observations[index];
+      for (const UsedObservation& used : landmarks[i].used) {
+        const TrackObservation& seen = track.observations[used.index];
+        losses_.emplace_back(round_.loss, landmarks[i].weight * used.weight);
         problem_.AddResidualBlock(
             MakeReprojectionCost(round_.reference,
                                  seen.camera,
@@ -229,7 +229,8 @@ class Builder {
   std::unique_ptr<ceres::Manifold> rotation_;
   std::unique_ptr<ceres::Manifold> gauge_;
   std::unique_ptr<ceres::Manifold> subspace_;
-  std::vector<CeresLoss> losses_;  // one of each landmark
+  // Of each observation. Ceres keeps pointers to them.
+  std::deque<CeresLoss> losses_;
   ceres::Problem problem_;
 };
 

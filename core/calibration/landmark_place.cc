@@ -22,7 +22,7 @@ struct Linearised {
 
 Linearised Linearise(const LandmarkScene& scene,
                      const Track& track,
-                     std::span<const int> used,
+                     std::span<const UsedObservation> used,
                      const RobustLoss& loss,
                      const LandmarkPlace& place) {
   Linearised sum;
@@ -36,10 +36,11 @@ Linearised Linearise(const LandmarkScene& scene,
   Eigen::Vector2d r;
   Eigen::Matrix<double, 2, 3> by_p_C;
   Eigen::Matrix3d p_C_by_place;
-  for (const int index : used) {
-    const TrackObservation& seen = track.observations[index];
+  for (const UsedObservation& one : used) {
+    const TrackObservation& seen = track.observations[one.index];
     if (!scene.Residual(seen, point_G, &r, &by_p_C)) {
-      sum.cost += loss.Value(kNotProjectedSigmas * kNotProjectedSigmas);
+      sum.cost +=
+          one.weight * loss.Value(kNotProjectedSigmas * kNotProjectedSigmas);
       continue;
     }
     ++sum.projected;
@@ -49,8 +50,8 @@ Linearised Linearise(const LandmarkScene& scene,
     p_C_by_place.col(2) = R_CG * place.anchor.a_G + scene.p_CG(seen);
     const Eigen::Matrix<double, 2, 3> J = scale * by_p_C * p_C_by_place;
     const double s = r.squaredNorm();
-    const double weight = loss.Weight(s);
-    sum.cost += loss.Value(s);
+    const double weight = one.weight * loss.Weight(s);
+    sum.cost += one.weight * loss.Value(s);
     sum.H += weight * J.transpose() * J;
     sum.g += weight * J.transpose() * r;
   }
@@ -132,7 +133,7 @@ LandmarkPlace PlaceAt(const LandmarkScene& scene,
 
 RefinedPlace RefinePlace(const LandmarkScene& scene,
                          const Track& track,
-                         std::span<const int> used,
+                         std::span<const UsedObservation> used,
                          const RobustLoss& loss,
                          const RefineLimits& limits,
                          LandmarkPlace* place) {
@@ -165,6 +166,14 @@ RefinedPlace RefinePlace(const LandmarkScene& scene,
     }
   }
   return {here.H, here.cost};
+}
+
+std::vector<UsedObservation> AllOf(const Track& track) {
+  std::vector<UsedObservation> all(track.observations.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    all[i].index = static_cast<int>(i);
+  }
+  return all;
 }
 
 std::vector<double> ResidualNorms(const LandmarkScene& scene,

@@ -89,6 +89,12 @@ LandmarkPlace PlaceAt(const LandmarkScene& scene,
                       const Track& track,
                       const Eigen::Vector4d& point_G);
 
+// One of a track that a place stands on.
+struct UsedObservation {
+  int index = 0;      // into the track
+  double weight = 1;  // in (0, 1]
+};
+
 // When to stop improving a place.
 struct RefineLimits {
   int steps = 30;
@@ -106,14 +112,17 @@ struct RefinedPlace {
 // any gate.
 inline constexpr double kNotProjectedSigmas = 1e3;
 
-// Minimises the robust reprojection cost of the observations `used` (indices
-// into the track), and the prior on inverse depth, by damped Gauss-Newton.
+// Minimises the robust reprojection cost of the observations `used`, and the
+// prior on inverse depth, by damped Gauss-Newton.
 RefinedPlace RefinePlace(const LandmarkScene& scene,
                          const Track& track,
-                         std::span<const int> used,
+                         std::span<const UsedObservation> used,
                          const RobustLoss& loss,
                          const RefineLimits& limits,
                          LandmarkPlace* place);
+
+// Every observation of the track, in full.
+std::vector<UsedObservation> AllOf(const Track& track);
 
 // Norm of each residual [px]; infinite where the place does not project.
 std::vector<double> ResidualNorms(const LandmarkScene& scene,

@@ -144,7 +144,7 @@ void LinearSystem::Linearise(const Rig& rig,
   StartChains(problem, static_cast<int>(camera_sizes_.size()));
   PlaceLandmarks(landmarks);
   SortByView(problem, landmarks);
-  Weigh(landmarks, loss);
+  Weigh(loss);
   interface_size_ = 0;
   FindTracks();
   KeepWalks(problem);

@@ -125,10 +125,12 @@ void LinearSystem::SortByView(const CalibrationProblem& problem,
   seen_begin_.assign(1, 0);
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     const Track& track = problem.tracks[landmarks[i].track];
-    for (const int index : landmarks[i].used) {
-      const TrackObservation& o = track.observations[index];
-      seen_.push_back(
-          {o.keyframe * cameras + o.camera, static_cast<int>(i), o.z_px});
+    for (const UsedObservation& used : landmarks[i].used) {
+      const TrackObservation& o = track.observations[used.index];
+      seen_.push_back({.view = o.keyframe * cameras + o.camera,
+                       .landmark = static_cast<int>(i),
+                       .z_px = o.z_px,
+                       .share = landmarks[i].weight * used.weight});
     }
     seen_begin_.push_back(static_cast<int>(seen_.size()));
   }
@@ -164,8 +166,7 @@ ObservationRun LinearSystem::Gather(int view, const Keep& keep) {
           motions_->At(view / cameras, view % cameras)};
 }
 
-void LinearSystem::Weigh(const std::vector<ScreenedLandmark>& landmarks,
-                         const RobustLoss* loss) {
+void LinearSystem::Weigh(const RobustLoss* loss) {
   const double inverse_sigma = 1 / rig_->pixel_sigma_px;
   for (int view = 0; view + 2 < static_cast<int>(view_begin_.size()); ++view) {
     const ObservationRun run = Gather(view, [](const Seen&) { return true; });
@@ -177,8 +178,7 @@ void LinearSystem::Weigh(const std::vector<ScreenedLandmark>& landmarks,
       if (!(s >= 0)) continue;  // does not project
       const double weight = loss != nullptr ? loss->Weight(s) : 1;
       if (weight < kLeastWeight) continue;
-      seen.weight =
-          std::sqrt(landmarks[seen.landmark].weight * weight) * inverse_sigma;
+      seen.weight = std::sqrt(seen.share * weight) * inverse_sigma;
     }
   }
 }

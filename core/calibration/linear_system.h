@@ -104,6 +104,7 @@ class LinearSystem {
     int view;  // keyframe and camera
     int landmark;
     Eigen::Vector2d z_px;
+    double share = 1;   // what screening leaves of it
     double weight = 0;  // of its rows; 0: it says nothing
     int factor = -1;    // index into the tracks of its chain
   };
@@ -117,8 +118,7 @@ class LinearSystem {
   void PlaceLandmarks(const std::vector<ScreenedLandmark>& landmarks);
   void SortByView(const CalibrationProblem& problem,
                   const std::vector<ScreenedLandmark>& landmarks);
-  void Weigh(const std::vector<ScreenedLandmark>& landmarks,
-             const RobustLoss* loss);
+  void Weigh(const RobustLoss* loss);
   void FindTracks();
   void AddViews(Chain* chain);
   // Of a landmark, by p_G: H and g of x^T H x + 2 g^T x.

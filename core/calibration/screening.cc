@@ -5,7 +5,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -23,20 +22,54 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-std::vector<int> Within(const std::vector<double>& norms_px, double gate_px) {
-  std::vector<int> indices;
-  for (int i = 0; i < static_cast<int>(norms_px.size()); ++i) {
-    if (norms_px[i] <= gate_px) {
-      indices.push_back(i);
-    }
-  }
-  return indices;
+// Of a track, what lies within the gate of its place, and away from the border
+// of the image.
+struct Selected {
+  std::vector<UsedObservation> used;
+  int candidates = 0;  // all but those at the border
+};
+
+// What an observation predicted here weighs.
+double BorderWeight(const CameraCalibration& camera,
+                    const Eigen::Vector2d& z_px,
+                    double pixel_sigma_px) {
+  const Eigen::Array2d last_px(camera.width_px - 1, camera.height_px - 1);
+  const double distance_px =
+      z_px.array().min(last_px - z_px.array()).minCoeff();
+  return std::clamp((distance_px / pixel_sigma_px - kBorderBegin) /
+                        (kBorderEnd - kBorderBegin),
+                    0.0,
+                    1.0);
 }
 
-bool EnoughLeft(const std::vector<int>& used, const Track& track) {
-  const auto n = static_cast<double>(track.observations.size());
-  return used.size() >= kMinTrackObservations &&
-         static_cast<double>(used.size()) >= (1 - kMaxOutlierFraction) * n;
+Selected Select(const LandmarkScene& scene,
+                const Track& track,
+                const LandmarkPlace& place,
+                double gate_px) {
+  const Eigen::Vector4d point_G = place.Homogeneous();
+  Selected result;
+  for (int i = 0; i < static_cast<int>(track.observations.size()); ++i) {
+    const TrackObservation& seen = track.observations[i];
+    Eigen::Vector2d residual_px;
+    const bool projects = scene.Residual(seen, point_G, &residual_px, nullptr);
+    if (!projects || residual_px.norm() > gate_px) {
+      ++result.candidates;
+      continue;
+    }
+    const double weight = BorderWeight(
+        scene.camera(seen), seen.z_px + residual_px, scene.pixel_sigma_px());
+    if (weight > 0) {
+      ++result.candidates;
+      result.used.push_back({i, weight});
+    }
+  }
+  return result;
+}
+
+bool EnoughLeft(const Selected& selected) {
+  return selected.used.size() >= kMinTrackObservations &&
+         static_cast<double>(selected.used.size()) >=
+             (1 - kMaxOutlierFraction) * selected.candidates;
 }
 
 // Where a track may be.
@@ -98,29 +131,28 @@ SettledPlace SettlePlace(const LandmarkScene& scene,
                          const Track& track,
                          const RobustLoss& loss,
                          const LandmarkPlace& start) {
-  std::vector<int> all(track.observations.size());
-  std::iota(all.begin(), all.end(), 0);
   SettledPlace settled{start, {}};
-  settled.refined = RefinePlace(scene, track, all, loss, {}, &settled.place);
+  settled.refined =
+      RefinePlace(scene, track, AllOf(track), loss, {}, &settled.place);
   return settled;
 }
 
-// Whether a landmark is used, and which of its observations: those within the
-// gate of its place.
+// Whether a landmark is used, and which of its observations.
 std::optional<ScreenedLandmark> Judge(const LandmarkScene& scene,
                                       const Track& track,
                                       const Thresholds& thresholds,
                                       const SettledPlace& settled) {
   const double sigma = InverseDepthSigma(settled.refined.information);
   const double weight = 2 * (1 - sigma / thresholds.max_inverse_depth_sigma);
-  std::vector<int> used =
-      Within(ResidualNorms(scene, track, settled.place.Homogeneous()),
-             thresholds.loss.gate * scene.pixel_sigma_px());
-  if (!EnoughLeft(used, track) || !(weight > 0)) {
+  Selected selected = Select(scene,
+                             track,
+                             settled.place,
+                             thresholds.loss.gate * scene.pixel_sigma_px());
+  if (!EnoughLeft(selected) || !(weight > 0)) {
     return std::nullopt;
   }
   return ScreenedLandmark{
-      0, settled.place, std::min(weight, 1.0), std::move(used)};
+      0, settled.place, std::min(weight, 1.0), std::move(selected.used)};
 }
 
 Screening Screen(const LandmarkScene& scene,
@@ -267,9 +299,10 @@ ReprojectionStatistics MeasureReprojection(
                  norms.end(),
                  std::back_inserter(projected_px),
                  [](double norm) { return std::isfinite(norm); });
-    for (const int index : landmark.used) {
-      if (std::isfinite(norms[index])) {
-        sum_of_squares += norms[index] * norms[index];
+    for (const UsedObservation& one : landmark.used) {
+      const double norm = norms[one.index];
+      if (std::isfinite(norm)) {
+        sum_of_squares += norm * norm;
         ++used;
       }
     }

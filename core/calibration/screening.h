@@ -25,6 +25,13 @@ inline constexpr std::size_t kMinTrackObservations = 3;
 // In robust standard deviations, from the median of all residuals; never less
 // than so many times the pixel sigma of the rig.
 inline constexpr double kOutlierGate = 5.0;
+// An observation predicted near to the border of the image weighs less, and
+// nothing below the nearer of these [pixel sigmas]: its own noise decided
+// whether it was seen there, so that those that were lean inwards, and with
+// them focal length and distortion. The prediction decides, since it is not
+// correlated with the residuals.
+inline constexpr double kBorderBegin = 2.0;
+inline constexpr double kBorderEnd = 4.0;
 // A landmark of which more than this is outlying is no landmark.
 inline constexpr double kMaxOutlierFraction = 0.5;
 
@@ -45,7 +52,7 @@ struct ScreenedLandmark {
   LandmarkPlace place;
   // In (0, 1], on all that the landmark contributes.
   double weight = 1;
-  std::vector<int> used;  // indices into the track's observations
+  std::vector<UsedObservation> used;
 };
 
 struct Screening {

@@ -86,18 +86,19 @@ class TrackSummer {
     H(2, 2) = 1 / (kInverseDepthSigma * kInverseDepthSigma);
     Eigen::Matrix<double, 3, Eigen::Dynamic> coupling =
         Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, D);
-    for (const int index : landmark.used) {
-      const std::optional<Row> row = RowOf(track.observations[index], point_G);
+    for (const UsedObservation& used : landmark.used) {
+      const std::optional<Row> row =
+          RowOf(track.observations[used.index], point_G);
       if (!row) continue;
       const double s = row->r.squaredNorm();
-      const double weight = round_.loss.Weight(s);
+      const double weight = used.weight * round_.loss.Weight(s);
       const Eigen::Matrix<double, 2, 3> by_landmark = row->by_point * by_place;
       const double square = row->along.squaredNorm();
       gradient += weight * row->along.transpose() * row->r;
       H += weight * by_landmark.transpose() * by_landmark;
       coupling += weight * by_landmark.transpose() * row->along;
       sums.weight += weight * square;
-      sums.curvature += round_.loss.Curvature(s) * square;
+      sums.curvature += used.weight * round_.loss.Curvature(s) * square;
       ++sums.observations;
     }
     const double w = landmark.weight;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <vector>
 
 #include "core/model/camera.h"
@@ -96,14 +95,12 @@ std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
     return std::nullopt;
   }
   LandmarkPlace place = PlaceAt(scene, track, best_G);
-  std::vector<int> all(track.observations.size());
-  std::iota(all.begin(), all.end(), 0);
   const double robust_sigmas =
       std::max(1.0, best_px / kMedianOfRayleigh / scene.pixel_sigma_px());
   RefinePlace(
       scene,
       track,
-      all,
+      AllOf(track),
       {.kind = LossKind::kCauchy, .scale = kSearchLossScale * robust_sigmas},
       {},
       &place);
