@@ -124,8 +124,8 @@ std::optional<Change> DetectChange(const ConsistencyTester& tester,
     const auto window = segments.last(n);
     const OffsetInformation sum = Fuse(window);
     const ConsistencyTest test = tester.Test(sum);
-    if (test.probability > level ||
-        ProbabilityWithoutOne(tester, window, sum) > level) {
+    if (test.probability >= level ||
+        ProbabilityWithoutOne(tester, window, sum) >= level) {
       continue;
     }
     Change change;

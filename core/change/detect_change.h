@@ -26,7 +26,8 @@ namespace selfcal {
 struct ChangeOptions {
   // Variance factor of segments and active calibration (consistency.h).
   double inflation = 1;
-  // Upper bound of the probability of a false alarm, for each new segment.
+  // Upper bound of the probability of a false alarm, for each new segment; 0:
+  // nothing is ever detected.
   double false_alarm_rate = 1e-6;
   int max_window = 16;  // segments
   // A group whose own test is less probable than this is concerned.

@@ -9,6 +9,7 @@ namespace {
 
 constexpr int kUsageError = 2;
 constexpr int kMaxScoringThreads = 256;
+constexpr double kMaxInflation = 1e4;
 
 }  // namespace
 
@@ -43,6 +44,18 @@ std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
           {"structured", SolverKind::kStructured},
           {"ceres", SolverKind::kCeres}}))
       ->default_str("structured");
+  app.add_option("--change-inflation",
+                 options->change.inflation,
+                 "Factor on all variances in the test for a change of the "
+                 "device: formal sigmas of real recordings are too small")
+      ->check(CLI::Range(1.0, kMaxInflation))
+      ->capture_default_str();
+  app.add_option("--change-false-alarms",
+                 options->change.false_alarm_rate,
+                 "Bound on false alarms of that test, for each segment; 0 "
+                 "turns it off")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   app.add_option("--log-level", options->log_level, "What goes to stderr")
       ->check(CLI::IsMember(
           {"trace", "debug", "info", "warning", "error", "critical", "off"}))

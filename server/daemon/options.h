@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/change/detect_change.h"
 
 namespace selfcal::server {
 
@@ -15,6 +16,8 @@ struct DaemonOptions {
   std::vector<std::string> listen;  // "unix:/path" or "host:port"
   int scoring_threads = 1;
   SolverKind solver = SolverKind::kStructured;
+  // On real recordings formal sigmas are too small, by about 2.
+  ChangeOptions change = {.inflation = 4};
   std::string log_level = "info";
 };
 

@@ -75,7 +75,8 @@ class Recalibrator {
       const StoredRun& run,
       const Rig& rig,
       const Calibration& start,
-      const std::vector<MotionSegment>& segments);
+      const std::vector<MotionSegment>& segments,
+      const CalibrateOptions& options);
   bool Report(const StoredRun& run, const CalibrateProgress& progress);
   absl::Status Conclude(const StoredRun& run, const Outcome& outcome);
   absl::Status Succeed(const StoredRun& run,

@@ -6,6 +6,7 @@
 #include <exception>
 #include <utility>
 
+#include "server/pipeline/after_change.h"
 #include "server/pipeline/candidate.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/retry.h"
@@ -91,10 +92,23 @@ absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
                            store_->GetCalibration(run.rig, run.base_version));
   std::vector<MotionSegment> segments;
   SELFCAL_RETURN_IF_ERROR(LoadSegments(run, &segments, damaged));
-  SELFCAL_ASSIGN_OR_RETURN(CalibrationResult result,
-                           RunSolver(run, rig.rig, base.theta, segments));
-  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
+  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration active,
                            store_->GetActiveCalibration(run.rig));
+  CalibrateOptions options = options_.calibrate;
+  if (run.change > 0) {
+    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
+                             store_->GetChange(run.rig, run.change));
+    SELFCAL_ASSIGN_OR_RETURN(
+        const StoredCalibration before,
+        store_->GetCalibration(run.rig, change.base_version));
+    options.prior = KnownAfter(rig.rig, change, before);
+    if (active.version == change.base_version) {
+      active.covariance = CovarianceAfter(rig.rig, change, active.covariance);
+    }
+  }
+  SELFCAL_ASSIGN_OR_RETURN(
+      CalibrationResult result,
+      RunSolver(run, rig.rig, base.theta, segments, options));
   StoredCalibration candidate;
   candidate.reasons = CandidateProblems(rig.rig, active, result);
   candidate.state = candidate.reasons.empty() ? CalibrationState::kActive
@@ -127,13 +141,12 @@ absl::StatusOr<CalibrationResult> Recalibrator::RunSolver(
     const StoredRun& run,
     const Rig& rig,
     const Calibration& start,
-    const std::vector<MotionSegment>& segments) {
+    const std::vector<MotionSegment>& segments,
+    const CalibrateOptions& options) {
   CalibrationResult result = estimators_.calibrate(
-      rig,
-      start,
-      segments,
-      options_.calibrate,
-      [&](const CalibrateProgress& progress) { return Report(run, progress); });
+      rig, start, segments, options, [&](const CalibrateProgress& progress) {
+        return Report(run, progress);
+      });
   if (result.status == CalibrateStatus::kCancelled) {
     return absl::CancelledError("interrupted");
   }

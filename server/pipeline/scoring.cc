@@ -207,6 +207,12 @@ absl::Status ScoringWorkers::TryCommit(const Claim& claim,
   spdlog::info("{} is scored; tables: [{}]",
                Name(claim),
                fmt::join(commit.tables, ", "));
+  if (commit.change) {
+    spdlog::warn("rig {} has changed: [{}], from sequence {} on",
+                 claim.rig,
+                 fmt::join(commit.change->groups, ", "),
+                 commit.change->first_sequence);
+  }
   if (commit.started_run) {
     on_run_(*commit.started_run);
   }

@@ -45,6 +45,8 @@ v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
       return v1::Recalibration::TABLES_CHANGED;
     case RunTrigger::kManual:
       return v1::Recalibration::MANUAL;
+    case RunTrigger::kChangeDetected:
+      return v1::Recalibration::CHANGE_DETECTED;
   }
   return v1::Recalibration::TRIGGER_UNSPECIFIED;
 }

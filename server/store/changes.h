@@ -17,7 +17,8 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
     Connection* db,
     const std::string& rig,
     const SegmentKey& key,
-    const SegmentInformation& information);
+    const SegmentInformation& information,
+    const ChangeOptions& change);
 
 absl::Status MarkUnusableRow(Connection* db,
                              const std::string& rig,

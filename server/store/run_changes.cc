@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "server/store/calibrations.h"
+#include "server/store/change_rows.h"
 #include "server/store/changes.h"
 #include "server/store/clock.h"
 #include "server/store/rigs.h"
@@ -99,6 +100,15 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
   stored.run = run.run;
   stored.base_version = run.base_version;
   stored.segments = run.segments;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
+                           NewestChange(db, rig.rowid));
+  if (run.change != change) {
+    stored.state = CalibrationState::kRejected;
+    stored.reasons.push_back(
+        fmt::format("the device has changed (change {}) since its segments "
+                    "were chosen",
+                    change));
+  }
   SELFCAL_RETURN_IF_ERROR(InsertCalibration(db, rig.rowid, stored));
   run.state = RunState::kSucceeded;
   run.end_time_ns = stored.create_time_ns;

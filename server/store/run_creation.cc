@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "server/store/calibrations.h"
+#include "server/store/change_rows.h"
 #include "server/store/clock.h"
 #include "server/store/events.h"
 #include "server/store/runs.h"
@@ -25,13 +26,18 @@ absl::StatusOr<std::int64_t> NewestRun(Connection* db,
 
 // What the trigger compares the tables with: the snapshot of the newest run,
 // however it ended, so that a failure is not repeated on the same data. Nothing
-// until the tables have started a run of their own: one that was asked for on
-// half-filled tables does not stand for the first full ones.
+// until the tables have started a run of their own since the last change: one
+// that was asked for on half-filled tables does not stand for the first full
+// ones.
 absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
     Connection* db, const RigRow& rig) {
   std::optional<std::vector<SegmentKey>> keys;
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t triggered,
-                           NewestRun(db, rig.rowid, "cause <> 3"));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
+                           NewestChange(db, rig.rowid));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t triggered,
+      NewestRun(
+          db, rig.rowid, fmt::format("cause <> 3 AND change = {}", change)));
   if (triggered == 0) {
     return keys;
   }
@@ -67,6 +73,8 @@ const char* TriggerText(RunTrigger trigger) {
       return "the tables are full";
     case RunTrigger::kTablesChanged:
       return "the tables have changed";
+    case RunTrigger::kChangeDetected:
+      return "the tables are full again after a change";
     case RunTrigger::kManual:
       break;
   }
@@ -99,19 +107,23 @@ absl::StatusOr<StoredRun> InsertRun(Connection* db,
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest,
                            NewestRun(db, rig.rowid, "1"));
   SELFCAL_ASSIGN_OR_RETURN(run.base_version, ActiveVersion(db, rig.rowid));
+  SELFCAL_ASSIGN_OR_RETURN(run.change, NewestChange(db, rig.rowid));
   run.rig = rig.stored.rig.id;
   run.run = newest + 1;
-  run.trigger = trigger;
+  run.trigger = trigger == RunTrigger::kTablesFull && run.change > 0
+                    ? RunTrigger::kChangeDetected
+                    : trigger;
   run.create_time_ns = NowNs();
   SELFCAL_RETURN_IF_ERROR(
       Statement(db,
                 "INSERT INTO runs (rig, run, state, cause, create_time_ns, "
-                "  base_version) VALUES (?1, ?2, 1, ?3, ?4, ?5)",
+                "  base_version, change) VALUES (?1, ?2, 1, ?3, ?4, ?5, ?6)",
                 rig.rowid,
                 run.run,
                 static_cast<int>(trigger) + 1,
                 run.create_time_ns,
-                run.base_version)
+                run.base_version,
+                run.change)
           .Run());
   SELFCAL_RETURN_IF_ERROR(InsertSnapshot(db, rig.rowid, run));
   SELFCAL_RETURN_IF_ERROR(AppendEvent(db,
@@ -120,7 +132,7 @@ absl::StatusOr<StoredRun> InsertRun(Connection* db,
                                       fmt::format("run {} on {} segments: {}",
                                                   run.run,
                                                   run.segments.size(),
-                                                  TriggerText(trigger))));
+                                                  TriggerText(run.trigger))));
   return run;
 }
 

@@ -13,7 +13,8 @@ namespace {
 
 constexpr char kColumns[] =
     "SELECT g.id, r.run, r.state, r.cause, r.create_time_ns, r.end_time_ns, "
-    "  r.base_version, r.attempts, r.calibration_version, r.message, r.rig "
+    "  r.base_version, r.attempts, r.calibration_version, r.message, r.rig, "
+    "  r.change "
     "FROM runs r JOIN rigs g USING (rig) ";
 
 absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
@@ -45,6 +46,10 @@ absl::StatusOr<StoredRun> RunFromRow(Connection* db, const Statement& row) {
   run.attempts = static_cast<int>(row.Int(7));
   run.calibration_version = row.Int(8);
   run.message = row.Text(9);
+  run.change = row.Int(11);
+  if (run.trigger == RunTrigger::kTablesFull && run.change > 0) {
+    run.trigger = RunTrigger::kChangeDetected;
+  }
   SELFCAL_ASSIGN_OR_RETURN(run.segments,
                            ReadSnapshot(db, row.Int(10), run.run));
   return run;

@@ -1,6 +1,7 @@
 // What happens to a stored segment: it gets its score, or turns out unusable.
 #include <fmt/format.h>
 
+#include "server/store/change_rows.h"
 #include "server/store/changes.h"
 #include "server/store/events.h"
 #include "server/store/rigs.h"
@@ -58,7 +59,8 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
     Connection* db,
     const std::string& rig_name,
     const SegmentKey& key,
-    const SegmentInformation& information) {
+    const SegmentInformation& information,
+    const ChangeOptions& change) {
   Transaction transaction(db);
   SELFCAL_RETURN_IF_ERROR(transaction.status());
   SELFCAL_ASSIGN_OR_RETURN(const RigRow rig, ReadRig(db, rig_name));
@@ -80,6 +82,11 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
   SELFCAL_ASSIGN_OR_RETURN(
       commit.tables,
       ScoreAndOffer(db, rig, segment, key, information, &tables));
+  SELFCAL_ASSIGN_OR_RETURN(commit.change, MaybeInsertChange(db, rig, change));
+  if (commit.change) {
+    SELFCAL_ASSIGN_OR_RETURN(tables, ReadTables(db, rig.rowid));
+    SELFCAL_ASSIGN_OR_RETURN(commit.tables, TablesOfSegment(db, segment.rowid));
+  }
   SELFCAL_ASSIGN_OR_RETURN(commit.started_run, MaybeInsertRun(db, rig, tables));
   SELFCAL_RETURN_IF_ERROR(DropUnreferencedPayloads(db, rig.rowid));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());

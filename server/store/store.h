@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/change/detect_change.h"
 #include "core/information/segment_information.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
@@ -88,7 +89,12 @@ struct StoredCalibration {
 };
 
 enum class RunState { kPending, kRunning, kSucceeded, kFailed, kCancelled };
-enum class RunTrigger { kTablesFull, kTablesChanged, kManual };
+enum class RunTrigger {
+  kTablesFull,
+  kTablesChanged,
+  kManual,
+  kChangeDetected,  // the tables are full again, for the first time since one
+};
 
 struct StoredRun {
   std::string rig;
@@ -98,16 +104,33 @@ struct StoredRun {
   std::int64_t create_time_ns = 0;
   std::int64_t end_time_ns = 0;      // 0 until it has ended
   std::int64_t base_version = 0;     // active when it was created
+  std::int64_t change = 0;           // the newest when it was created, 0: none
   std::vector<SegmentKey> segments;  // the snapshot of the tables
   int attempts = 0;
   std::int64_t calibration_version = 0;  // 0 until it succeeded
   std::string message;
 };
 
+// The device has changed.
+struct StoredChange {
+  std::string rig;
+  std::int64_t change = 0;   // counts from 1 in a rig
+  std::int64_t time_ns = 0;  // when it was detected
+  ChangeKind kind = ChangeKind::kSudden;
+  // Segments of a smaller sequence lie before it.
+  std::int64_t first_sequence = 0;
+  // The calibration that was active: what it knows of other groups than these
+  // stays known.
+  std::int64_t base_version = 0;
+  std::vector<std::string> groups;  // concerned
+  double inflation = 1;  // of the variances that the test was made with
+};
+
 // What the commit of a score did.
 struct ScoreCommit {
   std::vector<std::string> tables;       // groups it entered
   std::optional<StoredRun> started_run;  // the trigger fired
+  std::optional<StoredChange> change;    // was detected
 };
 
 // One line of the log of what happened to a rig.
@@ -118,6 +141,7 @@ enum class EventKind {
   kCalibrationPublished,
   kCalibrationRejected,
   kSegmentUnusable,
+  kChangeDetected,
 };
 struct StoredEvent {
   std::int64_t event = 0;  // counts from 1
@@ -158,10 +182,13 @@ class Store {
   virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) = 0;
 
   // Writes the information of one stored segment, offers it to the tables,
-  // drops the data of segments that neither a table nor an unfinished run
-  // references, and, where EvaluateTrigger says so and no run is unfinished,
-  // creates the run with its snapshot. A segment that is scored already changes
-  // nothing.
+  // tests the newest segments for a change of the device (core/change), drops
+  // the data of segments that neither a table nor an unfinished run references,
+  // and, where EvaluateTrigger says so and no run is unfinished, creates the
+  // run with its snapshot. A segment that is scored already changes nothing.
+  // Where the device has changed, the segments from before leave all tables,
+  // which start anew, and what they were scored for is over: a run that was
+  // created before the change ends with a rejected calibration.
   virtual absl::StatusOr<ScoreCommit> CommitScore(
       const std::string& rig,
       const SegmentKey& key,
@@ -177,6 +204,9 @@ class Store {
 
   virtual absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) = 0;
+
+  virtual absl::StatusOr<StoredChange> GetChange(const std::string& rig,
+                                                 std::int64_t change) = 0;
 
   // --- Calibrations.
   virtual absl::StatusOr<StoredCalibration> GetCalibration(

@@ -5,6 +5,7 @@
 
 #include "migrations/migrations.h"
 #include "server/store/calibrations.h"
+#include "server/store/change_rows.h"
 #include "server/store/changes.h"
 #include "server/store/database.h"
 #include "server/store/events.h"
@@ -21,7 +22,8 @@ namespace {
 // Locks, and leaves the work to the files of each subject.
 class SqliteStore : public Store {
  public:
-  explicit SqliteStore(Connection db) : db_(std::move(db)) {}
+  SqliteStore(Connection db, const ChangeOptions& change)
+      : db_(std::move(db)), change_(change) {}
 
   absl::StatusOr<StoredRig> CreateRig(const Rig& rig) override {
     const std::lock_guard lock(mutex_);
@@ -75,7 +77,7 @@ class SqliteStore : public Store {
       const SegmentKey& key,
       const SegmentInformation& information) override {
     const std::lock_guard lock(mutex_);
-    return CommitScoreRows(&db_, rig, key, information);
+    return CommitScoreRows(&db_, rig, key, information, change_);
   }
 
   absl::Status MarkUnusable(const std::string& rig,
@@ -90,6 +92,12 @@ class SqliteStore : public Store {
     const std::lock_guard lock(mutex_);
     SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(&db_, rig));
     return ReadTables(&db_, rig_id);
+  }
+
+  absl::StatusOr<StoredChange> GetChange(const std::string& rig,
+                                         std::int64_t change) override {
+    const std::lock_guard lock(mutex_);
+    return ReadChange(&db_, rig, change);
   }
 
   absl::StatusOr<StoredCalibration> GetCalibration(
@@ -174,15 +182,16 @@ class SqliteStore : public Store {
 
   std::mutex mutex_;
   Connection db_;  // guarded by mutex_
+  const ChangeOptions change_;
 };
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Store>> MakeSqliteStore(
-    const std::string& path) {
+    const std::string& path, const ChangeOptions& change) {
   SELFCAL_ASSIGN_OR_RETURN(Connection db,
                            OpenDatabase(path, EmbeddedMigrations()));
-  return std::unique_ptr<Store>(new SqliteStore(std::move(db)));
+  return std::unique_ptr<Store>(new SqliteStore(std::move(db), change));
 }
 
 }  // namespace selfcal::server

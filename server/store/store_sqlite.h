@@ -14,7 +14,8 @@ namespace selfcal::server {
 
 // Opens the database at `path`, or creates it in a folder that exists. Errors
 // as OpenDatabase (database.h). One process for one file: the caller holds a
-// lock on its state folder.
-absl::StatusOr<std::unique_ptr<Store>> MakeSqliteStore(const std::string& path);
+// lock on its state folder. `change` says how changes of a device are detected.
+absl::StatusOr<std::unique_ptr<Store>> MakeSqliteStore(
+    const std::string& path, const ChangeOptions& change = {});
 
 }  // namespace selfcal::server

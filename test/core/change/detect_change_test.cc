@@ -141,6 +141,13 @@ TEST_F(DetectChangeTest, ACarefulFactorNeedsMoreEvidence) {
   EXPECT_FALSE(DetectChange(careful, newest_, options_));
 }
 
+TEST_F(DetectChangeTest, ARateOfZeroTurnsItOff) {
+  Many(16, Sigmas(300, "cam0.focal.x"));
+  ASSERT_TRUE(Detect());
+  options_.false_alarm_rate = 0;
+  EXPECT_FALSE(Detect());
+}
+
 TEST_F(DetectChangeTest, NoSegmentsNoChange) {
   EXPECT_FALSE(Detect());
   Next(Sigmas(300, "cam0.focal.x"));

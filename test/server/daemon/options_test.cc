@@ -45,6 +45,22 @@ TEST_F(OptionsTest, SolverHasAName) {
   EXPECT_EQ(Parse({"--state-dir", "s", "--solver", "other"}), 2);
 }
 
+TEST_F(OptionsTest, TestForAChangeIsSet) {
+  EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
+  EXPECT_EQ(options_.change.inflation, 4);
+  EXPECT_EQ(Parse({"--state-dir",
+                   "s",
+                   "--change-inflation",
+                   "1",
+                   "--change-false-alarms",
+                   "1e-4"}),
+            std::nullopt);
+  EXPECT_EQ(options_.change.inflation, 1);
+  EXPECT_EQ(options_.change.false_alarm_rate, 1e-4);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--change-inflation", "0.5"}), 2);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--change-false-alarms", "2"}), 2);
+}
+
 TEST_F(OptionsTest, AddressesAreRepeatable) {
   EXPECT_EQ(Parse({"--state-dir",
                    "s",

@@ -62,11 +62,14 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 1u);
+  ASSERT_EQ(migrations.size(), 2u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
   EXPECT_EQ(Hex(Sha256(migrations[0].sql)), migrations[0].sha256);
+  EXPECT_EQ(migrations[1].name, "0002_change.sql");
+  EXPECT_EQ(migrations[1].sha256,
+            "9c54a19ad3cec64f7085e5f42a2bb58dfb078c5326486450a8f95cfbb631a52b");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

@@ -20,7 +20,9 @@ inline SegmentInformation FakeInformation(const Rig& rig,
   SegmentInformation information;
   const int size = TangentSize(rig.factory);
   information.theta0 = rig.factory;
-  information.Lambda = Eigen::MatrixXd::Zero(size, size).unaryExpr(draw);
+  // So small that nothing is observed: what is no information of a device must
+  // not pass for a change of it.
+  information.Lambda = 1e-6 * Eigen::MatrixXd::Zero(size, size).unaryExpr(draw);
   information.eta = Eigen::VectorXd::Zero(size).unaryExpr(draw);
   information.rank = size - 1;
   information.unobserved = {{{{"imu.gyro.scale.x", 0.9}}, 0.1}};

@@ -1,0 +1,244 @@
+#include "server/store/change_rows.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "server/store/calibrations.h"
+#include "server/store/checksum.h"
+#include "server/store/clock.h"
+#include "server/store/events.h"
+#include "server/store/records.h"
+#include "server/store/runs.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::StatusOr<SegmentInformation> ReadInformation(const Statement& row) {
+  constexpr char kWhat[] = "the information of a segment";
+  const std::string bytes = row.Text(1);
+  SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(2), kWhat));
+  return ParseInformation(bytes, kWhat);
+}
+
+// The newest segments that can be tested, oldest first.
+struct Newest {
+  std::vector<OffsetInformation> segments;
+  std::vector<std::int64_t> sequences;
+};
+
+absl::StatusOr<Newest> ReadNewest(Connection* db,
+                                  const RigRow& rig,
+                                  const StoredCalibration& active,
+                                  std::int64_t first_sequence,
+                                  const ConsistencyTester& tester,
+                                  int count) {
+  Statement read(db,
+                 "SELECT s.sequence, i.information, i.sha256 "
+                 "FROM segments s JOIN segment_information i USING (segment) "
+                 "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
+                 "  AND NOT EXISTS (SELECT 1 FROM calibration_segments c "
+                 "    WHERE c.rig = ?1 AND c.version = ?3 "
+                 "      AND c.segment = s.segment) "
+                 "ORDER BY s.sequence DESC LIMIT ?4",
+                 rig.rowid,
+                 first_sequence,
+                 active.version,
+                 count);
+  Newest newest;
+  while (read.Next()) {
+    const auto information = ReadInformation(read);
+    if (!information.ok() || !tester.Accepts(*information)) {
+      continue;
+    }
+    newest.sequences.push_back(read.Int(0));
+    newest.segments.push_back(tester.Offset(*information));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  std::reverse(newest.segments.begin(), newest.segments.end());
+  std::reverse(newest.sequences.begin(), newest.sequences.end());
+  return newest;
+}
+
+// Whether the segments can be tested against it: the factory's calibration is
+// a prior, not an estimate, and one from before the last change is no longer
+// that of the device.
+absl::StatusOr<bool> StandsSince(Connection* db,
+                                 const StoredCalibration& active,
+                                 std::int64_t change) {
+  if (!active.run) {
+    return false;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
+                           ReadRun(db, active.rig, *active.run));
+  return run.change == change;
+}
+
+std::string Describe(const Change& found, const StoredChange& change) {
+  return fmt::format(
+      "change {} ({}): calibration {} does not fit the segments from sequence "
+      "{} on; concerned: {}; chi-square {:.1f} with {} degrees over {} "
+      "segments "
+      "(probability {:.1e})",
+      change.change,
+      found.kind == ChangeKind::kSudden ? "sudden" : "drift",
+      change.base_version,
+      change.first_sequence,
+      fmt::join(change.groups, ", "),
+      found.test.statistic,
+      found.test.degrees,
+      found.window,
+      found.test.probability);
+}
+
+absl::Status RestartTables(Connection* db,
+                           std::int64_t rig,
+                           std::int64_t first_sequence) {
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(db,
+                "DELETE FROM table_entries WHERE rig = ?1 AND segment IN "
+                "(SELECT segment FROM segments "
+                "  WHERE rig = ?1 AND sequence < ?2)",
+                rig,
+                first_sequence)
+          .Run());
+  return Statement(db,
+                   "UPDATE tables SET scored = "
+                   "  (SELECT count(*) FROM segments WHERE rig = ?1 "
+                   "    AND state = 2 AND sequence >= ?2) "
+                   "WHERE rig = ?1",
+                   rig,
+                   first_sequence)
+      .Run();
+}
+
+absl::Status InsertChange(Connection* db,
+                          std::int64_t rig,
+                          const StoredChange& change) {
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(db,
+                "INSERT INTO changes (rig, change, time_ns, kind, "
+                "  first_sequence, base_version, inflation) "
+                "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+                rig,
+                change.change,
+                change.time_ns,
+                static_cast<int>(change.kind) + 1,
+                change.first_sequence,
+                change.base_version,
+                change.inflation)
+          .Run());
+  for (const std::string& group : change.groups) {
+    SELFCAL_RETURN_IF_ERROR(Statement(db,
+                                      "INSERT INTO change_groups "
+                                      "(rig, change, group_name) "
+                                      "VALUES (?1, ?2, ?3)",
+                                      rig,
+                                      change.change,
+                                      group)
+                                .Run());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::int64_t> NewestChange(Connection* db, std::int64_t rig) {
+  Statement read(
+      db, "SELECT coalesce(max(change), 0) FROM changes WHERE rig = ?1", rig);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return found ? read.Int(0) : 0;
+}
+
+absl::StatusOr<StoredChange> ReadChange(Connection* db,
+                                        const std::string& rig,
+                                        std::int64_t number) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  Statement read(db,
+                 "SELECT time_ns, kind, first_sequence, base_version, "
+                 "  inflation FROM changes WHERE rig = ?1 AND change = ?2",
+                 rig_id,
+                 number);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  if (!found) {
+    return absl::NotFoundError(
+        fmt::format("rig {} has no change {}", rig, number));
+  }
+  StoredChange change;
+  change.rig = rig;
+  change.change = number;
+  change.time_ns = read.Int(0);
+  change.kind = static_cast<ChangeKind>(read.Int(1) - 1);
+  change.first_sequence = read.Int(2);
+  change.base_version = read.Int(3);
+  change.inflation = read.Double(4);
+  Statement groups(db,
+                   "SELECT c.group_name FROM change_groups c "
+                   "JOIN tables t ON t.rig = c.rig "
+                   "  AND t.group_name = c.group_name "
+                   "WHERE c.rig = ?1 AND c.change = ?2 ORDER BY t.position",
+                   rig_id,
+                   number);
+  while (groups.Next()) {
+    change.groups.push_back(groups.Text(0));
+  }
+  SELFCAL_RETURN_IF_ERROR(groups.status());
+  return change;
+}
+
+absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
+    Connection* db, const RigRow& rig, const ChangeOptions& options) {
+  const std::optional<StoredChange> none;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest_change,
+                           NewestChange(db, rig.rowid));
+  const auto active = ReadActiveCalibration(db, rig.stored.rig.id);
+  if (absl::IsDataLoss(active.status())) {
+    return none;
+  }
+  SELFCAL_RETURN_IF_ERROR(active.status());
+  SELFCAL_ASSIGN_OR_RETURN(const bool stands,
+                           StandsSince(db, *active, newest_change));
+  if (!stands) {
+    return none;
+  }
+  std::int64_t first_sequence = 1;
+  if (newest_change > 0) {
+    SELFCAL_ASSIGN_OR_RETURN(const StoredChange last,
+                             ReadChange(db, rig.stored.rig.id, newest_change));
+    first_sequence = last.first_sequence;
+  }
+  const ConsistencyTester tester(
+      rig.stored.rig, {active->theta, active->covariance}, options.inflation);
+  SELFCAL_ASSIGN_OR_RETURN(
+      const Newest newest,
+      ReadNewest(db, rig, *active, first_sequence, tester, options.max_window));
+  const auto found = DetectChange(tester, newest.segments, options);
+  if (!found) {
+    return none;
+  }
+  StoredChange change;
+  change.rig = rig.stored.rig.id;
+  change.change = newest_change + 1;
+  change.time_ns = NowNs();
+  change.kind = found->kind;
+  change.first_sequence =
+      found->segments_since == 0
+          ? newest.sequences.back() + 1
+          : newest.sequences[newest.sequences.size() - found->segments_since];
+  change.base_version = active->version;
+  change.inflation = options.inflation;
+  change.groups = found->concerned;
+  SELFCAL_RETURN_IF_ERROR(InsertChange(db, rig.rowid, change));
+  SELFCAL_RETURN_IF_ERROR(RestartTables(db, rig.rowid, change.first_sequence));
+  SELFCAL_RETURN_IF_ERROR(AppendEvent(
+      db, change.rig, EventKind::kChangeDetected, Describe(*found, change)));
+  return change;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,35 @@
+// Changes of the device, in the database. All of it runs inside a transaction
+// of the caller.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/change/detect_change.h"
+#include "server/store/rigs.h"
+#include "server/store/statement.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+// The number of the newest change of a rig, 0 if there is none.
+absl::StatusOr<std::int64_t> NewestChange(Connection* db, std::int64_t rig);
+
+// NOT_FOUND.
+absl::StatusOr<StoredChange> ReadChange(Connection* db,
+                                        const std::string& rig,
+                                        std::int64_t change);
+
+// Tests the newest scored segments of the rig against its active calibration,
+// if that came of a run since the last change. Those that entered it are not
+// looked at, nor what is damaged. Where the device has changed: writes the
+// change and its event, and has the tables start anew with the segments after
+// it.
+absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
+    Connection* db, const RigRow& rig, const ChangeOptions& options);
+
+}  // namespace selfcal::server

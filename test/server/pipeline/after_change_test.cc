@@ -1,0 +1,41 @@
+#include "server/pipeline/after_change.h"
+
+#include <gtest/gtest.h>
+
+#include "core/simulation/simulate.h"
+
+namespace selfcal::server {
+namespace {
+
+TEST(AfterChange, OnlyWhatIsNotConcernedStaysKnown) {
+  Rig rig = HandheldRig("a");
+  // Overlaps with extrinsics.
+  rig.groups.push_back({"position", {"*.p_CI.*"}});
+  StoredCalibration before;
+  before.theta = rig.factory;
+  before.covariance = (0.2 * ReferenceSigmas(rig)).cwiseAbs2().asDiagonal();
+  StoredChange change;
+  change.groups = {"extrinsics"};
+  change.inflation = 4;
+  const ThetaPrior prior = KnownAfter(rig, change, before);
+  const Eigen::MatrixXd covariance =
+      CovarianceAfter(rig, change, before.covariance);
+  const auto components = TangentComponents(rig.factory);
+  const std::vector<int> concerned =
+      MatchComponents(components, {"*.q_CI.*", "*.p_CI.*"});
+  const Eigen::VectorXd sigmas = PriorSigmas(rig);
+  for (int i = 0; i < static_cast<int>(components.size()); ++i) {
+    const double variance = before.covariance(i, i);
+    if (std::count(concerned.begin(), concerned.end(), i) > 0) {
+      EXPECT_EQ(prior.information(i, i), 0) << components[i].name;
+      EXPECT_DOUBLE_EQ(covariance(i, i), sigmas(i) * sigmas(i));
+    } else {
+      EXPECT_NEAR(prior.information(i, i) * 4 * variance, 1, 1e-9)
+          << components[i].name;
+      EXPECT_EQ(covariance(i, i), variance);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::server

@@ -1,0 +1,213 @@
+#include "test/core/change/random_information.h"
+#include "test/server/store/store_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// A device whose segments are drawn about its truth, as good as a reference
+// segment each; tables of two.
+class ChangesTest : public StoreTest {
+ protected:
+  void SetUp() override {
+    rig_ = CreateTestRig("a");
+    // Two segments fill the tables, and the run gives version 2.
+    Many(2, zero_);
+    ASSERT_TRUE(store_->BeginRun("a", 1).ok());
+    StoredCalibration calibration;
+    calibration.theta = rig_.factory;
+    calibration.covariance =
+        (0.2 * ReferenceSigmas(rig_)).cwiseAbs2().asDiagonal();
+    const auto finished = store_->FinishRun("a", 1, calibration);
+    ASSERT_TRUE(finished.ok()) << finished.status();
+    ASSERT_EQ(finished->state, CalibrationState::kActive);
+  }
+
+  // Puts and scores the next segment of a device that is off by `offset`.
+  ScoreCommit Next(const Eigen::VectorXd& offset) {
+    Put("a", next_);
+    SegmentInformation information =
+        random_.Segment(rig_, rig_.factory, offset);
+    information.groups = ScoreGroups(rig_, information.Lambda);
+    const auto commit = store_->CommitScore("a", {"s", next_++}, information);
+    EXPECT_TRUE(commit.ok()) << commit.status();
+    return commit.value_or(ScoreCommit());
+  }
+  void Many(int count, const Eigen::VectorXd& offset) {
+    for (int i = 0; i < count; ++i) Next(offset);
+  }
+
+  // The device turns its camera: segments until that is noticed. The index of
+  // the first of them is first_after_.
+  StoredChange Shock() {
+    first_after_ = next_;
+    for (int i = 0; i < 8; ++i) {
+      if (auto commit = Next(turned_); commit.change) return *commit.change;
+    }
+    ADD_FAILURE() << "the change was not detected";
+    return {};
+  }
+
+  std::vector<StoredEvent> Events() {
+    auto events = store_->ListEvents({1000, ""});
+    EXPECT_TRUE(events.ok()) << events.status();
+    return events->items;
+  }
+
+  Rig rig_;
+  const Eigen::VectorXd zero_ =
+      Eigen::VectorXd::Zero(TangentSize(HandheldRig("a").factory));
+  const Eigen::VectorXd turned_ = [this] {
+    Eigen::VectorXd offset = zero_;
+    const Rig rig = HandheldRig("a");
+    const int i =
+        MatchComponents(TangentComponents(rig.factory), {"cam0.q_CI.x"}).at(0);
+    offset(i) = 15 * ReferenceSigmas(rig)(i);
+    return offset;
+  }();
+  RandomInformation random_{5};
+  std::int64_t next_ = 0;
+  std::int64_t first_after_ = 0;
+};
+SELFCAL_STORE_TEST_SUITE(ChangesTest);
+
+TEST_P(ChangesTest, WithoutOneNothingHappens) {
+  for (int i = 0; i < 40; ++i) {
+    EXPECT_FALSE(Next(zero_).change) << "segment " << i;
+  }
+  EXPECT_TRUE(absl::IsNotFound(store_->GetChange("a", 1).status()));
+}
+
+TEST_P(ChangesTest, SegmentsFromBeforeLeaveTheTables) {
+  Many(6, zero_);
+  const StoredChange change = Shock();
+  EXPECT_EQ(change.change, 1);
+  EXPECT_EQ(change.base_version, 2);
+  EXPECT_EQ(change.kind, ChangeKind::kSudden);
+  EXPECT_THAT(change.groups, ElementsAre("extrinsics"));
+  // Sequences count from 1, indices from 0.
+  EXPECT_GT(change.first_sequence, first_after_ + 1);
+  EXPECT_LE(change.first_sequence, next_ + 1);
+  const auto tables = store_->GetTables("a");
+  ASSERT_TRUE(tables.ok());
+  for (const Table& table : *tables) {
+    EXPECT_EQ(table.scored, next_ - (change.first_sequence - 1));
+    for (const TableEntry& entry : table.entries) {
+      EXPECT_GE(entry.sequence, change.first_sequence) << table.group;
+    }
+  }
+  const StoredEvent event = Events().back();
+  EXPECT_EQ(event.kind, EventKind::kChangeDetected);
+  EXPECT_THAT(event.detail, HasSubstr("extrinsics"));
+  EXPECT_THAT(event.detail, HasSubstr("chi-square"));
+}
+
+TEST_P(ChangesTest, TheNextRunIsOnSegmentsAfterItAlone) {
+  Many(6, zero_);
+  // Those that still run are of the device before.
+  const auto unfinished = store_->ListUnfinishedRuns();
+  ASSERT_TRUE(unfinished.ok()) << unfinished.status();
+  for (const StoredRun& run : *unfinished) {
+    ASSERT_TRUE(
+        store_->EndRun("a", run.run, RunState::kCancelled, "test").ok());
+  }
+  const StoredChange change = Shock();
+  std::optional<StoredRun> started;
+  for (int i = 0; i < 4 && !started; ++i) started = Next(turned_).started_run;
+  ASSERT_TRUE(started);
+  EXPECT_EQ(started->trigger, RunTrigger::kChangeDetected);
+  EXPECT_EQ(started->change, 1);
+  EXPECT_EQ(started->base_version, 2);
+  for (const SegmentKey& key : started->segments) {
+    EXPECT_GE(key.index + 1, change.first_sequence);
+  }
+  Reopen();
+  const auto run = store_->GetRun("a", started->run);
+  ASSERT_TRUE(run.ok()) << run.status();
+  EXPECT_EQ(run->trigger, RunTrigger::kChangeDetected);
+  EXPECT_EQ(run->change, 1);
+  EXPECT_EQ(run->segments, started->segments);
+}
+
+TEST_P(ChangesTest, NothingIsTestedUntilThereIsACalibrationAfterIt) {
+  Many(6, zero_);
+  Shock();
+  for (int i = 0; i < 20; ++i) EXPECT_FALSE(Next(turned_).change);
+}
+
+TEST_P(ChangesTest, ASecondOneIsFoundAgainstTheCalibrationAfterTheFirst) {
+  Shock();
+  std::optional<StoredRun> run;
+  while (!run && next_ < 60) run = Next(turned_).started_run;
+  if (!run) {
+    // One from before may still be under way.
+    ASSERT_EQ(store_->ListUnfinishedRuns()->size(), 1u);
+    run = store_->ListUnfinishedRuns()->front();
+  }
+  ASSERT_TRUE(store_->BeginRun("a", run->run).ok());
+  StoredCalibration calibration;
+  calibration.theta = BoxPlus(rig_.factory, turned_);
+  calibration.covariance =
+      (0.2 * ReferenceSigmas(rig_)).cwiseAbs2().asDiagonal();
+  const auto finished = store_->FinishRun("a", run->run, calibration);
+  ASSERT_TRUE(finished.ok()) << finished.status();
+  ASSERT_EQ(finished->state, CalibrationState::kActive);
+  // Estimated with the calibration before, it is too far to be tested.
+  EXPECT_FALSE(Next(zero_).change);
+  const auto next = [&](const Eigen::VectorXd& offset) {
+    Put("a", next_);
+    SegmentInformation information =
+        random_.Segment(rig_, calibration.theta, offset);
+    information.groups = ScoreGroups(rig_, information.Lambda);
+    return store_->CommitScore("a", {"s", next_++}, information);
+  };
+  for (int i = 0; i < 10; ++i) EXPECT_FALSE(next(zero_)->change);
+  std::optional<StoredChange> second;
+  for (int i = 0; i < 8 && !second; ++i) second = next(turned_)->change;
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->change, 2);
+  EXPECT_EQ(second->base_version, finished->version);
+}
+
+TEST_P(ChangesTest, ARunFromBeforeIsRejected) {
+  // A run of the tables as they were before is under way.
+  std::optional<StoredRun> run;
+  while (!run && next_ < 200) run = Next(zero_).started_run;
+  ASSERT_TRUE(run);
+  ASSERT_TRUE(store_->BeginRun("a", run->run).ok());
+  const StoredChange change = Shock();
+  StoredCalibration calibration;
+  calibration.theta = rig_.factory;
+  calibration.covariance =
+      (0.2 * ReferenceSigmas(rig_)).cwiseAbs2().asDiagonal();
+  const auto finished = store_->FinishRun("a", run->run, calibration);
+  ASSERT_TRUE(finished.ok()) << finished.status();
+  EXPECT_EQ(finished->state, CalibrationState::kRejected);
+  EXPECT_THAT(finished->reasons, ElementsAre(HasSubstr("change 1")));
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, change.base_version);
+}
+
+TEST_P(ChangesTest, IsFoundTheSameAcrossRestarts) {
+  Many(6, zero_);
+  first_after_ = next_;
+  std::optional<StoredChange> change;
+  for (int i = 0; i < 8 && !change; ++i) {
+    Reopen();
+    change = Next(turned_).change;
+  }
+  ASSERT_TRUE(change);
+  Reopen();
+  const auto stored = store_->GetChange("a", 1);
+  ASSERT_TRUE(stored.ok()) << stored.status();
+  EXPECT_EQ(stored->first_sequence, change->first_sequence);
+  EXPECT_EQ(stored->groups, change->groups);
+  EXPECT_EQ(stored->kind, change->kind);
+  EXPECT_EQ(stored->time_ns, change->time_ns);
+  EXPECT_EQ(stored->base_version, 2);
+  EXPECT_EQ(stored->inflation, 1);
+}
+
+}  // namespace
+}  // namespace selfcal::server
