@@ -360,6 +360,7 @@ class Calibrator {
     result_.theta = Theta();
     const Eigen::MatrixXd by_offset = ThetaByOffset(reference_, estimate_.d);
     result_.covariance = by_offset * covariance_d_ * by_offset.transpose();
+    result_.Lambda = linearised_.system.information().Lambda;
     result_.rank = static_cast<int>(subspace_.estimated.cols());
     result_.held_constant = subspace_.unobserved;
     // As the cost before: not weighted by what is known of tracks since.

@@ -68,6 +68,9 @@ struct CalibrationResult {
   // a direction that was held constant keeps the prior's variance, so that no
   // sigma is ever small for what was not shown.
   Eigen::MatrixXd covariance;
+  // Information about theta (D x D, tangent at theta) of the data alone, also
+  // along directions that were held constant.
+  Eigen::MatrixXd Lambda;
   int rank = 0;  // estimated directions
   std::vector<UnobservedDirection> held_constant;
   int iterations = 0;

@@ -86,6 +86,7 @@ Motion MakeMotion(int dataset, double duration_s) {
 SimulationOptions DatasetOptions(int dataset) {
   SimulationOptions options;
   options.seed = 1000 + static_cast<std::uint64_t>(dataset);
+  options.revisit_fraction = 0;
   return options;
 }
 

@@ -4,6 +4,11 @@ namespace selfcal {
 
 // One file each: <name>_experiment.cc.
 void RunDatasets(Context* context);
+void RunGainThreshold(Context* context);
+void RunBatchMatch(Context* context);
+void RunEntropy(Context* context);
+void RunGroups(Context* context);
+void RunRunTime(Context* context);
 void RunRecordedChoice(Context* context);
 void RunRecordings(Context* context);
 void RunSensors(Context* context);
@@ -13,6 +18,15 @@ const std::vector<Experiment>& Experiments() {
       {"datasets",
        "the 15 datasets: motion, size, what their segments say",
        RunDatasets},
+      {"gain_threshold",
+       "the baseline of incremental information gain: its threshold",
+       RunGainThreshold},
+      {"batch_match",
+       "informative segments against batch and information gain (Table I)",
+       RunBatchMatch},
+      {"entropy", "does the entropy find informative segments?", RunEntropy},
+      {"groups", "several groups of parameters against one", RunGroups},
+      {"run_time", "run-time of each, side by side (Table II)", RunRunTime},
       {"recordings",
        "real recordings before and after; are sigmas honest there?",
        RunRecordings},
