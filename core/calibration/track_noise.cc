@@ -131,7 +131,8 @@ class TrackSummer {
                    point_G,
                    seen.z_px,
                    &row.r,
-                   &jacobians)) {
+                   &jacobians,
+                   round_.motions.At(seen.keyframe, seen.camera))) {
       return std::nullopt;
     }
     const double scale = 1 / round_.rig.pixel_sigma_px;

@@ -68,8 +68,7 @@ TruncatedQr BySparseQr(const Scene& scene, const MotionSegment& segment) {
                   scene.rig,
                   scene.rig.factory,
                   segment,
-                  SelectInliers(
-                      scene.rig.factory, scene.rig.pixel_sigma_px, segment, {}),
+                  SelectInliers(scene.rig, scene.rig.factory, segment, {}),
                   PriorSigmas(scene.rig),
                   0),
               RankDetection::kNone);

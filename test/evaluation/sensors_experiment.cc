@@ -189,8 +189,8 @@ void AddAccuracy(const Setting& setting,
   for (const Block& block : kBlocks) {
     const Accuracy accuracy =
         AccuracyOf(runs, MatchComponents(components, {block.pattern}));
-    row.push_back(accuracy.error_rms / block.unit);
-    row.push_back(accuracy.sigma_rms / block.unit);
+    row.emplace_back(accuracy.error_rms / block.unit);
+    row.emplace_back(accuracy.sigma_rms / block.unit);
   }
   table->Add(std::move(row));
 }

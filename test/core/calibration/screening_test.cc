@@ -28,8 +28,15 @@ class ScreenedSession {
     const std::vector<const MotionSegment*> sorted =
         SortByKey(session_.segments);
     problem_ = FlattenSegments(rig_, sorted, PartitionSegments(sorted, 15));
-    screening_ = ScreenLandmarks(
-        rig_, rig_.factory, problem_, problem_.keyframes, {}, nullptr);
+    MeasureMotions(
+        rig_, rig_.factory, problem_, problem_.keyframes, &motions_);
+    screening_ = ScreenLandmarks(rig_,
+                                 rig_.factory,
+                                 problem_,
+                                 problem_.keyframes,
+                                 motions_,
+                                 {},
+                                 nullptr);
   }
 
   // Calls visit(distance, inward, weight) for all that is used: how far inside
@@ -38,7 +45,7 @@ class ScreenedSession {
   template <class Visitor>
   void VisitUsed(const Visitor& visit) const {
     const LandmarkScene scene(
-        rig_.factory, problem_.keyframes, rig_.pixel_sigma_px);
+        rig_.factory, problem_.keyframes, motions_, rig_.pixel_sigma_px);
     const CameraCalibration& camera = rig_.factory.cameras[0];
     for (const ScreenedLandmark& landmark : screening_.landmarks) {
       const Track& track = problem_.tracks[landmark.track];
@@ -72,6 +79,7 @@ class ScreenedSession {
   Rig rig_;
   SimulatedSession session_;
   CalibrationProblem problem_;
+  KeyframeMotions motions_;
   Screening screening_;
 };
 
