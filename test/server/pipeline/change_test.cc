@@ -93,7 +93,7 @@ TEST_F(ChangePipelineTest, AKnockedDeviceIsCalibratedOnWhatCameAfterIt) {
     EXPECT_LT(std::abs(error(i)), 3 * sigmas(i)) << components[i].name;
   }
   // What the knock does not concern stays as well known as it was.
-  for (const std::string& group : {"imu", "camera"}) {
+  for (const char* group : {"imu", "camera"}) {
     for (const ParameterGroup& settings : rig.groups) {
       if (settings.name != group) continue;
       for (const int i : GroupComponents(rig, settings)) {
