@@ -35,8 +35,10 @@ Outcome CalibrateDevice(std::uint64_t seed,
       rig, truth, rig.factory, *MakeMixed(17, seed), "session", simulation);
   rig.pixel_sigma_px *= believed;
   Outcome outcome{Calibrate(rig, rig.factory, session.segments, options), 0};
-  const Eigen::VectorXd error = BoxMinus(outcome.result.theta, truth);
-  outcome.nees = error.dot(outcome.result.covariance.ldlt().solve(error));
+  const std::vector<int> free = FreeComponents(rig);
+  const Eigen::VectorXd error = BoxMinus(outcome.result.theta, truth)(free);
+  const Eigen::MatrixXd covariance = outcome.result.covariance(free, free);
+  outcome.nees = error.dot(covariance.ldlt().solve(error));
   return outcome;
 }
 
@@ -50,8 +52,9 @@ TEST(TrackNoise, IndependentErrorsAreLeftAlone) {
 
 // Of the sigmas of one result against those of another, geometric mean.
 double SigmaRatio(const CalibrationResult& a, const CalibrationResult& b) {
-  const Eigen::ArrayXd ratios =
-      a.covariance.diagonal().array() / b.covariance.diagonal().array();
+  const std::vector<int> free = FreeComponents(HandheldRig("simulated"));
+  const Eigen::ArrayXd ratios = a.covariance.diagonal()(free).array() /
+                                b.covariance.diagonal()(free).array();
   return std::exp(0.5 * ratios.log().mean());
 }
 
