@@ -103,7 +103,7 @@ TEST(InertialCost, JacobiansMatchDifferencesThroughBothManifolds) {
         *cost,
         BlocksOf(factor),
         {nullptr, manifold, nullptr, nullptr, full.get(), nullptr, nullptr},
-        2e-4,
+        4e-4,
         1e-8);
     ExpectBlocksCanBeLeftOut(*cost, BlocksOf(factor));
     if (HasFailure()) FAIL() << "trial " << trial;

@@ -82,10 +82,11 @@ TEST(SegmentScorer, AllocatesNothingInSteadyState) {
       SCOPED_TRACE(VectorWidthName(width));
       SegmentScorer scorer(width);
       SegmentInformation result;
+      const std::size_t free = FreeComponents(scene.rig).size();
       const auto score_all = [&] {
         for (const MotionSegment& segment : scene.segments) {
           scorer.Score(scene.rig, scene.rig.factory, segment, {}, &result);
-          ASSERT_EQ(result.rank, FreeComponents(scene.rig).size());
+          ASSERT_EQ(result.rank, free);
         }
       };
       const int before = allocations;

@@ -113,7 +113,7 @@ class ServiceTest : public ::testing::Test {
     information.theta0 = rig.factory;
     information.Lambda = Eigen::MatrixXd::Identity(size, size);
     information.eta = Eigen::VectorXd::Zero(size);
-    information.rank = size;
+    information.rank = static_cast<int>(FreeComponents(rig).size());
     for (const ParameterGroup& group : rig.groups) {
       const int k = static_cast<int>(GroupComponents(rig, group).size());
       information.groups.push_back({group.name, k, -gain, gain, k, {}});

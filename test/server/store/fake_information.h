@@ -24,7 +24,7 @@ inline SegmentInformation FakeInformation(const Rig& rig,
   // not pass for a change of it.
   information.Lambda = 1e-6 * Eigen::MatrixXd::Zero(size, size).unaryExpr(draw);
   information.eta = Eigen::VectorXd::Zero(size).unaryExpr(draw);
-  information.rank = size - 1;
+  information.rank = static_cast<int>(FreeComponents(rig).size()) - 1;
   information.unobserved = {{{{"imu.gyro.scale.x", 0.9}}, 0.1}};
   for (const ParameterGroup& group : rig.groups) {
     GroupScore score;
