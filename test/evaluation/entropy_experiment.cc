@@ -55,7 +55,7 @@ SegmentSet Choose(Choice choice,
     case kLeast:
       return LeastOfSingleGroup(rig, kKept, scores);
     default:
-      return RandomSegments(static_cast<int>(scores.size()), kKept, seed);
+      return RandomSegments(rig, kKept, seed, scores);
   }
 }
 

@@ -1,17 +1,25 @@
 #include "test/evaluation/estimators.h"
 
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 
 #include "core/information/segment_scorer.h"
+#include "core/selection/baselines.h"
 #include "core/selection/tables.h"
-#include "core/simulation/random.h"
 
 namespace selfcal {
 namespace {
 
-constexpr std::uint64_t kRandomSegmentsStream = 501;
+// With their indices as keys.
+std::vector<ScoredSegment> Scored(
+    const std::vector<SegmentInformation>& scores) {
+  std::vector<ScoredSegment> scored;
+  for (const SegmentInformation& score : scores) {
+    const auto index = static_cast<std::int64_t>(scored.size());
+    scored.push_back({{"", index}, index, &score});
+  }
+  return scored;
+}
 
 SegmentSet Indices(const std::vector<Table>& tables) {
   SegmentSet set;
@@ -21,43 +29,11 @@ SegmentSet Indices(const std::vector<Table>& tables) {
   return set;
 }
 
-enum class Order { kMost, kLeast };
-
-SegmentSet FillTables(const Rig& rig,
-                      Order order,
-                      const std::vector<SegmentInformation>& scores) {
-  std::vector<Table> tables = MakeTables(rig);
-  for (std::size_t i = 0; i < scores.size(); ++i) {
-    for (std::size_t q = 0; q < tables.size(); ++q) {
-      const GroupScore& score = scores[i].groups[q];
-      const auto sequence = static_cast<std::int64_t>(i);
-      if (order == Order::kMost) {
-        Offer({{"", sequence}, sequence, score.entropy, score.gain},
-              rig.min_gain_nats,
-              &tables[q]);
-      } else {
-        Offer({{"", sequence}, sequence, -score.entropy, score.gain},
-              -std::numeric_limits<double>::infinity(),
-              &tables[q]);
-      }
-    }
-  }
-  return Indices(tables);
-}
-
-// One table over all of theta.
-SegmentSet FillTable(const Rig& rig,
-                     int capacity,
-                     Order order,
-                     const std::vector<SegmentInformation>& scores) {
+Rig WithOneGroup(const Rig& rig, int capacity) {
   Rig single = rig;
   single.groups = {{"theta", {"*"}}};
   single.table_size = capacity;
-  std::vector<SegmentInformation> of_all(scores.size());
-  for (std::size_t i = 0; i < scores.size(); ++i) {
-    of_all[i].groups = ScoreGroups(single, scores[i].Lambda);
-  }
-  return FillTables(single, order, of_all);
+  return single;
 }
 
 }  // namespace
@@ -74,34 +50,31 @@ std::vector<SegmentInformation> ScoreAll(
 
 SegmentSet MostInformative(const Rig& rig,
                            const std::vector<SegmentInformation>& scores) {
-  return FillTables(rig, Order::kMost, scores);
+  return Indices(MostInformativeTables(rig, Scored(scores)));
 }
 
 SegmentSet LeastInformative(const Rig& rig,
                             const std::vector<SegmentInformation>& scores) {
-  return FillTables(rig, Order::kLeast, scores);
+  return Indices(LeastInformativeTables(rig, Scored(scores)));
 }
 
 SegmentSet SingleGroup(const Rig& rig,
                        int capacity,
                        const std::vector<SegmentInformation>& scores) {
-  return FillTable(rig, capacity, Order::kMost, scores);
+  return MostInformative(WithOneGroup(rig, capacity), scores);
 }
 
 SegmentSet LeastOfSingleGroup(const Rig& rig,
                               int capacity,
                               const std::vector<SegmentInformation>& scores) {
-  return FillTable(rig, capacity, Order::kLeast, scores);
+  return LeastInformative(WithOneGroup(rig, capacity), scores);
 }
 
-// The segments with the lowest of numbers that each draws once.
-SegmentSet RandomSegments(int count, int size, std::uint64_t seed) {
-  Random random(seed, kRandomSegmentsStream);
-  Table table{.group = "random", .capacity = size, .entries = {}};
-  for (int i = 0; i < count; ++i) {
-    Offer({{"", i}, i, random.Uniform(), 0}, 0, &table);
-  }
-  return Indices({table});
+SegmentSet RandomSegments(const Rig& rig,
+                          int size,
+                          std::uint64_t seed,
+                          const std::vector<SegmentInformation>& scores) {
+  return Indices({RandomTable(rig, size, seed, Scored(scores))});
 }
 
 SegmentSet AllSegments(int count) {

@@ -19,23 +19,23 @@ std::vector<SegmentInformation> ScoreAll(
 // Segments of a dataset by their indices, ascending.
 using SegmentSet = std::vector<int>;
 
-// The segments that the tables of the rig hold in the end: for each group those
-// of lowest entropy.
+// Those of core/selection/baselines.h, of segments offered in their order: what
+// the tables of the rig hold in the end; the same with the highest entropies;
+// one table over all of theta; and at random.
 SegmentSet MostInformative(const Rig& rig,
                            const std::vector<SegmentInformation>& scores);
-// The same tables with the segments of highest entropy, whatever they gain.
 SegmentSet LeastInformative(const Rig& rig,
                             const std::vector<SegmentInformation>& scores);
-// One table of so many segments over all of theta.
 SegmentSet SingleGroup(const Rig& rig,
                        int capacity,
                        const std::vector<SegmentInformation>& scores);
 SegmentSet LeastOfSingleGroup(const Rig& rig,
                               int capacity,
                               const std::vector<SegmentInformation>& scores);
-// Of `count` segments, `size` at random. For one seed the sets of growing
-// counts differ by one replacement at most, as a table's do.
-SegmentSet RandomSegments(int count, int size, std::uint64_t seed);
+SegmentSet RandomSegments(const Rig& rig,
+                          int size,
+                          std::uint64_t seed,
+                          const std::vector<SegmentInformation>& scores);
 // All of them: batch.
 SegmentSet AllSegments(int count);
 

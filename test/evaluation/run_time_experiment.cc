@@ -4,12 +4,12 @@
 // several times; what takes minutes runs once, between them.
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <ctime>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "core/information/fusion.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/datasets.h"
 #include "test/evaluation/estimators.h"
@@ -23,21 +23,6 @@ double CpuSeconds(const std::function<void()>& work) {
   const std::clock_t begin = std::clock();
   work();
   return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-}
-
-// The optimum of the prior and of what the segments said: costs nothing, and is
-// where the calibration on the kept ones begins.
-Calibration Fuse(const Rig& rig,
-                 const std::vector<SegmentInformation>& scores,
-                 const SegmentSet& set) {
-  Eigen::MatrixXd Lambda =
-      PriorSigmas(rig).array().square().inverse().matrix().asDiagonal();
-  Eigen::VectorXd eta = Eigen::VectorXd::Zero(Lambda.rows());
-  for (const int i : set) {
-    Lambda += scores[i].Lambda;
-    eta += scores[i].eta;
-  }
-  return BoxPlus(rig.factory, Lambda.llt().solve(eta));
 }
 
 struct Timed {

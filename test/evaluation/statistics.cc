@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/change/chi_square.h"
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -28,36 +29,6 @@ std::vector<double> Ranks(const std::vector<double>& values) {
     begin = end;
   }
   return ranks;
-}
-
-// Regularised lower incomplete gamma function P(a, x): its series below a + 1,
-// beyond it one minus the continued fraction of Q by the method of Lentz
-// (Abramowitz and Stegun 6.5.29, 6.5.31).
-double IncompleteGamma(double a, double x) {
-  if (x <= 0) return 0;
-  constexpr double kEpsilon = 1e-15;
-  const double scale = std::exp(-x + a * std::log(x) - std::lgamma(a));
-  if (x < a + 1) {
-    double term = 1 / a;
-    double sum = term;
-    for (double n = a + 1; term > kEpsilon * sum; ++n) {
-      term *= x / n;
-      sum += term;
-    }
-    return scale * sum;
-  }
-  double b = x + 1 - a;
-  double c = 1e300;
-  double d = 1 / b;
-  double fraction = d;
-  for (double i = 1;; ++i) {
-    const double numerator = -i * (i - a);
-    b += 2;
-    d = 1 / (numerator * d + b);
-    c = b + numerator / c;
-    fraction *= c * d;
-    if (std::abs(c * d - 1) < kEpsilon) return 1 - scale * fraction;
-  }
 }
 
 }  // namespace
@@ -111,23 +82,19 @@ double RankCorrelation(const std::vector<double>& a,
   return ab / std::sqrt(aa * bb);
 }
 
-double ChiSquareCdf(double x, double dof) {
-  return IncompleteGamma(dof / 2, x / 2);
-}
-
-double ChiSquareQuantile(double p, double dof) {
+double ChiSquareQuantile(double p, int dof) {
   double low = 0;
   double high = dof + 1;
-  while (ChiSquareCdf(high, dof) < p) high *= 2;
+  while (ChiSquareTail(high, dof) > 1 - p) high *= 2;
   while (high - low > 1e-12 * high) {
     const double middle = 0.5 * (low + high);
     if (middle <= low || middle >= high) break;
-    (ChiSquareCdf(middle, dof) < p ? low : high) = middle;
+    (ChiSquareTail(middle, dof) > 1 - p ? low : high) = middle;
   }
   return 0.5 * (low + high);
 }
 
-std::pair<double, double> NeesBounds(double dof, int runs, double probability) {
+std::pair<double, double> NeesBounds(int dof, int runs, double probability) {
   const double tail = 0.5 * (1 - probability);
   return {ChiSquareQuantile(tail, dof * runs) / runs,
           ChiSquareQuantile(1 - tail, dof * runs) / runs};

@@ -23,15 +23,14 @@ double StandardDeviation(const std::vector<double>& values);
 double RankCorrelation(const std::vector<double>& a,
                        const std::vector<double>& b);
 
-// Of the chi-square distribution with dof > 0 degrees of freedom, to 1e-10:
-// its distribution function, and where that is p, 0 < p < 1.
-double ChiSquareCdf(double x, double dof);
-double ChiSquareQuantile(double p, double dof);
+// Where the distribution function of chi-square with dof > 0 degrees of freedom
+// is p, 0 < p < 1.
+double ChiSquareQuantile(double p, int dof);
 
 // Bounds within which the mean of `runs` normalised squared errors of dof
 // dimensions lies with the given probability, half of the rest on each side,
 // if errors are as the covariance says (Bar-Shalom).
-std::pair<double, double> NeesBounds(double dof, int runs, double probability);
+std::pair<double, double> NeesBounds(int dof, int runs, double probability);
 
 // The rotation that minimises the sum of squared chordal distances (Markley,
 // Cheng, Crassidis, Oshman 2007): of the sum of q q^T, the eigenvector with the
