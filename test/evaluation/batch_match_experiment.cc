@@ -135,9 +135,10 @@ void PlotSpreads(const ParameterStatistics& batch,
   Plot plot{.title = "Spread over the datasets, against that of batch",
             .y_label = "sd / sd of batch",
             .horizontal = {1, 1.5}};
-  for (const TangentComponent& component :
-       TangentComponents(MakeDevice().truth)) {
-    plot.categories.push_back(component.name);
+  const Rig rig = MakeDevice().rig;
+  const auto components = TangentComponents(rig.factory);
+  for (const int i : FreeComponents(rig)) {
+    plot.categories.push_back(components[i].name);
   }
   plot.series = {{.label = "informative",
                   .style = SeriesStyle::kBars,

@@ -17,8 +17,6 @@
 namespace selfcal {
 namespace {
 
-constexpr int kKept = 8;
-
 enum Choice { kMost, kLeast, kRandom, kChoices };
 constexpr const char* kNames[] = {
     "most informative", "least informative", "random"};
@@ -27,6 +25,7 @@ struct Sizes {
   int datasets = kDatasets;
   int converging = 4;    // of them, for the convergence
   int random_draws = 4;  // of each dataset
+  int kept = 8;          // segments
   double duration_s = kDatasetDuration_s;
 };
 
@@ -48,14 +47,15 @@ struct DatasetRun {
 SegmentSet Choose(Choice choice,
                   const Rig& rig,
                   const std::vector<SegmentInformation>& scores,
+                  int kept,
                   std::uint64_t seed) {
   switch (choice) {
     case kMost:
-      return SingleGroup(rig, kKept, scores);
+      return SingleGroup(rig, kept, scores);
     case kLeast:
-      return LeastOfSingleGroup(rig, kKept, scores);
+      return LeastOfSingleGroup(rig, kept, scores);
     default:
-      return RandomSegments(rig, kKept, seed, scores);
+      return RandomSegments(rig, kept, seed, scores);
   }
 }
 
@@ -66,8 +66,11 @@ void EstimateAll(const Dataset& dataset,
   for (const Choice choice : {kMost, kLeast, kRandom}) {
     const int draws = choice == kRandom ? sizes.random_draws : 1;
     for (int draw = 0; draw < draws; ++draw) {
-      const SegmentSet set =
-          Choose(choice, dataset.rig, scores, static_cast<std::uint64_t>(draw));
+      const SegmentSet set = Choose(choice,
+                                    dataset.rig,
+                                    scores,
+                                    sizes.kept,
+                                    static_cast<std::uint64_t>(draw));
       const CalibrationResult result = Calibrate(
           dataset.rig, dataset.rig.factory, Pick(dataset.segments(), set));
       run->not_converged[choice] +=
@@ -81,12 +84,13 @@ void EstimateAll(const Dataset& dataset,
 // The database as it was after each segment, where it changed.
 std::vector<SegmentSet> Updates(Choice choice,
                                 const Rig& rig,
-                                const std::vector<SegmentInformation>& scores) {
+                                const std::vector<SegmentInformation>& scores,
+                                int kept) {
   std::vector<SegmentSet> updates;
   for (std::size_t n = 1; n <= scores.size(); ++n) {
     const std::vector<SegmentInformation> first(
         scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(n));
-    SegmentSet set = Choose(choice, rig, first, 0);
+    SegmentSet set = Choose(choice, rig, first, kept, 0);
     if (!set.empty() && (updates.empty() || set != updates.back())) {
       updates.push_back(std::move(set));
     }
@@ -96,6 +100,7 @@ std::vector<SegmentSet> Updates(Choice choice,
 
 void Converge(const Dataset& dataset,
               const std::vector<SegmentInformation>& scores,
+              int kept,
               DatasetRun* run) {
   const auto count = static_cast<int>(scores.size());
   const CalibrationResult batch =
@@ -103,7 +108,7 @@ void Converge(const Dataset& dataset,
   const Eigen::VectorXd sigma = batch.covariance.diagonal().cwiseSqrt();
   for (const Choice choice : {kMost, kLeast, kRandom}) {
     Calibration theta = dataset.rig.factory;
-    for (const SegmentSet& set : Updates(choice, dataset.rig, scores)) {
+    for (const SegmentSet& set : Updates(choice, dataset.rig, scores, kept)) {
       const CalibrationResult result =
           Calibrate(dataset.rig, theta, Pick(dataset.segments(), set));
       if (result.status == CalibrateStatus::kConverged) theta = result.theta;
@@ -247,8 +252,11 @@ void WriteAlone(const std::vector<DatasetRun>& runs, Context* context) {
 void RunEntropy(Context* context) {
   Sizes sizes;
   if (context->quick()) {
-    sizes = {
-        .datasets = 2, .converging = 1, .random_draws = 2, .duration_s = 45};
+    sizes = {.datasets = 2,
+             .converging = 1,
+             .random_draws = 2,
+             .kept = 2,
+             .duration_s = 21};
   }
   std::vector<DatasetRun> runs(static_cast<std::size_t>(sizes.datasets));
   context->ForEach(sizes.datasets, [&](int i) {
@@ -257,7 +265,7 @@ void RunEntropy(Context* context) {
         ScoreAll(dataset.rig, dataset.segments());
     EstimateAll(dataset, scores, sizes, &runs[i]);
     CalibrateAlone(dataset, scores, &runs[i]);
-    if (i < sizes.converging) Converge(dataset, scores, &runs[i]);
+    if (i < sizes.converging) Converge(dataset, scores, sizes.kept, &runs[i]);
     context->Progress(dataset.name);
   });
   WriteChoices(runs, context);

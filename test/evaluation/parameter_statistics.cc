@@ -1,5 +1,6 @@
 #include "test/evaluation/parameter_statistics.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "test/evaluation/statistics.h"
@@ -62,6 +63,11 @@ ResultTable CompareParameters(
   const std::vector<TangentComponent> components = TangentComponents(truth);
   const Eigen::VectorXd true_values = ReadableValues(truth);
   for (int i = 0; i < true_values.size(); ++i) {
+    const bool estimated =
+        std::any_of(estimators.begin(), estimators.end(), [i](const auto& one) {
+          return one.second.rms_sigma(i) > 0;
+        });
+    if (!estimated) continue;
     std::vector<Cell> row = {
         components[i].name, components[i].unit, true_values(i)};
     for (const auto& [name, statistics] : estimators) {
@@ -76,8 +82,11 @@ ResultTable CompareParameters(
 }
 
 std::vector<double> Ratios(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-  const Eigen::VectorXd ratios = a.cwiseQuotient(b);
-  return {ratios.begin(), ratios.end()};
+  std::vector<double> ratios;
+  for (int i = 0; i < b.size(); ++i) {
+    if (b(i) != 0) ratios.push_back(a(i) / b(i));
+  }
+  return ratios;
 }
 
 }  // namespace selfcal

@@ -33,13 +33,14 @@ struct ParameterStatistics {
 ParameterStatistics Summarise(const Calibration& truth,
                               const std::vector<Estimate>& estimates);
 
-// One row for each component: truth, and for each named estimator average,
+// One row for each component that is estimated: truth, and for each named estimator average,
 // spread, error and claimed sigma.
 ResultTable CompareParameters(
     const Calibration& truth,
     const std::vector<std::pair<std::string, ParameterStatistics>>& estimators);
 
-// The elements of a / b, and of a vector, as values.
+// The elements of a / b, without those of components that are not estimated:
+// their spread and their sigma is exactly zero, and b with them.
 std::vector<double> Ratios(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
 
 }  // namespace selfcal
