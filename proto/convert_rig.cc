@@ -33,6 +33,42 @@ std::vector<ComponentSetting> ReadPriorSigmas(const v1::Rig& message) {
   return settings;
 }
 
+v1::Rig::Selection ToProto(Selection selection) {
+  switch (selection) {
+    case Selection::kTables:
+      return v1::Rig::TABLES;
+    case Selection::kJointD:
+      return v1::Rig::JOINT_D;
+    case Selection::kJointA:
+      return v1::Rig::JOINT_A;
+    case Selection::kJointE:
+      return v1::Rig::JOINT_E;
+  }
+  return v1::Rig::SELECTION_UNSPECIFIED;
+}
+
+// Leaves it as it is where the message says nothing; false if it is unknown.
+bool ReadSelection(const v1::Rig& message, Selection* selection) {
+  switch (message.selection()) {
+    case v1::Rig::SELECTION_UNSPECIFIED:
+      return true;
+    case v1::Rig::TABLES:
+      *selection = Selection::kTables;
+      return true;
+    case v1::Rig::JOINT_D:
+      *selection = Selection::kJointD;
+      return true;
+    case v1::Rig::JOINT_A:
+      *selection = Selection::kJointA;
+      return true;
+    case v1::Rig::JOINT_E:
+      *selection = Selection::kJointE;
+      return true;
+    default:
+      return false;
+  }
+}
+
 // Zero, or absence where zero has a meaning, stands for the default.
 void ReadSettings(const v1::Rig& message, Rig* rig) {
   rig->pixel_sigma_px = message.pixel_sigma_px();
@@ -70,6 +106,7 @@ v1::Rig ToProto(const Rig& rig) {
     added->set_value(setting.value);
   }
   message.mutable_fixed()->Add(rig.fixed.begin(), rig.fixed.end());
+  message.set_selection(ToProto(rig.selection));
   message.set_table_size(rig.table_size);
   message.set_min_gain_nats(rig.min_gain_nats);
   message.set_retrigger_fraction(rig.retrigger_fraction);
@@ -100,6 +137,12 @@ std::vector<Violation> FromProto(const v1::Rig& message,
     read.imu_noise = Value(message.imu_noise());
   } else {
     violations.push_back({prefix + "imu_noise", "is missing"});
+  }
+  if (!ReadSelection(message, &read.selection)) {
+    violations.push_back(
+        {prefix + "selection",
+         std::to_string(static_cast<int>(message.selection())) +
+             " is unknown; send TABLES, JOINT_D, JOINT_A or JOINT_E"});
   }
   ReadSettings(message, &read);
   read.groups = ReadGroups(message);

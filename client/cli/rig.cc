@@ -60,6 +60,7 @@ Facts Describe(const v1::Rig& rig) {
   }
   for (const auto& pattern : rig.fixed()) facts.Add("fixed", pattern);
   facts.Add("time offset", rig.estimate_time_offset() ? "estimated" : "known");
+  facts.Add("selection", SelectionText(rig.selection()));
   facts.Add("table size", fmt::format("{}", rig.table_size()));
   facts.Add("minimum gain", fmt::format("{:g} nat", rig.min_gain_nats()));
   facts.Add("retrigger fraction",
@@ -146,6 +147,10 @@ void AddOverrides(CLI::App* create, RigInput* input) {
   create->add_option(
       "--accel-bias-walk", input->accel_bias_walk, "[m/s^3/sqrt(Hz)]");
   create->add_option("--gravity", input->gravity_mps2, "[m/s^2]");
+  create->add_option("--selection",
+                     input->selection,
+                     "Which segments are kept: tables, joint-d, joint-a or "
+                     "joint-e");
   create->add_option(
       "--table-size", input->table_size, "Segments that a table keeps");
   create->add_option("--min-gain",

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <google/protobuf/util/json_util.h>
 
+#include <cctype>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -47,7 +48,31 @@ absl::StatusOr<v1::Rig> ReadBase(const RigInput& input) {
   return rig;
 }
 
+absl::Status SetSelection(const std::string& text, v1::Rig* rig) {
+  std::vector<std::string> known;
+  for (const v1::Rig::Selection selection : {v1::Rig::TABLES,
+                                             v1::Rig::JOINT_D,
+                                             v1::Rig::JOINT_A,
+                                             v1::Rig::JOINT_E}) {
+    if (SelectionText(selection) == text) {
+      rig->set_selection(selection);
+      return absl::OkStatus();
+    }
+    known.push_back(SelectionText(selection));
+  }
+  return absl::InvalidArgumentError(fmt::format(
+      "--selection {} is none of {}", text, fmt::join(known, ", ")));
+}
+
 }  // namespace
+
+std::string SelectionText(v1::Rig::Selection selection) {
+  std::string text = v1::Rig::Selection_Name(selection);
+  for (char& c : text) {
+    c = c == '_' ? '-' : static_cast<char>(std::tolower(c));
+  }
+  return text;
+}
 
 absl::StatusOr<v1::Rig> ParseRig(const std::string& json) {
   v1::Rig rig;
@@ -63,6 +88,10 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input) {
   if (input.id) rig->set_name(RigName(*input.id));
   if (input.pixel_sigma_px) rig->set_pixel_sigma_px(*input.pixel_sigma_px);
   if (input.gravity_mps2) rig->set_gravity_mps2(*input.gravity_mps2);
+  if (input.selection) {
+    const absl::Status status = SetSelection(*input.selection, &*rig);
+    if (!status.ok()) return status;
+  }
   if (input.table_size) rig->set_table_size(*input.table_size);
   if (input.min_gain_nats) rig->set_min_gain_nats(*input.min_gain_nats);
   if (input.retrigger_fraction) {

@@ -22,6 +22,7 @@ struct RigInput {
   std::optional<double> gyro_bias_walk;
   std::optional<double> accel_bias_walk;
   std::optional<double> gravity_mps2;
+  std::optional<std::string> selection;  // as SelectionText()
   std::optional<int> table_size;
   std::optional<double> min_gain_nats;
   std::optional<double> retrigger_fraction;
@@ -32,6 +33,9 @@ struct RigInput {
 // INVALID_ARGUMENT and NOT_FOUND for what cannot be read, with the file's name.
 // The values are judged by the daemon.
 absl::StatusOr<v1::Rig> ReadRig(const RigInput& input);
+
+// "tables", "joint-d", "joint-a", "joint-e".
+std::string SelectionText(v1::Rig::Selection selection);
 
 // proto3 JSON of a rig; unknown fields are errors.
 absl::StatusOr<v1::Rig> ParseRig(const std::string& json);

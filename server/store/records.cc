@@ -68,6 +68,23 @@ GroupScore GetGroup(const v1::GroupScore& message) {
   return score;
 }
 
+void PutLandmarks(const LandmarkSketch& landmarks,
+                  store::LandmarkSketchRecord* record) {
+  for (const LandmarkSketch::Entry& entry : landmarks.entries) {
+    record->add_ids(entry.id);
+    record->add_observations(entry.observations);
+  }
+}
+
+bool GetLandmarks(const store::LandmarkSketchRecord& record,
+                  LandmarkSketch* landmarks) {
+  if (record.ids_size() != record.observations_size()) return false;
+  for (int k = 0; k < record.ids_size(); ++k) {
+    landmarks->entries.push_back({record.ids(k), record.observations(k)});
+  }
+  return true;
+}
+
 }  // namespace
 
 std::string SerializeRig(const Rig& rig) {
@@ -80,6 +97,10 @@ absl::StatusOr<Rig> ParseRig(std::string_view bytes, const std::string& what) {
   store::RigRecord record;
   SELFCAL_RETURN_IF_ERROR(ParseMessage(bytes, what, &record));
   Rig rig;
+  // What was stored before there was a choice.
+  if (record.rig().selection() == v1::Rig::SELECTION_UNSPECIFIED) {
+    record.mutable_rig()->set_selection(v1::Rig::TABLES);
+  }
   if (!FromProto(record.rig(), "", &rig).empty()) {
     return DamagedRecord(what);
   }
@@ -97,6 +118,7 @@ std::string SerializeInformation(const SegmentInformation& information) {
     PutGroup(score, record.add_groups());
   }
   PutResiduals(information.residuals, record.mutable_residuals());
+  PutLandmarks(information.landmarks, record.mutable_landmarks());
   return record.SerializeAsString();
 }
 
@@ -106,7 +128,8 @@ absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
   SELFCAL_RETURN_IF_ERROR(ParseMessage(bytes, what, &record));
   SegmentInformation information;
   if (!FromProto(record.theta0(), "", &information.theta0).empty() ||
-      !GetMatrix(record.lambda(), &information.Lambda)) {
+      !GetMatrix(record.lambda(), &information.Lambda) ||
+      !GetLandmarks(record.landmarks(), &information.landmarks)) {
     return DamagedRecord(what);
   }
   information.eta = GetVector(record.eta());

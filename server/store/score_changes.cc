@@ -1,6 +1,12 @@
 // What happens to a stored segment: it gets its score, or turns out unusable.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/selection/joint_selection.h"
 #include "server/store/change_rows.h"
 #include "server/store/changes.h"
 #include "server/store/events.h"
@@ -23,7 +29,83 @@ const GroupScore* FindGroup(const SegmentInformation& information,
   return nullptr;
 }
 
-// Writes the score, and offers the segment to the table of each group.
+// Offers the segment to the table of its group.
+std::optional<TableChange> OfferToGroup(const Rig& rig,
+                                        const SegmentRow& segment,
+                                        const SegmentKey& key,
+                                        const SegmentInformation& information,
+                                        Table* table) {
+  const GroupScore* score = FindGroup(information, table->group);
+  if (score == nullptr) return std::nullopt;
+  return Offer({key, segment.sequence, score->entropy, score->gain},
+               rig.min_gain_nats,
+               table);
+}
+
+// Takes a segment that cannot be used out of everything.
+absl::Status SetAside(Connection* db,
+                      const std::string& rig,
+                      const SegmentKey& key,
+                      std::int64_t segment,
+                      const std::string& problem) {
+  SELFCAL_RETURN_IF_ERROR(WriteProblem(db, segment, problem));
+  SELFCAL_RETURN_IF_ERROR(RemoveFromTables(db, segment));
+  return AppendEvent(db,
+                     rig,
+                     EventKind::kSegmentUnusable,
+                     fmt::format("{}: {}", SegmentText(rig, key), problem));
+}
+
+// The kept segments of a joint selection, in order of arrival. One whose
+// information is damaged is set aside: it can be compared with nothing.
+absl::StatusOr<std::vector<Candidate>> ReadKept(Connection* db,
+                                                const RigRow& rig,
+                                                Table* table) {
+  std::vector<Candidate> kept;
+  std::vector<TableEntry> readable;
+  for (const TableEntry& entry : table->entries) {
+    const auto segment = ReadSegment(db, rig.stored.rig.id, entry.key);
+    if (absl::IsDataLoss(segment.status())) {
+      SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row,
+                               FindSegment(db, rig.rowid, entry.key));
+      SELFCAL_RETURN_IF_ERROR(
+          SetAside(db,
+                   rig.stored.rig.id,
+                   entry.key,
+                   row.rowid,
+                   std::string(segment.status().message())));
+      continue;
+    }
+    SELFCAL_RETURN_IF_ERROR(segment.status());
+    kept.push_back(MakeCandidate(rig.stored.rig,
+                                 entry.key,
+                                 entry.sequence,
+                                 segment->information.value()));
+    readable.push_back(entry);
+  }
+  table->entries = std::move(readable);
+  std::sort(kept.begin(), kept.end(), [](const auto& a, const auto& b) {
+    return a.sequence < b.sequence;
+  });
+  return kept;
+}
+
+absl::StatusOr<TableChange> OfferJointly(Connection* db,
+                                         const RigRow& rig,
+                                         const SegmentRow& segment,
+                                         const SegmentKey& key,
+                                         const SegmentInformation& information,
+                                         Table* table) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Candidate> kept,
+                           ReadKept(db, rig, table));
+  return Offer(
+      rig.stored.rig,
+      MakeCandidate(rig.stored.rig, key, segment.sequence, information),
+      kept,
+      table);
+}
+
+// Writes the score, and offers the segment to every table.
 absl::StatusOr<std::vector<std::string>> ScoreAndOffer(
     Connection* db,
     const RigRow& rig,
@@ -34,19 +116,16 @@ absl::StatusOr<std::vector<std::string>> ScoreAndOffer(
   SELFCAL_RETURN_IF_ERROR(WriteScore(db, segment.rowid, information));
   std::vector<std::string> entered;
   for (Table& table : *tables) {
-    const GroupScore* score = FindGroup(information, table.group);
-    if (score == nullptr) {
-      continue;
+    std::optional<TableChange> change;
+    if (rig.stored.rig.selection == Selection::kTables) {
+      change = OfferToGroup(rig.stored.rig, segment, key, information, &table);
+    } else {
+      SELFCAL_ASSIGN_OR_RETURN(
+          change, OfferJointly(db, rig, segment, key, information, &table));
     }
-    SELFCAL_ASSIGN_OR_RETURN(
-        const bool inserted,
-        OfferToTable(db,
-                     rig.rowid,
-                     segment.rowid,
-                     {key, segment.sequence, score->entropy, score->gain},
-                     rig.stored.rig.min_gain_nats,
-                     &table));
-    if (inserted) {
+    if (!change) continue;
+    SELFCAL_RETURN_IF_ERROR(WriteOffer(db, rig.rowid, key, *change, table));
+    if (change->inserted) {
       entered.push_back(table.group);
     }
   }
@@ -105,14 +184,8 @@ absl::Status MarkUnusableRow(Connection* db,
   if (segment.state == SegmentState::kUnusable) {
     return absl::OkStatus();
   }
-  SELFCAL_RETURN_IF_ERROR(WriteProblem(db, segment.rowid, problem));
-  SELFCAL_RETURN_IF_ERROR(RemoveFromTables(db, segment.rowid));
+  SELFCAL_RETURN_IF_ERROR(SetAside(db, rig, key, segment.rowid, problem));
   SELFCAL_RETURN_IF_ERROR(DropUnreferencedPayloads(db, rig_id));
-  SELFCAL_RETURN_IF_ERROR(
-      AppendEvent(db,
-                  rig,
-                  EventKind::kSegmentUnusable,
-                  fmt::format("{}: {}", SegmentText(rig, key), problem)));
   return transaction.Commit();
 }
 

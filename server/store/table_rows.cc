@@ -1,5 +1,7 @@
 #include "server/store/table_rows.h"
 
+#include <algorithm>
+
 #include "server/store/segment_rows.h"
 #include "server/store/status_macros.h"
 
@@ -63,45 +65,51 @@ absl::StatusOr<std::vector<Table>> ReadTables(Connection* db,
   return tables;
 }
 
-absl::StatusOr<bool> OfferToTable(Connection* db,
-                                  std::int64_t rig,
-                                  std::int64_t segment,
-                                  const TableEntry& candidate,
-                                  double min_gain_nats,
-                                  Table* table) {
-  const TableChange change = Offer(candidate, min_gain_nats, table);
+absl::Status WriteOffer(Connection* db,
+                        std::int64_t rig,
+                        const SegmentKey& key,
+                        const TableChange& change,
+                        const Table& table) {
   SELFCAL_RETURN_IF_ERROR(Statement(db,
                                     "UPDATE tables SET scored = ?3 "
                                     "WHERE rig = ?1 AND group_name = ?2",
                                     rig,
-                                    table->group,
-                                    table->scored)
+                                    table.group,
+                                    table.scored)
                               .Run());
   if (change.evicted) {
-    SELFCAL_ASSIGN_OR_RETURN(const SegmentRow evicted,
-                             FindSegment(db, rig, change.evicted->key));
     SELFCAL_RETURN_IF_ERROR(
         Statement(db,
                   "DELETE FROM table_entries "
-                  "WHERE rig = ?1 AND group_name = ?2 AND segment = ?3",
+                  "WHERE rig = ?1 AND group_name = ?2 AND segment = "
+                  "  (SELECT segment FROM segments WHERE rig = ?1 "
+                  "   AND session = ?3 AND session_index = ?4)",
                   rig,
-                  table->group,
-                  evicted.rowid)
+                  table.group,
+                  change.evicted->key.session,
+                  change.evicted->key.index)
             .Run());
   }
   if (change.inserted) {
+    const auto entry = std::find_if(
+        table.entries.begin(), table.entries.end(), [&](const TableEntry& e) {
+          return e.key == key;
+        });
     SELFCAL_RETURN_IF_ERROR(
         Statement(db,
                   "INSERT INTO table_entries (rig, group_name, segment, "
-                  "  entropy, gain) VALUES (?1, ?2, ?3, ?4, ?5)",
+                  "  entropy, gain) "
+                  "SELECT ?1, ?2, segment, ?5, ?6 FROM segments "
+                  "WHERE rig = ?1 AND session = ?3 AND session_index = ?4",
                   rig,
-                  table->group,
-                  segment,
-                  candidate.entropy,
-                  candidate.gain)
+                  table.group,
+                  key.session,
+                  key.index,
+                  entry->entropy,
+                  entry->gain)
             .Run());
   }
-  return change.inserted;
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,

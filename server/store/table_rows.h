@@ -21,14 +21,13 @@ absl::Status InsertTables(Connection* db,
 // In the order of the rig's groups, entries sorted as Table says.
 absl::StatusOr<std::vector<Table>> ReadTables(Connection* db, std::int64_t rig);
 
-// Offers one scored segment to `table` (core/selection) and writes what that
-// changed. Says whether the segment entered.
-absl::StatusOr<bool> OfferToTable(Connection* db,
-                                  std::int64_t rig,
-                                  std::int64_t segment,
-                                  const TableEntry& candidate,
-                                  double min_gain_nats,
-                                  Table* table);
+// Writes that one scored segment was offered to `table` (core/selection), and
+// what that changed.
+absl::Status WriteOffer(Connection* db,
+                        std::int64_t rig,
+                        const SegmentKey& key,
+                        const TableChange& change,
+                        const Table& table);
 
 // Groups whose table holds the segment, in the order of the rig.
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,

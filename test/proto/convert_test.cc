@@ -69,6 +69,7 @@ void ExpectSame(const Rig& a, const Rig& b) {
     EXPECT_TRUE(SameBits(a.prior_sigmas[i].value, b.prior_sigmas[i].value));
   }
   EXPECT_EQ(a.fixed, b.fixed);
+  EXPECT_EQ(a.selection, b.selection);
   EXPECT_EQ(a.table_size, b.table_size);
   EXPECT_TRUE(SameBits(a.min_gain_nats, b.min_gain_nats));
   EXPECT_TRUE(SameBits(a.retrigger_fraction, b.retrigger_fraction));
@@ -257,6 +258,7 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   v1::Rig message = ToProto(random.RigValue());
   message.clear_gravity_mps2();
   message.clear_groups();
+  message.clear_selection();
   message.clear_table_size();
   message.clear_min_gain_nats();
   message.clear_retrigger_fraction();
@@ -265,6 +267,7 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
   const Rig defaults;
   EXPECT_EQ(rig.gravity_mps2, defaults.gravity_mps2);
+  EXPECT_EQ(rig.selection, defaults.selection);
   EXPECT_EQ(rig.table_size, defaults.table_size);
   EXPECT_EQ(rig.min_gain_nats, defaults.min_gain_nats);
   EXPECT_EQ(rig.retrigger_fraction, defaults.retrigger_fraction);
@@ -277,6 +280,16 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   message.set_min_gain_nats(0);
   ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
   EXPECT_EQ(rig.min_gain_nats, 0);
+}
+
+TEST(Convert, AnUnknownSelectionIsRefused) {
+  RandomValues random(9);
+  v1::Rig message = ToProto(random.RigValue());
+  message.set_selection(static_cast<v1::Rig::Selection>(9));
+  Rig rig;
+  const auto violations = FromProto(message, "x.", &rig);
+  ASSERT_EQ(violations.size(), 1u);
+  EXPECT_EQ(violations[0].field, "x.selection");
 }
 
 TEST(Convert, ARefusedMessageLeavesTheValueAsItWas) {

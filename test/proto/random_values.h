@@ -81,6 +81,7 @@ class RandomValues {
       rig.prior_sigmas.push_back({Text(6), Double()});
     }
     for (int i = Int(0, 3); i > 0; --i) rig.fixed.push_back(Text(7));
+    rig.selection = static_cast<Selection>(Int(0, 3));
     rig.table_size = Int(1, 100);
     rig.min_gain_nats = Double();
     rig.retrigger_fraction = Double();
