@@ -39,9 +39,7 @@ class DetectChangeTest : public ::testing::Test {
   const Eigen::VectorXd zero_ =
       Eigen::VectorXd::Zero(TangentSize(rig_.factory));
   RandomInformation random_{3};
-  const KnownCalibration active_{
-      rig_.factory,
-      ReferenceSigmas(rig_).cwiseAbs2().asDiagonal().toDenseMatrix() / 20};
+  const KnownCalibration active_ = FactoryKnownTo(rig_, 0.05);
   const ConsistencyTester tester_{rig_, active_};
   ChangeOptions options_;
   std::vector<OffsetInformation> newest_;
@@ -130,13 +128,13 @@ TEST_F(DetectChangeTest, FindsADriftThatNoSegmentShowsAlone) {
 
 TEST_F(DetectChangeTest, ACarefulFactorNeedsMoreEvidence) {
   Many(14, zero_);
-  Many(2, Sigmas(8, "cam0.principal.x"));
+  Many(2, Sigmas(12, "cam0.principal.x"));
   ASSERT_TRUE(Detect());
   const ConsistencyTester careful(rig_, active_, 25);
   newest_.clear();
   for (int i = 0; i < 16; ++i) {
     newest_.push_back(careful.Offset(random_.Segment(
-        rig_, rig_.factory, i < 14 ? zero_ : Sigmas(8, "cam0.principal.x"))));
+        rig_, rig_.factory, i < 14 ? zero_ : Sigmas(12, "cam0.principal.x"))));
   }
   EXPECT_FALSE(DetectChange(careful, newest_, options_));
 }

@@ -5,11 +5,22 @@
 #include <Eigen/Cholesky>
 #include <cstdint>
 #include <random>
+#include <vector>
 
 #include "core/change/consistency.h"
 #include "core/simulation/simulate.h"
 
 namespace selfcal {
+
+// The factory's calibration, as well known as `share` of the variance of a
+// reference segment; as in a result, what the rig holds fixed has none.
+inline KnownCalibration FactoryKnownTo(const Rig& rig, double share) {
+  const std::vector<int> free = FreeComponents(rig);
+  const Eigen::VectorXd sigmas = ReferenceSigmas(rig);
+  Eigen::VectorXd variances = Eigen::VectorXd::Zero(sigmas.size());
+  variances(free) = share * sigmas(free).cwiseAbs2();
+  return {rig.factory, variances.asDiagonal()};
+}
 
 class RandomInformation {
  public:
@@ -21,11 +32,17 @@ class RandomInformation {
     });
   }
 
-  // A direction of theta in reference sigmas, as a tangent.
+  // A direction of what the rig estimates in reference sigmas, as a tangent.
   Eigen::VectorXd Direction(const Rig& rig) {
+    const std::vector<int> free = FreeComponents(rig);
     const Eigen::VectorXd sigmas = ReferenceSigmas(rig);
-    return sigmas.cwiseProduct(
-        Eigen::VectorXd(Normal(sigmas.size(), 1)).normalized());
+    Eigen::VectorXd direction = Eigen::VectorXd::Zero(sigmas.size());
+    direction(free) =
+        Eigen::VectorXd(sigmas(free))
+            .cwiseProduct(Eigen::VectorXd(
+                              Normal(static_cast<Eigen::Index>(free.size()), 1))
+                              .normalized());
+    return direction;
   }
 
   // Symmetric, definite, about `strength` in units of `sigmas`, mixed at
@@ -39,21 +56,32 @@ class RandomInformation {
     return scale.asDiagonal() * unit * scale.asDiagonal();
   }
 
-  // A segment of a device whose truth is theta0 [+] offset.
+  // A segment of a device whose truth is theta0 [+] offset. It says nothing of
+  // what the rig holds fixed.
   SegmentInformation Segment(const Rig& rig,
                              const Calibration& theta0,
                              const Eigen::VectorXd& offset,
                              double strength = 1) {
     SegmentInformation information;
     information.theta0 = theta0;
-    information.Lambda = Definite(ReferenceSigmas(rig), strength);
+    const std::vector<int> free = FreeComponents(rig);
+    const Eigen::VectorXd sigmas = ReferenceSigmas(rig);
+    information.Lambda = Eigen::MatrixXd::Zero(sigmas.size(), sigmas.size());
+    information.Lambda(free, free) = Definite(sigmas(free), strength);
     information.eta = information.Lambda * offset + Noise(information.Lambda);
     return information;
   }
 
-  // Drawn from N(0, covariance).
+  // Drawn from N(0, covariance); 0 where there is no variance.
   Eigen::VectorXd Noise(const Eigen::MatrixXd& covariance) {
-    return covariance.llt().matrixL() * Normal(covariance.rows(), 1);
+    std::vector<int> varied;
+    for (int i = 0; i < static_cast<int>(covariance.rows()); ++i) {
+      if (covariance(i, i) > 0) varied.push_back(i);
+    }
+    const Eigen::MatrixXd block = covariance(varied, varied);
+    Eigen::VectorXd noise = Eigen::VectorXd::Zero(covariance.rows());
+    noise(varied) = block.llt().matrixL() * Normal(block.rows(), 1);
+    return noise;
   }
 
  private:

@@ -29,7 +29,7 @@ class SimulatedSegments : public ::testing::Test {
 
   const Rig rig_ = HandheldRig("a");
   // Known without an error, the strictest case.
-  const KnownCalibration active_{rig_.factory, Eigen::MatrixXd::Zero(26, 26)};
+  const KnownCalibration active_{rig_.factory, Eigen::MatrixXd::Zero(27, 27)};
   const ConsistencyTester tester_{rig_, active_};
 };
 

@@ -18,8 +18,7 @@ class ChangesTest : public StoreTest {
     ASSERT_TRUE(store_->BeginRun("a", 1).ok());
     StoredCalibration calibration;
     calibration.theta = rig_.factory;
-    calibration.covariance =
-        (0.2 * ReferenceSigmas(rig_)).cwiseAbs2().asDiagonal();
+    calibration.covariance = FactoryKnownTo(rig_, 0.04).covariance;
     const auto finished = store_->FinishRun("a", 1, calibration);
     ASSERT_TRUE(finished.ok()) << finished.status();
     ASSERT_EQ(finished->state, CalibrationState::kActive);
@@ -106,14 +105,15 @@ TEST_P(ChangesTest, SegmentsFromBeforeLeaveTheTables) {
 
 TEST_P(ChangesTest, TheNextRunIsOnSegmentsAfterItAlone) {
   Many(6, zero_);
-  // Those that still run are of the device before.
+  const StoredChange change = Shock();
+  // One that still runs is of the device before, and no other starts meanwhile.
   const auto unfinished = store_->ListUnfinishedRuns();
   ASSERT_TRUE(unfinished.ok()) << unfinished.status();
   for (const StoredRun& run : *unfinished) {
+    ASSERT_EQ(run.change, 0);
     ASSERT_TRUE(
         store_->EndRun("a", run.run, RunState::kCancelled, "test").ok());
   }
-  const StoredChange change = Shock();
   std::optional<StoredRun> started;
   for (int i = 0; i < 4 && !started; ++i) started = Next(turned_).started_run;
   ASSERT_TRUE(started);
@@ -149,8 +149,7 @@ TEST_P(ChangesTest, ASecondOneIsFoundAgainstTheCalibrationAfterTheFirst) {
   ASSERT_TRUE(store_->BeginRun("a", run->run).ok());
   StoredCalibration calibration;
   calibration.theta = BoxPlus(rig_.factory, turned_);
-  calibration.covariance =
-      (0.2 * ReferenceSigmas(rig_)).cwiseAbs2().asDiagonal();
+  calibration.covariance = FactoryKnownTo(rig_, 0.04).covariance;
   const auto finished = store_->FinishRun("a", run->run, calibration);
   ASSERT_TRUE(finished.ok()) << finished.status();
   ASSERT_EQ(finished->state, CalibrationState::kActive);
@@ -180,8 +179,7 @@ TEST_P(ChangesTest, ARunFromBeforeIsRejected) {
   const StoredChange change = Shock();
   StoredCalibration calibration;
   calibration.theta = rig_.factory;
-  calibration.covariance =
-      (0.2 * ReferenceSigmas(rig_)).cwiseAbs2().asDiagonal();
+  calibration.covariance = FactoryKnownTo(rig_, 0.04).covariance;
   const auto finished = store_->FinishRun("a", run->run, calibration);
   ASSERT_TRUE(finished.ok()) << finished.status();
   EXPECT_EQ(finished->state, CalibrationState::kRejected);
