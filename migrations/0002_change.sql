@@ -10,7 +10,7 @@ CREATE TABLE changes (
   -- The calibration that was active: what it knows of the groups that are not
   -- concerned stays known.
   base_version INTEGER NOT NULL,
-  inflation REAL NOT NULL,  -- of the variances that the test was made with
+  inflation REAL NOT NULL,  -- of the variances of segments in the test
   PRIMARY KEY (rig, change),
   FOREIGN KEY (rig, base_version) REFERENCES calibrations
 ) STRICT, WITHOUT ROWID;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 
 #include "core/change/chi_square.h"
 
@@ -52,15 +53,16 @@ OffsetInformation& OffsetInformation::operator-=(
 
 ConsistencyTester::ConsistencyTester(const Rig& rig,
                                      const KnownCalibration& active,
-                                     double inflation)
+                                     std::optional<double> inflation)
     : theta_(active.theta),
-      inflation_(inflation),
+      inflation_(inflation.value_or(
+          std::pow(std::max(1.0, active.track_noise_factor), 2))),
       free_(FreeComponents(rig)),
       prior_(PriorSigmas(rig)(free_)),
       reference_(ReferenceSigmas(rig)(free_)) {
   const Eigen::VectorXd scale = prior_.cwiseInverse();
-  Sigma_ = inflation * scale.asDiagonal() * active.covariance(free_, free_) *
-           scale.asDiagonal();
+  Sigma_ =
+      scale.asDiagonal() * active.covariance(free_, free_) * scale.asDiagonal();
   for (const ParameterGroup& settings : rig.groups) {
     Group group{settings.name, {}};
     for (const int i : GroupComponents(rig, settings)) {

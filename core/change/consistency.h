@@ -18,7 +18,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <span>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +34,9 @@ inline constexpr double kMaxLinearisation = 2.0;  // reference sigmas
 struct KnownCalibration {
   Calibration theta;
   Eigen::MatrixXd covariance;  // D x D, tangent at theta
+  // As its segments showed it (core/calibration/track_noise.h): the covariance
+  // is that with a pixel sigma so many times larger than the rig's.
+  double track_noise_factor = 1;
 };
 
 struct ConsistencyTest {
@@ -58,13 +61,17 @@ struct OffsetInformation {
 };
 
 // Tests against one calibration of one rig. `inflation` >= 1 is a factor on the
-// variances of both, segments and calibration, for data whose formal sigmas are
-// too small.
+// variances of segments: scores take pixel errors for independent and as small
+// as the rig says. Without it, it is the square of the calibration's track
+// noise factor. The covariance of the calibration holds that already, and is
+// taken as it is.
 class ConsistencyTester {
  public:
   ConsistencyTester(const Rig& rig,
                     const KnownCalibration& active,
-                    double inflation = 1);
+                    std::optional<double> inflation = std::nullopt);
+
+  double inflation() const { return inflation_; }
 
   // Whether the segment can be tested: its information has the shape of the
   // rig, is finite, and was linearised near the active calibration, and not

@@ -24,8 +24,8 @@
 namespace selfcal {
 
 struct ChangeOptions {
-  // Variance factor of segments and active calibration (consistency.h).
-  double inflation = 1;
+  // Of the variances of segments, for who makes the tester (consistency.h).
+  std::optional<double> inflation = std::nullopt;
   // Upper bound of the probability of a false alarm, for each new segment; 0:
   // nothing is ever detected.
   double false_alarm_rate = 1e-6;

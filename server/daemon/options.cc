@@ -46,10 +46,10 @@ std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
       ->default_str("structured");
   app.add_option("--change-inflation",
                  options->change.inflation,
-                 "Factor on all variances in the test for a change of the "
-                 "device: formal sigmas of real recordings are too small")
-      ->check(CLI::Range(1.0, kMaxInflation))
-      ->capture_default_str();
+                 "Factor on the variances of segments in the test for a "
+                 "change of the device [what the active calibration found: the "
+                 "square of its track noise factor]")
+      ->check(CLI::Range(1.0, kMaxInflation));
   app.add_option("--change-false-alarms",
                  options->change.false_alarm_rate,
                  "Bound on false alarms of that test, for each segment; 0 "

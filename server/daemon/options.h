@@ -16,8 +16,7 @@ struct DaemonOptions {
   std::vector<std::string> listen;  // "unix:/path" or "host:port"
   int scoring_threads = 1;
   SolverKind solver = SolverKind::kStructured;
-  // On real recordings formal sigmas are too small, by about 2.
-  ChangeOptions change = {.inflation = 4};
+  ChangeOptions change;
   std::string log_level = "info";
 };
 

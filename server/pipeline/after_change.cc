@@ -34,8 +34,7 @@ ThetaPrior KnownAfter(const Rig& rig,
                       concerned.begin(),
                       concerned.end(),
                       std::back_inserter(known));
-  return MarginalPrior(
-      rig, before.theta, before.covariance, known, change.inflation);
+  return MarginalPrior(rig, before.theta, before.covariance, known);
 }
 
 Eigen::MatrixXd CovarianceAfter(const Rig& rig,

@@ -65,12 +65,13 @@ absl::StatusOr<Newest> ReadNewest(Connection* db,
 }
 
 // Whether the segments can be tested against it: the factory's calibration is
-// a prior, not an estimate, and one from before the last change is no longer
-// that of the device.
+// a prior, not an estimate, one from before the last change is no longer that
+// of the device, and one from before the noise of tracks was measured claims
+// sigmas that are too small.
 absl::StatusOr<bool> StandsSince(Connection* db,
                                  const StoredCalibration& active,
                                  std::int64_t change) {
-  if (!active.run) {
+  if (!active.run || !active.report || active.report->track_noise_factor == 0) {
     return false;
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
@@ -83,7 +84,7 @@ std::string Describe(const Change& found, const StoredChange& change) {
       "change {} ({}): calibration {} does not fit the segments from sequence "
       "{} on; concerned: {}; chi-square {:.1f} with {} degrees over {} "
       "segments "
-      "(probability {:.1e})",
+      "(probability {:.1e}; variances of segments times {:.2f})",
       change.change,
       found.kind == ChangeKind::kSudden ? "sudden" : "drift",
       change.base_version,
@@ -92,7 +93,8 @@ std::string Describe(const Change& found, const StoredChange& change) {
       found.test.statistic,
       found.test.degrees,
       found.window,
-      found.test.probability);
+      found.test.probability,
+      change.inflation);
 }
 
 absl::Status RestartTables(Connection* db,
@@ -214,7 +216,9 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
     first_sequence = last.first_sequence;
   }
   const ConsistencyTester tester(
-      rig.stored.rig, {active->theta, active->covariance}, options.inflation);
+      rig.stored.rig,
+      {active->theta, active->covariance, active->report->track_noise_factor},
+      options.inflation);
   SELFCAL_ASSIGN_OR_RETURN(
       const Newest newest,
       ReadNewest(db, rig, *active, first_sequence, tester, options.max_window));
@@ -232,7 +236,7 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
           ? newest.sequences.back() + 1
           : newest.sequences[newest.sequences.size() - found->segments_since];
   change.base_version = active->version;
-  change.inflation = options.inflation;
+  change.inflation = tester.inflation();
   change.groups = found->concerned;
   SELFCAL_RETURN_IF_ERROR(InsertChange(db, rig.rowid, change));
   SELFCAL_RETURN_IF_ERROR(RestartTables(db, rig.rowid, change.first_sequence));

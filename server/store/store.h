@@ -123,7 +123,7 @@ struct StoredChange {
   // stays known.
   std::int64_t base_version = 0;
   std::vector<std::string> groups;  // concerned
-  double inflation = 1;  // of the variances that the test was made with
+  double inflation = 1;             // of the variances of segments in the test
 };
 
 // What the commit of a score did.

@@ -113,14 +113,50 @@ TEST_F(ConsistencyTesterTest, DoesNotDependOnWhereASegmentWasLinearised) {
       tester_.Test(tester_.Offset(there)).statistic, expected, 1e-6 * expected);
 }
 
-TEST_F(ConsistencyTesterTest, InflationDividesTheStatistic) {
+// The covariance of a calibration is that with the noise it found: only what
+// segments say is taken for less sure.
+TEST_F(ConsistencyTesterTest, TakesSegmentsForAsNoisyAsTheCalibrationFound) {
+  KnownCalibration noisy = FactoryKnownTo(rig_, 0);
+  const ConsistencyTester exact(rig_, noisy);
+  noisy.track_noise_factor = 2;
+  const ConsistencyTester careful(rig_, noisy);
+  EXPECT_EQ(careful.inflation(), 4);
   const SegmentInformation information =
       random_.Segment(rig_, rig_.factory, random_.Direction(rig_), 1);
-  const ConsistencyTester careful(rig_, active_, 4);
-  const ConsistencyTest plain = tester_.Test(tester_.Offset(information));
+  const ConsistencyTest plain = exact.Test(exact.Offset(information));
   const ConsistencyTest inflated = careful.Test(careful.Offset(information));
   ASSERT_EQ(plain.degrees, inflated.degrees);
   EXPECT_NEAR(inflated.statistic, plain.statistic / 4, 1e-9 * plain.statistic);
+}
+
+TEST_F(ConsistencyTesterTest, DoesNotInflateTheCalibration) {
+  // A segment that leaves no doubt: what remains is the calibration's own.
+  const ConsistencyTester careful(rig_, active_, 4);
+  const SegmentInformation information =
+      random_.Segment(rig_, rig_.factory, random_.Direction(rig_), 1e6);
+  const ConsistencyTest plain = tester_.Test(tester_.Offset(information));
+  const ConsistencyTest inflated = careful.Test(careful.Offset(information));
+  EXPECT_NEAR(inflated.statistic, plain.statistic, 1e-3 * plain.statistic);
+}
+
+TEST_F(ConsistencyTesterTest, IsChiSquareDistributedWithSegmentsThatNoisy) {
+  KnownCalibration noisy = active_;
+  noisy.track_noise_factor = 2;
+  const ConsistencyTester tester(rig_, noisy);
+  double sum = 0;
+  int degrees = 0;
+  for (int i = 0; i < 2000; ++i) {
+    // Segments claim four times the information that they have.
+    const Eigen::VectorXd error = random_.Noise(noisy.covariance);
+    SegmentInformation information =
+        random_.Segment(rig_, rig_.factory, error, 0.5);
+    information.Lambda *= 4;
+    information.eta *= 4;
+    const ConsistencyTest test = tester.Test(tester.Offset(information));
+    sum += test.statistic;
+    degrees += test.degrees;
+  }
+  EXPECT_NEAR(sum, degrees, 4 * std::sqrt(2.0 * degrees));
 }
 
 TEST_F(ConsistencyTesterTest, LeavesOutWhatTheRigHoldsFixed) {

@@ -47,7 +47,7 @@ TEST_F(OptionsTest, SolverHasAName) {
 
 TEST_F(OptionsTest, TestForAChangeIsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
-  EXPECT_EQ(options_.change.inflation, 4);
+  EXPECT_EQ(options_.change.inflation, std::nullopt);
   EXPECT_EQ(Parse({"--state-dir",
                    "s",
                    "--change-inflation",

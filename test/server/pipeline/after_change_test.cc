@@ -21,7 +21,6 @@ TEST(AfterChange, OnlyWhatIsNotConcernedStaysKnown) {
   before.covariance = variances.asDiagonal();
   StoredChange change;
   change.groups = {"extrinsics"};
-  change.inflation = 4;
   const ThetaPrior prior = KnownAfter(rig, change, before);
   const Eigen::MatrixXd covariance =
       CovarianceAfter(rig, change, before.covariance);
@@ -38,7 +37,7 @@ TEST(AfterChange, OnlyWhatIsNotConcernedStaysKnown) {
       EXPECT_EQ(prior.information(i, i), 0) << components[i].name;
       EXPECT_EQ(covariance(i, i), 0) << components[i].name;
     } else {
-      EXPECT_NEAR(prior.information(i, i) * 4 * variance, 1, 1e-9)
+      EXPECT_NEAR(prior.information(i, i) * variance, 1, 1e-9)
           << components[i].name;
       EXPECT_EQ(covariance(i, i), variance);
     }

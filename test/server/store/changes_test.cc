@@ -16,12 +16,20 @@ class ChangesTest : public StoreTest {
     // Two segments fill the tables, and the run gives version 2.
     Many(2, zero_);
     ASSERT_TRUE(store_->BeginRun("a", 1).ok());
-    StoredCalibration calibration;
-    calibration.theta = rig_.factory;
-    calibration.covariance = FactoryKnownTo(rig_, 0.04).covariance;
-    const auto finished = store_->FinishRun("a", 1, calibration);
+    const auto finished = store_->FinishRun("a", 1, Result(rig_.factory));
     ASSERT_TRUE(finished.ok()) << finished.status();
     ASSERT_EQ(finished->state, CalibrationState::kActive);
+  }
+
+  // What a run comes to.
+  StoredCalibration Result(const Calibration& theta) const {
+    StoredCalibration calibration;
+    calibration.theta = theta;
+    calibration.covariance = FactoryKnownTo(rig_, 0.04).covariance;
+    calibration.report = CalibrationResult();
+    calibration.report->status = CalibrateStatus::kConverged;
+    calibration.report->track_noise_factor = track_noise_factor_;
+    return calibration;
   }
 
   // Puts and scores the next segment of a device that is off by `offset`.
@@ -55,6 +63,7 @@ class ChangesTest : public StoreTest {
     return events->items;
   }
 
+  double track_noise_factor_ = 1;
   Rig rig_;
   const Eigen::VectorXd zero_ =
       Eigen::VectorXd::Zero(TangentSize(HandheldRig("a").factory));
@@ -147,9 +156,7 @@ TEST_P(ChangesTest, ASecondOneIsFoundAgainstTheCalibrationAfterTheFirst) {
     run = store_->ListUnfinishedRuns()->front();
   }
   ASSERT_TRUE(store_->BeginRun("a", run->run).ok());
-  StoredCalibration calibration;
-  calibration.theta = BoxPlus(rig_.factory, turned_);
-  calibration.covariance = FactoryKnownTo(rig_, 0.04).covariance;
+  const StoredCalibration calibration = Result(BoxPlus(rig_.factory, turned_));
   const auto finished = store_->FinishRun("a", run->run, calibration);
   ASSERT_TRUE(finished.ok()) << finished.status();
   ASSERT_EQ(finished->state, CalibrationState::kActive);
@@ -177,10 +184,7 @@ TEST_P(ChangesTest, ARunFromBeforeIsRejected) {
   ASSERT_TRUE(run);
   ASSERT_TRUE(store_->BeginRun("a", run->run).ok());
   const StoredChange change = Shock();
-  StoredCalibration calibration;
-  calibration.theta = rig_.factory;
-  calibration.covariance = FactoryKnownTo(rig_, 0.04).covariance;
-  const auto finished = store_->FinishRun("a", run->run, calibration);
+  const auto finished = store_->FinishRun("a", run->run, Result(rig_.factory));
   ASSERT_TRUE(finished.ok()) << finished.status();
   EXPECT_EQ(finished->state, CalibrationState::kRejected);
   EXPECT_THAT(finished->reasons, ElementsAre(HasSubstr("change 1")));
@@ -205,6 +209,29 @@ TEST_P(ChangesTest, IsFoundTheSameAcrossRestarts) {
   EXPECT_EQ(stored->time_ns, change->time_ns);
   EXPECT_EQ(stored->base_version, 2);
   EXPECT_EQ(stored->inflation, 1);
+}
+
+class NoisyTracksTest : public ChangesTest {
+ protected:
+  NoisyTracksTest() { track_noise_factor_ = 1.5; }
+};
+SELFCAL_STORE_TEST_SUITE(NoisyTracksTest);
+
+TEST_P(NoisyTracksTest, SegmentsAreTakenForAsNoisyAsTheCalibrationFound) {
+  Many(6, zero_);
+  const StoredChange change = Shock();
+  EXPECT_EQ(change.inflation, 2.25);
+  EXPECT_THAT(Events().back().detail, HasSubstr("times 2.25"));
+}
+
+class UnmeasuredNoiseTest : public ChangesTest {
+ protected:
+  UnmeasuredNoiseTest() { track_noise_factor_ = 0; }
+};
+SELFCAL_STORE_TEST_SUITE(UnmeasuredNoiseTest);
+
+TEST_P(UnmeasuredNoiseTest, NothingIsTestedWithoutHonestSigmas) {
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(Next(turned_).change);
 }
 
 }  // namespace
