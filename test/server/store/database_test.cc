@@ -69,7 +69,7 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(Hex(Sha256(migrations[0].sql)), migrations[0].sha256);
   EXPECT_EQ(migrations[1].name, "0002_change.sql");
   EXPECT_EQ(migrations[1].sha256,
-            "9c54a19ad3cec64f7085e5f42a2bb58dfb078c5326486450a8f95cfbb631a52b");
+            "adf5980e317d2d27f223d86870c2c3dcb79f5bde58b267c701e853328cb4c1a3");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
