@@ -12,6 +12,8 @@ void RunRunTime(Context* context);
 void RunRecordedChoice(Context* context);
 void RunRecordings(Context* context);
 void RunSensors(Context* context);
+void RunFusion(Context* context);
+void RunSelection(Context* context);
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> all = {
@@ -36,6 +38,12 @@ const std::vector<Experiment>& Experiments() {
       {"sensors",
        "one, two and four cameras, with time offsets known, estimated, ignored",
        RunSensors},
+      {"selection",
+       "joint choices against tables, where one kind of motion dominates",
+       RunSelection},
+      {"fusion",
+       "the estimate from stored information alone, against the full solve",
+       RunFusion},
   };
   return all;
 }

@@ -1,0 +1,150 @@
+// The one-step estimate from stored information of all segments against the
+// full solve on their data: how far, and when is it enough.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/information/fusion.h"
+#include "core/information/segment_information.h"
+#include "test/evaluation/context.h"
+#include "test/evaluation/datasets.h"
+#include "test/evaluation/statistics.h"
+
+namespace selfcal {
+namespace {
+
+// What a linearisation point is off by, against a factory's error.
+constexpr double kScales[] = {0.1, 0.3, 1};
+
+CalibrationError Scaled(double scale) {
+  CalibrationError error;
+  error.focal_relative *= scale;
+  error.principal_point_px *= scale;
+  error.distortion_relative *= scale;
+  error.camera_rotation_rad *= scale;
+  error.camera_position_m *= scale;
+  error.scale *= scale;
+  error.misalignment *= scale;
+  error.accel_rotation_rad *= scale;
+  return error;
+}
+
+// The same readings, with states and landmarks that are right.
+MotionSegment AtTrueStates(MotionSegment segment, const MotionSegment& truth) {
+  segment.keyframes = truth.keyframes;
+  segment.landmarks = truth.landmarks;
+  return segment;
+}
+
+// (a [-] b) / D in the metric of a covariance at b.
+double SquareDistance(const Calibration& a,
+                      const Calibration& b,
+                      const Eigen::MatrixXd& covariance,
+                      const Eigen::VectorXd& unit) {
+  const Eigen::VectorXd scale = unit.cwiseInverse();
+  const Eigen::VectorXd d = scale.cwiseProduct(BoxMinus(a, b));
+  const Eigen::MatrixXd normalised =
+      scale.asDiagonal() * covariance * scale.asDiagonal();
+  return d.dot(normalised.llt().solve(d)) / static_cast<double>(d.size());
+}
+
+struct Outcome {
+  std::string dataset;
+  double scale = 0;
+  long segments = 0;
+  double step = 0;         // rms from linearisation to estimate [sigma_ref]
+  double to_full = 0;      // fused from full, in sigmas of the full (rms)
+  double true_states = 0;  // the same, scored at the true states
+  double error = 0;        // fused from truth [sigma_ref], rms
+  double full_error = 0;   // full from truth [sigma_ref], rms
+  double nees = 0;         // fused from truth, over D
+  double full_nees = 0;
+  double heterogeneity = 0;
+};
+
+Outcome Evaluate(int dataset, double scale, double duration_s) {
+  EvaluatedDevice device = MakeDevice();
+  device.rig.factory = PerturbCalibration(
+      device.truth, Scaled(scale), 900 + static_cast<std::uint64_t>(dataset));
+  const Dataset data =
+      MakeDataset(dataset, duration_s, device, DatasetOptions(dataset));
+  std::vector<SegmentInformation> stored, at_true_states;
+  for (std::size_t i = 0; i < data.segments().size(); ++i) {
+    const MotionSegment& segment = data.segments()[i];
+    stored.push_back(ScoreSegment(data.rig, data.rig.factory, segment));
+    at_true_states.push_back(
+        ScoreSegment(data.rig,
+                     data.rig.factory,
+                     AtTrueStates(segment, data.session.truth[i])));
+  }
+  const FusedEstimate fused = Fuse(data.rig, stored);
+  const FusedEstimate fused_true = Fuse(data.rig, at_true_states);
+  const CalibrationResult full =
+      Calibrate(data.rig, data.rig.factory, data.segments());
+  const Eigen::VectorXd unit = PriorSigmas(data.rig);
+  const Eigen::VectorXd reference = ReferenceSigmas(data.rig).cwiseInverse();
+  const auto rms = [&](const Calibration& a, const Calibration& b) {
+    const Eigen::VectorXd d = reference.cwiseProduct(BoxMinus(a, b));
+    return d.norm() / std::sqrt(static_cast<double>(d.size()));
+  };
+  Outcome outcome;
+  outcome.dataset = data.name;
+  outcome.scale = scale;
+  outcome.segments = static_cast<long>(stored.size());
+  outcome.step = rms(fused.theta, data.rig.factory);
+  outcome.to_full =
+      std::sqrt(SquareDistance(fused.theta, full.theta, full.covariance, unit));
+  outcome.true_states = std::sqrt(
+      SquareDistance(fused_true.theta, full.theta, full.covariance, unit));
+  outcome.error = rms(fused.theta, data.truth);
+  outcome.full_error = rms(full.theta, data.truth);
+  outcome.nees =
+      SquareDistance(data.truth, fused.theta, fused.covariance, unit);
+  outcome.full_nees =
+      SquareDistance(data.truth, full.theta, full.covariance, unit);
+  outcome.heterogeneity = fused.heterogeneity;
+  return outcome;
+}
+
+}  // namespace
+
+void RunFusion(Context* context) {
+  const int datasets = context->quick() ? 1 : 4;
+  const double duration_s = context->quick() ? 16.1 : 80.1;
+  const int scales = static_cast<int>(std::size(kScales));
+  std::vector<Outcome> all(datasets * scales);
+  context->ForEach(datasets * scales, [&](int i) {
+    all[i] = Evaluate(i % datasets, kScales[i / datasets], duration_s);
+    context->Progress(all[i].dataset + " at " + std::to_string(all[i].scale));
+  });
+  ResultTable table({"linearisation error / factory's",
+                     "dataset",
+                     "segments",
+                     "step [sigma_ref]",
+                     "fused from full [sigma]",
+                     "at true states [sigma]",
+                     "fused from truth [sigma_ref]",
+                     "full from truth [sigma_ref]",
+                     "NEES / D fused",
+                     "NEES / D full",
+                     "heterogeneity"});
+  for (const Outcome& one : all) {
+    table.Add({one.scale,
+               one.dataset,
+               one.segments,
+               one.step,
+               one.to_full,
+               one.true_states,
+               one.error,
+               one.full_error,
+               one.nees,
+               one.full_nees,
+               one.heterogeneity});
+  }
+  context->WriteTable("fusion", table);
+}
+
+}  // namespace selfcal
