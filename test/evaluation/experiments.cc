@@ -3,6 +3,7 @@
 namespace selfcal {
 
 // One file each: <name>_experiment.cc.
+void RunConsistency(Context* context);
 void RunDatasets(Context* context);
 void RunGainThreshold(Context* context);
 void RunBatchMatch(Context* context);
@@ -44,6 +45,9 @@ const std::vector<Experiment>& Experiments() {
       {"fusion",
        "the estimate from stored information alone, against the full solve",
        RunFusion},
+      {"consistency",
+       "is each estimator as sure as it says? NEES and coverage",
+       RunConsistency},
   };
   return all;
 }

@@ -100,6 +100,20 @@ std::pair<double, double> NeesBounds(int dof, int runs, double probability) {
           ChiSquareQuantile(1 - tail, dof * runs) / runs};
 }
 
+std::pair<int, int> BinomialBounds(int runs, double p, double probability) {
+  const double tail = (1 - probability) / 2;
+  const auto chance = [&](int hits) {
+    return std::exp(std::lgamma(runs + 1.0) - std::lgamma(hits + 1.0) -
+                    std::lgamma(runs - hits + 1.0) + hits * std::log(p) +
+                    (runs - hits) * std::log1p(-p));
+  };
+  int low = 0;
+  for (double below = chance(low); below < tail; below += chance(low)) ++low;
+  int high = runs;
+  for (double above = chance(high); above < tail; above += chance(high)) --high;
+  return {low, high};
+}
+
 Eigen::Quaterniond AverageRotation(
     const std::vector<Eigen::Quaterniond>& rotations) {
   Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();

@@ -32,6 +32,10 @@ double ChiSquareQuantile(double p, int dof);
 // if errors are as the covariance says (Bar-Shalom).
 std::pair<double, double> NeesBounds(int dof, int runs, double probability);
 
+// The fewest and the most hits in `runs` trials of chance p, 0 < p < 1, that
+// leave out less than half of 1 - probability each.
+std::pair<int, int> BinomialBounds(int runs, double p, double probability);
+
 // The rotation that minimises the sum of squared chordal distances (Markley,
 // Cheng, Crassidis, Oshman 2007): of the sum of q q^T, the eigenvector with the
 // largest eigenvalue. At least one; sign of each does not matter.

@@ -102,5 +102,14 @@ TEST(SpreadOfRotations, IsThatOfTheAnglesDrawn) {
   EXPECT_LT(Log(mean.conjugate() * AverageRotation(rotations)).norm(), 1e-3);
 }
 
+TEST(Statistics, BinomialBoundsLeaveOutHalfOfTheRestOnEachSide) {
+  // 10 throws of a coin: 1 or fewer heads in 11 of 1024, 2 or fewer in 56.
+  EXPECT_EQ(BinomialBounds(10, 0.5, 0.95), std::make_pair(2, 8));
+  EXPECT_EQ(BinomialBounds(10, 0.5, 1 - 2 * 10.9 / 1024), std::make_pair(1, 9));
+  EXPECT_EQ(BinomialBounds(10, 0.5, 1 - 2 * 11.1 / 1024), std::make_pair(2, 8));
+  // All of them may be hits where misses are rare.
+  EXPECT_EQ(BinomialBounds(100, 0.9973, 0.95).second, 100);
+}
+
 }  // namespace
 }  // namespace selfcal
