@@ -1,7 +1,6 @@
 // Is each estimator as sure as it says? Many devices with known truth: the
 // normalised squared error of theta (NEES), and how often each parameter lies
 // within one, two and three of its own sigmas.
-#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -11,6 +10,7 @@
 #include "core/simulation/simulate.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/estimators.h"
+#include "test/evaluation/information_gain.h"
 #include "test/evaluation/statistics.h"
 
 namespace selfcal {
@@ -26,9 +26,22 @@ constexpr double kProbability = 0.95;
 constexpr double kParameterProbability = 0.999;
 constexpr std::uint64_t kFirstSeed = 5001;
 
-enum Kind { kBatch, kInformative, kRandom, kLeast, kSingle, kKinds };
-constexpr std::array<const char*, kKinds> kNames = {
-    "batch", "informative", "random", "least", "single_group"};
+enum Kind {
+  kBatch,
+  kInformative,
+  kRandom,
+  kLeast,
+  kSingle,
+  kSelected,  // those above choose first, and calibrate then
+  kGain = kSelected,
+  kKinds
+};
+constexpr std::array<const char*, kKinds> kNames = {"batch",
+                                                    "informative",
+                                                    "random",
+                                                    "least",
+                                                    "single_group",
+                                                    "information_gain"};
 
 // An error in its own sigmas, where the solver converged and no direction of
 // theta was held.
@@ -42,14 +55,17 @@ struct Run {
   std::array<Outcome, kKinds> outcomes;
 };
 
-Outcome Compare(const CalibrationResult& result, const Calibration& truth) {
-  Outcome outcome{.segments = result.segments};
+Outcome Compare(const CalibrationResult& result,
+                const Calibration& truth,
+                const std::vector<int>& free) {
+  Outcome outcome;
+  outcome.segments = result.segments;
   if (result.status == CalibrateStatus::kConverged &&
       result.held_constant.empty()) {
     const Eigen::VectorXd error = BoxMinus(result.theta, truth);
-    outcome.nees = error.dot(result.covariance.ldlt().solve(error));
+    outcome.nees = NormalisedSquaredError(error, result.covariance).nees;
     outcome.sigmas =
-        error.cwiseQuotient(result.covariance.diagonal().cwiseSqrt());
+        error.cwiseQuotient(result.covariance.diagonal().cwiseSqrt())(free);
   }
   return outcome;
 }
@@ -74,17 +90,21 @@ Run RunDevice(std::uint64_t seed, double duration_s) {
   const int count = static_cast<int>(segments.size());
   const SegmentSet informative = MostInformative(rig, scores);
   const int kept = static_cast<int>(informative.size());
-  std::array<SegmentSet, kKinds> sets;
+  std::array<SegmentSet, kSelected> sets;
   sets[kBatch] = AllSegments(count);
   sets[kInformative] = informative;
-  sets[kRandom] = RandomSegments(count, kept, seed);
+  sets[kRandom] = RandomSegments(rig, kept, seed, scores);
   sets[kLeast] = LeastInformative(rig, scores);
   sets[kSingle] = SingleGroup(rig, kept, scores);
+  const std::vector<int> free = FreeComponents(rig);
   Run run;
-  for (int kind = 0; kind < kKinds; ++kind) {
+  for (int kind = 0; kind < kSelected; ++kind) {
     const std::vector<MotionSegment> picked = Pick(segments, sets[kind]);
-    run.outcomes[kind] = Compare(Calibrate(rig, rig.factory, picked), truth);
+    run.outcomes[kind] =
+        Compare(Calibrate(rig, rig.factory, picked), truth, free);
   }
+  run.outcomes[kGain] =
+      Compare(RunInformationGain(rig, segments, {}).calibration, truth, free);
   return run;
 }
 
@@ -151,8 +171,11 @@ void AddParameters(const std::string& name,
 }
 
 void Report(const std::vector<Run>& runs, Context* context) {
-  const std::vector<TangentComponent> components =
-      TangentComponents(HandheldRig("consistency").factory);
+  const Rig rig = HandheldRig("consistency");
+  std::vector<TangentComponent> components;
+  for (const int i : FreeComponents(rig)) {
+    components.push_back(TangentComponents(rig.factory)[i]);
+  }
   const int parameters = static_cast<int>(components.size());
   ResultTable nees({"estimator",
                     "segments",

@@ -1,6 +1,5 @@
 // The one-step estimate from stored information of all segments against the
 // full solve on their data: how far, and when is it enough.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -39,16 +38,12 @@ MotionSegment AtTrueStates(MotionSegment segment, const MotionSegment& truth) {
   return segment;
 }
 
-// (a [-] b) / D in the metric of a covariance at b.
+// a [-] b in the metric of a covariance at b, over D.
 double SquareDistance(const Calibration& a,
                       const Calibration& b,
-                      const Eigen::MatrixXd& covariance,
-                      const Eigen::VectorXd& unit) {
-  const Eigen::VectorXd scale = unit.cwiseInverse();
-  const Eigen::VectorXd d = scale.cwiseProduct(BoxMinus(a, b));
-  const Eigen::MatrixXd normalised =
-      scale.asDiagonal() * covariance * scale.asDiagonal();
-  return d.dot(normalised.llt().solve(d)) / static_cast<double>(d.size());
+                      const Eigen::MatrixXd& covariance) {
+  const auto [square, dof] = NormalisedSquaredError(BoxMinus(a, b), covariance);
+  return square / dof;
 }
 
 struct Outcome {
@@ -84,11 +79,11 @@ Outcome Evaluate(int dataset, double scale, double duration_s) {
   const FusedEstimate fused_true = Fuse(data.rig, at_true_states);
   const CalibrationResult full =
       Calibrate(data.rig, data.rig.factory, data.segments());
-  const Eigen::VectorXd unit = PriorSigmas(data.rig);
-  const Eigen::VectorXd reference = ReferenceSigmas(data.rig).cwiseInverse();
+  const std::vector<int> free = FreeComponents(data.rig);
+  const Eigen::VectorXd reference = ReferenceSigmas(data.rig);
   const auto rms = [&](const Calibration& a, const Calibration& b) {
-    const Eigen::VectorXd d = reference.cwiseProduct(BoxMinus(a, b));
-    return d.norm() / std::sqrt(static_cast<double>(d.size()));
+    const Eigen::VectorXd d = BoxMinus(a, b).cwiseQuotient(reference)(free);
+    return Rms({d.begin(), d.end()});
   };
   Outcome outcome;
   outcome.dataset = data.name;
@@ -96,15 +91,13 @@ Outcome Evaluate(int dataset, double scale, double duration_s) {
   outcome.segments = static_cast<long>(stored.size());
   outcome.step = rms(fused.theta, data.rig.factory);
   outcome.to_full =
-      std::sqrt(SquareDistance(fused.theta, full.theta, full.covariance, unit));
-  outcome.true_states = std::sqrt(
-      SquareDistance(fused_true.theta, full.theta, full.covariance, unit));
+      std::sqrt(SquareDistance(fused.theta, full.theta, full.covariance));
+  outcome.true_states =
+      std::sqrt(SquareDistance(fused_true.theta, full.theta, full.covariance));
   outcome.error = rms(fused.theta, data.truth);
   outcome.full_error = rms(full.theta, data.truth);
-  outcome.nees =
-      SquareDistance(data.truth, fused.theta, fused.covariance, unit);
-  outcome.full_nees =
-      SquareDistance(data.truth, full.theta, full.covariance, unit);
+  outcome.nees = SquareDistance(data.truth, fused.theta, fused.covariance);
+  outcome.full_nees = SquareDistance(data.truth, full.theta, full.covariance);
   outcome.heterogeneity = fused.heterogeneity;
   return outcome;
 }

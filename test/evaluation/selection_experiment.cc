@@ -176,19 +176,20 @@ Outcome Evaluate(const Data& data,
   for (const int i : choice) chosen.push_back(data.segments[i]);
   const CalibrationResult result =
       Calibrate(data.rig, data.rig.factory, chosen);
+  const std::vector<int> free = FreeComponents(data.rig);
   const Eigen::VectorXd error = BoxMinus(data.truth, result.theta);
-  const Eigen::VectorXd prior = PriorSigmas(data.rig).cwiseInverse();
+  const Eigen::VectorXd prior = PriorSigmas(data.rig)(free).cwiseInverse();
   const Eigen::LLT<Eigen::MatrixXd> normalised(
-      prior.asDiagonal() * result.covariance * prior.asDiagonal());
-  const Eigen::VectorXd scaled = prior.cwiseProduct(error);
-  const auto size = static_cast<double>(error.size());
+      prior.asDiagonal() * result.covariance(free, free) * prior.asDiagonal());
+  const Eigen::VectorXd in_reference =
+      error.cwiseQuotient(ReferenceSigmas(data.rig))(free);
+  const auto size = static_cast<double>(free.size());
   Outcome outcome;
   outcome.choice = name;
   outcome.segments = static_cast<int>(choice.size());
   outcome.gain_nats = -normalised.matrixLLT().diagonal().array().log().sum();
-  outcome.square_error =
-      error.cwiseQuotient(ReferenceSigmas(data.rig)).squaredNorm() / size;
-  outcome.nees = scaled.dot(normalised.solve(scaled)) / size;
+  outcome.square_error = in_reference.squaredNorm() / size;
+  outcome.nees = NormalisedSquaredError(error, result.covariance).nees / size;
   outcome.converged = result.status == CalibrateStatus::kConverged;
   return outcome;
 }

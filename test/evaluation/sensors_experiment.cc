@@ -82,11 +82,10 @@ Run RunOne(const Setting& setting, std::uint64_t seed, double duration_s) {
   Run run;
   run.error = BoxMinus(result.theta, device.truth);
   run.sigma = result.covariance.diagonal().cwiseSqrt();
-  const std::vector<int> free = FreeComponents(device.rig);
-  const Eigen::VectorXd error = run.error(free);
-  const Eigen::MatrixXd covariance = result.covariance(free, free);
-  run.nees = error.dot(covariance.ldlt().solve(error));
-  run.degrees = static_cast<int>(free.size());
+  const SquaredError square =
+      NormalisedSquaredError(run.error, result.covariance);
+  run.nees = square.nees;
+  run.degrees = square.dof;
   return run;
 }
 

@@ -94,6 +94,22 @@ double ChiSquareQuantile(double p, int dof) {
   return 0.5 * (low + high);
 }
 
+SquaredError NormalisedSquaredError(const Eigen::VectorXd& error,
+                                    const Eigen::MatrixXd& covariance) {
+  std::vector<int> estimated;
+  for (int i = 0; i < error.size(); ++i) {
+    if (covariance(i, i) != 0) estimated.push_back(i);
+  }
+  const Eigen::VectorXd sigma = covariance.diagonal()(estimated).cwiseSqrt();
+  const Eigen::VectorXd z = error(estimated).cwiseQuotient(sigma);
+  const Eigen::VectorXd scale = sigma.cwiseInverse();
+  const Eigen::MatrixXd correlation = scale.asDiagonal() *
+                                      covariance(estimated, estimated) *
+                                      scale.asDiagonal();
+  return {z.dot(correlation.ldlt().solve(z)),
+          static_cast<int>(estimated.size())};
+}
+
 std::pair<double, double> NeesBounds(int dof, int runs, double probability) {
   const double tail = 0.5 * (1 - probability);
   return {ChiSquareQuantile(tail, dof * runs) / runs,

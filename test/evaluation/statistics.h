@@ -27,6 +27,15 @@ double RankCorrelation(const std::vector<double>& a,
 // is p, 0 < p < 1.
 double ChiSquareQuantile(double p, int dof);
 
+// Normalised squared error (NEES) of the components that are estimated: those
+// whose variance is not exactly zero. Whatever the units.
+struct SquaredError {
+  double nees = 0;
+  int dof = 0;
+};
+SquaredError NormalisedSquaredError(const Eigen::VectorXd& error,
+                                    const Eigen::MatrixXd& covariance);
+
 // Bounds within which the mean of `runs` normalised squared errors of dof
 // dimensions lies with the given probability, half of the rest on each side,
 // if errors are as the covariance says (Bar-Shalom).

@@ -111,5 +111,18 @@ TEST(Statistics, BinomialBoundsLeaveOutHalfOfTheRestOnEachSide) {
   EXPECT_EQ(BinomialBounds(100, 0.9973, 0.95).second, 100);
 }
 
+TEST(Statistics, SquaredErrorIsOfWhatIsEstimated) {
+  // Two components that go together, in units far apart, and a fixed one.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  covariance(0, 0) = 4;
+  covariance(2, 2) = 1e-20;
+  covariance(0, 2) = covariance(2, 0) = 0.5 * 2 * 1e-10;
+  const auto [nees, dof] =
+      NormalisedSquaredError(Eigen::Vector3d(2, 0, 2e-10), covariance);
+  EXPECT_EQ(dof, 2);
+  // (1, 2) C^-1 (1, 2)^T with C = (1 0.5; 0.5 1).
+  EXPECT_NEAR(nees, (1 - 2 + 4) / 0.75, 1e-12);
+}
+
 }  // namespace
 }  // namespace selfcal
