@@ -7,6 +7,7 @@ void RunConsistency(Context* context);
 void RunDatasets(Context* context);
 void RunGainThreshold(Context* context);
 void RunBatchMatch(Context* context);
+void RunChange(Context* context);
 void RunEntropy(Context* context);
 void RunGroups(Context* context);
 void RunRunTime(Context* context);
@@ -27,6 +28,7 @@ const std::vector<Experiment>& Experiments() {
       {"batch_match",
        "informative segments against batch and information gain (Table I)",
        RunBatchMatch},
+      {"change", "change of the device: false alarms and delay", RunChange},
       {"entropy", "does the entropy find informative segments?", RunEntropy},
       {"groups", "several groups of parameters against one", RunGroups},
       {"run_time", "run-time of each, side by side (Table II)", RunRunTime},

@@ -31,6 +31,13 @@ std::vector<double> Ranks(const std::vector<double>& values) {
   return ranks;
 }
 
+// Of exactly so many hits; 0 < p < 1.
+double BinomialChance(int hits, int trials, double p) {
+  return std::exp(std::lgamma(trials + 1.0) - std::lgamma(hits + 1.0) -
+                  std::lgamma(trials - hits + 1.0) + hits * std::log(p) +
+                  (trials - hits) * std::log1p(-p));
+}
+
 }  // namespace
 
 double Mean(const std::vector<double>& values) {
@@ -110,6 +117,25 @@ SquaredError NormalisedSquaredError(const Eigen::VectorXd& error,
           static_cast<int>(estimated.size())};
 }
 
+double BinomialTail(int count, int trials, double rate) {
+  double below = 0;
+  for (int k = 0; k < count; ++k) {
+    below += BinomialChance(k, trials, rate);
+  }
+  return std::max(0.0, 1 - below);
+}
+
+double BinomialUpperBound(int count, int trials, double probability) {
+  if (count >= trials) return 1;
+  double low = 0, high = 1;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    const bool likely = BinomialTail(count + 1, trials, middle) < probability;
+    (likely ? low : high) = middle;
+  }
+  return high;
+}
+
 std::pair<double, double> NeesBounds(int dof, int runs, double probability) {
   const double tail = 0.5 * (1 - probability);
   return {ChiSquareQuantile(tail, dof * runs) / runs,
@@ -118,11 +144,7 @@ std::pair<double, double> NeesBounds(int dof, int runs, double probability) {
 
 std::pair<int, int> BinomialBounds(int runs, double p, double probability) {
   const double tail = (1 - probability) / 2;
-  const auto chance = [&](int hits) {
-    return std::exp(std::lgamma(runs + 1.0) - std::lgamma(hits + 1.0) -
-                    std::lgamma(runs - hits + 1.0) + hits * std::log(p) +
-                    (runs - hits) * std::log1p(-p));
-  };
+  const auto chance = [&](int hits) { return BinomialChance(hits, runs, p); };
   int low = 0;
   for (double below = chance(low); below < tail; below += chance(low)) ++low;
   int high = runs;

@@ -36,6 +36,14 @@ struct SquaredError {
 SquaredError NormalisedSquaredError(const Eigen::VectorXd& error,
                                     const Eigen::MatrixXd& covariance);
 
+// Probability that at least `count` of `trials` come out, at `rate` in (0, 1)
+// each.
+double BinomialTail(int count, int trials, double rate);
+
+// The rate at which `count` of `trials`, or fewer, come out with a probability
+// of only 1 - probability (Clopper and Pearson 1934); 1 for count = trials.
+double BinomialUpperBound(int count, int trials, double probability);
+
 // Bounds within which the mean of `runs` normalised squared errors of dof
 // dimensions lies with the given probability, half of the rest on each side,
 // if errors are as the covariance says (Bar-Shalom).

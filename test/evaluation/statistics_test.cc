@@ -60,6 +60,21 @@ TEST(NeesBounds, NarrowWithTheRuns) {
   EXPECT_NEAR(high_100, 26 + 1.96 * std::sqrt(0.52), 0.03);
 }
 
+TEST(Binomial, TailIsThatOfCoins) {
+  EXPECT_NEAR(BinomialTail(0, 4, 0.5), 1, 1e-12);
+  EXPECT_NEAR(BinomialTail(2, 4, 0.5), 11.0 / 16, 1e-12);
+  EXPECT_NEAR(BinomialTail(4, 4, 0.5), 1.0 / 16, 1e-12);
+  EXPECT_NEAR(BinomialTail(1, 1200, 0.01), 1 - std::pow(0.99, 1200), 1e-10);
+}
+
+TEST(Binomial, UpperBoundHasTheTail) {
+  EXPECT_NEAR(
+      BinomialUpperBound(0, 3000, 0.999), 1 - std::pow(1e-3, 1 / 3000.0), 1e-9);
+  const double bound = BinomialUpperBound(7, 500, 0.95);
+  EXPECT_NEAR(BinomialTail(8, 500, bound), 0.95, 1e-9);
+  EXPECT_EQ(BinomialUpperBound(5, 5, 0.95), 1);
+}
+
 TEST(AverageRotation, OfTwoIsHalfWay) {
   const Eigen::Quaterniond a = Exp({0.3, -0.2, 0.9});
   const Eigen::Vector3d step(0.4, 0.2, -0.3);

@@ -129,8 +129,10 @@ TEST_P(ChangesTest, TheNextRunIsOnSegmentsAfterItAlone) {
   EXPECT_EQ(started->trigger, RunTrigger::kChangeDetected);
   EXPECT_EQ(started->change, 1);
   EXPECT_EQ(started->base_version, 2);
+  ASSERT_FALSE(started->segments.empty());
   for (const SegmentKey& key : started->segments) {
     EXPECT_GE(key.index + 1, change.first_sequence);
+    EXPECT_GE(key.index, first_after_);
   }
   Reopen();
   const auto run = store_->GetRun("a", started->run);
