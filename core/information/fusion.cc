@@ -1,6 +1,8 @@
 #include "core/information/fusion.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
 
 #include "core/information/rig_components.h"
 #include "core/information/unobserved.h"
@@ -82,6 +84,19 @@ class FusionProblem {
     result->unobserved = std::move(observability.unobserved);
     result->segments = static_cast<int>(segments_.size());
     result->heterogeneity = Heterogeneity(covariance);
+    result->reach = Reach(result->theta);
+  }
+
+  double Reach(const Calibration& theta) const {
+    const Eigen::VectorXd unit = ReferenceSigmas(rig_)(components_.free());
+    double largest = 0;
+    for (const SegmentInformation& segment : segments_) {
+      const Eigen::VectorXd offset = BoxMinus(theta, segment.theta0);
+      const Eigen::VectorXd far =
+          offset(components_.free()).cwiseQuotient(unit);
+      largest = std::max(largest, far.squaredNorm());
+    }
+    return std::sqrt(largest / static_cast<double>(components_.free().size()));
   }
 
   // At the estimate, a segment's eta is what it would still move. Of covariance

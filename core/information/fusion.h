@@ -5,7 +5,7 @@
 // The step is as good as the linearisation: each segment stands at the states
 // of its SLAM system and at the calibration that it was scored with, and cannot
 // be linearised anew without its data. docs/concepts.md says how far that is
-// from a recalibration, and `heterogeneity` tells when it is too far.
+// from a recalibration; `reach` tells when it is too far.
 //
 // Pure functions, callable from any thread, deterministic.
 #pragma once
@@ -33,6 +33,10 @@ struct ThetaInformation {
 ThetaInformation Transport(const SegmentInformation& information,
                            const Calibration& point);
 
+// With a reach [reference sigmas] up to here, the covariance of the fused
+// estimate tells how far it is from the truth (docs/evaluation.md).
+inline constexpr double kEnoughReach = 0.5;
+
 struct FusedEstimate {
   Calibration theta;
   // D x D, tangent at theta: of the data and the prior. Zero rows for
@@ -44,9 +48,14 @@ struct FusedEstimate {
   int segments = 0;
   // How much more the segments differ than their information says: the sum of
   // (theta_i [-] theta)^2, weighted by what each knows, against its
-  // expectation. 1 where the linearisation holds and the noise is that of the
-  // rig. 0 without segments.
+  // expectation. 1 where the noise is that of the rig, whatever the reach:
+  // segments that were all scored at the same wrong calibration are wrong
+  // together. 0 without segments.
   double heterogeneity = 0;
+  // From the calibration at which a segment was scored to the estimate, in
+  // reference sigmas: rms over the free components, the largest of all
+  // segments. 0 without segments.
+  double reach = 0;
 };
 
 // The sum of all segments and of the rig's prior about rig.factory. Segments

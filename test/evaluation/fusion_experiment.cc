@@ -1,5 +1,7 @@
 // The one-step estimate from stored information of all segments against the
 // full solve on their data: how far, and when is it enough.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -16,7 +18,9 @@ namespace selfcal {
 namespace {
 
 // What a linearisation point is off by, against a factory's error.
-constexpr double kScales[] = {0.1, 0.3, 1};
+constexpr double kScales[] = {0.1, 0.3, 0.6, 1};
+
+const CheckOptions kSigmas{.unit = "sigma"};
 
 CalibrationError Scaled(double scale) {
   CalibrationError error;
@@ -50,7 +54,7 @@ struct Outcome {
   std::string dataset;
   double scale = 0;
   long segments = 0;
-  double step = 0;         // rms from linearisation to estimate [sigma_ref]
+  double reach = 0;        // from linearisation to estimate [sigma_ref]
   double to_full = 0;      // fused from full, in sigmas of the full (rms)
   double true_states = 0;  // the same, scored at the true states
   double error = 0;        // fused from truth [sigma_ref], rms
@@ -89,7 +93,7 @@ Outcome Evaluate(int dataset, double scale, double duration_s) {
   outcome.dataset = data.name;
   outcome.scale = scale;
   outcome.segments = static_cast<long>(stored.size());
-  outcome.step = rms(fused.theta, data.rig.factory);
+  outcome.reach = fused.reach;
   outcome.to_full =
       std::sqrt(SquareDistance(fused.theta, full.theta, full.covariance));
   outcome.true_states =
@@ -102,10 +106,30 @@ Outcome Evaluate(int dataset, double scale, double duration_s) {
   return outcome;
 }
 
+void PlotDistances(const std::vector<Outcome>& all, const Context& context) {
+  Plot plot{.title = "The fused estimate, by how far it was linearised",
+            .x_label = "reach [sigma_ref]",
+            .y_label = "distance [sigma of the full solve]",
+            .log_x = true,
+            .log_y = true,
+            .horizontal = {1}};
+  Series from_full{.label = "fused from full", .style = SeriesStyle::kScatter};
+  Series at_truth{.label = "the same, scored at true states",
+                  .style = SeriesStyle::kScatter};
+  for (const Outcome& one : all) {
+    from_full.x.push_back(one.reach);
+    from_full.y.push_back(one.to_full);
+    at_truth.x.push_back(one.reach);
+    at_truth.y.push_back(one.true_states);
+  }
+  plot.series = {from_full, at_truth};
+  context.WritePlot("distance", plot);
+}
+
 }  // namespace
 
 void RunFusion(Context* context) {
-  const int datasets = context->quick() ? 1 : 4;
+  const int datasets = context->quick() ? 1 : 10;
   const double duration_s = context->quick() ? 16.1 : 80.1;
   const int scales = static_cast<int>(std::size(kScales));
   std::vector<Outcome> all(datasets * scales);
@@ -116,7 +140,7 @@ void RunFusion(Context* context) {
   ResultTable table({"linearisation error / factory's",
                      "dataset",
                      "segments",
-                     "step [sigma_ref]",
+                     "reach [sigma_ref]",
                      "fused from full [sigma]",
                      "at true states [sigma]",
                      "fused from truth [sigma_ref]",
@@ -128,7 +152,7 @@ void RunFusion(Context* context) {
     table.Add({one.scale,
                one.dataset,
                one.segments,
-               one.step,
+               one.reach,
                one.to_full,
                one.true_states,
                one.error,
@@ -138,6 +162,29 @@ void RunFusion(Context* context) {
                one.heterogeneity});
   }
   context->WriteTable("fusion", table);
+  PlotDistances(all, *context);
+  for (const double scale : kScales) {
+    std::vector<double> to_full, nees;
+    for (const Outcome& one : all) {
+      if (one.scale != scale) continue;
+      to_full.push_back(one.to_full);
+      nees.push_back(one.nees);
+    }
+    const std::string at = fmt::format("_at_{:g}", scale);
+    // Nearer to the full solve than that is to the truth.
+    context->AtMost("fusion.from_full" + at, Rms(to_full), 1, kSigmas);
+    context->AtMost("fusion.nees_by_dof" + at, Mean(nees), 1.25);
+  }
+  // The rule for use: a reach that is short enough.
+  double largest = 0;
+  long enough = 0;
+  for (const Outcome& one : all) {
+    if (one.reach > kEnoughReach) continue;
+    ++enough;
+    largest = std::max(largest, one.to_full);
+  }
+  context->AtLeast("fusion.datasets_in_reach", static_cast<double>(enough), 1);
+  context->AtMost("fusion.from_full_in_reach_largest", largest, 1.5, kSigmas);
 }
 
 }  // namespace selfcal

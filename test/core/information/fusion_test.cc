@@ -162,12 +162,26 @@ TEST(Fuse, HeterogeneityIsTheFactorOfTheVariance) {
   }
 }
 
+TEST(Fuse, ReachIsTheWayFromTheFarthestScore) {
+  std::mt19937 random(7);
+  const Rig rig = AllEstimated(HandheldRig("handheld"));
+  const Eigen::VectorXd unit = ReferenceSigmas(rig);
+  std::vector<SegmentInformation> segments;
+  for (const double sigmas : {0.1, -0.7, 0.3}) {
+    const Calibration theta0 = BoxPlus(rig.factory, sigmas * unit);
+    segments.push_back(
+        LinearSegment(rig, theta0, rig.factory, 1000, 1000, 1e-3, &random));
+  }
+  EXPECT_NEAR(Fuse(rig, segments).reach, 0.7, 0.02);
+}
+
 TEST(Fuse, WithoutSegmentsIsThePrior) {
   const Rig rig = AllEstimated(HandheldRig("handheld"));
   const FusedEstimate fused = Fuse(rig, {});
   EXPECT_EQ(fused.rank, 0);
   EXPECT_EQ(fused.segments, 0);
   EXPECT_EQ(fused.heterogeneity, 0);
+  EXPECT_EQ(fused.reach, 0);
   EXPECT_EQ(static_cast<int>(fused.unobserved.size()),
             TangentSize(rig.factory));
   EXPECT_EQ(BoxMinus(fused.theta, rig.factory).norm(), 0);
