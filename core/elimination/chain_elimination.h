@@ -53,7 +53,9 @@ using ChainStateMatrix =
 // Six rows (by_bias b + by_kept x + residual), one for each component of the
 // biases of a keyframe and of six kept unknowns x.
 struct KeptBiasRows {
-  Eigen::Matrix<double, 6, 1> by_bias, by_kept, residual;
+  Eigen::Matrix<double, 6, 1> by_bias = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 1> by_kept = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 1> residual = Eigen::Matrix<double, 6, 1>::Zero();
 };
 
 // What the chain says about the shared parameters: minimising over all else
@@ -63,6 +65,19 @@ struct SharedInformation {
   Eigen::MatrixXd Lambda;  // symmetric
   Eigen::VectorXd eta;
   double constant = 0;
+};
+
+// What is known of a chain once all factors have spoken, given the step and the
+// covariance of the shared parameters.
+struct ChainPosterior {
+  // The noise e of each link: the one that minimises, and its covariance,
+  // between zero and the identity that it was before.
+  std::vector<ChainStateVector> noise;
+  std::vector<ChainStateMatrix> noise_covariance;
+  std::vector<ChainStateMatrix> state_covariance;  // of each keyframe
+  // 15 x shared_size(): of the first and of the last keyframe with what is
+  // shared.
+  Eigen::MatrixXd first_with_shared, last_with_shared;
 };
 
 // Who sees what: as ChainStructure::Find takes it, and for each camera the
@@ -116,12 +131,21 @@ class ChainElimination {
                  std::vector<ChainStateVector>* states,
                  std::vector<Eigen::Vector3d>* landmarks) const;
 
+  // The same way back for covariances; `states` as FindSteps gives them for the
+  // step of the shared parameters.
+  void FindPosterior(const Eigen::VectorXd& shared,
+                     const Eigen::MatrixXd& shared_covariance,
+                     const std::vector<ChainStateVector>& states,
+                     ChainPosterior* posterior) const;
+
   // Link parameters, landmark parameters, what is kept.
   int shared_size() const {
     return kChainLinkShared + landmark_shared_ + kept_;
   }
 
  private:
+  class CovarianceWalk;
+
   void LayOut(const ChainShape& shape);
   void PlacePanels(const ChainShape& shape);
   void ExpandGram(int keyframe, int camera, const PoseRotation* by_rotation);
@@ -145,6 +169,10 @@ class ChainElimination {
   void AddPosesWithFixed(const ChainTransition& link);
   void EliminateByItself();
   void RecordStep(const ChainTransition* link);
+  Eigen::VectorXd SharedInPlaces(const Eigen::VectorXd& shared) const;
+  void PlaceStates(int keyframe,
+                   const std::vector<ChainStateVector>& states,
+                   Eigen::VectorXd* z) const;
 
   double* Row(std::vector<double>* panel, int k) const {
     return panel->data() + k * panel_stride_;
@@ -224,6 +252,7 @@ class ChainElimination {
       Eigen::Matrix<double, 16, 16>::Zero();
   alignas(64) double root_[kChainStateSize][16] = {};  // A L^-T
   alignas(64) double root_transposed_[kChainStateSize][16] = {};
+  double factor_[kChainStateSize][16] = {};  // L^T, the upper triangle
   int panel_stride_ = 0;
   std::vector<double> coupling_, substituted_, product_, half_, link_terms_;
 
@@ -231,6 +260,7 @@ class ChainElimination {
     std::size_t product;  // of its P in products_
     int stride;
     double root[kChainStateSize][16];
+    double factor[kChainStateSize][16];
     bool linked;
     ChainTransition link;
   };

@@ -124,6 +124,7 @@ void ChainElimination::FindRoot(double (*M)[16], double (*panel)[16]) {
     for (int j = 0; j < kState; ++j) {
       root_[i][j] = panel[j][i];
       root_transposed_[i][j] = panel[i][j];
+      factor_[i][j] = M[i][j];
     }
   }
 }
@@ -219,6 +220,7 @@ void ChainElimination::RecordStep(const ChainTransition* link) {
   step.linked = link != nullptr;
   if (link != nullptr) step.link = *link;
   std::memcpy(step.root, root_, sizeof(root_));
+  std::memcpy(step.factor, factor_, sizeof(factor_));
   for (int k = 0; k < kState; ++k) {
     const double* row = Row(&product_, k);
     products_.insert(products_.end(), row, row + size);

@@ -18,6 +18,29 @@ using RowMajorPanel =
 
 }  // namespace
 
+// Values in the places of a panel, without those of states.
+Eigen::VectorXd ChainElimination::SharedInPlaces(
+    const Eigen::VectorXd& shared) const {
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(panel_stride_);
+  for (int i = 0; i < shared_size(); ++i) z(Place(i)) = shared(i);
+  z(constant_) = 1;
+  return z;
+}
+
+// The states that were in the front when a keyframe had been eliminated.
+void ChainElimination::PlaceStates(int k,
+                                   const std::vector<ChainStateVector>& states,
+                                   Eigen::VectorXd* z) const {
+  const std::span<const int> poses = structure_.Poses(k);
+  for (std::size_t s = 1; s < poses.size(); ++s) {
+    z->segment<kPose>(fixed_ + (s - 1) * kPose) =
+        states[poses[s]].head<kPose>();
+  }
+  if (k + 1 < structure_.keyframes()) {
+    z->segment<kMotion>(kMotionPlace) = states[k + 1].tail<kMotion>();
+  }
+}
+
 void ChainElimination::FindSteps(
     const Eigen::VectorXd& shared,
     std::vector<ChainStateVector>* states,
@@ -25,21 +48,11 @@ void ChainElimination::FindSteps(
   const int keyframes = structure_.keyframes();
   states->resize(keyframes);
   landmarks->resize(landmarks_count_);
-  // Values in the places of a panel.
-  Eigen::VectorXd z = Eigen::VectorXd::Zero(panel_stride_);
-  for (int i = 0; i < shared_size(); ++i) z(Place(i)) = shared(i);
-  z(constant_) = 1;
+  Eigen::VectorXd z = SharedInPlaces(shared);
 
   for (int k = keyframes - 1; k >= 0; --k) {
     const Step& step = steps_[k];
-    const std::span<const int> poses = structure_.Poses(k);
-    for (std::size_t s = 1; s < poses.size(); ++s) {
-      z.segment<kPose>(fixed_ + (s - 1) * kPose) =
-          (*states)[poses[s]].head<kPose>();
-    }
-    if (k + 1 < keyframes) {
-      z.segment<kMotion>(kMotionPlace) = (*states)[k + 1].tail<kMotion>();
-    }
+    PlaceStates(k, *states, &z);
     const Eigen::Map<const RowMajorPanel> P(
         &products_[step.product], kState, step.stride);
     const auto root =

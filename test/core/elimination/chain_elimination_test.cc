@@ -43,6 +43,14 @@ std::vector<RandomChainShape> Shapes() {
   return shapes;
 }
 
+// Of the dense problem.
+int FirstLinkRow(const Chain& chain) {
+  std::size_t observations = 0;
+  for (const auto& track : chain.landmarks) observations += track.size();
+  return static_cast<int>(3 * chain.landmarks.size() + 2 * observations) +
+         kChainStateSize * chain.keyframes();
+}
+
 // Calls check(elimination) for every width of this machine.
 template <typename Check>
 void ForAllWidths(const Check& check) {
@@ -98,6 +106,55 @@ TEST(ChainElimination, FindsTheStepsThatMinimise) {
         at += kChainStateSize;
       }
       EXPECT_LT(RelativeError(actual, expected), 1e-8);
+    }
+  });
+}
+
+TEST(ChainElimination, FindsThePosterior) {
+  ForAllWidths([](ChainElimination* elimination) {
+    std::mt19937 random(10);
+    for (const RandomChainShape& shape : Shapes()) {
+      const Chain chain = RandomChain(shape, &random);
+      Eliminate(chain, elimination, ChainElimination::Record::kSteps);
+      const DenseProblem dense = MakeDense(chain);
+      const int D = chain.shared_size();
+      // Shared parameters as the chain knows them, but for what it does not.
+      Eigen::MatrixXd H = dense.J.transpose() * dense.J;
+      H.bottomRightCorner(D, D).diagonal().array() += 1;
+      const Eigen::MatrixXd covariance = H.inverse();
+      const Eigen::VectorXd step = -covariance * dense.J.transpose() * dense.r;
+
+      std::vector<ChainStateVector> states;
+      std::vector<Eigen::Vector3d> landmarks;
+      elimination->FindSteps(step.tail(D), &states, &landmarks);
+      ChainPosterior posterior;
+      elimination->FindPosterior(
+          step.tail(D), covariance.bottomRightCorner(D, D), states, &posterior);
+      const int first = 3 * static_cast<int>(chain.landmarks.size());
+      const int last = chain.keyframes() - 1;
+      for (int k = 0; k <= last; ++k) {
+        const int at = first + kChainStateSize * k;
+        EXPECT_LT(RelativeError(posterior.state_covariance[k],
+                                covariance.block<15, 15>(at, at)),
+                  1e-8);
+      }
+      EXPECT_LT(RelativeError(
+                    posterior.first_with_shared,
+                    covariance.block(first, first + 15 * (last + 1), 15, D)),
+                1e-8);
+      EXPECT_LT(
+          RelativeError(posterior.last_with_shared,
+                        covariance.block(
+                            first + 15 * last, first + 15 * (last + 1), 15, D)),
+          1e-8);
+      for (int k = 0; k < last; ++k) {
+        const auto J = dense.J.middleRows<15>(FirstLinkRow(chain) + 15 * k);
+        const auto r = dense.r.segment<15>(FirstLinkRow(chain) + 15 * k);
+        EXPECT_LT(RelativeError(posterior.noise[k], r + J * step), 1e-8);
+        EXPECT_LT(RelativeError(posterior.noise_covariance[k],
+                                J * covariance * J.transpose()),
+                  1e-8);
+      }
     }
   });
 }

@@ -1,0 +1,283 @@
+// The way back through a chain for covariances: from that of the shared
+// parameters to those of the states and of the noise of the links.
+//
+// Given the front z that was left when a state went, the state is C z + noise
+// of covariance root root^T, and the noise of its link -L^-T (P z + noise of
+// unit covariance). All that was in the front before is the state, or in the
+// front still.
+#include <Eigen/Core>
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "core/elimination/chain_elimination.h"
+#include "core/elimination/chain_places.h"
+
+namespace selfcal {
+
+using namespace chain;
+
+namespace {
+
+template <int columns>
+using RowMajorState =
+    Eigen::Map<const Eigen::Matrix<double, kState, columns, Eigen::RowMajor>>;
+using RowMajorPanel = Eigen::Map<
+    const Eigen::
+        Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>,
+    0,
+    Eigen::OuterStride<>>;
+
+// Where poses stand while they are in the front, the first free place first.
+class PosePlaces {
+ public:
+  explicit PosePlaces(int places) : keyframes_(places, kFree) {}
+
+  int Find(int keyframe) const {
+    return static_cast<int>(
+        std::find(keyframes_.begin(), keyframes_.end(), keyframe) -
+        keyframes_.begin());
+  }
+  int Enter(int keyframe) {
+    const int place = Find(kFree);
+    keyframes_[place] = keyframe;
+    return place;
+  }
+  // Frees all places but those of `keyframes`.
+  void Keep(std::span<const int> keyframes) {
+    for (int& at : keyframes_) {
+      if (std::find(keyframes.begin(), keyframes.end(), at) ==
+          keyframes.end()) {
+        at = kFree;
+      }
+    }
+  }
+  // The first place after which all are free.
+  int end() const {
+    int end = static_cast<int>(keyframes_.size());
+    while (end > 0 && keyframes_[end - 1] == kFree) --end;
+    return end;
+  }
+
+ private:
+  static constexpr int kFree = -1;
+  std::vector<int> keyframes_;
+};
+
+}  // namespace
+
+// The covariance of the front, in places: what is fixed as in a panel, then
+// poses, each in one place as long as it is there. What stands in other places
+// is finite, and counts nowhere.
+class ChainElimination::CovarianceWalk {
+ public:
+  CovarianceWalk(const ChainElimination& chain, const Eigen::MatrixXd& shared)
+      : chain_(chain),
+        poses_(chain.structure_.max_slots()),
+        stride_(
+            WholeVectors(chain.fixed_ + chain.structure_.max_slots() * kPose) +
+            kZeros),
+        covariance_(static_cast<std::size_t>(stride_) * stride_, 0.0),
+        product_(static_cast<std::size_t>(kState) * stride_, 0.0),
+        with_front_(product_),
+        panel_(static_cast<std::size_t>(stride_) * kTileState, 0.0) {
+    for (int j = 0; j < chain.shared_size(); ++j) {
+      for (int i = 0; i < chain.shared_size(); ++i) {
+        At(chain.Place(i), chain.Place(j)) = shared(i, j);
+      }
+    }
+  }
+
+  // Goes back over the elimination of keyframe k.
+  void Step(int k) {
+    const ChainElimination::Step& step = chain_.steps_[k];
+    const std::span<const int> poses = chain_.structure_.Poses(k);
+    size_ = chain_.fixed_ + poses_.end() * kPose;
+    SetPanel(step, poses);
+    Multiply(step, poses);
+    SetState(step, poses);
+  }
+  // Before keyframe k - 1: k takes its place, and what was not in the front
+  // then leaves it.
+  void Enter(int k) {
+    poses_.Keep(chain_.structure_.Poses(k - 1).subspan(1));
+    const int pose = chain_.fixed_ + poses_.Enter(k) * kPose;
+    const auto put = [&](int m, int place) {
+      const double* row = &with_front_[m * stride_];
+      std::copy_n(row, size_, &At(0, place));
+      for (int i = 0; i < size_; ++i) At(place, i) = row[i];
+    };
+    const auto place = [&](int m) {
+      return m < kPose ? pose + m : kMotionPlace + m - kPose;
+    };
+    for (int m = 0; m < kState; ++m) put(m, place(m));
+    for (int j = 0; j < kState; ++j) {
+      for (int i = 0; i < kState; ++i) At(place(i), place(j)) = state_(i, j);
+    }
+  }
+
+  const ChainStateMatrix& state() const { return state_; }
+  // Of the noise of its link.
+  ChainStateMatrix Noise(const ChainElimination::Step& step) const {
+    const auto factor = RowMajorState<kTileState>(&step.factor[0][0])
+                            .leftCols<kState>()
+                            .triangularView<Eigen::Upper>();
+    const ChainStateMatrix half =
+        factor.solve(ChainStateMatrix::Identity() + ByPanel(product_));
+    return factor.solve(half.transpose().eval());
+  }
+  Eigen::MatrixXd WithShared() const {
+    Eigen::MatrixXd columns(kState, chain_.shared_size());
+    for (int i = 0; i < chain_.shared_size(); ++i) {
+      for (int m = 0; m < kState; ++m) {
+        columns(m, i) = with_front_[m * stride_ + chain_.Place(i)];
+      }
+    }
+    return columns;
+  }
+
+ private:
+  double& At(int i, int j) {
+    return covariance_[static_cast<std::size_t>(j) * stride_ + i];
+  }
+  int PlaceOf(int keyframe) const {
+    return chain_.fixed_ + poses_.Find(keyframe) * kPose;
+  }
+
+  // The transpose of P, in places.
+  void SetPanel(const ChainElimination::Step& step,
+                std::span<const int> poses) {
+    std::fill_n(panel_.begin(), size_ * kTileState, 0.0);
+    const double* P = &chain_.products_[step.product];
+    const auto copy = [&](int from, int to, int count) {
+      for (int i = 0; i < count; ++i) {
+        for (int k = 0; k < kState; ++k) {
+          panel_[(to + i) * kTileState + k] = P[k * step.stride + from + i];
+        }
+      }
+    };
+    copy(0, 0, chain_.fixed_);
+    for (std::size_t s = 1; s < poses.size(); ++s) {
+      copy(chain_.fixed_ + static_cast<int>(s - 1) * kPose,
+           PlaceOf(poses[s]),
+           kPose);
+    }
+  }
+
+  // product_ = P covariance, and with_front_ = (G - root P) covariance.
+  void Multiply(const ChainElimination::Step& step,
+                std::span<const int> poses) {
+    alignas(64) double root[kState][kTileState] = {};
+    alignas(64) double G[kKeptPlace + kPose][kTileState] = {};
+    for (int i = 0; i < kState; ++i) {
+      for (int j = 0; j < kState; ++j) root[j][i] = step.root[i][j];
+      if (!step.linked) continue;
+      for (int c = 0; c < kKeptPlace; ++c) G[c][i] = step.link.G[i][c];
+      for (int c = 0; c < kPose; ++c) {
+        G[kKeptPlace + c][i] = step.link.G[i][kTransitionNextPose + c];
+      }
+    }
+    const int next =
+        step.linked ? PlaceOf(poses[1]) : 0;  // G is zero without a link
+    chain_.WithKernels([&](auto kernels) {
+      kernels.SetProduct({covariance_.data(), stride_},
+                         size_,
+                         {panel_.data(), kTileState},
+                         kState,
+                         size_,
+                         {product_.data(), stride_});
+      kernels.SetProduct({covariance_.data(), stride_},
+                         size_,
+                         {&G[0][0], kTileState},
+                         kState,
+                         kKeptPlace,
+                         {with_front_.data(), stride_});
+      kernels.AddProduct(1,
+                         {&At(0, next), stride_},
+                         size_,
+                         {&G[kKeptPlace][0], kTileState},
+                         kState,
+                         kPose,
+                         {with_front_.data(), stride_});
+      kernels.AddProduct(-1,
+                         {product_.data(), stride_},
+                         size_,
+                         {&root[0][0], kTileState},
+                         kState,
+                         kState,
+                         {with_front_.data(), stride_});
+    });
+  }
+
+  // The product of rows over the front with the transpose of P.
+  ChainStateMatrix ByPanel(const std::vector<double>& rows) const {
+    return RowMajorPanel(
+               rows.data(), kState, size_, Eigen::OuterStride<>(stride_)) *
+           RowMajorPanel(
+               panel_.data(), size_, kState, Eigen::OuterStride<>(kTileState));
+  }
+
+  // with_front_ (G - root P)^T, and what the state has of its own.
+  void SetState(const ChainElimination::Step& step,
+                std::span<const int> poses) {
+    const auto root =
+        RowMajorState<kTileState>(&step.root[0][0]).leftCols<kState>();
+    state_ = (root - ByPanel(with_front_)) * root.transpose();
+    if (step.linked) {
+      const RowMajorState<32> G(&step.link.G[0][0]);
+      const RowMajorPanel with_front(
+          with_front_.data(), kState, size_, Eigen::OuterStride<>(stride_));
+      state_ += with_front.leftCols<kKeptPlace>() *
+                    G.leftCols<kKeptPlace>().transpose() +
+                with_front.middleCols<kPose>(PlaceOf(poses[1])) *
+                    G.middleCols<kPose>(kTransitionNextPose).transpose();
+    }
+    state_ = (0.5 * (state_ + state_.transpose())).eval();
+  }
+
+  const ChainElimination& chain_;
+  PosePlaces poses_;
+  const int stride_;
+  int size_ = 0;  // of the front, in places
+  std::vector<double> covariance_;
+  // 15 rows over the front: P covariance, and the covariance of the state with
+  // the front.
+  std::vector<double> product_, with_front_;
+  std::vector<double> panel_;
+  ChainStateMatrix state_;
+};
+
+void ChainElimination::FindPosterior(
+    const Eigen::VectorXd& shared,
+    const Eigen::MatrixXd& shared_covariance,
+    const std::vector<ChainStateVector>& states,
+    ChainPosterior* posterior) const {
+  const int keyframes = structure_.keyframes();
+  posterior->noise.resize(keyframes - 1);
+  posterior->noise_covariance.resize(keyframes - 1);
+  posterior->state_covariance.resize(keyframes);
+  Eigen::VectorXd z = SharedInPlaces(shared);
+  CovarianceWalk walk(*this, shared_covariance);
+  for (int k = keyframes - 1; k >= 0; --k) {
+    const Step& step = steps_[k];
+    walk.Step(k);
+    posterior->state_covariance[k] = walk.state();
+    if (k + 1 == keyframes) posterior->last_with_shared = walk.WithShared();
+    if (k == 0) posterior->first_with_shared = walk.WithShared();
+    if (step.linked) {
+      PlaceStates(k, states, &z);
+      const RowMajorPanel P(&products_[step.product],
+                            kState,
+                            step.stride,
+                            Eigen::OuterStride<>(step.stride));
+      posterior->noise[k] = -RowMajorState<kTileState>(&step.factor[0][0])
+                                 .leftCols<kState>()
+                                 .triangularView<Eigen::Upper>()
+                                 .solve(P * z.head(step.stride));
+      posterior->noise_covariance[k] = walk.Noise(step);
+    }
+    if (k > 0) walk.Enter(k);
+  }
+}
+
+}  // namespace selfcal
