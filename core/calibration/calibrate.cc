@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/calibration/noise_factors.h"
 #include "core/calibration/partition.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/screening.h"
@@ -363,10 +364,13 @@ class Calibrator {
     result_.Lambda = linearised_.system.information().Lambda;
     result_.rank = static_cast<int>(subspace_.estimated.cols());
     result_.held_constant = subspace_.unobserved;
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    result_.noise_factors =
+        EstimateNoiseFactors(Round(basis), estimate_, screening_.landmarks);
     // As the cost before: not weighted by what is known of tracks since.
     SetTrackNoise(1, &screening_);
-    result_.final_cost = RoundCost(
-        Round(TangentBasis(rig_, subspace_)), estimate_, screening_.landmarks);
+    result_.final_cost =
+        RoundCost(Round(basis), estimate_, screening_.landmarks);
     const ReprojectionStatistics after = Measure();
     result_.reprojection_rms_after_px = after.rms_px;
     result_.reprojection_median_after_px = after.median_px;

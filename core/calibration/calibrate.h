@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/noise_factor.h"
 #include "core/calibration/theta_prior.h"
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
@@ -90,6 +91,9 @@ struct CalibrationResult {
   int landmarks_dropped = 0;
   int observations = 0;  // used
   int observations_dropped = 0;
+  // By what the rig's noise is off, one of each kind (noise_factors.h); empty
+  // where that cannot be told.
+  std::vector<NoiseFactor> noise_factors;
 };
 
 // Calibrates on the segments (valid for the rig, distinct keys, any order),

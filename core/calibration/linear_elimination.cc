@@ -10,21 +10,6 @@ namespace {
 
 double Information(double sigma) { return 1 / (sigma * sigma); }
 
-// Half of a walk from a to b, between the biases of one of them and those in
-// its middle: twice the information, and half of what the whole is off.
-KeptBiasRows HalfWalk(const BiasLink& link,
-                      const KeyframeState& a,
-                      const KeyframeState& b,
-                      double sign_of_bias) {
-  const Eigen::Matrix<double, 6, 1> weight =
-      std::sqrt(2.0) * link.sigmas.cwiseInverse();
-  Eigen::Matrix<double, 6, 1> off;
-  off << b.b_a - a.b_a, b.b_g - a.b_g;
-  return {.by_bias = sign_of_bias * weight,
-          .by_kept = -sign_of_bias * weight,
-          .residual = 0.5 * weight.cwiseProduct(off)};
-}
-
 // By (alpha, beta, rho), of a step of p_G = a + R (alpha, beta, 1) / rho.
 Eigen::Vector3d PlaceStep(const LandmarkPlace& place,
                           double rho,
@@ -58,22 +43,18 @@ void LinearSystem::AddLandmarkPriors(
   }
 }
 
-void LinearSystem::EliminateKeyframes(const CalibrationProblem& problem,
-                                      Chain* chain) {
-  const std::vector<KeyframeState>& x = *keyframes_;
-  const auto keep_half = [&](const Chain::Walk& walk, double sign_of_bias) {
+void LinearSystem::EliminateKeyframes(Chain* chain) {
+  const auto keep_half = [&](const Chain::Walk& walk) {
     if (walk.link == kNone) return;
-    const BiasLink& link = problem.bias_links[walk.link];
-    chain->elimination.AddKeptBias(
-        walk.kept, HalfWalk(link, x[link.before], x[link.after], sign_of_bias));
+    chain->elimination.AddKeptBias(walk.kept, walk.rows);
   };
   for (int k = chain->range.begin; k < chain->range.end; ++k) {
     if (has_prior_[k]) chain->elimination.AddPrior(priors_[k]);
-    if (k == chain->range.begin) keep_half(chain->walk_in, 1);
+    if (k == chain->range.begin) keep_half(chain->walk_in);
     if (k + 1 == chain->range.end) break;
     chain->elimination.Advance(transitions_[inertial_after_[k]]);
   }
-  keep_half(chain->walk_out, -1);
+  keep_half(chain->walk_out);
   chain->elimination.Finish(&of_chain_);
 }
 
@@ -161,6 +142,7 @@ void LinearSystem::Linearise(const Rig& rig,
   for (const InertialTransition& transition : transitions_) {
     for (const double r : transition.whitened) decrease_ += r * r;
   }
+  motion_squares_ += decrease_;
 
   const int size = TangentSize(theta);
   information_.Lambda.setZero(size, size);
@@ -178,10 +160,16 @@ void LinearSystem::Linearise(const Rig& rig,
                             ChainElimination::Record::kSteps);
     AddViews(&chain);
     AddLandmarkPriors(landmarks, &chain);
-    EliminateKeyframes(problem, &chain);
+    EliminateKeyframes(&chain);
     AddChain(chain);
   }
   SolveInterface(landmarks);
+}
+
+Eigen::VectorXd LinearSystem::InterfaceStep(
+    const Eigen::VectorXd& theta_step) const {
+  if (interface_size_ == 0) return Eigen::VectorXd(0);
+  return interface_root_.solve(interface_eta_ - interface_theta_ * theta_step);
 }
 
 void LinearSystem::FindSteps(const Eigen::VectorXd& theta_step,
@@ -189,11 +177,7 @@ void LinearSystem::FindSteps(const Eigen::VectorXd& theta_step,
                              std::vector<Eigen::Vector3d>* landmarks) const {
   keyframes->clear();
   landmarks->assign(places_.size(), Eigen::Vector3d::Zero());
-  Eigen::VectorXd interface(interface_size_);
-  if (interface_size_ > 0) {
-    interface =
-        interface_root_.solve(interface_eta_ - interface_theta_ * theta_step);
-  }
+  const Eigen::VectorXd interface = InterfaceStep(theta_step);
   Eigen::VectorXd shared;
   std::vector<ChainStateVector> of_chain;
   std::vector<Eigen::Vector3d> points;

@@ -52,6 +52,21 @@ double UsedInverseDepth(const LandmarkPlace& place) {
   return std::abs(rho) < kLeastInverseDepth ? kLeastInverseDepth : rho;
 }
 
+// Half of a walk from a to b, between the biases of one of them and those in
+// its middle: twice the information, and half of what the whole is off.
+KeptBiasRows HalfWalk(const BiasLink& link,
+                      const KeyframeState& a,
+                      const KeyframeState& b,
+                      double sign_of_bias) {
+  const Eigen::Matrix<double, 6, 1> weight =
+      std::sqrt(2.0) * link.sigmas.cwiseInverse();
+  Eigen::Matrix<double, 6, 1> off;
+  off << b.b_a - a.b_a, b.b_g - a.b_g;
+  return {.by_bias = sign_of_bias * weight,
+          .by_kept = -sign_of_bias * weight,
+          .residual = 0.5 * weight.cwiseProduct(off)};
+}
+
 }  // namespace
 
 std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem) {
@@ -179,6 +194,7 @@ void LinearSystem::Weigh(const RobustLoss* loss) {
       const double weight = loss != nullptr ? loss->Weight(s) : 1;
       if (weight < kLeastWeight) continue;
       seen.weight = std::sqrt(seen.share * weight) * inverse_sigma;
+      seen.square = seen.share * weight * s;
     }
   }
 }
@@ -249,13 +265,20 @@ void LinearSystem::FindTracks() {
 }
 
 void LinearSystem::KeepWalks(const CalibrationProblem& problem) {
+  const std::vector<KeyframeState>& x = *keyframes_;
+  motion_squares_ = 0;
   for (std::size_t i = 0; i < problem.bias_links.size(); ++i) {
     const BiasLink& link = problem.bias_links[i];
     const int index = static_cast<int>(i);
     Chain& before = chains_[chain_of_keyframe_[link.before]];
     Chain& after = chains_[chain_of_keyframe_[link.after]];
-    before.walk_out = {index, KeepInChain(interface_size_, 6, &before)};
-    after.walk_in = {index, KeepInChain(interface_size_, 6, &after)};
+    const auto half = [&](double sign_of_bias) {
+      return HalfWalk(link, x[link.before], x[link.after], sign_of_bias);
+    };
+    before.walk_out = {
+        index, KeepInChain(interface_size_, 6, &before), half(-1)};
+    after.walk_in = {index, KeepInChain(interface_size_, 6, &after), half(1)};
+    motion_squares_ += 2 * after.walk_in.rows.residual.squaredNorm();
     interface_size_ += 6;
   }
 }

@@ -41,6 +41,30 @@ struct KeyframeChain {
 
 std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem);
 
+// What is left unknown of a linear system once all factors have spoken, kind by
+// kind: squares of whitened residuals at the minimum, and how much of each the
+// unknowns absorb, the trace of its hat matrix.
+struct LinearPosterior {
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+  // Of each inertial link: its whitened residual, and the covariance of that.
+  std::vector<ChainStateVector> inertial;
+  std::vector<ChainStateMatrix> inertial_covariance;
+  // Summed over bias links, by component. The redundancy is the number of links
+  // less what is absorbed.
+  Vector6 walk_squares, walk_redundancy;
+  int walk_rows = 0;  // each walk is two, by an unknown in its middle
+  double prior_squares = 0, prior_absorbed = 0;  // weak priors and gauge
+  // Reprojections, and the weak prior of each landmark.
+  double pixel_squares = 0;
+  // Each observation counts with the weight that screening gave it, not with
+  // that of the loss; so do landmarks.
+  double weighted_observations = 0, weighted_landmarks = 0;
+  int observations = 0;
+  int landmarks = 0;
+  int unknowns = 0;  // all but theta
+};
+
 class LinearSystem {
  public:
   explicit LinearSystem(VectorWidth width = WidestVectors())
@@ -77,6 +101,13 @@ class LinearSystem {
                  std::vector<ChainStateVector>* keyframes,
                  std::vector<Eigen::Vector3d>* landmarks) const;
 
+  // For a step of theta of the given covariance. `landmarks` as they were
+  // linearised.
+  LinearPosterior FindPosterior(
+      const Eigen::VectorXd& theta_step,
+      const Eigen::MatrixXd& theta_covariance,
+      const std::vector<ScreenedLandmark>& landmarks) const;
+
  private:
   static constexpr int kNone = -1;
 
@@ -96,6 +127,7 @@ class LinearSystem {
     struct Walk {
       int link = kNone;
       int kept = 0;
+      KeptBiasRows rows;
     };
     Walk walk_in, walk_out;
   };
@@ -106,6 +138,7 @@ class LinearSystem {
     Eigen::Vector2d z_px;
     double share = 1;   // what screening leaves of it
     double weight = 0;  // of its rows; 0: it says nothing
+    double square = 0;  // of its rows
     int factor = -1;    // index into the tracks of its chain
   };
 
@@ -113,6 +146,18 @@ class LinearSystem {
   void AddToTrack(int chain, int landmark, std::span<Seen> seen);
   int KeepInChain(int place, int size, Chain* chain);
   void KeepWalks(const CalibrationProblem& problem);
+  Eigen::VectorXd InterfaceStep(const Eigen::VectorXd& theta_step) const;
+  Eigen::MatrixXd SharedCovariance(
+      const Eigen::MatrixXd& theta_covariance) const;
+  void AddWalk(const Chain::Walk& walk,
+               const ChainStateVector& step,
+               const ChainStateMatrix& covariance,
+               const Eigen::MatrixXd& with_shared,
+               const Eigen::VectorXd& shared_step,
+               const Eigen::MatrixXd& shared_covariance,
+               LinearPosterior* posterior) const;
+  void AddLandmarks(const std::vector<ScreenedLandmark>& landmarks,
+                    LinearPosterior* posterior) const;
   void AddChain(const Chain& chain);
   void SolveInterface(const std::vector<ScreenedLandmark>& landmarks);
   void PlaceLandmarks(const std::vector<ScreenedLandmark>& landmarks);
@@ -130,7 +175,7 @@ class LinearSystem {
                         int landmark) const;
   void AddLandmarkPriors(const std::vector<ScreenedLandmark>& landmarks,
                          Chain* chain);
-  void EliminateKeyframes(const CalibrationProblem& problem, Chain* chain);
+  void EliminateKeyframes(Chain* chain);
   // The observations of a view that `keep` wants, as arrays.
   template <typename Keep>
   ObservationRun Gather(int view, const Keep& keep);
@@ -141,6 +186,7 @@ class LinearSystem {
   std::vector<Chain> chains_;
   SharedInformation information_, of_chain_;
   double decrease_ = 0;
+  double motion_squares_ = 0;  // of inertial factors and walks
 
   // Of the estimate at hand.
   const Rig* rig_ = nullptr;

@@ -83,22 +83,10 @@ struct Trial {
   double cost = 0;
 };
 
-// U with U^-1 = W.
-InertialNoiseRoot RootOf(const InertialMatrix& W) {
-  const Eigen::Matrix<double, 9, 9> U =
-      W.topLeftCorner<9, 9>().triangularView<Eigen::Upper>().solve(
-          Eigen::Matrix<double, 9, 9>::Identity());
-  InertialNoiseRoot root;
-  for (int i = 0; i < 9; ++i) {
-    for (int j = 0; j < 9; ++j) root.motion[i][j] = U(i, j);
-  }
-  for (int i = 0; i < 6; ++i) root.bias[i] = 1 / W(9 + i, 9 + i);
-  return root;
-}
-
 std::vector<InertialNoiseRoot> RootsOf(const SolverRound& round) {
   std::vector<InertialNoiseRoot> roots;
-  for (const InertialMatrix& W : round.whitening) roots.push_back(RootOf(W));
+  for (const InertialMatrix& W : round.whitening)
+    roots.push_back(NoiseRootOf(W));
   return roots;
 }
 

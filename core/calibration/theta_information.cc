@@ -24,6 +24,18 @@ std::vector<InertialMatrix> WhitenInertialLinks(
   return whitening;
 }
 
+InertialNoiseRoot NoiseRootOf(const InertialMatrix& W) {
+  const Eigen::Matrix<double, 9, 9> U =
+      W.topLeftCorner<9, 9>().triangularView<Eigen::Upper>().solve(
+          Eigen::Matrix<double, 9, 9>::Identity());
+  InertialNoiseRoot root;
+  for (int i = 0; i < 9; ++i) {
+    for (int j = 0; j < 9; ++j) root.motion[i][j] = U(i, j);
+  }
+  for (int i = 0; i < 6; ++i) root.bias[i] = 1 / W(9 + i, 9 + i);
+  return root;
+}
+
 SharedInformation ByOffset(const SharedInformation& at_theta,
                            const Eigen::MatrixXd& theta_by_offset) {
   return {theta_by_offset.transpose() * at_theta.Lambda * theta_by_offset,

@@ -8,6 +8,7 @@
 #include "core/calibration/problem.h"
 #include "core/elimination/chain_elimination.h"
 #include "core/factor/inertial.h"
+#include "core/factor/inertial_batch.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 
@@ -20,6 +21,9 @@ std::vector<InertialMatrix> WhitenInertialLinks(
     const ImuCalibration& imu,
     const CalibrationProblem& problem,
     const std::vector<KeyframeState>& keyframes);
+
+// U with U^-1 = W, a square root information of a link.
+InertialNoiseRoot NoiseRootOf(const InertialMatrix& W);
 
 // The same information by the offset d from a reference (theta = reference [+]
 // d), in which the solver works.

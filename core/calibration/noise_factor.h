@@ -1,0 +1,42 @@
+// What residuals say about the noise that a rig is believed to have.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+// In the order of NoiseFactors.
+enum class NoiseKind {
+  kPixel,
+  kGyro,
+  kAccel,
+  kGyroBiasWalk,
+  kAccelBiasWalk,
+};
+inline constexpr int kNoiseKinds = 5;
+
+// A factor counts as determined below this standard deviation of its
+// logarithm: 20 % are then two of them.
+inline constexpr double kDeterminedLogSigma = 0.1;
+
+// The noise of one kind is this many times what the rig says.
+struct NoiseFactor {
+  NoiseKind kind = NoiseKind::kPixel;
+  double factor = 1;
+  double log_sigma = 0;  // standard deviation of the logarithm of the factor
+  // So many residuals of this kind, whitened, are left to tell by.
+  double redundancy = 0;
+
+  bool determined() const { return log_sigma < kDeterminedLogSigma; }
+};
+
+// "pixel", "gyro", "accel", "gyro_bias_walk", "accel_bias_walk".
+std::string NoiseKindName(NoiseKind kind);
+
+// The sigma of a kind as the rig states it, in the unit of the rig.
+double* NoiseOf(NoiseKind kind, Rig* rig);
+
+}  // namespace selfcal
