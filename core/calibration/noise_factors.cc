@@ -93,6 +93,7 @@ class FactorProblem {
     const SolverRound round = {.rig = rig_,
                                .reference = round_.reference,
                                .problem = problem_,
+                               .motions = round_.motions,
                                .whitening = whitening_,
                                .basis = round_.basis,
                                .loss = loss,
@@ -339,6 +340,7 @@ std::vector<NoiseFactor> EstimateNoiseFactors(
                           BoxPlus(round.reference, estimate.d),
                           round.problem,
                           estimate.keyframes,
+                          round.motions,
                           landmarks);
   Kinds start = Kinds::Zero();
   if (pixels.median_px > 0) {

@@ -69,8 +69,9 @@ struct Solved {
 
   void Solve() {
     const Calibration theta = BoxPlus(rig.factory, estimate.d);
-    const Screening screening =
-        ScreenLandmarks(rig, theta, problem, estimate.keyframes, {}, nullptr);
+    MeasureMotions(rig, theta, problem, estimate.keyframes, &motions);
+    const Screening screening = ScreenLandmarks(
+        rig, theta, problem, estimate.keyframes, motions, {}, nullptr);
     loss = screening.loss;
     landmarks = screening.landmarks;
     // Some of less weight.
@@ -93,6 +94,7 @@ struct Solved {
     return {.rig = rig,
             .reference = rig.factory,
             .problem = problem,
+            .motions = motions,
             .whitening = whitening,
             .basis = basis,
             .loss = loss};
@@ -103,6 +105,7 @@ struct Solved {
   const std::vector<const MotionSegment*> sorted;
   const CalibrationProblem problem;
   const Eigen::MatrixXd basis;
+  KeyframeMotions motions;
   CalibrationEstimate estimate;
   RobustLoss loss;
   std::vector<ScreenedLandmark> landmarks;
@@ -288,8 +291,8 @@ class DenseRound {
     const Track& track = solved_.problem.tracks[landmark.track];
     const Eigen::Vector4d point = landmark.place.Homogeneous();
     const int column = landmark_column_ + 3 * static_cast<int>(m);
-    for (const int index : landmark.used) {
-      const TrackObservation& seen = track.observations[index];
+    for (const UsedObservation& used : landmark.used) {
+      const TrackObservation& seen = track.observations[used.index];
       const KeyframeState& x = solved_.estimate.keyframes[seen.keyframe];
       Eigen::Vector2d r;
       ReprojectionJacobians J;
@@ -304,7 +307,8 @@ class DenseRound {
       RobustLoss loss = solved_.loss;
       loss.gate = 5;
       const double w =
-          std::sqrt(landmark.weight * loss.Weight(r.squaredNorm()));
+          std::sqrt(landmark.weight * used.weight *
+                    loss.Weight(r.squaredNorm()));
       const double scale = w / rig_.pixel_sigma_px;
       for (int i = 0; i < 2; ++i) {
         Row& row = AddRow(w * r(i));
