@@ -42,6 +42,7 @@ class Tracker {
         random_(options.seed, kTrackStream),
         noise_(options.seed, kPixelNoiseStream),
         outliers_(options.seed, kOutlierStream),
+        moving_(options.seed, kMovingLandmarkStream),
         tracked_(theta.cameras.size()),
         errors_(theta.cameras.size()) {}
 
@@ -120,7 +121,20 @@ class Tracker {
     trackers_.push_back(0);
     last_seen_.push_back(-1);
     begun_.push_back(keyframe_);
+    made_.push_back(keyframe_);
+    velocities_mps_.push_back(DrawVelocity());
     return static_cast<int>(tracks_.landmarks_G.size()) - 1;
+  }
+
+  // Zero for a landmark that rests.
+  Eigen::Vector3d DrawVelocity() {
+    if (!moving_.Chance(options_.moving_fraction)) {
+      return Eigen::Vector3d::Zero();
+    }
+    const double x = moving_.Normal();
+    const double y = moving_.Normal();
+    const double z = moving_.Normal();
+    return options_.moving_speed_mps * Eigen::Vector3d(x, y, z).normalized();
   }
 
   // Begins a track in this camera, and in every other one that sees the
@@ -139,10 +153,15 @@ class Tracker {
 
   // True pixel of a landmark; false where the camera does not see it.
   bool Sees(int camera, int landmark, Eigen::Vector2d* z_px) const {
+    return SeesPoint(camera, tracks_.landmarks_G[landmark], z_px);
+  }
+
+  bool SeesPoint(int camera,
+                 const Eigen::Vector3d& p_G,
+                 Eigen::Vector2d* z_px) const {
     const CameraCalibration& c = theta_.cameras[camera];
     const KeyframeState& x = exposures_[camera][keyframe_];
-    const Eigen::Vector3d p_I =
-        x.q_GI.conjugate() * (tracks_.landmarks_G[landmark] - x.p_GI);
+    const Eigen::Vector3d p_I = x.q_GI.conjugate() * (p_G - x.p_GI);
     const Eigen::Vector3d p_C = c.q_CI * p_I + c.p_CI;
     const double depth_m = p_C.norm();
     return depth_m > options_.min_depth_m / kDepthSlack &&
@@ -174,8 +193,15 @@ class Tracker {
     observation.camera = camera;
     observation.landmark = landmark;
     if (!Sees(camera, landmark, &observation.true_px)) return false;
-    observation.measured_px =
-        observation.true_px + pixel_sigma_px_ * NextError(camera, landmark);
+    const double moved_s =
+        (keyframe_ - made_[landmark]) / options_.keyframe_rate_hz;
+    if (!SeesPoint(
+            camera,
+            tracks_.landmarks_G[landmark] + moved_s * velocities_mps_[landmark],
+            &observation.measured_px)) {
+      return false;
+    }
+    observation.measured_px += pixel_sigma_px_ * NextError(camera, landmark);
     if (!InsideImage(c, observation.measured_px)) return false;
     const Eigen::Vector2d elsewhere = RandomPixel(c, &outliers_);
     if (outliers_.Chance(options_.outlier_fraction)) {
@@ -193,6 +219,7 @@ class Tracker {
   Random random_;
   Random noise_;
   Random outliers_;
+  Random moving_;
   int keyframe_ = 0;
   FeatureTracks tracks_;
   struct TrackError {
@@ -204,6 +231,8 @@ class Tracker {
   std::vector<int> trackers_;   // for each landmark: cameras that track it
   std::vector<int> last_seen_;  // for each landmark: keyframe, or -1
   std::vector<int> begun_;      // for each landmark: keyframe
+  std::vector<int> made_;       // for each landmark: keyframe that first saw it
+  std::vector<Eigen::Vector3d> velocities_mps_;  // for each landmark
 };
 
 }  // namespace

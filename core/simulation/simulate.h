@@ -33,10 +33,14 @@ struct SimulationOptions {
   double min_depth_m = 0.5;  // of a landmark where it is first seen
   double max_depth_m = 8;
   double outlier_fraction = 0;  // observations replaced by a random pixel
+  // Of new landmarks: those that move through the scene on a straight line, as
+  // what a tracker locks on that is not part of it. Truth says they rest.
+  double moving_fraction = 0;
+  double moving_speed_mps = 0.3;
   // Of the pixel error of a track with that in the keyframe before, in [0, 1):
   // real trackers drift, errors go together along a track.
   double pixel_correlation = 0;
-  bool noise = true;            // false: perfect sensors, biases constant
+  bool noise = true;  // false: perfect sensors, biases constant
   // Errors of the SLAM system, one standard deviation. Most of each drifts
   // slowly, a small part is new with every keyframe.
   double slam_rotation_rad = 2e-3;  // roll and pitch; yaw drifts 3 times as far

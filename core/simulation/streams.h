@@ -14,5 +14,6 @@ inline constexpr std::uint64_t kOutlierStream = 106;
 inline constexpr std::uint64_t kSlamStateStream = 107;
 inline constexpr std::uint64_t kSlamLandmarkStream = 108;
 inline constexpr std::uint64_t kPerturbStream = 109;
+inline constexpr std::uint64_t kMovingLandmarkStream = 111;
 
 }  // namespace selfcal

@@ -182,6 +182,31 @@ TEST(FeatureTracksTest, TheWantedFractionOfObservationsIsReplaced) {
   EXPECT_NEAR(replaced / n, 0.07, 5 * std::sqrt(0.07 / n));
 }
 
+TEST(FeatureTracksTest, TheWantedFractionOfLandmarksMoves) {
+  const Rig rig = HandheldRig("a");
+  SimulationOptions options;
+  options.noise = false;
+  options.revisit_fraction = 0;
+  options.moving_fraction = 0.2;
+  const FeatureTracks tracks =
+      Tracks(rig, 0.8, Keyframes(*MakeHandheld(60, 1, 5)), options);
+  // Landmarks that were seen for a second, by whether they moved.
+  std::map<int, double> largest_px, seen;
+  for (const FeatureObservation& z : tracks.observations) {
+    double& error_px = largest_px[z.landmark];
+    error_px = std::max(error_px, (z.true_px - z.measured_px).norm());
+    ++seen[z.landmark];
+  }
+  double moved = 0, n = 0;
+  for (const auto& [landmark, error_px] : largest_px) {
+    if (seen[landmark] < 10) continue;
+    ++n;
+    moved += error_px > 1;
+  }
+  ASSERT_GT(n, 1000);
+  EXPECT_NEAR(moved / n, 0.2, 5 * std::sqrt(0.2 * 0.8 / n));
+}
+
 TEST(FeatureTracksTest, NewLandmarksLieBetweenTheDepthsOfTheOptions) {
   const Rig rig = HandheldRig("a");
   SimulationOptions options;
