@@ -33,6 +33,7 @@ constexpr double kMaxRoundSigmas = 0.02;
 // Pixel errors that make sigmas of theta larger by less than this part are
 // weighted as independent ones.
 constexpr double kLeastTrackNoise = 0.05;
+constexpr int kMaxReweightings = 3;
 
 std::string CheckInput(const Rig& rig,
                        const Calibration& theta_start,
@@ -125,13 +126,13 @@ class Calibrator {
       return true;
     }
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
-    const double factor = TrackNoiseFactor(
+    track_noise_ = TrackNoiseFactor(
         Round(basis), linearised_, estimate_, screening_.landmarks);
-    if (factor < 1 + kLeastTrackNoise) {
+    if (track_noise_ < 1 + kLeastTrackNoise) {
       return true;
     }
-    result_.track_noise_factor = factor;
-    SetTrackNoise(factor, &screening_);
+    result_.track_noise_factor = track_noise_;
+    SetTrackNoise(track_noise_, &screening_);
     Screen(&screening_);
     if (!Inform(&screening_.loss)) {
       return Fail(kNotDetermined);
@@ -365,12 +366,14 @@ class Calibrator {
     result_.rank = static_cast<int>(subspace_.estimated.cols());
     result_.held_constant = subspace_.unobserved;
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
-    result_.noise_factors =
-        EstimateNoiseFactors(Round(basis), estimate_, screening_.landmarks);
     // As the cost before: not weighted by what is known of tracks since.
     SetTrackNoise(1, &screening_);
     result_.final_cost =
         RoundCost(Round(basis), estimate_, screening_.landmarks);
+    if (options_.noise_factors || options_.reweight_noise) {
+      result_.noise_factors = EstimateNoiseFactors(
+          Round(basis), estimate_, screening_.landmarks, track_noise_);
+    }
     const ReprojectionStatistics after = Measure();
     result_.reprojection_rms_after_px = after.rms_px;
     result_.reprojection_median_after_px = after.median_px;
@@ -396,8 +399,36 @@ class Calibrator {
   SharedInformation information_;
   Eigen::MatrixXd covariance_d_;
   double moved_sigmas_ = 0;  // by the last step
+  double track_noise_ = 0;   // as TrackNoiseFactor
   CalibrationResult result_;
 };
+
+// Each time from the start, so that what is held is held there. The factors of
+// the result are of what the rig states.
+CalibrationResult CalibrateReweighted(
+    const Rig& rig,
+    const Calibration& theta_start,
+    const std::vector<const MotionSegment*>& segments,
+    const CalibrateOptions& options,
+    const ProgressCallback& progress) {
+  Rig taken = rig;
+  CalibrationResult result;
+  for (int i = 0;; ++i) {
+    const int iterations = result.iterations;
+    result = Calibrator(taken, theta_start, segments, options, progress).Run();
+    result.iterations += iterations;
+    if (i == kMaxReweightings || result.status != CalibrateStatus::kConverged) {
+      break;
+    }
+    std::optional<Rig> next = Reweight(rig, taken, result.noise_factors);
+    if (!next) break;
+    taken = *std::move(next);
+  }
+  for (NoiseFactor& factor : result.noise_factors) {
+    factor.factor *= NoiseOf(factor.kind, taken) / NoiseOf(factor.kind, rig);
+  }
+  return result;
+}
 
 }  // namespace
 
@@ -415,7 +446,9 @@ CalibrationResult Calibrate(const Rig& rig,
     result.theta = theta_start;
     return result;
   }
-  return Calibrator(rig, theta_start, sorted, options, progress).Run();
+  return options.reweight_noise
+             ? CalibrateReweighted(rig, theta_start, sorted, options, progress)
+             : Calibrator(rig, theta_start, sorted, options, progress).Run();
 }
 
 }  // namespace selfcal

@@ -39,6 +39,11 @@ struct CalibrateOptions {
   // Measures how far the pixel errors of a track go together, and weights them
   // by what that leaves of them (track_noise.h).
   bool correlated_tracks = true;
+  // Estimates by which factors the noise of the rig is off (noise_factors.h).
+  bool noise_factors = true;
+  // Estimates them, takes the noise of the rig times what they are as far as
+  // the residuals determine it, and calibrates again, until nothing is far off.
+  bool reweight_noise = false;
   int merge_landmarks = 15;  // partitions that share more are merged
   SolverKind solver = SolverKind::kStructured;
   int threads = 1;  // of Ceres
@@ -91,8 +96,8 @@ struct CalibrationResult {
   int landmarks_dropped = 0;
   int observations = 0;  // used
   int observations_dropped = 0;
-  // By what the rig's noise is off, one of each kind (noise_factors.h); empty
-  // where that cannot be told.
+  // By what the noise that the rig states is off, one of each kind
+  // (noise_factors.h); empty where that cannot be told.
   std::vector<NoiseFactor> noise_factors;
 };
 

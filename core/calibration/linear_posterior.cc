@@ -58,23 +58,32 @@ void LinearSystem::AddWalk(const Chain::Walk& walk,
   }
 }
 
+// The squares of a row of weight w that unknowns absorb weigh w, and rows share
+// in what they absorb by their weight: w^2 / w on average.
 void LinearSystem::AddLandmarks(const std::vector<ScreenedLandmark>& landmarks,
                                 LinearPosterior* posterior) const {
-  std::vector<int> observations(landmarks.size(), 0);
-  for (const Seen& seen : seen_) {
-    if (seen.factor == kNone) continue;
-    posterior->pixel_squares += seen.square;
-    posterior->weighted_observations += seen.share;
-    ++observations[seen.landmark];
-  }
+  double all_squared = 0;
   for (std::size_t m = 0; m < landmarks.size(); ++m) {
-    if (observations[m] == 0) continue;
-    const double weight = landmarks[m].weight;
+    double shares = 0, squared = 0;
+    for (int i = seen_begin_[m]; i < seen_begin_[m + 1]; ++i) {
+      const Seen& seen = seen_[i];
+      if (seen.factor == kNone) continue;
+      posterior->pixel_squares += seen.square;
+      shares += seen.share;
+      squared += seen.share * seen.share;
+      ++posterior->observations;
+    }
+    if (shares == 0) continue;
     const double rho = places_[m].inverse_depth.z() / kInverseDepthSigma;
-    posterior->pixel_squares += weight * rho * rho;
-    posterior->weighted_landmarks += weight;
-    posterior->observations += observations[m];
+    posterior->pixel_squares += landmarks[m].weight * rho * rho;
+    posterior->weighted_observations += shares;
+    posterior->landmark_weights += squared / shares;
     ++posterior->landmarks;
+    all_squared += squared;
+  }
+  if (posterior->observations > 0) {
+    posterior->weight_of_absorbed =
+        all_squared / posterior->weighted_observations;
   }
 }
 

@@ -57,9 +57,11 @@ struct LinearPosterior {
   double prior_squares = 0, prior_absorbed = 0;  // weak priors and gauge
   // Reprojections, and the weak prior of each landmark.
   double pixel_squares = 0;
-  // Each observation counts with the weight that screening gave it, not with
-  // that of the loss; so do landmarks.
-  double weighted_observations = 0, weighted_landmarks = 0;
+  // Each observation counts with the weight w that screening gave it, not with
+  // that of the loss: sum w, and sum w^2 / sum w, by which what is absorbed
+  // counts; the latter of each landmark too, summed.
+  double weighted_observations = 0;
+  double weight_of_absorbed = 0, landmark_weights = 0;
   int observations = 0;
   int landmarks = 0;
   int unknowns = 0;  // all but theta

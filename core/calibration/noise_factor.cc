@@ -1,6 +1,39 @@
 #include "core/calibration/noise_factor.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace selfcal {
+namespace {
+
+// Noise is never taken for further off than this: then something else is wrong.
+constexpr double kMostOff = 30;
+// What is hardly determined is still nearer to the truth, if it is so many
+// standard deviations off.
+constexpr double kOffSigmas = 3;
+// The logarithm of a factor that makes a difference: two standard deviations of
+// one that is just determined.
+constexpr double kLeastChange = 2 * kDeterminedLogSigma;
+
+// A reference into a Rig or a const Rig.
+template <typename AnyRig>
+auto& Noise(NoiseKind kind, AnyRig& rig) {
+  switch (kind) {
+    case NoiseKind::kPixel:
+      return rig.pixel_sigma_px;
+    case NoiseKind::kGyro:
+      return rig.imu_noise.gyro_noise_density;
+    case NoiseKind::kAccel:
+      return rig.imu_noise.accel_noise_density;
+    case NoiseKind::kGyroBiasWalk:
+      return rig.imu_noise.gyro_bias_random_walk;
+    case NoiseKind::kAccelBiasWalk:
+      break;
+  }
+  return rig.imu_noise.accel_bias_random_walk;
+}
+
+}  // namespace
 
 std::string NoiseKindName(NoiseKind kind) {
   switch (kind) {
@@ -18,20 +51,39 @@ std::string NoiseKindName(NoiseKind kind) {
   return "accel_bias_walk";
 }
 
-double* NoiseOf(NoiseKind kind, Rig* rig) {
-  switch (kind) {
-    case NoiseKind::kPixel:
-      return &rig->pixel_sigma_px;
-    case NoiseKind::kGyro:
-      return &rig->imu_noise.gyro_noise_density;
-    case NoiseKind::kAccel:
-      return &rig->imu_noise.accel_noise_density;
-    case NoiseKind::kGyroBiasWalk:
-      return &rig->imu_noise.gyro_bias_random_walk;
-    case NoiseKind::kAccelBiasWalk:
-      break;
+std::optional<NoiseKind> FindNoiseKind(const std::string& name) {
+  for (int i = 0; i < kNoiseKinds; ++i) {
+    const auto kind = static_cast<NoiseKind>(i);
+    if (NoiseKindName(kind) == name) return kind;
   }
-  return &rig->imu_noise.accel_bias_random_walk;
+  return std::nullopt;
+}
+
+double NoiseOf(NoiseKind kind, const Rig& rig) { return Noise(kind, rig); }
+
+void ScaleNoise(NoiseKind kind, double factor, Rig* rig) {
+  Noise(kind, *rig) *= factor;
+}
+
+std::optional<Rig> Reweight(const Rig& stated,
+                            const Rig& taken,
+                            const std::vector<NoiseFactor>& factors) {
+  Rig next = taken;
+  double change = 0;
+  for (const NoiseFactor& factor : factors) {
+    if (!factor.determined() &&
+        std::abs(std::log(factor.factor)) < kOffSigmas * factor.log_sigma) {
+      continue;
+    }
+    const double before = NoiseOf(factor.kind, taken);
+    const double most = kMostOff * NoiseOf(factor.kind, stated);
+    const double after =
+        std::clamp(factor.factor * before, most / (kMostOff * kMostOff), most);
+    ScaleNoise(factor.kind, after / before, &next);
+    change = std::max(change, std::abs(std::log(after / before)));
+  }
+  if (change < kLeastChange) return std::nullopt;
+  return next;
 }
 
 }  // namespace selfcal

@@ -1,6 +1,7 @@
 // What residuals say about the noise that a rig is believed to have.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,8 +36,18 @@ struct NoiseFactor {
 
 // "pixel", "gyro", "accel", "gyro_bias_walk", "accel_bias_walk".
 std::string NoiseKindName(NoiseKind kind);
+std::optional<NoiseKind> FindNoiseKind(const std::string& name);
 
-// The sigma of a kind as the rig states it, in the unit of the rig.
-double* NoiseOf(NoiseKind kind, Rig* rig);
+// The sigma of a kind as a rig states it, in the unit of the rig.
+double NoiseOf(NoiseKind kind, const Rig& rig);
+void ScaleNoise(NoiseKind kind, double factor, Rig* rig);
+
+// The rig with the noise that `factors`, found with the noise of `taken`,
+// suggest: those that are determined, or off by more than three of their
+// standard deviations. None is taken for more than 30 times what `stated`
+// states, either way. Nothing where all that is a difference of less than 20 %.
+std::optional<Rig> Reweight(const Rig& stated,
+                            const Rig& taken,
+                            const std::vector<NoiseFactor>& factors);
 
 }  // namespace selfcal

@@ -1,296 +1,95 @@
 #include "core/calibration/noise_factors.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "core/calibration/structured_solver.h"
-#include "core/calibration/theta_information.h"
+#include "core/calibration/noise_balance.h"
 
 namespace selfcal {
 namespace {
 
-using Kinds = Eigen::Matrix<double, kNoiseKinds, 1>;
-using KindsMatrix = Eigen::Matrix<double, kNoiseKinds, kNoiseKinds>;
-using MotionMatrix = Eigen::Matrix<double, 9, 9>;
+using NoiseMatrix = Eigen::Matrix<double, kNoiseKinds, kNoiseKinds>;
 
-constexpr int At(NoiseKind kind) { return static_cast<int>(kind); }
-
-// Of the noise of one link's motion at unit factors, what each sensor brings.
-struct MotionNoise {
-  MotionMatrix gyro, accel;
-};
-
-std::vector<MotionNoise> SplitMotionNoise(
-    const SolverRound& round,
-    const ImuCalibration& imu,
-    const std::vector<KeyframeState>& keyframes) {
-  const auto covariance = [&](const InertialLink& link, ImuNoise noise) {
-    InertialMatrix covariance;
-    EvaluateInertial(link.samples,
-                     keyframes[link.before],
-                     keyframes[link.after],
-                     imu,
-                     noise,
-                     round.rig.gravity_mps2,
-                     nullptr,
-                     &covariance);
-    return covariance.topLeftCorner<9, 9>().eval();
-  };
-  ImuNoise gyro = round.rig.imu_noise;
-  ImuNoise accel = gyro;
-  gyro.accel_noise_density = 0;
-  accel.gyro_noise_density = 0;
-  std::vector<MotionNoise> split;
-  for (const InertialLink& link : round.problem.inertial_links) {
-    split.push_back({covariance(link, gyro), covariance(link, accel)});
-  }
-  return split;
-}
-
-// What the weighted squares of a residual of two normal components of the
-// given variance [sigma^2] are on average, in parts of its squares.
-double Consistency(const RobustLoss& loss, double variance) {
-  constexpr int kSteps = 400;
-  constexpr double kEnd = 40;  // of s / 2, exponentially distributed
-  double sum = 0;
-  for (int i = 0; i < kSteps; ++i) {
-    const double half = kEnd * (i + 0.5) / kSteps;
-    sum += loss.Weight(2 * half * variance) * half * std::exp(-half);
-  }
-  return sum * kEnd / kSteps;
-}
-
-// Squares and redundancy of each kind, both for whitening by given factors.
-struct Balance {
-  Kinds squares, redundancy;
-};
-
-class FactorProblem {
- public:
-  FactorProblem(const SolverRound& round,
-                const CalibrationEstimate& estimate,
-                const std::vector<ScreenedLandmark>& landmarks)
-      : round_(round),
-        estimate_(estimate),
-        landmarks_(landmarks),
-        rig_(round.rig),
-        problem_(round.problem),
-        whitening_(round.whitening),
-        motion_(SplitMotionNoise(round,
-                                 BoxPlus(round.reference, estimate.d).imu,
-                                 estimate.keyframes)) {}
-
-  // Nothing where the linear system fails.
-  std::optional<Balance> Evaluate(const Kinds& log_factors) {
-    const Kinds factors = log_factors.array().exp();
-    Scale(factors);
-    RobustLoss loss = round_.loss;
-    loss.gate = std::max(kOutlierGate, 2 * loss.scale);
-    const SolverRound round = {.rig = rig_,
-                               .reference = round_.reference,
-                               .problem = problem_,
-                               .motions = round_.motions,
-                               .whitening = whitening_,
-                               .basis = round_.basis,
-                               .loss = loss,
-                               .prior_information = round_.prior_information};
-    if (!LineariseRound(round, estimate_, landmarks_, &loss, &linearised_)) {
-      return std::nullopt;
-    }
-    return Count(factors, loss);
-  }
-
- private:
-  void Scale(const Kinds& factors) {
-    for (int i = 0; i < kNoiseKinds; ++i) {
-      const auto kind = static_cast<NoiseKind>(i);
-      Rig believed = round_.rig;
-      *NoiseOf(kind, &rig_) = factors[i] * *NoiseOf(kind, &believed);
-    }
-    const double gyro = factors[At(NoiseKind::kGyro)];
-    const double accel = factors[At(NoiseKind::kAccel)];
-    InertialResidual walks = InertialResidual::Zero();
-    walks.segment<3>(9).setConstant(factors[At(NoiseKind::kAccelBiasWalk)]);
-    walks.segment<3>(12).setConstant(factors[At(NoiseKind::kGyroBiasWalk)]);
-    for (std::size_t i = 0; i < motion_.size(); ++i) {
-      InertialMatrix covariance = InertialMatrix::Identity();
-      covariance.topLeftCorner<9, 9>() =
-          gyro * gyro * motion_[i].gyro + accel * accel * motion_[i].accel;
-      InertialMatrix W = SquareRootInformation(covariance);
-      for (int m = 9; m < 15; ++m) {
-        W(m, m) = round_.whitening[i](m, m) / walks[m];
-      }
-      whitening_[i] = W;
-    }
-    for (std::size_t i = 0; i < problem_.bias_links.size(); ++i) {
-      problem_.bias_links[i].sigmas =
-          round_.problem.bias_links[i].sigmas.cwiseProduct(walks.tail<6>());
-    }
-  }
-
-  Balance Count(const Kinds& factors, const RobustLoss& loss) {
-    // The step of theta that minimises, and its covariance.
-    const Eigen::MatrixXd basis = linearised_.theta_by_offset * round_.basis;
-    const SharedInformation& by_offset = linearised_.by_offset;
-    const Eigen::LLT<Eigen::MatrixXd> reduced(round_.basis.transpose() *
-                                              by_offset.Lambda * round_.basis);
-    const Eigen::VectorXd step =
-        reduced.solve(round_.basis.transpose() * by_offset.eta);
-    const Eigen::MatrixXd inverse = reduced.solve(
-        Eigen::MatrixXd::Identity(reduced.rows(), reduced.cols()));
-    const LinearPosterior posterior = linearised_.system.FindPosterior(
-        basis * step, basis * inverse * basis.transpose(), landmarks_);
-    Balance balance = {Kinds::Zero(), Kinds::Zero()};
-    AddMotion(factors, posterior, &balance);
-
-    AddPixels(posterior,
-              posterior.unknowns + static_cast<double>(basis.cols()) -
-                  AbsorbedByPrior(inverse),
-              loss,
-              &balance);
-    return balance;
-  }
-
-  // Of the prior on theta, if there is one.
-  double AbsorbedByPrior(const Eigen::MatrixXd& inverse) const {
-    if (round_.prior_information == nullptr) return 0;
-    return inverse
-        .cwiseProduct(round_.basis.transpose() * *round_.prior_information *
-                      round_.basis)
-        .sum();
-  }
-
-  void AddMotion(const Kinds& factors,
-                 const LinearPosterior& posterior,
-                 Balance* balance) const {
-    const auto add = [&](NoiseKind kind, double squares, double redundancy) {
-      balance->squares[At(kind)] += squares;
-      balance->redundancy[At(kind)] += redundancy;
-    };
-    const double gyro = factors[At(NoiseKind::kGyro)];
-    for (std::size_t i = 0; i < motion_.size(); ++i) {
-      const ChainStateVector& e = posterior.inertial[i];
-      const ChainStateMatrix& C = posterior.inertial_covariance[i];
-      const auto W = whitening_[i].topLeftCorner<9, 9>();
-      // What of the whitened noise the gyroscope brings; the accelerometer
-      // brings the rest.
-      const MotionMatrix by_gyro =
-          gyro * gyro * W * motion_[i].gyro * W.transpose();
-      const MotionMatrix left =
-          MotionMatrix::Identity() - C.topLeftCorner<9, 9>();
-      const double squares = e.head<9>().dot(by_gyro * e.head<9>());
-      const double redundancy = by_gyro.cwiseProduct(left).sum();
-      add(NoiseKind::kGyro, squares, redundancy);
-      add(NoiseKind::kAccel,
-          e.head<9>().squaredNorm() - squares,
-          left.trace() - redundancy);
-      add(NoiseKind::kAccelBiasWalk,
-          e.segment<3>(9).squaredNorm(),
-          3 - C.diagonal().segment<3>(9).sum());
-      add(NoiseKind::kGyroBiasWalk,
-          e.segment<3>(12).squaredNorm(),
-          3 - C.diagonal().segment<3>(12).sum());
-    }
-    add(NoiseKind::kAccelBiasWalk,
-        posterior.walk_squares.head<3>().sum(),
-        posterior.walk_redundancy.head<3>().sum());
-    add(NoiseKind::kGyroBiasWalk,
-        posterior.walk_squares.tail<3>().sum(),
-        posterior.walk_redundancy.tail<3>().sum());
-  }
-
-  // What no other kind absorbs of the unknowns, reprojections do.
-  void AddPixels(const LinearPosterior& posterior,
-                 double unknowns,
-                 const RobustLoss& loss,
-                 Balance* balance) const {
-    double absorbed = unknowns - posterior.prior_absorbed - posterior.walk_rows;
-    for (const ChainStateMatrix& C : posterior.inertial_covariance) {
-      absorbed -= C.trace();
-    }
-    absorbed += posterior.walk_redundancy.sum();
-    // Observations of less weight count less, and what is absorbed of them.
-    const double weight =
-        posterior.weighted_observations / posterior.observations;
-    absorbed = weight * (absorbed - 3 * posterior.landmarks) +
-               3 * posterior.weighted_landmarks;
-    const double rows = 2 * posterior.weighted_observations;
-    const double redundancy = rows - absorbed;
-    balance->redundancy[At(NoiseKind::kPixel)] = redundancy;
-    balance->squares[At(NoiseKind::kPixel)] =
-        posterior.pixel_squares / Consistency(loss, redundancy / rows);
-  }
-
-  const SolverRound& round_;
-  const CalibrationEstimate& estimate_;
-  const std::vector<ScreenedLandmark>& landmarks_;
-  // Scaled by the factors at hand.
-  Rig rig_;
-  CalibrationProblem problem_;
-  std::vector<InertialMatrix> whitening_;
-  const std::vector<MotionNoise> motion_;
-  LinearisedRound linearised_;
-};
+constexpr double Square(double x) { return x * x; }
 
 constexpr double kMedianOfRayleigh = 1.1774100225154747;
 // Where nothing is known about a factor, its logarithm is within so much of
 // zero.
 const double kPriorLogSigma = std::log(10.0);
 constexpr double kDifference = 0.1;  // of logarithms
-constexpr double kLongestStep = 1.5;
+// A step takes a variance by no more than so much, nor below this part of it.
+constexpr double kLongestStep = 1.5;  // of the logarithm of the factor
+constexpr double kLeastPart = 0.1;
 constexpr int kMaxSteps = 15;
 // Settled when the next step is shorter, in standard deviations.
-constexpr double kSettledSigmas = 0.02;
-// A Fisher information taken further away than this is taken again.
+constexpr double kSettledSigmas = 0.1;
+constexpr double kSettledSigmasOfGuess = 1;
+// A Fisher information taken further away than this is taken again, if that is
+// of a kind that may be determined: of redundancy r, it is at most 2 r.
 constexpr double kNear = 0.3;
+constexpr double kMayBeDetermined = 0.5 / Square(kDeterminedLogSigma);
 
 // Score and Fisher information of the logarithms of the factors, with the
 // prior. The Fisher information of a restricted likelihood follows from how the
 // redundancies change with the factors.
 class Likelihood {
  public:
-  explicit Likelihood(FactorProblem* problem) : problem_(problem) {}
+  explicit Likelihood(NoiseProblem* problem) : problem_(problem) {}
 
-  bool MoveTo(const Kinds& at) {
-    const std::optional<Balance> balance = problem_->Evaluate(at);
+  bool MoveTo(const NoiseVector& at) {
+    const std::optional<NoiseBalance> balance = problem_->Evaluate(at);
     if (!balance) return false;
     at_ = at;
     balance_ = *balance;
     return true;
   }
 
-  const Kinds& at() const { return at_; }
-  const Balance& balance() const { return balance_; }
+  const NoiseVector& at() const { return at_; }
+  const NoiseBalance& balance() const { return balance_; }
 
-  // For squares that fall with the square of the factor, linear in its
-  // logarithm.
-  Kinds Score() const {
-    const Kinds& r = balance_.redundancy;
-    return r.array() * (balance_.squares.array() / r.array()).max(1e-12).log() -
-           at_.array() * Prior();
+  NoiseVector Score() const {
+    return balance_.squares - balance_.redundancy - Prior() * at_;
   }
 
-  std::optional<KindsMatrix> Fisher() const {
-    KindsMatrix by_factor;
-    by_factor.col(0).setZero();
-    static_assert(At(NoiseKind::kPixel) == 0);
-    for (int i = 1; i < kNoiseKinds; ++i) {
-      const std::optional<Balance> moved =
-          problem_->Evaluate(at_ + kDifference * Kinds::Unit(i));
-      if (!moved) return std::nullopt;
-      by_factor.col(i) =
-          (moved->redundancy - balance_.redundancy) / kDifference;
-      // Nothing changes where all factors change alike.
-      by_factor.col(0) -= by_factor.col(i);
+  // From two differences: a walk has to do with the noise of its own sensor
+  // only, so that each is moved along with that of the other one.
+  std::optional<NoiseMatrix> Fisher() const {
+    constexpr int kPixel = IndexOf(NoiseKind::kPixel);
+    constexpr int kGyro = IndexOf(NoiseKind::kGyro);
+    constexpr int kAccel = IndexOf(NoiseKind::kAccel);
+    constexpr int kGyroWalk = IndexOf(NoiseKind::kGyroBiasWalk);
+    constexpr int kAccelWalk = IndexOf(NoiseKind::kAccelBiasWalk);
+    const bool pixels_count = problem_->PixelsCount();
+    const auto a = Difference(kGyro, kAccelWalk);
+    const auto b = Difference(kAccel, kGyroWalk);
+    if (!a || !b) return std::nullopt;
+    NoiseMatrix by_factor = NoiseMatrix::Zero();
+    by_factor(kGyro, kGyro) = (*a)[kGyro];
+    by_factor(kAccel, kAccel) = (*b)[kAccel];
+    by_factor(kGyroWalk, kGyroWalk) = (*b)[kGyroWalk];
+    by_factor(kAccelWalk, kAccelWalk) = (*a)[kAccelWalk];
+    const double gyro_and_walk = (*a)[kGyroWalk];
+    const double accel_and_walk = (*b)[kAccelWalk];
+    SetBoth(kGyro, kGyroWalk, gyro_and_walk, &by_factor);
+    SetBoth(kAccel, kAccelWalk, accel_and_walk, &by_factor);
+    SetBoth(kGyro,
+            kAccel,
+            0.5 * ((*a)[kAccel] - accel_and_walk + (*b)[kGyro] - gyro_and_walk),
+            &by_factor);
+    // Nothing changes where all factors change alike.
+    if (pixels_count) {
+      for (int i = 1; i < kNoiseKinds; ++i) {
+        SetBoth(kPixel, i, -by_factor.row(i).sum(), &by_factor);
+      }
+      by_factor(kPixel, kPixel) = -by_factor.row(kPixel).sum();
     }
-    KindsMatrix fisher = -0.5 * (by_factor + by_factor.transpose());
+    NoiseMatrix fisher = -by_factor;
     fisher.diagonal() += 2 * balance_.redundancy;
     // What differences leave of nothing may be less than that.
-    const Eigen::SelfAdjointEigenSolver<KindsMatrix> eigen(fisher);
+    const Eigen::SelfAdjointEigenSolver<NoiseMatrix> eigen(fisher);
     return eigen.eigenvectors() *
            (eigen.eigenvalues().array().max(0) + Prior())
                .matrix()
@@ -299,42 +98,93 @@ class Likelihood {
   }
 
  private:
-  static double Prior() { return 1 / (kPriorLogSigma * kPriorLogSigma); }
+  static double Prior() { return 1 / Square(kPriorLogSigma); }
+  static void SetBoth(int i, int j, double value, NoiseMatrix* matrix) {
+    (*matrix)(i, j) = (*matrix)(j, i) = value;
+  }
 
-  FactorProblem* problem_;
-  Kinds at_ = Kinds::Zero();
-  Balance balance_;
+  // Of the redundancies, by the logarithms of two factors that change alike.
+  std::optional<NoiseVector> Difference(int i, int j) const {
+    const std::optional<NoiseBalance> moved = problem_->Evaluate(
+        at_ + kDifference * (NoiseVector::Unit(i) + NoiseVector::Unit(j)));
+    if (!moved) return std::nullopt;
+    return (moved->redundancy - balance_.redundancy) / kDifference;
+  }
+
+  NoiseProblem* problem_;
+  NoiseVector at_ = NoiseVector::Zero();
+  NoiseBalance balance_;
 };
 
-// Scoring, the information corrected by what each step shows (Broyden).
-std::optional<KindsMatrix> Maximise(Likelihood* likelihood) {
-  std::optional<KindsMatrix> fisher = likelihood->Fisher();
+// Where the Fisher information was taken.
+struct Informed {
+  NoiseMatrix fisher;
+  NoiseVector at, redundancy;
+};
+
+std::optional<Informed> Inform(const Likelihood& likelihood) {
+  const std::optional<NoiseMatrix> fisher = likelihood.Fisher();
   if (!fisher) return std::nullopt;
-  const Kinds informed_at = likelihood->at();
-  KindsMatrix slope = *fisher;
-  for (int i = 0; i < kMaxSteps; ++i) {
-    const Kinds score = likelihood->Score();
-    Kinds step = slope.partialPivLu().solve(score);
-    step *= std::min(1.0, kLongestStep / step.lpNorm<Eigen::Infinity>());
-    if (std::sqrt(step.dot(*fisher * step)) < kSettledSigmas) break;
-    if (!likelihood->MoveTo(likelihood->at() + step)) return std::nullopt;
-    const Kinds change = score - likelihood->Score();
-    slope += (change - slope * step) * step.transpose() / step.squaredNorm();
-  }
-  if ((likelihood->at() - informed_at).lpNorm<Eigen::Infinity>() > kNear) {
-    fisher = likelihood->Fisher();
-  }
-  return fisher;
+  return Informed{*fisher, likelihood.at(), likelihood.balance().redundancy};
 }
 
-}  // namespace
+bool StillHolds(const Informed& informed, const Likelihood& likelihood) {
+  for (int i = 0; i < kNoiseKinds; ++i) {
+    if (std::max(informed.redundancy[i], likelihood.balance().redundancy[i]) >
+            kMayBeDetermined &&
+        std::abs(likelihood.at()[i] - informed.at[i]) > kNear) {
+      return false;
+    }
+  }
+  return true;
+}
 
-std::vector<NoiseFactor> EstimateNoiseFactors(
-    const SolverRound& round,
-    const CalibrationEstimate& estimate,
-    const std::vector<ScreenedLandmark>& landmarks) {
-  FactorProblem problem(round, estimate, landmarks);
-  Likelihood likelihood(&problem);
+// Closely for kinds that may be determined; others are guesses whatever is
+// done.
+bool IsSettled(const NoiseVector& change, const Informed& informed) {
+  const NoiseMatrix covariance = informed.fisher.inverse();
+  for (int i = 0; i < kNoiseKinds; ++i) {
+    const double allowed = informed.redundancy[i] > kMayBeDetermined
+                               ? kSettledSigmas
+                               : kSettledSigmasOfGuess;
+    if (std::abs(change[i]) > allowed * std::sqrt(covariance(i, i))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Fisher scoring of the variances, by which the expected squares are linear:
+// the first step comes near from anywhere. The information is then corrected by
+// what each step shows (Broyden). Nothing if it does not settle.
+std::optional<NoiseMatrix> Maximise(Likelihood* likelihood) {
+  std::optional<Informed> informed = Inform(*likelihood);
+  if (!informed) return std::nullopt;
+  NoiseMatrix slope = informed->fisher;
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const NoiseVector score = likelihood->Score();
+    const NoiseVector change = slope.partialPivLu().solve(score);
+    if (IsSettled(change, *informed)) return informed->fisher;
+    const NoiseVector step =
+        (0.5 * (1 + 2 * change.array()).max(kLeastPart).log())
+            .min(kLongestStep);
+    if (!likelihood->MoveTo(likelihood->at() + step)) return std::nullopt;
+    if (StillHolds(*informed, *likelihood)) {
+      const NoiseVector shown = score - likelihood->Score();
+      slope += (shown - slope * step) * step.transpose() / step.squaredNorm();
+    } else {
+      informed = Inform(*likelihood);
+      if (!informed) return std::nullopt;
+      slope = informed->fisher;
+    }
+  }
+  return std::nullopt;
+}
+
+// From the median residual, as if all were alike.
+double GuessPixelFactor(const SolverRound& round,
+                        const CalibrationEstimate& estimate,
+                        const std::vector<ScreenedLandmark>& landmarks) {
   const ReprojectionStatistics pixels =
       MeasureReprojection(round.rig,
                           BoxPlus(round.reference, estimate.d),
@@ -342,21 +192,43 @@ std::vector<NoiseFactor> EstimateNoiseFactors(
                           estimate.keyframes,
                           round.motions,
                           landmarks);
-  Kinds start = Kinds::Zero();
-  if (pixels.median_px > 0) {
-    start[At(NoiseKind::kPixel)] = std::log(
-        pixels.median_px / kMedianOfRayleigh / round.rig.pixel_sigma_px);
+  if (!(pixels.median_px > 0)) return 1;
+  double rows = 0;
+  for (const ScreenedLandmark& landmark : landmarks) {
+    rows += 2.0 * static_cast<double>(landmark.used.size());
   }
+  const double absorbed = 3.0 * static_cast<double>(landmarks.size()) +
+                          6.0 * static_cast<double>(estimate.keyframes.size());
+  const double left = std::max(1 - absorbed / rows, kLeastPart);
+  return pixels.median_px / kMedianOfRayleigh / round.rig.pixel_sigma_px /
+         std::sqrt(left);
+}
+
+}  // namespace
+
+std::vector<NoiseFactor> EstimateNoiseFactors(
+    const SolverRound& round,
+    const CalibrationEstimate& estimate,
+    const std::vector<ScreenedLandmark>& landmarks,
+    double track_noise) {
+  NoiseProblem problem(round, estimate, landmarks, track_noise);
+  Likelihood likelihood(&problem);
+  NoiseVector start = NoiseVector::Zero();
+  start[IndexOf(NoiseKind::kPixel)] =
+      std::log(GuessPixelFactor(round, estimate, landmarks));
   if (!likelihood.MoveTo(start)) return {};
-  const std::optional<KindsMatrix> fisher = Maximise(&likelihood);
+  const std::optional<NoiseMatrix> fisher = Maximise(&likelihood);
   if (!fisher) return {};
-  const KindsMatrix covariance = fisher->inverse();
+  const NoiseMatrix covariance = fisher->inverse();
   std::vector<NoiseFactor> factors;
   for (int i = 0; i < kNoiseKinds; ++i) {
+    const double redundancy = likelihood.balance().redundancy[i];
+    // The information may be that of a place further off.
+    const double least = 1 / (2 * redundancy + 1 / Square(kPriorLogSigma));
     factors.push_back({static_cast<NoiseKind>(i),
                        std::exp(likelihood.at()[i]),
-                       std::sqrt(covariance(i, i)),
-                       likelihood.balance().redundancy[i]});
+                       std::sqrt(std::max(covariance(i, i), least)),
+                       redundancy});
   }
   return factors;
 }

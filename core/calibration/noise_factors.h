@@ -18,7 +18,6 @@
 // Testing in Linear Models" (1999), section 3.6.
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "core/calibration/noise_factor.h"
@@ -27,11 +26,15 @@
 
 namespace selfcal {
 
-// At the end of a round, with `round` as it was solved. Empty where the linear
-// system fails.
+// At the end of a round, with `round` as it was solved, but for landmarks
+// without the track noise. That is as TrackNoiseFactor (track_noise.h): where
+// it is larger than the pixel sigma is off, errors go together along tracks,
+// and what reprojections say of all else is weighted by it. Empty where the
+// linear system fails.
 std::vector<NoiseFactor> EstimateNoiseFactors(
     const SolverRound& round,
     const CalibrationEstimate& estimate,
-    const std::vector<ScreenedLandmark>& landmarks);
+    const std::vector<ScreenedLandmark>& landmarks,
+    double track_noise);
 
 }  // namespace selfcal

@@ -160,11 +160,11 @@ double RoundCost(const SolverRound& round,
       round, RootsOf(round), estimate, landmarks, {.steps = 0}, &places);
 }
 
-bool LineariseRound(const SolverRound& round,
-                    const CalibrationEstimate& estimate,
-                    const std::vector<ScreenedLandmark>& landmarks,
-                    const RobustLoss* loss,
-                    LinearisedRound* result) {
+bool LineariseFactors(const SolverRound& round,
+                      const CalibrationEstimate& estimate,
+                      const std::vector<ScreenedLandmark>& landmarks,
+                      const RobustLoss* loss,
+                      LinearisedRound* result) {
   const Calibration theta = BoxPlus(round.reference, estimate.d);
   result->theta_by_offset = ThetaByOffset(round.reference, estimate.d);
   result->roots = RootsOf(round);
@@ -184,6 +184,17 @@ bool LineariseRound(const SolverRound& round,
   if (round.prior_information != nullptr) {
     result->by_offset.Lambda += *round.prior_information;
     result->by_offset.eta -= *round.prior_information * estimate.d;
+  }
+  return true;
+}
+
+bool LineariseRound(const SolverRound& round,
+                    const CalibrationEstimate& estimate,
+                    const std::vector<ScreenedLandmark>& landmarks,
+                    const RobustLoss* loss,
+                    LinearisedRound* result) {
+  if (!LineariseFactors(round, estimate, landmarks, loss, result)) {
+    return false;
   }
   result->cost = RoundCost(round, estimate, landmarks);
   return true;

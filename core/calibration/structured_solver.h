@@ -31,7 +31,13 @@ double RoundCost(const SolverRound& round,
                  const std::vector<ScreenedLandmark>& landmarks);
 
 // With a loss, observations are weighted by it; null: all count fully. False if
-// the states of the keyframes are not determined.
+// the states of the keyframes are not determined. LineariseFactors leaves the
+// cost out.
+bool LineariseFactors(const SolverRound& round,
+                      const CalibrationEstimate& estimate,
+                      const std::vector<ScreenedLandmark>& landmarks,
+                      const RobustLoss* loss,
+                      LinearisedRound* result);
 bool LineariseRound(const SolverRound& round,
                     const CalibrationEstimate& estimate,
                     const std::vector<ScreenedLandmark>& landmarks,

@@ -158,7 +158,7 @@ double TrackNoiseFactor(const SolverRound& round,
                         const LinearisedRound& linearised,
                         const CalibrationEstimate& estimate,
                         const std::vector<ScreenedLandmark>& landmarks) {
-  if (round.basis.cols() == 0) return 1;
+  if (round.basis.cols() == 0) return 0;
   const Directions directions = FindDirections(round, linearised);
   const TrackSummer summer(round, estimate, directions);
   TrackSums all;
@@ -175,7 +175,7 @@ double TrackNoiseFactor(const SolverRound& round,
   const double absorbed = 6.0 * estimate.keyframes.size() + round.basis.cols();
   if (!(residuals - absorbed > kLeastRedundancy) || !(all.information > 0) ||
       !(all.curvature > 0)) {
-    return 1;
+    return 0;
   }
   const double stiffness = all.curvature / all.weight;
   return std::sqrt(all.scatter / all.information * residuals /

@@ -21,14 +21,14 @@
 
 namespace selfcal {
 
-// The factor by which the pixel sigma must be taken larger for the information
-// of the tracks to be as large as what their residuals show: the root of the
-// ratio of the two, over all directions that the round estimates, each in units
-// of its own sigma. 1 where errors are independent and of the size that the
-// rig says, whatever the loss; where the pixel sigma is too small, what that
-// makes the sigmas of theta too small by. The landmarks must be at the minimum of their residuals, theta and keyframes
-// near that of the round, which was linearised there with its loss. 1 where
-// there is too little to tell.
+// The factor by which the pixel sigma must be taken larger (or smaller) for the
+// information of the tracks to be as large as what their residuals show: the
+// root of the ratio of the two, over all directions that the round estimates,
+// each in units of its own sigma. 1 where errors are independent and of the
+// size that the rig says, whatever the loss; where the pixel sigma is wrong,
+// what that makes the sigmas of theta wrong by. The landmarks must be at the
+// minimum of their residuals, theta and keyframes near that of the round, which
+// was linearised there with its loss. 0 where there is too little to tell.
 double TrackNoiseFactor(const SolverRound& round,
                         const LinearisedRound& linearised,
                         const CalibrationEstimate& estimate,

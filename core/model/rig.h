@@ -72,6 +72,9 @@ struct Rig {
   // After the first run, the next starts when at least this part of the
   // entries of the tables is new since the last.
   double retrigger_fraction = 0.5;
+  // Calibrations weight by the noise that their residuals suggest, as far as
+  // these determine it, instead of by what is stated above.
+  bool reweight_noise = false;
 };
 
 // Indices of the tangent components that match at least one pattern, sorted.
