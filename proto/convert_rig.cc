@@ -74,6 +74,7 @@ void ReadSettings(const v1::Rig& message, Rig* rig) {
   rig->pixel_sigma_px = message.pixel_sigma_px();
   if (message.gravity_mps2() != 0) rig->gravity_mps2 = message.gravity_mps2();
   if (message.table_size() != 0) rig->table_size = message.table_size();
+  rig->reweight_noise = message.reweight_noise();
   if (message.has_min_gain_nats()) rig->min_gain_nats = message.min_gain_nats();
   if (message.has_retrigger_fraction()) {
     rig->retrigger_fraction = message.retrigger_fraction();
@@ -111,6 +112,7 @@ v1::Rig ToProto(const Rig& rig) {
   message.set_min_gain_nats(rig.min_gain_nats);
   message.set_retrigger_fraction(rig.retrigger_fraction);
   message.set_estimate_time_offset(rig.estimate_time_offset);
+  message.set_reweight_noise(rig.reweight_noise);
   return message;
 }
 

@@ -20,6 +20,27 @@ void AddProvenance(const v1::Calibration::Provenance& provenance,
   facts->Add("program", provenance.program_version());
 }
 
+std::string NoiseName(const std::string& kind) {
+  if (kind == "pixel") return "pixel sigma";
+  if (kind == "gyro") return "gyro noise";
+  if (kind == "accel") return "accel noise";
+  if (kind == "gyro_bias_walk") return "gyro bias walk";
+  if (kind == "accel_bias_walk") return "accel bias walk";
+  return kind;
+}
+
+std::string NoiseText(const v1::NoiseFactor& factor) {
+  const std::string name = NoiseName(factor.kind());
+  return factor.determined()
+             ? fmt::format(
+                   "{}: residuals suggest {:.2f} times what the rig "
+                   "states (+- {:.0f} %)",
+                   name,
+                   factor.factor(),
+                   100 * factor.log_sigma())
+             : fmt::format("{}: residuals do not determine it", name);
+}
+
 void AddSolver(const v1::SolverReport& solver, Facts* facts) {
   facts->Add("solver",
              solver.message().empty()
@@ -56,6 +77,9 @@ void AddSolver(const v1::SolverReport& solver, Facts* facts) {
              fmt::format("{} of {}", solver.rank(), solver.components()));
   for (const auto& direction : solver.held_constant()) {
     facts->Add("held constant", DirectionText(direction));
+  }
+  for (const auto& factor : solver.noise_factors()) {
+    facts->Add("noise", NoiseText(factor));
   }
 }
 

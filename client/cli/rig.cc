@@ -65,6 +65,9 @@ Facts Describe(const v1::Rig& rig) {
   facts.Add("minimum gain", fmt::format("{:g} nat", rig.min_gain_nats()));
   facts.Add("retrigger fraction",
             fmt::format("{:g}", rig.retrigger_fraction()));
+  facts.Add("noise",
+            rig.reweight_noise() ? "re-weighted by what residuals suggest"
+                                 : "as stated");
   return facts;
 }
 
@@ -159,6 +162,9 @@ void AddOverrides(CLI::App* create, RigInput* input) {
   create->add_option("--retrigger-fraction",
                      input->retrigger_fraction,
                      "Part of the tables that must be new for another run");
+  create->add_flag("--reweight-noise",
+                   input->reweight_noise,
+                   "Weight by the noise that the residuals suggest");
   create->add_option("--fixed",
                      input->fixed,
                      "Never estimate the components of this name, '*' at "

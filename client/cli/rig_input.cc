@@ -97,6 +97,7 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input) {
   if (input.retrigger_fraction) {
     rig->set_retrigger_fraction(*input.retrigger_fraction);
   }
+  if (input.reweight_noise) rig->set_reweight_noise(true);
   v1::ImuNoise noise = rig->imu_noise();
   if (input.gyro_noise) noise.set_gyro_noise_density(*input.gyro_noise);
   if (input.accel_noise) noise.set_accel_noise_density(*input.accel_noise);

@@ -26,6 +26,7 @@ struct RigInput {
   std::optional<int> table_size;
   std::optional<double> min_gain_nats;
   std::optional<double> retrigger_fraction;
+  bool reweight_noise = false;
   std::vector<std::string> fixed;
   bool estimate_time_offset = false;
 };

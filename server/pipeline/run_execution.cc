@@ -95,6 +95,7 @@ absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
   SELFCAL_ASSIGN_OR_RETURN(StoredCalibration active,
                            store_->GetActiveCalibration(run.rig));
   CalibrateOptions options = options_.calibrate;
+  options.reweight_noise |= rig.rig.reweight_noise;
   if (run.change > 0) {
     SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
                              store_->GetChange(run.rig, run.change));

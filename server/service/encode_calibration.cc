@@ -92,6 +92,14 @@ void FillReport(const CalibrationResult& result,
   message->set_observations_dropped(result.observations_dropped);
   message->set_track_noise_factor(result.track_noise_factor);
   message->set_seconds(seconds);
+  for (const NoiseFactor& factor : result.noise_factors) {
+    v1::NoiseFactor* added = message->add_noise_factors();
+    added->set_kind(NoiseKindName(factor.kind));
+    added->set_factor(factor.factor);
+    added->set_log_sigma(factor.log_sigma);
+    added->set_redundancy(factor.redundancy);
+    added->set_determined(factor.determined());
+  }
 }
 
 void FillEstimates(const StoredCalibration& calibration,

@@ -58,6 +58,14 @@ void PutSolver(const CalibrationResult& result, SolverRecord* record) {
   record->set_observations(result.observations);
   record->set_observations_dropped(result.observations_dropped);
   record->set_track_noise_factor(result.track_noise_factor);
+  for (const NoiseFactor& factor : result.noise_factors) {
+    v1::NoiseFactor* message = record->add_noise_factors();
+    message->set_kind(NoiseKindName(factor.kind));
+    message->set_factor(factor.factor);
+    message->set_log_sigma(factor.log_sigma);
+    message->set_redundancy(factor.redundancy);
+    message->set_determined(factor.determined());
+  }
 }
 
 CalibrationResult GetSolver(const SolverRecord& record) {
@@ -81,6 +89,12 @@ CalibrationResult GetSolver(const SolverRecord& record) {
   result.observations = record.observations();
   result.observations_dropped = record.observations_dropped();
   result.track_noise_factor = record.track_noise_factor();
+  for (const v1::NoiseFactor& message : record.noise_factors()) {
+    if (const auto kind = FindNoiseKind(message.kind())) {
+      result.noise_factors.push_back(
+          {*kind, message.factor(), message.log_sigma(), message.redundancy()});
+    }
+  }
   return result;
 }
 

@@ -74,6 +74,7 @@ void ExpectSame(const Rig& a, const Rig& b) {
   EXPECT_TRUE(SameBits(a.min_gain_nats, b.min_gain_nats));
   EXPECT_TRUE(SameBits(a.retrigger_fraction, b.retrigger_fraction));
   EXPECT_EQ(a.estimate_time_offset, b.estimate_time_offset);
+  EXPECT_EQ(a.reweight_noise, b.reweight_noise);
 }
 
 void ExpectSame(const MotionSegment& a, const MotionSegment& b) {

@@ -86,6 +86,7 @@ class RandomValues {
     rig.min_gain_nats = Double();
     rig.retrigger_fraction = Double();
     rig.estimate_time_offset = Int(0, 1) == 1;
+    rig.reweight_noise = Int(0, 1) == 1;
     return rig;
   }
 

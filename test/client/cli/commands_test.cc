@@ -276,6 +276,13 @@ v1::Calibration Version(std::int64_t version) {
   auto* part = calibration.mutable_solver()->add_held_constant()->add_parts();
   part->set_component("cam0.p_CI.z");
   part->set_weight(1);
+  auto* noise = calibration.mutable_solver()->add_noise_factors();
+  noise->set_kind("pixel");
+  noise->set_factor(1.234);
+  noise->set_log_sigma(0.02);
+  noise->set_determined(true);
+  noise = calibration.mutable_solver()->add_noise_factors();
+  noise->set_kind("gyro_bias_walk");
   return calibration;
 }
 
@@ -286,6 +293,12 @@ TEST_F(Commands, ShowsACalibrationWithItsOriginAndValues) {
   EXPECT_THAT(outcome.out, HasSubstr("version\t2\n"));
   EXPECT_THAT(outcome.out, HasSubstr("started from\tversion 1\n"));
   EXPECT_THAT(outcome.out, HasSubstr("held constant\tcam0.p_CI.z"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("noise\tpixel sigma: residuals suggest 1.23 times what "
+                        "the rig states (+- 2 %)\n"));
+  EXPECT_THAT(
+      outcome.out,
+      HasSubstr("noise\tgyro bias walk: residuals do not determine it\n"));
   EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255.123\tpx\t0.034\n"));
   Selfcal({"calibrations", "show", "device", "7"});
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/7");

@@ -1,3 +1,4 @@
+#include <map>
 #include <mutex>
 #include <stdexcept>
 
@@ -56,6 +57,35 @@ TEST_F(RecalibrationTest, FullTablesGiveOneNewVersion) {
   Restart();
   EXPECT_EQ(store_->ListRuns("a", {})->items.size(), 1u);
   EXPECT_EQ(store_->ListCalibrations("a", {})->items.size(), 2u);
+}
+
+TEST_F(RecalibrationTest, NoiseIsReweightedWhereTheRigSaysSo) {
+  std::mutex mutex;
+  std::map<std::string, bool> reweighted;
+  estimators_.calibrate = [&](const Rig& rig,
+                              const Calibration& start,
+                              const std::vector<MotionSegment>&,
+                              const CalibrateOptions& options,
+                              const ProgressCallback&) {
+    const std::lock_guard lock(mutex);
+    reweighted[rig.id] = options.reweight_noise;
+    return Converged(rig, start);
+  };
+  Rig rig = TestRig("b");
+  rig.reweight_noise = true;
+  ASSERT_TRUE(store_->CreateRig(rig).ok());
+  CreateRig();
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  Submit(0, "b");
+  Submit(1, "b");
+  ASSERT_TRUE(Eventually([&] {
+    const std::lock_guard lock(mutex);
+    return reweighted.size() == 2;
+  }));
+  EXPECT_FALSE(reweighted.at("a"));
+  EXPECT_TRUE(reweighted.at("b"));
 }
 
 TEST_F(RecalibrationTest, SolverStartsFromTheActiveVersionOnTheSnapshot) {

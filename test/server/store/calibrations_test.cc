@@ -33,6 +33,8 @@ class CalibrationsTest : public StoreTest {
     report.iterations = 12;
     report.final_cost = 1.0 / 9;
     report.rank = size - 1;
+    report.noise_factors = {{NoiseKind::kAccel, 1.0 / 7, 0.03, 100.5},
+                            {NoiseKind::kGyroBiasWalk, 2, 1.5, 0.25}};
     report.held_constant = {{{{"imu.gyro.scale.x", 1.0}}, 0.2}};
     report.observations = 1234;
     report.track_noise_factor = 1.0 / 0.7;
@@ -68,6 +70,14 @@ TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   EXPECT_EQ(stored->report->final_cost, 1.0 / 9);
   EXPECT_EQ(stored->report->observations, 1234);
   EXPECT_EQ(stored->report->track_noise_factor, 1.0 / 0.7);
+  ASSERT_EQ(stored->report->noise_factors.size(), 2u);
+  const NoiseFactor& factor = stored->report->noise_factors[0];
+  EXPECT_EQ(factor.kind, NoiseKind::kAccel);
+  EXPECT_EQ(factor.factor, 1.0 / 7);
+  EXPECT_EQ(factor.log_sigma, 0.03);
+  EXPECT_EQ(factor.redundancy, 100.5);
+  EXPECT_TRUE(factor.determined());
+  EXPECT_FALSE(stored->report->noise_factors[1].determined());
   ASSERT_EQ(stored->report->held_constant.size(), 1u);
   ExpectSameCalibration(stored->report->theta, candidate.theta);
 }
