@@ -16,6 +16,8 @@ void RunRecordings(Context* context);
 void RunSensors(Context* context);
 void RunFusion(Context* context);
 void RunSelection(Context* context);
+void RunNoiseFactors(Context* context);
+void RunWrongNoise(Context* context);
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> all = {
@@ -50,6 +52,12 @@ const std::vector<Experiment>& Experiments() {
       {"consistency",
        "is each estimator as sure as it says? NEES and coverage",
        RunConsistency},
+      {"noise_factors",
+       "the factors by which the noise of a rig is off, found from residuals",
+       RunNoiseFactors},
+      {"wrong_noise",
+       "estimate and sigma where the noise is wrong, or tracks are outlying",
+       RunWrongNoise},
   };
   return all;
 }
