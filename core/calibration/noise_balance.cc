@@ -9,6 +9,38 @@ namespace {
 
 using MotionMatrix = Eigen::Matrix<double, 9, 9>;
 
+// A landmark that is lost for more keyframes than this counts as another one
+// when it is found again. That it ties the two places says next to nothing
+// about noise, and would keep the keyframes between in every front of the
+// elimination.
+constexpr int kMaxLost = 10;
+constexpr std::size_t kMinObservations = 2;
+
+std::vector<ScreenedLandmark> SplitWhereFoundAgain(
+    const CalibrationProblem& problem,
+    const std::vector<ScreenedLandmark>& landmarks) {
+  std::vector<ScreenedLandmark> parts;
+  for (const ScreenedLandmark& whole : landmarks) {
+    const auto& seen = problem.tracks[whole.track].observations;
+    ScreenedLandmark part = whole;
+    const auto finish = [&] {
+      if (part.used.size() >= kMinObservations) parts.push_back(part);
+      part.used.clear();
+    };
+    part.used.clear();
+    for (const UsedObservation& used : whole.used) {
+      if (!part.used.empty() &&
+          seen[used.index].keyframe - seen[part.used.back().index].keyframe >
+              kMaxLost) {
+        finish();
+      }
+      part.used.push_back(used);
+    }
+    finish();
+  }
+  return parts;
+}
+
 // What the weighted squares of a residual of two normal components of the
 // given variance [sigma^2] are on average, in parts of its squares.
 double Consistency(const RobustLoss& loss, double variance) {
@@ -60,7 +92,7 @@ NoiseProblem::NoiseProblem(const SolverRound& round,
       track_noise_(track_noise),
       motion_(SplitMotionNoise(
           round, BoxPlus(round.reference, estimate.d).imu, estimate.keyframes)),
-      landmarks_(landmarks),
+      landmarks_(SplitWhereFoundAgain(round.problem, landmarks)),
       rig_(round.rig),
       problem_(round.problem),
       whitening_(round.whitening) {}

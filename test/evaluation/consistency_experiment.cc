@@ -21,6 +21,9 @@ constexpr int kQuickRuns = 4;
 constexpr double kDuration_s = 60;
 constexpr double kQuickDuration_s = 25;
 constexpr int kTableSize = 2;
+// New tracks of landmarks that were seen before, so that some are split between
+// the partitions of a calibration.
+constexpr double kFoundAgain = 0.02;
 constexpr double kProbability = 0.95;
 // Of many parameters some lie outside of 95 %: each is held to this instead.
 constexpr double kParameterProbability = 0.999;
@@ -78,6 +81,7 @@ Run RunDevice(std::uint64_t seed, double duration_s) {
   rig.table_size = kTableSize;
   SimulationOptions options;
   options.seed = seed;
+  options.revisit_fraction = kFoundAgain;
   const std::vector<MotionSegment> segments =
       Simulate(rig,
                truth,
