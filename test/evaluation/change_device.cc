@@ -6,6 +6,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/model/so3.h"
 #include "core/simulation/simulate.h"
+#include "test/evaluation/estimators.h"
 
 namespace selfcal {
 namespace {
@@ -45,8 +46,8 @@ ChangeDevice MakeChangeDevice(int index) {
           kActiveSegments * kChangeSegment_s + kMargin_s, 0.7, options.seed),
       "active",
       options);
-  const CalibrationResult result =
-      Calibrate(device.rig, device.rig.factory, session.segments);
+  const CalibrationResult result = Calibrate(
+      device.rig, device.rig.factory, session.segments, ComparedOptions());
   if (result.status != CalibrateStatus::kConverged) {
     throw std::runtime_error("the active calibration: " + result.message);
   }

@@ -9,6 +9,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/change/detect_change.h"
 #include "test/evaluation/change_device.h"
+#include "test/evaluation/estimators.h"
 #include "test/evaluation/recordings.h"
 
 namespace selfcal {
@@ -29,7 +30,7 @@ Half CalibrateHalf(const RecordedDevice& device, bool first) {
   std::vector<MotionSegment> other(middle, device.segments.end());
   if (!first) one.swap(other);
   const CalibrationResult result =
-      Calibrate(device.rig, device.rig.factory, one);
+      Calibrate(device.rig, device.rig.factory, one, ComparedOptions());
   if (result.status != CalibrateStatus::kConverged) {
     throw std::runtime_error("half of a recording: " + result.message);
   }

@@ -104,8 +104,8 @@ Run RunDevice(std::uint64_t seed, double duration_s) {
   Run run;
   for (int kind = 0; kind < kSelected; ++kind) {
     const std::vector<MotionSegment> picked = Pick(segments, sets[kind]);
-    run.outcomes[kind] =
-        Compare(Calibrate(rig, rig.factory, picked), truth, free);
+    run.outcomes[kind] = Compare(
+        Calibrate(rig, rig.factory, picked, ComparedOptions()), truth, free);
   }
   run.outcomes[kGain] =
       Compare(RunInformationGain(rig, segments, {}).calibration, truth, free);

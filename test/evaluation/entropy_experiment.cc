@@ -71,8 +71,10 @@ void EstimateAll(const Dataset& dataset,
                                     scores,
                                     sizes.kept,
                                     static_cast<std::uint64_t>(draw));
-      const CalibrationResult result = Calibrate(
-          dataset.rig, dataset.rig.factory, Pick(dataset.segments(), set));
+      const CalibrationResult result = Calibrate(dataset.rig,
+                                                 dataset.rig.factory,
+                                                 Pick(dataset.segments(), set),
+                                                 ComparedOptions());
       run->not_converged[choice] +=
           result.status != CalibrateStatus::kConverged;
       run->estimates[choice].push_back(
@@ -109,8 +111,8 @@ void Converge(const Dataset& dataset,
   for (const Choice choice : {kMost, kLeast, kRandom}) {
     Calibration theta = dataset.rig.factory;
     for (const SegmentSet& set : Updates(choice, dataset.rig, scores, kept)) {
-      const CalibrationResult result =
-          Calibrate(dataset.rig, theta, Pick(dataset.segments(), set));
+      const CalibrationResult result = Calibrate(
+          dataset.rig, theta, Pick(dataset.segments(), set), ComparedOptions());
       if (result.status == CalibrateStatus::kConverged) theta = result.theta;
       run->convergence[choice].push_back(
           Rms(Ratios(BoxMinus(theta, batch.theta), sigma)));
@@ -123,8 +125,10 @@ void CalibrateAlone(const Dataset& dataset,
                     DatasetRun* run) {
   const Eigen::VectorXd reference = ReferenceSigmas(dataset.rig);
   for (std::size_t i = 0; i < scores.size(); ++i) {
-    const CalibrationResult result =
-        Calibrate(dataset.rig, dataset.rig.factory, {dataset.segments()[i]});
+    const CalibrationResult result = Calibrate(dataset.rig,
+                                               dataset.rig.factory,
+                                               {dataset.segments()[i]},
+                                               ComparedOptions());
     if (result.status != CalibrateStatus::kConverged) continue;
     const Eigen::VectorXd error =
         BoxMinus(result.theta, dataset.truth).cwiseQuotient(reference);

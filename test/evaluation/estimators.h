@@ -12,6 +12,14 @@
 
 namespace selfcal {
 
+// Of all calibrations that are compared: what residuals say about the noise of
+// the rig is another matter, and takes as long again.
+inline CalibrateOptions ComparedOptions() {
+  CalibrateOptions options;
+  options.noise_factors = false;
+  return options;
+}
+
 // What each segment says, scored at the factory's calibration, in their order.
 std::vector<SegmentInformation> ScoreAll(
     const Rig& rig, const std::vector<MotionSegment>& segments);
@@ -44,9 +52,10 @@ std::vector<MotionSegment> Pick(const std::vector<MotionSegment>& segments,
 
 // Calibrates on the set from the factory's calibration. Throws
 // std::runtime_error if the solver does not converge.
-CalibrationResult CalibrateOn(const Rig& rig,
-                              const std::vector<MotionSegment>& segments,
-                              const SegmentSet& set,
-                              const CalibrateOptions& options = {});
+CalibrationResult CalibrateOn(
+    const Rig& rig,
+    const std::vector<MotionSegment>& segments,
+    const SegmentSet& set,
+    const CalibrateOptions& options = ComparedOptions());
 
 }  // namespace selfcal

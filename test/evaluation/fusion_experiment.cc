@@ -12,6 +12,7 @@
 #include "core/information/segment_information.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/datasets.h"
+#include "test/evaluation/estimators.h"
 #include "test/evaluation/statistics.h"
 
 namespace selfcal {
@@ -82,7 +83,7 @@ Outcome Evaluate(int dataset, double scale, double duration_s) {
   const FusedEstimate fused = Fuse(data.rig, stored);
   const FusedEstimate fused_true = Fuse(data.rig, at_true_states);
   const CalibrationResult full =
-      Calibrate(data.rig, data.rig.factory, data.segments());
+      Calibrate(data.rig, data.rig.factory, data.segments(), ComparedOptions());
   const std::vector<int> free = FreeComponents(data.rig);
   const Eigen::VectorXd reference = ReferenceSigmas(data.rig);
   const auto rms = [&](const Calibration& a, const Calibration& b) {

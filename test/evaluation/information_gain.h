@@ -59,9 +59,10 @@ struct GainResult {
 // Calibrates from the factory's calibration, then each time from where the
 // database stands. A candidate with which the solver does not converge is not
 // kept.
-GainResult RunInformationGain(const Rig& rig,
-                              const std::vector<MotionSegment>& segments,
-                              const GainOptions& options,
-                              const CalibrateOptions& calibrate = {});
+GainResult RunInformationGain(
+    const Rig& rig,
+    const std::vector<MotionSegment>& segments,
+    const GainOptions& options,
+    const CalibrateOptions& calibrate = ComparedOptions());
 
 }  // namespace selfcal

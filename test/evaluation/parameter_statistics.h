@@ -33,8 +33,8 @@ struct ParameterStatistics {
 ParameterStatistics Summarise(const Calibration& truth,
                               const std::vector<Estimate>& estimates);
 
-// One row for each component that is estimated: truth, and for each named estimator average,
-// spread, error and claimed sigma.
+// One row for each component that is estimated: truth, and for each named
+// estimator average, spread, error and claimed sigma.
 ResultTable CompareParameters(
     const Calibration& truth,
     const std::vector<std::pair<std::string, ParameterStatistics>>& estimators);

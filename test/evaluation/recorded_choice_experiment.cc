@@ -21,6 +21,7 @@
 #include "core/selection/joint_selection.h"
 #include "core/selection/tables.h"
 #include "test/evaluation/context.h"
+#include "test/evaluation/estimators.h"
 #include "test/evaluation/recordings.h"
 #include "test/evaluation/statistics.h"
 
@@ -87,7 +88,7 @@ double Distance(const ScoredRecording& recording,
   std::vector<MotionSegment> segments;
   for (const int i : chosen) segments.push_back(device.segments[i]);
   const CalibrationResult result =
-      Calibrate(device.rig, device.rig.factory, segments);
+      Calibrate(device.rig, device.rig.factory, segments, ComparedOptions());
   const std::vector<int> free = FreeComponents(device.rig);
   const Eigen::VectorXd off =
       BoxMinus(result.theta, recording.batch.theta)(free);
@@ -194,7 +195,8 @@ void RunRecordedChoice(Context* context) {
     recording.scores.push_back(
         ScoreSegment(tango->rig, tango->rig.factory, segment));
   }
-  recording.batch = Calibrate(tango->rig, tango->rig.factory, tango->segments);
+  recording.batch = Calibrate(
+      tango->rig, tango->rig.factory, tango->segments, ComparedOptions());
   Plot plot{.title = "A calibration on some segments against that on all",
             .x_label = "segments",
             .y_label = "rms distance [sigma of all]",

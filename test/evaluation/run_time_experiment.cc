@@ -47,7 +47,8 @@ void TimeInTurn(const Dataset& dataset, Timed* timed) {
   timed->informative.push_back(CpuSeconds([&] {
     std::vector<SegmentInformation> known;
     for (const int i : kept) known.push_back(scores[i]);
-    Calibrate(rig, Fuse(rig, known).theta, Pick(segments, kept));
+    Calibrate(
+        rig, Fuse(rig, known).theta, Pick(segments, kept), ComparedOptions());
   }));
   timed->batch.push_back(CpuSeconds([&] {
     CalibrateOn(rig, segments, AllSegments(static_cast<int>(segments.size())));
@@ -64,11 +65,13 @@ Timed TimeDataset(const Dataset& dataset, int repetitions, Context* context) {
   };
   for (int i = 0; i < repetitions; ++i) TimeInTurn(dataset, &timed);
   report("informative and batch");
+  CalibrateOptions with_ceres = ComparedOptions();
+  with_ceres.solver = SolverKind::kCeres;
   timed.batch_ceres = CpuSeconds([&] {
     CalibrateOn(dataset.rig,
                 segments,
                 AllSegments(static_cast<int>(segments.size())),
-                {.solver = SolverKind::kCeres});
+                with_ceres);
   });
   report("batch with Ceres");
   TimeInTurn(dataset, &timed);

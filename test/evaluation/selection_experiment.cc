@@ -16,6 +16,7 @@
 #include "test/evaluation/context.h"
 #include "test/evaluation/datasets.h"
 #include "test/evaluation/dominated_motion.h"
+#include "test/evaluation/estimators.h"
 #include "test/evaluation/statistics.h"
 
 namespace selfcal {
@@ -175,7 +176,7 @@ Outcome Evaluate(const Data& data,
   std::vector<MotionSegment> chosen;
   for (const int i : choice) chosen.push_back(data.segments[i]);
   const CalibrationResult result =
-      Calibrate(data.rig, data.rig.factory, chosen);
+      Calibrate(data.rig, data.rig.factory, chosen, ComparedOptions());
   const std::vector<int> free = FreeComponents(data.rig);
   const Eigen::VectorXd error = BoxMinus(data.truth, result.theta);
   const Eigen::VectorXd prior = PriorSigmas(data.rig)(free).cwiseInverse();
@@ -346,7 +347,7 @@ void PlotChoices(const std::vector<DatasetOutcome>& all, Context* context) {
 void RunSelection(Context* context) {
   const int datasets = context->quick() ? 1 : 6;
   const int draws = context->quick() ? 1 : 4;
-  const double duration_s = context->quick() ? 28.1 : 180.1;
+  const double duration_s = context->quick() ? 20.1 : 180.1;
   const int count = datasets * static_cast<int>(Scenarios().size());
   std::vector<DatasetOutcome> all(count);
   context->ForEach(count, [&](int i) {

@@ -11,6 +11,7 @@
 #include "core/calibration/calibrate.h"
 #include "test/core/simulation/rigs.h"
 #include "test/evaluation/context.h"
+#include "test/evaluation/estimators.h"
 #include "test/evaluation/statistics.h"
 
 namespace selfcal {
@@ -72,8 +73,8 @@ Run RunOne(const Setting& setting, std::uint64_t seed, double duration_s) {
                                             *MakeHandheld(duration_s, 1, seed),
                                             "session",
                                             options);
-  const CalibrationResult result =
-      Calibrate(device.rig, device.rig.factory, session.segments);
+  const CalibrationResult result = Calibrate(
+      device.rig, device.rig.factory, session.segments, ComparedOptions());
   if (result.status != CalibrateStatus::kConverged &&
       setting.offsets != Offsets::kIgnored) {
     throw std::runtime_error(setting.Name() + ", seed " + std::to_string(seed) +
