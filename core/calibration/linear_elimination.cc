@@ -113,7 +113,8 @@ void LinearSystem::Linearise(const Rig& rig,
                              const KeyframeMotions& motions,
                              const std::vector<ScreenedLandmark>& landmarks,
                              std::span<const InertialNoiseRoot> roots,
-                             const RobustLoss* loss) {
+                             const RobustLoss* loss,
+                             double damping) {
   rig_ = &rig;
   theta_ = &theta;
   keyframes_ = &keyframes;
@@ -122,7 +123,7 @@ void LinearSystem::Linearise(const Rig& rig,
   for (const CameraCalibration& camera : theta.cameras) {
     camera_sizes_.push_back(CameraTangentSize(camera));
   }
-  StartChains(problem, static_cast<int>(camera_sizes_.size()));
+  StartChains(problem, static_cast<int>(camera_sizes_.size()), damping);
   PlaceLandmarks(landmarks);
   SortByView(problem, landmarks);
   Weigh(loss);

@@ -21,6 +21,11 @@ constexpr double kLeastInverseDepth = 1e-9;
 constexpr double kGaugeSigma_m = 1e-5;
 constexpr double kGaugeSigma_rad = 1e-5;
 
+constexpr double kSmallTilt_rad = 0.1;
+constexpr double kSmallVelocity_mps = 0.3;
+constexpr double kSmallAccelBias_mps2 = 1;
+constexpr double kSmallGyroBias_radps = 0.1;
+
 double Information(double sigma) { return 1 / (sigma * sigma); }
 
 ChainStateMatrix WeakPrior() {
@@ -34,6 +39,20 @@ ChainStateMatrix WeakPrior() {
   weak.diagonal().segment<3>(kStateGyroBias).array() =
       Information(kGyroBiasPriorSigma_radps);
   return weak;
+}
+
+// Steps over which factors are about linear.
+ChainStateMatrix SmallSteps() {
+  ChainStateMatrix small = ChainStateMatrix::Zero();
+  small.diagonal().segment<3>(kStateRotation).array() =
+      Information(kSmallTilt_rad);
+  small.diagonal().segment<3>(kStateVelocity).array() =
+      Information(kSmallVelocity_mps);
+  small.diagonal().segment<3>(kStateAccelBias).array() =
+      Information(kSmallAccelBias_mps2);
+  small.diagonal().segment<3>(kStateGyroBias).array() =
+      Information(kSmallGyroBias_radps);
+  return small;
 }
 
 // Position and rotation about gravity.
@@ -83,7 +102,9 @@ std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem) {
   return chains;
 }
 
-void LinearSystem::StartChains(const CalibrationProblem& problem, int cameras) {
+void LinearSystem::StartChains(const CalibrationProblem& problem,
+                               int cameras,
+                               double damping) {
   const std::vector<KeyframeChain> ranges = FindChains(problem);
   while (chains_.size() < ranges.size()) chains_.emplace_back(width_);
   chains_.erase(chains_.begin() + static_cast<std::ptrdiff_t>(ranges.size()),
@@ -110,7 +131,7 @@ void LinearSystem::StartChains(const CalibrationProblem& problem, int cameras) {
   priors_.assign(keyframes, ChainStateMatrix::Zero());
   has_prior_.assign(keyframes, false);
   for (const int k : problem.chain_starts) {
-    priors_[k] += WeakPrior();
+    priors_[k] += WeakPrior() + damping * SmallSteps();
     has_prior_[k] = true;
   }
   for (const int k : problem.gauge_keyframes) {

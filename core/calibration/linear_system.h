@@ -78,6 +78,9 @@ class LinearSystem {
   // inverse of Lambda is then the covariance of the estimate to 1 %. Without
   // (null), all count fully. The weak priors of the score keep states proper
   // that nothing determines; centred at the estimate, they move nothing.
+  // Damping makes these priors stronger, to steps that are small: for a step,
+  // not for what is said about theta. 1 is next to nothing where states are
+  // determined.
   // Landmarks that do not have two observations left to stand on are left out.
   // What was linearised before is forgotten, its memory kept.
   void Linearise(const Rig& rig,
@@ -87,7 +90,8 @@ class LinearSystem {
                  const KeyframeMotions& motions,
                  const std::vector<ScreenedLandmark>& landmarks,
                  std::span<const InertialNoiseRoot> roots,
-                 const RobustLoss* loss);
+                 const RobustLoss* loss,
+                 double damping = 0);
 
   // Of theta's tangent. Not finite where the factors are not.
   const SharedInformation& information() const { return information_; }
@@ -144,7 +148,9 @@ class LinearSystem {
     int factor = -1;    // index into the tracks of its chain
   };
 
-  void StartChains(const CalibrationProblem& problem, int cameras);
+  void StartChains(const CalibrationProblem& problem,
+                   int cameras,
+                   double damping);
   void AddToTrack(int chain, int landmark, std::span<Seen> seen);
   int KeepInChain(int place, int size, Chain* chain);
   void KeepWalks(const CalibrationProblem& problem);

@@ -23,6 +23,11 @@ constexpr double kRobustStretch = 1.08;
 constexpr double kMaxStretch = 2;
 constexpr double kMinShortening = 0.1;
 constexpr int kMaxTrials = 10;
+// A step this short was turned by what states are hardly determined in, as the
+// tilt of a device that does not accelerate: then those are damped.
+constexpr double kShort = 0.5;
+constexpr double kDampingFactor = 1e2;
+constexpr double kMaxDamping = 1e6;
 // Landmarks at a point that is tried may together lack this part of what the
 // step promises.
 constexpr double kRefineDecrease = 1e-4;
@@ -164,7 +169,8 @@ bool LineariseFactors(const SolverRound& round,
                       const CalibrationEstimate& estimate,
                       const std::vector<ScreenedLandmark>& landmarks,
                       const RobustLoss* loss,
-                      LinearisedRound* result) {
+                      LinearisedRound* result,
+                      double damping) {
   const Calibration theta = BoxPlus(round.reference, estimate.d);
   result->theta_by_offset = ThetaByOffset(round.reference, estimate.d);
   result->roots = RootsOf(round);
@@ -175,7 +181,8 @@ bool LineariseFactors(const SolverRound& round,
                            round.motions,
                            landmarks,
                            result->roots,
-                           loss);
+                           loss,
+                           damping);
   const SharedInformation& at_theta = result->system.information();
   if (!at_theta.Lambda.allFinite() || !at_theta.eta.allFinite()) {
     return false;
@@ -192,58 +199,111 @@ bool LineariseRound(const SolverRound& round,
                     const CalibrationEstimate& estimate,
                     const std::vector<ScreenedLandmark>& landmarks,
                     const RobustLoss* loss,
-                    LinearisedRound* result) {
-  if (!LineariseFactors(round, estimate, landmarks, loss, result)) {
+                    LinearisedRound* result,
+                    double damping) {
+  if (!LineariseFactors(round, estimate, landmarks, loss, result, damping)) {
     return false;
   }
   result->cost = RoundCost(round, estimate, landmarks);
   return true;
 }
 
+namespace {
+
+// Tries points on one way from the estimate.
+class Way {
+ public:
+  Way(const SolverRound& round,
+      const LinearisedRound& linearised,
+      const CalibrationEstimate& estimate,
+      const std::vector<ScreenedLandmark>& landmarks)
+      : round_(round),
+        linearised_(linearised),
+        direction_(FirstStep(round, linearised)),
+        estimate_(estimate),
+        landmarks_(landmarks),
+        places_(Places(landmarks)) {}
+
+  // The lowest point that was tried; it may be higher than the start. Further
+  // lengths are tried until one is lower.
+  Trial Go() {
+    Trial best = At(1);
+    length_ = 1;
+    double next = Next(1, best);
+    if (Lower(best) && std::abs(next - 1) <= kLengthTolerance) return best;
+    for (int i = 0; i < kMaxTrials && (i == 0 || !Lower(best)); ++i) {
+      const double length = next;
+      Trial trial = At(length);
+      next = Next(length, trial);
+      if (trial.cost < best.cost) {
+        best = std::move(trial);
+        length_ = length;
+      }
+    }
+    return best;
+  }
+
+  bool Lower(const Trial& trial) const { return trial.cost < linearised_.cost; }
+  // Of the lowest point.
+  double length() const { return length_; }
+
+ private:
+  double Next(double length, const Trial& trial) const {
+    return NextLength(length, trial.cost - linearised_.cost, direction_.slope);
+  }
+
+  Trial At(double length) const {
+    Trial trial{estimate_, places_, 0};
+    trial.estimate.d += length * direction_.d;
+    for (std::size_t k = 0; k < direction_.keyframes.size(); ++k) {
+      Move(length * direction_.keyframes[k], &trial.estimate.keyframes[k]);
+    }
+    for (std::size_t i = 0; i < direction_.landmarks.size(); ++i) {
+      trial.places[i].Move(length * direction_.landmarks[i]);
+    }
+    const RefineLimits limits{.decrease =
+                                  kRefineDecrease * direction_.slope /
+                                  static_cast<double>(landmarks_.size() + 1)};
+    trial.cost = Evaluate(round_,
+                          linearised_.roots,
+                          trial.estimate,
+                          landmarks_,
+                          limits,
+                          &trial.places);
+    return trial;
+  }
+
+  const SolverRound& round_;
+  const LinearisedRound& linearised_;
+  const Direction direction_;
+  const CalibrationEstimate& estimate_;
+  const std::vector<ScreenedLandmark>& landmarks_;
+  const std::vector<LandmarkPlace> places_;
+  double length_ = 0;
+};
+
+}  // namespace
+
 StepOutcome TakeStep(const SolverRound& round,
                      const LinearisedRound& linearised,
                      CalibrationEstimate* estimate,
                      std::vector<ScreenedLandmark>* landmarks) {
-  const Direction direction = FirstStep(round, linearised);
-  const std::vector<LandmarkPlace> places = Places(*landmarks);
-  const RefineLimits limits{.decrease =
-                                kRefineDecrease * direction.slope /
-                                static_cast<double>(landmarks->size() + 1)};
-  const auto at = [&](double length) {
-    Trial trial{*estimate, places, 0};
-    trial.estimate.d += length * direction.d;
-    for (std::size_t k = 0; k < direction.keyframes.size(); ++k) {
-      Move(length * direction.keyframes[k], &trial.estimate.keyframes[k]);
+  Way way(round, linearised, *estimate, *landmarks);
+  Trial best = way.Go();
+  double length = way.length();
+  LinearisedRound damped;
+  for (double damping = 1; length < kShort && damping <= kMaxDamping;
+       damping *= kDampingFactor) {
+    if (!LineariseRound(
+            round, *estimate, *landmarks, &round.loss, &damped, damping)) {
+      break;
     }
-    for (std::size_t i = 0; i < direction.landmarks.size(); ++i) {
-      trial.places[i].Move(length * direction.landmarks[i]);
-    }
-    trial.cost = Evaluate(round,
-                          linearised.roots,
-                          trial.estimate,
-                          *landmarks,
-                          limits,
-                          &trial.places);
-    return trial;
-  };
-
-  double length = 1;
-  Trial best = at(length);
-  double next =
-      NextLength(length, best.cost - linearised.cost, direction.slope);
-  bool lower = best.cost < linearised.cost;
-  if (!lower || std::abs(next - length) > kLengthTolerance * length) {
-    for (int i = 0; i < kMaxTrials && (i == 0 || !lower); ++i) {
-      length = next;
-      Trial trial = at(length);
-      next = NextLength(length, trial.cost - linearised.cost, direction.slope);
-      if (trial.cost < best.cost) {
-        best = std::move(trial);
-      }
-      lower = best.cost < linearised.cost;
-    }
+    Way shorter(round, damped, *estimate, *landmarks);
+    Trial trial = shorter.Go();
+    length = shorter.length();
+    if (trial.cost < best.cost) best = std::move(trial);
   }
-  if (!lower) {
+  if (!way.Lower(best)) {
     return {false, linearised.cost};
   }
   *estimate = std::move(best.estimate);
@@ -251,6 +311,23 @@ StepOutcome TakeStep(const SolverRound& round,
     (*landmarks)[i].place = best.places[i];
   }
   return {true, best.cost};
+}
+
+void GoAlong(const LinearisedRound& linearised,
+             const Eigen::VectorXd& step_d,
+             CalibrationEstimate* estimate,
+             std::vector<ScreenedLandmark>* landmarks) {
+  std::vector<ChainStateVector> keyframes;
+  std::vector<Eigen::Vector3d> places;
+  linearised.system.FindSteps(
+      linearised.theta_by_offset * step_d, &keyframes, &places);
+  estimate->d += step_d;
+  for (std::size_t k = 0; k < keyframes.size(); ++k) {
+    Move(keyframes[k], &estimate->keyframes[k]);
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    (*landmarks)[i].place.Move(places[i]);
+  }
 }
 
 SolverOutcome SolveRoundByStructure(const SolverRound& round,

@@ -37,12 +37,14 @@ bool LineariseFactors(const SolverRound& round,
                       const CalibrationEstimate& estimate,
                       const std::vector<ScreenedLandmark>& landmarks,
                       const RobustLoss* loss,
-                      LinearisedRound* result);
+                      LinearisedRound* result,
+                      double damping = 0);
 bool LineariseRound(const SolverRound& round,
                     const CalibrationEstimate& estimate,
                     const std::vector<ScreenedLandmark>& landmarks,
                     const RobustLoss* loss,
-                    LinearisedRound* result);
+                    LinearisedRound* result,
+                    double damping = 0);
 
 struct StepOutcome {
   bool lower = false;  // else nothing was moved: no step lowers the cost
@@ -54,6 +56,12 @@ StepOutcome TakeStep(const SolverRound& round,
                      const LinearisedRound& linearised,
                      CalibrationEstimate* estimate,
                      std::vector<ScreenedLandmark>* landmarks);
+
+// Moves d by a step, and all else by what the linear system has for it.
+void GoAlong(const LinearisedRound& linearised,
+             const Eigen::VectorXd& step_d,
+             CalibrationEstimate* estimate,
+             std::vector<ScreenedLandmark>* landmarks);
 
 // As SolveRound.
 SolverOutcome SolveRoundByStructure(const SolverRound& round,
