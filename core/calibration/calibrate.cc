@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/calibration/linear_range.h"
 #include "core/calibration/noise_factors.h"
 #include "core/calibration/partition.h"
 #include "core/calibration/problem.h"
@@ -25,15 +26,23 @@ constexpr double kTolerance = 1e-8;
 // Largest undamped Gauss-Newton step of theta at convergence, in sigmas.
 constexpr double kMaxStepSigmas = 0.05;
 // A round ends when theta made so many steps below so many sigmas in a row:
-// landmarks of little weight may go on slipping for long, and move nothing.
+// landmarks of little weight may go on slipping for long, and move nothing; so
+// may the scale of a scene that nothing shows, and an undamped step then goes
+// far beyond where it is one.
 constexpr int kSmallSteps = 3;
 constexpr double kSmallStepSigmas = 0.005;
+// With steps that take less off the cost [half squares].
+constexpr double kSmallDecrease = 0.1;
 // Largest change of theta by a round at convergence, in sigmas.
 constexpr double kMaxRoundSigmas = 0.02;
 // Pixel errors that make sigmas of theta larger by less than this part are
 // weighted as independent ones.
 constexpr double kLeastTrackNoise = 0.05;
 constexpr int kMaxReweightings = 3;
+// In units of the prior. What the data says less about is held until all else
+// is estimated: from a start that is off, the estimate would wander along it to
+// where the linearisation no longer holds.
+constexpr double kWeakInformation = 100;
 
 std::string CheckInput(const Rig& rig,
                        const Calibration& theta_start,
@@ -91,7 +100,7 @@ class Calibrator {
   }
 
   CalibrationResult Run() {
-    if (Start() && Solve() && WeighTracks()) {
+    if (Start() && Solve() && WeighTracks() && ReleaseWeak()) {
       Finish();
     }
     return std::move(result_);
@@ -141,18 +150,40 @@ class Calibrator {
     return Solve();
   }
 
+  // So far all is held that the data says little about. Some of it follows the
+  // linearisation as far as its sigma reaches, and is estimated after all.
+  bool ReleaseWeak() {
+    if (subspace_.held.cols() == 0 ||
+        result_.status != CalibrateStatus::kConverged) {
+      return true;
+    }
+    const Eigen::MatrixXd nothing(start_d_.size(), 0);
+    const LinearRange range(Round(nothing), estimate_, screening_.landmarks);
+    if (!range.settled()) {
+      return true;
+    }
+    Hold(TrustedSubspace(rig_, range, kWeakInformation));
+    weak_were_judged_ = true;
+    Screen(&screening_);
+    return Inform(&screening_.loss) ? Solve() : Fail(kNotDetermined);
+  }
+
   // One step a round.
   bool SolveBySteps() {
     if (!Report(0)) {
       return Cancel();
     }
+    int small_steps = 0;
     for (;;) {
       const double undamped_sigmas = StepSigmas();
       const StepOutcome step = Step();
       if (!Report(moved_sigmas_)) {
         return Cancel();
       }
-      if (undamped_sigmas < kMaxStepSigmas) {
+      const bool small = step.lower && moved_sigmas_ < kSmallStepSigmas &&
+                         linearised_.cost - step.cost < kSmallDecrease;
+      small_steps = small ? small_steps + 1 : 0;
+      if (undamped_sigmas < kMaxStepSigmas || small_steps == kSmallSteps) {
         result_.status = CalibrateStatus::kConverged;
         break;
       }
@@ -225,6 +256,8 @@ class Calibrator {
     MeasureMotions(rig_, theta, problem_, estimate_.keyframes, &motions_);
     screening_ = ScreenLandmarks(
         rig_, theta, problem_, estimate_.keyframes, motions_, options_, before);
+    RefineOnWhatIsUsed(
+        rig_, theta, problem_, estimate_.keyframes, motions_, &screening_);
     SetTrackNoise(result_.track_noise_factor, &screening_);
     whitening_ =
         WhitenInertialLinks(rig_, theta.imu, problem_, estimate_.keyframes);
@@ -278,15 +311,23 @@ class Calibrator {
   // the present subspace stays as large as it was.
   bool ChooseSubspace() {
     const auto held = static_cast<int>(subspace_.held.cols());
-    ThetaSubspace observed = ObservedSubspace(rig_, information_.Lambda, held);
+    ThetaSubspace observed =
+        weak_were_judged_
+            ? HoldDirections(rig_, information_.Lambda, subspace_.held)
+            : ObservedSubspace(
+                  rig_, information_.Lambda, held, kWeakInformation);
     const bool same = observed.held.cols() == held;
     if (!same) {
-      subspace_ = std::move(observed);
-      estimate_.d =
-          start_d_ + ProjectOnSubspace(rig_, subspace_, estimate_.d - start_d_);
-      covariance_d_ = SubspaceCovariance(rig_, subspace_, information_.Lambda);
+      Hold(std::move(observed));
     }
     return same;
+  }
+
+  void Hold(ThetaSubspace subspace) {
+    subspace_ = std::move(subspace);
+    estimate_.d =
+        start_d_ + ProjectOnSubspace(rig_, subspace_, estimate_.d - start_d_);
+    covariance_d_ = SubspaceCovariance(rig_, subspace_, information_.Lambda);
   }
 
   SolverRound Round(const Eigen::MatrixXd& basis) const {
@@ -361,7 +402,9 @@ class Calibrator {
     }
     result_.theta = Theta();
     const Eigen::MatrixXd by_offset = ThetaByOffset(reference_, estimate_.d);
-    result_.covariance = by_offset * covariance_d_ * by_offset.transpose();
+    result_.covariance =
+        by_offset * CovarianceWithHeld(rig_, subspace_, information_.Lambda) *
+        by_offset.transpose();
     result_.Lambda = linearised_.system.information().Lambda;
     result_.rank = static_cast<int>(subspace_.estimated.cols());
     result_.held_constant = subspace_.unobserved;
@@ -398,6 +441,7 @@ class Calibrator {
   LinearisedRound linearised_;
   SharedInformation information_;
   Eigen::MatrixXd covariance_d_;
+  bool weak_were_judged_ = false;
   double moved_sigmas_ = 0;  // by the last step
   double track_noise_ = 0;   // as TrackNoiseFactor
   CalibrationResult result_;

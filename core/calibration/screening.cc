@@ -66,6 +66,13 @@ Selected Select(const LandmarkScene& scene,
   return result;
 }
 
+bool InFull(const std::vector<UsedObservation>& used, const Track& track) {
+  return used.size() == track.observations.size() &&
+         std::all_of(used.begin(), used.end(), [](const UsedObservation& one) {
+           return one.weight == 1;
+         });
+}
+
 bool EnoughLeft(const Selected& selected) {
   return selected.used.size() >= kMinTrackObservations &&
          static_cast<double>(selected.used.size()) >=
@@ -279,6 +286,22 @@ Screening ScreenLandmarks(const Rig& rig,
     OnlyFall(problem, *before, &result);
   }
   return result;
+}
+
+void RefineOnWhatIsUsed(const Rig& rig,
+                        const Calibration& theta,
+                        const CalibrationProblem& problem,
+                        const std::vector<KeyframeState>& keyframes,
+                        const KeyframeMotions& motions,
+                        Screening* screening) {
+  const LandmarkScene scene(theta, keyframes, motions, rig.pixel_sigma_px);
+  for (ScreenedLandmark& landmark : screening->landmarks) {
+    const Track& track = problem.tracks[landmark.track];
+    if (!InFull(landmark.used, track)) {
+      RefinePlace(
+          scene, track, landmark.used, screening->loss, {}, &landmark.place);
+    }
+  }
 }
 
 ReprojectionStatistics MeasureReprojection(

@@ -86,6 +86,16 @@ Screening ScreenLandmarks(const Rig& rig,
                           const CalibrateOptions& options,
                           const Screening* before);
 
+// Brings every landmark to the minimum of what is used of its track. With
+// little parallax that is somewhere else than the minimum of the whole track,
+// by which it was screened, and the solver is to linearise at a minimum.
+void RefineOnWhatIsUsed(const Rig& rig,
+                        const Calibration& theta,
+                        const CalibrationProblem& problem,
+                        const std::vector<KeyframeState>& keyframes,
+                        const KeyframeMotions& motions,
+                        Screening* screening);
+
 ReprojectionStatistics MeasureReprojection(
     const Rig& rig,
     const Calibration& theta,

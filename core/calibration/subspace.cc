@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -10,10 +11,6 @@
 
 namespace selfcal {
 namespace {
-
-// Just below an information of 1, by more than rounding: where the prior is
-// part of the information, it is 1 without any data.
-constexpr double kAtThreshold = 1 - 1e-4;
 
 // Prior sigmas, zero for what the rig holds fixed.
 Eigen::VectorXd FreeSigmas(const Rig& rig) {
@@ -43,6 +40,54 @@ Eigen::MatrixXd Reduced(const Rig& rig,
   return basis.transpose() * Lambda * basis;
 }
 
+// Eigenvalues ascend. Of nothing: nothing.
+struct Spectrum {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd directions;
+};
+
+Spectrum Decompose(const Eigen::MatrixXd& information) {
+  if (information.size() == 0) {
+    return {Eigen::VectorXd(0), information};
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+// What is held, in words. One that the data says something about is named as
+// one at the threshold.
+std::vector<UnobservedDirection> NameHeld(const Rig& rig,
+                                          const ThetaSubspace& subspace,
+                                          const Eigen::MatrixXd& Lambda) {
+  const std::vector<int> free = FreeComponents(rig);
+  const Eigen::MatrixXd held = subspace.held(free, Eigen::all);
+  const Eigen::MatrixXd estimated = subspace.estimated(free, Eigen::all);
+  const Eigen::VectorXd sigmas = FreeSigmas(rig)(free);
+  const Eigen::MatrixXd in_sigmas =
+      sigmas.asDiagonal() * Lambda(free, free) * sigmas.asDiagonal();
+  const Spectrum spectrum = Decompose(held.transpose() * in_sigmas * held);
+  const Eigen::MatrixXd directions = held * spectrum.directions;
+  return AnalyseObservability(
+             directions *
+                     spectrum.values.cwiseMin(kLeastInformation).asDiagonal() *
+                     directions.transpose() +
+                 estimated * estimated.transpose() / kLeastInformation,
+             FreeNames(rig))
+      .unobserved;
+}
+
+// Orthonormal: of the span of `whole`, what is orthogonal to `part` within it.
+Eigen::MatrixXd Complement(const Eigen::MatrixXd& whole,
+                           const Eigen::MatrixXd& part) {
+  if (part.cols() == 0) {
+    return whole;
+  }
+  const Eigen::MatrixXd inside = whole.transpose() * part;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(inside);
+  const Eigen::MatrixXd Q = qr.householderQ();
+  return whole * Q.rightCols(whole.cols() - part.cols());
+}
+
 }  // namespace
 
 ThetaSubspace WholeSubspace(const Rig& rig) {
@@ -59,30 +104,35 @@ ThetaSubspace WholeSubspace(const Rig& rig) {
 
 ThetaSubspace ObservedSubspace(const Rig& rig,
                                const Eigen::MatrixXd& Lambda,
-                               int min_held) {
+                               int min_held,
+                               double least_information) {
   const ThetaSubspace whole = WholeSubspace(rig);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      Reduced(rig, whole, Lambda));
-  const Eigen::MatrixXd directions = whole.estimated * eigen.eigenvectors();
+  const Spectrum spectrum = Decompose(Reduced(rig, whole, Lambda));
+  const Eigen::MatrixXd directions = whole.estimated * spectrum.directions;
   const auto size = static_cast<int>(directions.cols());
   int held = std::min(min_held, size);
-  while (held < size && eigen.eigenvalues()(held) < kAtThreshold) {
+  while (held < size && spectrum.values(held) < least_information) {
     ++held;
   }
   ThetaSubspace subspace;
   subspace.held = directions.leftCols(held);
   subspace.estimated = directions.rightCols(size - held);
-  // A direction that is held because it once was unobserved is named with the
-  // others, as one at the threshold.
-  Eigen::VectorXd information = eigen.eigenvalues();
-  information.head(held) = information.head(held).cwiseMin(kAtThreshold);
-  information.tail(size - held) =
-      information.tail(size - held).cwiseMax(1 / kAtThreshold);
-  subspace.unobserved =
-      AnalyseObservability(eigen.eigenvectors() * information.asDiagonal() *
-                               eigen.eigenvectors().transpose(),
-                           FreeNames(rig))
-          .unobserved;
+  subspace.unobserved = NameHeld(rig, subspace, Lambda);
+  return subspace;
+}
+
+ThetaSubspace HoldDirections(const Rig& rig,
+                             const Eigen::MatrixXd& Lambda,
+                             const Eigen::MatrixXd& held) {
+  ThetaSubspace subspace;
+  subspace.estimated = Complement(WholeSubspace(rig).estimated, held);
+  const Spectrum spectrum = Decompose(Reduced(rig, subspace, Lambda));
+  const auto weak = (spectrum.values.array() < kLeastInformation).count();
+  const Eigen::MatrixXd directions = subspace.estimated * spectrum.directions;
+  subspace.held.resize(held.rows(), held.cols() + weak);
+  subspace.held << held, directions.leftCols(weak);
+  subspace.estimated = directions.rightCols(directions.cols() - weak);
+  subspace.unobserved = NameHeld(rig, subspace, Lambda);
   return subspace;
 }
 
@@ -108,6 +158,24 @@ Eigen::MatrixXd SubspaceCovariance(const Rig& rig,
     const Eigen::LDLT<Eigen::MatrixXd> ldlt(Reduced(rig, subspace, Lambda));
     covariance += basis * ldlt.solve(basis.transpose());
   }
+  return (covariance + covariance.transpose()) / 2;
+}
+
+Eigen::MatrixXd CovarianceWithHeld(const Rig& rig,
+                                   const ThetaSubspace& subspace,
+                                   const Eigen::MatrixXd& Lambda) {
+  Eigen::MatrixXd covariance = SubspaceCovariance(rig, subspace, Lambda);
+  if (subspace.held.cols() == 0 || subspace.estimated.cols() == 0) {
+    return covariance;
+  }
+  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
+  const Eigen::MatrixXd held = FreeSigmas(rig).asDiagonal() * subspace.held;
+  const Eigen::MatrixXd leaning =
+      basis * Reduced(rig, subspace, Lambda)
+                  .ldlt()
+                  .solve(basis.transpose() * (Lambda * held));
+  const Eigen::MatrixXd off = held - leaning;
+  covariance += off * off.transpose() - held * held.transpose();
   return (covariance + covariance.transpose()) / 2;
 }
 

@@ -23,12 +23,25 @@ struct ThetaSubspace {
 // Everything that is free is estimated.
 ThetaSubspace WholeSubspace(const Rig& rig);
 
-// Splits by what Lambda (of the data, in tangent units) says. At least min_held
-// directions are held: what was once found unobserved stays so, lest rounds of
-// a calibration alternate about the threshold.
+// An information, in units of the prior, just below that of the prior by more
+// than rounding: where the prior is part of it, it is 1 without any data.
+inline constexpr double kLeastInformation = 1 - 1e-4;
+
+// Splits by what Lambda (of the data, in tangent units) says: estimated is what
+// has the least information or more. At least min_held directions are held:
+// what was once found unobserved stays so, lest rounds of a calibration
+// alternate about the threshold.
 ThetaSubspace ObservedSubspace(const Rig& rig,
                                const Eigen::MatrixXd& Lambda,
-                               int min_held);
+                               int min_held,
+                               double least_information = kLeastInformation);
+
+// Holds the directions `held` (orthonormal, as those of a ThetaSubspace), and
+// of the others those with less than kLeastInformation. The estimated ones come
+// in the order of their information, least first.
+ThetaSubspace HoldDirections(const Rig& rig,
+                             const Eigen::MatrixXd& Lambda,
+                             const Eigen::MatrixXd& held);
 
 // Basis in tangent units of what is estimated, D x r: for SubspaceManifold.
 Eigen::MatrixXd TangentBasis(const Rig& rig, const ThetaSubspace& subspace);
@@ -43,6 +56,13 @@ Eigen::VectorXd ProjectOnSubspace(const Rig& rig,
 // inverse on the estimated subspace, the prior's variance on what is held, zero
 // for what the rig fixes.
 Eigen::MatrixXd SubspaceCovariance(const Rig& rig,
+                                   const ThetaSubspace& subspace,
+                                   const Eigen::MatrixXd& Lambda);
+
+// The same for an estimate that is done. What is held is off by as much as the
+// prior says, and what is estimated leans on it where Lambda couples the two:
+// that is added (as Schmidt has it for states that a filter does not estimate).
+Eigen::MatrixXd CovarianceWithHeld(const Rig& rig,
                                    const ThetaSubspace& subspace,
                                    const Eigen::MatrixXd& Lambda);
 

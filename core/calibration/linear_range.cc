@@ -1,0 +1,92 @@
+#include "core/calibration/linear_range.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal {
+namespace {
+
+constexpr int kMaxIterations = 10;
+// The minimum is near enough when an iteration takes less off the cost.
+constexpr double kEnough = 0.1 * kGrowthTolerance;
+
+}  // namespace
+
+LinearRange::LinearRange(const SolverRound& round,
+                         const CalibrationEstimate& estimate,
+                         const std::vector<ScreenedLandmark>& landmarks)
+    : round_(round), estimate_(estimate), landmarks_(landmarks) {
+  double last = 0;
+  SolverRound settling = round_;
+  settling.max_iterations = kMaxIterations;
+  const SolverOutcome outcome = SolveRoundByStructure(
+      settling,
+      [&](int iteration, double cost, const Eigen::VectorXd&) {
+        const bool enough = iteration > 0 && last - cost < kEnough;
+        last = cost;
+        return enough ? SolverSignal::kEnough : SolverSignal::kGoOn;
+      },
+      &estimate_,
+      &landmarks_);
+  settled_ =
+      outcome.status == SolverStatus::kConverged &&
+      LineariseRound(round_, estimate_, landmarks_, &round_.loss, &linearised_);
+}
+
+bool LinearRange::Holds(const Eigen::VectorXd& step) const {
+  const double information = step.dot(linearised_.by_offset.Lambda * step);
+  if (!settled_ || !(information > 0)) {
+    return false;
+  }
+  const Eigen::VectorXd sigma_step = step / std::sqrt(information);
+  const double minimum = linearised_.by_offset.eta.dot(sigma_step);
+  return GrowsAsClaimed(sigma_step, minimum - 1) &&
+         GrowsAsClaimed(sigma_step, minimum + 1);
+}
+
+bool LinearRange::GrowsAsClaimed(const Eigen::VectorXd& sigma_step,
+                                 double length) const {
+  const double minimum = linearised_.by_offset.eta.dot(sigma_step);
+  const double claimed =
+      linearised_.cost + 0.5 * length * (length - 2 * minimum);
+  const double tolerance = kGrowthTolerance * std::max(1.0, length * length);
+  CalibrationEstimate estimate = estimate_;
+  std::vector<ScreenedLandmark> landmarks = landmarks_;
+  GoAlong(linearised_, length * sigma_step, &estimate, &landmarks);
+  double last = 0;
+  SolverRound walk = round_;
+  walk.max_iterations = kMaxIterations;
+  // Where the point on the tangent costs no more than claimed already, the way
+  // to it is as the linearisation has it.
+  const SolverOutcome outcome = SolveRoundByStructure(
+      walk,
+      [&](int iteration, double cost, const Eigen::VectorXd&) {
+        const bool enough =
+            iteration == 0 ? cost < claimed + tolerance : last - cost < kEnough;
+        last = cost;
+        return enough ? SolverSignal::kEnough : SolverSignal::kGoOn;
+      },
+      &estimate,
+      &landmarks);
+  return outcome.status == SolverStatus::kConverged &&
+         std::abs(outcome.final_cost - claimed) < tolerance;
+}
+
+ThetaSubspace TrustedSubspace(const Rig& rig,
+                              const LinearRange& range,
+                              double weak_information) {
+  const Eigen::MatrixXd& Lambda = range.information().Lambda;
+  const ThetaSubspace observed = ObservedSubspace(rig, Lambda, 0);
+  const Eigen::MatrixXd basis = TangentBasis(rig, observed);
+  Eigen::MatrixXd held = observed.held;
+  for (int j = 0; j < basis.cols(); ++j) {
+    const Eigen::VectorXd step = basis.col(j);
+    if (step.dot(Lambda * step) < weak_information && !range.Holds(step)) {
+      held.conservativeResize(Eigen::NoChange, held.cols() + 1);
+      held.rightCols<1>() = observed.estimated.col(j);
+    }
+  }
+  return HoldDirections(rig, Lambda, held);
+}
+
+}  // namespace selfcal
