@@ -18,6 +18,7 @@ void RunFusion(Context* context);
 void RunSelection(Context* context);
 void RunNoiseFactors(Context* context);
 void RunWrongNoise(Context* context);
+void RunDegenerate(Context* context);
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> all = {
@@ -58,6 +59,9 @@ const std::vector<Experiment>& Experiments() {
       {"wrong_noise",
        "estimate and sigma where the noise is wrong, or tracks are outlying",
        RunWrongNoise},
+      {"degenerate",
+       "motions that do not show all of theta: is what they do not show held",
+       RunDegenerate},
   };
   return all;
 }
