@@ -1,0 +1,434 @@
+#include "core/calibration/calibration_run.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/calibration/linear_range.h"
+#include "core/calibration/noise_factors.h"
+#include "core/calibration/partition.h"
+#include "core/calibration/problem.h"
+#include "core/calibration/screening.h"
+#include "core/calibration/solver.h"
+#include "core/calibration/structured_solver.h"
+#include "core/calibration/subspace.h"
+#include "core/calibration/theta_information.h"
+#include "core/calibration/track_noise.h"
+
+namespace selfcal {
+namespace {
+
+// Bounds the rounds; they end by convergence after two to four as a rule.
+constexpr int kMaxRounds = 12;
+// The first round only has to come near enough to tell outliers.
+constexpr double kFirstTolerance = 1e-4;
+constexpr double kTolerance = 1e-8;
+// Largest undamped Gauss-Newton step of theta at convergence, in sigmas.
+constexpr double kMaxStepSigmas = 0.05;
+// A round ends when theta made so many steps below so many sigmas in a row:
+// landmarks of little weight may go on slipping for long, and move nothing; so
+// may the scale of a scene that nothing shows, and an undamped step then goes
+// far beyond where it is one.
+constexpr int kSmallSteps = 3;
+constexpr double kSmallStepSigmas = 0.005;
+// With steps that take less off the cost [half squares].
+constexpr double kSmallDecrease = 0.1;
+// Largest change of theta by a round at convergence, in sigmas.
+constexpr double kMaxRoundSigmas = 0.02;
+// Pixel errors that make sigmas of theta larger by less than this part are
+// weighted as independent ones.
+constexpr double kLeastTrackNoise = 0.05;
+// In units of the prior. What the data says less about is held until all else
+// is estimated: from a start that is off, the estimate would wander along it to
+// where the linearisation no longer holds.
+constexpr double kWeakInformation = 100;
+
+constexpr char kNotDetermined[] =
+    "the states of the keyframes are not determined";
+
+// Each round decides, from the present
+// estimate alone, which landmarks and observations to use and how the inertial
+// factors are whitened, then solves that problem; the rounds end when one no
+// longer moves theta. The end is thus a fixed point that does not remember the
+// way to it.
+class Calibrator {
+ public:
+  Calibrator(const Rig& rig,
+             const Calibration& theta_start,
+             const std::vector<const MotionSegment*>& segments,
+             const CalibrateOptions& options,
+             const ProgressCallback& progress)
+      : rig_(rig),
+        options_(options),
+        progress_(progress),
+        partitioning_(PartitionSegments(segments, options.merge_landmarks)),
+        problem_(FlattenSegments(rig, segments, partitioning_)),
+        // A prior is centred where d = 0.
+        reference_(options.prior ? options.prior->centre : theta_start),
+        start_d_(BoxMinus(theta_start, reference_)),
+        estimate_{start_d_, problem_.keyframes},
+        subspace_(WholeSubspace(rig)) {
+    result_.segments = static_cast<int>(segments.size());
+    result_.partitions = static_cast<int>(partitioning_.partitions.size());
+    result_.keyframes = static_cast<int>(problem_.keyframes.size());
+  }
+
+  CalibrationResult Run() {
+    if (Start() && Solve() && WeighTracks() && ReleaseWeak()) {
+      Finish();
+    }
+    return std::move(result_);
+  }
+
+ private:
+  // What follows returns false where the calibration ends without a result:
+  // cancelled, or failed.
+  bool Start() {
+    Screen(nullptr);
+    const ReprojectionStatistics before = Measure();
+    result_.reprojection_rms_before_px = before.rms_px;
+    result_.reprojection_median_before_px = before.median_px;
+    if (!FindSubspace()) {
+      return Fail(kNotDetermined);
+    }
+    result_.initial_cost = result_.final_cost = linearised_.cost;
+    return true;
+  }
+
+  bool Solve() {
+    result_.status = CalibrateStatus::kNotConverged;
+    return options_.solver == SolverKind::kStructured ? SolveBySteps()
+                                                      : SolveByRounds();
+  }
+
+  // What the errors have in common along tracks is known only now that they
+  // are small: the minimum moves a little when tracks are weighted by it.
+  bool WeighTracks() {
+    if (!options_.correlated_tracks ||
+        result_.status != CalibrateStatus::kConverged) {
+      return true;
+    }
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    track_noise_ = TrackNoiseFactor(
+        Round(basis), linearised_, estimate_, screening_.landmarks);
+    if (track_noise_ < 1 + kLeastTrackNoise) {
+      return true;
+    }
+    result_.track_noise_factor = track_noise_;
+    SetTrackNoise(track_noise_, &screening_);
+    Screen(&screening_);
+    if (!Inform(&screening_.loss)) {
+      return Fail(kNotDetermined);
+    }
+    ChooseSubspace();
+    return Solve();
+  }
+
+  // So far all is held that the data says little about. Some of it follows the
+  // linearisation as far as its sigma reaches, and is estimated after all.
+  bool ReleaseWeak() {
+    if (subspace_.held.cols() == 0 ||
+        result_.status != CalibrateStatus::kConverged) {
+      return true;
+    }
+    const Eigen::MatrixXd nothing(start_d_.size(), 0);
+    const LinearRange range(Round(nothing), estimate_, screening_.landmarks);
+    if (!range.settled()) {
+      return true;
+    }
+    Hold(TrustedSubspace(rig_, range, kWeakInformation));
+    weak_were_judged_ = true;
+    Screen(&screening_);
+    return Inform(&screening_.loss) ? Solve() : Fail(kNotDetermined);
+  }
+
+  // One step a round.
+  bool SolveBySteps() {
+    if (!Report(0)) {
+      return Cancel();
+    }
+    int small_steps = 0;
+    for (;;) {
+      const double undamped_sigmas = StepSigmas();
+      const StepOutcome step = Step();
+      if (!Report(moved_sigmas_)) {
+        return Cancel();
+      }
+      const bool small = step.lower && moved_sigmas_ < kSmallStepSigmas &&
+                         linearised_.cost - step.cost < kSmallDecrease;
+      small_steps = small ? small_steps + 1 : 0;
+      if (undamped_sigmas < kMaxStepSigmas || small_steps == kSmallSteps) {
+        result_.status = CalibrateStatus::kConverged;
+        break;
+      }
+      if (!step.lower || result_.iterations >= options_.max_iterations) {
+        break;
+      }
+      do {
+        Screen(&screening_);
+        if (!Inform(&screening_.loss)) {
+          return Fail(kNotDetermined);
+        }
+      } while (!ChooseSubspace());
+    }
+    return true;
+  }
+
+  bool SolveByRounds() {
+    for (int round = 0; round < kMaxRounds; ++round) {
+      const Eigen::VectorXd d_before = estimate_.d;
+      const SolverOutcome outcome = SolveOneRound(round);
+      if (outcome.status == SolverStatus::kCancelled) {
+        return Cancel();
+      }
+      if (outcome.status == SolverStatus::kFailed) {
+        return Fail(outcome.message);
+      }
+      if (!Inform(&screening_.loss)) {
+        return Fail(kNotDetermined);
+      }
+      const double moved_sigmas =
+          LargestInSigmas(estimate_.d - d_before, covariance_d_);
+      const bool whole = ChooseSubspace();
+      if (round > 0 && whole && moved_sigmas < kMaxRoundSigmas &&
+          StepSigmas() < kMaxStepSigmas) {
+        result_.status = CalibrateStatus::kConverged;
+        break;
+      }
+      if (result_.iterations >= options_.max_iterations) {
+        break;
+      }
+      Screen(nullptr);
+    }
+    return true;
+  }
+
+  bool Report(double step_sigmas) const {
+    return !progress_ || progress_({result_.iterations,
+                                    options_.max_iterations,
+                                    result_.final_cost,
+                                    step_sigmas});
+  }
+
+  bool Cancel() {
+    result_.status = CalibrateStatus::kCancelled;
+    result_.message = "cancelled";
+    return false;
+  }
+
+  bool Fail(const std::string& message) {
+    result_.status = CalibrateStatus::kFailed;
+    result_.message = message;
+    return false;
+  }
+
+  Calibration Theta() const { return BoxPlus(reference_, estimate_.d); }
+
+  // Decides anew what the next round stands on.
+  void Screen(const Screening* before) {
+    const Calibration theta = Theta();
+    MeasureMotions(rig_, theta, problem_, estimate_.keyframes, &motions_);
+    screening_ = ScreenLandmarks(
+        rig_, theta, problem_, estimate_.keyframes, motions_, options_, before);
+    RefineOnWhatIsUsed(
+        rig_, theta, problem_, estimate_.keyframes, motions_, &screening_);
+    SetTrackNoise(result_.track_noise_factor, &screening_);
+    whitening_ =
+        WhitenInertialLinks(rig_, theta.imu, problem_, estimate_.keyframes);
+  }
+
+  ReprojectionStatistics Measure() const {
+    return MeasureReprojection(rig_,
+                               Theta(),
+                               problem_,
+                               estimate_.keyframes,
+                               motions_,
+                               screening_.landmarks);
+  }
+
+  // Information and covariance of the offset d at the estimate. False if
+  // states are not determined.
+  bool Inform(const RobustLoss* loss) {
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    if (!LineariseRound(Round(basis),
+                        estimate_,
+                        screening_.landmarks,
+                        loss,
+                        &linearised_)) {
+      return false;
+    }
+    information_ = linearised_.by_offset;
+    covariance_d_ = SubspaceCovariance(rig_, subspace_, information_.Lambda);
+    return covariance_d_.allFinite();
+  }
+
+  // At a start far from the optimum all residuals are large: what can be
+  // observed is judged without the weights that they get. As weights only take
+  // information away, there is nothing to judge if all is observed with them.
+  bool FindSubspace() {
+    if (!Inform(&screening_.loss)) {
+      return false;
+    }
+    if (ChooseSubspace()) {
+      return true;
+    }
+    subspace_ = WholeSubspace(rig_);
+    estimate_.d = start_d_;
+    if (!Inform(nullptr)) {
+      return false;
+    }
+    ChooseSubspace();
+    return Inform(&screening_.loss);
+  }
+
+  // Holds what the data does not observe, at its start value. Returns whether
+  // the present subspace stays as large as it was.
+  bool ChooseSubspace() {
+    const auto held = static_cast<int>(subspace_.held.cols());
+    ThetaSubspace observed =
+        weak_were_judged_
+            ? HoldDirections(rig_, information_.Lambda, subspace_.held)
+            : ObservedSubspace(
+                  rig_, information_.Lambda, held, kWeakInformation);
+    const bool same = observed.held.cols() == held;
+    if (!same) {
+      Hold(std::move(observed));
+    }
+    return same;
+  }
+
+  void Hold(ThetaSubspace subspace) {
+    subspace_ = std::move(subspace);
+    estimate_.d =
+        start_d_ + ProjectOnSubspace(rig_, subspace_, estimate_.d - start_d_);
+    covariance_d_ = SubspaceCovariance(rig_, subspace_, information_.Lambda);
+  }
+
+  SolverRound Round(const Eigen::MatrixXd& basis) const {
+    return {.rig = rig_,
+            .reference = reference_,
+            .problem = problem_,
+            .motions = motions_,
+            .whitening = whitening_,
+            .basis = basis,
+            .loss = screening_.loss,
+            .prior_information =
+                options_.prior ? &options_.prior->information : nullptr,
+            .threads = options_.threads};
+  }
+
+  StepOutcome Step() {
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    const Eigen::VectorXd d_before = estimate_.d;
+    const StepOutcome step =
+        TakeStep(Round(basis), linearised_, &estimate_, &screening_.landmarks);
+    result_.final_cost = step.cost;
+    ++result_.iterations;
+    moved_sigmas_ = LargestInSigmas(estimate_.d - d_before, covariance_d_);
+    return step;
+  }
+
+  SolverOutcome SolveOneRound(int round_number) {
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    SolverRound round = Round(basis);
+    round.max_iterations = options_.max_iterations - result_.iterations;
+    round.function_tolerance = round_number == 0 ? kFirstTolerance : kTolerance;
+    Eigen::VectorXd d_last = estimate_.d;
+    int small_steps = 0;
+    const auto report =
+        [&](int iteration, double cost, const Eigen::VectorXd& d) {
+          const double step = LargestInSigmas(d - d_last, covariance_d_);
+          d_last = d;
+          // A rejected step does not move theta, and counts for nothing.
+          if (step > 0) {
+            small_steps = step < kSmallStepSigmas ? small_steps + 1 : 0;
+          }
+          if (progress_ && !progress_({result_.iterations + iteration,
+                                       options_.max_iterations,
+                                       cost,
+                                       step})) {
+            return SolverSignal::kCancel;
+          }
+          return small_steps >= kSmallSteps ? SolverSignal::kEnough
+                                            : SolverSignal::kGoOn;
+        };
+    const SolverOutcome outcome = SolveRound(
+        options_.solver, round, report, &estimate_, &screening_.landmarks);
+    if (round_number == 0) {
+      result_.initial_cost = outcome.initial_cost;
+    }
+    result_.final_cost = outcome.final_cost;
+    result_.iterations += outcome.iterations;
+    return outcome;
+  }
+
+  double StepSigmas() const {
+    return LargestInSigmas(
+        SubspaceStep(rig_, subspace_, information_.Lambda, information_.eta),
+        covariance_d_);
+  }
+
+  void Finish() {
+    if (result_.status != CalibrateStatus::kConverged) {
+      result_.status = CalibrateStatus::kNotConverged;
+      result_.message = "the estimate still moves after " +
+                        std::to_string(result_.iterations) + " iterations";
+    }
+    result_.theta = Theta();
+    const Eigen::MatrixXd by_offset = ThetaByOffset(reference_, estimate_.d);
+    result_.covariance =
+        by_offset * CovarianceWithHeld(rig_, subspace_, information_.Lambda) *
+        by_offset.transpose();
+    result_.Lambda = linearised_.system.information().Lambda;
+    result_.rank = static_cast<int>(subspace_.estimated.cols());
+    result_.held_constant = subspace_.unobserved;
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    // As the cost before: not weighted by what is known of tracks since.
+    SetTrackNoise(1, &screening_);
+    result_.final_cost =
+        RoundCost(Round(basis), estimate_, screening_.landmarks);
+    if (options_.noise_factors || options_.reweight_noise) {
+      result_.noise_factors = EstimateNoiseFactors(
+          Round(basis), estimate_, screening_.landmarks, track_noise_);
+    }
+    const ReprojectionStatistics after = Measure();
+    result_.reprojection_rms_after_px = after.rms_px;
+    result_.reprojection_median_after_px = after.median_px;
+    result_.landmarks = static_cast<int>(screening_.landmarks.size());
+    result_.landmarks_dropped = screening_.landmarks_dropped;
+    result_.observations = screening_.observations;
+    result_.observations_dropped = screening_.observations_dropped;
+  }
+
+  const Rig& rig_;
+  const CalibrateOptions& options_;
+  const ProgressCallback& progress_;
+  Partitioning partitioning_;
+  CalibrationProblem problem_;
+  Calibration reference_;
+  Eigen::VectorXd start_d_;
+  CalibrationEstimate estimate_;
+  ThetaSubspace subspace_;
+  KeyframeMotions motions_;
+  Screening screening_;
+  std::vector<InertialMatrix> whitening_;
+  LinearisedRound linearised_;
+  SharedInformation information_;
+  Eigen::MatrixXd covariance_d_;
+  bool weak_were_judged_ = false;
+  double moved_sigmas_ = 0;  // by the last step
+  double track_noise_ = 0;   // as TrackNoiseFactor
+  CalibrationResult result_;
+};
+
+}  // namespace
+
+CalibrationResult RunCalibration(
+    const Rig& rig,
+    const Calibration& theta_start,
+    const std::vector<const MotionSegment*>& segments,
+    const CalibrateOptions& options,
+    const ProgressCallback& progress) {
+  return Calibrator(rig, theta_start, segments, options, progress).Run();
+}
+
+}  // namespace selfcal
