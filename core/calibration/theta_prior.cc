@@ -19,8 +19,7 @@ ThetaPrior FactoryPrior(const Rig& rig) {
 ThetaPrior MarginalPrior(const Rig& rig,
                          const Calibration& theta,
                          const Eigen::MatrixXd& covariance,
-                         const std::vector<int>& components,
-                         double inflation) {
+                         const std::vector<int>& components) {
   const std::vector<int> free = FreeComponents(rig);
   std::vector<int> known;
   std::set_intersection(free.begin(),
@@ -33,9 +32,8 @@ ThetaPrior MarginalPrior(const Rig& rig,
   if (known.empty()) return prior;
   // In units of the rig's prior: those of the components differ by far.
   const Eigen::VectorXd scale = PriorSigmas(rig)(known).cwiseInverse();
-  const Eigen::MatrixXd normalised = inflation * scale.asDiagonal() *
-                                     covariance(known, known) *
-                                     scale.asDiagonal();
+  const Eigen::MatrixXd normalised =
+      scale.asDiagonal() * covariance(known, known) * scale.asDiagonal();
   const Eigen::MatrixXd inverse = normalised.ldlt().solve(
       Eigen::MatrixXd::Identity(normalised.rows(), normalised.cols()));
   prior.information(known, known) = scale.asDiagonal() *

@@ -20,12 +20,10 @@ ThetaPrior FactoryPrior(const Rig& rig);
 
 // What a calibration with its covariance (D x D) says about some components
 // alone, all others marginalised: of these nothing remains known. Components
-// that the rig holds fixed are left out. `inflation` >= 1 is a factor on the
-// variances.
+// that the rig holds fixed are left out.
 ThetaPrior MarginalPrior(const Rig& rig,
                          const Calibration& theta,
                          const Eigen::MatrixXd& covariance,
-                         const std::vector<int>& components,
-                         double inflation = 1);
+                         const std::vector<int>& components);
 
 }  // namespace selfcal

@@ -18,8 +18,8 @@ namespace {
 
 constexpr int kRuns = 100;
 constexpr int kQuickRuns = 4;
-constexpr double kDuration_s = 60;
-constexpr double kQuickDuration_s = 25;
+constexpr double kDuration_s = 40.5;
+constexpr double kQuickDuration_s = 16.5;
 constexpr int kTableSize = 2;
 // New tracks of landmarks that were seen before, so that some are split between
 // the partitions of a calibration.

@@ -57,9 +57,11 @@ Calibration FusedCalibration(const Scene& scene) {
 
 Measurement StructuredAgainstCeres(const TimingOptions& options) {
   const Scene scene = MakeCalibrationScene();
+  // What both share afterwards is left out.
   CalibrateOptions ceres, structured;
   ceres.solver = SolverKind::kCeres;
   structured.solver = SolverKind::kStructured;
+  ceres.noise_factors = structured.noise_factors = false;
   int ceres_iterations = 0;
   int structured_iterations = 0;
   Measurement result = CompareTimes(
@@ -69,6 +71,16 @@ Measurement StructuredAgainstCeres(const TimingOptions& options) {
   result.figures["Ceres iterations"] = ceres_iterations;
   result.figures["structured iterations"] = structured_iterations;
   return result;
+}
+
+Measurement NoiseFactorsAgainstNone(const TimingOptions& options) {
+  const Scene scene = MakeCalibrationScene();
+  CalibrateOptions with, without;
+  without.noise_factors = false;
+  int iterations = 0;
+  return CompareTimes(CalibrationOf("with", scene, with, &iterations),
+                      CalibrationOf("without", scene, without, &iterations),
+                      Fewer(options));
 }
 
 Measurement IterationsFromFused(const TimingOptions&) {
@@ -214,6 +226,11 @@ std::vector<Case> CalibrationCases() {
            .must = 8,
            .goal = 12,
            .measure = RoundAgainstCeres},
+          {.name = "noise factors: a calibration with them against without",
+           .must = 2,
+           .goal = 1.2,
+           .higher_is_better = false,
+           .measure = NoiseFactorsAgainstNone},
           {.name = "iterations from the fused information",
            .must = 3,
            .goal = 2,

@@ -32,11 +32,10 @@ TEST(MarginalPrior, IsTheInverseOfTheMarginalCovariance) {
   std::vector<int> camera =
       MatchComponents(TangentComponents(rig.factory), {"cam0.focal.*"});
   ASSERT_EQ(camera.size(), 2u);
-  const ThetaPrior prior =
-      MarginalPrior(rig, rig.factory, covariance, camera, 4);
+  const ThetaPrior prior = MarginalPrior(rig, rig.factory, covariance, camera);
   // One of the two is fixed: what remains is a single number.
   Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(size, size);
-  expected(camera[1], camera[1]) = 1 / (4 * covariance(camera[1], camera[1]));
+  expected(camera[1], camera[1]) = 1 / covariance(camera[1], camera[1]);
   EXPECT_LT((prior.information - expected).norm(), 1e-9 * expected.norm());
 
   const std::vector<int> imu = Components(rig, "imu");
