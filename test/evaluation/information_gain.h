@@ -40,7 +40,7 @@ TruncatedQr TruncateInformation(const Rig& rig,
 struct GainOptions {
   // A candidate must gain more than this [nat]; chosen by the experiment
   // gain_threshold.
-  double threshold_nats = 1.0;
+  double threshold_nats = 1.25;
   // Smallest |R_jj| of an observable direction. At 1 the data says as much as
   // the prior; below, the solver holds a direction constant.
   double truncation = 1;
