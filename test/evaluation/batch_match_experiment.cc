@@ -173,13 +173,9 @@ void CheckFigures(const std::vector<DatasetRun>& runs, Context* context) {
   // sigma; over all parameters and datasets.
   for (const Kind kind : {kInformative, kBatch, kGain}) {
     const ParameterStatistics one = StatisticsOf(kind, runs);
-    context->Within(fmt::format("batch_match.error_in_sigmas_{}",
-                                [&] {
-                                  std::string name = kNames[kind];
-                                  std::replace(
-                                      name.begin(), name.end(), ' ', '_');
-                                  return name;
-                                }()),
+    std::string name = kNames[kind];
+    std::replace(name.begin(), name.end(), ' ', '_');
+    context->Within("batch_match.error_in_sigmas_" + name,
                     Rms(Ratios(one.rms_error, one.rms_sigma)),
                     0.8,
                     1.25,

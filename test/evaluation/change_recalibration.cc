@@ -1,17 +1,16 @@
 // After a shock: the calibration on the segments since, as the daemon makes it,
 // and that on tables that were not started anew.
-#include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numbers>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/change/concerned.h"
 #include "core/change/detect_change.h"
-#include "core/selection/tables.h"
 #include "test/evaluation/change_device.h"
+#include "test/evaluation/estimators.h"
 #include "test/evaluation/statistics.h"
 
 namespace selfcal {
@@ -57,42 +56,20 @@ Sent UseUntilRun(const ChangeDevice& device, std::uint64_t seed) {
 
 // Of the segments from `first` on, those that the tables keep.
 std::vector<MotionSegment> Kept(const Rig& rig, const Sent& sent, int first) {
-  std::vector<Table> tables = MakeTables(rig);
-  for (int i = first; i < static_cast<int>(sent.segments.size()); ++i) {
-    for (std::size_t q = 0; q < tables.size(); ++q) {
-      const GroupScore& score = sent.information[i].groups[q];
-      Offer({sent.segments[i].key, i, score.entropy, score.gain},
-            rig.min_gain_nats,
-            &tables[q]);
-    }
-  }
-  std::vector<MotionSegment> kept;
-  for (const TableEntry& entry : UnionOfTables(tables)) {
-    kept.push_back(sent.segments[entry.sequence]);
-  }
-  return kept;
+  const std::vector<MotionSegment> segments(sent.segments.begin() + first,
+                                            sent.segments.end());
+  return Pick(
+      segments,
+      MostInformative(
+          rig, {sent.information.begin() + first, sent.information.end()}));
 }
 
 // What stays known of the groups that are not concerned.
 ThetaPrior KnownAfter(const ChangeDevice& device, const Sent& sent) {
-  std::vector<int> concerned;
-  for (const ParameterGroup& group : device.rig.groups) {
-    if (std::count(sent.concerned.begin(), sent.concerned.end(), group.name) >
-        0) {
-      const std::vector<int> of = GroupComponents(device.rig, group);
-      concerned.insert(concerned.end(), of.begin(), of.end());
-    }
-  }
-  std::sort(concerned.begin(), concerned.end());
-  const std::vector<int> free = FreeComponents(device.rig);
-  std::vector<int> known;
-  std::set_difference(free.begin(),
-                      free.end(),
-                      concerned.begin(),
-                      concerned.end(),
-                      std::back_inserter(known));
-  return MarginalPrior(
-      device.rig, device.active.theta, device.active.covariance, known);
+  return MarginalPrior(device.rig,
+                       device.active.theta,
+                       device.active.covariance,
+                       UnconcernedComponents(device.rig, sent.concerned));
 }
 
 struct Outcome {
@@ -111,9 +88,6 @@ Outcome CalibrateAfter(const ChangeDevice& device,
     throw std::runtime_error("a calibration after a shock: " + result.message);
   }
   const Calibration truth = kShock.After(device.truth, 1);
-  const std::vector<int> free = FreeComponents(device.rig);
-  const Eigen::VectorXd error = BoxMinus(result.theta, truth)(free);
-  const Eigen::MatrixXd covariance = result.covariance(free, free);
   Outcome outcome;
   outcome.segments = static_cast<double>(segments.size());
   for (const MotionSegment& segment : segments) {
@@ -125,8 +99,9 @@ Outcome CalibrateAfter(const ChangeDevice& device,
   outcome.turn_error_deg =
       result.theta.cameras[0].q_CI.angularDistance(truth.cameras[0].q_CI) *
       180 / std::numbers::pi;
-  outcome.nees = error.dot(covariance.ldlt().solve(error)) /
-                 static_cast<double>(free.size());
+  const auto [nees, dof] =
+      NormalisedSquaredError(BoxMinus(result.theta, truth), result.covariance);
+  outcome.nees = nees / dof;
   return outcome;
 }
 

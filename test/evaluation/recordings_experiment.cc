@@ -11,10 +11,9 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/information/segment_information.h"
-#include "core/selection/tables.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/datasets.h"
+#include "test/evaluation/estimators.h"
 #include "test/evaluation/recordings.h"
 #include "test/evaluation/statistics.h"
 
@@ -37,25 +36,9 @@ TimedResult CalibrateOn(const RecordedDevice& device,
 }
 
 std::vector<MotionSegment> Kept(const RecordedDevice& device) {
-  std::vector<Table> tables = MakeTables(device.rig);
-  for (std::size_t i = 0; i < device.segments.size(); ++i) {
-    const SegmentInformation information =
-        ScoreSegment(device.rig, device.rig.factory, device.segments[i]);
-    for (std::size_t q = 0; q < tables.size(); ++q) {
-      const GroupScore& score = information.groups[q];
-      Offer({device.segments[i].key,
-             static_cast<std::int64_t>(i),
-             score.entropy,
-             score.gain},
-            device.rig.min_gain_nats,
-            &tables[q]);
-    }
-  }
-  std::vector<MotionSegment> kept;
-  for (const TableEntry& entry : UnionOfTables(tables)) {
-    kept.push_back(device.segments[entry.sequence]);
-  }
-  return kept;
+  return Pick(
+      device.segments,
+      MostInformative(device.rig, ScoreAll(device.rig, device.segments)));
 }
 
 std::string Held(const CalibrationResult& result) {

@@ -19,6 +19,8 @@
 namespace selfcal {
 namespace {
 
+constexpr int kDataset = 0;
+
 double CpuSeconds(const std::function<void()>& work) {
   const std::clock_t begin = std::clock();
   work();
@@ -98,7 +100,8 @@ double OwnSeconds(const Timed& timed) {
 double BatchRatioWithRevisits(double duration_s,
                               const SimulationOptions& options,
                               ResultTable* table) {
-  const Dataset dataset = MakeDataset(0, duration_s, MakeDevice(), options);
+  const Dataset dataset =
+      MakeDataset(kDataset, duration_s, MakeDevice(), options);
   Timed timed;
   TimeInTurn(dataset, &timed);
   table->Add({fmt::format("{}, {:g} of new tracks found again",
@@ -120,7 +123,6 @@ double BatchRatioWithRevisits(double duration_s,
 }  // namespace
 
 void RunRunTime(Context* context) {
-  constexpr int kDataset = 0;
   const double duration_s = context->quick() ? 17 : kDatasetDuration_s;
   // Batch takes minutes and gigabytes there, of three minutes of motion.
   const double with_revisits_s = context->quick() ? 17 : 90;

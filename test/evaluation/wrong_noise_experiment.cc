@@ -1,7 +1,5 @@
 // Noise that is wrong: what it does to estimate and sigma, with and without
 // re-weighting.
-#include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -56,14 +54,16 @@ Run Measure(const Dataset& dataset,
             const CalibrationResult& result) {
   const std::vector<int> free = FreeComponents(rig);
   const Eigen::VectorXd error = BoxMinus(result.theta, dataset.truth)(free);
-  const Eigen::MatrixXd covariance = result.covariance(free, free);
-  const Eigen::ArrayXd sigmas = covariance.diagonal().cwiseSqrt().array();
+  const Eigen::ArrayXd sigmas =
+      result.covariance.diagonal()(free).cwiseSqrt().array();
   const Eigen::ArrayXd right_sigmas =
       right.covariance.diagonal()(free).cwiseSqrt().array();
   const Eigen::ArrayXd in_sigmas = error.array() / sigmas;
   const Eigen::ArrayXd ratios = sigmas / right_sigmas;
   return {
-      .nees = error.dot(covariance.ldlt().solve(error)),
+      .nees = NormalisedSquaredError(BoxMinus(result.theta, dataset.truth),
+                                     result.covariance)
+                  .nees,
       .error_sigmas = std::sqrt(in_sigmas.square().mean()),
       .sigma_ratio = MedianOf({ratios.begin(), ratios.end()}),
       .error_ratio = std::sqrt((error.array() / right_sigmas).square().mean()),

@@ -1,7 +1,6 @@
 // Recalibration on 8 segments of one session, from a factory's calibration.
 #include <benchmark/benchmark.h>
 
-#include <Eigen/Cholesky>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "core/calibration/structured_solver.h"
 #include "core/calibration/subspace.h"
 #include "core/calibration/theta_information.h"
+#include "core/information/fusion.h"
 #include "core/information/segment_information.h"
 #include "test/performance/cases.h"
 #include "test/performance/scene.h"
@@ -40,19 +40,13 @@ TimedFunction CalibrationOf(const std::string& name,
           }};
 }
 
-// The optimum of the sum of what the segments say and of the prior.
+// Where what the segments say, and the prior, have their optimum.
 Calibration FusedCalibration(const Scene& scene) {
-  const Rig& rig = scene.rig;
-  Eigen::MatrixXd Lambda =
-      PriorSigmas(rig).array().square().inverse().matrix().asDiagonal();
-  Eigen::VectorXd eta = Eigen::VectorXd::Zero(Lambda.rows());
+  std::vector<SegmentInformation> information;
   for (const MotionSegment& segment : scene.segments) {
-    const SegmentInformation information =
-        ScoreSegment(rig, rig.factory, segment);
-    Lambda += information.Lambda;
-    eta += information.eta;
+    information.push_back(ScoreSegment(scene.rig, scene.rig.factory, segment));
   }
-  return BoxPlus(rig.factory, Lambda.llt().solve(eta));
+  return Fuse(scene.rig, information).theta;
 }
 
 Measurement StructuredAgainstCeres(const TimingOptions& options) {

@@ -9,7 +9,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/information/segment_information.h"
 #include "core/model/so3.h"
-#include "core/selection/tables.h"
+#include "core/selection/baselines.h"
 #include "test/recordings.h"
 
 namespace selfcal::client {
@@ -19,23 +19,20 @@ constexpr CalibrateOptions kOptions{.threads = 2};
 
 // What the tables of the rig hold after all segments.
 std::vector<MotionSegment> Kept(const Device& device) {
-  std::vector<Table> tables = MakeTables(device.rig);
-  for (std::size_t i = 0; i < device.segments.size(); ++i) {
-    const MotionSegment& segment = device.segments[i];
-    const SegmentInformation information =
-        ScoreSegment(device.rig, device.rig.factory, segment);
-    for (std::size_t q = 0; q < tables.size(); ++q) {
-      const GroupScore& score = information.groups[q];
-      Offer({segment.key,
-             static_cast<std::int64_t>(i),
-             score.entropy,
-             score.gain},
-            device.rig.min_gain_nats,
-            &tables[q]);
-    }
+  std::vector<SegmentInformation> information;
+  for (const MotionSegment& segment : device.segments) {
+    information.push_back(
+        ScoreSegment(device.rig, device.rig.factory, segment));
+  }
+  std::vector<ScoredSegment> scored;
+  for (std::size_t i = 0; i < information.size(); ++i) {
+    scored.push_back({device.segments[i].key,
+                      static_cast<std::int64_t>(i),
+                      &information[i]});
   }
   std::vector<MotionSegment> kept;
-  for (const TableEntry& entry : UnionOfTables(tables)) {
+  for (const TableEntry& entry :
+       UnionOfTables(MostInformativeTables(device.rig, scored))) {
     kept.push_back(device.segments[entry.sequence]);
   }
   return kept;
