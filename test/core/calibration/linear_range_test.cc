@@ -3,11 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <memory>
 #include <random>
 #include <vector>
 
 #include "core/calibration/theta_information.h"
-#include "core/simulation/simulate.h"
+#include "test/core/calibration/screened_session.h"
 #include "test/core/information/simple_motions.h"
 
 namespace selfcal {
@@ -17,60 +18,47 @@ namespace {
 class Simulated {
  public:
   Simulated(MotionKind kind, int seed)
-      : rig_(HandheldRig("simulated")), nothing_(TangentSize(rig_.factory), 0) {
+      : session_(HandheldRig("simulated"), *Motion(kind, seed), Options(seed)),
+        nothing_(TangentSize(rig().factory), 0),
+        estimate_{Eigen::VectorXd::Zero(nothing_.rows()),
+                  session_.problem.keyframes},
+        whitening_(WhitenInertialLinks(rig(),
+                                       rig().factory.imu,
+                                       session_.problem,
+                                       session_.problem.keyframes)) {}
+
+  const Rig& rig() const { return session_.rig; }
+
+  LinearRange Range() const {
+    return LinearRange({.rig = rig(),
+                        .reference = rig().factory,
+                        .problem = session_.problem,
+                        .motions = session_.motions,
+                        .whitening = whitening_,
+                        .basis = nothing_,
+                        .loss = session_.screening.loss},
+                       estimate_,
+                       session_.screening.landmarks);
+  }
+
+ private:
+  static std::unique_ptr<Trajectory> Motion(MotionKind kind, int seed) {
     std::mt19937 random(seed);
+    return RandomMotion(kind, 4.5, &random);
+  }
+
+  static SimulationOptions Options(int seed) {
     SimulationOptions options;
     options.seed = seed;
     options.keyframes_per_segment = 20;
     options.landmarks_in_view = 60;
-    session_ = Simulate(rig_,
-                        rig_.factory,
-                        rig_.factory,
-                        *RandomMotion(kind, 4.5, &random),
-                        "session",
-                        options);
-    for (std::size_t i = 0; i < session_.segments.size(); ++i) {
-      session_.segments[i].keyframes = session_.truth[i].keyframes;
-    }
-    sorted_ = SortByKey(session_.segments);
-    problem_ = FlattenSegments(rig_, sorted_, PartitionSegments(sorted_, 15));
-    estimate_ = {Eigen::VectorXd::Zero(nothing_.rows()), problem_.keyframes};
-    MeasureMotions(rig_, rig_.factory, problem_, problem_.keyframes, &motions_);
-    screening_ = ScreenLandmarks(rig_,
-                                 rig_.factory,
-                                 problem_,
-                                 problem_.keyframes,
-                                 motions_,
-                                 {},
-                                 nullptr);
-    whitening_ = WhitenInertialLinks(
-        rig_, rig_.factory.imu, problem_, problem_.keyframes);
+    return options;
   }
 
-  const Rig& rig() const { return rig_; }
-
-  LinearRange Range() const {
-    return LinearRange({.rig = rig_,
-                        .reference = rig_.factory,
-                        .problem = problem_,
-                        .motions = motions_,
-                        .whitening = whitening_,
-                        .basis = nothing_,
-                        .loss = screening_.loss},
-                       estimate_,
-                       screening_.landmarks);
-  }
-
- private:
-  Rig rig_;
-  Eigen::MatrixXd nothing_;
-  SimulatedSession session_;
-  std::vector<const MotionSegment*> sorted_;
-  CalibrationProblem problem_;
-  CalibrationEstimate estimate_;
-  KeyframeMotions motions_;
-  Screening screening_;
-  std::vector<InertialMatrix> whitening_;
+  const ScreenedSession session_;
+  const Eigen::MatrixXd nothing_;
+  const CalibrationEstimate estimate_;
+  const std::vector<InertialMatrix> whitening_;
 };
 
 TEST(LinearRange, TheCostOfHandHeldMotionGrowsAsClaimed) {
