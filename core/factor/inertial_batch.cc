@@ -66,7 +66,7 @@ int InertialBatch::GatherReadings(std::span<const InertialLinkStates> links) {
     const std::size_t end = (static_cast<std::size_t>(index) + 1) * kRow;
     const std::size_t chunks = (end + kChunk - 1) / kChunk;
     if (readings_.size() < chunks) readings_.resize(2 * chunks);
-    return readings_.data()->values + end - kRow;
+    return readings() + (end - kRow);
   };
   int counts[W];
   for (int lane = 0; lane < W; ++lane) {
@@ -121,7 +121,7 @@ void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
                            preintegration::kSecondsPerNanosecond;
       }
       input.rows = GatherReadings<W>(group);
-      input.readings = readings_.data()->values;
+      input.readings = readings();
       run.template operator()<W>(input, first, count);
     }
   });

@@ -74,6 +74,8 @@ class InertialBatch {
   struct alignas(64) Chunk {
     double values[8];
   };
+  // All chunks as one row of numbers.
+  double* readings() { return reinterpret_cast<double*>(readings_.data()); }
 
   // Calls run.operator()<W>(kernel input, first link, number of links) for each
   // group of W links.
