@@ -115,12 +115,7 @@ class Calibrator {
     }
     result_.track_noise_factor = track_noise_;
     SetTrackNoise(track_noise_, &screening_);
-    Screen(&screening_);
-    if (!Inform(&screening_.loss)) {
-      return Fail(kNotDetermined);
-    }
-    ChooseSubspace();
-    return Solve();
+    return Renew() && Solve();
   }
 
   // So far all is held that the data says little about. Some of it follows the
@@ -163,13 +158,22 @@ class Calibrator {
       if (!step.lower || result_.iterations >= options_.max_iterations) {
         break;
       }
-      do {
-        Screen(&screening_);
-        if (!Inform(&screening_.loss)) {
-          return Fail(kNotDetermined);
-        }
-      } while (!ChooseSubspace());
+      if (!Renew()) {
+        return false;
+      }
     }
+    return true;
+  }
+
+  // Decides anew what is used and what is held. As holding moves the estimate,
+  // that goes on until the present subspace stays.
+  bool Renew() {
+    do {
+      Screen(&screening_);
+      if (!Inform(&screening_.loss)) {
+        return Fail(kNotDetermined);
+      }
+    } while (!ChooseSubspace());
     return true;
   }
 

@@ -94,6 +94,9 @@ bool LandmarkScene::Residual(const TrackObservation& seen,
       view.R_CG * point_G.head<3>() + point_G(3) * view.p_CG;
   ProjectionJacobians jacobians;
   Eigen::Vector2d z_px;
+  if (p_C.norm() < kMinDistance_m * std::abs(point_G(3))) {
+    return false;
+  }
   if (!Project(camera(seen), p_C, &z_px, by_p_C ? &jacobians : nullptr)) {
     return false;
   }

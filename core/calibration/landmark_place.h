@@ -23,6 +23,9 @@ namespace selfcal {
 // parallax within a round, as that of a device at rest, from running away.
 inline constexpr double kInverseDepthSigma = 10;
 
+// No camera sees a point that is nearer to its centre.
+inline constexpr double kMinDistance_m = 0.01;
+
 // What landmarks are measured against: every camera at every keyframe.
 class LandmarkScene {
  public:
@@ -46,7 +49,8 @@ class LandmarkScene {
 
   // Predicted minus measured [px] of a homogeneous point in G; by_p_C, unless
   // null, its derivative by p_C = R_CG X + w p_CG. False, leaving both
-  // untouched, where the point does not project.
+  // untouched, where the point does not project, or lies nearer than
+  // kMinDistance_m: in the centre of a camera any pixel fits.
   bool Residual(const TrackObservation& seen,
                 const Eigen::Vector4d& point_G,
                 Eigen::Vector2d* residual_px,

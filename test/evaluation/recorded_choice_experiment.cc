@@ -12,6 +12,7 @@
 #include <numeric>
 #include <optional>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -89,6 +90,10 @@ double Distance(const ScoredRecording& recording,
   for (const int i : chosen) segments.push_back(device.segments[i]);
   const CalibrationResult result =
       Calibrate(device.rig, device.rig.factory, segments, ComparedOptions());
+  if (result.status == CalibrateStatus::kFailed) {
+    throw std::runtime_error("a calibration on chosen segments: " +
+                             result.message);
+  }
   const std::vector<int> free = FreeComponents(device.rig);
   const Eigen::VectorXd off =
       BoxMinus(result.theta, recording.batch.theta)(free);

@@ -141,5 +141,28 @@ TEST_F(TangoHandheld, TheKeptSegmentsAgreeWithTheBatch) {
   EXPECT_LE(q_AI, 0.5);
 }
 
+// Few and calm segments leave directions nearly unobserved, and landmarks that
+// the cost would rather have in the centre of a camera.
+TEST_F(TangoHandheld, AnyFewSegmentsConverge) {
+  const Device* device = Read();
+  if (!device) GTEST_SKIP() << "set SELFCAL_TEST_DATA to the recordings";
+  const std::vector<int> choices[] = {{0, 3, 5, 7},
+                                      {0, 7, 10, 12},
+                                      {2, 3, 4, 6},
+                                      {3, 5, 8, 11},
+                                      {4, 5, 6, 10},
+                                      {5, 6, 7, 13},
+                                      {0, 3, 4, 5, 8},
+                                      {4, 5, 6, 9, 11}};
+  for (const std::vector<int>& choice : choices) {
+    std::vector<MotionSegment> segments;
+    for (const int i : choice) segments.push_back(device->segments[i]);
+    const CalibrationResult result =
+        Calibrate(device->rig, device->rig.factory, segments, kOptions);
+    Print("few", result);
+    EXPECT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  }
+}
+
 }  // namespace
 }  // namespace selfcal::client
