@@ -226,7 +226,17 @@ class MapReader {
       }
       if (landmark->second.id == 0) landmark->second.id = next_landmark_id_++;
       if (frame.keypoint_measurement_sigmas_size() == n) {
-        sigmas_px_.push_back(frame.keypoint_measurement_sigmas(k));
+        const double sigma_px = frame.keypoint_measurement_sigmas(k);
+        if (!(sigma_px > 0 && std::isfinite(sigma_px))) {
+          return Bad(folder_,
+                     fmt::format("vertices[{}].frames[{}]: the sigma of "
+                                 "keypoint {} is {}, not positive",
+                                 vertex,
+                                 camera,
+                                 k,
+                                 sigma_px));
+        }
+        sigmas_px_.push_back(sigma_px);
       }
       keyframe->observations.push_back(
           {camera, landmark->second.id, z_px, landmark->second.p_M});

@@ -215,6 +215,19 @@ TEST_F(DamagedMap, WrongQuaternionNormNamesTheVertex) {
               HasSubstr("vertices[3].T_M_I"));
 }
 
+TEST_F(DamagedMap, SigmaThatIsNoNumberNamesTheKeypoint) {
+  vi_map::ViMap map = Read("vertices0");
+  for (double& sigma : *map.mutable_vertices(2)
+                            ->mutable_n_visual_frame()
+                            ->mutable_frames(0)
+                            ->mutable_keypoint_measurement_sigmas()) {
+    sigma = std::nan("");
+  }
+  Write("vertices0", map);
+  EXPECT_THAT(std::string(ReadError().message()),
+              HasSubstr("vertices[2].frames[0]: the sigma of keypoint"));
+}
+
 TEST_F(DamagedMap, BrokenChainIsRefused) {
   vi_map::ViMap map = Read("edges0");
   map.mutable_edges()->DeleteSubrange(10, 1);
