@@ -11,7 +11,7 @@ namespace {
 
 absl::Status InsertMetadata(Connection* db,
                             std::int64_t rig,
-                            const MotionSegment& segment) {
+                            const NewSegment& segment) {
   return Statement(
              db,
              "INSERT INTO segments (rig, session, session_index, sequence, "
@@ -25,12 +25,12 @@ absl::Status InsertMetadata(Connection* db,
              segment.key.index,
              NowNs(),
              segment.calibration_version,
-             segment.keyframes.empty() ? 0 : segment.keyframes.front().t_ns,
-             segment.keyframes.empty() ? 0 : segment.keyframes.back().t_ns,
-             static_cast<std::int64_t>(segment.keyframes.size()),
-             static_cast<std::int64_t>(segment.imu.size()),
-             static_cast<std::int64_t>(segment.landmarks.size()),
-             static_cast<std::int64_t>(segment.observations.size()))
+             segment.start_ns,
+             segment.end_ns,
+             segment.keyframes,
+             segment.imu_samples,
+             segment.landmarks,
+             segment.observations)
       .Run();
 }
 
@@ -40,10 +40,25 @@ std::string SegmentText(const std::string& rig, const SegmentKey& key) {
   return fmt::format("segment {}~{} of rig {}", key.session, key.index, rig);
 }
 
+absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment) {
+  NewSegment packed;
+  packed.key = segment.key;
+  packed.calibration_version = segment.calibration_version;
+  if (!segment.keyframes.empty()) {
+    packed.start_ns = segment.keyframes.front().t_ns;
+    packed.end_ns = segment.keyframes.back().t_ns;
+  }
+  packed.keyframes = static_cast<std::int64_t>(segment.keyframes.size());
+  packed.imu_samples = static_cast<std::int64_t>(segment.imu.size());
+  packed.landmarks = static_cast<std::int64_t>(segment.landmarks.size());
+  packed.observations = static_cast<std::int64_t>(segment.observations.size());
+  SELFCAL_ASSIGN_OR_RETURN(packed.payload, PackSegment(segment));
+  return packed;
+}
+
 absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
                                          const std::string& rig,
-                                         const MotionSegment& segment,
-                                         const Payload& payload) {
+                                         const NewSegment& segment) {
   Transaction transaction(db);
   SELFCAL_RETURN_IF_ERROR(transaction.status());
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
@@ -61,9 +76,9 @@ absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
                 "VALUES (?1, ?2, ?3, ?4, ?5)",
                 std::int64_t{sqlite3_last_insert_rowid(db->handle())},
                 rig_id,
-                BlobView{payload.data},
-                payload.raw_bytes,
-                BlobView{payload.sha256})
+                BlobView{segment.payload.data},
+                segment.payload.raw_bytes,
+                BlobView{segment.payload.sha256})
           .Run());
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());
   return PutVerdict::kStored;

@@ -23,11 +23,26 @@ struct SegmentRow {
 // "segment <session>~<index> of rig <rig>", for messages.
 std::string SegmentText(const std::string& rig, const SegmentKey& key);
 
+// What is written of a segment that was received.
+struct NewSegment {
+  SegmentKey key;
+  std::int64_t calibration_version = 1;
+  std::int64_t start_ns = 0;
+  std::int64_t end_ns = 0;
+  std::int64_t keyframes = 0;
+  std::int64_t imu_samples = 0;
+  std::int64_t landmarks = 0;
+  std::int64_t observations = 0;
+  Payload payload;
+};
+
+// Compresses: the larger part of the work, and needs no database.
+absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment);
+
 // In one transaction. NOT_FOUND for the rig.
 absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
                                          const std::string& rig,
-                                         const MotionSegment& segment,
-                                         const Payload& payload);
+                                         const NewSegment& segment);
 
 // NOT_FOUND.
 absl::StatusOr<SegmentRow> FindSegment(Connection* db,

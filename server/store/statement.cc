@@ -171,25 +171,41 @@ void Statement::Check(int code) {
   }
 }
 
-Transaction::Transaction(Connection* connection) : connection_(connection) {
-  status_ = connection_->Execute("BEGIN IMMEDIATE");
+Transaction::Transaction(Connection* connection)
+    : connection_(connection), nested_(connection->in_transaction()) {
+  status_ =
+      connection_->Execute(nested_ ? "SAVEPOINT part" : "BEGIN IMMEDIATE");
   open_ = status_.ok();
 }
 
 Transaction::~Transaction() {
   // SQLite has rolled back by itself after some errors; then there is nothing
   // left to do.
-  if (open_ && sqlite3_get_autocommit(connection_->handle()) == 0) {
-    sqlite3_exec(connection_->handle(), "ROLLBACK", nullptr, nullptr, nullptr);
+  if (open_ && connection_->in_transaction()) {
+    sqlite3_exec(connection_->handle(),
+                 nested_ ? "ROLLBACK TO part; RELEASE part" : "ROLLBACK",
+                 nullptr,
+                 nullptr,
+                 nullptr);
   }
 }
 
 absl::Status Transaction::Commit() {
-  absl::Status status = connection_->Execute("COMMIT");
+  absl::Status status =
+      connection_->Execute(nested_ ? "RELEASE part" : "COMMIT");
   if (status.ok()) {
     open_ = false;
   }
   return status;
+}
+
+Snapshot::Snapshot(Connection* connection)
+    : connection_(connection), status_(connection->Execute("BEGIN")) {}
+
+Snapshot::~Snapshot() {
+  if (status_.ok() && connection_->in_transaction()) {
+    sqlite3_exec(connection_->handle(), "COMMIT", nullptr, nullptr, nullptr);
+  }
 }
 
 }  // namespace selfcal::server

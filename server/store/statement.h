@@ -34,6 +34,11 @@ class Connection {
   // SQLITE_OK, SQLITE_ROW and SQLITE_DONE.
   absl::Status StatusOf(int code, std::string_view what) const;
 
+  // Whether a transaction is open; SQLite ends one by itself after some errors.
+  bool in_transaction() const {
+    return sqlite3_get_autocommit(handle_.get()) == 0;
+  }
+
   sqlite3* handle() const { return handle_.get(); }
 
  private:
@@ -85,7 +90,9 @@ class Statement {
   absl::Status status_;
 };
 
-// BEGIN IMMEDIATE; rolls back unless committed.
+// BEGIN IMMEDIATE; rolls back unless committed. Inside another transaction it
+// is a savepoint of that one: its rollback leaves the other's changes, and its
+// commit becomes durable with the other's.
 class Transaction {
  public:
   explicit Transaction(Connection* connection);
@@ -100,7 +107,23 @@ class Transaction {
  private:
   Connection* connection_;
   absl::Status status_;
+  bool nested_ = false;
   bool open_ = false;
+};
+
+// One state of the database for several statements that only read.
+class Snapshot {
+ public:
+  explicit Snapshot(Connection* connection);
+  ~Snapshot();
+  Snapshot(const Snapshot&) = delete;
+  Snapshot& operator=(const Snapshot&) = delete;
+
+  const absl::Status& status() const { return status_; }
+
+ private:
+  Connection* connection_;
+  absl::Status status_;
 };
 
 }  // namespace selfcal::server

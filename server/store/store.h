@@ -2,9 +2,10 @@
 // (store_sqlite.h) is the implementation; another engine proves itself by the
 // same tests.
 //
-// Every method that changes something is one transaction: when it returns OK
-// the change is committed and synced, when it returns an error nothing has
-// changed. Any thread may call; writes are serialised inside.
+// Every method that changes something does so as a whole or not at all: when it
+// returns OK the change is committed and synced, when it returns an error
+// nothing has changed. Changes that come at the same time may share one commit
+// and its sync. Any thread may call; writes are serialised inside.
 // Errors: NOT_FOUND, ALREADY_EXISTS, FAILED_PRECONDITION from the caller's
 // side; RESOURCE_EXHAUSTED (disk full), DATA_LOSS (a checksum does not match),
 // UNAVAILABLE from the environment.
@@ -165,6 +166,14 @@ class Store {
   // changes nothing.
   virtual absl::StatusOr<PutVerdict> PutSegment(
       const std::string& rig, const MotionSegment& segment) = 0;
+  // The same without waiting for the disk. What one thread puts is stored in
+  // that order. `done` is called once: on this thread where the segment is
+  // refused before it is written, else on one of the store's; it must be short
+  // and not call the store.
+  using PutDone = std::function<void(const absl::StatusOr<PutVerdict>&)>;
+  virtual void BeginPutSegment(const std::string& rig,
+                               const MotionSegment& segment,
+                               PutDone done) = 0;
   virtual absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
                                                    const SegmentKey& key) = 0;
   // Newest first.

@@ -1,6 +1,8 @@
 #include "server/store/store_sqlite.h"
 
-#include <mutex>
+#include <future>
+#include <memory>
+#include <type_traits>
 #include <utility>
 
 #include "migrations/migrations.h"
@@ -13,184 +15,233 @@
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
+#include "server/store/shared_database.h"
 #include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
 namespace {
 
-// Locks, and leaves the work to the files of each subject.
+// Gives the work of each subject its connection.
 class SqliteStore : public Store {
  public:
-  SqliteStore(Connection db, const ChangeOptions& change)
-      : db_(std::move(db)), change_(change) {}
+  SqliteStore(std::unique_ptr<SharedDatabase> db, const ChangeOptions& change)
+      : change_(change), db_(std::move(db)) {}
 
   absl::StatusOr<StoredRig> CreateRig(const Rig& rig) override {
-    const std::lock_guard lock(mutex_);
-    return CreateRigRow(&db_, rig);
+    return Write([&](Connection* db) { return CreateRigRow(db, rig); });
   }
 
   absl::StatusOr<StoredRig> GetRig(const std::string& rig) override {
-    const std::lock_guard lock(mutex_);
-    SELFCAL_ASSIGN_OR_RETURN(RigRow row, ReadRig(&db_, rig));
-    return std::move(row.stored);
+    return Read([&](Connection* db) -> absl::StatusOr<StoredRig> {
+      SELFCAL_ASSIGN_OR_RETURN(RigRow row, ReadRig(db, rig));
+      return std::move(row.stored);
+    });
   }
 
   absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) override {
-    const std::lock_guard lock(mutex_);
-    return ListRigRows(&db_, page);
+    return Read([&](Connection* db) { return ListRigRows(db, page); });
   }
 
   absl::StatusOr<PutVerdict> PutSegment(const std::string& rig,
                                         const MotionSegment& segment) override {
-    // Compression is the larger part of the work, and needs no lock.
-    SELFCAL_ASSIGN_OR_RETURN(const Payload payload, PackSegment(segment));
-    const std::lock_guard lock(mutex_);
-    return PutSegmentRow(&db_, rig, segment, payload);
+    const auto verdict =
+        std::make_shared<std::promise<absl::StatusOr<PutVerdict>>>();
+    BeginPutSegment(rig, segment, [verdict](const auto& answer) {
+      verdict->set_value(answer);
+    });
+    return verdict->get_future().get();
+  }
+
+  void BeginPutSegment(const std::string& rig,
+                       const MotionSegment& segment,
+                       PutDone done) override {
+    auto packed = PackNewSegment(segment);
+    if (!packed.ok()) return done(packed.status());
+    // Shared by the change and by what is told of it.
+    struct Put {
+      std::string rig;
+      NewSegment segment;
+      PutVerdict verdict;
+    };
+    const auto put =
+        std::make_shared<Put>(Put{rig, *std::move(packed), PutVerdict()});
+    db_->Write(
+        [put](Connection* db) {
+          const auto verdict = PutSegmentRow(db, put->rig, put->segment);
+          put->verdict = verdict.value_or(PutVerdict());
+          return verdict.status();
+        },
+        [put, done = std::move(done)](const absl::Status& status) {
+          if (status.ok()) {
+            done(put->verdict);
+          } else {
+            done(status);
+          }
+        });
   }
 
   absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
                                            const SegmentKey& key) override {
-    const std::lock_guard lock(mutex_);
-    return ReadSegment(&db_, rig, key);
+    return Read([&](Connection* db) { return ReadSegment(db, rig, key); });
   }
 
   absl::StatusOr<Listed<StoredSegment>> ListSegments(
       const std::string& rig, const Page& page) override {
-    const std::lock_guard lock(mutex_);
-    return ListSegmentRows(&db_, rig, page);
+    return Read([&](Connection* db) { return ListSegmentRows(db, rig, page); });
   }
 
   absl::StatusOr<MotionSegment> GetSegmentData(const std::string& rig,
                                                const SegmentKey& key) override {
-    SELFCAL_ASSIGN_OR_RETURN(const Payload payload, LockedPayload(rig, key));
+    SELFCAL_ASSIGN_OR_RETURN(const Payload payload, Read([&](Connection* db) {
+                               return ReadPayload(db, rig, key);
+                             }));
     return UnpackSegment(payload, SegmentText(rig, key));
   }
 
   absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) override {
-    const std::lock_guard lock(mutex_);
-    return ListUnscoredRows(&db_, limit);
+    return Read([&](Connection* db) { return ListUnscoredRows(db, limit); });
   }
 
   absl::StatusOr<ScoreCommit> CommitScore(
       const std::string& rig,
       const SegmentKey& key,
       const SegmentInformation& information) override {
-    const std::lock_guard lock(mutex_);
-    return CommitScoreRows(&db_, rig, key, information, change_);
+    return Write([&](Connection* db) {
+      return CommitScoreRows(db, rig, key, information, change_);
+    });
   }
 
   absl::Status MarkUnusable(const std::string& rig,
                             const SegmentKey& key,
                             const std::string& problem) override {
-    const std::lock_guard lock(mutex_);
-    return MarkUnusableRow(&db_, rig, key, problem);
+    return Write(
+        [&](Connection* db) { return MarkUnusableRow(db, rig, key, problem); });
   }
 
   absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) override {
-    const std::lock_guard lock(mutex_);
-    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(&db_, rig));
-    return ReadTables(&db_, rig_id);
+    return Read([&](Connection* db) -> absl::StatusOr<std::vector<Table>> {
+      SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+      return ReadTables(db, rig_id);
+    });
   }
 
   absl::StatusOr<StoredChange> GetChange(const std::string& rig,
                                          std::int64_t change) override {
-    const std::lock_guard lock(mutex_);
-    return ReadChange(&db_, rig, change);
+    return Read([&](Connection* db) { return ReadChange(db, rig, change); });
   }
 
   absl::StatusOr<StoredCalibration> GetCalibration(
       const std::string& rig, std::int64_t version) override {
-    const std::lock_guard lock(mutex_);
-    return ReadCalibration(&db_, rig, version);
+    return Read(
+        [&](Connection* db) { return ReadCalibration(db, rig, version); });
   }
 
   absl::StatusOr<StoredCalibration> GetActiveCalibration(
       const std::string& rig) override {
-    const std::lock_guard lock(mutex_);
-    return ReadActiveCalibration(&db_, rig);
+    return Read([&](Connection* db) { return ReadActiveCalibration(db, rig); });
   }
 
   absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
       const std::string& rig, const Page& page) override {
-    const std::lock_guard lock(mutex_);
-    return ListCalibrationRows(&db_, rig, page);
+    return Read(
+        [&](Connection* db) { return ListCalibrationRows(db, rig, page); });
   }
 
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig) override {
-    const std::lock_guard lock(mutex_);
-    return CreateManualRunRow(&db_, rig);
+    return Write([&](Connection* db) { return CreateManualRunRow(db, rig); });
   }
 
   absl::StatusOr<StoredRun> GetRun(const std::string& rig,
                                    std::int64_t run) override {
-    const std::lock_guard lock(mutex_);
-    return ReadRun(&db_, rig, run);
+    return Read([&](Connection* db) { return ReadRun(db, rig, run); });
   }
 
   absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
                                              const Page& page) override {
-    const std::lock_guard lock(mutex_);
-    return ListRunRows(&db_, rig, page);
+    return Read([&](Connection* db) { return ListRunRows(db, rig, page); });
   }
 
   absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns() override {
-    const std::lock_guard lock(mutex_);
-    return ListUnfinishedRunRows(&db_);
+    return Read([&](Connection* db) { return ListUnfinishedRunRows(db); });
   }
 
   absl::StatusOr<StoredRun> BeginRun(const std::string& rig,
                                      std::int64_t run) override {
-    const std::lock_guard lock(mutex_);
-    return BeginRunRow(&db_, rig, run);
+    return Write([&](Connection* db) { return BeginRunRow(db, rig, run); });
   }
 
   absl::StatusOr<StoredRun> ReleaseRun(const std::string& rig,
                                        std::int64_t run) override {
-    const std::lock_guard lock(mutex_);
-    return ReleaseRunRow(&db_, rig, run);
+    return Write([&](Connection* db) { return ReleaseRunRow(db, rig, run); });
   }
 
   absl::StatusOr<StoredCalibration> FinishRun(
       const std::string& rig,
       std::int64_t run,
       const StoredCalibration& calibration) override {
-    const std::lock_guard lock(mutex_);
-    return FinishRunRow(&db_, rig, run, calibration);
+    return Write([&](Connection* db) {
+      return FinishRunRow(db, rig, run, calibration);
+    });
   }
 
   absl::StatusOr<StoredRun> EndRun(const std::string& rig,
                                    std::int64_t run,
                                    RunState state,
                                    const std::string& message) override {
-    const std::lock_guard lock(mutex_);
-    return EndRunRow(&db_, rig, run, state, message);
+    return Write([&](Connection* db) {
+      return EndRunRow(db, rig, run, state, message);
+    });
   }
 
   absl::StatusOr<Listed<StoredEvent>> ListEvents(const Page& page) override {
-    const std::lock_guard lock(mutex_);
-    return ListEventRows(&db_, page);
+    return Read([&](Connection* db) { return ListEventRows(db, page); });
   }
 
  private:
-  absl::StatusOr<Payload> LockedPayload(const std::string& rig,
-                                        const SegmentKey& key) {
-    const std::lock_guard lock(mutex_);
-    return ReadPayload(&db_, rig, key);
+  // `query` returns a Status or a StatusOr of what it has read.
+  template <typename Query>
+  auto Read(const Query& query) -> std::invoke_result_t<Query, Connection*> {
+    std::invoke_result_t<Query, Connection*> result = absl::UnknownError("");
+    const absl::Status status = db_->Read([&](Connection* db) {
+      result = query(db);
+      return StatusOf(result);
+    });
+    SELFCAL_RETURN_IF_ERROR(status);
+    return result;
   }
 
-  std::mutex mutex_;
-  Connection db_;  // guarded by mutex_
+  template <typename Change>
+  auto Write(const Change& change)
+      -> std::invoke_result_t<Change, Connection*> {
+    std::invoke_result_t<Change, Connection*> result = absl::UnknownError("");
+    const absl::Status status = db_->Write([&](Connection* db) {
+      result = change(db);
+      return StatusOf(result);
+    });
+    SELFCAL_RETURN_IF_ERROR(status);
+    return result;
+  }
+
+  static absl::Status StatusOf(const absl::Status& status) { return status; }
+  template <typename T>
+  static absl::Status StatusOf(const absl::StatusOr<T>& result) {
+    return result.status();
+  }
+
   const ChangeOptions change_;
+  const std::unique_ptr<SharedDatabase> db_;
 };
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Store>> MakeSqliteStore(
     const std::string& path, const ChangeOptions& change) {
-  SELFCAL_ASSIGN_OR_RETURN(Connection db,
-                           OpenDatabase(path, EmbeddedMigrations()));
+  SELFCAL_ASSIGN_OR_RETURN(std::unique_ptr<SharedDatabase> db,
+                           SharedDatabase::Open(path, [path] {
+                             return OpenDatabase(path, EmbeddedMigrations());
+                           }));
   return std::unique_ptr<Store>(new SqliteStore(std::move(db), change));
 }
 

@@ -1,5 +1,5 @@
-// The store on SQLite: one file, one connection that reads and writes, under a
-// mutex. (SQLite before 3.51.3 can corrupt its write-ahead log where several
+// The store on SQLite: one file, one connection that writes and one that only
+// reads. (SQLite before 3.51.3 can corrupt its write-ahead log where several
 // connections write or checkpoint at once; here only one ever does.)
 #pragma once
 

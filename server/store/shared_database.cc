@@ -1,0 +1,205 @@
+#include "server/store/shared_database.h"
+
+#include <algorithm>
+#include <exception>
+#include <future>
+#include <iterator>
+#include <new>
+#include <utility>
+
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// Bounds how long the first of a group waits for the last.
+constexpr std::size_t kMaxGroup = 64;
+
+// A COMMIT failed, or a statement of it: the disk, not the question.
+bool IsDiskError(const absl::Status& status) {
+  return absl::IsUnavailable(status);
+}
+
+absl::Status Checking() {
+  return absl::UnavailableError(
+      "the disk has failed: the database is being checked; try again, and look "
+      "into the system's log");
+}
+
+absl::Status QuickCheck(Connection* connection) {
+  Statement check(connection, "PRAGMA quick_check(1)");
+  if (!check.Next()) return check.status();
+  const std::string words = check.Text(0);
+  if (words == "ok") return absl::OkStatus();
+  return absl::DataLossError(
+      "the database is damaged: stop the daemon, keep a copy of the file, and "
+      "restore a backup (quick_check: " +
+      words + ")");
+}
+
+// What a change throws fails it alone.
+absl::Status RunGuarded(const SharedDatabase::Work& work,
+                        Connection* connection) {
+  try {
+    return work(connection);
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError("memory is short: try again later");
+  } catch (const std::exception& error) {
+    return absl::InternalError(error.what());
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<SharedDatabase>> SharedDatabase::Open(
+    const std::string& path, Opener open_writer) {
+  std::unique_ptr<SharedDatabase> database(
+      new SharedDatabase(path, std::move(open_writer)));
+  SELFCAL_RETURN_IF_ERROR(database->OpenConnections());
+  database->thread_ = std::thread([raw = database.get()] { raw->Run(); });
+  return database;
+}
+
+SharedDatabase::SharedDatabase(std::string path, Opener open_writer)
+    : path_(std::move(path)), open_writer_(std::move(open_writer)) {}
+
+SharedDatabase::~SharedDatabase() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  arrived_.notify_all();
+  if (thread_.joinable()) thread_.join();
+  // The writer closes last: closing it moves the log into the file.
+  reader_.reset();
+  writer_.reset();
+}
+
+absl::Status SharedDatabase::OpenConnections() {
+  const std::lock_guard lock(read_mutex_);
+  reader_.reset();
+  writer_.reset();
+  SELFCAL_ASSIGN_OR_RETURN(writer_, open_writer_());
+  SELFCAL_ASSIGN_OR_RETURN(reader_,
+                           Connection::Open(path_, SQLITE_OPEN_READONLY));
+  return reader_->Execute(
+      "PRAGMA busy_timeout = 5000;"
+      "PRAGMA trusted_schema = OFF;"
+      "PRAGMA cell_size_check = ON");
+}
+
+absl::Status SharedDatabase::Recover() {
+  SELFCAL_RETURN_IF_ERROR(OpenConnections());
+  SELFCAL_RETURN_IF_ERROR(QuickCheck(&*writer_));
+  Statement checkpoint(&*writer_, "PRAGMA wal_checkpoint(TRUNCATE)");
+  const bool found = checkpoint.Next();
+  SELFCAL_RETURN_IF_ERROR(checkpoint.status());
+  if (!found || checkpoint.Int(0) != 0) return Checking();
+  failed_ = false;
+  return absl::OkStatus();
+}
+
+void SharedDatabase::Failed(const absl::Status& status) {
+  if (IsDiskError(status)) failed_ = true;
+}
+
+absl::Status SharedDatabase::Read(const Work& query) {
+  const std::lock_guard lock(read_mutex_);
+  if (failed_ || !reader_) {
+    // The thread that writes opens it again. Whoever waits for that here could
+    // be waited for by what that thread calls.
+    Write([](Connection*) { return absl::OkStatus(); },
+          [](const absl::Status&) {});
+    return Checking();
+  }
+  const Snapshot snapshot(&*reader_);
+  Failed(snapshot.status());
+  SELFCAL_RETURN_IF_ERROR(snapshot.status());
+  absl::Status status = query(&*reader_);
+  Failed(status);
+  return status;
+}
+
+void SharedDatabase::Write(Work change, Done done) {
+  {
+    const std::lock_guard lock(mutex_);
+    queue_.push_back({std::move(change), std::move(done)});
+  }
+  arrived_.notify_all();
+}
+
+absl::Status SharedDatabase::Write(Work change) {
+  // Shared: this thread may be gone before set_value has returned.
+  const auto committed = std::make_shared<std::promise<absl::Status>>();
+  Write(std::move(change), [committed](const absl::Status& status) {
+    committed->set_value(status);
+  });
+  return committed->get_future().get();
+}
+
+void SharedDatabase::Run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    arrived_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
+    if (queue_.empty()) return;
+    const auto end = std::next(
+        queue_.begin(),
+        static_cast<std::ptrdiff_t>(std::min(queue_.size(), kMaxGroup)));
+    std::vector<Job> group(std::make_move_iterator(queue_.begin()),
+                           std::make_move_iterator(end));
+    queue_.erase(queue_.begin(), end);
+    lock.unlock();
+    Commit(group);
+    for (const Job& job : group) job.done(job.status);
+    group.clear();  // what the changes hold goes while others may queue
+    lock.lock();
+  }
+}
+
+void SharedDatabase::Commit(std::span<Job> group) {
+  if (failed_) {
+    const absl::Status recovered = Recover();
+    if (!recovered.ok()) {
+      failed_ = true;
+      for (Job& job : group) job.status = recovered;
+      return;
+    }
+  }
+  if (CommitTogether(group) || group.size() == 1) return;
+  // One of them was too much, for a disk that is almost full: each by itself.
+  for (Job& job : group) {
+    if (failed_) {
+      job.status = Checking();
+    } else {
+      CommitTogether({&job, 1});
+    }
+  }
+}
+
+// False: nothing was committed, and each is worth a try of its own. True: the
+// statuses are final.
+bool SharedDatabase::CommitTogether(std::span<Job> group) {
+  const auto fail = [&](const absl::Status& status) {
+    Failed(status);
+    for (Job& job : group) job.status = status;
+    return IsDiskError(status);
+  };
+  Transaction transaction(&*writer_);
+  if (!transaction.status().ok()) return fail(transaction.status());
+  for (Job& job : group) {
+    job.status = RunGuarded(job.change, &*writer_);
+    if (IsDiskError(job.status) || !writer_->in_transaction()) {
+      const absl::Status lost =
+          job.status.ok()
+              ? absl::InternalError("a change ended the transaction")
+              : job.status;
+      return fail(lost);
+    }
+  }
+  const absl::Status committed = transaction.Commit();
+  if (!committed.ok()) return fail(committed);
+  ++commits_;
+  return true;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,73 @@
+// For tests of what only SQLite promises: they reach around the store, into its
+// file.
+#pragma once
+
+#include <string>
+
+#include "server/store/statement.h"
+#include "test/server/store/store_test.h"
+
+namespace selfcal::server {
+
+// "ok", or what integrity_check and foreign_key_check find.
+inline std::string IntegrityOf(const std::string& path) {
+  auto db = Connection::Open(path, SQLITE_OPEN_READWRITE);
+  if (!db.ok()) return db.status().ToString();
+  Statement check(&*db, "PRAGMA integrity_check");
+  if (!check.Next()) return check.status().ToString();
+  if (check.Text(0) != "ok") return check.Text(0);
+  Statement keys(&*db, "PRAGMA foreign_key_check");
+  return keys.Next() ? "a foreign key leads nowhere" : "ok";
+}
+
+// A folder in memory, where syncs are free: for tests that simulate the disk
+// themselves.
+class MemoryFolder {
+ public:
+  MemoryFolder() {
+    const std::string parent =
+        std::filesystem::exists("/dev/shm") ? "/dev/shm" : ::testing::TempDir();
+    std::string pattern = parent + "/selfcal-XXXXXX";
+    path_ = mkdtemp(pattern.data());
+  }
+  ~MemoryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  MemoryFolder(const MemoryFolder&) = delete;
+  MemoryFolder& operator=(const MemoryFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  std::string File(const std::string& name) const {
+    return (path_ / name).string();
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// A rig and segments whose answers a test keeps.
+class SqliteTest : public ::testing::Test {
+ protected:
+  static MotionSegment Segment(std::int64_t index) {
+    static const std::vector<MotionSegment> kSegments =
+        TestSegments(TestRig("a"), 1);
+    MotionSegment segment = kSegments.front();
+    segment.key = {"s", index};
+    return segment;
+  }
+
+  absl::Status Open() {
+    auto opened = MakeSqliteStore(Path());
+    if (opened.ok()) store_ = *std::move(opened);
+    return opened.status();
+  }
+
+  std::string Path() const { return folder_.File("selfcal.db"); }
+
+  MemoryFolder folder_;
+  const Rig rig_ = TestRig("a");
+  std::unique_ptr<Store> store_;
+};
+
+}  // namespace selfcal::server
