@@ -19,13 +19,9 @@ namespace selfcal::client {
 class CalibrationWatch::Impl {
  public:
   Impl(const ClientOptions& options, Callback callback)
-      : options_(options), callback_(std::move(callback)) {
-    try {
-      thread_ = std::thread([this] { Run(); });
-    } catch (const std::exception& error) {
-      connection_ = absl::ResourceExhaustedError(error.what());
-    }
-  }
+      : options_(options),
+        callback_(std::move(callback)),
+        thread_([this] { Run(); }) {}
 
   ~Impl() {
     {
@@ -34,7 +30,7 @@ class CalibrationWatch::Impl {
       if (context_ != nullptr) context_->TryCancel();
     }
     stopped_.notify_all();
-    if (thread_.joinable()) thread_.join();
+    thread_.join();
   }
 
   absl::Status connection_status() const {
@@ -77,8 +73,9 @@ class CalibrationWatch::Impl {
 
   // One connection, from its beginning to its end, which is never a success.
   absl::Status Watch(bool* answered) {
-    const auto stub =
-        v1::CalibrationService::NewStub(MakeChannel(options_.target));
+    const auto channel = MakeChannel(options_);
+    if (!channel.ok()) return channel.status();
+    const auto stub = v1::CalibrationService::NewStub(*channel);
     const auto context = std::make_shared<grpc::ClientContext>();
     {
       std::lock_guard lock(mutex_);
@@ -130,16 +127,24 @@ class CalibrationWatch::Impl {
 };
 
 CalibrationWatch::CalibrationWatch(const ClientOptions& options,
-                                   Callback callback)
-    : impl_(std::make_unique<Impl>(options, std::move(callback))) {}
+                                   Callback callback) noexcept {
+  try {
+    impl_ = std::make_unique<Impl>(options, std::move(callback));
+  } catch (...) {
+    impl_ = nullptr;  // as documented: tells nothing
+  }
+}
 CalibrationWatch::~CalibrationWatch() = default;
 
-absl::Status CalibrationWatch::connection_status() const {
-  return impl_->connection_status();
+absl::Status CalibrationWatch::connection_status() const noexcept {
+  // Without a message, which would take memory.
+  return impl_ == nullptr
+             ? absl::Status(absl::StatusCode::kResourceExhausted, "")
+             : impl_->connection_status();
 }
 
-std::uint64_t CalibrationWatch::callback_failures() const {
-  return impl_->callback_failures();
+std::uint64_t CalibrationWatch::callback_failures() const noexcept {
+  return impl_ == nullptr ? 0 : impl_->callback_failures();
 }
 
 }  // namespace selfcal::client

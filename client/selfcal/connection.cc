@@ -1,23 +1,70 @@
 #include "client/selfcal/connection.h"
 
+#include <fmt/format.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/channel_arguments.h>
 
 #include <exception>
+#include <fstream>
 #include <random>
+#include <sstream>
+#include <utility>
 
 namespace selfcal::client {
 
-std::shared_ptr<grpc::Channel> MakeChannel(const std::string& target) {
+namespace {
+
+std::shared_ptr<grpc::Channel> MakeChannel(
+    const std::string& target,
+    const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   grpc::ChannelArguments arguments;
   // A failed connection that is shared would impose its own waiting time.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // Finds out that the other end is gone without a word; servers allow a ping
   // every five minutes by default.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 6 * 60 * 1000);
-  return grpc::CreateCustomChannel(
-      target, grpc::InsecureChannelCredentials(), arguments);
+  return grpc::CreateCustomChannel(target, credentials, arguments);
+}
+
+// Nothing for no path.
+absl::StatusOr<std::string> ReadPem(const std::string& path) {
+  if (path.empty()) return std::string();
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file || text.str().empty()) {
+    return absl::FailedPreconditionError(
+        fmt::format("cannot read {}: it should be a PEM file", path));
+  }
+  return text.str();
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(
+    const ClientOptions& options) {
+  const bool has_own =
+      !options.certificate_file.empty() || !options.key_file.empty();
+  if (options.ca_file.empty() && !has_own) return MakeChannel(options.target);
+  if (options.certificate_file.empty() != options.key_file.empty()) {
+    return absl::FailedPreconditionError(
+        "certificate_file and key_file belong together: give both");
+  }
+  grpc::SslCredentialsOptions tls;
+  for (const auto& [path, pem] :
+       {std::pair(&options.ca_file, &tls.pem_root_certs),
+        std::pair(&options.certificate_file, &tls.pem_cert_chain),
+        std::pair(&options.key_file, &tls.pem_private_key)}) {
+    auto read = ReadPem(*path);
+    if (!read.ok()) return read.status();
+    *pem = *std::move(read);
+  }
+  return MakeChannel(options.target, grpc::SslCredentials(tls));
+}
+
+std::shared_ptr<grpc::Channel> MakeChannel(const std::string& target) {
+  return MakeChannel(target, grpc::InsecureChannelCredentials());
 }
 
 absl::Status ToAbsl(const grpc::Status& status) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 #include <grpcpp/channel.h>
 #include <grpcpp/support/status.h>
 
@@ -10,10 +11,17 @@
 #include <memory>
 #include <string>
 
+#include "client/selfcal/client.h"
+
 namespace selfcal::client {
 
 // A channel of its own, which shares neither connection nor backoff with any
-// other: an attempt to connect begins at the first call.
+// other: an attempt to connect begins at the first call. With the certificates
+// of the options as they are on disk now; FAILED_PRECONDITION if one cannot be
+// read.
+absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(
+    const ClientOptions& options);
+// Without TLS.
 std::shared_ptr<grpc::Channel> MakeChannel(const std::string& target);
 
 absl::Status ToAbsl(const grpc::Status& status);

@@ -4,18 +4,17 @@
 #include <cmath>
 #include <deque>
 #include <limits>
-#include <set>
-#include <unordered_map>
+#include <new>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace selfcal::client {
 namespace {
 
-struct Keyframe {
-  KeyframeState state;
-  std::vector<KeyframeObservation> observations;
-};
+// Otherwise a vector that grows would copy every observation.
+static_assert(std::is_nothrow_move_constructible_v<ObservedKeyframe>);
+static_assert(std::is_nothrow_move_constructible_v<ClosedSegment>);
 
 std::int64_t Nanoseconds(double seconds) {
   constexpr double kMaxSeconds = 1e9;  // keeps the product inside int64
@@ -32,48 +31,6 @@ bool Before(const ImuSample& sample, std::int64_t t_ns) {
   return sample.t_ns < t_ns;
 }
 
-// The first observation of each landmark by each camera.
-std::vector<KeyframeObservation> WithoutDuplicates(
-    std::span<const KeyframeObservation> observations) {
-  std::set<std::pair<std::int32_t, std::uint64_t>> seen;
-  std::vector<KeyframeObservation> unique;
-  unique.reserve(observations.size());
-  for (const KeyframeObservation& observation : observations) {
-    if (seen.emplace(observation.camera, observation.landmark_id).second) {
-      unique.push_back(observation);
-    }
-  }
-  return unique;
-}
-
-// Landmarks seen often enough, in the order of their first observation, and
-// the observations of them.
-void AddLandmarks(std::span<const Keyframe> keyframes,
-                  int min_observations,
-                  MotionSegment* segment) {
-  std::unordered_map<std::uint64_t, int> count;
-  for (const Keyframe& keyframe : keyframes) {
-    for (const KeyframeObservation& seen : keyframe.observations) {
-      ++count[seen.landmark_id];
-    }
-  }
-  std::unordered_map<std::uint64_t, std::int32_t> index;
-  for (std::size_t k = 0; k < keyframes.size(); ++k) {
-    for (const KeyframeObservation& seen : keyframes[k].observations) {
-      if (count[seen.landmark_id] < min_observations) continue;
-      const auto next = static_cast<std::int32_t>(segment->landmarks.size());
-      const auto [entry, is_new] = index.emplace(seen.landmark_id, next);
-      if (is_new) segment->landmarks.push_back({seen.landmark_id, seen.p_G});
-      segment->landmarks[static_cast<std::size_t>(entry->second)].p_G =
-          seen.p_G;
-      segment->observations.push_back({static_cast<std::int32_t>(k),
-                                       seen.camera,
-                                       entry->second,
-                                       seen.z_px});
-    }
-  }
-}
-
 }  // namespace
 
 struct SegmentBuilder::State {
@@ -82,11 +39,11 @@ struct SegmentBuilder::State {
   std::uint64_t seconds_ns;
   std::int64_t next_index;
   // Of the segment at hand and, while IMU samples lag behind, of later ones.
-  std::vector<Keyframe> keyframes;
+  std::vector<ObservedKeyframe> keyframes;
   // From the last sample at or before the first keyframe.
   std::vector<ImuSample> imu;
   std::optional<std::int64_t> last_keyframe_ns;
-  std::deque<MotionSegment> complete;
+  std::deque<ClosedSegment> closed;
   SegmentBuilderStatistics statistics;
 
   explicit State(const SegmentBuilderOptions& given)
@@ -98,14 +55,17 @@ struct SegmentBuilder::State {
   // Number of keyframes of the segment that begins with the first one, if the
   // keyframe after it has come.
   std::optional<std::size_t> ClosedSize() const {
-    for (std::size_t n = 2; n < keyframes.size(); ++n) {
-      const bool full =
-          options.seconds > 0
-              ? Elapsed(keyframes[n].state.t_ns, keyframes[0].state.t_ns) >=
-                    seconds_ns
-              : n >= static_cast<std::size_t>(std::max(options.keyframes, 2));
-      if (full) return n;
+    if (options.seconds > 0) {
+      for (std::size_t n = 2; n < keyframes.size(); ++n) {
+        if (Elapsed(keyframes[n].state.t_ns, keyframes[0].state.t_ns) >=
+            seconds_ns) {
+          return n;
+        }
+      }
+      return std::nullopt;
     }
+    const auto full = static_cast<std::size_t>(std::max(options.keyframes, 2));
+    if (keyframes.size() > full) return full;
     return std::nullopt;
   }
 
@@ -113,44 +73,38 @@ struct SegmentBuilder::State {
     return !imu.empty() && imu.back().t_ns >= t_ns;
   }
 
-  // Samples from the last one at or before `begin` to the first one at or after
-  // `end`.
-  std::vector<ImuSample> ImuBetween(std::int64_t begin_ns,
-                                    std::int64_t end_ns) const {
-    auto first = std::lower_bound(imu.begin(), imu.end(), begin_ns, Before);
-    if (first != imu.begin() &&
-        (first == imu.end() || first->t_ns > begin_ns)) {
-      --first;
-    }
-    auto last = std::lower_bound(first, imu.end(), end_ns, Before);
-    if (last != imu.end()) ++last;
-    return {first, last};
-  }
-
-  void ForgetImuBefore(std::int64_t t_ns) {
-    auto first = std::lower_bound(imu.begin(), imu.end(), t_ns, Before);
-    if (first != imu.begin() && (first == imu.end() || first->t_ns > t_ns)) {
-      --first;
-    }
-    imu.erase(imu.begin(), first);
+  // The last sample at or before the time, or the first there is.
+  std::vector<ImuSample>::iterator SampleBefore(std::int64_t t_ns) {
+    const auto first = std::lower_bound(imu.begin(), imu.end(), t_ns, Before);
+    const bool at = first != imu.end() && first->t_ns == t_ns;
+    return first == imu.begin() || at ? first : first - 1;
   }
 
   // The first `size` keyframes leave as a segment whose samples reach `end_ns`.
-  void Complete(std::size_t size, std::int64_t end_ns) {
-    MotionSegment segment;
-    segment.key = {options.session, next_index++};
+  void Close(std::size_t size, std::int64_t end_ns) {
+    // What may find no memory comes first, and changes nothing.
+    ClosedSegment segment;
+    segment.key = {options.session, next_index};
     segment.calibration_version = options.calibration_version;
-    const std::span<const Keyframe> mine(keyframes.data(), size);
-    for (const Keyframe& keyframe : mine) {
-      segment.keyframes.push_back(keyframe.state);
-    }
-    segment.imu = ImuBetween(mine.front().state.t_ns, end_ns);
-    AddLandmarks(mine, options.min_observations, &segment);
-    complete.push_back(std::move(segment));
+    segment.min_observations = options.min_observations;
+    segment.end_ns = end_ns;
+    std::vector<ObservedKeyframe> next_keyframes;
+    next_keyframes.reserve(keyframes.size());
+    std::vector<ImuSample> next_imu;
+    next_imu.reserve(imu.size() + imu.size() / 8);
+    closed.push_back(std::move(segment));
+
+    const auto middle = keyframes.begin() + static_cast<std::ptrdiff_t>(size);
+    next_keyframes.insert(next_keyframes.end(),
+                          std::move_iterator(middle),
+                          std::move_iterator(keyframes.end()));
+    keyframes.erase(middle, keyframes.end());
+    next_imu.insert(next_imu.end(), SampleBefore(end_ns), imu.end());
+    closed.back().keyframes =
+        std::exchange(keyframes, std::move(next_keyframes));
+    closed.back().imu = std::exchange(imu, std::move(next_imu));
+    ++next_index;
     ++statistics.segments;
-    keyframes.erase(keyframes.begin(),
-                    keyframes.begin() + static_cast<std::ptrdiff_t>(size));
-    ForgetImuBefore(end_ns);
   }
 
   // Keyframes before the first sample: no later sample can cover them.
@@ -165,89 +119,158 @@ struct SegmentBuilder::State {
     keyframes.erase(keyframes.begin(), first);
   }
 
-  void CompleteWhatIs() {
+  void CloseWhatIs() {
     DropUncovered();
     while (const auto size = ClosedSize()) {
       const std::int64_t end_ns = keyframes[*size].state.t_ns;
       if (!ImuReaches(end_ns)) return;
-      Complete(*size, end_ns);
+      Close(*size, end_ns);
     }
   }
 
   void Flush(int min_keyframes) {
-    CompleteWhatIs();
+    CloseWhatIs();
     std::size_t covered = keyframes.size();
     while (covered > 0 && !ImuReaches(keyframes[covered - 1].state.t_ns)) {
       --covered;
     }
     if (covered >= static_cast<std::size_t>(std::max(min_keyframes, 2))) {
-      Complete(covered, keyframes[covered - 1].state.t_ns);
+      Close(covered, keyframes[covered - 1].state.t_ns);
     }
     statistics.keyframes_dropped += keyframes.size();
     keyframes.clear();
   }
+
+  bool AddImu(const ImuSample& sample);
+  bool AddKeyframe(const KeyframeState& state,
+                   std::span<const KeyframeObservation> observations);
+  // True if samples that have not come by this time will not.
+  bool IsStarved(std::int64_t t_ns) const;
+  void GiveUp();
 };
 
-SegmentBuilder::SegmentBuilder(const SegmentBuilderOptions& options)
-    : state_(std::make_unique<State>(options)) {}
+bool SegmentBuilder::State::AddImu(const ImuSample& sample) {
+  if (!imu.empty() && sample.t_ns <= imu.back().t_ns) {
+    ++statistics.imu_ignored;
+    return false;
+  }
+  imu.push_back(sample);
+  CloseWhatIs();
+  // A keyframe may lag by max_gap; one that comes later than that cannot
+  // continue the segment at hand, and samples older than that are not needed.
+  if (!keyframes.empty() && sample.t_ns > keyframes.back().state.t_ns &&
+      Elapsed(sample.t_ns, keyframes.back().state.t_ns) > 2 * max_gap_ns) {
+    Flush(options.min_keyframes);
+  }
+  const auto lowest = std::numeric_limits<std::int64_t>::min();
+  if (keyframes.empty() && Elapsed(sample.t_ns, lowest) > max_gap_ns &&
+      Elapsed(sample.t_ns, imu.front().t_ns) > 2 * max_gap_ns) {
+    const auto oldest = sample.t_ns - static_cast<std::int64_t>(max_gap_ns);
+    imu.erase(imu.begin(), SampleBefore(oldest));
+  }
+  return true;
+}
+
+bool SegmentBuilder::State::IsStarved(std::int64_t t_ns) const {
+  if (keyframes.empty()) return false;
+  const std::int64_t since =
+      imu.empty() ? keyframes.front().state.t_ns
+                  : std::max(imu.back().t_ns, keyframes.front().state.t_ns);
+  return t_ns > since && Elapsed(t_ns, since) > 2 * max_gap_ns;
+}
+
+bool SegmentBuilder::State::AddKeyframe(
+    const KeyframeState& state,
+    std::span<const KeyframeObservation> observations) {
+  if (last_keyframe_ns.has_value() && state.t_ns <= *last_keyframe_ns) {
+    ++statistics.keyframes_refused;
+    return false;
+  }
+  const bool gap =
+      !keyframes.empty() && Elapsed(state.t_ns, *last_keyframe_ns) > max_gap_ns;
+  if (gap || IsStarved(state.t_ns)) Flush(options.min_keyframes);
+  keyframes.push_back({state, {observations.begin(), observations.end()}});
+  last_keyframe_ns = state.t_ns;
+  CloseWhatIs();
+  return true;
+}
+
+// There was no memory: what is held is freed.
+void SegmentBuilder::State::GiveUp() {
+  ++statistics.out_of_memory;
+  statistics.keyframes_dropped += keyframes.size();
+  std::vector<ObservedKeyframe>().swap(keyframes);
+  std::vector<ImuSample>().swap(imu);
+}
+
+SegmentBuilder::SegmentBuilder(const SegmentBuilderOptions& options) noexcept {
+  try {
+    state_ = std::make_unique<State>(options);
+  } catch (const std::bad_alloc&) {
+    state_ = nullptr;  // as documented: refuses everything
+  }
+}
 SegmentBuilder::~SegmentBuilder() = default;
 SegmentBuilder::SegmentBuilder(SegmentBuilder&&) noexcept = default;
 SegmentBuilder& SegmentBuilder::operator=(SegmentBuilder&&) noexcept = default;
 
-bool SegmentBuilder::AddImu(const ImuSample& sample) {
-  State& s = *state_;
-  if (!s.imu.empty() && sample.t_ns <= s.imu.back().t_ns) {
-    ++s.statistics.imu_ignored;
+bool SegmentBuilder::AddImu(const ImuSample& sample) noexcept {
+  if (state_ == nullptr) return false;
+  try {
+    return state_->AddImu(sample);
+  } catch (...) {
+    state_->GiveUp();
     return false;
   }
-  s.imu.push_back(sample);
-  s.CompleteWhatIs();
-  // A keyframe may lag by max_gap; one that comes later than that cannot
-  // continue the segment at hand, and samples older than that are not needed.
-  if (!s.keyframes.empty() && sample.t_ns > s.keyframes.back().state.t_ns &&
-      Elapsed(sample.t_ns, s.keyframes.back().state.t_ns) > 2 * s.max_gap_ns) {
-    s.Flush(s.options.min_keyframes);
-  }
-  const auto lowest = std::numeric_limits<std::int64_t>::min();
-  if (s.keyframes.empty() && Elapsed(sample.t_ns, lowest) > s.max_gap_ns &&
-      Elapsed(sample.t_ns, s.imu.front().t_ns) > 2 * s.max_gap_ns) {
-    s.ForgetImuBefore(sample.t_ns - static_cast<std::int64_t>(s.max_gap_ns));
-  }
-  return true;
 }
 
 bool SegmentBuilder::AddKeyframe(
     const KeyframeState& state,
-    std::span<const KeyframeObservation> observations) {
-  State& s = *state_;
-  if (s.last_keyframe_ns.has_value() && state.t_ns <= *s.last_keyframe_ns) {
-    ++s.statistics.keyframes_refused;
+    std::span<const KeyframeObservation> observations) noexcept {
+  if (state_ == nullptr) return false;
+  try {
+    return state_->AddKeyframe(state, observations);
+  } catch (...) {
+    state_->GiveUp();
     return false;
   }
-  if (!s.keyframes.empty() &&
-      Elapsed(state.t_ns, *s.last_keyframe_ns) > s.max_gap_ns) {
-    s.Flush(s.options.min_keyframes);
-  }
-  s.last_keyframe_ns = state.t_ns;
-  s.keyframes.push_back({state, WithoutDuplicates(observations)});
-  s.CompleteWhatIs();
-  return true;
 }
 
-std::optional<MotionSegment> SegmentBuilder::Take() {
-  State& s = *state_;
-  if (s.complete.empty()) return std::nullopt;
-  std::optional<MotionSegment> oldest(std::move(s.complete.front()));
-  s.complete.pop_front();
+std::optional<ClosedSegment> SegmentBuilder::TakeClosed() noexcept {
+  if (state_ == nullptr || state_->closed.empty()) return std::nullopt;
+  std::optional<ClosedSegment> oldest(std::move(state_->closed.front()));
+  state_->closed.pop_front();
   return oldest;
 }
 
-void SegmentBuilder::Flush(int min_keyframes) { state_->Flush(min_keyframes); }
+std::optional<MotionSegment> SegmentBuilder::Take() noexcept {
+  while (const auto closed = TakeClosed()) {
+    try {
+      return Assemble(*closed);
+    } catch (...) {
+      ++state_->statistics.out_of_memory;
+      --state_->statistics.segments;
+      state_->statistics.keyframes_dropped += closed->keyframes.size();
+    }
+  }
+  return std::nullopt;
+}
 
-std::int64_t SegmentBuilder::next_index() const { return state_->next_index; }
+void SegmentBuilder::Flush(int min_keyframes) noexcept {
+  if (state_ == nullptr) return;
+  try {
+    state_->Flush(min_keyframes);
+  } catch (...) {
+    state_->GiveUp();
+  }
+}
 
-SegmentBuilderStatistics SegmentBuilder::statistics() const {
-  return state_->statistics;
+std::int64_t SegmentBuilder::next_index() const noexcept {
+  return state_ == nullptr ? 0 : state_->next_index;
+}
+
+SegmentBuilderStatistics SegmentBuilder::statistics() const noexcept {
+  return state_ == nullptr ? SegmentBuilderStatistics{} : state_->statistics;
 }
 
 }  // namespace selfcal::client

@@ -9,10 +9,13 @@
 //
 //   builder.AddImu(sample);
 //   builder.AddKeyframe(state, observations);
-//   while (auto segment = builder.Take()) stream.Send(*std::move(segment));
+//   while (auto closed = builder.TakeClosed()) stream.Send(*std::move(closed));
 //
-// Memory is bounded: by what one segment holds, and by what the caller leaves
-// untaken. Not thread-safe. Bad input is refused and counted, never fatal.
+// Each call takes microseconds: what is handed in is copied once, and a segment
+// leaves by move. Memory is bounded: by what one segment holds, and by what the
+// caller leaves untaken. Not thread-safe. Bad input is refused and counted,
+// never fatal; no function throws. When there is no memory, the segment at hand
+// is dropped and counted.
 #pragma once
 
 #include <cstdint>
@@ -21,17 +24,10 @@
 #include <span>
 #include <string>
 
+#include "client/selfcal/closed_segment.h"
 #include "core/model/segment.h"
 
 namespace selfcal::client {
-
-// What the SLAM system says when it makes a keyframe.
-struct KeyframeObservation {
-  std::int32_t camera = 0;
-  std::uint64_t landmark_id = 0;
-  Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
-  Eigen::Vector3d p_G = Eigen::Vector3d::Zero();  // landmark's estimate [m]
-};
 
 struct SegmentBuilderOptions {
   std::string session;
@@ -52,45 +48,50 @@ struct SegmentBuilderStatistics {
   std::uint64_t segments = 0;  // completed
   // Keyframes at or before the last one.
   std::uint64_t keyframes_refused = 0;
-  // Accepted, but in no segment: no IMU sample covers them, or the rest they
-  // belong to was too short.
+  // Accepted, but in no segment: no IMU sample covers them, the rest they
+  // belong to was too short, or there was no memory.
   std::uint64_t keyframes_dropped = 0;
   // IMU samples at or before the last one.
   std::uint64_t imu_ignored = 0;
+  // Calls that found no memory; each gave up the segment at hand.
+  std::uint64_t out_of_memory = 0;
 };
 
 class SegmentBuilder {
  public:
-  explicit SegmentBuilder(const SegmentBuilderOptions& options);
+  explicit SegmentBuilder(const SegmentBuilderOptions& options) noexcept;
   ~SegmentBuilder();
+  // What was moved from refuses everything.
   SegmentBuilder(SegmentBuilder&&) noexcept;
   SegmentBuilder& operator=(SegmentBuilder&&) noexcept;
 
   // False, and ignored, if it is not later than the sample before it.
-  bool AddImu(const ImuSample& sample);
+  bool AddImu(const ImuSample& sample) noexcept;
 
   // False, and refused, if it is not later than the keyframe before it. Of
   // several observations of one landmark by one camera the first counts; the
   // last p_G given for a landmark within the segment is the one that is sent.
   bool AddKeyframe(const KeyframeState& state,
-                   std::span<const KeyframeObservation> observations);
+                   std::span<const KeyframeObservation> observations) noexcept;
 
-  // The oldest complete segment, if there is one.
-  std::optional<MotionSegment> Take();
+  // The oldest complete segment, if there is one: as it was collected, for
+  // SegmentStream::Send, or put together here, which takes some milliseconds.
+  std::optional<ClosedSegment> TakeClosed() noexcept;
+  std::optional<MotionSegment> Take() noexcept;
 
   // Ends the segment at hand, at the end of a session or where tracking was
   // lost: with at least max(2, min_keyframes) keyframes that the IMU samples
   // cover it is complete, otherwise it is dropped. The builder then starts
   // anew, with the next index of the same session.
-  void Flush(int min_keyframes);
+  void Flush(int min_keyframes) noexcept;
 
   // Index that the next segment gets.
-  std::int64_t next_index() const;
-  SegmentBuilderStatistics statistics() const;
+  std::int64_t next_index() const noexcept;
+  SegmentBuilderStatistics statistics() const noexcept;
 
  private:
   struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<State> state_;  // null if there was no memory for it
 };
 
 }  // namespace selfcal::client

@@ -1,13 +1,10 @@
-// Two threads: `sender_` connects, sends and waits out the backoff; while a
-// connection lasts, a reader takes the acknowledgements. The queue holds, in
-// order, first what was sent on this connection and is unacknowledged
-// (in_flight_ segments), then what is to be sent.
+// Two threads beside the queue's: `sender_` connects, sends and waits out the
+// backoff; while a connection lasts, a reader takes the acknowledgements.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
-#include <condition_variable>
-#include <deque>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -16,6 +13,7 @@
 #include "client/selfcal/client.h"
 #include "client/selfcal/connection.h"
 #include "client/selfcal/segment_messages.h"
+#include "client/selfcal/segment_queue.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 
 namespace selfcal::client {
@@ -31,63 +29,46 @@ bool EndsStream(const absl::Status& status) {
          absl::IsPermissionDenied(status) || absl::IsUnauthenticated(status);
 }
 
+// Without a message, which would take memory.
+absl::Status NoMemory() {
+  return absl::Status(absl::StatusCode::kResourceExhausted, "");
+}
+
 }  // namespace
 
 class SegmentStream::Impl {
  public:
+  // Throws std::bad_alloc, and std::system_error if there can be no thread.
   Impl(const ClientOptions& options, AckCallback on_ack)
-      : options_(options), on_ack_(std::move(on_ack)) {
-    try {
-      sender_ = std::thread([this] { Run(); });
-    } catch (const std::exception& error) {
-      end_ = absl::ResourceExhaustedError(error.what());
-    }
-  }
+      : options_(options),
+        on_ack_(std::move(on_ack)),
+        queue_(options_, [this](const Acknowledgement& ack) { CallBack(ack); }),
+        sender_([this] { Run(); }) {}
 
   ~Impl() {
+    queue_.Stop();
     {
       std::lock_guard lock(mutex_);
-      stop_ = true;
       if (context_ != nullptr) context_->TryCancel();
     }
-    changed_.notify_all();
-    if (sender_.joinable()) sender_.join();
+    sender_.join();
   }
 
-  bool Send(MotionSegment segment) {
-    {
-      std::lock_guard lock(mutex_);
-      const auto limit =
-          static_cast<std::size_t>(std::max(options_.max_queue, 1));
-      if (!end_.ok() || queue_.size() >= limit || !Push(std::move(segment))) {
-        ++statistics_.dropped;
-        return false;
-      }
-      ++statistics_.queued;
-    }
-    changed_.notify_all();
-    return true;
-  }
+  SegmentQueue& queue() { return queue_; }
 
   absl::Status Drain(std::chrono::milliseconds timeout) {
-    std::unique_lock lock(mutex_);
     // Longer ones may not be representable as a point in time.
     const auto wait = std::min<std::chrono::milliseconds>(
         timeout, std::chrono::hours(24 * 365));
-    const bool done = changed_.wait_for(lock, wait, [this] {
-      return !end_.ok() || (queue_.empty() && callbacks_due_ == 0);
-    });
-    if (!end_.ok()) return end_;
+    const bool done = queue_.WaitUntilDone(wait);
+    const absl::Status end = queue_.end();
+    if (!end.ok()) return end;
     if (done) return absl::OkStatus();
-    std::string message =
-        std::to_string(queue_.size()) + " segments are not acknowledged";
-    if (!connection_.ok()) message += ": " + connection_.ToString();
+    std::string message = std::to_string(queue_.unacknowledged()) +
+                          " segments are not acknowledged";
+    const absl::Status connection = connection_status();
+    if (!connection.ok()) message += ": " + connection.ToString();
     return absl::DeadlineExceededError(message);
-  }
-
-  StreamStatistics statistics() const {
-    std::lock_guard lock(mutex_);
-    return statistics_;
   }
 
   absl::Status connection_status() const {
@@ -96,51 +77,29 @@ class SegmentStream::Impl {
   }
 
  private:
-  struct Entry {
-    std::shared_ptr<const MotionSegment> segment;
-    bool was_sent = false;
-  };
-
-  bool Push(MotionSegment segment) {
-    try {
-      queue_.push_back(
-          {std::make_shared<const MotionSegment>(std::move(segment))});
-      return true;
-    } catch (const std::exception&) {  // no memory
-      return false;
-    }
-  }
-
   void Run() {
     Backoff backoff(
         options_.min_backoff, options_.max_backoff, JitterSeed(this));
-    while (WaitForWork()) {
+    while (queue_.WaitForWork()) {
       const absl::Status status = TryConverse();
       if (answered_) backoff.Reset();
       if (!AfterConversation(status, backoff.Next())) return;
     }
   }
 
-  bool WaitForWork() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return stop_ || !queue_.empty(); });
-    return !stop_;
-  }
-
   // False if there is to be no other conversation.
   bool AfterConversation(const absl::Status& status,
                          std::chrono::milliseconds wait) {
-    std::unique_lock lock(mutex_);
-    if (stop_) return false;
-    connection_ = status;
+    if (queue_.stopped()) return false;
+    {
+      std::lock_guard lock(mutex_);
+      connection_ = status;
+    }
     if (EndsStream(status)) {
-      end_ = status;
-      lock.unlock();
-      changed_.notify_all();
+      queue_.End(status);
       return false;
     }
-    changed_.wait_for(lock, wait, [this] { return stop_; });
-    return !stop_;
+    return queue_.Pause(wait);
   }
 
   absl::Status TryConverse() {
@@ -157,17 +116,19 @@ class SegmentStream::Impl {
 
   // One connection, from its beginning to its end, which is never a success.
   absl::Status Converse() {
-    const auto stub = v1::SegmentService::NewStub(MakeChannel(options_.target));
+    answered_ = false;
+    const auto channel = MakeChannel(options_);
+    if (!channel.ok()) return channel.status();
+    const auto stub = v1::SegmentService::NewStub(*channel);
     const auto context = std::make_shared<grpc::ClientContext>();
     {
       std::lock_guard lock(mutex_);
-      if (stop_) return absl::CancelledError();
       context_ = context;
-      in_flight_ = 0;
       broken_ = absl::OkStatus();
-      answered_ = false;
-      reading_ = true;
     }
+    // Who stops looks for a context after saying so, and so does this.
+    if (queue_.stopped()) return absl::CancelledError();
+    queue_.Open();
     const auto stream = stub->StreamSegments(context.get());
     std::thread reader([this, &stream] { ReadAll(stream.get()); });
     WriteAll(stream.get());
@@ -180,37 +141,9 @@ class SegmentStream::Impl {
 
   // Sends until the connection ends.
   void WriteAll(ClientStream* stream) {
-    try {
-      while (const auto segment = NextToSend()) {
-        Request request;
-        auto violations = MakeRequest(options_.rig, *segment, &request);
-        if (!violations.empty()) {
-          Acknowledge({segment->key,
-                       Acknowledgement::Verdict::kRejected,
-                       std::move(violations)});
-        } else if (!stream->Write(request)) {
-          return;  // the reader learns of it, too
-        }
-      }
-    } catch (const std::exception& error) {
-      Break(absl::InternalError(error.what()));
+    while (const auto request = queue_.Next()) {
+      if (!stream->Write(*request)) return;  // the reader learns of it, too
     }
-  }
-
-  // Waits until there is one and the window has room; null at the end.
-  std::shared_ptr<const MotionSegment> NextToSend() {
-    std::unique_lock lock(mutex_);
-    const auto window =
-        static_cast<std::size_t>(std::max(options_.max_unacknowledged, 1));
-    changed_.wait(lock, [&] {
-      return stop_ || !reading_ || in_flight_ < std::min(window, queue_.size());
-    });
-    if (stop_ || !reading_) return nullptr;
-    Entry& entry = queue_[in_flight_];
-    ++in_flight_;  // before it is sent, for its acknowledgement may be quick
-    if (entry.was_sent) ++statistics_.resent;
-    entry.was_sent = true;
-    return entry.segment;
   }
 
   // Takes acknowledgements until the connection ends.
@@ -219,7 +152,10 @@ class SegmentStream::Impl {
       Response response;
       while (stream->Read(&response)) {
         NoteAnswer();
-        if (!Acknowledge(ToAcknowledgement(response))) {
+        const Acknowledgement ack = ToAcknowledgement(response);
+        if (queue_.Take(ack)) {
+          CallBack(ack);
+        } else {
           Break(absl::InternalError(
               "the daemon acknowledged a segment that it was not sent"));
         }
@@ -227,17 +163,13 @@ class SegmentStream::Impl {
     } catch (const std::exception& error) {
       Break(absl::InternalError(error.what()));
     }
-    {
-      std::lock_guard lock(mutex_);
-      reading_ = false;
-    }
-    changed_.notify_all();
+    queue_.Close();
   }
 
   void NoteAnswer() {
-    std::lock_guard lock(mutex_);
-    if (!answered_) ++statistics_.connections;
+    if (!answered_) queue_.NoteConnection();
     answered_ = true;
+    std::lock_guard lock(mutex_);
     connection_ = absl::OkStatus();
   }
 
@@ -248,95 +180,73 @@ class SegmentStream::Impl {
     context_->TryCancel();
   }
 
-  // Takes the segment off the queue and calls back. False if it is not among
-  // those that were sent.
-  bool Acknowledge(const Acknowledgement& ack) {
-    {
-      std::lock_guard lock(mutex_);
-      const auto end = queue_.begin() + static_cast<std::ptrdiff_t>(in_flight_);
-      const auto entry =
-          std::find_if(queue_.begin(), end, [&](const Entry& candidate) {
-            return candidate.segment->key == ack.key;
-          });
-      if (entry == end) return false;
-      queue_.erase(entry);
-      --in_flight_;
-      Count(ack.verdict);
-      ++callbacks_due_;
-    }
-    CallBack(ack);
-    {
-      std::lock_guard lock(mutex_);
-      --callbacks_due_;
-    }
-    changed_.notify_all();
-    return true;
-  }
-
-  void Count(Acknowledgement::Verdict verdict) {
-    switch (verdict) {
-      case Acknowledgement::Verdict::kStored:
-        ++statistics_.stored;
-        break;
-      case Acknowledgement::Verdict::kDuplicate:
-        ++statistics_.duplicates;
-        break;
-      case Acknowledgement::Verdict::kRejected:
-        ++statistics_.rejected;
-        break;
-    }
-  }
-
   void CallBack(const Acknowledgement& ack) {
-    if (!on_ack_) return;
-    std::lock_guard one_at_a_time(callback_mutex_);
-    try {
-      on_ack_(ack);
-    } catch (...) {
-      std::lock_guard lock(mutex_);
-      ++statistics_.callback_failures;
+    bool failed = false;
+    if (on_ack_) {
+      std::lock_guard one_at_a_time(callback_mutex_);
+      try {
+        on_ack_(ack);
+      } catch (...) {
+        failed = true;
+      }
     }
+    queue_.CallbackReturned(failed);
   }
 
   const ClientOptions options_;
   const AckCallback on_ack_;
-  std::mutex callback_mutex_;  // taken before mutex_
+  std::mutex callback_mutex_;
 
-  mutable std::mutex mutex_;  // guards all below
-  std::condition_variable changed_;
-  std::deque<Entry> queue_;
-  std::size_t in_flight_ = 0;
-  int callbacks_due_ = 0;
-  StreamStatistics statistics_;
+  mutable std::mutex mutex_;  // guards the three below
   absl::Status connection_;
-  absl::Status end_;       // not OK: the stream has ended for good
-  absl::Status broken_;    // not OK: why this side ended the connection
-  bool reading_ = false;   // the connection lasts
-  bool answered_ = false;  // the daemon has said something on it
-  bool stop_ = false;
+  absl::Status broken_;  // not OK: why this side ended the connection
   std::shared_ptr<grpc::ClientContext> context_;  // while there is one
 
+  // The daemon has said something on the connection. The reader writes it, the
+  // sender reads it when the reader has ended.
+  bool answered_ = false;
+
+  SegmentQueue queue_;  // its thread uses all of the above
   std::thread sender_;  // last: it uses all of the above
 };
 
-SegmentStream::SegmentStream(const ClientOptions& options, AckCallback on_ack)
-    : impl_(std::make_unique<Impl>(options, std::move(on_ack))) {}
+SegmentStream::SegmentStream(const ClientOptions& options,
+                             AckCallback on_ack) noexcept {
+  try {
+    impl_ = std::make_unique<Impl>(options, std::move(on_ack));
+  } catch (...) {
+    impl_ = nullptr;  // as documented: sends nothing
+  }
+}
 SegmentStream::~SegmentStream() = default;
 
-bool SegmentStream::Send(MotionSegment segment) {
-  return impl_->Send(std::move(segment));
+bool SegmentStream::Send(MotionSegment segment) noexcept {
+  return impl_ != nullptr && impl_->queue().Push(std::move(segment));
 }
 
-absl::Status SegmentStream::Drain(std::chrono::milliseconds timeout) {
-  return impl_->Drain(timeout);
+bool SegmentStream::Send(ClosedSegment segment) noexcept {
+  return impl_ != nullptr && impl_->queue().Push(std::move(segment));
 }
 
-StreamStatistics SegmentStream::statistics() const {
-  return impl_->statistics();
+absl::Status SegmentStream::Drain(std::chrono::milliseconds timeout) noexcept {
+  if (impl_ == nullptr) return NoMemory();
+  try {
+    return impl_->Drain(timeout);
+  } catch (...) {
+    return NoMemory();
+  }
 }
 
-absl::Status SegmentStream::connection_status() const {
-  return impl_->connection_status();
+StreamStatistics SegmentStream::statistics() const noexcept {
+  return impl_ == nullptr ? StreamStatistics{} : impl_->queue().statistics();
+}
+
+absl::Status SegmentStream::connection_status() const noexcept {
+  return impl_ == nullptr ? NoMemory() : impl_->connection_status();
+}
+
+absl::Status SegmentStream::spool_status() const noexcept {
+  return impl_ == nullptr ? NoMemory() : impl_->queue().spool_status();
 }
 
 }  // namespace selfcal::client

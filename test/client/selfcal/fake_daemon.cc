@@ -30,13 +30,27 @@ struct FakeDaemon::Inbox {
   bool ended = false;
 };
 
-FakeDaemon::FakeDaemon() : socket_(NewSocket()) {}
+FakeDaemon::FakeDaemon() : target_("unix:" + NewSocket()) {}
 
 FakeDaemon::~FakeDaemon() { Stop(); }
 
 void FakeDaemon::Start() {
+  Listen(target_, grpc::InsecureServerCredentials(), nullptr);
+}
+
+void FakeDaemon::StartOnTcp(
+    const std::shared_ptr<grpc::ServerCredentials>& credentials) {
+  int port = 0;
+  Listen("localhost:0", credentials, &port);
+  target_ = "localhost:" + std::to_string(port);
+}
+
+void FakeDaemon::Listen(
+    const std::string& address,
+    const std::shared_ptr<grpc::ServerCredentials>& credentials,
+    int* port) {
   grpc::ServerBuilder builder;
-  builder.AddListeningPort(target(), grpc::InsecureServerCredentials());
+  builder.AddListeningPort(address, credentials, port);
   builder.RegisterService(static_cast<v1::SegmentService::Service*>(this));
   builder.RegisterService(static_cast<v1::CalibrationService::Service*>(this));
   server_ = builder.BuildAndStart();

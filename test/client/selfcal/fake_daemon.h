@@ -37,8 +37,10 @@ class FakeDaemon final : private v1::SegmentService::Service,
   FakeDaemon();  // not started
   ~FakeDaemon();
 
-  std::string target() const { return "unix:" + socket_; }
+  std::string target() const { return target_; }
   void Start();
+  // On a port of localhost that is free; target() names it from now on.
+  void StartOnTcp(const std::shared_ptr<grpc::ServerCredentials>& credentials);
   void Stop();  // streams that are open are cancelled
 
   // Settings; may be changed at any time.
@@ -76,7 +78,11 @@ class FakeDaemon final : private v1::SegmentService::Service,
   // The verdict, or nothing if the connection is to break.
   std::optional<v1::StreamSegmentsResponse> Answer(const SegmentKey& key);
 
-  const std::string socket_;
+  void Listen(const std::string& address,
+              const std::shared_ptr<grpc::ServerCredentials>& credentials,
+              int* port);
+
+  std::string target_;
   std::unique_ptr<grpc::Server> server_;
 
   mutable std::mutex mutex_;  // guards all below

@@ -393,6 +393,30 @@ TEST_F(RegularStream, EndsASegmentAtAGapBetweenKeyframes) {
   EXPECT_EQ(next->imu.front().t_ns, 58'000 * kMs);
 }
 
+TEST_F(RegularStream, IsBoundedWhenTheImuIsSilent) {
+  for (int k = 0; k < 5000; ++k) AddKeyframe(100 * k);
+  EXPECT_FALSE(builder_.Take().has_value());
+  // What waits is what 20 s can bring.
+  EXPECT_GE(builder_.statistics().keyframes_dropped, 4700u);
+}
+
+TEST_F(RegularStream, GoesOnWhenTheImuComesBack) {
+  AddImuUntil(1000);
+  for (int k = 0; k < 500; ++k) AddKeyframe(100 * k);
+  const auto covered = builder_.Take();
+  ASSERT_TRUE(covered.has_value());
+  EXPECT_EQ(covered->keyframes.size(), 5u);
+  AddImuUntil(52'000);
+  for (int k = 500; k < 520; ++k) AddKeyframe(100 * k);
+  builder_.Flush(2);
+  std::uint64_t in_segments = covered->keyframes.size();
+  while (const auto segment = builder_.Take()) {
+    in_segments += segment->keyframes.size();
+  }
+  EXPECT_EQ(in_segments + builder_.statistics().keyframes_dropped, 520u);
+  EXPECT_GE(in_segments, 20u);
+}
+
 TEST_F(RegularStream, SurvivesTheEndsOfTime) {
   const auto lowest = std::numeric_limits<std::int64_t>::min();
   const auto highest = std::numeric_limits<std::int64_t>::max();

@@ -1,0 +1,137 @@
+// No function of the client throws, whichever of its allocations fails: a
+// program by itself, since it replaces the global operator new.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+#include <tuple>
+#include <vector>
+
+#include "client/selfcal/client.h"
+#include "client/selfcal/segment_builder.h"
+
+namespace {
+
+// Allocations of this thread until one fails; below 0 none does.
+thread_local int until_failure = -1;
+
+void* Allocate(std::size_t size) {
+  if (until_failure == 0) {
+    until_failure = -1;
+    throw std::bad_alloc();
+  }
+  if (until_failure > 0) --until_failure;
+  void* memory = std::malloc(size == 0 ? 1 : size);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return Allocate(size); }
+void* operator new[](std::size_t size) { return Allocate(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+
+namespace selfcal::client {
+namespace {
+
+// True if the call met the failure.
+template <typename Call>
+bool Fails(int allocation, const Call& call) {
+  until_failure = allocation;
+  call();
+  const bool failed = until_failure < 0;
+  until_failure = -1;
+  return failed;
+}
+
+// 30 keyframes, 6 to a segment, with ten samples and three landmarks each.
+void Feed(const std::vector<KeyframeObservation>& seen,
+          SegmentBuilder* builder) {
+  for (std::int64_t k = 0; k < 30; ++k) {
+    for (std::int64_t i = 0; i < 10; ++i) {
+      builder->AddImu({1000 * k + 100 * i + 1});
+    }
+    KeyframeState state;
+    state.t_ns = 1000 * k + 500;
+    builder->AddKeyframe(state, seen);
+  }
+}
+
+TEST(NoMemory, NoCallOfTheBuilderThrowsAndItGoesOn) {
+  SegmentBuilderOptions options;
+  options.session = "a session with a name that is no short string";
+  options.keyframes = 6;
+  const std::vector<KeyframeObservation> seen = {{0, 1}, {0, 2}, {0, 3}};
+  int failures = 0;
+  for (int allocation = 0;; ++allocation) {
+    ASSERT_LT(allocation, 10'000);
+    std::optional<SegmentBuilder> builder;
+    bool refused = false;
+    const bool failed = Fails(allocation, [&] {
+      builder.emplace(options);
+      Feed(seen, &*builder);
+      builder->Flush(2);
+      while (builder->Take()) {
+      }
+      refused = builder->next_index() == 0;
+    });
+    if (!failed) break;
+    ++failures;
+    if (refused) continue;  // there was no memory for the builder itself
+    EXPECT_EQ(builder->statistics().out_of_memory, 1u);
+    EXPECT_GE(builder->statistics().segments, 3u) << allocation;
+    EXPECT_LE(builder->statistics().segments, 5u) << allocation;
+  }
+  EXPECT_GT(failures, 100);
+}
+
+TEST(NoMemory, WhatWasMovedFromRefuses) {
+  SegmentBuilder builder({.session = "s"});
+  const SegmentBuilder other(std::move(builder));
+  EXPECT_FALSE(builder.AddImu({1}));
+  EXPECT_FALSE(builder.AddKeyframe({}, {}));
+  builder.Flush(2);
+  EXPECT_FALSE(builder.Take().has_value());
+  EXPECT_EQ(builder.next_index(), 0);
+}
+
+TEST(NoMemory, NoCallOfAStreamOrAWatchThrows) {
+  ClientOptions options;
+  options.target = "unix:/nonexistent/selfcal-no-memory-test.sock";
+  options.rig = "device";
+  options.min_backoff = std::chrono::milliseconds(1);
+  int failures = 0;
+  int unusable = 0;
+  for (int allocation = 0;; ++allocation) {
+    ASSERT_LT(allocation, 1000);
+    std::optional<SegmentStream> stream;
+    std::optional<CalibrationWatch> watch;
+    MotionSegment segment;
+    segment.key = {"walk", 0};
+    const bool failed = Fails(allocation, [&] {
+      stream.emplace(options, nullptr);
+      watch.emplace(options, nullptr);
+      stream->Send(std::move(segment));
+      stream->Send(ClosedSegment{});
+      stream->statistics();
+      std::ignore = stream->Drain(std::chrono::milliseconds(1));
+      std::ignore = stream->spool_status();
+      std::ignore = stream->connection_status();
+      std::ignore = watch->connection_status();
+    });
+    if (!failed) break;
+    ++failures;
+    if (absl::IsResourceExhausted(stream->connection_status())) ++unusable;
+  }
+  EXPECT_GT(failures, 5);
+  EXPECT_GT(unusable, 0);
+}
+
+}  // namespace
+}  // namespace selfcal::client
