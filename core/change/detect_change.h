@@ -35,6 +35,8 @@ struct ChangeOptions {
   // The change lies before the segments that count as after it with this
   // probability, given that there was one.
   double since_probability = 0.99;
+
+  friend bool operator==(const ChangeOptions&, const ChangeOptions&) = default;
 };
 
 enum class ChangeKind {

@@ -1,82 +1,17 @@
-// selfcald: wires the store, the pipeline and the gRPC server, and runs them
-// until it is told to stop.
-#include <fmt/ranges.h>
+// selfcald: keeps the calibration of a camera-IMU device true.
 #include <signal.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
 
-#include <chrono>
 #include <cstdlib>
-#include <memory>
+#include <exception>
 #include <optional>
 #include <string>
 
+#include "server/daemon/log.h"
 #include "server/daemon/options.h"
-#include "server/daemon/state_lock.h"
+#include "server/daemon/serve.h"
 #include "server/daemon/stop.h"
-#include "server/pipeline/pipeline.h"
-#include "server/service/server.h"
-#include "server/store/store_sqlite.h"
-
-namespace selfcal::server {
-namespace {
-
-// A stop is over within 10 s, of which calls get a part to end by themselves.
-constexpr std::chrono::milliseconds kStopLimit{9500};
-constexpr std::chrono::milliseconds kCallLimit{2000};
-
-void SetUpLog(const std::string& level) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("selfcald"));
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %^%l%$ %v",
-                      spdlog::pattern_time_type::utc);
-  spdlog::set_level(spdlog::level::from_str(level));
-  spdlog::flush_on(spdlog::level::trace);
-}
-
-int Failed(const std::string& what, const absl::Status& status) {
-  spdlog::error("{}: {}", what, status.ToString());
-  return EXIT_FAILURE;
-}
-
-int Serve(const DaemonOptions& options) {
-  // First, so that it watches over the end of all that follows.
-  std::optional<StopDeadline> deadline;
-  const auto lock = StateLock::Take(options.state_dir);
-  if (!lock.ok()) return Failed("cannot start", lock.status());
-  const std::string database = (options.state_dir / "selfcal.db").string();
-  const auto store = MakeSqliteStore(database, options.change);
-  if (!store.ok()) return Failed("cannot open " + database, store.status());
-
-  PipelineOptions pipeline_options;
-  pipeline_options.scoring_threads = options.scoring_threads;
-  pipeline_options.program_version = SELFCAL_VERSION;
-  pipeline_options.calibrate.solver = options.solver;
-  const auto pipeline = MakePipeline(store->get(), pipeline_options);
-  if (absl::Status started = pipeline->Start(); !started.ok()) {
-    return Failed("cannot start the pipeline", started);
-  }
-  ServerOptions server_options;
-  server_options.listen = options.listen;
-  const auto server = MakeServer(store->get(), pipeline.get(), server_options);
-  if (!server.ok()) {
-    pipeline->Stop();
-    return Failed("cannot serve", server.status());
-  }
-  spdlog::info("selfcald ready: listening on {}",
-               fmt::join((*server)->addresses(), ", "));
-
-  const int signal = WaitForStop();
-  deadline.emplace(kStopLimit);
-  spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
-  (*server)->Shutdown(kCallLimit);
-  pipeline->Stop();
-  spdlog::info("stopped");
-  return EXIT_SUCCESS;
-}
-
-}  // namespace
-}  // namespace selfcal::server
 
 int main(int argc, char** argv) {
   using namespace selfcal::server;
@@ -88,10 +23,15 @@ int main(int argc, char** argv) {
   umask(S_IRWXG | S_IRWXO);
   // A reader of the log that goes away must not end the daemon.
   signal(SIGPIPE, SIG_IGN);
-  BlockStopSignals();
+  BlockSignals();
   try {
-    SetUpLog(options.log_level);
-    return Serve(options);
+    SetUpLog(options.log_level, options.log_format);
+    if (options.check) return Check(options);
+    return Serve(options, [&]() -> std::optional<std::string> {
+      DaemonOptions now;
+      if (ParseOptions(argc, argv, &now)) return std::nullopt;
+      return now.log_level;
+    });
   } catch (const std::exception& error) {
     spdlog::critical("{}", error.what());
     return EXIT_FAILURE;

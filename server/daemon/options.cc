@@ -1,74 +1,85 @@
 #include "server/daemon/options.h"
 
 #include <CLI/CLI.hpp>
-#include <map>
+#include <cstdio>
+#include <cstdlib>
 #include <string>
+
+#include "server/daemon/config_file.h"
+#include "server/daemon/settings.h"
 
 namespace selfcal::server {
 namespace {
 
 constexpr int kUsageError = 2;
-constexpr int kMaxScoringThreads = 256;
-constexpr double kMaxInflation = 1e4;
+
+// The command line with the environment under it.
+class CommandLine {
+ public:
+  explicit CommandLine(DaemonOptions* options) {
+    app_.set_version_flag("--version", "selfcald " SELFCAL_VERSION);
+    app_.add_option("--config", file_, "TOML file with the settings below")
+        ->envname("SELFCAL_CONFIG");
+    app_.add_flag("--check",
+                  options->check,
+                  "Look at the settings and the files they name, and end");
+    DefineSettings(&app_, Environment::kUse, options);
+  }
+
+  std::optional<int> Parse(int argc, char** argv) {
+    try {
+      app_.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      return app_.exit(error) == 0 ? 0 : kUsageError;
+    }
+    return std::nullopt;
+  }
+
+  const std::string& file() const { return file_; }
+
+ private:
+  CLI::App app_{
+      "selfcald scores motion segments, keeps the most informative ones and "
+      "calibrates cameras and IMU on them."};
+  std::string file_;
+};
+
+int Mistake(const std::string& what) {
+  std::fprintf(stderr, "%s\n", what.c_str());
+  return kUsageError;
+}
+
+std::string FolderOfTheServiceManager(const char* variable) {
+  const char* folder = std::getenv(variable);
+  return folder == nullptr ? "" : folder;
+}
 
 }  // namespace
 
 std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
-  CLI::App app(
-      "selfcald scores motion segments, keeps the most informative ones and "
-      "calibrates cameras and IMU on them.");
-  app.set_version_flag("--version", "selfcald " SELFCAL_VERSION);
-  app.set_config("--config", "", "Read options from a TOML file");
-  // A misspelt key must not be taken for a default.
-  app.allow_config_extras(CLI::config_extras_mode::error);
-  app.add_option("--state-dir",
-                 options->state_dir,
-                 "Folder of the database, the lock and the socket; created if "
-                 "it does not exist")
-      ->envname("STATE_DIRECTORY")
-      ->required();
-  app.add_option("--listen",
-                 options->listen,
-                 "Address, repeatable: unix:/path or host:port "
-                 "[unix:<state-dir>/selfcald.sock]. There is no "
-                 "authentication: do not listen on a network you do not trust");
-  app.add_option("--scoring-threads",
-                 options->scoring_threads,
-                 "Threads that score segments")
-      ->check(CLI::Range(1, kMaxScoringThreads))
-      ->capture_default_str();
-  app.add_option("--solver",
-                 options->solver,
-                 "What solves recalibrations; both lead to the same minimum")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, SolverKind>{
-          {"structured", SolverKind::kStructured},
-          {"ceres", SolverKind::kCeres}}))
-      ->default_str("structured");
-  app.add_option("--change-inflation",
-                 options->change.inflation,
-                 "Factor on the variances of segments in the test for a "
-                 "change of the device [what the active calibration found: the "
-                 "square of its track noise factor]")
-      ->check(CLI::Range(1.0, kMaxInflation));
-  app.add_option("--change-false-alarms",
-                 options->change.false_alarm_rate,
-                 "Bound on false alarms of that test, for each segment; 0 "
-                 "turns it off")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  app.add_option("--log-level", options->log_level, "What goes to stderr")
-      ->check(CLI::IsMember(
-          {"trace", "debug", "info", "warning", "error", "critical", "off"}))
-      ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kUsageError;
+  // Once for its mistakes and for the file, then again on top of the file.
+  DaemonOptions without_file;
+  CommandLine first(&without_file);
+  if (const auto exit_code = first.Parse(argc, argv)) return exit_code;
+  if (!first.file().empty()) {
+    const absl::Status applied = ApplyConfigFile(first.file(), options);
+    if (!applied.ok()) return Mistake(std::string(applied.message()));
   }
-  if (options->listen.empty()) {
-    const auto socket =
-        std::filesystem::absolute(options->state_dir) / "selfcald.sock";
-    options->listen.push_back("unix:" + socket.string());
+  CommandLine again(options);
+  if (const auto exit_code = again.Parse(argc, argv)) return exit_code;
+
+  if (options->state_dir.empty()) {
+    options->state_dir = FolderOfTheServiceManager("STATE_DIRECTORY");
+  }
+  if (options->state_dir.empty()) {
+    return Mistake("state-dir is not set: give --state-dir FOLDER");
+  }
+  if (options->server.listen.empty()) {
+    const std::string runtime = FolderOfTheServiceManager("RUNTIME_DIRECTORY");
+    const auto folder =
+        runtime.empty() ? options->state_dir : std::filesystem::path(runtime);
+    const auto socket = std::filesystem::absolute(folder) / "selfcald.sock";
+    options->server.listen.push_back("unix:" + socket.string());
   }
   return std::nullopt;
 }

@@ -1,27 +1,41 @@
-// What selfcald is told at its start: flags, or a TOML file of the same names.
+// What selfcald is told at its start. Each setting has one name: the flag
+// --name, the variable SELFCAL_NAME (capitals, '_' for '-') and the key in the
+// TOML file. A flag goes before the environment, the environment before the
+// file, the file before the default.
 #pragma once
 
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "core/calibration/calibrate.h"
 #include "core/change/detect_change.h"
+#include "server/service/server.h"
 
 namespace selfcal::server {
 
 struct DaemonOptions {
+  // Not given: the service manager's STATE_DIRECTORY.
   std::filesystem::path state_dir;
-  std::vector<std::string> listen;  // "unix:/path" or "host:port"
+  // Without an address to listen on: selfcald.sock in the service manager's
+  // RUNTIME_DIRECTORY, or else in the state folder.
+  ServerOptions server;
   int scoring_threads = 1;
+  int max_backlog = 64;  // stored and unscored segments; then streams wait
   SolverKind solver = SolverKind::kStructured;
   ChangeOptions change;
+  std::string metrics = "off";  // or host:port of the loopback
+  int metrics_rigs = 16;        // with series of their own
   std::string log_level = "info";
+  std::string log_format = "text";
+  bool check = false;  // no setting: look at the settings and end
+
+  friend bool operator==(const DaemonOptions&, const DaemonOptions&) = default;
 };
 
 // Fills *options. Returns the exit code if the program ends here: 0 after
-// --help and --version, 2 after a mistake, which is explained on stderr.
+// --help and --version, 2 after a mistake, which is explained on stderr; one in
+// the file with its line.
 std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options);
 
 }  // namespace selfcal::server

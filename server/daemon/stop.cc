@@ -2,32 +2,36 @@
 
 #include <signal.h>
 #include <spdlog/spdlog.h>
+#include <time.h>
 
 #include <cstdlib>
 
 namespace selfcal::server {
 namespace {
 
-sigset_t StopSignals() {
+sigset_t Signals() {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGHUP);
   return signals;
 }
 
 }  // namespace
 
-void BlockStopSignals() {
-  const sigset_t signals = StopSignals();
+void BlockSignals() {
+  const sigset_t signals = Signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 }
 
-int WaitForStop() {
-  const sigset_t signals = StopSignals();
-  int signal = 0;
-  sigwait(&signals, &signal);
-  return signal;
+std::optional<int> WaitForSignal(std::chrono::milliseconds limit) {
+  const sigset_t signals = Signals();
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit);
+  const std::chrono::nanoseconds rest = limit - seconds;
+  const timespec timeout{seconds.count(), rest.count()};
+  const int signal = sigtimedwait(&signals, nullptr, &timeout);
+  return signal < 0 ? std::nullopt : std::optional(signal);
 }
 
 StopDeadline::StopDeadline(std::chrono::milliseconds limit)

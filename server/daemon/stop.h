@@ -1,19 +1,21 @@
-// How the daemon is told to stop, and what happens if that takes too long.
+// What the daemon is told by signals: to stop, to look at its settings again;
+// and what happens if a stop takes too long.
 #pragma once
 
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 namespace selfcal::server {
 
-// Blocks SIGTERM and SIGINT in this thread and in those it starts, so that
-// WaitForStop receives them. Call before any thread is started.
-void BlockStopSignals();
+// Blocks SIGTERM, SIGINT and SIGHUP in this thread and in those it starts, so
+// that WaitForSignal receives them. Call before any thread is started.
+void BlockSignals();
 
-// Returns the signal that arrived.
-int WaitForStop();
+// The signal that arrived; nothing if none does within the limit.
+std::optional<int> WaitForSignal(std::chrono::milliseconds limit);
 
 // Ends the process with exit code 1 if it lives longer than the limit. That
 // loses nothing: what was acknowledged is on disk.

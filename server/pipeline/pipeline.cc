@@ -4,6 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
+#include <memory>
 #include <utility>
 
 #include "core/information/segment_scorer.h"
@@ -17,6 +19,43 @@ namespace {
 
 constexpr char kVersionField[] = "calibration_version";
 
+PipelineObserver::Verdict VerdictOf(
+    const absl::StatusOr<SubmitResult>& result) {
+  using Verdict = PipelineObserver::Verdict;
+  if (!result.ok()) return Verdict::kFailed;
+  switch (result->verdict) {
+    case SubmitResult::Verdict::kStored:
+      return Verdict::kStored;
+    case SubmitResult::Verdict::kDuplicate:
+      return Verdict::kDuplicate;
+    case SubmitResult::Verdict::kRejected:
+      return Verdict::kRejected;
+  }
+  return Verdict::kFailed;
+}
+
+// The estimators with each score told to the observer, if there is one.
+Estimators Observed(Estimators estimators, PipelineObserver* observer) {
+  if (observer == nullptr) return estimators;
+  const auto score = estimators.score;
+  estimators.score = [=](const Rig& rig,
+                         const Calibration& theta0,
+                         const MotionSegment& segment) {
+    const auto start = std::chrono::steady_clock::now();
+    SegmentInformation information = score(rig, theta0, segment);
+    const std::chrono::duration<double> took =
+        std::chrono::steady_clock::now() - start;
+    observer->OnScore(information, took.count());
+    return information;
+  };
+  return estimators;
+}
+
+std::function<void(const RunUpdate&)> ObserveRuns(PipelineObserver* observer) {
+  if (observer == nullptr) return nullptr;
+  return [observer](const RunUpdate& update) { observer->OnRun(update.run); };
+}
+
 // Wires the two kinds of threads, and does on the caller's thread what comes
 // before them.
 class PipelineImpl : public Pipeline {
@@ -26,12 +65,16 @@ class PipelineImpl : public Pipeline {
                const Estimators& estimators)
       : store_(store),
         options_(options),
+        run_watchers_(ObserveRuns(options.observer)),
         recalibrator_(
             store, options, estimators, &calibration_watchers_, &run_watchers_),
-        scoring_(store, options, estimators, [this](const StoredRun& run) {
-          spdlog::info("run {} of rig {} is due", run.run, run.rig);
-          recalibrator_.Wake();
-        }) {}
+        scoring_(store,
+                 options,
+                 Observed(estimators, options.observer),
+                 [this](const StoredRun& run) {
+                   spdlog::info("run {} of rig {} is due", run.run, run.rig);
+                   recalibrator_.Wake();
+                 }) {}
 
   absl::Status Start() override {
     SELFCAL_RETURN_IF_ERROR(recalibrator_.Start());
@@ -51,6 +94,16 @@ class PipelineImpl : public Pipeline {
       const std::string& rig,
       const MotionSegment& segment,
       const std::function<bool()>& cancelled) override {
+    absl::StatusOr<SubmitResult> result = Take(rig, segment, cancelled);
+    if (options_.observer != nullptr) {
+      options_.observer->OnVerdict(rig, VerdictOf(result));
+    }
+    return result;
+  }
+
+  absl::StatusOr<SubmitResult> Take(const std::string& rig,
+                                    const MotionSegment& segment,
+                                    const std::function<bool()>& cancelled) {
     SubmitResult result;
     SELFCAL_ASSIGN_OR_RETURN(result.violations, Check(rig, segment));
     if (!result.violations.empty()) {
@@ -154,10 +207,11 @@ Estimators CoreEstimators() {
             if (segment.keyframes.size() > kMaxKeptKeyframes) {
               return ScoreSegment(rig, theta0, segment);
             }
-            // One workspace for each thread that scores.
-            thread_local SegmentScorer scorer;
+            // One workspace for each thread that scores; not in its static
+            // storage, which every thread of the process would have to hold.
+            thread_local const auto scorer = std::make_unique<SegmentScorer>();
             SegmentInformation information;
-            scorer.Score(rig, theta0, segment, {}, &information);
+            scorer->Score(rig, theta0, segment, {}, &information);
             return information;
           },
           Calibrate};

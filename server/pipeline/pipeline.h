@@ -19,6 +19,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/information/segment_information.h"
 #include "core/model/segment.h"
+#include "server/pipeline/observer.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -30,6 +31,7 @@ struct PipelineOptions {
   std::string program_version;
   SegmentLimits limits;
   CalibrateOptions calibrate;
+  PipelineObserver* observer = nullptr;  // must outlive the pipeline
 };
 
 // What the pipeline computes with. Called from its threads; what they throw

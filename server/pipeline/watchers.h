@@ -37,6 +37,10 @@ class Watchers {
  public:
   using Callback = std::function<void(const Update&)>;
 
+  // `every` gets each update of every topic before those who watch it; may be
+  // empty.
+  explicit Watchers(Callback every = nullptr) : every_(std::move(every)) {}
+
   // Subscribes to `topic`. `now` tells how things are; it is called after the
   // subscription stands, so that nothing is missed between the two.
   absl::StatusOr<std::unique_ptr<Subscription>> Watch(
@@ -58,6 +62,7 @@ class Watchers {
   }
 
   void Publish(const std::string& topic, const Update& update) {
+    if (every_) every_(update);
     for (const std::shared_ptr<Watcher>& watcher : Living()) {
       const std::lock_guard lock(watcher->mutex);
       if (!watcher->ended && watcher->topic == topic) {
@@ -113,6 +118,7 @@ class Watchers {
     return living;
   }
 
+  const Callback every_;
   std::mutex mutex_;
   std::list<std::weak_ptr<Watcher>> watchers_;  // guarded by mutex_
 };

@@ -1,5 +1,6 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
+#include "server/service/caller.h"
 #include "server/service/encode.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
@@ -15,10 +16,10 @@ class CalibrationService final : public v1::CalibrationService::Service {
   explicit CalibrationService(const ServiceContext& context)
       : context_(context) {}
 
-  grpc::Status GetCalibration(grpc::ServerContext*,
+  grpc::Status GetCalibration(grpc::ServerContext* call,
                               const v1::GetCalibrationRequest* request,
                               v1::Calibration* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       constexpr char kPattern[] =
           "rigs/{rig}/calibrations/{version}, {version} a number or 'active'";
       const auto parts = ParseChildName(request->name(), "calibrations");
@@ -39,10 +40,10 @@ class CalibrationService final : public v1::CalibrationService::Service {
   }
 
   grpc::Status ListCalibrations(
-      grpc::ServerContext*,
+      grpc::ServerContext* call,
       const v1::ListCalibrationsRequest* request,
       v1::ListCalibrationsResponse* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
       return FillPage(
@@ -64,7 +65,7 @@ class CalibrationService final : public v1::CalibrationService::Service {
       grpc::ServerContext* call,
       const v1::WatchCalibrationRequest* request,
       grpc::ServerWriter<v1::Calibration>* writer) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
       // Before the subscription, so that it ends after it.

@@ -1,5 +1,6 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
+#include "server/service/caller.h"
 #include "server/service/encode.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
@@ -35,10 +36,10 @@ class RecalibrationService final : public v1::RecalibrationService::Service {
   explicit RecalibrationService(const ServiceContext& context)
       : context_(context) {}
 
-  grpc::Status StartRecalibration(grpc::ServerContext*,
+  grpc::Status StartRecalibration(grpc::ServerContext* call,
                                   const v1::StartRecalibrationRequest* request,
                                   v1::Recalibration* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
       const auto run = context_.pipeline->StartRecalibration(*rig);
@@ -50,10 +51,10 @@ class RecalibrationService final : public v1::RecalibrationService::Service {
     });
   }
 
-  grpc::Status GetRecalibration(grpc::ServerContext*,
+  grpc::Status GetRecalibration(grpc::ServerContext* call,
                                 const v1::GetRecalibrationRequest* request,
                                 v1::Recalibration* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       RunId id;
       if (auto bad = ParseRun(request->name(), &id); !bad.ok()) return bad;
       const auto run = context_.store->GetRun(id.rig, id.run);
@@ -65,10 +66,10 @@ class RecalibrationService final : public v1::RecalibrationService::Service {
   }
 
   grpc::Status ListRecalibrations(
-      grpc::ServerContext*,
+      grpc::ServerContext* call,
       const v1::ListRecalibrationsRequest* request,
       v1::ListRecalibrationsResponse* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
       return FillPage(
@@ -88,7 +89,7 @@ class RecalibrationService final : public v1::RecalibrationService::Service {
       grpc::ServerContext* call,
       const v1::WatchRecalibrationRequest* request,
       grpc::ServerWriter<v1::Recalibration>* writer) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       RunId id;
       if (auto bad = ParseRun(request->name(), &id); !bad.ok()) return bad;
       // Before the subscription, so that it ends after it.
@@ -113,10 +114,10 @@ class RecalibrationService final : public v1::RecalibrationService::Service {
   }
 
   grpc::Status CancelRecalibration(
-      grpc::ServerContext*,
+      grpc::ServerContext* call,
       const v1::CancelRecalibrationRequest* request,
       v1::Recalibration* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       RunId id;
       if (auto bad = ParseRun(request->name(), &id); !bad.ok()) return bad;
       const auto run = context_.pipeline->CancelRecalibration(id.rig, id.run);

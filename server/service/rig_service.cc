@@ -1,8 +1,13 @@
+#include <cstdint>
+#include <mutex>
+#include <optional>
+
 #include "core/model/rig.h"
 #include "proto/convert.h"
 #include "proto/field_paths.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/rig.grpc.pb.h"
+#include "server/service/caller.h"
 #include "server/service/encode.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
@@ -15,35 +20,36 @@ constexpr char kType[] = "selfcal.v1.Rig";
 
 class RigService final : public v1::RigService::Service {
  public:
-  explicit RigService(const ServiceContext& context) : store_(context.store) {}
+  explicit RigService(const ServiceContext& context) : context_(context) {}
 
-  grpc::Status CreateRig(grpc::ServerContext*,
+  grpc::Status CreateRig(grpc::ServerContext* call,
                          const v1::CreateRigRequest* request,
                          v1::Rig* response) override {
-    return Guarded([&] { return Create(*request, response); });
+    return Authorised(
+        context_, *call, *request, [&] { return Create(*request, response); });
   }
 
-  grpc::Status GetRig(grpc::ServerContext*,
+  grpc::Status GetRig(grpc::ServerContext* call,
                       const v1::GetRigRequest* request,
                       v1::Rig* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto id = ParseRigName(request->name());
       if (!id) return BadName("name", "rigs/{rig}");
-      const auto rig = store_->GetRig(*id);
+      const auto rig = context_.store->GetRig(*id);
       if (!rig.ok()) return ToGrpc(rig.status(), {kType, request->name(), {}});
       *response = Encode(*rig);
       return grpc::Status::OK;
     });
   }
 
-  grpc::Status ListRigs(grpc::ServerContext*,
+  grpc::Status ListRigs(grpc::ServerContext* call,
                         const v1::ListRigsRequest* request,
                         v1::ListRigsResponse* response) override {
-    return Guarded([&] {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       return FillPage(
           *request,
           "",
-          [&](const Page& page) { return store_->ListRigs(page); },
+          [&](const Page& page) { return context_.store->ListRigs(page); },
           [](const StoredRig& rig, v1::ListRigsResponse* to) {
             *to->add_rigs() = Encode(rig);
             return grpc::Status::OK;
@@ -63,15 +69,43 @@ class RigService final : public v1::RigService::Service {
       violation.field = "rig." + RigFieldPath(violation.field);
     }
     if (!violations.empty()) return InvalidFields(violations);
-    const auto created = store_->CreateRig(rig);
+    const std::lock_guard lock(mutex_);
+    const absl::StatusOr<std::int64_t> rigs = Count();
+    if (!rigs.ok()) return ToGrpc(rigs.status(), {});
+    const bool exists = context_.store->GetRig(rig.id).ok();
+    if (*rigs >= context_.max_rigs && !exists) {
+      return ToGrpc(absl::ResourceExhaustedError(
+                        "there are as many rigs as the setting max-rigs "
+                        "allows; ask the operator to raise it"),
+                    {});
+    }
+    const auto created = context_.store->CreateRig(rig);
     if (!created.ok()) {
       return ToGrpc(created.status(), {kType, request.rig().name(), "rig"});
     }
+    ++*rigs_;
     *response = Encode(*created);
     return grpc::Status::OK;
   }
 
-  Store* store_;
+  // Rigs of the store; they are counted once and never become fewer.
+  absl::StatusOr<std::int64_t> Count() {
+    if (rigs_) return *rigs_;
+    std::int64_t rigs = 0;
+    Page page{kMaxPageSize, ""};
+    do {
+      const auto listed = context_.store->ListRigs(page);
+      if (!listed.ok()) return listed.status();
+      rigs += static_cast<std::int64_t>(listed->items.size());
+      page.token = listed->next_token;
+    } while (!page.token.empty());
+    rigs_ = rigs;
+    return rigs;
+  }
+
+  ServiceContext context_;
+  std::mutex mutex_;  // guards rigs_, and that no rig is created meanwhile
+  std::optional<std::int64_t> rigs_;
 };
 
 }  // namespace

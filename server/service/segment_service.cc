@@ -2,6 +2,7 @@
 
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
+#include "server/service/caller.h"
 #include "server/service/encode.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
@@ -28,6 +29,8 @@ class SegmentService final : public v1::SegmentService::Service {
       v1::StreamSegmentsRequest request;
       v1::StreamSegmentsResponse response;
       while (stream->Read(&request)) {
+        const auto may = Authorise(*call, context_.local_role, request);
+        if (!may.ok()) return may;
         const grpc::Status status = segments.Take(request, &response);
         if (!status.ok()) return status;
         if (!stream->Write(response)) return grpc::Status::CANCELLED;
@@ -36,10 +39,10 @@ class SegmentService final : public v1::SegmentService::Service {
     });
   }
 
-  grpc::Status ListSegments(grpc::ServerContext*,
+  grpc::Status ListSegments(grpc::ServerContext* call,
                             const v1::ListSegmentsRequest* request,
                             v1::ListSegmentsResponse* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
       return FillPage(
@@ -56,10 +59,10 @@ class SegmentService final : public v1::SegmentService::Service {
     });
   }
 
-  grpc::Status GetSegment(grpc::ServerContext*,
+  grpc::Status GetSegment(grpc::ServerContext* call,
                           const v1::GetSegmentRequest* request,
                           v1::Segment* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto parts = ParseSegmentName(request->name());
       if (!parts) {
         return BadName("name", "rigs/{rig}/segments/{session}~{index}");
@@ -73,10 +76,10 @@ class SegmentService final : public v1::SegmentService::Service {
     });
   }
 
-  grpc::Status ListTables(grpc::ServerContext*,
+  grpc::Status ListTables(grpc::ServerContext* call,
                           const v1::ListTablesRequest* request,
                           v1::ListTablesResponse* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
       const auto tables = context_.store->GetTables(*rig);
@@ -90,10 +93,10 @@ class SegmentService final : public v1::SegmentService::Service {
     });
   }
 
-  grpc::Status GetTable(grpc::ServerContext*,
+  grpc::Status GetTable(grpc::ServerContext* call,
                         const v1::GetTableRequest* request,
                         v1::Table* response) override {
-    return Guarded([&]() -> grpc::Status {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto parts = ParseChildName(request->name(), "tables");
       if (!parts) return BadName("name", "rigs/{rig}/tables/{group}");
       const Subject subject{kTableType, request->name(), {}};

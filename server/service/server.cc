@@ -8,7 +8,10 @@
 #include <atomic>
 #include <mutex>
 
+#include "server/service/credentials.h"
+#include "server/service/grpc_log.h"
 #include "server/service/services.h"
+#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -24,6 +27,7 @@ constexpr const char* kServiceNames[] = {
 void SetUpPlugins() {
   static std::once_flag once;
   std::call_once(once, [] {
+    RouteGrpcLog();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   });
@@ -35,6 +39,8 @@ void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
   quota.SetMaxThreads(options.max_threads);
   quota.Resize(static_cast<std::size_t>(options.max_memory_bytes));
   builder->SetResourceQuota(quota);
+  builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                              options.max_streams);
   // Two daemons on one port would share its calls without a word.
   builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   // Readers that vanished without closing are noticed, and may ask likewise.
@@ -51,10 +57,23 @@ std::string BoundAddress(const std::string& address, int port) {
   return address.substr(0, address.rfind(':') + 1) + std::to_string(port);
 }
 
+void AddAddresses(const ServerOptions& options,
+                  grpc::ServerBuilder* builder,
+                  std::vector<int>* ports) {
+  for (std::size_t i = 0; i < ports->size(); ++i) {
+    const Endpoint endpoint = ParseEndpoint(options.listen[i]);
+    builder->AddListeningPort(endpoint.address,
+                              endpoint.tls ? TlsCredentials(options.tls)
+                                           : grpc::InsecureServerCredentials(),
+                              &(*ports)[i]);
+  }
+}
+
 class GrpcServer final : public Server {
  public:
-  GrpcServer(Store* store, Pipeline* pipeline) {
-    const ServiceContext context{store, pipeline, &stopping_};
+  GrpcServer(Store* store, Pipeline* pipeline, const ServerOptions& options) {
+    const ServiceContext context{
+        store, pipeline, &stopping_, options.local_role, options.max_rigs};
     services_.push_back(MakeRigService(context));
     services_.push_back(MakeSegmentService(context));
     services_.push_back(MakeCalibrationService(context));
@@ -68,22 +87,25 @@ class GrpcServer final : public Server {
     grpc::ServerBuilder builder;
     SetLimits(options, &builder);
     std::vector<int> ports(options.listen.size(), 0);
-    for (std::size_t i = 0; i < ports.size(); ++i) {
-      builder.AddListeningPort(
-          options.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
-    }
+    AddAddresses(options, &builder, &ports);
     for (const auto& service : services_)
       builder.RegisterService(service.get());
     server_ = builder.BuildAndStart();
     std::string failed;
     for (std::size_t i = 0; i < ports.size(); ++i) {
-      addresses_.push_back(BoundAddress(options.listen[i], ports[i]));
+      addresses_.push_back(
+          BoundAddress(ParseEndpoint(options.listen[i]).address, ports[i]));
       if (ports[i] <= 0) failed += " " + options.listen[i];
     }
     if (server_ == nullptr || !failed.empty()) {
       return absl::UnavailableError(
           "cannot listen on" + failed +
           "; is the address free, the path writable and short enough?");
+    }
+    for (const std::string& address : options.listen) {
+      const std::string socket = ParseEndpoint(address).socket;
+      if (socket.empty()) continue;
+      SELFCAL_RETURN_IF_ERROR(SetPermissions(socket, options.socket));
     }
     SetServing(true);
     return absl::OkStatus();
@@ -123,10 +145,8 @@ class GrpcServer final : public Server {
 
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
     Store* store, Pipeline* pipeline, const ServerOptions& options) {
-  if (options.listen.empty()) {
-    return absl::InvalidArgumentError("no address to listen on");
-  }
-  auto server = std::make_unique<GrpcServer>(store, pipeline);
+  SELFCAL_RETURN_IF_ERROR(CheckServerOptions(options));
+  auto server = std::make_unique<GrpcServer>(store, pipeline, options);
   if (absl::Status started = server->Start(options); !started.ok()) {
     return started;
   }

@@ -1,8 +1,7 @@
 // The gRPC server: the four services, grpc.health.v1 and reflection, on unix
-// sockets or TCP ports.
-//
-// There is no encryption and no authentication: who can open the socket or
-// reach the port may do everything. Any thread may call.
+// sockets or TCP ports (credentials.h says how each is opened). What a caller
+// may do is in server/access; health and reflection are for all who connect.
+// Any thread may call.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -13,20 +12,53 @@
 #include <string>
 #include <vector>
 
+#include "server/access/grants.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 
+// PEM files, for addresses of TCP. They are read anew when they change; a
+// change that cannot be used leaves the ones before in place.
+struct TlsOptions {
+  std::string certificate;  // of the daemon, with those between it and its root
+  std::string key;          // of the certificate
+  std::string client_ca;    // whose certificates clients must have
+  int refresh_s = 60;       // how often the files are looked at
+
+  friend bool operator==(const TlsOptions&, const TlsOptions&) = default;
+};
+
+// Of unix sockets. The folder is a gate of its own.
+struct SocketOptions {
+  std::string group;     // empty: that of the process
+  unsigned mode = 0660;  // who may write may connect
+
+  friend bool operator==(const SocketOptions&, const SocketOptions&) = default;
+};
+
 struct ServerOptions {
-  // "unix:/path" or "host:port"; port 0 takes a free one.
+  // "unix:/path", "host:port" or "insecure:host:port"; port 0 takes a free one.
   std::vector<std::string> listen;
+  TlsOptions tls;
+  SocketOptions socket;
+  // Of callers without a certificate: over unix sockets and insecure ports.
+  Role local_role = Role::kAdminister;
   int max_receive_bytes = 64 << 20;  // of one message
   // Every stream and every watch holds a thread; calls beyond are refused with
   // RESOURCE_EXHAUSTED.
   int max_threads = 128;
   std::int64_t max_memory_bytes = 512 << 20;  // of messages in flight
+  int max_streams = 100;  // calls at once on one connection; more wait
+  std::int64_t max_rigs = 10'000;
+
+  friend bool operator==(const ServerOptions&, const ServerOptions&) = default;
 };
+
+// Whether a server could be opened with these: INVALID_ARGUMENT without an
+// address, for one of TCP without TLS, or for an unknown group;
+// FAILED_PRECONDITION for files of TLS that cannot be used. Opens nothing.
+absl::Status CheckServerOptions(const ServerOptions& options);
 
 class Server {
  public:
@@ -42,8 +74,8 @@ class Server {
   virtual void Shutdown(std::chrono::milliseconds deadline) = 0;
 };
 
-// Starts a server; `store` and `pipeline` must outlive it. INVALID_ARGUMENT
-// without an address; UNAVAILABLE if one cannot be listened on.
+// Starts a server; `store` and `pipeline` must outlive it. Errors of
+// CheckServerOptions; UNAVAILABLE if an address cannot be listened on.
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
     Store* store, Pipeline* pipeline, const ServerOptions& options);
 

@@ -3,17 +3,48 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #include <fstream>
+#include <regex>
+#include <set>
+
+#include "server/daemon/settings.h"
 
 namespace selfcal::server {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 class OptionsTest : public ::testing::Test {
  protected:
-  OptionsTest() { unsetenv("STATE_DIRECTORY"); }
+  OptionsTest() {
+    for (const char* name : {"STATE_DIRECTORY",
+                             "RUNTIME_DIRECTORY",
+                             "SELFCAL_STATE_DIR",
+                             "SELFCAL_LISTEN",
+                             "SELFCAL_SCORING_THREADS",
+                             "SELFCAL_CONFIG"}) {
+      unsetenv(name);
+    }
+  }
+
+  std::string File(const std::string& text) {
+    const std::string file =
+        ::testing::TempDir() + "selfcald_" + std::to_string(getpid()) + ".toml";
+    std::ofstream(file) << text;
+    return file;
+  }
+
+  // What the file is told to be wrong with.
+  std::string MistakeIn(const std::string& text) {
+    ::testing::internal::CaptureStderr();
+    EXPECT_EQ(Parse({"--state-dir", "s", "--config", File(text)}), 2) << text;
+    return ::testing::internal::GetCapturedStderr();
+  }
 
   std::optional<int> Parse(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "selfcald");
@@ -29,7 +60,7 @@ class OptionsTest : public ::testing::Test {
 TEST_F(OptionsTest, StateFolderAloneIsEnough) {
   EXPECT_EQ(Parse({"--state-dir", "/var/lib/selfcal"}), std::nullopt);
   EXPECT_EQ(options_.state_dir, "/var/lib/selfcal");
-  EXPECT_THAT(options_.listen,
+  EXPECT_THAT(options_.server.listen,
               ElementsAre("unix:/var/lib/selfcal/selfcald.sock"));
   EXPECT_EQ(options_.scoring_threads, 1);
   EXPECT_EQ(options_.solver, SolverKind::kStructured);
@@ -69,7 +100,7 @@ TEST_F(OptionsTest, AddressesAreRepeatable) {
                    "--listen",
                    "127.0.0.1:0"}),
             std::nullopt);
-  EXPECT_THAT(options_.listen, ElementsAre("unix:/a", "127.0.0.1:0"));
+  EXPECT_THAT(options_.server.listen, ElementsAre("unix:/a", "127.0.0.1:0"));
 }
 
 TEST_F(OptionsTest, FolderMayComeFromTheServiceManager) {
@@ -78,21 +109,88 @@ TEST_F(OptionsTest, FolderMayComeFromTheServiceManager) {
   EXPECT_EQ(options_.state_dir, "/var/lib/other");
 }
 
-TEST_F(OptionsTest, FileGivesWhatFlagsDoNot) {
-  const std::string file = ::testing::TempDir() + "selfcald_options_test.toml";
-  std::ofstream(file) << "state-dir = \"/from/file\"\n"
-                         "listen = [\"unix:/a\", \"unix:/b\"]\n"
-                         "scoring-threads = 3\n";
-  EXPECT_EQ(Parse({"--config", file, "--scoring-threads", "2"}), std::nullopt);
-  EXPECT_EQ(options_.state_dir, "/from/file");
-  EXPECT_THAT(options_.listen, ElementsAre("unix:/a", "unix:/b"));
-  EXPECT_EQ(options_.scoring_threads, 2);
+TEST_F(OptionsTest, SocketIsInTheFolderOfTheServiceManager) {
+  setenv("RUNTIME_DIRECTORY", "/run/selfcal", 1);
+  EXPECT_EQ(Parse({"--state-dir", "/s"}), std::nullopt);
+  EXPECT_THAT(options_.server.listen,
+              ElementsAre("unix:/run/selfcal/selfcald.sock"));
 }
 
-TEST_F(OptionsTest, MisspeltNameInTheFileIsAMistake) {
-  const std::string file = ::testing::TempDir() + "selfcald_misspelt.toml";
-  std::ofstream(file) << "state-dir = \"/from/file\"\nscoring-treads = 3\n";
-  EXPECT_EQ(Parse({"--config", file}), 2);
+TEST_F(OptionsTest, FlagGoesBeforeEnvironmentBeforeFileBeforeDefault) {
+  const std::string file = File(
+      "state-dir = \"/from/file\"\n"
+      "listen = [\"unix:/a\", \"unix:/b\"]\n"
+      "scoring-threads = 3\n"
+      "max-backlog = 5\n"
+      "max-rigs = 7\n");
+  setenv("SELFCAL_SCORING_THREADS", "4", 1);
+  setenv("SELFCAL_MAX_BACKLOG", "6", 1);
+  setenv("STATE_DIRECTORY", "/from/manager", 1);
+  EXPECT_EQ(Parse({"--config", file, "--scoring-threads", "2"}), std::nullopt);
+  unsetenv("SELFCAL_MAX_BACKLOG");
+  EXPECT_EQ(options_.state_dir, "/from/file");
+  EXPECT_THAT(options_.server.listen, ElementsAre("unix:/a", "unix:/b"));
+  EXPECT_EQ(options_.scoring_threads, 2);
+  EXPECT_EQ(options_.max_backlog, 6);
+  EXPECT_EQ(options_.server.max_rigs, 7);
+  EXPECT_EQ(options_.metrics, "off");
+}
+
+TEST_F(OptionsTest, EnvironmentGivesListsWithCommas) {
+  setenv("SELFCAL_LISTEN", "unix:/a,unix:/b", 1);
+  setenv("SELFCAL_STATE_DIR", "/from/environment", 1);
+  EXPECT_EQ(Parse({}), std::nullopt);
+  EXPECT_EQ(options_.state_dir, "/from/environment");
+  EXPECT_THAT(options_.server.listen, ElementsAre("unix:/a", "unix:/b"));
+}
+
+TEST_F(OptionsTest, MistakesOfTheFileAreNamedWithTheirLine) {
+  EXPECT_THAT(MistakeIn("max-rigs = 1\nscoring-treads = 3\n"),
+              AllOf(HasSubstr(".toml:2:1: "), HasSubstr("scoring-treads")));
+  EXPECT_THAT(MistakeIn("\n\nscoring-threads = 0\n"),
+              AllOf(HasSubstr(".toml:3:1: "), HasSubstr("scoring-threads")));
+  EXPECT_THAT(MistakeIn("local-role = \"root\"\n"),
+              AllOf(HasSubstr(".toml:1:1: "), HasSubstr("root")));
+  EXPECT_THAT(MistakeIn("socket-mode = \"0999\"\n"),
+              AllOf(HasSubstr(".toml:1:1: "), HasSubstr("0999")));
+  EXPECT_THAT(MistakeIn("metrics = true\n"), HasSubstr(".toml:1:1: "));
+  EXPECT_THAT(MistakeIn("[server]\nlisten = \"unix:/a\"\n"),
+              HasSubstr(".toml:1:"));
+  EXPECT_THAT(MistakeIn("log-level = \"info\"\nmax-rigs = = 2\n"),
+              HasSubstr(".toml:2:"));
+  EXPECT_THAT(MistakeIn("config = \"/other\"\n"), HasSubstr(".toml:1:1: "));
+  EXPECT_THAT(MistakeIn("help = \"me\"\n"), HasSubstr("no setting 'help'"));
+}
+
+// The file that is installed: each setting is in it, what it shows as default
+// is the default, and its examples can be used.
+TEST_F(OptionsTest, ExampleFileShowsEverySettingAndItsDefault) {
+  std::ifstream example(SELFCAL_EXAMPLE_CONFIG);
+  std::string defaults, examples;
+  std::set<std::string> names;
+  for (std::string line; std::getline(example, line);) {
+    std::smatch match;
+    static const std::regex kSetting("#( ?)(([a-z-]+) = .*)");
+    if (!std::regex_match(line, match, kSetting)) continue;
+    EXPECT_TRUE(names.insert(match[3]).second) << match[3];
+    (match[1].length() == 0 ? defaults : examples) += match[2].str() + "\n";
+  }
+  EXPECT_EQ(Parse({"--state-dir", "s", "--config", File(defaults)}),
+            std::nullopt);
+  const DaemonOptions shown = options_;
+  EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
+  EXPECT_EQ(shown, options_);
+  EXPECT_EQ(Parse({"--config", File(examples)}), std::nullopt);
+
+  CLI::App app;
+  DaemonOptions options;
+  DefineSettings(&app, Environment::kIgnore, &options);
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_name() == "--help") continue;
+    EXPECT_EQ(names.erase(option->get_name().substr(2)), 1u)
+        << option->get_name() << " is not in the example";
+  }
+  EXPECT_THAT(names, IsEmpty());
 }
 
 TEST_F(OptionsTest, MistakesEndWithTwo) {
@@ -101,7 +199,10 @@ TEST_F(OptionsTest, MistakesEndWithTwo) {
   EXPECT_EQ(Parse({"--state-dir", "s", "--scoring-threads", "0"}), 2);
   EXPECT_EQ(Parse({"--state-dir", "s", "--scoring-threads", "many"}), 2);
   EXPECT_EQ(Parse({"--state-dir", "s", "--log-level", "loud"}), 2);
-  EXPECT_EQ(Parse({"--config", "/no/such/file"}), 2);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--config", "/no/such/file"}), 2);
+  setenv("SELFCAL_SCORING_THREADS", "many", 1);
+  EXPECT_EQ(Parse({"--state-dir", "s"}), 2);
+  unsetenv("SELFCAL_SCORING_THREADS");
 }
 
 TEST_F(OptionsTest, HelpAndVersionEndWithZero) {

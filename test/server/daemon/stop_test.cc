@@ -27,16 +27,21 @@ TEST(Stop, DeadlineLetsAStopInTimePass) {
 }
 
 TEST(StopDeathTest, BlockedSignalIsReceivedInsteadOfEndingTheProcess) {
-  for (const int signal : {SIGTERM, SIGINT}) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
     EXPECT_EXIT(
         {
-          BlockStopSignals();
+          BlockSignals();
           raise(signal);
-          std::_Exit(WaitForStop() == signal ? 3 : 4);
+          std::_Exit(WaitForSignal(hours(1)) == signal ? 3 : 4);
         },
         ::testing::ExitedWithCode(3),
         "");
   }
+}
+
+TEST(Stop, WaitingForASignalEndsAfterItsLimit) {
+  BlockSignals();
+  EXPECT_EQ(WaitForSignal(milliseconds(5)), std::nullopt);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <grpcpp/impl/codegen/client_unary_call.h>
 #include <grpcpp/impl/codegen/sync_stream.h>
 
+#include "test/server/service/methods.h"
 #include "test/server/service/service_test.h"
 
 namespace selfcal::server {
@@ -92,11 +93,19 @@ TEST_F(ServerTest, ReflectionListsTheServices) {
                                     "grpc.health.v1.Health"}) {
     EXPECT_THAT(listed, HasSubstr(service));
   }
+  // The tests of access go through these: none is served beside them.
+  std::size_t served = 0;
+  for (auto at = listed.find("selfcal.v1."); at != listed.npos;
+       at = listed.find("selfcal.v1.", at + 1)) {
+    ++served;
+  }
+  EXPECT_EQ(served, Services().size());
 }
 
 TEST_F(ServerTest, FreePortIsTakenAndNamed) {
   ServerOptions options;
-  options.listen = {"127.0.0.1:0", "unix:" + (folder_ / "other").string()};
+  options.listen = {"insecure:127.0.0.1:0",
+                    "unix:" + (folder_ / "other").string()};
   const auto server = MakeServer(store_.get(), pipeline_.get(), options);
   ASSERT_TRUE(server.ok()) << server.status();
   EXPECT_THAT((*server)->addresses(),
@@ -110,10 +119,10 @@ TEST_F(ServerTest, FreePortIsTakenAndNamed) {
 
 TEST_F(ServerTest, AddressInUseOrImpossibleIsAnError) {
   ServerOptions options;
-  options.listen = {"127.0.0.1:0"};
+  options.listen = {"insecure:127.0.0.1:0"};
   const auto first = MakeServer(store_.get(), pipeline_.get(), options);
   ASSERT_TRUE(first.ok()) << first.status();
-  for (const std::string& address : {(*first)->addresses()[0],
+  for (const std::string& address : {"insecure:" + (*first)->addresses()[0],
                                      std::string("unix:/no/such/folder/socket"),
                                      "unix:/" + std::string(200, 'x')}) {
     options.listen = {address};

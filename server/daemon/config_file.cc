@@ -1,0 +1,98 @@
+#include "server/daemon/config_file.h"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include "server/daemon/settings.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::Status Mistake(const std::string& path,
+                     const toml::source_region& where,
+                     const std::string& what) {
+  return absl::InvalidArgumentError(fmt::format(
+      "{}:{}:{}: {}", path, where.begin.line, where.begin.column, what));
+}
+
+// As it would stand behind the flag; nothing for a kind that no setting has.
+std::optional<std::string> Text(const toml::node& node) {
+  if (const auto* text = node.as_string()) return text->get();
+  if (const auto* number = node.as_integer()) {
+    return fmt::format("{}", number->get());
+  }
+  if (const auto* number = node.as_floating_point()) {
+    return fmt::format("{}", number->get());
+  }
+  return std::nullopt;
+}
+
+std::optional<std::vector<std::string>> Texts(const toml::node& node) {
+  std::vector<std::string> texts;
+  const auto add = [&](const toml::node& one) {
+    const auto text = Text(one);
+    if (text && !text->empty()) texts.push_back(*text);
+    return text.has_value();
+  };
+  if (const auto* list = node.as_array()) {
+    const bool all = std::all_of(list->begin(), list->end(), add);
+    return all ? std::optional(texts) : std::nullopt;
+  }
+  return add(node) ? std::optional(texts) : std::nullopt;
+}
+
+// The explanation of what is wrong with the value, or nothing.
+std::optional<std::string> Set(const std::string& name,
+                               const std::vector<std::string>& values,
+                               DaemonOptions* options) {
+  CLI::App app;
+  app.set_help_flag();  // no setting
+  DefineSettings(&app, Environment::kIgnore, options);
+  if (app.get_option_no_throw("--" + name) == nullptr) {
+    return "there is no setting '" + name + "'; selfcald --help lists them";
+  }
+  std::vector<std::string> arguments;
+  for (const std::string& value : values) {
+    arguments.push_back("--" + name + "=" + value);
+  }
+  try {
+    // CLI11 takes them in reverse.
+    std::reverse(arguments.begin(), arguments.end());
+    app.parse(arguments);
+  } catch (const CLI::ParseError& error) {
+    return error.what();
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+absl::Status ApplyConfigFile(const std::string& path, DaemonOptions* options) {
+  toml::table table;
+  try {
+    table = toml::parse_file(path);
+  } catch (const toml::parse_error& error) {
+    return Mistake(path, error.source(), std::string(error.description()));
+  }
+  for (const auto& [key, node] : table) {
+    const std::string name(key.str());
+    const auto values = Texts(node);
+    if (!values) {
+      return Mistake(path,
+                     key.source(),
+                     "'" + name +
+                         "' must be a text, a number or a list of "
+                         "texts");
+    }
+    if (const auto wrong = Set(name, *values, options)) {
+      return Mistake(path, key.source(), *wrong);
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace selfcal::server

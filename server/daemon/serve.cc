@@ -1,0 +1,139 @@
+#include "server/daemon/serve.h"
+
+#include <fmt/ranges.h>
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "server/daemon/log.h"
+#include "server/daemon/service_manager.h"
+#include "server/daemon/state_lock.h"
+#include "server/daemon/stop.h"
+#include "server/metrics/metrics.h"
+#include "server/pipeline/pipeline.h"
+#include "server/store/store_sqlite.h"
+
+namespace selfcal::server {
+namespace {
+
+// A stop is over within 10 s, of which calls get a part to end by themselves.
+constexpr std::chrono::milliseconds kStopLimit{9500};
+constexpr std::chrono::milliseconds kCallLimit{2000};
+
+int Failed(const std::string& what, const absl::Status& status) {
+  spdlog::error("{}: {}", what, status.ToString());
+  return EXIT_FAILURE;
+}
+
+// Each connection holds a file: as many as the system lets this process have.
+void RaiseFileLimit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
+                                  Metrics* metrics) {
+  PipelineOptions pipeline;
+  pipeline.scoring_threads = options.scoring_threads;
+  pipeline.max_backlog = options.max_backlog;
+  pipeline.program_version = SELFCAL_VERSION;
+  pipeline.calibrate.solver = options.solver;
+  pipeline.observer = metrics == nullptr ? nullptr : metrics->observer();
+  return pipeline;
+}
+
+absl::StatusOr<std::unique_ptr<Metrics>> OpenMetrics(
+    const DaemonOptions& options, const std::string& database, Store* store) {
+  if (options.metrics == "off") return nullptr;
+  MetricsOptions metrics;
+  metrics.address = options.metrics;
+  metrics.rigs = options.metrics_rigs;
+  metrics.program_version = SELFCAL_VERSION;
+  metrics.database = database;
+  auto opened = MakeMetrics(store, metrics);
+  if (opened.ok()) spdlog::info("metrics: {}", (*opened)->url());
+  return opened;
+}
+
+// The signal that ends the wait. A store that does not answer any more keeps
+// the watchdog from being told.
+int RunUntilStopped(
+    Store* store,
+    const std::function<std::optional<std::string>()>& read_log_level) {
+  const auto interval = WatchdogInterval();
+  for (;;) {
+    const auto signal = WaitForSignal(interval.value_or(std::chrono::hours(1)));
+    if (!signal && interval) {
+      store->ListRigs({1, ""}).IgnoreError();
+      NotifyAlive();
+    } else if (signal == SIGHUP) {
+      const auto level = read_log_level();
+      if (level) SetLogLevel(*level);
+      spdlog::info("log level: {}", level.value_or("as it was"));
+    } else if (signal) {
+      return *signal;
+    }
+  }
+}
+
+}  // namespace
+
+int Check(const DaemonOptions& options) {
+  absl::Status status = CheckServerOptions(options.server);
+  if (status.ok() && options.metrics != "off") {
+    status = CheckMetricsAddress(options.metrics);
+  }
+  if (!status.ok()) return Failed("the settings have a mistake", status);
+  spdlog::info("the settings are good; state-dir {}, listening on {}",
+               options.state_dir.string(),
+               fmt::join(options.server.listen, ", "));
+  return EXIT_SUCCESS;
+}
+
+int Serve(const DaemonOptions& options,
+          const std::function<std::optional<std::string>()>& read_log_level) {
+  // First, so that it watches over the end of all that follows.
+  std::optional<StopDeadline> deadline;
+  RaiseFileLimit();
+  const auto lock = StateLock::Take(options.state_dir);
+  if (!lock.ok()) return Failed("cannot start", lock.status());
+  const std::string database = (options.state_dir / "selfcal.db").string();
+  NotifyStatus("opening the database, with migrations if it is older");
+  const auto store = MakeSqliteStore(database, options.change);
+  if (!store.ok()) return Failed("cannot open " + database, store.status());
+  const auto metrics = OpenMetrics(options, database, store->get());
+  if (!metrics.ok()) return Failed("cannot start", metrics.status());
+
+  const auto pipeline =
+      MakePipeline(store->get(), OptionsOfPipeline(options, metrics->get()));
+  if (absl::Status started = pipeline->Start(); !started.ok()) {
+    return Failed("cannot start the pipeline", started);
+  }
+  const auto server = MakeServer(store->get(), pipeline.get(), options.server);
+  if (!server.ok()) {
+    pipeline->Stop();
+    return Failed("cannot serve", server.status());
+  }
+  spdlog::info("selfcald ready: listening on {}",
+               fmt::join((*server)->addresses(), ", "));
+  NotifyReady();
+
+  const int signal = RunUntilStopped(store->get(), read_log_level);
+  deadline.emplace(kStopLimit);
+  NotifyStopping();
+  spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
+  (*server)->Shutdown(kCallLimit);
+  pipeline->Stop();
+  spdlog::info("stopped");
+  return EXIT_SUCCESS;
+}
+
+}  // namespace selfcal::server

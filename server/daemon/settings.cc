@@ -1,0 +1,213 @@
+#include "server/daemon/settings.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <string>
+
+namespace selfcal::server {
+namespace {
+
+constexpr int kMaxScoringThreads = 256;
+constexpr double kMaxInflation = 1e4;
+constexpr int kMinMessageBytes = 1 << 20;
+constexpr std::int64_t kMinMemoryBytes = 16 << 20;
+constexpr std::int64_t kMaxMemoryBytes = std::int64_t{1} << 40;
+constexpr int kMaxThreads = 100'000;
+constexpr int kMaxSeconds = 86'400;
+constexpr int kMaxBacklog = 1'000'000;
+constexpr int kMaxMetricsRigs = 1000;
+constexpr int kMaxRigs = 10'000'000;
+
+class Definer {
+ public:
+  Definer(CLI::App* app, Environment environment)
+      : app_(app), environment_(environment) {}
+
+  template <typename T>
+  CLI::Option* Add(const std::string& name, T* value, const std::string& help) {
+    return Named(name, app_->add_option("--" + name, *value, help));
+  }
+
+  CLI::Option* Named(const std::string& name, CLI::Option* option) const {
+    if (environment_ == Environment::kIgnore) return option;
+    std::string variable = "SELFCAL_" + name;
+    std::transform(
+        variable.begin(), variable.end(), variable.begin(), [](char c) {
+          return c == '-' ? '_' : static_cast<char>(std::toupper(c));
+        });
+    return option->envname(variable);
+  }
+
+  CLI::App* app() { return app_; }
+
+ private:
+  CLI::App* app_;
+  Environment environment_;
+};
+
+std::string OctalMode(const std::string& text) {
+  const bool octal = !text.empty() && text.size() <= 4 &&
+                     text.find_first_not_of("01234567") == text.npos;
+  return octal ? "" : "'" + text + "' is no mode such as 0660";
+}
+
+void DefineAccess(Definer* define, ServerOptions* options) {
+  define
+      ->Add("listen",
+            &options->listen,
+            "Address, repeatable: unix:/path, host:port (needs tls-*), or "
+            "insecure:host:port, where whoever reaches the port may do what "
+            "local-role says [unix:<runtime or state folder>/selfcald.sock]")
+      ->delimiter(',');
+  define->Add("socket-group",
+              &options->socket.group,
+              "Group of unix sockets [that of the process]");
+  define
+      ->Named("socket-mode",
+              define->app()->add_option_function<std::string>(
+                  "--socket-mode",
+                  [options](const std::string& text) {
+                    options->socket.mode =
+                        static_cast<unsigned>(std::stoul(text, nullptr, 8));
+                  },
+                  "Mode of unix sockets, octal"))
+      ->check(OctalMode)
+      ->default_str("0660");
+  define
+      ->Add("local-role",
+            &options->local_role,
+            "What callers without a certificate may do: read, produce or "
+            "administer")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, Role>{{"read", Role::kRead},
+                                      {"produce", Role::kProduce},
+                                      {"administer", Role::kAdminister}}))
+      ->default_str("administer");
+  define->Add("tls-certificate",
+              &options->tls.certificate,
+              "PEM file: certificate of the daemon and its chain");
+  define->Add(
+      "tls-key", &options->tls.key, "PEM file: key of that certificate");
+  define->Add("tls-client-ca",
+              &options->tls.client_ca,
+              "PEM file: authority of the clients' certificates");
+  define
+      ->Add("tls-refresh",
+            &options->tls.refresh_s,
+            "Seconds after which changed files of TLS are noticed")
+      ->check(CLI::Range(1, kMaxSeconds))
+      ->capture_default_str();
+}
+
+void DefineLimits(Definer* define, DaemonOptions* options) {
+  ServerOptions& server = options->server;
+  define
+      ->Add("max-message-bytes",
+            &server.max_receive_bytes,
+            "Bytes of one message")
+      ->check(CLI::Range(kMinMessageBytes, std::numeric_limits<int>::max()))
+      ->capture_default_str();
+  define
+      ->Add("max-memory-bytes",
+            &server.max_memory_bytes,
+            "Bytes of all messages on their way")
+      ->check(CLI::Range(kMinMemoryBytes, kMaxMemoryBytes))
+      ->capture_default_str();
+  define
+      ->Add("max-threads",
+            &server.max_threads,
+            "Threads of calls; each stream and each watch holds one")
+      ->check(CLI::Range(8, kMaxThreads))
+      ->capture_default_str();
+  define
+      ->Add(
+          "max-streams", &server.max_streams, "Calls at once on one connection")
+      ->check(CLI::Range(1, kMaxThreads))
+      ->capture_default_str();
+  define->Add("max-rigs", &server.max_rigs, "Rigs in the database")
+      ->check(CLI::Range(1, kMaxRigs))
+      ->capture_default_str();
+  define
+      ->Add("max-backlog",
+            &options->max_backlog,
+            "Segments that wait for their score; then streams wait")
+      ->check(CLI::Range(1, kMaxBacklog))
+      ->capture_default_str();
+}
+
+void DefineEstimation(Definer* define, DaemonOptions* options) {
+  define
+      ->Add("scoring-threads",
+            &options->scoring_threads,
+            "Threads that score segments")
+      ->check(CLI::Range(1, kMaxScoringThreads))
+      ->capture_default_str();
+  define
+      ->Add("solver",
+            &options->solver,
+            "What solves recalibrations; both lead to the same minimum")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, SolverKind>{
+          {"structured", SolverKind::kStructured},
+          {"ceres", SolverKind::kCeres}}))
+      ->default_str("structured");
+  define
+      ->Add("change-inflation",
+            &options->change.inflation,
+            "Factor on the variances of segments in the test for a change of "
+            "the device [what the active calibration found: the square of its "
+            "track noise factor]")
+      ->check(CLI::Range(1.0, kMaxInflation));
+  define
+      ->Add("change-false-alarms",
+            &options->change.false_alarm_rate,
+            "Bound on false alarms of that test, for each segment; 0 turns it "
+            "off")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+}
+
+void DefineReports(Definer* define, DaemonOptions* options) {
+  define
+      ->Add("metrics",
+            &options->metrics,
+            "Where Prometheus reads /metrics: a port of the loopback such as "
+            "127.0.0.1:9464, or off")
+      ->capture_default_str();
+  define
+      ->Add("metrics-rigs",
+            &options->metrics_rigs,
+            "Rigs with series of their own: those that sent last")
+      ->check(CLI::Range(0, kMaxMetricsRigs))
+      ->capture_default_str();
+  define->Add("log-level", &options->log_level, "What goes to stderr")
+      ->check(CLI::IsMember(
+          {"trace", "debug", "info", "warning", "error", "critical", "off"}))
+      ->capture_default_str();
+  define
+      ->Add("log-format",
+            &options->log_format,
+            "text, or json: an object on each line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void DefineSettings(CLI::App* app,
+                    Environment environment,
+                    DaemonOptions* options) {
+  Definer define(app, environment);
+  define.Add("state-dir",
+             &options->state_dir,
+             "Folder of the database and the lock; created if it does not "
+             "exist [STATE_DIRECTORY]");
+  DefineAccess(&define, &options->server);
+  DefineLimits(&define, options);
+  DefineEstimation(&define, options);
+  DefineReports(&define, options);
+}
+
+}  // namespace selfcal::server

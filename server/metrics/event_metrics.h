@@ -1,0 +1,48 @@
+// Counts what the pipeline tells.
+#pragma once
+
+#include <prometheus/counter.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "server/metrics/recent_rigs.h"
+#include "server/pipeline/observer.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+class EventMetrics final : public PipelineObserver {
+ public:
+  // All three must outlive it.
+  EventMetrics(Store* store, RecentRigs* rigs, prometheus::Registry* registry);
+
+  void OnVerdict(const std::string& rig, Verdict verdict) override;
+  void OnScore(const SegmentInformation& information, double seconds) override;
+  void OnRun(const StoredRun& run) override;
+
+ private:
+  using RunId = std::pair<std::string, std::int64_t>;
+
+  // What became of a run that has ended.
+  std::string Outcome(const StoredRun& run) const;
+
+  Store* const store_;
+  RecentRigs* const rigs_;
+  prometheus::Family<prometheus::Counter>& segments_;
+  prometheus::Histogram& scoring_;
+  prometheus::Family<prometheus::Histogram>& entropy_;
+  prometheus::Family<prometheus::Counter>& runs_;
+  prometheus::Histogram& run_seconds_;
+  std::mutex mutex_;  // guards what follows
+  // Runs at work; one, as a rule.
+  std::map<RunId, std::chrono::steady_clock::time_point> started_;
+};
+
+}  // namespace selfcal::server

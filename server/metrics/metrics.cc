@@ -1,0 +1,91 @@
+#include "server/metrics/metrics.h"
+
+#include <prometheus/exposer.h>
+#include <prometheus/gauge.h>
+#include <prometheus/registry.h>
+
+#include <charconv>
+#include <exception>
+#include <string_view>
+
+#include "server/metrics/event_metrics.h"
+#include "server/metrics/recent_rigs.h"
+#include "server/metrics/state_metrics.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr int kMaxPort = 65535;
+
+// The host of host:port; empty if there is no port.
+std::string_view HostOf(std::string_view address) {
+  const std::size_t colon = address.rfind(':');
+  if (colon == address.npos) return {};
+  int port = -1;
+  const char* end = address.data() + address.size();
+  const auto [rest, error] =
+      std::from_chars(address.data() + colon + 1, end, port);
+  const bool valid =
+      error == std::errc() && rest == end && port >= 0 && port <= kMaxPort;
+  return valid ? address.substr(0, colon) : std::string_view();
+}
+
+class PrometheusMetrics final : public Metrics {
+ public:
+  PrometheusMetrics(Store* store, const MetricsOptions& options)
+      : rigs_(options.rigs),
+        registry_(std::make_shared<prometheus::Registry>()),
+        events_(store, &rigs_, registry_.get()),
+        state_(std::make_shared<StateMetrics>(store, &rigs_, options.database)),
+        exposer_(options.address) {
+    prometheus::BuildGauge()
+        .Name("selfcal_build_info")
+        .Help("1, with the version of the program as label.")
+        .Register(*registry_)
+        .Add({{"version", options.program_version}})
+        .Set(1);
+    exposer_.RegisterCollectable(registry_);
+    exposer_.RegisterCollectable(state_);
+    url_ = "http://" + std::string(HostOf(options.address)) + ":" +
+           std::to_string(exposer_.GetListeningPorts().at(0)) + "/metrics";
+  }
+
+  PipelineObserver* observer() override { return &events_; }
+  const std::string& url() const override { return url_; }
+
+ private:
+  RecentRigs rigs_;
+  std::shared_ptr<prometheus::Registry> registry_;
+  EventMetrics events_;
+  std::shared_ptr<StateMetrics> state_;
+  prometheus::Exposer exposer_;  // last: its threads use the others
+  std::string url_;
+};
+
+}  // namespace
+
+absl::Status CheckMetricsAddress(const std::string& address) {
+  const std::string_view host = HostOf(address);
+  if (host == "127.0.0.1" || host == "[::1]") {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      "metrics: '" + address +
+      "' is no port of the loopback such as 127.0.0.1:9464; there is no "
+      "authentication, so put a proxy in front for other machines");
+}
+
+absl::StatusOr<std::unique_ptr<Metrics>> MakeMetrics(
+    Store* store, const MetricsOptions& options) {
+  SELFCAL_RETURN_IF_ERROR(CheckMetricsAddress(options.address));
+  try {
+    return std::make_unique<PrometheusMetrics>(store, options);
+  } catch (const std::exception& error) {
+    return absl::UnavailableError("cannot open " + options.address +
+                                  " for metrics; is it free? (" + error.what() +
+                                  ")");
+  }
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,132 @@
+#include "server/metrics/state_metrics.h"
+
+#include <unistd.h>
+
+#include <fstream>
+#include <future>
+#include <limits>
+#include <map>
+#include <string>
+#include <system_error>
+#include <utility>
+
+namespace selfcal::server {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+
+class Gauge {
+ public:
+  Gauge(const std::string& name, const std::string& help) {
+    family_.name = name;
+    family_.help = help;
+    family_.type = prometheus::MetricType::Gauge;
+  }
+
+  void Add(std::vector<ClientMetric::Label> labels, double value) {
+    ClientMetric metric;
+    metric.label = std::move(labels);
+    metric.gauge.value = value;
+    family_.metric.push_back(std::move(metric));
+  }
+
+  MetricFamily Take() { return std::move(family_); }
+
+ private:
+  MetricFamily family_;
+};
+
+void AddTables(Store* store,
+               const std::vector<std::string>& rigs,
+               std::vector<MetricFamily>* families) {
+  Gauge entries("selfcal_table_entries", "Segments in the tables of a group.");
+  Gauge capacity("selfcal_table_capacity",
+                 "Segments that the tables of a group can hold.");
+  Gauge version("selfcal_active_version", "Number of the active calibration.");
+  for (const std::string& rig : rigs) {
+    // Several groups may share the label "other".
+    std::map<std::string, std::pair<double, double>> groups;
+    const auto tables = store->GetTables(rig);
+    if (!tables.ok()) continue;
+    for (const Table& table : *tables) {
+      auto& [held, room] = groups[GroupLabel(table.group)];
+      held += static_cast<double>(table.entries.size());
+      room += table.capacity;
+    }
+    for (const auto& [group, fill] : groups) {
+      entries.Add({{"rig", rig}, {"group", group}}, fill.first);
+      capacity.Add({{"rig", rig}, {"group", group}}, fill.second);
+    }
+    const auto active = store->GetActiveCalibration(rig);
+    if (!active.ok()) continue;
+    version.Add({{"rig", rig}}, static_cast<double>(active->version));
+  }
+  families->push_back(entries.Take());
+  families->push_back(capacity.Take());
+  families->push_back(version.Take());
+}
+
+void AddQueue(Store* store, std::vector<MetricFamily>* families) {
+  Gauge queue("selfcal_queue_length", "Segments that wait for their score.");
+  const auto unscored = store->ListUnscored(std::numeric_limits<int>::max());
+  if (unscored.ok()) queue.Add({}, static_cast<double>(unscored->size()));
+  families->push_back(queue.Take());
+  Gauge runs("selfcal_unfinished_runs", "Recalibrations that wait or run.");
+  const auto unfinished = store->ListUnfinishedRuns();
+  if (unfinished.ok()) runs.Add({}, static_cast<double>(unfinished->size()));
+  families->push_back(runs.Take());
+}
+
+void AddDisk(const std::filesystem::path& database,
+             std::vector<MetricFamily>* families) {
+  Gauge bytes("selfcal_database_bytes", "Size of the files of the database.");
+  for (const auto& [label, suffix] :
+       {std::pair<const char*, const char*>{"database", ""}, {"log", "-wal"}}) {
+    std::error_code error;
+    const auto size =
+        std::filesystem::file_size(database.string() + suffix, error);
+    if (!error) bytes.Add({{"file", label}}, static_cast<double>(size));
+  }
+  families->push_back(bytes.Take());
+  Gauge free("selfcal_disk_free_bytes",
+             "Free space where the database is, for the daemon's user.");
+  std::error_code error;
+  const auto space = std::filesystem::space(database.parent_path(), error);
+  if (!error) free.Add({}, static_cast<double>(space.available));
+  families->push_back(free.Take());
+}
+
+void AddMemory(std::vector<MetricFamily>* families) {
+  Gauge memory("process_resident_memory_bytes", "Resident memory.");
+  std::ifstream statm("/proc/self/statm");
+  double total_pages = 0, resident_pages = 0;
+  if (statm >> total_pages >> resident_pages) {
+    memory.Add({}, resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE)));
+  }
+  families->push_back(memory.Take());
+}
+
+}  // namespace
+
+StateMetrics::StateMetrics(Store* store,
+                           const RecentRigs* rigs,
+                           std::filesystem::path database)
+    : store_(store), rigs_(rigs), database_(std::move(database)) {}
+
+std::vector<MetricFamily> StateMetrics::Collect() const {
+  // The threads of the HTTP server have a stack of 100 KiB, most of which it
+  // uses itself.
+  return std::async(std::launch::async,
+                    [this] {
+                      std::vector<MetricFamily> families;
+                      AddTables(store_, rigs_->List(), &families);
+                      AddQueue(store_, &families);
+                      AddDisk(database_, &families);
+                      AddMemory(&families);
+                      return families;
+                    })
+      .get();
+}
+
+}  // namespace selfcal::server

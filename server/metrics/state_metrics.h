@@ -1,0 +1,32 @@
+// How things are at the moment that Prometheus asks: tables and versions of the
+// rigs that sent last, the queue, disk and memory.
+#pragma once
+
+#include <prometheus/collectable.h>
+#include <prometheus/metric_family.h>
+
+#include <filesystem>
+#include <vector>
+
+#include "server/metrics/recent_rigs.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+class StateMetrics final : public prometheus::Collectable {
+ public:
+  // `store` and `rigs` must outlive it.
+  StateMetrics(Store* store,
+               const RecentRigs* rigs,
+               std::filesystem::path database);
+
+  // What cannot be read is left out.
+  std::vector<prometheus::MetricFamily> Collect() const override;
+
+ private:
+  Store* const store_;
+  const RecentRigs* const rigs_;
+  const std::filesystem::path database_;
+};
+
+}  // namespace selfcal::server

@@ -1,0 +1,33 @@
+#include "server/service/grpc_log.h"
+
+#include <grpc/support/log.h>
+#include <spdlog/spdlog.h>
+
+#include <memory>
+
+namespace selfcal::server {
+namespace {
+
+// Never destroyed: threads of gRPC may outlive the end of main.
+const std::shared_ptr<spdlog::logger>& Logger() {
+  static const auto* const logger =
+      new std::shared_ptr<spdlog::logger>(spdlog::default_logger());
+  return *logger;
+}
+
+void Log(gpr_log_func_args* line) {
+  // Its errors are failures of one connection, as a rule.
+  const bool is_error = line->severity == GPR_LOG_SEVERITY_ERROR;
+  Logger()->log(is_error ? spdlog::level::warn : spdlog::level::debug,
+                "grpc: {}",
+                line->message);
+}
+
+}  // namespace
+
+void RouteGrpcLog() {
+  Logger();
+  gpr_set_log_function(Log);
+}
+
+}  // namespace selfcal::server

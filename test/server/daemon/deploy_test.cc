@@ -1,0 +1,135 @@
+// What is installed beside the daemon: the unit, its user and folders, and the
+// image. Where a tool is not installed the test is skipped.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kMaxExposure = 1.5;
+
+std::string Output(const std::string& command) {
+  FILE* const pipe = popen((command + " 2>&1").c_str(), "r");
+  std::string output;
+  char buffer[4096];
+  for (std::size_t n = 0; (n = fread(buffer, 1, sizeof(buffer), pipe)) > 0;) {
+    output.append(buffer, n);
+  }
+  pclose(pipe);
+  return output;
+}
+
+bool Has(const std::string& tool) {
+  return std::system(("command -v " + tool + " >/dev/null").c_str()) == 0;
+}
+
+std::string Deployed(const std::string& name) {
+  return std::string(SELFCAL_DEPLOY) + "/" + name;
+}
+
+std::string Read(const std::string& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(Unit, IsHardened) {
+  if (!Has("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze";
+  const std::string report = Output("systemd-analyze security --offline=true " +
+                                    Deployed("systemd/selfcald.service"));
+  std::smatch match;
+  ASSERT_TRUE(std::regex_search(
+      report, match, std::regex("exposure level[^:]*: ([0-9.]+)")))
+      << report;
+  RecordProperty("exposure", match[1].str());
+  EXPECT_LE(std::stod(match[1]), kMaxExposure);
+}
+
+TEST(Unit, HasNoMistake) {
+  if (!Has("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze";
+  const auto folder =
+      std::filesystem::path(::testing::TempDir()) / "selfcal-unit";
+  std::filesystem::create_directories(folder);
+  std::string unit = Read(Deployed("systemd/selfcald.service"));
+  const std::string program = "/usr/bin/selfcald";
+  ASSERT_THAT(unit, HasSubstr("ExecStart=" + program));
+  // verify looks whether the program is there.
+  unit.replace(unit.find(program), program.size(), SELFCALD_PATH);
+  std::ofstream(folder / "selfcald.service") << unit;
+  EXPECT_EQ(Output("systemd-analyze verify " +
+                   (folder / "selfcald.service").string()),
+            "");
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Unit, UserAndFoldersAreMade) {
+  if (!Has("systemd-sysusers") || !Has("systemd-tmpfiles")) {
+    GTEST_SKIP() << "no systemd-sysusers or systemd-tmpfiles";
+  }
+  std::string pattern = ::testing::TempDir() + "selfcal-root-XXXXXX";
+  const std::string root = mkdtemp(pattern.data());
+  std::filesystem::create_directories(root + "/etc");
+  Output("systemd-sysusers --root=" + root + " " +
+         Deployed("systemd/selfcal.sysusers.conf"));
+  EXPECT_THAT(Read(root + "/etc/passwd"), HasSubstr("selfcal:x:"));
+  EXPECT_THAT(Read(root + "/etc/group"), HasSubstr("selfcal:x:"));
+  if (geteuid() == 0) {
+    Output("systemd-tmpfiles --create --root=" + root + " " +
+           Deployed("systemd/selfcal.tmpfiles.conf"));
+    for (const std::string folder :
+         {"/etc/selfcal", "/var/lib/selfcal", "/run/selfcal"}) {
+      EXPECT_TRUE(std::filesystem::is_directory(root + folder)) << folder;
+      EXPECT_EQ(std::filesystem::status(root + folder).permissions() &
+                    std::filesystem::perms::others_all,
+                std::filesystem::perms::none)
+          << folder;
+    }
+  }
+  std::filesystem::remove_all(root);
+}
+
+// The libraries that the program loads come with the packages of the image.
+TEST(Image, InstallsWhatTheProgramLoads) {
+  if (!Has("dpkg-query")) GTEST_SKIP() << "no dpkg";
+  std::istringstream lines(Output("ldd " SELFCALD_PATH));
+  std::string files;
+  const std::regex library("=> (?:/usr)?(/lib/[^ ]+)");
+  const std::regex sanitizer("lib(asan|ubsan|tsan)");
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch match;
+    if (std::regex_search(line, sanitizer)) continue;
+    if (std::regex_search(line, match, library)) {
+      files += " '*" + match[1].str() + "'";
+    }
+  }
+  std::istringstream owners(Output("dpkg-query -S" + files));
+  std::set<std::string> packages;
+  for (std::string line; std::getline(owners, line);) {
+    // A file that an alternative chooses has no owner.
+    if (line.starts_with("dpkg-query: ")) continue;
+    packages.insert(line.substr(0, line.find(':')));
+  }
+  EXPECT_GT(packages.size(), 5u);
+  const std::string image = Read(Deployed("Containerfile"));
+  const std::string installed = image.substr(image.rfind("apt-get install"));
+  for (const std::string& package : packages) {
+    // Part of every Debian image.
+    if (package == "libc6" || package == "libgcc-s1") continue;
+    EXPECT_THAT(installed, HasSubstr(package));
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::server

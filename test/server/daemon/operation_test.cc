@@ -1,0 +1,293 @@
+// selfcald as its operator meets it: certificates, settings, signals, metrics.
+#include <gmock/gmock.h>
+#include <yaml-cpp/yaml.h>
+
+#include <atomic>
+#include <cstdio>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include "test/server/certificates.h"
+#include "test/server/daemon/daemon_fixture.h"
+#include "test/server/daemon/notify_socket.h"
+#include "test/server/http_get.h"
+
+namespace selfcal::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+class OperationTest : public DaemonTest {
+ protected:
+  std::string File(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+
+  // What stands behind the text in the log, to the end of the word.
+  static std::string Word(const Process& daemon, const std::string& before) {
+    EXPECT_TRUE(daemon.Says(before)) << daemon.Log();
+    const std::string log = daemon.Log();
+    const auto at = log.find(before) + before.size();
+    return log.substr(at, log.find_first_of(", \n", at) - at);
+  }
+};
+
+TEST_F(OperationTest, CheckLooksAtTheSettingsAndEnds) {
+  const auto good = Start({"--check"});
+  EXPECT_EQ(good->Wait(), 0);
+  EXPECT_FALSE(std::filesystem::exists(state_));
+
+  const auto plain = Start({"--check", "--listen", "127.0.0.1:7447"});
+  EXPECT_EQ(plain->Wait(), 1);
+  EXPECT_THAT(plain->Log(), HasSubstr("insecure:host:port"));
+
+  const auto metrics = Start({"--check", "--metrics", "0.0.0.0:9464"});
+  EXPECT_EQ(metrics->Wait(), 1);
+  EXPECT_THAT(metrics->Log(), HasSubstr("loopback"));
+
+  const auto file = File("bad.toml", "max-rigs = 5\nmax-rig = 5\n");
+  const auto misspelt = Start({"--check", "--config", file});
+  EXPECT_EQ(misspelt->Wait(), 2);
+  EXPECT_THAT(misspelt->Log(), HasSubstr(file + ":2:1: "));
+}
+
+TEST_F(OperationTest, NoSecretReachesTheLog) {
+  Certificates certificates;
+  certificates.Add("admin", "ca", "URI:selfcal://role/administer");
+  certificates.AddAuthority("other");
+  certificates.Add("stranger", "other", "URI:selfcal://role/administer");
+  const auto daemon = Start({"--log-level",
+                             "trace",
+                             "--listen",
+                             "127.0.0.1:0",
+                             "--tls-certificate",
+                             certificates.Pem("server"),
+                             "--tls-key",
+                             certificates.Key("server"),
+                             "--tls-client-ca",
+                             certificates.Pem("ca"),
+                             "--tls-refresh",
+                             "1"});
+  const std::string address = Word(*daemon, "ready: listening on ");
+  for (const std::string name : {"admin", "stranger", ""}) {
+    const auto stub = v1::RigService::NewStub(
+        grpc::CreateChannel(address, certificates.Client(name)));
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() +
+                         std::chrono::seconds(20));
+    v1::ListRigsResponse response;
+    EXPECT_EQ(stub->ListRigs(&context, {}, &response).ok(), name == "admin");
+  }
+  // A key that cannot be used any more.
+  std::string key = Certificates::Read(certificates.Key("server"));
+  std::ofstream(certificates.Key("server")) << key.substr(0, key.size() / 2);
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  daemon->Signal(SIGTERM);
+  EXPECT_EQ(daemon->Wait(), 0);
+  std::istringstream lines(key);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find("PRIVATE KEY") != line.npos) continue;
+    EXPECT_THAT(daemon->Log(), Not(HasSubstr(line.substr(0, 16))));
+  }
+  EXPECT_THAT(daemon->Log(), Not(HasSubstr("PRIVATE KEY")));
+}
+
+TEST_F(OperationTest, LogLevelIsTakenUpOnHangup) {
+  const auto config = File("c.toml", "log-level = \"info\"\n");
+  const auto daemon = StartAndWait({"--config", config});
+  File("c.toml", "log-level = \"error\"\n");
+  daemon->Signal(SIGHUP);
+  // From now on nothing at info is written, the stop included.
+  std::this_thread::sleep_for(milliseconds(300));
+  File("c.toml", "log-levle = \"trace\"\n");
+  daemon->Signal(SIGHUP);
+  EXPECT_TRUE(daemon->Says("log-levle")) << daemon->Log();
+  daemon->Signal(SIGTERM);
+  EXPECT_EQ(daemon->Wait(), 0);
+  EXPECT_THAT(daemon->Log(), Not(HasSubstr("stopped")));
+}
+
+TEST_F(OperationTest, EveryLineOfAJsonLogIsAnObject) {
+  const auto daemon = Start({"--log-format", "json", "--listen", "unix:/no/x"});
+  EXPECT_EQ(daemon->Wait(), 1);
+  std::istringstream lines(daemon->Log());
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    const auto object = nlohmann::json::parse(line, nullptr, false);
+    ASSERT_TRUE(object.is_object()) << line;
+    EXPECT_TRUE(object.contains("time") && object.contains("level") &&
+                object.contains("message"))
+        << line;
+  }
+  EXPECT_GT(count, 0);
+}
+
+TEST_F(OperationTest, ServiceManagerIsToldOfStartLifeAndStop) {
+  const std::string path = folder_ / "notify";
+  NotifySocket manager(path);
+  setenv("NOTIFY_SOCKET", path.c_str(), 1);
+  setenv("WATCHDOG_USEC", "200000", 1);
+  const auto daemon = Start();
+  unsetenv("NOTIFY_SOCKET");
+  unsetenv("WATCHDOG_USEC");
+  EXPECT_TRUE(manager.Hears("STATUS=opening the database"));
+  EXPECT_TRUE(manager.Hears("READY=1"));
+  EXPECT_TRUE(manager.Hears("WATCHDOG=1"));
+  EXPECT_TRUE(manager.Hears("WATCHDOG=1"));
+  daemon->Signal(SIGTERM);
+  EXPECT_TRUE(manager.Hears("STOPPING=1"));
+  EXPECT_EQ(daemon->Wait(), 0);
+}
+
+// A promise: SIGTERM while clients stream ends the daemon with 0, which it does
+// only within 10 s, and what was acknowledged is there at the next start.
+TEST_F(OperationTest, StopUnderLoadLosesNothing) {
+  const char* wanted = std::getenv("SELFCAL_TRIALS");
+  const int trials = wanted == nullptr ? 2 : std::atoi(wanted);
+  constexpr int kClients = 4;
+  const auto segments = TestSegments(TestRig("r"), 4);
+  int lost = 0;
+  std::set<std::string> acknowledged;
+  std::mutex mutex;
+  for (int trial = 0; trial < trials; ++trial) {
+    auto daemon = StartAndWait();
+    if (trial == 0) CreateRig();
+    std::atomic<int> verdicts = 0;
+    std::vector<std::thread> clients;
+    for (int client = 0; client < kClients; ++client) {
+      clients.emplace_back([&, client] {
+        grpc::ClientContext context;
+        const auto stub = v1::SegmentService::NewStub(channel_);
+        const auto stream = stub->StreamSegments(&context);
+        const std::string session =
+            "t" + std::to_string(trial) + "c" + std::to_string(client);
+        v1::StreamSegmentsRequest request;
+        v1::StreamSegmentsResponse response;
+        request.set_parent("rigs/r");
+        for (int index = 0;; ++index) {
+          MotionSegment segment = segments[index % segments.size()];
+          segment.key = {session, index};
+          *request.mutable_segment() = ToProto(segment);
+          if (!stream->Write(request) || !stream->Read(&response)) break;
+          ++verdicts;
+          if (response.verdict() != v1::StreamSegmentsResponse::STORED)
+            continue;
+          const std::lock_guard lock(mutex);
+          acknowledged.insert(session + "~" + std::to_string(index));
+        }
+        stream->Finish();
+      });
+    }
+    while (verdicts < 2 * kClients) {
+      std::this_thread::sleep_for(milliseconds(5));
+    }
+    const auto start = steady_clock::now();
+    daemon->Signal(SIGTERM);
+    lost += daemon->Wait() != 0 ||
+            steady_clock::now() - start > std::chrono::seconds(10);
+    for (std::thread& client : clients) client.join();
+  }
+  const auto daemon = StartAndWait();
+  v1::ListSegmentsRequest request;
+  request.set_parent("rigs/r");
+  request.set_page_size(1000);
+  std::set<std::string> found;
+  do {
+    grpc::ClientContext context;
+    v1::ListSegmentsResponse response;
+    const auto stub = v1::SegmentService::NewStub(channel_);
+    ASSERT_TRUE(stub->ListSegments(&context, request, &response).ok());
+    for (const auto& segment : response.segments()) {
+      found.insert(segment.name().substr(segment.name().rfind('/') + 1));
+    }
+    request.set_page_token(response.next_page_token());
+  } while (!request.page_token().empty());
+  for (const std::string& name : acknowledged) lost += found.count(name) == 0;
+  std::printf("promise: stop-loses-nothing trials %d lost %d\n", trials, lost);
+  EXPECT_GE(acknowledged.size(), 2u * kClients * trials);
+  EXPECT_EQ(lost, 0);
+}
+
+// The names of series, without what stands in labels and strings, and without
+// functions and words of the language.
+std::set<std::string> SeriesIn(const std::string& expression) {
+  std::set<std::string> names;
+  static const std::regex kSeries("\\b(selfcal|process)_[a-z_]+");
+  for (std::sregex_iterator at(expression.begin(), expression.end(), kSeries),
+       end;
+       at != end;
+       ++at) {
+    names.insert(at->str());
+  }
+  return names;
+}
+
+std::set<std::string> LabelsIn(const std::string& expression) {
+  std::set<std::string> labels;
+  static const std::regex kLabel("([a-z]+=\"[a-z]+\")");
+  for (std::sregex_iterator at(expression.begin(), expression.end(), kLabel),
+       end;
+       at != end;
+       ++at) {
+    labels.insert(at->str());
+  }
+  labels.erase("job=\"selfcal\"");  // Prometheus adds it
+  return labels;
+}
+
+std::vector<std::string> DeployedExpressions() {
+  std::vector<std::string> expressions;
+  const std::string deploy = SELFCAL_DEPLOY "/monitoring/";
+  const YAML::Node alerts = YAML::LoadFile(deploy + "alerts.yml");
+  for (const auto& group : alerts["groups"]) {
+    for (const auto& rule : group["rules"]) {
+      EXPECT_TRUE(rule["alert"] && rule["annotations"]["summary"]);
+      expressions.push_back(rule["expr"].as<std::string>());
+    }
+  }
+  std::ifstream file(deploy + "dashboard.json");
+  const auto dashboard = nlohmann::json::parse(file);
+  for (const auto& panel : dashboard.at("panels")) {
+    for (const auto& target : panel.at("targets")) {
+      expressions.push_back(target.at("expr").get<std::string>());
+    }
+  }
+  return expressions;
+}
+
+TEST_F(OperationTest, AlertsAndDashboardShowSeriesThatThereAre) {
+  const auto daemon = StartAndWait({"--metrics", "127.0.0.1:0"});
+  const Rig rig = CreateRig();
+  Stream(TestSegments(rig, 4));
+  ASSERT_TRUE(AllScored());
+  const std::string series = HttpGet(Word(*daemon, "metrics: "));
+  EXPECT_THAT(series,
+              HasSubstr("selfcal_segments_total{verdict=\"stored\"} 4"));
+  EXPECT_THAT(series,
+              HasSubstr("selfcal_table_entries{rig=\"r\",group=\"imu\"} 2"));
+  const auto expressions = DeployedExpressions();
+  EXPECT_GT(expressions.size(), 15u);
+  std::set<std::string> used;
+  for (const std::string& expression : expressions) {
+    for (const std::string& name : SeriesIn(expression)) {
+      used.insert(name);
+      EXPECT_TRUE(std::regex_search(series, std::regex("\n" + name + "[{ ]")))
+          << name << " of " << expression;
+    }
+    for (const std::string& label : LabelsIn(expression)) {
+      EXPECT_THAT(series, HasSubstr(label)) << expression;
+    }
+  }
+  EXPECT_GT(used.size(), 12u);
+}
+
+}  // namespace
+}  // namespace selfcal::server
