@@ -39,13 +39,13 @@ struct ClientOptions {
   // For a TCP target with mutual TLS: PEM files, read at every connection. All
   // empty: no TLS. The authority alone: the daemon is known by its certificate,
   // this side by none.
-  std::string ca_file;           // authorities that the daemon's may be of
-  std::string certificate_file;  // this client's, with its chain
-  std::string key_file;
+  std::string ca_file = {};           // authorities that the daemon's may be of
+  std::string certificate_file = {};  // this client's, with its chain
+  std::string key_file = {};
 
   // Where segments go that memory has no room for, in a folder named after the
   // rig; empty: nowhere, they are dropped. One stream at a time may use it.
-  std::string spool_dir;
+  std::string spool_dir = {};
   std::uint64_t max_spool_bytes = 256u << 20;
 };
 

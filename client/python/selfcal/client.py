@@ -1,0 +1,156 @@
+"""A connection to selfcald; see the package."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from typing import Callable, Iterable, Iterator, Optional, TypeVar
+
+import grpc
+
+from selfcal.v1 import (
+    calibration_service_pb2 as calibration,
+    calibration_service_pb2_grpc as calibration_grpc,
+    recalibration_pb2 as recalibration,
+    recalibration_pb2_grpc as recalibration_grpc,
+    rig_pb2 as rig,
+    rig_pb2_grpc as rig_grpc,
+    segment_pb2 as segment,
+    segment_pb2_grpc as segment_grpc,
+)
+
+_PAGE_SIZE = 500
+_MAX_MESSAGE_BYTES = 64 << 20  # what the daemon takes and sends
+
+_Request = TypeVar("_Request")
+_Response = TypeVar("_Response")
+
+
+@dataclasses.dataclass(frozen=True)
+class Tls:
+    """PEM files for a TCP target with mutual TLS."""
+
+    ca_file: str
+    certificate_file: str
+    key_file: str
+
+    def credentials(self) -> grpc.ChannelCredentials:
+        return grpc.ssl_channel_credentials(
+            root_certificates=pathlib.Path(self.ca_file).read_bytes(),
+            private_key=pathlib.Path(self.key_file).read_bytes(),
+            certificate_chain=pathlib.Path(self.certificate_file).read_bytes(),
+        )
+
+
+class Daemon:
+    """Lists are read page by page while they are iterated over.
+
+    `timeout_s` is that of each call but the watches, which last.
+    """
+
+    def __init__(self, channel: grpc.Channel, timeout_s: float = 30) -> None:
+        self._channel = channel
+        self._timeout_s = timeout_s
+        self.rig_service = rig_grpc.RigServiceStub(channel)
+        self.segment_service = segment_grpc.SegmentServiceStub(channel)
+        self.calibration_service = calibration_grpc.CalibrationServiceStub(
+            channel
+        )
+        self.recalibration_service = (
+            recalibration_grpc.RecalibrationServiceStub(channel)
+        )
+
+    def __enter__(self) -> Daemon:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._channel.close()
+
+    def rigs(self) -> Iterator[rig.Rig]:
+        for page in self._pages(
+            self.rig_service.ListRigs, rig.ListRigsRequest()
+        ):
+            yield from page.rigs
+
+    def segments(self, rig_id: str) -> Iterator[segment.Segment]:
+        """Newest first."""
+        request = segment.ListSegmentsRequest(parent=f"rigs/{rig_id}")
+        for page in self._pages(self.segment_service.ListSegments, request):
+            yield from page.segments
+
+    def tables(self, rig_id: str) -> Iterable[segment.Table]:
+        request = segment.ListTablesRequest(parent=f"rigs/{rig_id}")
+        return self.segment_service.ListTables(
+            request, timeout=self._timeout_s
+        ).tables
+
+    def stream(
+        self, requests: Iterable[segment.StreamSegmentsRequest]
+    ) -> Iterator[segment.StreamSegmentsResponse]:
+        """Sends segments; one verdict for each, in their order."""
+        return self.segment_service.StreamSegments(iter(requests))
+
+    def calibration(
+        self, rig_id: str, version: str = "active"
+    ) -> calibration.Calibration:
+        return self.calibration_service.GetCalibration(
+            calibration.GetCalibrationRequest(
+                name=f"rigs/{rig_id}/calibrations/{version}"
+            ),
+            timeout=self._timeout_s,
+        )
+
+    def calibrations(self, rig_id: str) -> Iterator[calibration.Calibration]:
+        """Every version, rejected ones too; newest first."""
+        request = calibration.ListCalibrationsRequest(parent=f"rigs/{rig_id}")
+        for page in self._pages(
+            self.calibration_service.ListCalibrations, request
+        ):
+            yield from page.calibrations
+
+    def watch_calibration(
+        self, rig_id: str
+    ) -> Iterator[calibration.Calibration]:
+        """The active version at once, then each new one."""
+        return self.calibration_service.WatchCalibration(
+            calibration.WatchCalibrationRequest(parent=f"rigs/{rig_id}")
+        )
+
+    def recalibrations(
+        self, rig_id: str
+    ) -> Iterator[recalibration.Recalibration]:
+        """Newest first."""
+        request = recalibration.ListRecalibrationsRequest(
+            parent=f"rigs/{rig_id}"
+        )
+        for page in self._pages(
+            self.recalibration_service.ListRecalibrations, request
+        ):
+            yield from page.recalibrations
+
+    def _pages(
+        self, method: Callable[..., _Response], request: _Request
+    ) -> Iterator[_Response]:
+        request.page_size = _PAGE_SIZE
+        while True:
+            page = method(request, timeout=self._timeout_s)
+            yield page
+            if not page.next_page_token:
+                return
+            request.page_token = page.next_page_token
+
+
+def connect(target: str, tls: Optional[Tls] = None) -> Daemon:
+    """`target` as gRPC names it: unix:/path or host:port.
+
+    Returns at once; the connection is made by the first call.
+    """
+    options = [("grpc.max_receive_message_length", _MAX_MESSAGE_BYTES)]
+    if tls is None:
+        return Daemon(grpc.insecure_channel(target, options=options))
+    return Daemon(
+        grpc.secure_channel(target, tls.credentials(), options=options)
+    )

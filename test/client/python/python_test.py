@@ -1,0 +1,147 @@
+"""The Python package and its example against a real daemon.
+
+    python_test.py PACKAGE_DIR EXAMPLE SELFCALD
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PACKAGE, EXAMPLE, SELFCALD = sys.argv[1:4]
+sys.path[:0] = [PACKAGE, os.path.dirname(EXAMPLE)]
+
+import grpc  # noqa: E402
+
+import history  # noqa: E402
+import selfcal  # noqa: E402
+from google.protobuf import json_format  # noqa: E402
+from selfcal.v1 import rig_pb2, segment_pb2  # noqa: E402
+
+RIG = {
+    "name": "rigs/tablet",
+    "factory": {
+        "imu": {
+            "s_g": {"x": 1, "y": 1, "z": 1},
+            "m_g": {},
+            "s_a": {"x": 1, "y": 1, "z": 1},
+            "m_a": {},
+            "q_ai": {"w": 1},
+        },
+        "cameras": [
+            {
+                "q_ci": {"w": 1},
+                "p_ci": {"x": 0.01},
+                "f": {"x": 260, "y": 260},
+                "c": {"x": 320, "y": 240},
+                "distortion_model": "DISTORTION_MODEL_FOV",
+                "distortion": [0.92],
+                "width_px": 640,
+                "height_px": 480,
+            }
+        ],
+    },
+    "imu_noise": {
+        "gyro_noise_density": 1.7e-4,
+        "accel_noise_density": 2e-3,
+        "gyro_bias_random_walk": 2e-5,
+        "accel_bias_random_walk": 3e-3,
+    },
+    "pixel_sigma_px": 0.8,
+}
+KEYFRAMES = 12
+
+
+def segment_at_rest(index: int) -> segment_pb2.StreamSegmentsRequest:
+    """A device that lies still and sees nothing."""
+    request = segment_pb2.StreamSegmentsRequest(parent="rigs/tablet")
+    segment = request.segment
+    segment.session = "rest"
+    segment.index = index
+    begin_ns = index * 10**10
+    for k in range(KEYFRAMES):
+        segment.keyframes.t_ns.append(begin_ns + k * 10**8)
+        segment.keyframes.q_gi.extend([1, 0, 0, 0])
+        for column in ("p_gi", "v_gi", "b_a", "b_g"):
+            getattr(segment.keyframes, column).extend([0, 0, 0])
+    for i in range((KEYFRAMES - 1) * 20 + 1):
+        segment.imu.t_ns.append(begin_ns + i * 5 * 10**6)
+        segment.imu.gyro.extend([0, 0, 0])
+        segment.imu.accel.extend([0, 0, 9.81])
+    return request
+
+
+class PythonTest(unittest.TestCase):
+    def setUp(self) -> None:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        socket = f"{self.folder}/state/selfcald.sock"
+        log = open(f"{self.folder}/log", "w", encoding="utf-8")
+        self.addCleanup(log.close)
+        process = subprocess.Popen(
+            [SELFCALD, "--state-dir", f"{self.folder}/state"], stderr=log
+        )
+        self.addCleanup(process.wait)
+        self.addCleanup(process.terminate)
+        while not os.path.exists(socket):
+            self.assertIsNone(process.poll(), "the daemon ended")
+            time.sleep(0.05)
+        self.target = f"unix:{socket}"
+        self.daemon = selfcal.connect(self.target)
+        self.addCleanup(self.daemon.close)
+        self.daemon.rig_service.CreateRig(
+            rig_pb2.CreateRigRequest(
+                rig=json_format.ParseDict(RIG, rig_pb2.Rig())
+            ),
+            wait_for_ready=True,
+        )
+
+    def test_lists_what_was_streamed(self) -> None:
+        stored = segment_pb2.StreamSegmentsResponse.STORED
+        verdicts = [
+            answer.verdict
+            for answer in self.daemon.stream(map(segment_at_rest, range(3)))
+        ]
+        self.assertEqual(verdicts, [stored] * 3)
+        frame = history.segment_frame(self.daemon, "tablet")
+        self.assertEqual(
+            list(frame.segment), ["rest~0", "rest~1", "rest~2"]
+        )
+        self.assertEqual(list(frame.keyframes), [KEYFRAMES] * 3)
+        self.assertAlmostEqual(frame.seconds[0], 1.1)
+
+    def test_plots_the_history(self) -> None:
+        frame = history.calibration_frame(self.daemon, "tablet")
+        self.assertEqual(set(frame.version), {1})
+        focal = frame[frame.component == "cam0.focal.x"].iloc[0]
+        self.assertEqual((focal.value, focal.unit), (260, "px"))
+        plot = f"{self.folder}/plot.png"
+        done = subprocess.run(
+            [sys.executable, EXAMPLE, self.target, "tablet", plot],
+            env={**os.environ, "PYTHONPATH": PACKAGE},
+            check=False,
+        )
+        self.assertEqual(done.returncode, 0)
+        with open(plot, "rb") as file:
+            self.assertEqual(file.read(4), b"\x89PNG")
+
+    def test_reads_rigs_tables_runs_and_the_active_version(self) -> None:
+        self.assertEqual([r.name for r in self.daemon.rigs()], ["rigs/tablet"])
+        self.assertEqual(len(self.daemon.tables("tablet")), 3)
+        self.assertEqual(list(self.daemon.recalibrations("tablet")), [])
+        self.assertEqual(self.daemon.calibration("tablet").version, 1)
+        watch = self.daemon.watch_calibration("tablet")
+        self.assertEqual(next(watch).version, 1)
+        watch.cancel()
+
+    def test_says_what_the_daemon_says(self) -> None:
+        with self.assertRaises(grpc.RpcError) as raised:
+            list(self.daemon.segments("unknown"))
+        self.assertEqual(raised.exception.code(), grpc.StatusCode.NOT_FOUND)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
