@@ -17,8 +17,8 @@ struct AccessRule {
   std::string_view method;  // full name, e.g. "selfcal.v1.RigService.GetRig"
   Role role = Role::kAdminister;
   // Path of the request's field whose name begins with rigs/{rig}; several with
-  // commas, which must all pass. Empty: the method concerns every rig, and needs
-  // the role on all of them.
+  // commas, which must all pass. Empty: the method concerns every rig, and
+  // needs the role on all of them.
   std::string_view rig_field;
 };
 

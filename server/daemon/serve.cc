@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "server/daemon/stop.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
+#include "server/service/grpc_log.h"
 #include "server/store/store_sqlite.h"
 
 namespace selfcal::server {
@@ -25,6 +27,8 @@ namespace {
 // A stop is over within 10 s, of which calls get a part to end by themselves.
 constexpr std::chrono::milliseconds kStopLimit{9500};
 constexpr std::chrono::milliseconds kCallLimit{2000};
+// How often it looks whether its addresses still accept.
+constexpr std::chrono::milliseconds kLookAfter{1000};
 
 int Failed(const std::string& what, const absl::Status& status) {
   spdlog::error("{}: {}", what, status.ToString());
@@ -63,15 +67,16 @@ absl::StatusOr<std::unique_ptr<Metrics>> OpenMetrics(
   return opened;
 }
 
-// The signal that ends the wait. A store that does not answer any more keeps
-// the watchdog from being told.
-int RunUntilStopped(
+// The signal to stop, or nothing if an address has gone deaf. A store that does
+// not answer any more keeps the watchdog from being told.
+std::optional<int> RunUntilStopped(
     Store* store,
     const std::function<std::optional<std::string>()>& read_log_level) {
-  const auto interval = WatchdogInterval();
-  for (;;) {
-    const auto signal = WaitForSignal(interval.value_or(std::chrono::hours(1)));
-    if (!signal && interval) {
+  const auto watchdog = WatchdogInterval();
+  const auto interval = std::min(watchdog.value_or(kLookAfter), kLookAfter);
+  while (!HasStoppedAccepting()) {
+    const auto signal = WaitForSignal(interval);
+    if (!signal && watchdog) {
       store->ListRigs({1, ""}).IgnoreError();
       NotifyAlive();
     } else if (signal == SIGHUP) {
@@ -79,9 +84,10 @@ int RunUntilStopped(
       if (level) SetLogLevel(*level);
       spdlog::info("log level: {}", level.value_or("as it was"));
     } else if (signal) {
-      return *signal;
+      return signal;
     }
   }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -126,14 +132,20 @@ int Serve(const DaemonOptions& options,
                fmt::join((*server)->addresses(), ", "));
   NotifyReady();
 
-  const int signal = RunUntilStopped(store->get(), read_log_level);
+  const auto signal = RunUntilStopped(store->get(), read_log_level);
   deadline.emplace(kStopLimit);
   NotifyStopping();
-  spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
+  if (signal) {
+    spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
+  } else {
+    spdlog::error(
+        "stopping to be started anew: with more connections than files it may "
+        "open, it does not accept any more");
+  }
   (*server)->Shutdown(kCallLimit);
   pipeline->Stop();
   spdlog::info("stopped");
-  return EXIT_SUCCESS;
+  return signal ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
 }  // namespace selfcal::server

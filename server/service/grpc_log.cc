@@ -3,7 +3,9 @@
 #include <grpc/support/log.h>
 #include <spdlog/spdlog.h>
 
+#include <atomic>
 #include <memory>
+#include <string_view>
 
 namespace selfcal::server {
 namespace {
@@ -15,7 +17,12 @@ const std::shared_ptr<spdlog::logger>& Logger() {
   return *logger;
 }
 
+std::atomic<bool> stopped_accepting = false;
+
 void Log(gpr_log_func_args* line) {
+  if (std::string_view(line->message).starts_with("Failed accept4")) {
+    stopped_accepting = true;
+  }
   // Its errors are failures of one connection, as a rule.
   const bool is_error = line->severity == GPR_LOG_SEVERITY_ERROR;
   Logger()->log(is_error ? spdlog::level::warn : spdlog::level::debug,
@@ -29,5 +36,7 @@ void RouteGrpcLog() {
   Logger();
   gpr_set_log_function(Log);
 }
+
+bool HasStoppedAccepting() { return stopped_accepting; }
 
 }  // namespace selfcal::server

@@ -7,4 +7,9 @@ namespace selfcal::server {
 // call does nothing.
 void RouteGrpcLog();
 
+// Whether an address has gone deaf. gRPC 1.51 gives up accepting on it for good
+// when the process has no file left for a connection, and says so in its log
+// alone.
+bool HasStoppedAccepting();
+
 }  // namespace selfcal::server

@@ -147,6 +147,31 @@ TEST_F(OperationTest, ServiceManagerIsToldOfStartLifeAndStop) {
   EXPECT_EQ(daemon->Wait(), 0);
 }
 
+// gRPC does not accept any more once it had no file for a connection: a daemon
+// that is deaf ends, so that its service manager starts it anew.
+TEST_F(OperationTest, MoreConnectionsThanFilesEndItWithAnError) {
+  const std::string shell = "ulimit -n 64; exec \"$0\" \"$@\"";
+  Process daemon(
+      {"/bin/bash", "-c", shell, SELFCALD_PATH, "--state-dir", state_.string()},
+      folder_ / "few");
+  ASSERT_TRUE(daemon.Says("selfcald ready")) << daemon.Log();
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  (state_ / "selfcald.sock")
+      .string()
+      .copy(address.sun_path, sizeof(address.sun_path) - 1);
+  std::vector<int> connections;
+  for (int k = 0; k < 100; ++k) {
+    connections.push_back(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    connect(connections.back(),
+            reinterpret_cast<sockaddr*>(&address),
+            sizeof(address));
+  }
+  EXPECT_EQ(daemon.Wait(), 1);
+  EXPECT_THAT(daemon.Log(), HasSubstr("to be started anew"));
+  for (const int connection : connections) close(connection);
+}
+
 // A promise: SIGTERM while clients stream ends the daemon with 0, which it does
 // only within 10 s, and what was acknowledged is there at the next start.
 TEST_F(OperationTest, StopUnderLoadLosesNothing) {
