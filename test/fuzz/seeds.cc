@@ -91,6 +91,17 @@ std::string ViMapSeed(const MotionSegment& segment) {
   return map.SerializeAsString();
 }
 
+std::string ConfigText() {
+  return R"(# A comment.
+state-dir = "/var/lib/selfcal"
+listen = ["unix:/run/selfcal/selfcald.sock", "insecure:127.0.0.1:7447"]
+scoring-threads = 2
+change-false-alarms = 1e-6
+log-level = "info"
+metrics = "off"
+)";
+}
+
 }  // namespace
 
 std::string FuzzSensorsText() {
@@ -130,6 +141,7 @@ std::vector<FuzzSeed> FuzzSeeds() {
   seeds.push_back(
       {"rig", "seed", ToProto(HandheldRig("fuzzed")).SerializeAsString()});
   seeds.push_back({"sensors", "seed", FuzzSensorsText()});
+  seeds.push_back({"config", "seed", ConfigText()});
   return seeds;
 }
 

@@ -11,6 +11,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"rig", FuzzRig},
       {"vi_map", FuzzViMap},
       {"sensors", FuzzSensors},
+      {"config", FuzzConfig},
   };
   return targets;
 }

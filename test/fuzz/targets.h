@@ -27,6 +27,8 @@ void FuzzRig(std::string_view bytes);
 void FuzzViMap(std::string_view bytes);
 // The text of a VI-map's sensors.yaml.
 void FuzzSensors(std::string_view bytes);
+// The daemon's file of settings.
+void FuzzConfig(std::string_view bytes);
 
 // Ends the process with the sentence if it does not hold.
 void FuzzCheck(bool holds, const char* sentence);

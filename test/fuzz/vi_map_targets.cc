@@ -1,4 +1,3 @@
-#include <unistd.h>
 #include <zlib.h>
 
 #include <filesystem>
@@ -7,6 +6,7 @@
 
 #include "client/import/vi_map.h"
 #include "client/import/vi_map_sensors.h"
+#include "test/fuzz/fuzz_folder.h"
 #include "test/fuzz/seeds.h"
 #include "test/fuzz/targets.h"
 
@@ -15,11 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One folder for a process, made anew by its first call.
-const fs::path& Folder() {
+// A map that lacks its part.
+const fs::path& MapFolder() {
   static const fs::path folder = [] {
-    fs::path path = fs::temp_directory_path() /
-                    ("selfcal-fuzz-" + std::to_string(::getpid()));
+    fs::path path = FuzzFolder() / "map";
     fs::create_directories(path / "vi_map");
     std::ofstream(path / "vi_map/vi_map_metadata")
         << "files { file_type: 0 path: \"part\" }";
@@ -32,12 +31,12 @@ const fs::path& Folder() {
 }  // namespace
 
 void FuzzViMap(std::string_view bytes) {
-  const std::string part = (Folder() / "vi_map/part").string();
+  const std::string part = (MapFolder() / "vi_map/part").string();
   gzFile file = gzopen(part.c_str(), "wb1");
   FuzzCheck(file != nullptr, "the temporary folder can be written");
   gzwrite(file, bytes.data(), static_cast<unsigned>(bytes.size()));
   gzclose(file);
-  const auto recording = client::ReadViMap(Folder().string(), {});
+  const auto recording = client::ReadViMap(MapFolder().string(), {});
   if (!recording.ok()) {
     FuzzCheck(!recording.status().message().empty(), "a refusal says why");
     return;
