@@ -45,7 +45,7 @@ int Serve(const DaemonOptions& options) {
   const auto lock = StateLock::Take(options.state_dir);
   if (!lock.ok()) return Failed("cannot start", lock.status());
   const std::string database = (options.state_dir / "selfcal.db").string();
-  const auto store = MakeSqliteStore(database, options.change);
+  const auto store = MakeSqliteStore(database, {.change = options.change});
   if (!store.ok()) return Failed("cannot open " + database, store.status());
 
   PipelineOptions pipeline_options;
