@@ -5,7 +5,9 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <memory>
@@ -39,7 +41,9 @@ int Failed(const std::string& what, const absl::Status& status) {
   return EXIT_FAILURE;
 }
 
-int Serve(const DaemonOptions& options) {
+// Until it is told to stop; *restored says that it was because a restored
+// database waits for the next start.
+int Serve(const DaemonOptions& options, std::atomic<bool>* restored) {
   // First, so that it watches over the end of all that follows.
   std::optional<StopDeadline> deadline;
   const auto lock = StateLock::Take(options.state_dir);
@@ -58,7 +62,11 @@ int Serve(const DaemonOptions& options) {
   }
   ServerOptions server_options;
   server_options.listen = options.listen;
-  const auto server = MakeServer(store->get(), pipeline.get(), server_options);
+  const auto server =
+      MakeServer(store->get(), pipeline.get(), server_options, [restored] {
+        *restored = true;
+        kill(getpid(), SIGTERM);
+      });
   if (!server.ok()) {
     pipeline->Stop();
     return Failed("cannot serve", server.status());
@@ -91,7 +99,12 @@ int main(int argc, char** argv) {
   BlockStopSignals();
   try {
     SetUpLog(options.log_level);
-    return Serve(options);
+    for (;;) {
+      std::atomic<bool> restored = false;
+      const int exit_code = Serve(options, &restored);
+      if (exit_code != EXIT_SUCCESS || !restored) return exit_code;
+      spdlog::info("starting anew with the restored database");
+    }
   } catch (const std::exception& error) {
     spdlog::critical("{}", error.what());
     return EXIT_FAILURE;

@@ -4,6 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <future>
+#include <memory>
 #include <utility>
 
 #include "core/information/segment_scorer.h"
@@ -51,22 +53,29 @@ class PipelineImpl : public Pipeline {
       const std::string& rig,
       const MotionSegment& segment,
       const std::function<bool()>& cancelled) override {
-    SubmitResult result;
-    SELFCAL_ASSIGN_OR_RETURN(result.violations, Check(rig, segment));
-    if (!result.violations.empty()) {
-      return result;
+    const auto result =
+        std::make_shared<std::promise<absl::StatusOr<SubmitResult>>>();
+    BeginSubmit(rig, segment, cancelled, [result](const auto& submitted) {
+      result->set_value(submitted);
+    });
+    return result->get_future().get();
+  }
+
+  void BeginSubmit(const std::string& rig,
+                   const MotionSegment& segment,
+                   const std::function<bool()>& cancelled,
+                   const SubmitDone& done) override {
+    auto violations = Check(rig, segment);
+    if (!violations.ok()) return done(violations.status());
+    if (!violations->empty()) {
+      return done(SubmitResult{SubmitResult::Verdict::kRejected,
+                               *std::move(violations)});
     }
-    SELFCAL_RETURN_IF_ERROR(scoring_.TakePlace(cancelled));
-    const absl::StatusOr<PutVerdict> verdict = store_->PutSegment(rig, segment);
-    if (!verdict.ok() || *verdict == PutVerdict::kDuplicate) {
-      scoring_.ReturnPlace();
-      SELFCAL_RETURN_IF_ERROR(verdict.status());
-      result.verdict = SubmitResult::Verdict::kDuplicate;
-      return result;
-    }
-    scoring_.FillPlace();
-    result.verdict = SubmitResult::Verdict::kStored;
-    return result;
+    const absl::Status place = scoring_.TakePlace(cancelled);
+    if (!place.ok()) return done(place);
+    store_->BeginPutSegment(rig, segment, [this, done](const auto& verdict) {
+      done(Settle(verdict));
+    });
   }
 
   absl::StatusOr<StoredRun> StartRecalibration(
@@ -101,6 +110,18 @@ class PipelineImpl : public Pipeline {
   }
 
  private:
+  // Gives the place in the backlog its segment, or gives it back.
+  absl::StatusOr<SubmitResult> Settle(
+      const absl::StatusOr<PutVerdict>& verdict) {
+    if (verdict.ok() && *verdict == PutVerdict::kStored) {
+      scoring_.FillPlace();
+      return SubmitResult{SubmitResult::Verdict::kStored, {}};
+    }
+    scoring_.ReturnPlace();
+    SELFCAL_RETURN_IF_ERROR(verdict.status());
+    return SubmitResult{SubmitResult::Verdict::kDuplicate, {}};
+  }
+
   // Every violation of a segment: those of its values, and the version that it
   // names, which only the store knows.
   absl::StatusOr<std::vector<Violation>> Check(const std::string& rig_name,

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <utility>
 
 #include "server/service/services.h"
 
@@ -18,6 +19,7 @@ constexpr const char* kServiceNames[] = {
     "selfcal.v1.SegmentService",
     "selfcal.v1.CalibrationService",
     "selfcal.v1.RecalibrationService",
+    "selfcal.v1.StoreService",
 };
 
 // Plugins of gRPC's builder are global and meant to be set once.
@@ -53,12 +55,17 @@ std::string BoundAddress(const std::string& address, int port) {
 
 class GrpcServer final : public Server {
  public:
-  GrpcServer(Store* store, Pipeline* pipeline) {
-    const ServiceContext context{store, pipeline, &stopping_};
+  GrpcServer(Store* store,
+             Pipeline* pipeline,
+             const ServerOptions& options,
+             std::function<void()> restored) {
+    const ServiceContext context{
+        store, pipeline, &stopping_, options.max_streams, std::move(restored)};
     services_.push_back(MakeRigService(context));
     services_.push_back(MakeSegmentService(context));
     services_.push_back(MakeCalibrationService(context));
     services_.push_back(MakeRecalibrationService(context));
+    services_.push_back(MakeStoreService(context));
   }
 
   ~GrpcServer() override { Shutdown(std::chrono::milliseconds(0)); }
@@ -122,11 +129,15 @@ class GrpcServer final : public Server {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
-    Store* store, Pipeline* pipeline, const ServerOptions& options) {
+    Store* store,
+    Pipeline* pipeline,
+    const ServerOptions& options,
+    std::function<void()> restored) {
   if (options.listen.empty()) {
     return absl::InvalidArgumentError("no address to listen on");
   }
-  auto server = std::make_unique<GrpcServer>(store, pipeline);
+  auto server = std::make_unique<GrpcServer>(
+      store, pipeline, options, std::move(restored));
   if (absl::Status started = server->Start(options); !started.ok()) {
     return started;
   }

@@ -1,4 +1,4 @@
-// The gRPC server: the four services, grpc.health.v1 and reflection, on unix
+// The gRPC server: the five services, grpc.health.v1 and reflection, on unix
 // sockets or TCP ports.
 //
 // There is no encryption and no authentication: who can open the socket or
@@ -9,6 +9,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,9 +23,10 @@ struct ServerOptions {
   // "unix:/path" or "host:port"; port 0 takes a free one.
   std::vector<std::string> listen;
   int max_receive_bytes = 64 << 20;  // of one message
-  // Every stream and every watch holds a thread; calls beyond are refused with
-  // RESOURCE_EXHAUSTED.
+  // Every watch holds a thread; calls beyond are refused with
+  // RESOURCE_EXHAUSTED, as are streams of segments beyond theirs.
   int max_threads = 128;
+  int max_streams = 256;
   std::int64_t max_memory_bytes = 512 << 20;  // of messages in flight
 };
 
@@ -42,9 +44,14 @@ class Server {
   virtual void Shutdown(std::chrono::milliseconds deadline) = 0;
 };
 
-// Starts a server; `store` and `pipeline` must outlive it. INVALID_ARGUMENT
-// without an address; UNAVAILABLE if one cannot be listened on.
+// Starts a server; `store` and `pipeline` must outlive it. `restored` is called
+// on one of its threads when a restored database waits for the next start.
+// INVALID_ARGUMENT without an address; UNAVAILABLE if one cannot be listened
+// on.
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
-    Store* store, Pipeline* pipeline, const ServerOptions& options);
+    Store* store,
+    Pipeline* pipeline,
+    const ServerOptions& options,
+    std::function<void()> restored = nullptr);
 
 }  // namespace selfcal::server

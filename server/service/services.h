@@ -1,14 +1,15 @@
-// The four services of the contract, each in a file of its own: decode the
+// The five services of the contract, each in a file of its own: decode the
 // request, ask the store or the pipeline, encode the answer. Nothing that comes
 // from the network aborts or throws out of a handler.
 //
-// Every call runs on a thread of the gRPC server; a stream or a watch holds one
-// as long as it lives.
+// Every call runs on a thread of the gRPC server; a watch holds one as long as
+// it lives, a stream of segments has one of its own.
 #pragma once
 
 #include <grpcpp/impl/codegen/service_type.h>
 
 #include <atomic>
+#include <functional>
 #include <memory>
 
 #include "server/pipeline/pipeline.h"
@@ -22,6 +23,9 @@ struct ServiceContext {
   Pipeline* pipeline = nullptr;
   // Once true, watches and streams end with UNAVAILABLE.
   const std::atomic<bool>* stopping = nullptr;
+  int max_streams = 256;  // of segments, at once
+  // Called when a restored database waits for the next start; or nothing.
+  std::function<void()> restored;
 };
 
 std::unique_ptr<grpc::Service> MakeRigService(const ServiceContext& context);
@@ -31,5 +35,6 @@ std::unique_ptr<grpc::Service> MakeCalibrationService(
     const ServiceContext& context);
 std::unique_ptr<grpc::Service> MakeRecalibrationService(
     const ServiceContext& context);
+std::unique_ptr<grpc::Service> MakeStoreService(const ServiceContext& context);
 
 }  // namespace selfcal::server
