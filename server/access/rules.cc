@@ -35,6 +35,10 @@ constexpr AccessRule kRules[] = {
     {"selfcal.v1.RecalibrationService.CancelRecalibration",
      Role::kAdminister,
      "name"},
+    {"selfcal.v1.StoreService.CheckStore", Role::kAdminister, ""},
+    {"selfcal.v1.StoreService.BackupStore", Role::kAdminister, ""},
+    {"selfcal.v1.StoreService.RestoreStore", Role::kAdminister, ""},
+    {"selfcal.v1.StoreService.ListEvents", Role::kRead, "parent", true},
 };
 
 // Every method has a request type of its own, in the file of its service.
@@ -100,7 +104,11 @@ bool Passes(const Caller& caller,
   for (;;) {
     const std::size_t comma = fields.find(',');
     const std::string name = TextAt(request, fields.substr(0, comma));
-    if (!Holds(caller, rule.role, name)) return false;
+    const bool every = name.empty() && rule.empty_is_every;
+    if (!(every ? HoldsOnEveryRig(caller, rule.role)
+                : Holds(caller, rule.role, name))) {
+      return false;
+    }
     if (comma == fields.npos) return true;
     fields.remove_prefix(comma + 1);
   }

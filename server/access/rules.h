@@ -20,6 +20,8 @@ struct AccessRule {
   // commas, which must all pass. Empty: the method concerns every rig, and
   // needs the role on all of them.
   std::string_view rig_field;
+  // An empty name asks for all rigs, and needs the role on all of them.
+  bool empty_is_every = false;
 };
 
 std::span<const AccessRule> AccessRules();
@@ -27,8 +29,8 @@ std::span<const AccessRule> AccessRules();
 // Whether the caller may make the call with this request, whose type stands
 // for the method. PERMISSION_DENIED with a sentence that names what is missing.
 // Where the request leaves the name of the rig empty the role on any rig is
-// enough: in a stream the first message's name holds for the later ones, and
-// no method takes an empty name otherwise.
+// enough, unless the rule says otherwise: in a stream the first message's name
+// holds for the later ones, and no other method takes an empty name.
 absl::Status Authorise(const Caller& caller,
                        const google::protobuf::Message& request);
 

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "core/calibration/calibrate.h"
-#include "core/change/detect_change.h"
 #include "server/service/server.h"
+#include "server/store/store_options.h"
 
 namespace selfcal::server {
 
@@ -23,7 +23,7 @@ struct DaemonOptions {
   int scoring_threads = 1;
   int max_backlog = 64;  // stored and unscored segments; then streams wait
   SolverKind solver = SolverKind::kStructured;
-  ChangeOptions change;
+  StoreOptions store;
   std::string metrics = "off";  // or host:port of the loopback
   int metrics_rigs = 16;        // with series of their own
   std::string log_level = "info";

@@ -4,8 +4,10 @@
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <memory>
@@ -90,22 +92,11 @@ std::optional<int> RunUntilStopped(
   return std::nullopt;
 }
 
-}  // namespace
-
-int Check(const DaemonOptions& options) {
-  absl::Status status = CheckServerOptions(options.server);
-  if (status.ok() && options.metrics != "off") {
-    status = CheckMetricsAddress(options.metrics);
-  }
-  if (!status.ok()) return Failed("the settings have a mistake", status);
-  spdlog::info("the settings are good; state-dir {}, listening on {}",
-               options.state_dir.string(),
-               fmt::join(options.server.listen, ", "));
-  return EXIT_SUCCESS;
-}
-
-int Serve(const DaemonOptions& options,
-          const std::function<std::optional<std::string>()>& read_log_level) {
+// From a start to a stop; *restored says that it stopped for a database that
+// was restored.
+int ServeOnce(const DaemonOptions& options,
+              const std::function<std::optional<std::string>()>& read_log_level,
+              std::atomic<bool>* restored) {
   // First, so that it watches over the end of all that follows.
   std::optional<StopDeadline> deadline;
   RaiseFileLimit();
@@ -113,7 +104,7 @@ int Serve(const DaemonOptions& options,
   if (!lock.ok()) return Failed("cannot start", lock.status());
   const std::string database = (options.state_dir / "selfcal.db").string();
   NotifyStatus("opening the database, with migrations if it is older");
-  const auto store = MakeSqliteStore(database, options.change);
+  const auto store = MakeSqliteStore(database, options.store);
   if (!store.ok()) return Failed("cannot open " + database, store.status());
   const auto metrics = OpenMetrics(options, database, store->get());
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
@@ -123,7 +114,13 @@ int Serve(const DaemonOptions& options,
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);
   }
-  const auto server = MakeServer(store->get(), pipeline.get(), options.server);
+  // A restored database takes its place at a start.
+  const auto start_anew = [restored] {
+    *restored = true;
+    kill(getpid(), SIGTERM);
+  };
+  const auto server =
+      MakeServer(store->get(), pipeline.get(), options.server, start_anew);
   if (!server.ok()) {
     pipeline->Stop();
     return Failed("cannot serve", server.status());
@@ -146,6 +143,30 @@ int Serve(const DaemonOptions& options,
   pipeline->Stop();
   spdlog::info("stopped");
   return signal ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+}  // namespace
+
+int Check(const DaemonOptions& options) {
+  absl::Status status = CheckServerOptions(options.server);
+  if (status.ok() && options.metrics != "off") {
+    status = CheckMetricsAddress(options.metrics);
+  }
+  if (!status.ok()) return Failed("the settings have a mistake", status);
+  spdlog::info("the settings are good; state-dir {}, listening on {}",
+               options.state_dir.string(),
+               fmt::join(options.server.listen, ", "));
+  return EXIT_SUCCESS;
+}
+
+int Serve(const DaemonOptions& options,
+          const std::function<std::optional<std::string>()>& read_log_level) {
+  for (;;) {
+    std::atomic<bool> restored = false;
+    const int exit_code = ServeOnce(options, read_log_level, &restored);
+    if (exit_code != EXIT_SUCCESS || !restored) return exit_code;
+    spdlog::info("starting anew with the restored database");
+  }
 }
 
 }  // namespace selfcal::server

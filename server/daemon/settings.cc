@@ -119,12 +119,18 @@ void DefineLimits(Definer* define, DaemonOptions* options) {
   define
       ->Add("max-threads",
             &server.max_threads,
-            "Threads of calls; each stream and each watch holds one")
+            "Threads of calls; each watch holds one")
       ->check(CLI::Range(8, kMaxThreads))
       ->capture_default_str();
   define
       ->Add(
           "max-streams", &server.max_streams, "Calls at once on one connection")
+      ->check(CLI::Range(1, kMaxThreads))
+      ->capture_default_str();
+  define
+      ->Add("max-segment-streams",
+            &server.max_segment_streams,
+            "Streams of segments at once, each with a thread of its own")
       ->check(CLI::Range(1, kMaxThreads))
       ->capture_default_str();
   define->Add("max-rigs", &server.max_rigs, "Rigs in the database")
@@ -136,6 +142,28 @@ void DefineLimits(Definer* define, DaemonOptions* options) {
             "Segments that wait for their score; then streams wait")
       ->check(CLI::Range(1, kMaxBacklog))
       ->capture_default_str();
+}
+
+// Each is off at 0.
+void DefineQuotas(Definer* define, Quotas* quotas) {
+  const CLI::Range any(std::int64_t{0},
+                       std::numeric_limits<std::int64_t>::max());
+  const auto add =
+      [&](const char* name, std::int64_t* value, const char* help) {
+        define->Add(name, value, help)->check(any)->capture_default_str();
+      };
+  add("max-payload-bytes-per-rig",
+      &quotas->max_payload_bytes_per_rig,
+      "Bytes of stored data of one rig's segments; 0: no limit");
+  add("max-segments-per-rig",
+      &quotas->max_segments_per_rig,
+      "Segments of one rig whose metadata is kept; 0: no limit");
+  add("max-segment-age",
+      &quotas->max_segment_age_s,
+      "Seconds that metadata of segments is kept; 0: no limit");
+  add("max-database-bytes",
+      &quotas->max_database_bytes,
+      "Bytes of the database; near it segments are refused; 0: no limit");
 }
 
 void DefineEstimation(Definer* define, DaemonOptions* options) {
@@ -155,14 +183,14 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
       ->default_str("structured");
   define
       ->Add("change-inflation",
-            &options->change.inflation,
+            &options->store.change.inflation,
             "Factor on the variances of segments in the test for a change of "
             "the device [what the active calibration found: the square of its "
             "track noise factor]")
       ->check(CLI::Range(1.0, kMaxInflation));
   define
       ->Add("change-false-alarms",
-            &options->change.false_alarm_rate,
+            &options->store.change.false_alarm_rate,
             "Bound on false alarms of that test, for each segment; 0 turns it "
             "off")
       ->check(CLI::Range(0.0, 1.0))
@@ -206,6 +234,7 @@ void DefineSettings(CLI::App* app,
              "exist [STATE_DIRECTORY]");
   DefineAccess(&define, &options->server);
   DefineLimits(&define, options);
+  DefineQuotas(&define, &options->store.quotas);
   DefineEstimation(&define, options);
   DefineReports(&define, options);
 }

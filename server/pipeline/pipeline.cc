@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <future>
 #include <memory>
 #include <utility>
 
@@ -35,7 +36,7 @@ PipelineObserver::Verdict VerdictOf(
 }
 
 // The estimators with each score told to the observer, if there is one.
-Estimators Observed(Estimators estimators, PipelineObserver* observer) {
+Estimators ObserveScores(Estimators estimators, PipelineObserver* observer) {
   if (observer == nullptr) return estimators;
   const auto score = estimators.score;
   estimators.score = [=](const Rig& rig,
@@ -70,7 +71,7 @@ class PipelineImpl : public Pipeline {
             store, options, estimators, &calibration_watchers_, &run_watchers_),
         scoring_(store,
                  options,
-                 Observed(estimators, options.observer),
+                 ObserveScores(estimators, options.observer),
                  [this](const StoredRun& run) {
                    spdlog::info("run {} of rig {} is due", run.run, run.rig);
                    recalibrator_.Wake();
@@ -94,32 +95,30 @@ class PipelineImpl : public Pipeline {
       const std::string& rig,
       const MotionSegment& segment,
       const std::function<bool()>& cancelled) override {
-    absl::StatusOr<SubmitResult> result = Take(rig, segment, cancelled);
-    if (options_.observer != nullptr) {
-      options_.observer->OnVerdict(rig, VerdictOf(result));
-    }
-    return result;
+    const auto result =
+        std::make_shared<std::promise<absl::StatusOr<SubmitResult>>>();
+    BeginSubmit(rig, segment, cancelled, [result](const auto& submitted) {
+      result->set_value(submitted);
+    });
+    return result->get_future().get();
   }
 
-  absl::StatusOr<SubmitResult> Take(const std::string& rig,
-                                    const MotionSegment& segment,
-                                    const std::function<bool()>& cancelled) {
-    SubmitResult result;
-    SELFCAL_ASSIGN_OR_RETURN(result.violations, Check(rig, segment));
-    if (!result.violations.empty()) {
-      return result;
+  void BeginSubmit(const std::string& rig,
+                   const MotionSegment& segment,
+                   const std::function<bool()>& cancelled,
+                   const SubmitDone& submitted) override {
+    const SubmitDone done = Observed(rig, submitted);
+    auto violations = Check(rig, segment);
+    if (!violations.ok()) return done(violations.status());
+    if (!violations->empty()) {
+      return done(SubmitResult{SubmitResult::Verdict::kRejected,
+                               *std::move(violations)});
     }
-    SELFCAL_RETURN_IF_ERROR(scoring_.TakePlace(cancelled));
-    const absl::StatusOr<PutVerdict> verdict = store_->PutSegment(rig, segment);
-    if (!verdict.ok() || *verdict == PutVerdict::kDuplicate) {
-      scoring_.ReturnPlace();
-      SELFCAL_RETURN_IF_ERROR(verdict.status());
-      result.verdict = SubmitResult::Verdict::kDuplicate;
-      return result;
-    }
-    scoring_.FillPlace();
-    result.verdict = SubmitResult::Verdict::kStored;
-    return result;
+    const absl::Status place = scoring_.TakePlace(cancelled);
+    if (!place.ok()) return done(place);
+    store_->BeginPutSegment(rig, segment, [this, done](const auto& verdict) {
+      done(Settle(verdict));
+    });
   }
 
   absl::StatusOr<StoredRun> StartRecalibration(
@@ -154,6 +153,28 @@ class PipelineImpl : public Pipeline {
   }
 
  private:
+  // Tells the observer, if there is one, before `done`.
+  SubmitDone Observed(const std::string& rig, const SubmitDone& done) const {
+    PipelineObserver* observer = options_.observer;
+    if (observer == nullptr) return done;
+    return [observer, rig, done](const absl::StatusOr<SubmitResult>& result) {
+      observer->OnVerdict(rig, VerdictOf(result));
+      done(result);
+    };
+  }
+
+  // Gives the place in the backlog its segment, or gives it back.
+  absl::StatusOr<SubmitResult> Settle(
+      const absl::StatusOr<PutVerdict>& verdict) {
+    if (verdict.ok() && *verdict == PutVerdict::kStored) {
+      scoring_.FillPlace();
+      return SubmitResult{SubmitResult::Verdict::kStored, {}};
+    }
+    scoring_.ReturnPlace();
+    SELFCAL_RETURN_IF_ERROR(verdict.status());
+    return SubmitResult{SubmitResult::Verdict::kDuplicate, {}};
+  }
+
   // Every violation of a segment: those of its values, and the version that it
   // names, which only the store knows.
   absl::StatusOr<std::vector<Violation>> Check(const std::string& rig_name,

@@ -93,6 +93,20 @@ class Pipeline {
       const MotionSegment& segment,
       const std::function<bool()>& cancelled) = 0;
 
+  // The same without waiting for the disk, so that segments of one caller can
+  // share a commit: it returns when the segment is refused or queued to be
+  // written. `done` is called once, on any thread; it is short and calls
+  // neither the pipeline nor the store. Segments of one caller are stored in
+  // the order of its calls.
+  using SubmitDone =
+      std::function<void(const absl::StatusOr<SubmitResult>& result)>;
+  virtual void BeginSubmit(const std::string& rig,
+                           const MotionSegment& segment,
+                           const std::function<bool()>& cancelled,
+                           const SubmitDone& done) {
+    done(Submit(rig, segment, cancelled));
+  }
+
   // On the tables as they are (Store::CreateManualRun).
   virtual absl::StatusOr<StoredRun> StartRecalibration(
       const std::string& rig) = 0;

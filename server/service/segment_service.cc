@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
@@ -6,7 +7,7 @@
 #include "server/service/encode.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
-#include "server/service/segment_stream.h"
+#include "server/service/segment_call.h"
 #include "server/service/services.h"
 
 namespace selfcal::server {
@@ -16,27 +17,16 @@ constexpr char kRigType[] = "selfcal.v1.Rig";
 constexpr char kSegmentType[] = "selfcal.v1.Segment";
 constexpr char kTableType[] = "selfcal.v1.Table";
 
-class SegmentService final : public v1::SegmentService::Service {
+// Streams are answered as segments become durable, all else at once.
+using Service = v1::SegmentService::WithCallbackMethod_StreamSegments<
+    v1::SegmentService::Service>;
+
+class SegmentService final : public Service {
  public:
   explicit SegmentService(const ServiceContext& context) : context_(context) {}
 
-  grpc::Status StreamSegments(
-      grpc::ServerContext* call,
-      grpc::ServerReaderWriter<v1::StreamSegmentsResponse,
-                               v1::StreamSegmentsRequest>* stream) override {
-    return Guarded([&]() -> grpc::Status {
-      SegmentStream segments(context_, [call] { return call->IsCancelled(); });
-      v1::StreamSegmentsRequest request;
-      v1::StreamSegmentsResponse response;
-      while (stream->Read(&request)) {
-        const auto may = Authorise(*call, context_.local_role, request);
-        if (!may.ok()) return may;
-        const grpc::Status status = segments.Take(request, &response);
-        if (!status.ok()) return status;
-        if (!stream->Write(response)) return grpc::Status::CANCELLED;
-      }
-      return grpc::Status::OK;
-    });
+  SegmentReactor* StreamSegments(grpc::CallbackServerContext* call) override {
+    return StartSegmentCall(context_, call, &open_streams_);
   }
 
   grpc::Status ListSegments(grpc::ServerContext* call,
@@ -119,6 +109,7 @@ class SegmentService final : public v1::SegmentService::Service {
 
  private:
   ServiceContext context_;
+  std::atomic<int> open_streams_ = 0;
 };
 
 }  // namespace

@@ -60,37 +60,45 @@ grpc::Status SegmentStream::Open(const std::string& parent) {
   return grpc::Status::OK;
 }
 
-grpc::Status SegmentStream::Take(const v1::StreamSegmentsRequest& request,
-                                 v1::StreamSegmentsResponse* response) {
-  response->Clear();
-  if (stopped()) return ShuttingDown();
+void SegmentStream::Take(const v1::StreamSegmentsRequest& request,
+                         const Done& done) {
+  if (stopped()) return done({ShuttingDown(), {}});
   if (parent_.empty()) {
-    if (grpc::Status open = Open(request.parent()); !open.ok()) return open;
+    grpc::Status open = Open(request.parent());
+    if (!open.ok()) return done({std::move(open), {}});
   }
-  response->set_session(
-      Shortened(request.segment().session(), kMaxSessionEcho));
-  response->set_index(request.segment().index());
+  v1::StreamSegmentsResponse response;
+  response.set_session(Shortened(request.segment().session(), kMaxSessionEcho));
+  response.set_index(request.segment().index());
   if (!request.parent().empty() && request.parent() != parent_) {
     Reject({{"parent",
              "is another rig than that of the first message; open a stream "
              "for each rig"}},
-           response);
-    return grpc::Status::OK;
+           &response);
+    return done({grpc::Status::OK, std::move(response)});
   }
   MotionSegment segment;
   const auto violations = FromProto(request.segment(), "", &segment);
   if (!violations.empty()) {
-    Reject(violations, response);
-    return grpc::Status::OK;
+    Reject(violations, &response);
+    return done({grpc::Status::OK, std::move(response)});
   }
-  const auto result = context_.pipeline->Submit(
-      rig_, segment, [this] { return stopped() || cancelled_(); });
-  if (!result.ok()) {
-    if (stopped()) return ShuttingDown();
-    return ToGrpc(result.status(), {"selfcal.v1.Rig", parent_, "segment"});
-  }
-  FillVerdict(*result, response);
-  return grpc::Status::OK;
+  context_.pipeline->BeginSubmit(
+      rig_,
+      segment,
+      [this] { return stopped() || cancelled_(); },
+      [this, done, response](const auto& result) {
+        Answer answer{grpc::Status::OK, response};
+        if (result.ok()) {
+          FillVerdict(*result, &answer.response);
+        } else if (stopped()) {
+          answer.status = ShuttingDown();
+        } else {
+          answer.status =
+              ToGrpc(result.status(), {"selfcal.v1.Rig", parent_, "segment"});
+        }
+        done(std::move(answer));
+      });
 }
 
 }  // namespace selfcal::server

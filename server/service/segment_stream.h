@@ -1,4 +1,4 @@
-// The state of one StreamSegments call. Used by one thread.
+// What happens to the segments of one StreamSegments call.
 #pragma once
 
 #include <grpcpp/support/status.h>
@@ -13,13 +13,21 @@ namespace selfcal::server {
 
 class SegmentStream {
  public:
+  // The verdict on one segment, or the error that ends the stream: the first
+  // message does not name a rig that exists, or the store fails.
+  struct Answer {
+    grpc::Status status;
+    v1::StreamSegmentsResponse response;
+  };
+  using Done = std::function<void(Answer answer)>;
+
   // `cancelled` tells whether the caller has gone.
   SegmentStream(const ServiceContext& context, std::function<bool()> cancelled);
 
-  // Takes one request and fills the verdict on it. An error ends the stream:
-  // the first message does not name a rig that exists, or the store fails.
-  grpc::Status Take(const v1::StreamSegmentsRequest& request,
-                    v1::StreamSegmentsResponse* response);
+  // Takes one request; one thread calls. Waits while the daemon is behind, but
+  // not for the disk. `done` is called once unless this throws: on this thread,
+  // or on another that must not be held up.
+  void Take(const v1::StreamSegmentsRequest& request, const Done& done);
 
  private:
   grpc::Status Open(const std::string& parent);

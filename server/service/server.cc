@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <utility>
 
 #include "server/service/credentials.h"
 #include "server/service/grpc_log.h"
@@ -21,6 +22,7 @@ constexpr const char* kServiceNames[] = {
     "selfcal.v1.SegmentService",
     "selfcal.v1.CalibrationService",
     "selfcal.v1.RecalibrationService",
+    "selfcal.v1.StoreService",
 };
 
 // Plugins of gRPC's builder are global and meant to be set once.
@@ -71,13 +73,22 @@ void AddAddresses(const ServerOptions& options,
 
 class GrpcServer final : public Server {
  public:
-  GrpcServer(Store* store, Pipeline* pipeline, const ServerOptions& options) {
-    const ServiceContext context{
-        store, pipeline, &stopping_, options.local_role, options.max_rigs};
+  GrpcServer(Store* store,
+             Pipeline* pipeline,
+             const ServerOptions& options,
+             std::function<void()> restored) {
+    const ServiceContext context{store,
+                                 pipeline,
+                                 &stopping_,
+                                 options.local_role,
+                                 options.max_rigs,
+                                 options.max_segment_streams,
+                                 std::move(restored)};
     services_.push_back(MakeRigService(context));
     services_.push_back(MakeSegmentService(context));
     services_.push_back(MakeCalibrationService(context));
     services_.push_back(MakeRecalibrationService(context));
+    services_.push_back(MakeStoreService(context));
   }
 
   ~GrpcServer() override { Shutdown(std::chrono::milliseconds(0)); }
@@ -144,9 +155,13 @@ class GrpcServer final : public Server {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
-    Store* store, Pipeline* pipeline, const ServerOptions& options) {
+    Store* store,
+    Pipeline* pipeline,
+    const ServerOptions& options,
+    std::function<void()> restored) {
   SELFCAL_RETURN_IF_ERROR(CheckServerOptions(options));
-  auto server = std::make_unique<GrpcServer>(store, pipeline, options);
+  auto server = std::make_unique<GrpcServer>(
+      store, pipeline, options, std::move(restored));
   if (absl::Status started = server->Start(options); !started.ok()) {
     return started;
   }

@@ -1,4 +1,4 @@
-// The gRPC server: the four services, grpc.health.v1 and reflection, on unix
+// The gRPC server: the five services, grpc.health.v1 and reflection, on unix
 // sockets or TCP ports (credentials.h says how each is opened). What a caller
 // may do is in server/access; health and reflection are for all who connect.
 // Any thread may call.
@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -45,9 +46,10 @@ struct ServerOptions {
   // Of callers without a certificate: over unix sockets and insecure ports.
   Role local_role = Role::kAdminister;
   int max_receive_bytes = 64 << 20;  // of one message
-  // Every stream and every watch holds a thread; calls beyond are refused with
-  // RESOURCE_EXHAUSTED.
+  // Every watch holds a thread; calls beyond are refused with
+  // RESOURCE_EXHAUSTED, as are streams of segments beyond theirs.
   int max_threads = 128;
+  int max_segment_streams = 256;
   std::int64_t max_memory_bytes = 512 << 20;  // of messages in flight
   int max_streams = 100;  // calls at once on one connection; more wait
   std::int64_t max_rigs = 10'000;
@@ -74,9 +76,14 @@ class Server {
   virtual void Shutdown(std::chrono::milliseconds deadline) = 0;
 };
 
-// Starts a server; `store` and `pipeline` must outlive it. Errors of
-// CheckServerOptions; UNAVAILABLE if an address cannot be listened on.
+// Starts a server; `store` and `pipeline` must outlive it. `restored` is called
+// on one of its threads when a restored database waits for the next start.
+// Errors of CheckServerOptions; UNAVAILABLE if an address cannot be listened
+// on.
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
-    Store* store, Pipeline* pipeline, const ServerOptions& options);
+    Store* store,
+    Pipeline* pipeline,
+    const ServerOptions& options,
+    std::function<void()> restored = nullptr);
 
 }  // namespace selfcal::server

@@ -134,18 +134,10 @@ void SetCheckpointOnClose(Connection* connection, bool on) {
 
 }  // namespace
 
-absl::StatusOr<Connection> OpenDatabase(const std::string& path,
-                                        std::span<const Migration> migrations) {
-  SELFCAL_ASSIGN_OR_RETURN(const DatabaseFile file, InspectDatabaseFile(path));
-  if (file == DatabaseFile::kAbsent) {
-    SELFCAL_RETURN_IF_ERROR(Create(path, migrations));
-  }
-  SELFCAL_ASSIGN_OR_RETURN(
-      Connection connection,
-      Connection::Open(path, kOpenFlags & ~SQLITE_OPEN_CREATE));
-  SetCheckpointOnClose(&connection, false);
-  SELFCAL_RETURN_IF_ERROR(SetSafetyPragmas(&connection));
-  SELFCAL_ASSIGN_OR_RETURN(const int version, UserVersion(&connection));
+absl::Status VerifySchema(Connection* connection,
+                          const std::string& path,
+                          std::span<const Migration> migrations) {
+  SELFCAL_ASSIGN_OR_RETURN(const int version, UserVersion(connection));
   const int newest = static_cast<int>(migrations.size());
   if (version > newest) {
     return absl::FailedPreconditionError(fmt::format(
@@ -161,9 +153,24 @@ absl::StatusOr<Connection> OpenDatabase(const std::string& path,
         "{} has no schema version; it was left as it is. Restore a backup",
         path));
   }
-  SELFCAL_RETURN_IF_ERROR(VerifyApplied(&connection, migrations, version));
+  return VerifyApplied(connection, migrations, version);
+}
+
+absl::StatusOr<Connection> OpenDatabase(const std::string& path,
+                                        std::span<const Migration> migrations) {
+  SELFCAL_ASSIGN_OR_RETURN(const DatabaseFile file, InspectDatabaseFile(path));
+  if (file == DatabaseFile::kAbsent) {
+    SELFCAL_RETURN_IF_ERROR(Create(path, migrations));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(
+      Connection connection,
+      Connection::Open(path, kOpenFlags & ~SQLITE_OPEN_CREATE));
+  SetCheckpointOnClose(&connection, false);
+  SELFCAL_RETURN_IF_ERROR(SetSafetyPragmas(&connection));
+  SELFCAL_RETURN_IF_ERROR(VerifySchema(&connection, path, migrations));
+  SELFCAL_ASSIGN_OR_RETURN(const int version, UserVersion(&connection));
   SetCheckpointOnClose(&connection, true);
-  if (version < newest) {
+  if (version < static_cast<int>(migrations.size())) {
     SELFCAL_RETURN_IF_ERROR(Backup(&connection, path, version));
     SELFCAL_RETURN_IF_ERROR(ApplyFrom(&connection, migrations, version));
   }

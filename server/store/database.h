@@ -23,4 +23,10 @@ namespace selfcal::server {
 absl::StatusOr<Connection> OpenDatabase(const std::string& path,
                                         std::span<const Migration> migrations);
 
+// Whether a database is one that this program opens as it is or migrates.
+// FAILED_PRECONDITION otherwise. `path` is for the message.
+absl::Status VerifySchema(Connection* connection,
+                          const std::string& path,
+                          std::span<const Migration> migrations);
+
 }  // namespace selfcal::server

@@ -5,12 +5,6 @@
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
-namespace {
-
-constexpr char kList[] = "events";
-
-}  // namespace
-
 absl::Status AppendEvent(Connection* db,
                          const std::string& rig,
                          EventKind kind,
@@ -26,14 +20,18 @@ absl::Status AppendEvent(Connection* db,
 }
 
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
-                                                  const Page& page) {
-  SELFCAL_ASSIGN_OR_RETURN(const auto after, PageNumber(kList, page));
+                                                  const Page& page,
+                                                  const std::string& rig) {
+  const std::string list = rig.empty() ? "events" : "events/" + rig;
+  SELFCAL_ASSIGN_OR_RETURN(const auto after, PageNumber(list, page));
   const int size = PageSize(page);
   Statement read(db,
                  "SELECT event, time_ns, rig, kind, detail FROM events "
-                 "WHERE event > ?1 ORDER BY event LIMIT ?2",
+                 "WHERE event > ?1 AND (?3 = '' OR rig = ?3) "
+                 "ORDER BY event LIMIT ?2",
                  after.value_or(0),
-                 size + 1);
+                 size + 1,
+                 rig);
   Listed<StoredEvent> listed;
   while (read.Next()) {
     listed.items.push_back({read.Int(0),
@@ -44,7 +42,7 @@ absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   CutPage(
-      kList, size, [](const auto& e) { return e.event; }, &listed);
+      list, size, [](const auto& e) { return e.event; }, &listed);
   return listed;
 }
 

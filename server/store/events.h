@@ -17,7 +17,9 @@ absl::Status AppendEvent(Connection* db,
                          EventKind kind,
                          const std::string& detail);
 
+// Of one rig, or with an empty name of all.
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
-                                                  const Page& page);
+                                                  const Page& page,
+                                                  const std::string& rig);
 
 }  // namespace selfcal::server

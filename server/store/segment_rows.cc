@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "server/store/clock.h"
+#include "server/store/quotas.h"
 #include "server/store/rigs.h"
 #include "server/store/status_macros.h"
 
@@ -58,7 +59,8 @@ absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment) {
 
 absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
                                          const std::string& rig,
-                                         const NewSegment& segment) {
+                                         const NewSegment& segment,
+                                         const Quotas& quotas) {
   Transaction transaction(db);
   SELFCAL_RETURN_IF_ERROR(transaction.status());
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
@@ -69,6 +71,13 @@ absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
   if (!absl::IsNotFound(existing.status())) {
     return existing.status();
   }
+  SELFCAL_RETURN_IF_ERROR(
+      MakeRoom(db,
+               rig_id,
+               rig,
+               static_cast<std::int64_t>(segment.payload.data.size()),
+               quotas));
+  SELFCAL_RETURN_IF_ERROR(DropOldSegments(db, rig_id, rig, quotas));
   SELFCAL_RETURN_IF_ERROR(InsertMetadata(db, rig_id, segment));
   SELFCAL_RETURN_IF_ERROR(
       Statement(db,
@@ -115,9 +124,14 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
   const bool found = read.Next();
   SELFCAL_RETURN_IF_ERROR(read.status());
   if (!found) {
-    return absl::FailedPreconditionError(
-        fmt::format("the data of {} was dropped: no table and no run needs it",
-                    SegmentText(rig, key)));
+    Statement why(
+        db, "SELECT problem FROM segments WHERE segment = ?1", row.rowid);
+    const std::string problem = why.Next() ? why.Text(0) : "";
+    SELFCAL_RETURN_IF_ERROR(why.status());
+    return absl::FailedPreconditionError(fmt::format(
+        "the data of {} was dropped: {}",
+        SegmentText(rig, key),
+        problem.empty() ? "no table and no run needs it" : problem));
   }
   return Payload{read.Text(0), read.Int(1), read.Text(2)};
 }

@@ -11,6 +11,7 @@
 #include "server/store/payload.h"
 #include "server/store/statement.h"
 #include "server/store/store.h"
+#include "server/store/store_options.h"
 
 namespace selfcal::server {
 
@@ -39,10 +40,11 @@ struct NewSegment {
 // Compresses: the larger part of the work, and needs no database.
 absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment);
 
-// In one transaction. NOT_FOUND for the rig.
+// In one transaction. NOT_FOUND for the rig; RESOURCE_EXHAUSTED by a quota.
 absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
                                          const std::string& rig,
-                                         const NewSegment& segment);
+                                         const NewSegment& segment,
+                                         const Quotas& quotas);
 
 // NOT_FOUND.
 absl::StatusOr<SegmentRow> FindSegment(Connection* db,

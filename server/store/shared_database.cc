@@ -106,10 +106,7 @@ void SharedDatabase::Failed(const absl::Status& status) {
 absl::Status SharedDatabase::Read(const Work& query) {
   const std::lock_guard lock(read_mutex_);
   if (failed_ || !reader_) {
-    // The thread that writes opens it again. Whoever waits for that here could
-    // be waited for by what that thread calls.
-    Write([](Connection*) { return absl::OkStatus(); },
-          [](const absl::Status&) {});
+    WakeToRecover();
     return Checking();
   }
   const Snapshot snapshot(&*reader_);
@@ -118,6 +115,18 @@ absl::Status SharedDatabase::Read(const Work& query) {
   absl::Status status = query(&*reader_);
   Failed(status);
   return status;
+}
+
+// The thread that writes opens the database again. Nobody waits for that here:
+// that thread could be waiting for whoever reads.
+void SharedDatabase::WakeToRecover() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!queue_.empty()) return;
+    queue_.push_back({[](Connection*) { return absl::OkStatus(); },
+                      [](const absl::Status&) {}});
+  }
+  arrived_.notify_all();
 }
 
 void SharedDatabase::Write(Work change, Done done) {

@@ -75,6 +75,7 @@ class SharedDatabase {
   void Commit(std::span<Job> group);
   bool CommitTogether(std::span<Job> group);
   void Failed(const absl::Status& status);
+  void WakeToRecover();
 
   const std::string path_;
   const Opener open_writer_;

@@ -66,7 +66,9 @@ struct StoredSegment {
   int observations = 0;
   std::optional<SegmentInformation> information;  // once scored
   std::vector<std::string> tables;                // groups that hold it
-  std::string problem;                            // empty: none
+  // Why it is unusable, or its data gone; empty: neither, or no table and no
+  // run needs the data.
+  std::string problem;
 };
 
 enum class PutVerdict { kStored, kDuplicate };
@@ -143,6 +145,7 @@ enum class EventKind {
   kCalibrationRejected,
   kSegmentUnusable,
   kChangeDetected,
+  kDataEvicted,  // a quota was reached
 };
 struct StoredEvent {
   std::int64_t event = 0;  // counts from 1
@@ -151,6 +154,8 @@ struct StoredEvent {
   EventKind kind = EventKind::kRigCreated;
   std::string detail;
 };
+
+class StoreMaintenance;  // maintenance.h
 
 class Store {
  public:
@@ -163,7 +168,7 @@ class Store {
   virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) = 0;
 
   // --- Segments. `segment` must be valid for the rig. The same key again
-  // changes nothing.
+  // changes nothing. RESOURCE_EXHAUSTED where a quota leaves no room.
   virtual absl::StatusOr<PutVerdict> PutSegment(
       const std::string& rig, const MotionSegment& segment) = 0;
   // The same without waiting for the disk. What one thread puts is stored in
@@ -256,8 +261,14 @@ class Store {
                                            RunState state,
                                            const std::string& message) = 0;
 
-  // --- Events, oldest first. They are only ever appended.
-  virtual absl::StatusOr<Listed<StoredEvent>> ListEvents(const Page& page) = 0;
+  // --- Events, oldest first; of one rig unless it is empty. They are only ever
+  // appended.
+  virtual absl::StatusOr<Listed<StoredEvent>> ListEvents(
+      const Page& page, const std::string& rig = "") = 0;
+
+  // Check, backup and restore; null for an engine that has tools of its own for
+  // them. Lives as long as the store.
+  virtual StoreMaintenance* maintenance() { return nullptr; }
 };
 
 }  // namespace selfcal::server

@@ -11,7 +11,10 @@
 #include "server/store/changes.h"
 #include "server/store/database.h"
 #include "server/store/events.h"
+#include "server/store/maintenance_sqlite.h"
 #include "server/store/payload.h"
+#include "server/store/quotas.h"
+#include "server/store/restore.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
@@ -25,8 +28,12 @@ namespace {
 // Gives the work of each subject its connection.
 class SqliteStore : public Store {
  public:
-  SqliteStore(std::unique_ptr<SharedDatabase> db, const ChangeOptions& change)
-      : change_(change), db_(std::move(db)) {}
+  SqliteStore(const std::string& path,
+              std::unique_ptr<SharedDatabase> db,
+              const StoreOptions& options)
+      : options_(options),
+        maintenance_(MakeSqliteMaintenance(path)),
+        db_(std::move(db)) {}
 
   absl::StatusOr<StoredRig> CreateRig(const Rig& rig) override {
     return Write([&](Connection* db) { return CreateRigRow(db, rig); });
@@ -67,8 +74,9 @@ class SqliteStore : public Store {
     const auto put =
         std::make_shared<Put>(Put{rig, *std::move(packed), PutVerdict()});
     db_->Write(
-        [put](Connection* db) {
-          const auto verdict = PutSegmentRow(db, put->rig, put->segment);
+        [put, quotas = options_.quotas](Connection* db) {
+          const auto verdict =
+              PutSegmentRow(db, put->rig, put->segment, quotas);
           put->verdict = verdict.value_or(PutVerdict());
           return verdict.status();
         },
@@ -108,7 +116,7 @@ class SqliteStore : public Store {
       const SegmentKey& key,
       const SegmentInformation& information) override {
     return Write([&](Connection* db) {
-      return CommitScoreRows(db, rig, key, information, change_);
+      return CommitScoreRows(db, rig, key, information, options_.change);
     });
   }
 
@@ -195,9 +203,12 @@ class SqliteStore : public Store {
     });
   }
 
-  absl::StatusOr<Listed<StoredEvent>> ListEvents(const Page& page) override {
-    return Read([&](Connection* db) { return ListEventRows(db, page); });
+  absl::StatusOr<Listed<StoredEvent>> ListEvents(
+      const Page& page, const std::string& rig) override {
+    return Read([&](Connection* db) { return ListEventRows(db, page, rig); });
   }
+
+  StoreMaintenance* maintenance() override { return maintenance_.get(); }
 
  private:
   // `query` returns a Status or a StatusOr of what it has read.
@@ -230,19 +241,26 @@ class SqliteStore : public Store {
     return result.status();
   }
 
-  const ChangeOptions change_;
+  const StoreOptions options_;
+  const std::unique_ptr<StoreMaintenance> maintenance_;
   const std::unique_ptr<SharedDatabase> db_;
 };
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Store>> MakeSqliteStore(
-    const std::string& path, const ChangeOptions& change) {
+    const std::string& path, const StoreOptions& options) {
+  SELFCAL_RETURN_IF_ERROR(TakeOverRestored(path));
+  const auto open = [path,
+                     quotas = options.quotas]() -> absl::StatusOr<Connection> {
+    SELFCAL_ASSIGN_OR_RETURN(Connection db,
+                             OpenDatabase(path, EmbeddedMigrations()));
+    SELFCAL_RETURN_IF_ERROR(LimitDatabase(&db, quotas));
+    return db;
+  };
   SELFCAL_ASSIGN_OR_RETURN(std::unique_ptr<SharedDatabase> db,
-                           SharedDatabase::Open(path, [path] {
-                             return OpenDatabase(path, EmbeddedMigrations());
-                           }));
-  return std::unique_ptr<Store>(new SqliteStore(std::move(db), change));
+                           SharedDatabase::Open(path, open));
+  return std::unique_ptr<Store>(new SqliteStore(path, std::move(db), options));
 }
 
 }  // namespace selfcal::server

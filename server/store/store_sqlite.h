@@ -9,13 +9,15 @@
 #include <string>
 
 #include "server/store/store.h"
+#include "server/store/store_options.h"
 
 namespace selfcal::server {
 
 // Opens the database at `path`, or creates it in a folder that exists. Errors
 // as OpenDatabase (database.h). One process for one file: the caller holds a
-// lock on its state folder. `change` says how changes of a device are detected.
+// lock on its state folder. A database that was restored takes its place first
+// (restore.h).
 absl::StatusOr<std::unique_ptr<Store>> MakeSqliteStore(
-    const std::string& path, const ChangeOptions& change = {});
+    const std::string& path, const StoreOptions& options = {});
 
 }  // namespace selfcal::server

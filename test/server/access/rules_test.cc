@@ -15,6 +15,7 @@
 #include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/rig.pb.h"
 #include "selfcal/v1/segment.pb.h"
+#include "selfcal/v1/store_service.pb.h"
 
 namespace selfcal::server {
 namespace {
@@ -29,7 +30,8 @@ std::vector<const MethodDescriptor*> Methods() {
   for (const auto* file : {v1::GetRigRequest::descriptor()->file(),
                            v1::GetSegmentRequest::descriptor()->file(),
                            v1::GetCalibrationRequest::descriptor()->file(),
-                           v1::GetRecalibrationRequest::descriptor()->file()}) {
+                           v1::GetRecalibrationRequest::descriptor()->file(),
+                           v1::ListEventsRequest::descriptor()->file()}) {
     for (int s = 0; s < file->service_count(); ++s) {
       for (int m = 0; m < file->service(s)->method_count(); ++m) {
         methods.push_back(file->service(s)->method(m));

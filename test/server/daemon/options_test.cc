@@ -78,7 +78,7 @@ TEST_F(OptionsTest, SolverHasAName) {
 
 TEST_F(OptionsTest, TestForAChangeIsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
-  EXPECT_EQ(options_.change.inflation, std::nullopt);
+  EXPECT_EQ(options_.store.change.inflation, std::nullopt);
   EXPECT_EQ(Parse({"--state-dir",
                    "s",
                    "--change-inflation",
@@ -86,8 +86,8 @@ TEST_F(OptionsTest, TestForAChangeIsSet) {
                    "--change-false-alarms",
                    "1e-4"}),
             std::nullopt);
-  EXPECT_EQ(options_.change.inflation, 1);
-  EXPECT_EQ(options_.change.false_alarm_rate, 1e-4);
+  EXPECT_EQ(options_.store.change.inflation, 1);
+  EXPECT_EQ(options_.store.change.false_alarm_rate, 1e-4);
   EXPECT_EQ(Parse({"--state-dir", "s", "--change-inflation", "0.5"}), 2);
   EXPECT_EQ(Parse({"--state-dir", "s", "--change-false-alarms", "2"}), 2);
 }

@@ -43,6 +43,17 @@ class FakePipeline final : public Pipeline {
                         {}};
   }
 
+  // Replaces BeginSubmit: whoever takes `done` answers when it likes.
+  std::function<void(const MotionSegment&, const SubmitDone& done)> begin_hook;
+
+  void BeginSubmit(const std::string& rig,
+                   const MotionSegment& segment,
+                   const std::function<bool()>& cancelled,
+                   const SubmitDone& done) override {
+    if (begin_hook) return begin_hook(segment, done);
+    done(Submit(rig, segment, cancelled));
+  }
+
   absl::StatusOr<StoredRun> StartRecalibration(
       const std::string& rig) override {
     return store_->CreateManualRun(rig);

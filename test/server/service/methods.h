@@ -16,20 +16,22 @@
 #include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/rig.pb.h"
 #include "selfcal/v1/segment.pb.h"
+#include "selfcal/v1/store_service.pb.h"
 #include "server/access/rules.h"
 
 namespace selfcal::server {
 
 using google::protobuf::MethodDescriptor;
 
-// Those of the four services; a test compares these with the services that the
+// Those of the five services; a test compares these with the services that the
 // server offers.
 inline std::vector<const google::protobuf::ServiceDescriptor*> Services() {
   std::vector<const google::protobuf::ServiceDescriptor*> services;
   for (const auto* file : {v1::GetRigRequest::descriptor()->file(),
                            v1::GetSegmentRequest::descriptor()->file(),
                            v1::GetCalibrationRequest::descriptor()->file(),
-                           v1::GetRecalibrationRequest::descriptor()->file()}) {
+                           v1::GetRecalibrationRequest::descriptor()->file(),
+                           v1::ListEventsRequest::descriptor()->file()}) {
     for (int s = 0; s < file->service_count(); ++s) {
       services.push_back(file->service(s));
     }

@@ -1,5 +1,9 @@
 #include <limits>
+#include <mutex>
+#include <thread>
+#include <vector>
 
+#include "server/service/segment_call.h"
 #include "test/server/service/service_test.h"
 
 namespace selfcal::server {
@@ -35,6 +39,12 @@ class Stream {
     request.set_parent("rigs/r");
     *request.mutable_segment() = ToProto(segment);
     stream_->Write(request);
+  }
+
+  Response Read() {
+    Response response;
+    stream_->Read(&response);
+    return response;
   }
 
   grpc::Status Finish() {
@@ -204,6 +214,136 @@ TEST_F(SegmentStreamTest, CallerThatLeavesFreesAWaitingSubmit) {
   stream.context().TryCancel();
   EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_TRUE(Eventually([&] { return freed == 1; }));
+}
+
+// A disk whose commits the test ends one by one.
+class HeldCommits {
+ public:
+  explicit HeldCommits(FakePipeline* pipeline) {
+    pipeline->begin_hook = [this](const MotionSegment&,
+                                  const Pipeline::SubmitDone& done) {
+      const std::lock_guard lock(mutex_);
+      held_.push_back(done);
+    };
+  }
+  std::size_t size() {
+    const std::lock_guard lock(mutex_);
+    return held_.size();
+  }
+  void End(std::size_t k, const absl::StatusOr<SubmitResult>& result) {
+    Pipeline::SubmitDone done;
+    {
+      const std::lock_guard lock(mutex_);
+      done = held_[k];
+    }
+    done(result);
+  }
+  void EndStored(std::size_t k) {
+    End(k, SubmitResult{SubmitResult::Verdict::kStored, {}});
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<Pipeline::SubmitDone> held_;
+};
+
+TEST_F(SegmentStreamTest, ReadsAheadOnlyWhileThereIsRoom) {
+  const auto segments = TestSegments(AddRig(), 1);
+  HeldCommits commits(pipeline_.get());
+  Stream stream(segments_.get());
+  constexpr std::size_t kSent = 7;
+  for (std::size_t k = 0; k < kSent; ++k) stream.Write(segments[0]);
+  ASSERT_TRUE(Eventually([&] { return commits.size() == kReadAhead; }));
+  for (std::size_t k = 0; k < kSent; ++k) {
+    // No more than there is room for, however many were sent.
+    EXPECT_LE(commits.size(), kReadAhead + k);
+    ASSERT_TRUE(Eventually([&] { return commits.size() > k; }));
+    commits.EndStored(k);
+    EXPECT_EQ(stream.Read().verdict(), Response::STORED);
+  }
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, AnswersComeInTheOrderOfTheSegments) {
+  auto segments = TestSegments(AddRig(), 3);
+  HeldCommits commits(pipeline_.get());
+  Stream stream(segments_.get());
+  for (const MotionSegment& segment : segments) stream.Write(segment);
+  ASSERT_TRUE(Eventually([&] { return commits.size() == 3; }));
+  for (const std::size_t k : {2, 0, 1}) commits.EndStored(k);
+  for (const MotionSegment& segment : segments) {
+    EXPECT_EQ(stream.Read().index(), segment.key.index);
+  }
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(SegmentStreamTest, WhatWasStoredIsAnsweredBeforeTheErrorThatFollows) {
+  const auto segments = TestSegments(AddRig(), 3);
+  HeldCommits commits(pipeline_.get());
+  Stream stream(segments_.get());
+  for (const MotionSegment& segment : segments) stream.Write(segment);
+  ASSERT_TRUE(Eventually([&] { return commits.size() == 3; }));
+  commits.End(1, absl::ResourceExhaustedError("disk full"));
+  commits.EndStored(2);
+  commits.EndStored(0);
+  EXPECT_EQ(stream.Read().verdict(), Response::STORED);
+  EXPECT_EQ(stream.Read().verdict(), Response::VERDICT_UNSPECIFIED);
+  EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+}
+
+TEST_F(SegmentStreamTest, CallerMayLeaveWhileItsSegmentsAreOnTheirWay) {
+  const auto segments = TestSegments(AddRig(), 2);
+  HeldCommits commits(pipeline_.get());
+  for (int k = 0; k < 20; ++k) {
+    Stream stream(segments_.get());
+    for (const MotionSegment& segment : segments) stream.Write(segment);
+    const std::size_t first = 2 * static_cast<std::size_t>(k);
+    ASSERT_TRUE(Eventually([&] { return commits.size() == first + 2; }));
+    stream.context().TryCancel();
+    EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::CANCELLED);
+    commits.EndStored(first + 1);
+    commits.EndStored(first);
+  }
+}
+
+TEST_F(SegmentStreamTest, SegmentsOfOneStreamAreStoredInTheirOrder) {
+  auto segment = TestSegments(AddRig(), 1)[0];
+  Stream stream(segments_.get());
+  constexpr int kSent = 40;
+  std::thread writer([&] {
+    for (int k = 0; k < kSent; ++k) {
+      segment.key.index = k;
+      stream.Write(segment);
+    }
+  });
+  for (int k = 0; k < kSent; ++k) EXPECT_EQ(stream.Read().index(), k);
+  writer.join();
+  EXPECT_TRUE(stream.Finish().ok());
+  for (int k = 0; k < kSent; ++k) {
+    EXPECT_EQ(store_->GetSegment("r", {segment.key.session, k})->sequence,
+              k + 1);
+  }
+}
+
+TEST_F(SegmentStreamTest, OneStreamTooManyIsRefusedUntilAnotherEnds) {
+  ServerOptions options;
+  options.max_segment_streams = 2;
+  StartServer(options);
+  const auto segments = TestSegments(AddRig(), 1);
+  Stream first(segments_.get());
+  Stream second(segments_.get());
+  EXPECT_EQ(first.Send(segments[0]).verdict(), Response::STORED);
+  EXPECT_EQ(second.Send(segments[0]).verdict(), Response::DUPLICATE);
+  Stream third(segments_.get());
+  third.Send(segments[0]);
+  EXPECT_EQ(third.Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(first.Finish().ok());
+  EXPECT_TRUE(Eventually([&] {
+    Stream again(segments_.get());
+    return again.Send(segments[0]).verdict() == Response::DUPLICATE &&
+           again.Finish().ok();
+  }));
+  EXPECT_TRUE(second.Finish().ok());
 }
 
 TEST_F(SegmentStreamTest, ExceptionEndsTheCallAndNotTheServer) {

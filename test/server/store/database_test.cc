@@ -62,7 +62,7 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 2u);
+  ASSERT_EQ(migrations.size(), 3u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -70,6 +70,9 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[1].name, "0002_change.sql");
   EXPECT_EQ(migrations[1].sha256,
             "adf5980e317d2d27f223d86870c2c3dcb79f5bde58b267c701e853328cb4c1a3");
+  EXPECT_EQ(migrations[2].name, "0004_eviction.sql");
+  EXPECT_EQ(migrations[2].sha256,
+            "5a82f4fc6db59545573f5f06ab80fcba269077339ca59dbd5ff8dc972cd80411");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

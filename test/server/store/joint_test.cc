@@ -8,7 +8,6 @@
 #include "proto/convert.h"
 #include "server/store/records.h"
 #include "server/store/records.pb.h"
-#include "server/store/statement.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -146,13 +145,7 @@ TEST_P(JointTest, AKeptSegmentOfDamagedInformationIsSetAside) {
   const Rig rig = CreateJointRig("a", Selection::kJointD);
   Commit(rig, 4);
   store_.reset();
-  {
-    auto db =
-        Connection::Open(folder_.File("selfcal.db"), SQLITE_OPEN_READWRITE);
-    ASSERT_TRUE(db.ok());
-    ASSERT_TRUE(
-        db->Execute("UPDATE segment_information SET information = x'00'").ok());
-  }
+  ASSERT_TRUE(GetParam().damage_information(folder_));
   Reopen();
   Commit(rig, 9);
   EXPECT_THAT(TableIndices("a", 0), ElementsAre(9));

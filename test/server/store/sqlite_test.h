@@ -57,8 +57,8 @@ class SqliteTest : public ::testing::Test {
     return segment;
   }
 
-  absl::Status Open() {
-    auto opened = MakeSqliteStore(Path());
+  absl::Status Open(const StoreOptions& options = {}) {
+    auto opened = MakeSqliteStore(Path(), options);
     if (opened.ok()) store_ = *std::move(opened);
     return opened.status();
   }

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "server/store/statement.h"
 #include "server/store/store.h"
 #include "server/store/store_sqlite.h"
 #include "test/server/store/fake_information.h"
@@ -21,12 +22,25 @@ namespace selfcal::server {
 
 struct Engine {
   std::string name;
+  // The store that this folder stands for, empty the first time.
   std::function<absl::StatusOr<std::unique_ptr<Store>>(const TempFolder&)> open;
+  // Spoils the information of every segment, behind the back of a store that
+  // is closed.
+  std::function<bool(const TempFolder&)> damage_information;
 };
 
 inline std::vector<Engine> Engines() {
-  return {{"Sqlite", [](const TempFolder& folder) {
+  return {{"Sqlite",
+           [](const TempFolder& folder) {
              return MakeSqliteStore(folder.File("selfcal.db"));
+           },
+           [](const TempFolder& folder) {
+             auto db = Connection::Open(folder.File("selfcal.db"),
+                                        SQLITE_OPEN_READWRITE);
+             return db.ok() &&
+                    db->Execute(
+                          "UPDATE segment_information SET information = x'00'")
+                        .ok();
            }}};
 }
 

@@ -1,16 +1,22 @@
 // What SQLite itself must refuse or notice: these reach around the store, into
 // its file.
-#include "server/store/statement.h"
-#include "test/server/store/store_test.h"
+#include "test/server/store/sqlite_test.h"
 
 namespace selfcal::server {
 namespace {
 
-class TamperingTest : public StoreTest {
+class TamperingTest : public SqliteTest {
  protected:
+  TamperingTest() { Reopen(); }
+
+  void Reopen() {
+    store_.reset();
+    const absl::Status opened = Open();
+    ASSERT_TRUE(opened.ok()) << opened;
+  }
+
   absl::Status Execute(const std::string& sql) {
-    auto db =
-        Connection::Open(folder_.File("selfcal.db"), SQLITE_OPEN_READWRITE);
+    auto db = Connection::Open(Path(), SQLITE_OPEN_READWRITE);
     EXPECT_TRUE(db.ok());
     EXPECT_TRUE(db->Execute("PRAGMA busy_timeout = 1000").ok());
     return db->Execute(sql);
@@ -32,10 +38,9 @@ class TamperingTest : public StoreTest {
     Reopen();
   }
 };
-SELFCAL_STORE_TEST_SUITE(TamperingTest);
 
-TEST_P(TamperingTest, CalibrationCannotBeChangedOrDeleted) {
-  CreateTestRig("a");
+TEST_F(TamperingTest, CalibrationCannotBeChangedOrDeleted) {
+  ASSERT_TRUE(store_->CreateRig(rig_).ok());
   store_.reset();
   for (const char* sql : {"UPDATE calibrations SET content = x'00'",
                           "UPDATE calibrations SET sha256 = x'00'",
@@ -49,24 +54,24 @@ TEST_P(TamperingTest, CalibrationCannotBeChangedOrDeleted) {
   }
 }
 
-TEST_P(TamperingTest, DamagedDataIsNoticed) {
-  CreateTestRig("a");
-  Put("a", 0);
+TEST_F(TamperingTest, DamagedDataIsNoticed) {
+  ASSERT_TRUE(store_->CreateRig(rig_).ok());
+  ASSERT_TRUE(store_->PutSegment("a", Segment(0)).ok());
   Damage("payloads", "data");
   const absl::Status status = store_->GetSegmentData("a", {"s", 0}).status();
   EXPECT_TRUE(absl::IsDataLoss(status)) << status;
   EXPECT_NE(std::string(status.message()).find("s~0"), std::string::npos);
 }
 
-TEST_P(TamperingTest, DamagedCalibrationIsNoticed) {
-  CreateTestRig("a");
+TEST_F(TamperingTest, DamagedCalibrationIsNoticed) {
+  ASSERT_TRUE(store_->CreateRig(rig_).ok());
   Damage("calibrations", "content");
   EXPECT_TRUE(absl::IsDataLoss(store_->GetActiveCalibration("a").status()));
 }
 
-TEST_P(TamperingTest, CalibrationInAnotherRowIsNoticed) {
-  CreateTestRig("a");
-  CreateTestRig("b");
+TEST_F(TamperingTest, CalibrationInAnotherRowIsNoticed) {
+  ASSERT_TRUE(store_->CreateRig(rig_).ok());
+  ASSERT_TRUE(store_->CreateRig(TestRig("b")).ok());
   store_.reset();
   ASSERT_TRUE(
       Execute("DROP TRIGGER calibrations_never_change;"
@@ -80,18 +85,19 @@ TEST_P(TamperingTest, CalibrationInAnotherRowIsNoticed) {
   EXPECT_TRUE(absl::IsDataLoss(store_->GetActiveCalibration("b").status()));
 }
 
-TEST_P(TamperingTest, DamagedRigIsNoticed) {
-  CreateTestRig("a");
+TEST_F(TamperingTest, DamagedRigIsNoticed) {
+  ASSERT_TRUE(store_->CreateRig(rig_).ok());
   Damage("rigs", "definition");
   EXPECT_TRUE(absl::IsDataLoss(store_->GetRig("a").status()));
 }
 
-TEST_P(TamperingTest, DamagedInformationIsNoticedAndHidesNoOther) {
-  const Rig rig = CreateTestRig("a");
-  Put("a", 0);
-  Score(rig, 0, 1.0);
+TEST_F(TamperingTest, DamagedInformationIsNoticedAndHidesNoOther) {
+  ASSERT_TRUE(store_->CreateRig(rig_).ok());
+  ASSERT_TRUE(store_->PutSegment("a", Segment(0)).ok());
+  ASSERT_TRUE(
+      store_->CommitScore("a", {"s", 0}, FakeInformation(rig_, 1.0)).ok());
   Damage("segment_information", "information");
-  Put("a", 1);
+  ASSERT_TRUE(store_->PutSegment("a", Segment(1)).ok());
   EXPECT_TRUE(absl::IsDataLoss(store_->GetSegment("a", {"s", 0}).status()));
   const auto listed = store_->ListSegments("a", {});
   ASSERT_TRUE(listed.ok()) << listed.status();
