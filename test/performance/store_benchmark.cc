@@ -1,0 +1,202 @@
+// Sustained acknowledged segments per second of the store, against the disk's
+// own limit: the same bytes of compressed data, in as many commits of the same
+// size, written in place and synced one after the other.
+//
+//   selfcal_store_benchmark --folder DIR [--streams N] [--segments N]
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
+#include <filesystem>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/simulation/simulate.h"
+#include "core/simulation/trajectory.h"
+#include "server/store/store_sqlite.h"
+#include "test/server/store/fault_vfs.h"
+
+namespace selfcal::server {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+// As the service keeps under way for one stream.
+constexpr int kUnderWay = 4;
+
+struct Options {
+  std::string folder;
+  int streams = 16;
+  int segments = 400;  // of all streams
+  int rounds = 5;
+};
+
+double Seconds(Clock::duration time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+// One after the other, as a stream: at most kUnderWay unacknowledged.
+class Stream {
+ public:
+  Stream(Store* store, std::string session)
+      : store_(store), session_(std::move(session)) {}
+
+  void Send(MotionSegment segment, int count) {
+    segment.key.session = session_;
+    for (int k = 0; k < count; ++k) {
+      segment.key.index = k;
+      {
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, [this] { return under_way_ < kUnderWay; });
+        ++under_way_;
+      }
+      store_->BeginPutSegment("bench", segment, [this](const auto& verdict) {
+        const std::lock_guard lock(mutex_);
+        if (!verdict.ok()) ++failed_;
+        --under_way_;
+        changed_.notify_all();
+      });
+    }
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return under_way_ == 0; });
+  }
+  int failed() const { return failed_; }
+
+ private:
+  Store* const store_;
+  const std::string session_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int under_way_ = 0;
+  int failed_ = 0;
+};
+
+struct Measured {
+  double seconds = 0;
+  int commits = 0;
+  std::int64_t bytes = 0;
+};
+
+Measured MeasureStore(const Options& options, const MotionSegment& segment) {
+  const std::string path = options.folder + "/bench.db";
+  for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(path + suffix);
+  FaultVfs vfs;
+  auto store = MakeSqliteStore(path);
+  if (!store.ok()) throw std::runtime_error(store.status().ToString());
+  if (!(*store)->CreateRig(HandheldRig("bench")).ok()) {
+    throw std::runtime_error("cannot create the rig");
+  }
+  Measured measured;
+  const int before = vfs.syncs("-wal");
+  const auto start = Clock::now();
+  std::atomic<int> failed = 0;
+  std::vector<std::thread> threads;
+  const int each = options.segments / options.streams;
+  for (int k = 0; k < options.streams; ++k) {
+    threads.emplace_back([&, k] {
+      Stream stream(store->get(), fmt::format("s{}", k));
+      stream.Send(segment, each);
+      failed += stream.failed();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  measured.seconds = Seconds(Clock::now() - start);
+  measured.commits = vfs.syncs("-wal") - before;
+  if (failed > 0) throw std::runtime_error("a segment was refused");
+  const auto stored = (*store)->GetSegment("bench", {"s0", 0});
+  measured.bytes = stored->payload_bytes * each * options.streams;
+  store->reset();
+  return measured;
+}
+
+// Seconds of the disk for these commits.
+double MeasureDisk(const Options& options, const Measured& of) {
+  const std::string path = options.folder + "/bench.raw";
+  const std::string commit(
+      static_cast<std::size_t>(of.bytes / std::max(1, of.commits)), 'x');
+  const int file = open(path.c_str(), O_CREAT | O_RDWR | O_TRUNC, 0600);
+  if (file < 0) throw std::runtime_error("cannot open " + path);
+  const auto write_all = [&] {
+    for (int k = 0; k < of.commits; ++k) {
+      if (pwrite(file, commit.data(), commit.size(), k * commit.size()) !=
+              static_cast<ssize_t>(commit.size()) ||
+          fdatasync(file) != 0) {
+        throw std::runtime_error("cannot write " + path);
+      }
+    }
+  };
+  write_all();  // its place on the disk
+  const auto start = Clock::now();
+  write_all();
+  const double seconds = Seconds(Clock::now() - start);
+  close(file);
+  fs::remove(path);
+  return seconds;
+}
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+void Run(const Options& options) {
+  SimulationOptions simulation;
+  const auto trajectory = MakeHandheld(30.0, 1.0, 1);
+  const Rig rig = HandheldRig("bench");
+  const MotionSegment segment =
+      Simulate(rig, rig.factory, rig.factory, *trajectory, "s", simulation)
+          .segments.front();
+  std::vector<double> ratios;
+  for (int round = 0; round < options.rounds; ++round) {
+    const Measured store = MeasureStore(options, segment);
+    const double disk_s = MeasureDisk(options, store);
+    const int segments = options.segments / options.streams * options.streams;
+    ratios.push_back(disk_s / store.seconds);
+    fmt::print(
+        "streams {:3d}: {:7.1f} segments/s, {:6.1f} commits/s, {:5.1f} "
+        "segments and {:.0f} kB a commit; disk alone {:7.1f} segments/s; ratio "
+        "{:.2f}\n",
+        options.streams,
+        segments / store.seconds,
+        store.commits / store.seconds,
+        static_cast<double>(segments) / store.commits,
+        1e-3 * static_cast<double>(store.bytes) / store.commits,
+        segments / disk_s,
+        ratios.back());
+    std::fflush(stdout);
+  }
+  fmt::print(
+      "streams {:3d}: median ratio {:.2f}\n", options.streams, Median(ratios));
+}
+
+}  // namespace
+}  // namespace selfcal::server
+
+int main(int argc, char** argv) {
+  CLI::App app("Durable segments per second, against the disk's own limit");
+  selfcal::server::Options options;
+  app.add_option("--folder", options.folder, "On the disk to measure")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--streams", options.streams)->check(CLI::Range(1, 1000));
+  app.add_option("--segments", options.segments, "Of all streams together");
+  app.add_option("--rounds", options.rounds)->check(CLI::Range(1, 1000));
+  CLI11_PARSE(app, argc, argv);
+  options.segments = std::max(options.segments, options.streams);
+  try {
+    selfcal::server::Run(options);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 1;
+  }
+  return 0;
+}
