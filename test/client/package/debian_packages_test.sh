@@ -23,9 +23,10 @@ for package in selfcald selfcal libselfcal0 libselfcal-dev; do
   deb=$work/packs/${package}_$version-1_$arch.deb
   [[ -f $deb ]] || fail "$package is missing"
   dpkg-deb -f "$deb" Package Version Depends Description
-  dpkg-deb -c "$deb" | grep -q "./usr/share/doc/$package/copyright" ||
+  files=$(dpkg-deb -c "$deb" | awk '{print $6}')
+  grep -qx "./usr/share/doc/$package/copyright" <<<"$files" ||
     fail "$package has no licence"
-  dpkg-deb -c "$deb" | awk '{print $6}' | grep -vE '^\./(usr(/|$)|$)' &&
+  ! grep -vE '^\./(usr(/|$)|$)' <<<"$files" ||
     fail "$package puts files outside of /usr"
   dpkg-deb -x "$deb" "$work/root"
 done
