@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -75,6 +76,7 @@ struct Measured {
 Measured Run(const Options& options,
              const ClientOptions& client,
              const Rig& rig,
+             const std::function<void()>& before_end,
              StreamStatistics* statistics) {
   Measured measured;
   SegmentStream stream(client, nullptr);
@@ -106,6 +108,7 @@ Measured Run(const Options& options,
     for (const ImuSample& sample : step.after) builder.AddImu(sample);
   }
   *statistics = stream.statistics();
+  before_end();
   return measured;
 }
 
@@ -148,9 +151,12 @@ absl::Status Report(const Options& options, Daemon state, bool with_spool) {
     });
   }
   StreamStatistics statistics;
-  Measured measured = Run(options, client, rig, &statistics);
-  if (stall.joinable()) stall.join();
-  if (state == Daemon::kStalled) kill(daemon->pid(), SIGCONT);
+  const auto go_on = [&] {
+    if (!stall.joinable()) return;
+    stall.join();
+    kill(daemon->pid(), SIGCONT);
+  };
+  Measured measured = Run(options, client, rig, go_on, &statistics);
   const char* name = state == Daemon::kAbsent    ? "absent"
                      : state == Daemon::kStalled ? "stalled"
                                                  : "busy";
