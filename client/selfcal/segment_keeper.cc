@@ -1,5 +1,9 @@
 // The keeper's side of the queue: the thread that encodes, spools and reads
 // back, so that neither the SLAM system nor the sender waits for it.
+#include <sched.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <exception>
 #include <utility>
 
@@ -13,16 +17,26 @@ namespace {
 // Until the disk is tried again after it was full or failed.
 constexpr std::chrono::milliseconds kSpoolRetry{1000};
 
+// This thread does not push aside the one that wakes it, which is that of the
+// SLAM system. If it may not be so, it goes on as it is.
+void YieldToOthers() {
+  constexpr int kNice = 10;
+  const sched_param parameters{};
+  sched_setscheduler(0, SCHED_BATCH, &parameters);
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
+}
+
 }  // namespace
 
 void SegmentQueue::Keep() {
+  YieldToOthers();
   OpenSpool();
   Lock lock(mutex_);
   while (!finish_) {
     const auto due = [this] { return finish_ || HasChore(); };
     if (!spool_blocked_) {
-      changed_.wait(lock, due);
-    } else if (!changed_.wait_for(lock, kSpoolRetry, due)) {
+      chores_.wait(lock, due);
+    } else if (!chores_.wait_for(lock, kSpoolRetry, due)) {
       spool_blocked_ = false;
     }
     if (finish_ || !HasChore()) continue;
@@ -149,9 +163,9 @@ void SegmentQueue::Load(Lock& lock) {
 void SegmentQueue::TakeIn(Lock& lock) {
   if (!pending_.has_value()) {
     taking_in_ = true;
-    const Material material = std::move(incoming_.front());
+    Material material = std::move(incoming_.front());
     incoming_.pop_front();
-    pending_ = Prepare(material, lock);
+    pending_ = Prepare(std::move(material), lock);
   }
   if (pending_.has_value() && !HeadIsNext() && spool_ != nullptr) {
     Write(lock);
@@ -164,29 +178,27 @@ void SegmentQueue::TakeIn(Lock& lock) {
 }
 
 // Returns with the lock held. Nothing for a segment that no message can carry.
-std::optional<SegmentQueue::Entry> SegmentQueue::Prepare(
-    const Material& material, Lock& lock) {
+std::optional<SegmentQueue::Entry> SegmentQueue::Prepare(Material material,
+                                                         Lock& lock) {
   lock.unlock();
-  const MotionSegment* segment = std::get_if<MotionSegment>(&material);
-  MotionSegment assembled;
-  if (segment == nullptr) {
-    assembled = Assemble(std::get<ClosedSegment>(material));
-    segment = &assembled;
+  if (const auto* closed = std::get_if<ClosedSegment>(&material)) {
+    material = Assemble(*closed);
   }
+  auto& segment = std::get<MotionSegment>(material);
   auto request = std::make_shared<Request>();
-  auto violations = MakeRequest(options_.rig, *segment, request.get());
+  auto violations = MakeRequest(options_.rig, segment, request.get());
+  const SegmentKey key = segment.key;
+  segment = MotionSegment();  // freed before anybody can wait for the lock
   if (violations.empty()) {
     lock.lock();
-    return Entry{next_number_++, segment->key, std::move(request)};
+    return Entry{next_number_++, key, std::move(request)};
   }
   {
     std::lock_guard count(mutex_);
     Count(Acknowledgement::Verdict::kRejected);
     ++callbacks_due_;
   }
-  refuse_({segment->key,
-           Acknowledgement::Verdict::kRejected,
-           std::move(violations)});
+  refuse_({key, Acknowledgement::Verdict::kRejected, std::move(violations)});
   lock.lock();
   return std::nullopt;
 }
@@ -196,11 +208,11 @@ void SegmentQueue::Write(Lock& lock) {
   lock.unlock();
   const absl::Status status =
       spool_->Write(pending_->number, pending_->request->SerializeAsString());
+  if (status.ok()) pending_.reset();
   lock.lock();
   spool_status_ = status;
   if (status.ok()) {
     ++statistics_.spooled;
-    pending_.reset();
   } else {
     if (!absl::IsResourceExhausted(status)) ++statistics_.spool_failures;
     spool_blocked_ = true;
@@ -225,9 +237,9 @@ void SegmentQueue::SpoolRest(Lock& lock) {
   }
   while (pending_.has_value() || !incoming_.empty()) {
     if (!pending_.has_value()) {
-      const Material material = std::move(incoming_.front());
+      Material material = std::move(incoming_.front());
       incoming_.pop_front();
-      pending_ = Prepare(material, lock);
+      pending_ = Prepare(std::move(material), lock);
     }
     if (!pending_.has_value()) continue;
     Write(lock);

@@ -33,7 +33,7 @@ SegmentQueue::~SegmentQueue() {
     stop_ = true;
     finish_ = true;
   }
-  changed_.notify_all();
+  chores_.notify_one();
   keeper_.join();
 }
 
@@ -51,7 +51,7 @@ bool SegmentQueue::Push(Material segment) noexcept {
     ++(taken ? statistics_.queued : statistics_.dropped);
     if (!taken) return false;
   }
-  changed_.notify_all();
+  chores_.notify_one();
   return true;
 }
 
@@ -137,6 +137,7 @@ bool SegmentQueue::Take(const Acknowledgement& ack) {
     Count(ack.verdict);
     ++callbacks_due_;
   }
+  chores_.notify_one();
   changed_.notify_all();
   return true;
 }

@@ -98,7 +98,7 @@ class SegmentQueue {
   void Load(Lock& lock);
   void SetAside(std::uint64_t number, const absl::Status& why);
   void TakeIn(Lock& lock);
-  std::optional<Entry> Prepare(const Material& material, Lock& lock);
+  std::optional<Entry> Prepare(Material material, Lock& lock);
   void Write(Lock& lock);
   void NoteSpool();
   void SpoolRest(Lock& lock);
@@ -117,8 +117,9 @@ class SegmentQueue {
   std::uint64_t loaded_ = 0;      // files up to this number are in the head
   std::optional<Entry> pending_;  // taken in, waits for a place
 
-  mutable std::mutex mutex_;  // guards all below
-  std::condition_variable changed_;
+  mutable std::mutex mutex_;         // guards all below
+  std::condition_variable chores_;   // the keeper waits for it alone, so
+  std::condition_variable changed_;  // that Push wakes nobody else
   std::deque<Material> incoming_;
   bool taking_in_ = false;  // the keeper holds one that is nowhere else
   std::deque<Entry> head_;

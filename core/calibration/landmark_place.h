@@ -10,8 +10,8 @@
 
 #include "core/calibration/problem.h"
 #include "core/calibration/robust_loss.h"
-#include "core/factor/ceres_factors.h"
 #include "core/factor/keyframe_motion.h"
+#include "core/factor/landmark_anchor.h"
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
 

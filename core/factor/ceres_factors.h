@@ -22,19 +22,10 @@
 #include <optional>
 
 #include "core/factor/inertial.h"
+#include "core/factor/landmark_anchor.h"
 #include "core/factor/reprojection.h"
 
 namespace selfcal {
-
-// Fixed place from which a landmark is parametrised by inverse depth.
-struct LandmarkAnchor {
-  Eigen::Matrix3d R_GA = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d a_G = Eigen::Vector3d::Zero();  // [m]
-
-  // Homogeneous point in G of (alpha, beta, rho), and the other way.
-  Eigen::Vector4d ToHomogeneous(const Eigen::Vector3d& inverse_depth) const;
-  Eigen::Vector3d FromPoint(const Eigen::Vector3d& p_G) const;
-};
 
 // Blocks (theta, q, p, l); 2 residuals, divided by sigma_px. Where the point
 // cannot be projected, the residual and its Jacobians are zero: such an

@@ -45,27 +45,37 @@ LoopedSession::LoopedSession(const Rig& rig, const Calibration& theta) {
   }
 }
 
-void LoopedSession::Feed(int k, SegmentBuilder* builder) {
+LoopedSession::Step LoopedSession::Next(int k) {
   const int loop = k / kLoopKeyframes;
   const int at = k % kLoopKeyframes;
   if (at == 0) next_sample_ = 0;
   const std::int64_t shift_ns = loop * kLoop_ns;
-  // What is left of a loop after its last keyframe belongs to it.
-  const bool last = at + 1 == kLoopKeyframes;
-  const auto feed_until = [&](std::int64_t t_ns) {
+  const auto take_until = [&](std::int64_t t_ns) {
+    std::vector<ImuSample> taken;
     while (next_sample_ < imu_.size() && imu_[next_sample_].t_ns <= t_ns) {
-      ImuSample sample = imu_[next_sample_++];
-      sample.t_ns += shift_ns;
-      builder->AddImu(sample);
+      taken.push_back(imu_[next_sample_++]);
+      taken.back().t_ns += shift_ns;
     }
+    return taken;
   };
-  KeyframeState state = keyframes_[at];
-  feed_until(state.t_ns);
-  state.t_ns += shift_ns;
-  std::vector<KeyframeObservation> seen = observations_[at];
-  for (KeyframeObservation& o : seen) o.landmark_id += loop * landmarks_;
-  builder->AddKeyframe(state, seen);
-  if (last) feed_until(kLoop_ns);
+  Step step;
+  step.state = keyframes_[at];
+  step.before = take_until(step.state.t_ns);
+  step.state.t_ns += shift_ns;
+  step.observations = observations_[at];
+  for (KeyframeObservation& o : step.observations) {
+    o.landmark_id += loop * landmarks_;
+  }
+  // What is left of a loop after its last keyframe belongs to it.
+  if (at + 1 == kLoopKeyframes) step.after = take_until(kLoop_ns);
+  return step;
+}
+
+void LoopedSession::Feed(int k, SegmentBuilder* builder) {
+  const Step step = Next(k);
+  for (const ImuSample& sample : step.before) builder->AddImu(sample);
+  builder->AddKeyframe(step.state, step.observations);
+  for (const ImuSample& sample : step.after) builder->AddImu(sample);
 }
 
 }  // namespace selfcal::client

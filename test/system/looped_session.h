@@ -21,8 +21,17 @@ class LoopedSession {
   // The SLAM system runs with the factory's calibration; the truth is theta.
   LoopedSession(const Rig& rig, const Calibration& theta);
 
-  // Feeds the samples up to keyframe k, then the keyframe. To be called for
-  // k = 0, 1, ...
+  // What comes with keyframe k: the samples up to it, the keyframe, and at the
+  // end of a loop the samples that are left of it.
+  struct Step {
+    std::vector<ImuSample> before;
+    KeyframeState state;
+    std::vector<KeyframeObservation> observations;
+    std::vector<ImuSample> after;
+  };
+  // To be called for k = 0, 1, ...
+  Step Next(int k);
+  // The same, into the builder.
   void Feed(int k, SegmentBuilder* builder);
 
  private:

@@ -1,0 +1,55 @@
+# Debian packages, one for each component: selfcald (the daemon), selfcal (the
+# command line), libselfcal0 and libselfcal-dev (the client library). What they
+# depend on is read from what they link. deploy/package builds them.
+include(GNUInstallDirs)
+
+set(SELFCAL_MAINTAINER "The selfcal authors <selfcal@localhost>" CACHE STRING
+    "Name and address that the packages carry")
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_CONTACT ${SELFCAL_MAINTAINER})
+set(CPACK_PACKAGE_VENDOR selfcal)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_GROUPING IGNORE)
+set(CPACK_COMPONENTS_ALL daemon cli library development)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
+if(CMAKE_CROSSCOMPILING)
+  # Nothing here knows the packages of the other machine's libraries.
+  set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE ${SELFCAL_DEBIAN_ARCHITECTURE})
+else()
+  set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+endif()
+
+# selfcal_package(COMPONENT PACKAGE SECTION SUMMARY): the summary is the first
+# line of the description; the licence goes where Debian looks for it.
+macro(selfcal_package component package section summary)
+  string(TOUPPER ${component} upper)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${package})
+  set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section})
+  set(CPACK_COMPONENT_${upper}_DESCRIPTION "${summary}")
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
+    RENAME copyright
+    COMPONENT ${component})
+endmacro()
+
+set(library libselfcal${PROJECT_VERSION_MAJOR})
+selfcal_package(daemon selfcald science
+  "daemon that keeps a camera-IMU calibration true")
+selfcal_package(cli selfcal science
+  "command line of selfcald")
+selfcal_package(library ${library} libs
+  "client library of selfcald")
+selfcal_package(development libselfcal-dev libdevel
+  "client library of selfcald: headers, CMake package, contract, example")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
+    "${library} (= ${PROJECT_VERSION}-1), libabsl-dev, libeigen3-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
+set(CPACK_DEBIAN_DAEMON_PACKAGE_GENERATE_SHLIBS OFF)
+set(CPACK_DEBIAN_CLI_PACKAGE_GENERATE_SHLIBS OFF)
+
+include(CPack)

@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# Packs what the build made into Debian packages, looks at what is in them and
+# what they depend on, and runs the programs from an unpacked copy.
+#
+#   debian_packages_test.sh BUILD_DIR VERSION CERES     CERES: ON or OFF
+set -euo pipefail
+build=$1 version=$2 ceres=$3
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+fail() {
+  echo "FAILED: $*" >&2
+  exit 1
+}
+
+(cd "$work" && cpack --config "$build/CPackConfig.cmake" -B "$work/packs") \
+  >"$work/log" 2>&1 || {
+  cat "$work/log" >&2
+  exit 1
+}
+arch=$(dpkg --print-architecture)
+for package in selfcald selfcal libselfcal0 libselfcal-dev; do
+  deb=$work/packs/${package}_$version-1_$arch.deb
+  [[ -f $deb ]] || fail "$package is missing"
+  dpkg-deb -f "$deb" Package Version Depends Description
+  files=$(dpkg-deb -c "$deb" | awk '{print $6}')
+  grep -qx "./usr/share/doc/$package/copyright" <<<"$files" ||
+    fail "$package has no licence"
+  ! grep -vE '^\./(usr(/|$)|$)' <<<"$files" ||
+    fail "$package puts files outside of /usr"
+  dpkg-deb -x "$deb" "$work/root"
+done
+depends() { dpkg-deb -f "$work/packs/${1}_$version-1_$arch.deb" Depends; }
+for package in selfcald selfcal libselfcal0; do
+  [[ $(depends "$package") == *libgrpc++* ]] ||
+    fail "$package does not depend on what it links"
+done
+[[ $(depends libselfcal-dev) == *"libselfcal0 (= $version-1)"* ]] ||
+  fail 'libselfcal-dev does not depend on its library'
+[[ $(depends selfcald) != *libselfcal* ]] ||
+  fail 'the daemon depends on the client'
+
+# SuiteSparseQR is GPL: no target of ours may link it (docs/licences.md).
+programs=("$work/root/usr/bin/selfcald" "$work/root/usr/bin/selfcal"
+  "$(find "$work/root" -name "libselfcal.so.$version")")
+for program in "${programs[@]}"; do
+  needed=$(readelf -d "$program" | grep NEEDED)
+  [[ $needed == *libstdc++* ]] || fail "cannot read what $program links"
+  [[ $needed != *libspqr* ]] || fail "$program links SuiteSparseQR"
+  [[ $ceres == ON && $program == */selfcald || $needed != *libcholmod* ]] ||
+    fail "$program links CHOLMOD"
+done
+
+"$work/root/usr/bin/selfcald" --version | grep -qF "$version" ||
+  fail 'selfcald --version'
+"$work/root/usr/bin/selfcal" --version | grep -qF "$version" ||
+  fail 'selfcal --version'
+echo passed

@@ -1,0 +1,77 @@
+#!/usr/bin/env bash
+# Installs the client library into a folder of its own, builds the example
+# outside the tree with nothing but that, by CMake and by pkg-config, and
+# streams a recording with it to a daemon.
+#
+#   installed_package_test.sh BUILD_DIR SOURCE_DIR SELFCALD SELFCAL WRITER
+set -euo pipefail
+build=$1 source=$2 selfcald=$3 selfcal=$4 writer=$5
+
+work=$(mktemp -d)
+daemon=
+cleanup() {
+  if [[ -n $daemon ]]; then
+    kill "$daemon" 2>/dev/null || true
+    wait "$daemon" 2>/dev/null || true
+  fi
+  rm -rf "$work"
+}
+trap cleanup EXIT
+
+for component in library development; do
+  cmake --install "$build" --prefix "$work/prefix" --component "$component" \
+    >/dev/null
+done
+
+echo 'headers: only what the package may know'
+if grep -rnE '#include [<"](grpc|google|client/|core/|proto/|server/)' \
+  "$work/prefix/include"; then
+  echo 'FAILED: a public header includes what is not installed' >&2
+  exit 1
+fi
+library=$(find "$work/prefix" -name 'libselfcal.so')
+foreign=$(nm -DC --defined-only "$library" |
+  grep -vE ' selfcal::(client::(SegmentBuilder::|SegmentStream::|CalibrationWatch::|Assemble)|[A-Z])' ||
+  true)
+if [[ -n $foreign ]]; then
+  echo "FAILED: libselfcal shows more than its interface: $foreign" >&2
+  exit 1
+fi
+
+echo 'example: with CMake'
+cp -r "$source/client/example" "$work/example"
+cmake -S "$work/example" -B "$work/build" -DCMAKE_PREFIX_PATH="$work/prefix" \
+  -DCMAKE_BUILD_TYPE=Debug >"$work/log" 2>&1 &&
+  cmake --build "$work/build" >>"$work/log" 2>&1 || {
+  cat "$work/log" >&2
+  exit 1
+}
+
+echo 'example: with pkg-config'
+PKG_CONFIG_PATH=$(dirname "$(find "$work/prefix" -name selfcal.pc)")
+export PKG_CONFIG_PATH
+# shellcheck disable=SC2046
+c++ -std=c++20 "$work/example/stream_recording.cc" -o "$work/by_pkg_config" \
+  $(pkg-config --cflags --libs selfcal)
+export LD_LIBRARY_PATH
+LD_LIBRARY_PATH=$(dirname "$library")
+
+echo 'example: streams a recording'
+"$writer" "$work"
+"$selfcald" --state-dir "$work/state" 2>"$work/daemon.log" &
+daemon=$!
+export SELFCAL_TARGET=unix:$work/state/selfcald.sock
+for _ in $(seq 300); do
+  grep -q ready "$work/daemon.log" && break
+  sleep 0.1
+done
+"$selfcal" rig create "$work/rig.json" >/dev/null
+first=$("$work/build/stream_recording" "$SELFCAL_TARGET" packaged "$work" \
+  "$work/spool" | tee /dev/stderr | tail -n 1)
+again=$("$work/by_pkg_config" "$SELFCAL_TARGET" packaged "$work" |
+  tee /dev/stderr | tail -n 1)
+listed=$("$selfcal" segments list packaged | wc -l)
+[[ $first == 'segments: 4 stored, 0 known already, 0 rejected' ]]
+[[ $again == 'segments: 0 stored, 4 known already, 0 rejected' ]]
+[[ $listed == 4 ]]
+echo 'passed'
