@@ -70,7 +70,7 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[1].name, "0002_change.sql");
   EXPECT_EQ(migrations[1].sha256,
             "adf5980e317d2d27f223d86870c2c3dcb79f5bde58b267c701e853328cb4c1a3");
-  EXPECT_EQ(migrations[2].name, "0004_eviction.sql");
+  EXPECT_EQ(migrations[2].name, "0003_eviction.sql");
   EXPECT_EQ(migrations[2].sha256,
             "5a82f4fc6db59545573f5f06ab80fcba269077339ca59dbd5ff8dc972cd80411");
 }
