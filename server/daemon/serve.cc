@@ -4,10 +4,8 @@
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <memory>
@@ -92,11 +90,11 @@ std::optional<int> RunUntilStopped(
   return std::nullopt;
 }
 
-// From a start to a stop; *restored says that it stopped for a database that
-// was restored.
-int ServeOnce(const DaemonOptions& options,
-              const std::function<std::optional<std::string>()>& read_log_level,
-              std::atomic<bool>* restored) {
+// From a start to a stop. Returns the exit code, or nothing where a restored
+// database waits for the next start.
+std::optional<int> ServeOnce(
+    const DaemonOptions& options,
+    const std::function<std::optional<std::string>()>& read_log_level) {
   // First, so that it watches over the end of all that follows.
   std::optional<StopDeadline> deadline;
   RaiseFileLimit();
@@ -114,13 +112,8 @@ int ServeOnce(const DaemonOptions& options,
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);
   }
-  // A restored database takes its place at a start.
-  const auto start_anew = [restored] {
-    *restored = true;
-    kill(getpid(), SIGTERM);
-  };
   const auto server =
-      MakeServer(store->get(), pipeline.get(), options.server, start_anew);
+      MakeServer(store->get(), pipeline.get(), options.server, AskToStartAnew);
   if (!server.ok()) {
     pipeline->Stop();
     return Failed("cannot serve", server.status());
@@ -132,7 +125,9 @@ int ServeOnce(const DaemonOptions& options,
   const auto signal = RunUntilStopped(store->get(), read_log_level);
   deadline.emplace(kStopLimit);
   NotifyStopping();
-  if (signal) {
+  if (signal == kStartAnew) {
+    spdlog::info("stopping, to start anew with the restored database");
+  } else if (signal) {
     spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
   } else {
     spdlog::error(
@@ -142,6 +137,7 @@ int ServeOnce(const DaemonOptions& options,
   (*server)->Shutdown(kCallLimit);
   pipeline->Stop();
   spdlog::info("stopped");
+  if (signal == kStartAnew) return std::nullopt;
   return signal ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
@@ -162,10 +158,8 @@ int Check(const DaemonOptions& options) {
 int Serve(const DaemonOptions& options,
           const std::function<std::optional<std::string>()>& read_log_level) {
   for (;;) {
-    std::atomic<bool> restored = false;
-    const int exit_code = ServeOnce(options, read_log_level, &restored);
-    if (exit_code != EXIT_SUCCESS || !restored) return exit_code;
-    spdlog::info("starting anew with the restored database");
+    const auto exit_code = ServeOnce(options, read_log_level);
+    if (exit_code) return *exit_code;
   }
 }
 

@@ -3,6 +3,7 @@
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <cstdlib>
 
@@ -15,6 +16,7 @@ sigset_t Signals() {
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGHUP);
+  sigaddset(&signals, kStartAnew);
   return signals;
 }
 
@@ -33,6 +35,8 @@ std::optional<int> WaitForSignal(std::chrono::milliseconds limit) {
   const int signal = sigtimedwait(&signals, nullptr, &timeout);
   return signal < 0 ? std::nullopt : std::optional(signal);
 }
+
+void AskToStartAnew() { kill(getpid(), kStartAnew); }
 
 StopDeadline::StopDeadline(std::chrono::milliseconds limit)
     : thread_([this, limit] {

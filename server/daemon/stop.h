@@ -2,6 +2,8 @@
 // and what happens if a stop takes too long.
 #pragma once
 
+#include <signal.h>
+
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -10,8 +12,13 @@
 
 namespace selfcal::server {
 
-// Blocks SIGTERM, SIGINT and SIGHUP in this thread and in those it starts, so
-// that WaitForSignal receives them. Call before any thread is started.
+// What the daemon sends to itself when it is to stop and start again: apart
+// from SIGTERM, so that a stop that comes at the same time is not lost.
+inline constexpr int kStartAnew = SIGUSR1;
+void AskToStartAnew();
+
+// Blocks these signals in this thread and in those it starts, so that
+// WaitForSignal receives them. Call before any thread is started.
 void BlockSignals();
 
 // The signal that arrived; nothing if none does within the limit.

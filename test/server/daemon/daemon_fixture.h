@@ -43,14 +43,18 @@ class DaemonTest : public ::testing::Test {
     auto daemon = Start(std::move(more));
     EXPECT_TRUE(daemon->Says("selfcald ready: listening on unix:"))
         << daemon->Log();
-    // A channel of its own for each process: no backoff from the one before.
+    Connect();
+    return daemon;
+  }
+
+  // A channel of its own for each start: no backoff from the one before.
+  void Connect() {
     grpc::ChannelArguments arguments;
-    arguments.SetInt("test.generation", processes_);
+    arguments.SetInt("test.generation", ++channels_);
     channel_ =
         grpc::CreateCustomChannel("unix:" + (state_ / "selfcald.sock").string(),
                                   grpc::InsecureChannelCredentials(),
                                   arguments);
-    return daemon;
   }
 
   Rig CreateRig() {
@@ -137,6 +141,7 @@ class DaemonTest : public ::testing::Test {
 
  private:
   int processes_ = 0;
+  int channels_ = 0;
 };
 
 }  // namespace selfcal::server

@@ -68,10 +68,12 @@ class Process {
     return {std::istreambuf_iterator<char>(file), {}};
   }
 
-  // Whether the log shows the text within a minute.
-  bool Says(const std::string& text) const {
+  // Whether the log shows the text within a minute; after `first`, if given.
+  bool Says(const std::string& text, const std::string& first = "") const {
     for (int i = 0; i < 6000; ++i) {
-      if (Log().find(text) != std::string::npos) return true;
+      const std::string log = Log();
+      const size_t from = log.find(first);
+      if (from != log.npos && log.find(text, from) != log.npos) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     return false;
