@@ -20,6 +20,9 @@ constexpr int kMaxSeconds = 86'400;
 constexpr int kMaxBacklog = 1'000'000;
 constexpr int kMaxMetricsRigs = 1000;
 constexpr int kMaxRigs = 10'000'000;
+constexpr std::int64_t kMaxBytes = std::int64_t{1} << 60;
+constexpr std::int64_t kMaxSegments = 1'000'000'000;
+constexpr std::int64_t kMaxAgeSeconds = 1'000'000'000;
 
 class Definer {
  public:
@@ -146,24 +149,30 @@ void DefineLimits(Definer* define, DaemonOptions* options) {
 
 // Each is off at 0.
 void DefineQuotas(Definer* define, Quotas* quotas) {
-  const CLI::Range any(std::int64_t{0},
-                       std::numeric_limits<std::int64_t>::max());
-  const auto add =
-      [&](const char* name, std::int64_t* value, const char* help) {
-        define->Add(name, value, help)->check(any)->capture_default_str();
-      };
+  const auto add = [&](const char* name,
+                       std::int64_t* value,
+                       const char* help,
+                       std::int64_t most) {
+    define->Add(name, value, help)
+        ->check(CLI::Range(std::int64_t{0}, most))
+        ->capture_default_str();
+  };
   add("max-payload-bytes-per-rig",
       &quotas->max_payload_bytes_per_rig,
-      "Bytes of stored data of one rig's segments; 0: no limit");
+      "Bytes of stored data of one rig's segments; 0: no limit",
+      kMaxBytes);
   add("max-segments-per-rig",
       &quotas->max_segments_per_rig,
-      "Segments of one rig whose metadata is kept; 0: no limit");
+      "Segments of one rig whose metadata is kept; 0: no limit",
+      kMaxSegments);
   add("max-segment-age",
       &quotas->max_segment_age_s,
-      "Seconds that metadata of segments is kept; 0: no limit");
+      "Seconds that metadata of segments is kept; 0: no limit",
+      kMaxAgeSeconds);
   add("max-database-bytes",
       &quotas->max_database_bytes,
-      "Bytes of the database; near it segments are refused; 0: no limit");
+      "Bytes of the database; near it segments are refused; 0: no limit",
+      kMaxBytes);
 }
 
 void DefineEstimation(Definer* define, DaemonOptions* options) {

@@ -161,6 +161,25 @@ TEST_F(QuotasTest, OldMetadataGoesButNotWhatACalibrationCameFrom) {
   EXPECT_EQ(store_->GetCalibration("a", 2)->segments.size(), 2u);
 }
 
+TEST_F(QuotasTest, MetadataOlderThanItMayBeGoes) {
+  OpenWith({});
+  for (int k = 0; k < 4; ++k) PutAndScore(k, 50, 0);  // enter no table
+  store_.reset();
+  auto db = Connection::Open(Path(), SQLITE_OPEN_READWRITE);
+  ASSERT_TRUE(db.ok());
+  ASSERT_TRUE(db->Execute("UPDATE segments SET receive_time_ns = "
+                          "receive_time_ns - 7200 * 1000000000 "
+                          "WHERE session_index < 2")
+                  .ok());
+  db = absl::UnknownError("closed");
+  OpenWith({.max_segment_age_s = 3600});
+  ASSERT_TRUE(Put(4).ok());
+  EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("a", {"s", 1}).status()));
+  EXPECT_TRUE(store_->GetSegment("a", {"s", 2}).ok());
+  ASSERT_EQ(Evictions().size(), 1u);
+  EXPECT_THAT(Evictions()[0], HasSubstr("2 segments"));
+}
+
 TEST_F(QuotasTest, AFullDatabaseRefusesSegmentsAndStillScoresWhatItHas) {
   OpenWith({.max_database_bytes = 2'000'000});
   absl::Status refused;
