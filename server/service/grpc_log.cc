@@ -1,10 +1,12 @@
 #include "server/service/grpc_log.h"
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <spdlog/spdlog.h>
 
 #include <atomic>
 #include <memory>
+#include <string>
 #include <string_view>
 
 namespace selfcal::server {
@@ -30,11 +32,20 @@ void Log(gpr_log_func_args* line) {
                 line->message);
 }
 
+// What it says of is what callers send, as often as they like.
+void LogProtobuf(google::protobuf::LogLevel,
+                 const char*,
+                 int,
+                 const std::string& message) {
+  Logger()->debug("protobuf: {}", message);
+}
+
 }  // namespace
 
 void RouteGrpcLog() {
   Logger();
   gpr_set_log_function(Log);
+  google::protobuf::SetLogHandler(LogProtobuf);
 }
 
 bool HasStoppedAccepting() { return stopped_accepting; }

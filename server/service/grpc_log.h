@@ -1,4 +1,4 @@
-// What gRPC itself has to say goes into the daemon's log.
+// What gRPC and protobuf themselves have to say goes into the daemon's log.
 #pragma once
 
 namespace selfcal::server {
