@@ -12,7 +12,6 @@
 #include <numeric>
 #include <optional>
 #include <random>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -86,14 +85,8 @@ std::vector<int> ChooseJointly(const ScoredRecording& recording,
 double Distance(const ScoredRecording& recording,
                 const std::vector<int>& chosen) {
   const RecordedDevice& device = recording.device;
-  std::vector<MotionSegment> segments;
-  for (const int i : chosen) segments.push_back(device.segments[i]);
   const CalibrationResult result =
-      Calibrate(device.rig, device.rig.factory, segments, ComparedOptions());
-  if (result.status == CalibrateStatus::kFailed) {
-    throw std::runtime_error("a calibration on chosen segments: " +
-                             result.message);
-  }
+      CalibrateOn(device.rig, device.segments, chosen);
   const std::vector<int> free = FreeComponents(device.rig);
   const Eigen::VectorXd off =
       BoxMinus(result.theta, recording.batch.theta)(free);

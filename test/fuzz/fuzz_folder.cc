@@ -3,17 +3,31 @@
 #include <unistd.h>
 
 #include <string>
+#include <system_error>
 
 namespace selfcal {
+namespace {
+
+class Folder {
+ public:
+  Folder() { std::filesystem::create_directories(path_); }
+  ~Folder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  const std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() /
+      ("selfcal-fuzz-" + std::to_string(::getpid()));
+};
+
+}  // namespace
 
 const std::filesystem::path& FuzzFolder() {
-  static const std::filesystem::path folder = [] {
-    auto path = std::filesystem::temp_directory_path() /
-                ("selfcal-fuzz-" + std::to_string(::getpid()));
-    std::filesystem::create_directories(path);
-    return path;
-  }();
-  return folder;
+  static const Folder folder;
+  return folder.path();
 }
 
 }  // namespace selfcal

@@ -5,7 +5,7 @@
 
 namespace selfcal {
 
-// One for a process, made by the first call.
+// One for a process, made by the first call, removed at its end.
 const std::filesystem::path& FuzzFolder();
 
 }  // namespace selfcal

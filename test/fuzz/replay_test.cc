@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -17,6 +15,7 @@
 #include "proto/convert.h"
 #include "test/fuzz/seeds.h"
 #include "test/fuzz/targets.h"
+#include "test/promise.h"
 
 namespace selfcal {
 namespace {
@@ -42,11 +41,6 @@ std::vector<std::string> Corpus(const std::string& target) {
     if (seed.target == target) inputs.push_back(seed.bytes);
   }
   return inputs;
-}
-
-int Trials() {
-  const char* trials = std::getenv("SELFCAL_TRIALS");
-  return trials == nullptr ? 2000 : std::atoi(trials);
 }
 
 // One to four places are overwritten, removed, doubled or taken from another
@@ -92,17 +86,19 @@ TEST_P(HostileBytes, EndNothing) {
   const FuzzTarget& target = GetParam();
   const std::vector<std::string> corpus = Corpus(target.name);
   ASSERT_FALSE(corpus.empty());
-  for (const std::string& bytes : corpus) target.run(bytes);
+  Promise promise("hostile bytes end nothing, " + target.name);
+  const auto run = [&](const std::string& bytes) {
+    target.run(bytes);
+    ++promise.trials;
+  };
+  for (const std::string& bytes : corpus) run(bytes);
   Mutator mutator(1);
-  const int trials = Trials();
+  const int trials = Trials(2000);
   for (int i = 0; i < trials; ++i) {
     const std::string& one = corpus[mutator.Below(corpus.size())];
     const std::string& other = corpus[mutator.Below(corpus.size())];
-    target.run(mutator.Change(one, other));
+    run(mutator.Change(one, other));
   }
-  std::printf("promise: hostile bytes, %s: trials %zu lost 0\n",
-              target.name.c_str(),
-              corpus.size() + trials);
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets,

@@ -1,85 +1,21 @@
 #include "server/access/rules.h"
 
 #include <google/protobuf/descriptor.h>
-#include <google/protobuf/dynamic_message.h>
 #include <gtest/gtest.h>
 
 #include <map>
-#include <memory>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
-#include "selfcal/v1/calibration_service.pb.h"
-#include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/rig.pb.h"
 #include "selfcal/v1/segment.pb.h"
-#include "selfcal/v1/store_service.pb.h"
+#include "test/server/access/contract.h"
 
 namespace selfcal::server {
 namespace {
 
 using google::protobuf::Descriptor;
-using google::protobuf::MethodDescriptor;
-
-// Every method of every service of the contract. A service in a new file must
-// be named here: server_test fails for one that is served and is not.
-std::vector<const MethodDescriptor*> Methods() {
-  std::vector<const MethodDescriptor*> methods;
-  for (const auto* file : {v1::GetRigRequest::descriptor()->file(),
-                           v1::GetSegmentRequest::descriptor()->file(),
-                           v1::GetCalibrationRequest::descriptor()->file(),
-                           v1::GetRecalibrationRequest::descriptor()->file(),
-                           v1::ListEventsRequest::descriptor()->file()}) {
-    for (int s = 0; s < file->service_count(); ++s) {
-      for (int m = 0; m < file->service(s)->method_count(); ++m) {
-        methods.push_back(file->service(s)->method(m));
-      }
-    }
-  }
-  return methods;
-}
-
-const AccessRule& RuleOf(const MethodDescriptor& method) {
-  for (const AccessRule& rule : AccessRules()) {
-    if (rule.method == method.full_name()) return rule;
-  }
-  static const AccessRule none;
-  ADD_FAILURE() << method.full_name() << " has no rule of access";
-  return none;
-}
-
-// Writes the name to the field at a path like "rig.name".
-void SetAt(google::protobuf::Message* message,
-           const std::string& path,
-           const std::string& name) {
-  const auto dot = path.find('.');
-  const auto* field =
-      message->GetDescriptor()->FindFieldByName(path.substr(0, dot));
-  ASSERT_NE(field, nullptr) << message->GetTypeName() << " has no " << path;
-  const auto& reflection = *message->GetReflection();
-  if (dot == path.npos) {
-    reflection.SetString(message, field, name);
-  } else {
-    SetAt(
-        reflection.MutableMessage(message, field), path.substr(dot + 1), name);
-  }
-}
-
-// A request of the method for `name`, put wherever the rule looks for it.
-std::unique_ptr<google::protobuf::Message> Request(
-    const MethodDescriptor& method, const std::string& name) {
-  std::unique_ptr<google::protobuf::Message> request(
-      google::protobuf::MessageFactory::generated_factory()
-          ->GetPrototype(method.input_type())
-          ->New());
-  std::istringstream fields{std::string(RuleOf(method).rig_field)};
-  for (std::string field; std::getline(fields, field, ',');) {
-    SetAt(request.get(), field, name);
-  }
-  return request;
-}
 
 TEST(Rules, EveryMethodHasOneAndARequestTypeOfItsOwn) {
   std::set<const Descriptor*> requests;
@@ -112,7 +48,7 @@ TEST(Rules, EveryMethodWithANameInItsRequestIsBoundToTheRig) {
 TEST(Rules, NobodyWithoutAGrantPasses) {
   for (const MethodDescriptor* method : Methods()) {
     for (const std::string name : {"", "rigs/a", "rigs/a/segments/s~1", "x"}) {
-      const auto status = Authorise({"nobody", {}}, *Request(*method, name));
+      const auto status = Authorise({"nobody", {}}, *RequestFor(*method, name));
       EXPECT_TRUE(absl::IsPermissionDenied(status)) << method->full_name();
     }
   }
@@ -122,7 +58,7 @@ TEST(Rules, RoleOnAllRigsPassesWhereItSuffices) {
   for (const Role role : {Role::kRead, Role::kProduce, Role::kAdminister}) {
     const Caller caller{"someone", {{role, ""}}};
     for (const MethodDescriptor* method : Methods()) {
-      EXPECT_EQ(Authorise(caller, *Request(*method, "rigs/a")).ok(),
+      EXPECT_EQ(Authorise(caller, *RequestFor(*method, "rigs/a")).ok(),
                 RuleOf(*method).role <= role)
           << method->full_name() << " for " << RoleName(role);
     }
@@ -145,7 +81,7 @@ TEST(Rules, RightsOnOneRigEndThere) {
         {"x/rigs/a", false},
     };
     for (const auto& [name, passes] : expected) {
-      EXPECT_EQ(Authorise(caller, *Request(*method, name)).ok(), passes)
+      EXPECT_EQ(Authorise(caller, *RequestFor(*method, name)).ok(), passes)
           << method->full_name() << " of " << name;
     }
   }

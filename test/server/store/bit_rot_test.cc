@@ -6,7 +6,7 @@
 #include "server/store/maintenance.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite_test.h"
-#include "test/server/trials.h"
+#include "test/promise.h"
 
 namespace selfcal::server {
 namespace {

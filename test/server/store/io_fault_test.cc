@@ -8,7 +8,7 @@
 
 #include "test/server/store/fault_vfs.h"
 #include "test/server/store/sqlite_test.h"
-#include "test/server/trials.h"
+#include "test/promise.h"
 
 namespace selfcal::server {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "server/store/maintenance.h"
 #include "test/server/store/store_test.h"
-#include "test/server/trials.h"
+#include "test/promise.h"
 
 namespace selfcal::server {
 namespace {

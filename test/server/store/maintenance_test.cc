@@ -9,7 +9,7 @@
 #include "server/store/restore.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite_test.h"
-#include "test/server/trials.h"
+#include "test/promise.h"
 
 namespace selfcal::server {
 namespace {

@@ -3,7 +3,7 @@
 #include <random>
 
 #include "test/server/store/store_test.h"
-#include "test/server/trials.h"
+#include "test/promise.h"
 
 namespace selfcal::server {
 namespace {

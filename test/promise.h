@@ -7,8 +7,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <utility>
 
-namespace selfcal::server {
+namespace selfcal {
 
 inline int Trials(int few) {
   const char* wanted = std::getenv("SELFCAL_TRIALS");
@@ -36,4 +37,4 @@ class Promise {
   std::string name_;
 };
 
-}  // namespace selfcal::server
+}  // namespace selfcal
