@@ -9,10 +9,10 @@
 // calls them. A destructor waits for a callback that is running, and that of a
 // stream with a spool for the disk; and where a daemon stands still in the
 // middle of a message, as a process under SIGSTOP, that of a stream waits until
-// it goes on or the connection is given up, which takes up to 6 min 20 s. No
-// function throws, and what a callback throws is caught and counted. An object
-// for which there was no memory, or no thread, does nothing and says
-// RESOURCE_EXHAUSTED. (gRPC itself ends the process when it finds no memory.)
+// it goes on or gRPC gives the connection up. No function throws, and what a
+// callback throws is caught and counted. An object for which there was no
+// memory, or no thread, does nothing and says RESOURCE_EXHAUSTED. (gRPC itself
+// ends the process when it finds no memory.)
 #pragma once
 
 #include <absl/status/status.h>
