@@ -7,6 +7,7 @@
 #include "server/service/errors.h"
 #include "server/service/paging.h"
 #include "server/service/services.h"
+#include "server/store/rig_policy.h"
 
 namespace selfcal::server {
 namespace {
@@ -62,8 +63,12 @@ class RigService final : public v1::RigService::Service {
     for (Violation& violation : violations) {
       violation.field = "rig." + RigFieldPath(violation.field);
     }
+    RigPolicy policy;
+    for (const Violation& violation : GetPolicy(request.rig(), &policy)) {
+      violations.push_back({"rig." + violation.field, violation.message});
+    }
     if (!violations.empty()) return InvalidFields(violations);
-    const auto created = store_->CreateRig(rig);
+    const auto created = store_->CreateRig(rig, policy);
     if (!created.ok()) {
       return ToGrpc(created.status(), {kType, request.rig().name(), "rig"});
     }

@@ -25,9 +25,10 @@ class SqliteStore : public Store {
   SqliteStore(Connection db, const ChangeOptions& change)
       : db_(std::move(db)), change_(change) {}
 
-  absl::StatusOr<StoredRig> CreateRig(const Rig& rig) override {
+  absl::StatusOr<StoredRig> CreateRig(const Rig& rig,
+                                      const RigPolicy& policy) override {
     const std::lock_guard lock(mutex_);
-    return CreateRigRow(&db_, rig);
+    return CreateRigRow(&db_, rig, policy);
   }
 
   absl::StatusOr<StoredRig> GetRig(const std::string& rig) override {
@@ -94,6 +95,12 @@ class SqliteStore : public Store {
     return ReadTables(&db_, rig_id);
   }
 
+  absl::StatusOr<std::vector<SegmentInformation>> ListHeldOut(
+      const std::string& rig, std::int64_t run, int limit) override {
+    const std::lock_guard lock(mutex_);
+    return ListHeldOutRows(&db_, rig, run, limit);
+  }
+
   absl::StatusOr<StoredChange> GetChange(const std::string& rig,
                                          std::int64_t change) override {
     const std::lock_guard lock(mutex_);
@@ -118,6 +125,15 @@ class SqliteStore : public Store {
     return ListCalibrationRows(&db_, rig, page);
   }
 
+  absl::StatusOr<StoredCalibration> ActivateCalibration(
+      const std::string& rig,
+      std::int64_t version,
+      const std::string& caller,
+      const std::string& reason) override {
+    const std::lock_guard lock(mutex_);
+    return ActivateCalibrationRow(&db_, rig, version, caller, reason);
+  }
+
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig) override {
     const std::lock_guard lock(mutex_);
     return CreateManualRunRow(&db_, rig);
@@ -140,6 +156,19 @@ class SqliteStore : public Store {
     return ListUnfinishedRunRows(&db_);
   }
 
+  absl::StatusOr<std::vector<StoredRun>> StartAgedRuns(
+      std::int64_t now_ns) override {
+    const std::lock_guard lock(mutex_);
+    return StartAgedRunRows(&db_, now_ns);
+  }
+
+  absl::Status HoldRun(const std::string& rig,
+                       std::int64_t run,
+                       const std::string& reason) override {
+    const std::lock_guard lock(mutex_);
+    return HoldRunRow(&db_, rig, run, reason);
+  }
+
   absl::StatusOr<StoredRun> BeginRun(const std::string& rig,
                                      std::int64_t run) override {
     const std::lock_guard lock(mutex_);
@@ -150,6 +179,20 @@ class SqliteStore : public Store {
                                        std::int64_t run) override {
     const std::lock_guard lock(mutex_);
     return ReleaseRunRow(&db_, rig, run);
+  }
+
+  absl::StatusOr<StoredCalibration> StoreCandidate(
+      const std::string& rig,
+      std::int64_t run,
+      const StoredCalibration& calibration) override {
+    const std::lock_guard lock(mutex_);
+    return StoreCandidateRow(&db_, rig, run, calibration);
+  }
+
+  absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
+                                                 std::int64_t run) override {
+    const std::lock_guard lock(mutex_);
+    return ReadCandidate(&db_, rig, run);
   }
 
   absl::StatusOr<StoredCalibration> FinishRun(
