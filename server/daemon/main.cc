@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <memory>
 #include <optional>
+#include <ratio>
 #include <string>
 
 #include "server/daemon/options.h"
@@ -52,6 +53,11 @@ int Serve(const DaemonOptions& options) {
   pipeline_options.scoring_threads = options.scoring_threads;
   pipeline_options.program_version = SELFCAL_VERSION;
   pipeline_options.calibrate.solver = options.solver;
+  const auto conditions = MakeHostConditions(options.host);
+  pipeline_options.conditions = conditions.get();
+  pipeline_options.idle_runs = options.idle_runs;
+  pipeline_options.max_run_time = std::chrono::round<std::chrono::milliseconds>(
+      std::chrono::duration<double, std::ratio<60>>(options.max_run_minutes));
   const auto pipeline = MakePipeline(store->get(), pipeline_options);
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);

@@ -10,6 +10,9 @@ namespace {
 constexpr int kUsageError = 2;
 constexpr int kMaxScoringThreads = 256;
 constexpr double kMaxInflation = 1e4;
+constexpr double kMaxLoad = 1000;
+constexpr double kMinRunMinutes = 0.1;
+constexpr double kMaxRunMinutes = 10'000;
 
 }  // namespace
 
@@ -55,6 +58,29 @@ std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
                  "Bound on false alarms of that test, for each segment; 0 "
                  "turns it off")
       ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_flag("--only-on-external-power",
+               options->host.only_on_external_power,
+               "Hold runs back while the machine runs on its battery, unless "
+               "they are asked for");
+  app.add_option("--max-load",
+                 options->host.max_load,
+                 "Hold runs back while the load of the last minute, for each "
+                 "processor, is this or more; 0: no matter")
+      ->check(CLI::Range(0.0, kMaxLoad))
+      ->capture_default_str();
+  app.add_option("--run-priority",
+                 options->idle_runs,
+                 "idle: a run takes only what nobody else wants, and does not "
+                 "get on while the machine is busy; low: it stands behind "
+                 "everything else")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, bool>{{"idle", true}, {"low", false}}))
+      ->default_str("idle");
+  app.add_option("--max-run-minutes",
+                 options->max_run_minutes,
+                 "A run that takes longer fails")
+      ->check(CLI::Range(kMinRunMinutes, kMaxRunMinutes))
       ->capture_default_str();
   app.add_option("--log-level", options->log_level, "What goes to stderr")
       ->check(CLI::IsMember(

@@ -8,6 +8,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/change/detect_change.h"
+#include "server/host/host_conditions.h"
 
 namespace selfcal::server {
 
@@ -17,6 +18,9 @@ struct DaemonOptions {
   int scoring_threads = 1;
   SolverKind solver = SolverKind::kStructured;
   ChangeOptions change;
+  HostLimits host;  // for runs that nobody asks for
+  bool idle_runs = true;
+  double max_run_minutes = 30;  // of a run; it fails then
   std::string log_level = "info";
 };
 
