@@ -28,6 +28,9 @@ std::optional<std::string> Text(const toml::node& node) {
   if (const auto* number = node.as_floating_point()) {
     return fmt::format("{}", number->get());
   }
+  if (const auto* flag = node.as_boolean()) {
+    return flag->get() ? "true" : "false";
+  }
   return std::nullopt;
 }
 
@@ -85,8 +88,8 @@ absl::Status ApplyConfigFile(const std::string& path, DaemonOptions* options) {
       return Mistake(path,
                      key.source(),
                      "'" + name +
-                         "' must be a text, a number or a list of "
-                         "texts");
+                         "' must be a text, a number, true, "
+                         "false or a list of texts");
     }
     if (const auto wrong = Set(name, *values, options)) {
       return Mistake(path, key.source(), *wrong);
