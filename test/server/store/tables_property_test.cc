@@ -3,6 +3,7 @@
 #include <random>
 
 #include "test/server/store/store_test.h"
+#include "test/server/trials.h"
 
 namespace selfcal::server {
 namespace {
@@ -25,9 +26,11 @@ TEST_P(TablesPropertyTest, TablesHoldTheBestAndTheirDataAlways) {
   std::mt19937 random(5);
   // Few values, so that ties happen.
   std::uniform_int_distribution<int> level(0, 9);
-  for (int trial = 0; trial < 4; ++trial) {
+  Promise promise("tables hold exactly the N best");
+  const int rigs = Trials(4);
+  for (int trial = 0; trial < rigs; ++trial) {
     Rig rig = TestRig("rig" + std::to_string(trial));
-    rig.table_size = 1 + trial;
+    rig.table_size = 1 + trial % 8;
     ASSERT_TRUE(store_->CreateRig(rig).ok());
     std::vector<std::vector<TableEntry>> offered(rig.groups.size());
     for (int k = 0; k < 30; ++k) {
@@ -68,6 +71,7 @@ TEST_P(TablesPropertyTest, TablesHoldTheBestAndTheirDataAlways) {
         ASSERT_EQ(segment.has_data, referenced[segment.key.index])
             << segment.key.index << " after " << k;
       }
+      ++promise.trials;
     }
   }
 }
