@@ -7,10 +7,7 @@ namespace {
 
 class ChangePipelineTest : public PipelineTest {
  protected:
-  ChangePipelineTest() {
-    estimators_ = CoreEstimators();
-    options_.idle_runs = false;  // the machine may be busy with other tests
-  }
+  ChangePipelineTest() { estimators_ = CoreEstimators(); }
 
   // Segments of a session of the device as it is, estimated with a version.
   std::vector<MotionSegment> Session(const Rig& rig,

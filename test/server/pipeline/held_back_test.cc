@@ -157,6 +157,7 @@ TEST_F(HeldBackTest, RunThatTakesTooLongFails) {
 
 TEST_F(HeldBackTest, SolverRunsAtIdlePriority) {
   CreateRig();
+  options_.idle_runs = true;
   std::atomic<int> policy{-1};
   std::atomic<long> io{-1};
   estimators_.calibrate = [&](const Rig& rig,

@@ -89,7 +89,9 @@ bool Ended(Store* store) {
                             const ProgressCallback& progress) {
     return Solve(rig, start, progress);
   };
-  const auto pipeline = MakePipeline(store->get(), {}, estimators);
+  PipelineOptions options;
+  options.idle_runs = false;  // the machine may be busy with other tests
+  const auto pipeline = MakePipeline(store->get(), options, estimators);
   if (!pipeline->Start().ok()) _exit(4);
   for (const std::int64_t index : {0, 1}) {
     if (!pipeline->Submit("a", Segment(index), nullptr).ok()) _exit(5);

@@ -6,10 +6,7 @@ namespace {
 
 class WholeWayTest : public PipelineTest {
  protected:
-  WholeWayTest() {
-    estimators_ = CoreEstimators();
-    options_.idle_runs = false;  // the machine may be busy with other tests
-  }
+  WholeWayTest() { estimators_ = CoreEstimators(); }
 };
 
 TEST_F(WholeWayTest, SimulatedSegmentsFillTheTablesAndGiveAVersion) {
