@@ -8,7 +8,7 @@
 
 #include "server/store/statement.h"
 #include "test/server/pipeline/pipeline_test.h"
-#include "test/server/promise.h"
+#include "test/server/trials.h"
 
 namespace selfcal::server {
 namespace {
@@ -159,7 +159,9 @@ TEST(RunKillTest, OneRunForEachTriggerHoweverItIsKilled) {
     // Put and score twice, begin, candidate, finish: on both sides.
     EXPECT_GT(steps, 14);
   }
-  ReportPromise("one-run-for-each-trigger", counts.trials, counts.lost);
+  Promise promise("one-run-for-each-trigger");
+  promise.trials = counts.trials;
+  promise.lost = counts.lost;
 }
 
 }  // namespace
