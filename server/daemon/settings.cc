@@ -201,12 +201,12 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
 }
 
 void DefineRuns(Definer* define, DaemonOptions* options) {
-  define
-      ->Add("only-on-external-power",
-            &options->host.only_on_external_power,
-            "true: runs that nobody asked for wait while the machine runs on "
-            "its battery")
-      ->capture_default_str();
+  define->Named(
+      "only-on-external-power",
+      define->app()->add_flag("--only-on-external-power",
+                              options->host.only_on_external_power,
+                              "Runs that nobody asked for wait while the "
+                              "machine runs on its battery"));
   define
       ->Add("max-load",
             &options->host.max_load,

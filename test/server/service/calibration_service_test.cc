@@ -187,7 +187,7 @@ TEST_F(CalibrationServiceTest, RolledBackVersionSaysSo) {
   EXPECT_EQ(read.version(), 1);
   const StoredEvent event = store_->ListEvents({1000, ""})->items.back();
   EXPECT_EQ(event.kind, EventKind::kCalibrationRolledBack);
-  EXPECT_THAT(event.detail, ::testing::HasSubstr("unix:"));
+  EXPECT_THAT(event.detail, ::testing::HasSubstr("by local"));
   EXPECT_THAT(event.detail, ::testing::HasSubstr("drifts"));
 }
 
