@@ -18,6 +18,39 @@ void AddProvenance(const v1::Calibration::Provenance& provenance,
   }
   facts->Add("segments", segments);
   facts->Add("program", provenance.program_version());
+  std::string settings;
+  for (const auto& setting : provenance.settings()) {
+    settings +=
+        (settings.empty() ? "" : ", ") + setting.name() + " " + setting.value();
+  }
+  if (!settings.empty()) facts->Add("settings", settings);
+}
+
+void AddValidation(const v1::Validation& validation, Facts* facts) {
+  for (const auto& check : validation.checks()) {
+    facts->Add("check",
+               fmt::format("{} {}: {:.3g}, limit {:.3g}",
+                           check.name(),
+                           check.passed() ? "passed" : "failed",
+                           check.value(),
+                           check.limit()));
+  }
+  const auto& held_out = validation.held_out();
+  if (held_out.degrees() == 0) {
+    facts->Add("held-out segments",
+               fmt::format("none could be tested of {}",
+                           held_out.segments() + held_out.left_out()));
+    return;
+  }
+  facts->Add("held-out segments",
+             fmt::format("{} ({} left out), {} degrees: chi-square {:.1f}, of "
+                         "version {} {:.1f}",
+                         held_out.segments(),
+                         held_out.left_out(),
+                         held_out.degrees(),
+                         held_out.chi_square(),
+                         validation.active_version(),
+                         held_out.active_chi_square()));
 }
 
 std::string NoiseName(const std::string& kind) {
@@ -98,6 +131,9 @@ Facts DescribeCalibration(const v1::Calibration& calibration) {
   } else {
     facts.Add("origin", "factory");
   }
+  if (calibration.has_validation()) {
+    AddValidation(calibration.validation(), &facts);
+  }
   if (calibration.has_solver()) AddSolver(calibration.solver(), &facts);
   return facts;
 }
@@ -109,6 +145,44 @@ Table CalibrationValues(const v1::Calibration& calibration) {
                ValueText(estimate.value(), estimate.sigma()),
                estimate.unit(),
                SigmaText(estimate.sigma())});
+  }
+  return table;
+}
+
+Facts DescribeDifferences(const v1::CompareCalibrationsResponse& differences) {
+  Facts facts;
+  facts.Add("versions",
+            fmt::format(
+                "{} and {}", differences.version_a(), differences.version_b()));
+  facts.Add("shared segments",
+            fmt::format("{} ({} taken into account)",
+                        differences.shared_segments(),
+                        differences.shared_segments_used()));
+  facts.Add(
+      "difference",
+      fmt::format("{}: chi-square {:.1f} with {} degrees, probability "
+                  "{:.2g}",
+                  differences.significant() ? "significant" : "not significant",
+                  differences.chi_square(),
+                  differences.degrees(),
+                  differences.probability()));
+  return facts;
+}
+
+Table DifferenceValues(const v1::CompareCalibrationsResponse& differences) {
+  Table table({{"component"},
+               {"a", true},
+               {"b", true},
+               {"unit"},
+               {"difference", true},
+               {"sigma", true}});
+  for (const auto& one : differences.differences()) {
+    table.Add({one.component(),
+               ValueText(one.value_a(), one.sigma()),
+               ValueText(one.value_b(), one.sigma()),
+               one.unit(),
+               ValueText(one.difference(), one.sigma()),
+               SigmaText(one.sigma())});
   }
   return table;
 }

@@ -14,6 +14,10 @@ Facts DescribeCalibration(const v1::Calibration& calibration);
 // Component, value, unit, sigma.
 Table CalibrationValues(const v1::Calibration& calibration);
 
+// Verdict on two versions; component, both values, difference with its sigma.
+Facts DescribeDifferences(const v1::CompareCalibrationsResponse& differences);
+Table DifferenceValues(const v1::CompareCalibrationsResponse& differences);
+
 // A line: version, state, time, what the solver did.
 std::string CalibrationLine(const v1::Calibration& calibration);
 

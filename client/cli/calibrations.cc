@@ -58,6 +58,48 @@ int Show(Context* context, const std::string& rig, const std::string& version) {
   return kDone;
 }
 
+int Activate(Context* context,
+             const std::string& rig,
+             const std::string& version,
+             const std::string& reason) {
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  v1::ActivateCalibrationRequest request;
+  request.set_name(ChildName(rig, "calibrations", version));
+  request.set_reason(reason);
+  v1::Calibration calibration;
+  const auto status = Call<Service>(
+      stub.get(), &Service::ActivateCalibration, request, &calibration);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(calibration);
+  } else {
+    PrintText(CalibrationLine(calibration) + "\n");
+  }
+  return kDone;
+}
+
+int Diff(Context* context,
+         const std::string& rig,
+         const std::string& a,
+         const std::string& b) {
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  v1::CompareCalibrationsRequest request;
+  request.set_a(ChildName(rig, "calibrations", a));
+  request.set_b(ChildName(rig, "calibrations", b));
+  v1::CompareCalibrationsResponse differences;
+  const auto status = Call<Service>(
+      stub.get(), &Service::CompareCalibrations, request, &differences);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(differences);
+    return kDone;
+  }
+  context->Print(DescribeDifferences(differences));
+  if (context->terminal) PrintText("\n");
+  context->Print(DifferenceValues(differences));
+  return kDone;
+}
+
 // Until `count` have come, or, if it is 0, until the daemon ends it.
 int Watch(Context* context, const std::string& rig, std::int64_t count) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
@@ -107,6 +149,33 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   show->callback([context, rig, version] {
     context->command = [context, rig, version] {
       return Show(context, *rig, *version);
+    };
+  });
+
+  const auto reason = std::make_shared<std::string>();
+  CLI::App* activate = calibrations->add_subcommand(
+      "activate",
+      "Make a version the active one; an older one rolls the active one back");
+  activate->add_option("RIG", *rig)->required();
+  activate->add_option("VERSION", *version, "A number")->required();
+  activate
+      ->add_option("--reason", *reason, "Why; the event log keeps it with who")
+      ->required();
+  activate->callback([context, rig, version, reason] {
+    context->command = [context, rig, version, reason] {
+      return Activate(context, *rig, *version, *reason);
+    };
+  });
+
+  const auto other = std::make_shared<std::string>("active");
+  CLI::App* diff = calibrations->add_subcommand(
+      "diff", "Compare two versions, by their uncertainty");
+  diff->add_option("RIG", *rig)->required();
+  diff->add_option("A", *version, "A number, or active")->required();
+  diff->add_option("B", *other, "A number, or active")->capture_default_str();
+  diff->callback([context, rig, version, other] {
+    context->command = [context, rig, version, other] {
+      return Diff(context, *rig, *version, *other);
     };
   });
 

@@ -32,6 +32,26 @@ std::string GroupText(const v1::ParameterGroup& group) {
   return fmt::format("{}: {}", group.group(), fmt::join(group.patterns(), " "));
 }
 
+std::string SecondsText(const google::protobuf::Duration& duration) {
+  return fmt::format(
+      "{:g} s",
+      static_cast<double>(duration.seconds()) + 1e-9 * duration.nanos());
+}
+
+void AddPolicy(const v1::Rig& rig, Facts* facts) {
+  if (rig.has_table_max_age()) {
+    facts->Add("table maximum age", SecondsText(rig.table_max_age()));
+  }
+  if (rig.has_recalibration_min_interval()) {
+    facts->Add("minimum interval",
+               SecondsText(rig.recalibration_min_interval()));
+  }
+  if (rig.has_calibration_max_age()) {
+    facts->Add("calibration maximum age",
+               SecondsText(rig.calibration_max_age()));
+  }
+}
+
 Facts Describe(const v1::Rig& rig) {
   Facts facts;
   facts.Add("rig", LastPart(rig.name()));
@@ -65,6 +85,7 @@ Facts Describe(const v1::Rig& rig) {
   facts.Add("minimum gain", fmt::format("{:g} nat", rig.min_gain_nats()));
   facts.Add("retrigger fraction",
             fmt::format("{:g}", rig.retrigger_fraction()));
+  AddPolicy(rig, &facts);
   facts.Add("noise",
             rig.reweight_noise() ? "re-weighted by what residuals suggest"
                                  : "as stated");
@@ -162,6 +183,17 @@ void AddOverrides(CLI::App* create, RigInput* input) {
   create->add_option("--retrigger-fraction",
                      input->retrigger_fraction,
                      "Part of the tables that must be new for another run");
+  create->add_option("--table-max-age",
+                     input->table_max_age_s,
+                     "Segments that arrived longer ago leave the tables [s]");
+  create->add_option("--min-interval",
+                     input->min_interval_s,
+                     "From the end of a run to the next that nobody asks for "
+                     "[s]");
+  create->add_option("--calibration-max-age",
+                     input->calibration_max_age_s,
+                     "A calibration that is active for longer is computed anew "
+                     "[s]");
   create->add_flag("--reweight-noise",
                    input->reweight_noise,
                    "Weight by the noise that the residuals suggest");

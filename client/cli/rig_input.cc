@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <google/protobuf/util/json_util.h>
 
+#include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -64,6 +66,28 @@ absl::Status SetSelection(const std::string& text, v1::Rig* rig) {
       "--selection {} is none of {}", text, fmt::join(known, ", ")));
 }
 
+google::protobuf::Duration Seconds(double seconds) {
+  constexpr double kMost = 1e12;  // more is refused by the daemon anyway
+  const double bounded = std::clamp(seconds, -kMost, kMost);
+  google::protobuf::Duration duration;
+  duration.set_seconds(static_cast<std::int64_t>(bounded));
+  duration.set_nanos(static_cast<std::int32_t>(
+      std::round((bounded - std::trunc(bounded)) * 1e3) * 1e6));
+  return duration;
+}
+
+void SetPolicy(const RigInput& input, v1::Rig* rig) {
+  if (input.table_max_age_s) {
+    *rig->mutable_table_max_age() = Seconds(*input.table_max_age_s);
+  }
+  if (input.min_interval_s) {
+    *rig->mutable_recalibration_min_interval() = Seconds(*input.min_interval_s);
+  }
+  if (input.calibration_max_age_s) {
+    *rig->mutable_calibration_max_age() = Seconds(*input.calibration_max_age_s);
+  }
+}
+
 }  // namespace
 
 std::string SelectionText(v1::Rig::Selection selection) {
@@ -98,6 +122,7 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input) {
     rig->set_retrigger_fraction(*input.retrigger_fraction);
   }
   if (input.reweight_noise) rig->set_reweight_noise(true);
+  SetPolicy(input, &*rig);
   v1::ImuNoise noise = rig->imu_noise();
   if (input.gyro_noise) noise.set_gyro_noise_density(*input.gyro_noise);
   if (input.accel_noise) noise.set_accel_noise_density(*input.accel_noise);

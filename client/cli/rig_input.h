@@ -27,6 +27,9 @@ struct RigInput {
   std::optional<double> min_gain_nats;
   std::optional<double> retrigger_fraction;
   bool reweight_noise = false;
+  std::optional<double> table_max_age_s;
+  std::optional<double> min_interval_s;
+  std::optional<double> calibration_max_age_s;
   std::vector<std::string> fixed;
   bool estimate_time_offset = false;
 };

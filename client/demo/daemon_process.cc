@@ -49,6 +49,9 @@ pid_t Spawn(const std::string& binary,
         binary.c_str(),
         "--state-dir",
         state_dir.c_str(),
+        // Someone waits for the result, on a machine that may be busy.
+        "--run-priority",
+        "low",
         static_cast<char*>(nullptr));
   _exit(127);
 }

@@ -28,6 +28,9 @@ std::optional<std::string> Text(const toml::node& node) {
   if (const auto* number = node.as_floating_point()) {
     return fmt::format("{}", number->get());
   }
+  if (const auto* flag = node.as_boolean()) {
+    return flag->get() ? "true" : "false";
+  }
   return std::nullopt;
 }
 
@@ -45,8 +48,13 @@ std::optional<std::vector<std::string>> Texts(const toml::node& node) {
   return add(node) ? std::optional(texts) : std::nullopt;
 }
 
+std::string WrongKind(const std::string& name) {
+  return "'" + name + "' must be a text, a number or a list of texts";
+}
+
 // The explanation of what is wrong with the value, or nothing.
 std::optional<std::string> Set(const std::string& name,
+                               bool is_flag,
                                const std::vector<std::string>& values,
                                DaemonOptions* options) {
   CLI::App app;
@@ -55,6 +63,10 @@ std::optional<std::string> Set(const std::string& name,
   if (app.get_option_no_throw("--" + name) == nullptr) {
     return "there is no setting '" + name + "'; selfcald --help lists them";
   }
+  const bool takes_flag =
+      app.get_option("--" + name)->get_items_expected_max() == 0;
+  if (takes_flag && !is_flag) return "'" + name + "' must be true or false";
+  if (!takes_flag && is_flag) return WrongKind(name);
   std::vector<std::string> arguments;
   for (const std::string& value : values) {
     arguments.push_back("--" + name + "=" + value);
@@ -82,13 +94,9 @@ absl::Status ApplyConfigFile(const std::string& path, DaemonOptions* options) {
     const std::string name(key.str());
     const auto values = Texts(node);
     if (!values) {
-      return Mistake(path,
-                     key.source(),
-                     "'" + name +
-                         "' must be a text, a number or a list of "
-                         "texts");
+      return Mistake(path, key.source(), WrongKind(name));
     }
-    if (const auto wrong = Set(name, *values, options)) {
+    if (const auto wrong = Set(name, node.is_boolean(), *values, options)) {
       return Mistake(path, key.source(), *wrong);
     }
   }

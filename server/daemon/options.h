@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/calibration/calibrate.h"
+#include "server/host/host_conditions.h"
 #include "server/service/server.h"
 #include "server/store/store_options.h"
 
@@ -24,6 +25,9 @@ struct DaemonOptions {
   int max_backlog = 64;  // stored and unscored segments; then streams wait
   SolverKind solver = SolverKind::kStructured;
   StoreOptions store;
+  HostLimits host;  // for runs that nobody asks for
+  bool idle_runs = true;
+  double max_run_minutes = 30;  // of a run; it fails then
   std::string metrics = "off";  // or host:port of the loopback
   int metrics_rigs = 16;        // with series of their own
   std::string log_level = "info";

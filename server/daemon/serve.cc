@@ -16,6 +16,7 @@
 #include "server/daemon/service_manager.h"
 #include "server/daemon/state_lock.h"
 #include "server/daemon/stop.h"
+#include "server/host/host_conditions.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
 #include "server/service/grpc_log.h"
@@ -44,12 +45,17 @@ void RaiseFileLimit() {
 }
 
 PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
+                                  Conditions* conditions,
                                   Metrics* metrics) {
   PipelineOptions pipeline;
   pipeline.scoring_threads = options.scoring_threads;
   pipeline.max_backlog = options.max_backlog;
   pipeline.program_version = SELFCAL_VERSION;
   pipeline.calibrate.solver = options.solver;
+  pipeline.conditions = conditions;
+  pipeline.idle_runs = options.idle_runs;
+  pipeline.max_run_time = std::chrono::round<std::chrono::milliseconds>(
+      std::chrono::duration<double, std::ratio<60>>(options.max_run_minutes));
   pipeline.observer = metrics == nullptr ? nullptr : metrics->observer();
   return pipeline;
 }
@@ -107,8 +113,10 @@ std::optional<int> ServeOnce(
   const auto metrics = OpenMetrics(options, database, store->get());
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
-  const auto pipeline =
-      MakePipeline(store->get(), OptionsOfPipeline(options, metrics->get()));
+  const auto conditions = MakeHostConditions(options.host);
+  const auto pipeline = MakePipeline(
+      store->get(),
+      OptionsOfPipeline(options, conditions.get(), metrics->get()));
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);
   }

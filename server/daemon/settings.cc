@@ -23,6 +23,9 @@ constexpr int kMaxRigs = 10'000'000;
 constexpr std::int64_t kMaxBytes = std::int64_t{1} << 60;
 constexpr std::int64_t kMaxSegments = 1'000'000'000;
 constexpr std::int64_t kMaxAgeSeconds = 1'000'000'000;
+constexpr double kMaxLoad = 1000;
+constexpr double kMinRunMinutes = 0.1;
+constexpr double kMaxRunMinutes = 10'000;
 
 class Definer {
  public:
@@ -206,6 +209,37 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
       ->capture_default_str();
 }
 
+void DefineRuns(Definer* define, DaemonOptions* options) {
+  define->Named(
+      "only-on-external-power",
+      define->app()->add_flag("--only-on-external-power",
+                              options->host.only_on_external_power,
+                              "Runs that nobody asked for wait while the "
+                              "machine runs on its battery"));
+  define
+      ->Add("max-load",
+            &options->host.max_load,
+            "They wait while the load of the last minute, for each processor, "
+            "is this or more; 0: no matter")
+      ->check(CLI::Range(0.0, kMaxLoad))
+      ->capture_default_str();
+  define
+      ->Add("run-priority",
+            &options->idle_runs,
+            "idle: a run takes only what nobody else wants, and does not get "
+            "on while the machine is busy; low: it stands behind everything "
+            "else")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, bool>{{"idle", true}, {"low", false}}))
+      ->default_str("idle");
+  define
+      ->Add("max-run-minutes",
+            &options->max_run_minutes,
+            "A run that takes longer fails")
+      ->check(CLI::Range(kMinRunMinutes, kMaxRunMinutes))
+      ->capture_default_str();
+}
+
 void DefineReports(Definer* define, DaemonOptions* options) {
   define
       ->Add("metrics",
@@ -245,6 +279,7 @@ void DefineSettings(CLI::App* app,
   DefineLimits(&define, options);
   DefineQuotas(&define, &options->store.quotas);
   DefineEstimation(&define, options);
+  DefineRuns(&define, options);
   DefineReports(&define, options);
 }
 

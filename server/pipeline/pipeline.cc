@@ -133,6 +133,23 @@ class PipelineImpl : public Pipeline {
     return recalibrator_.Cancel(rig, run);
   }
 
+  absl::StatusOr<StoredCalibration> ActivateCalibration(
+      const std::string& rig,
+      std::int64_t version,
+      const std::string& caller,
+      const std::string& reason) override {
+    SELFCAL_ASSIGN_OR_RETURN(
+        StoredCalibration active,
+        store_->ActivateCalibration(rig, version, caller, reason));
+    spdlog::warn("{} makes calibration {} of rig {} the active one: {}",
+                 caller,
+                 version,
+                 rig,
+                 reason);
+    calibration_watchers_.Publish(rig, active);
+    return active;
+  }
+
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const StoredCalibration&)> callback) override {
@@ -199,11 +216,11 @@ class PipelineImpl : public Pipeline {
                        segment.calibration_version)});
     } else if (!calibration.ok()) {
       return calibration.status();
-    } else if (calibration->state == CalibrationState::kRejected) {
+    } else if (calibration->activation == 0) {
       violations.push_back(
           {kVersionField,
-           fmt::format("version {} was rejected and never published; send the "
-                       "one that the states were estimated with",
+           fmt::format("version {} was never published; send the one that the "
+                       "states were estimated with",
                        segment.calibration_version)});
     }
     return violations;

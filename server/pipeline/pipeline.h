@@ -10,6 +10,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -20,9 +21,19 @@
 #include "core/information/segment_information.h"
 #include "core/model/segment.h"
 #include "server/pipeline/observer.h"
+#include "server/store/clock.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
+
+// Whether now is a time for a run that nobody asked for by hand.
+class Conditions {
+ public:
+  virtual ~Conditions() = default;
+  // Why it is none, in words that stay the same while the reason does; empty if
+  // it is one. Called from the pipeline's threads, often: returns at once.
+  virtual std::string HoldReason() = 0;
+};
 
 struct PipelineOptions {
   int scoring_threads = 1;
@@ -32,6 +43,18 @@ struct PipelineOptions {
   SegmentLimits limits;
   CalibrateOptions calibrate;
   PipelineObserver* observer = nullptr;  // must outlive the pipeline
+  // Outlives the pipeline; none: every time is one.
+  Conditions* conditions = nullptr;
+  // How often runs that are held back are looked at again, and whether a
+  // calibration has become old.
+  std::chrono::milliseconds recheck = std::chrono::seconds(30);
+  // The solver takes only what nobody else wants: on a machine that is never
+  // idle it does not get on. Otherwise it stands behind everything else.
+  bool idle_runs = true;
+  // A run that takes longer fails.
+  std::chrono::milliseconds max_run_time = std::chrono::minutes(30);
+  // Nanoseconds since the Unix epoch.
+  std::function<std::int64_t()> now_ns = NowNs;
 };
 
 // What the pipeline computes with. Called from its threads; what they throw
@@ -87,7 +110,7 @@ class Pipeline {
   // unknown rig; errors of the store as they are. Blocks while the backlog is
   // full, until `cancelled` returns true (then CANCELLED). UNAVAILABLE while
   // the pipeline is not started. The segment must have been estimated with a
-  // version of the rig that was not rejected.
+  // version of the rig that was published.
   virtual absl::StatusOr<SubmitResult> Submit(
       const std::string& rig,
       const MotionSegment& segment,
@@ -116,8 +139,16 @@ class Pipeline {
   virtual absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
                                                         std::int64_t run) = 0;
 
+  // Store::ActivateCalibration, and tells the watchers.
+  virtual absl::StatusOr<StoredCalibration> ActivateCalibration(
+      const std::string& rig,
+      std::int64_t version,
+      const std::string& caller,
+      const std::string& reason) = 0;
+
   // The callback gets the active calibration of the rig at once (on the calling
-  // thread), then each new active one; each version once, in order.
+  // thread), then each that becomes active, in the order in which they did:
+  // each activation once.
   virtual absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const StoredCalibration&)> callback) = 0;

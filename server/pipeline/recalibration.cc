@@ -2,33 +2,14 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
+#include <algorithm>
 #include <utility>
 
 #include "server/pipeline/retry.h"
+#include "server/store/status_macros.h"
 
 namespace selfcal::server {
-namespace {
-
-// Behind everything else, but not idle: it takes the lock of the store in
-// between, and must be able to give it back.
-constexpr int kNiceness = 10;
-
-void LowerPriority() {
-  const auto thread = static_cast<id_t>(syscall(SYS_gettid));
-  if (setpriority(PRIO_PROCESS, thread, kNiceness) != 0) {
-    spdlog::warn("recalibration runs at normal priority: {}",
-                 std::strerror(errno));
-  }
-}
-
-}  // namespace
-
 std::string RunTopic(const std::string& rig, std::int64_t run) {
   return fmt::format("{}/{}", rig, run);
 }
@@ -53,10 +34,7 @@ absl::Status Recalibrator::Start() {
         "recalibration has been started already");
   }
   running_ = true;
-  thread_ = std::thread([this] {
-    LowerPriority();
-    Loop();
-  });
+  thread_ = std::thread([this] { Loop(); });
   return absl::OkStatus();
 }
 
@@ -121,6 +99,11 @@ bool Recalibrator::IsCurrent(const std::string& rig, std::int64_t run) const {
   return current_ && current_->rig == rig && current_->run == run;
 }
 
+bool Recalibrator::Running() {
+  const std::lock_guard lock(mutex_);
+  return running_;
+}
+
 bool Recalibrator::Interrupted() {
   const std::lock_guard lock(mutex_);
   return !running_ || (current_ && current_->cancelled);
@@ -138,6 +121,16 @@ bool Recalibrator::Pause(std::chrono::milliseconds time) {
   return running_ && !current_->cancelled;
 }
 
+absl::StatusOr<StoredCalibration> Recalibrator::Retry(
+    const std::function<absl::StatusOr<StoredCalibration>()>& call) {
+  Backoff backoff;
+  auto result = call();
+  while (IsTransient(result.status()) && Pause(backoff.Next())) {
+    result = call();
+  }
+  return result;
+}
+
 void Recalibrator::Loop() {
   Backoff backoff;
   for (;;) {
@@ -149,24 +142,59 @@ void Recalibrator::Loop() {
       }
       seen = wakes_;
     }
-    const auto runs = store_->ListUnfinishedRuns();
-    bool all_done = runs.ok();
-    if (!runs.ok()) {
-      spdlog::error("cannot list runs: {}", runs.status().ToString());
+    const auto executed = ExecuteAll();
+    if (!executed.ok()) {
+      spdlog::error("cannot list runs: {}", executed.status().ToString());
     }
-    for (std::size_t k = 0; runs.ok() && k < runs->size(); ++k) {
-      all_done &= Execute((*runs)[k]);
-    }
+    const auto woken = [&] { return !running_ || wakes_ != seen; };
     std::unique_lock lock(mutex_);
-    if (!all_done) {
+    if (!executed.ok() || *executed == Execution::kTryLater) {
       changed_.wait_for(lock, backoff.Next(), [this] { return !running_; });
       continue;
     }
     backoff.Reset();
-    if (runs->empty()) {
-      changed_.wait(lock, [&] { return !running_ || wakes_ != seen; });
+    changed_.wait_for(lock, options_.recheck, woken);
+  }
+}
+
+absl::StatusOr<Recalibrator::Execution> Recalibrator::ExecuteAll() {
+  auto worst = Execution::kDone;
+  for (bool any = true; any && worst != Execution::kTryLater;) {
+    any = false;
+    SELFCAL_RETURN_IF_ERROR(store_->StartAgedRuns(options_.now_ns()).status());
+    SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredRun> runs,
+                             store_->ListUnfinishedRuns());
+    for (const StoredRun& run : runs) {
+      const Execution executed = Execute(run);
+      worst = std::max(worst, executed);
+      any |= executed == Execution::kDone && Running();
     }
   }
+  return worst;
+}
+
+absl::StatusOr<std::string> Recalibrator::HoldReason(const StoredRun& run) {
+  if (run.trigger == RunTrigger::kManual) {
+    return "";
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
+  const std::int64_t interval_ns = rig.policy.recalibration_min_interval_ns;
+  if (interval_ns > 0) {
+    // The newest is this one.
+    SELFCAL_ASSIGN_OR_RETURN(const auto newest,
+                             store_->ListRuns(run.rig, {2, ""}));
+    const bool too_early =
+        newest.items.size() > 1 &&
+        options_.now_ns() - newest.items[1].end_time_ns < interval_ns;
+    if (too_early) {
+      return fmt::format(
+          "the minimum interval of {:g} s since recalibration {} is not over",
+          static_cast<double>(interval_ns) * 1e-9,
+          newest.items[1].run);
+    }
+  }
+  return options_.conditions == nullptr ? ""
+                                        : options_.conditions->HoldReason();
 }
 
 }  // namespace selfcal::server

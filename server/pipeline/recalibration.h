@@ -2,8 +2,15 @@
 // first, solves, validates, and has the result stored and told.
 //
 // A run is a row in the store from its trigger to its end. A crash leaves it
-// running and it starts again; after kMaxAttempts crashes it fails instead. An
-// orderly stop gives it back, which counts for nothing.
+// running and it starts again, from its candidate if it had stored that; after
+// kMaxAttempts crashes it fails instead. An orderly stop gives it back, which
+// counts for nothing.
+//
+// One that nobody asked for by hand waits while the minimum interval of its rig
+// or the conditions hold it back: it stays pending, with a message that says
+// why. The solver runs on a thread of its own, idle in CPU and I/O: the thread
+// of the runs takes the lock of the store in between, and must be able to give
+// it back.
 #pragma once
 
 #include <absl/status/status.h>
@@ -12,6 +19,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -54,18 +62,26 @@ class Recalibrator {
     bool cancelled = false;
     CalibrateProgress progress;
   };
-  // What a run came to: a result, or why there is none.
+  // What a run came to: a candidate, or why there is none.
   struct Outcome {
     absl::Status status;
-    std::optional<StoredCalibration> calibration;
+    std::optional<StoredCalibration> candidate;
     std::optional<SegmentKey> damaged;
   };
+  enum class Execution { kDone, kHeldBack, kTryLater };
 
   void Loop();
-  // Whether it ended or was given back; false: try again later.
-  bool Execute(const StoredRun& run);
+  // Of all unfinished runs; the worst of them.
+  absl::StatusOr<Execution> ExecuteAll();
+  Execution Execute(const StoredRun& run);
+  Execution ExecuteBegun(const StoredRun& run);
+  Execution Hold(const StoredRun& run, const std::string& reason);
+  // Why the run does not begin yet; empty if it may.
+  absl::StatusOr<std::string> HoldReason(const StoredRun& run);
   bool GiveUp(const StoredRun& run);
   Outcome Solve(const StoredRun& run);
+  absl::StatusOr<StoredCalibration> EnsureCandidate(
+      const StoredRun& run, std::optional<SegmentKey>* damaged);
   absl::StatusOr<StoredCalibration> FindCandidate(
       const StoredRun& run, std::optional<SegmentKey>* damaged);
   absl::Status LoadSegments(const StoredRun& run,
@@ -78,17 +94,27 @@ class Recalibrator {
       const std::vector<MotionSegment>& segments,
       const CalibrateOptions& options);
   bool Report(const StoredRun& run, const CalibrateProgress& progress);
+  // State, reasons and validation of the candidate against what is active.
+  absl::Status Judge(const StoredRun& run, StoredCalibration* candidate);
+  // Judges and stores it, again where another version became active meanwhile.
+  absl::StatusOr<StoredCalibration> Finish(const StoredRun& run,
+                                           StoredCalibration candidate);
   absl::Status Conclude(const StoredRun& run, const Outcome& outcome);
   absl::Status Succeed(const StoredRun& run,
-                       const StoredCalibration& calibration);
+                       const StoredCalibration& candidate);
   absl::Status End(const StoredRun& run,
                    RunState state,
                    const std::string& message);
 
   bool IsCurrent(const std::string& rig, std::int64_t run) const;
+  bool Running();
   bool Interrupted();  // cancelled, or stopping
   bool Cancelled();
   bool Pause(std::chrono::milliseconds time);  // false when interrupted
+  // Calls until it succeeds or fails for good; when interrupted, returns what
+  // came last. A result that took minutes is not thrown away for a full disk.
+  absl::StatusOr<StoredCalibration> Retry(
+      const std::function<absl::StatusOr<StoredCalibration>()>& call);
 
   Store* const store_;
   const PipelineOptions options_;

@@ -2,34 +2,40 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <chrono>
 #include <exception>
 #include <utility>
 
-#include "server/pipeline/after_change.h"
-#include "server/pipeline/candidate.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/retry.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
 
-bool Recalibrator::Execute(const StoredRun& pending) {
+Recalibrator::Execution Recalibrator::Execute(const StoredRun& pending) {
+  if (pending.attempts >= kMaxAttempts) {
+    return GiveUp(pending) ? Execution::kDone : Execution::kTryLater;
+  }
+  const auto hold = HoldReason(pending);
+  if (!hold.ok()) {
+    spdlog::error("cannot tell whether run {} of rig {} may begin: {}",
+                  pending.run,
+                  pending.rig,
+                  hold.status().ToString());
+    return Execution::kTryLater;
+  }
+  if (pending.state == RunState::kPending && !hold->empty()) {
+    return Hold(pending, *hold);
+  }
   absl::StatusOr<StoredRun> begun = absl::UnknownError("");
   {
     const std::lock_guard lock(mutex_);
     if (!running_) {
-      return true;
+      return Execution::kDone;
     }
-    if (pending.attempts < kMaxAttempts) {
-      begun = store_->BeginRun(pending.rig, pending.run);
-      if (begun.ok()) {
-        current_ = Current{pending.rig, pending.run, false, {}};
-      }
+    begun = store_->BeginRun(pending.rig, pending.run);
+    if (begun.ok()) {
+      current_ = Current{pending.rig, pending.run, false, {}};
     }
-  }
-  if (pending.attempts >= kMaxAttempts) {
-    return GiveUp(pending);
   }
   if (!begun.ok()) {
     // One that was cancelled meanwhile is done.
@@ -37,15 +43,19 @@ bool Recalibrator::Execute(const StoredRun& pending) {
                  pending.run,
                  pending.rig,
                  begun.status().ToString());
-    return absl::IsFailedPrecondition(begun.status());
+    return absl::IsFailedPrecondition(begun.status()) ? Execution::kDone
+                                                      : Execution::kTryLater;
   }
-  run_watchers_->Publish(RunTopic(begun->rig, begun->run), {*begun, {}});
-  const Outcome outcome = Solve(*begun);
-  absl::Status status = Conclude(*begun, outcome);
+  return ExecuteBegun(*begun);
+}
+
+Recalibrator::Execution Recalibrator::ExecuteBegun(const StoredRun& run) {
+  run_watchers_->Publish(RunTopic(run.rig, run.run), {run, {}});
+  const absl::Status status = Conclude(run, Solve(run));
   if (!status.ok()) {
     spdlog::error("cannot store the end of run {} of rig {}: {}",
-                  begun->run,
-                  begun->rig,
+                  run.run,
+                  run.rig,
                   status.ToString());
   }
   {
@@ -53,7 +63,25 @@ bool Recalibrator::Execute(const StoredRun& pending) {
     current_.reset();
   }
   changed_.notify_all();
-  return status.ok();
+  return status.ok() ? Execution::kDone : Execution::kTryLater;
+}
+
+Recalibrator::Execution Recalibrator::Hold(const StoredRun& run,
+                                           const std::string& reason) {
+  if (run.message == reason) {
+    return Execution::kHeldBack;
+  }
+  const absl::Status held = store_->HoldRun(run.rig, run.run, reason);
+  if (!held.ok()) {
+    // One that was cancelled meanwhile is done.
+    return absl::IsFailedPrecondition(held) ? Execution::kDone
+                                            : Execution::kTryLater;
+  }
+  spdlog::info("run {} of rig {} is held back: {}", run.run, run.rig, reason);
+  StoredRun now = run;
+  now.message = reason;
+  run_watchers_->Publish(RunTopic(run.rig, run.run), {now, {}});
+  return Execution::kHeldBack;
 }
 
 bool Recalibrator::GiveUp(const StoredRun& run) {
@@ -66,17 +94,13 @@ bool Recalibrator::GiveUp(const StoredRun& run) {
 }
 
 Recalibrator::Outcome Recalibrator::Solve(const StoredRun& run) {
-  const auto start = std::chrono::steady_clock::now();
   Outcome outcome;
   try {
     absl::StatusOr<StoredCalibration> candidate =
-        FindCandidate(run, &outcome.damaged);
+        EnsureCandidate(run, &outcome.damaged);
     outcome.status = candidate.status();
     if (candidate.ok()) {
-      candidate->seconds = std::chrono::duration<double>(
-                               std::chrono::steady_clock::now() - start)
-                               .count();
-      outcome.calibration = *std::move(candidate);
+      outcome.candidate = *std::move(candidate);
     }
   } catch (const std::exception& error) {
     outcome.status = absl::InternalError(
@@ -85,96 +109,13 @@ Recalibrator::Outcome Recalibrator::Solve(const StoredRun& run) {
   return outcome;
 }
 
-absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
-    const StoredRun& run, std::optional<SegmentKey>* damaged) {
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
-  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration base,
-                           store_->GetCalibration(run.rig, run.base_version));
-  std::vector<MotionSegment> segments;
-  SELFCAL_RETURN_IF_ERROR(LoadSegments(run, &segments, damaged));
-  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration active,
-                           store_->GetActiveCalibration(run.rig));
-  CalibrateOptions options = options_.calibrate;
-  options.reweight_noise |= rig.rig.reweight_noise;
-  if (run.change > 0) {
-    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
-                             store_->GetChange(run.rig, run.change));
-    SELFCAL_ASSIGN_OR_RETURN(
-        const StoredCalibration before,
-        store_->GetCalibration(run.rig, change.base_version));
-    options.prior = KnownAfter(rig.rig, change, before);
-    if (active.version == change.base_version) {
-      active.covariance = CovarianceAfter(rig.rig, change, active.covariance);
-    }
-  }
-  SELFCAL_ASSIGN_OR_RETURN(
-      CalibrationResult result,
-      RunSolver(run, rig.rig, base.theta, segments, options));
-  StoredCalibration candidate;
-  candidate.reasons = CandidateProblems(rig.rig, active, result);
-  candidate.state = candidate.reasons.empty() ? CalibrationState::kActive
-                                              : CalibrationState::kRejected;
-  candidate.theta = result.theta;
-  candidate.covariance = result.covariance;
-  candidate.program_version = options_.program_version;
-  candidate.report = std::move(result);
-  return candidate;
-}
-
-absl::Status Recalibrator::LoadSegments(const StoredRun& run,
-                                        std::vector<MotionSegment>* segments,
-                                        std::optional<SegmentKey>* damaged) {
-  for (const SegmentKey& key : run.segments) {
-    if (Interrupted()) {
-      return absl::CancelledError("interrupted");
-    }
-    auto segment = store_->GetSegmentData(run.rig, key);
-    if (absl::IsDataLoss(segment.status())) {
-      *damaged = key;
-    }
-    SELFCAL_RETURN_IF_ERROR(segment.status());
-    segments->push_back(*std::move(segment));
-  }
-  return absl::OkStatus();
-}
-
-absl::StatusOr<CalibrationResult> Recalibrator::RunSolver(
-    const StoredRun& run,
-    const Rig& rig,
-    const Calibration& start,
-    const std::vector<MotionSegment>& segments,
-    const CalibrateOptions& options) {
-  CalibrationResult result = estimators_.calibrate(
-      rig, start, segments, options, [&](const CalibrateProgress& progress) {
-        return Report(run, progress);
-      });
-  if (result.status == CalibrateStatus::kCancelled) {
-    return absl::CancelledError("interrupted");
-  }
-  if (result.status == CalibrateStatus::kFailed) {
-    return absl::InternalError(
-        fmt::format("the solver failed: {}", result.message));
-  }
-  return result;
-}
-
-bool Recalibrator::Report(const StoredRun& run,
-                          const CalibrateProgress& progress) {
-  {
-    const std::lock_guard lock(mutex_);
-    current_->progress = progress;
-  }
-  run_watchers_->Publish(RunTopic(run.rig, run.run), {run, progress});
-  return !Interrupted();
-}
-
 absl::Status Recalibrator::Conclude(const StoredRun& run,
                                     const Outcome& outcome) {
   if (Cancelled()) {
     return End(run, RunState::kCancelled, "cancelled on request");
   }
-  if (outcome.calibration) {
-    return Succeed(run, *outcome.calibration);
+  if (outcome.candidate) {
+    return Succeed(run, *outcome.candidate);
   }
   if (absl::IsCancelled(outcome.status) || IsTransient(outcome.status)) {
     // A stop, or the disk: the run goes back, and starts again later.
@@ -189,13 +130,8 @@ absl::Status Recalibrator::Conclude(const StoredRun& run,
 }
 
 absl::Status Recalibrator::Succeed(const StoredRun& run,
-                                   const StoredCalibration& calibration) {
-  // A result that took minutes is not thrown away for a full disk.
-  Backoff backoff;
-  auto finished = store_->FinishRun(run.rig, run.run, calibration);
-  while (IsTransient(finished.status()) && Pause(backoff.Next())) {
-    finished = store_->FinishRun(run.rig, run.run, calibration);
-  }
+                                   const StoredCalibration& candidate) {
+  const auto finished = Retry([&] { return Finish(run, candidate); });
   if (IsTransient(finished.status())) {
     return finished.status();
   }

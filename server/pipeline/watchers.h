@@ -20,10 +20,11 @@
 
 namespace selfcal::server {
 
-// Each version once, in order.
+// Each activation once, in order. The newest need not be that of the highest
+// version: an older one may have been made active again.
 inline bool Follows(const StoredCalibration& last,
                     const StoredCalibration& next) {
-  return next.version > last.version;
+  return next.activation > last.activation;
 }
 
 // Nothing after the end of a run.

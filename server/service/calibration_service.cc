@@ -1,6 +1,7 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 #include "server/service/caller.h"
+#include "server/service/compare.h"
 #include "server/service/encode.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
@@ -11,6 +12,9 @@
 namespace selfcal::server {
 namespace {
 
+constexpr char kType[] = "selfcal.v1.Calibration";
+constexpr std::size_t kMaxReason = 500;
+
 class CalibrationService final : public v1::CalibrationService::Service {
  public:
   explicit CalibrationService(const ServiceContext& context)
@@ -20,21 +24,54 @@ class CalibrationService final : public v1::CalibrationService::Service {
                               const v1::GetCalibrationRequest* request,
                               v1::Calibration* response) override {
     return Authorised(context_, *call, *request, [&]() -> grpc::Status {
-      constexpr char kPattern[] =
-          "rigs/{rig}/calibrations/{version}, {version} a number or 'active'";
+      StoredCalibration calibration;
+      const auto status = Read("name", request->name(), &calibration);
+      if (status.ok()) *response = Encode(calibration);
+      return status;
+    });
+  }
+
+  grpc::Status ActivateCalibration(
+      grpc::ServerContext* call,
+      const v1::ActivateCalibrationRequest* request,
+      v1::Calibration* response) override {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto parts = ParseChildName(request->name(), "calibrations");
-      if (!parts) return BadName("name", kPattern);
-      const bool active = parts->id == "active";
-      const auto version = ParseCount(parts->id);
-      if (!active && !version) return BadName("name", kPattern);
-      const auto calibration =
-          active ? context_.store->GetActiveCalibration(parts->rig)
-                 : context_.store->GetCalibration(parts->rig, *version);
-      if (!calibration.ok()) {
-        return ToGrpc(calibration.status(),
-                      {"selfcal.v1.Calibration", request->name(), {}});
+      const auto version = parts ? ParseCount(parts->id) : std::nullopt;
+      if (!version) return BadName("name", "rigs/{rig}/calibrations/{version}");
+      const std::string& reason = request->reason();
+      if (reason.empty() || reason.size() > kMaxReason) {
+        return InvalidFields(
+            {{"reason",
+              "must have 1 to 500 bytes; say why, for whoever reads the log"}});
       }
-      *response = Encode(*calibration);
+      const auto active = context_.pipeline->ActivateCalibration(
+          parts->rig, *version, CallerName(*call), reason);
+      if (!active.ok()) {
+        return ToGrpc(active.status(), {kType, request->name(), "name"});
+      }
+      *response = Encode(*active);
+      return grpc::Status::OK;
+    });
+  }
+
+  grpc::Status CompareCalibrations(
+      grpc::ServerContext* call,
+      const v1::CompareCalibrationsRequest* request,
+      v1::CompareCalibrationsResponse* response) override {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
+      StoredCalibration a;
+      StoredCalibration b;
+      if (auto bad = Read("a", request->a(), &a); !bad.ok()) return bad;
+      if (auto bad = Read("b", request->b(), &b); !bad.ok()) return bad;
+      if (a.rig != b.rig) {
+        return InvalidFields({{"b", "must be a version of the rig of a"}});
+      }
+      const auto compared = Compare(context_.store, a, b);
+      if (!compared.ok()) {
+        return ToGrpc(compared.status(), {kType, request->a(), "a"});
+      }
+      *response = *compared;
       return grpc::Status::OK;
     });
   }
@@ -76,16 +113,39 @@ class CalibrationService final : public v1::CalibrationService::Service {
         return ToGrpc(subscription.status(),
                       {"selfcal.v1.Rig", request->parent(), "parent"});
       }
+      // One that was rolled back and made active again while the reader was
+      // slow is what the reader has.
+      std::int64_t told = 0;
       return Watch(context_,
                    call,
                    &mailbox,
                    [&](const StoredCalibration& active, bool*) {
+                     if (active.version == told) return true;
+                     told = active.version;
                      return writer->Write(Encode(active));
                    });
     });
   }
 
  private:
+  // The version of that name.
+  grpc::Status Read(std::string_view field,
+                    const std::string& name,
+                    StoredCalibration* calibration) {
+    constexpr char kPattern[] =
+        "rigs/{rig}/calibrations/{version}, {version} a number or 'active'";
+    const auto parts = ParseChildName(name, "calibrations");
+    if (!parts) return BadName(field, kPattern);
+    const bool active = parts->id == "active";
+    const auto version = ParseCount(parts->id);
+    if (!active && !version) return BadName(field, kPattern);
+    auto read = active ? context_.store->GetActiveCalibration(parts->rig)
+                       : context_.store->GetCalibration(parts->rig, *version);
+    if (!read.ok()) return ToGrpc(read.status(), {kType, name, {}});
+    *calibration = *std::move(read);
+    return grpc::Status::OK;
+  }
+
   ServiceContext context_;
 };
 

@@ -17,6 +17,10 @@ v1::Calibration::State EncodeState(CalibrationState state) {
       return v1::Calibration::SUPERSEDED;
     case CalibrationState::kRejected:
       return v1::Calibration::REJECTED;
+    case CalibrationState::kCandidate:
+      return v1::Calibration::CANDIDATE;
+    case CalibrationState::kRolledBack:
+      return v1::Calibration::ROLLED_BACK;
   }
   return v1::Calibration::STATE_UNSPECIFIED;
 }
@@ -47,6 +51,8 @@ v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
       return v1::Recalibration::MANUAL;
     case RunTrigger::kChangeDetected:
       return v1::Recalibration::CHANGE_DETECTED;
+    case RunTrigger::kCalibrationAged:
+      return v1::Recalibration::CALIBRATION_AGED;
   }
   return v1::Recalibration::TRIGGER_UNSPECIFIED;
 }
@@ -129,6 +135,36 @@ void FillProvenance(const StoredCalibration& calibration,
     message->add_segments(SegmentName(calibration.rig, key));
   }
   message->set_program_version(calibration.program_version);
+  message->set_schema_version(calibration.schema_version);
+  for (const auto& [name, value] : calibration.settings) {
+    auto* setting = message->add_settings();
+    setting->set_name(name);
+    setting->set_value(value);
+  }
+}
+
+void FillValidation(const StoredValidation& validation,
+                    bool accepted,
+                    v1::Validation* message) {
+  message->set_verdict(accepted ? v1::Validation::ACCEPTED
+                                : v1::Validation::REJECTED);
+  message->set_active_version(validation.active_version);
+  for (const ValidationCheck& check : validation.checks) {
+    auto* added = message->add_checks();
+    added->set_name(check.name);
+    added->set_value(check.value);
+    added->set_limit(check.limit);
+    added->set_passed(check.passed);
+  }
+  const HeldOutTest& test = validation.held_out;
+  auto* held_out = message->mutable_held_out();
+  held_out->set_segments(test.segments);
+  held_out->set_left_out(test.left_out);
+  held_out->set_degrees(test.candidate.degrees);
+  held_out->set_chi_square(test.candidate.statistic);
+  held_out->set_probability(test.candidate.probability);
+  held_out->set_active_chi_square(test.active.statistic);
+  held_out->set_active_probability(test.active.probability);
 }
 
 std::string CalibrationName(const std::string& rig, std::int64_t version) {
@@ -153,6 +189,11 @@ v1::Calibration Encode(const StoredCalibration& calibration) {
   if (calibration.report) {
     FillReport(
         *calibration.report, calibration.seconds, message.mutable_solver());
+  }
+  if (calibration.validation) {
+    FillValidation(*calibration.validation,
+                   calibration.state != CalibrationState::kRejected,
+                   message.mutable_validation());
   }
   return message;
 }

@@ -4,6 +4,7 @@
 #include "proto/resource_names.h"
 #include "server/service/encode.h"
 #include "server/service/encode_parts.h"
+#include "server/store/rig_policy.h"
 
 namespace selfcal::server {
 namespace {
@@ -52,6 +53,7 @@ void FillResiduals(const ResidualStatistics& residuals,
 
 v1::Rig Encode(const StoredRig& rig) {
   v1::Rig message = ToProto(rig.rig);
+  PutPolicy(rig.policy, &message);
   SetTime(rig.create_time_ns, message.mutable_create_time());
   return message;
 }

@@ -12,6 +12,7 @@
 #include "server/service/errors.h"
 #include "server/service/paging.h"
 #include "server/service/services.h"
+#include "server/store/rig_policy.h"
 
 namespace selfcal::server {
 namespace {
@@ -68,6 +69,10 @@ class RigService final : public v1::RigService::Service {
     for (Violation& violation : violations) {
       violation.field = "rig." + RigFieldPath(violation.field);
     }
+    RigPolicy policy;
+    for (const Violation& violation : GetPolicy(request.rig(), &policy)) {
+      violations.push_back({"rig." + violation.field, violation.message});
+    }
     if (!violations.empty()) return InvalidFields(violations);
     const std::lock_guard lock(mutex_);
     const absl::StatusOr<std::int64_t> rigs = Count();
@@ -79,7 +84,7 @@ class RigService final : public v1::RigService::Service {
                         "allows; ask the operator to raise it"),
                     {});
     }
-    const auto created = context_.store->CreateRig(rig);
+    const auto created = context_.store->CreateRig(rig, policy);
     if (!created.ok()) {
       return ToGrpc(created.status(), {kType, request.rig().name(), "rig"});
     }

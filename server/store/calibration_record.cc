@@ -106,15 +106,18 @@ std::string SerializeCalibration(const StoredCalibration& calibration) {
   record.set_version(calibration.version);
   *record.mutable_theta() = ToProto(calibration.theta);
   PutMatrix(calibration.covariance, record.mutable_covariance());
-  for (const std::string& reason : calibration.reasons) {
-    record.add_reasons(reason);
-  }
   record.set_base_version(calibration.base_version);
   record.set_program_version(calibration.program_version);
   if (calibration.report) {
     PutSolver(*calibration.report, record.mutable_solver());
   }
   record.set_seconds(calibration.seconds);
+  record.set_schema_version(calibration.schema_version);
+  for (const auto& [name, value] : calibration.settings) {
+    auto* setting = record.add_settings();
+    setting->set_name(name);
+    setting->set_value(value);
+  }
   return record.SerializeAsString();
 }
 
@@ -139,6 +142,10 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
     calibration.report->covariance = calibration.covariance;
   }
   calibration.seconds = record.seconds();
+  calibration.schema_version = record.schema_version();
+  for (const auto& setting : record.settings()) {
+    calibration.settings.emplace_back(setting.name(), setting.value());
+  }
   return calibration;
 }
 

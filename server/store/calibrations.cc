@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "server/store/checksum.h"
-#include "server/store/events.h"
 #include "server/store/paging.h"
 #include "server/store/records.h"
 #include "server/store/rigs.h"
@@ -15,8 +14,11 @@ namespace selfcal::server {
 namespace {
 
 constexpr char kColumns[] =
-    "SELECT version, state, create_time_ns, run, content, sha256 "
-    "FROM calibrations ";
+    "SELECT c.version, c.state, c.create_time_ns, c.run, c.content, c.sha256, "
+    "  v.content, v.sha256, "
+    "  (SELECT coalesce(max(a.activation), 0) FROM activations a "
+    "   WHERE a.rig = c.rig AND a.version = c.version) "
+    "FROM calibrations c LEFT JOIN validations v USING (rig, version) ";
 
 absl::Status ReadSegmentKeys(Connection* db,
                              std::int64_t rig,
@@ -53,45 +55,15 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
   if (!row.IsNull(3)) {
     calibration.run = row.Int(3);
   }
+  if (!row.IsNull(6)) {
+    const std::string validation = row.Text(6);
+    SELFCAL_RETURN_IF_ERROR(
+        VerifySha256(validation, row.Text(7), "the validation of " + what));
+    SELFCAL_RETURN_IF_ERROR(ParseValidation(validation, what, &calibration));
+  }
+  calibration.activation = row.Int(8);
   SELFCAL_RETURN_IF_ERROR(ReadSegmentKeys(db, rig_id, &calibration));
   return calibration;
-}
-
-absl::Status InsertContent(Connection* db,
-                           std::int64_t rig,
-                           const StoredCalibration& calibration) {
-  const std::string content = SerializeCalibration(calibration);
-  const std::string sha256 = Sha256(content);
-  // A version that no run produced has run 0 here, which becomes NULL.
-  return Statement(
-             db,
-             "INSERT INTO calibrations (rig, version, state, create_time_ns, "
-             "  run, content, sha256) "
-             "VALUES (?1, ?2, ?3, ?4, nullif(?5, 0), ?6, ?7)",
-             rig,
-             calibration.version,
-             static_cast<int>(calibration.state) + 1,
-             calibration.create_time_ns,
-             calibration.run.value_or(0),
-             BlobView{content},
-             BlobView{sha256})
-      .Run();
-}
-
-absl::Status AppendCalibrationEvent(Connection* db,
-                                    const StoredCalibration& calibration) {
-  if (calibration.state == CalibrationState::kRejected) {
-    return AppendEvent(db,
-                       calibration.rig,
-                       EventKind::kCalibrationRejected,
-                       fmt::format("version {}: {}",
-                                   calibration.version,
-                                   fmt::join(calibration.reasons, "; ")));
-  }
-  return AppendEvent(db,
-                     calibration.rig,
-                     EventKind::kCalibrationPublished,
-                     fmt::format("version {}", calibration.version));
 }
 
 }  // namespace
@@ -101,7 +73,7 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
                                                   std::int64_t version) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   Statement read(db,
-                 std::string(kColumns) + "WHERE rig = ?1 AND version = ?2",
+                 std::string(kColumns) + "WHERE c.rig = ?1 AND c.version = ?2",
                  rig_id,
                  version);
   const bool found = read.Next();
@@ -129,8 +101,8 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
   const int size = PageSize(page);
   Statement read(db,
                  std::string(kColumns) +
-                     "WHERE rig = ?1 AND version < ?2 "
-                     "ORDER BY version DESC LIMIT ?3",
+                     "WHERE c.rig = ?1 AND c.version < ?2 "
+                     "ORDER BY c.version DESC LIMIT ?3",
                  rig_id,
                  before.value_or(INT64_MAX),
                  size + 1);
@@ -159,6 +131,22 @@ absl::StatusOr<std::int64_t> ActiveVersion(Connection* db, std::int64_t rig) {
   return read.Int(0);
 }
 
+absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(Connection* db,
+                                                           std::int64_t rig,
+                                                           std::int64_t run) {
+  Statement read(db,
+                 "SELECT version FROM calibrations "
+                 "WHERE rig = ?1 AND run = ?2 AND state = 4",
+                 rig,
+                 run);
+  std::optional<std::int64_t> version;
+  if (read.Next()) {
+    version = read.Int(0);
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return version;
+}
+
 absl::StatusOr<std::int64_t> NextVersion(Connection* db, std::int64_t rig) {
   Statement read(db,
                  "SELECT coalesce(max(version), 0) + 1 FROM calibrations "
@@ -167,32 +155,6 @@ absl::StatusOr<std::int64_t> NextVersion(Connection* db, std::int64_t rig) {
   const bool found = read.Next();
   SELFCAL_RETURN_IF_ERROR(read.status());
   return found ? read.Int(0) : 1;
-}
-
-absl::Status InsertCalibration(Connection* db,
-                               std::int64_t rig,
-                               const StoredCalibration& calibration) {
-  if (calibration.state == CalibrationState::kActive) {
-    SELFCAL_RETURN_IF_ERROR(Statement(db,
-                                      "UPDATE calibrations SET state = 2 "
-                                      "WHERE rig = ?1 AND state = 1",
-                                      rig)
-                                .Run());
-  }
-  SELFCAL_RETURN_IF_ERROR(InsertContent(db, rig, calibration));
-  for (const SegmentKey& key : calibration.segments) {
-    SELFCAL_RETURN_IF_ERROR(
-        Statement(db,
-                  "INSERT INTO calibration_segments (rig, version, segment) "
-                  "SELECT ?1, ?2, segment FROM segments "
-                  "WHERE rig = ?1 AND session = ?3 AND session_index = ?4",
-                  rig,
-                  calibration.version,
-                  key.session,
-                  key.index)
-            .Run());
-  }
-  return AppendCalibrationEvent(db, calibration);
 }
 
 }  // namespace selfcal::server

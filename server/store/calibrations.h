@@ -6,6 +6,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "server/store/statement.h"
@@ -30,10 +31,25 @@ absl::StatusOr<std::int64_t> ActiveVersion(Connection* db, std::int64_t rig);
 
 absl::StatusOr<std::int64_t> NextVersion(Connection* db, std::int64_t rig);
 
-// Writes a version with the segments of its run, and the event. An active one
-// supersedes the active one before.
+// Writes the factory's version, active, and the event.
+absl::Status InsertFactory(Connection* db,
+                           std::int64_t rig,
+                           const StoredCalibration& calibration);
+
+// Writes a version of that state with the segments of its run.
 absl::Status InsertCalibration(Connection* db,
                                std::int64_t rig,
                                const StoredCalibration& calibration);
+
+// The version of the run's candidate, nothing if it has none.
+absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(Connection* db,
+                                                           std::int64_t rig,
+                                                           std::int64_t run);
+
+// Candidate -> active or rejected, as its state says, with its reasons and
+// validation, and the event. What was active is superseded.
+absl::Status JudgeCandidate(Connection* db,
+                            std::int64_t rig,
+                            const StoredCalibration& judged);
 
 }  // namespace selfcal::server

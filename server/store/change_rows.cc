@@ -245,4 +245,40 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
   return change;
 }
 
+absl::StatusOr<std::vector<SegmentInformation>> ListHeldOutRows(
+    Connection* db,
+    const std::string& rig,
+    std::int64_t run_number,
+    int limit) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run, ReadRun(db, rig, run_number));
+  std::int64_t first_sequence = 1;
+  if (run.change > 0) {
+    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
+                             ReadChange(db, rig, run.change));
+    first_sequence = change.first_sequence;
+  }
+  Statement read(db,
+                 "SELECT s.sequence, i.information, i.sha256 "
+                 "FROM segments s JOIN segment_information i USING (segment) "
+                 "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
+                 "  AND NOT EXISTS (SELECT 1 FROM run_segments x "
+                 "    WHERE x.rig = ?1 AND x.run = ?3 "
+                 "      AND x.segment = s.segment) "
+                 "ORDER BY s.sequence DESC LIMIT ?4",
+                 rig_id,
+                 first_sequence,
+                 run_number,
+                 limit);
+  std::vector<SegmentInformation> newest;
+  while (read.Next()) {
+    auto information = ReadInformation(read);
+    if (information.ok()) {
+      newest.push_back(*std::move(information));
+    }
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return newest;
+}
+
 }  // namespace selfcal::server

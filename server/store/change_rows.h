@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/change/detect_change.h"
 #include "server/store/rigs.h"
@@ -31,5 +32,12 @@ absl::StatusOr<StoredChange> ReadChange(Connection* db,
 // it.
 absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
     Connection* db, const RigRow& rig, const ChangeOptions& options);
+
+// The rest is not part of a transaction.
+
+// What the newest scored segments of a rig say that a run does not use, newest
+// first. Not from before the run's change, nor what is damaged.
+absl::StatusOr<std::vector<SegmentInformation>> ListHeldOutRows(
+    Connection* db, const std::string& rig, std::int64_t run, int limit);
 
 }  // namespace selfcal::server

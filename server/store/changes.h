@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "server/store/statement.h"
 #include "server/store/store.h"
@@ -27,12 +28,32 @@ absl::Status MarkUnusableRow(Connection* db,
 
 absl::StatusOr<StoredRun> CreateManualRunRow(Connection* db,
                                              const std::string& rig);
+absl::StatusOr<std::vector<StoredRun>> StartAgedRunRows(Connection* db,
+                                                        std::int64_t now_ns);
+absl::Status HoldRunRow(Connection* db,
+                        const std::string& rig,
+                        std::int64_t run,
+                        const std::string& reason);
 absl::StatusOr<StoredRun> BeginRunRow(Connection* db,
                                       const std::string& rig,
                                       std::int64_t run);
 absl::StatusOr<StoredRun> ReleaseRunRow(Connection* db,
                                         const std::string& rig,
                                         std::int64_t run);
+absl::StatusOr<StoredCalibration> StoreCandidateRow(
+    Connection* db,
+    const std::string& rig,
+    std::int64_t run,
+    const StoredCalibration& calibration);
+absl::StatusOr<StoredCalibration> ReadCandidate(Connection* db,
+                                                const std::string& rig,
+                                                std::int64_t run);
+absl::StatusOr<StoredCalibration> ActivateCalibrationRow(
+    Connection* db,
+    const std::string& rig,
+    std::int64_t version,
+    const std::string& caller,
+    const std::string& reason);
 absl::StatusOr<StoredCalibration> FinishRunRow(
     Connection* db,
     const std::string& rig,

@@ -2,6 +2,7 @@
 
 #include "proto/convert.h"
 #include "server/store/record_parts.h"
+#include "server/store/rig_policy.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -87,21 +88,24 @@ bool GetLandmarks(const store::LandmarkSketchRecord& record,
 
 }  // namespace
 
-std::string SerializeRig(const Rig& rig) {
+std::string SerializeRig(const StoredRig& rig) {
   store::RigRecord record;
-  *record.mutable_rig() = ToProto(rig);
+  *record.mutable_rig() = ToProto(rig.rig);
+  PutPolicy(rig.policy, record.mutable_rig());
   return record.SerializeAsString();
 }
 
-absl::StatusOr<Rig> ParseRig(std::string_view bytes, const std::string& what) {
+absl::StatusOr<StoredRig> ParseRig(std::string_view bytes,
+                                   const std::string& what) {
   store::RigRecord record;
   SELFCAL_RETURN_IF_ERROR(ParseMessage(bytes, what, &record));
-  Rig rig;
+  StoredRig rig;
   // What was stored before there was a choice.
   if (record.rig().selection() == v1::Rig::SELECTION_UNSPECIFIED) {
     record.mutable_rig()->set_selection(v1::Rig::TABLES);
   }
-  if (!FromProto(record.rig(), "", &rig).empty()) {
+  if (!FromProto(record.rig(), "", &rig.rig).empty() ||
+      !GetPolicy(record.rig(), &rig.policy).empty()) {
     return DamagedRecord(what);
   }
   return rig;

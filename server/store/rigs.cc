@@ -27,7 +27,7 @@ absl::StatusOr<StoredRig> RigFromRow(const Statement& row, int column) {
   const std::string bytes = row.Text(column + 2);
   SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(column + 3), what));
   StoredRig stored;
-  SELFCAL_ASSIGN_OR_RETURN(stored.rig, ParseRig(bytes, what));
+  SELFCAL_ASSIGN_OR_RETURN(stored, ParseRig(bytes, what));
   stored.create_time_ns = row.Int(column + 1);
   return stored;
 }
@@ -50,7 +50,9 @@ StoredCalibration FactoryCalibration(const Rig& rig) {
 
 }  // namespace
 
-absl::StatusOr<StoredRig> CreateRigRow(Connection* db, const Rig& rig) {
+absl::StatusOr<StoredRig> CreateRigRow(Connection* db,
+                                       const Rig& rig,
+                                       const RigPolicy& policy) {
   Transaction transaction(db);
   SELFCAL_RETURN_IF_ERROR(transaction.status());
   Statement existing(db, "SELECT 1 FROM rigs WHERE id = ?1", rig.id);
@@ -60,8 +62,8 @@ absl::StatusOr<StoredRig> CreateRigRow(Connection* db, const Rig& rig) {
     return absl::AlreadyExistsError(
         fmt::format("rig {} exists; choose another name", rig.id));
   }
-  StoredRig stored{rig, NowNs()};
-  const std::string bytes = SerializeRig(rig);
+  StoredRig stored{rig, NowNs(), policy};
+  const std::string bytes = SerializeRig(stored);
   const std::string sha256 = Sha256(bytes);
   SELFCAL_RETURN_IF_ERROR(
       Statement(db,
@@ -78,7 +80,7 @@ absl::StatusOr<StoredRig> CreateRigRow(Connection* db, const Rig& rig) {
       AppendEvent(db, rig.id, EventKind::kRigCreated, "created"));
   StoredCalibration factory = FactoryCalibration(rig);
   factory.create_time_ns = stored.create_time_ns;
-  SELFCAL_RETURN_IF_ERROR(InsertCalibration(db, rowid, factory));
+  SELFCAL_RETURN_IF_ERROR(InsertFactory(db, rowid, factory));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());
   return stored;
 }

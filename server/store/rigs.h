@@ -17,7 +17,9 @@ struct RigRow {
 };
 
 // With its tables and version 1, in one transaction. ALREADY_EXISTS.
-absl::StatusOr<StoredRig> CreateRigRow(Connection* db, const Rig& rig);
+absl::StatusOr<StoredRig> CreateRigRow(Connection* db,
+                                       const Rig& rig,
+                                       const RigPolicy& policy);
 
 // NOT_FOUND.
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig);

@@ -2,14 +2,13 @@
 #include <fmt/format.h>
 
 #include "server/store/calibrations.h"
-#include "server/store/change_rows.h"
 #include "server/store/changes.h"
 #include "server/store/clock.h"
+#include "server/store/events.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
 #include "server/store/status_macros.h"
-#include "server/store/table_rows.h"
 
 namespace selfcal::server {
 namespace {
@@ -28,19 +27,51 @@ absl::Status NotRunning(const StoredRun& run) {
       "recalibration {} of rig {} is not running", run.run, run.rig));
 }
 
+// That of a run that ends without a calibration.
+absl::Status RejectCandidate(Connection* db,
+                             std::int64_t rig,
+                             const StoredRun& run) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto version,
+                           CandidateOfRun(db, rig, run.run));
+  if (!version) {
+    return absl::OkStatus();
+  }
+  StoredCalibration judged;
+  judged.rig = run.rig;
+  judged.version = *version;
+  judged.state = CalibrationState::kRejected;
+  judged.reasons = {
+      fmt::format("its run ended before it was validated: {}", run.message)};
+  return JudgeCandidate(db, rig, judged);
+}
+
 }  // namespace
 
-absl::StatusOr<StoredRun> CreateManualRunRow(Connection* db,
-                                             const std::string& rig_name) {
+absl::Status HoldRunRow(Connection* db,
+                        const std::string& rig,
+                        std::int64_t run_number,
+                        const std::string& reason) {
   Transaction transaction(db);
   SELFCAL_RETURN_IF_ERROR(transaction.status());
-  SELFCAL_ASSIGN_OR_RETURN(const RigRow rig, ReadRig(db, rig_name));
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
-                           ReadTables(db, rig.rowid));
-  SELFCAL_ASSIGN_OR_RETURN(StoredRun run,
-                           InsertRun(db, rig, tables, RunTrigger::kManual));
-  SELFCAL_RETURN_IF_ERROR(transaction.Commit());
-  return run;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRun(db, rig, run_number));
+  if (run.state != RunState::kPending) {
+    return absl::FailedPreconditionError(fmt::format(
+        "recalibration {} of rig {} does not wait", run_number, rig));
+  }
+  if (run.message == reason) {
+    return absl::OkStatus();
+  }
+  if (run.message.empty()) {
+    SELFCAL_RETURN_IF_ERROR(
+        AppendEvent(db,
+                    rig,
+                    EventKind::kRunHeldBack,
+                    fmt::format("run {} is held back: {}", run.run, reason)));
+  }
+  run.message = reason;
+  SELFCAL_RETURN_IF_ERROR(UpdateRun(db, rig_id, run));
+  return transaction.Commit();
 }
 
 absl::StatusOr<StoredRun> BeginRunRow(Connection* db,
@@ -54,6 +85,7 @@ absl::StatusOr<StoredRun> BeginRunRow(Connection* db,
     return Ended(run);
   }
   run.state = RunState::kRunning;
+  run.message.clear();
   ++run.attempts;
   SELFCAL_RETURN_IF_ERROR(UpdateRun(db, rig_id, run));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());
@@ -77,51 +109,6 @@ absl::StatusOr<StoredRun> ReleaseRunRow(Connection* db,
   return run;
 }
 
-absl::StatusOr<StoredCalibration> FinishRunRow(
-    Connection* db,
-    const std::string& rig_name,
-    std::int64_t run_number,
-    const StoredCalibration& calibration) {
-  if (calibration.state == CalibrationState::kSuperseded) {
-    return absl::InvalidArgumentError(
-        "a new calibration is active or rejected, not superseded");
-  }
-  Transaction transaction(db);
-  SELFCAL_RETURN_IF_ERROR(transaction.status());
-  SELFCAL_ASSIGN_OR_RETURN(const RigRow rig, ReadRig(db, rig_name));
-  SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRun(db, rig_name, run_number));
-  if (run.state != RunState::kRunning) {
-    return NotRunning(run);
-  }
-  StoredCalibration stored = calibration;
-  SELFCAL_ASSIGN_OR_RETURN(stored.version, NextVersion(db, rig.rowid));
-  stored.rig = rig_name;
-  stored.create_time_ns = NowNs();
-  stored.run = run.run;
-  stored.base_version = run.base_version;
-  stored.segments = run.segments;
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
-                           NewestChange(db, rig.rowid));
-  if (run.change != change) {
-    stored.state = CalibrationState::kRejected;
-    stored.reasons.push_back(
-        fmt::format("the device has changed (change {}) since its segments "
-                    "were chosen",
-                    change));
-  }
-  SELFCAL_RETURN_IF_ERROR(InsertCalibration(db, rig.rowid, stored));
-  run.state = RunState::kSucceeded;
-  run.end_time_ns = stored.create_time_ns;
-  run.calibration_version = stored.version;
-  SELFCAL_RETURN_IF_ERROR(UpdateRun(db, rig.rowid, run));
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
-                           ReadTables(db, rig.rowid));
-  SELFCAL_RETURN_IF_ERROR(MaybeInsertRun(db, rig, tables).status());
-  SELFCAL_RETURN_IF_ERROR(DropUnreferencedPayloads(db, rig.rowid));
-  SELFCAL_RETURN_IF_ERROR(transaction.Commit());
-  return stored;
-}
-
 absl::StatusOr<StoredRun> EndRunRow(Connection* db,
                                     const std::string& rig,
                                     std::int64_t run_number,
@@ -141,6 +128,7 @@ absl::StatusOr<StoredRun> EndRunRow(Connection* db,
   run.state = state;
   run.message = message;
   run.end_time_ns = NowNs();
+  SELFCAL_RETURN_IF_ERROR(RejectCandidate(db, rig_id, run));
   SELFCAL_RETURN_IF_ERROR(UpdateRun(db, rig_id, run));
   SELFCAL_RETURN_IF_ERROR(DropUnreferencedPayloads(db, rig_id));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());

@@ -3,10 +3,12 @@
 
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
+#include "server/store/changes.h"
 #include "server/store/clock.h"
 #include "server/store/events.h"
 #include "server/store/runs.h"
 #include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
 
 namespace selfcal::server {
 namespace {
@@ -36,8 +38,9 @@ absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
                            NewestChange(db, rig.rowid));
   SELFCAL_ASSIGN_OR_RETURN(
       const std::int64_t triggered,
-      NewestRun(
-          db, rig.rowid, fmt::format("cause <> 3 AND change = {}", change)));
+      NewestRun(db,
+                rig.rowid,
+                fmt::format("cause IN (1, 2) AND change = {}", change)));
   if (triggered == 0) {
     return keys;
   }
@@ -75,10 +78,28 @@ const char* TriggerText(RunTrigger trigger) {
       return "the tables have changed";
     case RunTrigger::kChangeDetected:
       return "the tables are full again after a change";
+    case RunTrigger::kCalibrationAged:
+      return "the calibration is old";
     case RunTrigger::kManual:
       break;
   }
   return "asked for";
+}
+
+// In the column cause.
+int CauseOf(RunTrigger trigger) {
+  switch (trigger) {
+    case RunTrigger::kTablesFull:
+    case RunTrigger::kChangeDetected:
+      return 1;
+    case RunTrigger::kTablesChanged:
+      return 2;
+    case RunTrigger::kCalibrationAged:
+      return 4;
+    case RunTrigger::kManual:
+      break;
+  }
+  return 3;
 }
 
 }  // namespace
@@ -120,7 +141,7 @@ absl::StatusOr<StoredRun> InsertRun(Connection* db,
                 "  base_version, change) VALUES (?1, ?2, 1, ?3, ?4, ?5, ?6)",
                 rig.rowid,
                 run.run,
-                static_cast<int>(trigger) + 1,
+                CauseOf(trigger),
                 run.create_time_ns,
                 run.base_version,
                 run.change)
@@ -157,6 +178,19 @@ absl::StatusOr<std::optional<StoredRun>> MaybeInsertRun(
                 trigger == Trigger::kTablesFull ? RunTrigger::kTablesFull
                                                 : RunTrigger::kTablesChanged));
   return started;
+}
+
+absl::StatusOr<StoredRun> CreateManualRunRow(Connection* db,
+                                             const std::string& rig_name) {
+  Transaction transaction(db);
+  SELFCAL_RETURN_IF_ERROR(transaction.status());
+  SELFCAL_ASSIGN_OR_RETURN(const RigRow rig, ReadRig(db, rig_name));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
+                           ReadFreshTables(db, rig, NowNs()));
+  SELFCAL_ASSIGN_OR_RETURN(StoredRun run,
+                           InsertRun(db, rig, tables, RunTrigger::kManual));
+  SELFCAL_RETURN_IF_ERROR(transaction.Commit());
+  return run;
 }
 
 }  // namespace selfcal::server

@@ -34,12 +34,26 @@ absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
   return keys;
 }
 
+// From the columns cause and change.
+RunTrigger TriggerOf(std::int64_t cause, std::int64_t change) {
+  switch (cause) {
+    case 1:
+      return change > 0 ? RunTrigger::kChangeDetected : RunTrigger::kTablesFull;
+    case 2:
+      return RunTrigger::kTablesChanged;
+    case 4:
+      return RunTrigger::kCalibrationAged;
+    default:
+      return RunTrigger::kManual;
+  }
+}
+
 absl::StatusOr<StoredRun> RunFromRow(Connection* db, const Statement& row) {
   StoredRun run;
   run.rig = row.Text(0);
   run.run = row.Int(1);
   run.state = static_cast<RunState>(row.Int(2) - 1);
-  run.trigger = static_cast<RunTrigger>(row.Int(3) - 1);
+  run.trigger = TriggerOf(row.Int(3), row.Int(11));
   run.create_time_ns = row.Int(4);
   run.end_time_ns = row.Int(5);
   run.base_version = row.Int(6);
@@ -47,9 +61,6 @@ absl::StatusOr<StoredRun> RunFromRow(Connection* db, const Statement& row) {
   run.calibration_version = row.Int(8);
   run.message = row.Text(9);
   run.change = row.Int(11);
-  if (run.trigger == RunTrigger::kTablesFull && run.change > 0) {
-    run.trigger = RunTrigger::kChangeDetected;
-  }
   SELFCAL_ASSIGN_OR_RETURN(run.segments,
                            ReadSnapshot(db, row.Int(10), run.run));
   return run;

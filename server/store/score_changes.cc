@@ -156,8 +156,10 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
         " was found unusable; send it anew under "
         "another session");
   }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t receive_time_ns,
+                           ReceiveTime(db, segment.rowid));
   SELFCAL_ASSIGN_OR_RETURN(std::vector<Table> tables,
-                           ReadTables(db, rig.rowid));
+                           ReadFreshTables(db, rig, receive_time_ns));
   SELFCAL_ASSIGN_OR_RETURN(
       commit.tables,
       ScoreAndOffer(db, rig, segment, key, information, &tables));

@@ -19,6 +19,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
@@ -41,9 +42,23 @@ struct Listed {
   std::string next_token;  // empty on the last page
 };
 
+// What of a rig goes by the clock; 0: no matter.
+struct RigPolicy {
+  // Segments that arrived longer ago leave the tables.
+  std::int64_t table_max_age_ns = 0;
+  // From the end of a run to the beginning of the next that the tables or the
+  // age of the calibration call for.
+  std::int64_t recalibration_min_interval_ns = 0;
+  // A calibration that has been active for longer is computed anew.
+  std::int64_t calibration_max_age_ns = 0;
+
+  friend bool operator==(const RigPolicy&, const RigPolicy&) = default;
+};
+
 struct StoredRig {
   Rig rig;
   std::int64_t create_time_ns = 0;  // since the Unix epoch
+  RigPolicy policy = {};
 };
 
 // kUnusable: its data is damaged or cannot be scored; `problem` says why.
@@ -73,7 +88,37 @@ struct StoredSegment {
 
 enum class PutVerdict { kStored, kDuplicate };
 
-enum class CalibrationState { kActive, kSuperseded, kRejected };
+// What may become what: calibration_states.h.
+enum class CalibrationState {
+  kActive,
+  kSuperseded,
+  kRejected,
+  kCandidate,
+  kRolledBack,
+};
+
+struct ValidationCheck {
+  std::string name;
+  double value = 0;
+  double limit = 0;
+  bool passed = false;
+};
+
+// Of segments that a candidate was not calibrated on: how well it says before
+// what they show, and how well the active version does.
+struct HeldOutTest {
+  int segments = 0;  // that were tested
+  int left_out = 0;  // that could not be tested
+  ConsistencyTest candidate;
+  ConsistencyTest active;
+};
+
+// What a candidate was judged by.
+struct StoredValidation {
+  std::int64_t active_version = 0;  // that it was judged against
+  std::vector<ValidationCheck> checks;
+  HeldOutTest held_out;
+};
 
 struct StoredCalibration {
   std::string rig;
@@ -87,8 +132,15 @@ struct StoredCalibration {
   std::int64_t base_version = 0;     // where the solver started, 0: none
   std::vector<SegmentKey> segments;
   std::string program_version;
-  std::optional<CalibrationResult> report;  // of the solver
-  double seconds = 0;                       // it took
+  int schema_version = 0;  // of the database; 0 from before it was kept
+  // Name and value of what shaped the run's result.
+  std::vector<std::pair<std::string, std::string>> settings;
+  std::optional<CalibrationResult> report;     // of the solver
+  std::optional<StoredValidation> validation;  // of one that was a candidate
+  double seconds = 0;                          // it took
+  // Counts the activations of all rigs: that of its newest, 0 if it never was
+  // active.
+  std::int64_t activation = 0;
 };
 
 enum class RunState { kPending, kRunning, kSucceeded, kFailed, kCancelled };
@@ -97,6 +149,7 @@ enum class RunTrigger {
   kTablesChanged,
   kManual,
   kChangeDetected,  // the tables are full again, for the first time since one
+  kCalibrationAged,
 };
 
 struct StoredRun {
@@ -111,6 +164,7 @@ struct StoredRun {
   std::vector<SegmentKey> segments;  // the snapshot of the tables
   int attempts = 0;
   std::int64_t calibration_version = 0;  // 0 until it succeeded
+  // Why it failed; while it is pending, why it is held back.
   std::string message;
 };
 
@@ -145,7 +199,10 @@ enum class EventKind {
   kCalibrationRejected,
   kSegmentUnusable,
   kChangeDetected,
-  kDataEvicted,  // a quota was reached
+  kDataEvicted,            // a quota was reached
+  kCalibrationActivated,   // by hand
+  kCalibrationRolledBack,  // by hand
+  kRunHeldBack,
 };
 struct StoredEvent {
   std::int64_t event = 0;  // counts from 1
@@ -163,7 +220,11 @@ class Store {
 
   // --- Rigs. Creating one also stores its factory calibration as version 1,
   // active, and its empty tables.
-  virtual absl::StatusOr<StoredRig> CreateRig(const Rig& rig) = 0;
+  virtual absl::StatusOr<StoredRig> CreateRig(const Rig& rig,
+                                              const RigPolicy& policy) = 0;
+  absl::StatusOr<StoredRig> CreateRig(const Rig& rig) {
+    return CreateRig(rig, {});
+  }
   virtual absl::StatusOr<StoredRig> GetRig(const std::string& rig) = 0;
   virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) = 0;
 
@@ -195,7 +256,8 @@ class Store {
   };
   virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) = 0;
 
-  // Writes the information of one stored segment, offers it to the tables,
+  // Writes the information of one stored segment, takes segments out of the
+  // tables that were too old when it arrived, offers it to the tables,
   // tests the newest segments for a change of the device (core/change), drops
   // the data of segments that neither a table nor an unfinished run references,
   // and, where EvaluateTrigger says so and no run is unfinished, creates the
@@ -219,6 +281,11 @@ class Store {
   virtual absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) = 0;
 
+  // What the newest scored segments say that the run does not use, newest
+  // first; none from before its change of the device, none that is damaged.
+  virtual absl::StatusOr<std::vector<SegmentInformation>> ListHeldOut(
+      const std::string& rig, std::int64_t run, int limit) = 0;
+
   virtual absl::StatusOr<StoredChange> GetChange(const std::string& rig,
                                                  std::int64_t change) = 0;
 
@@ -229,6 +296,15 @@ class Store {
       const std::string& rig) = 0;
   virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
       const std::string& rig, const Page& page) = 0;
+  // Makes a version active by hand; an event keeps who did it and why. What was
+  // active becomes superseded, or rolled back if it is the newer of the two.
+  // The version that is active already changes nothing. FAILED_PRECONDITION for
+  // a candidate or a rejected one.
+  virtual absl::StatusOr<StoredCalibration> ActivateCalibration(
+      const std::string& rig,
+      std::int64_t version,
+      const std::string& caller,
+      const std::string& reason) = 0;
 
   // --- Runs.
   // On the tables as they are. FAILED_PRECONDITION if they are empty or a run
@@ -241,21 +317,44 @@ class Store {
   // Pending or running runs of all rigs, oldest first: after a restart a
   // running one starts again.
   virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns() = 0;
+  // Creates a run for each rig whose calibration came from a run and has been
+  // active for longer than the rig's policy says, where the tables hold a
+  // segment that the last run did not use, no run is unfinished, and the last
+  // one began as long ago.
+  virtual absl::StatusOr<std::vector<StoredRun>> StartAgedRuns(
+      std::int64_t now_ns) = 0;
+  // Writes down why a pending run does not begin yet; the first time with an
+  // event.
+  virtual absl::Status HoldRun(const std::string& rig,
+                               std::int64_t run,
+                               const std::string& reason) = 0;
   // Pending or running -> running, one attempt more.
   virtual absl::StatusOr<StoredRun> BeginRun(const std::string& rig,
                                              std::int64_t run) = 0;
   // Running -> pending, the attempt not counted: an orderly stop gives it back.
   virtual absl::StatusOr<StoredRun> ReleaseRun(const std::string& rig,
                                                std::int64_t run) = 0;
-  // Ends a running run with its calibration, stored as the next version:
-  // active (the one before becomes superseded) or rejected. Drops data that
-  // only the run referenced. May create the next run, as CommitScore does.
-  // The version is assigned here.
+  // Stores what a running run has found as the next version, a candidate; where
+  // it has one already, changes nothing and returns that. The version is
+  // assigned here.
+  virtual absl::StatusOr<StoredCalibration> StoreCandidate(
+      const std::string& rig,
+      std::int64_t run,
+      const StoredCalibration& calibration) = 0;
+  // The candidate that a run has stored; NOT_FOUND if it has none.
+  virtual absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
+                                                         std::int64_t run) = 0;
+  // Ends a running run with its calibration, stored as a candidate if it was
+  // not yet: active (the one before becomes superseded) or rejected, as its
+  // state, reasons and validation say. ABORTED if it was validated against
+  // another version than is active now. Drops data that only the run
+  // referenced. May create the next run, as CommitScore does.
   virtual absl::StatusOr<StoredCalibration> FinishRun(
       const std::string& rig,
       std::int64_t run,
       const StoredCalibration& calibration) = 0;
-  // Ends it without a calibration: kFailed or kCancelled.
+  // Ends it without a calibration: kFailed or kCancelled. If it has a candidate
+  // that is rejected, with the message.
   virtual absl::StatusOr<StoredRun> EndRun(const std::string& rig,
                                            std::int64_t run,
                                            RunState state,

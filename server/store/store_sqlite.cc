@@ -35,8 +35,9 @@ class SqliteStore : public Store {
         maintenance_(MakeSqliteMaintenance(path)),
         db_(std::move(db)) {}
 
-  absl::StatusOr<StoredRig> CreateRig(const Rig& rig) override {
-    return Write([&](Connection* db) { return CreateRigRow(db, rig); });
+  absl::StatusOr<StoredRig> CreateRig(const Rig& rig,
+                                      const RigPolicy& policy) override {
+    return Write([&](Connection* db) { return CreateRigRow(db, rig, policy); });
   }
 
   absl::StatusOr<StoredRig> GetRig(const std::string& rig) override {
@@ -135,6 +136,12 @@ class SqliteStore : public Store {
     });
   }
 
+  absl::StatusOr<std::vector<SegmentInformation>> ListHeldOut(
+      const std::string& rig, std::int64_t run, int limit) override {
+    return Read(
+        [&](Connection* db) { return ListHeldOutRows(db, rig, run, limit); });
+  }
+
   absl::StatusOr<StoredChange> GetChange(const std::string& rig,
                                          std::int64_t change) override {
     return Read([&](Connection* db) { return ReadChange(db, rig, change); });
@@ -157,6 +164,16 @@ class SqliteStore : public Store {
         [&](Connection* db) { return ListCalibrationRows(db, rig, page); });
   }
 
+  absl::StatusOr<StoredCalibration> ActivateCalibration(
+      const std::string& rig,
+      std::int64_t version,
+      const std::string& caller,
+      const std::string& reason) override {
+    return Write([&](Connection* db) {
+      return ActivateCalibrationRow(db, rig, version, caller, reason);
+    });
+  }
+
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig) override {
     return Write([&](Connection* db) { return CreateManualRunRow(db, rig); });
   }
@@ -175,6 +192,18 @@ class SqliteStore : public Store {
     return Read([&](Connection* db) { return ListUnfinishedRunRows(db); });
   }
 
+  absl::StatusOr<std::vector<StoredRun>> StartAgedRuns(
+      std::int64_t now_ns) override {
+    return Write([&](Connection* db) { return StartAgedRunRows(db, now_ns); });
+  }
+
+  absl::Status HoldRun(const std::string& rig,
+                       std::int64_t run,
+                       const std::string& reason) override {
+    return Write(
+        [&](Connection* db) { return HoldRunRow(db, rig, run, reason); });
+  }
+
   absl::StatusOr<StoredRun> BeginRun(const std::string& rig,
                                      std::int64_t run) override {
     return Write([&](Connection* db) { return BeginRunRow(db, rig, run); });
@@ -183,6 +212,20 @@ class SqliteStore : public Store {
   absl::StatusOr<StoredRun> ReleaseRun(const std::string& rig,
                                        std::int64_t run) override {
     return Write([&](Connection* db) { return ReleaseRunRow(db, rig, run); });
+  }
+
+  absl::StatusOr<StoredCalibration> StoreCandidate(
+      const std::string& rig,
+      std::int64_t run,
+      const StoredCalibration& calibration) override {
+    return Write([&](Connection* db) {
+      return StoreCandidateRow(db, rig, run, calibration);
+    });
+  }
+
+  absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
+                                                 std::int64_t run) override {
+    return Read([&](Connection* db) { return ReadCandidate(db, rig, run); });
   }
 
   absl::StatusOr<StoredCalibration> FinishRun(

@@ -65,6 +65,31 @@ absl::StatusOr<std::vector<Table>> ReadTables(Connection* db,
   return tables;
 }
 
+absl::StatusOr<std::vector<Table>> ReadFreshTables(Connection* db,
+                                                   const RigRow& rig,
+                                                   std::int64_t now_ns) {
+  const std::int64_t max_age_ns = rig.stored.policy.table_max_age_ns;
+  if (max_age_ns > 0) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(db,
+                  "DELETE FROM table_entries WHERE rig = ?1 AND segment IN "
+                  "(SELECT segment FROM segments "
+                  "  WHERE rig = ?1 AND receive_time_ns < ?2)",
+                  rig.rowid,
+                  now_ns - max_age_ns)
+            .Run());
+  }
+  return ReadTables(db, rig.rowid);
+}
+
+absl::StatusOr<std::int64_t> ReceiveTime(Connection* db, std::int64_t segment) {
+  Statement read(
+      db, "SELECT receive_time_ns FROM segments WHERE segment = ?1", segment);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return found ? read.Int(0) : 0;
+}
+
 absl::Status WriteOffer(Connection* db,
                         std::int64_t rig,
                         const SegmentKey& key,

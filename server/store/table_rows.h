@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/selection/tables.h"
+#include "server/store/rigs.h"
 #include "server/store/statement.h"
 
 namespace selfcal::server {
@@ -20,6 +21,15 @@ absl::Status InsertTables(Connection* db,
 
 // In the order of the rig's groups, entries sorted as Table says.
 absl::StatusOr<std::vector<Table>> ReadTables(Connection* db, std::int64_t rig);
+
+// The same, after segments that are too old at that time by the policy of the
+// rig have left them.
+absl::StatusOr<std::vector<Table>> ReadFreshTables(Connection* db,
+                                                   const RigRow& rig,
+                                                   std::int64_t now_ns);
+
+// When the segment arrived.
+absl::StatusOr<std::int64_t> ReceiveTime(Connection* db, std::int64_t segment);
 
 // Writes that one scored segment was offered to `table` (core/selection), and
 // what that changed.

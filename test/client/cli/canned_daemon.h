@@ -46,7 +46,9 @@ struct CannedDaemon final : v1::RigService::Service,
   std::vector<v1::Calibration> calibrations;  // the last is active
   std::vector<v1::Recalibration> run;         // as it goes on
   grpc::Status refusal;                       // of CreateRig
+  v1::CompareCalibrationsResponse differences;
   std::string last_name;
+  std::string last_reason;
   std::int64_t reject_index = -1;      // of the segments that are sent
   std::atomic<int> broken_watches{0};  // that many end before the run does
 
@@ -171,6 +173,24 @@ struct CannedDaemon final : v1::RigService::Service,
     Page(*request, calibrations, response, [&](const v1::Calibration& one) {
       *response->add_calibrations() = one;
     });
+    return grpc::Status::OK;
+  }
+  grpc::Status ActivateCalibration(
+      grpc::ServerContext*,
+      const v1::ActivateCalibrationRequest* request,
+      v1::Calibration* response) override {
+    last_name = request->name();
+    last_reason = request->reason();
+    if (calibrations.empty()) return {grpc::StatusCode::NOT_FOUND, "none"};
+    *response = calibrations.back();
+    return grpc::Status::OK;
+  }
+  grpc::Status CompareCalibrations(
+      grpc::ServerContext*,
+      const v1::CompareCalibrationsRequest* request,
+      v1::CompareCalibrationsResponse* response) override {
+    last_name = request->a() + " " + request->b();
+    *response = differences;
     return grpc::Status::OK;
   }
   grpc::Status WatchCalibration(

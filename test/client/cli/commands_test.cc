@@ -304,6 +304,32 @@ TEST_F(Commands, ShowsACalibrationWithItsOriginAndValues) {
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/7");
 }
 
+TEST_F(Commands, ActivateSaysWhichAndWhy) {
+  daemon_.calibrations = {Version(1)};
+  const Outcome outcome = Selfcal(
+      {"calibrations", "activate", "device", "1", "--reason", "it drifts"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/1");
+  EXPECT_EQ(daemon_.last_reason, "it drifts");
+  EXPECT_NE(Selfcal({"calibrations", "activate", "device", "1"}).code, 0);
+}
+
+TEST_F(Commands, DiffShowsDifferencesWithTheirSigmas) {
+  daemon_.differences.set_significant(true);
+  daemon_.differences.set_degrees(26);
+  auto* one = daemon_.differences.add_differences();
+  one->set_component("cam0.focal.x");
+  one->set_difference(1.5);
+  one->set_sigma(0.25);
+  const Outcome outcome = Selfcal({"calibrations", "diff", "device", "1"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(daemon_.last_name,
+            "rigs/device/calibrations/1 rigs/device/calibrations/active");
+  EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x"));
+  EXPECT_THAT(outcome.out, HasSubstr("1.50"));
+  EXPECT_THAT(outcome.out, HasSubstr("significant"));
+}
+
 TEST_F(Commands, WatchPrintsALineForEachVersion) {
   daemon_.calibrations = {Version(1), Version(2), Version(3)};
   const Outcome some =

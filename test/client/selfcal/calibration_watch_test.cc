@@ -95,6 +95,19 @@ TEST_F(CalibrationWatchTest, TellsTheActiveOneAtOnceAndThenEachNewOne) {
   EXPECT_TRUE(watch.connection_status().ok());
 }
 
+TEST_F(CalibrationWatchTest, TellsARollBackAndNoneTwiceInARow) {
+  daemon_.Publish(Version(3));
+  daemon_.Start();
+  CalibrationWatch watch(Options(), told_.Callback());
+  ASSERT_TRUE(told_.WaitFor(1));
+  daemon_.Publish(Version(2));
+  ASSERT_TRUE(told_.WaitFor(2));
+  daemon_.Publish(Version(2));
+  daemon_.Publish(Version(3));
+  ASSERT_TRUE(told_.WaitFor(3));
+  EXPECT_THAT(told_.versions(), testing::ElementsAre(3, 2, 3));
+}
+
 TEST_F(CalibrationWatchTest, TellsNoVersionTwiceOverRestarts) {
   daemon_.Publish(Version(1));
   CalibrationWatch watch(Options(), told_.Callback());

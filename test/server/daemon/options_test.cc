@@ -76,6 +76,29 @@ TEST_F(OptionsTest, SolverHasAName) {
   EXPECT_EQ(Parse({"--state-dir", "s", "--solver", "other"}), 2);
 }
 
+TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
+  EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
+  EXPECT_EQ(options_.host, HostLimits());
+  EXPECT_EQ(options_.max_run_minutes, 30);
+  EXPECT_TRUE(options_.idle_runs);
+  EXPECT_EQ(Parse({"--state-dir",
+                   "s",
+                   "--only-on-external-power",
+                   "--max-load",
+                   "0.5",
+                   "--max-run-minutes",
+                   "2.5",
+                   "--run-priority",
+                   "low"}),
+            std::nullopt);
+  EXPECT_FALSE(options_.idle_runs);
+  EXPECT_TRUE(options_.host.only_on_external_power);
+  EXPECT_EQ(options_.host.max_load, 0.5);
+  EXPECT_EQ(options_.max_run_minutes, 2.5);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--max-load", "-1"}), 2);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--max-run-minutes", "0"}), 2);
+}
+
 TEST_F(OptionsTest, TestForAChangeIsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
   EXPECT_EQ(options_.store.change.inflation, std::nullopt);

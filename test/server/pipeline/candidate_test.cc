@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "test/core/change/random_information.h"
 #include "test/server/test_segments.h"
 
 namespace selfcal::server {
@@ -25,8 +26,16 @@ class CandidateTest : public ::testing::Test {
     result_.covariance = active_.covariance;
   }
 
-  std::vector<std::string> Problems() {
-    return CandidateProblems(rig_, active_, result_);
+  Judgement Judge() {
+    return JudgeCandidate(rig_, active_, result_, held_out_);
+  }
+  std::vector<std::string> Problems() { return Judge().reasons; }
+  ValidationCheck Check(const std::string& name) {
+    for (const ValidationCheck& check : Judge().validation.checks) {
+      if (check.name == name) return check;
+    }
+    ADD_FAILURE() << "no check " << name;
+    return {};
   }
   // The one problem of this result, or all of them.
   std::string Problem() {
@@ -38,6 +47,7 @@ class CandidateTest : public ::testing::Test {
   Rig rig_ = TestRig("a");
   StoredCalibration active_;
   CalibrationResult result_;
+  std::vector<SegmentInformation> held_out_;
 };
 
 TEST_F(CandidateTest, SoundOneHasNoProblem) {
@@ -98,6 +108,19 @@ TEST_F(CandidateTest, SigmaMayNotGrowByMoreThanHalf) {
   EXPECT_THAT(Problem(), HasSubstr(TangentComponents(rig_.factory)[5].name));
 }
 
+TEST_F(CandidateTest, FiguresAreKeptWithTheirLimits) {
+  result_.covariance(5, 5) = active_.covariance(5, 5) * 4;
+  result_.status = CalibrateStatus::kNotConverged;
+  const ValidationCheck growth = Check("sigma_growth");
+  EXPECT_NEAR(growth.value, 2, 1e-9);
+  EXPECT_EQ(growth.limit, 1.5);
+  EXPECT_FALSE(growth.passed);
+  EXPECT_FALSE(Check("converged").passed);
+  EXPECT_TRUE(Check("usable").passed);
+  EXPECT_NEAR(Check("prior_sigmas").value, 0.5, 1e-9);
+  EXPECT_EQ(Judge().validation.active_version, 4);
+}
+
 TEST_F(CandidateTest, SigmaIsNotComparedWhereOneOfThemObservedNothing) {
   const double prior = PriorSigmas(rig_)[5];
   result_.covariance(5, 5) = prior * prior;
@@ -112,6 +135,79 @@ TEST_F(CandidateTest, FixedComponentsAreNotLookedAt) {
   result_.covariance(6, 6) = 0;
   active_.covariance(6, 6) = 0;
   EXPECT_THAT(Problems(), IsEmpty());
+}
+
+// Of devices whose segments are as good as a reference segment each.
+class HeldOutTestOfCandidates : public CandidateTest {
+ protected:
+  HeldOutTestOfCandidates() {
+    const KnownCalibration known = FactoryKnownTo(rig_, 0.04);
+    active_.theta = known.theta;
+    active_.covariance = known.covariance;
+    result_.theta = known.theta;
+    result_.covariance = known.covariance;
+    result_.track_noise_factor = 1;
+  }
+
+  // Segments of a device that is off from the factory's by `offset`.
+  void HoldOut(int count, const Eigen::VectorXd& offset) {
+    for (int k = 0; k < count; ++k) {
+      held_out_.push_back(random_.Segment(rig_, rig_.factory, offset));
+    }
+  }
+
+  RandomInformation random_{3};
+  const Eigen::VectorXd none_ =
+      Eigen::VectorXd::Zero(TangentSize(rig_.factory));
+  const Eigen::VectorXd off_ = 1.9 * ReferenceSigmas(rig_);
+};
+
+TEST_F(HeldOutTestOfCandidates, AGoodOnePasses) {
+  for (int trial = 0; trial < 100; ++trial) {
+    held_out_.clear();
+    HoldOut(8, none_);
+    ASSERT_THAT(Problems(), IsEmpty()) << trial;
+  }
+  const HeldOutTest test = Judge().validation.held_out;
+  EXPECT_EQ(test.segments, 7);
+  EXPECT_EQ(test.left_out, 1);
+  EXPECT_GT(test.candidate.degrees, 20);
+  EXPECT_EQ(test.active.statistic, test.candidate.statistic);
+}
+
+TEST_F(HeldOutTestOfCandidates, OneFromCorruptedSegmentsIsRejectedForThat) {
+  result_.theta = BoxPlus(rig_.factory, off_);
+  HoldOut(8, none_);
+  EXPECT_THAT(Problem(), HasSubstr("held-out"));
+  EXPECT_FALSE(Check("held_out_probability").passed);
+  EXPECT_LT(Check("held_out_probability").value, 1e-4);
+  const HeldOutTest test = Judge().validation.held_out;
+  EXPECT_GT(test.candidate.statistic, 3 * test.active.statistic);
+}
+
+TEST_F(HeldOutTestOfCandidates, OneThatFollowsTheDevicePasses) {
+  result_.theta = BoxPlus(rig_.factory, off_);
+  HoldOut(8, off_);
+  EXPECT_THAT(Problems(), IsEmpty());
+  EXPECT_LT(Judge().validation.held_out.active.probability, 1e-4);
+}
+
+TEST_F(HeldOutTestOfCandidates, OneBadSegmentProvesNothing) {
+  HoldOut(5, none_);
+  HoldOut(1, off_);
+  EXPECT_THAT(Problems(), IsEmpty());
+  HoldOut(5, off_);
+  EXPECT_THAT(Judge().validation.checks.back().value, ::testing::Lt(1e-4));
+}
+
+TEST_F(HeldOutTestOfCandidates, WhatCannotBeTestedIsCounted) {
+  HoldOut(3, none_);
+  result_.theta = BoxPlus(rig_.factory, 3 * ReferenceSigmas(rig_));
+  EXPECT_THAT(Problems(), IsEmpty());
+  const HeldOutTest test = Judge().validation.held_out;
+  EXPECT_EQ(test.segments, 0);
+  EXPECT_EQ(test.left_out, 3);
+  EXPECT_EQ(test.candidate.degrees, 0);
 }
 
 }  // namespace

@@ -47,6 +47,7 @@ class PipelineTest : public ::testing::Test {
       if (!progress({1, 2, 1.0, 1.0})) return Cancelled(start);
       return Converged(rig, start);
     };
+    options_.idle_runs = false;  // the machine may be busy with other tests
     OpenStore();
   }
   ~PipelineTest() override { pipeline_.reset(); }

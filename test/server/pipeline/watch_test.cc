@@ -57,6 +57,57 @@ TEST_F(WatchTest, EachVersionIsToldOnceInOrder) {
   EXPECT_THAT(late.values(), ::testing::ElementsAre(3, 4));
 }
 
+TEST_F(WatchTest, ARollBackIsToldAsTheNewest) {
+  CreateRig();
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  Told<std::int64_t> early;
+  Told<std::int64_t> late;
+  const auto first = Watch(&early);
+  Recalibrate(1);
+  Recalibrate(2);
+  ASSERT_TRUE(pipeline_->ActivateCalibration("a", 2, "me", "drifts").ok());
+  const auto second = Watch(&late);
+  // What is active is not told again.
+  ASSERT_TRUE(pipeline_->ActivateCalibration("a", 2, "me", "twice").ok());
+  ASSERT_TRUE(pipeline_->ActivateCalibration("a", 3, "me", "fine").ok());
+  Recalibrate(3);
+  ASSERT_TRUE(Eventually([&] { return early.values().size() == 6; }));
+  ASSERT_TRUE(Eventually([&] { return late.values().size() == 3; }));
+  EXPECT_THAT(early.values(), ::testing::ElementsAre(1, 2, 3, 2, 3, 4));
+  EXPECT_THAT(late.values(), ::testing::ElementsAre(2, 3, 4));
+  EXPECT_EQ(store_->GetCalibration("a", 4)->base_version, 3);
+}
+
+// Activations by hand from two threads while a run publishes: in whatever order
+// they are told of, a watcher ends with the active one.
+TEST_F(WatchTest, WatchersEndWithTheActiveOneWhoeverActivates) {
+  CreateRig();
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  Recalibrate(1);
+  Told<std::int64_t> told;
+  const auto watch = Watch(&told);
+  const auto toggle = [&](std::int64_t version) {
+    for (int k = 0; k < 20; ++k) {
+      pipeline_->ActivateCalibration("a", version, "me", "test")
+          .status()
+          .IgnoreError();
+    }
+  };
+  std::thread one(toggle, 1);
+  std::thread two(toggle, 2);
+  Recalibrate(2);
+  one.join();
+  two.join();
+  const std::int64_t active = store_->GetActiveCalibration("a")->version;
+  ASSERT_TRUE(Eventually([&] { return told.values().back() == active; }));
+  const std::vector<std::int64_t> versions = told.values();
+  EXPECT_GT(versions.size(), 2u);
+}
+
 TEST_F(WatchTest, WatchersThatComeDuringPublicationsMissNothing) {
   CreateRig();
   StartOne();

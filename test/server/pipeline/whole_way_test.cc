@@ -59,5 +59,47 @@ TEST_F(WholeWayTest, ScoresAreTheSameAfterAStop) {
   EXPECT_EQ(matrices[0], matrices[1]);
 }
 
+// Ids are unique within a session: the same ones in another mean nothing.
+TEST_F(WholeWayTest, LandmarksNeverMatchAcrossSessions) {
+  constexpr std::uint64_t kFar = 1'000'000;
+  for (const Selection selection : {Selection::kTables, Selection::kJointD}) {
+    std::vector<Eigen::VectorXd> values;
+    std::vector<std::vector<Table>> tables;
+    for (const std::uint64_t offset : {std::uint64_t{0}, kFar}) {
+      Rig rig = TestRig(std::string(offset == 0 ? "same" : "other") +
+                        (selection == Selection::kTables ? "" : "-joint"));
+      rig.selection = selection;
+      ASSERT_TRUE(store_->CreateRig(rig).ok());
+      StartOne();
+      auto segments = TestSegments(rig, 2, "one", 1);
+      for (MotionSegment& segment : TestSegments(rig, 2, "two", 2)) {
+        for (Landmark& landmark : segment.landmarks) landmark.id += offset;
+        segments.push_back(segment);
+      }
+      for (const MotionSegment& segment : segments) {
+        ASSERT_TRUE(pipeline_->Submit(rig.id, segment, nullptr).ok());
+      }
+      ASSERT_TRUE(AllScored());
+      ASSERT_TRUE(
+          Eventually([&] { return store_->ListUnfinishedRuns()->empty(); }));
+      const auto run = pipeline_->StartRecalibration(rig.id);
+      ASSERT_TRUE(run.ok()) << run.status();
+      ASSERT_TRUE(
+          Eventually([&] { return store_->ListUnfinishedRuns()->empty(); }));
+      const std::int64_t version =
+          store_->GetRun(rig.id, run->run)->calibration_version;
+      const auto calibration = store_->GetCalibration(rig.id, version);
+      ASSERT_TRUE(calibration.ok()) << calibration.status();
+      values.push_back(ReadableValues(calibration->theta));
+      tables.push_back(*store_->GetTables(rig.id));
+    }
+    EXPECT_EQ(values[0], values[1]);
+    ASSERT_EQ(tables[0].size(), tables[1].size());
+    for (std::size_t t = 0; t < tables[0].size(); ++t) {
+      EXPECT_EQ(tables[0][t].entries, tables[1][t].entries);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace selfcal::server

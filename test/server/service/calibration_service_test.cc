@@ -35,6 +35,16 @@ class CalibrationServiceTest : public ServiceTest {
     return calibrations_->ListCalibrations(&context, request, response);
   }
 
+  grpc::Status Activate(const std::string& name,
+                        const std::string& reason,
+                        v1::Calibration* calibration) {
+    Context context;
+    v1::ActivateCalibrationRequest request;
+    request.set_name(name);
+    request.set_reason(reason);
+    return calibrations_->ActivateCalibration(&context, request, calibration);
+  }
+
   std::unique_ptr<grpc::ClientReader<v1::Calibration>> Watch(
       Context* context, const std::string& parent) {
     v1::WatchCalibrationRequest request;
@@ -143,6 +153,118 @@ TEST_F(CalibrationServiceTest, WatchBeginsWithTheActiveAndGetsTheNext) {
   context.TryCancel();
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_TRUE(Eventually([&] { return pipeline_->watchers() == 0; }));
+}
+
+TEST_F(CalibrationServiceTest, WatchIsToldOfARollBackAndNoneTwice) {
+  AddCalibrated();
+  Context context;
+  const auto reader = Watch(&context, "rigs/r");
+  v1::Calibration seen;
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 2);
+  v1::Calibration active;
+  ASSERT_TRUE(Activate("rigs/r/calibrations/1", "drifts", &active).ok());
+  EXPECT_EQ(active.version(), 1);
+  EXPECT_EQ(active.state(), v1::Calibration::ACTIVE);
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 1);
+  // What the reader has, activated once more, is not told.
+  pipeline_->Publish(*store_->GetActiveCalibration("r"));
+  ASSERT_TRUE(Activate("rigs/r/calibrations/2", "fine", &active).ok());
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 2);
+  context.TryCancel();
+  reader->Finish();
+}
+
+TEST_F(CalibrationServiceTest, RolledBackVersionSaysSo) {
+  AddCalibrated();
+  v1::Calibration read;
+  ASSERT_TRUE(Activate("rigs/r/calibrations/1", "drifts", &read).ok());
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  EXPECT_EQ(read.state(), v1::Calibration::ROLLED_BACK);
+  ASSERT_TRUE(Get("rigs/r/calibrations/active", &read).ok());
+  EXPECT_EQ(read.version(), 1);
+  const StoredEvent event = store_->ListEvents({1000, ""})->items.back();
+  EXPECT_EQ(event.kind, EventKind::kCalibrationRolledBack);
+  EXPECT_THAT(event.detail, ::testing::HasSubstr("by local"));
+  EXPECT_THAT(event.detail, ::testing::HasSubstr("drifts"));
+}
+
+TEST_F(CalibrationServiceTest, ActivationNeedsAVersionAndAReason) {
+  AddCalibrated();
+  v1::Calibration read;
+  for (const std::string name :
+       {"rigs/r", "rigs/r/calibrations/active", "rigs/r/calibrations/x"}) {
+    EXPECT_THAT(BadFields(Activate(name, "why", &read)), ElementsAre("name"));
+  }
+  EXPECT_THAT(BadFields(Activate("rigs/r/calibrations/1", "", &read)),
+              ElementsAre("reason"));
+  EXPECT_THAT(BadFields(Activate(
+                  "rigs/r/calibrations/1", std::string(501, 'x'), &read)),
+              ElementsAre("reason"));
+  ExpectNotFound(Activate("rigs/r/calibrations/9", "why", &read),
+                 "rigs/r/calibrations/9");
+  EXPECT_EQ(store_->GetActiveCalibration("r")->version, 2);
+}
+
+TEST_F(CalibrationServiceTest, WhatItWasJudgedByIsShown) {
+  const Rig rig = AddScored(1);
+  const auto run = store_->CreateManualRun(rig.id);
+  ASSERT_TRUE(store_->BeginRun(rig.id, run->run).ok());
+  StoredCalibration rejected = *store_->GetActiveCalibration(rig.id);
+  rejected.state = CalibrationState::kRejected;
+  rejected.reasons = {"does not fit"};
+  rejected.settings = {{"loss", "huber"}};
+  rejected.validation = StoredValidation();
+  rejected.validation->active_version = 1;
+  rejected.validation->checks = {{"held_out_probability", 0.5e-9, 1e-4, false}};
+  rejected.validation->held_out = {5, 3, {99, 26, 0.5e-9}, {20, 26, 0.8}};
+  ASSERT_TRUE(store_->FinishRun(rig.id, run->run, rejected).ok());
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  EXPECT_EQ(read.validation().verdict(), v1::Validation::REJECTED);
+  ASSERT_EQ(read.validation().checks_size(), 1);
+  EXPECT_EQ(read.validation().checks(0).value(), 0.5e-9);
+  EXPECT_FALSE(read.validation().checks(0).passed());
+  EXPECT_EQ(read.validation().held_out().left_out(), 3);
+  EXPECT_EQ(read.validation().held_out().chi_square(), 99);
+  EXPECT_EQ(read.validation().held_out().active_probability(), 0.8);
+  ASSERT_EQ(read.provenance().settings_size(), 1);
+  EXPECT_EQ(read.provenance().settings(0).name(), "loss");
+  EXPECT_GE(read.provenance().schema_version(), 3);
+  EXPECT_EQ(Activate("rigs/r/calibrations/2", "why not", &read).error_code(),
+            grpc::StatusCode::FAILED_PRECONDITION);
+}
+
+TEST_F(CalibrationServiceTest, VersionsAreCompared) {
+  const Rig rig = AddCalibrated();
+  Context context;
+  v1::CompareCalibrationsRequest request;
+  request.set_a("rigs/r/calibrations/1");
+  request.set_b("rigs/r/calibrations/active");
+  v1::CompareCalibrationsResponse compared;
+  ASSERT_TRUE(
+      calibrations_->CompareCalibrations(&context, request, &compared).ok());
+  EXPECT_EQ(compared.version_a(), 1);
+  EXPECT_EQ(compared.version_b(), 2);
+  EXPECT_EQ(compared.differences_size(),
+            static_cast<int>(FreeComponents(rig).size()));
+  EXPECT_EQ(compared.differences(0).component(), "imu.gyro.scale.x");
+  EXPECT_EQ(compared.differences(0).difference(), 0);
+  EXPECT_GT(compared.differences(0).sigma(), 2);
+  EXPECT_FALSE(compared.significant());
+  Context other;
+  AddRig("other");
+  request.set_b("rigs/other/calibrations/1");
+  EXPECT_THAT(
+      BadFields(calibrations_->CompareCalibrations(&other, request, &compared)),
+      ElementsAre("b"));
+  Context missing;
+  request.set_b("rigs/r/calibrations/7");
+  ExpectNotFound(
+      calibrations_->CompareCalibrations(&missing, request, &compared),
+      "rigs/r/calibrations/7");
 }
 
 TEST_F(CalibrationServiceTest, EveryWatcherGetsTheNewVersion) {

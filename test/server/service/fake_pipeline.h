@@ -66,6 +66,16 @@ class FakePipeline final : public Pipeline {
     return ended;
   }
 
+  absl::StatusOr<StoredCalibration> ActivateCalibration(
+      const std::string& rig,
+      std::int64_t version,
+      const std::string& caller,
+      const std::string& reason) override {
+    auto active = store_->ActivateCalibration(rig, version, caller, reason);
+    if (active.ok()) Publish(*active);
+    return active;
+  }
+
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const StoredCalibration&)> callback) override {

@@ -49,6 +49,27 @@ TEST_F(RigServiceTest, CreatedRigIsReturnedWithItsTimeAndCanBeRead) {
   EXPECT_EQ(created.SerializeAsString(), rig.SerializeAsString());
 }
 
+TEST_F(RigServiceTest, AgesAndIntervalsAreKeptOrRefused) {
+  v1::Rig rig = ToProto(TestRig("r"));
+  rig.mutable_table_max_age()->set_seconds(86400);
+  rig.mutable_recalibration_min_interval()->set_nanos(500'000'000);
+  rig.mutable_calibration_max_age()->set_seconds(604800);
+  ASSERT_TRUE(Create(rig).ok());
+  v1::Rig read;
+  ASSERT_TRUE(Get("rigs/r", &read).ok());
+  EXPECT_EQ(read.table_max_age().seconds(), 86400);
+  EXPECT_EQ(read.recalibration_min_interval().nanos(), 500'000'000);
+  EXPECT_EQ(read.calibration_max_age().seconds(), 604800);
+  rig.set_name("rigs/s");
+  rig.mutable_table_max_age()->set_seconds(-1);
+  rig.mutable_calibration_max_age()->set_seconds(10'000'000'000);
+  rig.mutable_recalibration_min_interval()->set_nanos(1'000'000'000);
+  EXPECT_THAT(BadFields(Create(rig)),
+              ElementsAre("rig.table_max_age",
+                          "rig.recalibration_min_interval",
+                          "rig.calibration_max_age"));
+}
+
 TEST_F(RigServiceTest, FactoryCalibrationBecomesVersionOneAndActive) {
   ASSERT_TRUE(Create(ToProto(TestRig("r"))).ok());
   Context context;

@@ -62,7 +62,7 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 3u);
+  ASSERT_EQ(migrations.size(), 4u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -73,6 +73,9 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[2].name, "0003_eviction.sql");
   EXPECT_EQ(migrations[2].sha256,
             "5a82f4fc6db59545573f5f06ab80fcba269077339ca59dbd5ff8dc972cd80411");
+  EXPECT_EQ(migrations[3].name, "0004_lifecycle.sql");
+  EXPECT_EQ(migrations[3].sha256,
+            "bcd30205089e8fe7cbd13379f5da0483249fe3da42095f67976948a2cc112e8c");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
@@ -108,6 +111,47 @@ TEST_F(DatabaseTest, OlderDatabaseIsMigratedAfterABackup) {
   ASSERT_TRUE(old.ok()) << old.status();
   EXPECT_EQ(Read(&*old, "PRAGMA user_version"), 1);
   EXPECT_EQ(Read(&*old, "SELECT count(*) FROM one"), 0);
+}
+
+TEST_F(DatabaseTest, VersionsFromBeforeStatesWereExplicitKeepTheirLife) {
+  const auto all = EmbeddedMigrations();
+  const std::vector<Migration> old(all.begin(), all.begin() + 2);
+  {
+    auto db = Open(old);
+    ASSERT_TRUE(db.ok()) << db.status();
+    const absl::Status written = db->Execute(
+        "INSERT INTO rigs VALUES (1, 'a', 0, x'00', x'00');"
+        "INSERT INTO segments VALUES "
+        "  (1, 1, 's', 0, 1, 2, '', 0, 1, 0, 1, 1, 1, 1, 1);"
+        "INSERT INTO runs (rig, run, state, cause, create_time_ns, "
+        "  base_version, message) VALUES (1, 1, 3, 1, 0, 1, 'm');"
+        "INSERT INTO run_segments VALUES (1, 1, 1);"
+        "INSERT INTO calibrations VALUES "
+        "  (1, 1, 2, 3, NULL, x'01', x'02'), (1, 2, 3, 4, 1, x'03', x'04'),"
+        "  (1, 3, 1, 5, 1, x'05', x'06');"
+        "INSERT INTO calibration_segments VALUES (1, 3, 1);"
+        "INSERT INTO changes VALUES (1, 1, 0, 1, 1, 1, 1.5);"
+        "INSERT INTO change_groups VALUES (1, 1, 'imu');"
+        "INSERT INTO events VALUES (7, 0, 'a', 1, 'x');");
+    ASSERT_TRUE(written.ok()) << written;
+  }
+  auto db = Open({all.begin(), all.end()});
+  ASSERT_TRUE(db.ok()) << db.status();
+  EXPECT_EQ(Read(&*db, "SELECT count(*) FROM pragma_foreign_key_check"), 0);
+  for (const char* sql :
+       {"SELECT count(*) = 3 FROM calibrations",
+        "SELECT state = 1 AND content = x'05' FROM calibrations "
+        "  WHERE version = 3",
+        // The rejected one never was active.
+        "SELECT group_concat(version) = '1,3' FROM activations",
+        "SELECT message = 'm' AND cause = 1 FROM runs",
+        "SELECT segment = 1 FROM run_segments",
+        "SELECT version = 3 FROM calibration_segments",
+        "SELECT inflation = 1.5 FROM changes",
+        "SELECT group_name = 'imu' FROM change_groups",
+        "SELECT event = 7 FROM events"}) {
+    EXPECT_EQ(Read(&*db, sql), 1) << sql;
+  }
 }
 
 TEST_F(DatabaseTest, FailedMigrationChangesNothing) {

@@ -167,10 +167,10 @@ TEST(RigRecord, ARigStoredWithoutASelectionKeepsItsTables) {
   rig.selection = Selection::kJointD;
   store::RigRecord record;
   *record.mutable_rig() = ToProto(rig);
-  EXPECT_EQ(ParseRig(record.SerializeAsString(), "test")->selection,
+  EXPECT_EQ(ParseRig(record.SerializeAsString(), "test")->rig.selection,
             Selection::kJointD);
   record.mutable_rig()->clear_selection();
-  EXPECT_EQ(ParseRig(record.SerializeAsString(), "test")->selection,
+  EXPECT_EQ(ParseRig(record.SerializeAsString(), "test")->rig.selection,
             Selection::kTables);
 }
 

@@ -1,0 +1,63 @@
+#include "server/pipeline/held_out.h"
+
+namespace selfcal::server {
+namespace {
+
+OffsetInformation Fuse(const ConsistencyTester& tester,
+                       const std::vector<const SegmentInformation*>& segments) {
+  OffsetInformation sum = tester.Offset(*segments.front());
+  for (std::size_t k = 1; k < segments.size(); ++k) {
+    sum += tester.Offset(*segments[k]);
+  }
+  return sum;
+}
+
+// Which segment to leave out; all are kept where there are only two.
+std::size_t LeastFitting(
+    const ConsistencyTester& tester,
+    const std::vector<const SegmentInformation*>& segments) {
+  const OffsetInformation sum = Fuse(tester, segments);
+  std::size_t least = 0;
+  double best = -1;
+  for (std::size_t k = 0; k < segments.size(); ++k) {
+    OffsetInformation rest = sum;
+    rest -= tester.Offset(*segments[k]);
+    const double probability = tester.Test(rest).probability;
+    if (probability > best) {
+      best = probability;
+      least = k;
+    }
+  }
+  return least;
+}
+
+}  // namespace
+
+HeldOutTest TestHeldOut(const Rig& rig,
+                        const KnownCalibration& candidate,
+                        const KnownCalibration& active,
+                        const std::vector<SegmentInformation>& segments) {
+  const ConsistencyTester tester(rig, candidate);
+  const ConsistencyTester before(rig, active, tester.inflation());
+  std::vector<const SegmentInformation*> tested;
+  for (const SegmentInformation& segment : segments) {
+    if (tester.Accepts(segment)) {
+      tested.push_back(&segment);
+    }
+  }
+  if (tested.size() > 2) {
+    const auto least =
+        static_cast<std::ptrdiff_t>(LeastFitting(tester, tested));
+    tested.erase(tested.begin() + least);
+  }
+  HeldOutTest test;
+  test.segments = static_cast<int>(tested.size());
+  test.left_out = static_cast<int>(segments.size() - tested.size());
+  if (!tested.empty()) {
+    test.candidate = tester.Test(Fuse(tester, tested));
+    test.active = before.Test(Fuse(before, tested));
+  }
+  return test;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,25 @@
+// How well a candidate says before what segments show that it was not
+// calibrated on. Pure.
+#pragma once
+
+#include <vector>
+
+#include "core/change/consistency.h"
+#include "core/information/segment_information.h"
+#include "core/model/rig.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+// Tests what the segments show together against candidate and active version,
+// with the noise that the candidate has found (core/change/consistency.h). Of
+// three segments or more, the one is left out without which the candidate fits
+// best: a single segment that fits nothing proves nothing. Those that were
+// linearised too far from the candidate are left out and counted; the active
+// version, of the same segments, is taken linearly however far it is.
+HeldOutTest TestHeldOut(const Rig& rig,
+                        const KnownCalibration& candidate,
+                        const KnownCalibration& active,
+                        const std::vector<SegmentInformation>& segments);
+
+}  // namespace selfcal::server

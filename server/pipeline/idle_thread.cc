@@ -1,0 +1,43 @@
+#include "server/pipeline/idle_thread.h"
+
+#include <sched.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace selfcal::server {
+namespace {
+
+// linux/ioprio.h is not for programs.
+constexpr int kWhoProcess = 1;
+constexpr int kClassIdle = 3;
+constexpr int kClassShift = 13;
+
+}  // namespace
+
+void BecomeIdle() {
+  const sched_param parameters{};
+  if (sched_setscheduler(0, SCHED_IDLE, &parameters) != 0) {
+    spdlog::warn("recalibration does not run at idle priority: {}",
+                 std::strerror(errno));
+  }
+  if (syscall(SYS_ioprio_set, kWhoProcess, 0, kClassIdle << kClassShift) != 0) {
+    spdlog::warn("recalibration does not read at idle priority: {}",
+                 std::strerror(errno));
+  }
+}
+
+void StandBack() {
+  constexpr int kNiceness = 10;
+  const auto thread = static_cast<id_t>(syscall(SYS_gettid));
+  if (setpriority(PRIO_PROCESS, thread, kNiceness) != 0) {
+    spdlog::warn("recalibration runs at normal priority: {}",
+                 std::strerror(errno));
+  }
+}
+
+}  // namespace selfcal::server

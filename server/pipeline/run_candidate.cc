@@ -1,0 +1,178 @@
+// How a run comes to its candidate, and what becomes of that.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <thread>
+#include <utility>
+
+#include "server/pipeline/after_change.h"
+#include "server/pipeline/candidate.h"
+#include "server/pipeline/idle_thread.h"
+#include "server/pipeline/recalibration.h"
+#include "server/pipeline/run_settings.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// Segments that a candidate is tested with.
+constexpr int kHeldOut = 8;
+
+}  // namespace
+
+absl::StatusOr<StoredCalibration> Recalibrator::EnsureCandidate(
+    const StoredRun& run, std::optional<SegmentKey>* damaged) {
+  auto stored = store_->GetCandidate(run.rig, run.run);
+  if (!absl::IsNotFound(stored.status())) {
+    return stored;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration found,
+                           FindCandidate(run, damaged));
+  return Retry([&] { return store_->StoreCandidate(run.rig, run.run, found); });
+}
+
+absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
+    const StoredRun& run, std::optional<SegmentKey>* damaged) {
+  const auto begin = std::chrono::steady_clock::now();
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration base,
+                           store_->GetCalibration(run.rig, run.base_version));
+  std::vector<MotionSegment> segments;
+  SELFCAL_RETURN_IF_ERROR(LoadSegments(run, &segments, damaged));
+  CalibrateOptions options = options_.calibrate;
+  options.reweight_noise |= rig.rig.reweight_noise;
+  if (run.change > 0) {
+    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
+                             store_->GetChange(run.rig, run.change));
+    SELFCAL_ASSIGN_OR_RETURN(
+        const StoredCalibration before,
+        store_->GetCalibration(run.rig, change.base_version));
+    options.prior = KnownAfter(rig.rig, change, before);
+  }
+  SELFCAL_ASSIGN_OR_RETURN(
+      CalibrationResult result,
+      RunSolver(run, rig.rig, base.theta, segments, options));
+  StoredCalibration candidate;
+  candidate.state = CalibrationState::kCandidate;
+  candidate.theta = result.theta;
+  candidate.covariance = result.covariance;
+  candidate.program_version = options_.program_version;
+  candidate.settings = RunSettings(options, run.change);
+  candidate.report = std::move(result);
+  candidate.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin)
+          .count();
+  return candidate;
+}
+
+absl::Status Recalibrator::LoadSegments(const StoredRun& run,
+                                        std::vector<MotionSegment>* segments,
+                                        std::optional<SegmentKey>* damaged) {
+  for (const SegmentKey& key : run.segments) {
+    if (Interrupted()) {
+      return absl::CancelledError("interrupted");
+    }
+    auto segment = store_->GetSegmentData(run.rig, key);
+    if (absl::IsDataLoss(segment.status())) {
+      *damaged = key;
+    }
+    SELFCAL_RETURN_IF_ERROR(segment.status());
+    segments->push_back(*std::move(segment));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<CalibrationResult> Recalibrator::RunSolver(
+    const StoredRun& run,
+    const Rig& rig,
+    const Calibration& start,
+    const std::vector<MotionSegment>& segments,
+    const CalibrateOptions& options) {
+  const auto deadline =
+      std::chrono::steady_clock::now() + options_.max_run_time;
+  bool late = false;  // by the solver's thread, until it has ended
+  CalibrationResult result;
+  std::exception_ptr failure;
+  std::thread solver([&] {
+    options_.idle_runs ? BecomeIdle() : StandBack();
+    try {
+      result = estimators_.calibrate(rig,
+                                     start,
+                                     segments,
+                                     options,
+                                     [&](const CalibrateProgress& progress) {
+                                       late = std::chrono::steady_clock::now() >
+                                              deadline;
+                                       return Report(run, progress) && !late;
+                                     });
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  });
+  solver.join();
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+  if (result.status == CalibrateStatus::kCancelled && late && !Interrupted()) {
+    return absl::DeadlineExceededError(fmt::format(
+        "it took longer than the {:g} s that a run may; smaller tables make it "
+        "shorter",
+        std::chrono::duration<double>(options_.max_run_time).count()));
+  }
+  if (result.status == CalibrateStatus::kCancelled) {
+    return absl::CancelledError("interrupted");
+  }
+  if (result.status == CalibrateStatus::kFailed) {
+    return absl::InternalError(
+        fmt::format("the solver failed: {}", result.message));
+  }
+  return result;
+}
+
+bool Recalibrator::Report(const StoredRun& run,
+                          const CalibrateProgress& progress) {
+  {
+    const std::lock_guard lock(mutex_);
+    current_->progress = progress;
+  }
+  run_watchers_->Publish(RunTopic(run.rig, run.run), {run, progress});
+  return !Interrupted();
+}
+
+absl::Status Recalibrator::Judge(const StoredRun& run,
+                                 StoredCalibration* candidate) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
+  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration active,
+                           store_->GetActiveCalibration(run.rig));
+  if (run.change > 0) {
+    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
+                             store_->GetChange(run.rig, run.change));
+    if (active.version == change.base_version) {
+      active.covariance = CovarianceAfter(rig.rig, change, active.covariance);
+    }
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> held_out,
+                           store_->ListHeldOut(run.rig, run.run, kHeldOut));
+  Judgement judgement =
+      JudgeCandidate(rig.rig, active, candidate->report.value(), held_out);
+  candidate->state = judgement.reasons.empty() ? CalibrationState::kActive
+                                               : CalibrationState::kRejected;
+  candidate->reasons = std::move(judgement.reasons);
+  candidate->validation = std::move(judgement.validation);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<StoredCalibration> Recalibrator::Finish(
+    const StoredRun& run, StoredCalibration candidate) {
+  for (;;) {
+    SELFCAL_RETURN_IF_ERROR(Judge(run, &candidate));
+    auto finished = store_->FinishRun(run.rig, run.run, candidate);
+    if (!absl::IsAborted(finished.status())) {
+      return finished;
+    }
+  }
+}
+
+}  // namespace selfcal::server

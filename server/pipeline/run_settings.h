@@ -1,0 +1,18 @@
+// The settings of a run, for its provenance.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+
+namespace selfcal::server {
+
+// Name and value of every setting that shapes the result; `change` is the
+// change of the device whose calibration from before is the prior, 0: none.
+std::vector<std::pair<std::string, std::string>> RunSettings(
+    const CalibrateOptions& options, std::int64_t change);
+
+}  // namespace selfcal::server

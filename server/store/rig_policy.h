@@ -1,0 +1,18 @@
+// The policy of a rig as fields of its message.
+#pragma once
+
+#include <vector>
+
+#include "core/model/segment.h"
+#include "selfcal/v1/rig.pb.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+void PutPolicy(const RigPolicy& policy, v1::Rig* message);
+
+// Fills *policy, or returns every violation: durations are from 0 (no matter)
+// to a hundred years.
+std::vector<Violation> GetPolicy(const v1::Rig& message, RigPolicy* policy);
+
+}  // namespace selfcal::server

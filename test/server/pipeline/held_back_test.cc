@@ -1,0 +1,243 @@
+// Runs that wait for a better time, take too long, or go on from a candidate.
+#include <sched.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <mutex>
+
+#include "server/store/clock.h"
+#include "test/server/pipeline/pipeline_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+class FakeConditions : public Conditions {
+ public:
+  std::string HoldReason() override {
+    const std::lock_guard lock(mutex_);
+    return reason_;
+  }
+  void Set(const std::string& reason) {
+    const std::lock_guard lock(mutex_);
+    reason_ = reason;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::string reason_;
+};
+
+class HeldBackTest : public PipelineTest {
+ protected:
+  HeldBackTest() {
+    options_.recheck = std::chrono::milliseconds(5);
+    options_.conditions = &conditions_;
+    options_.now_ns = [this] { return NowNs() + ahead_ns_.load(); };
+  }
+  ~HeldBackTest() override { pipeline_.reset(); }
+
+  // Tables of 2: two segments start the first run.
+  void FillTables() {
+    Submit(0);
+    Submit(1);
+    ASSERT_TRUE(AllScored());
+  }
+  bool MessageIs(const std::string& part, std::int64_t run = 1) {
+    return Eventually([&] {
+      const auto stored = store_->GetRun("a", run);
+      return stored.ok() && stored->message.find(part) != std::string::npos;
+    });
+  }
+  int CountHeldBack() {
+    const auto events = store_->ListEvents({1000, ""});
+    return static_cast<int>(std::count_if(
+        events->items.begin(), events->items.end(), [](const auto& event) {
+          return event.kind == EventKind::kRunHeldBack;
+        }));
+  }
+
+  FakeConditions conditions_;
+  std::atomic<std::int64_t> ahead_ns_{0};
+};
+
+TEST_F(HeldBackTest, RunWaitsForTheConditionsAndSaysWhy) {
+  CreateRig();
+  conditions_.Set("the device runs on battery");
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(MessageIs("battery"));
+  EXPECT_EQ(store_->GetRun("a", 1)->state, RunState::kPending);
+  conditions_.Set("the load is high");
+  ASSERT_TRUE(MessageIs("load"));
+  Restart();
+  EXPECT_EQ(store_->GetRun("a", 1)->state, RunState::kPending);
+  conditions_.Set("");
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  EXPECT_EQ(store_->GetRun("a", 1)->message, "");
+  EXPECT_EQ(store_->GetRun("a", 1)->attempts, 1);
+  EXPECT_EQ(CountHeldBack(), 1);
+}
+
+TEST_F(HeldBackTest, RunThatWaitsCanBeCancelled) {
+  CreateRig();
+  conditions_.Set("the device runs on battery");
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(MessageIs("battery"));
+  ASSERT_TRUE(pipeline_->CancelRecalibration("a", 1).ok());
+  EXPECT_EQ(store_->GetRun("a", 1)->state, RunState::kCancelled);
+}
+
+TEST_F(HeldBackTest, RunByHandDoesNotWait) {
+  RigPolicy policy;
+  policy.recalibration_min_interval_ns = 3600 * kSecond;
+  ASSERT_TRUE(store_->CreateRig(TestRig("a"), policy).ok());
+  conditions_.Set("the device runs on battery");
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  for (const int run : {1, 2}) {
+    ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+    ASSERT_TRUE(RunIs(RunState::kSucceeded, run));
+  }
+}
+
+TEST_F(HeldBackTest, NextRunWaitsForTheMinimumInterval) {
+  RigPolicy policy;
+  policy.recalibration_min_interval_ns = 3600 * kSecond;
+  ASSERT_TRUE(store_->CreateRig(TestRig("a"), policy).ok());
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  Submit(3);  // richer than one of them
+  ASSERT_TRUE(MessageIs("minimum interval of 3600 s", 2));
+  EXPECT_EQ(store_->GetRun("a", 2)->state, RunState::kPending);
+  ahead_ns_ = 3601 * kSecond;
+  ASSERT_TRUE(RunIs(RunState::kSucceeded, 2));
+}
+
+TEST_F(HeldBackTest, OldCalibrationIsComputedAnew) {
+  Rig rig = TestRig("a");
+  rig.retrigger_fraction = 1;
+  RigPolicy policy;
+  policy.calibration_max_age_ns = 3600 * kSecond;
+  ASSERT_TRUE(store_->CreateRig(rig, policy).ok());
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  Submit(3);  // half of the tables are new: not enough
+  ASSERT_TRUE(AllScored());
+  ahead_ns_ = 3601 * kSecond;
+  ASSERT_TRUE(RunIs(RunState::kSucceeded, 2));
+  EXPECT_EQ(store_->GetRun("a", 2)->trigger, RunTrigger::kCalibrationAged);
+}
+
+TEST_F(HeldBackTest, RunThatTakesTooLongFails) {
+  CreateRig();
+  options_.max_run_time = std::chrono::milliseconds(20);
+  estimators_.calibrate = [](const Rig&,
+                             const Calibration& start,
+                             const auto&,
+                             const auto&,
+                             const ProgressCallback& progress) {
+    for (int k = 1; progress({k, 100, 1.0, 1.0}); ++k) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return Cancelled(start);
+  };
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(RunIs(RunState::kFailed));
+  EXPECT_THAT(store_->GetRun("a", 1)->message, HasSubstr("longer than"));
+}
+
+TEST_F(HeldBackTest, SolverRunsAtIdlePriority) {
+  CreateRig();
+  options_.idle_runs = true;
+  std::atomic<int> policy{-1};
+  std::atomic<long> io{-1};
+  estimators_.calibrate = [&](const Rig& rig,
+                              const Calibration& start,
+                              const auto&,
+                              const auto&,
+                              const auto&) {
+    policy = sched_getscheduler(0);
+    io = syscall(SYS_ioprio_get, 1, 0) >> 13;
+    return Converged(rig, start);
+  };
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  EXPECT_EQ(policy, SCHED_IDLE);
+  EXPECT_EQ(io, 3);
+  EXPECT_NE(sched_getscheduler(0), SCHED_IDLE);
+}
+
+TEST_F(HeldBackTest, RunGoesOnFromTheCandidateThatItHasStored) {
+  CreateRig();
+  std::atomic<int> solves{0};
+  estimators_.calibrate = [&](const Rig& rig,
+                              const Calibration& start,
+                              const auto&,
+                              const auto&,
+                              const auto&) {
+    ++solves;
+    return Converged(rig, start);
+  };
+  conditions_.Set("wait");
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(MessageIs("wait"));
+  pipeline_->Stop();
+  // As if the daemon had died after it had stored what it found.
+  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
+  const auto factory = store_->GetActiveCalibration("a");
+  StoredCalibration found;
+  const CalibrationResult result = Converged(TestRig("a"), factory->theta);
+  found.theta = result.theta;
+  found.covariance = result.covariance;
+  found.report = result;
+  ASSERT_TRUE(store_->StoreCandidate("a", 1, found).ok());
+  Restart();
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  EXPECT_EQ(solves, 0);
+  const auto active = store_->GetActiveCalibration("a");
+  EXPECT_EQ(active->version, 2);
+  ASSERT_TRUE(active->validation.has_value());
+  EXPECT_EQ(active->validation->active_version, 1);
+  EXPECT_EQ(active->validation->checks.size(), 5u);
+}
+
+TEST_F(HeldBackTest, ActivationByHandDuringARunIsWhatItIsJudgedAgainst) {
+  CreateRig();
+  StartOne();
+  FillTables();
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  std::atomic<bool> solving{false};
+  std::atomic<bool> go_on{false};
+  estimators_.calibrate = [&](const Rig& rig,
+                              const Calibration& start,
+                              const auto&,
+                              const auto&,
+                              const auto&) {
+    solving = true;
+    while (!go_on) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return Converged(rig, start);
+  };
+  StartOne();
+  ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+  ASSERT_TRUE(Eventually([&] { return solving.load(); }));
+  ASSERT_TRUE(pipeline_->ActivateCalibration("a", 1, "me", "drifts").ok());
+  go_on = true;
+  ASSERT_TRUE(RunIs(RunState::kSucceeded, 2));
+  const auto active = store_->GetActiveCalibration("a");
+  EXPECT_EQ(active->version, 3);
+  EXPECT_EQ(active->validation->active_version, 1);
+}
+
+}  // namespace
+}  // namespace selfcal::server

@@ -1,0 +1,309 @@
+// The life of a calibration: what may become what, by whom, and what is told.
+#include <atomic>
+#include <map>
+#include <random>
+#include <thread>
+
+#include "migrations/migrations.h"
+#include "server/store/calibration_states.h"
+#include "server/store/statement.h"
+#include "test/server/trials.h"
+#include "test/server/store/store_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr CalibrationState kStates[] = {CalibrationState::kActive,
+                                        CalibrationState::kSuperseded,
+                                        CalibrationState::kRejected,
+                                        CalibrationState::kCandidate,
+                                        CalibrationState::kRolledBack};
+
+class LifecycleTest : public StoreTest {
+ protected:
+  LifecycleTest() : rig_(CreateTestRig("a")) {
+    Put("a", 0);
+    Score(rig_, 0, 1.0);
+  }
+
+  StoredCalibration Found(CalibrationState verdict) const {
+    StoredCalibration found;
+    found.state = verdict;
+    found.theta = rig_.factory;
+    found.theta.cameras[0].f.x() += 1;
+    const int size = TangentSize(rig_.factory);
+    found.covariance = Eigen::MatrixXd::Identity(size, size);
+    found.settings = {{"loss", "huber"}, {"solver", "structured"}};
+    found.report = CalibrationResult();
+    found.report->status = CalibrateStatus::kConverged;
+    return found;
+  }
+
+  StoredRun Begin() {
+    const auto run = store_->CreateManualRun("a");
+    EXPECT_TRUE(run.ok()) << run.status();
+    const auto begun = store_->BeginRun("a", run->run);
+    EXPECT_TRUE(begun.ok()) << begun.status();
+    return *begun;
+  }
+
+  StoredCalibration Finish(CalibrationState verdict) {
+    const StoredRun run = Begin();
+    const auto finished = store_->FinishRun("a", run.run, Found(verdict));
+    EXPECT_TRUE(finished.ok()) << finished.status();
+    return *finished;
+  }
+
+  CalibrationState StateOf(std::int64_t version) {
+    return store_->GetCalibration("a", version)->state;
+  }
+
+  StoredEvent LastEvent() {
+    return store_->ListEvents({1000, ""})->items.back();
+  }
+
+  // Around the store.
+  absl::Status Execute(const std::string& sql) {
+    auto db =
+        Connection::Open(folder_.File("selfcal.db"), SQLITE_OPEN_READWRITE);
+    EXPECT_TRUE(db.ok());
+    EXPECT_TRUE(db->Execute("PRAGMA busy_timeout = 1000").ok());
+    return db->Execute(sql);
+  }
+
+  std::string TriggerSql(const std::string& name) {
+    auto db =
+        Connection::Open(folder_.File("selfcal.db"), SQLITE_OPEN_READWRITE);
+    Statement read(&*db, "SELECT sql FROM sqlite_master WHERE name = ?1", name);
+    EXPECT_TRUE(read.Next());
+    return read.Text(0);
+  }
+
+  const Rig rig_;
+};
+SELFCAL_STORE_TEST_SUITE(LifecycleTest);
+
+TEST_P(LifecycleTest, DatabaseRefusesEveryTransitionThatIsNotInTheTable) {
+  Finish(CalibrationState::kActive);
+  store_.reset();
+  const std::string trigger = TriggerSql("calibration_transitions");
+  const auto set = [](CalibrationState state) {
+    return "UPDATE calibrations SET state = " +
+           std::to_string(static_cast<int>(state) + 1) + " WHERE version = 2;";
+  };
+  int allowed = 0;
+  for (const CalibrationState from : kStates) {
+    for (const CalibrationState to : kStates) {
+      ASSERT_TRUE(
+          Execute("DROP TRIGGER calibration_transitions;" + set(from) + trigger)
+              .ok());
+      EXPECT_EQ(Execute(set(to)).ok(), MayBecome(from, to))
+          << StateName(from) << " -> " << StateName(to);
+      allowed += MayBecome(from, to) ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(allowed, 6);
+}
+
+TEST_P(LifecycleTest, DatabaseLetsOnlyCandidatesAndTheFactorysBegin) {
+  store_.reset();
+  for (const CalibrationState state : kStates) {
+    const std::string sql =
+        "INSERT INTO calibrations SELECT rig, 9, " +
+        std::to_string(static_cast<int>(state) + 1) +
+        ", create_time_ns, run, content, sha256 FROM calibrations";
+    EXPECT_EQ(Execute("BEGIN;" + sql + ";ROLLBACK").ok(),
+              state == CalibrationState::kCandidate)
+        << StateName(state);
+  }
+}
+
+TEST_P(LifecycleTest, CandidateIsKeptUntilItIsJudged) {
+  const StoredRun run = Begin();
+  EXPECT_TRUE(absl::IsNotFound(store_->GetCandidate("a", run.run).status()));
+  const auto candidate =
+      store_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate));
+  ASSERT_TRUE(candidate.ok()) << candidate.status();
+  EXPECT_EQ(candidate->version, 2);
+  Reopen();
+  const auto kept = store_->GetCandidate("a", run.run);
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  EXPECT_EQ(kept->state, CalibrationState::kCandidate);
+  EXPECT_EQ(kept->activation, 0);
+  EXPECT_EQ(kept->schema_version,
+            static_cast<int>(EmbeddedMigrations().size()));
+  EXPECT_EQ(kept->settings, candidate->settings);
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
+  // A second one changes nothing.
+  EXPECT_EQ(
+      store_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
+          ->version,
+      2);
+  ASSERT_TRUE(
+      store_->FinishRun("a", run.run, Found(CalibrationState::kActive)).ok());
+  EXPECT_EQ(StateOf(2), CalibrationState::kActive);
+  EXPECT_EQ(store_->ListCalibrations("a", {})->items.size(), 2u);
+  EXPECT_TRUE(absl::IsNotFound(store_->GetCandidate("a", run.run).status()));
+}
+
+TEST_P(LifecycleTest, CandidateOfARunThatEndsOtherwiseIsRejected) {
+  const StoredRun run = Begin();
+  ASSERT_TRUE(
+      store_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
+          .ok());
+  ASSERT_TRUE(
+      store_->EndRun("a", run.run, RunState::kCancelled, "by hand").ok());
+  const auto rejected = store_->GetCalibration("a", 2);
+  EXPECT_EQ(rejected->state, CalibrationState::kRejected);
+  ASSERT_EQ(rejected->reasons.size(), 1u);
+  EXPECT_THAT(rejected->reasons[0], HasSubstr("by hand"));
+}
+
+TEST_P(LifecycleTest, RejectedOneKeepsReasonsAndFigures) {
+  const StoredRun run = Begin();
+  StoredCalibration judged = Found(CalibrationState::kRejected);
+  judged.reasons = {"does not fit"};
+  StoredValidation validation;
+  validation.active_version = 1;
+  validation.checks = {{"converged", 1, 1, true},
+                       {"held_out_probability", 1e-9, 1e-4, false}};
+  validation.held_out = {5, 3, {123.5, 26, 1e-9}, {21.5, 26, 0.7}};
+  judged.validation = validation;
+  ASSERT_TRUE(store_->FinishRun("a", run.run, judged).ok());
+  Reopen();
+  const auto kept = store_->GetCalibration("a", 2);
+  EXPECT_EQ(kept->state, CalibrationState::kRejected);
+  EXPECT_THAT(kept->reasons, ElementsAre("does not fit"));
+  ASSERT_TRUE(kept->validation.has_value());
+  EXPECT_EQ(kept->validation->active_version, 1);
+  ASSERT_EQ(kept->validation->checks.size(), 2u);
+  EXPECT_EQ(kept->validation->checks[1].name, "held_out_probability");
+  EXPECT_EQ(kept->validation->checks[1].value, 1e-9);
+  EXPECT_FALSE(kept->validation->checks[1].passed);
+  EXPECT_EQ(kept->validation->held_out.segments, 5);
+  EXPECT_EQ(kept->validation->held_out.left_out, 3);
+  EXPECT_EQ(kept->validation->held_out.candidate.statistic, 123.5);
+  EXPECT_EQ(kept->validation->held_out.active.probability, 0.7);
+}
+
+TEST_P(LifecycleTest, OneJudgedAgainstAnotherThanTheActiveIsJudgedAgain) {
+  Finish(CalibrationState::kActive);
+  const StoredRun run = Begin();
+  StoredCalibration judged = Found(CalibrationState::kActive);
+  judged.validation = StoredValidation();
+  judged.validation->active_version = 2;
+  ASSERT_TRUE(store_->ActivateCalibration("a", 1, "me", "drifts").ok());
+  EXPECT_TRUE(
+      absl::IsAborted(store_->FinishRun("a", run.run, judged).status()));
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
+  judged.validation->active_version = 1;
+  ASSERT_TRUE(store_->FinishRun("a", run.run, judged).ok());
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, 3);
+}
+
+TEST_P(LifecycleTest, RollBackIsLoggedWithWhoAndWhy) {
+  Finish(CalibrationState::kActive);
+  const auto active =
+      store_->ActivateCalibration("a", 1, "cn=operator", "it drifts");
+  ASSERT_TRUE(active.ok()) << active.status();
+  EXPECT_EQ(active->state, CalibrationState::kActive);
+  EXPECT_EQ(StateOf(2), CalibrationState::kRolledBack);
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
+  EXPECT_EQ(LastEvent().kind, EventKind::kCalibrationRolledBack);
+  EXPECT_THAT(LastEvent().detail, HasSubstr("cn=operator"));
+  EXPECT_THAT(LastEvent().detail, HasSubstr("it drifts"));
+  EXPECT_GT(active->activation, store_->GetCalibration("a", 2)->activation);
+  // And forth again.
+  ASSERT_TRUE(store_->ActivateCalibration("a", 2, "me", "it does not").ok());
+  EXPECT_EQ(StateOf(1), CalibrationState::kSuperseded);
+  EXPECT_EQ(StateOf(2), CalibrationState::kActive);
+  EXPECT_EQ(LastEvent().kind, EventKind::kCalibrationActivated);
+}
+
+TEST_P(LifecycleTest, ActivatingTheActiveOneChangesNothing) {
+  Finish(CalibrationState::kActive);
+  const StoredEvent last = LastEvent();
+  const auto before = store_->GetActiveCalibration("a");
+  const auto again = store_->ActivateCalibration("a", 2, "me", "twice");
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->activation, before->activation);
+  EXPECT_EQ(LastEvent().event, last.event);
+}
+
+TEST_P(LifecycleTest, WhatWasNeverValidatedIsNotActivated) {
+  Finish(CalibrationState::kRejected);
+  const StoredRun run = Begin();
+  ASSERT_TRUE(
+      store_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
+          .ok());
+  for (const std::int64_t version : {2, 3}) {
+    EXPECT_TRUE(absl::IsFailedPrecondition(
+        store_->ActivateCalibration("a", version, "me", "why not").status()))
+        << version;
+  }
+  EXPECT_TRUE(absl::IsNotFound(
+      store_->ActivateCalibration("a", 9, "me", "why not").status()));
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
+}
+
+TEST_P(LifecycleTest, NextRunStartsFromTheOneThatWasMadeActive) {
+  Finish(CalibrationState::kActive);
+  Finish(CalibrationState::kActive);
+  ASSERT_TRUE(store_->ActivateCalibration("a", 2, "me", "3 drifts").ok());
+  EXPECT_EQ(Begin().base_version, 2);
+}
+
+// While versions are made, and made active to and fro.
+TEST_P(LifecycleTest, AVersionReadsTheSameForEver) {
+  std::atomic<bool> done{false};
+  std::atomic<int> reads{0};
+  std::atomic<int> changed{0};
+  const auto read = [&](unsigned seed) {
+    std::mt19937 random(seed);
+    std::map<std::int64_t, StoredCalibration> first;
+    while (!done) {
+      const std::int64_t newest =
+          store_->ListCalibrations("a", {1, ""})->items.front().version;
+      const std::int64_t version =
+          std::uniform_int_distribution<std::int64_t>(1, newest)(random);
+      const auto now = store_->GetCalibration("a", version);
+      if (!now.ok()) {
+        ++changed;
+        continue;
+      }
+      const auto known = first.emplace(version, *now).first->second;
+      const bool same =
+          ReadableValues(known.theta) == ReadableValues(now->theta) &&
+          known.covariance == now->covariance &&
+          known.create_time_ns == now->create_time_ns &&
+          known.segments == now->segments && known.run == now->run;
+      changed += same ? 0 : 1;
+      ++reads;
+    }
+  };
+  std::thread one(read, 1);
+  std::thread two(read, 2);
+  const int trials = Trials(10);
+  for (int k = 0; k < trials; ++k) {
+    const StoredCalibration made = Finish(
+        k % 3 == 0 ? CalibrationState::kRejected : CalibrationState::kActive);
+    if (k % 4 == 3) {
+      EXPECT_TRUE(store_->ActivateCalibration("a", 1, "me", "test").ok());
+    }
+    EXPECT_EQ(made.version, k + 2);
+  }
+  while (reads == 0 && changed == 0) std::this_thread::yield();
+  done = true;
+  one.join();
+  two.join();
+  EXPECT_EQ(changed, 0);
+  Promise promise("a-version-never-changes");
+  promise.trials = reads;
+  promise.lost = changed;
+}
+
+}  // namespace
+}  // namespace selfcal::server
