@@ -8,7 +8,7 @@
 
 #include "server/store/statement.h"
 #include "test/server/pipeline/pipeline_test.h"
-#include "test/server/trials.h"
+#include "test/promise.h"
 
 namespace selfcal::server {
 namespace {
@@ -159,7 +159,7 @@ TEST(RunKillTest, OneRunForEachTriggerHoweverItIsKilled) {
     // Put and score twice, begin, candidate, finish: on both sides.
     EXPECT_GT(steps, 14);
   }
-  Promise promise("one-run-for-each-trigger");
+  Promise promise("one run for each trigger, over any kill");
   promise.trials = counts.trials;
   promise.lost = counts.lost;
 }

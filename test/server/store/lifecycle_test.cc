@@ -7,7 +7,7 @@
 #include "migrations/migrations.h"
 #include "server/store/calibration_states.h"
 #include "server/store/statement.h"
-#include "test/server/trials.h"
+#include "test/promise.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -300,7 +300,7 @@ TEST_P(LifecycleTest, AVersionReadsTheSameForEver) {
   one.join();
   two.join();
   EXPECT_EQ(changed, 0);
-  Promise promise("a-version-never-changes");
+  Promise promise("a calibration version never changes");
   promise.trials = reads;
   promise.lost = changed;
 }
