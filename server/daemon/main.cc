@@ -8,14 +8,19 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "server/daemon/log.h"
 #include "server/daemon/options.h"
 #include "server/daemon/serve.h"
 #include "server/daemon/stop.h"
+#include "server/worker/worker.h"
 
 int main(int argc, char** argv) {
   using namespace selfcal::server;
+  if (argc == 2 && std::string_view(argv[1]) == kWorkerArgument) {
+    return RunWorker();
+  }
   DaemonOptions options;
   if (const auto exit_code = ParseOptions(argc, argv, &options)) {
     return *exit_code;

@@ -21,6 +21,7 @@
 #include "server/pipeline/pipeline.h"
 #include "server/service/grpc_log.h"
 #include "server/store/store_sqlite.h"
+#include "server/worker/worker.h"
 
 namespace selfcal::server {
 namespace {
@@ -53,11 +54,23 @@ PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
   pipeline.program_version = SELFCAL_VERSION;
   pipeline.calibrate.solver = options.solver;
   pipeline.conditions = conditions;
-  pipeline.idle_runs = options.idle_runs;
   pipeline.max_run_time = std::chrono::round<std::chrono::milliseconds>(
       std::chrono::duration<double, std::ratio<60>>(options.max_run_minutes));
   pipeline.observer = metrics == nullptr ? nullptr : metrics->observer();
   return pipeline;
+}
+
+// Calibrates in a worker: this program again.
+Estimators EstimatorsOfPipeline(const DaemonOptions& options) {
+  WorkerLimits limits;
+  limits.idle = options.idle_runs;
+  limits.max_memory_bytes = std::int64_t{options.max_run_memory_mib} << 20;
+  Estimators estimators = CoreEstimators();
+  estimators.calibrate = [limits](const auto&... input) {
+    return CalibrateInWorker(
+        {"/proc/self/exe", kWorkerArgument}, limits, input...);
+  };
+  return estimators;
 }
 
 absl::StatusOr<std::unique_ptr<Metrics>> OpenMetrics(
@@ -114,9 +127,10 @@ std::optional<int> ServeOnce(
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
   const auto conditions = MakeHostConditions(options.host);
-  const auto pipeline = MakePipeline(
-      store->get(),
-      OptionsOfPipeline(options, conditions.get(), metrics->get()));
+  const auto pipeline =
+      MakePipeline(store->get(),
+                   OptionsOfPipeline(options, conditions.get(), metrics->get()),
+                   EstimatorsOfPipeline(options));
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);
   }

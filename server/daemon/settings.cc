@@ -26,6 +26,7 @@ constexpr std::int64_t kMaxAgeSeconds = 1'000'000'000;
 constexpr double kMaxLoad = 1000;
 constexpr double kMinRunMinutes = 0.1;
 constexpr double kMaxRunMinutes = 10'000;
+constexpr int kMaxRunMemoryMib = 1 << 20;
 
 class Definer {
  public:
@@ -237,6 +238,12 @@ void DefineRuns(Definer* define, DaemonOptions* options) {
             &options->max_run_minutes,
             "A run that takes longer fails")
       ->check(CLI::Range(kMinRunMinutes, kMaxRunMinutes))
+      ->capture_default_str();
+  define
+      ->Add("max-run-memory",
+            &options->max_run_memory_mib,
+            "MiB; a run that needs more fails; 0: no limit")
+      ->check(CLI::Range(0, kMaxRunMemoryMib))
       ->capture_default_str();
 }
 

@@ -252,7 +252,14 @@ Estimators CoreEstimators() {
             scorer->Score(rig, theta0, segment, {}, &information);
             return information;
           },
-          Calibrate};
+          [](const Rig& rig,
+             const Calibration& theta_start,
+             const std::vector<MotionSegment>& segments,
+             const CalibrateOptions& options,
+             const ProgressCallback& progress,
+             const std::function<bool()>&) {
+            return Calibrate(rig, theta_start, segments, options, progress);
+          }};
 }
 
 std::unique_ptr<Pipeline> MakePipeline(Store* store,

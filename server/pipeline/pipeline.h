@@ -48,9 +48,6 @@ struct PipelineOptions {
   // How often runs that are held back are looked at again, and whether a
   // calibration has become old.
   std::chrono::milliseconds recheck = std::chrono::seconds(30);
-  // The solver takes only what nobody else wants: on a machine that is never
-  // idle it does not get on. Otherwise it stands behind everything else.
-  bool idle_runs = true;
   // A run that takes longer fails.
   std::chrono::milliseconds max_run_time = std::chrono::minutes(30);
   // Nanoseconds since the Unix epoch.
@@ -67,11 +64,13 @@ struct Estimators {
                                   const Calibration& theta_start,
                                   const std::vector<MotionSegment>& segments,
                                   const CalibrateOptions& options,
-                                  const ProgressCallback& progress)>
+                                  const ProgressCallback& progress,
+                                  const std::function<bool()>& interrupted)>
       calibrate;
 };
 
-// ScoreSegment and Calibrate of core.
+// ScoreSegment and Calibrate of core; that asks nobody whether it is
+// interrupted between two calls of `progress`.
 Estimators CoreEstimators();
 
 // The verdict on one segment; durable when it is kStored or kDuplicate.

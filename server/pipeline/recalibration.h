@@ -8,10 +8,7 @@
 //
 // One that nobody asked for by hand waits while the minimum interval of its rig
 // or the conditions hold it back: it stays pending, with a message that says
-// why. The solver runs on a thread of its own, idle in CPU and I/O: the thread
-// of the runs takes the lock of the store in between, and must be able to give
-// it back.
-#pragma once
+// why.#pragma once
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>

@@ -1,15 +1,11 @@
 // How a run comes to its candidate, and what becomes of that.
 #include <fmt/format.h>
 
-#include <atomic>
 #include <chrono>
-#include <exception>
-#include <thread>
 #include <utility>
 
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/candidate.h"
-#include "server/pipeline/idle_thread.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/run_settings.h"
 #include "server/store/status_macros.h"
@@ -92,30 +88,18 @@ absl::StatusOr<CalibrationResult> Recalibrator::RunSolver(
     const CalibrateOptions& options) {
   const auto deadline =
       std::chrono::steady_clock::now() + options_.max_run_time;
-  bool late = false;  // by the solver's thread, until it has ended
-  CalibrationResult result;
-  std::exception_ptr failure;
-  std::thread solver([&] {
-    options_.idle_runs ? BecomeIdle() : StandBack();
-    try {
-      result = estimators_.calibrate(rig,
-                                     start,
-                                     segments,
-                                     options,
-                                     [&](const CalibrateProgress& progress) {
-                                       late = std::chrono::steady_clock::now() >
-                                              deadline;
-                                       return Report(run, progress) && !late;
-                                     });
-    } catch (...) {
-      failure = std::current_exception();
-    }
-  });
-  solver.join();
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
-  if (result.status == CalibrateStatus::kCancelled && late && !Interrupted()) {
+  const auto late = [&] { return std::chrono::steady_clock::now() > deadline; };
+  CalibrationResult result = estimators_.calibrate(
+      rig,
+      start,
+      segments,
+      options,
+      [&](const CalibrateProgress& progress) {
+        return Report(run, progress) && !late();
+      },
+      [&] { return Interrupted() || late(); });
+  if (result.status == CalibrateStatus::kCancelled && late() &&
+      !Interrupted()) {
     return absl::DeadlineExceededError(fmt::format(
         "it took longer than the {:g} s that a run may; smaller tables make it "
         "shorter",

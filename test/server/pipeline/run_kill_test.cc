@@ -7,8 +7,8 @@
 #include <string_view>
 
 #include "server/store/statement.h"
-#include "test/server/pipeline/pipeline_test.h"
 #include "test/promise.h"
+#include "test/server/pipeline/pipeline_test.h"
 
 namespace selfcal::server {
 namespace {
@@ -86,11 +86,11 @@ bool Ended(Store* store) {
                             const Calibration& start,
                             const auto&,
                             const auto&,
-                            const ProgressCallback& progress) {
+                            const ProgressCallback& progress,
+                            const auto&) {
     return Solve(rig, start, progress);
   };
   PipelineOptions options;
-  options.idle_runs = false;  // the machine may be busy with other tests
   const auto pipeline = MakePipeline(store->get(), options, estimators);
   if (!pipeline->Start().ok()) _exit(4);
   for (const std::int64_t index : {0, 1}) {

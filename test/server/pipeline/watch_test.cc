@@ -163,7 +163,8 @@ TEST_F(WatchTest, RunIsToldFromItsStateToItsEnd) {
                               const Calibration& start,
                               const auto&,
                               const auto&,
-                              const ProgressCallback& progress) {
+                              const ProgressCallback& progress,
+                              const auto&) {
     const std::lock_guard wait(gate);
     for (int k = 1; k <= 3; ++k) progress({k, 3, 10.0 / k, 1.0});
     return Converged(rig, start);

@@ -1,4 +1,4 @@
-#include "server/pipeline/idle_thread.h"
+#include "server/worker/idle_process.h"
 
 #include <sched.h>
 #include <spdlog/spdlog.h>
@@ -33,8 +33,7 @@ void BecomeIdle() {
 
 void StandBack() {
   constexpr int kNiceness = 10;
-  const auto thread = static_cast<id_t>(syscall(SYS_gettid));
-  if (setpriority(PRIO_PROCESS, thread, kNiceness) != 0) {
+  if (setpriority(PRIO_PROCESS, 0, kNiceness) != 0) {
     spdlog::warn("recalibration runs at normal priority: {}",
                  std::strerror(errno));
   }

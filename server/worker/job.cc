@@ -1,0 +1,153 @@
+#include "server/worker/job.h"
+
+#include <utility>
+
+#include "proto/convert.h"
+#include "server/store/record_parts.h"
+#include "server/store/records.h"
+#include "server/worker/job.pb.h"
+
+namespace selfcal::server {
+namespace {
+
+template <typename Message>
+bool Parse(std::string_view bytes, Message* message) {
+  return message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+}
+
+void PutOptions(const CalibrateOptions& options, worker::Options* message) {
+  message->set_loss(static_cast<int>(options.loss));
+  message->set_loss_scale(options.loss_scale);
+  if (options.prior) {
+    *message->mutable_prior()->mutable_centre() =
+        ToProto(options.prior->centre);
+    PutMatrix(options.prior->information,
+              message->mutable_prior()->mutable_information());
+  }
+  message->set_max_iterations(options.max_iterations);
+  message->set_correlated_tracks(options.correlated_tracks);
+  message->set_noise_factors(options.noise_factors);
+  message->set_reweight_noise(options.reweight_noise);
+  message->set_merge_landmarks(options.merge_landmarks);
+  message->set_solver(static_cast<int>(options.solver));
+  message->set_threads(options.threads);
+}
+
+bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
+  options->loss = static_cast<LossKind>(message.loss());
+  options->loss_scale = message.loss_scale();
+  if (message.has_prior()) {
+    ThetaPrior& prior = options->prior.emplace();
+    if (!FromProto(message.prior().centre(), "", &prior.centre).empty() ||
+        !GetMatrix(message.prior().information(), &prior.information)) {
+      return false;
+    }
+  }
+  options->max_iterations = message.max_iterations();
+  options->correlated_tracks = message.correlated_tracks();
+  options->noise_factors = message.noise_factors();
+  options->reweight_noise = message.reweight_noise();
+  options->merge_landmarks = message.merge_landmarks();
+  options->solver = static_cast<SolverKind>(message.solver());
+  options->threads = message.threads();
+  return true;
+}
+
+}  // namespace
+
+std::string EncodeJob(const Rig& rig,
+                      const Calibration& theta_start,
+                      const std::vector<MotionSegment>& segments,
+                      const CalibrateOptions& options,
+                      const WorkerLimits& limits) {
+  worker::Job job;
+  *job.mutable_rig() = ToProto(rig);
+  *job.mutable_theta_start() = ToProto(theta_start);
+  for (const MotionSegment& segment : segments) {
+    *job.add_segments() = ToProto(segment);
+  }
+  PutOptions(options, job.mutable_options());
+  job.mutable_limits()->set_idle(limits.idle);
+  job.mutable_limits()->set_max_memory_bytes(limits.max_memory_bytes);
+  std::string bytes;
+  return job.SerializeToString(&bytes) ? bytes : "";
+}
+
+std::string EncodeProgress(const CalibrateProgress& progress) {
+  worker::Progress message;
+  message.set_iteration(progress.iteration);
+  message.set_max_iterations(progress.max_iterations);
+  message.set_cost(progress.cost);
+  message.set_step_sigmas(progress.step_sigmas);
+  return message.SerializeAsString();
+}
+
+std::string EncodeResult(const CalibrationResult& result) {
+  worker::Result message;
+  if (result.status == CalibrateStatus::kFailed) {
+    message.set_failure(result.message);
+    return message.SerializeAsString();
+  }
+  StoredCalibration calibration;
+  calibration.theta = result.theta;
+  calibration.covariance = result.covariance;
+  calibration.report = result;
+  message.mutable_calibration()->set_record(SerializeCalibration(calibration));
+  PutMatrix(result.Lambda, message.mutable_calibration()->mutable_lambda());
+  return message.SerializeAsString();
+}
+
+std::optional<Job> DecodeJob(std::string_view bytes) {
+  worker::Job message;
+  Job job;
+  if (!Parse(bytes, &message) ||
+      !FromProto(message.rig(), "", &job.rig).empty() ||
+      !FromProto(message.theta_start(), "", &job.theta_start).empty() ||
+      !GetOptions(message.options(), &job.options)) {
+    return std::nullopt;
+  }
+  job.segments.resize(message.segments_size());
+  for (int i = 0; i < message.segments_size(); ++i) {
+    if (!FromProto(message.segments(i), "", &job.segments[i]).empty()) {
+      return std::nullopt;
+    }
+  }
+  job.limits.idle = message.limits().idle();
+  job.limits.max_memory_bytes = message.limits().max_memory_bytes();
+  return job;
+}
+
+std::optional<CalibrateProgress> DecodeProgress(std::string_view bytes) {
+  worker::Progress message;
+  if (!Parse(bytes, &message)) {
+    return std::nullopt;
+  }
+  return CalibrateProgress{.iteration = message.iteration(),
+                           .max_iterations = message.max_iterations(),
+                           .cost = message.cost(),
+                           .step_sigmas = message.step_sigmas()};
+}
+
+std::optional<CalibrationResult> DecodeResult(std::string_view bytes) {
+  worker::Result message;
+  if (!Parse(bytes, &message)) {
+    return std::nullopt;
+  }
+  if (message.has_failure()) {
+    CalibrationResult failed;
+    failed.message = message.failure();
+    return failed;
+  }
+  auto calibration =
+      ParseCalibration(message.calibration().record(), "the worker's result");
+  if (!calibration.ok() || !calibration->report) {
+    return std::nullopt;
+  }
+  CalibrationResult result = *std::move(calibration->report);
+  if (!GetMatrix(message.calibration().lambda(), &result.Lambda)) {
+    return std::nullopt;
+  }
+  return result;
+}
+
+}  // namespace selfcal::server

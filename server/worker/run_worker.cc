@@ -1,0 +1,90 @@
+// The worker's side.
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <exception>
+#include <fstream>
+#include <new>
+
+#include "server/worker/channel.h"
+#include "server/worker/idle_process.h"
+#include "server/worker/job.h"
+#include "server/worker/worker.h"
+
+namespace selfcal::server {
+namespace {
+
+// The daemon decides when it ends; a signal to the whole group or service is
+// not for it.
+void LeaveTheEndToTheDaemon() {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  for (const int stop : {SIGTERM, SIGINT, SIGHUP}) {
+    signal(stop, SIG_IGN);
+  }
+}
+
+// Where memory runs out, the system takes this process and not the daemon.
+void BeTakenFirst() { std::ofstream("/proc/self/oom_score_adj") << 1000; }
+
+// Bytes of data that the process has mapped.
+std::int64_t DataBytes() {
+  std::ifstream file("/proc/self/statm");
+  std::int64_t pages = 0;
+  for (int column = 0; column < 6; ++column) file >> pages;
+  return pages * sysconf(_SC_PAGESIZE);
+}
+
+void LimitMemory(std::int64_t bytes) {
+  if (bytes == 0) return;
+  const auto most = static_cast<rlim_t>(DataBytes() + bytes);
+  const rlimit limit{.rlim_cur = most, .rlim_max = most};
+  setrlimit(RLIMIT_DATA, &limit);
+}
+
+// False if nobody listens any more.
+bool Tell(const CalibrateProgress& progress) {
+  const std::string bytes = EncodeProgress(progress);
+  return send(kProgressFile, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
+         static_cast<ssize_t>(bytes.size());
+}
+
+CalibrationResult Failure(std::string message) {
+  CalibrationResult result;
+  result.message = std::move(message);
+  return result;
+}
+
+CalibrationResult Solve(const Job& job) {
+  LimitMemory(job.limits.max_memory_bytes);
+  try {
+    return Calibrate(job.rig, job.theta_start, job.segments, job.options, Tell);
+  } catch (const std::bad_alloc&) {
+    return Failure(fmt::format(
+        "it needs more than the {} MiB of memory that a run may take; smaller "
+        "tables need less",
+        job.limits.max_memory_bytes >> 20));
+  } catch (const std::exception& error) {
+    return Failure(error.what());
+  }
+}
+
+}  // namespace
+
+int RunWorker() {
+  LeaveTheEndToTheDaemon();
+  BeTakenFirst();
+  const auto job = DecodeJob(ReadWhole(kJobFile));
+  if (!job) {
+    return EXIT_FAILURE;
+  }
+  job->limits.idle ? BecomeIdle() : StandBack();
+  WriteWhole(kResultFile, EncodeResult(Solve(*job)));
+  return EXIT_SUCCESS;
+}
+
+}  // namespace selfcal::server

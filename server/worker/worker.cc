@@ -1,0 +1,208 @@
+#include "server/worker/worker.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "server/worker/channel.h"
+#include "server/worker/job.h"
+
+extern char** environ;
+
+namespace selfcal::server {
+namespace {
+
+// How often `interrupted` is asked.
+constexpr int kPollMs = 20;
+
+std::system_error SystemError(const char* what) {
+  return {errno, std::generic_category(), what};
+}
+
+class Descriptor {
+ public:
+  // Takes a number above those that the worker's get, so that none is taken for
+  // another when they are handed over.
+  Descriptor(int file, const char* what) {
+    if (file < 0) throw SystemError(what);
+    file_ = fcntl(file, F_DUPFD_CLOEXEC, kFirstFreeFile);
+    close(file);
+    if (file_ < 0) throw SystemError(what);
+  }
+  ~Descriptor() { Close(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  int get() const { return file_; }
+  void Close() {
+    if (file_ >= 0) close(file_);
+    file_ = -1;
+  }
+
+ private:
+  int file_ = -1;
+};
+
+// A file without a name.
+Descriptor MakeFile(const char* name) {
+  return {memfd_create(name, MFD_CLOEXEC), "memfd_create"};
+}
+
+struct Sockets {
+  Sockets() : Sockets(Pair()) {}
+  explicit Sockets(const std::array<int, 2>& pair)
+      : ours(pair[0], "socketpair"), workers(pair[1], "socketpair") {}
+
+  static std::array<int, 2> Pair() {
+    std::array<int, 2> pair{-1, -1};
+    if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, pair.data())) {
+      throw SystemError("socketpair");
+    }
+    return pair;
+  }
+
+  Descriptor ours;
+  Descriptor workers;
+};
+
+class Process {
+ public:
+  Process(const std::vector<std::string>& command,
+          int job,
+          int progress,
+          int result) {
+    std::vector<std::string> arguments = command;
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, job, kJobFile);
+    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, progress, kProgressFile);
+    posix_spawn_file_actions_adddup2(&actions, result, kResultFile);
+    posix_spawn_file_actions_addclosefrom_np(&actions, kFirstFreeFile);
+    const int error =
+        posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) {
+      errno = error;
+      throw SystemError("cannot start the solver");
+    }
+  }
+  ~Process() {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      Wait();
+    }
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  // As waitpid().
+  int Wait() {
+    int status = 0;
+    while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+    }
+    pid_ = 0;
+    return status;
+  }
+
+ private:
+  pid_t pid_ = 0;
+};
+
+CalibrationResult Ended(CalibrateStatus status, std::string message) {
+  CalibrationResult result;
+  result.status = status;
+  result.message = std::move(message);
+  return result;
+}
+
+CalibrationResult EndedBadly(int status) {
+  return Ended(CalibrateStatus::kFailed,
+               WIFSIGNALED(status)
+                   ? fmt::format("its process ended by signal {} ({})",
+                                 WTERMSIG(status),
+                                 strsignal(WTERMSIG(status)))
+                   : fmt::format("its process ended with exit code {}",
+                                 WEXITSTATUS(status)));
+}
+
+// Until the worker closes its end. False if it is not wanted any longer.
+bool Follow(int socket,
+            const ProgressCallback& progress,
+            const std::function<bool()>& interrupted) {
+  std::array<char, kMaxProgressBytes> buffer{};
+  for (;;) {
+    if (interrupted && interrupted()) {
+      return false;
+    }
+    pollfd polled{.fd = socket, .events = POLLIN, .revents = 0};
+    if (poll(&polled, 1, kPollMs) <= 0) {
+      continue;
+    }
+    const ssize_t size = recv(socket, buffer.data(), buffer.size(), 0);
+    if (size <= 0) {
+      return true;
+    }
+    const auto told =
+        DecodeProgress({buffer.data(), static_cast<std::size_t>(size)});
+    if (told && progress && !progress(*told)) {
+      return false;
+    }
+  }
+}
+
+}  // namespace
+
+CalibrationResult CalibrateInWorker(const std::vector<std::string>& command,
+                                    const WorkerLimits& limits,
+                                    const Rig& rig,
+                                    const Calibration& theta_start,
+                                    const std::vector<MotionSegment>& segments,
+                                    const CalibrateOptions& options,
+                                    const ProgressCallback& progress,
+                                    const std::function<bool()>& interrupted) {
+  const Descriptor job = MakeFile("selfcal-job");
+  const Descriptor result = MakeFile("selfcal-result");
+  {
+    const std::string bytes =
+        EncodeJob(rig, theta_start, segments, options, limits);
+    if (bytes.empty()) {
+      return Ended(CalibrateStatus::kFailed,
+                   "its segments are more than 2 GiB; make the tables smaller");
+    }
+    WriteWhole(job.get(), bytes);
+  }
+  Sockets sockets;
+  Process process(command, job.get(), sockets.workers.get(), result.get());
+  sockets.workers.Close();
+  if (!Follow(sockets.ours.get(), progress, interrupted)) {
+    return Ended(CalibrateStatus::kCancelled, "cancelled");
+  }
+  if (const int status = process.Wait(); status != 0) {
+    return EndedBadly(status);
+  }
+  auto read = DecodeResult(ReadWhole(result.get()));
+  return read ? *std::move(read)
+              : Ended(CalibrateStatus::kFailed,
+                      "its process ended without a result");
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,241 @@
+// Calibrations in a process of their own, and what becomes of that.
+#include "server/worker/worker.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "server/worker/job.h"
+#include "test/server/test_segments.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::vector<std::string> kWorker = {SELFCAL_TEST_WORKER};
+
+// The process that this thread has started; 0 for none.
+pid_t Child() {
+  std::ifstream file("/proc/thread-self/children");
+  pid_t child = 0;
+  file >> child;
+  return child;
+}
+
+bool IsAlive(pid_t process) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+  std::string number;
+  std::string name;
+  char state = 'X';
+  file >> number >> name >> state;
+  return file.good() && state != 'Z' && state != 'X';
+}
+
+class WorkerTest : public ::testing::Test {
+ protected:
+  WorkerTest() { limits_.idle = false; }  // the machine may be busy
+
+  CalibrationResult InWorker(
+      const std::vector<std::string>& command = kWorker,
+      const std::function<bool()>& interrupted = nullptr) {
+    return CalibrateInWorker(command,
+                             limits_,
+                             rig_,
+                             rig_.factory,
+                             segments_,
+                             options_,
+                             progress_,
+                             interrupted);
+  }
+
+  const Rig rig_ = TestRig("a");
+  const std::vector<MotionSegment> segments_ = TestSegments(rig_, 3);
+  CalibrateOptions options_;
+  WorkerLimits limits_;
+  ProgressCallback progress_ = [](const CalibrateProgress&) { return true; };
+};
+
+TEST_F(WorkerTest, ResultAndProgressAreThoseOfCalibrateToTheBit) {
+  std::vector<std::string> here;
+  std::vector<std::string> there;
+  const auto note = [](std::vector<std::string>* noted) {
+    return [noted](const CalibrateProgress& progress) {
+      noted->push_back(EncodeProgress(progress));
+      return true;
+    };
+  };
+  options_.prior = FactoryPrior(rig_);
+  const CalibrationResult expected =
+      Calibrate(rig_, rig_.factory, segments_, options_, note(&here));
+  progress_ = note(&there);
+  const CalibrationResult result = InWorker();
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  EXPECT_EQ(EncodeResult(result), EncodeResult(expected));
+  EXPECT_EQ(BoxMinus(result.theta, expected.theta).norm(), 0);
+  EXPECT_EQ(result.covariance, expected.covariance);
+  EXPECT_EQ(result.Lambda, expected.Lambda);
+  EXPECT_EQ(result.rank, expected.rank);
+  EXPECT_EQ(result.final_cost, expected.final_cost);
+  EXPECT_EQ(result.track_noise_factor, expected.track_noise_factor);
+  EXPECT_EQ(result.noise_factors.size(), expected.noise_factors.size());
+  EXPECT_GT(here.size(), 2u);
+  EXPECT_EQ(there, here);
+}
+
+TEST_F(WorkerTest, AllOfAJobArrives) {
+  options_.loss = LossKind::kCauchy;
+  options_.loss_scale = 1.25;
+  options_.prior = FactoryPrior(rig_);
+  options_.max_iterations = 7;
+  options_.correlated_tracks = false;
+  options_.noise_factors = false;
+  options_.reweight_noise = true;
+  options_.merge_landmarks = 3;
+  options_.solver = SolverKind::kCeres;
+  options_.threads = 2;
+  limits_ = {.idle = true, .max_memory_bytes = 123};
+  const std::string bytes =
+      EncodeJob(rig_, rig_.factory, segments_, options_, limits_);
+  const auto job = DecodeJob(bytes);
+  ASSERT_TRUE(job.has_value());
+  EXPECT_EQ(
+      EncodeJob(
+          job->rig, job->theta_start, job->segments, job->options, job->limits),
+      bytes);
+  EXPECT_EQ(job->segments.size(), segments_.size());
+  EXPECT_EQ(job->options.loss, LossKind::kCauchy);
+  EXPECT_EQ(job->options.loss_scale, 1.25);
+  EXPECT_EQ(job->options.prior->information, options_.prior->information);
+  EXPECT_EQ(job->options.max_iterations, 7);
+  EXPECT_FALSE(job->options.correlated_tracks);
+  EXPECT_FALSE(job->options.noise_factors);
+  EXPECT_TRUE(job->options.reweight_noise);
+  EXPECT_EQ(job->options.merge_landmarks, 3);
+  EXPECT_EQ(job->options.solver, SolverKind::kCeres);
+  EXPECT_EQ(job->options.threads, 2);
+  EXPECT_TRUE(job->limits.idle);
+  EXPECT_EQ(job->limits.max_memory_bytes, 123);
+  EXPECT_FALSE(DecodeJob("not a job").has_value());
+}
+
+// A worker that says nothing for hours.
+TEST_F(WorkerTest, AnInterruptedOneIsKilledWhereverItIs) {
+  pid_t child = 0;
+  const CalibrationResult result = InWorker({"/bin/sleep", "100000"}, [&] {
+    child = Child();
+    return child != 0;
+  });
+  EXPECT_EQ(result.status, CalibrateStatus::kCancelled);
+  ASSERT_NE(child, 0);
+  EXPECT_FALSE(IsAlive(child));
+}
+
+TEST_F(WorkerTest, ProgressThatIsNotWantedEndsIt) {
+  progress_ = [](const CalibrateProgress&) { return false; };
+  EXPECT_EQ(InWorker().status, CalibrateStatus::kCancelled);
+  EXPECT_EQ(Child(), 0);
+}
+
+TEST_F(WorkerTest, OneThatEndsBadlyFailsWithAMessage) {
+  const auto message = [&](const char* script) {
+    const CalibrationResult result = InWorker({"/bin/sh", "-c", script});
+    EXPECT_EQ(result.status, CalibrateStatus::kFailed);
+    return result.message;
+  };
+  EXPECT_THAT(message("kill -SEGV $$"), HasSubstr("signal 11"));
+  EXPECT_THAT(message("exit 3"), HasSubstr("exit code 3"));
+  EXPECT_THAT(message("exit 0"), HasSubstr("without a result"));
+  EXPECT_THROW(InWorker({"/nowhere"}), std::system_error);
+}
+
+TEST_F(WorkerTest, OneThatNeedsTooMuchMemoryFailsAndSaysSo) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "it ends the process where memory runs out";
+#endif
+  limits_.max_memory_bytes = 1 << 20;
+  const CalibrationResult result = InWorker();
+  EXPECT_EQ(result.status, CalibrateStatus::kFailed);
+  EXPECT_THAT(result.message, HasSubstr("more than the 1 MiB of memory"));
+}
+
+TEST_F(WorkerTest, AnIdleOneTakesOnlyWhatOthersLeave) {
+  struct Seen {
+    int policy = -1;
+    long io_class = -1;
+    int niceness = -1;
+  };
+  const auto see = [&](bool idle) {
+    limits_.idle = idle;
+    Seen seen;
+    progress_ = [&](const CalibrateProgress&) {
+      const pid_t child = Child();
+      seen = {sched_getscheduler(child),
+              syscall(SYS_ioprio_get, 1, child) >> 13,
+              getpriority(PRIO_PROCESS, child)};
+      return false;
+    };
+    InWorker();
+    return seen;
+  };
+  const Seen idle = see(true);
+  EXPECT_EQ(idle.policy, SCHED_IDLE);
+  EXPECT_EQ(idle.io_class, 3);
+  const Seen low = see(false);
+  EXPECT_EQ(low.policy, SCHED_OTHER);
+  EXPECT_EQ(low.niceness, 10);
+  EXPECT_NE(sched_getscheduler(0), SCHED_IDLE);
+}
+
+// As the service manager and a terminal do to all processes of a service.
+TEST_F(WorkerTest, SignalsToTheWholeGroupAreNotForIt) {
+  progress_ = [](const CalibrateProgress&) {
+    for (const int stop : {SIGTERM, SIGINT, SIGHUP}) kill(Child(), stop);
+    return true;
+  };
+  EXPECT_EQ(InWorker().status, CalibrateStatus::kConverged);
+}
+
+TEST_F(WorkerTest, ItDiesWithTheDaemon) {
+  std::array<int, 2> told{};
+  ASSERT_EQ(pipe(told.data()), 0);
+  const pid_t daemon = fork();
+  ASSERT_GE(daemon, 0);
+  if (daemon == 0) {
+    progress_ = [&](const CalibrateProgress&) -> bool {
+      const pid_t child = Child();
+      if (write(told[1], &child, sizeof(child)) < 0) _exit(1);
+      for (;;) pause();
+    };
+    InWorker();
+    _exit(0);
+  }
+  pid_t worker = 0;
+  ASSERT_EQ(read(told[0], &worker, sizeof(worker)), ssize_t{sizeof(worker)});
+  ASSERT_TRUE(IsAlive(worker));
+  kill(daemon, SIGKILL);
+  waitpid(daemon, nullptr, 0);
+  for (int k = 0; k < 3000 && IsAlive(worker); ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_FALSE(IsAlive(worker));
+  close(told[0]);
+  close(told[1]);
+}
+
+}  // namespace
+}  // namespace selfcal::server
