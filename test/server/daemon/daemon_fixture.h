@@ -57,8 +57,7 @@ class DaemonTest : public ::testing::Test {
                                   arguments);
   }
 
-  Rig CreateRig() {
-    const Rig rig = TestRig("r");
+  Rig CreateRig(const Rig& rig = TestRig("r")) {
     grpc::ClientContext context;
     v1::CreateRigRequest request;
     *request.mutable_rig() = ToProto(rig);
