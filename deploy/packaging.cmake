@@ -40,6 +40,23 @@ endmacro()
 set(library libselfcal${PROJECT_VERSION_MAJOR})
 selfcal_package(daemon selfcald science
   "daemon that keeps a camera-IMU calibration true")
+set(deploy ${PROJECT_SOURCE_DIR}/deploy)
+install(FILES ${deploy}/systemd/selfcald.service
+  DESTINATION lib/systemd/system COMPONENT daemon)
+install(FILES ${deploy}/systemd/selfcal.sysusers.conf
+  DESTINATION lib/sysusers.d RENAME selfcal.conf COMPONENT daemon)
+install(FILES ${deploy}/systemd/selfcal.tmpfiles.conf
+  DESTINATION lib/tmpfiles.d RENAME selfcal.conf COMPONENT daemon)
+install(FILES ${deploy}/selfcald.toml
+  DESTINATION /etc/selfcal
+  PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ
+  COMPONENT daemon)
+set(CPACK_DEBIAN_DAEMON_PACKAGE_DEPENDS "systemd, init-system-helpers")
+set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA
+  ${deploy}/debian/conffiles
+  ${deploy}/debian/postinst
+  ${deploy}/debian/prerm
+  ${deploy}/debian/postrm)
 selfcal_package(cli selfcal science
   "command line of selfcald")
 selfcal_package(library ${library} libs

@@ -26,10 +26,23 @@ for package in selfcald selfcal libselfcal0 libselfcal-dev; do
   files=$(dpkg-deb -c "$deb" | awk '{print $6}')
   grep -qx "./usr/share/doc/$package/copyright" <<<"$files" ||
     fail "$package has no licence"
-  ! grep -vE '^\./(usr(/|$)|$)' <<<"$files" ||
+  elsewhere=$(grep -vE '^\./(usr(/|$)|$)' <<<"$files" || true)
+  [[ $package == selfcald ]] || [[ -z $elsewhere ]] ||
     fail "$package puts files outside of /usr"
   dpkg-deb -x "$deb" "$work/root"
 done
+[[ -f $work/root/etc/selfcal/selfcald.toml ]] || fail 'no settings'
+for file in systemd/system/selfcald.service sysusers.d/selfcal.conf \
+  tmpfiles.d/selfcal.conf; do
+  [[ -f $work/root/usr/lib/$file ]] || fail "selfcald has no $file"
+done
+dpkg-deb -e "$work/packs/selfcald_$version-1_$arch.deb" "$work/control"
+for script in postinst prerm postrm; do
+  sh -n "$work/control/$script" || fail "$script is no script"
+done
+# Settings that somebody has changed stay as they are.
+grep -qx /etc/selfcal/selfcald.toml "$work/control/conffiles" ||
+  fail 'the settings are no conffile'
 depends() { dpkg-deb -f "$work/packs/${1}_$version-1_$arch.deb" Depends; }
 for package in selfcald selfcal libselfcal0; do
   [[ $(depends "$package") == *libgrpc++* ]] ||
