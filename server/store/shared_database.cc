@@ -15,6 +15,10 @@ namespace {
 // Bounds how long the first of a group waits for the last.
 constexpr std::size_t kMaxGroup = 64;
 
+// The log is moved into the file when it is this large: some groups of
+// segments, so that a page that many of them change is written once.
+constexpr std::int64_t kCheckpointBytes = 32 << 20;
+
 // A COMMIT failed, or a statement of it: the disk, not the question.
 bool IsDiskError(const absl::Status& status) {
   return absl::IsUnavailable(status);
@@ -49,6 +53,19 @@ absl::Status RunGuarded(const SharedDatabase::Work& work,
   }
 }
 
+// Takes the place of SQLite's own checkpoint, which is part of a commit.
+int NoteLogPages(void* log_pages, sqlite3*, const char*, int pages) {
+  *static_cast<int*>(log_pages) = pages;
+  return SQLITE_OK;
+}
+
+absl::StatusOr<std::int64_t> CheckpointPages(Connection* connection) {
+  Statement read(connection, "PRAGMA page_size");
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return kCheckpointBytes / (found ? read.Int(0) : 4096);
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<SharedDatabase>> SharedDatabase::Open(
@@ -80,6 +97,9 @@ absl::Status SharedDatabase::OpenConnections() {
   reader_.reset();
   writer_.reset();
   SELFCAL_ASSIGN_OR_RETURN(writer_, open_writer_());
+  SELFCAL_ASSIGN_OR_RETURN(checkpoint_pages_, CheckpointPages(&*writer_));
+  log_pages_ = 0;
+  sqlite3_wal_hook(writer_->handle(), NoteLogPages, &log_pages_);
   SELFCAL_ASSIGN_OR_RETURN(reader_,
                            Connection::Open(path_, SQLITE_OPEN_READONLY));
   return reader_->Execute(
@@ -97,6 +117,15 @@ absl::Status SharedDatabase::Recover() {
   if (!found || checkpoint.Int(0) != 0) return Checking();
   failed_ = false;
   return absl::OkStatus();
+}
+
+void SharedDatabase::CheckpointIfLarge() {
+  if (failed_ || log_pages_ < checkpoint_pages_) return;
+  log_pages_ = 0;  // until the next commit
+  // As far as those who read allow; the rest next time.
+  const int code = sqlite3_wal_checkpoint_v2(
+      writer_->handle(), nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
+  if (code != SQLITE_BUSY) Failed(writer_->StatusOf(code, "checkpoint"));
 }
 
 void SharedDatabase::Failed(const absl::Status& status) {
@@ -161,6 +190,7 @@ void SharedDatabase::Run() {
     Commit(group);
     for (const Job& job : group) job.done(job.status);
     group.clear();  // what the changes hold goes while others may queue
+    CheckpointIfLarge();
     lock.lock();
   }
 }

@@ -5,6 +5,10 @@
 // leaves the others as they are. A change is answered only after the COMMIT
 // that it was part of.
 //
+// The one that writes also moves the log into the file (a checkpoint), by
+// size, after those who wait were answered: SQLite before 3.51.3 can damage a
+// database where two connections write or do so at once.
+//
 // All changes run on one thread of this class, in the order in which they came.
 // Reads run on the thread of the caller, in a snapshot, and never wait for a
 // sync.
@@ -19,6 +23,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -74,12 +79,16 @@ class SharedDatabase {
   void Run();
   void Commit(std::span<Job> group);
   bool CommitTogether(std::span<Job> group);
+  void CheckpointIfLarge();
   void Failed(const absl::Status& status);
   void WakeToRecover();
 
   const std::string path_;
   const Opener open_writer_;
-  std::optional<Connection> writer_;  // of the thread alone, once it runs
+  // Of the thread alone, once it runs.
+  std::optional<Connection> writer_;
+  int log_pages_ = 0;  // after the last commit
+  std::int64_t checkpoint_pages_ = 0;
   std::mutex read_mutex_;
   std::optional<Connection> reader_;  // guarded by read_mutex_
   std::atomic<bool> failed_ = false;  // the disk; to be opened again

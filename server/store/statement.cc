@@ -5,6 +5,9 @@
 namespace selfcal::server {
 namespace {
 
+// Kept by a connection; some kB each.
+constexpr std::size_t kMaxPrepared = 128;
+
 absl::StatusCode CanonicalCode(int primary) {
   switch (primary) {
     case SQLITE_FULL:
@@ -86,19 +89,47 @@ absl::Status Connection::StatusOf(int code, std::string_view what) const {
                                   what.substr(0, 120)));
 }
 
+Connection::Prepared Connection::Take(std::string_view sql, int* code) {
+  const auto found = prepared_.find(sql);
+  if (found != prepared_.end() && found->second != nullptr) {
+    *code = SQLITE_OK;
+    return std::move(found->second);
+  }
+  sqlite3_stmt* prepared = nullptr;
+  *code = sqlite3_prepare_v3(handle(),
+                             sql.data(),
+                             static_cast<int>(sql.size()),
+                             SQLITE_PREPARE_PERSISTENT,
+                             &prepared,
+                             nullptr);
+  Prepared owned(prepared);
+  // Its place is made here, where want of memory may be told.
+  if (found == prepared_.end() && prepared_.size() < kMaxPrepared) {
+    prepared_.emplace(sql, nullptr);
+  }
+  return owned;
+}
+
+void Connection::Keep(Prepared prepared) {
+  if (prepared == nullptr) return;
+  const auto place = prepared_.find(sqlite3_sql(prepared.get()));
+  if (place == prepared_.end() || place->second != nullptr) return;
+  sqlite3_reset(prepared.get());  // returns the error of its last step again
+  sqlite3_clear_bindings(prepared.get());
+  place->second = std::move(prepared);
+}
+
 void Statement::Prepare(std::string_view sql) {
-  Check(sqlite3_prepare_v2(connection_->handle(),
-                           sql.data(),
-                           static_cast<int>(sql.size()),
-                           &statement_,
-                           nullptr));
+  int code = SQLITE_OK;
+  statement_ = connection_->Take(sql, &code);
+  Check(code);
 }
 
 bool Statement::Next() {
   if (!status_.ok()) {
     return false;
   }
-  const int code = sqlite3_step(statement_);
+  const int code = sqlite3_step(statement_.get());
   Check(code);
   return code == SQLITE_ROW;
 }
@@ -110,37 +141,37 @@ absl::Status Statement::Run() {
 }
 
 std::int64_t Statement::Int(int column) const {
-  return sqlite3_column_int64(statement_, column);
+  return sqlite3_column_int64(statement_.get(), column);
 }
 
 double Statement::Double(int column) const {
-  return sqlite3_column_double(statement_, column);
+  return sqlite3_column_double(statement_.get(), column);
 }
 
 std::string Statement::Text(int column) const {
-  const void* bytes = sqlite3_column_blob(statement_, column);
-  const int size = sqlite3_column_bytes(statement_, column);
+  const void* bytes = sqlite3_column_blob(statement_.get(), column);
+  const int size = sqlite3_column_bytes(statement_.get(), column);
   return bytes == nullptr ? std::string()
                           : std::string(static_cast<const char*>(bytes), size);
 }
 
 bool Statement::IsNull(int column) const {
-  return sqlite3_column_type(statement_, column) == SQLITE_NULL;
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
 }
 
 void Statement::Bind(int index, std::int64_t value) {
-  if (status_.ok()) Check(sqlite3_bind_int64(statement_, index, value));
+  if (status_.ok()) Check(sqlite3_bind_int64(statement_.get(), index, value));
 }
 
 void Statement::Bind(int index, int value) { Bind(index, std::int64_t{value}); }
 
 void Statement::Bind(int index, double value) {
-  if (status_.ok()) Check(sqlite3_bind_double(statement_, index, value));
+  if (status_.ok()) Check(sqlite3_bind_double(statement_.get(), index, value));
 }
 
 void Statement::Bind(int index, std::string_view value) {
   if (status_.ok()) {
-    Check(sqlite3_bind_text64(statement_,
+    Check(sqlite3_bind_text64(statement_.get(),
                               index,
                               value.data() ? value.data() : "",
                               value.size(),
@@ -156,7 +187,7 @@ void Statement::Bind(int index, const std::string& value) {
 void Statement::Bind(int index, BlobView value) {
   if (status_.ok()) {
     // The statement is stepped and gone before the caller's bytes are.
-    Check(sqlite3_bind_blob64(statement_,
+    Check(sqlite3_bind_blob64(statement_.get(),
                               index,
                               value.bytes.data(),
                               value.bytes.size(),
@@ -166,7 +197,7 @@ void Statement::Bind(int index, BlobView value) {
 
 void Statement::Check(int code) {
   if (status_.ok()) {
-    const char* sql = statement_ ? sqlite3_sql(statement_) : nullptr;
+    const char* sql = statement_ ? sqlite3_sql(statement_.get()) : nullptr;
     status_ = connection_->StatusOf(code, sql ? sql : "prepare");
   }
 }
@@ -174,7 +205,8 @@ void Statement::Check(int code) {
 Transaction::Transaction(Connection* connection)
     : connection_(connection), nested_(connection->in_transaction()) {
   status_ =
-      connection_->Execute(nested_ ? "SAVEPOINT part" : "BEGIN IMMEDIATE");
+      Statement(connection_, nested_ ? "SAVEPOINT part" : "BEGIN IMMEDIATE")
+          .Run();
   open_ = status_.ok();
 }
 
@@ -192,7 +224,7 @@ Transaction::~Transaction() {
 
 absl::Status Transaction::Commit() {
   absl::Status status =
-      connection_->Execute(nested_ ? "RELEASE part" : "COMMIT");
+      Statement(connection_, nested_ ? "RELEASE part" : "COMMIT").Run();
   if (status.ok()) {
     open_ = false;
   }
@@ -200,7 +232,7 @@ absl::Status Transaction::Commit() {
 }
 
 Snapshot::Snapshot(Connection* connection)
-    : connection_(connection), status_(connection->Execute("BEGIN")) {}
+    : connection_(connection), status_(Statement(connection, "BEGIN").Run()) {}
 
 Snapshot::~Snapshot() {
   if (status_.ok() && connection_->in_transaction()) {

@@ -11,9 +11,12 @@
 #include <sqlite3.h>
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace selfcal::server {
 
@@ -42,11 +45,25 @@ class Connection {
   sqlite3* handle() const { return handle_.get(); }
 
  private:
+  friend class Statement;
   struct Close {
     void operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
   };
+  struct Finalize {
+    void operator()(sqlite3_stmt* prepared) const {
+      sqlite3_finalize(prepared);
+    }
+  };
+  using Prepared = std::unique_ptr<sqlite3_stmt, Finalize>;
+
   explicit Connection(sqlite3* handle) : handle_(handle) {}
+  Prepared Take(std::string_view sql, int* code);  // null after an error
+  void Keep(Prepared prepared);
+
   std::unique_ptr<sqlite3, Close> handle_;
+  // By their SQL: to prepare a statement takes longer than to run it. Null
+  // while it is in use.
+  std::map<std::string, Prepared, std::less<>> prepared_;
 };
 
 class Statement {
@@ -59,7 +76,7 @@ class Statement {
     int index = 0;
     (Bind(++index, args), ...);
   }
-  ~Statement() { sqlite3_finalize(statement_); }
+  ~Statement() { connection_->Keep(std::move(statement_)); }
   Statement(const Statement&) = delete;
   Statement& operator=(const Statement&) = delete;
 
@@ -86,7 +103,7 @@ class Statement {
   void Check(int code);
 
   Connection* connection_;
-  sqlite3_stmt* statement_ = nullptr;
+  Connection::Prepared statement_;
   absl::Status status_;
 };
 

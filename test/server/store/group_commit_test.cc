@@ -1,5 +1,6 @@
 // Changes that come at the same time share a commit, and are told apart in it.
 #include <atomic>
+#include <filesystem>
 #include <future>
 #include <thread>
 
@@ -165,6 +166,28 @@ TEST_F(GroupCommitTest, ReadersDoNotWaitForTheThreadThatWrites) {
   Hold();
   EXPECT_EQ(Stored(), (std::vector<int>{1}));
   Release();
+}
+
+// As for an hour of streams: the log is written over from its start.
+TEST_F(GroupCommitTest, TheLogIsMovedIntoTheFileBySize) {
+  const std::string data(1 << 20, 'x');
+  ASSERT_TRUE(
+      db_->Write([](Connection* db) {
+           return Statement(db, "CREATE TABLE large (data BLOB) STRICT").Run();
+         })
+          .ok());
+  for (int k = 0; k < 150; ++k) {
+    const absl::Status written = db_->Write([&](Connection* db) {
+      return Statement(db, "INSERT INTO large VALUES (?1)", BlobView{data})
+          .Run();
+    });
+    ASSERT_TRUE(written.ok()) << written;
+  }
+  const auto size = [&](const std::string& name) {
+    return std::filesystem::file_size(folder_.File(name));
+  };
+  EXPECT_LT(size("test.db-wal"), 50u << 20);
+  EXPECT_GT(size("test.db"), 100u << 20);
 }
 
 TEST_F(GroupCommitTest, ManyThreadsLoseNothing) {

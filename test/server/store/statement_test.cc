@@ -56,6 +56,38 @@ TEST_F(StatementTest, FirstErrorStays) {
   EXPECT_EQ(bad.status().code(), absl::StatusCode::kInternal);
 }
 
+TEST_F(StatementTest, OneThatIsPreparedAgainKnowsNothingOfBefore) {
+  const char* const insert = "INSERT INTO t (i, s) VALUES (?1, ?2)";
+  ASSERT_TRUE(Statement(&db_, insert, 1, std::string("one")).Run().ok());
+  ASSERT_TRUE(Statement(&db_, insert, 2).Run().ok());
+  ASSERT_TRUE(Statement(&db_, insert, 3).Run().ok());
+  const char* const select = "SELECT s FROM t WHERE i >= ?1 ORDER BY i";
+  {
+    Statement first(&db_, select, 1);
+    ASSERT_TRUE(first.Next());
+    Statement second(&db_, select, 2);  // while the first is in use
+    ASSERT_TRUE(second.Next());
+    EXPECT_EQ(first.Text(0), "one");
+    EXPECT_TRUE(second.IsNull(0));
+  }
+  Statement third(&db_, select, 3);  // from the start, not where one stood
+  ASSERT_TRUE(third.Next());
+  EXPECT_TRUE(third.IsNull(0));
+  EXPECT_FALSE(third.Next());
+  EXPECT_TRUE(third.status().ok());
+}
+
+TEST_F(StatementTest, AnErrorDoesNotStayWithThePreparedStatement) {
+  ASSERT_TRUE(db_.Execute("CREATE UNIQUE INDEX once ON t (i)").ok());
+  const char* const insert = "INSERT INTO t (i) VALUES (?1)";
+  ASSERT_TRUE(Statement(&db_, insert, 1).Run().ok());
+  EXPECT_FALSE(Statement(&db_, insert, 1).Run().ok());
+  EXPECT_TRUE(Statement(&db_, insert, 2).Run().ok());
+  ASSERT_TRUE(db_.Execute("ALTER TABLE t ADD COLUMN more INTEGER").ok());
+  EXPECT_TRUE(Statement(&db_, insert, 3).Run().ok());
+  EXPECT_EQ(Count(), 3);
+}
+
 TEST_F(StatementTest, TransactionRollsBackUnlessCommitted) {
   {
     Transaction transaction(&db_);
