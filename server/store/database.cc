@@ -16,9 +16,10 @@ constexpr int kOpenFlags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
 // more would write more where a row changes.
 constexpr int kPageBytes = 8192;
 
-// A group of segments whole: pages that do not fit are written to the log
-// before the commit, and again when they change once more.
-constexpr int kCacheKiB = 16 << 10;
+// A group of segments stays in memory whole until its commit: pages that are
+// written to the log before it are written again when they change once more.
+// What is beyond the cache is given back after the commit.
+constexpr int kSpillKiB = 16 << 10;
 
 absl::Status SetSafetyPragmas(Connection* connection) {
   return connection->Execute(
@@ -185,10 +186,8 @@ absl::StatusOr<Connection> OpenDatabase(const std::string& path,
     SELFCAL_RETURN_IF_ERROR(Backup(&connection, path, version));
     SELFCAL_RETURN_IF_ERROR(ApplyFrom(&connection, migrations, version));
   }
-  SELFCAL_RETURN_IF_ERROR(
-      connection.Execute(fmt::format("PRAGMA journal_mode = WAL;"
-                                     "PRAGMA cache_size = -{}",
-                                     kCacheKiB)));
+  SELFCAL_RETURN_IF_ERROR(connection.Execute(fmt::format(
+      "PRAGMA journal_mode = WAL; PRAGMA cache_spill = -{}", kSpillKiB)));
   return connection;
 }
 
