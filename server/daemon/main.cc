@@ -1,5 +1,4 @@
 // selfcald: keeps the calibration of a camera-IMU device true.
-#include <malloc.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
@@ -12,30 +11,18 @@
 #include <string_view>
 
 #include "server/daemon/log.h"
+#include "server/daemon/memory.h"
 #include "server/daemon/options.h"
 #include "server/daemon/serve.h"
 #include "server/daemon/stop.h"
 #include "server/worker/worker.h"
-
-namespace {
-
-// Segments and what a run computes with go from thread to thread: with an arena
-// for each thread the heap grows to several times of what is in use, and what
-// is large stays in it.
-void KeepTheHeapSmall() {
-  mallopt(M_ARENA_MAX, 1);
-  mallopt(M_MMAP_THRESHOLD, 128 << 10);
-  mallopt(M_TRIM_THRESHOLD, 1 << 20);
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   using namespace selfcal::server;
   if (argc == 2 && std::string_view(argv[1]) == kWorkerArgument) {
     return RunWorker();
   }
-  KeepTheHeapSmall();
+  KeepHeapSmall();
   DaemonOptions options;
   if (const auto exit_code = ParseOptions(argc, argv, &options)) {
     return *exit_code;

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "server/daemon/log.h"
+#include "server/daemon/memory.h"
 #include "server/daemon/service_manager.h"
 #include "server/daemon/state_lock.h"
 #include "server/daemon/stop.h"
@@ -95,6 +96,7 @@ std::optional<int> RunUntilStopped(
   const auto interval = std::min(watchdog.value_or(kLookAfter), kLookAfter);
   while (!HasStoppedAccepting()) {
     const auto signal = WaitForSignal(interval);
+    TrimHeap();
     if (!signal && watchdog) {
       store->ListRigs({1, ""}).IgnoreError();
       NotifyAlive();
