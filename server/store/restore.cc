@@ -50,7 +50,13 @@ absl::Status MoveIfThere(const std::string& from, const std::string& to) {
   return RenameDurably(from, to);
 }
 
-absl::Status VerifyApart(const std::string& path) {
+absl::Status Damaged(std::string_view how) {
+  return absl::DataLossError(fmt::format(
+      "the backup is damaged and was not restored, use another: {}", how));
+}
+
+// Whether it is a database that this program can migrate.
+absl::StatusOr<Connection> OpenApart(const std::string& path) {
   SELFCAL_ASSIGN_OR_RETURN(const DatabaseFile file, InspectDatabaseFile(path));
   if (file == DatabaseFile::kAbsent) {
     return absl::DataLossError("no database arrived");
@@ -58,21 +64,23 @@ absl::Status VerifyApart(const std::string& path) {
   SELFCAL_ASSIGN_OR_RETURN(Connection db,
                            Connection::Open(path, SQLITE_OPEN_READWRITE));
   SELFCAL_RETURN_IF_ERROR(VerifySchema(&db, path, EmbeddedMigrations()));
+  return db;
+}
+
+absl::Status VerifyApart(const std::string& path) {
+  auto db = OpenApart(path);
+  // Such errors advise about the database in use, which is sound.
+  if (absl::IsDataLoss(db.status())) return Damaged("it cannot be opened");
+  SELFCAL_RETURN_IF_ERROR(db.status());
   std::string first;
-  SELFCAL_ASSIGN_OR_RETURN(const CheckSummary summary,
-                           CheckDatabase(&db, [&](const StoreProblem& problem) {
-                             if (first.empty()) {
-                               first =
-                                   problem.place + ": " + problem.description;
-                             }
-                             return true;
-                           }));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const CheckSummary summary,
+      CheckDatabase(&*db, [&](const StoreProblem& problem) {
+        if (first.empty()) first = problem.place + ": " + problem.description;
+        return true;
+      }));
   if (summary.problems == 0) return absl::OkStatus();
-  return absl::DataLossError(
-      fmt::format("the backup is damaged and was not restored, use another: {} "
-                  "problems, first {}",
-                  summary.problems,
-                  first));
+  return Damaged(fmt::format("{} problems, first {}", summary.problems, first));
 }
 
 class FileRestoration final : public Restoration {
