@@ -12,9 +12,10 @@ constexpr char kFooter[] =
     "On a terminal the output is a table. Into a pipe it is one record a line, "
     "its fields\nseparated by tabs, without a header. With --json it is the "
     "contract's message in\nproto3 JSON: one document, or one line each for "
-    "import and calibrations watch.\n\n"
+    "import,\ncalibrations watch and doctor.\n\n"
     "Exit codes: 0 done; 1 the daemon refused, or what was asked for failed; 2 "
-    "wrong\nusage or unusable input; 3 the daemon cannot be reached.";
+    "wrong\nusage or unusable input; 3 the daemon cannot be reached; 4 doctor "
+    "found damage.";
 
 void AddGlobalOptions(CLI::App* app, Context* context) {
   app->set_version_flag("--version", "selfcal " SELFCAL_VERSION);
@@ -41,6 +42,10 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddTablesCommand(&app, &context);
     AddRecalibrateCommand(&app, &context);
     AddCalibrationCommands(&app, &context);
+    AddEventsCommand(&app, &context);
+    AddDoctorCommand(&app, &context);
+    AddBackupCommand(&app, &context);
+    AddRestoreCommand(&app, &context);
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -42,6 +42,11 @@ std::shared_ptr<grpc::Channel> Context::Channel() {
   return channel_;
 }
 
+std::shared_ptr<grpc::Channel> Context::Reconnect() {
+  channel_ = nullptr;
+  return Channel();
+}
+
 void Context::Print(const Table& table) const {
   PrintText(terminal ? table.Aligned() : table.Tabbed());
 }

@@ -2,7 +2,8 @@
 // become exit codes.
 //
 // Exit codes: 0 done; 1 the daemon refused, or what was asked for failed; 2
-// wrong usage or unusable input; 3 the daemon cannot be reached.
+// wrong usage or unusable input; 3 the daemon cannot be reached; 4 its database
+// is damaged.
 #pragma once
 
 #include <absl/status/status.h>
@@ -23,6 +24,7 @@ inline constexpr int kDone = 0;
 inline constexpr int kFailed = 1;
 inline constexpr int kUsage = 2;
 inline constexpr int kUnreachable = 3;
+inline constexpr int kDamaged = 4;
 
 struct Context {
   std::string target = "unix:/run/selfcal/selfcald.sock";
@@ -31,7 +33,10 @@ struct Context {
   // Set by the command that was named, run once the line is parsed.
   std::function<int()> command;
 
+  // One for all calls.
   std::shared_ptr<grpc::Channel> Channel();
+  // Another, which knows nothing of how the daemon was before.
+  std::shared_ptr<grpc::Channel> Reconnect();
 
   void Print(const Table& table) const;
   void Print(const Facts& facts) const;

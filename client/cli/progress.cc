@@ -52,8 +52,17 @@ void Progress::Show(std::size_t done,
                     std::size_t total,
                     std::string_view note) {
   if (!terminal_) return;
-  const std::string line =
-      ProgressLine(label_, done, total, note, TerminalWidth());
+  Put(ProgressLine(label_, done, total, note, TerminalWidth()));
+}
+
+void Progress::Say(std::string_view note) {
+  if (!terminal_) return;
+  std::string line = fmt::format("{}: {}", label_, note);
+  line.resize(std::min(line.size(), TerminalWidth() - 1));
+  Put(line);
+}
+
+void Progress::Put(const std::string& line) {
   std::fprintf(stderr, "\r\033[K%s", line.c_str());
   std::fflush(stderr);
   shown_ = true;

@@ -24,9 +24,12 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   void Show(std::size_t done, std::size_t total, std::string_view note);
-  void Clear();  // before other output to the terminal
+  void Say(std::string_view note);  // where the total is not known
+  void Clear();                     // before other output to the terminal
 
  private:
+  void Put(const std::string& line);
+
   const std::string label_;
   const bool terminal_;
   bool shown_ = false;

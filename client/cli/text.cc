@@ -80,6 +80,10 @@ std::string TriggerText(v1::Recalibration::Trigger trigger) {
   return Words(v1::Recalibration::Trigger_Name(trigger));
 }
 
+std::string KindText(v1::Event::Kind kind) {
+  return Words(v1::Event::Kind_Name(kind));
+}
+
 std::string DirectionText(const v1::UnobservedDirection& direction) {
   std::string text;
   int parts = 0;

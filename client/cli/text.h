@@ -11,6 +11,7 @@
 #include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/segment.pb.h"
+#include "selfcal/v1/store_service.pb.h"
 
 namespace selfcal::client {
 
@@ -32,6 +33,7 @@ std::string StateText(v1::Calibration::State state);
 std::string StateText(v1::Segment::State state);
 std::string StateText(v1::Recalibration::State state);
 std::string TriggerText(v1::Recalibration::Trigger trigger);
+std::string KindText(v1::Event::Kind kind);
 
 // "imu.gyro.scale.x", or for a combination "0.71 imu.accel.scale.x - 0.70
 // cam0.p_CI.z"; in brackets what the data says against what was known before.

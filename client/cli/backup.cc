@@ -1,0 +1,97 @@
+// backup: a copy of the daemon's database, whole or not there.
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/cli/new_file.h"
+#include "client/cli/progress.h"
+#include "client/cli/sha256.h"
+#include "client/cli/text.h"
+#include "selfcal/v1/store_service.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Summary = v1::BackupStoreResponse::Summary;
+
+// Receives every piece; *arrived says what did, in the form in which the daemon
+// says what it sent.
+grpc::Status Receive(v1::StoreService::StubInterface* stub,
+                     NewFile* file,
+                     absl::Status* written,
+                     Summary* sent,
+                     Summary* arrived) {
+  Progress progress("backup");
+  progress.Say("the daemon makes a copy");
+  grpc::ClientContext call;
+  const auto reader = stub->BackupStore(&call, v1::BackupStoreRequest());
+  Sha256 digest;
+  v1::BackupStoreResponse response;
+  while (written->ok() && reader->Read(&response)) {
+    if (response.has_summary()) *sent = response.summary();
+    digest.Add(response.data());
+    *written = file->Append(response.data());
+    arrived->set_bytes(arrived->bytes() +
+                       static_cast<std::int64_t>(response.data().size()));
+    progress.Say(BytesText(arrived->bytes()));
+  }
+  if (!written->ok()) call.TryCancel();
+  arrived->set_sha256(digest.Finish());
+  return reader->Finish();
+}
+
+int Backup(Context* context, const std::string& path, bool force) {
+  NewFile file;
+  absl::Status written = file.Open(path, force);
+  if (!written.ok()) return FailInput(written);
+  const auto stub = v1::StoreService::NewStub(context->Channel());
+  Summary sent;
+  Summary arrived;
+  const grpc::Status status =
+      Receive(stub.get(), &file, &written, &sent, &arrived);
+  if (written.ok()) {
+    if (!status.ok()) return Fail(*context, status);
+    if (arrived.bytes() != sent.bytes() || arrived.sha256() != sent.sha256()) {
+      PrintError(fmt::format(
+          "the backup did not arrive whole: try again; there is no {}", path));
+      return kFailed;
+    }
+    written = file.Commit();
+  }
+  if (!written.ok()) {
+    PrintError(std::string(written.message()));
+    return kFailed;
+  }
+  if (context->json) {
+    context->PrintJson(arrived);
+    return kDone;
+  }
+  Facts facts;
+  facts.Add("backup", path);
+  facts.Add("size", BytesText(arrived.bytes()));
+  facts.Add("sha256", HexText(arrived.sha256()));
+  context->Print(facts);
+  return kDone;
+}
+
+}  // namespace
+
+void AddBackupCommand(CLI::App* app, Context* context) {
+  CLI::App* backup = app->add_subcommand(
+      "backup",
+      "Copy the daemon's database, as it is at one instant, to a file; the "
+      "daemon goes on meanwhile");
+  const auto path = std::make_shared<std::string>();
+  const auto force = std::make_shared<bool>(false);
+  backup->add_option("FILE", *path)->required();
+  backup->add_flag("--force", *force, "Overwrite the file if there is one");
+  backup->callback([context, path, force] {
+    context->command = [context, path, force] {
+      return Backup(context, *path, *force);
+    };
+  });
+}
+
+}  // namespace selfcal::client

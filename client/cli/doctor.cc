@@ -1,0 +1,75 @@
+// doctor: whether what the daemon keeps is sound.
+#include <fmt/format.h>
+
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/cli/text.h"
+#include "selfcal/v1/store_service.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+void Print(const Context& context,
+           const v1::CheckStoreResponse::Problem& problem) {
+  Table line({{""}, {""}, {""}});
+  line.Add({"problem", problem.place(), problem.description()});
+  context.Print(line);
+}
+
+void Print(const Context& context,
+           const v1::CheckStoreResponse::Summary& summary) {
+  Facts facts;
+  facts.Add("database", BytesText(summary.bytes()));
+  facts.Add("checksums", fmt::format("{}", summary.checksums()));
+  facts.Add("segments with data", fmt::format("{}", summary.payloads()));
+  facts.Add("problems", fmt::format("{}", summary.problems()));
+  context.Print(facts);
+}
+
+int Doctor(Context* context) {
+  const auto stub = v1::StoreService::NewStub(context->Channel());
+  grpc::ClientContext call;
+  const auto reader = stub->CheckStore(&call, v1::CheckStoreRequest());
+  v1::CheckStoreResponse response;
+  bool damaged = false;
+  bool whole = false;
+  while (reader->Read(&response)) {
+    damaged = damaged || response.has_problem();
+    if (response.has_summary()) {
+      whole = true;
+      damaged = damaged || response.summary().problems() > 0;
+    }
+    if (context->json) {
+      context->PrintJson(response, /*line=*/true);
+    } else if (response.has_problem()) {
+      Print(*context, response.problem());
+    } else {
+      Print(*context, response.summary());
+    }
+  }
+  const grpc::Status status = reader->Finish();
+  int code = kDone;
+  if (!status.ok()) {
+    code = Fail(*context, status);
+    damaged = damaged || status.error_code() == grpc::StatusCode::DATA_LOSS;
+  } else if (!whole) {
+    PrintError("the check ended without a summary: try again");
+    code = kFailed;
+  }
+  return damaged ? kDamaged : code;
+}
+
+}  // namespace
+
+void AddDoctorCommand(CLI::App* app, Context* context) {
+  CLI::App* doctor = app->add_subcommand(
+      "doctor",
+      "Check the daemon's database while it runs: structure, references, every "
+      "checksum, the data of every segment. Exits with 0 if it is sound, with "
+      "4 if it is damaged, with another code if that could not be found out");
+  doctor->callback(
+      [context] { context->command = [context] { return Doctor(context); }; });
+}
+
+}  // namespace selfcal::client

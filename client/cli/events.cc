@@ -1,0 +1,139 @@
+// events: what has happened.
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/commands.h"
+#include "client/cli/text.h"
+#include "client/cli/time_input.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/store_service.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using google::protobuf::Timestamp;
+using google::protobuf::util::TimeUtil;
+using Service = v1::StoreService::StubInterface;
+
+constexpr int kPageSize = 500;
+
+struct Options {
+  std::string rig;                 // empty: all
+  std::vector<std::string> kinds;  // as KindName; empty: all
+  std::string since;
+  std::size_t limit = 0;  // none
+};
+
+// "data-evicted".
+std::string KindName(v1::Event::Kind kind) {
+  std::string name = KindText(kind);
+  std::replace(name.begin(), name.end(), ' ', '-');
+  return name;
+}
+
+std::vector<std::string> KindNames() {
+  const auto* kinds = v1::Event::Kind_descriptor();
+  std::vector<std::string> names;
+  for (int k = 0; k < kinds->value_count(); ++k) {
+    const auto kind = static_cast<v1::Event::Kind>(kinds->value(k)->number());
+    if (kind != v1::Event::KIND_UNSPECIFIED) names.push_back(KindName(kind));
+  }
+  return names;
+}
+
+bool IsWanted(const v1::Event& event,
+              const Options& options,
+              const std::optional<Timestamp>& since) {
+  if (since && event.time() < *since) return false;
+  return options.kinds.empty() ||
+         std::find(options.kinds.begin(),
+                   options.kinds.end(),
+                   KindName(event.kind())) != options.kinds.end();
+}
+
+// Page by page, so that a long history needs no more memory than what is
+// wanted of it.
+grpc::Status Read(Context* context,
+                  const Options& options,
+                  const std::optional<Timestamp>& since,
+                  std::deque<v1::Event>* events) {
+  const auto stub = v1::StoreService::NewStub(context->Channel());
+  v1::ListEventsRequest request;
+  if (!options.rig.empty()) request.set_parent(RigName(options.rig));
+  request.set_page_size(kPageSize);
+  do {
+    v1::ListEventsResponse page;
+    const grpc::Status status =
+        Call<Service>(stub.get(), &Service::ListEvents, request, &page);
+    if (!status.ok()) return status;
+    for (const v1::Event& event : page.events()) {
+      if (IsWanted(event, options, since)) events->push_back(event);
+      if (options.limit > 0 && events->size() > options.limit) {
+        events->pop_front();
+      }
+    }
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return grpc::Status::OK;
+}
+
+void Print(const Context& context, const std::deque<v1::Event>& events) {
+  if (context.json) {
+    v1::ListEventsResponse document;
+    for (const v1::Event& event : events) *document.add_events() = event;
+    context.PrintJson(document);
+    return;
+  }
+  Table table({{"event", true}, {"time"}, {"rig"}, {"kind"}, {"detail"}});
+  for (const v1::Event& event : events) {
+    table.Add({fmt::format("{}", event.number()),
+               TimeText(event.time()),
+               LastPart(event.rig()),
+               KindText(event.kind()),
+               event.detail()});
+  }
+  context.Print(table);
+}
+
+int List(Context* context, const Options& options) {
+  std::optional<Timestamp> since;
+  if (!options.since.empty()) {
+    const auto time = ParseTime(options.since, TimeUtil::GetCurrentTime());
+    if (!time.ok()) return FailInput(time.status());
+    since = *time;
+  }
+  std::deque<v1::Event> events;
+  const grpc::Status status = Read(context, options, since, &events);
+  if (!status.ok()) return Fail(*context, status);
+  Print(*context, events);
+  return kDone;
+}
+
+}  // namespace
+
+void AddEventsCommand(CLI::App* app, Context* context) {
+  CLI::App* events = app->add_subcommand(
+      "events", "List what has happened, oldest first, of one rig or of all");
+  const auto options = std::make_shared<Options>();
+  events->add_option("RIG", options->rig);
+  events->add_option("--kind", options->kinds, "Of this kind only; repeatable")
+      ->check(CLI::IsMember(KindNames()));
+  events->add_option("--since",
+                     options->since,
+                     "Not before 2026-11-21, '2026-11-21 04:10:03' (UTC), or "
+                     "30s, 15m, 2h, 7d ago");
+  events->add_option("--limit", options->limit, "The newest of them, so many")
+      ->check(CLI::PositiveNumber);
+  events->callback([context, options] {
+    context->command = [context, options] { return List(context, *options); };
+  });
+}
+
+}  // namespace selfcal::client

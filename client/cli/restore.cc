@@ -1,0 +1,195 @@
+// restore: a backup in the place of the daemon's database.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/cli/commands.h"
+#include "client/cli/progress.h"
+#include "client/cli/sha256.h"
+#include "client/cli/text.h"
+#include "selfcal/v1/store_service.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Clock = std::chrono::system_clock;
+using Service = v1::StoreService::StubInterface;
+
+constexpr std::size_t kPiece = 1 << 20;
+constexpr std::chrono::milliseconds kRetryEvery{200};
+constexpr double kDefaultTimeoutS = 120;
+
+struct Options {
+  std::string path;
+  bool yes = false;
+  double timeout_s = kDefaultTimeoutS;
+};
+
+// A database of SQLite that the daemon marked as its own: what begins otherwise
+// need not be sent. The daemon looks at all of it.
+bool IsBackup(std::istream* file) {
+  constexpr std::string_view kMagic("SQLite format 3\0", 16);
+  constexpr std::string_view kApplication = "SCAL";
+  constexpr std::size_t kApplicationAt = 68;
+  std::string header(kApplicationAt + kApplication.size(), '\0');
+  file->read(header.data(), static_cast<std::streamsize>(header.size()));
+  return *file && header.starts_with(kMagic) && header.ends_with(kApplication);
+}
+
+absl::Status OpenBackup(const std::string& path, std::ifstream* file) {
+  file->open(path, std::ios::binary);
+  std::error_code error;
+  if (!*file || !std::filesystem::is_regular_file(path, error)) {
+    return absl::NotFoundError(fmt::format("cannot read {}", path));
+  }
+  if (!IsBackup(file)) {
+    return absl::InvalidArgumentError(fmt::format(
+        "{} is not a backup of selfcald: name a file that selfcal backup wrote",
+        path));
+  }
+  file->seekg(0);
+  return absl::OkStatus();
+}
+
+bool Confirmed(const Context& context, const std::string& path) {
+  std::cerr << fmt::format(
+                   "Put {} in the place of the database of the daemon at {}?\n"
+                   "What was stored since is in the present database alone, "
+                   "which is kept apart. [y/N] ",
+                   path,
+                   context.target)
+            << std::flush;
+  std::string answer;
+  std::getline(std::cin, answer);
+  return answer == "y" || answer == "Y" || answer == "yes";
+}
+
+// False if the file could not be read to its end.
+bool Send(std::ifstream* file,
+          std::size_t size,
+          grpc::ClientWriterInterface<v1::RestoreStoreRequest>* writer) {
+  Progress progress("restore");
+  Sha256 digest;
+  std::vector<char> piece(kPiece);
+  v1::RestoreStoreRequest request;
+  std::size_t sent = 0;
+  while (file->read(piece.data(), kPiece), file->gcount() > 0) {
+    request.set_data(piece.data(), static_cast<std::size_t>(file->gcount()));
+    digest.Add(request.data());
+    // What stopped it is the status of the call.
+    if (!writer->Write(request)) return true;
+    sent += request.data().size();
+    progress.Show(sent / kPiece, size / kPiece, "MiB");
+  }
+  if (!file->eof()) return false;
+  request.set_sha256(digest.Finish());
+  writer->Write(request);
+  writer->WritesDone();
+  return true;
+}
+
+// The daemon that answered stops, which its connection shows, and one answers
+// that was not connected to before.
+bool WaitForNewStart(Context* context, double timeout_s) {
+  Progress progress("restore");
+  progress.Say("verified; the daemon starts anew");
+  const auto until =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                         std::chrono::duration<double>(timeout_s));
+  const auto before = context->Channel();
+  while (before->GetState(false) == GRPC_CHANNEL_READY) {
+    if (!before->WaitForStateChange(GRPC_CHANNEL_READY, until)) return false;
+  }
+  do {
+    const auto stub = v1::StoreService::NewStub(context->Reconnect());
+    v1::ListEventsRequest request;
+    request.set_page_size(1);
+    v1::ListEventsResponse response;
+    const grpc::Status status =
+        Call<Service>(stub.get(), &Service::ListEvents, request, &response);
+    if (!IsUnreachable(status) &&
+        status.error_code() != grpc::StatusCode::CANCELLED) {
+      return true;
+    }
+    std::this_thread::sleep_for(kRetryEvery);
+  } while (Clock::now() < until);
+  return false;
+}
+
+int Report(Context* context,
+           const Options& options,
+           const v1::RestoreStoreResponse& response) {
+  if (context->json) {
+    context->PrintJson(response);
+  } else {
+    Facts facts;
+    facts.Add("restored", options.path);
+    facts.Add("previous database", response.previous_database());
+    context->Print(facts);
+  }
+  if (WaitForNewStart(context, options.timeout_s)) return kDone;
+  PrintError(fmt::format(
+      "the daemon at {} did not start anew within {:g} s: look at its log. The "
+      "backup is verified, and its next start puts it in place",
+      context->target,
+      options.timeout_s));
+  return kUnreachable;
+}
+
+int Restore(Context* context, const Options& options) {
+  std::ifstream file;
+  const absl::Status opened = OpenBackup(options.path, &file);
+  if (!opened.ok()) return FailInput(opened);
+  if (!options.yes && !Confirmed(*context, options.path)) {
+    PrintError("nothing was changed; without a question: --yes");
+    return kUsage;
+  }
+  const auto stub = v1::StoreService::NewStub(context->Channel());
+  grpc::ClientContext call;
+  v1::RestoreStoreResponse response;
+  const auto writer = stub->RestoreStore(&call, &response);
+  std::error_code error;
+  const auto size = std::filesystem::file_size(options.path, error);
+  const bool read = Send(&file, error ? 0 : size, writer.get());
+  if (!read) call.TryCancel();
+  const grpc::Status status = writer->Finish();
+  if (!read) {
+    return FailInput(absl::DataLossError(
+        fmt::format("cannot read {} to its end", options.path)));
+  }
+  if (!status.ok()) return Fail(*context, status);
+  return Report(context, options, response);
+}
+
+}  // namespace
+
+void AddRestoreCommand(CLI::App* app, Context* context) {
+  CLI::App* restore = app->add_subcommand(
+      "restore",
+      "Put a backup in the place of the daemon's database: the daemon verifies "
+      "it, keeps the present one under another name and starts anew");
+  const auto options = std::make_shared<Options>();
+  restore->add_option("FILE", options->path, "What selfcal backup wrote")
+      ->required();
+  restore->add_flag("--yes", options->yes, "Do not ask");
+  restore
+      ->add_option("--timeout",
+                   options->timeout_s,
+                   "Give up after waiting this long for the new start [s]")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->capture_default_str();
+  restore->callback([context, options] {
+    context->command = [context, options] {
+      return Restore(context, *options);
+    };
+  });
+}
+
+}  // namespace selfcal::client

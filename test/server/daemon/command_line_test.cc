@@ -1,0 +1,76 @@
+// The command line as a program, on a daemon as a program.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "test/server/daemon/daemon_fixture.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class CommandLineTest : public DaemonTest {
+ protected:
+  struct Outcome {
+    int code;
+    std::string text;  // of both streams
+  };
+
+  Outcome Selfcal(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), SELFCAL_PATH);
+    arguments.insert(
+        arguments.end(),
+        {"--target", "unix:" + (state_ / "selfcald.sock").string()});
+    const auto output = folder_ / ("output" + std::to_string(++runs_));
+    Process selfcal(arguments, output);
+    const int code = selfcal.Wait().value_or(-1);
+    return {code, selfcal.Log()};
+  }
+
+ private:
+  int runs_ = 0;
+};
+
+TEST_F(CommandLineTest, BacksUpChecksAndRestoresWhileTheDaemonRuns) {
+  const auto daemon = StartAndWait();
+  const Rig rig = CreateRig();
+  const std::string backup = folder_ / "backup.db";
+  Outcome outcome = Selfcal({"backup", backup});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+
+  Stream(TestSegments(rig, 2));
+  ASSERT_TRUE(AllScored());
+  outcome = Selfcal({"doctor"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_THAT(outcome.text, HasSubstr("problems\t0"));
+  outcome = Selfcal({"events", "r", "--kind", "rig-created"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_THAT(outcome.text, HasSubstr("\tr\trig created\t"));
+
+  // Once it returns the daemon serves what the backup holds.
+  outcome = Selfcal({"restore", backup, "--yes"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text << daemon->Log();
+  EXPECT_THAT(outcome.text, HasSubstr("selfcal.db.before-restore-"));
+  outcome = Selfcal({"segments", "list", "r"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_EQ(outcome.text, "");
+
+  // A damaged one is refused, and changes nothing.
+  std::filesystem::resize_file(backup, std::filesystem::file_size(backup) / 2);
+  outcome = Selfcal({"restore", backup, "--yes"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(
+      outcome.text,
+      AllOf(HasSubstr("the backup is damaged"), Not(HasSubstr("previous"))));
+  EXPECT_EQ(Selfcal({"rig", "show", "r"}).code, 0);
+  daemon->Signal(SIGTERM);
+  EXPECT_EQ(daemon->Wait(), 0);
+}
+
+}  // namespace
+}  // namespace selfcal::server
