@@ -19,9 +19,24 @@ constexpr char kFooter[] =
 
 void AddGlobalOptions(CLI::App* app, Context* context) {
   app->set_version_flag("--version", "selfcal " SELFCAL_VERSION);
-  app->add_option("--target", context->target, "Address of the daemon")
+  Target& target = context->target;
+  app->add_option("--target",
+                  target.address,
+                  "The daemon: unix:/path, host:port (with TLS), or "
+                  "insecure:host:port (without)")
       ->envname("SELFCAL_TARGET")
       ->capture_default_str();
+  app->add_option("--ca",
+                  target.ca_file,
+                  "For host:port: the authority of the daemon's certificate "
+                  "(PEM)")
+      ->envname("SELFCAL_CA");
+  app->add_option("--cert",
+                  target.certificate_file,
+                  "For host:port: your certificate (PEM)")
+      ->envname("SELFCAL_CERT");
+  app->add_option("--key", target.key_file, "For host:port: its key (PEM)")
+      ->envname("SELFCAL_KEY");
   app->add_flag("--json", context->json, "Print JSON");
   app->require_subcommand(1);
   app->fallthrough();  // global options may come after the command, too
@@ -51,6 +66,8 @@ int RunCommandLine(int argc, const char* const* argv) {
     } catch (const CLI::ParseError& error) {
       return app.exit(error) == 0 ? kDone : kUsage;
     }
+    const absl::Status connected = context.Connect();
+    if (!connected.ok()) return FailInput(connected);
     const int code = context.command();
     if (code == kDone && (std::fflush(stdout) != 0 || std::ferror(stdout))) {
       PrintError("the output could not be written");

@@ -4,6 +4,7 @@
 #include <google/protobuf/util/json_util.h>
 
 #include <cstdio>
+#include <utility>
 
 #include "client/selfcal/connection.h"
 #include "google/rpc/error_details.pb.h"
@@ -37,14 +38,14 @@ std::string Violations(const grpc::Status& status) {
 
 }  // namespace
 
-std::shared_ptr<grpc::Channel> Context::Channel() {
-  if (channel_ == nullptr) channel_ = MakeChannel(target);
-  return channel_;
-}
-
-std::shared_ptr<grpc::Channel> Context::Reconnect() {
-  channel_ = nullptr;
-  return Channel();
+absl::Status Context::Connect() {
+  auto connection = Resolve(target);
+  if (!connection.ok()) return connection.status();
+  auto channel = MakeChannel(*connection);
+  if (!channel.ok()) return channel.status();
+  connection_ = *std::move(connection);
+  channel_ = *std::move(channel);
+  return absl::OkStatus();
 }
 
 void Context::Print(const Table& table) const {
@@ -91,7 +92,7 @@ int Fail(const Context& context, const grpc::Status& status) {
         fmt::format("the daemon at {} does not answer: {}\n"
                     "  Is selfcald running? Another address: --target, or "
                     "SELFCAL_TARGET in the environment.",
-                    context.target,
+                    context.target.address,
                     status.error_message()));
     return kUnreachable;
   }

@@ -17,6 +17,8 @@
 #include <string_view>
 
 #include "client/cli/table.h"
+#include "client/cli/target.h"
+#include "client/selfcal/client.h"
 
 namespace selfcal::client {
 
@@ -27,16 +29,19 @@ inline constexpr int kUnreachable = 3;
 inline constexpr int kDamaged = 4;
 
 struct Context {
-  std::string target = "unix:/run/selfcal/selfcald.sock";
+  Target target;
   bool json = false;
   bool terminal = false;  // stdout is one
   // Set by the command that was named, run once the line is parsed.
   std::function<int()> command;
 
-  // One for all calls.
-  std::shared_ptr<grpc::Channel> Channel();
-  // Another, which knows nothing of how the daemon was before.
-  std::shared_ptr<grpc::Channel> Reconnect();
+  // Before the first call, and to forget how the daemon was. Says what is wrong
+  // with the target or its files; the daemon need not be there.
+  absl::Status Connect();
+  // One for all calls from then on.
+  std::shared_ptr<grpc::Channel> Channel() const { return channel_; }
+  // For what the library connects.
+  const ClientOptions& Connection() const { return connection_; }
 
   void Print(const Table& table) const;
   void Print(const Facts& facts) const;
@@ -45,6 +50,7 @@ struct Context {
                  bool line = false) const;
 
  private:
+  ClientOptions connection_;
   std::shared_ptr<grpc::Channel> channel_;
 };
 

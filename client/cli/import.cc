@@ -142,8 +142,7 @@ absl::Status DrainPatiently(SegmentStream* stream,
 int Send(Context* context,
          const ImportOptions& options,
          std::vector<MotionSegment> segments) {
-  ClientOptions client;
-  client.target = context->target;
+  ClientOptions client = context->Connection();
   client.rig = options.rig;
   client.max_queue = static_cast<int>(segments.size());
   client.max_backoff = std::chrono::seconds(1);

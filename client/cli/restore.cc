@@ -64,7 +64,7 @@ bool Confirmed(const Context& context, const std::string& path) {
                    "What was stored since is in the present database alone, "
                    "which is kept apart. [y/N] ",
                    path,
-                   context.target)
+                   context.target.address)
             << std::flush;
   std::string answer;
   std::getline(std::cin, answer);
@@ -95,6 +95,19 @@ bool Send(std::ifstream* file,
   return true;
 }
 
+// On a connection of its own.
+bool Answers(Context* context) {
+  if (!context->Connect().ok()) return false;
+  const auto stub = v1::StoreService::NewStub(context->Channel());
+  v1::ListEventsRequest request;
+  request.set_page_size(1);
+  v1::ListEventsResponse response;
+  const grpc::Status status =
+      Call<Service>(stub.get(), &Service::ListEvents, request, &response);
+  return !IsUnreachable(status) &&
+         status.error_code() != grpc::StatusCode::CANCELLED;
+}
+
 // The daemon that answered stops, which its connection shows, and one answers
 // that was not connected to before.
 bool WaitForNewStart(Context* context, double timeout_s) {
@@ -108,16 +121,7 @@ bool WaitForNewStart(Context* context, double timeout_s) {
     if (!before->WaitForStateChange(GRPC_CHANNEL_READY, until)) return false;
   }
   do {
-    const auto stub = v1::StoreService::NewStub(context->Reconnect());
-    v1::ListEventsRequest request;
-    request.set_page_size(1);
-    v1::ListEventsResponse response;
-    const grpc::Status status =
-        Call<Service>(stub.get(), &Service::ListEvents, request, &response);
-    if (!IsUnreachable(status) &&
-        status.error_code() != grpc::StatusCode::CANCELLED) {
-      return true;
-    }
+    if (Answers(context)) return true;
     std::this_thread::sleep_for(kRetryEvery);
   } while (Clock::now() < until);
   return false;
@@ -138,7 +142,7 @@ int Report(Context* context,
   PrintError(fmt::format(
       "the daemon at {} did not start anew within {:g} s: look at its log. The "
       "backup is verified, and its next start puts it in place",
-      context->target,
+      context->target.address,
       options.timeout_s));
   return kUnreachable;
 }

@@ -52,12 +52,19 @@ struct CannedDaemon final : v1::RigService::Service,
   std::int64_t reject_index = -1;      // of the segments that are sent
   std::atomic<int> broken_watches{0};  // that many end before the run does
 
-  CannedDaemon() {
+  // On a unix socket, or with credentials on a port.
+  explicit CannedDaemon(
+      const std::shared_ptr<grpc::ServerCredentials>& credentials = nullptr) {
     static std::atomic<int> count{0};
+    int port = 0;
     target = "unix:" + ::testing::TempDir() + "selfcal-canned-" +
              std::to_string(getpid()) + "-" + std::to_string(count++) + ".sock";
     grpc::ServerBuilder builder;
-    builder.AddListeningPort(target, grpc::InsecureServerCredentials());
+    if (credentials == nullptr) {
+      builder.AddListeningPort(target, grpc::InsecureServerCredentials());
+    } else {
+      builder.AddListeningPort("127.0.0.1:0", credentials, &port);
+    }
     builder.RegisterService(static_cast<v1::RigService::Service*>(this));
     builder.RegisterService(static_cast<v1::SegmentService::Service*>(this));
     builder.RegisterService(
@@ -65,6 +72,7 @@ struct CannedDaemon final : v1::RigService::Service,
     builder.RegisterService(
         static_cast<v1::RecalibrationService::Service*>(this));
     server = builder.BuildAndStart();
+    if (port != 0) target = "127.0.0.1:" + std::to_string(port);
   }
   ~CannedDaemon() override {
     server->Shutdown(std::chrono::system_clock::now());

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "test/server/certificates.h"
 #include "test/server/daemon/daemon_fixture.h"
 
 namespace selfcal::server {
@@ -23,14 +24,16 @@ class CommandLineTest : public DaemonTest {
 
   Outcome Selfcal(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), SELFCAL_PATH);
-    arguments.insert(
-        arguments.end(),
-        {"--target", "unix:" + (state_ / "selfcald.sock").string()});
+    arguments.insert(arguments.end(), connection_.begin(), connection_.end());
     const auto output = folder_ / ("output" + std::to_string(++runs_));
     Process selfcal(arguments, output);
     const int code = selfcal.Wait().value_or(-1);
     return {code, selfcal.Log()};
   }
+
+  // How to reach the daemon.
+  std::vector<std::string> connection_ = {
+      "--target", "unix:" + (state_ / "selfcald.sock").string()};
 
  private:
   int runs_ = 0;
@@ -68,6 +71,61 @@ TEST_F(CommandLineTest, BacksUpChecksAndRestoresWhileTheDaemonRuns) {
       outcome.text,
       AllOf(HasSubstr("the backup is damaged"), Not(HasSubstr("previous"))));
   EXPECT_EQ(Selfcal({"rig", "show", "r"}).code, 0);
+  daemon->Signal(SIGTERM);
+  EXPECT_EQ(daemon->Wait(), 0);
+}
+
+TEST_F(CommandLineTest, DoesOverMutualTlsWhatItsCertificateSays) {
+  Certificates certificates;
+  certificates.Add("operator", "ca", "URI:selfcal://role/administer");
+  certificates.Add("device", "ca", "URI:selfcal://role/produce/rigs/r");
+  // The fixture's client creates the rig, on the socket.
+  const std::string socket = "unix:" + (state_ / "selfcald.sock").string();
+  const auto daemon = StartAndWait({"--listen",
+                                    socket,
+                                    "--listen",
+                                    "127.0.0.1:0",
+                                    "--tls-certificate",
+                                    certificates.Pem("server"),
+                                    "--tls-key",
+                                    certificates.Key("server"),
+                                    "--tls-client-ca",
+                                    certificates.Pem("ca")});
+  CreateRig();
+  const std::string log = daemon->Log();
+  const auto port = log.find("127.0.0.1:");
+  ASSERT_NE(port, log.npos) << log;
+  const std::string address =
+      log.substr(port, log.find_first_of(", \n", port) - port);
+  const auto as = [&](const std::string& name) {
+    connection_ = {"--target",
+                   address,
+                   "--ca",
+                   certificates.Pem("ca"),
+                   "--cert",
+                   certificates.Pem(name),
+                   "--key",
+                   certificates.Key(name)};
+  };
+
+  as("device");
+  EXPECT_EQ(Selfcal({"rig", "show", "r"}).code, 0);
+  EXPECT_EQ(Selfcal({"backup", folder_ / "stolen.db"}).code, 1);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "stolen.db"));
+
+  as("operator");
+  const std::string backup = folder_ / "backup.db";
+  for (const std::vector<std::string>& command :
+       std::vector<std::vector<std::string>>{{"rig", "list"},
+                                             {"segments", "list", "r"},
+                                             {"tables", "r"},
+                                             {"calibrations", "show", "r"},
+                                             {"events"},
+                                             {"doctor"},
+                                             {"backup", backup}}) {
+    const Outcome outcome = Selfcal(command);
+    EXPECT_EQ(outcome.code, 0) << command[0] << ": " << outcome.text;
+  }
   daemon->Signal(SIGTERM);
   EXPECT_EQ(daemon->Wait(), 0);
 }

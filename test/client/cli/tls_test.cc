@@ -1,0 +1,127 @@
+// The commands over mutual TLS.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "client/cli/commands.h"
+#include "test/client/cli/canned_daemon.h"
+#include "test/server/certificates.h"
+
+namespace selfcal::client {
+namespace {
+
+using ::testing::HasSubstr;
+
+class TlsCommands : public ::testing::Test {
+ protected:
+  TlsCommands() : daemon_(Credentials(&certificates_)) {
+    certificates_.Add("operator", "ca", "URI:selfcal://role/administer");
+    daemon_.rigs.emplace_back().set_name("rigs/device");
+  }
+
+  static std::shared_ptr<grpc::ServerCredentials> Credentials(
+      server::Certificates* certificates) {
+    grpc::SslServerCredentialsOptions tls(
+        GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
+    using server::Certificates;
+    tls.pem_root_certs = Certificates::Read(certificates->Pem("ca"));
+    tls.pem_key_cert_pairs.push_back(
+        {Certificates::Read(certificates->Key("server")),
+         Certificates::Read(certificates->Pem("server"))});
+    return grpc::SslServerCredentials(tls);
+  }
+  std::vector<std::string> As(const std::string& name,
+                              const std::string& authority = "ca") const {
+    return {"--ca",
+            certificates_.Pem(authority),
+            "--cert",
+            certificates_.Pem(name),
+            "--key",
+            certificates_.Key(name)};
+  }
+
+  int Selfcal(std::vector<std::string> arguments,
+              const std::vector<std::string>& more = {}) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    std::vector<const char*> argv = {"selfcal", "--target", target_.c_str()};
+    for (const auto& argument : arguments) argv.push_back(argument.c_str());
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int code = RunCommandLine(static_cast<int>(argv.size()), argv.data());
+    out_ = testing::internal::GetCapturedStdout();
+    err_ = testing::internal::GetCapturedStderr();
+    return code;
+  }
+
+  server::Certificates certificates_;
+  CannedDaemon daemon_;
+  std::string target_ = daemon_.target;
+  std::string out_;
+  std::string err_;
+};
+
+TEST_F(TlsCommands, WorkWithACertificateOfTheAuthority) {
+  EXPECT_EQ(Selfcal({"rig", "list"}, As("operator")), 0) << err_;
+  EXPECT_THAT(out_, HasSubstr("device"));
+}
+
+TEST_F(TlsCommands, TakeTheFilesFromTheEnvironment) {
+  setenv("SELFCAL_CA", certificates_.Pem("ca").c_str(), 1);
+  setenv("SELFCAL_CERT", certificates_.Pem("operator").c_str(), 1);
+  setenv("SELFCAL_KEY", certificates_.Key("operator").c_str(), 1);
+  EXPECT_EQ(Selfcal({"rig", "list"}), 0) << err_;
+  for (const char* name : {"SELFCAL_CA", "SELFCAL_CERT", "SELFCAL_KEY"}) {
+    unsetenv(name);
+  }
+  EXPECT_THAT(out_, HasSubstr("device"));
+}
+
+TEST_F(TlsCommands, AreNotConnectedWithTheWrongOnes) {
+  certificates_.AddAuthority("other");
+  certificates_.Add("stranger", "other", "URI:selfcal://role/administer");
+  EXPECT_EQ(Selfcal({"rig", "list"}, As("stranger")), 3);
+  EXPECT_EQ(Selfcal({"rig", "list"}, As("operator", "other")), 3);
+  EXPECT_EQ(out_, "");
+  target_ = "insecure:" + daemon_.target;
+  EXPECT_EQ(Selfcal({"rig", "list"}, As("operator")), 3);
+}
+
+TEST_F(TlsCommands, SayWhatIsMissing) {
+  EXPECT_EQ(Selfcal({"rig", "list"}), 2);
+  EXPECT_THAT(err_, HasSubstr("insecure:" + target_));
+  auto files = As("operator");
+  files[1] = "/nonexistent/ca.pem";
+  EXPECT_EQ(Selfcal({"rig", "list"}, files), 2);
+  EXPECT_THAT(err_, HasSubstr("/nonexistent/ca.pem"));
+}
+
+// A stream of the library's, not a call on the channel of the others.
+TEST_F(TlsCommands, ImportARecording) {
+  const char* folder = std::getenv("SELFCAL_TEST_DATA");
+  const std::string map =
+      std::string(folder != nullptr ? folder : SELFCAL_TEST_DATA_DEFAULT) +
+      "/tango_handheld";
+  if (!std::filesystem::is_directory(map)) {
+    GTEST_SKIP() << map << " is missing; name the folder of recordings in "
+                 << "SELFCAL_TEST_DATA";
+  }
+  EXPECT_EQ(Selfcal({"import", "device", map}, As("operator")), 0) << err_;
+  EXPECT_THAT(out_, HasSubstr("\t13\tSTORED\n"));
+}
+
+TEST(InsecureCommands, WorkOnAPortIfItIsAskedForByName) {
+  CannedDaemon daemon(grpc::InsecureServerCredentials());
+  daemon.rigs.emplace_back().set_name("rigs/device");
+  const std::string target = "insecure:" + daemon.target;
+  const char* argv[] = {"selfcal", "rig", "list", "--target", target.c_str()};
+  testing::internal::CaptureStdout();
+  EXPECT_EQ(RunCommandLine(5, argv), 0);
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("device"));
+}
+
+}  // namespace
+}  // namespace selfcal::client
