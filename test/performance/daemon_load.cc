@@ -1,5 +1,6 @@
-// The daemon with its default settings under clients that send as fast as it
-// acknowledges: whether each gets on, and the daemon's resident memory.
+// The daemon with its default settings, but for the priority of runs, under
+// clients that send as fast as it acknowledges: whether each gets on, and the
+// daemon's resident memory.
 //
 //   selfcal_daemon_load --daemon build/release/server/daemon/selfcald
 //       --folder DIR [--clients N] [--seconds N] [--hold-runs]
