@@ -49,7 +49,8 @@ TEST_F(RestoreTest, TheDaemonStartsAnewWithTheBackup) {
     ASSERT_TRUE(status.ok()) << status.error_message();
   }
   ASSERT_TRUE(
-      daemon->Says("selfcald ready", "start anew with the restored database"));
+      daemon->Says("selfcald ready", "start anew with the restored database"))
+      << daemon->Log();
   Connect();
   EXPECT_EQ(Segments().segments_size(), 0);
   EXPECT_TRUE(std::filesystem::exists(restored.previous_database()));
