@@ -176,6 +176,7 @@ v1::MotionSegment ToProto(const MotionSegment& segment) {
     Append(landmark.p_G, landmarks->mutable_p_g());
   }
   FillObservations(segment.observations, message.mutable_observations());
+  if (segment.temperature_c) message.set_temperature_c(*segment.temperature_c);
   return message;
 }
 
@@ -187,6 +188,9 @@ std::vector<Violation> FromProto(const v1::MotionSegment& message,
   read.key = {message.session(), message.index()};
   if (message.calibration_version() != 0) {
     read.calibration_version = message.calibration_version();
+  }
+  if (message.has_temperature_c()) {
+    read.temperature_c = message.temperature_c();
   }
   // A segment may have seen nothing, but not without moments and samples.
   if (!message.has_keyframes()) {

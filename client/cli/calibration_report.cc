@@ -17,6 +17,16 @@ void AddProvenance(const v1::Calibration::Provenance& provenance,
     segments += (segments.empty() ? "" : " ") + LastPart(segment);
   }
   facts->Add("segments", segments);
+  if (provenance.has_temperature()) {
+    const auto& temperature = provenance.temperature();
+    facts->Add("temperature",
+               fmt::format("{:.1f} C, {:.1f} to {:.1f} C ({} of {} segments)",
+                           temperature.mean_c(),
+                           temperature.min_c(),
+                           temperature.max_c(),
+                           temperature.segments(),
+                           provenance.segments_size()));
+  }
   facts->Add("program", provenance.program_version());
   std::string settings;
   for (const auto& setting : provenance.settings()) {

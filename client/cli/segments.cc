@@ -20,6 +20,13 @@ std::string SecondsText(const v1::Segment& segment) {
       static_cast<double>(segment.end_ns() - segment.start_ns()) * 1e-9);
 }
 
+// In degrees Celsius.
+std::string TemperatureText(const v1::Segment& segment) {
+  return segment.has_temperature_c()
+             ? fmt::format("{:.1f}", segment.temperature_c())
+             : "-";
+}
+
 // Groups of the rig, in its order, as any scored segment names them.
 std::vector<std::string> Groups(const v1::ListSegmentsResponse& segments) {
   std::vector<std::string> groups;
@@ -63,6 +70,7 @@ Table ListTable(const v1::ListSegmentsResponse& segments) {
     columns.push_back({"H(" + group + ")", true});
   }
   columns.push_back({"in tables"});
+  columns.push_back({"T [C]", true});
   Table table(std::move(columns));
   for (const v1::Segment& segment : segments.segments()) {
     std::vector<std::string> row = {
@@ -77,6 +85,7 @@ Table ListTable(const v1::ListSegmentsResponse& segments) {
       row.push_back(EntropyText(segment, group));
     }
     row.push_back(TablesText(segment));
+    row.push_back(TemperatureText(segment));
     table.Add(std::move(row));
   }
   return table;
@@ -93,6 +102,9 @@ Facts Describe(const v1::Segment& segment) {
   facts.Add("calibration", fmt::format("{}", segment.calibration_version()));
   facts.Add("seconds", SecondsText(segment));
   facts.Add("keyframes", fmt::format("{}", segment.keyframes()));
+  if (segment.has_temperature_c()) {
+    facts.Add("temperature", TemperatureText(segment) + " C");
+  }
   facts.Add("IMU samples", fmt::format("{}", segment.imu_samples()));
   facts.Add("landmarks", fmt::format("{}", segment.landmarks()));
   facts.Add("observations", fmt::format("{}", segment.observations()));

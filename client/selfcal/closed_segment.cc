@@ -92,6 +92,7 @@ MotionSegment Assemble(const ClosedSegment& closed) {
   MotionSegment segment;
   segment.key = closed.key;
   segment.calibration_version = closed.calibration_version;
+  segment.temperature_c = closed.temperature_c;
   segment.keyframes.reserve(closed.keyframes.size());
   for (const ObservedKeyframe& keyframe : closed.keyframes) {
     segment.keyframes.push_back(keyframe.state);

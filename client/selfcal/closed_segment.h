@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/model/segment.h"
@@ -35,6 +36,7 @@ struct ClosedSegment {
   // Strictly increasing in time; those far outside are left out.
   std::vector<ImuSample> imu;
   std::int64_t end_ns = 0;  // where the samples of the segment end
+  std::optional<double> temperature_c = std::nullopt;  // of the device
 };
 
 // The segment. Of several observations of one landmark by one camera in one

@@ -43,6 +43,7 @@ struct SegmentBuilder::State {
   // From the last sample at or before the first keyframe.
   std::vector<ImuSample> imu;
   std::optional<std::int64_t> last_keyframe_ns;
+  std::optional<double> temperature_c;
   std::deque<ClosedSegment> closed;
   SegmentBuilderStatistics statistics;
 
@@ -87,6 +88,7 @@ struct SegmentBuilder::State {
     segment.key = {options.session, next_index};
     segment.calibration_version = options.calibration_version;
     segment.min_observations = options.min_observations;
+    segment.temperature_c = temperature_c;
     segment.end_ns = end_ns;
     std::vector<ObservedKeyframe> next_keyframes;
     next_keyframes.reserve(keyframes.size());
@@ -234,6 +236,17 @@ bool SegmentBuilder::AddKeyframe(
     state_->GiveUp();
     return false;
   }
+}
+
+bool SegmentBuilder::SetTemperature(
+    std::optional<double> temperature_c) noexcept {
+  if (state_ == nullptr) return false;
+  constexpr SegmentLimits kLimits;
+  const bool possible =
+      !temperature_c || (*temperature_c >= kLimits.min_temperature_c &&
+                         *temperature_c <= kLimits.max_temperature_c);
+  if (possible) state_->temperature_c = temperature_c;
+  return possible;
 }
 
 std::optional<ClosedSegment> SegmentBuilder::TakeClosed() noexcept {

@@ -74,6 +74,11 @@ class SegmentBuilder {
   bool AddKeyframe(const KeyframeState& state,
                    std::span<const KeyframeObservation> observations) noexcept;
 
+  // The device's temperature from now on [degrees Celsius]; nothing: it is not
+  // known. A segment carries what was given last when it is completed.
+  // False, and ignored, for what the daemon would not accept (-100 to 200).
+  bool SetTemperature(std::optional<double> temperature_c) noexcept;
+
   // The oldest complete segment, if there is one: as it was collected, for
   // SegmentStream::Send, or put together here, which takes some milliseconds.
   std::optional<ClosedSegment> TakeClosed() noexcept;

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -77,6 +78,8 @@ struct MotionSegment {
   std::vector<Landmark> landmarks;        // ids distinct
   std::vector<Observation> observations;  // any order, at most one for each
                                           // (keyframe, camera, landmark)
+  // Of the device, in degrees Celsius, where it is known.
+  std::optional<double> temperature_c = std::nullopt;
 };
 
 // One way in which a value breaks its rules: where, and what to do.
@@ -100,8 +103,10 @@ struct SegmentLimits {
   double max_gyro_radps = 1e3;  // readings and biases
   double max_accel_mps2 = 1e4;
   double pixel_margin_px = 1;  // outside the image
-  int max_violations = 100;    // the list is cut there; one more entry,
-                               // without a field, says so
+  double min_temperature_c = -100;
+  double max_temperature_c = 200;
+  int max_violations = 100;  // the list is cut there; one more entry,
+                             // without a field, says so
 };
 
 struct Calibration;  // core/model/calibration.h

@@ -53,6 +53,19 @@ void CheckKey(const MotionSegment& segment, ViolationList* list) {
   }
 }
 
+void CheckTemperature(const MotionSegment& segment,
+                      const SegmentLimits& limits,
+                      ViolationList* list) {
+  if (!segment.temperature_c) return;
+  const double c = *segment.temperature_c;
+  // Not a number compares as false.
+  if (c >= limits.min_temperature_c && c <= limits.max_temperature_c) return;
+  list->Add("temperature_c",
+            std::to_string(c) +
+                " is no temperature of a device; send degrees Celsius, or "
+                "leave it out");
+}
+
 // Adds a violation and returns false if the list may not even be looked at.
 bool CheckCount(std::string_view field,
                 std::size_t count,
@@ -314,6 +327,7 @@ std::vector<Violation> Validate(const MotionSegment& segment,
                                 const SegmentLimits& limits) {
   ViolationList list(limits.max_violations);
   CheckKey(segment, &list);
+  CheckTemperature(segment, limits, &list);
   const bool keyframes_counted = CheckCount("keyframes",
                                             segment.keyframes.size(),
                                             limits.min_keyframes,

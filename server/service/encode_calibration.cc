@@ -141,6 +141,13 @@ void FillProvenance(const StoredCalibration& calibration,
     setting->set_name(name);
     setting->set_value(value);
   }
+  if (!calibration.temperatures) return;
+  const SegmentTemperatures& temperatures = *calibration.temperatures;
+  auto* temperature = message->mutable_temperature();
+  temperature->set_segments(temperatures.segments);
+  temperature->set_mean_c(temperatures.mean_c);
+  temperature->set_min_c(temperatures.min_c);
+  temperature->set_max_c(temperatures.max_c);
 }
 
 void FillValidation(const StoredValidation& validation,

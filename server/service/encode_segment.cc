@@ -74,6 +74,7 @@ v1::Segment Encode(const StoredSegment& segment) {
   message.set_end_ns(segment.end_ns);
   message.set_sequence(segment.sequence);
   message.set_problem(segment.problem);
+  if (segment.temperature_c) message.set_temperature_c(*segment.temperature_c);
   if (!segment.information) return message;
   const SegmentInformation& information = *segment.information;
   for (const GroupScore& score : information.groups) {

@@ -35,6 +35,26 @@ absl::Status ReadSegmentKeys(Connection* db,
   return read.status();
 }
 
+absl::Status ReadTemperatures(Connection* db,
+                              std::int64_t rig,
+                              StoredCalibration* calibration) {
+  Statement read(db,
+                 "SELECT count(*), avg(s.temperature_c), min(s.temperature_c), "
+                 "  max(s.temperature_c) FROM calibration_segments c "
+                 "JOIN segments s USING (segment) WHERE c.rig = ?1 "
+                 "AND c.version = ?2 AND s.temperature_c IS NOT NULL",
+                 rig,
+                 calibration->version);
+  if (read.Next() && read.Int(0) > 0) {
+    calibration->temperatures =
+        SegmentTemperatures{static_cast<int>(read.Int(0)),
+                            read.Double(1),
+                            read.Double(2),
+                            read.Double(3)};
+  }
+  return read.status();
+}
+
 absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
                                                      const Statement& row,
                                                      std::int64_t rig_id,
@@ -63,6 +83,7 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
   }
   calibration.activation = row.Int(8);
   SELFCAL_RETURN_IF_ERROR(ReadSegmentKeys(db, rig_id, &calibration));
+  SELFCAL_RETURN_IF_ERROR(ReadTemperatures(db, rig_id, &calibration));
   return calibration;
 }
 

@@ -20,7 +20,8 @@ constexpr char kColumns[] =
     "  s.problem, s.receive_time_ns, s.calibration_version, s.start_ns, "
     "  s.end_ns, s.keyframes, s.imu_samples, s.landmarks, s.observations, "
     "  i.information, i.sha256, "
-    "  (SELECT length(p.data) FROM payloads p WHERE p.segment = s.segment) "
+    "  (SELECT length(p.data) FROM payloads p WHERE p.segment = s.segment), "
+    "  s.temperature_c "
     "FROM segments s LEFT JOIN segment_information i USING (segment) ";
 
 StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
@@ -40,6 +41,7 @@ StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
   segment.observations = static_cast<int>(row.Int(13));
   segment.has_data = !row.IsNull(16);
   segment.payload_bytes = row.Int(16);
+  if (!row.IsNull(17)) segment.temperature_c = row.Double(17);
   return segment;
 }
 

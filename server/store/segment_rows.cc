@@ -17,10 +17,11 @@ absl::Status InsertMetadata(Connection* db,
              db,
              "INSERT INTO segments (rig, session, session_index, sequence, "
              "  state, receive_time_ns, calibration_version, start_ns, end_ns, "
-             "  keyframes, imu_samples, landmarks, observations) "
+             "  keyframes, imu_samples, landmarks, observations, "
+             "  temperature_c) "
              "VALUES (?1, ?2, ?3, (SELECT coalesce(max(sequence), 0) + 1 "
              "    FROM segments WHERE rig = ?1), "
-             "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+             "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
              rig,
              segment.key.session,
              segment.key.index,
@@ -31,7 +32,8 @@ absl::Status InsertMetadata(Connection* db,
              segment.keyframes,
              segment.imu_samples,
              segment.landmarks,
-             segment.observations)
+             segment.observations,
+             segment.temperature_c)
       .Run();
 }
 
@@ -53,6 +55,7 @@ absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment) {
   packed.imu_samples = static_cast<std::int64_t>(segment.imu.size());
   packed.landmarks = static_cast<std::int64_t>(segment.landmarks.size());
   packed.observations = static_cast<std::int64_t>(segment.observations.size());
+  packed.temperature_c = segment.temperature_c;
   SELFCAL_ASSIGN_OR_RETURN(packed.payload, PackSegment(segment));
   return packed;
 }

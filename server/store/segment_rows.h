@@ -5,6 +5,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,7 @@ struct NewSegment {
   std::int64_t imu_samples = 0;
   std::int64_t landmarks = 0;
   std::int64_t observations = 0;
+  std::optional<double> temperature_c;
   Payload payload;
 };
 

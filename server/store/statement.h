@@ -14,6 +14,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -97,6 +98,7 @@ class Statement {
   void Bind(int index, std::int64_t value);
   void Bind(int index, int value);
   void Bind(int index, double value);
+  void Bind(int index, std::optional<double> value);  // nothing: NULL
   void Bind(int index, std::string_view value);
   void Bind(int index, const std::string& value);
   void Bind(int index, BlobView value);

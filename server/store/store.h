@@ -79,6 +79,7 @@ struct StoredSegment {
   int imu_samples = 0;
   int landmarks = 0;
   int observations = 0;
+  std::optional<double> temperature_c;            // of the device
   std::optional<SegmentInformation> information;  // once scored
   std::vector<std::string> tables;                // groups that hold it
   // Why it is unusable, or its data gone; empty: neither, or no table and no
@@ -120,6 +121,14 @@ struct StoredValidation {
   HeldOutTest held_out;
 };
 
+// Of the device in the segments of a calibration that say so.
+struct SegmentTemperatures {
+  int segments = 0;
+  double mean_c = 0;
+  double min_c = 0;
+  double max_c = 0;
+};
+
 struct StoredCalibration {
   std::string rig;
   std::int64_t version = 0;  // the factory's is 1
@@ -131,6 +140,8 @@ struct StoredCalibration {
   std::optional<std::int64_t> run;   // that produced it
   std::int64_t base_version = 0;     // where the solver started, 0: none
   std::vector<SegmentKey> segments;
+  // Read with it, never written: the segments have it.
+  std::optional<SegmentTemperatures> temperatures;
   std::string program_version;
   int schema_version = 0;  // of the database; 0 from before it was kept
   // Name and value of what shaped the run's result.

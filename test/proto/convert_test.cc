@@ -80,6 +80,7 @@ void ExpectSame(const Rig& a, const Rig& b) {
 void ExpectSame(const MotionSegment& a, const MotionSegment& b) {
   EXPECT_EQ(a.key, b.key);
   EXPECT_EQ(a.calibration_version, b.calibration_version);
+  EXPECT_EQ(a.temperature_c, b.temperature_c);
   ASSERT_EQ(a.keyframes.size(), b.keyframes.size());
   for (std::size_t k = 0; k < a.keyframes.size(); ++k) {
     const KeyframeState& x = a.keyframes[k];

@@ -94,6 +94,7 @@ class RandomValues {
     MotionSegment segment;
     segment.key = {Text(Int(1, 20)), Int64()};
     segment.calibration_version = Int(1, 1000);
+    if (Int(0, 1) == 1) segment.temperature_c = Double();
     for (int i = Int(0, 20); i > 0; --i) {
       segment.keyframes.push_back(
           {Int64(), Quaternion(), Vector3(), Vector3(), Vector3(), Vector3()});

@@ -29,6 +29,11 @@ def segment_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:
             "seconds": 1e-9 * (segment.end_ns - segment.start_ns),
             "keyframes": segment.keyframes,
             "landmarks": segment.landmarks,
+            "temperature_c": (
+                segment.temperature_c
+                if segment.HasField("temperature_c")
+                else float("nan")
+            ),
             "kept": any(score.in_table for score in segment.scores),
         }
         for score in segment.scores:

@@ -210,6 +210,7 @@ v1::Segment ScoredSegment(int index) {
   segment.set_state(v1::Segment::SCORED);
   segment.set_end_ns(3'900'000'000);
   segment.set_keyframes(40);
+  if (index > 0) segment.set_temperature_c(21.25 * index);
   for (const char* group : {"imu", "camera"}) {
     v1::GroupScore* score = segment.add_scores();
     score->set_group(group);
@@ -229,9 +230,9 @@ TEST_F(Commands, ListsSegmentsWithTheirEntropies) {
   const Outcome outcome = Selfcal({"segments", "list", "device"});
   EXPECT_EQ(daemon_.last_name, "rigs/device");
   EXPECT_EQ(outcome.out,
-            "walk~2\tstored\t-\t40\t3.90\t0\t0\t-\t-\t-\n"
-            "walk~1\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\n"
-            "walk~0\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\n");
+            "walk~2\tstored\t-\t40\t3.90\t0\t0\t-\t-\t-\t42.5\n"
+            "walk~1\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\t21.2\n"
+            "walk~0\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\t-\n");
 }
 
 TEST_F(Commands, ShowsASegmentAndWhatItDoesNotObserve) {
@@ -272,6 +273,12 @@ v1::Calibration Version(std::int64_t version) {
   estimate->set_sigma(0.034);
   if (version == 1) return calibration;
   calibration.mutable_provenance()->set_base_version(version - 1);
+  calibration.mutable_provenance()->add_segments("rigs/device/segments/a~0");
+  auto* temperature = calibration.mutable_provenance()->mutable_temperature();
+  temperature->set_segments(1);
+  temperature->set_mean_c(21.5);
+  temperature->set_min_c(20);
+  temperature->set_max_c(23);
   calibration.mutable_solver()->set_status("converged");
   auto* part = calibration.mutable_solver()->add_held_constant()->add_parts();
   part->set_component("cam0.p_CI.z");
@@ -292,6 +299,9 @@ TEST_F(Commands, ShowsACalibrationWithItsOriginAndValues) {
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/active");
   EXPECT_THAT(outcome.out, HasSubstr("version\t2\n"));
   EXPECT_THAT(outcome.out, HasSubstr("started from\tversion 1\n"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("temperature\t21.5 C, 20.0 to 23.0 C (1 of 1 "
+                        "segments)\n"));
   EXPECT_THAT(outcome.out, HasSubstr("held constant\tcam0.p_CI.z"));
   EXPECT_THAT(outcome.out,
               HasSubstr("noise\tpixel sigma: residuals suggest 1.23 times what "

@@ -3,6 +3,7 @@
     python_test.py PACKAGE_DIR EXAMPLE SELFCALD
 """
 
+import math
 import os
 import subprocess
 import sys
@@ -60,6 +61,8 @@ def segment_at_rest(index: int) -> segment_pb2.StreamSegmentsRequest:
     segment = request.segment
     segment.session = "rest"
     segment.index = index
+    if index > 0:
+        segment.temperature_c = 20.5 * index
     begin_ns = index * 10**10
     for k in range(KEYFRAMES):
         segment.keyframes.t_ns.append(begin_ns + k * 10**8)
@@ -112,6 +115,8 @@ class PythonTest(unittest.TestCase):
         )
         self.assertEqual(list(frame.keyframes), [KEYFRAMES] * 3)
         self.assertAlmostEqual(frame.seconds[0], 1.1)
+        self.assertTrue(math.isnan(frame.temperature_c[0]))
+        self.assertEqual(list(frame.temperature_c[1:]), [20.5, 41])
 
     def test_plots_the_history(self) -> None:
         frame = history.calibration_frame(self.daemon, "tablet")

@@ -335,6 +335,33 @@ TEST_F(RegularStream, KeepsTheFirstOfTwoObservationsByOneCamera) {
   EXPECT_EQ(segment->landmarks[0].p_G, Eigen::Vector3d(3, 3, 3));
 }
 
+TEST_F(RegularStream, GivesEachSegmentTheTemperatureThatIsKnown) {
+  AddImuUntil(2000);
+  for (int k = 0; k < 6; ++k) AddKeyframe(100 * k);
+  EXPECT_EQ(builder_.Take()->temperature_c, std::nullopt);
+  EXPECT_TRUE(builder_.SetTemperature(-12.5));
+  for (int k = 6; k < 16; ++k) AddKeyframe(100 * k);
+  EXPECT_EQ(builder_.Take()->temperature_c, -12.5);
+  EXPECT_EQ(builder_.Take()->temperature_c, -12.5) << "until another is given";
+  EXPECT_TRUE(builder_.SetTemperature(std::nullopt));
+  for (int k = 16; k < 21; ++k) AddKeyframe(100 * k);
+  AddImuUntil(2100);
+  EXPECT_EQ(builder_.Take()->temperature_c, std::nullopt);
+}
+
+TEST_F(RegularStream, IgnoresATemperatureThatTheDaemonWouldNotAccept) {
+  EXPECT_TRUE(builder_.SetTemperature(36.6));
+  for (const double c : {293.15,
+                         -100.1,
+                         std::numeric_limits<double>::infinity(),
+                         std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_FALSE(builder_.SetTemperature(c)) << c;
+  }
+  AddImuUntil(1000);
+  for (int k = 0; k < 6; ++k) AddKeyframe(100 * k);
+  EXPECT_EQ(builder_.Take()->temperature_c, 36.6);
+}
+
 TEST_F(RegularStream, FlushesTheRestIfItIsLongEnough) {
   AddImuUntil(1000);
   for (int k = 0; k < 8; ++k) AddKeyframe(100 * k);

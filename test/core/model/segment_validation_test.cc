@@ -90,6 +90,9 @@ std::vector<Corruption> Corruptions() {
       {"calibration_version",
        "begin with 1",
        [](S* s) { s->calibration_version = 0; }},
+      {"temperature_c",
+       "send degrees Celsius",
+       [](S* s) { s->temperature_c = 293.15; }},
       {"keyframes[1].q_GI",
        "norm is 2; send a unit quaternion",
        [](S* s) { s->keyframes[1].q_GI.coeffs() *= 2; }},
@@ -210,6 +213,22 @@ TEST(ValidateSegment, SessionNameIsShortAndPrintable) {
     EXPECT_THAT(Fields(Validate(segment, Theta())), ElementsAre("key.session"));
   }
   segment.key.session = std::string(128, '~');
+  EXPECT_THAT(Validate(segment, Theta()), IsEmpty());
+}
+
+TEST(ValidateSegment, TemperatureIsThatOfADeviceOrUnknown) {
+  MotionSegment segment = ValidSegment();
+  for (const double c : {-100.0, 0.0, 200.0}) {
+    segment.temperature_c = c;
+    EXPECT_THAT(Validate(segment, Theta()), IsEmpty()) << c;
+  }
+  for (const double c : {-100.01, 200.01, kNan, kInfinity, -kInfinity}) {
+    segment.temperature_c = c;
+    EXPECT_THAT(Fields(Validate(segment, Theta())),
+                ElementsAre("temperature_c"))
+        << c;
+  }
+  segment.temperature_c.reset();
   EXPECT_THAT(Validate(segment, Theta()), IsEmpty());
 }
 

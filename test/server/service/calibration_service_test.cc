@@ -84,6 +84,27 @@ TEST_F(CalibrationServiceTest, VersionShowsWhereItCameFrom) {
   EXPECT_EQ(read.solver().iterations(), 7);
 }
 
+TEST_F(CalibrationServiceTest, VersionShowsTheTemperaturesOfItsSegments) {
+  const Rig rig = AddRig();
+  auto segments = TestSegments(rig, 2);
+  segments[0].temperature_c = 20;
+  segments[1].temperature_c = 31;
+  for (const MotionSegment& segment : segments) {
+    ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+    Score(rig, segment.key, 10);
+  }
+  FinishRun(rig, 1);
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  const auto& temperature = read.provenance().temperature();
+  EXPECT_EQ(temperature.segments(), 2);
+  EXPECT_EQ(temperature.mean_c(), 25.5);
+  EXPECT_EQ(temperature.min_c(), 20);
+  EXPECT_EQ(temperature.max_c(), 31);
+  ASSERT_TRUE(Get("rigs/r/calibrations/1", &read).ok());
+  EXPECT_FALSE(read.provenance().has_temperature());
+}
+
 TEST_F(CalibrationServiceTest, ActiveIsTheNewestThatWasPublished) {
   AddCalibrated();
   v1::Calibration read;

@@ -116,6 +116,28 @@ TEST_F(SegmentStreamTest, MalformedSegmentIsRejectedAndTheStreamGoesOn) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
+TEST_F(SegmentStreamTest, TemperatureIsStoredAndShownIfItIsPossible) {
+  auto segments = TestSegments(AddRig(), 3);
+  Stream stream(segments_.get());
+  segments[0].temperature_c = 41.5;
+  EXPECT_EQ(stream.Send(segments[0]).verdict(), Response::STORED);
+  segments[1].temperature_c = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(Fields(stream.Send(segments[1])), ElementsAre("temperature_c"));
+  segments[1].temperature_c = 200.1;
+  EXPECT_THAT(Fields(stream.Send(segments[1])), ElementsAre("temperature_c"));
+  EXPECT_EQ(stream.Send(segments[2]).verdict(), Response::STORED);
+  EXPECT_TRUE(stream.Finish().ok());
+
+  Context context;
+  v1::ListSegmentsRequest request;
+  request.set_parent("rigs/r");
+  v1::ListSegmentsResponse listed;
+  ASSERT_TRUE(segments_->ListSegments(&context, request, &listed).ok());
+  ASSERT_EQ(listed.segments_size(), 2);
+  EXPECT_FALSE(listed.segments(0).has_temperature_c());
+  EXPECT_EQ(listed.segments(1).temperature_c(), 41.5);
+}
+
 TEST_F(SegmentStreamTest, WrongShapeIsRejectedAndTheStreamGoesOn) {
   const auto segments = TestSegments(AddRig(), 1);
   Stream stream(segments_.get());

@@ -82,6 +82,34 @@ TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   ExpectSameCalibration(stored->report->theta, candidate.theta);
 }
 
+TEST_P(CalibrationsTest, VersionTellsTheTemperaturesOfItsSegments) {
+  const Rig rig = CreateTestRig("a");
+  ASSERT_EQ(rig.table_size, 2);
+  for (int k = 0; k < 2; ++k) {
+    MotionSegment segment = Segment(k);
+    segment.temperature_c = 20 + 5 * k;
+    ASSERT_TRUE(store_->PutSegment("a", segment).ok());
+    Score(rig, k, k);
+  }
+  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  const auto stored = store_->GetActiveCalibration("a");
+  ASSERT_TRUE(stored.ok()) << stored.status();
+  ASSERT_TRUE(stored->temperatures.has_value());
+  EXPECT_EQ(stored->temperatures->segments, 2);
+  EXPECT_EQ(stored->temperatures->mean_c, 22.5);
+  EXPECT_EQ(stored->temperatures->min_c, 20);
+  EXPECT_EQ(stored->temperatures->max_c, 25);
+  // The factory's came of none.
+  EXPECT_FALSE(store_->GetCalibration("a", 1)->temperatures.has_value());
+}
+
+TEST_P(CalibrationsTest, VersionTellsNoTemperatureThatNoSegmentHas) {
+  const Rig rig = RigWithRun("a");
+  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  EXPECT_FALSE(store_->GetActiveCalibration("a")->temperatures.has_value());
+}
+
 // As one that was stored before cameras had a time offset.
 TEST_P(CalibrationsTest, OldVersionHasKnownTimeOffsets) {
   const Rig rig = RigWithRun("a");

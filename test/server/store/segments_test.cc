@@ -55,6 +55,21 @@ TEST_P(SegmentsTest, MetadataTellsWhatWasReceived) {
   EXPECT_TRUE(stored->problem.empty());
 }
 
+TEST_P(SegmentsTest, TemperatureIsKeptWhereItIsKnown) {
+  CreateTestRig("a");
+  MotionSegment warm = Segment(0);
+  warm.temperature_c = -7.25;
+  ASSERT_TRUE(store_->PutSegment("a", warm).ok());
+  ASSERT_TRUE(store_->PutSegment("a", Segment(1)).ok());
+  Reopen();
+  EXPECT_EQ(store_->GetSegment("a", warm.key)->temperature_c, -7.25);
+  EXPECT_EQ(store_->GetSegmentData("a", warm.key)->temperature_c, -7.25);
+  const auto listed = store_->ListSegments("a", {});
+  ASSERT_TRUE(listed.ok()) << listed.status();
+  EXPECT_EQ(listed->items[0].temperature_c, std::nullopt);
+  EXPECT_EQ(listed->items[1].temperature_c, -7.25);
+}
+
 TEST_P(SegmentsTest, SameSegmentTwiceChangesNothing) {
   const Rig rig = CreateTestRig("a");
   Put("a", 0);
