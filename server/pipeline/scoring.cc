@@ -69,14 +69,20 @@ void ScoringWorkers::Stop() {
 
 absl::Status ScoringWorkers::TakePlace(const std::function<bool()>& cancelled) {
   std::unique_lock lock(mutex_);
-  while (running_ && backlog_ >= options_.max_backlog) {
+  const std::int64_t ticket = next_ticket_++;
+  waiting_.insert(ticket);
+  bool gone = false;
+  while (running_ && !gone &&
+         (backlog_ >= options_.max_backlog || *waiting_.begin() != ticket)) {
     lock.unlock();
-    const bool gone = cancelled && cancelled();
+    gone = cancelled && cancelled();
     lock.lock();
-    if (gone) {
-      return absl::CancelledError("the caller has gone");
-    }
-    changed_.wait_for(lock, kCancelPoll);
+    if (!gone) changed_.wait_for(lock, kCancelPoll);
+  }
+  waiting_.erase(ticket);
+  changed_.notify_all();  // it is the next one's turn
+  if (gone) {
+    return absl::CancelledError("the caller has gone");
   }
   if (!running_) {
     return absl::UnavailableError("the daemon is stopping; send again later");

@@ -40,7 +40,8 @@ class ScoringWorkers {
   // Returns when every thread has ended, each after the segment at hand.
   void Stop();
 
-  // Waits until there is room in the backlog and takes one place. CANCELLED,
+  // Waits until there is room in the backlog and takes one place, first come,
+  // first served. CANCELLED,
   // UNAVAILABLE as Pipeline::Submit.
   absl::Status TakePlace(const std::function<bool()>& cancelled);
   // The place is filled by a stored segment, or was not needed.
@@ -75,8 +76,10 @@ class ScoringWorkers {
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
   bool running_ = false;
-  int backlog_ = 0;            // places taken: stored and unscored, or about to
-  std::int64_t arrivals_ = 0;  // segments stored since the start
+  int backlog_ = 0;  // places taken: stored and unscored, or about to
+  std::int64_t next_ticket_ = 0;
+  std::set<std::int64_t> waiting_;  // for a place; the lowest is next
+  std::int64_t arrivals_ = 0;       // segments stored since the start
   std::set<std::pair<std::string, std::int64_t>> claimed_;  // rig, sequence
   std::vector<std::thread> threads_;
 };

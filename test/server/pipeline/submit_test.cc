@@ -1,5 +1,8 @@
+#include <atomic>
 #include <mutex>
 #include <set>
+#include <thread>
+#include <vector>
 
 #include "test/server/pipeline/pipeline_test.h"
 
@@ -85,6 +88,41 @@ TEST_F(SubmitTest, WaitsWhileTheBacklogIsFullUntilCancelled) {
   gate.unlock();
   EXPECT_EQ(Submit(3), Verdict::kStored);  // now there is room
   EXPECT_TRUE(AllScored());
+}
+
+// One that sends fast takes nobody's place.
+TEST_F(SubmitTest, WhoWaitsLongestIsNext) {
+  CreateRig();
+  options_.max_backlog = 1;
+  std::mutex gate;
+  gate.lock();
+  std::vector<std::int64_t> scored;
+  estimators_.score = [&](const Rig& rig, const auto&, const auto& segment) {
+    const std::lock_guard wait(gate);
+    scored.push_back(segment.key.index);
+    return FakeInformation(rig, EntropyOf(segment.key.index));
+  };
+  StartOne();
+  EXPECT_EQ(Submit(0), Verdict::kStored);
+  std::vector<std::thread> senders;
+  for (int k = 1; k <= 8; ++k) {
+    std::atomic<bool> waits = false;
+    senders.emplace_back([this, k, &waits] {
+      const auto result = pipeline_->Submit("a", Segment(k), [&waits] {
+        static thread_local bool first = true;
+        if (first) waits = true;
+        first = false;
+        return false;
+      });
+      EXPECT_TRUE(result.ok()) << result.status();
+    });
+    while (!waits) std::this_thread::yield();
+  }
+  gate.unlock();
+  for (std::thread& sender : senders) sender.join();
+  ASSERT_TRUE(AllScored());
+  pipeline_->Stop();
+  EXPECT_THAT(scored, ::testing::ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8));
 }
 
 }  // namespace
