@@ -1,10 +1,10 @@
 // receive -> score -> select -> trigger -> recalibrate -> validate -> publish.
 //
-// Owns the worker threads: `scoring_threads` that score, one low-priority
-// thread that recalibrates. Scores are committed in the order of arrival within
-// a rig, so that tables do not depend on the number of threads. Knows no gRPC.
-// Any thread may call. Nothing is kept only in memory: whatever is stored and
-// unscored, or started and unfinished, is taken up by Start().
+// Owns the worker threads: `scoring_threads` that score, one that recalibrates.
+// Scores are committed in the order of arrival within a rig, so that tables do
+// not depend on the number of threads. Knows no gRPC. Any thread may call.
+// Nothing is kept only in memory: whatever is stored and unscored, or started
+// and unfinished, is taken up by Start().
 #pragma once
 
 #include <absl/status/status.h>
