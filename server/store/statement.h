@@ -67,6 +67,7 @@ class Connection {
   std::map<std::string, Prepared, std::less<>> prepared_;
 };
 
+// Its connection outlives it, and stays where it is meanwhile.
 class Statement {
  public:
   // Prepares `sql` and binds the arguments to ?1, ?2, ...

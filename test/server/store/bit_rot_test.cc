@@ -116,19 +116,20 @@ TEST_F(BitRotTest, AFlipInTheDataOfASegmentIsFoundByTheDoctor) {
   ASSERT_TRUE(WriteFixture(store_.get()));
   store_.reset();
   const std::string whole = ReadBytes(Path());
-  auto db = Connection::Open(Path(), SQLITE_OPEN_READWRITE);
-  ASSERT_TRUE(db.ok());
-  Statement read(&*db, "SELECT data FROM payloads");
-  ASSERT_TRUE(read.Next());
-  const std::string data = read.Text(0);
+  std::string data;
+  {
+    auto db = Connection::Open(Path(), SQLITE_OPEN_READWRITE);
+    ASSERT_TRUE(db.ok());
+    Statement read(&*db, "SELECT data FROM payloads");
+    ASSERT_TRUE(read.Next());
+    data = read.Text(0);
+  }
   ASSERT_GT(data.size(), 3000u);
   const std::string piece = data.substr(data.size() / 2, 64);
   const std::size_t at = whole.find(piece);
   ASSERT_NE(at, std::string::npos);
   std::string bytes = whole;
   bytes[at] ^= 1;
-  ASSERT_TRUE(read.Run().ok());
-  db = absl::UnknownError("closed");
   WriteBytes(Path(), bytes);
   ASSERT_TRUE(Open().ok());
   std::vector<std::string> places;
