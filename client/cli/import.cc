@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,7 @@ struct ImportOptions {
   std::string rig;
   std::vector<std::string> folders;
   SegmentBuilderOptions builder;
+  std::optional<double> temperature_c;
   bool all_landmarks = false;
   double timeout_s = 60;
 };
@@ -38,7 +40,11 @@ absl::StatusOr<std::vector<MotionSegment>> ReadSegments(
   if (!recording.ok()) return recording.status();
   SegmentBuilderOptions builder = options.builder;
   if (builder.session.empty()) builder.session = recording->session;
-  return BuildSegments(*recording, builder);
+  std::vector<MotionSegment> segments = BuildSegments(*recording, builder);
+  for (MotionSegment& segment : segments) {
+    segment.temperature_c = options.temperature_c;
+  }
+  return segments;
 }
 
 v1::StreamSegmentsResponse ToMessage(const Acknowledgement& ack) {
@@ -224,6 +230,12 @@ void AddImportCommand(CLI::App* app, Context* context) {
                    builder.calibration_version,
                    "The version that the map was estimated with")
       ->capture_default_str();
+  import
+      ->add_option("--temperature",
+                   options->temperature_c,
+                   "The device's temperature at the time [degrees Celsius]")
+      ->check(CLI::Range(SegmentLimits{}.min_temperature_c,
+                         SegmentLimits{}.max_temperature_c));
   import->add_flag("--all-landmarks",
                    options->all_landmarks,
                    "Also those that the map does not call good");

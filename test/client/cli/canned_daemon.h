@@ -49,6 +49,7 @@ struct CannedDaemon final : v1::RigService::Service,
   v1::CompareCalibrationsResponse differences;
   std::string last_name;
   std::string last_reason;
+  v1::MotionSegment last_segment;      // that was sent
   std::int64_t reject_index = -1;      // of the segments that are sent
   std::atomic<int> broken_watches{0};  // that many end before the run does
 
@@ -138,6 +139,7 @@ struct CannedDaemon final : v1::RigService::Service,
         violation->set_field("keyframes[3].q_gi");
         violation->set_description("norm is 0.9");
       }
+      last_segment = segment;
       stream->Write(response);
     }
     return grpc::Status::OK;

@@ -1,7 +1,5 @@
-#include "client/cli/commands.h"
-
+// The commands that show and change what the daemon has.
 #include <gmock/gmock.h>
-#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -11,70 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "core/model/rig.h"
-#include "proto/convert.h"
-#include "test/client/cli/canned_daemon.h"
+#include "test/client/cli/commands_fixture.h"
 
 namespace selfcal::client {
 namespace {
 
 using testing::HasSubstr;
-
-struct Outcome {
-  int code;
-  std::string out;
-  std::string err;
-};
-
-Outcome Selfcal(const std::vector<std::string>& arguments) {
-  std::vector<const char*> argv = {"selfcal"};
-  for (const std::string& argument : arguments) {
-    argv.push_back(argument.c_str());
-  }
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  const int code = RunCommandLine(static_cast<int>(argv.size()), argv.data());
-  std::string out = testing::internal::GetCapturedStdout();
-  return {code, std::move(out), testing::internal::GetCapturedStderr()};
-}
-
-Rig ARig(const std::string& id) {
-  Rig rig;
-  rig.id = id;
-  rig.factory.cameras.resize(1);
-  CameraCalibration& camera = rig.factory.cameras[0];
-  camera.f = {255, 256};
-  camera.c = {320, 240};
-  camera.distortion << 0.9;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  return rig;
-}
-
-class Commands : public ::testing::Test {
- protected:
-  Outcome Selfcal(std::vector<std::string> arguments) const {
-    arguments.push_back("--target");
-    arguments.push_back(daemon_.target);
-    return client::Selfcal(arguments);
-  }
-  // The document on stdout as a message.
-  template <typename Message>
-  static Message Parse(const std::string& json) {
-    Message message;
-    const auto status =
-        google::protobuf::util::JsonStringToMessage(json, &message);
-    EXPECT_TRUE(status.ok()) << status.ToString() << json;
-    return message;
-  }
-  static std::string WriteFile(const std::string& text) {
-    const std::string name = testing::TempDir() + "selfcal-cli-rig.json";
-    std::ofstream(name) << text;
-    return name;
-  }
-
-  CannedDaemon daemon_;
-};
 
 TEST_F(Commands, WrongUsageExitsWithTwo) {
   for (const std::vector<std::string>& line :
@@ -262,37 +202,6 @@ TEST_F(Commands, PrintsTheEntriesOfTheTables) {
             "imu\t2\twalk~1\t-9.000000\t4.000000\n");
 }
 
-v1::Calibration Version(std::int64_t version) {
-  v1::Calibration calibration;
-  calibration.set_version(version);
-  calibration.set_state(v1::Calibration::ACTIVE);
-  auto* estimate = calibration.add_estimates();
-  estimate->set_component("cam0.focal.x");
-  estimate->set_unit("px");
-  estimate->set_value(255.1234);
-  estimate->set_sigma(0.034);
-  if (version == 1) return calibration;
-  calibration.mutable_provenance()->set_base_version(version - 1);
-  calibration.mutable_provenance()->add_segments("rigs/device/segments/a~0");
-  auto* temperature = calibration.mutable_provenance()->mutable_temperature();
-  temperature->set_segments(1);
-  temperature->set_mean_c(21.5);
-  temperature->set_min_c(20);
-  temperature->set_max_c(23);
-  calibration.mutable_solver()->set_status("converged");
-  auto* part = calibration.mutable_solver()->add_held_constant()->add_parts();
-  part->set_component("cam0.p_CI.z");
-  part->set_weight(1);
-  auto* noise = calibration.mutable_solver()->add_noise_factors();
-  noise->set_kind("pixel");
-  noise->set_factor(1.234);
-  noise->set_log_sigma(0.02);
-  noise->set_determined(true);
-  noise = calibration.mutable_solver()->add_noise_factors();
-  noise->set_kind("gyro_bias_walk");
-  return calibration;
-}
-
 TEST_F(Commands, ShowsACalibrationWithItsOriginAndValues) {
   daemon_.calibrations = {Version(1), Version(2)};
   const Outcome outcome = Selfcal({"calibrations", "show", "device"});
@@ -356,115 +265,6 @@ TEST_F(Commands, WatchPrintsALineForEachVersion) {
     ASSERT_TRUE(std::getline(lines, line));
     EXPECT_EQ(Parse<v1::Calibration>(line).version(), version);
   }
-}
-
-class RecalibrateCommand : public Commands {
- protected:
-  RecalibrateCommand() {
-    v1::Recalibration run;
-    run.set_name("rigs/device/recalibrations/1");
-    run.set_state(v1::Recalibration::PENDING);
-    daemon_.run.push_back(run);
-    run.set_state(v1::Recalibration::RUNNING);
-    daemon_.run.push_back(run);
-    run.set_state(v1::Recalibration::SUCCEEDED);
-    run.set_calibration("rigs/device/calibrations/2");
-    daemon_.run.push_back(run);
-    daemon_.calibrations = {Version(1), Version(2)};
-  }
-};
-
-TEST_F(RecalibrateCommand, WaitsForTheEndAndShowsTheValues) {
-  const Outcome outcome = Selfcal({"recalibrate", "device"});
-  EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_EQ(outcome.err, "") << "no progress bar but on a terminal";
-  EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/2");
-  EXPECT_THAT(outcome.out, HasSubstr("state\tsucceeded\n"));
-  EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255.123\tpx\t0.034\n"));
-}
-
-TEST_F(RecalibrateCommand, OutlivesTheConnection) {
-  daemon_.broken_watches = 2;
-  const Outcome outcome = Selfcal({"recalibrate", "device", "--json"});
-  EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_EQ(Parse<v1::Recalibration>(outcome.out).state(),
-            v1::Recalibration::SUCCEEDED);
-}
-
-TEST_F(RecalibrateCommand, ReturnsAtOnceIfAskedTo) {
-  const Outcome outcome = Selfcal({"recalibrate", "device", "--no-wait"});
-  EXPECT_EQ(outcome.code, 0);
-  EXPECT_THAT(outcome.out, HasSubstr("state\tpending\n"));
-}
-
-TEST_F(RecalibrateCommand, ExitsWithOneIfTheResultWasRejected) {
-  daemon_.calibrations[1].set_state(v1::Calibration::REJECTED);
-  daemon_.calibrations[1].add_reasons("held-out segments fit worse");
-  const Outcome outcome = Selfcal({"recalibrate", "device"});
-  EXPECT_EQ(outcome.code, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("held-out segments fit worse"));
-}
-
-TEST_F(RecalibrateCommand, ExitsWithOneIfItFailedOrCouldNotStart) {
-  daemon_.run[2].set_state(v1::Recalibration::FAILED);
-  daemon_.run[2].set_message("no segment has enough inliers");
-  const Outcome failed = Selfcal({"recalibrate", "device"});
-  EXPECT_EQ(failed.code, 1);
-  EXPECT_THAT(failed.err, HasSubstr("no segment has enough inliers"));
-  daemon_.run.clear();
-  const Outcome refused = Selfcal({"recalibrate", "device"});
-  EXPECT_EQ(refused.code, 1);
-  EXPECT_THAT(refused.err, HasSubstr("the tables are empty"));
-}
-
-class ImportCommand : public Commands {
- protected:
-  void SetUp() override {
-    const char* folder = std::getenv("SELFCAL_TEST_DATA");
-    map_ = std::string(folder != nullptr ? folder : SELFCAL_TEST_DATA_DEFAULT) +
-           "/tango_handheld";
-    if (!std::filesystem::is_directory(map_)) {
-      GTEST_SKIP() << map_ << " is missing; name the folder of recordings in "
-                   << "SELFCAL_TEST_DATA";
-    }
-    daemon_.rigs.push_back(ToProto(ARig("device")));
-  }
-  std::string map_;
-};
-
-TEST_F(ImportCommand, SendsEverySegmentOfARecording) {
-  const Outcome outcome =
-      Selfcal({"import", "device", map_, "--session", "walk"});
-  ASSERT_EQ(outcome.code, 0) << outcome.err;
-  std::string expected;
-  for (int i = 0; i < 14; ++i) {
-    expected += "walk\t" + std::to_string(i) + "\tSTORED\n";
-  }
-  EXPECT_EQ(outcome.out, expected);
-}
-
-TEST_F(ImportCommand, ReportsARejectionAndExitsWithOne) {
-  daemon_.reject_index = 2;
-  const Outcome outcome = Selfcal({"import", "device", map_, "--json"});
-  EXPECT_EQ(outcome.code, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("\n  keyframes[3].q_gi: norm is 0.9\n"));
-  std::istringstream lines(outcome.out);
-  std::string line;
-  for (int i = 0; i < 14; ++i) {
-    ASSERT_TRUE(std::getline(lines, line));
-    const auto response = Parse<v1::StreamSegmentsResponse>(line);
-    EXPECT_EQ(response.index(), i);
-    EXPECT_EQ(response.verdict(),
-              i == 2 ? v1::StreamSegmentsResponse::REJECTED
-                     : v1::StreamSegmentsResponse::STORED);
-  }
-}
-
-TEST_F(ImportCommand, ExitsWithOneForARigThatDoesNotExist) {
-  const Outcome outcome = Selfcal({"import", "nobody", map_});
-  EXPECT_EQ(outcome.code, 1);
-  EXPECT_EQ(outcome.out, "");
-  EXPECT_THAT(outcome.err, HasSubstr("rigs/nobody does not exist"));
 }
 
 }  // namespace

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/commands.h"
 #include "test/client/cli/canned_store.h"
+#include "test/client/cli/commands_fixture.h"
 
 namespace selfcal::client {
 namespace {
@@ -35,14 +35,10 @@ class StoreCommands : public ::testing::Test {
 
   int Selfcal(std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--target", daemon_.target});
-    std::vector<const char*> argv = {"selfcal"};
-    for (const auto& argument : arguments) argv.push_back(argument.c_str());
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    const int code = RunCommandLine(static_cast<int>(argv.size()), argv.data());
-    out_ = testing::internal::GetCapturedStdout();
-    err_ = testing::internal::GetCapturedStderr();
-    return code;
+    Outcome outcome = client::Selfcal(arguments);
+    out_ = std::move(outcome.out);
+    err_ = std::move(outcome.err);
+    return outcome.code;
   }
   // The same with `answer` on its standard input.
   int Answering(const std::string& answer,

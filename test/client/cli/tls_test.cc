@@ -2,13 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "client/cli/commands.h"
-#include "test/client/cli/canned_daemon.h"
+#include "test/client/cli/commands_fixture.h"
+#include "test/recordings.h"
 #include "test/server/certificates.h"
 
 namespace selfcal::client {
@@ -46,15 +44,12 @@ class TlsCommands : public ::testing::Test {
 
   int Selfcal(std::vector<std::string> arguments,
               const std::vector<std::string>& more = {}) {
+    arguments.insert(arguments.end(), {"--target", target_});
     arguments.insert(arguments.end(), more.begin(), more.end());
-    std::vector<const char*> argv = {"selfcal", "--target", target_.c_str()};
-    for (const auto& argument : arguments) argv.push_back(argument.c_str());
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    const int code = RunCommandLine(static_cast<int>(argv.size()), argv.data());
-    out_ = testing::internal::GetCapturedStdout();
-    err_ = testing::internal::GetCapturedStderr();
-    return code;
+    Outcome outcome = client::Selfcal(arguments);
+    out_ = std::move(outcome.out);
+    err_ = std::move(outcome.err);
+    return outcome.code;
   }
 
   server::Certificates certificates_;
@@ -101,14 +96,7 @@ TEST_F(TlsCommands, SayWhatIsMissing) {
 
 // A stream of the library's, not a call on the channel of the others.
 TEST_F(TlsCommands, ImportARecording) {
-  const char* folder = std::getenv("SELFCAL_TEST_DATA");
-  const std::string map =
-      std::string(folder != nullptr ? folder : SELFCAL_TEST_DATA_DEFAULT) +
-      "/tango_handheld";
-  if (!std::filesystem::is_directory(map)) {
-    GTEST_SKIP() << map << " is missing; name the folder of recordings in "
-                 << "SELFCAL_TEST_DATA";
-  }
+  SELFCAL_NEED_RECORDING(map, "tango_handheld");
   EXPECT_EQ(Selfcal({"import", "device", map}, As("operator")), 0) << err_;
   EXPECT_THAT(out_, HasSubstr("\t13\tSTORED\n"));
 }
@@ -117,10 +105,9 @@ TEST(InsecureCommands, WorkOnAPortIfItIsAskedForByName) {
   CannedDaemon daemon(grpc::InsecureServerCredentials());
   daemon.rigs.emplace_back().set_name("rigs/device");
   const std::string target = "insecure:" + daemon.target;
-  const char* argv[] = {"selfcal", "rig", "list", "--target", target.c_str()};
-  testing::internal::CaptureStdout();
-  EXPECT_EQ(RunCommandLine(5, argv), 0);
-  EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("device"));
+  const Outcome outcome = Selfcal({"rig", "list", "--target", target});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("device"));
 }
 
 }  // namespace
