@@ -1,12 +1,14 @@
 #include "client/selfcal/connection.h"
 
 #include <fmt/format.h>
+#include <grpc/grpc.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/channel_arguments.h>
 
 #include <exception>
 #include <fstream>
+#include <mutex>
 #include <random>
 #include <sstream>
 #include <utility>
@@ -15,9 +17,17 @@ namespace selfcal::client {
 
 namespace {
 
+// gRPC is kept until the process ends: to shut it down with the last channel
+// can wait 10 s for a poll of that channel.
+void KeepLibrary() {
+  static std::once_flag once;
+  std::call_once(once, [] { grpc_init(); });
+}
+
 std::shared_ptr<grpc::Channel> MakeChannel(
     const std::string& target,
     const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
+  KeepLibrary();
   grpc::ChannelArguments arguments;
   // A failed connection that is shared would impose its own waiting time.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);

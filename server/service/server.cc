@@ -1,5 +1,6 @@
 #include "server/service/server.h"
 
+#include <grpc/grpc.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
@@ -25,10 +26,13 @@ constexpr const char* kServiceNames[] = {
     "selfcal.v1.StoreService",
 };
 
-// Plugins of gRPC's builder are global and meant to be set once.
-void SetUpPlugins() {
+// Plugins of gRPC's builder are global and meant to be set once. The library
+// is kept until the process ends: to shut it down with the last server waits up
+// to 10 s for a poll of a connection that a client has left open.
+void SetUpLibrary() {
   static std::once_flag once;
   std::call_once(once, [] {
+    grpc_init();
     RouteGrpcLog();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -96,7 +100,7 @@ class GrpcServer final : public Server {
   ~GrpcServer() override { Shutdown(std::chrono::milliseconds(0)); }
 
   absl::Status Start(const ServerOptions& options) {
-    SetUpPlugins();
+    SetUpLibrary();
     grpc::ServerBuilder builder;
     SetLimits(options, &builder);
     std::vector<int> ports(options.listen.size(), 0);
