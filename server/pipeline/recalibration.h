@@ -8,7 +8,8 @@
 //
 // One that nobody asked for by hand waits while the minimum interval of its rig
 // or the conditions hold it back: it stays pending, with a message that says
-// why.#pragma once
+// why.
+#pragma once
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -90,7 +91,7 @@ class Recalibrator {
       const Calibration& start,
       const std::vector<MotionSegment>& segments,
       const CalibrateOptions& options);
-  bool Report(const StoredRun& run, const CalibrateProgress& progress);
+  void Report(const StoredRun& run, const CalibrateProgress& progress);
   // State, reasons and validation of the candidate against what is active.
   absl::Status Judge(const StoredRun& run, StoredCalibration* candidate);
   // Judges and stores it, again where another version became active meanwhile.

@@ -89,15 +89,17 @@ absl::StatusOr<CalibrationResult> Recalibrator::RunSolver(
   const auto deadline =
       std::chrono::steady_clock::now() + options_.max_run_time;
   const auto late = [&] { return std::chrono::steady_clock::now() > deadline; };
+  const auto unwanted = [&] { return Interrupted() || late(); };
   CalibrationResult result = estimators_.calibrate(
       rig,
       start,
       segments,
       options,
       [&](const CalibrateProgress& progress) {
-        return Report(run, progress) && !late();
+        Report(run, progress);
+        return !unwanted();
       },
-      [&] { return Interrupted() || late(); });
+      unwanted);
   if (result.status == CalibrateStatus::kCancelled && late() &&
       !Interrupted()) {
     return absl::DeadlineExceededError(fmt::format(
@@ -115,14 +117,13 @@ absl::StatusOr<CalibrationResult> Recalibrator::RunSolver(
   return result;
 }
 
-bool Recalibrator::Report(const StoredRun& run,
+void Recalibrator::Report(const StoredRun& run,
                           const CalibrateProgress& progress) {
   {
     const std::lock_guard lock(mutex_);
     current_->progress = progress;
   }
   run_watchers_->Publish(RunTopic(run.rig, run.run), {run, progress});
-  return !Interrupted();
 }
 
 absl::Status Recalibrator::Judge(const StoredRun& run,

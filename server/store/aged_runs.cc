@@ -13,11 +13,8 @@ namespace {
 
 absl::StatusOr<std::int64_t> ActiveSince(Connection* db,
                                          std::int64_t activation) {
-  Statement read(
+  return ReadInt(
       db, "SELECT time_ns FROM activations WHERE activation = ?1", activation);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? read.Int(0) : 0;
 }
 
 bool HoldsAnother(const std::vector<Table>& tables, const StoredRun& last) {

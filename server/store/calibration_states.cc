@@ -17,7 +17,7 @@ struct Transition {
   CalibrationState to;
 };
 
-// Those of migrations/0003_lifecycle.sql.
+// Those of migrations/0004_lifecycle.sql.
 constexpr Transition kTransitions[] = {
     {CalibrationState::kCandidate, CalibrationState::kActive},
     {CalibrationState::kCandidate, CalibrationState::kRejected},

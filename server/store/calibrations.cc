@@ -169,13 +169,10 @@ absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(Connection* db,
 }
 
 absl::StatusOr<std::int64_t> NextVersion(Connection* db, std::int64_t rig) {
-  Statement read(db,
+  return ReadInt(db,
                  "SELECT coalesce(max(version), 0) + 1 FROM calibrations "
                  "WHERE rig = ?1",
                  rig);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? read.Int(0) : 1;
 }
 
 }  // namespace selfcal::server

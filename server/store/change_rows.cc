@@ -150,11 +150,8 @@ absl::Status InsertChange(Connection* db,
 }  // namespace
 
 absl::StatusOr<std::int64_t> NewestChange(Connection* db, std::int64_t rig) {
-  Statement read(
+  return ReadInt(
       db, "SELECT coalesce(max(change), 0) FROM changes WHERE rig = ?1", rig);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? read.Int(0) : 0;
 }
 
 absl::StatusOr<StoredChange> ReadChange(Connection* db,

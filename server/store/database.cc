@@ -31,13 +31,6 @@ absl::Status SetSafetyPragmas(Connection* connection) {
       "PRAGMA synchronous = FULL");
 }
 
-absl::StatusOr<int> UserVersion(Connection* connection) {
-  Statement read(connection, "PRAGMA user_version");
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? static_cast<int>(read.Int(0)) : 0;
-}
-
 absl::Status ApplyOne(Connection* connection,
                       const Migration& migration,
                       int version) {
@@ -149,7 +142,8 @@ void SetCheckpointOnClose(Connection* connection, bool on) {
 absl::Status VerifySchema(Connection* connection,
                           const std::string& path,
                           std::span<const Migration> migrations) {
-  SELFCAL_ASSIGN_OR_RETURN(const int version, UserVersion(connection));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t version,
+                           ReadInt(connection, "PRAGMA user_version"));
   const int newest = static_cast<int>(migrations.size());
   if (version > newest) {
     return absl::FailedPreconditionError(fmt::format(
@@ -180,7 +174,8 @@ absl::StatusOr<Connection> OpenDatabase(const std::string& path,
   SetCheckpointOnClose(&connection, false);
   SELFCAL_RETURN_IF_ERROR(SetSafetyPragmas(&connection));
   SELFCAL_RETURN_IF_ERROR(VerifySchema(&connection, path, migrations));
-  SELFCAL_ASSIGN_OR_RETURN(const int version, UserVersion(&connection));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t version,
+                           ReadInt(&connection, "PRAGMA user_version"));
   SetCheckpointOnClose(&connection, true);
   if (version < static_cast<int>(migrations.size())) {
     SELFCAL_RETURN_IF_ERROR(Backup(&connection, path, version));

@@ -18,30 +18,16 @@ namespace {
 constexpr double kReserve = 0.1;
 constexpr int kMaxDropped = 100;
 
-absl::StatusOr<std::int64_t> ReadNumber(Connection* db,
-                                        std::string_view sql,
-                                        std::int64_t rig) {
-  Statement read(db, sql, rig);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? read.Int(0) : 0;
-}
-
-absl::StatusOr<std::int64_t> Pragma(Connection* db, std::string_view name) {
-  Statement read(db, fmt::format("PRAGMA {}", name));
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? read.Int(0) : 0;
-}
-
 absl::Status CheckDatabaseSize(Connection* db,
                                std::int64_t bytes,
                                const Quotas& quotas) {
   if (quotas.max_database_bytes == 0) return absl::OkStatus();
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t pages, Pragma(db, "page_count"));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t pages,
+                           ReadInt(db, "PRAGMA page_count"));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t free,
-                           Pragma(db, "freelist_count"));
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t size, Pragma(db, "page_size"));
+                           ReadInt(db, "PRAGMA freelist_count"));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t size,
+                           ReadInt(db, "PRAGMA page_size"));
   const std::int64_t used = (pages - free) * size;
   const auto open = static_cast<std::int64_t>(
       (1 - kReserve) * static_cast<double>(quotas.max_database_bytes));
@@ -103,7 +89,8 @@ absl::StatusOr<std::int64_t> EvictOne(Connection* db,
 
 absl::Status LimitDatabase(Connection* db, const Quotas& quotas) {
   if (quotas.max_database_bytes == 0) return absl::OkStatus();
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t size, Pragma(db, "page_size"));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t size,
+                           ReadInt(db, "PRAGMA page_size"));
   return Statement(db,
                    fmt::format("PRAGMA max_page_count = {}",
                                std::max<std::int64_t>(
@@ -121,10 +108,10 @@ absl::Status MakeRoom(Connection* db,
   if (limit == 0) return absl::OkStatus();
   SELFCAL_ASSIGN_OR_RETURN(
       std::int64_t used,
-      ReadNumber(db,
-                 "SELECT coalesce(sum(length(data)), 0) FROM payloads "
-                 "WHERE rig = ?1",
-                 rig));
+      ReadInt(db,
+              "SELECT coalesce(sum(length(data)), 0) FROM payloads "
+              "WHERE rig = ?1",
+              rig));
   while (used + bytes > limit) {
     SELFCAL_ASSIGN_OR_RETURN(const std::int64_t freed,
                              EvictOne(db, rig, rig_name, quotas));

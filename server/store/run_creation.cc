@@ -17,13 +17,10 @@ namespace {
 absl::StatusOr<std::int64_t> NewestRun(Connection* db,
                                        std::int64_t rig,
                                        const std::string& condition) {
-  Statement read(
+  return ReadInt(
       db,
       "SELECT coalesce(max(run), 0) FROM runs WHERE rig = ?1 AND " + condition,
       rig);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? read.Int(0) : 0;
 }
 
 // What the trigger compares the tables with: the snapshot of the newest run,

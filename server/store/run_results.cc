@@ -25,13 +25,6 @@ absl::StatusOr<StoredRun> ReadRunningRun(Connection* db,
   return run;
 }
 
-absl::StatusOr<int> SchemaVersion(Connection* db) {
-  Statement read(db, "PRAGMA user_version");
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? static_cast<int>(read.Int(0)) : 0;
-}
-
 // The candidate of the run: the one that it has, or a new one.
 absl::StatusOr<StoredCalibration> EnsureCandidate(
     Connection* db,
@@ -45,7 +38,8 @@ absl::StatusOr<StoredCalibration> EnsureCandidate(
   }
   StoredCalibration stored = calibration;
   SELFCAL_ASSIGN_OR_RETURN(stored.version, NextVersion(db, rig));
-  SELFCAL_ASSIGN_OR_RETURN(stored.schema_version, SchemaVersion(db));
+  SELFCAL_ASSIGN_OR_RETURN(stored.schema_version,
+                           ReadInt(db, "PRAGMA user_version"));
   stored.rig = run.rig;
   stored.state = CalibrationState::kCandidate;
   stored.create_time_ns = NowNs();

@@ -18,6 +18,7 @@ constexpr std::size_t kMaxGroup = 64;
 // The log is moved into the file when it is this large: some groups of
 // segments, so that a page that many of them change is written once.
 constexpr std::int64_t kCheckpointBytes = 32 << 20;
+constexpr std::int64_t kLeastPage = 512;  // of SQLite
 
 // A COMMIT failed, or a statement of it: the disk, not the question.
 bool IsDiskError(const absl::Status& status) {
@@ -59,13 +60,6 @@ int NoteLogPages(void* log_pages, sqlite3*, const char*, int pages) {
   return SQLITE_OK;
 }
 
-absl::StatusOr<std::int64_t> CheckpointPages(Connection* connection) {
-  Statement read(connection, "PRAGMA page_size");
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return kCheckpointBytes / (found ? read.Int(0) : 4096);
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<SharedDatabase>> SharedDatabase::Open(
@@ -97,7 +91,9 @@ absl::Status SharedDatabase::OpenConnections() {
   reader_.reset();
   writer_.reset();
   SELFCAL_ASSIGN_OR_RETURN(writer_, open_writer_());
-  SELFCAL_ASSIGN_OR_RETURN(checkpoint_pages_, CheckpointPages(&*writer_));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t page_bytes,
+                           ReadInt(&*writer_, "PRAGMA page_size"));
+  checkpoint_pages_ = kCheckpointBytes / std::max(page_bytes, kLeastPage);
   log_pages_ = 0;
   sqlite3_wal_hook(writer_->handle(), NoteLogPages, &log_pages_);
   SELFCAL_ASSIGN_OR_RETURN(reader_,

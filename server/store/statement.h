@@ -146,4 +146,15 @@ class Snapshot {
   absl::Status status_;
 };
 
+// The number that `sql` gives in its first row; 0 without one.
+template <typename... Args>
+absl::StatusOr<std::int64_t> ReadInt(Connection* db,
+                                     std::string_view sql,
+                                     const Args&... args) {
+  Statement read(db, sql, args...);
+  const bool found = read.Next();
+  if (!read.status().ok()) return read.status();
+  return found ? read.Int(0) : 0;
+}
+
 }  // namespace selfcal::server

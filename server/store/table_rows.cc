@@ -83,11 +83,8 @@ absl::StatusOr<std::vector<Table>> ReadFreshTables(Connection* db,
 }
 
 absl::StatusOr<std::int64_t> ReceiveTime(Connection* db, std::int64_t segment) {
-  Statement read(
+  return ReadInt(
       db, "SELECT receive_time_ns FROM segments WHERE segment = ?1", segment);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return found ? read.Int(0) : 0;
 }
 
 absl::Status WriteOffer(Connection* db,

@@ -3,10 +3,9 @@
 // daemon's resident memory.
 //
 //   selfcal_daemon_load --daemon build/release/server/daemon/selfcald
-//       --folder DIR [--clients N] [--seconds N] [--hold-runs]
+//       --folder DIR [--clients N] [--seconds N]
 #include <fmt/format.h>
 #include <grpcpp/create_channel.h>
-#include <stdlib.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -40,7 +39,6 @@ struct Options {
   std::string folder;
   int clients = 200;
   int seconds = 60;
-  bool hold_runs = false;
   int unacknowledged = 4;  // of one client, as the library's default
 };
 
@@ -198,7 +196,6 @@ std::vector<MotionSegment> Record() {
 void Run(const Options& options) {
   const std::string state = options.folder + "/load";
   fs::remove_all(state);
-  if (options.hold_runs) setenv("SELFCAL_MAX_LOAD", "0.000001", 1);
   auto started = DaemonProcess::Start(options.daemon, state);
   if (!started.ok()) throw std::runtime_error(started.status().ToString());
   const std::unique_ptr<DaemonProcess> daemon = *std::move(started);
@@ -243,9 +240,6 @@ int main(int argc, char** argv) {
       ->check(CLI::ExistingDirectory);
   app.add_option("--clients", options.clients)->check(CLI::Range(1, 1000));
   app.add_option("--seconds", options.seconds)->check(CLI::Range(1, 86'400));
-  app.add_flag("--hold-runs",
-               options.hold_runs,
-               "No recalibration meanwhile: streams and scores alone");
   CLI11_PARSE(app, argc, argv);
   try {
     selfcal::client::Run(options);

@@ -92,11 +92,7 @@ TEST_F(CommandLineTest, DoesOverMutualTlsWhatItsCertificateSays) {
                                     "--tls-client-ca",
                                     certificates.Pem("ca")});
   CreateRig();
-  const std::string log = daemon->Log();
-  const auto port = log.find("127.0.0.1:");
-  ASSERT_NE(port, log.npos) << log;
-  const std::string address =
-      log.substr(port, log.find_first_of(", \n", port) - port);
+  const std::string address = "127.0.0.1:" + daemon->Word("127.0.0.1:");
   const auto as = [&](const std::string& name) {
     connection_ = {"--target",
                    address,

@@ -31,14 +31,6 @@ class OperationTest : public DaemonTest {
     std::ofstream(folder_ / name) << text;
     return folder_ / name;
   }
-
-  // What stands behind the text in the log, to the end of the word.
-  static std::string Word(const Process& daemon, const std::string& before) {
-    EXPECT_TRUE(daemon.Says(before)) << daemon.Log();
-    const std::string log = daemon.Log();
-    const auto at = log.find(before) + before.size();
-    return log.substr(at, log.find_first_of(", \n", at) - at);
-  }
 };
 
 TEST_F(OperationTest, CheckLooksAtTheSettingsAndEnds) {
@@ -77,7 +69,7 @@ TEST_F(OperationTest, NoSecretReachesTheLog) {
                              certificates.Pem("ca"),
                              "--tls-refresh",
                              "1"});
-  const std::string address = Word(*daemon, "ready: listening on ");
+  const std::string address = daemon->Word("ready: listening on ");
   for (const std::string name : {"admin", "stranger", ""}) {
     const auto stub = v1::RigService::NewStub(
         grpc::CreateChannel(address, certificates.Client(name)));
@@ -293,7 +285,7 @@ TEST_F(OperationTest, AlertsAndDashboardShowSeriesThatThereAre) {
   const Rig rig = CreateRig();
   Stream(TestSegments(rig, 4));
   ASSERT_TRUE(AllScored());
-  const std::string series = HttpGet(Word(*daemon, "metrics: "));
+  const std::string series = HttpGet(daemon->Word("metrics: "));
   EXPECT_THAT(series,
               HasSubstr("selfcal_segments_total{verdict=\"stored\"} 4"));
   EXPECT_THAT(series,

@@ -79,6 +79,14 @@ class Process {
     return false;
   }
 
+  // What stands behind the text in the log, to the end of the word.
+  std::string Word(const std::string& before) const {
+    if (!Says(before)) throw std::runtime_error("not in the log: " + Log());
+    const std::string log = Log();
+    const size_t at = log.find(before) + before.size();
+    return log.substr(at, log.find_first_of(", \n", at) - at);
+  }
+
  private:
   std::filesystem::path log_;
   pid_t pid_ = 0;
