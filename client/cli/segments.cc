@@ -139,10 +139,18 @@ Table Scores(const v1::Segment& segment) {
   return table;
 }
 
-int List(Context* context, const std::string& rig) {
+struct ListOptions {
+  std::string rig;
+  std::string filter;
+  std::string order_by;
+};
+
+int List(Context* context, const ListOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::ListSegmentsRequest request;
-  request.set_parent(RigName(rig));
+  request.set_parent(RigName(options.rig));
+  request.set_filter(options.filter);
+  request.set_order_by(options.order_by);
   v1::ListSegmentsResponse segments;
   const auto status = CallForAllPages<Service>(
       stub.get(), &Service::ListSegments, request, &segments);
@@ -184,16 +192,24 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   CLI::App* segments = app->add_subcommand("segments", "Show segments");
   segments->require_subcommand(1);
 
-  const auto rig = std::make_shared<std::string>();
+  const auto options = std::make_shared<ListOptions>();
   CLI::App* list = segments->add_subcommand(
       "list",
       "List the segments of a rig, newest first, with the entropy of each "
       "group [nat] (lower is richer) and the tables that hold it");
-  list->add_option("RIG", *rig)->required();
-  list->callback([context, rig] {
-    context->command = [context, rig] { return List(context, *rig); };
+  list->add_option("RIG", options->rig)->required();
+  list->add_option("--filter",
+                   options->filter,
+                   "Conditions joined by AND, as 'state = SCORED AND "
+                   "gain.camera >= 2'");
+  list->add_option("--order-by",
+                   options->order_by,
+                   "A field, then asc or desc, as 'entropy.camera asc'");
+  list->callback([context, options] {
+    context->command = [context, options] { return List(context, *options); };
   });
 
+  const auto rig = std::make_shared<std::string>();
   const auto id = std::make_shared<std::string>();
   CLI::App* show = segments->add_subcommand("show", "Show a segment");
   show->add_option("RIG", *rig)->required();

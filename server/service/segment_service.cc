@@ -8,6 +8,7 @@
 #include "server/service/errors.h"
 #include "server/service/paging.h"
 #include "server/service/segment_call.h"
+#include "server/service/segment_filter.h"
 #include "server/service/services.h"
 
 namespace selfcal::server {
@@ -35,11 +36,20 @@ class SegmentService final : public Service {
     return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
+      SegmentQuery query;
+      if (const auto filter = ParseSegmentFilter(request->filter(), &query);
+          !filter.ok()) {
+        return ToGrpc(filter, {kSegmentType, "", "filter"});
+      }
+      if (const auto order = ParseSegmentOrder(request->order_by(), &query);
+          !order.ok()) {
+        return ToGrpc(order, {kSegmentType, "", "order_by"});
+      }
       return FillPage(
           *request,
           request->parent(),
           [&](const Page& page) {
-            return context_.store->ListSegments(*rig, page);
+            return context_.store->ListSegments(*rig, query, page);
           },
           [](const StoredSegment& segment, v1::ListSegmentsResponse* to) {
             *to->add_segments() = Encode(segment);

@@ -38,13 +38,13 @@ std::optional<std::string> FromHex(std::string_view hex) {
   return bytes;
 }
 
-absl::Status BadToken() {
+}  // namespace
+
+absl::Status BadPageToken() {
   return absl::InvalidArgumentError(
       "the page token is not one of this list; send the one that came with the "
       "page before, or none for the first page");
 }
-
-}  // namespace
 
 int PageSize(const Page& page) {
   return page.size <= 0 ? kDefaultPageSize : std::min(page.size, kMaxPageSize);
@@ -66,7 +66,7 @@ absl::StatusOr<std::optional<std::string>> PageKey(std::string_view list,
   const std::optional<std::string> text = FromHex(page.token);
   const std::string prefix = fmt::format("{}\n", list);
   if (!text || !text->starts_with(prefix)) {
-    return BadToken();
+    return BadPageToken();
   }
   return std::optional<std::string>(text->substr(prefix.size()));
 }
@@ -82,7 +82,7 @@ absl::StatusOr<std::optional<std::int64_t>> PageNumber(std::string_view list,
   const char* end = key->data() + key->size();
   const auto parsed = std::from_chars(key->data(), end, number);
   if (parsed.ec != std::errc() || parsed.ptr != end) {
-    return BadToken();
+    return BadPageToken();
   }
   return std::optional<std::int64_t>(number);
 }

@@ -26,6 +26,8 @@ absl::StatusOr<std::optional<std::string>> PageKey(std::string_view list,
 absl::StatusOr<std::optional<std::int64_t>> PageNumber(std::string_view list,
                                                        const Page& page);
 
+absl::Status BadPageToken();
+
 // For a list that was read one item longer than the page: drops that item, and
 // makes the token if it was there. `key` gives the key of an item.
 template <typename T, typename Key>

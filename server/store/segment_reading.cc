@@ -8,6 +8,7 @@
 #include "server/store/paging.h"
 #include "server/store/records.h"
 #include "server/store/rigs.h"
+#include "server/store/segment_query_sql.h"
 #include "server/store/segment_rows.h"
 #include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
@@ -16,13 +17,13 @@ namespace selfcal::server {
 namespace {
 
 constexpr char kColumns[] =
-    "SELECT s.segment, s.session, s.session_index, s.sequence, s.state, "
+    "s.segment, s.session, s.session_index, s.sequence, s.state, "
     "  s.problem, s.receive_time_ns, s.calibration_version, s.start_ns, "
     "  s.end_ns, s.keyframes, s.imu_samples, s.landmarks, s.observations, "
     "  i.information, i.sha256, "
     "  (SELECT length(p.data) FROM payloads p WHERE p.segment = s.segment), "
-    "  s.temperature_c "
-    "FROM segments s LEFT JOIN segment_information i USING (segment) ";
+    "  s.temperature_c";
+constexpr int kKeyColumn = 18;  // behind those of a list
 
 StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
   StoredSegment segment;
@@ -70,9 +71,11 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
                                           const SegmentKey& key) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   Statement read(db,
-                 std::string(kColumns) +
-                     "WHERE s.rig = ?1 AND s.session = ?2 "
-                     "AND s.session_index = ?3",
+                 fmt::format("SELECT {} FROM segments s "
+                             "LEFT JOIN segment_information i USING (segment) "
+                             "WHERE s.rig = ?1 AND s.session = ?2 "
+                             "AND s.session_index = ?3",
+                             kColumns),
                  rig_id,
                  key.session,
                  key.index);
@@ -88,20 +91,22 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
 
 absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
                                                       const std::string& rig,
+                                                      const SegmentQuery& query,
                                                       const Page& page) {
-  const std::string list = "segments/" + rig;
-  SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
+  const std::string list = ListName(rig, query);
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentPlace after,
+                           PlaceOfPage(list, query, page));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  const int size = PageSize(page);
-  Statement read(db,
-                 std::string(kColumns) +
-                     "WHERE s.rig = ?1 AND s.sequence < ?2 "
-                     "ORDER BY s.sequence DESC LIMIT ?3",
-                 rig_id,
-                 before.value_or(INT64_MAX),
-                 size + 1);
+  const auto size = static_cast<std::size_t>(PageSize(page));
+  Statement read = SelectSegments(
+      db, kColumns, rig_id, query, after, static_cast<int>(size) + 1);
   Listed<StoredSegment> listed;
+  SegmentPlace last;
   while (read.Next()) {
+    if (listed.items.size() == size) {
+      listed.next_token = TokenAfter(list, last);
+      break;
+    }
     StoredSegment segment;
     const absl::Status status = FillFromRow(db, read, rig, &segment);
     if (absl::IsDataLoss(status)) {
@@ -109,11 +114,10 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
     } else if (!status.ok()) {
       return status;
     }
+    last = {read.Double(kKeyColumn), segment.sequence};
     listed.items.push_back(std::move(segment));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
-  CutPage(
-      list, size, [](const auto& item) { return item.sequence; }, &listed);
   return listed;
 }
 

@@ -58,10 +58,11 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
                                           const std::string& rig,
                                           const SegmentKey& key);
 
-// Newest first. Damaged information leaves a `problem` instead, so that one
-// bad row does not hide the others.
+// Damaged information leaves a `problem` instead, so that one bad row does not
+// hide the others.
 absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
                                                       const std::string& rig,
+                                                      const SegmentQuery& query,
                                                       const Page& page);
 
 // FAILED_PRECONDITION if the data was dropped.

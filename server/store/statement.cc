@@ -169,10 +169,6 @@ void Statement::Bind(int index, double value) {
   if (status_.ok()) Check(sqlite3_bind_double(statement_.get(), index, value));
 }
 
-void Statement::Bind(int index, std::optional<double> value) {
-  if (value) Bind(index, *value);  // what is not bound is NULL
-}
-
 void Statement::Bind(int index, std::string_view value) {
   if (status_.ok()) {
     Check(sqlite3_bind_text64(statement_.get(),

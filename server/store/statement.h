@@ -99,7 +99,10 @@ class Statement {
   void Bind(int index, std::int64_t value);
   void Bind(int index, int value);
   void Bind(int index, double value);
-  void Bind(int index, std::optional<double> value);  // nothing: NULL
+  template <typename T>
+  void Bind(int index, const std::optional<T>& value) {
+    if (value) Bind(index, *value);  // what is not bound is NULL
+  }
   void Bind(int index, std::string_view value);
   void Bind(int index, const std::string& value);
   void Bind(int index, BlobView value);

@@ -28,6 +28,7 @@
 #include "core/model/rig.h"
 #include "core/model/segment.h"
 #include "core/selection/tables.h"
+#include "server/store/segment_query.h"
 
 namespace selfcal::server {
 
@@ -253,9 +254,13 @@ class Store {
                                PutDone done) = 0;
   virtual absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
                                                    const SegmentKey& key) = 0;
-  // Newest first.
   virtual absl::StatusOr<Listed<StoredSegment>> ListSegments(
-      const std::string& rig, const Page& page) = 0;
+      const std::string& rig, const SegmentQuery& query, const Page& page) = 0;
+  // All, newest first.
+  absl::StatusOr<Listed<StoredSegment>> ListSegments(const std::string& rig,
+                                                     const Page& page) {
+    return ListSegments(rig, {}, page);
+  }
   // FAILED_PRECONDITION if its data was dropped; DATA_LOSS if it is damaged.
   virtual absl::StatusOr<MotionSegment> GetSegmentData(
       const std::string& rig, const SegmentKey& key) = 0;

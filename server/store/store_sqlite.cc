@@ -95,9 +95,13 @@ class SqliteStore : public Store {
     return Read([&](Connection* db) { return ReadSegment(db, rig, key); });
   }
 
+  using Store::ListSegments;
   absl::StatusOr<Listed<StoredSegment>> ListSegments(
-      const std::string& rig, const Page& page) override {
-    return Read([&](Connection* db) { return ListSegmentRows(db, rig, page); });
+      const std::string& rig,
+      const SegmentQuery& query,
+      const Page& page) override {
+    return Read(
+        [&](Connection* db) { return ListSegmentRows(db, rig, query, page); });
   }
 
   absl::StatusOr<MotionSegment> GetSegmentData(const std::string& rig,

@@ -49,6 +49,8 @@ struct CannedDaemon final : v1::RigService::Service,
   v1::CompareCalibrationsResponse differences;
   std::string last_name;
   std::string last_reason;
+  std::string last_filter;
+  std::string last_order;
   v1::MotionSegment last_segment;      // that was sent
   std::int64_t reject_index = -1;      // of the segments that are sent
   std::atomic<int> broken_watches{0};  // that many end before the run does
@@ -148,6 +150,8 @@ struct CannedDaemon final : v1::RigService::Service,
                             const v1::ListSegmentsRequest* request,
                             v1::ListSegmentsResponse* response) override {
     last_name = request->parent();
+    last_filter = request->filter();
+    last_order = request->order_by();
     Page(*request, segments, response, [&](const v1::Segment& segment) {
       *response->add_segments() = segment;
     });

@@ -175,6 +175,19 @@ TEST_F(Commands, ListsSegmentsWithTheirEntropies) {
             "walk~0\tscored\t-\t40\t3.90\t0\t0\t-12.35\t-12.35\timu\t-\n");
 }
 
+TEST_F(Commands, AsksForSegmentsByFilterAndOrder) {
+  const Outcome outcome = Selfcal({"segments",
+                                   "list",
+                                   "device",
+                                   "--filter",
+                                   "state = SCORED",
+                                   "--order-by",
+                                   "gain.imu asc"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(daemon_.last_filter, "state = SCORED");
+  EXPECT_EQ(daemon_.last_order, "gain.imu asc");
+}
+
 TEST_F(Commands, ShowsASegmentAndWhatItDoesNotObserve) {
   daemon_.segments.push_back(ScoredSegment(0));
   const Outcome outcome = Selfcal({"segments", "show", "device", "walk~0"});

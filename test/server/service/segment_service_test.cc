@@ -141,6 +141,33 @@ TEST_F(SegmentServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
               ElementsAre("page_token"));
 }
 
+TEST_F(SegmentServiceTest, ListsByFilterInAnOrder) {
+  const Rig rig = AddScored(3);
+  ASSERT_TRUE(
+      store_->PutSegment("r", TestSegments(rig, 1, "unscored")[0]).ok());
+  Context context;
+  v1::ListSegmentsRequest request;
+  request.set_parent("rigs/r");
+  request.set_filter("state = SCORED AND session = s");
+  request.set_order_by("receive_time asc");
+  v1::ListSegmentsResponse response;
+  ASSERT_TRUE(segments_->ListSegments(&context, request, &response).ok());
+  ASSERT_EQ(response.segments_size(), 3);
+  EXPECT_EQ(response.segments(0).name(), "rigs/r/segments/s~0");
+
+  request.set_filter("state = scored");
+  Context wrong_filter;
+  EXPECT_THAT(
+      BadFields(segments_->ListSegments(&wrong_filter, request, &response)),
+      ElementsAre("filter"));
+  request.set_filter("");
+  request.set_order_by("colour");
+  Context wrong_order;
+  EXPECT_THAT(
+      BadFields(segments_->ListSegments(&wrong_order, request, &response)),
+      ElementsAre("order_by"));
+}
+
 TEST_F(SegmentServiceTest, TablesShowTheRichestFirst) {
   const Rig rig = AddScored(3);
   v1::ListTablesResponse response;
