@@ -56,11 +56,13 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddSegmentCommands(&app, &context);
     AddTablesCommand(&app, &context);
     AddRecalibrateCommand(&app, &context);
+    AddRunCommands(&app, &context);
     AddCalibrationCommands(&app, &context);
     AddEventsCommand(&app, &context);
     AddDoctorCommand(&app, &context);
     AddBackupCommand(&app, &context);
     AddRestoreCommand(&app, &context);
+    AddCompletionCommand(&app, &context);
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

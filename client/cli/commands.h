@@ -13,11 +13,13 @@ void AddImportCommand(CLI::App* app, Context* context);
 void AddSegmentCommands(CLI::App* app, Context* context);
 void AddTablesCommand(CLI::App* app, Context* context);
 void AddRecalibrateCommand(CLI::App* app, Context* context);
+void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
 void AddEventsCommand(CLI::App* app, Context* context);
 void AddDoctorCommand(CLI::App* app, Context* context);
 void AddBackupCommand(CLI::App* app, Context* context);
 void AddRestoreCommand(CLI::App* app, Context* context);
+void AddCompletionCommand(CLI::App* app, Context* context);
 
 // The whole command line; returns the exit code.
 int RunCommandLine(int argc, const char* const* argv);

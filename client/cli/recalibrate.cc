@@ -1,17 +1,10 @@
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <chrono>
 #include <memory>
 #include <string>
-#include <thread>
+#include <utility>
 
-#include "client/cli/calibration_report.h"
 #include "client/cli/commands.h"
-#include "client/cli/progress.h"
-#include "client/cli/text.h"
+#include "client/cli/run_following.h"
 #include "proto/resource_names.h"
-#include "selfcal/v1/calibration_service.grpc.pb.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
 
 namespace selfcal::client {
@@ -19,115 +12,17 @@ namespace {
 
 using Service = v1::RecalibrationService::StubInterface;
 
-// A run outlives its daemon: it starts again with the next one.
-constexpr std::chrono::seconds kPatience{60};
-constexpr std::chrono::milliseconds kRetryEvery{500};
-
-bool HasEnded(const v1::Recalibration& run) {
-  return run.state() == v1::Recalibration::SUCCEEDED ||
-         run.state() == v1::Recalibration::FAILED ||
-         run.state() == v1::Recalibration::CANCELLED;
-}
-
-void ShowProgress(const v1::Recalibration& run, Progress* progress) {
-  const auto iteration = static_cast<std::size_t>(std::max(run.iteration(), 0));
-  const auto limit =
-      static_cast<std::size_t>(std::max(run.max_iterations(), 0));
-  progress->Show(iteration,
-                 limit,
-                 fmt::format("{}, cost {:.6g}, step {:.2g} sigma",
-                             StateText(run.state()),
-                             run.cost(),
-                             run.step_sigmas()));
-}
-
-// One connection; *run is the last state that was told, if any was.
-grpc::Status WatchOnce(Service* stub,
-                       Progress* progress,
-                       v1::Recalibration* run,
-                       bool* told) {
-  grpc::ClientContext call;
-  v1::WatchRecalibrationRequest request;
-  request.set_name(run->name());
-  const auto stream = stub->WatchRecalibration(&call, request);
-  v1::Recalibration update;
-  while (stream->Read(&update)) {
-    *run = update;
-    *told = true;
-    ShowProgress(*run, progress);
-  }
-  return stream->Finish();
-}
-
-grpc::Status WatchToEnd(Service* stub, v1::Recalibration* run) {
-  using Clock = std::chrono::steady_clock;
-  Progress progress("recalibration");
-  auto give_up = Clock::now() + kPatience;
-  while (!HasEnded(*run)) {
-    bool told = false;
-    const grpc::Status status = WatchOnce(stub, &progress, run, &told);
-    if (!status.ok() && !IsUnreachable(status)) return status;
-    if (told) give_up = Clock::now() + kPatience;
-    if (!status.ok() && Clock::now() > give_up) return status;
-    if (!HasEnded(*run)) std::this_thread::sleep_for(kRetryEvery);
-  }
-  return grpc::Status::OK;
-}
-
-void PrintRun(const Context& context, const v1::Recalibration& run) {
-  if (context.json) return context.PrintJson(run);
-  Facts facts;
-  facts.Add("recalibration", LastPart(run.name()));
-  facts.Add("state", StateText(run.state()));
-  facts.Add("trigger", TriggerText(run.trigger()));
-  facts.Add("segments", fmt::format("{}", run.segments_size()));
-  if (!run.message().empty()) facts.Add("message", run.message());
-  if (!run.calibration().empty()) {
-    facts.Add("calibration", LastPart(run.calibration()));
-  }
-  context.Print(facts);
-}
-
-// What the run has produced; 1 if it may not be used.
-int Judge(Context* context, const v1::Recalibration& run) {
-  if (run.state() != v1::Recalibration::SUCCEEDED) {
-    PrintError(fmt::format(
-        "the recalibration has {}: {}", StateText(run.state()), run.message()));
-    return kFailed;
-  }
-  const auto stub = v1::CalibrationService::NewStub(context->Channel());
-  v1::GetCalibrationRequest request;
-  request.set_name(run.calibration());
-  v1::Calibration calibration;
-  const auto status = Call<v1::CalibrationService::StubInterface>(
-      stub.get(),
-      &v1::CalibrationService::StubInterface::GetCalibration,
-      request,
-      &calibration);
-  if (!status.ok()) return Fail(*context, status);
-  if (!context->json) {
-    if (context->terminal) PrintText("\n");
-    context->Print(CalibrationValues(calibration));
-  }
-  if (calibration.state() != v1::Calibration::REJECTED) return kDone;
-  PrintError(fmt::format("version {} was rejected: {}",
-                         calibration.version(),
-                         fmt::join(calibration.reasons(), " ")));
-  return kFailed;
-}
-
 int Recalibrate(Context* context, const std::string& rig, bool no_wait) {
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::StartRecalibrationRequest request;
   request.set_parent(RigName(rig));
   v1::Recalibration run;
-  grpc::Status status =
+  const grpc::Status status =
       Call<Service>(stub.get(), &Service::StartRecalibration, request, &run);
   if (!status.ok()) return Fail(*context, status);
-  if (!no_wait) status = WatchToEnd(stub.get(), &run);
-  if (!status.ok()) return Fail(*context, status);
+  if (!no_wait) return FollowRun(context, stub.get(), std::move(run));
   PrintRun(*context, run);
-  return no_wait ? kDone : Judge(context, run);
+  return kDone;
 }
 
 }  // namespace

@@ -49,6 +49,7 @@ struct CannedDaemon final : v1::RigService::Service,
   v1::CompareCalibrationsResponse differences;
   std::string last_name;
   std::string last_reason;
+  std::string cancelled;  // the run
   std::string last_filter;
   std::string last_order;
   v1::MotionSegment last_segment;      // that was sent
@@ -237,6 +238,35 @@ struct CannedDaemon final : v1::RigService::Service,
       return {grpc::StatusCode::UNAVAILABLE, "the daemon is stopping"};
     }
     for (const v1::Recalibration& update : run) writer->Write(update);
+    return grpc::Status::OK;
+  }
+
+  grpc::Status ListRecalibrations(
+      grpc::ServerContext*,
+      const v1::ListRecalibrationsRequest* request,
+      v1::ListRecalibrationsResponse* response) override {
+    last_name = request->parent();
+    Page(*request, run, response, [&](const v1::Recalibration& one) {
+      *response->add_recalibrations() = one;
+    });
+    return grpc::Status::OK;
+  }
+  grpc::Status GetRecalibration(grpc::ServerContext*,
+                                const v1::GetRecalibrationRequest* request,
+                                v1::Recalibration* response) override {
+    last_name = request->name();
+    if (run.empty()) return {grpc::StatusCode::NOT_FOUND, "no such run"};
+    *response = run.front();
+    return grpc::Status::OK;
+  }
+  grpc::Status CancelRecalibration(
+      grpc::ServerContext*,
+      const v1::CancelRecalibrationRequest* request,
+      v1::Recalibration* response) override {
+    cancelled = request->name();
+    if (run.empty()) return {grpc::StatusCode::NOT_FOUND, "no such run"};
+    *response = run.front();
+    response->set_state(v1::Recalibration::CANCELLED);
     return grpc::Status::OK;
   }
 

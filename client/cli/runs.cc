@@ -1,0 +1,133 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/cli/run_following.h"
+#include "client/cli/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/recalibration.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Service = v1::RecalibrationService::StubInterface;
+
+struct RunOptions {
+  std::string rig;
+  std::string run;
+};
+
+int List(Context* context, const RunOptions& options) {
+  const auto stub = v1::RecalibrationService::NewStub(context->Channel());
+  v1::ListRecalibrationsRequest request;
+  request.set_parent(RigName(options.rig));
+  v1::ListRecalibrationsResponse runs;
+  const auto status = CallForAllPages<Service>(
+      stub.get(), &Service::ListRecalibrations, request, &runs);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(runs);
+    return kDone;
+  }
+  Table table({{"run", true},
+               {"state"},
+               {"trigger"},
+               {"created"},
+               {"ended"},
+               {"segments", true},
+               {"calibration", true},
+               {"message"}});
+  for (const v1::Recalibration& run : runs.recalibrations()) {
+    table.Add({LastPart(run.name()),
+               StateText(run.state()),
+               TriggerText(run.trigger()),
+               TimeText(run.create_time()),
+               TimeText(run.end_time()),
+               fmt::format("{}", run.segments_size()),
+               run.calibration().empty() ? "-" : LastPart(run.calibration()),
+               run.message()});
+  }
+  context->Print(table);
+  return kDone;
+}
+
+// One call about a run: the request names it, the response is the run.
+template <typename Request>
+grpc::Status Ask(Service* stub,
+                 grpc::Status (Service::*method)(grpc::ClientContext*,
+                                                 const Request&,
+                                                 v1::Recalibration*),
+                 const RunOptions& options,
+                 v1::Recalibration* run) {
+  Request request;
+  request.set_name(ChildName(options.rig, "recalibrations", options.run));
+  return Call<Service>(stub, method, request, run);
+}
+
+int Show(Context* context, const RunOptions& options) {
+  const auto stub = v1::RecalibrationService::NewStub(context->Channel());
+  v1::Recalibration run;
+  const auto status =
+      Ask(stub.get(), &Service::GetRecalibration, options, &run);
+  if (!status.ok()) return Fail(*context, status);
+  PrintRun(*context, run);
+  return kDone;
+}
+
+int Watch(Context* context, const RunOptions& options) {
+  const auto stub = v1::RecalibrationService::NewStub(context->Channel());
+  v1::Recalibration run;
+  const auto status =
+      Ask(stub.get(), &Service::GetRecalibration, options, &run);
+  if (!status.ok()) return Fail(*context, status);
+  return FollowRun(context, stub.get(), std::move(run));
+}
+
+int Cancel(Context* context, const RunOptions& options) {
+  const auto stub = v1::RecalibrationService::NewStub(context->Channel());
+  v1::Recalibration run;
+  const auto status =
+      Ask(stub.get(), &Service::CancelRecalibration, options, &run);
+  if (!status.ok()) return Fail(*context, status);
+  PrintRun(*context, run);
+  return kDone;
+}
+
+}  // namespace
+
+void AddRunCommands(CLI::App* app, Context* context) {
+  CLI::App* runs =
+      app->add_subcommand("runs", "Show and cancel recalibrations");
+  runs->require_subcommand(1);
+  const auto options = std::make_shared<RunOptions>();
+
+  CLI::App* list =
+      runs->add_subcommand("list", "List the runs of a rig, newest first");
+  list->add_option("RIG", options->rig)->required();
+  list->callback([context, options] {
+    context->command = [context, options] { return List(context, *options); };
+  });
+
+  const auto add = [&](const char* name, const char* what, auto command) {
+    CLI::App* about_one = runs->add_subcommand(name, what);
+    about_one->add_option("RIG", options->rig)->required();
+    about_one->add_option("RUN", options->run, "Its number")->required();
+    about_one->callback([context, options, command] {
+      context->command = [context, options, command] {
+        return command(context, *options);
+      };
+    });
+  };
+  add("show", "Show a run", Show);
+  add("watch",
+      "Wait for the end of a run and show the result; exits with 1 if that "
+      "was rejected",
+      Watch);
+  add("cancel",
+      "End a run that is under way; what it found is given up",
+      Cancel);
+}
+
+}  // namespace selfcal::client
