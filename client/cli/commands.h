@@ -11,6 +11,8 @@ namespace selfcal::client {
 void AddRigCommands(CLI::App* app, Context* context);
 void AddImportCommand(CLI::App* app, Context* context);
 void AddSegmentCommands(CLI::App* app, Context* context);
+// Below `segments`.
+void AddSegmentExport(CLI::App* segments, Context* context);
 void AddTablesCommand(CLI::App* app, Context* context);
 void AddRecalibrateCommand(CLI::App* app, Context* context);
 void AddRunCommands(CLI::App* app, Context* context);

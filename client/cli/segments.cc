@@ -217,6 +217,8 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   show->callback([context, rig, id] {
     context->command = [context, rig, id] { return Show(context, *rig, *id); };
   });
+
+  AddSegmentExport(segments, context);
 }
 
 }  // namespace selfcal::client

@@ -34,6 +34,8 @@ std::shared_ptr<grpc::Channel> MakeChannel(
   // Finds out that the other end is gone without a word; servers allow a ping
   // every five minutes by default.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 6 * 60 * 1000);
+  // The data of a segment may be larger than the 4 MiB of the default.
+  arguments.SetMaxReceiveMessageSize(-1);
   return grpc::CreateCustomChannel(target, credentials, arguments);
 }
 

@@ -19,6 +19,7 @@ constexpr AccessRule kRules[] = {
     {"selfcal.v1.SegmentService.StreamSegments", Role::kProduce, "parent"},
     {"selfcal.v1.SegmentService.ListSegments", Role::kRead, "parent"},
     {"selfcal.v1.SegmentService.GetSegment", Role::kRead, "name"},
+    {"selfcal.v1.SegmentService.GetSegmentData", Role::kRead, "name"},
     {"selfcal.v1.SegmentService.ListTables", Role::kRead, "parent"},
     {"selfcal.v1.SegmentService.GetTable", Role::kRead, "name"},
     {"selfcal.v1.CalibrationService.GetCalibration", Role::kRead, "name"},

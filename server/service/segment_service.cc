@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <atomic>
 
+#include "proto/convert.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 #include "server/service/caller.h"
@@ -72,6 +73,23 @@ class SegmentService final : public Service {
         return ToGrpc(segment.status(), {kSegmentType, request->name(), {}});
       }
       *response = Encode(*segment);
+      return grpc::Status::OK;
+    });
+  }
+
+  grpc::Status GetSegmentData(grpc::ServerContext* call,
+                              const v1::GetSegmentDataRequest* request,
+                              v1::MotionSegment* response) override {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
+      const auto parts = ParseSegmentName(request->name());
+      if (!parts) {
+        return BadName("name", "rigs/{rig}/segments/{session}~{index}");
+      }
+      const auto data = context_.store->GetSegmentData(parts->rig, parts->key);
+      if (!data.ok()) {
+        return ToGrpc(data.status(), {kSegmentType, request->name(), {}});
+      }
+      *response = ToProto(*data);
       return grpc::Status::OK;
     });
   }

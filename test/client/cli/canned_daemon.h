@@ -49,7 +49,8 @@ struct CannedDaemon final : v1::RigService::Service,
   v1::CompareCalibrationsResponse differences;
   std::string last_name;
   std::string last_reason;
-  std::string cancelled;  // the run
+  std::vector<v1::MotionSegment> data;  // of the segments, while it is there
+  std::string cancelled;                // the run
   std::string last_filter;
   std::string last_order;
   v1::MotionSegment last_segment;      // that was sent
@@ -157,6 +158,18 @@ struct CannedDaemon final : v1::RigService::Service,
       *response->add_segments() = segment;
     });
     return grpc::Status::OK;
+  }
+  grpc::Status GetSegmentData(grpc::ServerContext*,
+                              const v1::GetSegmentDataRequest* request,
+                              v1::MotionSegment* response) override {
+    for (const v1::MotionSegment& one : data) {
+      if (request->name() == "rigs/device/segments/" + one.session() + "~" +
+                                 std::to_string(one.index())) {
+        *response = one;
+        return grpc::Status::OK;
+      }
+    }
+    return {grpc::StatusCode::FAILED_PRECONDITION, "its data was dropped"};
   }
   grpc::Status GetSegment(grpc::ServerContext*,
                           const v1::GetSegmentRequest* request,

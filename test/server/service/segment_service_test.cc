@@ -1,3 +1,4 @@
+#include "proto/convert.h"
 #include "test/server/service/service_test.h"
 
 namespace selfcal::server {
@@ -139,6 +140,33 @@ TEST_F(SegmentServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
               ElementsAre("page_size"));
   EXPECT_THAT(BadFields(List("rigs/r", 7, "%", &page)),
               ElementsAre("page_token"));
+}
+
+TEST_F(SegmentServiceTest, DataComesBackAsItWasSentWhileItIsKept) {
+  const Rig rig = AddScored(3);  // of which the tables keep two
+  const auto sent = TestSegments(rig, 3, "s");
+  int kept = 0;
+  for (int k = 0; k < 3; ++k) {
+    Context context;
+    v1::GetSegmentDataRequest request;
+    request.set_name("rigs/r/segments/s~" + std::to_string(k));
+    v1::MotionSegment data;
+    const auto status = segments_->GetSegmentData(&context, request, &data);
+    if (store_->GetSegment("r", {"s", k})->has_data) {
+      ++kept;
+      ASSERT_TRUE(status.ok()) << status.error_message();
+      EXPECT_EQ(data.SerializeAsString(), ToProto(sent[k]).SerializeAsString());
+    } else {
+      EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+    }
+  }
+  EXPECT_EQ(kept, 2);
+  Context context;
+  v1::GetSegmentDataRequest request;
+  request.set_name("rigs/r/segments/s~9");
+  v1::MotionSegment data;
+  ExpectNotFound(segments_->GetSegmentData(&context, request, &data),
+                 "rigs/r/segments/s~9");
 }
 
 TEST_F(SegmentServiceTest, ListsByFilterInAnOrder) {

@@ -1,0 +1,184 @@
+// segments export: the data of segments as files that other tools read.
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/cli/commands.h"
+#include "client/cli/new_file.h"
+#include "client/cli/progress.h"
+#include "client/cli/segment_csv.h"
+#include "client/cli/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/segment.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Service = v1::SegmentService::StubInterface;
+
+struct ExportOptions {
+  std::string rig;
+  std::vector<std::string> segments;  // all with data where there is none
+  std::string filter;
+  std::string format = "csv";
+  std::string output;
+  bool force = false;
+};
+
+// Where segments go, one after the other.
+class Sink {
+ public:
+  virtual ~Sink() = default;
+  virtual absl::Status Add(const v1::MotionSegment& segment) = 0;
+  virtual absl::Status Finish() = 0;
+};
+
+class JsonLines final : public Sink {
+ public:
+  absl::Status Open(const ExportOptions& options) {
+    return file_.Open(options.output, options.force);
+  }
+  absl::Status Add(const v1::MotionSegment& segment) override {
+    return file_.Append(ToJson(segment, true) + "\n");
+  }
+  absl::Status Finish() override { return file_.Commit(); }
+
+ private:
+  NewFile file_;
+};
+
+class CsvFolder final : public Sink {
+ public:
+  absl::Status Open(const ExportOptions& options) {
+    std::error_code error;
+    std::filesystem::create_directories(options.output, error);
+    for (std::size_t k = 0; k < files_.size(); ++k) {
+      const CsvFile& file = SegmentCsvFiles()[k];
+      absl::Status opened =
+          files_[k].Open(options.output + "/" + file.name, options.force);
+      if (opened.ok()) opened = files_[k].Append(file.header);
+      if (!opened.ok()) return opened;
+    }
+    return absl::OkStatus();
+  }
+  absl::Status Add(const v1::MotionSegment& segment) override {
+    const auto rows = SegmentCsvRows(segment);
+    for (std::size_t k = 0; k < files_.size(); ++k) {
+      if (absl::Status added = files_[k].Append(rows[k]); !added.ok()) {
+        return added;
+      }
+    }
+    return absl::OkStatus();
+  }
+  absl::Status Finish() override {
+    for (NewFile& file : files_) {
+      if (absl::Status done = file.Commit(); !done.ok()) return done;
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  std::array<NewFile, 4> files_;
+};
+
+template <typename T>
+absl::StatusOr<std::unique_ptr<Sink>> OpenSink(const ExportOptions& options) {
+  auto sink = std::make_unique<T>();
+  if (absl::Status opened = sink->Open(options); !opened.ok()) return opened;
+  return sink;
+}
+
+// The names of the segments to export; all that have data, oldest first, where
+// none is given.
+grpc::Status FindNames(Service* stub,
+                       const ExportOptions& options,
+                       std::vector<std::string>* names) {
+  for (const std::string& id : options.segments) {
+    names->push_back(RigName(options.rig) + "/segments/" + LastPart(id));
+  }
+  if (!names->empty()) return grpc::Status::OK;
+  v1::ListSegmentsRequest request;
+  request.set_parent(RigName(options.rig));
+  request.set_filter(options.filter.empty()
+                         ? "has_data = true"
+                         : options.filter + " AND has_data = true");
+  request.set_order_by("receive_time asc");
+  v1::ListSegmentsResponse listed;
+  const auto status =
+      CallForAllPages<Service>(stub, &Service::ListSegments, request, &listed);
+  for (const v1::Segment& segment : listed.segments()) {
+    names->push_back(segment.name());
+  }
+  return status;
+}
+
+int Export(Context* context, const ExportOptions& options) {
+  const auto stub = v1::SegmentService::NewStub(context->Channel());
+  std::vector<std::string> names;
+  const auto found = FindNames(stub.get(), options, &names);
+  if (!found.ok()) return Fail(*context, found);
+  auto sink = options.format == "csv" ? OpenSink<CsvFolder>(options)
+                                      : OpenSink<JsonLines>(options);
+  if (!sink.ok()) return FailInput(sink.status());
+  Progress progress("export");
+  int written = 0;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    progress.Show(k, names.size(), LastPart(names[k]));
+    v1::GetSegmentDataRequest request;
+    request.set_name(names[k]);
+    v1::MotionSegment segment;
+    const auto status =
+        Call<Service>(stub.get(), &Service::GetSegmentData, request, &segment);
+    // Dropped since it was listed.
+    if (options.segments.empty() &&
+        status.error_code() == grpc::StatusCode::FAILED_PRECONDITION) {
+      continue;
+    }
+    progress.Clear();
+    if (!status.ok()) return Fail(*context, status);
+    const absl::Status added = (*sink)->Add(segment);
+    if (!added.ok()) return FailInput(added);
+    ++written;
+  }
+  progress.Clear();
+  const absl::Status finished = (*sink)->Finish();
+  if (!finished.ok()) return FailInput(finished);
+  Facts facts;
+  facts.Add("segments", fmt::format("{}", written));
+  facts.Add("written", options.output);
+  if (!context->json) context->Print(facts);
+  return kDone;
+}
+
+}  // namespace
+
+void AddSegmentExport(CLI::App* segments, Context* context) {
+  CLI::App* command = segments->add_subcommand(
+      "export",
+      "Write the data of segments to files; nothing is there until all are");
+  const auto options = std::make_shared<ExportOptions>();
+  command->add_option("RIG", options->rig)->required();
+  command->add_option("SEGMENT",
+                      options->segments,
+                      "As in the list: session~index [all that have data]");
+  command->add_option(
+      "--filter", options->filter, "Of all that have data, as for the list");
+  command
+      ->add_option("--format",
+                   options->format,
+                   "csv: four tables in a folder; jsonl: a message a line")
+      ->check(CLI::IsMember({"csv", "jsonl"}))
+      ->capture_default_str();
+  command->add_option("--output", options->output, "A folder or a file")
+      ->required();
+  command->add_flag("--force", options->force, "Overwrite what is there");
+  command->callback([context, options] {
+    context->command = [context, options] { return Export(context, *options); };
+  });
+}
+
+}  // namespace selfcal::client
