@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "client/cli/text.h"
+#include "client/text/text.h"
 
 namespace selfcal::client {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "client/cli/calibration_report.h"
 #include "client/cli/commands.h"
-#include "client/cli/text.h"
+#include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 

@@ -58,6 +58,7 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddRecalibrateCommand(&app, &context);
     AddRunCommands(&app, &context);
     AddCalibrationCommands(&app, &context);
+    AddReportCommand(&app, &context);
     AddEventsCommand(&app, &context);
     AddDoctorCommand(&app, &context);
     AddBackupCommand(&app, &context);

@@ -17,6 +17,7 @@ void AddTablesCommand(CLI::App* app, Context* context);
 void AddRecalibrateCommand(CLI::App* app, Context* context);
 void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
+void AddReportCommand(CLI::App* app, Context* context);
 void AddEventsCommand(CLI::App* app, Context* context);
 void AddDoctorCommand(CLI::App* app, Context* context);
 void AddBackupCommand(CLI::App* app, Context* context);

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "client/cli/commands.h"
-#include "client/cli/text.h"
+#include "client/text/text.h"
 #include "selfcal/v1/store_service.grpc.pb.h"
 
 namespace selfcal::client {

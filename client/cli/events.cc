@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/cli/commands.h"
-#include "client/cli/text.h"
 #include "client/cli/time_input.h"
+#include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/store_service.grpc.pb.h"
 

@@ -11,7 +11,7 @@
 #include "client/cli/new_file.h"
 #include "client/cli/progress.h"
 #include "client/cli/segment_csv.h"
-#include "client/cli/text.h"
+#include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 
@@ -43,7 +43,7 @@ class JsonLines final : public Sink {
     return file_.Open(options.output, options.force);
   }
   absl::Status Add(const v1::MotionSegment& segment) override {
-    return file_.Append(ToJson(segment, true) + "\n");
+    return file_.Append(ToJson(segment, true));
   }
   absl::Status Finish() override { return file_.Commit(); }
 

@@ -13,7 +13,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/progress.h"
 #include "client/cli/sha256.h"
-#include "client/cli/text.h"
+#include "client/text/text.h"
 #include "selfcal/v1/store_service.grpc.pb.h"
 
 namespace selfcal::client {

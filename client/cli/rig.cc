@@ -6,7 +6,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/rig_input.h"
-#include "client/cli/text.h"
+#include "client/text/text.h"
 #include "core/model/calibration.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"

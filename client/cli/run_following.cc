@@ -9,7 +9,7 @@
 
 #include "client/cli/calibration_report.h"
 #include "client/cli/progress.h"
-#include "client/cli/text.h"
+#include "client/text/text.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 
 namespace selfcal::client {

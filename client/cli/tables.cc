@@ -4,7 +4,7 @@
 #include <string>
 
 #include "client/cli/commands.h"
-#include "client/cli/text.h"
+#include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 

@@ -1,0 +1,276 @@
+#include "client/report/sections.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "client/report/chart.h"
+#include "client/report/html.h"
+#include "client/report/verdict.h"
+#include "client/text/text.h"
+
+namespace selfcal::client {
+namespace {
+
+const v1::Calibration& Factory(const ReportData& data) {
+  for (const v1::Calibration& version : data.versions) {
+    if (version.version() == 1) return version;
+  }
+  return v1::Calibration::default_instance();
+}
+
+std::string ClassOf(VerdictKind kind) {
+  if (kind == VerdictKind::kGood) return "good";
+  return kind == VerdictKind::kInconsistent || kind == VerdictKind::kRejected
+             ? "bad"
+             : "weak";
+}
+
+// In the order of their arrival.
+std::vector<const v1::Segment*> InOrder(const ReportData& data) {
+  std::vector<const v1::Segment*> segments;
+  for (const v1::Segment& segment : data.segments) segments.push_back(&segment);
+  std::sort(segments.begin(), segments.end(), [](const auto* a, const auto* b) {
+    return a->sequence() < b->sequence();
+  });
+  return segments;
+}
+
+std::set<std::string> UsedSegments(const v1::Calibration& calibration) {
+  const auto& used = calibration.provenance().segments();
+  return {used.begin(), used.end()};
+}
+
+std::string Course(const ReportData& data, const std::string& component) {
+  std::vector<ChartPoint> points;
+  for (const v1::Calibration& version : data.versions) {
+    if (version.state() == v1::Calibration::REJECTED) continue;
+    for (const auto& estimate : version.estimates()) {
+      if (estimate.component() != component) continue;
+      // The band of the factory would hide all others.
+      const double sigma = version.version() == 1 ? 0 : estimate.sigma();
+      points.push_back({static_cast<double>(version.version()),
+                        estimate.value(),
+                        sigma,
+                        false,
+                        ""});
+    }
+  }
+  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
+    return a.x < b.x;
+  });
+  return Sparkline(points, component + " over the versions");
+}
+
+std::string Facts(
+    const std::vector<std::pair<std::string, std::string>>& facts) {
+  std::string rows;
+  for (const auto& [name, value] : facts) {
+    rows += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n",
+                        Escaped(name),
+                        Escaped(value));
+  }
+  return "<table><tbody>" + rows + "</tbody></table>\n";
+}
+
+}  // namespace
+
+std::string VerdictSection(const ReportData& data) {
+  const Verdict verdict = Judge(data.calibration, Factory(data));
+  std::string sentences;
+  for (const std::string& sentence : verdict.sentences) {
+    sentences += "<li>" + Escaped(sentence) + "</li>\n";
+  }
+  return fmt::format(
+      "<div class=\"verdict {}\"><p><strong>Verdict: {}.</strong> State: {}, "
+      "made {} UTC.</p>\n<ul>{}</ul></div>\n",
+      ClassOf(verdict.kind),
+      Escaped(VerdictText(verdict.kind)),
+      Escaped(StateText(data.calibration.state())),
+      Escaped(TimeText(data.calibration.create_time())),
+      sentences);
+}
+
+std::string ParameterSection(const ReportData& data) {
+  HtmlTable table({{"component"},
+                   {"value", true},
+                   {"sigma", true},
+                   {"unit"},
+                   {"sigma before", true},
+                   {"learned [nat]", true},
+                   {"observability"},
+                   {"over the versions"}});
+  for (const auto& estimate : data.calibration.estimates()) {
+    const double before = SigmaBefore(Factory(data), estimate.component());
+    const double nats = std::log(before / estimate.sigma());
+    const bool known = before > 0 && estimate.sigma() > 0;
+    // A full bar: a sigma e^5 = 148 times smaller than before.
+    table.Add({Escaped(estimate.component()),
+               ValueText(estimate.value(), estimate.sigma()),
+               SigmaText(estimate.sigma()),
+               Escaped(estimate.unit()),
+               SigmaText(before),
+               known ? fmt::format("{:.2f}", std::max(nats, 0.0)) : "held",
+               known ? Bar(nats / 5, estimate.component() + ": learned") : "",
+               Course(data, estimate.component())});
+  }
+  return Section("parameters",
+                 "Parameters",
+                 "<p class=\"faint\">Learned is the logarithm of sigma before "
+                 "by sigma now. A held component is not estimated.</p>\n" +
+                     table.Html());
+}
+
+std::string ResidualSection(const ReportData& data) {
+  std::vector<ChartPoint> pixels;
+  constexpr const char* kInertial[] = {"rotation",
+                                       "velocity",
+                                       "position",
+                                       "accelerometer bias",
+                                       "gyroscope bias"};
+  std::vector<ChartPoint> inertial[std::size(kInertial)];
+  const auto used = UsedSegments(data.calibration);
+  for (const v1::Segment* segment : InOrder(data)) {
+    if (!segment->has_residuals()) continue;
+    const auto& residuals = segment->residuals();
+    const auto point = [&](double value) {
+      return ChartPoint{
+          static_cast<double>(segment->sequence()),
+          value,
+          0,
+          used.count(segment->name()) > 0,
+          fmt::format("{}: {:.3g}", LastPart(segment->name()), value)};
+    };
+    pixels.push_back(point(residuals.reprojection_rms_px()));
+    for (int k = 0; k < residuals.inertial_rms_size() &&
+                    k < static_cast<int>(std::size(kInertial));
+         ++k) {
+      inertial[k].push_back(point(residuals.inertial_rms(k)));
+    }
+  }
+  std::string body =
+      "<p class=\"faint\">Of each segment when it was scored, against the "
+      "calibration of that time; filled: this version was calibrated on it."
+      "</p>\n" +
+      PointChart(pixels,
+                 "Reprojection error of each segment",
+                 "segment",
+                 "camera: rms [px]");
+  for (std::size_t k = 0; k < std::size(kInertial); ++k) {
+    body += PointChart(
+        inertial[k],
+        fmt::format("IMU residual of {} of each segment", kInertial[k]),
+        "segment",
+        fmt::format("IMU, {}: rms [sigma]", kInertial[k]));
+  }
+  return Section("residuals", "Residuals by sensor", body);
+}
+
+std::string EntropySection(const ReportData& data) {
+  std::string body =
+      "<p class=\"faint\">Differential entropy of each group after one "
+      "segment alone; lower is richer. Filled: a table keeps it.</p>\n";
+  for (const v1::Table& table : data.tables) {
+    const std::string group = LastPart(table.name());
+    std::vector<ChartPoint> points;
+    for (const v1::Segment* segment : InOrder(data)) {
+      for (const auto& score : segment->scores()) {
+        if (score.group() != group) continue;
+        points.push_back({static_cast<double>(segment->sequence()),
+                          score.entropy_nats(),
+                          0,
+                          score.in_table(),
+                          fmt::format("{}: {:.2f} nat",
+                                      LastPart(segment->name()),
+                                      score.entropy_nats())});
+      }
+    }
+    body += PointChart(points,
+                       "Entropy of " + group + " over the segments",
+                       "segment",
+                       group + " [nat]");
+  }
+  return Section("entropy", "Entropy over time", body);
+}
+
+std::string SegmentSection(const ReportData& data) {
+  const auto used = UsedSegments(data.calibration);
+  HtmlTable table({{"segment"},
+                   {"received"},
+                   {"seconds", true},
+                   {"observations", true},
+                   {"reprojection rms [px]", true},
+                   {"observed directions", true},
+                   {"kept for"}});
+  for (const v1::Segment* segment : InOrder(data)) {
+    if (used.count(segment->name()) == 0) continue;
+    std::string kept;
+    for (const auto& score : segment->scores()) {
+      if (score.in_table()) kept += (kept.empty() ? "" : ", ") + score.group();
+    }
+    table.Add(
+        {Escaped(LastPart(segment->name())),
+         TimeText(segment->receive_time()),
+         fmt::format("{:.1f}",
+                     1e-9 * static_cast<double>(segment->end_ns() -
+                                                segment->start_ns())),
+         fmt::format("{}", segment->observations()),
+         fmt::format("{:.3f}", segment->residuals().reprojection_rms_px()),
+         fmt::format("{} of {}", segment->rank(), segment->components()),
+         kept.empty() ? "no table any more" : Escaped(kept)});
+  }
+  return Section("segments", "Segments it was calibrated on", table.Html());
+}
+
+std::string OriginSection(const ReportData& data) {
+  const v1::Calibration& calibration = data.calibration;
+  if (!calibration.has_provenance()) return "";
+  const auto& provenance = calibration.provenance();
+  const auto& solver = calibration.solver();
+  std::vector<std::pair<std::string, std::string>> facts = {
+      {"run", LastPart(provenance.recalibration())},
+      {"started from", fmt::format("version {}", provenance.base_version())},
+      {"program", provenance.program_version()},
+      {"solver", solver.status() + " " + solver.message()},
+      {"iterations", fmt::format("{}", solver.iterations())},
+      {"reprojection rms [px]",
+       fmt::format("{:.3f} before, {:.3f} after",
+                   solver.reprojection_rms_before_px(),
+                   solver.reprojection_rms_after_px())},
+      {"observed directions",
+       fmt::format("{} of {}", solver.rank(), solver.components())},
+      {"observations",
+       fmt::format("{}, {} left out",
+                   solver.observations(),
+                   solver.observations_dropped())}};
+  for (const auto& setting : provenance.settings()) {
+    facts.emplace_back("setting " + setting.name(), setting.value());
+  }
+  for (const auto& check : calibration.validation().checks()) {
+    facts.emplace_back("check " + check.name(),
+                       fmt::format("{}: {:.3g}, limit {:.3g}",
+                                   check.passed() ? "passed" : "failed",
+                                   check.value(),
+                                   check.limit()));
+  }
+  return Section("origin", "Where it came from", Facts(facts));
+}
+
+std::string HistorySection(const ReportData& data) {
+  HtmlTable table(
+      {{"version", true}, {"state"}, {"made (UTC)"}, {"segments", true}, {""}});
+  for (const v1::Calibration& version : data.versions) {
+    table.Add({fmt::format("{}", version.version()),
+               Escaped(StateText(version.state())),
+               TimeText(version.create_time()),
+               version.has_provenance()
+                   ? fmt::format("{}", version.provenance().segments_size())
+                   : "factory",
+               Escaped(fmt::format("{}", fmt::join(version.reasons(), " ")))});
+  }
+  return Section("history", "History", table.Html());
+}
+
+}  // namespace selfcal::client
