@@ -26,7 +26,7 @@ std::string_view VectorWidthName(VectorWidth width);
 // Calls f.operator()<W>() for the width; one that was not compiled for this
 // architecture runs as the portable one.
 template <typename Function>
-decltype(auto) WithLanes(VectorWidth width, Function&& f) {
+decltype(auto) WithLanes([[maybe_unused]] VectorWidth width, Function&& f) {
 #if defined(__x86_64__)
   if (width == VectorWidth::k8) return f.template operator()<8>();
   if (width == VectorWidth::k4) return f.template operator()<4>();

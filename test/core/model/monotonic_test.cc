@@ -74,8 +74,8 @@ TEST(ProfileRises, DoesNotEndWhereTheSlopeStaysJustAboveZero) {
 
 TEST(ProfileRises, IsFalseForWhatIsNotANumber) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(ProfileRises(std::array{kNan, 0.0}, 1));
-  EXPECT_FALSE(ProfileRises(std::array{0.1, kNan}, 1));
+  EXPECT_FALSE(ProfileRises(std::array{kNan, 0.0}, 1.0));
+  EXPECT_FALSE(ProfileRises(std::array{0.1, kNan}, 1.0));
   EXPECT_FALSE(ProfileRises(std::array{0.1, 0.1}, kNan));
 }
 
