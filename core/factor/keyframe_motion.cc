@@ -101,7 +101,9 @@ class Readings {
       accel_slope += s * samples_[i].accel;
     }
     const double at_s = std::clamp(t_s, first_s - kReach_s, last_s + kReach_s);
-    const double along = square > 0 ? (at_s - mean_s) / square : 0;
+    // By the number of samples: where products are fused with sums, the square
+    // of a single one is that of a rounding error.
+    const double along = end - begin > 1 ? (at_s - mean_s) / square : 0;
     const double rate_Hz =
         end - begin > 1 ? (count - 1) / (Time(end - 1) - Time(begin)) : 0;
     *variance_Hz = rate_Hz * (1 / count + along * along * square);
