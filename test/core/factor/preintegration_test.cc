@@ -292,7 +292,9 @@ TEST(Preintegrate, PartsLeftOutStayZeroAndChangeNothingElse) {
   const Integral integral = RandomIntegral(random, 200, 0.1);
   const Preintegration all = integral.Whole();
   const Preintegration motion = integral.MotionAlone();
-  EXPECT_EQ(Difference(motion, all).norm(), 0);
+  // Two instances of one template: a compiler that fuses products with sums may
+  // do so differently in each, which is 1.1e-18 on arm64.
+  EXPECT_LT(Difference(motion, all).norm(), 1e-15);
   EXPECT_EQ(motion.J_bias.norm() + motion.J_theta.norm(), 0);
   EXPECT_EQ(motion.covariance.norm(), 0);
 }
