@@ -38,6 +38,14 @@ if [[ -n $foreign ]]; then
   exit 1
 fi
 
+echo 'library: what applies a calibration is in it'
+for function in CorrectImu Project Unproject; do
+  nm -DC --defined-only "$library" | grep " selfcal::$function(" >/dev/null || {
+    echo "FAILED: libselfcal has no $function" >&2
+    exit 1
+  }
+done
+
 echo 'example: with CMake'
 cp -r "$source/client/example" "$work/example"
 cmake -S "$work/example" -B "$work/build" -DCMAKE_PREFIX_PATH="$work/prefix" \

@@ -1,0 +1,29 @@
+// What an IMU's readings mean under a calibration: the inverse of
+//   gyro = T_g w_I + b_g,   accel = T_a R_AI f_I + b_a.
+// A program that applies a calibration needs this and camera.h, nothing else.
+// Pure functions, callable from any thread.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/model/calibration.h"
+
+namespace selfcal {
+
+// In the body frame I.
+struct BodyRates {
+  Eigen::Vector3d w_I;  // angular rate [rad/s]
+  Eigen::Vector3d f_I;  // specific force: acceleration minus gravity [m/s^2]
+};
+
+// What a pair of readings says, with the biases that hold at its time: b_g in
+// I, b_a in the accelerometer's frame A, both as the SLAM system estimates them
+// and as a keyframe of a segment has them. A calibration that is valid
+// (positive scales) has an inverse.
+BodyRates CorrectImu(const ImuCalibration& imu,
+                     const Eigen::Vector3d& gyro,   // [rad/s]
+                     const Eigen::Vector3d& accel,  // [m/s^2]
+                     const Eigen::Vector3d& b_g,    // [rad/s]
+                     const Eigen::Vector3d& b_a);   // [m/s^2]
+
+}  // namespace selfcal
