@@ -9,8 +9,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "client/formats/format.h"
 #include "client/import/vi_map_files.h"
-#include "client/import/vi_map_sensors.h"
 
 namespace selfcal::client {
 namespace {
@@ -51,9 +51,10 @@ class MapReader {
     const std::string sensors = folder_ + "/vi_map/sensors.yaml";
     absl::StatusOr<std::string> yaml = ReadFile(sensors);
     if (!yaml.ok()) return yaml.status();
-    absl::StatusOr<Rig> rig = ParseSensors(*yaml, sensors);
+    absl::StatusOr<ImportedRig> rig =
+        ImportRig("maplab", {{sensors, *yaml}}, {});
     if (!rig.ok()) return rig.status();
-    recording_.rig = *std::move(rig);
+    recording_.rig = std::move(rig->rig);
     for (auto step : {&MapReader::IndexVertices,
                       &MapReader::ReadLandmarks,
                       &MapReader::WalkChain}) {

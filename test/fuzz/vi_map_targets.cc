@@ -4,8 +4,8 @@
 #include <fstream>
 #include <string>
 
+#include "client/formats/format.h"
 #include "client/import/vi_map.h"
-#include "client/import/vi_map_sensors.h"
 #include "test/fuzz/fuzz_folder.h"
 #include "test/fuzz/seeds.h"
 #include "test/fuzz/targets.h"
@@ -45,7 +45,8 @@ void FuzzViMap(std::string_view bytes) {
 }
 
 void FuzzSensors(std::string_view bytes) {
-  const auto rig = client::ParseSensors(std::string(bytes), "sensors.yaml");
+  const auto rig =
+      client::ImportRig("maplab", {{"sensors.yaml", std::string(bytes)}}, {});
   FuzzCheck(rig.ok() || !rig.status().message().empty(), "a refusal says why");
 }
 

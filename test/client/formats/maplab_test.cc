@@ -1,9 +1,9 @@
-#include "client/import/vi_map_sensors.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
+
+#include "client/formats/format.h"
 
 namespace selfcal::client {
 namespace {
@@ -45,13 +45,19 @@ std::string Replaced(const std::string& from, const std::string& to) {
   return text.replace(text.find(from), from.size(), to);
 }
 
-std::string Error(const std::string& text) {
-  return std::string(ParseSensors(text, "sensors.yaml").status().message());
+absl::StatusOr<ImportedRig> Import(const std::string& text) {
+  return ImportRig("maplab", {{"sensors.yaml", text}}, {});
 }
 
-TEST(ParseSensors, ReadsNoiseCameraAndInvertsExtrinsics) {
-  const auto rig = ParseSensors(kSensors, "sensors.yaml");
-  ASSERT_TRUE(rig.ok()) << rig.status();
+std::string Error(const std::string& text) {
+  return std::string(Import(text).status().message());
+}
+
+TEST(ImportMaplab, ReadsNoiseCameraAndInvertsExtrinsics) {
+  const auto imported = Import(kSensors);
+  ASSERT_TRUE(imported.ok()) << imported.status();
+  EXPECT_TRUE(imported->losses.empty());
+  const Rig* rig = &imported->rig;
   EXPECT_EQ(rig->imu_noise.gyro_noise_density, 0.001);
   EXPECT_EQ(rig->imu_noise.gyro_bias_random_walk, 0.002);
   EXPECT_EQ(rig->imu_noise.accel_noise_density, 0.003);
@@ -71,10 +77,11 @@ TEST(ParseSensors, ReadsNoiseCameraAndInvertsExtrinsics) {
             1e-12);
 }
 
-TEST(ParseSensors, EveryMistakeIsNamedWithTheFile) {
+TEST(ImportMaplab, EveryMistakeIsNamedWithTheFile) {
   EXPECT_THAT(Error(Replaced("fisheye", "unknown")),
               HasSubstr("sensors.yaml: distortion type 'unknown'"));
-  EXPECT_THAT(Error(Replaced("[0.9]", "[0.9, 1]")), HasSubstr("coefficients"));
+  EXPECT_THAT(Error(Replaced("[0.9]", "[0.9, 1]")),
+              HasSubstr("'parameters' needs 1 x 1"));
   EXPECT_THAT(Error(Replaced("gyro_noise_density", "x")),
               HasSubstr("'gyro_noise_density' is missing"));
   EXPECT_THAT(Error(Replaced("[1, 0, 0, 0.2]", "[2, 0, 0, 0.2]")),

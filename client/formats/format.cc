@@ -1,0 +1,125 @@
+#include "client/formats/format.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <exception>
+
+#include "client/formats/basalt.h"
+#include "client/formats/kalibr.h"
+#include "client/formats/maplab.h"
+#include "client/formats/openvins.h"
+#include "client/formats/orb_slam3.h"
+#include "client/formats/vins_fusion.h"
+
+namespace selfcal::client {
+namespace {
+
+struct Format {
+  const char* name;
+  const char* files;
+  ImportedRig (*import)(const std::vector<TextFile>&, const FormatOptions&);
+  ExportedFiles (*write)(const Rig&, const Calibration&, const FormatOptions&);
+};
+
+constexpr std::array kFormats = {
+    Format{
+        "kalibr", "camchain-imucam.yaml imu.yaml", ImportKalibr, ExportKalibr},
+    Format{"openvins",
+           "kalibr_imucam_chain.yaml kalibr_imu_chain.yaml",
+           ImportOpenVins,
+           ExportOpenVins},
+    Format{"orb_slam3", "orb_slam3.yaml", ImportOrbSlam3, ExportOrbSlam3},
+    Format{"vins_fusion",
+           "vins_fusion.yaml cam0.yaml cam1.yaml",
+           ImportVinsFusion,
+           ExportVinsFusion},
+    Format{"basalt", "calibration.json", ImportBasalt, ExportBasalt},
+    Format{"maplab", "sensors.yaml", ImportMaplab, ExportMaplab}};
+
+absl::StatusOr<const Format*> FindFormat(const std::string& name) {
+  std::vector<std::string> known;
+  for (const Format& format : kFormats) {
+    if (format.name == name) return &format;
+    known.emplace_back(format.name);
+  }
+  return absl::InvalidArgumentError(
+      fmt::format("format '{}' is none of {}", name, fmt::join(known, ", ")));
+}
+
+std::string Names(const std::vector<TextFile>& files) {
+  std::vector<std::string> names;
+  for (const TextFile& file : files) names.push_back(file.name);
+  return fmt::format("{}", fmt::join(names, " "));
+}
+
+absl::Status CheckOptions(const FormatOptions& options) {
+  constexpr double kMost_hz = 1e6;
+  if (!options.imu_rate_hz ||
+      (*options.imu_rate_hz > 0 && *options.imu_rate_hz <= kMost_hz)) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError("the IMU's rate is not above 0 Hz");
+}
+
+absl::Status Check(const Rig& rig, const std::string& files) {
+  const std::vector<Violation> faults = Validate(rig.factory, "");
+  if (faults.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      fmt::format("{}: {} {}", files, faults[0].field, faults[0].message));
+}
+
+}  // namespace
+
+std::vector<FormatInfo> Formats() {
+  std::vector<FormatInfo> infos;
+  for (const Format& format : kFormats) {
+    infos.push_back({format.name, format.files});
+  }
+  return infos;
+}
+
+absl::StatusOr<ImportedRig> ImportRig(const std::string& format,
+                                      const std::vector<TextFile>& files,
+                                      const FormatOptions& options) {
+  const auto found = FindFormat(format);
+  if (!found.ok()) return found.status();
+  if (absl::Status status = CheckOptions(options); !status.ok()) return status;
+  try {
+    ImportedRig result = (*found)->import(files, options);
+    if (absl::Status status = Check(result.rig, Names(files)); !status.ok()) {
+      return status;
+    }
+    return result;
+  } catch (const std::exception& error) {
+    return absl::InvalidArgumentError(
+        fmt::format("{}: {}", Names(files), error.what()));
+  }
+}
+
+absl::StatusOr<ExportedFiles> ExportRig(const std::string& format,
+                                        const Rig& rig,
+                                        const Calibration& theta,
+                                        const FormatOptions& options) {
+  const auto found = FindFormat(format);
+  if (!found.ok()) return found.status();
+  if (absl::Status status = CheckOptions(options); !status.ok()) return status;
+  const std::vector<Violation> faults = Validate(theta, "");
+  if (!faults.empty()) {
+    return absl::InvalidArgumentError(
+        fmt::format("{} {}", faults[0].field, faults[0].message));
+  }
+  try {
+    ExportedFiles result = (*found)->write(rig, theta, options);
+    result.losses.push_back(
+        {"sigmas",
+         fmt::format("{} keeps no uncertainty: calibrations show has it",
+                     format),
+         false});
+    return result;
+  } catch (const std::exception& error) {
+    return absl::FailedPreconditionError(error.what());
+  }
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,56 @@
+// The IMU's matrices in the frames and triangular forms that tools use.
+//
+// Any pair of readings gyro = G w_B, accel = A f_B in a body frame B can be
+// written with triangular matrices, since a matrix is the product of a
+// triangular one with positive diagonal and a rotation in exactly one way.
+// Which body frame a tool ends up with depends on which of its matrices has no
+// rotation of its own: selfcal turns B until G is upper triangular (B = I);
+// Kalibr and Basalt until A is lower triangular.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/model/calibration.h"
+
+namespace selfcal::client {
+
+// M = triangular * R with a positive diagonal and det R = 1. FormatError unless
+// det M is positive: an IMU of which axes are missing or mirrored.
+struct Factors {
+  Eigen::Matrix3d triangular;
+  Eigen::Matrix3d R;
+};
+Factors LowerFactors(const Eigen::Matrix3d& M);
+Factors UpperFactors(const Eigen::Matrix3d& M);
+
+// Readings in a body frame B: gyro = G w_B + b_g, accel = A f_B + b_a.
+struct ImuMatrices {
+  Eigen::Matrix3d G;
+  Eigen::Matrix3d A;
+};
+
+// The same IMU as selfcal has it, and where its frame I is.
+struct ImuInBody {
+  ImuCalibration imu;
+  Eigen::Matrix3d R_IB;
+};
+ImuInBody FromMatrices(const ImuMatrices& matrices);
+
+// In the frame B in which the accelerometer's matrix is lower triangular.
+struct AccelFrame {
+  ImuMatrices matrices;
+  Eigen::Matrix3d R_BI;
+};
+AccelFrame ToAccelFrame(const ImuCalibration& imu);
+
+// T_CI as a matrix, and a camera from one. B and I have the same origin.
+Eigen::Matrix4d TransformFromBody(const CameraCalibration& camera,
+                                  const Eigen::Matrix3d& R_BI);
+void SetTransformFromBody(const Eigen::Matrix4d& T_CB,
+                          const Eigen::Matrix3d& R_BI,
+                          CameraCalibration* camera);
+
+// Of a rigid transform.
+Eigen::Matrix4d RigidInverse(const Eigen::Matrix4d& T);
+
+}  // namespace selfcal::client

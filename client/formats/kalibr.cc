@@ -1,0 +1,115 @@
+#include "client/formats/kalibr.h"
+
+#include <fmt/format.h>
+
+#include "client/formats/camera_chain.h"
+#include "client/formats/format_error.h"
+#include "client/formats/imu_matrices.h"
+#include "client/formats/losses.h"
+#include "client/formats/yaml_values.h"
+
+namespace selfcal::client {
+namespace {
+
+void CheckReference(const YAML::Node& imu) {
+  if (Has(imu, "T_i_b") && !GetMatrix(imu, "T_i_b", 4, 4).isIdentity(1e-9)) {
+    throw FormatError(
+        "T_i_b is not the identity: give the file with imu0, the reference");
+  }
+  if (GetDouble(imu, "time_offset", 0) != 0) {
+    throw FormatError("time_offset of imu0 is not 0");
+  }
+}
+
+// Without matrices the readings are taken as they are.
+ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
+  ImuMatrices result{Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};
+  if (!Has(imu, "gyroscopes")) return result;
+  const YAML::Node gyro = Get(imu, "gyroscopes");
+  const YAML::Node accel = Get(imu, "accelerometers");
+  result.G = GetMatrix(gyro, "M", 3, 3) * GetMatrix(gyro, "C_gyro_i", 3, 3);
+  result.A = GetMatrix(accel, "M", 3, 3);
+  if (Has(gyro, "A") && !GetMatrix(gyro, "A", 3, 3).isZero(0)) {
+    losses->push_back({"gyroscopes.A",
+                       "selfcal has no sensitivity of the gyroscope to "
+                       "acceleration: left out",
+                       true});
+  }
+  for (const char* arm : {"rx_i", "ry_i", "rz_i"}) {
+    if (!Has(accel, arm) || GetMatrix(accel, arm, 3, 1).isZero(0)) continue;
+    losses->push_back({fmt::format("accelerometers.{}", arm),
+                       "selfcal has one place for all axes: left out",
+                       true});
+  }
+  return result;
+}
+
+}  // namespace
+
+ImportedRig ImportKalibr(const std::vector<TextFile>& files,
+                         const FormatOptions&) {
+  const ChainFiles chain = ReadChainFiles(files);
+  ImportedRig result;
+  CheckReference(chain.imu);
+  result.rig.imu_noise = ReadChainNoise(chain.imu);
+  const ImuInBody body = FromMatrices(ReadMatrices(chain.imu, &result.losses));
+  result.rig.factory.imu = body.imu;
+  Eigen::Matrix4d T_CB;  // of the camera before
+  for (int j = 0; Has(chain.cameras, fmt::format("cam{}", j)); ++j) {
+    const YAML::Node node = chain.cameras[fmt::format("cam{}", j)];
+    CameraCalibration camera = ReadChainCamera(node);
+    if (Has(node, "T_cam_imu")) {
+      T_CB = Rigid(GetMatrix(node, "T_cam_imu", 4, 4), "T_cam_imu");
+    } else if (j > 0 && Has(node, "T_cn_cnm1")) {
+      T_CB = Rigid(GetMatrix(node, "T_cn_cnm1", 4, 4), "T_cn_cnm1") * T_CB;
+    } else {
+      throw FormatError(
+          "T_cam_imu is missing: give the chain of the calibration with the "
+          "IMU (camchain-imucam)");
+    }
+    SetTransformFromBody(T_CB, body.R_IB.transpose(), &camera);
+    result.rig.factory.cameras.push_back(camera);
+  }
+  return result;
+}
+
+ExportedFiles ExportKalibr(const Rig& rig,
+                           const Calibration& theta,
+                           const FormatOptions& options) {
+  ExportedFiles result;
+  const AccelFrame body = ToAccelFrame(theta.imu);
+  std::string chain;
+  Eigen::Matrix4d before;
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    const CameraCalibration& camera = theta.cameras[j];
+    const Eigen::Matrix4d T_CB = TransformFromBody(camera, body.R_BI);
+    chain += fmt::format("cam{}:\n  T_cam_imu:\n{}", j, RowsText(T_CB, "  "));
+    if (j > 0) {
+      chain += fmt::format("  T_cn_cnm1:\n{}",
+                           RowsText(T_CB * RigidInverse(before), "  "));
+    }
+    chain += ChainCameraText(camera);
+    chain += fmt::format("  rostopic: /cam{}/image_raw\n", j);
+    before = T_CB;
+  }
+  const Factors gyro = LowerFactors(body.matrices.G);
+  const std::string imu = fmt::format(
+      "imu0:\n"
+      "  T_i_b:\n{}"
+      "{}"
+      "  model: scale-misalignment\n"
+      "  accelerometers:\n    M:\n{}"
+      "  gyroscopes:\n    M:\n{}    A:\n{}    C_gyro_i:\n{}",
+      RowsText(Eigen::Matrix4d::Identity(), "  "),
+      ChainNoiseText(rig.imu_noise,
+                     ImuRate(options, "update_rate", &result.losses)),
+      RowsText(body.matrices.A, "    "),
+      RowsText(gyro.triangular, "    "),
+      RowsText(Eigen::Matrix3d::Zero(), "    "),
+      RowsText(gyro.R, "    "));
+  AddGravityLoss("kalibr", rig, &result.losses);
+  result.files = {{"camchain-imucam.yaml", chain}, {"imu.yaml", imu}};
+  return result;
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,24 @@
+// Kalibr: camchain-imucam.yaml and imu.yaml.
+//
+// T_cam_imu takes a point from the IMU's frame to the camera's, and
+// t_imu = t_cam + timeshift_cam_imu. The IMU's frame is that in which the
+// accelerometer's matrix is lower triangular:
+//   accel = M_a f + b_a,   gyro = M_g C_gyro_i w + A_g C_gyro_i f + b_g,
+// with M_g lower triangular, too. Whatever selfcal has can be said; A_g, the
+// gyroscope's sensitivity to acceleration, and lever arms of the
+// accelerometer's axes, cannot be read.
+#pragma once
+
+#include <vector>
+
+#include "client/formats/format.h"
+
+namespace selfcal::client {
+
+ImportedRig ImportKalibr(const std::vector<TextFile>& files,
+                         const FormatOptions& options);
+ExportedFiles ExportKalibr(const Rig& rig,
+                           const Calibration& theta,
+                           const FormatOptions& options);
+
+}  // namespace selfcal::client

@@ -1,0 +1,109 @@
+#include "client/formats/losses.h"
+
+#include <fmt/format.h>
+
+#include "client/formats/format_error.h"
+
+namespace selfcal::client {
+
+void AddImuLoss(const std::string& tool,
+                const ImuCalibration& imu,
+                std::vector<Loss>* losses) {
+  const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
+  if (imu.T_g() == one && imu.T_a() == one && imu.q_AI.vec().isZero(0)) return;
+  losses->push_back(
+      {"imu",
+       fmt::format("{} takes the readings as they are: give it those that "
+                   "CorrectImu makes with this calibration (scales, "
+                   "misalignments and q_AI removed, both in frame I)",
+                   tool),
+       true});
+}
+
+void AddTimeOffsetLosses(const std::string& tool,
+                         const Calibration& theta,
+                         std::vector<Loss>* losses) {
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    const double offset_s = theta.cameras[j].time_offset_s;
+    if (offset_s == 0) continue;
+    losses->push_back(
+        {fmt::format("cam{}.time_offset", j),
+         fmt::format("{} has no time offset: add {} s to the stamps of its "
+                     "images",
+                     tool,
+                     offset_s),
+         true});
+  }
+}
+
+void AddSharedOffsetLosses(const std::string& tool,
+                           const Calibration& theta,
+                           std::vector<Loss>* losses) {
+  for (std::size_t j = 1; j < theta.cameras.size(); ++j) {
+    const double more_s =
+        theta.cameras[j].time_offset_s - theta.cameras[0].time_offset_s;
+    if (more_s == 0) continue;
+    losses->push_back(
+        {fmt::format("cam{}.time_offset", j),
+         fmt::format("{} has one time offset, that of cam0: add {} s to the "
+                     "stamps of cam{}",
+                     tool,
+                     more_s,
+                     j),
+         true});
+  }
+}
+
+void AddGravityLoss(const std::string& tool,
+                    const Rig& rig,
+                    std::vector<Loss>* losses) {
+  if (rig.gravity_mps2 == Rig().gravity_mps2) return;
+  losses->push_back({"gravity",
+                     fmt::format("{} does not take it from these files; the "
+                                 "rig's is {} m/s^2",
+                                 tool,
+                                 rig.gravity_mps2),
+                     false});
+}
+
+void KeepCameras(const std::string& tool,
+                 std::size_t count,
+                 Calibration* theta,
+                 std::vector<Loss>* losses) {
+  for (std::size_t j = count; j < theta->cameras.size(); ++j) {
+    losses->push_back(
+        {fmt::format("cam{}", j),
+         fmt::format("{} has at most {} cameras: left out", tool, count),
+         true});
+  }
+  if (theta->cameras.size() > count) theta->cameras.resize(count);
+}
+
+double ImuRate(const FormatOptions& options,
+               const std::string& field,
+               std::vector<Loss>* losses) {
+  if (options.imu_rate_hz) return *options.imu_rate_hz;
+  constexpr double kUsual_hz = 200;
+  losses->push_back({"imu_rate",
+                     fmt::format("{} is taken for {} Hz, which selfcal does "
+                                 "not know: give --imu-rate",
+                                 field,
+                                 kUsual_hz),
+                     false});
+  return kUsual_hz;
+}
+
+void NoSuchModel(const std::string& tool,
+                 std::size_t camera,
+                 DistortionModel model,
+                 const std::string& models) {
+  throw FormatError(
+      fmt::format("cam{} has the distortion model {}, {} only {}; kalibr, "
+                  "basalt and maplab have all of selfcal's",
+                  camera,
+                  DistortionName(model),
+                  tool,
+                  models));
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,230 @@
+#include "client/formats/maplab.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <string>
+
+#include "client/formats/format_error.h"
+#include "client/formats/imu_matrices.h"
+#include "client/formats/losses.h"
+#include "client/formats/yaml_values.h"
+
+namespace selfcal::client {
+namespace {
+
+ImuNoise ReadNoise(const YAML::Node& imu) {
+  const YAML::Node sigmas = Get(imu, "sigmas");
+  return {.gyro_noise_density = GetDouble(sigmas, "gyro_noise_density"),
+          .accel_noise_density = GetDouble(sigmas, "acc_noise_density"),
+          .gyro_bias_random_walk =
+              GetDouble(sigmas, "gyro_bias_random_walk_noise_density"),
+          .accel_bias_random_walk =
+              GetDouble(sigmas, "acc_bias_random_walk_noise_density")};
+}
+
+const char* ModelText(DistortionModel model) {
+  switch (model) {
+    case DistortionModel::kFov:
+      return "fisheye";
+    case DistortionModel::kRadialTangential:
+      return "radial-tangential";
+    case DistortionModel::kEquidistant:
+      break;
+  }
+  return "equidistant";
+}
+
+DistortionModel ReadModel(const std::string& type) {
+  for (const DistortionModel model : {DistortionModel::kFov,
+                                      DistortionModel::kRadialTangential,
+                                      DistortionModel::kEquidistant}) {
+    if (type == ModelText(model)) return model;
+  }
+  throw FormatError(fmt::format(
+      "distortion type '{}' is not fisheye, radial-tangential or equidistant",
+      type));
+}
+
+CameraCalibration ReadCamera(const YAML::Node& entry,
+                             std::vector<Loss>* losses) {
+  const YAML::Node camera = Get(entry, "camera");
+  CameraCalibration result;
+  const Eigen::Vector4d intrinsics = GetMatrixData(camera, "intrinsics", 4, 1);
+  result.f = intrinsics.head<2>();
+  result.c = intrinsics.tail<2>();
+  const YAML::Node distortion = Get(camera, "distortion");
+  result.model = ReadModel(GetText(distortion, "type"));
+  result.distortion =
+      GetMatrixData(distortion, "parameters", DistortionSize(result.model), 1);
+  result.width_px = GetInt(camera, "image_width");
+  result.height_px = GetInt(camera, "image_height");
+  const Eigen::Matrix4d T_BC =
+      Rigid(GetMatrixData(entry, "T_B_C", 4, 4), "T_B_C");
+  SetTransformFromBody(
+      RigidInverse(T_BC), Eigen::Matrix3d::Identity(), &result);
+  if (GetDouble(camera, "line-delay-nanoseconds", 0) != 0) {
+    losses->push_back({"line-delay-nanoseconds",
+                       "selfcal takes an image for exposed at one time",
+                       true});
+  }
+  return result;
+}
+
+// maplab projects into the cameras of a map by T_B_C alone, whatever the
+// extrinsics say of their system.
+void AddExtrinsicsLoss(const YAML::Node& root,
+                       const YAML::Node& system,
+                       std::vector<Loss>* losses) {
+  if (!Has(root, "extrinsics") || !Has(system, "id")) return;
+  for (const YAML::Node& entry : root["extrinsics"]) {
+    if (GetText(entry, "sensor_id") != GetText(system, "id") ||
+        GetMatrixData(entry, "T_B_S", 4, 4).isIdentity(0)) {
+      continue;
+    }
+    losses->push_back({"extrinsics",
+                       "T_B_S of the camera system is not used: maplab "
+                       "projects by T_B_C alone",
+                       false});
+  }
+}
+
+// An id of 32 hexadecimal digits, the same for the same text (FNV-1a).
+std::string SensorId(const std::string& text) {
+  std::uint64_t halves[2] = {14695981039346656037ull, 1099511628211ull};
+  for (std::uint64_t& hash : halves) {
+    for (const char c : text) {
+      hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+    }
+  }
+  return fmt::format("{:016x}{:016x}", halves[0], halves[1]);
+}
+
+std::string ImuText(const Rig& rig, const std::string& id) {
+  const ImuNoise& noise = rig.imu_noise;
+  return fmt::format(
+      "  - id: {}\n"
+      "    topic: /imu0\n"
+      "    description: \"IMU\"\n"
+      "    sensor_type: IMU\n"
+      "    sigmas:\n"
+      "      acc_noise_density: {}\n"
+      "      acc_bias_random_walk_noise_density: {}\n"
+      "      gyro_noise_density: {}\n"
+      "      gyro_bias_random_walk_noise_density: {}\n"
+      "    saturation_accel_max_mps2: 150.0\n"
+      "    saturation_gyro_max_radps: 7.5\n"
+      "    gravity_magnitude_mps2: {}\n",
+      id,
+      NumberText(noise.accel_noise_density),
+      NumberText(noise.accel_bias_random_walk),
+      NumberText(noise.gyro_noise_density),
+      NumberText(noise.gyro_bias_random_walk),
+      NumberText(rig.gravity_mps2));
+}
+
+std::string CameraText(const CameraCalibration& camera,
+                       const std::string& id,
+                       std::size_t number) {
+  const DistortionVector& k = camera.distortion;
+  const Eigen::Matrix4d T_BC =
+      RigidInverse(TransformFromBody(camera, Eigen::Matrix3d::Identity()));
+  return fmt::format(
+      "      - camera:\n"
+      "          id: {}\n"
+      "          sensor_type: CAMERA\n"
+      "          description: \"cam{}\"\n"
+      "          topic: /cam{}/image_raw\n"
+      "          line-delay-nanoseconds: 0\n"
+      "          image_height: {}\n"
+      "          image_width: {}\n"
+      "          type: pinhole\n"
+      "          intrinsics:\n"
+      "            cols: 1\n            rows: 4\n            data: {}\n"
+      "          distortion:\n"
+      "            type: {}\n"
+      "            parameters:\n"
+      "              cols: 1\n              rows: {}\n              data: {}\n"
+      "        T_B_C:\n"
+      "          cols: 4\n          rows: 4\n          data:\n{}",
+      id,
+      number,
+      number,
+      camera.height_px,
+      camera.width_px,
+      ListText(
+          std::vector{camera.f.x(), camera.f.y(), camera.c.x(), camera.c.y()}),
+      ModelText(camera.model),
+      k.size(),
+      ListText({k.data(), static_cast<std::size_t>(k.size())}),
+      RowsText(T_BC, "            "));
+}
+
+std::string PlaceText(const std::string& sensor, const std::string& base) {
+  return fmt::format(
+      "  - sensor_id: {}\n"
+      "    base_sensor_id: {}\n"
+      "    T_B_S:\n      cols: 4\n      rows: 4\n      data:\n{}",
+      sensor,
+      base,
+      RowsText(Eigen::Matrix4d::Identity(), "        "));
+}
+
+}  // namespace
+
+ImportedRig ImportMaplab(const std::vector<TextFile>& files,
+                         const FormatOptions&) {
+  if (files.size() != 1) throw FormatError("give one file");
+  const YAML::Node root = ParseYaml(files[0]);
+  YAML::Node imu;
+  YAML::Node system;
+  for (const YAML::Node& sensor : Get(root, "sensors")) {
+    const std::string type = GetText(sensor, "sensor_type");
+    if (type == "IMU" && !imu.IsMap()) imu.reset(sensor);
+    if (type == "NCAMERA" && !system.IsMap()) system.reset(sensor);
+  }
+  if (!imu.IsMap()) throw FormatError("there is no sensor of type IMU");
+  if (!system.IsMap()) {
+    throw FormatError("there is no sensor of type NCAMERA");
+  }
+  ImportedRig result;
+  result.rig.imu_noise = ReadNoise(imu);
+  result.rig.gravity_mps2 = GetDouble(imu, "gravity_magnitude_mps2");
+  AddExtrinsicsLoss(root, system, &result.losses);
+  for (const YAML::Node& entry : Get(system, "cameras")) {
+    result.rig.factory.cameras.push_back(ReadCamera(entry, &result.losses));
+  }
+  return result;
+}
+
+ExportedFiles ExportMaplab(const Rig& rig,
+                           const Calibration& theta,
+                           const FormatOptions&) {
+  ExportedFiles result;
+  const std::string imu = SensorId(rig.id + "/imu");
+  const std::string system = SensorId(rig.id + "/cameras");
+  std::string text = "sensors:\n" + ImuText(rig, imu);
+  text += fmt::format(
+      "  - id: {}\n"
+      "    topic: \"\"\n"
+      "    description: \"cameras\"\n"
+      "    sensor_type: NCAMERA\n"
+      "    cameras:\n",
+      system);
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    text += CameraText(
+        theta.cameras[j], SensorId(fmt::format("{}/cam{}", rig.id, j)), j);
+  }
+  text += "extrinsics:\n" + PlaceText(imu, imu) + PlaceText(system, imu);
+  AddImuLoss("maplab", theta.imu, &result.losses);
+  AddTimeOffsetLosses("maplab", theta, &result.losses);
+  result.losses.push_back({"saturation",
+                           "maplab wants the IMU's range, which selfcal does "
+                           "not know: its defaults are written, 150 m/s^2 and "
+                           "7.5 rad/s",
+                           false});
+  result.files = {{"sensors.yaml", text}};
+  return result;
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,207 @@
+#include "client/formats/vins_fusion.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "client/formats/format_error.h"
+#include "client/formats/imu_matrices.h"
+#include "client/formats/losses.h"
+#include "client/formats/yaml_values.h"
+
+namespace selfcal::client {
+namespace {
+
+std::string FileName(const std::string& path) {
+  return path.substr(path.find_last_of('/') + 1);
+}
+
+const TextFile& FindFile(const std::vector<TextFile>& files,
+                         const std::string& name) {
+  for (const TextFile& file : files) {
+    if (FileName(file.name) == FileName(name)) return file;
+  }
+  throw FormatError(
+      fmt::format("its camera file {} is missing: give it, too", name));
+}
+
+YAML::Node FindConfiguration(const std::vector<TextFile>& files) {
+  for (const TextFile& file : files) {
+    const YAML::Node root = ParseYaml(file);
+    if (Has(root, "num_of_cam")) return root;
+  }
+  throw FormatError("no file has num_of_cam: give the configuration, too");
+}
+
+CameraCalibration ReadCamera(const TextFile& file) {
+  const YAML::Node root = ParseYaml(file);
+  const std::string type = GetText(root, "model_type");
+  const YAML::Node p = Get(root, "projection_parameters");
+  CameraCalibration camera;
+  if (type == "PINHOLE") {
+    const YAML::Node k = Get(root, "distortion_parameters");
+    camera.f = {GetDouble(p, "fx"), GetDouble(p, "fy")};
+    camera.c = {GetDouble(p, "cx"), GetDouble(p, "cy")};
+    camera.model = DistortionModel::kRadialTangential;
+    camera.distortion = Eigen::Vector4d(GetDouble(k, "k1"),
+                                        GetDouble(k, "k2"),
+                                        GetDouble(k, "p1"),
+                                        GetDouble(k, "p2"));
+  } else if (type == "KANNALA_BRANDT") {
+    camera.f = {GetDouble(p, "mu"), GetDouble(p, "mv")};
+    camera.c = {GetDouble(p, "u0"), GetDouble(p, "v0")};
+    camera.model = DistortionModel::kEquidistant;
+    camera.distortion = Eigen::Vector4d(GetDouble(p, "k2"),
+                                        GetDouble(p, "k3"),
+                                        GetDouble(p, "k4"),
+                                        GetDouble(p, "k5"));
+  } else {
+    throw FormatError(
+        fmt::format("{}: model_type '{}' is not PINHOLE or KANNALA_BRANDT",
+                    file.name,
+                    type));
+  }
+  camera.width_px = GetInt(root, "image_width");
+  camera.height_px = GetInt(root, "image_height");
+  return camera;
+}
+
+std::string CameraText(const CameraCalibration& camera) {
+  const bool pinhole = camera.model == DistortionModel::kRadialTangential;
+  const DistortionVector& k = camera.distortion;
+  const auto four =
+      [](const char* names, double a, double b, double c, double d) {
+        return fmt::format(fmt::runtime(names),
+                           NumberText(a),
+                           NumberText(b),
+                           NumberText(c),
+                           NumberText(d));
+      };
+  std::string text = fmt::format(
+      "%YAML:1.0\n---\n"
+      "model_type: {}\n"
+      "camera_name: camera\n"
+      "image_width: {}\n"
+      "image_height: {}\n",
+      pinhole ? "PINHOLE" : "KANNALA_BRANDT",
+      camera.width_px,
+      camera.height_px);
+  const Eigen::Vector2d& f = camera.f;
+  const Eigen::Vector2d& c = camera.c;
+  if (pinhole) {
+    text += "distortion_parameters:\n";
+    text += four(
+        "  k1: {}\n  k2: {}\n  p1: {}\n  p2: {}\n", k[0], k[1], k[2], k[3]);
+    text += "projection_parameters:\n";
+    text += four(
+        "  fx: {}\n  fy: {}\n  cx: {}\n  cy: {}\n", f.x(), f.y(), c.x(), c.y());
+  } else {
+    text += "projection_parameters:\n";
+    text += four(
+        "  k2: {}\n  k3: {}\n  k4: {}\n  k5: {}\n", k[0], k[1], k[2], k[3]);
+    text += four(
+        "  mu: {}\n  mv: {}\n  u0: {}\n  v0: {}\n", f.x(), f.y(), c.x(), c.y());
+  }
+  return text;
+}
+
+void CheckCameras(const std::vector<CameraCalibration>& cameras) {
+  for (std::size_t j = 0; j < cameras.size(); ++j) {
+    if (cameras[j].model == DistortionModel::kFov) {
+      NoSuchModel("vins_fusion",
+                  j,
+                  cameras[j].model,
+                  "radial-tangential and equidistant");
+    }
+    if (cameras[j].width_px != cameras[0].width_px ||
+        cameras[j].height_px != cameras[0].height_px) {
+      throw FormatError(
+          "vins_fusion has one size of the image for both cameras");
+    }
+  }
+}
+
+}  // namespace
+
+ImportedRig ImportVinsFusion(const std::vector<TextFile>& files,
+                             const FormatOptions& options) {
+  const YAML::Node root = FindConfiguration(files);
+  ImportedRig result;
+  if (GetInt(root, "imu") != 1) throw FormatError("imu is not 1: it has none");
+  const double by_sample =
+      1 / std::sqrt(ImuRate(options, "the rate of its noise", &result.losses));
+  result.rig.imu_noise = {
+      .gyro_noise_density = GetDouble(root, "gyr_n") * by_sample,
+      .accel_noise_density = GetDouble(root, "acc_n") * by_sample,
+      .gyro_bias_random_walk = GetDouble(root, "gyr_w") * by_sample,
+      .accel_bias_random_walk = GetDouble(root, "acc_w") * by_sample};
+  result.rig.gravity_mps2 = GetDouble(root, "g_norm");
+  const int count = GetInt(root, "num_of_cam");
+  if (count != 1 && count != 2) throw FormatError("num_of_cam is not 1 or 2");
+  for (int j = 0; j < count; ++j) {
+    CameraCalibration camera = ReadCamera(
+        FindFile(files, GetText(root, fmt::format("cam{}_calib", j))));
+    const std::string key = fmt::format("body_T_cam{}", j);
+    SetTransformFromBody(
+        RigidInverse(Rigid(GetMatrixData(root, key, 4, 4), key)),
+        Eigen::Matrix3d::Identity(),
+        &camera);
+    camera.time_offset_s = GetDouble(root, "td", 0);
+    result.rig.factory.cameras.push_back(camera);
+  }
+  return result;
+}
+
+ExportedFiles ExportVinsFusion(const Rig& rig,
+                               const Calibration& theta,
+                               const FormatOptions& options) {
+  ExportedFiles result;
+  Calibration kept = theta;
+  KeepCameras("vins_fusion", 2, &kept, &result.losses);
+  CheckCameras(kept.cameras);
+  const double by_sample =
+      std::sqrt(ImuRate(options, "the rate of its noise", &result.losses));
+  const ImuNoise& noise = rig.imu_noise;
+  std::string text = fmt::format(
+      "%YAML:1.0\n---\n"
+      "imu: 1\n"
+      "num_of_cam: {}\n"
+      "image_width: {}\n"
+      "image_height: {}\n"
+      "acc_n: {}\n"
+      "gyr_n: {}\n"
+      "acc_w: {}\n"
+      "gyr_w: {}\n"
+      "g_norm: {}\n"
+      "td: {}\n",
+      kept.cameras.size(),
+      kept.cameras[0].width_px,
+      kept.cameras[0].height_px,
+      NumberText(noise.accel_noise_density * by_sample),
+      NumberText(noise.gyro_noise_density * by_sample),
+      NumberText(noise.accel_bias_random_walk * by_sample),
+      NumberText(noise.gyro_bias_random_walk * by_sample),
+      NumberText(rig.gravity_mps2),
+      NumberText(kept.cameras[0].time_offset_s));
+  std::vector<TextFile> cameras;
+  for (std::size_t j = 0; j < kept.cameras.size(); ++j) {
+    const std::string name = fmt::format("cam{}.yaml", j);
+    const Eigen::Matrix4d T_BC = RigidInverse(
+        TransformFromBody(kept.cameras[j], Eigen::Matrix3d::Identity()));
+    text += fmt::format("cam{}_calib: \"{}\"\n", j, name);
+    text += fmt::format("body_T_cam{}: {}", j, OpenCvMatrixText(T_BC));
+    cameras.push_back({name, CameraText(kept.cameras[j])});
+  }
+  AddImuLoss("vins_fusion", theta.imu, &result.losses);
+  AddSharedOffsetLosses("vins_fusion", kept, &result.losses);
+  result.losses.push_back(
+      {"settings",
+       "those of its tracker, solver and topics are no calibration: put these "
+       "lines into your file",
+       false});
+  result.files = {{"vins_fusion.yaml", text}};
+  result.files.insert(result.files.end(), cameras.begin(), cameras.end());
+  return result;
+}
+
+}  // namespace selfcal::client

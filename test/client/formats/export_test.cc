@@ -1,0 +1,244 @@
+// Files that are written: each tool predicts from them what selfcal does, and
+// they read back as what they were written from.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <regex>
+
+#include "test/client/formats/predictions.h"
+
+namespace selfcal::client {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Model = DistortionModel;
+
+constexpr double kRate_hz = 250;
+constexpr FormatOptions kOptions{.imu_rate_hz = kRate_hz};
+
+struct Expressible {
+  const char* format;
+  std::vector<Model> models;
+  std::size_t cameras;
+  bool same_model;    // of all cameras
+  bool imu;           // its scales, misalignments, rotation
+  bool time_offset;   // any
+  bool time_offsets;  // one for each camera
+};
+
+const Expressible kExpressible[] = {
+    {"kalibr",
+     {Model::kFov, Model::kRadialTangential, Model::kEquidistant},
+     4,
+     false,
+     true,
+     true,
+     true},
+    {"openvins",
+     {Model::kRadialTangential, Model::kEquidistant},
+     4,
+     false,
+     true,
+     true,
+     false},
+    {"orb_slam3",
+     {Model::kRadialTangential, Model::kEquidistant},
+     2,
+     true,
+     false,
+     false,
+     false},
+    {"vins_fusion",
+     {Model::kRadialTangential, Model::kEquidistant},
+     2,
+     false,
+     false,
+     true,
+     false},
+    {"basalt",
+     {Model::kFov, Model::kRadialTangential, Model::kEquidistant},
+     4,
+     false,
+     true,
+     true,
+     false},
+    {"maplab",
+     {Model::kFov, Model::kRadialTangential, Model::kEquidistant},
+     4,
+     false,
+     false,
+     false,
+     false}};
+
+std::size_t Pick(std::size_t count, RandomValues* random) {
+  return std::min(count - 1,
+                  static_cast<std::size_t>(random->Uniform(0, 1) *
+                                           static_cast<double>(count)));
+}
+
+// A rig that a format has words for, but for its IMU.
+Rig RandomRig(const Expressible& format, RandomValues* random) {
+  Rig rig;
+  rig.id = "device";
+  rig.factory = random->Theta();
+  rig.factory.cameras.clear();
+  rig.imu_noise = {.gyro_noise_density = random->Uniform(1e-4, 1e-3),
+                   .accel_noise_density = random->Uniform(1e-3, 1e-2),
+                   .gyro_bias_random_walk = random->Uniform(1e-6, 1e-4),
+                   .accel_bias_random_walk = random->Uniform(1e-5, 1e-3)};
+  const std::size_t cameras = 1 + Pick(format.cameras, random);
+  const Model model = format.models[Pick(format.models.size(), random)];
+  for (std::size_t j = 0; j < cameras; ++j) {
+    CameraCalibration camera = random->Camera(
+        format.same_model ? model
+                          : format.models[Pick(format.models.size(), random)]);
+    if (format.time_offset) {
+      // Basalt has whole nanoseconds.
+      camera.time_offset_s = std::round(random->Uniform(-3e7, 3e7)) / 1e9;
+    }
+    if (!format.time_offsets && j > 0) {
+      camera.time_offset_s = rig.factory.cameras[0].time_offset_s;
+    }
+    rig.factory.cameras.push_back(camera);
+  }
+  return rig;
+}
+
+std::vector<std::string> Names(const std::vector<Loss>& losses) {
+  std::vector<std::string> names;
+  for (const Loss& loss : losses) names.push_back(loss.name);
+  return names;
+}
+
+class Export : public testing::TestWithParam<Expressible> {};
+
+TEST_P(Export, TheToolPredictsTheSamePixelsRatesAndTimes) {
+  RandomValues random(7);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Rig rig = RandomRig(GetParam(), &random);
+    const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
+    ASSERT_TRUE(files.ok()) << files.status();
+    const Tool tool = ReadAsTool(GetParam().format, files->files, kRate_hz);
+    EXPECT_EQ(tool.has_imu_model, GetParam().imu);
+    ExpectSamePredictions(rig.factory, tool, &random);
+    ExpectSameNoise(tool.noise, rig.imu_noise);
+  }
+}
+
+TEST_P(Export, ReadsBackAsItWas) {
+  RandomValues random(8);
+  for (int trial = 0; trial < 50; ++trial) {
+    Rig rig = RandomRig(GetParam(), &random);
+    const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
+    ASSERT_TRUE(files.ok()) << files.status();
+    const auto again = ImportRig(GetParam().format, files->files, kOptions);
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_THAT(again->losses, IsEmpty());
+    if (!GetParam().imu) rig.factory.imu = {};
+    ASSERT_TRUE(SameShape(again->rig.factory, rig.factory));
+    EXPECT_LT(BoxMinus(again->rig.factory, rig.factory).cwiseAbs().maxCoeff(),
+              1e-9);
+    for (std::size_t j = 0; j < rig.factory.cameras.size(); ++j) {
+      EXPECT_EQ(again->rig.factory.cameras[j].width_px, 640);
+      EXPECT_EQ(again->rig.factory.cameras[j].height_px, 480);
+    }
+    ExpectSameNoise(again->rig.imu_noise, rig.imu_noise);
+  }
+}
+
+TEST_P(Export, WhatTheToolCannotSayHasAName) {
+  RandomValues random(9);
+  Rig rig = RandomRig(GetParam(), &random);
+  const std::string format = GetParam().format;
+  rig.factory.cameras.assign(3, random.Camera(Model::kEquidistant));
+  rig.factory.cameras[0].time_offset_s = 0.003;
+  rig.factory.cameras[1].time_offset_s = 0.004;
+  rig.factory.cameras[2].time_offset_s = 0.003;
+  const auto files = ExportRig(format, rig, rig.factory, {});
+  ASSERT_TRUE(files.ok()) << files.status();
+  const std::vector<std::string> names = Names(files->losses);
+  const auto named = [&](const std::string& name) {
+    return std::count(names.begin(), names.end(), name) == 1;
+  };
+  EXPECT_EQ(named("imu"), !GetParam().imu);
+  EXPECT_EQ(named("cam0.time_offset"), !GetParam().time_offset);
+  EXPECT_EQ(named("cam1.time_offset"), !GetParam().time_offsets);
+  EXPECT_EQ(named("cam2.time_offset"),
+            !GetParam().time_offset && GetParam().cameras > 2);
+  EXPECT_EQ(named("cam2"), GetParam().cameras < 3);
+  EXPECT_EQ(named("imu_rate"), format != "maplab");
+  EXPECT_TRUE(named("sigmas"));
+  for (const Loss& loss : files->losses) {
+    EXPECT_EQ(loss.changes_prediction,
+              loss.name == "imu" || loss.name.rfind("cam", 0) == 0)
+        << loss.name;
+  }
+}
+
+TEST_P(Export, NothingIsLostOfANominalDevice) {
+  RandomValues random(10);
+  Rig rig;
+  rig.factory.cameras = {random.Camera(Model::kEquidistant)};
+  const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
+  ASSERT_TRUE(files.ok()) << files.status();
+  for (const Loss& loss : files->losses) {
+    EXPECT_FALSE(loss.changes_prediction) << loss.name;
+  }
+}
+
+TEST_P(Export, AModelWithoutWordsIsRefused) {
+  RandomValues random(11);
+  Rig rig;
+  rig.factory.cameras = {random.Camera(Model::kFov)};
+  const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
+  const bool has = GetParam().models.size() == 3;
+  EXPECT_EQ(files.ok(), has);
+  if (has) return;
+  EXPECT_EQ(files.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(files.status().message()),
+              HasSubstr("cam0 has the distortion model fov"));
+}
+
+// OpenCV and YAML 1.1 tell an integer from a number, and want an exponent to
+// follow a decimal point.
+TEST_P(Export, NumbersReadAsNumbersEverywhere) {
+  RandomValues random(12);
+  Rig rig;
+  rig.factory.cameras = {random.Camera(Model::kEquidistant)};
+  rig.factory.cameras[0].f = {300, 1e-7};
+  const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
+  ASSERT_TRUE(files.ok()) << files.status();
+  const std::regex bare("[ \\[-][0-9]+e[-+]");
+  for (const TextFile& file : files->files) {
+    if (GetParam().format == std::string("basalt")) continue;  // JSON
+    EXPECT_FALSE(std::regex_search(file.text, bare)) << file.text;
+    EXPECT_THAT(file.text.substr(0, 300), Not(HasSubstr("300,")));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats,
+                         Export,
+                         testing::ValuesIn(kExpressible),
+                         [](const auto& info) {
+                           return std::string(info.param.format);
+                         });
+
+TEST(Formats, AllAreTested) {
+  std::vector<std::string> tested;
+  for (const Expressible& one : kExpressible) tested.emplace_back(one.format);
+  std::vector<std::string> all;
+  for (const FormatInfo& info : Formats()) all.push_back(info.name);
+  EXPECT_EQ(tested, all);
+}
+
+TEST(Formats, AnUnknownOneIsNamedWithThoseThatAre) {
+  const auto rig = ImportRig("okvis", {}, {});
+  EXPECT_EQ(rig.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(rig.status().message()),
+              HasSubstr("none of kalibr, openvins, orb_slam3"));
+  EXPECT_FALSE(ExportRig("kalibr", Rig(), Calibration(), {}).ok());
+}
+
+}  // namespace
+}  // namespace selfcal::client

@@ -1,0 +1,384 @@
+// Files as the tools themselves write them, in forms that we do not: selfcal
+// predicts from them what the tool does.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "test/client/formats/predictions.h"
+
+namespace selfcal::client {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix4d;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::string Numbers(const Eigen::MatrixXd& M) {
+  std::vector<double> values;
+  for (Eigen::Index i = 0; i < M.rows(); ++i) {
+    for (Eigen::Index j = 0; j < M.cols(); ++j) values.push_back(M(i, j));
+  }
+  return fmt::format("{}", fmt::join(values, ", "));
+}
+
+std::string Rows(const Eigen::MatrixXd& M) {
+  std::vector<std::string> rows;
+  for (Eigen::Index i = 0; i < M.rows(); ++i) {
+    rows.push_back("[" + Numbers(M.row(i)) + "]");
+  }
+  return fmt::format("[{}]", fmt::join(rows, ", "));
+}
+
+Matrix4d RandomTransform(RandomValues* random) {
+  Matrix4d T = Matrix4d::Identity();
+  T.topLeftCorner<3, 3>() = random->Rotation().toRotationMatrix();
+  T.topRightCorner<3, 1>() = random->Vector(3, 0.2);
+  return T;
+}
+
+Matrix3d RandomLower(RandomValues* random) {
+  Matrix3d M = Matrix3d::Identity();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j <= i; ++j) M(i, j) += random->Uniform(-0.03, 0.03);
+  }
+  return M;
+}
+
+constexpr char kNoise[] =
+    "  accelerometer_noise_density: 0.01\n"
+    "  accelerometer_random_walk: 0.0002\n"
+    "  gyroscope_noise_density: 0.005\n"
+    "  gyroscope_random_walk: 4.0e-06\n"
+    "  update_rate: 200.0\n";
+
+std::vector<TextFile> KalibrFiles(RandomValues* random) {
+  const std::string chain = fmt::format(
+      "cam0:\n"
+      "  T_cam_imu: {}\n"
+      "  cam_overlaps: [1]\n"
+      "  camera_model: pinhole\n"
+      "  distortion_coeffs: [0.01, -0.02, 0.003, -0.001]\n"
+      "  distortion_model: equidistant\n"
+      "  intrinsics: [190.9, 190.8, 254.9, 256.9]\n"
+      "  resolution: [512, 512]\n"
+      "  timeshift_cam_imu: 0.0056\n"
+      "cam1:\n"
+      "  T_cn_cnm1: {}\n"
+      "  camera_model: pinhole\n"
+      "  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n"
+      "  distortion_model: radtan\n"
+      "  intrinsics: [458, 457, 367, 248]\n"
+      "  resolution: [752, 480]\n"
+      "  timeshift_cam_imu: -0.0021\n",
+      Rows(RandomTransform(random)),
+      Rows(RandomTransform(random)));
+  const std::string imu = fmt::format(
+      "imu0:\n"
+      "  T_i_b: {}\n"
+      "{}"
+      "  accelerometers:\n    M: {}\n"
+      "  gyroscopes:\n    M: {}\n    A: {}\n    C_gyro_i: {}\n"
+      "  model: scale-misalignment\n"
+      "  time_offset: 0.0\n",
+      Rows(Matrix4d::Identity()),
+      kNoise,
+      Rows(RandomLower(random)),
+      Rows(RandomLower(random)),
+      Rows(Matrix3d::Zero()),
+      Rows(random->Rotation().toRotationMatrix()));
+  return {{"camchain.yaml", chain}, {"imu.yaml", imu}};
+}
+
+std::vector<TextFile> OpenVinsFiles(RandomValues* random) {
+  std::string chain = "%YAML:1.0\n\n";
+  for (int j = 0; j < 2; ++j) {
+    chain += fmt::format(
+        "cam{}:\n"
+        "  T_cam_imu: {}\n"
+        "  camera_model: pinhole\n"
+        "  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n"
+        "  distortion_model: radtan\n"
+        "  intrinsics: [458, 457, 367, 248]\n"
+        "  resolution: [752, 480]\n"
+        "  timeshift_cam_imu: 0.0056\n",
+        j,
+        Rows(RandomTransform(random)));
+  }
+  const std::string imu = fmt::format(
+      "%YAML:1.0\n"
+      "imu0:\n{}"
+      "  model: \"kalibr\"\n"
+      "  Tw: {}\n  R_IMUtoGYRO: {}\n  Ta: {}\n  R_IMUtoACC: {}\n  Tg: {}\n",
+      kNoise,
+      Rows(RandomLower(random)),
+      Rows(random->Rotation().toRotationMatrix()),
+      Rows(RandomLower(random)),
+      Rows(random->Rotation().toRotationMatrix()),
+      Rows(Matrix3d::Zero()));
+  return {{"chain.yaml", chain}, {"imu.yaml", imu}};
+}
+
+std::vector<TextFile> OrbSlam3Files(RandomValues* random) {
+  std::string text =
+      "%YAML:1.0\n\n"
+      "File.version: \"1.0\"\n"
+      "Camera.type: \"PinHole\"\n";
+  for (const int j : {1, 2}) {
+    text += fmt::format(
+        "Camera{0}.fx: 458.6\nCamera{0}.fy: 457.3\n"
+        "Camera{0}.cx: 367.2\nCamera{0}.cy: 248.4\n"
+        "Camera{0}.k1: -0.28\nCamera{0}.k2: 0.07\n"
+        "Camera{0}.p1: 0.00019\nCamera{0}.p2: 1.76e-05\n",
+        j);
+  }
+  const auto matrix = [](const Eigen::MatrixXd& M) {
+    return fmt::format(
+        "!!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: f\n   data: [{}]\n",
+        Numbers(M));
+  };
+  text += "Stereo.T_c1_c2: " + matrix(RandomTransform(random));
+  text += "IMU.T_b_c1: " + matrix(RandomTransform(random));
+  text +=
+      "Camera.width: 752\nCamera.height: 480\nCamera.fps: 20\n"
+      "IMU.NoiseGyro: 1.7e-04 # rad/s^0.5\nIMU.NoiseAcc: 2.0e-03\n"
+      "IMU.GyroWalk: 1.9e-05\nIMU.AccWalk: 3.0e-03\nIMU.Frequency: 200.0\n";
+  return {{"EuRoC.yaml", text}};
+}
+
+std::vector<TextFile> VinsFusionFiles(RandomValues* random) {
+  std::string text =
+      "%YAML:1.0\n\n#common parameters\nimu: 1         \nnum_of_cam: 2  \n"
+      "cam0_calib: \"left.yaml\"\ncam1_calib: \"right.yaml\"\n"
+      "image_width: 848\nimage_height: 800\n"
+      "acc_n: 0.1          # deviation. #0.2   0.04\ngyr_n: 0.01\n"
+      "acc_w: 0.001\ngyr_w: 0.0001\ng_norm: 9.805\ntd: -0.003\n";
+  for (const int j : {0, 1}) {
+    text += fmt::format(
+        "body_T_cam{}: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n"
+        "   data: [{}]\n",
+        j,
+        Numbers(RandomTransform(random)));
+  }
+  const std::string left =
+      "%YAML:1.0\n---\nmodel_type: KANNALA_BRANDT\ncamera_name: camera\n"
+      "image_width: 848\nimage_height: 800\nprojection_parameters:\n"
+      "   k2: -0.007\n   k3: 0.0422\n   k4: -0.0399\n   k5: 0.00665\n"
+      "   mu: 286.2\n   mv: 286.5\n   u0: 421.5\n   v0: 400.8\n";
+  const std::string right =
+      "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\n"
+      "image_width: 848\nimage_height: 800\ndistortion_parameters:\n"
+      "   k1: -0.29\n   k2: 0.083\n   p1: 2.4e-05\n   p2: -1.2e-04\n"
+      "projection_parameters:\n"
+      "   fx: 461\n   fy: 460\n   cx: 363\n   cy: 248\n";
+  return {{"config.yaml", text}, {"left.yaml", left}, {"right.yaml", right}};
+}
+
+std::vector<TextFile> BasaltFiles(RandomValues* random) {
+  std::string poses;
+  for (const char* end : {",", ""}) {
+    const Eigen::Quaterniond q = random->Rotation();
+    poses += fmt::format(
+        R"({{"px": 0.01, "py": -0.02, "pz": 0.05,
+            "qx": {}, "qy": {}, "qz": {}, "qw": {}}}{})",
+        q.x(),
+        q.y(),
+        q.z(),
+        q.w(),
+        end);
+  }
+  Eigen::VectorXd accel = random->Vector(9, 0.03);
+  Eigen::VectorXd gyro = random->Vector(12, 0.03);
+  accel.head<3>().setZero();
+  gyro.head<3>().setZero();
+  const std::string text = fmt::format(
+      R"({{"value0": {{"T_imu_cam": [{}],
+          "intrinsics": [
+            {{"camera_type": "kb4", "intrinsics": {{
+              "fx": 286.6, "fy": 286.5, "cx": 422.3, "cy": 395.2,
+              "k1": -0.0067, "k2": 0.045, "k3": -0.0435, "k4": 0.0083}}}},
+            {{"camera_type": "pinhole", "intrinsics": {{
+              "fx": 460, "fy": 461, "cx": 420, "cy": 400}}}}],
+          "resolution": [[848, 800], [848, 800]],
+          "calib_accel_bias": [{}],
+          "calib_gyro_bias": [{}],
+          "imu_update_rate": 200.2,
+          "accel_noise_std": [0.008, 0.008, 0.008],
+          "gyro_noise_std": [0.002, 0.002, 0.002],
+          "accel_bias_std": [0.01, 0.01, 0.01],
+          "gyro_bias_std": [0.0007, 0.0007, 0.0007],
+          "cam_time_offset_ns": 2124029, "vignette": []}}}})",
+      poses,
+      Numbers(accel.transpose()),
+      Numbers(gyro.transpose()));
+  return {{"calibration.json", text}};
+}
+
+std::vector<TextFile> Files(const std::string& format, RandomValues* random) {
+  if (format == "kalibr") return KalibrFiles(random);
+  if (format == "openvins") return OpenVinsFiles(random);
+  if (format == "orb_slam3") return OrbSlam3Files(random);
+  if (format == "vins_fusion") return VinsFusionFiles(random);
+  return BasaltFiles(random);
+}
+
+class Import : public testing::TestWithParam<const char*> {};
+
+TEST_P(Import, PredictsThePixelsRatesAndTimesOfTheTool) {
+  constexpr double kRate_hz = 400;
+  RandomValues random(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    const std::vector<TextFile> files = Files(GetParam(), &random);
+    const auto rig = ImportRig(GetParam(), files, {.imu_rate_hz = kRate_hz});
+    ASSERT_TRUE(rig.ok()) << rig.status();
+    EXPECT_THAT(rig->losses, IsEmpty());
+    const Tool tool = ReadAsTool(GetParam(), files, kRate_hz);
+    ExpectSamePredictions(rig->rig.factory, tool, &random);
+    ExpectSameNoise(rig->rig.imu_noise, tool.noise);
+    EXPECT_EQ(rig->rig.id, "");
+  }
+}
+
+TEST_P(Import, WhatIsWrittenAgainSaysTheSame) {
+  RandomValues random(4);
+  const std::vector<TextFile> files = Files(GetParam(), &random);
+  const auto rig = ImportRig(GetParam(), files, {.imu_rate_hz = 100});
+  ASSERT_TRUE(rig.ok()) << rig.status();
+  const auto again =
+      ExportRig(GetParam(), rig->rig, rig->rig.factory, {.imu_rate_hz = 100});
+  ASSERT_TRUE(again.ok()) << again.status();
+  ExpectSamePredictions(
+      rig->rig.factory, ReadAsTool(GetParam(), again->files, 100), &random);
+}
+
+// Each file with one line after the other missing: read, or refused in words.
+TEST_P(Import, AFileThatIsCutOffIsRefusedInWords) {
+  RandomValues random(5);
+  std::vector<TextFile> files = Files(GetParam(), &random);
+  int refused = 0;
+  for (TextFile& file : files) {
+    const std::string whole = file.text;
+    for (std::size_t end = 0; end < whole.size(); end += 37) {
+      file.text = whole.substr(0, end);
+      const auto rig = ImportRig(GetParam(), files, {});
+      if (rig.ok()) continue;
+      ++refused;
+      EXPECT_EQ(rig.status().code(), absl::StatusCode::kInvalidArgument);
+      EXPECT_THAT(std::string(rig.status().message()), HasSubstr(file.name));
+    }
+    file.text = whole;
+  }
+  EXPECT_GT(refused, 10);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Formats,
+    Import,
+    testing::Values("kalibr", "openvins", "orb_slam3", "vins_fusion", "basalt"),
+    [](const auto& info) { return std::string(info.param); });
+
+struct Change {
+  const char* format;
+  const char* from;
+  const char* to;
+  const char* answer;  // of an error, or the name of a loss
+};
+
+absl::StatusOr<ImportedRig> Changed(const Change& change) {
+  RandomValues random(6);
+  std::vector<TextFile> files = Files(change.format, &random);
+  for (TextFile& file : files) {
+    const std::size_t at = file.text.find(change.from);
+    if (at == std::string::npos) continue;
+    file.text.replace(at, std::string(change.from).size(), change.to);
+    return ImportRig(change.format, files, {.imu_rate_hz = 200});
+  }
+  ADD_FAILURE() << change.from << " is in no file";
+  return absl::InternalError("");
+}
+
+TEST(ImportErrors, NameTheFieldAndWhatToDo) {
+  for (const Change& change : std::initializer_list<Change>{
+           {"kalibr", "pinhole", "omni", "camera_model 'omni'"},
+           {"kalibr", "equidistant", "equi", "distortion_model 'equi'"},
+           {"kalibr", "T_cam_imu", "x", "camchain-imucam"},
+           {"kalibr", "cam0", "x", "give two files"},
+           {"kalibr", "[512, 512]", "[512]", "'resolution' needs 2"},
+           {"kalibr", "190.9", ".nan", "'intrinsics' is not finite"},
+           {"kalibr", "190.9", "-1", "must be positive"},
+           {"kalibr", "time_offset: 0.0", "time_offset: 0.1", "time_offset"},
+           {"kalibr", "gyroscope_noise", "x", "gyroscope_noise_density"},
+           {"openvins", "\"kalibr\"", "\"rpng\"", "not upper triangular"},
+           {"openvins", "\"kalibr\"", "\"imu\"", "model 'imu'"},
+           {"openvins", "T_cam_imu", "x", "'T_imu_cam' is missing"},
+           {"orb_slam3", "PinHole", "Rectified", "Camera.type 'Rectified'"},
+           {"orb_slam3", "File.version", "x", "File.version is missing"},
+           {"orb_slam3",
+            "Camera2.fx",
+            "Camera2.k3: 0.1\nCamera2.fx",
+            "Camera2.k3 is not 0"},
+           {"orb_slam3", "Camera.width", "x", "'Camera.width' is missing"},
+           {"vins_fusion", "imu: 1", "imu: 0", "imu is not 1"},
+           {"vins_fusion", "left.yaml", "up.yaml", "up.yaml is missing"},
+           {"vins_fusion", "KANNALA_BRANDT", "MEI", "model_type 'MEI'"},
+           {"vins_fusion", "num_of_cam: 2", "num_of_cam: 3", "not 1 or 2"},
+           {"basalt", "kb4", "ds", "camera_type \"ds\""},
+           {"basalt", "value0", "value1", "'value0' is missing"},
+           {"basalt", "\"qw\": ", "\"qw\": 1", "norm"},
+           {"basalt", "[848, 800]", "[848.5, 800]", "resolution"},
+           {"basalt", "2124029", "\"soon\"", "cam_time_offset_ns"}}) {
+    const auto rig = Changed(change);
+    EXPECT_EQ(rig.status().code(), absl::StatusCode::kInvalidArgument)
+        << change.to;
+    EXPECT_THAT(std::string(rig.status().message()), HasSubstr(change.answer));
+  }
+}
+
+TEST(ImportLosses, HaveAName) {
+  for (const Change& change : std::initializer_list<Change>{
+           {"kalibr", "A: [[0,", "A: [[0.001,", "gyroscopes.A"},
+           {"kalibr",
+            "  gyroscopes:",
+            "    rx_i: [0.01, 0, 0]\n  gyroscopes:",
+            "accelerometers.rx_i"},
+           {"openvins", "Tg: [[0,", "Tg: [[0.001,", "Tg"},
+           {"openvins",
+            "timeshift_cam_imu: 0.0056",
+            "timeshift_cam_imu: 0.001",
+            "cam1.timeshift_cam_imu"},
+           {"basalt", "bias\": [0,", "bias\": [0.1,", "calib_accel_bias"},
+           {"basalt", "\"vignette\": []", "\"vignette\": [1]", "vignette"},
+           {"basalt",
+            "[0.008, 0.008, 0.008]",
+            "[0.008, 0.009, 0.008]",
+            "accel_noise_std"}}) {
+    const auto rig = Changed(change);
+    ASSERT_TRUE(rig.ok()) << rig.status();
+    ASSERT_EQ(rig->losses.size(), 1u) << change.answer;
+    EXPECT_EQ(rig->losses[0].name, change.answer);
+  }
+}
+
+// Basalt's constant bias, in terms of the readings, makes the same rates.
+TEST(ImportLosses, ABiasIsToldAsCorrectImuTakesIt) {
+  const auto rig =
+      Changed({"basalt", "bias\": [0, 0, 0,", "bias\": [0.1, 0.2, 0.3,", ""});
+  ASSERT_TRUE(rig.ok()) << rig.status();
+  ASSERT_EQ(rig->losses.size(), 1u);
+  const std::string& text = rig->losses[0].text;
+  Eigen::Vector3d b_a;
+  ASSERT_EQ(std::sscanf(text.substr(text.find("are ")).c_str(),
+                        "are %lf %lf %lf",
+                        &b_a.x(),
+                        &b_a.y(),
+                        &b_a.z()),
+            3);
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  const ImuCalibration& imu = rig->rig.factory.imu;
+  // f = (1 + M) accel - b: of a reading of 0 the rate is -b, of norm |b|.
+  EXPECT_NEAR(CorrectImu(imu, zero, zero, zero, b_a).f_I.norm(),
+              Eigen::Vector3d(0.1, 0.2, 0.3).norm(),
+              1e-12);
+}
+
+}  // namespace
+}  // namespace selfcal::client

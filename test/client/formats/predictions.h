@@ -1,0 +1,65 @@
+// What a tool predicts from its files, against what selfcal does.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <string>
+
+#include "core/model/camera.h"
+#include "core/model/imu.h"
+#include "test/client/formats/tools.h"
+#include "test/core/model/random_values.h"
+
+namespace selfcal::client {
+
+// The frames of both differ by a rotation that is nobody's business: so a point
+// is given by where it is against the motion, in terms of the corrected rates.
+// That a tool sees it at the same pixel says that its rates and its extrinsics
+// fit each other as ours do.
+inline void ExpectSamePredictions(const Calibration& theta,
+                                  const Tool& tool,
+                                  RandomValues* random) {
+  ASSERT_EQ(tool.cameras.size(), theta.cameras.size());
+  for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::Vector3d gyro = 2 * random->Direction();
+    const Eigen::Vector3d accel = 10 * random->Direction();
+    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+    const BodyRates ours = CorrectImu(theta.imu, gyro, accel, zero, zero);
+    // A tool without a model of the IMU gets what CorrectImu makes.
+    const ToolRates its = tool.has_imu_model ? tool.correct(gyro, accel)
+                                             : tool.correct(ours.w_I, ours.f_I);
+    EXPECT_NEAR(its.w_B.norm(), ours.w_I.norm(), 1e-9);
+    EXPECT_NEAR(its.f_B.norm(), ours.f_I.norm(), 1e-9);
+    EXPECT_NEAR(its.w_B.dot(its.f_B), ours.w_I.dot(ours.f_I), 1e-8);
+    Eigen::Matrix3d ours_basis;
+    ours_basis << ours.w_I, ours.f_I, ours.w_I.cross(ours.f_I);
+    Eigen::Matrix3d its_basis;
+    its_basis << its.w_B, its.f_B, its.w_B.cross(its.f_B);
+    if (std::abs(ours_basis.determinant()) < 1) continue;  // nearly parallel
+    for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+      const CameraCalibration& camera = theta.cameras[j];
+      EXPECT_NEAR(tool.cameras[j].offset_s, camera.time_offset_s, 1e-9);
+      const Eigen::Vector2d z_px(random->Uniform(0, camera.width_px),
+                                 random->Uniform(0, camera.height_px));
+      Eigen::Vector3d bearing_C;
+      if (!Unproject(camera, z_px, &bearing_C)) continue;
+      const Eigen::Vector3d p_I =
+          camera.q_CI.conjugate() *
+          (random->Uniform(0.3, 8) * bearing_C - camera.p_CI);
+      const Eigen::Vector3d p_B =
+          its_basis * (ours_basis.inverse() * p_I).eval();
+      EXPECT_LT((tool.cameras[j].pixel(p_B) - z_px).norm(), 1e-5);
+    }
+  }
+}
+
+inline void ExpectSameNoise(const ImuNoise& a, const ImuNoise& b) {
+  EXPECT_DOUBLE_EQ(a.gyro_noise_density, b.gyro_noise_density);
+  EXPECT_DOUBLE_EQ(a.accel_noise_density, b.accel_noise_density);
+  EXPECT_DOUBLE_EQ(a.gyro_bias_random_walk, b.gyro_bias_random_walk);
+  EXPECT_DOUBLE_EQ(a.accel_bias_random_walk, b.accel_bias_random_walk);
+}
+
+}  // namespace selfcal::client
