@@ -90,6 +90,11 @@ void SetBasaltResolution(const Json& size, CameraCalibration* camera) {
 Json BasaltCameraJson(const CameraCalibration& camera) {
   for (const Model& model : Models()) {
     if (model.model != camera.model) continue;
+    constexpr double kLeastFov = 1e-4;  // Basalt's equations end there
+    if (camera.model == DistortionModel::kFov &&
+        !(camera.distortion[0] > kLeastFov)) {
+      throw FormatError("basalt's fov wants a w above 0");
+    }
     Json values = {{"fx", camera.f.x()},
                    {"fy", camera.f.y()},
                    {"cx", camera.c.x()},

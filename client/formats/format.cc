@@ -69,6 +69,15 @@ absl::Status Check(const Rig& rig, const std::string& files) {
       fmt::format("{}: {} {}", files, faults[0].field, faults[0].message));
 }
 
+// The FOV model is even in w; tools want it positive.
+Calibration WithPositiveFov(Calibration theta) {
+  for (CameraCalibration& camera : theta.cameras) {
+    if (camera.model != DistortionModel::kFov) continue;
+    camera.distortion = camera.distortion.cwiseAbs();
+  }
+  return theta;
+}
+
 }  // namespace
 
 std::vector<FormatInfo> Formats() {
@@ -110,7 +119,8 @@ absl::StatusOr<ExportedFiles> ExportRig(const std::string& format,
         fmt::format("{} {}", faults[0].field, faults[0].message));
   }
   try {
-    ExportedFiles result = (*found)->write(rig, theta, options);
+    ExportedFiles result =
+        (*found)->write(rig, WithPositiveFov(theta), options);
     result.losses.push_back(
         {"sigmas",
          fmt::format("{} keeps no uncertainty: calibrations show has it",

@@ -84,8 +84,8 @@ std::string Name(const std::string& prefix, int j) {
   return prefix + std::to_string(j);
 }
 
-// https://github.com/ethz-asl/kalibr/wiki/yaml-formats, and the residuals of
-// its scale-misalignment model of the IMU.
+// Kalibr's wiki, "Yaml formats", and the residuals of its scale-misalignment
+// model of the IMU.
 Tool Kalibr(const std::vector<TextFile>& files) {
   Tool tool;
   tool.has_imu_model = true;
@@ -123,7 +123,7 @@ Tool Kalibr(const std::vector<TextFile>& files) {
   return tool;
 }
 
-// VioManagerOptions (how the files are read), Propagator (how readings are
+// VioManagerOptions (how files are read), Propagator (how readings are
 // corrected): D = T^-1, of which only a triangle is kept.
 Tool OpenVins(const std::vector<TextFile>& files) {
   Tool tool;
@@ -197,9 +197,9 @@ Tool OrbSlam3(const std::vector<TextFile>& files) {
   return tool;
 }
 
-// parameters.cpp, integration_base.h; camodocal's PinholeCamera and
-// EquidistantCamera. A reading has the standard deviation acc_n; in a step dt a
-// bias moves by acc_w dt.
+// Its configurations, integration_base.h and camodocal's EquidistantCamera. A
+// reading has the standard deviation acc_n; in a step dt a bias moves by acc_w
+// dt.
 Tool VinsFusion(const std::vector<TextFile>& files, double rate_hz) {
   Tool tool;
   const YAML::Node root = Yaml(files[0].text);
@@ -237,7 +237,8 @@ Tool VinsFusion(const std::vector<TextFile>& files, double rate_hz) {
   return tool;
 }
 
-// calib_bias.hpp, calibration.hpp, headers_serialization.h of basalt-headers.
+// calib_bias.hpp, calibration.hpp, headers_serialization.h and the cameras of
+// basalt-headers.
 Tool Basalt(const std::vector<TextFile>& files) {
   Tool tool;
   tool.has_imu_model = true;
@@ -271,6 +272,7 @@ Tool Basalt(const std::vector<TextFile>& files) {
     } else if (type == "fov") {
       model = "fov";
       k = {p["w"]};
+      if (!(k[0] > 1e-5)) throw std::runtime_error("takes w for 0");
     } else if (type == "pinhole-radtan8") {
       // The rational model with a denominator of 1 and no third coefficient.
       for (const char* zero : {"k3", "k4", "k5", "k6", "rpmax"}) {
@@ -286,7 +288,7 @@ Tool Basalt(const std::vector<TextFile>& files) {
   return tool;
 }
 
-// maplab's wiki, "Sensor calibration format"; aslam_cv2's distortions.
+// imu.cc and the example calibrations of maplab; its recordings reproject so.
 Tool Maplab(const std::vector<TextFile>& files) {
   Tool tool;
   tool.correct = AsTheyAre;
