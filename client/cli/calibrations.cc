@@ -179,6 +179,8 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
     };
   });
 
+  AddExportCommand(calibrations, context);
+
   const auto count = std::make_shared<std::int64_t>(0);
   CLI::App* watch = calibrations->add_subcommand(
       "watch", "Print the active version at once, then each new one");

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "client/cli/commands.h"
+#include "client/cli/foreign_files.h"
 #include "client/cli/rig_input.h"
 #include "client/text/text.h"
 #include "core/model/calibration.h"
@@ -115,7 +116,9 @@ void PrintRig(const Context& context, const v1::Rig& rig) {
 }
 
 int Create(Context* context, const RigInput& input) {
-  const auto rig = ReadRig(input);
+  std::vector<Loss> losses;
+  const auto rig = ReadRig(input, &losses);
+  PrintLosses(losses);
   if (!rig.ok()) return FailInput(rig.status());
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::CreateRigRequest request;
@@ -218,11 +221,23 @@ void AddRigCommands(CLI::App* app, Context* context) {
   const auto input = std::make_shared<RigInput>();
   CLI::Option_group* source = create->add_option_group("source");
   source->add_option("FILE",
-                     input->file,
-                     "selfcal.v1.Rig in proto3 JSON; - is standard input");
+                     input->files,
+                     "selfcal.v1.Rig in proto3 JSON, - is standard input; or "
+                     "with --from the files of that tool");
   source->add_option(
       "--vi-map", input->vi_map, "Take the rig from this maplab VI-map");
   source->require_option(1);
+  create
+      ->add_option(
+          "--from", input->from, "Take the calibration from files of this tool")
+      ->check(FormatNames());
+  create->add_option("--imu-rate",
+                     input->imu_rate_hz,
+                     "With --from, for a tool whose noise is by sample [Hz]");
+  create->add_flag("--strict",
+                   input->strict,
+                   "With --from: no rig if the tool predicts otherwise than "
+                   "selfcal would");
   AddOverrides(create, input.get());
   create->callback([context, input] {
     context->command = [context, input] { return Create(context, *input); };

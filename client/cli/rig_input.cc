@@ -10,6 +10,7 @@
 #include <iostream>
 #include <iterator>
 
+#include "client/cli/foreign_files.h"
 #include "client/import/vi_map.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"
@@ -29,7 +30,26 @@ absl::StatusOr<std::string> ReadFile(const std::string& name) {
   return text;
 }
 
-absl::StatusOr<v1::Rig> ReadBase(const RigInput& input) {
+absl::StatusOr<v1::Rig> ReadForeign(const RigInput& input,
+                                    std::vector<Loss>* losses) {
+  const auto files = ReadTextFiles(input.files);
+  if (!files.ok()) return files.status();
+  const auto imported =
+      ImportRig(input.from, *files, {.imu_rate_hz = input.imu_rate_hz});
+  if (!imported.ok()) return imported.status();
+  *losses = imported->losses;
+  if (input.strict && ChangesPrediction(*losses)) {
+    return absl::InvalidArgumentError(
+        "no rig is created: --strict, and something is lost");
+  }
+  v1::Rig rig = ToProto(imported->rig);
+  rig.clear_groups();  // files have none: the daemon knows the default
+  return rig;
+}
+
+absl::StatusOr<v1::Rig> ReadBase(const RigInput& input,
+                                 std::vector<Loss>* losses) {
+  if (!input.from.empty()) return ReadForeign(input, losses);
   if (!input.vi_map.empty()) {
     absl::StatusOr<ViMapRecording> recording = ReadViMap(input.vi_map, {});
     if (!recording.ok()) return recording.status();
@@ -37,13 +57,18 @@ absl::StatusOr<v1::Rig> ReadBase(const RigInput& input) {
     rig.clear_groups();  // a VI-map has none: the daemon knows the default
     return rig;
   }
-  const auto json = ReadFile(input.file);
+  if (input.files.size() != 1) {
+    return absl::InvalidArgumentError(
+        "name one file, or the tool that several are of with --from");
+  }
+  const std::string& file = input.files[0];
+  const auto json = ReadFile(file);
   if (!json.ok()) return json.status();
   auto rig = ParseRig(*json);
   if (!rig.ok()) {
     return absl::InvalidArgumentError(
         fmt::format("{}: {}",
-                    input.file,
+                    file,
                     std::string(rig.status().message().data(),
                                 rig.status().message().size())));
   }
@@ -106,8 +131,9 @@ absl::StatusOr<v1::Rig> ParseRig(const std::string& json) {
       fmt::format("is not a selfcal.v1.Rig in JSON: {}", status.ToString()));
 }
 
-absl::StatusOr<v1::Rig> ReadRig(const RigInput& input) {
-  absl::StatusOr<v1::Rig> rig = ReadBase(input);
+absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
+                                std::vector<Loss>* losses) {
+  absl::StatusOr<v1::Rig> rig = ReadBase(input, losses);
   if (!rig.ok()) return rig;
   if (input.id) rig->set_name(RigName(*input.id));
   if (input.pixel_sigma_px) rig->set_pixel_sigma_px(*input.pixel_sigma_px);

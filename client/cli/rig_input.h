@@ -1,5 +1,5 @@
-// The rig that `rig create` sends: from a file or a VI-map, with what the
-// command line overrides.
+// The rig that `rig create` sends: from a file, a VI-map or the files of
+// another tool, with what the command line overrides.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -8,13 +8,18 @@
 #include <string>
 #include <vector>
 
+#include "client/formats/format.h"
 #include "selfcal/v1/rig.pb.h"
 
 namespace selfcal::client {
 
 struct RigInput {
-  std::string file;    // proto3 JSON of selfcal.v1.Rig; "-" is stdin
+  // One with proto3 JSON of selfcal.v1.Rig, "-" is stdin; or those of `from`.
+  std::vector<std::string> files;
+  std::string from;    // a format of client/formats
   std::string vi_map;  // or a VI-map
+  std::optional<double> imu_rate_hz;
+  bool strict = false;  // nothing of `from` may be lost
   std::optional<std::string> id;
   std::optional<double> pixel_sigma_px;
   std::optional<double> gyro_noise;
@@ -35,8 +40,10 @@ struct RigInput {
 };
 
 // INVALID_ARGUMENT and NOT_FOUND for what cannot be read, with the file's name.
-// The values are judged by the daemon.
-absl::StatusOr<v1::Rig> ReadRig(const RigInput& input);
+// The values are judged by the daemon. Adds what files of another tool have and
+// selfcal has not.
+absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
+                                std::vector<Loss>* losses);
 
 // "tables", "joint-d", "joint-a", "joint-e".
 std::string SelectionText(v1::Rig::Selection selection);

@@ -1,0 +1,149 @@
+#include <fmt/format.h>
+#include <google/protobuf/struct.pb.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/cli/foreign_files.h"
+#include "proto/convert.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
+#include "selfcal/v1/rig.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+struct ExportInput {
+  std::string rig;
+  std::string version = "active";
+  std::string format;
+  std::string output;
+  std::optional<double> imu_rate_hz;
+  bool strict = false;
+  bool force = false;
+};
+
+struct Source {
+  Rig rig;
+  Calibration theta;
+};
+
+// The rig and the version as values. Returns kDone, or says what is wrong.
+int Fetch(const Context& context, const ExportInput& input, Source* source) {
+  const auto rigs = v1::RigService::NewStub(context.Channel());
+  v1::GetRigRequest rig_request;
+  rig_request.set_name(RigName(input.rig));
+  v1::Rig rig;
+  using Rigs = v1::RigService::StubInterface;
+  grpc::Status status =
+      Call<Rigs>(rigs.get(), &Rigs::GetRig, rig_request, &rig);
+  if (!status.ok()) return Fail(context, status);
+
+  const auto calibrations = v1::CalibrationService::NewStub(context.Channel());
+  v1::GetCalibrationRequest request;
+  request.set_name(ChildName(input.rig, "calibrations", input.version));
+  v1::Calibration calibration;
+  using Calibrations = v1::CalibrationService::StubInterface;
+  status = Call<Calibrations>(
+      calibrations.get(), &Calibrations::GetCalibration, request, &calibration);
+  if (!status.ok()) return Fail(context, status);
+
+  std::vector<Violation> faults = FromProto(rig, "rig", &source->rig);
+  if (faults.empty()) {
+    faults = FromProto(calibration.parameters(), "parameters", &source->theta);
+  }
+  if (faults.empty()) return kDone;
+  PrintError(fmt::format("the daemon's answer cannot be read: {} {}",
+                         faults[0].field,
+                         faults[0].message));
+  return kFailed;
+}
+
+google::protobuf::Struct ToMessage(const std::vector<std::string>& paths,
+                                   const std::vector<Loss>& losses) {
+  google::protobuf::Struct message;
+  auto* files = (*message.mutable_fields())["files"].mutable_list_value();
+  for (const std::string& path : paths) {
+    files->add_values()->set_string_value(path);
+  }
+  auto* list = (*message.mutable_fields())["losses"].mutable_list_value();
+  for (const Loss& loss : losses) {
+    auto& fields =
+        *list->add_values()->mutable_struct_value()->mutable_fields();
+    fields["name"].set_string_value(loss.name);
+    fields["text"].set_string_value(loss.text);
+    fields["changes_prediction"].set_bool_value(loss.changes_prediction);
+  }
+  return message;
+}
+
+int Export(Context* context, const ExportInput& input) {
+  Source source;
+  if (const int code = Fetch(*context, input, &source); code != kDone) {
+    return code;
+  }
+  const auto exported = ExportRig(input.format,
+                                  source.rig,
+                                  source.theta,
+                                  {.imu_rate_hz = input.imu_rate_hz});
+  if (!exported.ok()) {
+    PrintError(std::string(exported.status().message()));
+    return kFailed;
+  }
+  PrintLosses(exported->losses);
+  if (input.strict && ChangesPrediction(exported->losses)) {
+    PrintError("nothing is written: --strict, and something is lost");
+    return kFailed;
+  }
+  const std::vector<std::string> paths =
+      OutputPaths(exported->files, input.output);
+  const absl::Status written =
+      WriteTextFiles(exported->files, paths, input.force);
+  if (!written.ok()) {
+    PrintError(std::string(written.message()));
+    return kFailed;
+  }
+  if (context->json) {
+    context->PrintJson(ToMessage(paths, exported->losses));
+    return kDone;
+  }
+  Table table({{"file"}});
+  for (const std::string& path : paths) table.Add({path});
+  context->Print(table);
+  return kDone;
+}
+
+}  // namespace
+
+void AddExportCommand(CLI::App* calibrations, Context* context) {
+  CLI::App* command = calibrations->add_subcommand(
+      "export", "Write a version in the files of another tool");
+  const auto input = std::make_shared<ExportInput>();
+  command->add_option("RIG", input->rig)->required();
+  command->add_option("VERSION", input->version, "A number, or active")
+      ->capture_default_str();
+  command->add_option("--format", input->format, "The tool")
+      ->required()
+      ->check(FormatNames());
+  command
+      ->add_option("--output",
+                   input->output,
+                   "A folder for the files; where there is but one, that file "
+                   "or its folder")
+      ->required();
+  command->add_option("--imu-rate",
+                      input->imu_rate_hz,
+                      "Of the IMU, for tools that want to know [Hz]");
+  command->add_flag("--strict",
+                    input->strict,
+                    "Write nothing if the tool would predict otherwise than "
+                    "selfcal does");
+  command->add_flag("--force", input->force, "Overwrite files");
+  command->callback([context, input] {
+    context->command = [context, input] { return Export(context, *input); };
+  });
+}
+
+}  // namespace selfcal::client
