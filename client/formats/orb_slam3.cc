@@ -161,9 +161,9 @@ ExportedFiles ExportOrbSlam3(const Rig& rig,
     const Eigen::Matrix4d T_C1C2 =
         TransformFromBody(cameras[0], I) *
         RigidInverse(TransformFromBody(cameras[1], I));
-    text += "Stereo.T_c1_c2: " + OpenCvMatrixText(T_C1C2);
+    text += "Stereo.T_c1_c2: " + OpenCvMatrixText(T_C1C2, 'f');
   }
-  text += "IMU.T_b_c1: " + OpenCvMatrixText(T_BC1);
+  text += "IMU.T_b_c1: " + OpenCvMatrixText(T_BC1, 'f');
   text += NoiseText(rig.imu_noise,
                     ImuRate(options, "IMU.Frequency", &result.losses));
   AddImuLoss("orb_slam3", theta.imu, &result.losses);

@@ -189,7 +189,7 @@ ExportedFiles ExportVinsFusion(const Rig& rig,
     const Eigen::Matrix4d T_BC = RigidInverse(
         TransformFromBody(kept.cameras[j], Eigen::Matrix3d::Identity()));
     text += fmt::format("cam{}_calib: \"{}\"\n", j, name);
-    text += fmt::format("body_T_cam{}: {}", j, OpenCvMatrixText(T_BC));
+    text += fmt::format("body_T_cam{}: {}", j, OpenCvMatrixText(T_BC, 'd'));
     cameras.push_back({name, CameraText(kept.cameras[j])});
   }
   AddImuLoss("vins_fusion", theta.imu, &result.losses);

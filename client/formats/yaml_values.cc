@@ -155,12 +155,13 @@ std::string RowsText(const Eigen::MatrixXd& M, const std::string& indent) {
   return text;
 }
 
-std::string OpenCvMatrixText(const Eigen::MatrixXd& M) {
+std::string OpenCvMatrixText(const Eigen::MatrixXd& M, char type) {
   const Eigen::Matrix<double, -1, -1, Eigen::RowMajor> by_rows = M;
   return fmt::format(
-      "!!opencv-matrix\n  rows: {}\n  cols: {}\n  dt: d\n  data: {}\n",
+      "!!opencv-matrix\n  rows: {}\n  cols: {}\n  dt: {}\n  data: {}\n",
       M.rows(),
       M.cols(),
+      type,
       ListText({by_rows.data(), static_cast<std::size_t>(by_rows.size())}));
 }
 

@@ -47,7 +47,8 @@ std::string NumberText(double value);
 std::string ListText(std::span<const double> values);
 // A line for each row, "    - [1.0, 2.0]".
 std::string RowsText(const Eigen::MatrixXd& M, const std::string& indent);
-// "!!opencv-matrix" with its rows, columns and data.
-std::string OpenCvMatrixText(const Eigen::MatrixXd& M);
+// "!!opencv-matrix" with its rows, columns and data; `type` is 'd', or 'f' for
+// a reader that takes the elements for floats whatever they are.
+std::string OpenCvMatrixText(const Eigen::MatrixXd& M, char type);
 
 }  // namespace selfcal::client

@@ -176,6 +176,11 @@ Tool OrbSlam3(const std::vector<TextFile>& files) {
                 .gyro_bias_random_walk = root["IMU.GyroWalk"].as<double>(),
                 .accel_bias_random_walk = root["IMU.AccWalk"].as<double>()};
   const bool pinhole = root["Camera.type"].as<std::string>() == "PinHole";
+  for (const char* matrix : {"IMU.T_b_c1", "Stereo.T_c1_c2"}) {
+    if (root[matrix] && root[matrix]["dt"].as<std::string>() != "f") {
+      throw std::runtime_error("its elements are read as floats");
+    }
+  }
   Matrix4d T_BC = Mat<4>(root["IMU.T_b_c1"]["data"]);
   for (const int j : {1, 2}) {
     const auto value = [&](const char* key) {
