@@ -179,7 +179,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
     };
   });
 
-  AddExportCommand(calibrations, context);
+  AddCalibrationExport(calibrations, context);
 
   const auto count = std::make_shared<std::int64_t>(0);
   CLI::App* watch = calibrations->add_subcommand(

@@ -19,7 +19,7 @@ void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
 void AddReportCommand(CLI::App* app, Context* context);
 // To `calibrations`.
-void AddExportCommand(CLI::App* calibrations, Context* context);
+void AddCalibrationExport(CLI::App* calibrations, Context* context);
 void AddEventsCommand(CLI::App* app, Context* context);
 void AddDoctorCommand(CLI::App* app, Context* context);
 void AddBackupCommand(CLI::App* app, Context* context);

@@ -117,7 +117,7 @@ int Export(Context* context, const ExportInput& input) {
 
 }  // namespace
 
-void AddExportCommand(CLI::App* calibrations, Context* context) {
+void AddCalibrationExport(CLI::App* calibrations, Context* context) {
   CLI::App* command = calibrations->add_subcommand(
       "export", "Write a version in the files of another tool");
   const auto input = std::make_shared<ExportInput>();
