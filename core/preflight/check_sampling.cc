@@ -1,0 +1,123 @@
+// Dropped and repeated samples. What is dropped shows as a step between stamps
+// that is a multiple of the usual one; what is repeated as six equal numbers,
+// which no two readings of a sensor with noise have, or as equal stamps.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/preflight/checks.h"
+
+namespace selfcal {
+namespace {
+
+constexpr std::size_t kMinSamples = 100;
+// A step this much over the median one has room for another sample.
+constexpr double kGap = 1.6;
+// Of all samples: fewer are no finding.
+constexpr double kMinShare = 5e-3;
+
+struct Counts {
+  std::size_t samples = 0;
+  std::size_t missing = 0;
+  std::size_t gaps = 0;
+  std::size_t equal_readings = 0;
+  std::size_t bad_stamps = 0;  // equal to the one before, or earlier
+  double longest_gap_s = 0;
+};
+
+std::int64_t MedianStep(std::span<const MotionSegment> segments) {
+  std::vector<std::int64_t> steps;
+  for (const MotionSegment& segment : segments) {
+    for (std::size_t i = 1; i < segment.imu.size(); ++i) {
+      const std::int64_t step = segment.imu[i].t_ns - segment.imu[i - 1].t_ns;
+      if (step > 0) steps.push_back(step);
+    }
+  }
+  if (steps.empty()) return 0;
+  const auto middle =
+      steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+Counts Count(std::span<const MotionSegment> segments, double usual_ns) {
+  Counts counts;
+  for (const MotionSegment& segment : segments) {
+    counts.samples += segment.imu.size();
+    for (std::size_t i = 1; i < segment.imu.size(); ++i) {
+      const ImuSample& a = segment.imu[i - 1];
+      const ImuSample& b = segment.imu[i];
+      const auto step = static_cast<double>(b.t_ns - a.t_ns);
+      if (step <= 0) ++counts.bad_stamps;
+      if (a.gyro == b.gyro && a.accel == b.accel) ++counts.equal_readings;
+      if (step < kGap * usual_ns) continue;
+      ++counts.gaps;
+      counts.missing += static_cast<std::size_t>(step / usual_ns - 0.4);
+      counts.longest_gap_s = std::max(counts.longest_gap_s, 1e-9 * step);
+    }
+  }
+  return counts;
+}
+
+std::string OfSamples(std::size_t part, std::size_t all) {
+  return std::to_string(part) + " of " + std::to_string(all) + " samples (" +
+         Figure(100 * static_cast<double>(part) / static_cast<double>(all)) +
+         " %)";
+}
+
+}  // namespace
+
+void CheckSampling(std::span<const MotionSegment> segments,
+                   Diagnosis* diagnosis) {
+  const auto usual_ns = static_cast<double>(MedianStep(segments));
+  const Counts counts = Count(segments, usual_ns);
+  if (counts.samples < kMinSamples || usual_ns <= 0) {
+    diagnosis->not_checked.push_back("dropped and repeated samples: only " +
+                                     std::to_string(counts.samples) +
+                                     " samples");
+    return;
+  }
+  const auto share = [&](std::size_t part) {
+    return static_cast<double>(part) / static_cast<double>(counts.samples);
+  };
+  diagnosis->checked.push_back(
+      "dropped and repeated samples: " + std::to_string(counts.samples) +
+      " at " + Figure(1e9 / usual_ns) + " Hz");
+  if (share(counts.missing) > kMinShare) {
+    diagnosis->findings.push_back(
+        {FindingKind::kDroppedSamples,
+         "samples of the IMU are missing: about " +
+             OfSamples(counts.missing, counts.samples + counts.missing) +
+             " in " + std::to_string(counts.gaps) + " gaps of up to " +
+             Figure(1e3 * counts.longest_gap_s) + " ms, at one in " +
+             Figure(1e-6 * usual_ns) + " ms",
+         "look for a queue that overflows between the driver and the segment "
+         "builder, and for messages sent without guarantee",
+         static_cast<double>(counts.missing) /
+             static_cast<double>(counts.samples + counts.missing)});
+  }
+  if (share(counts.equal_readings) > kMinShare) {
+    diagnosis->findings.push_back(
+        {FindingKind::kRepeatedSamples,
+         "readings of the IMU are repeated: " +
+             OfSamples(counts.equal_readings, counts.samples) +
+             " equal the one before in all six numbers",
+         "send each reading once, with the stamp at which it was taken; a "
+         "driver that fills gaps with the last reading hides lost samples",
+         share(counts.equal_readings)});
+  }
+  if (share(counts.bad_stamps) > kMinShare) {
+    diagnosis->findings.push_back(
+        {FindingKind::kRepeatedSamples,
+         "stamps of the IMU do not rise: those of " +
+             OfSamples(counts.bad_stamps, counts.samples) +
+             " are not later than the one before",
+         "send each sample once, in the order of time",
+         share(counts.bad_stamps)});
+  }
+}
+
+}  // namespace selfcal

@@ -1,0 +1,52 @@
+// The families of checks, a file each. Each adds what it finds, and says what
+// it looked at or why it could not. Internal to core/preflight.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+#include "core/preflight/diagnose.h"
+#include "core/preflight/motion_data.h"
+
+namespace selfcal {
+
+// Dropped and repeated samples, by stamps and readings.
+void CheckSampling(std::span<const MotionSegment> segments,
+                   Diagnosis* diagnosis);
+
+void CheckSaturation(std::span<const MotionSegment> segments,
+                     Diagnosis* diagnosis);
+
+// What the rates told about the samples, for the check of the accelerometer.
+struct GyroResult {
+  double offset_s = 0;  // that has to be added to stamps of keyframes
+  // The axes of the gyroscope, where they had to be turned.
+  std::optional<Eigen::Matrix3d> axes;
+  // R_BI, from the body to the frame that keyframes are poses of: not the
+  // identity where the extrinsics were misused.
+  Eigen::Matrix3d R_BI = Eigen::Matrix3d::Identity();
+};
+
+// Axes and units of the gyroscope, and the time offset.
+GyroResult CheckGyro(const Calibration& theta,
+                     const MotionData& data,
+                     Diagnosis* diagnosis);
+
+// Axes and units of the accelerometer, and gravity.
+void CheckAccelerometer(const Rig& rig,
+                        const Calibration& theta,
+                        const MotionData& data,
+                        const GyroResult& gyro,
+                        Diagnosis* diagnosis);
+
+// Extrinsics, intrinsics and the frame of the landmarks.
+void CheckReprojection(const Rig& rig,
+                       const Calibration& theta,
+                       std::span<const MotionSegment> segments,
+                       Diagnosis* diagnosis);
+
+}  // namespace selfcal

@@ -1,0 +1,55 @@
+#include "core/preflight/diagnose.h"
+
+#include "core/preflight/checks.h"
+#include "core/preflight/motion_data.h"
+
+namespace selfcal {
+
+std::string_view FindingName(FindingKind kind) {
+  switch (kind) {
+    case FindingKind::kImuAxes:
+      return "imu-axes";
+    case FindingKind::kGyroUnits:
+      return "gyro-units";
+    case FindingKind::kAccelUnits:
+      return "accel-units";
+    case FindingKind::kGravity:
+      return "gravity";
+    case FindingKind::kTimeOffset:
+      return "time-offset";
+    case FindingKind::kDroppedSamples:
+      return "dropped-samples";
+    case FindingKind::kRepeatedSamples:
+      return "repeated-samples";
+    case FindingKind::kSaturation:
+      return "saturation";
+    case FindingKind::kExtrinsics:
+      return "extrinsics";
+    case FindingKind::kFocalLength:
+      return "focal-length";
+    case FindingKind::kLandmarkFrame:
+      return "landmark-frame";
+    case FindingKind::kGyroMismatch:
+      return "gyro-mismatch";
+    case FindingKind::kAccelMismatch:
+      return "accel-mismatch";
+    case FindingKind::kReprojectionMismatch:
+      return "reprojection-mismatch";
+  }
+  return "";
+}
+
+Diagnosis Diagnose(const Rig& rig,
+                   const Calibration& theta,
+                   std::span<const MotionSegment> segments) {
+  Diagnosis diagnosis;
+  CheckSampling(segments, &diagnosis);
+  CheckSaturation(segments, &diagnosis);
+  const MotionData data = CollectMotion(segments);
+  const GyroResult gyro = CheckGyro(theta, data, &diagnosis);
+  CheckAccelerometer(rig, theta, data, gyro, &diagnosis);
+  CheckReprojection(rig, theta, segments, &diagnosis);
+  return diagnosis;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,67 @@
+// Observations of one camera with all that predicts them. Internal to
+// core/preflight.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/model/camera.h"
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+struct BodyPose {
+  Eigen::Quaterniond q_GI;
+  Eigen::Vector3d p_GI;
+
+  Eigen::Vector3d ToG(const Eigen::Vector3d& p_I) const {
+    return q_GI * p_I + p_GI;
+  }
+};
+
+struct View {
+  BodyPose pose;      // of the keyframe that sees
+  BodyPose first;     // of the first keyframe of its segment that saw it
+  Eigen::Vector3d p;  // the landmark as it was fed
+  Eigen::Vector2d z_px;
+};
+
+// Of the observations of `camera` an even choice of about 4000, without those
+// of numbers or indices that are none.
+std::vector<View> CollectViews(std::span<const MotionSegment> segments,
+                               int camera);
+
+// Pixel of a point in G; nothing where it cannot be projected.
+std::optional<Eigen::Vector2d> Predict(const CameraCalibration& camera,
+                                       const BodyPose& pose,
+                                       const Eigen::Vector3d& p_G);
+
+// How well views are predicted: what cannot be projected counts as infinitely
+// far away.
+struct ReprojectionError {
+  double median_px = 0;
+  double in_front = 0;  // share that can be projected
+};
+
+ReprojectionError Summarise(std::vector<double> errors_px);
+
+// `place` takes a view to its landmark in G.
+template <typename Place>
+ReprojectionError Measure(const std::vector<View>& views,
+                          const CameraCalibration& camera,
+                          const Place& place) {
+  std::vector<double> errors;
+  errors.reserve(views.size());
+  for (const View& view : views) {
+    const auto z = Predict(camera, view.pose, place(view));
+    errors.push_back(z ? (*z - view.z_px).norm() : HUGE_VAL);
+  }
+  return Summarise(std::move(errors));
+}
+
+}  // namespace selfcal
