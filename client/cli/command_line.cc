@@ -13,9 +13,9 @@ constexpr char kFooter[] =
     "its fields\nseparated by tabs, without a header. With --json it is the "
     "contract's message in\nproto3 JSON: one document, or one line each for "
     "import,\ncalibrations watch and doctor.\n\n"
-    "Exit codes: 0 done; 1 the daemon refused, or what was asked for failed; 2 "
-    "wrong\nusage or unusable input; 3 the daemon cannot be reached; 4 doctor "
-    "found damage.";
+    "Exit codes: 0 done; 1 the daemon refused, what was asked for failed, or "
+    "preflight\nfound something; 2 wrong usage or unusable input; 3 the daemon "
+    "cannot be\nreached; 4 doctor found damage.";
 
 void AddGlobalOptions(CLI::App* app, Context* context) {
   app->set_version_flag("--version", "selfcal " SELFCAL_VERSION);
@@ -53,6 +53,7 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddGlobalOptions(&app, &context);
     AddRigCommands(&app, &context);
     AddImportCommand(&app, &context);
+    AddPreflightCommand(&app, &context);
     AddSegmentCommands(&app, &context);
     AddTablesCommand(&app, &context);
     AddRecalibrateCommand(&app, &context);

@@ -10,6 +10,7 @@ namespace selfcal::client {
 
 void AddRigCommands(CLI::App* app, Context* context);
 void AddImportCommand(CLI::App* app, Context* context);
+void AddPreflightCommand(CLI::App* app, Context* context);
 void AddSegmentCommands(CLI::App* app, Context* context);
 // Below `segments`.
 void AddSegmentExport(CLI::App* segments, Context* context);

@@ -10,10 +10,14 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/diagnosis_text.h"
 #include "client/cli/progress.h"
-#include "client/import/vi_map.h"
+#include "client/cli/recording_input.h"
 #include "client/selfcal/client.h"
+#include "core/preflight/diagnose.h"
+#include "proto/convert.h"
 #include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
 #include "selfcal/v1/rig.grpc.pb.h"
 #include "selfcal/v1/segment.pb.h"
 
@@ -22,30 +26,10 @@ namespace {
 
 struct ImportOptions {
   std::string rig;
-  std::vector<std::string> folders;
-  SegmentBuilderOptions builder;
+  RecordingInput recording;
   std::optional<double> temperature_c;
-  bool all_landmarks = false;
   double timeout_s = 60;
 };
-
-absl::StatusOr<std::vector<MotionSegment>> ReadSegments(
-    const ImportOptions& options) {
-  ViMapOptions map_options;
-  map_options.good_landmarks_only = !options.all_landmarks;
-  absl::StatusOr<ViMapRecording> recording =
-      options.folders.size() == 1
-          ? ReadViMap(options.folders.front(), map_options)
-          : ReadViMaps(options.folders, map_options);
-  if (!recording.ok()) return recording.status();
-  SegmentBuilderOptions builder = options.builder;
-  if (builder.session.empty()) builder.session = recording->session;
-  std::vector<MotionSegment> segments = BuildSegments(*recording, builder);
-  for (MotionSegment& segment : segments) {
-    segment.temperature_c = options.temperature_c;
-  }
-  return segments;
-}
 
 v1::StreamSegmentsResponse ToMessage(const Acknowledgement& ack) {
   v1::StreamSegmentsResponse message;
@@ -123,13 +107,44 @@ class Reporter {
   Progress progress_;
 };
 
-grpc::Status CheckRig(Context* context, const std::string& rig) {
+grpc::Status GetRig(Context* context, const std::string& rig, v1::Rig* found) {
   using Service = v1::RigService::StubInterface;
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::GetRigRequest request;
   request.set_name(RigName(rig));
-  v1::Rig found;
-  return Call<Service>(stub.get(), &Service::GetRig, request, &found);
+  return Call<Service>(stub.get(), &Service::GetRig, request, found);
+}
+
+// The parameters of the version that the map was estimated with; nothing where
+// the daemon has none: it will say so itself.
+std::optional<Calibration> GetVersion(Context* context,
+                                      const Rig& rig,
+                                      std::int64_t version) {
+  if (version <= 1) return rig.factory;
+  using Service = v1::CalibrationService::StubInterface;
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  v1::GetCalibrationRequest request;
+  request.set_name(ChildName(rig.id, "calibrations", std::to_string(version)));
+  v1::Calibration found;
+  Calibration theta;
+  const grpc::Status status =
+      Call<Service>(stub.get(), &Service::GetCalibration, request, &found);
+  if (!status.ok() || !FromProto(found.parameters(), "", &theta).empty()) {
+    return std::nullopt;
+  }
+  return theta;
+}
+
+// Says what looks wrong, and sends all the same: a person may know better.
+void WarnBeforeSending(Context* context,
+                       const v1::Rig& message,
+                       const ImportOptions& options,
+                       const std::vector<MotionSegment>& segments) {
+  Rig rig;
+  if (!FromProto(message, "", &rig).empty()) return;
+  const auto theta =
+      GetVersion(context, rig, options.recording.builder.calibration_version);
+  if (theta) WarnOf(Diagnose(rig, *theta, segments));
 }
 
 // Waits as long as acknowledgements keep coming.
@@ -183,16 +198,17 @@ int Send(Context* context,
 }
 
 int Import(Context* context, const ImportOptions& options) {
-  auto segments = ReadSegments(options);
-  if (!segments.ok()) return FailInput(segments.status());
-  if (segments->empty()) {
-    return FailInput(absl::InvalidArgumentError(
-        "the recording is too short for one segment; give fewer --keyframes"));
+  auto recording = ReadRecording(options.recording);
+  if (!recording.ok()) return FailInput(recording.status());
+  for (MotionSegment& segment : recording->segments) {
+    segment.temperature_c = options.temperature_c;
   }
   // Says at once what the stream would wait for.
-  const grpc::Status found = CheckRig(context, options.rig);
+  v1::Rig rig;
+  const grpc::Status found = GetRig(context, options.rig, &rig);
   if (!found.ok()) return Fail(*context, found);
-  return Send(context, options, *std::move(segments));
+  WarnBeforeSending(context, rig, options, recording->segments);
+  return Send(context, options, std::move(recording->segments));
 }
 
 }  // namespace
@@ -203,28 +219,11 @@ void AddImportCommand(CLI::App* app, Context* context) {
       "Cut maplab VI-maps into segments and send them; returns when all are "
       "acknowledged");
   const auto options = std::make_shared<ImportOptions>();
-  SegmentBuilderOptions& builder = options->builder;
+  SegmentBuilderOptions& builder = options->recording.builder;
   import->add_option("RIG", options->rig)->required();
-  import
-      ->add_option("DIR",
-                   options->folders,
-                   "A VI-map, or a folder of submap_0, submap_1, ...; several "
-                   "must continue each other and are one session")
-      ->required();
-  import->add_option("--keyframes", builder.keyframes, "Keyframes a segment")
-      ->check(CLI::Range(2, 2000))
-      ->capture_default_str();
-  import
-      ->add_option(
-          "--seconds", builder.seconds, "Close segments by time instead [s]")
-      ->check(CLI::PositiveNumber);
+  AddRecordingOptions(import, &options->recording);
   import->add_option(
       "--session", builder.session, "Name of the session [the mission's id]");
-  import
-      ->add_option("--min-observations",
-                   builder.min_observations,
-                   "Leave out landmarks that a segment sees less often")
-      ->capture_default_str();
   import
       ->add_option("--calibration-version",
                    builder.calibration_version,
@@ -236,9 +235,6 @@ void AddImportCommand(CLI::App* app, Context* context) {
                    "The device's temperature at the time [degrees Celsius]")
       ->check(CLI::Range(SegmentLimits{}.min_temperature_c,
                          SegmentLimits{}.max_temperature_c));
-  import->add_flag("--all-landmarks",
-                   options->all_landmarks,
-                   "Also those that the map does not call good");
   import
       ->add_option("--timeout",
                    options->timeout_s,

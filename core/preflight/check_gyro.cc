@@ -257,8 +257,8 @@ class GyroCheck {
              Figure(1e3 * fit.sigma_s) + " ms)",
          std::string(late ? "add " : "subtract ") + ms +
              (late ? " to" : " from") +
-             " the stamps of the keyframes, or state it as time_offset_s of "
-             "the cameras and let the rig estimate it",
+             " the stamps of the keyframes; or add " + Figure(fit.offset_s) +
+             " to time_offset_s of the cameras, and let the rig estimate it",
          fit.offset_s});
   }
 

@@ -1,7 +1,8 @@
 #include "core/preflight/signed_permutation.h"
 
-#include <Eigen/LU>
 #include <gtest/gtest.h>
+
+#include <Eigen/LU>
 
 namespace selfcal {
 namespace {

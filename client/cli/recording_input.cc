@@ -1,0 +1,51 @@
+#include "client/cli/recording_input.h"
+
+#include <utility>
+
+namespace selfcal::client {
+
+void AddRecordingOptions(CLI::App* command, RecordingInput* input) {
+  SegmentBuilderOptions& builder = input->builder;
+  command
+      ->add_option("DIR",
+                   input->folders,
+                   "A VI-map, or a folder of submap_0, submap_1, ...; several "
+                   "must continue each other and are one session")
+      ->required();
+  command->add_option("--keyframes", builder.keyframes, "Keyframes a segment")
+      ->check(CLI::Range(2, 2000))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--seconds", builder.seconds, "Close segments by time instead [s]")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--min-observations",
+                   builder.min_observations,
+                   "Leave out landmarks that a segment sees less often")
+      ->capture_default_str();
+  command->add_flag("--all-landmarks",
+                    input->all_landmarks,
+                    "Also those that the map does not call good");
+}
+
+absl::StatusOr<RecordedSegments> ReadRecording(const RecordingInput& input) {
+  ViMapOptions options;
+  options.good_landmarks_only = !input.all_landmarks;
+  absl::StatusOr<ViMapRecording> recording =
+      input.folders.size() == 1 ? ReadViMap(input.folders.front(), options)
+                                : ReadViMaps(input.folders, options);
+  if (!recording.ok()) return recording.status();
+  SegmentBuilderOptions builder = input.builder;
+  if (builder.session.empty()) builder.session = recording->session;
+  RecordedSegments result;
+  result.segments = BuildSegments(*recording, builder);
+  result.rig = std::move(recording->rig);
+  if (result.segments.empty()) {
+    return absl::InvalidArgumentError(
+        "the recording is too short for one segment; give fewer --keyframes");
+  }
+  return result;
+}
+
+}  // namespace selfcal::client
