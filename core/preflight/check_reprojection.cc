@@ -75,17 +75,11 @@ class ReprojectionCheck {
       const bool better = !best || one.error.median_px < best->error.median_px;
       if (Explains(one.error) && better) best = one;
     }
-    const auto map = FitLandmarkMap(views_, camera_);
-    if (map && IsFar(*map)) {
-      const Explanation moved = MovedLandmarks(*map);
-      const bool clearly =
-          !best || moved.error.median_px < kAsGood * best->error.median_px;
-      if (Explains(moved.error) && clearly) best = moved;
-    }
-    if (best) return Complete(*best);
-    const bool wrong =
+    const bool gross =
         fed_.median_px > kUnexplained * f_px_ || fed_.in_front < kMinInFront;
-    if (!wrong) return std::nullopt;
+    if (gross) TryLandmarkMap(&best);
+    if (best) return Complete(*best);
+    if (!gross) return std::nullopt;
     return Mismatch();
   }
 
@@ -93,6 +87,17 @@ class ReprojectionCheck {
   bool Explains(const ReprojectionError& error) const {
     return error.median_px < kExplained * f_px_ &&
            kGain * error.median_px < fed_.median_px;
+  }
+
+  // A free map has so many parameters that without parallax it takes up errors
+  // of the calibration: it is asked for gross errors alone.
+  void TryLandmarkMap(std::optional<Explanation>* best) const {
+    const auto map = FitLandmarkMap(views_, camera_);
+    if (!map || !IsFar(*map)) return;
+    const Explanation moved = MovedLandmarks(*map);
+    const bool clearly =
+        !*best || moved.error.median_px < kAsGood * (*best)->error.median_px;
+    if (Explains(moved.error) && clearly) *best = moved;
   }
 
   std::vector<Explanation> Explanations() const {
