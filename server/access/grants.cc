@@ -1,5 +1,6 @@
 #include "server/access/grants.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -14,6 +15,7 @@ constexpr std::array<std::pair<Role, std::string_view>, 3> kRoles = {{
 constexpr std::string_view kScheme = "selfcal://role/";
 constexpr std::string_view kRigs = "/rigs/";
 constexpr std::size_t kMaxRigId = 63;
+constexpr std::size_t kMaxName = 100;
 
 // A name that no rig can have would grant nothing, or, if empty, everything.
 bool IsRigId(std::string_view id) {
@@ -36,6 +38,15 @@ std::optional<Role> ParseRole(std::string_view name) {
     if (known == name) return role;
   }
   return std::nullopt;
+}
+
+std::string PrintableName(std::string name) {
+  std::replace_if(
+      name.begin(),
+      name.end(),
+      [](char c) { return c < 0x20 || c > 0x7e; },
+      '?');
+  return name.substr(0, kMaxName);
 }
 
 std::optional<Grant> ParseGrant(std::string_view uri) {

@@ -32,6 +32,9 @@ struct Caller {
   std::vector<Grant> grants;
 };
 
+// A name out of a certificate for the log of events: ASCII, and not too long.
+std::string PrintableName(std::string name);
+
 // What the name of a certificate grants; nothing for any other name.
 std::optional<Grant> ParseGrant(std::string_view uri);
 

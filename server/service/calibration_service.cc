@@ -1,19 +1,19 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
+#include "server/encode/compare.h"
+#include "server/encode/encode.h"
+#include "server/encode/reason.h"
+#include "server/encode/versions.h"
 #include "server/service/caller.h"
-#include "server/service/compare.h"
-#include "server/service/encode.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
 #include "server/service/services.h"
-#include "server/service/versions.h"
 #include "server/service/watch.h"
 
 namespace selfcal::server {
 namespace {
 
 constexpr char kType[] = "selfcal.v1.Calibration";
-constexpr std::size_t kMaxReason = 500;
 
 class CalibrationService final : public v1::CalibrationService::Service {
  public:
@@ -40,10 +40,8 @@ class CalibrationService final : public v1::CalibrationService::Service {
       const auto version = parts ? ParseCount(parts->id) : std::nullopt;
       if (!version) return BadName("name", "rigs/{rig}/calibrations/{version}");
       const std::string& reason = request->reason();
-      if (reason.empty() || reason.size() > kMaxReason) {
-        return InvalidFields(
-            {{"reason",
-              "must have 1 to 500 bytes; say why, for whoever reads the log"}});
+      if (!IsReason(reason)) {
+        return InvalidFields({{"reason", std::string(kReasonRule)}});
       }
       const auto active = context_.pipeline->ActivateCalibration(
           parts->rig, *version, CallerName(*call), reason);

@@ -4,7 +4,6 @@
 #include <grpcpp/security/auth_context.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <vector>
 
 #include "server/access/rules.h"
@@ -12,8 +11,6 @@
 
 namespace selfcal::server {
 namespace {
-
-constexpr std::size_t kMaxName = 100;
 
 std::vector<std::string> Properties(const grpc::ServerContextBase& call,
                                     const char* name) {
@@ -30,15 +27,6 @@ bool HasCertificate(const grpc::ServerContextBase& call) {
   return !Properties(call, GRPC_X509_PEM_CERT_PROPERTY_NAME).empty();
 }
 
-std::string Printable(std::string name) {
-  std::replace_if(
-      name.begin(),
-      name.end(),
-      [](char c) { return c < 0x20 || c > 0x7e; },
-      '?');
-  return name.substr(0, kMaxName);
-}
-
 }  // namespace
 
 std::string CallerName(const grpc::ServerContextBase& call) {
@@ -49,7 +37,7 @@ std::string CallerName(const grpc::ServerContextBase& call) {
   for (const char* property :
        {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME}) {
     for (const std::string& name : Properties(call, property)) {
-      if (!name.empty()) return Printable(name);
+      if (!name.empty()) return PrintableName(name);
     }
   }
   return "unnamed certificate";

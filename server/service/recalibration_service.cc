@@ -1,11 +1,11 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
+#include "server/encode/encode.h"
+#include "server/encode/versions.h"
 #include "server/service/caller.h"
-#include "server/service/encode.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
 #include "server/service/services.h"
-#include "server/service/versions.h"
 #include "server/service/watch.h"
 
 namespace selfcal::server {
@@ -129,18 +129,12 @@ class RecalibrationService final : public v1::RecalibrationService::Service {
   }
 
  private:
-  // The solver's report is kept with the calibration that the run produced.
   grpc::Status EncodeWithReport(const StoredRun& run,
                                 const CalibrateProgress& progress,
                                 v1::Recalibration* message) {
-    if (run.calibration_version == 0) {
-      *message = Encode(run, progress, nullptr);
-      return grpc::Status::OK;
-    }
-    const auto calibration =
-        context_.store->GetCalibration(run.rig, run.calibration_version);
-    if (!calibration.ok()) return ToGrpc(calibration.status(), {});
-    *message = Encode(run, progress, &*calibration);
+    auto encoded = server::EncodeWithReport(context_.store, run, progress);
+    if (!encoded.ok()) return ToGrpc(encoded.status(), {});
+    *message = *std::move(encoded);
     return grpc::Status::OK;
   }
 

@@ -1,7 +1,6 @@
-#include <google/protobuf/util/time_util.h>
-
 #include "proto/resource_names.h"
 #include "selfcal/v1/store_service.grpc.pb.h"
+#include "server/encode/encode.h"
 #include "server/service/caller.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
@@ -12,18 +11,6 @@ namespace selfcal::server {
 namespace {
 
 constexpr char kRigType[] = "selfcal.v1.Rig";
-
-v1::Event Encode(const StoredEvent& event) {
-  v1::Event message;
-  message.set_number(event.event);
-  *message.mutable_time() =
-      google::protobuf::util::TimeUtil::NanosecondsToTimestamp(event.time_ns);
-  message.set_rig(RigName(event.rig));
-  message.set_kind(
-      static_cast<v1::Event::Kind>(static_cast<int>(event.kind) + 1));
-  message.set_detail(event.detail);
-  return message;
-}
 
 class StoreService final : public v1::StoreService::Service {
  public:

@@ -6,7 +6,7 @@
 
 #include "google/rpc/status.pb.h"
 #include "server/service/mailbox.h"
-#include "server/service/versions.h"
+#include "server/encode/versions.h"
 
 namespace selfcal::server {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/service/compare.h"
+#include "server/encode/compare.h"
 
 #include <algorithm>
 #include <iterator>

@@ -3,8 +3,8 @@
 
 #include "proto/convert.h"
 #include "proto/resource_names.h"
-#include "server/service/encode.h"
-#include "server/service/encode_parts.h"
+#include "server/encode/encode.h"
+#include "server/encode/encode_parts.h"
 
 namespace selfcal::server {
 namespace {

@@ -1,17 +1,21 @@
 // What the store keeps, as the messages of the contract.
 #pragma once
 
+#include <absl/status/statusor.h>
+
 #include "core/calibration/calibrate.h"
 #include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/rig.pb.h"
 #include "selfcal/v1/segment.pb.h"
+#include "selfcal/v1/store_service.pb.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 
 v1::Rig Encode(const StoredRig& rig);
 v1::Segment Encode(const StoredSegment& segment);
+v1::Event Encode(const StoredEvent& event);
 v1::Table Encode(const std::string& rig, const Table& table);
 
 // With an estimate for each tangent component, sigmas from the covariance.
@@ -21,5 +25,9 @@ v1::Calibration Encode(const StoredCalibration& calibration);
 v1::Recalibration Encode(const StoredRun& run,
                          const CalibrateProgress& progress,
                          const StoredCalibration* calibration);
+
+// The same with what the store keeps of the calibration: the solver's report.
+absl::StatusOr<v1::Recalibration> EncodeWithReport(
+    Store* store, const StoredRun& run, const CalibrateProgress& progress);
 
 }  // namespace selfcal::server
