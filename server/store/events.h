@@ -17,9 +17,12 @@ absl::Status AppendEvent(Connection* db,
                          EventKind kind,
                          const std::string& detail);
 
-// Of one rig, or with an empty name of all.
+// Of one rig, or with an empty name of all; oldest first.
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
                                                   const Page& page,
                                                   const std::string& rig);
+absl::StatusOr<Listed<StoredEvent>> ListNewestEventRows(Connection* db,
+                                                        const Page& page,
+                                                        const std::string& rig);
 
 }  // namespace selfcal::server

@@ -224,6 +224,28 @@ struct StoredEvent {
   std::string detail;
 };
 
+// A rig in a list of many.
+struct RigSummary {
+  std::string rig;
+  std::int64_t create_time_ns = 0;
+  std::int64_t last_seen_ns = 0;  // its newest segment arrived; 0: none so far
+  std::int64_t active_version = 0;
+  std::int64_t active_since_ns = 0;
+  std::vector<Table> tables;            // in the order of the rig's groups
+  std::int64_t newest_version = 0;
+  CalibrationState newest_state = CalibrationState::kActive;
+  std::int64_t newest_run = 0;  // 0: none so far, as the change
+  RunState run_state = RunState::kPending;
+  std::int64_t newest_change_ns = 0;  // of the device
+};
+
+// Which rigs, and in which order.
+struct RigQuery {
+  std::string text;  // that the name contains; empty: every rig
+  enum class Order { kName, kLastSeen } order = Order::kName;
+  bool descending = false;
+};
+
 class StoreMaintenance;  // maintenance.h
 
 class Store {
@@ -239,6 +261,10 @@ class Store {
   }
   virtual absl::StatusOr<StoredRig> GetRig(const std::string& rig) = 0;
   virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) = 0;
+  // Reads no more than the page, however many rigs there are, unless it looks
+  // for a text.
+  virtual absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
+      const RigQuery& query, const Page& page) = 0;
 
   // --- Segments. `segment` must be valid for the rig. The same key again
   // changes nothing. RESOURCE_EXHAUSTED where a quota leaves no room.
@@ -376,9 +402,11 @@ class Store {
                                            RunState state,
                                            const std::string& message) = 0;
 
-  // --- Events, oldest first; of one rig unless it is empty. They are only ever
-  // appended.
+  // --- Events, oldest or newest first; of one rig unless it is empty. They are
+  // only ever appended.
   virtual absl::StatusOr<Listed<StoredEvent>> ListEvents(
+      const Page& page, const std::string& rig = "") = 0;
+  virtual absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(
       const Page& page, const std::string& rig = "") = 0;
 
   // Check, backup and restore; null for an engine that has tools of its own for

@@ -15,6 +15,7 @@
 #include "server/store/payload.h"
 #include "server/store/quotas.h"
 #include "server/store/restore.h"
+#include "server/store/rig_summaries.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
@@ -49,6 +50,12 @@ class SqliteStore : public Store {
 
   absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) override {
     return Read([&](Connection* db) { return ListRigRows(db, page); });
+  }
+
+  absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
+      const RigQuery& query, const Page& page) override {
+    return Read(
+        [&](Connection* db) { return ListSummaryRows(db, query, page); });
   }
 
   absl::StatusOr<PutVerdict> PutSegment(const std::string& rig,
@@ -253,6 +260,12 @@ class SqliteStore : public Store {
   absl::StatusOr<Listed<StoredEvent>> ListEvents(
       const Page& page, const std::string& rig) override {
     return Read([&](Connection* db) { return ListEventRows(db, page, rig); });
+  }
+
+  absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(
+      const Page& page, const std::string& rig) override {
+    return Read(
+        [&](Connection* db) { return ListNewestEventRows(db, page, rig); });
   }
 
   StoreMaintenance* maintenance() override { return maintenance_.get(); }

@@ -62,7 +62,7 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 5u);
+  ASSERT_EQ(migrations.size(), 6u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -79,6 +79,9 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[4].name, "0005_temperature.sql");
   EXPECT_EQ(migrations[4].sha256,
             "84e8d6a957199f8ef8c2c2befc356df4218aff0dd02d34a09da51b10cae0c2b6");
+  EXPECT_EQ(migrations[5].name, "0006_overview.sql");
+  EXPECT_EQ(migrations[5].sha256,
+            "3cb3665d806bd2ea106166e980914db83905fb4e8d37f528f0d14fbc07e5353c");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

@@ -1,0 +1,166 @@
+#include "server/store/rig_summaries.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <limits>
+
+#include "server/store/paging.h"
+#include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
+
+namespace selfcal::server {
+namespace {
+
+// A rig of the page, with what tells its place in the order.
+struct Found {
+  std::int64_t rowid = 0;
+  RigSummary summary;
+};
+
+// Where a page goes on.
+struct Place {
+  std::int64_t last_seen_ns = 0;
+  std::string id;
+};
+
+std::string ListOf(const RigQuery& query) {
+  return fmt::format("rigs by {}{} with {}",
+                     query.order == RigQuery::Order::kName ? "name" : "seen",
+                     query.descending ? " desc" : "",
+                     query.text);
+}
+
+std::string KeyOf(const RigSummary& summary) {
+  return fmt::format("{} {}", summary.last_seen_ns, summary.rig);
+}
+
+// Before the first rig.
+Place Beginning(const RigQuery& query) {
+  if (!query.descending) return {-1, ""};
+  return {std::numeric_limits<std::int64_t>::max(), "~"};
+}
+
+absl::StatusOr<Place> PlaceOf(const RigQuery& query, const Page& page) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto key, PageKey(ListOf(query), page));
+  if (!key) return Beginning(query);
+  Place place;
+  const char* end = key->data() + key->size();
+  const auto [rest, error] =
+      std::from_chars(key->data(), end, place.last_seen_ns);
+  if (error != std::errc() || rest == end || *rest != ' ') {
+    return absl::InvalidArgumentError(
+        "the page token is not one of this list; ask for the first page");
+  }
+  place.id.assign(rest + 1, end);
+  return place;
+}
+
+std::string SqlOf(const RigQuery& query) {
+  const bool by_name = query.order == RigQuery::Order::kName;
+  const char* direction = query.descending ? "DESC" : "ASC";
+  const char* beyond = query.descending ? "<" : ">";
+  const std::string place = by_name ? fmt::format("id {} ?2", beyond)
+                                    : fmt::format(
+                                          "(last_seen_ns, id) {} "
+                                          "(?1, ?2)",
+                                          beyond);
+  const std::string order =
+      by_name ? fmt::format("id {}", direction)
+              : fmt::format("last_seen_ns {0}, id {0}", direction);
+  // ?1 is not in the condition on the name, and has to stand somewhere.
+  return fmt::format(
+      "SELECT rig, id, create_time_ns, last_seen_ns FROM rigs "
+      "WHERE {} AND (?4 = '' OR instr(id, ?4) > 0) AND ?1 IS NOT NULL "
+      "ORDER BY {} LIMIT ?3",
+      place,
+      order);
+}
+
+absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
+                                            const RigQuery& query,
+                                            const Place& place,
+                                            int limit) {
+  Statement read(
+      db, SqlOf(query), place.last_seen_ns, place.id, limit, query.text);
+  std::vector<Found> found;
+  while (read.Next()) {
+    Found rig;
+    rig.rowid = read.Int(0);
+    rig.summary.rig = read.Text(1);
+    rig.summary.create_time_ns = read.Int(2);
+    rig.summary.last_seen_ns = read.Int(3);
+    found.push_back(std::move(rig));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return found;
+}
+
+absl::Status ReadVersions(Connection* db,
+                          std::int64_t rig,
+                          RigSummary* summary) {
+  Statement active(db,
+                   "SELECT c.version, (SELECT a.time_ns FROM activations a "
+                   "    WHERE a.rig = c.rig AND a.version = c.version "
+                   "    ORDER BY a.activation DESC LIMIT 1) "
+                   "FROM calibrations c WHERE c.rig = ?1 AND c.state = 1",
+                   rig);
+  if (active.Next()) {
+    summary->active_version = active.Int(0);
+    summary->active_since_ns = active.Int(1);
+  }
+  SELFCAL_RETURN_IF_ERROR(active.status());
+  Statement newest(db,
+                   "SELECT version, state FROM calibrations WHERE rig = ?1 "
+                   "ORDER BY version DESC LIMIT 1",
+                   rig);
+  if (newest.Next()) {
+    summary->newest_version = newest.Int(0);
+    summary->newest_state = static_cast<CalibrationState>(newest.Int(1) - 1);
+  }
+  return newest.status();
+}
+
+absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
+  SELFCAL_RETURN_IF_ERROR(ReadVersions(db, rig, summary));
+  SELFCAL_ASSIGN_OR_RETURN(summary->tables, ReadTables(db, rig));
+  Statement run(db,
+                "SELECT run, state FROM runs WHERE rig = ?1 "
+                "ORDER BY run DESC LIMIT 1",
+                rig);
+  if (run.Next()) {
+    summary->newest_run = run.Int(0);
+    summary->run_state = static_cast<RunState>(run.Int(1) - 1);
+  }
+  SELFCAL_RETURN_IF_ERROR(run.status());
+  SELFCAL_ASSIGN_OR_RETURN(summary->newest_change_ns,
+                           ReadInt(db,
+                                   "SELECT time_ns FROM changes WHERE rig = ?1 "
+                                   "ORDER BY change DESC LIMIT 1",
+                                   rig));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<Listed<RigSummary>> ListSummaryRows(Connection* db,
+                                                   const RigQuery& query,
+                                                   const Page& page) {
+  SELFCAL_ASSIGN_OR_RETURN(const Place place, PlaceOf(query, page));
+  const int size = PageSize(page);
+  SELFCAL_ASSIGN_OR_RETURN(std::vector<Found> found,
+                           FindRigs(db, query, place, size + 1));
+  Listed<RigSummary> listed;
+  for (Found& rig : found) {
+    if (static_cast<int>(listed.items.size()) == size) {
+      listed.next_token =
+          MakePageToken(ListOf(query), KeyOf(listed.items.back()));
+      break;
+    }
+    SELFCAL_RETURN_IF_ERROR(ReadRest(db, rig.rowid, &rig.summary));
+    listed.items.push_back(std::move(rig.summary));
+  }
+  return listed;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,17 @@
+// Lists of many rigs, in the database. Pages go on after the key of the last
+// rig, so that a late one costs what the first does.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include "server/store/statement.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+// INVALID_ARGUMENT for a token of another list or another query.
+absl::StatusOr<Listed<RigSummary>> ListSummaryRows(Connection* db,
+                                                   const RigQuery& query,
+                                                   const Page& page);
+
+}  // namespace selfcal::server
