@@ -27,10 +27,12 @@ struct DaemonOptions {
   StoreOptions store;
   HostLimits host;  // for runs that nobody asks for
   bool idle_runs = true;
-  double max_run_minutes = 30;   // of a run; it fails then
-  int max_run_memory_mib = 512;  // of a run; 0: no limit
-  std::string metrics = "off";   // or host:port of the loopback
-  int metrics_rigs = 16;         // with series of their own
+  double max_run_minutes = 30;      // of a run; it fails then
+  int max_run_memory_mib = 512;     // of a run; 0: no limit
+  std::string metrics = "off";      // or host:port of the loopback
+  int metrics_rigs = 16;            // with series of their own
+  std::string console = "off";      // or host:port
+  Role console_role = Role::kRead;  // of whoever opens it on the loopback
   std::string log_level = "info";
   std::string log_format = "text";
   bool check = false;  // no setting: look at the settings and end

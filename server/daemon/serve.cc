@@ -12,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "server/console/console.h"
 #include "server/daemon/log.h"
 #include "server/daemon/memory.h"
 #include "server/daemon/service_manager.h"
@@ -48,7 +49,7 @@ void RaiseFileLimit() {
 
 PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
                                   Conditions* conditions,
-                                  Metrics* metrics) {
+                                  PipelineObserver* observer) {
   PipelineOptions pipeline;
   pipeline.scoring_threads = options.scoring_threads;
   pipeline.max_backlog = options.max_backlog;
@@ -57,7 +58,7 @@ PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
   pipeline.conditions = conditions;
   pipeline.max_run_time = std::chrono::round<std::chrono::milliseconds>(
       std::chrono::duration<double, std::ratio<60>>(options.max_run_minutes));
-  pipeline.observer = metrics == nullptr ? nullptr : metrics->observer();
+  pipeline.observer = observer;
   return pipeline;
 }
 
@@ -84,6 +85,25 @@ absl::StatusOr<std::unique_ptr<Metrics>> OpenMetrics(
   metrics.database = database;
   auto opened = MakeMetrics(store, metrics);
   if (opened.ok()) spdlog::info("metrics: {}", (*opened)->url());
+  return opened;
+}
+
+ConsoleOptions OptionsOfConsole(const DaemonOptions& options) {
+  return {options.console,
+          options.console_role,
+          options.server.tls,
+          SELFCAL_VERSION};
+}
+
+// Null where it is off.
+absl::StatusOr<std::unique_ptr<Console>> OpenConsole(
+    const DaemonOptions& options,
+    Store* store,
+    Pipeline* pipeline,
+    ChangeFeed* feed) {
+  if (options.console == "off") return nullptr;
+  auto opened = MakeConsole(store, pipeline, feed, OptionsOfConsole(options));
+  if (opened.ok()) spdlog::info("console: {}", (*opened)->url());
   return opened;
 }
 
@@ -128,13 +148,25 @@ std::optional<int> ServeOnce(
   const auto metrics = OpenMetrics(options, database, store->get());
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
+  PipelineObserver* observer =
+      *metrics == nullptr ? nullptr : (*metrics)->observer();
+  std::optional<ChangeFeed> feed;
+  if (options.console != "off") {
+    observer = &feed.emplace(store->get(), observer);
+  }
   const auto conditions = MakeHostConditions(options.host);
   const auto pipeline =
       MakePipeline(store->get(),
-                   OptionsOfPipeline(options, conditions.get(), metrics->get()),
+                   OptionsOfPipeline(options, conditions.get(), observer),
                    EstimatorsOfPipeline(options));
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);
+  }
+  auto console = OpenConsole(
+      options, store->get(), pipeline.get(), feed ? &*feed : nullptr);
+  if (!console.ok()) {
+    pipeline->Stop();
+    return Failed("cannot open the console", console.status());
   }
   const auto server =
       MakeServer(store->get(), pipeline.get(), options.server, AskToStartAnew);
@@ -158,6 +190,7 @@ std::optional<int> ServeOnce(
         "stopping to be started anew: with more connections than files it may "
         "open, it does not accept any more");
   }
+  console->reset();
   (*server)->Shutdown(kCallLimit);
   pipeline->Stop();
   spdlog::info("stopped");
@@ -171,6 +204,9 @@ int Check(const DaemonOptions& options) {
   absl::Status status = CheckServerOptions(options.server);
   if (status.ok() && options.metrics != "off") {
     status = CheckMetricsAddress(options.metrics);
+  }
+  if (status.ok() && options.console != "off") {
+    status = CheckConsole(OptionsOfConsole(options));
   }
   if (!status.ok()) return Failed("the settings have a mistake", status);
   spdlog::info("the settings are good; state-dir {}, listening on {}",

@@ -55,6 +55,12 @@ class Definer {
   Environment environment_;
 };
 
+std::map<std::string, Role> Roles() {
+  return {{"read", Role::kRead},
+          {"produce", Role::kProduce},
+          {"administer", Role::kAdminister}};
+}
+
 std::string OctalMode(const std::string& text) {
   const bool octal = !text.empty() && text.size() <= 4 &&
                      text.find_first_not_of("01234567") == text.npos;
@@ -88,10 +94,7 @@ void DefineAccess(Definer* define, ServerOptions* options) {
             &options->local_role,
             "What callers without a certificate may do: read, produce or "
             "administer")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, Role>{{"read", Role::kRead},
-                                      {"produce", Role::kProduce},
-                                      {"administer", Role::kAdminister}}))
+      ->transform(CLI::CheckedTransformer(Roles()))
       ->default_str("administer");
   define->Add("tls-certificate",
               &options->tls.certificate,
@@ -260,6 +263,19 @@ void DefineReports(Definer* define, DaemonOptions* options) {
             "Rigs with series of their own: those that sent last")
       ->check(CLI::Range(0, kMaxMetricsRigs))
       ->capture_default_str();
+  define
+      ->Add("console",
+            &options->console,
+            "Where browsers open the web console: a port of the loopback such "
+            "as 127.0.0.1:7448, another host:port (needs tls-*), or off")
+      ->capture_default_str();
+  define
+      ->Add("console-role",
+            &options->console_role,
+            "What whoever opens it on the loopback may do: read, produce or "
+            "administer")
+      ->transform(CLI::CheckedTransformer(Roles()))
+      ->default_str("read");
   define->Add("log-level", &options->log_level, "What goes to stderr")
       ->check(CLI::IsMember(
           {"trace", "debug", "info", "warning", "error", "critical", "off"}))

@@ -1,0 +1,104 @@
+#include <google/protobuf/util/json_util.h>
+
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.pb.h"
+#include "server/console/call.h"
+#include "server/console/json.h"
+#include "server/encode/compare.h"
+#include "server/encode/encode.h"
+#include "server/encode/reason.h"
+#include "server/encode/versions.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr std::string_view kActivate = ":activate";
+
+// A version by its number, or the active one.
+absl::StatusOr<StoredCalibration> Read(const Call& call,
+                                       const std::string& id) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  if (id == "active") return call.context.store->GetActiveCalibration(rig);
+  const auto version = ParseCount(id);
+  if (version) return call.context.store->GetCalibration(rig, *version);
+  return absl::InvalidArgumentError(
+      "a version is a number from 1 on, or 'active'");
+}
+
+}  // namespace
+
+Answer ListCalibrations(const Call& call) {
+  v1::ListCalibrationsRequest request;
+  request.set_parent(RigName(call.parts.at(0)));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
+                           call.context.store->ListCalibrations(rig, page));
+  v1::ListCalibrationsResponse response;
+  for (const StoredCalibration& calibration : listed.items) {
+    *response.add_calibrations() = Encode(calibration);
+  }
+  response.set_next_page_token(listed.next_token);
+  return JsonResponse(response);
+}
+
+Answer GetCalibration(const Call& call) {
+  v1::GetCalibrationRequest request;
+  request.set_name(
+      ChildName(call.parts.at(0), "calibrations", call.parts.at(1)));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration calibration,
+                           Read(call, call.parts[1]));
+  return JsonResponse(Encode(calibration));
+}
+
+// The body is an ActivateCalibrationRequest; the address says which version.
+Answer ActivateCalibration(const Call& call) {
+  std::string id = call.parts.at(1);
+  if (!id.ends_with(kActivate)) {
+    return absl::UnimplementedError(
+        "a version can be read with GET, and with POST ':activate' be made "
+        "active");
+  }
+  id.resize(id.size() - kActivate.size());
+  v1::ActivateCalibrationRequest request;
+  const auto parsed =
+      google::protobuf::util::JsonStringToMessage(call.request.body, &request);
+  if (!parsed.ok()) {
+    return absl::InvalidArgumentError(
+        "the body must be JSON such as {\"reason\": \"...\"}");
+  }
+  request.set_name(ChildName(call.parts[0], "calibrations", id));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  const auto version = ParseCount(id);
+  if (!version) {
+    return absl::InvalidArgumentError("a version is a number from 1 on");
+  }
+  if (!IsReason(request.reason())) {
+    return absl::InvalidArgumentError("reason: " + std::string(kReasonRule));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(
+      const StoredCalibration active,
+      call.context.pipeline->ActivateCalibration(
+          rig, *version, call.request.caller.name, request.reason()));
+  return JsonResponse(Encode(active));
+}
+
+Answer CompareCalibrations(const Call& call) {
+  v1::CompareCalibrationsRequest request;
+  request.set_a(ChildName(call.parts.at(0), "calibrations", call.Query("a")));
+  request.set_b(ChildName(call.parts[0], "calibrations", call.Query("b")));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration a,
+                           Read(call, call.Query("a")));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration b,
+                           Read(call, call.Query("b")));
+  SELFCAL_ASSIGN_OR_RETURN(const v1::CompareCalibrationsResponse compared,
+                           Compare(call.context.store, a, b));
+  return JsonResponse(compared);
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,53 @@
+// Parts of the handlers under /api/v1; internal to server/console.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/access/rules.h"
+#include "server/console/api.h"
+
+namespace selfcal::server {
+
+// One request on its way; `parts` are what stands at the '*' of its pattern.
+struct Call {
+  const ApiContext& context;
+  const HttpRequest& request;
+  std::vector<std::string> parts;
+
+  // Of the query; empty if it is not there.
+  std::string Query(const std::string& name) const {
+    const auto found = request.query.find(name);
+    return found == request.query.end() ? "" : found->second;
+  }
+};
+
+using Answer = absl::StatusOr<HttpResponse>;
+
+// Size and token; INVALID_ARGUMENT for a size that is no number.
+absl::StatusOr<Page> PageOf(const Call& call);
+
+// INVALID_ARGUMENT for what can be no id of a rig.
+absl::StatusOr<std::string> RigOf(const Call& call);
+
+Answer GetSession(const Call& call);
+Answer ListRigs(const Call& call);
+Answer GetRig(const Call& call);
+Answer ListTables(const Call& call);
+Answer ListSegments(const Call& call);
+Answer GetSegment(const Call& call);
+Answer GetSegmentData(const Call& call);
+Answer ListCalibrations(const Call& call);
+Answer GetCalibration(const Call& call);
+Answer ActivateCalibration(const Call& call);
+Answer CompareCalibrations(const Call& call);
+Answer ListRuns(const Call& call);
+Answer GetRun(const Call& call);
+Answer ListEvents(const Call& call);
+Answer OpenStream(const Call& call);
+
+}  // namespace selfcal::server

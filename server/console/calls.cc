@@ -1,0 +1,120 @@
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "proto/resource_names.h"
+#include "selfcal/v1/rig.pb.h"
+#include "selfcal/v1/store_service.pb.h"
+#include "server/console/call.h"
+#include "server/console/json.h"
+#include "server/console/overview.h"
+#include "server/encode/encode.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::StatusOr<RigQuery> QueryOf(const Call& call) {
+  RigQuery query;
+  query.text = call.Query("filter");
+  const std::string order = call.Query("order_by");
+  query.descending = order.ends_with(" desc");
+  const std::string field = order.substr(0, order.find(' '));
+  if (field == "last_seen") {
+    query.order = RigQuery::Order::kLastSeen;
+  } else if (!field.empty() && field != "name") {
+    return absl::InvalidArgumentError(
+        "order_by is name or last_seen, with ' desc' for the other way");
+  }
+  return query;
+}
+
+nlohmann::json GrantsOf(const Caller& caller) {
+  nlohmann::json grants = nlohmann::json::array();
+  for (const Grant& grant : caller.grants) {
+    grants.push_back({{"role", std::string(RoleName(grant.role))},
+                      {"rig", grant.rig.empty() ? "" : RigName(grant.rig)}});
+  }
+  return grants;
+}
+
+}  // namespace
+
+absl::StatusOr<Page> PageOf(const Call& call) {
+  constexpr int kDefault = 50;
+  Page page{kDefault, call.Query("page_token")};
+  const std::string size = call.Query("page_size");
+  if (size.empty()) return page;
+  const char* end = size.data() + size.size();
+  const auto [rest, error] = std::from_chars(size.data(), end, page.size);
+  if (error != std::errc() || rest != end || page.size < 1) {
+    return absl::InvalidArgumentError(
+        "page_size is a number from 1 to 1000; without it a page has 50");
+  }
+  return page;
+}
+
+absl::StatusOr<std::string> RigOf(const Call& call) {
+  const auto rig = ParseRigName(RigName(call.parts.at(0)));
+  if (rig) return *rig;
+  return absl::InvalidArgumentError(
+      "a rig's name has 1 to 63 characters out of a-z, 0-9, '-' and '_'");
+}
+
+// What the caller may do, and where: the pages hide what it may not.
+Answer GetSession(const Call& call) {
+  const nlohmann::json body = {
+      {"caller", call.request.caller.name},
+      {"grants", GrantsOf(call.request.caller)},
+      {"programVersion", call.context.program_version}};
+  HttpResponse response;
+  response.body = body.dump();
+  return response;
+}
+
+Answer ListRigs(const Call& call) {
+  SELFCAL_RETURN_IF_ERROR(
+      Authorise(call.request.caller, v1::ListRigsRequest()));
+  SELFCAL_ASSIGN_OR_RETURN(const RigQuery query, QueryOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
+                           call.context.store->ListRigSummaries(query, page));
+  console::ListRigOverviewsResponse response;
+  for (const RigSummary& rig : listed.items) {
+    *response.add_rigs() = Encode(rig);
+  }
+  response.set_next_page_token(listed.next_token);
+  return JsonResponse(response);
+}
+
+Answer GetRig(const Call& call) {
+  v1::GetRigRequest request;
+  request.set_name(RigName(call.parts.at(0)));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig stored,
+                           call.context.store->GetRig(rig));
+  return JsonResponse(Encode(stored));
+}
+
+// Newest first, unlike over gRPC.
+Answer ListEvents(const Call& call) {
+  v1::ListEventsRequest request;
+  std::string rig;
+  if (!call.parts.empty()) request.set_parent(RigName(call.parts[0]));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  if (!call.parts.empty()) {
+    SELFCAL_ASSIGN_OR_RETURN(rig, RigOf(call));
+    SELFCAL_RETURN_IF_ERROR(call.context.store->GetRig(rig).status());
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
+                           call.context.store->ListNewestEvents(page, rig));
+  v1::ListEventsResponse response;
+  for (const StoredEvent& event : listed.items) {
+    *response.add_events() = Encode(event);
+  }
+  response.set_next_page_token(listed.next_token);
+  return JsonResponse(response);
+}
+
+}  // namespace selfcal::server

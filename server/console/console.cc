@@ -1,0 +1,73 @@
+#include "server/console/console.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "server/console/api.h"
+#include "server/console/assets.h"
+#include "server/console/http_server.h"
+#include "server/console/json.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+HttpOptions HttpOf(const ConsoleOptions& options) {
+  return {options.address, options.tls, options.local_role};
+}
+
+HttpResponse AnswerPage(const HttpRequest& request) {
+  if (request.method != "GET" && request.method != "HEAD") {
+    return ErrorResponse(
+        absl::UnimplementedError("pages can only be read, with GET"));
+  }
+  const auto assets = Assets();
+  const auto found =
+      std::find_if(assets.begin(), assets.end(), [&](const Asset& asset) {
+        return asset.path == request.path;
+      });
+  if (found == assets.end() && request.path.starts_with("/assets/")) {
+    return ErrorResponse(absl::NotFoundError("there is no such file"));
+  }
+  const Asset& asset = found == assets.end() ? assets.front() : *found;
+  HttpResponse response;
+  response.type = asset.type;
+  response.body = asset.bytes;
+  return response;
+}
+
+class HttpConsole final : public Console {
+ public:
+  absl::Status Start(const ApiContext& context, const HttpOptions& options) {
+    SELFCAL_ASSIGN_OR_RETURN(
+        server_, MakeHttpServer(options, [context](const HttpRequest& request) {
+          return request.path.starts_with("/api/") ? AnswerApi(context, request)
+                                                   : AnswerPage(request);
+        }));
+    return absl::OkStatus();
+  }
+
+  const std::string& url() const override { return server_->url(); }
+
+ private:
+  std::unique_ptr<HttpServer> server_;
+};
+
+}  // namespace
+
+absl::Status CheckConsole(const ConsoleOptions& options) {
+  return CheckHttpOptions(HttpOf(options));
+}
+
+absl::StatusOr<std::unique_ptr<Console>> MakeConsole(
+    Store* store,
+    Pipeline* pipeline,
+    ChangeFeed* feed,
+    const ConsoleOptions& options) {
+  auto console = std::make_unique<HttpConsole>();
+  SELFCAL_RETURN_IF_ERROR(console->Start(
+      {store, pipeline, feed, options.program_version}, HttpOf(options)));
+  return console;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,314 @@
+#include "server/console/http_server.h"
+
+#include <microhttpd.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "server/console/address.h"
+#include "server/console/certificate.h"
+#include "server/console/json.h"
+#include "server/console/policy.h"
+#include "server/console/tls_files.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr unsigned kMaxConnections = 64;
+constexpr std::size_t kMaxStreams = 16;
+constexpr std::size_t kMaxBodyBytes = 64 << 10;
+constexpr std::size_t kConnectionBytes = 32 << 10;  // of headers
+constexpr unsigned kIdleSeconds = 15;
+constexpr std::size_t kMaxLogBytes = 500;
+constexpr std::size_t kStreamBlock = 16 << 10;
+// Tells a reader that has gone from one that has nothing to read.
+constexpr std::chrono::milliseconds kHeartbeat{5000};
+
+// libmicrohttpd keeps a pointer to it while a request is received and answered.
+struct Exchange {
+  HttpRequest request;
+  bool too_large = false;
+};
+
+// What is sent after the body of an answer.
+struct Sending {
+  std::string waiting;
+  std::shared_ptr<Outbox> stream;
+  std::shared_ptr<void> keep;
+};
+
+void Log(void*, const char* format, va_list arguments) {
+  std::array<char, kMaxLogBytes> line{};
+  std::vsnprintf(line.data(), line.size(), format, arguments);
+  spdlog::debug("console: {}", line.data());
+}
+
+MHD_Result AddQuery(void* to,
+                    MHD_ValueKind,
+                    const char* key,
+                    const char* text) {
+  auto* query = static_cast<std::map<std::string, std::string>*>(to);
+  (*query)[key] = text == nullptr ? "" : text;
+  return MHD_YES;
+}
+
+MHD_Result AddHeader(void* to,
+                     MHD_ValueKind,
+                     const char* key,
+                     const char* text) {
+  std::string name = key;
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  auto* headers = static_cast<std::map<std::string, std::string>*>(to);
+  (*headers)[name] = text == nullptr ? "" : text;
+  return MHD_YES;
+}
+
+ssize_t ReadStream(void* from, std::uint64_t, char* to, std::size_t size) {
+  auto* sending = static_cast<Sending*>(from);
+  if (sending->waiting.empty()) {
+    auto more = sending->stream->Take(kHeartbeat);
+    if (!more) return MHD_CONTENT_READER_END_OF_STREAM;
+    sending->waiting = more->empty() ? ":\n\n" : *std::move(more);
+  }
+  const std::size_t count = std::min(size, sending->waiting.size());
+  std::memcpy(to, sending->waiting.data(), count);
+  sending->waiting.erase(0, count);
+  return static_cast<ssize_t>(count);
+}
+
+void EndStream(void* sending) { delete static_cast<Sending*>(sending); }
+
+MHD_Result Send(MHD_Connection* connection, HttpResponse answer) {
+  MHD_Response* response = nullptr;
+  if (answer.stream == nullptr) {
+    response = MHD_create_response_from_buffer(
+        answer.body.size(), answer.body.data(), MHD_RESPMEM_MUST_COPY);
+  } else {
+    auto sending = std::make_unique<Sending>();
+    sending->waiting = std::move(answer.body);
+    sending->stream = std::move(answer.stream);
+    sending->keep = std::move(answer.keep);
+    response = MHD_create_response_from_callback(
+        MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream, sending.get(), EndStream);
+    if (response != nullptr) static_cast<void>(sending.release());
+  }
+  if (response == nullptr) return MHD_NO;
+  MHD_add_response_header(response, "Content-Type", answer.type.c_str());
+  for (const auto& [name, value] : SecurityHeaders()) {
+    MHD_add_response_header(response, name, value);
+  }
+  for (const auto& [name, value] : answer.headers) {
+    MHD_add_response_header(response, name.c_str(), value.c_str());
+  }
+  const MHD_Result queued = MHD_queue_response(
+      connection, static_cast<unsigned>(answer.status), response);
+  MHD_destroy_response(response);
+  return queued;
+}
+
+class MicroServer final : public HttpServer {
+ public:
+  MicroServer(const HttpOptions& options,
+              const SocketAddress& address,
+              HttpHandler handler)
+      : handler_(std::move(handler)),
+        local_role_(options.local_role),
+        loopback_(address.loopback) {}
+
+  ~MicroServer() override {
+    if (daemon_ == nullptr) return;
+    {
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+      for (const auto& weak : streams_) {
+        if (const auto stream = weak.lock()) stream->Close();
+      }
+    }
+    MHD_stop_daemon(daemon_);
+  }
+
+  absl::Status Start(const SocketAddress& address, const TlsOptions& tls) {
+    TlsFiles files;
+    unsigned flags = MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL |
+                     MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_ITC |
+                     MHD_USE_ERROR_LOG;
+    if (address.ipv6) flags |= MHD_USE_IPv6;
+    std::vector<MHD_OptionItem> more;
+    if (!address.loopback) {
+      SELFCAL_ASSIGN_OR_RETURN(files, ReadTlsFiles(tls));
+      flags |= MHD_USE_TLS;
+      more = {{MHD_OPTION_HTTPS_MEM_CERT, 0, files.certificate.data()},
+              {MHD_OPTION_HTTPS_MEM_KEY, 0, files.key.data()},
+              {MHD_OPTION_HTTPS_MEM_TRUST, 0, files.client_ca.data()}};
+    }
+    more.push_back({MHD_OPTION_END, 0, nullptr});
+    daemon_ = MHD_start_daemon(flags,
+                               0,
+                               nullptr,
+                               nullptr,
+                               &MicroServer::Access,
+                               this,
+                               MHD_OPTION_EXTERNAL_LOGGER,
+                               &Log,
+                               nullptr,
+                               MHD_OPTION_SOCK_ADDR,
+                               address.get(),
+                               MHD_OPTION_CONNECTION_LIMIT,
+                               kMaxConnections,
+                               MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+                               kConnectionBytes,
+                               MHD_OPTION_CONNECTION_TIMEOUT,
+                               kIdleSeconds,
+                               MHD_OPTION_STRICT_FOR_CLIENT,
+                               1,
+                               MHD_OPTION_NOTIFY_COMPLETED,
+                               &MicroServer::Completed,
+                               nullptr,
+                               MHD_OPTION_ARRAY,
+                               more.data(),
+                               MHD_OPTION_END);
+    if (daemon_ == nullptr) {
+      return absl::UnavailableError(
+          "cannot open the port of the console; is it free, and are the files "
+          "of TLS a certificate with its key?");
+    }
+    const MHD_DaemonInfo* info =
+        MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT);
+    url_ = (address.loopback ? "http://" : "https://") + address.host + ":" +
+           std::to_string(info == nullptr ? 0 : info->port);
+    return absl::OkStatus();
+  }
+
+  const std::string& url() const override { return url_; }
+
+ private:
+  static MHD_Result Access(void* self,
+                           MHD_Connection* connection,
+                           const char* path,
+                           const char* method,
+                           const char*,
+                           const char* data,
+                           std::size_t* size,
+                           void** state) {
+    try {
+      if (*state == nullptr) {
+        auto exchange = std::make_unique<Exchange>();
+        exchange->request.method = method;
+        exchange->request.path = path;
+        *state = exchange.release();
+        return MHD_YES;
+      }
+      auto* exchange = static_cast<Exchange*>(*state);
+      if (*size > 0) {
+        std::string& body = exchange->request.body;
+        exchange->too_large |= body.size() + *size > kMaxBodyBytes;
+        if (!exchange->too_large) body.append(data, *size);
+        *size = 0;
+        return MHD_YES;
+      }
+      return Send(
+          connection,
+          static_cast<MicroServer*>(self)->Answer(connection, exchange));
+    } catch (const std::exception& error) {
+      spdlog::error("console: {}", error.what());
+      return MHD_NO;  // ends this connection
+    }
+  }
+
+  static void Completed(void*,
+                        MHD_Connection*,
+                        void** state,
+                        MHD_RequestTerminationCode) {
+    delete static_cast<Exchange*>(*state);
+    *state = nullptr;
+  }
+
+  HttpResponse Answer(MHD_Connection* connection, Exchange* exchange) {
+    HttpRequest& request = exchange->request;
+    if (exchange->too_large) {
+      return ErrorResponse(
+          absl::OutOfRangeError("the request has more than 64 KiB; send less"));
+    }
+    MHD_get_connection_values(
+        connection, MHD_GET_ARGUMENT_KIND, &AddQuery, &request.query);
+    MHD_get_connection_values(
+        connection, MHD_HEADER_KIND, &AddHeader, &request.headers);
+    const absl::Status allowed = CheckOrigin(request, loopback_);
+    if (!allowed.ok()) return ErrorResponse(allowed);
+    if (loopback_) {
+      request.caller = {"console on the loopback", {{local_role_, ""}}};
+    } else {
+      auto caller = Peer(connection);
+      if (!caller.ok()) return ErrorResponse(caller.status());
+      request.caller = *std::move(caller);
+    }
+    HttpResponse answer = handler_(request);
+    return answer.stream == nullptr || Admit(answer.stream)
+               ? std::move(answer)
+               : ErrorResponse(absl::UnavailableError(
+                     "too many pages are open, or the daemon is stopping; "
+                     "close some and load this one again"));
+  }
+
+  static absl::StatusOr<Caller> Peer(MHD_Connection* connection) {
+    const MHD_ConnectionInfo* info =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_GNUTLS_SESSION);
+    if (info == nullptr) {
+      return absl::UnauthenticatedError("this connection has no TLS");
+    }
+    return CallerOf(static_cast<gnutls_session_t>(info->tls_session));
+  }
+
+  // Whether one more stream may run.
+  bool Admit(const std::shared_ptr<Outbox>& stream) {
+    const std::lock_guard lock(mutex_);
+    streams_.remove_if([](const auto& weak) { return weak.expired(); });
+    if (stopping_ || streams_.size() >= kMaxStreams) return false;
+    streams_.push_back(stream);
+    return true;
+  }
+
+  const HttpHandler handler_;
+  const Role local_role_;
+  const bool loopback_;
+  std::string url_;
+  std::mutex mutex_;  // guards the two below
+  std::list<std::weak_ptr<Outbox>> streams_;
+  bool stopping_ = false;
+  MHD_Daemon* daemon_ = nullptr;
+};
+
+}  // namespace
+
+absl::Status CheckHttpOptions(const HttpOptions& options) {
+  SELFCAL_ASSIGN_OR_RETURN(const SocketAddress address,
+                           ParseSocketAddress(options.address));
+  return address.loopback ? absl::OkStatus()
+                          : ReadTlsFiles(options.tls).status();
+}
+
+absl::StatusOr<std::unique_ptr<HttpServer>> MakeHttpServer(
+    const HttpOptions& options, HttpHandler handler) {
+  SELFCAL_RETURN_IF_ERROR(CheckHttpOptions(options));
+  SELFCAL_ASSIGN_OR_RETURN(const SocketAddress address,
+                           ParseSocketAddress(options.address));
+  auto server =
+      std::make_unique<MicroServer>(options, address, std::move(handler));
+  SELFCAL_RETURN_IF_ERROR(server->Start(address, options.tls));
+  return server;
+}
+
+}  // namespace selfcal::server

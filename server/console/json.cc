@@ -1,0 +1,72 @@
+#include "server/console/json.h"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace selfcal::server {
+namespace {
+
+struct Kind {
+  int status;
+  const char* what_to_do;
+};
+
+Kind KindOf(absl::StatusCode code) {
+  switch (code) {
+    case absl::StatusCode::kInvalidArgument:
+      return {400, "Correct the address or the request, and send it again."};
+    case absl::StatusCode::kOutOfRange:
+      return {413, "Send less at once."};
+    case absl::StatusCode::kUnauthenticated:
+      return {401, "Import a client certificate into the browser."};
+    case absl::StatusCode::kPermissionDenied:
+      return {403, "Ask the operator for the role that this needs."};
+    case absl::StatusCode::kNotFound:
+      return {404, "Look in the list for what there is."};
+    case absl::StatusCode::kFailedPrecondition:
+    case absl::StatusCode::kAlreadyExists:
+    case absl::StatusCode::kAborted:
+      return {409, "Load the page again to see how things are now."};
+    case absl::StatusCode::kResourceExhausted:
+    case absl::StatusCode::kUnavailable:
+      return {503, "Try again in a moment."};
+    case absl::StatusCode::kUnimplemented:
+      return {405, "Use a method that this address has."};
+    case absl::StatusCode::kDataLoss:
+      return {500, "Run 'selfcal doctor', and restore a backup."};
+    default:
+      return {500, "Look into the log of selfcald, and report this."};
+  }
+}
+
+}  // namespace
+
+HttpResponse JsonResponse(const google::protobuf::Message& message) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.always_print_primitive_fields = true;
+  HttpResponse response;
+  const auto written = google::protobuf::util::MessageToJsonString(
+      message, &response.body, options);
+  if (!written.ok()) {
+    return ErrorResponse(absl::InternalError(written.ToString()));
+  }
+  return response;
+}
+
+HttpResponse ErrorResponse(const absl::Status& status) {
+  const Kind kind = KindOf(status.code());
+  const nlohmann::json body = {
+      {"code", absl::StatusCodeToString(status.code())},
+      {"message", std::string(status.message())},
+      {"whatToDo", kind.what_to_do}};
+  HttpResponse response;
+  response.status = kind.status;
+  // Messages may quote bytes of the request that are no UTF-8.
+  response.body =
+      body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return response;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,55 @@
+#include "server/console/overview.h"
+
+#include <string>
+
+#include "proto/resource_names.h"
+#include "server/encode/encode_parts.h"
+
+namespace selfcal::server {
+namespace {
+
+void AddAlarms(const RigSummary& rig, console::RigOverview* message) {
+  if (rig.newest_state == CalibrationState::kRejected) {
+    message->add_alarms("version " + std::to_string(rig.newest_version) +
+                        " was rejected; its reasons are in the history");
+  }
+  if (rig.run_state == RunState::kFailed) {
+    message->add_alarms("run " + std::to_string(rig.newest_run) +
+                        " failed; its message is among the runs");
+  }
+  if (rig.newest_change_ns > rig.active_since_ns) {
+    message->add_alarms("the device has changed since version " +
+                        std::to_string(rig.active_version) +
+                        " became active; move it until the tables are full");
+  }
+  for (const Table& table : rig.tables) {
+    if (!table.starved()) continue;
+    message->add_alarms("the table '" + table.group +
+                        "' does not fill: the motion says too little about it");
+  }
+}
+
+}  // namespace
+
+console::RigOverview Encode(const RigSummary& rig) {
+  console::RigOverview message;
+  message.set_name(RigName(rig.rig));
+  SetTime(rig.create_time_ns, message.mutable_create_time());
+  if (rig.last_seen_ns != 0) {
+    SetTime(rig.last_seen_ns, message.mutable_last_seen());
+  }
+  message.set_active_version(rig.active_version);
+  SetTime(rig.active_since_ns, message.mutable_active_since());
+  int entries = 0;
+  int capacity = 0;
+  for (const Table& table : rig.tables) {
+    entries += static_cast<int>(table.entries.size());
+    capacity += static_cast<int>(table.capacity);
+  }
+  message.set_table_entries(entries);
+  message.set_table_capacity(capacity);
+  AddAlarms(rig, &message);
+  return message;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,11 @@
+// A rig in the list of rigs, with what somebody should look at.
+#pragma once
+
+#include "server/console/overview.pb.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+console::RigOverview Encode(const RigSummary& rig);
+
+}  // namespace selfcal::server

@@ -1,0 +1,64 @@
+#include "server/console/policy.h"
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+
+namespace selfcal::server {
+namespace {
+
+std::string HeaderOf(const HttpRequest& request, const char* name) {
+  const auto found = request.headers.find(name);
+  return found == request.headers.end() ? "" : found->second;
+}
+
+// Without the port.
+std::string_view HostOf(std::string_view host) {
+  if (host.starts_with('[')) return host.substr(0, host.find(']') + 1);
+  return host.substr(0, host.find(':'));
+}
+
+bool IsLoopbackName(std::string_view host) {
+  constexpr std::string_view kNames[] = {"127.0.0.1", "localhost", "[::1]"};
+  return std::find(std::begin(kNames), std::end(kNames), HostOf(host)) !=
+         std::end(kNames);
+}
+
+}  // namespace
+
+const std::array<Header, 6>& SecurityHeaders() {
+  static constexpr std::array<Header, 6> kHeaders = {{
+      {"Content-Security-Policy",
+       "default-src 'self'; img-src 'self' data:; object-src 'none'; "
+       "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"},
+      {"X-Content-Type-Options", "nosniff"},
+      {"X-Frame-Options", "DENY"},
+      {"Referrer-Policy", "no-referrer"},
+      {"Cross-Origin-Resource-Policy", "same-origin"},
+      {"Cache-Control", "no-store"},
+  }};
+  return kHeaders;
+}
+
+absl::Status CheckOrigin(const HttpRequest& request, bool loopback) {
+  if (loopback && !IsLoopbackName(HeaderOf(request, "host"))) {
+    return absl::PermissionDeniedError(
+        "the console answers on the loopback to 127.0.0.1, localhost and [::1] "
+        "alone; open it by one of these names");
+  }
+  if (request.method == "GET" || request.method == "HEAD") {
+    return absl::OkStatus();
+  }
+  if (request.method != "POST") {
+    return absl::UnimplementedError(
+        "the console answers to GET, HEAD and POST");
+  }
+  if (HeaderOf(request, "x-selfcal-console").empty()) {
+    return absl::PermissionDeniedError(
+        "a change needs the header X-Selfcal-Console: 1, which the pages of "
+        "the console send");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace selfcal::server

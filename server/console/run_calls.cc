@@ -1,0 +1,114 @@
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.pb.h"
+#include "selfcal/v1/recalibration.pb.h"
+#include "selfcal/v1/rig.pb.h"
+#include "server/console/call.h"
+#include "server/console/json.h"
+#include "server/encode/encode.h"
+#include "server/encode/versions.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+struct RunId {
+  std::string rig;
+  std::int64_t run = 0;
+};
+
+absl::StatusOr<RunId> RunOf(const Call& call, const std::string& text) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  const auto run = ParseCount(text);
+  if (run) return RunId{rig, *run};
+  return absl::InvalidArgumentError("a run is a number from 1 on");
+}
+
+HttpResponse StreamResponse(std::shared_ptr<Outbox> outbox) {
+  HttpResponse response;
+  response.type = "text/event-stream";
+  response.stream = std::move(outbox);
+  return response;
+}
+
+bool HasEnded(RunState state) {
+  return state != RunState::kPending && state != RunState::kRunning;
+}
+
+// Each iteration of a run, until it has ended.
+Answer OpenRunStream(const Call& call, const std::string& name) {
+  v1::WatchRecalibrationRequest request;
+  request.set_name(name);
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  const auto parts = ParseChildName(name, "recalibrations");
+  const auto run = parts ? ParseCount(parts->id) : std::nullopt;
+  if (!run) {
+    return absl::InvalidArgumentError(
+        "run is a name of the form rigs/{rig}/recalibrations/{run}");
+  }
+  auto outbox = std::make_shared<Outbox>("event: run\ndata: {}\n\n");
+  SELFCAL_ASSIGN_OR_RETURN(
+      auto subscription,
+      call.context.pipeline->WatchRun(
+          parts->rig, *run, [outbox](const RunUpdate& update) {
+            outbox->Put(
+                "event: run\ndata: " +
+                JsonResponse(Encode(update.run, update.progress, nullptr))
+                    .body +
+                "\n\n");
+            if (HasEnded(update.run.state)) outbox->Close();
+          }));
+  HttpResponse response = StreamResponse(std::move(outbox));
+  response.keep = std::move(subscription);
+  return response;
+}
+
+}  // namespace
+
+Answer ListRuns(const Call& call) {
+  v1::ListRecalibrationsRequest request;
+  request.set_parent(RigName(call.parts.at(0)));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
+                           call.context.store->ListRuns(rig, page));
+  v1::ListRecalibrationsResponse response;
+  for (const StoredRun& run : listed.items) {
+    SELFCAL_ASSIGN_OR_RETURN(*response.add_recalibrations(),
+                             EncodeWithReport(call.context.store, run, {}));
+  }
+  response.set_next_page_token(listed.next_token);
+  return JsonResponse(response);
+}
+
+Answer GetRun(const Call& call) {
+  v1::GetRecalibrationRequest request;
+  request.set_name(
+      ChildName(call.parts.at(0), "recalibrations", call.parts.at(1)));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  SELFCAL_ASSIGN_OR_RETURN(const RunId id, RunOf(call, call.parts[1]));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
+                           call.context.store->GetRun(id.rig, id.run));
+  SELFCAL_ASSIGN_OR_RETURN(const v1::Recalibration encoded,
+                           EncodeWithReport(call.context.store, run, {}));
+  return JsonResponse(encoded);
+}
+
+// Of a run, of a rig (its id), or of everything.
+Answer OpenStream(const Call& call) {
+  const std::string run = call.Query("run");
+  if (!run.empty()) return OpenRunStream(call, run);
+  const std::string rig = call.Query("rig");
+  if (rig.empty()) {
+    SELFCAL_RETURN_IF_ERROR(
+        Authorise(call.request.caller, v1::ListRigsRequest()));
+  } else {
+    v1::WatchCalibrationRequest request;
+    request.set_parent(RigName(rig));
+    SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+    SELFCAL_RETURN_IF_ERROR(call.context.store->GetRig(rig).status());
+  }
+  return StreamResponse(call.context.feed->Subscribe(rig));
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,266 @@
+// What /api/v1 answers; names and values are those of the contract, 64-bit
+// integers as texts.
+
+export interface ApiError {
+  code: string;
+  message: string;
+  whatToDo: string;
+}
+
+export class Failure extends Error {
+  constructor(readonly error: ApiError) {
+    super(error.message);
+  }
+}
+
+export interface Grant {
+  role: 'read' | 'produce' | 'administer';
+  rig: string; // empty: every rig
+}
+
+export interface Session {
+  caller: string;
+  grants: Grant[];
+  programVersion: string;
+}
+
+export interface RigOverview {
+  name: string;
+  createTime: string;
+  lastSeen?: string;
+  activeVersion: string;
+  activeSince: string;
+  tableEntries: number;
+  tableCapacity: number;
+  alarms: string[];
+}
+
+export interface Rig {
+  name: string;
+  createTime: string;
+  groups: { group: string; patterns: string[] }[];
+  tableSize: number;
+}
+
+export interface Estimate {
+  component: string;
+  unit: string;
+  value: number;
+  sigma: number;
+}
+
+export interface Direction {
+  parts: { component: string; weight: number }[];
+  informationRatio: number;
+}
+
+export interface Solver {
+  status: string;
+  message: string;
+  iterations: number;
+  initialCost: number;
+  finalCost: number;
+  reprojectionRmsBeforePx: number;
+  reprojectionRmsAfterPx: number;
+  rank: number;
+  components: number;
+  heldConstant: Direction[];
+  segments: number;
+  keyframes: number;
+  landmarks: number;
+  observations: number;
+  seconds: number;
+}
+
+export interface Calibration {
+  name: string;
+  version: string;
+  state: string;
+  createTime: string;
+  estimates: Estimate[];
+  reasons: string[];
+  provenance?: {
+    recalibration: string;
+    baseVersion: string;
+    segments: string[];
+    programVersion: string;
+  };
+  solver?: Solver;
+  validation?: {
+    verdict: string;
+    activeVersion: string;
+    checks: { name: string; value: number; limit: number; passed: boolean }[];
+    heldOut?: {
+      segments: number;
+      degrees: number;
+      chiSquare: number;
+      probability: number;
+      activeChiSquare: number;
+      activeProbability: number;
+    };
+  };
+}
+
+export interface Comparison {
+  versionA: string;
+  versionB: string;
+  differences: {
+    component: string;
+    unit: string;
+    valueA: number;
+    valueB: number;
+    difference: number;
+    sigma: number;
+  }[];
+  chiSquare: number;
+  degrees: number;
+  probability: number;
+  significant: boolean;
+  sharedSegments: number;
+}
+
+export interface Table {
+  name: string;
+  capacity: number;
+  entries: { segment: string; entropyNats: number; gainNats: number }[];
+  scored: string;
+  starved: boolean;
+}
+
+export interface Segment {
+  name: string;
+  state: string;
+  hasData: boolean;
+  payloadBytes: string;
+  receiveTime: string;
+  keyframes: number;
+  imuSamples: number;
+  landmarks: number;
+  observations: number;
+  calibrationVersion: string;
+  startNs: string;
+  endNs: string;
+  sequence: string;
+  scores: {
+    group: string;
+    size: number;
+    entropyNats: number;
+    gainNats: number;
+    rank: number;
+    unobserved: Direction[];
+    inTable: boolean;
+  }[];
+  residuals?: {
+    observations: number;
+    inliers: number;
+    outliers: number;
+    reprojectionRmsPx: number;
+    reprojectionMedianPx: number;
+    manyOutliers: boolean;
+  };
+  rank: number;
+  components: number;
+  unobserved: Direction[];
+  problem: string;
+  temperatureC?: number;
+}
+
+export interface SegmentData {
+  keyframes: { tNs: string[]; qGi: number[]; pGi: number[] };
+  imu: { tNs: string[]; gyro: number[]; accel: number[] };
+  observations: {
+    keyframe: number[];
+    camera: number[];
+    landmark: number[];
+    zPx: number[];
+  };
+}
+
+export interface Run {
+  name: string;
+  state: string;
+  trigger: string;
+  createTime: string;
+  endTime?: string;
+  segments: string[];
+  iteration: number;
+  maxIterations: number;
+  cost: number;
+  stepSigmas: number;
+  calibration: string;
+  message: string;
+  attempts: number;
+  solver?: Solver;
+}
+
+export interface Event {
+  number: string;
+  time: string;
+  rig: string;
+  kind: string;
+  detail: string;
+}
+
+async function answer<T>(response: Response): Promise<T> {
+  const text = await response.text();
+  let body: unknown;
+  try {
+    body = JSON.parse(text);
+  } catch {
+    body = null;
+  }
+  if (response.ok && body !== null) return body as T;
+  const error = body as ApiError | null;
+  throw new Failure(
+    error?.code
+      ? error
+      : {
+          code: String(response.status),
+          message: 'The answer of the daemon cannot be read.',
+          whatToDo: 'Load the page again; look into the log of selfcald.',
+        },
+  );
+}
+
+async function reach(path: string, init?: RequestInit): Promise<Response> {
+  try {
+    return await fetch('/api/v1/' + path, init);
+  } catch {
+    throw new Failure({
+      code: 'UNAVAILABLE',
+      message: 'The daemon does not answer.',
+      whatToDo: 'See whether selfcald runs; this page goes on by itself.',
+    });
+  }
+}
+
+export async function get<T>(path: string): Promise<T> {
+  return answer<T>(await reach(path));
+}
+
+export async function post<T>(path: string, body: unknown): Promise<T> {
+  return answer<T>(
+    await reach(path, {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/json', 'X-Selfcal-Console': '1' },
+      body: JSON.stringify(body),
+    }),
+  );
+}
+
+// The last part of a resource name, as it stands in an address.
+export function idOf(name: string): string {
+  return name.slice(name.lastIndexOf('/') + 1);
+}
+
+// The address of the page of a resource, which is that of its name.
+export function pageOf(name: string): string {
+  return '/' + name.split('/').map(encodeURIComponent).join('/');
+}
+
+export function mayActivate(session: Session | null, rig: string): boolean {
+  return (session?.grants ?? []).some(
+    (grant) =>
+      grant.role === 'administer' && (grant.rig === '' || grant.rig === rig),
+  );
+}

@@ -1,0 +1,89 @@
+// Times, numbers and names as people read them.
+
+export function number(value: number | string, digits = 3): string {
+  const x = Number(value);
+  if (!Number.isFinite(x)) return String(value);
+  if (x === 0) return '0';
+  const size = Math.abs(x);
+  if (size >= 1e5 || size < 1e-3) return x.toExponential(digits - 1);
+  return String(Number(x.toPrecision(Math.max(digits, Math.floor(Math.log10(size)) + 1))));
+}
+
+export function bytes(value: number | string): string {
+  let x = Number(value);
+  for (const unit of ['B', 'KiB', 'MiB']) {
+    if (x < 1024) return number(x) + ' ' + unit;
+    x /= 1024;
+  }
+  return number(x) + ' GiB';
+}
+
+export function ago(time: string | undefined): string {
+  if (!time) return 'never';
+  const seconds = Math.max(0, (Date.now() - Date.parse(time)) / 1000);
+  const steps: [number, string][] = [
+    [60, 'second'],
+    [60, 'minute'],
+    [24, 'hour'],
+    [Infinity, 'day'],
+  ];
+  let x = seconds;
+  for (const [size, unit] of steps) {
+    if (x < size) {
+      const count = Math.floor(x);
+      return count === 0 && unit === 'second'
+        ? 'now'
+        : `${count} ${unit}${count === 1 ? '' : 's'} ago`;
+    }
+    x /= size;
+  }
+  return time;
+}
+
+export function clock(time: string | undefined): string {
+  return time ? time.replace('T', ' ').replace(/\.\d+Z$|Z$/, ' UTC') : '';
+}
+
+// RUN_HELD_BACK -> run held back
+export function words(name: string): string {
+  return name.toLowerCase().replaceAll('_', ' ');
+}
+
+const kParts: Record<string, string> = {
+  gyro: 'gyroscope',
+  accel: 'accelerometer',
+  scale: 'scale',
+  misalignment: 'misalignment',
+  focal: 'focal length',
+  principal_point: 'principal point',
+  distortion: 'distortion',
+  position: 'position',
+  rotation: 'rotation',
+};
+
+// cam0.focal.x -> focal length of camera 0, x
+export function component(name: string): string {
+  const parts = name.split('.');
+  const camera = /^cam(\d+)$/.exec(parts[0]);
+  const say = (part: string) => kParts[part] ?? part.replaceAll('_', ' ');
+  if (camera) {
+    const [, what, ...rest] = parts;
+    return [`${say(what ?? '')} of camera ${camera[1]}`, ...rest].join(', ');
+  }
+  if (parts[0] === 'imu' && parts.length >= 3) {
+    const [, sensor, what, ...rest] = parts;
+    return [`${say(what)} of the ${say(sensor)}`, ...rest].join(', ');
+  }
+  return parts.map(say).join(' ');
+}
+
+// A pattern with a '*' at either end.
+export function matches(pattern: string, name: string): boolean {
+  const text = pattern.replace(/^\*|\*$/g, '');
+  const open = pattern.startsWith('*');
+  const end = pattern.endsWith('*');
+  if (open && end) return name.includes(text);
+  if (open) return name.endsWith(text);
+  if (end) return name.startsWith(text);
+  return name === pattern;
+}

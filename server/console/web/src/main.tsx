@@ -1,0 +1,142 @@
+// Which page an address shows. Addresses are those of the resources: what is
+// rigs/a/segments/s~0 over gRPC is /rigs/a/segments/s~0 here.
+import './style.css';
+import { render } from 'preact';
+import { useEffect } from 'preact/hooks';
+import type { Session } from './api';
+import { Empty, Link, Problem, Title } from './parts';
+import { useAddress, useLive, useRead } from './state';
+import { Calibrations } from './pages/calibrations';
+import { Events } from './pages/events';
+import { RigPage } from './pages/rig';
+import { Rigs } from './pages/rigs';
+import { RunPage, Runs } from './pages/runs';
+import { SegmentPage } from './pages/segment';
+import { Segments } from './pages/segments';
+
+const kRigPages: [string, string][] = [
+  ['', 'Overview'],
+  ['segments', 'Segments'],
+  ['calibrations', 'Calibrations'],
+  ['recalibrations', 'Runs'],
+  ['events', 'Events'],
+];
+
+function RigNav(props: { rig: string; page: string }) {
+  return (
+    <nav class="tabs" aria-label={'Pages of rig ' + props.rig}>
+      {kRigPages.map(([page, name]) => (
+        <Link
+          key={page}
+          to={`/rigs/${props.rig}${page && '/' + page}`}
+          current={page === props.page}
+        >
+          {name}
+        </Link>
+      ))}
+    </nav>
+  );
+}
+
+function Page(props: {
+  parts: string[];
+  session: Session | null;
+  version: number;
+}) {
+  const [top, rig, page, id] = props.parts;
+  const { version, session } = props;
+  if (!top) return <Rigs version={version} />;
+  if (top === 'events' && !rig) return <Events rig="" version={version} />;
+  if (top === 'rigs' && rig) {
+    const shown = () => {
+      if (!page) return <RigPage rig={rig} version={version} />;
+      if (page === 'events') return <Events rig={rig} version={version} />;
+      if (page === 'calibrations' && !id) {
+        return <Calibrations rig={rig} session={session} version={version} />;
+      }
+      if (page === 'recalibrations') {
+        return id ? (
+          <RunPage key={id} rig={rig} run={id} version={version} />
+        ) : (
+          <Runs rig={rig} version={version} />
+        );
+      }
+      if (page === 'segments') {
+        return id ? (
+          <SegmentPage key={id} rig={rig} segment={id} version={version} />
+        ) : (
+          <Segments rig={rig} version={version} />
+        );
+      }
+      return null;
+    };
+    const content = shown();
+    if (content) {
+      return (
+        <>
+          <RigNav rig={rig} page={page ?? ''} />
+          {content}
+        </>
+      );
+    }
+  }
+  return (
+    <>
+      <Title text="Not found">There is no such page</Title>
+      <Empty>
+        The address names nothing that the console shows. Begin at the{' '}
+        <Link to="/">list of rigs</Link>.
+      </Empty>
+    </>
+  );
+}
+
+function App() {
+  const url = useAddress();
+  // A calibration has its place in the history.
+  const calibration = /^(\/rigs\/[^/]+\/calibrations)\/(\d+)$/.exec(url.pathname);
+  const parts = (calibration ? calibration[1] : url.pathname)
+    .split('/')
+    .filter(Boolean)
+    .map(decodeURIComponent);
+  const rig = parts[0] === 'rigs' ? (parts[1] ?? '') : '';
+  const session = useRead<Session>('session');
+  const { version, live } = useLive(rig);
+  useEffect(() => window.scrollTo(0, 0), [url.pathname]);
+  return (
+    <>
+      <a class="skip" href="#content">
+        To the content
+      </a>
+      <header>
+        <Link to="/" class="brand">
+          selfcal
+        </Link>
+        <nav aria-label="Main">
+          <Link to="/" current={parts.length === 0 || rig !== ''}>
+            Rigs
+          </Link>
+          <Link to="/events" current={parts[0] === 'events'}>
+            Events
+          </Link>
+        </nav>
+        <span class={live ? 'live on' : 'live'} role="status">
+          {live ? 'live' : 'not live'}
+        </span>
+      </header>
+      <main id="content">
+        {session.error ? (
+          <Problem error={session.error} />
+        ) : (
+          <Page parts={parts} session={session.value} version={version} />
+        )}
+      </main>
+      <footer class="quiet">
+        {session.value &&
+          `selfcald ${session.value.programVersion}, as ${session.value.caller}`}
+      </footer>
+    </>
+  );
+}
+
+render(<App />, document.getElementById('app')!);

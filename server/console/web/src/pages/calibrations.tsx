@@ -1,0 +1,352 @@
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import type uPlot from 'uplot';
+import {
+  Failure,
+  idOf,
+  mayActivate,
+  pageOf,
+  post,
+  type ApiError,
+  type Calibration,
+  type Comparison,
+  type Session,
+} from '../api';
+import { component, number, words } from '../format';
+import { Badge, DataTable, Figures, Link, Loaded, Problem, Title, When } from '../parts';
+import { kColours, Plot } from '../plot';
+import { go, useAddress, useRead, withQuery } from '../state';
+
+const kBand = 2; // sigmas either way
+
+function History(props: { of: Calibration[] }) {
+  const query = useAddress().searchParams;
+  const versions = [...props.of].reverse();
+  const names = versions[0].estimates
+    .filter((e) => e.sigma > 0)
+    .map((e) => e.component);
+  const chosen = query.get('parameter') ?? names[0];
+  const data = useMemo(() => {
+    const at = versions.map((v) => v.estimates.find((e) => e.component === chosen));
+    return [
+      versions.map((v) => Number(v.version)),
+      at.map((e) => e?.value ?? null),
+      at.map((e) => (e ? e.value + kBand * e.sigma : null)),
+      at.map((e) => (e ? e.value - kBand * e.sigma : null)),
+    ] as uPlot.AlignedData;
+  }, [props.of, chosen]);
+  const unit = versions[0].estimates.find((e) => e.component === chosen)?.unit ?? '';
+  const bound = { stroke: kColours[0] + '66', width: 1, points: { show: false } };
+  return (
+    <>
+      <label class="bar">
+        Parameter
+        <select
+          value={chosen}
+          onChange={(event) => go(withQuery({ parameter: event.currentTarget.value }), true)}
+        >
+          {names.map((name) => (
+            <option key={name} value={name}>
+              {component(name)}
+            </option>
+          ))}
+        </select>
+      </label>
+      <Plot
+        label={`${component(chosen)} over the versions, with two sigmas either way`}
+        data={data}
+        x={{ label: 'version', integers: true }}
+        y={unit}
+        series={[
+          { label: component(chosen), stroke: kColours[0], width: 2, points: { show: true, size: 7 } },
+          { label: 'and two sigmas', ...bound },
+          { label: 'less two sigmas', ...bound },
+        ]}
+        bands={[{ series: [2, 3], fill: kColours[0] + '22' }]}
+      />
+    </>
+  );
+}
+
+function Difference(props: { rig: string; of: Calibration[] }) {
+  const query = useAddress().searchParams;
+  const newest = props.of[0].version;
+  const a = query.get('a') ?? props.of[1]?.version ?? newest;
+  const b = query.get('b') ?? newest;
+  const read = useRead<Comparison>(
+    `rigs/${encodeURIComponent(props.rig)}/compare?a=${encodeURIComponent(a)}&b=${encodeURIComponent(b)}`,
+  );
+  const choose = (which: 'a' | 'b', value: string, name: string) => (
+    <label>
+      {name}
+      <select
+        value={value}
+        onChange={(event) => go(withQuery({ a, b, [which]: event.currentTarget.value }), true)}
+      >
+        {props.of.map((c) => (
+          <option key={c.version}>{c.version}</option>
+        ))}
+      </select>
+    </label>
+  );
+  return (
+    <>
+      <h2>Difference of two versions</h2>
+      <div class="bar">
+        {choose('a', a, 'From version')}
+        {choose('b', b, 'to version')}
+      </div>
+      <Loaded read={read}>
+        {(compared) => (
+          <>
+            <p>
+              {compared.degrees === 0
+                ? 'Neither version knows a direction clearly better than the factory: nothing can be compared.'
+                : `Together they differ ${compared.significant ? 'by more than' : 'no more than'} their uncertainty explains: chi-square ${number(compared.chiSquare)} with ${compared.degrees} degrees, probability ${number(compared.probability)}.`}
+            </p>
+            <DataTable
+              caption={`Version ${compared.versionB} less version ${compared.versionA}`}
+              hideCaption
+              head={['Parameter', `Version ${compared.versionA}`, `Version ${compared.versionB}`, 'Difference', 'Sigma', 'In sigmas']}
+              rows={compared.differences.map((d) => {
+                const sigmas = Math.abs(d.difference) / d.sigma;
+                return [
+                  component(d.component),
+                  number(d.valueA, 6),
+                  `${number(d.valueB, 6)} ${d.unit}`,
+                  number(d.difference),
+                  number(d.sigma),
+                  <span class={sigmas > 3 ? 'strong' : ''}>{d.sigma > 0 ? number(sigmas, 2) : ''}</span>,
+                ];
+              })}
+            />
+          </>
+        )}
+      </Loaded>
+    </>
+  );
+}
+
+function Activate(props: { calibration: Calibration; active: string; onEnd: () => void }) {
+  const dialog = useRef<HTMLDialogElement>(null);
+  const [reason, setReason] = useState('');
+  const [error, setError] = useState<ApiError | null>(null);
+  const [busy, setBusy] = useState(false);
+  useEffect(() => dialog.current?.showModal(), []);
+  const back = Number(props.calibration.version) < Number(props.active);
+  const send = async (event: SubmitEvent) => {
+    event.preventDefault();
+    setBusy(true);
+    try {
+      await post(props.calibration.name + ':activate', { reason });
+      props.onEnd();
+    } catch (failure) {
+      setError((failure as Failure).error);
+      setBusy(false);
+    }
+  };
+  return (
+    <dialog ref={dialog} onClose={props.onEnd} aria-labelledby="activate">
+      <form onSubmit={send}>
+        <h2 id="activate">
+          {back ? 'Roll back to' : 'Activate'} version {props.calibration.version}?
+        </h2>
+        <p>
+          Every device that watches this rig takes it up at once, in place of
+          version {props.active}. The reason goes into the log of events.
+        </p>
+        <label>
+          Reason
+          <textarea
+            required
+            maxLength={500}
+            value={reason}
+            onInput={(event) => setReason(event.currentTarget.value)}
+          />
+        </label>
+        {error && <Problem error={error} />}
+        <p class="buttons">
+          <button type="button" onClick={props.onEnd}>
+            Cancel
+          </button>
+          <button type="submit" class="strong" disabled={busy || !reason.trim()}>
+            {back ? 'Roll back' : 'Activate'}
+          </button>
+        </p>
+      </form>
+    </dialog>
+  );
+}
+
+function Verdict(props: { of: Calibration }) {
+  const validation = props.of.validation;
+  if (!validation) return null;
+  const held = validation.heldOut;
+  return (
+    <>
+      <h3>
+        Validation <Badge state={validation.verdict} />
+      </h3>
+      <p class="quiet">Judged against version {validation.activeVersion}.</p>
+      <DataTable
+        caption="Checks"
+        hideCaption
+        head={['Check', 'Value', 'Limit', 'Passed']}
+        rows={validation.checks.map((check) => [
+          words(check.name),
+          number(check.value),
+          number(check.limit),
+          check.passed ? 'yes' : <strong>no</strong>,
+        ])}
+      />
+      {held && held.degrees > 0 && (
+        <p>
+          On {held.segments} segments that it was not calibrated on: chi-square{' '}
+          {number(held.chiSquare)} with {held.degrees} degrees (probability{' '}
+          {number(held.probability)}); the version before: {number(held.activeChiSquare)}.
+        </p>
+      )}
+    </>
+  );
+}
+
+function Origin(props: { of: Calibration }) {
+  const from = props.of.provenance;
+  if (!from) return <p>From the factory: its sigmas are the tolerances.</p>;
+  return (
+    <>
+      <p>
+        Made by <Link to={pageOf(from.recalibration)}>run {idOf(from.recalibration)}</Link>{' '}
+        of selfcald {from.programVersion}, starting at version {from.baseVersion}, out of{' '}
+        {from.segments.length} segments:
+      </p>
+      <ul class="columns">
+        {from.segments.map((segment) => (
+          <li key={segment}>
+            <Link to={pageOf(segment)}>{decodeURIComponent(idOf(segment))}</Link>
+          </li>
+        ))}
+      </ul>
+    </>
+  );
+}
+
+function Version(props: { of: Calibration }) {
+  const heading = useRef<HTMLHeadingElement>(null);
+  useEffect(() => heading.current?.scrollIntoView(), [props.of.version]);
+  const solver = props.of.solver;
+  return (
+    <section>
+      <h2 ref={heading}>
+        Version {props.of.version} <Badge state={props.of.state} />
+      </h2>
+      {props.of.reasons.map((reason) => (
+        <p class="warning" key={reason}>
+          {reason}
+        </p>
+      ))}
+      <Origin of={props.of} />
+      {solver && (
+        <Figures
+          of={[
+            ['Solver', solver.status],
+            ['Iterations', solver.iterations],
+            ['Reprojection rms', `${number(solver.reprojectionRmsBeforePx)} to ${number(solver.reprojectionRmsAfterPx)} px`],
+            ['Rank', `${solver.rank} of ${solver.components}`],
+          ]}
+        />
+      )}
+      <Verdict of={props.of} />
+      <h3>Parameters</h3>
+      <DataTable
+        caption={'Parameters of version ' + props.of.version}
+        hideCaption
+        head={['Parameter', 'Value', 'Sigma', 'Unit']}
+        rows={props.of.estimates.map((e) => [
+          component(e.component),
+          number(e.value, 6),
+          e.sigma > 0 ? number(e.sigma) : 'held',
+          e.unit,
+        ])}
+      />
+    </section>
+  );
+}
+
+export function Calibrations(props: { rig: string; session: Session | null; version: number }) {
+  const url = useAddress();
+  const shown = /\/calibrations\/(\d+)$/.exec(url.pathname)?.[1];
+  const [asked, setAsked] = useState<Calibration | null>(null);
+  const [changed, setChanged] = useState(0);
+  const base = `rigs/${encodeURIComponent(props.rig)}/calibrations`;
+  const read = useRead<{ calibrations: Calibration[]; nextPageToken: string }>(
+    base + '?page_size=100',
+    props.version + changed,
+  );
+  const title = 'Calibrations of ' + props.rig;
+  const may = mayActivate(props.session, 'rigs/' + props.rig);
+  return (
+    <>
+      <Title text={title}>{title}</Title>
+      <Loaded read={read}>
+        {({ calibrations, nextPageToken }) => {
+          const active = calibrations.find((c) => c.state === 'ACTIVE')?.version ?? '';
+          const one = calibrations.find((c) => c.version === shown);
+          return (
+            <>
+              {nextPageToken && <p class="quiet">The newest 100 versions.</p>}
+              <DataTable
+                caption="Versions"
+                hideCaption
+                head={['Version', 'State', 'Created', 'Validation', 'Segments', 'Reprojection rms [px]', ...(may ? ['Change'] : [])]}
+                rows={calibrations.map((c) => [
+                  <Link to={pageOf(c.name)} current={c.version === shown}>
+                    {c.version === '1' ? '1 (factory)' : c.version}
+                  </Link>,
+                  <Badge state={c.state} />,
+                  <When time={c.createTime} />,
+                  c.validation ? <Badge state={c.validation.verdict} /> : '',
+                  c.provenance?.segments.length ?? '',
+                  c.solver ? number(c.solver.reprojectionRmsAfterPx) : '',
+                  ...(may
+                    ? [
+                        ['SUPERSEDED', 'ROLLED_BACK'].includes(c.state) ? (
+                          <button type="button" onClick={() => setAsked(c)}>
+                            {Number(c.version) < Number(active) ? 'Roll back to it' : 'Activate'}
+                          </button>
+                        ) : (
+                          ''
+                        ),
+                      ]
+                    : []),
+                ])}
+              />
+              {shown && !one && (
+                <Problem
+                  error={{
+                    code: 'NOT_FOUND',
+                    message: `Version ${shown} is not among those listed.`,
+                    whatToDo: 'Choose one from the table.',
+                  }}
+                />
+              )}
+              {one && <Version of={one} />}
+              <h2>History</h2>
+              <History of={calibrations} />
+              <Difference rig={props.rig} of={calibrations} />
+              {asked && (
+                <Activate
+                  calibration={asked}
+                  active={active}
+                  onEnd={() => {
+                    setAsked(null);
+                    setChanged((count) => count + 1);
+                  }}
+                />
+              )}
+            </>
+          );
+        }}
+      </Loaded>
+    </>
+  );
+}

@@ -1,0 +1,295 @@
+import { useMemo, useState } from 'preact/hooks';
+import uPlot from 'uplot';
+import {
+  idOf,
+  pageOf,
+  type Calibration,
+  type Estimate,
+  type Rig,
+  type Segment,
+  type Table,
+} from '../api';
+import { component, matches, number } from '../format';
+import {
+  Badge,
+  DataTable,
+  Empty,
+  Figures,
+  Link,
+  Loaded,
+  Meter,
+  Title,
+  When,
+} from '../parts';
+import { kColours, Plot } from '../plot';
+import { useRead } from '../state';
+
+// Of what the factory says, that is still not known.
+const kWell = 0.1;
+const kWeak = 0.5;
+
+interface Known extends Estimate {
+  tolerance: number;
+  ratio: number; // sigma against the factory's tolerance
+}
+
+function known(active: Calibration, factory: Calibration): Known[] {
+  const tolerances = new Map(factory.estimates.map((e) => [e.component, e.sigma]));
+  return active.estimates
+    .map((estimate) => {
+      const tolerance = tolerances.get(estimate.component) ?? 0;
+      return { ...estimate, tolerance, ratio: estimate.sigma / tolerance };
+    })
+    .filter((estimate) => estimate.tolerance > 0);
+}
+
+function verdict(ratio: number): string {
+  if (ratio <= kWell) return 'well known';
+  return ratio <= kWeak ? 'better than the factory' : 'hardly better than the factory';
+}
+
+function Group(props: { name: string; of: Known[] }) {
+  const mean = Math.exp(
+    props.of.reduce((sum, e) => sum + Math.log(e.ratio), 0) / props.of.length,
+  );
+  return (
+    <section>
+      <h3>
+        {props.name}: {verdict(mean)}
+      </h3>
+      <DataTable
+        caption={'How well the group ' + props.name + ' is known'}
+        hideCaption
+        head={['Parameter', 'Value', 'Sigma', 'Factory tolerance', 'Still unknown']}
+        rows={props.of.map((e) => [
+          component(e.component),
+          `${number(e.value, 6)} ${e.unit}`,
+          number(e.sigma),
+          number(e.tolerance),
+          <span class="meter">
+            <meter
+              min={0}
+              max={1}
+              low={kWell}
+              high={kWeak}
+              optimum={0}
+              value={Math.min(e.ratio, 1)}
+              aria-label={'part of the tolerance of ' + component(e.component)}
+            />
+            {number(100 * e.ratio, 2)} %
+          </span>,
+        ])}
+      />
+    </section>
+  );
+}
+
+function Weak(props: { of: Known[] }) {
+  const weak = props.of.filter((e) => e.ratio > kWeak).sort((a, b) => b.ratio - a.ratio);
+  if (weak.length === 0) {
+    return <p>Every parameter is known at least twice as well as from the factory.</p>;
+  }
+  return (
+    <>
+      <p>
+        {weak.length} of {props.of.length} parameters are hardly better known than
+        from the factory. What was recorded so far did not show:
+      </p>
+      <ul>
+        {weak.slice(0, 8).map((e) => (
+          <li key={e.component}>
+            {component(e.component)} <span class="quiet">({e.component})</span>
+          </li>
+        ))}
+        {weak.length > 8 && <li>and {weak.length - 8} more, in the tables below</li>}
+      </ul>
+    </>
+  );
+}
+
+function Knowledge(props: { rig: Rig; of: Known[] }) {
+  return (
+    <>
+      <h2>What is weak</h2>
+      <Weak of={props.of} />
+      <h2>How well it is known</h2>
+      {props.rig.groups.map((group) => {
+        const members = props.of.filter((e) =>
+          group.patterns.some((pattern) => matches(pattern, e.component)),
+        );
+        return members.length === 0 ? null : (
+          <Group key={group.group} name={group.group} of={members} />
+        );
+      })}
+    </>
+  );
+}
+
+function Tables(props: { of: Table[] }) {
+  return (
+    <>
+      <h2>Tables</h2>
+      {props.of.map((table) => (
+        <section key={table.name}>
+          <h3>
+            {idOf(table.name)}{' '}
+            <Meter
+              value={table.entries.length}
+              of={table.capacity}
+              label={'fill of the table ' + idOf(table.name)}
+            />
+          </h3>
+          {table.starved && (
+            <p class="warning">
+              It does not fill: {table.scored} segments were offered. Move the
+              device in more directions, and nearer to what it sees.
+            </p>
+          )}
+          {table.entries.length === 0 ? (
+            <p class="quiet">
+              Empty: no segment has told enough about this group so far.
+            </p>
+          ) : (
+            <DataTable
+              caption={'Segments in the table ' + idOf(table.name)}
+              hideCaption
+              head={['Segment', 'Entropy [nats]', 'Gain [nats]']}
+              rows={table.entries.map((entry) => [
+                <Link to={pageOf(entry.segment)}>
+                  {decodeURIComponent(idOf(entry.segment))}
+                </Link>,
+                number(entry.entropyNats, 4),
+                number(entry.gainNats, 4),
+              ])}
+            />
+          )}
+        </section>
+      ))}
+    </>
+  );
+}
+
+const kBins = 24;
+
+function Histogram(props: { segments: Segment[]; group: string }) {
+  const data = useMemo(() => {
+    const scores = props.segments
+      .flatMap((segment) => segment.scores)
+      .filter((s) => s.group === props.group && Number.isFinite(s.entropyNats));
+    const all = scores.map((s) => s.entropyNats);
+    const low = Math.min(...all);
+    const width = (Math.max(...all) - low || 1) / kBins;
+    const count = (wanted: boolean) => {
+      const bins = new Array<number>(kBins).fill(0);
+      for (const s of scores) {
+        if (wanted && !s.inTable) continue;
+        bins[Math.min(kBins - 1, Math.floor((s.entropyNats - low) / width))]++;
+      }
+      return bins;
+    };
+    const centres = Array.from({ length: kBins }, (_, i) => low + (i + 0.5) * width);
+    return [centres, count(false), count(true)] as uPlot.AlignedData;
+  }, [props.segments, props.group]);
+  const bars = uPlot.paths.bars!({ size: [0.9, 60] });
+  return (
+    <Plot
+      label={`How many segments have which entropy for the group ${props.group}`}
+      data={data}
+      x={{ label: 'entropy [nats], lower is richer' }}
+      y="segments"
+      series={[
+        { label: 'all', fill: kColours[0] + '66', stroke: kColours[0], paths: bars, points: { show: false } },
+        { label: 'kept in the table', fill: kColours[1], stroke: kColours[1], paths: bars, points: { show: false } },
+      ]}
+    />
+  );
+}
+
+function Entropies(props: { rig: string; groups: string[]; version: number }) {
+  const [group, setGroup] = useState(props.groups[0]);
+  const read = useRead<{ segments: Segment[] }>(
+    `rigs/${props.rig}/segments?page_size=200`,
+    props.version,
+  );
+  return (
+    <>
+      <h2>Entropy of segments</h2>
+      <Loaded read={read}>
+        {({ segments }) => {
+          const scored = segments.filter((s) => s.scores.length > 0);
+          if (scored.length === 0) {
+            return (
+              <Empty>
+                No segment is scored yet. Send some with the client library or{' '}
+                <code>selfcal import</code>.
+              </Empty>
+            );
+          }
+          return (
+            <>
+              <label class="bar">
+                Group
+                <select
+                  value={group}
+                  onChange={(event) => setGroup(event.currentTarget.value)}
+                >
+                  {props.groups.map((name) => (
+                    <option key={name}>{name}</option>
+                  ))}
+                </select>
+              </label>
+              <Histogram segments={scored} group={group} />
+              <p class="quiet">Of the newest {scored.length} scored segments.</p>
+            </>
+          );
+        }}
+      </Loaded>
+    </>
+  );
+}
+
+export function RigPage(props: { rig: string; version: number }) {
+  const base = 'rigs/' + encodeURIComponent(props.rig);
+  const rig = useRead<Rig>(base);
+  const active = useRead<Calibration>(base + '/calibrations/active', props.version);
+  const factory = useRead<Calibration>(base + '/calibrations/1');
+  const tables = useRead<{ tables: Table[] }>(base + '/tables', props.version);
+  const both = useMemo(
+    () =>
+      active.value && factory.value ? known(active.value, factory.value) : null,
+    [active.value, factory.value],
+  );
+  return (
+    <>
+      <Title text={props.rig}>{props.rig}</Title>
+      <Loaded read={active}>
+        {(calibration) => (
+          <Figures
+            of={[
+              [
+                'Active version',
+                <Link to={pageOf(calibration.name)}>{calibration.version}</Link>,
+              ],
+              ['State', <Badge state={calibration.state} />],
+              ['Created', <When time={calibration.createTime} />],
+              ['From', calibration.provenance
+                ? `${calibration.provenance.segments.length} segments`
+                : 'the factory'],
+            ]}
+          />
+        )}
+      </Loaded>
+      <Loaded read={{ value: rig.value && both && { rig: rig.value, both }, error: rig.error ?? factory.error }}>
+        {(value) => <Knowledge rig={value.rig} of={value.both} />}
+      </Loaded>
+      <Loaded read={tables}>{(value) => <Tables of={value.tables} />}</Loaded>
+      {rig.value && (
+        <Entropies
+          rig={encodeURIComponent(props.rig)}
+          groups={rig.value.groups.map((g) => g.group)}
+          version={props.version}
+        />
+      )}
+    </>
+  );
+}

@@ -1,0 +1,99 @@
+// A plot by uPlot that follows the width and the colours of the page.
+import { useEffect, useRef } from 'preact/hooks';
+import uPlot from 'uplot';
+import 'uplot/dist/uPlot.min.css';
+
+export const kColours = ['#2f6fdb', '#d9822b', '#2a9d6f', '#a64ac9'];
+const dark = matchMedia('(prefers-color-scheme: dark)');
+
+function ink(name: string): string {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+export interface PlotProps {
+  label: string; // what it shows, in a sentence
+  data: uPlot.AlignedData;
+  series: uPlot.Series[];
+  x?: { label?: string; integers?: boolean };
+  y?: string;
+  bands?: uPlot.Band[];
+  height?: number;
+  cursor?: number; // index of the value that is pointed at
+  onCursor?: (index: number) => void;
+}
+
+function axis(label: string | undefined, integers = false): uPlot.Axis {
+  return {
+    label,
+    labelSize: label ? 22 : 0,
+    stroke: () => ink('--quiet'),
+    grid: { stroke: () => ink('--line'), width: 1 },
+    ticks: { stroke: () => ink('--line'), width: 1 },
+    ...(integers
+      ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] }
+      : {}),
+  };
+}
+
+export function Plot(props: PlotProps) {
+  const holder = useRef<HTMLDivElement>(null);
+  const plot = useRef<uPlot | null>(null);
+  const onCursor = useRef(props.onCursor);
+  onCursor.current = props.onCursor;
+  // Whoever reads numbers moves it, or the pointer does.
+  const moving = useRef(false);
+
+  useEffect(() => {
+    const element = holder.current!;
+    const size = () => ({
+      width: Math.max(200, element.clientWidth),
+      height: props.height ?? 220,
+    });
+    const made = new uPlot(
+      {
+        ...size(),
+        scales: { x: { time: false } },
+        axes: [axis(props.x?.label, props.x?.integers), { ...axis(props.y), size: 64 }],
+        series: [{}, ...props.series],
+        bands: props.bands,
+        legend: { show: props.series.length > 1, live: false },
+        cursor: { drag: { x: false, y: false } },
+        hooks: {
+          setCursor: [
+            (u) => {
+              if (!moving.current && u.cursor.idx != null) {
+                onCursor.current?.(u.cursor.idx);
+              }
+            },
+          ],
+        },
+      },
+      props.data,
+      element,
+    );
+    plot.current = made;
+    const observer = new ResizeObserver(() => made.setSize(size()));
+    observer.observe(element);
+    const redraw = () => made.redraw();
+    dark.addEventListener('change', redraw);
+    return () => {
+      observer.disconnect();
+      dark.removeEventListener('change', redraw);
+      made.destroy();
+      plot.current = null;
+    };
+  }, [props.data, props.height, props.label]);
+
+  useEffect(() => {
+    const made = plot.current;
+    if (!made || props.cursor === undefined) return;
+    moving.current = true;
+    made.setCursor({
+      left: made.valToPos(props.data[0][props.cursor] as number, 'x'),
+      top: 10,
+    });
+    moving.current = false;
+  }, [props.cursor, props.data]);
+
+  return <div ref={holder} class="plot" role="img" aria-label={props.label} />;
+}

@@ -1,0 +1,106 @@
+// Where the reader is, what was read, and when to read it again.
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { Failure, get, type ApiError } from './api';
+
+// ------------------------------------------------------------- addresses
+
+const listeners = new Set<() => void>();
+
+export function go(address: string, replace = false): void {
+  if (replace) history.replaceState(null, '', address);
+  else history.pushState(null, '', address);
+  listeners.forEach((tell) => tell());
+}
+
+addEventListener('popstate', () => listeners.forEach((tell) => tell()));
+
+export function useAddress(): URL {
+  const [url, setUrl] = useState(() => new URL(location.href));
+  useEffect(() => {
+    const tell = () => setUrl(new URL(location.href));
+    listeners.add(tell);
+    return () => {
+      listeners.delete(tell);
+    };
+  }, []);
+  return url;
+}
+
+// The address of this page with other values in its query; empty ones go.
+export function withQuery(values: Record<string, string>): string {
+  const url = new URL(location.href);
+  for (const [key, value] of Object.entries(values)) {
+    if (value) url.searchParams.set(key, value);
+    else url.searchParams.delete(key);
+  }
+  return url.pathname + url.search;
+}
+
+// ------------------------------------------------------------- reading
+
+export interface Read<T> {
+  value: T | null;
+  error: ApiError | null;
+}
+
+// Reads a path, and again whenever `version` changes; what was read stays until
+// the new answer is there. A null path reads nothing.
+export function useRead<T>(path: string | null, version = 0): Read<T> {
+  const [read, setRead] = useState<Read<T> & { path: string | null }>({
+    value: null,
+    error: null,
+    path,
+  });
+  useEffect(() => {
+    if (path === null) return;
+    let gone = false;
+    get<T>(path).then(
+      (value) => !gone && setRead({ value, error: null, path }),
+      (failure: Failure) =>
+        !gone && setRead({ value: null, error: failure.error, path }),
+    );
+    return () => {
+      gone = true;
+    };
+  }, [path, version]);
+  return read.path === path ? read : { value: null, error: null };
+}
+
+// ------------------------------------------------------------- live
+
+const kSettleMs = 400;
+
+// Counts up when something has changed; of one rig, or of all with ''. Bursts
+// count once.
+export function useLive(rig: string): { version: number; live: boolean } {
+  const [version, setVersion] = useState(0);
+  const [live, setLive] = useState(false);
+  const timer = useRef<number | undefined>(undefined);
+  useEffect(() => {
+    const source = new EventSource(
+      '/api/v1/stream' + (rig ? '?rig=' + encodeURIComponent(rig) : ''),
+    );
+    let first = true;
+    source.onopen = () => setLive(true);
+    source.onerror = () => setLive(false);
+    source.addEventListener('change', () => {
+      setLive(true);
+      if (first) {
+        // Says that the stream stands: what was read before is as new.
+        first = false;
+        return;
+      }
+      if (timer.current !== undefined) return;
+      timer.current = window.setTimeout(() => {
+        timer.current = undefined;
+        setVersion((count) => count + 1);
+      }, kSettleMs);
+    });
+    return () => {
+      source.close();
+      clearTimeout(timer.current);
+      timer.current = undefined;
+    };
+  }, [rig]);
+  return { version, live };
+}

@@ -1,0 +1,154 @@
+#include <google/protobuf/util/json_util.h>
+
+#include "proto/resource_names.h"
+#include "selfcal/v1/segment.pb.h"
+#include "server/encode/encode.h"
+#include "test/server/console/console_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ApiTest = ConsoleTest;
+
+// As gRPC has it.
+template <typename Message>
+Message Parsed(const Reply& reply) {
+  Message message;
+  EXPECT_EQ(reply.status, 200) << reply.body;
+  EXPECT_THAT(reply.head, HasSubstr("application/json"));
+  const auto parsed =
+      google::protobuf::util::JsonStringToMessage(reply.body, &message);
+  EXPECT_TRUE(parsed.ok()) << parsed.ToString();
+  return message;
+}
+
+TEST_F(ApiTest, RigsComeInPagesFilteredAndSorted) {
+  for (const char* id : {"phone", "tablet-1", "tablet-2"}) AddRig(id);
+  const auto first =
+      Get("/api/v1/rigs?filter=tablet&order_by=name%20desc&page_size=1").json();
+  ASSERT_EQ(first["rigs"].size(), 1u);
+  EXPECT_EQ(first["rigs"][0]["name"], "rigs/tablet-2");
+  EXPECT_EQ(first["rigs"][0]["activeVersion"], "1");
+  EXPECT_EQ(first["rigs"][0]["tableCapacity"], 6);
+  EXPECT_THAT(first["rigs"][0]["alarms"], IsEmpty());
+  const std::string token = first["nextPageToken"];
+  const auto second =
+      Get("/api/v1/"
+          "rigs?filter=tablet&order_by=name+desc&page_size=1&page_token=" +
+          token)
+          .json();
+  ASSERT_EQ(second["rigs"].size(), 1u);
+  EXPECT_EQ(second["rigs"][0]["name"], "rigs/tablet-1");
+  EXPECT_EQ(second["nextPageToken"], "");
+}
+
+TEST_F(ApiTest, ValuesAreThoseOfTheContract) {
+  const Rig rig = AddRig("r");
+  AddVersion(rig);
+  EXPECT_EQ(Parsed<v1::Rig>(Get("/api/v1/rigs/r")).SerializeAsString(),
+            Encode(*store_->GetRig("r")).SerializeAsString());
+  const auto active = *store_->GetActiveCalibration("r");
+  for (const char* path : {"active", "2"}) {
+    EXPECT_EQ(Parsed<v1::Calibration>(
+                  Get("/api/v1/rigs/r/calibrations/" + std::string(path)))
+                  .SerializeAsString(),
+              Encode(active).SerializeAsString());
+  }
+  const auto segments =
+      Parsed<v1::ListSegmentsResponse>(Get("/api/v1/rigs/r/segments"));
+  ASSERT_EQ(segments.segments_size(), 1);
+  EXPECT_EQ(segments.segments(0).SerializeAsString(),
+            Encode(*store_->GetSegment("r", {"s", 0})).SerializeAsString());
+  EXPECT_EQ(Get("/api/v1/rigs/r/tables").json()["tables"].size(),
+            rig.groups.size());
+  EXPECT_EQ(Get("/api/v1/rigs/r/calibrations").json()["calibrations"].size(),
+            2u);
+  EXPECT_EQ(Get("/api/v1/rigs/r/recalibrations")
+                .json()["recalibrations"][0]["calibration"],
+            "rigs/r/calibrations/2");
+  EXPECT_EQ(Get("/api/v1/rigs/r/recalibrations/1").json()["state"],
+            "SUCCEEDED");
+}
+
+TEST_F(ApiTest, DataOfASegmentIsReadWhileItIsKept) {
+  const Rig rig = AddRig("r");
+  MotionSegment segment = TestSegments(rig, 1)[0];
+  segment.key.session = "a b/c";
+  ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+  // The name of the segment has "a%20b%2Fc", and '%' is %25 in an address.
+  const std::string path = "/api/v1/rigs/r/segments/a%2520b%252Fc~0";
+  const auto data = Parsed<v1::MotionSegment>(Get(path + "/data"));
+  EXPECT_EQ(data.session(), "a b/c");
+  EXPECT_EQ(data.keyframes().t_ns_size(),
+            static_cast<int>(segment.keyframes.size()));
+  ASSERT_TRUE(store_->MarkUnusable("r", segment.key, "test").ok());
+  EXPECT_EQ(Get(path).json()["hasData"], false);
+  EXPECT_EQ(Get(path + "/data").status, 409);
+}
+
+TEST_F(ApiTest, TwoVersionsAreCompared) {
+  AddVersion(AddRig("r"));
+  const auto compared = Get("/api/v1/rigs/r/compare?a=1&b=active").json();
+  EXPECT_EQ(compared["versionA"], "1");
+  EXPECT_EQ(compared["versionB"], "2");
+  EXPECT_EQ(compared["significant"], false);
+  EXPECT_EQ(Get("/api/v1/rigs/r/compare?a=1").status, 400);
+}
+
+TEST_F(ApiTest, EventsComeNewestFirst) {
+  AddRig("a");
+  AddRig("b");
+  const auto all = Get("/api/v1/events").json()["events"];
+  ASSERT_GE(all.size(), 2u);
+  EXPECT_EQ(all[0]["rig"], "rigs/b");
+  EXPECT_EQ(all.back()["kind"], "RIG_CREATED");
+  for (const auto& event : Get("/api/v1/rigs/a/events").json()["events"]) {
+    EXPECT_EQ(event["rig"], "rigs/a");
+  }
+}
+
+TEST_F(ApiTest, MistakesSayWhatToDo) {
+  AddRig("r");
+  const std::pair<const char*, int> kMistakes[] = {
+      {"/api/v1/rigs/none", 404},
+      {"/api/v1/rigs/NO", 400},
+      {"/api/v1/rigs/none/tables", 404},
+      {"/api/v1/rigs/none/events", 404},
+      {"/api/v1/rigs/r/segments/x", 400},
+      {"/api/v1/rigs/r/segments/x~1", 404},
+      {"/api/v1/rigs/r/calibrations/0", 400},
+      {"/api/v1/rigs/r/calibrations/7", 404},
+      {"/api/v1/rigs/r/recalibrations/1", 404},
+      {"/api/v1/rigs?page_size=many", 400},
+      {"/api/v1/rigs?page_token=zz", 400},
+      {"/api/v1/rigs?order_by=colour", 400},
+      {"/api/v1/stream?run=r/1", 400},
+      {"/api/v1/stream?rig=none", 404},
+      {"/api/v1/nothing", 404},
+      {"/api/v2/rigs", 404},
+  };
+  for (const auto& [path, status] : kMistakes) {
+    const Reply reply = Get(path);
+    EXPECT_EQ(reply.status, status) << path << " " << reply.body;
+    EXPECT_FALSE(reply.json().value("code", "").empty()) << path;
+    EXPECT_FALSE(reply.json().value("message", "").empty()) << path;
+    EXPECT_FALSE(reply.json().value("whatToDo", "").empty()) << path;
+  }
+}
+
+TEST_F(ApiTest, PagesHaveAddressesThatCanBeShared) {
+  const Reply front = Get("/");
+  EXPECT_EQ(front.status, 200);
+  EXPECT_THAT(front.head, HasSubstr("text/html"));
+  EXPECT_EQ(Get("/rigs/r/calibrations?a=1&b=2").body, front.body);
+  EXPECT_THAT(Get("/assets/app.js").head, HasSubstr("text/javascript"));
+  EXPECT_THAT(Get("/assets/app.css").head, HasSubstr("text/css"));
+  EXPECT_EQ(Get("/assets/other.js").status, 404);
+  // Nothing from elsewhere.
+  EXPECT_EQ(front.body.find("http"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace selfcal::server

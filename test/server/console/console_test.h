@@ -1,0 +1,184 @@
+// A real console on a port of the loopback over a real SQLite store, and a
+// client that sends what it is told to.
+#pragma once
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "server/console/console.h"
+#include "server/store/store_sqlite.h"
+#include "test/server/service/fake_pipeline.h"
+#include "test/server/test_segments.h"
+
+namespace selfcal::server {
+
+// A TCP connection to the loopback.
+class Wire {
+ public:
+  explicit Wire(int port) : file_(socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const timeval patience{20, 0};
+    setsockopt(file_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    connected_ =
+        connect(
+            file_, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
+  }
+  ~Wire() { close(file_); }
+  Wire(const Wire&) = delete;
+  Wire& operator=(const Wire&) = delete;
+
+  bool connected() const { return connected_; }
+  void Send(const std::string& bytes) const {
+    send(file_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  }
+  // Until the text has come, or the other end has closed.
+  std::string ReadUntil(const std::string& text) {
+    char buffer[4096];
+    while (text.empty() || read_.find(text) == read_.npos) {
+      const ssize_t n = recv(file_, buffer, sizeof(buffer), 0);
+      if (n <= 0) break;
+      read_.append(buffer, static_cast<std::size_t>(n));
+    }
+    return read_;
+  }
+
+ private:
+  int file_;
+  bool connected_ = false;
+  std::string read_;
+};
+
+struct Reply {
+  int status = 0;  // 0: none came
+  std::string head;
+  std::string body;
+
+  nlohmann::json json() const {
+    return nlohmann::json::parse(body, nullptr, false);
+  }
+  std::string code() const { return json().value("code", "none"); }
+};
+
+class ConsoleTest : public ::testing::Test {
+ protected:
+  ConsoleTest() {
+    std::string folder = std::filesystem::temp_directory_path() / "scw-XXXXXX";
+    folder_ = mkdtemp(folder.data());
+    auto store = MakeSqliteStore(folder_ / "test.db");
+    if (!store.ok()) throw std::runtime_error(store.status().ToString());
+    store_ = *std::move(store);
+    pipeline_ = std::make_unique<FakePipeline>(store_.get());
+    feed_ = std::make_unique<ChangeFeed>(store_.get(), nullptr);
+    Open(Role::kRead);
+  }
+  ~ConsoleTest() override {
+    console_.reset();
+    feed_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  void Open(Role role) {
+    console_.reset();
+    auto console = MakeConsole(store_.get(),
+                               pipeline_.get(),
+                               feed_.get(),
+                               {"127.0.0.1:0", role, {}, "test"});
+    if (!console.ok()) throw std::runtime_error(console.status().ToString());
+    console_ = *std::move(console);
+  }
+
+  int port() const {
+    return std::stoi(
+        console_->url().substr(std::string("http://127.0.0.1:").size()));
+  }
+
+  // Sends these bytes, and reads until the other end closes.
+  Reply Exchange(const std::string& bytes) const {
+    Wire wire(port());
+    wire.Send(bytes);
+    const std::string answer = wire.ReadUntil("");
+    Reply reply;
+    const auto end = answer.find("\r\n\r\n");
+    if (!answer.starts_with("HTTP/1.") || end == answer.npos) return reply;
+    reply.status = std::stoi(answer.substr(9, 3));
+    reply.head = answer.substr(0, end);
+    reply.body = answer.substr(end + 4);
+    return reply;
+  }
+
+  Reply Get(const std::string& path,
+            const std::string& host = "127.0.0.1") const {
+    return Exchange("GET " + path + " HTTP/1.1\r\nHost: " + host +
+                    "\r\nConnection: close\r\n\r\n");
+  }
+
+  Reply Post(const std::string& path,
+             const std::string& body,
+             const std::string& headers = "X-Selfcal-Console: 1\r\n") const {
+    return Exchange("POST " + path +
+                    " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" +
+                    headers + "Content-Length: " + std::to_string(body.size()) +
+                    "\r\n\r\n" + body);
+  }
+
+  Rig AddRig(const std::string& id) {
+    const Rig rig = TestRig(id);
+    const auto created = store_->CreateRig(rig);
+    EXPECT_TRUE(created.ok()) << created.status();
+    return rig;
+  }
+
+  // A second version of the rig, active.
+  void AddVersion(const Rig& rig) {
+    const MotionSegment segment = TestSegments(rig, 1)[0];
+    ASSERT_TRUE(store_->PutSegment(rig.id, segment).ok());
+    const auto size = TangentSize(rig.factory);
+    SegmentInformation information;
+    information.theta0 = rig.factory;
+    information.Lambda = Eigen::MatrixXd::Identity(size, size);
+    information.eta = Eigen::VectorXd::Zero(size);
+    information.rank = static_cast<int>(FreeComponents(rig).size());
+    for (const ParameterGroup& group : rig.groups) {
+      const int k = static_cast<int>(GroupComponents(rig, group).size());
+      information.groups.push_back({group.name, k, -9, 9, k, {}});
+    }
+    ASSERT_TRUE(store_->CommitScore(rig.id, segment.key, information).ok());
+    const auto run = store_->CreateManualRun(rig.id);
+    ASSERT_TRUE(run.ok()) << run.status();
+    ASSERT_TRUE(store_->BeginRun(rig.id, run->run).ok());
+    StoredCalibration calibration;
+    calibration.rig = rig.id;
+    calibration.state = CalibrationState::kActive;
+    calibration.theta = rig.factory;
+    calibration.covariance = 4 * Eigen::MatrixXd::Identity(size, size);
+    calibration.run = run->run;
+    calibration.base_version = 1;
+    calibration.segments = run->segments;
+    calibration.program_version = "test";
+    const auto finished = store_->FinishRun(rig.id, run->run, calibration);
+    ASSERT_TRUE(finished.ok()) << finished.status();
+  }
+
+  std::filesystem::path folder_;
+  std::unique_ptr<Store> store_;
+  std::unique_ptr<FakePipeline> pipeline_;
+  std::unique_ptr<ChangeFeed> feed_;
+  std::unique_ptr<Console> console_;
+};
+
+}  // namespace selfcal::server

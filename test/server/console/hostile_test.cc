@@ -1,0 +1,96 @@
+// What comes from the network ends no more than its own connection.
+#include <random>
+
+#include "test/server/console/console_test.h"
+
+namespace selfcal::server {
+namespace {
+
+class HostileTest : public ConsoleTest {
+ protected:
+  void ExpectServing() { EXPECT_EQ(Get("/api/v1/rigs").status, 200); }
+};
+
+TEST_F(HostileTest, RequestsThatAreNone) {
+  for (const std::string& bytes : {
+           std::string("\r\n\r\n"),
+           std::string("GET\r\n\r\n"),
+           std::string("GET / HTTP/9.9\r\n\r\n"),
+           std::string("BREW /pot HTTP/1.1\r\nHost: localhost\r\n"
+                       "Connection: close\r\n\r\n"),
+           std::string("GET /%00%ff%zz/api/v1 HTTP/1.1\r\nHost: localhost\r\n"
+                       "Connection: close\r\n\r\n"),
+           std::string("GET /api/v1/rigs/%2e%2e%2f HTTP/1.1\r\nHost: "
+                       "localhost\r\nConnection: close\r\n\r\n"),
+           std::string("GET /api/v1/rigs?filter=%ff%fe HTTP/1.1\r\nHost: "
+                       "localhost\r\nConnection: close\r\n\r\n"),
+           std::string("POST /api/v1/rigs HTTP/1.1\r\nHost: localhost\r\n"
+                       "Content-Length: -5\r\nConnection: close\r\n\r\n"),
+           std::string("POST / HTTP/1.1\r\nHost: localhost\r\n"
+                       "Transfer-Encoding: chunked\r\nX-Selfcal-Console: 1\r\n"
+                       "Connection: close\r\n\r\nzz\r\n"),
+           std::string(64, '\0') + "\r\n\r\n",
+       }) {
+    const Reply reply = Exchange(bytes);
+    EXPECT_TRUE(reply.status == 0 || reply.status == 200 || reply.status >= 400)
+        << bytes << reply.status;
+    ExpectServing();
+  }
+}
+
+TEST_F(HostileTest, NoiseIsSurvived) {
+  std::mt19937 random(7);
+  const std::string alphabet =
+      "GET POST /api/v1/rigs?&=%:~\r\n\t {}[]\"\\HTTP/1.1 Host: localhost";
+  for (int i = 0; i < 200; ++i) {
+    std::string bytes = i % 2 == 0 ? "GET /api/v1/rigs/" : "";
+    const std::size_t size = 1 + random() % 300;
+    while (bytes.size() < size) bytes += alphabet[random() % alphabet.size()];
+    Wire wire(port());
+    wire.Send(bytes);
+  }
+  ExpectServing();
+}
+
+TEST_F(HostileTest, TooMuchIsRefused) {
+  const Reply body = Post("/api/v1/rigs", std::string(100 << 10, 'x'));
+  EXPECT_EQ(body.status, 413) << body.body;
+  const Reply header = Exchange("GET / HTTP/1.1\r\nHost: localhost\r\nX: " +
+                                std::string(100 << 10, 'x') + "\r\n\r\n");
+  EXPECT_GE(header.status, 400);
+  const Reply path = Get("/" + std::string(60 << 10, 'x'));
+  EXPECT_GE(path.status, 400);
+  ExpectServing();
+}
+
+TEST_F(HostileTest, DeepJsonIsRefused) {
+  Open(Role::kAdminister);
+  AddRig("r");
+  const Reply reply =
+      Post("/api/v1/rigs/r/calibrations/1:activate", std::string(30'000, '['));
+  EXPECT_EQ(reply.status, 400) << reply.body;
+  ExpectServing();
+}
+
+TEST_F(HostileTest, ErrorsQuoteBytesThatAreNoText) {
+  const Reply reply = Get("/api/v1/rigs/r%ff/segments/%fe~1");
+  EXPECT_EQ(reply.status, 400) << reply.body;
+  EXPECT_FALSE(reply.json().is_discarded()) << reply.body;
+}
+
+TEST_F(HostileTest, ConnectionsBeyondTheLimitDoNotHoldUpTheFirst) {
+  {
+    std::vector<std::unique_ptr<Wire>> held;
+    for (int i = 0; i < 100; ++i) {
+      held.push_back(std::make_unique<Wire>(port()));
+      held.back()->Send("GET / HTTP/1.1\r\nHost:");
+    }
+    held[0]->Send(" localhost\r\nConnection: close\r\n\r\n");
+    EXPECT_NE(held[0]->ReadUntil("").find("200 OK"), std::string::npos);
+  }
+  for (int i = 0; i < 500 && Get("/").status != 200; ++i) usleep(10'000);
+  ExpectServing();
+}
+
+}  // namespace
+}  // namespace selfcal::server

@@ -1,0 +1,81 @@
+#include "proto/resource_names.h"
+#include "test/server/console/console_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class StreamTest : public ConsoleTest {
+ protected:
+  std::unique_ptr<Wire> OpenStream(const std::string& query) {
+    auto wire = std::make_unique<Wire>(port());
+    wire->Send("GET /api/v1/stream" + query +
+               " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    return wire;
+  }
+};
+
+TEST_F(StreamTest, TellsWhatThePipelineDoes) {
+  AddRig("a");
+  const auto wire = OpenStream("?rig=a");
+  EXPECT_THAT(wire->ReadUntil("everything"), HasSubstr("text/event-stream"));
+  feed_->OnVerdict("b", PipelineObserver::Verdict::kStored);
+  feed_->OnVerdict("a", PipelineObserver::Verdict::kRejected);
+  feed_->OnVerdict("a", PipelineObserver::Verdict::kStored);
+  const std::string told = wire->ReadUntil("segments");
+  EXPECT_THAT(told, HasSubstr(R"(data: {"what":"segments","rig":"rigs/a"})"));
+  EXPECT_EQ(told.find("rigs/b"), told.npos);
+  StoredRun run;
+  run.rig = "a";
+  feed_->OnRun(run);
+  EXPECT_THAT(wire->ReadUntil("runs"), HasSubstr(R"("what":"runs")"));
+}
+
+TEST_F(StreamTest, TellsWhatIsWrittenIntoTheLogOfEvents) {
+  AddRig("a");
+  const auto wire = OpenStream("");
+  wire->ReadUntil("everything");
+  AddRig("b");
+  EXPECT_THAT(wire->ReadUntil("rigs/b"), HasSubstr("event: change"));
+}
+
+TEST_F(StreamTest, RunIsToldUntilItsEnd) {
+  AddVersion(AddRig("a"));
+  const auto run = store_->CreateManualRun("a");
+  ASSERT_TRUE(run.ok()) << run.status();
+  const auto wire = OpenStream("?run=rigs/a/recalibrations/2");
+  EXPECT_THAT(wire->ReadUntil("PENDING"), HasSubstr("event: run"));
+  RunUpdate update{*run, {}};
+  update.run.state = RunState::kRunning;
+  update.progress.iteration = 3;
+  update.progress.cost = 12.5;
+  pipeline_->Tell(update);
+  EXPECT_THAT(wire->ReadUntil("\"cost\":12.5"), HasSubstr("\"iteration\":3"));
+  update.run.state = RunState::kSucceeded;
+  pipeline_->Tell(update);
+  EXPECT_THAT(wire->ReadUntil(""), HasSubstr("SUCCEEDED"));
+  for (int i = 0; i < 2000 && pipeline_->watchers() > 0; ++i) usleep(10'000);
+  EXPECT_EQ(pipeline_->watchers(), 0u);
+}
+
+TEST_F(StreamTest, StreamsAreBounded) {
+  std::vector<std::unique_ptr<Wire>> open;
+  for (int i = 0; i < 16; ++i) {
+    open.push_back(OpenStream(""));
+    EXPECT_THAT(open.back()->ReadUntil("everything"), HasSubstr("200 OK"));
+  }
+  EXPECT_EQ(Get("/api/v1/stream").status, 503);
+  EXPECT_EQ(Get("/api/v1/rigs").status, 200);
+}
+
+TEST_F(StreamTest, ConsoleEndsWithStreamsOpen) {
+  AddRig("a");
+  const auto wire = OpenStream("");
+  wire->ReadUntil("everything");
+  console_.reset();
+  EXPECT_THAT(wire->ReadUntil(""), HasSubstr("everything"));
+}
+
+}  // namespace
+}  // namespace selfcal::server
