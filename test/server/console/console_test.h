@@ -111,7 +111,10 @@ class ConsoleTest : public ::testing::Test {
   Reply Exchange(const std::string& bytes) const {
     Wire wire(port());
     wire.Send(bytes);
-    const std::string answer = wire.ReadUntil("");
+    return Parse(wire.ReadUntil(""));
+  }
+
+  static Reply Parse(const std::string& answer) {
     Reply reply;
     const auto end = answer.find("\r\n\r\n");
     if (!answer.starts_with("HTTP/1.") || end == answer.npos) return reply;

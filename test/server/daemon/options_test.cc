@@ -104,6 +104,22 @@ TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s", "--max-run-memory", "-1"}), 2);
 }
 
+TEST_F(OptionsTest, ConsoleIsOffAndOnlyReadsUnlessToldOtherwise) {
+  EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
+  EXPECT_EQ(options_.console, "off");
+  EXPECT_EQ(options_.console_role, Role::kRead);
+  EXPECT_EQ(Parse({"--state-dir",
+                   "s",
+                   "--console",
+                   "127.0.0.1:7448",
+                   "--console-role",
+                   "administer"}),
+            std::nullopt);
+  EXPECT_EQ(options_.console, "127.0.0.1:7448");
+  EXPECT_EQ(options_.console_role, Role::kAdminister);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--console-role", "all"}), 2);
+}
+
 TEST_F(OptionsTest, TestForAChangeIsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
   EXPECT_EQ(options_.store.change.inflation, std::nullopt);

@@ -52,29 +52,34 @@ export function words(name: string): string {
 const kParts: Record<string, string> = {
   gyro: 'gyroscope',
   accel: 'accelerometer',
-  scale: 'scale',
-  misalignment: 'misalignment',
   focal: 'focal length',
-  principal_point: 'principal point',
-  distortion: 'distortion',
-  position: 'position',
-  rotation: 'rotation',
+  principal: 'principal point',
+  time_offset: 'time offset',
+  q_CI: 'rotation to the IMU',
+  p_CI: 'position to the IMU',
 };
 
 // cam0.focal.x -> focal length of camera 0, x
 export function component(name: string): string {
-  const parts = name.split('.');
-  const camera = /^cam(\d+)$/.exec(parts[0]);
+  const [device, first, ...rest] = name.split('.');
   const say = (part: string) => kParts[part] ?? part.replaceAll('_', ' ');
-  if (camera) {
-    const [, what, ...rest] = parts;
-    return [`${say(what ?? '')} of camera ${camera[1]}`, ...rest].join(', ');
+  const camera = /^cam(\d+)$/.exec(device);
+  if (camera && first) {
+    return [`${say(first)} of camera ${camera[1]}`, ...rest].join(', ');
   }
-  if (parts[0] === 'imu' && parts.length >= 3) {
-    const [, sensor, what, ...rest] = parts;
-    return [`${say(what)} of the ${say(sensor)}`, ...rest].join(', ');
+  if (first === 'q_AI') {
+    return ['rotation of the accelerometer', ...rest].join(', ');
   }
-  return parts.map(say).join(' ');
+  if (device === 'imu' && rest.length > 0) {
+    const [what, ...axis] = rest;
+    return [`${say(what)} of the ${say(first)}`, ...axis].join(', ');
+  }
+  return name;
+}
+
+// With its unit, where it has one.
+export function quantity(value: number, unit: string): string {
+  return number(value, 6) + (unit === '-' ? '' : ' ' + unit);
 }
 
 // A pattern with a '*' at either end.

@@ -14,7 +14,7 @@ export interface PlotProps {
   label: string; // what it shows, in a sentence
   data: uPlot.AlignedData;
   series: uPlot.Series[];
-  x?: { label?: string; integers?: boolean };
+  x?: { label?: string; integers?: boolean; range?: [number, number] };
   y?: string;
   bands?: uPlot.Band[];
   height?: number;
@@ -52,7 +52,7 @@ export function Plot(props: PlotProps) {
     const made = new uPlot(
       {
         ...size(),
-        scales: { x: { time: false } },
+        scales: { x: { time: false, range: props.x?.range } },
         axes: [axis(props.x?.label, props.x?.integers), { ...axis(props.y), size: 64 }],
         series: [{}, ...props.series],
         bands: props.bands,

@@ -11,7 +11,7 @@ import {
   type Comparison,
   type Session,
 } from '../api';
-import { component, number, words } from '../format';
+import { component, number, quantity, words } from '../format';
 import { Badge, DataTable, Figures, Link, Loaded, Problem, Title, When } from '../parts';
 import { kColours, Plot } from '../plot';
 import { go, useAddress, useRead, withQuery } from '../state';
@@ -20,7 +20,9 @@ const kBand = 2; // sigmas either way
 
 function History(props: { of: Calibration[] }) {
   const query = useAddress().searchParams;
-  const versions = [...props.of].reverse();
+  const [factory, setFactory] = useState(props.of.length === 1);
+  // The factory's sigmas would flatten all that came after.
+  const versions = [...props.of].reverse().filter((v) => factory || v.version !== '1');
   const names = versions[0].estimates
     .filter((e) => e.sigma > 0)
     .map((e) => e.component);
@@ -33,29 +35,41 @@ function History(props: { of: Calibration[] }) {
       at.map((e) => (e ? e.value + kBand * e.sigma : null)),
       at.map((e) => (e ? e.value - kBand * e.sigma : null)),
     ] as uPlot.AlignedData;
-  }, [props.of, chosen]);
+  }, [props.of, chosen, factory]);
   const unit = versions[0].estimates.find((e) => e.component === chosen)?.unit ?? '';
   const bound = { stroke: kColours[0] + '66', width: 1, points: { show: false } };
   return (
     <>
-      <label class="bar">
-        Parameter
-        <select
-          value={chosen}
-          onChange={(event) => go(withQuery({ parameter: event.currentTarget.value }), true)}
-        >
-          {names.map((name) => (
-            <option key={name} value={name}>
-              {component(name)}
-            </option>
-          ))}
-        </select>
-      </label>
+      <div class="bar">
+        <label>
+          Parameter
+          <select
+            value={chosen}
+            onChange={(event) => go(withQuery({ parameter: event.currentTarget.value }), true)}
+          >
+            {names.map((name) => (
+              <option key={name} value={name}>
+                {component(name)}
+              </option>
+            ))}
+          </select>
+        </label>
+        {props.of.length > 1 && (
+          <label>
+            <input
+              type="checkbox"
+              checked={factory}
+              onChange={(event) => setFactory(event.currentTarget.checked)}
+            />
+            with the factory's
+          </label>
+        )}
+      </div>
       <Plot
         label={`${component(chosen)} over the versions, with two sigmas either way`}
         data={data}
         x={{ label: 'version', integers: true }}
-        y={unit}
+        y={unit === '-' ? 'value' : unit}
         series={[
           { label: component(chosen), stroke: kColours[0], width: 2, points: { show: true, size: 7 } },
           { label: 'and two sigmas', ...bound },
@@ -111,8 +125,8 @@ function Difference(props: { rig: string; of: Calibration[] }) {
                 const sigmas = Math.abs(d.difference) / d.sigma;
                 return [
                   component(d.component),
-                  number(d.valueA, 6),
-                  `${number(d.valueB, 6)} ${d.unit}`,
+                  quantity(d.valueA, d.unit),
+                  quantity(d.valueB, d.unit),
                   number(d.difference),
                   number(d.sigma),
                   <span class={sigmas > 3 ? 'strong' : ''}>{d.sigma > 0 ? number(sigmas, 2) : ''}</span>,
@@ -260,12 +274,11 @@ function Version(props: { of: Calibration }) {
       <DataTable
         caption={'Parameters of version ' + props.of.version}
         hideCaption
-        head={['Parameter', 'Value', 'Sigma', 'Unit']}
+        head={['Parameter', 'Value', 'Sigma']}
         rows={props.of.estimates.map((e) => [
           component(e.component),
-          number(e.value, 6),
+          quantity(e.value, e.unit),
           e.sigma > 0 ? number(e.sigma) : 'held',
-          e.unit,
         ])}
       />
     </section>

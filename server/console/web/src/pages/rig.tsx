@@ -9,7 +9,7 @@ import {
   type Segment,
   type Table,
 } from '../api';
-import { component, matches, number } from '../format';
+import { component, matches, number, quantity } from '../format';
 import {
   Badge,
   DataTable,
@@ -63,7 +63,7 @@ function Group(props: { name: string; of: Known[] }) {
         head={['Parameter', 'Value', 'Sigma', 'Factory tolerance', 'Still unknown']}
         rows={props.of.map((e) => [
           component(e.component),
-          `${number(e.value, 6)} ${e.unit}`,
+          quantity(e.value, e.unit),
           number(e.sigma),
           number(e.tolerance),
           <span class="meter">
@@ -172,7 +172,7 @@ function Tables(props: { of: Table[] }) {
 const kBins = 24;
 
 function Histogram(props: { segments: Segment[]; group: string }) {
-  const data = useMemo(() => {
+  const { data, low, high } = useMemo(() => {
     const scores = props.segments
       .flatMap((segment) => segment.scores)
       .filter((s) => s.group === props.group && Number.isFinite(s.entropyNats));
@@ -188,14 +188,18 @@ function Histogram(props: { segments: Segment[]; group: string }) {
       return bins;
     };
     const centres = Array.from({ length: kBins }, (_, i) => low + (i + 0.5) * width);
-    return [centres, count(false), count(true)] as uPlot.AlignedData;
+    return {
+      data: [centres, count(false), count(true)] as uPlot.AlignedData,
+      low,
+      high: low + kBins * width,
+    };
   }, [props.segments, props.group]);
   const bars = uPlot.paths.bars!({ size: [0.9, 60] });
   return (
     <Plot
       label={`How many segments have which entropy for the group ${props.group}`}
       data={data}
-      x={{ label: 'entropy [nats], lower is richer' }}
+      x={{ label: 'entropy [nats], lower is richer', range: [low, high] }}
       y="segments"
       series={[
         { label: 'all', fill: kColours[0] + '66', stroke: kColours[0], paths: bars, points: { show: false } },

@@ -1,0 +1,307 @@
+// Opens every page of the console in Chromium against a selfcald with simulated
+// data, looks that it shows what it should, and keeps a picture of each.
+//
+//   node browser_test.mjs SELFCALD FILL_STATE WEB SCREENSHOTS
+//
+// WEB has the node_modules. Exit code 77: no Chromium, skipped.
+import assert from 'node:assert/strict';
+import { execFileSync, spawn } from 'node:child_process';
+import { existsSync, mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+
+const [, , selfcald, fillState, web, screenshots] = process.argv;
+const kChromium = '/usr/bin/chromium';
+const kPatience = 120_000;
+const kSkipped = 77;
+
+if (!existsSync(kChromium)) {
+  console.log(`skipped: there is no ${kChromium} (Debian's package chromium)`);
+  process.exit(kSkipped);
+}
+const { chromium } = createRequire(join(web, 'package.json'))('playwright-core');
+
+// The daemon, once it says where its console is.
+function startDaemon(state) {
+  const daemon = spawn(
+    selfcald,
+    ['--state-dir', state, '--listen', 'unix:' + join(state, 's'),
+      '--console', '127.0.0.1:0', '--console-role', 'administer'],
+    { stdio: ['ignore', 'ignore', 'pipe'] },
+  );
+  const url = new Promise((resolve, reject) => {
+    let log = '';
+    daemon.stderr.on('data', (bytes) => {
+      log += bytes;
+      const found = /console: (http:\S+)/.exec(log);
+      if (found && log.includes('ready')) resolve(found[1]);
+    });
+    daemon.on('exit', (code) => reject(new Error(`selfcald ended (${code}):\n${log}`)));
+  });
+  const stop = async () => {
+    if (daemon.exitCode !== null) return;
+    const ended = new Promise((resolve) => daemon.on('exit', resolve));
+    daemon.kill('SIGTERM');
+    assert.equal(await ended, 0, 'selfcald did not stop in order');
+  };
+  return { url, stop };
+}
+
+class Reader {
+  constructor(page, base) {
+    this.page = page;
+    this.base = base;
+    this.problems = [];
+    this.expectProblems = false;
+    page.on('pageerror', (error) => this.problems.push(String(error)));
+    page.on('console', (message) => {
+      if (message.type() === 'error' && !this.expectProblems) {
+        this.problems.push(message.text());
+      }
+    });
+    page.on('request', (request) => {
+      const { origin, protocol } = new URL(request.url());
+      if (protocol !== 'data:' && origin !== base) {
+        this.problems.push('asks elsewhere: ' + request.url());
+      }
+    });
+  }
+
+  async open(path, heading) {
+    await this.page.goto(this.base + path);
+    await this.heading(heading);
+  }
+  async heading(text) {
+    await this.page
+      .getByRole('heading', { level: 1, name: text, exact: true })
+      .waitFor({ timeout: kPatience });
+  }
+  async sees(text) {
+    await this.page.getByText(text).first().waitFor({ timeout: kPatience });
+  }
+  // Until what stands first in each row is as it should be.
+  async rows(areRight) {
+    const end = Date.now() + kPatience;
+    for (;;) {
+      const names = await this.page.locator('tbody th').allTextContents();
+      if (areRight(names)) return;
+      assert.ok(Date.now() < end, 'rows are ' + names.join(', '));
+      await this.page.waitForTimeout(50);
+    }
+  }
+  async picture(name) {
+    // Chromium draws the page in front alone.
+    await this.page.bringToFront();
+    for (const scheme of ['light', 'dark']) {
+      await this.page.emulateMedia({ colorScheme: scheme });
+      await this.page.waitForTimeout(200);
+      await this.page.screenshot({
+        path: join(screenshots, `${name}-${scheme}.png`),
+        fullPage: true,
+      });
+    }
+    await this.page.emulateMedia({ colorScheme: 'light' });
+    await this.usable(name);
+  }
+  // What the window shows, for docs/pictures.
+  async detail(name) {
+    await this.page.bringToFront();
+    await this.page.screenshot({ path: join(screenshots, `${name}-detail.png`) });
+  }
+  // What a screen reader needs: one heading of the page, names for controls,
+  // heads for tables, and nothing that is wider than the window.
+  async usable(name) {
+    const found = await this.page.evaluate(() => {
+      const named = (e) =>
+        e.labels?.length > 0 || e.getAttribute('aria-label') || e.textContent.trim();
+      const all = (query) => [...document.querySelectorAll(query)];
+      return {
+        headings: all('h1').length,
+        nameless: all('input, select, textarea, button, meter')
+          .filter((e) => !named(e)).map((e) => e.outerHTML),
+        headless: all('table:not(.u-legend)').filter((t) => !t.querySelector('th[scope=col]')).length,
+        pictures: all('[role=img]').filter((e) => !e.getAttribute('aria-label')).length,
+        wide: document.documentElement.scrollWidth - innerWidth,
+      };
+    });
+    assert.deepEqual(
+      { ...found, wide: Math.max(0, found.wide) },
+      { headings: 1, nameless: [], headless: 0, pictures: 0, wide: 0 },
+      name,
+    );
+  }
+}
+
+const tests = {
+  async 'rigs are listed, filtered, sorted and paged by their address'(r) {
+    await r.open('/', 'Rigs');
+    assert.equal(await r.page.locator('tbody tr').count(), 50);
+    await r.picture('rigs');
+    await r.page.getByRole('link', { name: 'Next rigs' }).click();
+    await r.page.getByRole('link', { name: 'First page' }).waitFor();
+    await r.sees('phone-070');
+    await r.page.getByLabel('Name contains').fill('tab');
+    await r.rows((names) => names.length === 1 && names[0] === 'tablet');
+    assert.match(r.page.url(), /filter=tab/);
+    await r.page.getByLabel('Name contains').fill('');
+    await r.page.getByLabel('Sorted by').selectOption('last_seen desc');
+    await r.rows((names) => names[0] === 'tablet');
+    await r.page.reload();
+    await r.rows((names) => names[0] === 'tablet');
+  },
+
+  async 'a filter that nothing passes says what to do'(r) {
+    await r.open('/?filter=nothing', 'Rigs');
+    await r.sees('Take the filter away');
+    await r.picture('rigs-none');
+  },
+
+  async 'a rig tells how well it is known'(r) {
+    await r.open('/rigs/tablet', 'tablet');
+    await r.sees('What is weak');
+    await r.sees('focal length of camera 0, x');
+    await r.page.locator('.uplot canvas').first().waitFor();
+    await r.picture('rig');
+    await r.detail('rig');
+  },
+
+  async 'a rig without segments says what to do'(r) {
+    await r.open('/rigs/phone-001', 'phone-001');
+    await r.sees('No segment is scored yet');
+    await r.open('/rigs/phone-001/segments', 'Segments of phone-001');
+    await r.sees('No segment has arrived yet');
+    await r.open('/rigs/phone-001/recalibrations', 'Runs of phone-001');
+    await r.sees('No run yet');
+    await r.picture('runs-none');
+  },
+
+  async 'a segment shows its motion and why it is kept'(r) {
+    await r.open('/rigs/tablet/segments', 'Segments of tablet');
+    await r.picture('segments');
+    const kept = await (await fetch(r.base + '/api/v1/rigs/tablet/tables')).json();
+    const { segment } = kept.tables[0].entries[0];
+    await r.page.goto(`${r.base}/${segment}`);
+    await r.sees('kept: place 1 of');
+    await r.page.locator('.uplot canvas').nth(1).waitFor();
+    const scrubber = r.page.getByLabel(/^Time:/);
+    const before = await r.page.locator('circle.now').getAttribute('cx');
+    await scrubber.focus();
+    await r.page.keyboard.press('End');
+    await r.sees('keyframe 20 of 20');
+    assert.notEqual(await r.page.locator('circle.now').getAttribute('cx'), before);
+    await r.picture('segment');
+    await r.page.getByRole('heading', { name: 'Motion' }).scrollIntoViewIfNeeded();
+    await r.page.mouse.wheel(0, 300);
+    await r.page.waitForTimeout(300);
+    await r.detail('segment');
+  },
+
+  async 'a segment whose data is gone says so'(r) {
+    const all = await (
+      await fetch(r.base + '/api/v1/rigs/tablet/segments?page_size=100')).json();
+    const gone = all.segments.find((s) => !s.hasData);
+    assert.ok(gone, 'every segment has its data');
+    await r.page.goto(`${r.base}/${gone.name}`);
+    await r.sees('Its data was dropped');
+    await r.sees('not kept');
+    await r.picture('segment-dropped');
+  },
+
+  async 'the history compares versions and shows their origin'(r) {
+    await r.open('/rigs/tablet/calibrations', 'Calibrations of tablet');
+    await r.page.locator('.uplot canvas').waitFor();
+    await r.sees('Difference of two versions');
+    await r.page.getByLabel('From version').selectOption('1');
+    await r.sees('Version 1');
+    assert.match(r.page.url(), /a=1/);
+    await r.picture('calibrations');
+    await r.open('/rigs/tablet/calibrations/2', 'Calibrations of tablet');
+    await r.sees('Validation');
+    await r.picture('calibration');
+  },
+
+  async 'runs are listed and explained'(r) {
+    await r.open('/rigs/tablet/recalibrations', 'Runs of tablet');
+    await r.sees('tables full');
+    await r.picture('runs');
+    await r.open('/rigs/tablet/recalibrations/1', 'Run 1 of tablet');
+    await r.sees('What the solver says');
+    await r.picture('run');
+  },
+
+  async 'mistakes in an address are explained'(r) {
+    r.expectProblems = true;
+    await r.open('/rigs/none', 'none');
+    await r.sees('rig none does not exist');
+    await r.picture('rig-unknown');
+    await r.open('/nothing', 'There is no such page');
+    await r.open('/rigs/tablet/segments/none~1', 'Segment none~1');
+    await r.page.getByRole('alert').first().waitFor();
+    r.expectProblems = false;
+  },
+
+  async 'a version is activated by keyboard, and other pages see it'(r, other) {
+    await other.open('/rigs/tablet/events', 'Events of tablet');
+    await other.sees('live');
+    await r.open('/rigs/tablet/calibrations', 'Calibrations of tablet');
+    const button = r.page.getByRole('button', { name: /Roll back|Activate/ }).last();
+    await button.focus();
+    await r.page.keyboard.press('Enter');
+    await r.page.getByRole('dialog').waitFor();
+    await r.picture('activate');
+    await r.page.getByLabel('Reason').fill('the browser test asked for it');
+    await r.page.keyboard.press('Tab');
+    await r.page.keyboard.press('Tab');
+    await r.page.keyboard.press('Enter');
+    await r.page.getByRole('dialog').waitFor({ state: 'detached', timeout: kPatience });
+    await other.sees('the browser test asked for it');
+    await other.picture('events');
+  },
+
+  async 'events of all rigs are listed'(r) {
+    await r.open('/events', 'Events');
+    await r.sees('rig created');
+    await r.picture('all-events');
+  },
+};
+
+const folder = mkdtempSync(join(tmpdir(), 'selfcal-browser-'));
+mkdirSync(screenshots, { recursive: true });
+let daemon;
+let browser;
+try {
+  execFileSync(fillState, [join(folder, 'state')], { stdio: 'inherit' });
+  daemon = startDaemon(join(folder, 'state'));
+  const base = await daemon.url;
+  browser = await chromium.launchPersistentContext(join(folder, 'profile'), {
+    executablePath: kChromium,
+    headless: true,
+    viewport: { width: 1200, height: 800 },
+    args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+      '--disable-background-networking', '--disable-component-update',
+      '--disable-sync'],
+  });
+  browser.setDefaultTimeout(kPatience);
+  const reader = new Reader(await browser.newPage(), base);
+  const other = new Reader(await browser.newPage(), base);
+  for (const [name, run] of Object.entries(tests)) {
+    console.log(name);
+    await run(reader, other);
+    assert.deepEqual([...reader.problems, ...other.problems], [], name);
+  }
+  console.log('a daemon that has stopped');
+  reader.expectProblems = other.expectProblems = true;
+  await reader.open('/rigs/tablet', 'tablet');
+  await reader.sees('What is weak');
+  await daemon.stop();
+  await reader.page.getByText('not live').waitFor();
+  await reader.page.getByRole('link', { name: 'Segments', exact: true }).click();
+  await reader.sees('The daemon does not answer');
+  await reader.picture('stopped');
+  console.log(`every page is as it should be; pictures are in ${screenshots}`);
+} finally {
+  await browser?.close();
+  await daemon?.stop();
+  rmSync(folder, { recursive: true, force: true });
+}

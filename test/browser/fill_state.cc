@@ -1,0 +1,85 @@
+// Fills a state folder for the test of the pages: a simulated device with its
+// segments, runs and versions, and many rigs that have sent nothing.
+//
+//   fill_state FOLDER
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "core/simulation/simulate.h"
+#include "server/pipeline/pipeline.h"
+#include "server/store/status_macros.h"
+#include "server/store/store_sqlite.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr int kIdleRigs = 70;
+constexpr double kSeconds = 60;
+constexpr std::uint64_t kSeed = 1;
+
+absl::Status Settled(Store* store) {
+  for (;;) {
+    SELFCAL_ASSIGN_OR_RETURN(const auto unscored, store->ListUnscored(1));
+    SELFCAL_ASSIGN_OR_RETURN(const auto runs, store->ListUnfinishedRuns());
+    if (unscored.empty() && runs.empty()) return absl::OkStatus();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+// Scored and calibrated on as the daemon does it.
+absl::Status AddDevice(Store* store, const std::string& id) {
+  Rig rig = HandheldRig(id);
+  rig.table_size = 4;
+  const Calibration truth = rig.factory;
+  rig.factory = PerturbCalibration(truth, {}, kSeed);
+  SELFCAL_RETURN_IF_ERROR(store->CreateRig(rig).status());
+  SimulationOptions options;
+  options.keyframes_per_segment = 20;
+  options.landmarks_in_view = 60;
+  const auto session = Simulate(
+      rig, truth, rig.factory, *MakeMixed(kSeconds, kSeed), "walk", options);
+  PipelineOptions pipeline_options;
+  pipeline_options.program_version = "test";
+  const auto pipeline = MakePipeline(store, pipeline_options);
+  SELFCAL_RETURN_IF_ERROR(pipeline->Start());
+  for (const MotionSegment& segment : session.segments) {
+    SELFCAL_RETURN_IF_ERROR(
+        pipeline->Submit(id, segment, [] { return false; }).status());
+  }
+  SELFCAL_RETURN_IF_ERROR(Settled(store));
+  SELFCAL_RETURN_IF_ERROR(pipeline->StartRecalibration(id).status());
+  SELFCAL_RETURN_IF_ERROR(Settled(store));
+  pipeline->Stop();
+  return absl::OkStatus();
+}
+
+absl::Status Fill(const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  SELFCAL_ASSIGN_OR_RETURN(const auto store,
+                           MakeSqliteStore(folder / "selfcal.db"));
+  for (int i = 1; i <= kIdleRigs; ++i) {
+    SELFCAL_RETURN_IF_ERROR(
+        store->CreateRig(HandheldRig(fmt::format("phone-{:03}", i))).status());
+  }
+  return AddDevice(store.get(), "tablet");
+}
+
+}  // namespace
+}  // namespace selfcal::server
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: fill_state FOLDER\n");
+    return EXIT_FAILURE;
+  }
+  const absl::Status filled = selfcal::server::Fill(argv[1]);
+  if (filled.ok()) return EXIT_SUCCESS;
+  std::fprintf(stderr, "%s\n", filled.ToString().c_str());
+  return EXIT_FAILURE;
+}
