@@ -1,0 +1,74 @@
+// Which motion would teach the most now: what is known of theta, and what a
+// segment of each primitive motion is predicted to add to it.
+//
+// With Lambda the information that is known (prior included) and Lambda_i that
+// of a motion, the gain is 1/2 ln det((Lambda + Lambda_i) / Lambda) [nat] over
+// the free components; that of a group the same of its marginal covariance.
+// Linear algebra of the size of theta: fast enough after every segment.
+//
+// Pure, deterministic, any thread.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/coach/predict.h"
+#include "core/information/fusion.h"
+#include "core/information/segment_information.h"
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+inline constexpr int kWeakestDirections = 3;
+
+struct GroupGain {
+  std::string group;
+  double gain_nats = 0;
+};
+
+struct SigmaChange {
+  std::string component;
+  std::string unit;
+  double sigma_now = 0;  // in the unit
+  double sigma_after = 0;
+};
+
+struct Advice {
+  std::string_view motion;  // Primitive::name
+  std::string_view instruction;
+  double gain_nats = 0;             // of all free components together
+  std::vector<GroupGain> groups;    // in the order of rig.groups
+  std::vector<SigmaChange> sigmas;  // of the free components, in their order
+};
+
+// A direction of theta that is known worst, as a unit vector in units of the
+// reference sigmas.
+struct WeakDirection {
+  std::string words;
+  std::vector<UnobservedDirection::Part> parts;  // largest first
+  double sigma = 0;  // in reference sigmas: 1 after one usual segment
+};
+
+struct Coaching {
+  std::vector<Advice> advice;          // of every motion, by gain
+  std::vector<WeakDirection> weakest;  // the worst kWeakestDirections
+};
+
+// `known` is D x D, of theta's tangent at predictions.theta: positive definite
+// on the free components of the rig; what it says of others is not looked at.
+Coaching Advise(const Rig& rig,
+                const Predictions& predictions,
+                const Eigen::MatrixXd& known);
+
+// What a calibration says of theta (D x D covariance at it, the prior in it),
+// and segments that it did not come from, moved to it.
+Eigen::MatrixXd KnownInformation(
+    const Rig& rig,
+    const Calibration& theta,
+    const Eigen::MatrixXd& covariance,
+    std::span<const SegmentInformation> since = {});
+
+}  // namespace selfcal

@@ -1,0 +1,20 @@
+// Components and directions of theta in words for whoever holds the device.
+// Pure.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/information/segment_information.h"
+
+namespace selfcal {
+
+// "the accelerometer's scale on z" for "imu.accel.scale.z"; a name that is not
+// known as it is.
+std::string ComponentInWords(std::string_view component);
+
+// "the accelerometer's scale on z", or "a mix of ... and ..." of the largest
+// parts, at most three. A direction has at least one part.
+std::string DirectionInWords(const UnobservedDirection& direction);
+
+}  // namespace selfcal
