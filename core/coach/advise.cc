@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/coach/words.h"
@@ -23,8 +24,13 @@ double HalfLogDet(const Eigen::MatrixXd& matrix) {
 }
 
 Eigen::MatrixXd Inverse(const Eigen::MatrixXd& matrix) {
-  const Eigen::MatrixXd inverse = Eigen::LLT<Eigen::MatrixXd>(matrix).solve(
-      Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
+  const Eigen::LLT<Eigen::MatrixXd> llt(matrix);
+  if (llt.info() != Eigen::Success) {
+    return Eigen::MatrixXd::Constant(
+        matrix.rows(), matrix.cols(), std::numeric_limits<double>::quiet_NaN());
+  }
+  const Eigen::MatrixXd inverse =
+      llt.solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
   return 0.5 * (inverse + inverse.transpose());
 }
 

@@ -64,7 +64,8 @@ Coaching Advise(const Rig& rig,
                 const Eigen::MatrixXd& known);
 
 // What a calibration says of theta (D x D covariance at it, the prior in it),
-// and segments that it did not come from, moved to it.
+// and segments that it did not come from, moved to it. Not finite where the
+// covariance is not positive definite on the free components.
 Eigen::MatrixXd KnownInformation(
     const Rig& rig,
     const Calibration& theta,

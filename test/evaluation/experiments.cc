@@ -8,6 +8,7 @@ void RunDatasets(Context* context);
 void RunGainThreshold(Context* context);
 void RunBatchMatch(Context* context);
 void RunChange(Context* context);
+void RunCoach(Context* context);
 void RunEntropy(Context* context);
 void RunGroups(Context* context);
 void RunRunTime(Context* context);
@@ -62,6 +63,9 @@ const std::vector<Experiment>& Experiments() {
       {"degenerate",
        "motions that do not show all of theta: is what they do not show held",
        RunDegenerate},
+      {"coach",
+       "recorded time to a target sigma: following the coach, or carried about",
+       RunCoach},
   };
   return all;
 }

@@ -191,5 +191,19 @@ TEST(KnownInformation, IsTheInverseOfACovarianceAndWhatCameSince) {
   EXPECT_LT((since - known - 2 * segment.Lambda).norm(), 1e-9 * since.norm());
 }
 
+TEST(KnownInformation, IsNotFiniteForWhatIsNoCovariance) {
+  const Rig rig = HandheldRig("r");
+  const auto size = TangentSize(rig.factory);
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
+  Eigen::MatrixXd indefinite = identity;
+  indefinite(0, 1) = indefinite(1, 0) = 2;
+  Eigen::MatrixXd flat = identity;
+  flat(3, 3) = 0;
+  for (const Eigen::MatrixXd& wrong : {indefinite, flat}) {
+    EXPECT_FALSE(KnownInformation(rig, rig.factory, wrong).allFinite());
+  }
+  EXPECT_TRUE(KnownInformation(rig, rig.factory, identity).allFinite());
+}
+
 }  // namespace
 }  // namespace selfcal
