@@ -29,6 +29,7 @@ constexpr AccessRule kRules[] = {
      Role::kAdminister,
      "name"},
     {"selfcal.v1.CalibrationService.CompareCalibrations", Role::kRead, "a,b"},
+    {"selfcal.v1.CalibrationService.AdviseMotion", Role::kRead, "parent"},
     {"selfcal.v1.RecalibrationService.StartRecalibration",
      Role::kAdminister,
      "parent"},

@@ -66,6 +66,7 @@ class PipelineImpl : public Pipeline {
                const Estimators& estimators)
       : store_(store),
         options_(options),
+        coach_(store),
         run_watchers_(ObserveRuns(options.observer)),
         recalibrator_(
             store, options, estimators, &calibration_watchers_, &run_watchers_),
@@ -150,6 +151,10 @@ class PipelineImpl : public Pipeline {
     return active;
   }
 
+  absl::StatusOr<RigCoaching> AdviseMotion(const std::string& rig) override {
+    return coach_.Advise(rig);
+  }
+
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const StoredCalibration&)> callback) override {
@@ -228,6 +233,7 @@ class PipelineImpl : public Pipeline {
 
   Store* const store_;
   const PipelineOptions options_;
+  RigCoach coach_;
   Watchers<StoredCalibration> calibration_watchers_;
   Watchers<RunUpdate> run_watchers_;
   Recalibrator recalibrator_;

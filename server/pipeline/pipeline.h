@@ -20,6 +20,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/information/segment_information.h"
 #include "core/model/segment.h"
+#include "server/pipeline/coaching.h"
 #include "server/pipeline/observer.h"
 #include "server/store/clock.h"
 #include "server/store/store.h"
@@ -144,6 +145,11 @@ class Pipeline {
       std::int64_t version,
       const std::string& caller,
       const std::string& reason) = 0;
+
+  // Which motion would teach the rig the most now: RigCoach::Advise
+  // (coaching.h). The first call for a version takes as long as simulating a
+  // segment of every motion.
+  virtual absl::StatusOr<RigCoaching> AdviseMotion(const std::string& rig) = 0;
 
   // The callback gets the active calibration of the rig at once (on the calling
   // thread), then each that becomes active, in the order in which they did:

@@ -5,6 +5,7 @@
 #include "server/encode/reason.h"
 #include "server/encode/versions.h"
 #include "server/service/caller.h"
+#include "server/service/encode_coaching.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
 #include "server/service/services.h"
@@ -14,6 +15,7 @@ namespace selfcal::server {
 namespace {
 
 constexpr char kType[] = "selfcal.v1.Calibration";
+constexpr int kDefaultAdvice = 3;
 
 class CalibrationService final : public v1::CalibrationService::Service {
  public:
@@ -70,6 +72,27 @@ class CalibrationService final : public v1::CalibrationService::Service {
         return ToGrpc(compared.status(), {kType, request->a(), "a"});
       }
       *response = *compared;
+      return grpc::Status::OK;
+    });
+  }
+
+  grpc::Status AdviseMotion(grpc::ServerContext* call,
+                            const v1::AdviseMotionRequest* request,
+                            v1::AdviseMotionResponse* response) override {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
+      const auto rig = ParseRigName(request->parent());
+      if (!rig) return BadName("parent", "rigs/{rig}");
+      if (request->max_advice() < 0) {
+        return InvalidFields({{"max_advice", "must be 0 or more"}});
+      }
+      const auto coaching = context_.pipeline->AdviseMotion(*rig);
+      if (!coaching.ok()) {
+        return ToGrpc(coaching.status(),
+                      {"selfcal.v1.Rig", request->parent(), "parent"});
+      }
+      *response = Encode(
+          *coaching,
+          request->max_advice() > 0 ? request->max_advice() : kDefaultAdvice);
       return grpc::Status::OK;
     });
   }

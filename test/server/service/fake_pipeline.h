@@ -15,7 +15,7 @@ namespace selfcal::server {
 
 class FakePipeline final : public Pipeline {
  public:
-  explicit FakePipeline(Store* store) : store_(store) {}
+  explicit FakePipeline(Store* store) : store_(store), coach_(store) {}
 
   absl::Status Start() override { return absl::OkStatus(); }
   void Stop() override {}
@@ -74,6 +74,10 @@ class FakePipeline final : public Pipeline {
     auto active = store_->ActivateCalibration(rig, version, caller, reason);
     if (active.ok()) Publish(*active);
     return active;
+  }
+
+  absl::StatusOr<RigCoaching> AdviseMotion(const std::string& rig) override {
+    return coach_.Advise(rig);
   }
 
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
@@ -144,6 +148,7 @@ class FakePipeline final : public Pipeline {
   }
 
   Store* store_;
+  RigCoach coach_;
   std::mutex mutex_;
   Watchers<StoredCalibration> calibration_watchers_;
   Watchers<RunUpdate> run_watchers_;

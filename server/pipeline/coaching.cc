@@ -1,0 +1,123 @@
+#include "server/pipeline/coaching.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/selection/tables.h"
+#include "server/pipeline/after_change.h"
+#include "server/store/records.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+std::size_t BytesOf(const Predictions& predictions) {
+  std::size_t bytes = 0;
+  for (const MotionPrediction& motion : predictions.motions) {
+    bytes += sizeof(double) * static_cast<std::size_t>(motion.Lambda.size());
+  }
+  return bytes;
+}
+
+// They are few, and count from 1.
+absl::StatusOr<std::optional<StoredChange>> NewestChange(
+    Store* store, const std::string& rig) {
+  std::optional<StoredChange> newest;
+  for (std::int64_t number = 1;; ++number) {
+    auto change = store->GetChange(rig, number);
+    if (absl::IsNotFound(change.status())) return newest;
+    SELFCAL_RETURN_IF_ERROR(change.status());
+    newest = *std::move(change);
+  }
+}
+
+// Of the segments in the tables that the version did not come from; what is
+// damaged is left out.
+absl::StatusOr<std::vector<SegmentInformation>> InformationSince(
+    Store* store, const StoredCalibration& active) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
+                           store->GetTables(active.rig));
+  std::vector<SegmentInformation> since;
+  for (const TableEntry& entry : UnionOfTables(tables)) {
+    const auto& used = active.segments;
+    if (std::find(used.begin(), used.end(), entry.key) != used.end()) continue;
+    auto segment = store->GetSegment(active.rig, entry.key);
+    if (absl::IsDataLoss(segment.status())) continue;
+    SELFCAL_RETURN_IF_ERROR(segment.status());
+    if (segment->information) {
+      since.push_back(*std::move(segment->information));
+    }
+  }
+  return since;
+}
+
+}  // namespace
+
+absl::StatusOr<RigCoaching> RigCoach::Advise(const std::string& rig_name) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(rig_name));
+  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration active,
+                           store_->GetActiveCalibration(rig_name));
+  SELFCAL_ASSIGN_OR_RETURN(const std::optional<StoredChange> change,
+                           NewestChange(store_, rig_name));
+  if (change && change->base_version == active.version) {
+    active.covariance = CovarianceAfter(rig.rig, *change, active.covariance);
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
+                           InformationSince(store_, active));
+  const Eigen::MatrixXd known =
+      KnownInformation(rig.rig, active.theta, active.covariance, since);
+  if (!known.allFinite()) {
+    return absl::FailedPreconditionError(
+        "the covariance of the active version is not positive definite; "
+        "recalibrate, or make another version active");
+  }
+  const Kept predictions = PredictionsFor(rig, active);
+  return RigCoaching{selfcal::Advise(rig.rig, *predictions, known),
+                     active.version,
+                     static_cast<int>(since.size()),
+                     predictions->segment_s};
+}
+
+RigCoach::Kept RigCoach::PredictionsFor(const StoredRig& rig,
+                                        const StoredCalibration& active) {
+  const std::string key =
+      SerializeRig(rig) + "/" + std::to_string(active.version);
+  if (Kept kept = Find(key)) return kept;
+  const std::lock_guard lock(computing_);
+  if (Kept kept = Find(key)) return kept;
+  const auto predictions =
+      std::make_shared<const Predictions>(Predict(rig.rig, active.theta));
+  Keep({key, predictions});
+  return predictions;
+}
+
+RigCoach::Kept RigCoach::Find(const std::string& key) {
+  const std::lock_guard lock(mutex_);
+  const auto found =
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) {
+        return entry.key == key;
+      });
+  if (found == entries_.end()) return nullptr;
+  entries_.splice(entries_.begin(), entries_, found);
+  return found->predictions;
+}
+
+void RigCoach::Keep(Entry entry) {
+  const std::lock_guard lock(mutex_);
+  ++computed_;
+  bytes_ += BytesOf(*entry.predictions);
+  entries_.push_front(std::move(entry));
+  while (bytes_ > max_bytes_) {
+    bytes_ -= BytesOf(*entries_.back().predictions);
+    entries_.pop_back();
+  }
+}
+
+int RigCoach::computed() const {
+  const std::lock_guard lock(mutex_);
+  return computed_;
+}
+
+}  // namespace selfcal::server
