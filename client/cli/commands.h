@@ -19,6 +19,7 @@ void AddRecalibrateCommand(CLI::App* app, Context* context);
 void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
 void AddReportCommand(CLI::App* app, Context* context);
+void AddCoachCommand(CLI::App* app, Context* context);
 // To `calibrations`.
 void AddCalibrationExport(CLI::App* calibrations, Context* context);
 void AddEventsCommand(CLI::App* app, Context* context);

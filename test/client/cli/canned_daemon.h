@@ -47,6 +47,8 @@ struct CannedDaemon final : v1::RigService::Service,
   std::vector<v1::Recalibration> run;         // as it goes on
   grpc::Status refusal;                       // of CreateRig
   v1::CompareCalibrationsResponse differences;
+  std::vector<v1::AdviseMotionResponse> advice;
+  int max_advice = -1;  // that was asked for
   std::string last_name;
   std::string last_reason;
   std::vector<v1::MotionSegment> data;  // of the segments, while it is there
@@ -219,6 +221,17 @@ struct CannedDaemon final : v1::RigService::Service,
       v1::CompareCalibrationsResponse* response) override {
     last_name = request->a() + " " + request->b();
     *response = differences;
+    return grpc::Status::OK;
+  }
+  // The answers in turn; the last stays.
+  grpc::Status AdviseMotion(grpc::ServerContext*,
+                            const v1::AdviseMotionRequest* request,
+                            v1::AdviseMotionResponse* response) override {
+    last_name = request->parent();
+    max_advice = request->max_advice();
+    if (advice.empty()) return {grpc::StatusCode::NOT_FOUND, "no such rig"};
+    *response = advice.front();
+    if (advice.size() > 1) advice.erase(advice.begin());
     return grpc::Status::OK;
   }
   grpc::Status WatchCalibration(

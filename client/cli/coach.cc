@@ -1,0 +1,189 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+#include <tuple>
+#include <vector>
+
+#include "client/cli/commands.h"
+#include "client/cli/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Service = v1::CalibrationService::StubInterface;
+using Response = v1::AdviseMotionResponse;
+
+// Scores come a few seconds apart.
+constexpr std::chrono::milliseconds kPoll(1000);
+
+std::string GainText(double gain_nats) {
+  return fmt::format("{:.2f}", gain_nats);
+}
+
+// "imu 3.10, camera 0.42".
+std::string GroupsText(const Response::Advice& advice) {
+  std::vector<std::string> parts;
+  for (const auto& gain : advice.group_gains()) {
+    parts.push_back(
+        fmt::format("{} {}", gain.group(), GainText(gain.gain_nats())));
+  }
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+// Of the component that the motion sharpens most: "cam0.p_CI.z 0.013 -> 0.0041
+// m".
+std::string SharpestText(const Response::Advice& advice) {
+  const auto& changes = advice.sigma_changes();
+  const auto sharpest = std::min_element(
+      changes.begin(), changes.end(), [](const auto& a, const auto& b) {
+        return a.sigma_after() * b.sigma_now() <
+               b.sigma_after() * a.sigma_now();
+      });
+  if (sharpest == changes.end()) return "";
+  const std::string unit =
+      sharpest->unit() == "-" ? "" : " " + sharpest->unit();
+  return fmt::format("{} {} -> {}{}",
+                     sharpest->component(),
+                     SigmaText(sharpest->sigma_now()),
+                     SigmaText(sharpest->sigma_after()),
+                     unit);
+}
+
+std::string KnownText(const Response& response) {
+  return fmt::format("version {} and {} segments since",
+                     response.calibration_version(),
+                     response.segments_since());
+}
+
+Table AdviceTable(const Response& response) {
+  Table table({{"#", true},
+               {"motion"},
+               {"gain [nat]", true},
+               {"by group"},
+               {"sharpens most"},
+               {"what to do"}});
+  int rank = 0;
+  for (const auto& advice : response.advice()) {
+    table.Add({fmt::format("{}", ++rank),
+               advice.motion(),
+               GainText(advice.gain_nats()),
+               GroupsText(advice),
+               SharpestText(advice),
+               advice.instruction()});
+  }
+  return table;
+}
+
+void Print(const Context& context, const Response& response) {
+  if (context.json) {
+    context.PrintJson(response);
+    return;
+  }
+  if (context.terminal) {
+    PrintText(fmt::format("known: {}; known worst, in reference sigmas:\n",
+                          KnownText(response)));
+    for (const auto& weak : response.weakest()) {
+      PrintText(fmt::format(
+          "  {:8.3g}  {}\n", weak.sigma_by_reference(), weak.words()));
+    }
+    PrintText(fmt::format("a segment of {:g} s would bring:\n",
+                          response.segment_seconds()));
+  }
+  context.Print(AdviceTable(response));
+}
+
+// One line: what to do now, and what that is worth.
+void PrintLine(const Context& context, const Response& response) {
+  if (context.json) {
+    context.PrintJson(response, true);
+    return;
+  }
+  if (response.advice().empty()) return;
+  const auto& best = response.advice(0);
+  PrintText(fmt::format("{}: {} (+{} nat; {})\n",
+                        best.motion(),
+                        best.instruction(),
+                        GainText(best.gain_nats()),
+                        KnownText(response)));
+}
+
+grpc::Status Ask(Context* context,
+                 const std::string& rig,
+                 int top,
+                 Response* response) {
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  v1::AdviseMotionRequest request;
+  request.set_parent(RigName(rig));
+  request.set_max_advice(top);
+  return Call<Service>(stub.get(), &Service::AdviseMotion, request, response);
+}
+
+int Coach(Context* context, const std::string& rig, int top) {
+  Response response;
+  const auto status = Ask(context, rig, top, &response);
+  if (!status.ok()) return Fail(*context, status);
+  Print(*context, response);
+  return kDone;
+}
+
+// What a line is told for: the motion, or what it follows from, is another one.
+using Told = std::tuple<std::string, std::int64_t, int>;
+Told Subject(const Response& response) {
+  return {response.advice().empty() ? "" : response.advice(0).motion(),
+          response.calibration_version(),
+          response.segments_since()};
+}
+
+// Until `count` lines are printed, or, if it is 0, until the daemon ends.
+int Watch(Context* context,
+          const std::string& rig,
+          int top,
+          std::int64_t count) {
+  Told told;
+  for (std::int64_t lines = 0;;) {
+    Response response;
+    const auto status = Ask(context, rig, top, &response);
+    if (!status.ok()) return Fail(*context, status);
+    if (Subject(response) != told) {
+      told = Subject(response);
+      PrintLine(*context, response);
+      if (++lines == count) return kDone;
+    }
+    std::this_thread::sleep_for(kPoll);
+  }
+}
+
+}  // namespace
+
+void AddCoachCommand(CLI::App* app, Context* context) {
+  CLI::App* coach = app->add_subcommand(
+      "coach", "Say which motion would teach a rig the most now");
+  const auto rig = std::make_shared<std::string>();
+  const auto top = std::make_shared<int>(3);
+  const auto watch = std::make_shared<bool>(false);
+  const auto count = std::make_shared<std::int64_t>(0);
+  coach->add_option("RIG", *rig)->required();
+  coach->add_option("--top", *top, "Print this many motions")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  CLI::Option* watching = coach->add_flag(
+      "--watch", *watch, "Print a line now, and each time the advice changes");
+  coach->add_option("--count", *count, "With --watch: end after this many")
+      ->needs(watching)
+      ->check(CLI::PositiveNumber);
+  coach->callback([context, rig, top, watch, count] {
+    context->command = [context, rig, top, watch, count] {
+      return *watch ? Watch(context, *rig, *top, *count)
+                    : Coach(context, *rig, *top);
+    };
+  });
+}
+
+}  // namespace selfcal::client
