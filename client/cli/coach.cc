@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "client/cli/commands.h"
-#include "client/cli/text.h"
+#include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 
