@@ -31,8 +31,9 @@ absl::Status Invalid(const std::string& source,
 
 absl::StatusOr<Rig> ReadRigFile(const std::string& file) {
   RigInput input;
-  input.file = file;
-  const auto message = ReadRig(input);
+  input.files = {file};
+  std::vector<Loss> losses;  // of other tools' files: this is our own
+  const auto message = ReadRig(input, &losses);
   if (!message.ok()) return message.status();
   Rig rig;
   auto violations = FromProto(*message, "", &rig);
