@@ -21,9 +21,9 @@ std::string ReadAll(const fs::path& path) {
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
-class ExportCommand : public Commands {
+class CalibrationExport : public Commands {
  protected:
-  ExportCommand() {
+  CalibrationExport() {
     fs::remove_all(folder_);
     Rig rig = ARig("device");
     rig.factory.imu.s_g = {1.01, 0.99, 1.02};
@@ -34,7 +34,7 @@ class ExportCommand : public Commands {
     *version.mutable_parameters() = ToProto(rig.factory);
     daemon_.calibrations.push_back(version);
   }
-  ~ExportCommand() override { fs::remove_all(folder_); }
+  ~CalibrationExport() override { fs::remove_all(folder_); }
 
   std::vector<std::string> Line(const std::string& format) const {
     return {"calibrations",
@@ -52,7 +52,7 @@ class ExportCommand : public Commands {
   const fs::path folder_ = fs::path(testing::TempDir()) / "selfcal-cli-export";
 };
 
-TEST_F(ExportCommand, WritesTheVersionAndNamesWhatIsLost) {
+TEST_F(CalibrationExport, WritesTheVersionAndNamesWhatIsLost) {
   const Outcome outcome = Selfcal(Line("maplab"));
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/2");
@@ -62,7 +62,7 @@ TEST_F(ExportCommand, WritesTheVersionAndNamesWhatIsLost) {
   EXPECT_THAT(outcome.err, HasSubstr("note: sigmas: "));
 }
 
-TEST_F(ExportCommand, SeveralFilesOrOneByItsName) {
+TEST_F(CalibrationExport, SeveralFilesOrOneByItsName) {
   EXPECT_EQ(Selfcal(Line("kalibr")).out,
             (folder_ / "camchain-imucam.yaml").string() + "\n" +
                 (folder_ / "imu.yaml").string() + "\n");
@@ -80,7 +80,7 @@ TEST_F(ExportCommand, SeveralFilesOrOneByItsName) {
   EXPECT_TRUE(fs::exists(file));
 }
 
-TEST_F(ExportCommand, StrictWritesNothingThatPredictsOtherwise) {
+TEST_F(CalibrationExport, StrictWritesNothingThatPredictsOtherwise) {
   std::vector<std::string> line = Line("maplab");
   line.push_back("--strict");
   const Outcome outcome = Selfcal(line);
@@ -94,7 +94,7 @@ TEST_F(ExportCommand, StrictWritesNothingThatPredictsOtherwise) {
   EXPECT_EQ(Selfcal(line).code, 0);
 }
 
-TEST_F(ExportCommand, OverwritesOnlyWhenTold) {
+TEST_F(CalibrationExport, OverwritesOnlyWhenTold) {
   std::vector<std::string> line = Line("kalibr");
   EXPECT_EQ(Selfcal(line).code, 0);
   fs::remove(folder_ / "camchain-imucam.yaml");
@@ -106,7 +106,7 @@ TEST_F(ExportCommand, OverwritesOnlyWhenTold) {
   EXPECT_EQ(Selfcal(line).code, 0);
 }
 
-TEST_F(ExportCommand, JsonHasFilesAndLosses) {
+TEST_F(CalibrationExport, JsonHasFilesAndLosses) {
   std::vector<std::string> line = Line("maplab");
   line.push_back("--json");
   const auto message = Parse<google::protobuf::Struct>(Selfcal(line).out);
@@ -121,7 +121,7 @@ TEST_F(ExportCommand, JsonHasFilesAndLosses) {
   EXPECT_TRUE(loss.at("changes_prediction").bool_value());
 }
 
-TEST_F(ExportCommand, AModelThatTheToolLacksIsAnError) {
+TEST_F(CalibrationExport, AModelThatTheToolLacksIsAnError) {
   const Outcome outcome = Selfcal(Line("openvins"));
   EXPECT_EQ(outcome.code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("distortion model fov"));
@@ -131,7 +131,7 @@ TEST_F(ExportCommand, AModelThatTheToolLacksIsAnError) {
   EXPECT_EQ(Selfcal(Line("kalibr")).code, 1);
 }
 
-TEST_F(ExportCommand, ARigIsCreatedFromWhatWasWritten) {
+TEST_F(CalibrationExport, ARigIsCreatedFromWhatWasWritten) {
   ASSERT_EQ(Selfcal(Line("kalibr")).code, 0);
   const std::string chain = (folder_ / "camchain-imucam.yaml").string();
   const std::string imu = (folder_ / "imu.yaml").string();
@@ -156,7 +156,7 @@ TEST_F(ExportCommand, ARigIsCreatedFromWhatWasWritten) {
   EXPECT_NEAR(rig.factory().imu().s_g().x(), 1.01, 1e-12);
 }
 
-TEST_F(ExportCommand, FilesThatCannotBeReadAreUnusableInput) {
+TEST_F(CalibrationExport, FilesThatCannotBeReadAreUnusableInput) {
   const Outcome missing =
       Selfcal({"rig", "create", "--from", "kalibr", "/nowhere", "--id", "a"});
   EXPECT_EQ(missing.code, 2);
@@ -172,7 +172,7 @@ TEST_F(ExportCommand, FilesThatCannotBeReadAreUnusableInput) {
   EXPECT_EQ(daemon_.rigs.size(), 1u);
 }
 
-TEST_F(ExportCommand, WhatARigCannotTakeIsNamedAndStrictRefusesIt) {
+TEST_F(CalibrationExport, WhatARigCannotTakeIsNamedAndStrictRefusesIt) {
   ASSERT_EQ(Selfcal(Line("kalibr")).code, 0);
   const fs::path imu = folder_ / "imu.yaml";
   std::string text = ReadAll(imu);

@@ -15,9 +15,9 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-class ExportCommand : public Commands {
+class SegmentExport : public Commands {
  protected:
-  ExportCommand() {
+  SegmentExport() {
     for (int k = 0; k < 3; ++k) {
       v1::Segment listed;
       listed.set_name("rigs/device/segments/a,b~" + std::to_string(k));
@@ -49,7 +49,7 @@ class ExportCommand : public Commands {
     }
     std::filesystem::remove_all(folder_);
   }
-  ~ExportCommand() override { std::filesystem::remove_all(folder_); }
+  ~SegmentExport() override { std::filesystem::remove_all(folder_); }
 
   std::string Read(const std::string& name) const {
     std::ifstream file(folder_ + name);
@@ -60,7 +60,7 @@ class ExportCommand : public Commands {
       testing::TempDir() + "selfcal-export-" + std::to_string(getpid());
 };
 
-TEST_F(ExportCommand, WritesTablesOfAllThatHaveData) {
+TEST_F(SegmentExport, WritesTablesOfAllThatHaveData) {
   const Outcome outcome = Selfcal({"segments",
                                    "export",
                                    "device",
@@ -86,7 +86,7 @@ TEST_F(ExportCommand, WritesTablesOfAllThatHaveData) {
               HasSubstr("\"a,b\",1,0,0,0,320.25,240\n"));
 }
 
-TEST_F(ExportCommand, WritesTheMessagesOfSomeALineEach) {
+TEST_F(SegmentExport, WritesTheMessagesOfSomeALineEach) {
   const Outcome outcome = Selfcal({"segments",
                                    "export",
                                    "device",
@@ -107,7 +107,7 @@ TEST_F(ExportCommand, WritesTheMessagesOfSomeALineEach) {
   EXPECT_FALSE(std::getline(lines, line));
 }
 
-TEST_F(ExportCommand, LeavesOutWhatWasDroppedMeanwhileUnlessItWasNamed) {
+TEST_F(SegmentExport, LeavesOutWhatWasDroppedMeanwhileUnlessItWasNamed) {
   daemon_.data.pop_back();
   const Outcome all =
       Selfcal({"segments", "export", "device", "--output", folder_});
@@ -122,7 +122,7 @@ TEST_F(ExportCommand, LeavesOutWhatWasDroppedMeanwhileUnlessItWasNamed) {
   EXPECT_FALSE(std::filesystem::exists(folder_ + "/imu.csv"));
 }
 
-TEST_F(ExportCommand, OverwritesOnlyWhenAsked) {
+TEST_F(SegmentExport, OverwritesOnlyWhenAsked) {
   ASSERT_EQ(Selfcal({"segments", "export", "device", "--output", folder_}).code,
             0);
   const Outcome again =
