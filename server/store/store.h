@@ -231,7 +231,7 @@ struct RigSummary {
   std::int64_t last_seen_ns = 0;  // its newest segment arrived; 0: none so far
   std::int64_t active_version = 0;
   std::int64_t active_since_ns = 0;
-  std::vector<Table> tables;            // in the order of the rig's groups
+  std::vector<Table> tables;  // in the order of the rig's groups
   std::int64_t newest_version = 0;
   CalibrationState newest_state = CalibrationState::kActive;
   std::int64_t newest_run = 0;  // 0: none so far, as the change
