@@ -63,7 +63,7 @@ std::string PointChart(const std::vector<ChartPoint>& all,
                        const std::string& y_label) {
   const auto points = Finite(all);
   if (points.empty()) return "";
-  const Box box{60, 10, 620, 130};
+  const Box box{60, 24, 620, 116};
   const Scale scale(points, box);
   std::string marks;
   for (const ChartPoint& point : points) {
@@ -78,11 +78,11 @@ std::string PointChart(const std::vector<ChartPoint>& all,
   return fmt::format(
       "<svg role=\"img\" aria-label=\"{}\" viewBox=\"0 0 700 170\" "
       "width=\"700\" height=\"170\">"
-      "<path class=\"axis\" d=\"M60 10V140H680\"/>"
-      "<text x=\"55\" y=\"15\" text-anchor=\"end\">{:.3g}</text>"
+      "<path class=\"axis\" d=\"M60 24V140H680\"/>"
+      "<text x=\"55\" y=\"28\" text-anchor=\"end\">{:.3g}</text>"
       "<text x=\"55\" y=\"140\" text-anchor=\"end\">{:.3g}</text>"
       "<text x=\"680\" y=\"158\" text-anchor=\"end\">{}</text>"
-      "<text x=\"65\" y=\"15\">{}</text>{}</svg>\n",
+      "<text x=\"60\" y=\"12\">{}</text>{}</svg>\n",
       Escaped(name),
       scale.most(),
       scale.least(),

@@ -15,6 +15,7 @@ constexpr double kByChance = 1e-3;
 
 void AddHeldOut(const v1::Validation::HeldOut& held_out, Verdict* verdict) {
   if (held_out.degrees() == 0) {
+    verdict->kind = VerdictKind::kUntested;
     verdict->sentences.push_back(
         "No segment was held out to test it on: nothing but the fit itself "
         "speaks for it.");
@@ -52,7 +53,7 @@ void AddWeakness(const v1::Calibration& calibration,
                     estimate.unit(),
                     SigmaText(before)));
   }
-  if (weak && verdict->kind == VerdictKind::kGood) {
+  if (weak && verdict->kind != VerdictKind::kInconsistent) {
     verdict->kind = VerdictKind::kWeak;
   }
 }
@@ -84,9 +85,7 @@ Verdict Judge(const v1::Calibration& calibration,
     }
     return verdict;
   }
-  if (calibration.has_validation()) {
-    AddHeldOut(calibration.validation().held_out(), &verdict);
-  }
+  AddHeldOut(calibration.validation().held_out(), &verdict);
   AddWeakness(calibration, factory, &verdict);
   return verdict;
 }
@@ -95,6 +94,8 @@ std::string VerdictText(VerdictKind kind) {
   switch (kind) {
     case VerdictKind::kGood:
       return "good";
+    case VerdictKind::kUntested:
+      return "plausible, and not tested on other segments";
     case VerdictKind::kWeak:
       return "weak in these directions";
     case VerdictKind::kInconsistent:

@@ -8,7 +8,14 @@
 
 namespace selfcal::client {
 
-enum class VerdictKind { kGood, kWeak, kInconsistent, kRejected, kFactory };
+enum class VerdictKind {
+  kGood,
+  kUntested,  // nothing but the fit itself speaks for it
+  kWeak,
+  kInconsistent,
+  kRejected,
+  kFactory,
+};
 
 struct Verdict {
   VerdictKind kind = VerdictKind::kGood;

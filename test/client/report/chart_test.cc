@@ -21,7 +21,7 @@ TEST(PointChart, PutsTheEndsOfTheRangeAtTheEndsOfTheAxes) {
               HasSubstr("class=\"mark\" cx=\"60.0\" cy=\"140.0\" r=\"3\">"
                         "<title>low<"));
   EXPECT_THAT(chart,
-              HasSubstr("class=\"hollow\" cx=\"680.0\" cy=\"10.0\" r=\"3\">"
+              HasSubstr("class=\"hollow\" cx=\"680.0\" cy=\"24.0\" r=\"3\">"
                         "<title>high<"));
   EXPECT_THAT(chart, HasSubstr(">-2</text>"));
   EXPECT_THAT(chart, HasSubstr(">6</text>"));

@@ -49,7 +49,7 @@ TEST(Verdict, SaysWhereNothingTestedIt) {
   v1::Calibration calibration = AVersion(2, 0.01);
   calibration.mutable_validation()->clear_held_out();
   const Verdict verdict = Judge(calibration, AVersion(1, 1));
-  EXPECT_EQ(verdict.kind, VerdictKind::kGood);
+  EXPECT_EQ(verdict.kind, VerdictKind::kUntested);
   EXPECT_THAT(verdict.sentences, Contains(HasSubstr("No segment was held")));
 }
 
