@@ -1,6 +1,7 @@
 #include "server/console/http_server.h"
 
 #include <microhttpd.h>
+#include <poll.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -32,8 +33,10 @@ constexpr std::size_t kConnectionBytes = 32 << 10;  // of headers
 constexpr unsigned kIdleSeconds = 15;
 constexpr std::size_t kMaxLogBytes = 500;
 constexpr std::size_t kStreamBlock = 16 << 10;
-// Tells a reader that has gone from one that has nothing to read.
+// Keeps what stands between from ending a stream that has nothing to say.
 constexpr std::chrono::milliseconds kHeartbeat{5000};
+// A reader that has gone is noticed so soon, and makes room for the next.
+constexpr std::chrono::milliseconds kLookForReader{100};
 
 // libmicrohttpd keeps a pointer to it while a request is received and answered.
 struct Exchange {
@@ -46,6 +49,8 @@ struct Sending {
   std::string waiting;
   std::shared_ptr<Outbox> stream;
   std::shared_ptr<void> keep;
+  MHD_socket reader = MHD_INVALID_SOCKET;
+  std::chrono::milliseconds silent{0};
 };
 
 void Log(void*, const char* format, va_list arguments) {
@@ -76,13 +81,30 @@ MHD_Result AddHeader(void* to,
   return MHD_YES;
 }
 
+// Writing would not tell: the first write after a reader has gone succeeds.
+bool HasGone(MHD_socket reader) {
+  pollfd state{reader, POLLRDHUP, 0};
+  return poll(&state, 1, 0) > 0;
+}
+
+// Until there is something to send, which may be a heartbeat; false at the end.
+bool AwaitMore(Sending* sending) {
+  while (sending->waiting.empty()) {
+    auto more = sending->stream->Take(kLookForReader);
+    if (!more || HasGone(sending->reader)) return false;
+    sending->waiting = *std::move(more);
+    sending->silent += kLookForReader;
+    if (sending->waiting.empty() && sending->silent >= kHeartbeat) {
+      sending->waiting = ":\n\n";
+    }
+  }
+  sending->silent = {};
+  return true;
+}
+
 ssize_t ReadStream(void* from, std::uint64_t, char* to, std::size_t size) {
   auto* sending = static_cast<Sending*>(from);
-  if (sending->waiting.empty()) {
-    auto more = sending->stream->Take(kHeartbeat);
-    if (!more) return MHD_CONTENT_READER_END_OF_STREAM;
-    sending->waiting = more->empty() ? ":\n\n" : *std::move(more);
-  }
+  if (!AwaitMore(sending)) return MHD_CONTENT_READER_END_OF_STREAM;
   const std::size_t count = std::min(size, sending->waiting.size());
   std::memcpy(to, sending->waiting.data(), count);
   sending->waiting.erase(0, count);
@@ -101,6 +123,9 @@ MHD_Result Send(MHD_Connection* connection, HttpResponse answer) {
     sending->waiting = std::move(answer.body);
     sending->stream = std::move(answer.stream);
     sending->keep = std::move(answer.keep);
+    const MHD_ConnectionInfo* info =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+    if (info != nullptr) sending->reader = info->connect_fd;
     response = MHD_create_response_from_callback(
         MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream, sending.get(), EndStream);
     if (response != nullptr) static_cast<void>(sending.release());

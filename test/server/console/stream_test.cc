@@ -1,3 +1,6 @@
+#include <chrono>
+#include <memory>
+
 #include "proto/resource_names.h"
 #include "test/server/console/console_test.h"
 
@@ -11,8 +14,22 @@ class StreamTest : public ConsoleTest {
   std::unique_ptr<Wire> OpenStream(const std::string& query) {
     auto wire = std::make_unique<Wire>(port());
     wire->Send("GET /api/v1/stream" + query +
-               " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+               " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
     return wire;
+  }
+
+  // The first answer that lets a stream run, or the last before the time.
+  std::unique_ptr<Wire> OpenStreamWithin(std::chrono::seconds time) {
+    const auto end = std::chrono::steady_clock::now() + time;
+    for (;;) {
+      auto wire = OpenStream("");
+      const std::string answer = wire->ReadUntil("\r\n\r\n");
+      if (answer.starts_with("HTTP/1.1 200") ||
+          std::chrono::steady_clock::now() > end) {
+        wire->ReadUntil("everything");
+        return wire;
+      }
+    }
   }
 };
 
@@ -67,6 +84,17 @@ TEST_F(StreamTest, StreamsAreBounded) {
   }
   EXPECT_EQ(Get("/api/v1/stream").status, 503);
   EXPECT_EQ(Get("/api/v1/rigs").status, 200);
+}
+
+TEST_F(StreamTest, ReadersThatHaveGoneMakeRoom) {
+  for (int round = 0; round < 5; ++round) {
+    std::vector<std::unique_ptr<Wire>> open;
+    for (int i = 0; i < 16; ++i) {
+      // Sooner than two heartbeats, the first of which a dead socket takes.
+      open.push_back(OpenStreamWithin(std::chrono::seconds(4)));
+      ASSERT_THAT(open.back()->ReadUntil("everything"), HasSubstr("200 OK"));
+    }
+  }
 }
 
 TEST_F(StreamTest, ConsoleEndsWithStreamsOpen) {
