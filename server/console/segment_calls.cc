@@ -4,22 +4,23 @@
 #include "server/console/call.h"
 #include "server/console/json.h"
 #include "server/encode/encode.h"
+#include "server/encode/segment_filter.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
 
-// The segment that the address names, for a caller who may read it.
+// The segment that the address names, for a caller who may ask this of it.
+template <typename Request>
 absl::StatusOr<SegmentNameParts> SegmentOf(const Call& call) {
-  v1::GetSegmentRequest request;
+  Request request;
   request.set_name(RigName(call.parts.at(0)) + "/segments/" + call.parts.at(1));
   SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
   const auto parts = ParseSegmentName(request.name());
   if (parts) return *parts;
   return absl::InvalidArgumentError(
       "a segment's name is rigs/{rig}/segments/{session}~{index}; in an "
-      "address "
-      "a '%' of the session stands as %25");
+      "address a '%' of the session stands as %25");
 }
 
 }  // namespace
@@ -43,9 +44,12 @@ Answer ListSegments(const Call& call) {
   request.set_parent(RigName(call.parts.at(0)));
   SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
   SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  SegmentQuery query;
+  SELFCAL_RETURN_IF_ERROR(ParseSegmentFilter(call.Query("filter"), &query));
+  SELFCAL_RETURN_IF_ERROR(ParseSegmentOrder(call.Query("order_by"), &query));
   SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
   SELFCAL_ASSIGN_OR_RETURN(const auto listed,
-                           call.context.store->ListSegments(rig, page));
+                           call.context.store->ListSegments(rig, query, page));
   v1::ListSegmentsResponse response;
   for (const StoredSegment& segment : listed.items) {
     *response.add_segments() = Encode(segment);
@@ -55,14 +59,16 @@ Answer ListSegments(const Call& call) {
 }
 
 Answer GetSegment(const Call& call) {
-  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts name, SegmentOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts name,
+                           SegmentOf<v1::GetSegmentRequest>(call));
   SELFCAL_ASSIGN_OR_RETURN(const StoredSegment segment,
                            call.context.store->GetSegment(name.rig, name.key));
   return JsonResponse(Encode(segment));
 }
 
 Answer GetSegmentData(const Call& call) {
-  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts name, SegmentOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts name,
+                           SegmentOf<v1::GetSegmentDataRequest>(call));
   SELFCAL_ASSIGN_OR_RETURN(
       const MotionSegment data,
       call.context.store->GetSegmentData(name.rig, name.key));

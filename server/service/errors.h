@@ -38,11 +38,6 @@ grpc::Status BadName(std::string_view field, std::string_view pattern);
 // UNAVAILABLE with a delay after which to connect again.
 grpc::Status ShuttingDown();
 
-// A text of any bytes as valid UTF-8 of at most max_bytes: cut between
-// characters, with an ellipsis; '?' for control characters and for bytes that
-// are no UTF-8.
-std::string Shortened(std::string_view text, std::size_t max_bytes);
-
 // Runs a handler; no exception leaves it.
 template <typename Handler>
 grpc::Status Guarded(const Handler& handler) {

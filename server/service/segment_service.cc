@@ -5,11 +5,12 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 #include "server/encode/encode.h"
+#include "server/encode/segment_filter.h"
+#include "server/encode/shortened.h"
 #include "server/service/caller.h"
 #include "server/service/errors.h"
 #include "server/service/paging.h"
 #include "server/service/segment_call.h"
-#include "server/service/segment_filter.h"
 #include "server/service/services.h"
 
 namespace selfcal::server {

@@ -6,6 +6,7 @@
 #include "proto/convert.h"
 #include "proto/field_paths.h"
 #include "proto/resource_names.h"
+#include "server/encode/shortened.h"
 #include "server/service/errors.h"
 
 namespace selfcal::server {

@@ -88,6 +88,26 @@ TEST_F(ApiTest, DataOfASegmentIsReadWhileItIsKept) {
   EXPECT_EQ(Get(path + "/data").status, 409);
 }
 
+TEST_F(ApiTest, SegmentsAreFilteredAndSorted) {
+  const Rig rig = AddRig("r");
+  for (const char* session : {"a", "b"}) {
+    for (const MotionSegment& segment : TestSegments(rig, 2, session)) {
+      ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+    }
+  }
+  const std::string path = "/api/v1/rigs/r/segments";
+  const auto listed =
+      Get(path + "?filter=session%3Db&order_by=receive_time%20asc")
+          .json()["segments"];
+  ASSERT_EQ(listed.size(), 2u);
+  EXPECT_EQ(listed[0]["name"], "rigs/r/segments/b~0");
+  EXPECT_EQ(listed[1]["name"], "rigs/r/segments/b~1");
+  const auto wrong = Get(path + "?filter=colour%3D1");
+  EXPECT_EQ(wrong.status, 400);
+  EXPECT_THAT(wrong.body, HasSubstr("colour"));
+  EXPECT_EQ(Get(path + "?order_by=colour").status, 400);
+}
+
 TEST_F(ApiTest, TwoVersionsAreCompared) {
   AddVersion(AddRig("r"));
   const auto compared = Get("/api/v1/rigs/r/compare?a=1&b=active").json();

@@ -1,4 +1,4 @@
-#include "server/service/segment_filter.h"
+#include "server/encode/segment_filter.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "server/service/segment_filter.h"
+#include "server/encode/segment_filter.h"
 
 #include <fmt/format.h>
 #include <google/protobuf/util/time_util.h>
@@ -10,7 +10,7 @@
 #include <limits>
 #include <string>
 
-#include "server/service/errors.h"
+#include "server/encode/shortened.h"
 #include "server/store/status_macros.h"
 #include "server/store/store.h"
 
