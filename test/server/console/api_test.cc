@@ -56,11 +56,22 @@ TEST_F(ApiTest, ValuesAreThoseOfTheContract) {
                   .SerializeAsString(),
               Encode(active).SerializeAsString());
   }
+  v1::Segment segment = Encode(*store_->GetSegment("r", {"s", 0}));
+  EXPECT_EQ(Parsed<v1::Segment>(Get("/api/v1/rigs/r/segments/s~0"))
+                .SerializeAsString(),
+            segment.SerializeAsString());
+  // A list leaves out the directions.
+  ASSERT_EQ(segment.unobserved_size(), 1);
+  ASSERT_EQ(segment.scores(0).unobserved_size(), 1);
+  segment.clear_unobserved();
+  for (v1::GroupScore& score : *segment.mutable_scores()) {
+    score.clear_unobserved();
+  }
   const auto segments =
       Parsed<v1::ListSegmentsResponse>(Get("/api/v1/rigs/r/segments"));
   ASSERT_EQ(segments.segments_size(), 1);
   EXPECT_EQ(segments.segments(0).SerializeAsString(),
-            Encode(*store_->GetSegment("r", {"s", 0})).SerializeAsString());
+            segment.SerializeAsString());
   EXPECT_EQ(Get("/api/v1/rigs/r/tables").json()["tables"].size(),
             rig.groups.size());
   EXPECT_EQ(Get("/api/v1/rigs/r/calibrations").json()["calibrations"].size(),

@@ -160,6 +160,8 @@ class ConsoleTest : public ::testing::Test {
       const int k = static_cast<int>(GroupComponents(rig, group).size());
       information.groups.push_back({group.name, k, -9, 9, k, {}});
     }
+    information.unobserved = {{{{"imu.gyro.scale.x", 1}}, 0.5}};
+    information.groups[0].unobserved = information.unobserved;
     ASSERT_TRUE(store_->CommitScore(rig.id, segment.key, information).ok());
     const auto run = store_->CreateManualRun(rig.id);
     ASSERT_TRUE(run.ok()) << run.status();
