@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <type_traits>
 
 #include "core/simd/lanes.h"
 
@@ -40,9 +41,10 @@ bool PositiveOnUnitInterval(const double* a, int degree);
 
 // True if the derivative of r (1 + sum k_i r^(2i)) is positive on [0, r], with
 // q = r^2: the polynomial 1 + sum (2i + 1) k_i q^i on [0, q]. False if anything
-// is not a number. T is double or Lanes.
+// is not a number. T is double or Lanes, no integer: powers would overflow.
 template <std::size_t N, typename T>
-auto ProfileRises(const std::array<double, N>& k, T q) {
+requires(!std::is_integral_v<T>) auto ProfileRises(
+    const std::array<double, N>& k, T q) {
   // Scaled to [0, 1]; no power of q is computed that is not needed.
   std::array<T, N + 1> a;
   a[0] = T(1);

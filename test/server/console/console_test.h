@@ -20,6 +20,7 @@
 #include "server/console/console.h"
 #include "server/store/store_sqlite.h"
 #include "test/server/service/fake_pipeline.h"
+#include "test/server/test_records.h"
 #include "test/server/test_segments.h"
 
 namespace selfcal::server {
@@ -150,32 +151,15 @@ class ConsoleTest : public ::testing::Test {
   void AddVersion(const Rig& rig) {
     const MotionSegment segment = TestSegments(rig, 1)[0];
     ASSERT_TRUE(store_->PutSegment(rig.id, segment).ok());
-    const auto size = TangentSize(rig.factory);
-    SegmentInformation information;
-    information.theta0 = rig.factory;
-    information.Lambda = Eigen::MatrixXd::Identity(size, size);
-    information.eta = Eigen::VectorXd::Zero(size);
-    information.rank = static_cast<int>(FreeComponents(rig).size());
-    for (const ParameterGroup& group : rig.groups) {
-      const int k = static_cast<int>(GroupComponents(rig, group).size());
-      information.groups.push_back({group.name, k, -9, 9, k, {}});
-    }
+    SegmentInformation information = TestInformation(rig, 9);
     information.unobserved = {{{{"imu.gyro.scale.x", 1}}, 0.5}};
     information.groups[0].unobserved = information.unobserved;
     ASSERT_TRUE(store_->CommitScore(rig.id, segment.key, information).ok());
     const auto run = store_->CreateManualRun(rig.id);
     ASSERT_TRUE(run.ok()) << run.status();
     ASSERT_TRUE(store_->BeginRun(rig.id, run->run).ok());
-    StoredCalibration calibration;
-    calibration.rig = rig.id;
-    calibration.state = CalibrationState::kActive;
-    calibration.theta = rig.factory;
-    calibration.covariance = 4 * Eigen::MatrixXd::Identity(size, size);
-    calibration.run = run->run;
-    calibration.base_version = 1;
-    calibration.segments = run->segments;
-    calibration.program_version = "test";
-    const auto finished = store_->FinishRun(rig.id, run->run, calibration);
+    const auto finished =
+        store_->FinishRun(rig.id, run->run, TestCalibration(rig, *run));
     ASSERT_TRUE(finished.ok()) << finished.status();
   }
 

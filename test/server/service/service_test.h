@@ -24,6 +24,7 @@
 #include "server/service/server.h"
 #include "server/store/store_sqlite.h"
 #include "test/server/service/fake_pipeline.h"
+#include "test/server/test_records.h"
 #include "test/server/test_segments.h"
 
 namespace selfcal::server {
@@ -108,17 +109,8 @@ class ServiceTest : public ::testing::Test {
 
   // Puts a score with this information gain for every group.
   void Score(const Rig& rig, const SegmentKey& key, double gain) {
-    const auto size = TangentSize(rig.factory);
-    SegmentInformation information;
-    information.theta0 = rig.factory;
-    information.Lambda = Eigen::MatrixXd::Identity(size, size);
-    information.eta = Eigen::VectorXd::Zero(size);
-    information.rank = static_cast<int>(FreeComponents(rig).size());
-    for (const ParameterGroup& group : rig.groups) {
-      const int k = static_cast<int>(GroupComponents(rig, group).size());
-      information.groups.push_back({group.name, k, -gain, gain, k, {}});
-    }
-    const auto committed = store_->CommitScore(rig.id, key, information);
+    const auto committed =
+        store_->CommitScore(rig.id, key, TestInformation(rig, gain));
     EXPECT_TRUE(committed.ok()) << committed.status();
   }
 
@@ -136,16 +128,8 @@ class ServiceTest : public ::testing::Test {
   // Ends the unfinished run of the rig with an active calibration.
   StoredCalibration FinishRun(const Rig& rig, std::int64_t run) {
     EXPECT_TRUE(store_->BeginRun(rig.id, run).ok());
-    const auto size = TangentSize(rig.factory);
-    StoredCalibration calibration;
-    calibration.rig = rig.id;
-    calibration.state = CalibrationState::kActive;
-    calibration.theta = rig.factory;
-    calibration.covariance = 4 * Eigen::MatrixXd::Identity(size, size);
-    calibration.run = run;
-    calibration.base_version = 1;
-    calibration.segments = store_->GetRun(rig.id, run)->segments;
-    calibration.program_version = "test";
+    StoredCalibration calibration =
+        TestCalibration(rig, *store_->GetRun(rig.id, run));
     calibration.report = CalibrationResult();
     calibration.report->status = CalibrateStatus::kConverged;
     calibration.report->theta = rig.factory;
