@@ -73,7 +73,7 @@ grpc::Status WatchToEnd(Service* stub, v1::Recalibration* run) {
 }
 
 // What the run has produced; 1 if it may not be used.
-int Judge(Context* context, const v1::Recalibration& run) {
+int ShowResult(Context* context, const v1::Recalibration& run) {
   if (run.state() != v1::Recalibration::SUCCEEDED) {
     PrintError(fmt::format(
         "the recalibration has {}: {}", StateText(run.state()), run.message()));
@@ -122,7 +122,7 @@ int FollowRun(Context* context, Service* stub, v1::Recalibration run) {
   const grpc::Status status = WatchToEnd(stub, &run);
   if (!status.ok()) return Fail(*context, status);
   PrintRun(*context, run);
-  return Judge(context, run);
+  return ShowResult(context, run);
 }
 
 }  // namespace selfcal::client

@@ -9,6 +9,7 @@
 #include "client/report/chart.h"
 #include "client/report/html.h"
 #include "client/report/verdict.h"
+#include "client/text/calibration_facts.h"
 #include "client/text/text.h"
 
 namespace selfcal::client {
@@ -62,17 +63,6 @@ std::string Course(const ReportData& data, const std::string& component) {
     return a.x < b.x;
   });
   return Sparkline(points, component + " over the versions");
-}
-
-std::string Facts(
-    const std::vector<std::pair<std::string, std::string>>& facts) {
-  std::string rows;
-  for (const auto& [name, value] : facts) {
-    rows += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n",
-                        Escaped(name),
-                        Escaped(value));
-  }
-  return "<table><tbody>" + rows + "</tbody></table>\n";
 }
 
 }  // namespace
@@ -227,35 +217,11 @@ std::string SegmentSection(const ReportData& data) {
 std::string OriginSection(const ReportData& data) {
   const v1::Calibration& calibration = data.calibration;
   if (!calibration.has_provenance()) return "";
-  const auto& provenance = calibration.provenance();
-  const auto& solver = calibration.solver();
-  std::vector<std::pair<std::string, std::string>> facts = {
-      {"run", LastPart(provenance.recalibration())},
-      {"started from", fmt::format("version {}", provenance.base_version())},
-      {"program", provenance.program_version()},
-      {"solver", solver.status() + " " + solver.message()},
-      {"iterations", fmt::format("{}", solver.iterations())},
-      {"reprojection rms [px]",
-       fmt::format("{:.3f} before, {:.3f} after",
-                   solver.reprojection_rms_before_px(),
-                   solver.reprojection_rms_after_px())},
-      {"observed directions",
-       fmt::format("{} of {}", solver.rank(), solver.components())},
-      {"observations",
-       fmt::format("{}, {} left out",
-                   solver.observations(),
-                   solver.observations_dropped())}};
-  for (const auto& setting : provenance.settings()) {
-    facts.emplace_back("setting " + setting.name(), setting.value());
+  HtmlTable table({{"fact"}, {""}});
+  for (const Fact& fact : CalibrationFacts(calibration)) {
+    table.Add({Escaped(fact.name), Escaped(fact.text)});
   }
-  for (const auto& check : calibration.validation().checks()) {
-    facts.emplace_back("check " + check.name(),
-                       fmt::format("{}: {:.3g}, limit {:.3g}",
-                                   check.passed() ? "passed" : "failed",
-                                   check.value(),
-                                   check.limit()));
-  }
-  return Section("origin", "Where it came from", Facts(facts));
+  return Section("origin", "Where it came from", table.Html());
 }
 
 std::string HistorySection(const ReportData& data) {

@@ -62,6 +62,14 @@ TEST(Report, ShowsEachParameterWithBothSigmasAndWhatWasLearned) {
                         "<td class=\"number\">4.61</td>"));
 }
 
+TEST(Report, SaysWhereItCameFromAndWhatWasChecked) {
+  const std::string html = WriteReport(ADevice());
+  EXPECT_THAT(html, HasSubstr("<td>started from</td><td>version 0</td>"));
+  EXPECT_THAT(html,
+              HasSubstr("<td>held-out segments</td><td>3 (0 left out), 60 "
+                        "degrees: chi-square 58.0, of version 0 0.0</td>"));
+}
+
 TEST(Report, MarksSegmentsThatItUsesAndThatTablesKeep) {
   const std::string html = WriteReport(ADevice());
   EXPECT_THAT(html, HasSubstr("<title>walk~0: 0.5</title>"));

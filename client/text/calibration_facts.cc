@@ -1,0 +1,169 @@
+#include "client/text/calibration_facts.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "client/text/text.h"
+
+namespace selfcal::client {
+namespace {
+
+using FactList = std::vector<Fact>;
+
+void Add(FactList* facts, std::string name, std::string text) {
+  facts->push_back({std::move(name), std::move(text)});
+}
+
+void AddProvenance(const v1::Calibration::Provenance& provenance,
+                   FactList* facts) {
+  Add(facts, "recalibration", LastPart(provenance.recalibration()));
+  Add(facts,
+      "started from",
+      fmt::format("version {}", provenance.base_version()));
+  std::string segments;
+  for (const std::string& segment : provenance.segments()) {
+    segments += (segments.empty() ? "" : " ") + LastPart(segment);
+  }
+  Add(facts, "segments", segments);
+  if (provenance.has_temperature()) {
+    const auto& temperature = provenance.temperature();
+    Add(facts,
+        "temperature",
+        fmt::format("{:.1f} C, {:.1f} to {:.1f} C ({} of {} segments)",
+                    temperature.mean_c(),
+                    temperature.min_c(),
+                    temperature.max_c(),
+                    temperature.segments(),
+                    provenance.segments_size()));
+  }
+  Add(facts, "program", provenance.program_version());
+  std::string settings;
+  for (const auto& setting : provenance.settings()) {
+    settings +=
+        (settings.empty() ? "" : ", ") + setting.name() + " " + setting.value();
+  }
+  if (!settings.empty()) Add(facts, "settings", settings);
+}
+
+void AddValidation(const v1::Validation& validation, FactList* facts) {
+  for (const auto& check : validation.checks()) {
+    Add(facts,
+        "check",
+        fmt::format("{} {}: {:.3g}, limit {:.3g}",
+                    check.name(),
+                    check.passed() ? "passed" : "failed",
+                    check.value(),
+                    check.limit()));
+  }
+  const auto& held_out = validation.held_out();
+  if (held_out.degrees() == 0) {
+    Add(facts,
+        "held-out segments",
+        fmt::format("none could be tested of {}",
+                    held_out.segments() + held_out.left_out()));
+    return;
+  }
+  Add(facts,
+      "held-out segments",
+      fmt::format("{} ({} left out), {} degrees: chi-square {:.1f}, of "
+                  "version {} {:.1f}",
+                  held_out.segments(),
+                  held_out.left_out(),
+                  held_out.degrees(),
+                  held_out.chi_square(),
+                  validation.active_version(),
+                  held_out.active_chi_square()));
+}
+
+std::string NoiseName(const std::string& kind) {
+  if (kind == "pixel") return "pixel sigma";
+  if (kind == "gyro") return "gyro noise";
+  if (kind == "accel") return "accel noise";
+  if (kind == "gyro_bias_walk") return "gyro bias walk";
+  if (kind == "accel_bias_walk") return "accel bias walk";
+  return kind;
+}
+
+std::string NoiseText(const v1::NoiseFactor& factor) {
+  const std::string name = NoiseName(factor.kind());
+  return factor.determined()
+             ? fmt::format(
+                   "{}: residuals suggest {:.2f} times what the rig "
+                   "states (+- {:.0f} %)",
+                   name,
+                   factor.factor(),
+                   100 * factor.log_sigma())
+             : fmt::format("{}: residuals do not determine it", name);
+}
+
+void AddSolver(const v1::SolverReport& solver, FactList* facts) {
+  Add(facts,
+      "solver",
+      solver.message().empty() ? solver.status()
+                               : solver.status() + ": " + solver.message());
+  Add(facts,
+      "iterations",
+      fmt::format("{} in {:.1f} s, cost {:.6g} -> {:.6g}",
+                  solver.iterations(),
+                  solver.seconds(),
+                  solver.initial_cost(),
+                  solver.final_cost()));
+  Add(facts,
+      "reprojection",
+      fmt::format("median {:.3f} -> {:.3f} px, rms {:.3f} -> {:.3f} px",
+                  solver.reprojection_median_before_px(),
+                  solver.reprojection_median_after_px(),
+                  solver.reprojection_rms_before_px(),
+                  solver.reprojection_rms_after_px()));
+  Add(facts,
+      "problem",
+      fmt::format("{} segments, {} partitions, {} keyframes, {} "
+                  "landmarks ({} dropped), {} observations ({} dropped)",
+                  solver.segments(),
+                  solver.partitions(),
+                  solver.keyframes(),
+                  solver.landmarks(),
+                  solver.landmarks_dropped(),
+                  solver.observations(),
+                  solver.observations_dropped()));
+  if (solver.track_noise_factor() > 1) {
+    Add(facts,
+        "pixel errors along tracks",
+        fmt::format("count as {:.2f} times the rig's sigma",
+                    solver.track_noise_factor()));
+  }
+  Add(facts,
+      "observed directions",
+      fmt::format("{} of {}", solver.rank(), solver.components()));
+  for (const auto& direction : solver.held_constant()) {
+    Add(facts, "held constant", DirectionText(direction));
+  }
+  for (const auto& factor : solver.noise_factors()) {
+    Add(facts, "noise", NoiseText(factor));
+  }
+}
+
+}  // namespace
+
+std::vector<Fact> CalibrationFacts(const v1::Calibration& calibration) {
+  FactList facts;
+  Add(&facts, "version", fmt::format("{}", calibration.version()));
+  Add(&facts, "state", StateText(calibration.state()));
+  Add(&facts, "created", TimeText(calibration.create_time()));
+  for (const std::string& reason : calibration.reasons()) {
+    Add(&facts, "rejected because", reason);
+  }
+  if (calibration.has_provenance()) {
+    AddProvenance(calibration.provenance(), &facts);
+  } else {
+    Add(&facts, "origin", "factory");
+  }
+  if (calibration.has_validation()) {
+    AddValidation(calibration.validation(), &facts);
+  }
+  if (calibration.has_solver()) AddSolver(calibration.solver(), &facts);
+  return facts;
+}
+
+}  // namespace selfcal::client
