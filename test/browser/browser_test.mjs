@@ -72,6 +72,16 @@ class Reader {
     await this.page.goto(this.base + path);
     await this.heading(heading);
   }
+  // A page that only has to show what it should.
+  async shows(path, heading, texts, picture) {
+    await this.open(path, heading);
+    for (const text of texts) await this.sees(text);
+    if (picture) await this.picture(picture);
+  }
+  // What the pages read.
+  async api(path) {
+    return (await fetch(this.base + '/api/v1/' + path)).json();
+  }
   async heading(text) {
     await this.page
       .getByRole('heading', { level: 1, name: text, exact: true })
@@ -152,35 +162,27 @@ const tests = {
   },
 
   async 'a filter that nothing passes says what to do'(r) {
-    await r.open('/?filter=nothing', 'Rigs');
-    await r.sees('Take the filter away');
-    await r.picture('rigs-none');
+    await r.shows('/?filter=nothing', 'Rigs', ['Take the filter away'], 'rigs-none');
   },
 
   async 'a rig tells how well it is known'(r) {
-    await r.open('/rigs/tablet', 'tablet');
-    await r.sees('What is weak');
-    await r.sees('focal length of camera 0, x');
+    await r.shows('/rigs/tablet', 'tablet', ['What is weak', 'focal length of camera 0, x']);
     await r.page.locator('.uplot canvas').first().waitFor();
     await r.picture('rig');
     await r.detail('rig');
   },
 
   async 'a rig without segments says what to do'(r) {
-    await r.open('/rigs/phone-001', 'phone-001');
-    await r.sees('No segment is scored yet');
-    await r.open('/rigs/phone-001/segments', 'Segments of phone-001');
-    await r.sees('No segment has arrived yet');
-    await r.open('/rigs/phone-001/recalibrations', 'Runs of phone-001');
-    await r.sees('No run yet');
-    await r.picture('runs-none');
+    const rig = '/rigs/phone-001';
+    await r.shows(rig, 'phone-001', ['No segment is scored yet']);
+    await r.shows(rig + '/segments', 'Segments of phone-001', ['No segment has arrived yet']);
+    await r.shows(rig + '/recalibrations', 'Runs of phone-001', ['No run yet'], 'runs-none');
   },
 
   async 'a segment shows its motion and why it is kept'(r) {
-    await r.open('/rigs/tablet/segments', 'Segments of tablet');
-    await r.picture('segments');
-    const kept = await (await fetch(r.base + '/api/v1/rigs/tablet/tables')).json();
-    const { segment } = kept.tables[0].entries[0];
+    await r.shows('/rigs/tablet/segments', 'Segments of tablet', ['walk~0'], 'segments');
+    const { tables } = await r.api('rigs/tablet/tables');
+    const { segment } = tables[0].entries[0];
     await r.page.goto(`${r.base}/${segment}`);
     await r.sees('kept: place 1 of');
     await r.page.locator('.uplot canvas').nth(1).waitFor();
@@ -198,9 +200,8 @@ const tests = {
   },
 
   async 'a segment whose data is gone says so'(r) {
-    const all = await (
-      await fetch(r.base + '/api/v1/rigs/tablet/segments?page_size=100')).json();
-    const gone = all.segments.find((s) => !s.hasData);
+    const { segments } = await r.api('rigs/tablet/segments?page_size=100');
+    const gone = segments.find((s) => !s.hasData);
     assert.ok(gone, 'every segment has its data');
     await r.page.goto(`${r.base}/${gone.name}`);
     await r.sees('Its data was dropped');
@@ -216,25 +217,19 @@ const tests = {
     await r.sees('Version 1');
     assert.match(r.page.url(), /a=1/);
     await r.picture('calibrations');
-    await r.open('/rigs/tablet/calibrations/2', 'Calibrations of tablet');
-    await r.sees('Validation');
-    await r.picture('calibration');
+    await r.shows('/rigs/tablet/calibrations/2', 'Calibrations of tablet',
+      ['Validation'], 'calibration');
   },
 
   async 'runs are listed and explained'(r) {
-    await r.open('/rigs/tablet/recalibrations', 'Runs of tablet');
-    await r.sees('tables full');
-    await r.picture('runs');
-    await r.open('/rigs/tablet/recalibrations/1', 'Run 1 of tablet');
-    await r.sees('What the solver says');
-    await r.picture('run');
+    await r.shows('/rigs/tablet/recalibrations', 'Runs of tablet', ['tables full'], 'runs');
+    await r.shows('/rigs/tablet/recalibrations/1', 'Run 1 of tablet',
+      ['What the solver says'], 'run');
   },
 
   async 'mistakes in an address are explained'(r) {
     r.expectProblems = true;
-    await r.open('/rigs/none', 'none');
-    await r.sees('rig none does not exist');
-    await r.picture('rig-unknown');
+    await r.shows('/rigs/none', 'none', ['rig none does not exist'], 'rig-unknown');
     await r.open('/nothing', 'There is no such page');
     await r.open('/rigs/tablet/segments/none~1', 'Segment none~1');
     await r.page.getByRole('alert').first().waitFor();
@@ -242,8 +237,7 @@ const tests = {
   },
 
   async 'a version is activated by keyboard, and other pages see it'(r, other) {
-    await other.open('/rigs/tablet/events', 'Events of tablet');
-    await other.sees('live');
+    await other.shows('/rigs/tablet/events', 'Events of tablet', ['live']);
     await r.open('/rigs/tablet/calibrations', 'Calibrations of tablet');
     const button = r.page.getByRole('button', { name: /Roll back|Activate/ }).last();
     await button.focus();
@@ -260,9 +254,7 @@ const tests = {
   },
 
   async 'events of all rigs are listed'(r) {
-    await r.open('/events', 'Events');
-    await r.sees('rig created');
-    await r.picture('all-events');
+    await r.shows('/events', 'Events', ['rig created'], 'all-events');
   },
 };
 
@@ -292,8 +284,7 @@ try {
   }
   console.log('a daemon that has stopped');
   reader.expectProblems = other.expectProblems = true;
-  await reader.open('/rigs/tablet', 'tablet');
-  await reader.sees('What is weak');
+  await reader.shows('/rigs/tablet', 'tablet', ['What is weak']);
   await daemon.stop();
   await reader.page.getByText('not live').waitFor();
   await reader.page.getByRole('link', { name: 'Segments', exact: true }).click();

@@ -253,6 +253,11 @@ export function idOf(name: string): string {
   return name.slice(name.lastIndexOf('/') + 1);
 }
 
+// The path of a rig under /api/v1.
+export function rigPath(rig: string): string {
+  return 'rigs/' + encodeURIComponent(rig);
+}
+
 // The address of the page of a resource, which is that of its name.
 export function pageOf(name: string): string {
   return '/' + name.split('/').map(encodeURIComponent).join('/');

@@ -1,8 +1,8 @@
 // What several pages are made of.
 import type { ComponentChildren, JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
-import type { ApiError } from './api';
-import { ago, clock } from './format';
+import { idOf, pageOf, type ApiError, type Solver } from './api';
+import { ago, clock, number } from './format';
 import { go } from './state';
 
 export function Link(props: {
@@ -113,10 +113,13 @@ export function Meter(props: { value: number; of: number; label: string }) {
   );
 }
 
-export function Figures(props: { of: [string, ComponentChildren][] }) {
+export type Figure = [string, ComponentChildren];
+
+// What is null is not shown.
+export function Figures(props: { of: (Figure | null)[] }) {
   return (
     <dl class="figures">
-      {props.of.map(([name, value]) => (
+      {props.of.filter((figure) => figure !== null).map(([name, value]) => (
         <div key={name}>
           <dt>{name}</dt>
           <dd>{value}</dd>
@@ -126,16 +129,67 @@ export function Figures(props: { of: [string, ComponentChildren][] }) {
   );
 }
 
+// What several pages say of how a calibration went.
+export function solverFigures(solver: Solver): Record<'iterations' | 'reprojection' | 'rank', Figure> {
+  return {
+    iterations: ['Iterations', solver.iterations],
+    reprojection: [
+      'Reprojection rms',
+      `${number(solver.reprojectionRmsBeforePx)} to ${number(solver.reprojectionRmsAfterPx)} px`,
+    ],
+    rank: ['Rank', `${solver.rank} of ${solver.components}`],
+  };
+}
+
+export function SegmentLink(props: { name: string }) {
+  return <Link to={pageOf(props.name)}>{decodeURIComponent(idOf(props.name))}</Link>;
+}
+
+export function SegmentLinks(props: { names: string[] }) {
+  return (
+    <ul class="columns">
+      {props.names.map((name) => (
+        <li key={name}>
+          <SegmentLink name={name} />
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+// One of several, each with what it is called.
+export function Choice(props: {
+  label: string;
+  value: string;
+  of: [string, string][];
+  onChoice: (value: string) => void;
+}) {
+  return (
+    <label>
+      {props.label}
+      <select
+        value={props.value}
+        onChange={(event) => props.onChoice(event.currentTarget.value)}
+      >
+        {props.of.map(([value, name]) => (
+          <option key={value} value={value}>
+            {name}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+
 export function DataTable(props: {
   caption: string;
   head: ComponentChildren[];
   rows: ComponentChildren[][];
-  hideCaption?: boolean;
 }) {
   return (
     <div class="scroll" tabIndex={0} role="region" aria-label={props.caption}>
       <table>
-        <caption class={props.hideCaption ? 'hidden' : ''}>{props.caption}</caption>
+        <caption>{props.caption}</caption>
         <thead>
           <tr>
             {props.head.map((cell) => (
@@ -154,16 +208,5 @@ export function DataTable(props: {
         </tbody>
       </table>
     </div>
-  );
-}
-
-// To the next page and to the first one; the address says where one is.
-export function Pager(props: { next: string; first: string | null; more: string | null }) {
-  if (props.first === null && props.more === null) return null;
-  return (
-    <nav class="pager" aria-label="Pages">
-      {props.first !== null && <Link to={props.first}>First page</Link>}
-      {props.more !== null && <Link to={props.more}>{props.next}</Link>}
-    </nav>
   );
 }

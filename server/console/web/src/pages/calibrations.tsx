@@ -6,13 +6,26 @@ import {
   mayActivate,
   pageOf,
   post,
+  rigPath,
   type ApiError,
   type Calibration,
   type Comparison,
   type Session,
 } from '../api';
 import { component, number, quantity, words } from '../format';
-import { Badge, DataTable, Figures, Link, Loaded, Problem, Title, When } from '../parts';
+import {
+  Badge,
+  Choice,
+  DataTable,
+  Figures,
+  Link,
+  Loaded,
+  Problem,
+  SegmentLinks,
+  solverFigures,
+  Title,
+  When,
+} from '../parts';
 import { kColours, Plot } from '../plot';
 import { go, useAddress, useRead, withQuery } from '../state';
 
@@ -41,19 +54,12 @@ function History(props: { of: Calibration[] }) {
   return (
     <>
       <div class="bar">
-        <label>
-          Parameter
-          <select
-            value={chosen}
-            onChange={(event) => go(withQuery({ parameter: event.currentTarget.value }), true)}
-          >
-            {names.map((name) => (
-              <option key={name} value={name}>
-                {component(name)}
-              </option>
-            ))}
-          </select>
-        </label>
+        <Choice
+          label="Parameter"
+          value={chosen}
+          of={names.map((name) => [name, component(name)])}
+          onChoice={(parameter) => go(withQuery({ parameter }), true)}
+        />
         {props.of.length > 1 && (
           <label>
             <input
@@ -87,20 +93,15 @@ function Difference(props: { rig: string; of: Calibration[] }) {
   const a = query.get('a') ?? props.of[1]?.version ?? newest;
   const b = query.get('b') ?? newest;
   const read = useRead<Comparison>(
-    `rigs/${encodeURIComponent(props.rig)}/compare?a=${encodeURIComponent(a)}&b=${encodeURIComponent(b)}`,
+    `${rigPath(props.rig)}/compare?a=${encodeURIComponent(a)}&b=${encodeURIComponent(b)}`,
   );
   const choose = (which: 'a' | 'b', value: string, name: string) => (
-    <label>
-      {name}
-      <select
-        value={value}
-        onChange={(event) => go(withQuery({ a, b, [which]: event.currentTarget.value }), true)}
-      >
-        {props.of.map((c) => (
-          <option key={c.version}>{c.version}</option>
-        ))}
-      </select>
-    </label>
+    <Choice
+      label={name}
+      value={value}
+      of={props.of.map((c) => [c.version, c.version])}
+      onChoice={(version) => go(withQuery({ a, b, [which]: version }), true)}
+    />
   );
   return (
     <>
@@ -119,7 +120,6 @@ function Difference(props: { rig: string; of: Calibration[] }) {
             </p>
             <DataTable
               caption={`Version ${compared.versionB} less version ${compared.versionA}`}
-              hideCaption
               head={['Parameter', `Version ${compared.versionA}`, `Version ${compared.versionB}`, 'Difference', 'Sigma', 'In sigmas']}
               rows={compared.differences.map((d) => {
                 const sigmas = Math.abs(d.difference) / d.sigma;
@@ -203,7 +203,6 @@ function Verdict(props: { of: Calibration }) {
       <p class="quiet">Judged against version {validation.activeVersion}.</p>
       <DataTable
         caption="Checks"
-        hideCaption
         head={['Check', 'Value', 'Limit', 'Passed']}
         rows={validation.checks.map((check) => [
           words(check.name),
@@ -233,13 +232,7 @@ function Origin(props: { of: Calibration }) {
         of selfcald {from.programVersion}, starting at version {from.baseVersion}, out of{' '}
         {from.segments.length} segments:
       </p>
-      <ul class="columns">
-        {from.segments.map((segment) => (
-          <li key={segment}>
-            <Link to={pageOf(segment)}>{decodeURIComponent(idOf(segment))}</Link>
-          </li>
-        ))}
-      </ul>
+      <SegmentLinks names={from.segments} />
     </>
   );
 }
@@ -263,9 +256,7 @@ function Version(props: { of: Calibration }) {
         <Figures
           of={[
             ['Solver', solver.status],
-            ['Iterations', solver.iterations],
-            ['Reprojection rms', `${number(solver.reprojectionRmsBeforePx)} to ${number(solver.reprojectionRmsAfterPx)} px`],
-            ['Rank', `${solver.rank} of ${solver.components}`],
+            ...Object.values(solverFigures(solver)),
           ]}
         />
       )}
@@ -273,7 +264,6 @@ function Version(props: { of: Calibration }) {
       <h3>Parameters</h3>
       <DataTable
         caption={'Parameters of version ' + props.of.version}
-        hideCaption
         head={['Parameter', 'Value', 'Sigma']}
         rows={props.of.estimates.map((e) => [
           component(e.component),
@@ -290,7 +280,7 @@ export function Calibrations(props: { rig: string; session: Session | null; vers
   const shown = /\/calibrations\/(\d+)$/.exec(url.pathname)?.[1];
   const [asked, setAsked] = useState<Calibration | null>(null);
   const [changed, setChanged] = useState(0);
-  const base = `rigs/${encodeURIComponent(props.rig)}/calibrations`;
+  const base = rigPath(props.rig) + '/calibrations';
   const read = useRead<{ calibrations: Calibration[]; nextPageToken: string }>(
     base + '?page_size=100',
     props.version + changed,
@@ -309,8 +299,7 @@ export function Calibrations(props: { rig: string; session: Session | null; vers
               {nextPageToken && <p class="quiet">The newest 100 versions.</p>}
               <DataTable
                 caption="Versions"
-                hideCaption
-                head={['Version', 'State', 'Created', 'Validation', 'Segments', 'Reprojection rms [px]', ...(may ? ['Change'] : [])]}
+                  head={['Version', 'State', 'Created', 'Validation', 'Segments', 'Reprojection rms [px]', ...(may ? ['Change'] : [])]}
                 rows={calibrations.map((c) => [
                   <Link to={pageOf(c.name)} current={c.version === shown}>
                     {c.version === '1' ? '1 (factory)' : c.version}

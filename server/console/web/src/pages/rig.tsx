@@ -3,6 +3,7 @@ import uPlot from 'uplot';
 import {
   idOf,
   pageOf,
+  rigPath,
   type Calibration,
   type Estimate,
   type Rig,
@@ -12,12 +13,14 @@ import {
 import { component, matches, number, quantity } from '../format';
 import {
   Badge,
+  Choice,
   DataTable,
   Empty,
   Figures,
   Link,
   Loaded,
   Meter,
+  SegmentLink,
   Title,
   When,
 } from '../parts';
@@ -59,7 +62,6 @@ function Group(props: { name: string; of: Known[] }) {
       </h3>
       <DataTable
         caption={'How well the group ' + props.name + ' is known'}
-        hideCaption
         head={['Parameter', 'Value', 'Sigma', 'Factory tolerance', 'Still unknown']}
         rows={props.of.map((e) => [
           component(e.component),
@@ -152,12 +154,9 @@ function Tables(props: { of: Table[] }) {
           ) : (
             <DataTable
               caption={'Segments in the table ' + idOf(table.name)}
-              hideCaption
               head={['Segment', 'Entropy [nats]', 'Gain [nats]']}
               rows={table.entries.map((entry) => [
-                <Link to={pageOf(entry.segment)}>
-                  {decodeURIComponent(idOf(entry.segment))}
-                </Link>,
+                <SegmentLink name={entry.segment} />,
                 number(entry.entropyNats, 4),
                 number(entry.gainNats, 4),
               ])}
@@ -212,7 +211,7 @@ function Histogram(props: { segments: Segment[]; group: string }) {
 function Entropies(props: { rig: string; groups: string[]; version: number }) {
   const [group, setGroup] = useState(props.groups[0]);
   const read = useRead<{ segments: Segment[] }>(
-    `rigs/${props.rig}/segments?page_size=200`,
+    rigPath(props.rig) + '/segments?page_size=200',
     props.version,
   );
   return (
@@ -231,17 +230,14 @@ function Entropies(props: { rig: string; groups: string[]; version: number }) {
           }
           return (
             <>
-              <label class="bar">
-                Group
-                <select
+              <div class="bar">
+                <Choice
+                  label="Group"
                   value={group}
-                  onChange={(event) => setGroup(event.currentTarget.value)}
-                >
-                  {props.groups.map((name) => (
-                    <option key={name}>{name}</option>
-                  ))}
-                </select>
-              </label>
+                  of={props.groups.map((name) => [name, name])}
+                  onChoice={setGroup}
+                />
+              </div>
               <Histogram segments={scored} group={group} />
               <p class="quiet">Of the newest {scored.length} scored segments.</p>
             </>
@@ -253,7 +249,7 @@ function Entropies(props: { rig: string; groups: string[]; version: number }) {
 }
 
 export function RigPage(props: { rig: string; version: number }) {
-  const base = 'rigs/' + encodeURIComponent(props.rig);
+  const base = rigPath(props.rig);
   const rig = useRead<Rig>(base);
   const active = useRead<Calibration>(base + '/calibrations/active', props.version);
   const factory = useRead<Calibration>(base + '/calibrations/1');
@@ -289,7 +285,7 @@ export function RigPage(props: { rig: string; version: number }) {
       <Loaded read={tables}>{(value) => <Tables of={value.tables} />}</Loaded>
       {rig.value && (
         <Entropies
-          rig={encodeURIComponent(props.rig)}
+          rig={props.rig}
           groups={rig.value.groups.map((g) => g.group)}
           version={props.version}
         />

@@ -1,70 +1,62 @@
-import type { ComponentChildren } from 'preact';
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
-import { idOf, pageOf, type Run } from '../api';
+import { idOf, pageOf, rigPath, type Run, type Solver } from '../api';
 import { number, words } from '../format';
-import { Badge, DataTable, Empty, Figures, Link, Loaded, Pager, Title, When } from '../parts';
+import { ListPage, type Column } from '../list';
+import {
+  Badge,
+  Empty,
+  Figures,
+  Link,
+  Loaded,
+  SegmentLinks,
+  solverFigures,
+  Title,
+  When,
+} from '../parts';
 import { kColours, Plot } from '../plot';
-import { useAddress, useRead, withQuery } from '../state';
+import { useRead } from '../state';
 
 function isRunning(run: Run): boolean {
   return run.state === 'PENDING' || run.state === 'RUNNING';
 }
 
+function costs(solver: Solver): string {
+  return `${number(solver.initialCost)} to ${number(solver.finalCost)}`;
+}
+
+function Result(props: { of: Run }) {
+  const { calibration } = props.of;
+  return <Link to={pageOf(calibration)}>version {idOf(calibration)}</Link>;
+}
+
+const kColumns: Column<Run>[] = [
+  { head: 'Run', cell: (run) => <Link to={pageOf(run.name)}>{idOf(run.name)}</Link> },
+  { head: 'State', cell: (run) => <Badge state={run.state} /> },
+  { head: 'Why', cell: (run) => words(run.trigger) },
+  { head: 'Begun', cell: (run) => <When time={run.createTime} /> },
+  { head: 'Segments', cell: (run) => run.segments.length },
+  { head: 'Cost', cell: (run) => run.solver && costs(run.solver) },
+  { head: 'Result', cell: (run) => run.calibration && <Result of={run} /> },
+  { head: 'Message', cell: (run) => run.message },
+];
+
 export function Runs(props: { rig: string; version: number }) {
-  const token = useAddress().searchParams.get('page_token') ?? '';
-  const read = useRead<{ recalibrations: Run[]; nextPageToken: string }>(
-    `rigs/${encodeURIComponent(props.rig)}/recalibrations?page_token=${token}`,
-    props.version,
-  );
-  const title = 'Runs of ' + props.rig;
   return (
-    <>
-      <Title text={title}>{title}</Title>
-      <Loaded read={read}>
-        {(listed) =>
-          listed.recalibrations.length === 0 ? (
-            <Empty>
-              No run yet. One begins when the tables are full;{' '}
-              <code>selfcal recalibrate {props.rig}</code> starts one by hand.
-            </Empty>
-          ) : (
-            <>
-              <DataTable
-                caption={title}
-                hideCaption
-                head={['Run', 'State', 'Why', 'Begun', 'Segments', 'Cost', 'Result', 'Message']}
-                rows={listed.recalibrations.map((run) => [
-                  <Link to={pageOf(run.name)}>{idOf(run.name)}</Link>,
-                  <Badge state={run.state} />,
-                  words(run.trigger),
-                  <When time={run.createTime} />,
-                  run.segments.length,
-                  run.solver
-                    ? `${number(run.solver.initialCost)} to ${number(run.solver.finalCost)}`
-                    : '',
-                  run.calibration && (
-                    <Link to={pageOf(run.calibration)}>
-                      version {idOf(run.calibration)}
-                    </Link>
-                  ),
-                  run.message,
-                ])}
-              />
-              <Pager
-                next="Older runs"
-                first={token ? withQuery({ page_token: '' }) : null}
-                more={
-                  listed.nextPageToken
-                    ? withQuery({ page_token: listed.nextPageToken })
-                    : null
-                }
-              />
-            </>
-          )
-        }
-      </Loaded>
-    </>
+    <ListPage
+      title={'Runs of ' + props.rig}
+      path={rigPath(props.rig) + '/recalibrations'}
+      items="recalibrations"
+      version={props.version}
+      columns={kColumns}
+      next="Older runs"
+      empty={
+        <>
+          No run yet. One begins when the tables are full;{' '}
+          <code>selfcal recalibrate {props.rig}</code> starts one by hand.
+        </>
+      }
+    />
   );
 }
 
@@ -118,16 +110,17 @@ function Progress(props: { steps: Step[] }) {
 function Report(props: { run: Run }) {
   const solver = props.run.solver;
   if (!solver) return null;
+  const said = solverFigures(solver);
   return (
     <>
       <h2>What the solver says</h2>
       <Figures
         of={[
           ['Status', solver.status],
-          ['Iterations', solver.iterations],
-          ['Cost', `${number(solver.initialCost)} to ${number(solver.finalCost)}`],
-          ['Reprojection rms', `${number(solver.reprojectionRmsBeforePx)} to ${number(solver.reprojectionRmsAfterPx)} px`],
-          ['Rank', `${solver.rank} of ${solver.components}`],
+          said.iterations,
+          ['Cost', costs(solver)],
+          said.reprojection,
+          said.rank,
           ['Keyframes', solver.keyframes],
           ['Landmarks', solver.landmarks],
           ['Time', number(solver.seconds) + ' s'],
@@ -140,7 +133,7 @@ function Report(props: { run: Run }) {
 export function RunPage(props: { rig: string; run: string; version: number }) {
   const name = `rigs/${props.rig}/recalibrations/${props.run}`;
   const read = useRead<Run>(
-    `rigs/${encodeURIComponent(props.rig)}/recalibrations/${encodeURIComponent(props.run)}`,
+    `${rigPath(props.rig)}/recalibrations/${encodeURIComponent(props.run)}`,
     props.version,
   );
   const { steps, now } = useSteps(name, read.value !== null && isRunning(read.value));
@@ -160,12 +153,10 @@ export function RunPage(props: { rig: string; run: string; version: number }) {
                   ['Begun', <When time={shown.createTime} />],
                   ['Segments', shown.segments.length],
                   ['Attempts', shown.attempts],
-                  ...(isRunning(shown)
-                    ? ([['Iteration', `${shown.iteration} of ${shown.maxIterations}`]] as [string, string][])
-                    : []),
-                  ...(shown.calibration
-                    ? ([['Result', <Link to={pageOf(shown.calibration)}>version {idOf(shown.calibration)}</Link>]] as [string, ComponentChildren][])
-                    : []),
+                  isRunning(shown)
+                    ? ['Iteration', `${shown.iteration} of ${shown.maxIterations}`]
+                    : null,
+                  shown.calibration ? ['Result', <Result of={shown} />] : null,
                 ]}
               />
               {shown.message && <p class="warning">{shown.message}</p>}
@@ -175,13 +166,7 @@ export function RunPage(props: { rig: string; run: string; version: number }) {
               )}
               <Report run={run} />
               <h2>Segments</h2>
-              <ul class="columns">
-                {shown.segments.map((segment) => (
-                  <li key={segment}>
-                    <Link to={pageOf(segment)}>{decodeURIComponent(idOf(segment))}</Link>
-                  </li>
-                ))}
-              </ul>
+              <SegmentLinks names={shown.segments} />
             </>
           );
         }}

@@ -3,6 +3,7 @@ import type uPlot from 'uplot';
 import {
   idOf,
   pageOf,
+  rigPath,
   type Direction,
   type Segment,
   type SegmentData,
@@ -52,7 +53,6 @@ function Information(props: { of: Segment; tables: Table[] }) {
     <>
       <DataTable
         caption="What it says about each group"
-        hideCaption
         head={['Group', 'Gain [nats]', 'Entropy [nats]', 'Rank', 'Kept?', 'Does not show']}
         rows={props.of.scores.map((score) => [
           score.group,
@@ -155,12 +155,9 @@ function Data(props: { path: string; segment: Segment }) {
 }
 
 export function SegmentPage(props: { rig: string; segment: string; version: number }) {
-  const path = `rigs/${encodeURIComponent(props.rig)}/segments/${encodeURIComponent(props.segment)}`;
+  const path = `${rigPath(props.rig)}/segments/${encodeURIComponent(props.segment)}`;
   const read = useRead<Segment>(path, props.version);
-  const tables = useRead<{ tables: Table[] }>(
-    `rigs/${encodeURIComponent(props.rig)}/tables`,
-    props.version,
-  );
+  const tables = useRead<{ tables: Table[] }>(rigPath(props.rig) + '/tables', props.version);
   const title = 'Segment ' + decodeURIComponent(props.segment);
   return (
     <>
@@ -178,9 +175,9 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
                 ['Landmarks', segment.landmarks],
                 ['Observations', segment.observations],
                 ['Data', segment.hasData ? bytes(segment.payloadBytes) : 'dropped'],
-                ...(segment.temperatureC === undefined
-                  ? []
-                  : ([['Temperature', number(segment.temperatureC) + ' °C']] as [string, string][])),
+                segment.temperatureC === undefined
+                  ? null
+                  : ['Temperature', number(segment.temperatureC) + ' °C'],
               ]}
             />
             {segment.problem && <p class="warning">{segment.problem}</p>}
