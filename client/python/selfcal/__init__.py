@@ -1,4 +1,4 @@
-"""Reads what selfcald knows: segments, tables, calibrations and runs.
+"""Reads what selfcald knows: segments, tables, calibrations and runs::
 
     with selfcal.connect("unix:/run/selfcal/selfcald.sock") as daemon:
         for segment in daemon.segments("tablet"):
