@@ -20,10 +20,29 @@ struct Flags {
   std::string daemon;
   std::vector<std::string> vi_map;
   std::string json;
+  std::string keep;
   std::uint64_t seed = 1;
   double seconds = 120;
   selfcal::client::RecordingOptions recording;
 };
+
+// A new folder: `keep`, or one for the time of the demo. Says what is wrong.
+std::optional<std::string> MakeFolder(const std::string& keep) {
+  std::error_code error;
+  if (!keep.empty()) {
+    if (std::filesystem::create_directories(keep, error)) return keep;
+    fmt::print(stderr,
+               "cannot make the folder {}: {}\n",
+               keep,
+               error ? error.message() : "it is there already");
+    return std::nullopt;
+  }
+  std::string folder =
+      (std::filesystem::temp_directory_path() / "selfcal-demo-XXXXXX").string();
+  if (mkdtemp(folder.data()) != nullptr) return folder;
+  fmt::print(stderr, "cannot make a folder like {}\n", folder);
+  return std::nullopt;
+}
 
 int Run(const Flags& flags) {
   using namespace selfcal::client;
@@ -34,23 +53,20 @@ int Run(const Flags& flags) {
     fmt::print(stderr, "{}\n", std::string(device.status().message()));
     return 1;
   }
-  std::string folder =
-      (std::filesystem::temp_directory_path() / "selfcal-demo-XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) {
-    fmt::print(stderr, "cannot make a folder like {}\n", folder);
-    return 1;
-  }
+  const std::optional<std::string> folder = MakeFolder(flags.keep);
+  if (!folder) return 1;
   Report report;
   const absl::Status status =
-      RunDemo({.daemon = flags.daemon, .state_dir = folder + "/state"},
+      RunDemo({.daemon = flags.daemon, .state_dir = *folder + "/state"},
               *device,
               &report);
   if (!status.ok()) {
     report.Fail(std::string(status.message()));
   }
-  report.Line(report.failed() ? "the state stays in " + folder
-                              : "every step did what it says");
-  if (!report.failed()) std::filesystem::remove_all(folder);
+  const bool stays = report.failed() || !flags.keep.empty();
+  if (!report.failed()) report.Line("every step did what it says");
+  if (stays) report.Line("the state stays in " + *folder + "/state");
+  if (!stays) std::filesystem::remove_all(*folder);
   if (!flags.json.empty()) {
     if (const absl::Status written = report.WriteJson(flags.json);
         !written.ok()) {
@@ -72,6 +88,8 @@ int main(int argc, char** argv) {
                  "A real recording: a maplab VI-map folder, or several that "
                  "are consecutive submaps; without it, a simulated device");
   app.add_option("--json", flags.json, "Write all that is shown to this file");
+  app.add_option(
+      "--keep", flags.keep, "A new folder, in which the daemon's state stays");
   app.add_option("--seed", flags.seed, "Of the simulation");
   app.add_option("--seconds", flags.seconds, "Length of the simulation [s]")
       ->check(CLI::Range(40.0, 3600.0));
