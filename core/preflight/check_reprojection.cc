@@ -45,8 +45,13 @@ struct Explanation {
 
 Eigen::Vector3d AsFed(const View& view) { return view.p; }
 
-Explanation Extrinsics(const char* cause, const char* remedy) {
+Explanation Extrinsics(const std::string& cause, const std::string& remedy) {
   return {{}, {FindingKind::kExtrinsics, cause, remedy, 0}};
+}
+
+// T_CI, which takes a point from the body to the camera frame.
+Eigen::Isometry3d FromBody(const CameraCalibration& camera) {
+  return Eigen::Translation3d(camera.p_CI) * camera.q_CI;
 }
 
 bool IsFar(const LandmarkMap& map) {
@@ -57,14 +62,18 @@ bool IsFar(const LandmarkMap& map) {
 
 class ReprojectionCheck {
  public:
-  ReprojectionCheck(const CameraCalibration& camera,
+  // Of camera j.
+  ReprojectionCheck(const std::vector<CameraCalibration>& cameras,
+                    std::size_t j,
                     const std::vector<View>& views,
                     double pixel_sigma_px)
-      : camera_(camera),
+      : cameras_(cameras),
+        j_(j),
+        camera_(cameras[j]),
         views_(views),
-        f_px_(camera.f.mean()),
+        f_px_(camera_.f.mean()),
         fine_px_(kFineSigmas * pixel_sigma_px),
-        fed_(Measure(views, camera, AsFed)) {}
+        fed_(Measure(views, camera_, AsFed)) {}
 
   const ReprojectionError& fed() const { return fed_; }
 
@@ -103,6 +112,7 @@ class ReprojectionCheck {
   std::vector<Explanation> Explanations() const {
     std::vector<Explanation> all;
     AddExtrinsics(&all);
+    AddPoses(&all);
     AddAnchors(&all);
     const ImageMap map = FitImageMap(views_, camera_);
     if (std::abs(map.scale - 1) > kMinScale) {
@@ -113,17 +123,24 @@ class ReprojectionCheck {
     return all;
   }
 
+  void AddWith(const Eigen::Quaterniond& q_CI,
+               const Eigen::Vector3d& p_CI,
+               Explanation explanation,
+               std::vector<Explanation>* all) const {
+    CameraCalibration other = camera_;
+    other.q_CI = q_CI;
+    other.p_CI = p_CI;
+    explanation.error = Measure(views_, other, AsFed);
+    all->push_back(std::move(explanation));
+  }
+
   void AddExtrinsics(std::vector<Explanation>* all) const {
     const Eigen::Quaterniond q = camera_.q_CI;
     const Eigen::Vector3d p = camera_.p_CI;
     const auto add = [&](const Eigen::Quaterniond& q_CI,
                          const Eigen::Vector3d& p_CI,
-                         Explanation explanation) {
-      CameraCalibration other = camera_;
-      other.q_CI = q_CI;
-      other.p_CI = p_CI;
-      explanation.error = Measure(views_, other, AsFed);
-      all->push_back(explanation);
+                         const Explanation& explanation) {
+      AddWith(q_CI, p_CI, explanation, all);
     };
     add(q.conjugate(),
         -(q.conjugate() * p),
@@ -145,27 +162,59 @@ class ReprojectionCheck {
                    "with p_CI = -R_CI p",
                    "state p_ci as the body's origin in the camera frame, "
                    "-R_CI p of the p that is stated now"));
-    add(Eigen::Quaterniond::Identity(),
-        Eigen::Vector3d::Zero(),
-        Extrinsics("the keyframes are poses of the camera: landmarks project "
-                   "to where they were seen without the extrinsics",
-                   "send the poses of the body: T_GI = T_GC T_CI"));
+  }
+
+  // Keyframes that are poses of a camera, or were made from those with inverted
+  // extrinsics: one of the cameras gave them, and all see what follows.
+  void AddPoses(std::vector<Explanation>* all) const {
+    const Eigen::Isometry3d T_CI = FromBody(camera_);
+    for (std::size_t k = 0; k < cameras_.size(); ++k) {
+      const Eigen::Isometry3d T_KI = FromBody(cameras_[k]);
+      const std::string which =
+          cameras_.size() == 1 ? "the camera" : "cam" + std::to_string(k);
+      const Eigen::Isometry3d of_camera = T_CI * T_KI.inverse();
+      AddWith(Eigen::Quaterniond(of_camera.linear()),
+              of_camera.translation(),
+              Extrinsics("the keyframes are poses of " + which +
+                             ": landmarks project to where they were seen "
+                             "without the extrinsics",
+                         "send the poses of the body: T_GI = T_GC T_CI"),
+              all);
+      // The camera that gave the poses sees nothing wrong.
+      if (k == j_) continue;
+      const Eigen::Isometry3d by_inverse = T_CI.inverse() * T_KI * T_KI;
+      AddWith(
+          Eigen::Quaterniond(by_inverse.linear()),
+          by_inverse.translation(),
+          Extrinsics("the keyframes were made with inverted extrinsics of " +
+                         which +
+                         ": landmarks project to where they were seen "
+                         "with these undone and the own inverted",
+                     "invert q_ci and p_ci, which take a point from the "
+                     "body to the camera frame, and make the poses with "
+                     "them: T_GI = T_GC T_CI"),
+          all);
+    }
+  }
+
+  // A camera's frame in which landmarks may be, of the keyframe that saw them
+  // first: `of` takes a view to the camera.
+  template <typename Camera>
+  Explanation AnchoredIn(const std::string& which, const Camera& of) const {
+    return {Measure(views_,
+                    camera_,
+                    [&](const View& v) {
+                      const CameraCalibration& c = cameras_[of(v)];
+                      return v.first.ToG(c.q_CI.conjugate() * (v.p - c.p_CI));
+                    }),
+            {FindingKind::kLandmarkFrame,
+             "landmarks are in the camera frame" + which +
+                 " of the keyframe that saw them first",
+             "send landmarks in G: p_G = T_GI T_IC p_C",
+             0}};
   }
 
   void AddAnchors(std::vector<Explanation>* all) const {
-    const char* remedy = "send landmarks in G: p_G = T_GI T_IC p_C";
-    const Eigen::Quaterniond q_IC = camera_.q_CI.conjugate();
-    Explanation camera = {
-        Measure(views_,
-                camera_,
-                [&](const View& v) {
-                  return v.first.ToG(q_IC * (v.p - camera_.p_CI));
-                }),
-        {FindingKind::kLandmarkFrame,
-         "landmarks are in the camera frame of the keyframe that saw them "
-         "first",
-         remedy,
-         0}};
     Explanation body = {
         Measure(
             views_, camera_, [](const View& v) { return v.first.ToG(v.p); }),
@@ -173,7 +222,11 @@ class ReprojectionCheck {
          "landmarks are in the body frame of the keyframe that saw them first",
          "send landmarks in G: p_G = T_GI p_I",
          0}};
-    all->push_back(camera);
+    all->push_back(
+        AnchoredIn("", [](const View& v) { return v.first_camera; }));
+    if (cameras_.size() > 1) {
+      all->push_back(AnchoredIn(" (of cam0)", [](const View&) { return 0; }));
+    }
     all->push_back(body);
   }
 
@@ -234,7 +287,7 @@ class ReprojectionCheck {
                  " degrees and moved by (" + Figure(map.t.x()) + ", " +
                  Figure(map.t.y()) + ", " + Figure(map.t.z()) + ") m",
              "send landmarks and keyframes in the same frame G and in metres",
-             0}};
+             std::abs(map.scale - 1) > kMinScale ? map.scale : 0}};
   }
 
   std::string Figures(const ReprojectionError& error) const {
@@ -265,11 +318,37 @@ class ReprojectionCheck {
             fed_.median_px};
   }
 
+  const std::vector<CameraCalibration>& cameras_;
+  const std::size_t j_;
   const CameraCalibration& camera_;
   const std::vector<View>& views_;
   const double f_px_;
   const double fine_px_;
   const ReprojectionError fed_;
+};
+
+// Says once what several cameras show alike.
+class FindingsByCamera {
+ public:
+  void Add(const std::string& camera, Finding finding) {
+    for (auto& [cameras, known] : findings_) {
+      if (known.kind == finding.kind && known.remedy == finding.remedy) {
+        cameras += ", " + camera;
+        return;
+      }
+    }
+    findings_.emplace_back(camera, std::move(finding));
+  }
+
+  void MoveTo(Diagnosis* diagnosis) {
+    for (auto& [cameras, finding] : findings_) {
+      finding.cause = cameras + ": " + finding.cause;
+      diagnosis->findings.push_back(std::move(finding));
+    }
+  }
+
+ private:
+  std::vector<std::pair<std::string, Finding>> findings_;
 };
 
 }  // namespace
@@ -278,25 +357,26 @@ void CheckReprojection(const Rig& rig,
                        const Calibration& theta,
                        std::span<const MotionSegment> segments,
                        Diagnosis* diagnosis) {
-  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+  const auto cameras = static_cast<int>(theta.cameras.size());
+  FindingsByCamera findings;
+  for (int j = 0; j < cameras; ++j) {
     const std::string name = "cam" + std::to_string(j);
-    const auto views = CollectViews(segments, static_cast<int>(j));
+    const auto views = CollectViews(segments, j, cameras);
     if (views.size() < kMinViews) {
       diagnosis->not_checked.push_back(
           name + ": extrinsics, focal length and landmarks: only " +
           std::to_string(views.size()) + " observations");
       continue;
     }
-    const ReprojectionCheck check(theta.cameras[j], views, rig.pixel_sigma_px);
+    const ReprojectionCheck check(
+        theta.cameras, static_cast<std::size_t>(j), views, rig.pixel_sigma_px);
     diagnosis->checked.push_back(
         name + ": extrinsics, focal length and landmarks: " +
         std::to_string(views.size()) + " observations, " +
         Figure(check.fed().median_px) + " px median");
-    if (auto finding = check.Run()) {
-      finding->cause = name + ": " + finding->cause;
-      diagnosis->findings.push_back(*std::move(finding));
-    }
+    if (auto finding = check.Run()) findings.Add(name, *std::move(finding));
   }
+  findings.MoveTo(diagnosis);
 }
 
 }  // namespace selfcal

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace selfcal {
 namespace {
@@ -26,37 +28,50 @@ BodyPose PoseOf(const KeyframeState& state) {
   return {state.q_GI.normalized(), state.p_GI};
 }
 
-// Of each landmark the first keyframe that sees it.
-std::vector<std::int32_t> FirstKeyframes(const MotionSegment& segment,
-                                         int camera) {
-  std::vector<std::int32_t> first(
-      segment.landmarks.size(),
-      static_cast<std::int32_t>(segment.keyframes.size()));
+struct Sighting {
+  std::int32_t keyframe = std::numeric_limits<std::int32_t>::max();
+  std::int32_t camera = 0;
+  auto operator<=>(const Sighting&) const = default;
+};
+
+// The first of each landmark.
+std::vector<Sighting> FirstSightings(const MotionSegment& segment,
+                                     int cameras) {
+  std::vector<Sighting> first(segment.landmarks.size());
   for (const Observation& o : segment.observations) {
-    if (o.camera != camera || !Usable(segment, o)) continue;
-    first[o.landmark] = std::min(first[o.landmark], o.keyframe);
+    if (o.camera < 0 || o.camera >= cameras || !Usable(segment, o)) continue;
+    first[o.landmark] =
+        std::min(first[o.landmark], Sighting{o.keyframe, o.camera});
   }
   return first;
+}
+
+std::size_t CountOf(std::span<const MotionSegment> segments, int camera) {
+  std::size_t count = 0;
+  for (const MotionSegment& segment : segments) {
+    for (const Observation& o : segment.observations) {
+      count += o.camera == camera ? 1 : 0;
+    }
+  }
+  return count;
 }
 
 }  // namespace
 
 std::vector<View> CollectViews(std::span<const MotionSegment> segments,
-                               int camera) {
-  std::size_t all = 0;
-  for (const MotionSegment& segment : segments) {
-    all += segment.observations.size();
-  }
-  const std::size_t step = all / kMaxViews + 1;
+                               int camera,
+                               int cameras) {
+  const std::size_t step = CountOf(segments, camera) / kMaxViews + 1;
   std::vector<View> views;
   std::size_t count = 0;
   for (const MotionSegment& segment : segments) {
-    const auto first = FirstKeyframes(segment, camera);
+    const auto first = FirstSightings(segment, cameras);
     for (const Observation& o : segment.observations) {
       if (o.camera != camera || !Usable(segment, o)) continue;
       if (count++ % step != 0) continue;
       views.push_back({PoseOf(segment.keyframes[o.keyframe]),
-                       PoseOf(segment.keyframes[first[o.landmark]]),
+                       PoseOf(segment.keyframes[first[o.landmark].keyframe]),
+                       first[o.landmark].camera,
                        segment.landmarks[o.landmark].p_G,
                        o.z_px});
     }

@@ -25,16 +25,20 @@ struct BodyPose {
 };
 
 struct View {
-  BodyPose pose;      // of the keyframe that sees
-  BodyPose first;     // of the first keyframe of its segment that saw it
+  BodyPose pose;  // of the keyframe that sees
+  // Of the first keyframe of its segment that saw the landmark, by any camera,
+  // and the camera that did.
+  BodyPose first;
+  int first_camera;
   Eigen::Vector3d p;  // the landmark as it was fed
   Eigen::Vector2d z_px;
 };
 
 // Of the observations of `camera` an even choice of about 4000, without those
-// of numbers or indices that are none.
+// of numbers or indices that are none; of `cameras` in all.
 std::vector<View> CollectViews(std::span<const MotionSegment> segments,
-                               int camera);
+                               int camera,
+                               int cameras);
 
 // Pixel of a point in G; nothing where it cannot be projected.
 std::optional<Eigen::Vector2d> Predict(const CameraCalibration& camera,

@@ -59,7 +59,8 @@ TEST(CleanData, GivesNoFinding) {
       {"hand-held", HandheldRig("a"), false, 0},
       {"hand-held, offset of 15 ms", HandheldRig("a"), false, 0.015},
       {"hand-held, true calibration stated", HandheldRig("a"), true, 0},
-      {"stereo", StereoRig(), false, 0}};
+      {"stereo", StereoRig(), false, 0},
+      {"four cameras", RigOfCameras(4), false, 0}};
   int sessions = 0, alarms = 0;
   for (const Case& one : cases) {
     for (const Motion& motion : kMotions) {

@@ -170,16 +170,17 @@ void ScaleCamera(FedData* data, double by) {
 
 // Landmarks as the front end has them: in the camera that saw them first.
 void AnchorLandmarks(FedData* data) {
-  const CameraCalibration& camera = data->rig.factory.cameras[0];
   for (MotionSegment& segment : data->segments) {
-    std::map<int, int> first;
+    std::map<int, std::pair<int, int>> first;  // keyframe and camera
     for (const Observation& o : segment.observations) {
-      const auto [at, added] = first.emplace(o.landmark, o.keyframe);
-      if (!added) at->second = std::min(at->second, o.keyframe);
+      const std::pair seen(o.keyframe, o.camera);
+      const auto [at, added] = first.emplace(o.landmark, seen);
+      if (!added) at->second = std::min<std::pair<int, int>>(at->second, seen);
     }
-    for (const auto& [landmark, keyframe] : first) {
+    for (const auto& [landmark, seen] : first) {
+      const CameraCalibration& camera = data->rig.factory.cameras[seen.second];
       Eigen::Vector3d& p = segment.landmarks[landmark].p_G;
-      const KeyframeState& state = segment.keyframes[keyframe];
+      const KeyframeState& state = segment.keyframes[seen.first];
       p = camera.q_CI * (state.q_GI.conjugate() * (p - state.p_GI)) +
           camera.p_CI;
     }
@@ -383,11 +384,12 @@ std::vector<Mistake> CameraMistakes() {
        LandmarksOfFirstCamera},
       {"landmarks_in_mm",
        {Kind::kLandmarkFrame},
-       "scaled by 0.001",
+       "when scaled by",
        "metres",
        [](FedData* d) {
          ForLandmarks(d, [](Eigen::Vector3d* p) { *p *= 1000; });
-       }},
+       },
+       0.001},
   };
 }
 

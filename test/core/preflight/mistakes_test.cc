@@ -8,6 +8,7 @@
 
 #include "core/simulation/simulate.h"
 #include "test/core/preflight/expect_found.h"
+#include "test/core/simulation/rigs.h"
 #include "test/promise.h"
 
 namespace selfcal {
@@ -28,11 +29,12 @@ FedData Simulated(const Rig& rig, const Trajectory& trajectory, int seed) {
 
 // Over seeds: as many as SELFCAL_TRIALS says.
 void ExpectAllFound(
-    const std::function<std::unique_ptr<Trajectory>(int)>& motion) {
+    const std::function<std::unique_ptr<Trajectory>(int)>& motion,
+    const Rig& rig = HandheldRig("rig")) {
   int planted = 0, named = 0;
   for (int seed = 1; seed <= Trials(1); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const FedData clean = Simulated(HandheldRig("rig"), *motion(seed), seed);
+    const FedData clean = Simulated(rig, *motion(seed), seed);
     const Diagnosis diagnosis = clean.Diagnose();
     ASSERT_TRUE(diagnosis.findings.empty()) << Text(diagnosis);
     for (const Mistake& mistake : Mistakes()) {
@@ -53,6 +55,40 @@ TEST(Mistakes, AreFoundInCalmMotion) {
 
 TEST(Mistakes, AreFoundInMixedMotion) {
   ExpectAllFound([](int seed) { return MakeMixed(60, seed); });
+}
+
+// Of all four, which look in three directions.
+TEST(Mistakes, AreFoundWithFourCameras) {
+  ExpectAllFound([](int seed) { return MakeMixed(60, seed); }, RigOfCameras(4));
+}
+
+// A front end that keeps all landmarks in its first camera.
+TEST(Mistakes, LandmarksInTheFirstOfFourCamerasAreFound) {
+  const FedData clean = Simulated(RigOfCameras(4), *MakeMixed(60, 1), 1);
+  const auto plant = [](FedData* data) {
+    const CameraCalibration& camera = data->rig.factory.cameras[0];
+    for (MotionSegment& segment : data->segments) {
+      std::vector<int> first(segment.landmarks.size(), -1);
+      for (const Observation& o : segment.observations) {
+        int& keyframe = first[o.landmark];
+        if (keyframe < 0 || o.keyframe < keyframe) keyframe = o.keyframe;
+      }
+      for (std::size_t i = 0; i < first.size(); ++i) {
+        if (first[i] < 0) continue;
+        const KeyframeState& state = segment.keyframes[first[i]];
+        Eigen::Vector3d& p = segment.landmarks[i].p_G;
+        p = camera.q_CI * (state.q_GI.conjugate() * (p - state.p_GI)) +
+            camera.p_CI;
+      }
+    }
+  };
+  EXPECT_TRUE(ExpectFound({"landmarks_in_cam0",
+                           {FindingKind::kLandmarkFrame},
+                           "cam0, cam1, cam2, cam3: landmarks are in the "
+                           "camera frame (of cam0)",
+                           "landmarks in G",
+                           plant},
+                          clean));
 }
 
 // At rest nothing can be said about rates, and it is not.
