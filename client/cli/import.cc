@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/device_data.h"
 #include "client/cli/diagnosis_text.h"
 #include "client/cli/progress.h"
 #include "client/cli/recording_input.h"
@@ -17,8 +18,6 @@
 #include "core/preflight/diagnose.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"
-#include "selfcal/v1/calibration_service.grpc.pb.h"
-#include "selfcal/v1/rig.grpc.pb.h"
 #include "selfcal/v1/segment.pb.h"
 
 namespace selfcal::client {
@@ -107,34 +106,6 @@ class Reporter {
   Progress progress_;
 };
 
-grpc::Status GetRig(Context* context, const std::string& rig, v1::Rig* found) {
-  using Service = v1::RigService::StubInterface;
-  const auto stub = v1::RigService::NewStub(context->Channel());
-  v1::GetRigRequest request;
-  request.set_name(RigName(rig));
-  return Call<Service>(stub.get(), &Service::GetRig, request, found);
-}
-
-// The parameters of the version that the map was estimated with; nothing where
-// the daemon has none: it will say so itself.
-std::optional<Calibration> GetVersion(Context* context,
-                                      const Rig& rig,
-                                      std::int64_t version) {
-  if (version <= 1) return rig.factory;
-  using Service = v1::CalibrationService::StubInterface;
-  const auto stub = v1::CalibrationService::NewStub(context->Channel());
-  v1::GetCalibrationRequest request;
-  request.set_name(ChildName(rig.id, "calibrations", std::to_string(version)));
-  v1::Calibration found;
-  Calibration theta;
-  const grpc::Status status =
-      Call<Service>(stub.get(), &Service::GetCalibration, request, &found);
-  if (!status.ok() || !FromProto(found.parameters(), "", &theta).empty()) {
-    return std::nullopt;
-  }
-  return theta;
-}
-
 // Says what looks wrong, and sends all the same: a person may know better.
 void WarnBeforeSending(Context* context,
                        const v1::Rig& message,
@@ -143,7 +114,7 @@ void WarnBeforeSending(Context* context,
   Rig rig;
   if (!FromProto(message, "", &rig).empty()) return;
   const auto theta =
-      GetVersion(context, rig, options.recording.builder.calibration_version);
+      ReadVersion(context, rig, options.recording.builder.calibration_version);
   if (theta) WarnOf(Diagnose(rig, *theta, segments));
 }
 
@@ -205,7 +176,7 @@ int Import(Context* context, const ImportOptions& options) {
   }
   // Says at once what the stream would wait for.
   v1::Rig rig;
-  const grpc::Status found = GetRig(context, options.rig, &rig);
+  const grpc::Status found = ReadDevice(context, options.rig, &rig);
   if (!found.ok()) return Fail(*context, found);
   WarnBeforeSending(context, rig, options, recording->segments);
   return Send(context, options, std::move(recording->segments));

@@ -1,11 +1,15 @@
-// preflight: whether a recording is wrong in one of the usual ways.
+// preflight: whether a recording, or what a device has sent, is wrong in one of
+// the usual ways.
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/device_data.h"
 #include "client/cli/diagnosis_text.h"
 #include "client/cli/recording_input.h"
 #include "client/cli/rig_input.h"
@@ -18,6 +22,15 @@ namespace {
 struct PreflightOptions {
   RecordingInput recording;
   std::string rig_file;  // empty: the sensors of the map
+  std::string device;    // of the daemon, instead of a recording
+  int newest = 20;       // of its segments
+};
+
+// What is looked at.
+struct Subject {
+  Rig rig;
+  Calibration theta;
+  std::vector<MotionSegment> segments;
 };
 
 absl::Status Invalid(const std::string& source,
@@ -42,24 +55,70 @@ absl::StatusOr<Rig> ReadRigFile(const std::string& file) {
   return rig;
 }
 
-int Preflight(const Context& context, const PreflightOptions& options) {
+absl::Status FromRecording(const PreflightOptions& options, Subject* subject) {
   auto recording = ReadRecording(options.recording);
-  if (!recording.ok()) return FailInput(recording.status());
-  Rig rig = recording->rig;
+  if (!recording.ok()) return recording.status();
+  subject->rig = recording->rig;
   if (!options.rig_file.empty()) {
     auto read = ReadRigFile(options.rig_file);
-    if (!read.ok()) return FailInput(read.status());
-    rig = *std::move(read);
-  } else if (auto violations = Validate(rig.factory, "sensors");
+    if (!read.ok()) return read.status();
+    subject->rig = *std::move(read);
+  } else if (auto violations = Validate(subject->rig.factory, "sensors");
              !violations.empty()) {
-    return FailInput(Invalid("the map's sensors.yaml", violations));
+    return Invalid("the map's sensors.yaml", violations);
   }
-  const Diagnosis diagnosis = Diagnose(rig, rig.factory, recording->segments);
-  if (context.json) {
-    context.PrintJson(DiagnosisJson(diagnosis));
+  subject->theta = subject->rig.factory;
+  subject->segments = std::move(recording->segments);
+  return absl::OkStatus();
+}
+
+grpc::Status FromDevice(Context* context,
+                        const PreflightOptions& options,
+                        Subject* subject) {
+  v1::Rig message;
+  grpc::Status status = ReadDevice(context, options.device, &message);
+  if (!status.ok()) return status;
+  if (const auto violations = FromProto(message, "", &subject->rig);
+      !violations.empty()) {
+    return {grpc::StatusCode::DATA_LOSS,
+            "the daemon's rig is not valid: " + violations[0].message};
+  }
+  status = ReadNewestSegments(
+      context, options.device, options.newest, &subject->segments);
+  if (!status.ok()) return status;
+  if (subject->segments.empty()) {
+    return {grpc::StatusCode::FAILED_PRECONDITION,
+            "the daemon keeps the data of no segment of " + options.device +
+                ": let the device send some, and ask again"};
+  }
+  const std::int64_t version = subject->segments[0].calibration_version;
+  const auto theta = ReadVersion(context, subject->rig, version);
+  if (!theta) {
+    return {grpc::StatusCode::NOT_FOUND,
+            fmt::format("version {}, with which the segments were recorded, "
+                        "cannot be read",
+                        version)};
+  }
+  subject->theta = *theta;
+  return status;
+}
+
+int Preflight(Context* context, const PreflightOptions& options) {
+  Subject subject;
+  if (options.device.empty()) {
+    const absl::Status read = FromRecording(options, &subject);
+    if (!read.ok()) return FailInput(read);
   } else {
-    PrintText(context.terminal ? DiagnosisText(diagnosis)
-                               : DiagnosisRecords(diagnosis));
+    const grpc::Status read = FromDevice(context, options, &subject);
+    if (!read.ok()) return Fail(*context, read);
+  }
+  const Diagnosis diagnosis =
+      Diagnose(subject.rig, subject.theta, subject.segments);
+  if (context->json) {
+    context->PrintJson(DiagnosisJson(diagnosis));
+  } else {
+    PrintText(context->terminal ? DiagnosisText(diagnosis)
+                                : DiagnosisRecords(diagnosis));
   }
   return diagnosis.findings.empty() ? kDone : kFailed;
 }
@@ -69,20 +128,36 @@ int Preflight(const Context& context, const PreflightOptions& options) {
 void AddPreflightCommand(CLI::App* app, Context* context) {
   CLI::App* preflight = app->add_subcommand(
       "preflight",
-      "Check VI-maps for the usual mistakes: axes, units, gravity, time "
-      "offset, "
-      "lost samples, saturation, extrinsics, focal length, landmarks. Exits "
-      "with 0 if nothing is found, with 1 if something is. Needs no daemon");
+      "Check VI-maps, or what a device has sent, for the usual mistakes: axes, "
+      "units, gravity, time offset, lost samples, saturation, extrinsics, "
+      "focal length, landmarks. Exits with 0 if nothing is found, with 1 if "
+      "something is");
   const auto options = std::make_shared<PreflightOptions>();
   AddRecordingOptions(preflight, &options->recording);
-  preflight->add_option(
+  CLI::Option* const folders = preflight->get_option("DIR")->required(false);
+  CLI::Option* const rig = preflight->add_option(
       "--rig",
       options->rig_file,
       "What is stated about the rig: proto3 JSON of selfcal.v1.Rig, \"-\" is "
       "standard input [the map's own sensors]");
+  CLI::Option* const device =
+      preflight
+          ->add_option("--device",
+                       options->device,
+                       "A rig of the daemon instead of VI-maps: its newest "
+                       "segments, against the version they were recorded with")
+          ->excludes(folders)
+          ->excludes(rig);
+  preflight->add_option("--newest", options->newest, "How many segments of it")
+      ->check(CLI::Range(1, 500))
+      ->capture_default_str()
+      ->needs(device);
   preflight->callback([context, options] {
+    if (options->device.empty() && options->recording.folders.empty()) {
+      throw CLI::RequiredError("DIR or --device");
+    }
     context->command = [context, options] {
-      return Preflight(*context, *options);
+      return Preflight(context, *options);
     };
   });
 }

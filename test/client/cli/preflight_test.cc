@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string>
 
+#include "client/cli/recording_input.h"
 #include "client/import/vi_map.h"
 #include "test/client/cli/commands_fixture.h"
 #include "test/recordings.h"
@@ -85,6 +86,43 @@ TEST_F(PreflightCommand, ExitsWithTwoForWhatItCannotRead) {
   const Outcome outcome = Selfcal({"preflight", map, "--rig", WriteRig(rig)});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("factory.cameras[0].f"));
+}
+
+// The segments that the daemon keeps of the device, as the recording has them.
+TEST_F(PreflightCommand, LooksAtWhatADeviceHasSent) {
+  SELFCAL_NEED_RECORDING(map, "tango_handheld");
+  RecordingInput input;
+  input.folders = {map};
+  const auto recording = ReadRecording(input);
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  Rig rig = recording->rig;
+  rig.id = "device";
+  daemon_.rigs.push_back(ToProto(rig));
+  const Outcome nothing = Selfcal({"preflight", "--device", "device"});
+  EXPECT_EQ(nothing.code, 1);
+  EXPECT_THAT(nothing.err, HasSubstr("let the device send some"));
+  for (MotionSegment segment : recording->segments) {
+    segment.calibration_version = 2;
+    v1::Segment listed;
+    listed.set_name("rigs/device/segments/" + segment.key.session + "~" +
+                    std::to_string(segment.key.index));
+    listed.set_calibration_version(2);
+    daemon_.segments.push_back(listed);
+    daemon_.data.push_back(ToProto(segment));
+  }
+  daemon_.data.pop_back();  // dropped since
+  v1::Calibration version = Version(2);
+  *version.mutable_parameters() = ToProto(rig.factory);
+  daemon_.calibrations.push_back(version);
+  const Outcome good = Selfcal({"preflight", "--device", "device"});
+  EXPECT_EQ(good.code, 0) << good.err << good.out;
+  EXPECT_EQ(daemon_.last_filter, "has_data = true AND calibration_version = 2");
+  EXPECT_THAT(good.out, StartsWith("checked\tdropped and repeated samples"));
+  *daemon_.calibrations[0].mutable_parameters() =
+      ToProto(DoubleSize(map).factory);
+  const Outcome bad = Selfcal({"preflight", "--device", "device"});
+  EXPECT_EQ(bad.code, 1);
+  EXPECT_THAT(bad.out, StartsWith("focal-length\tcam0"));
 }
 
 TEST_F(PreflightCommand, IsRunByImportWhichWarnsAndSends) {
