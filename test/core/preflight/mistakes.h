@@ -32,7 +32,14 @@ struct Mistake {
   double value = 0;  // of the first finding, where it is known beforehand
 };
 
+// All of both kinds.
 std::vector<Mistake> Mistakes();
+std::vector<Mistake> ImuMistakes();
+std::vector<Mistake> CameraMistakes();
+
+// Changes the place of each landmark.
+void ForLandmarks(FedData* data,
+                  const std::function<void(Eigen::Vector3d*)>& change);
 
 // The kinds of all findings, sorted, each once; and as text for a failure.
 std::vector<FindingKind> Kinds(const Diagnosis& diagnosis);

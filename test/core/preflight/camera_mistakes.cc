@@ -1,0 +1,171 @@
+// Mistakes about cameras and landmarks.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/model/so3.h"
+#include "test/core/preflight/mistakes.h"
+
+namespace selfcal {
+namespace {
+
+using Kind = FindingKind;
+
+void InvertExtrinsics(FedData* data) {
+  for (CameraCalibration& camera : data->rig.factory.cameras) {
+    camera.q_CI = camera.q_CI.conjugate();
+    camera.p_CI = -(camera.q_CI * camera.p_CI);
+  }
+}
+
+// States of the camera handed on as those of the body.
+void SendCameraPoses(FedData* data) {
+  const CameraCalibration& camera = data->rig.factory.cameras[0];
+  const Eigen::Quaterniond q_IC = camera.q_CI.conjugate();
+  for (MotionSegment& segment : data->segments) {
+    for (KeyframeState& state : segment.keyframes) {
+      state.p_GI -= state.q_GI * (q_IC * camera.p_CI);
+      state.q_GI = state.q_GI * q_IC;
+    }
+  }
+}
+
+// The bridge has the extrinsics inverted and makes the poses of the body from
+// those of the camera with them: landmarks project as they should.
+void MakePosesByInverse(FedData* data) {
+  SendCameraPoses(data);
+  InvertExtrinsics(data);
+  const CameraCalibration& camera = data->rig.factory.cameras[0];
+  for (MotionSegment& segment : data->segments) {
+    for (KeyframeState& state : segment.keyframes) {
+      state.p_GI += state.q_GI * camera.p_CI;
+      state.q_GI = state.q_GI * camera.q_CI;
+    }
+  }
+}
+
+// A calibration made at another resolution of the images.
+void ScaleCamera(FedData* data, double by) {
+  for (CameraCalibration& camera : data->rig.factory.cameras) {
+    camera.f *= by;
+    camera.c *= by;
+    camera.width_px = static_cast<int>(std::lround(by * camera.width_px));
+    camera.height_px = static_cast<int>(std::lround(by * camera.height_px));
+  }
+}
+
+// Landmarks as the front end has them: in the camera that saw them first.
+void AnchorLandmarks(FedData* data) {
+  for (MotionSegment& segment : data->segments) {
+    std::map<int, std::pair<int, int>> first;  // keyframe and camera
+    for (const Observation& o : segment.observations) {
+      const std::pair seen(o.keyframe, o.camera);
+      const auto [at, added] = first.emplace(o.landmark, seen);
+      if (!added) at->second = std::min<std::pair<int, int>>(at->second, seen);
+    }
+    for (const auto& [landmark, seen] : first) {
+      const CameraCalibration& camera = data->rig.factory.cameras[seen.second];
+      Eigen::Vector3d& p = segment.landmarks[landmark].p_G;
+      const KeyframeState& state = segment.keyframes[seen.first];
+      p = camera.q_CI * (state.q_GI.conjugate() * (p - state.p_GI)) +
+          camera.p_CI;
+    }
+  }
+}
+
+// Landmarks in the frame of the session's first camera, as ORB-SLAM's map has
+// them, beside poses in G.
+void LandmarksOfFirstCamera(FedData* data) {
+  const CameraCalibration& camera = data->rig.factory.cameras[0];
+  const KeyframeState state = data->segments.front().keyframes.front();
+  ForLandmarks(data, [&](Eigen::Vector3d* p) {
+    *p = camera.q_CI * (state.q_GI.conjugate() * (*p - state.p_GI)) +
+         camera.p_CI;
+  });
+}
+
+}  // namespace
+
+std::vector<Mistake> CameraMistakes() {
+  return {
+      {"extrinsics_inverted",
+       {Kind::kExtrinsics},
+       "are inverted",
+       "invert",
+       InvertExtrinsics},
+      {"rotation_inverted",
+       {Kind::kExtrinsics},
+       "rotation",
+       "conjugate",
+       [](FedData* d) {
+         for (auto& camera : d->rig.factory.cameras) {
+           camera.q_CI = camera.q_CI.conjugate();
+         }
+       }},
+      {"camera_poses",
+       {Kind::kExtrinsics},
+       "poses of the camera",
+       "poses of the body",
+       SendCameraPoses},
+      {"poses_by_inverted_extrinsics",
+       {Kind::kExtrinsics},
+       "made with inverted",
+       "invert",
+       MakePosesByInverse},
+      {"calibrated_at_double_size",
+       {Kind::kFocalLength},
+       "another resolution",
+       "multiply",
+       [](FedData* d) { ScaleCamera(d, 2); },
+       0.5},
+      {"calibrated_at_half_size",
+       {Kind::kFocalLength},
+       "another resolution",
+       "multiply",
+       [](FedData* d) { ScaleCamera(d, 0.5); },
+       2},
+      {"calibrated_at_two_thirds",
+       {Kind::kFocalLength},
+       "another resolution",
+       "multiply",
+       [](FedData* d) { ScaleCamera(d, 2. / 3); },
+       1.5},
+      {"focal_length_alone",
+       {Kind::kFocalLength},
+       "focal length is wrong",
+       "multiply",
+       [](FedData* d) {
+         for (auto& camera : d->rig.factory.cameras) camera.f *= 1.25;
+       },
+       0.8},
+      {"image_cropped",
+       {Kind::kFocalLength},
+       "principal point",
+       "principal",
+       [](FedData* d) {
+         for (auto& camera : d->rig.factory.cameras) camera.c.x() += 80;
+       },
+       80},
+      {"landmarks_in_camera",
+       {Kind::kLandmarkFrame},
+       "camera frame",
+       "landmarks in G",
+       AnchorLandmarks},
+      {"landmarks_of_first_camera",
+       {Kind::kLandmarkFrame},
+       "another frame",
+       "same frame G",
+       LandmarksOfFirstCamera},
+      {"landmarks_in_mm",
+       {Kind::kLandmarkFrame},
+       "when scaled by",
+       "metres",
+       [](FedData* d) {
+         ForLandmarks(d, [](Eigen::Vector3d* p) { *p *= 1000; });
+       },
+       0.001},
+  };
+}
+
+}  // namespace selfcal
