@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "migrations/migrations.h"
 #include "server/store/checksum.h"
 #include "server/store/payload.h"
 #include "server/store/status_macros.h"
@@ -33,6 +35,58 @@ class Findings {
   const StoreMaintenance::OnProblem& on_problem_;
   bool cancelled_ = false;
 };
+
+std::int64_t Number(Connection* db, std::string_view sql) {
+  Statement read(db, sql);
+  return read.Next() ? read.Int(0) : 0;
+}
+
+// Columns of all tables with their types, in their order.
+absl::StatusOr<std::vector<std::string>> Columns(Connection* db) {
+  Statement read(db,
+                 "SELECT t.name, c.name, c.type FROM sqlite_schema t "
+                 "JOIN pragma_table_info(t.name) c "
+                 "WHERE t.type = 'table' AND t.name NOT LIKE 'sqlite%' "
+                 "  AND t.name <> 'schema_migrations' "
+                 "ORDER BY t.name, c.cid");
+  std::vector<std::string> columns;
+  while (read.Next()) {
+    columns.push_back(fmt::format(
+        "table {}, {} of type {}", read.Text(0), read.Text(1), read.Text(2)));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return columns;
+}
+
+// What the migrations of the database's version make of an empty one.
+absl::StatusOr<std::vector<std::string>> ExpectedColumns(std::int64_t version) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      Connection empty,
+      Connection::Open(":memory:", SQLITE_OPEN_READWRITE | SQLITE_OPEN_MEMORY));
+  for (const Migration& migration : EmbeddedMigrations()) {
+    if (version-- <= 0) break;
+    SELFCAL_RETURN_IF_ERROR(empty.Execute(std::string(migration.sql)));
+  }
+  return Columns(&empty);
+}
+
+// A name that was damaged hides what is under it, and SQLite sees nothing
+// wrong with it.
+void CheckSchema(Connection* db, Findings* findings) {
+  const auto found = Columns(db);
+  const auto expected = ExpectedColumns(Number(db, "PRAGMA user_version"));
+  for (const auto& columns : {found, expected}) {
+    if (columns.ok()) continue;
+    findings->Add("schema", std::string(columns.status().message()));
+    return;
+  }
+  for (const std::string& column : *expected) {
+    if (std::find(found->begin(), found->end(), column) != found->end()) {
+      continue;
+    }
+    findings->Add("schema", column + " is not there");
+  }
+}
 
 // SQLite's own: of each page, record and index.
 void CheckStructure(Connection* db, Findings* findings) {
@@ -107,11 +161,6 @@ void CheckPayloads(Connection* db, Findings* findings) {
   }
 }
 
-std::int64_t Number(Connection* db, std::string_view sql) {
-  Statement read(db, sql);
-  return read.Next() ? read.Int(0) : 0;
-}
-
 }  // namespace
 
 absl::StatusOr<CheckSummary> CheckDatabase(
@@ -121,6 +170,7 @@ absl::StatusOr<CheckSummary> CheckDatabase(
   Findings findings(on_problem);
   findings.summary.bytes =
       Number(db, "PRAGMA page_count") * Number(db, "PRAGMA page_size");
+  CheckSchema(db, &findings);
   CheckStructure(db, &findings);
   CheckReferences(db, &findings);
   for (const Checked& what : CheckedBlobs(db, &findings)) {

@@ -7,9 +7,9 @@
 
 #include "server/store/checksum.h"
 #include "server/store/restore.h"
+#include "test/promise.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite_test.h"
-#include "test/promise.h"
 
 namespace selfcal::server {
 namespace {
@@ -69,6 +69,30 @@ TEST_F(MaintenanceTest, AHealthyDatabaseHasNoProblems) {
   // Besides, of a rig, two calibrations and three segments' information.
   EXPECT_GE(summary->checksums, 3 + 1 + 2 + 3);
   EXPECT_GT(summary->bytes, 4096);
+}
+
+// SQLite reads on under the name that it finds.
+TEST_F(MaintenanceTest, ADamagedNameInTheSchemaIsFound) {
+  store_.reset();
+  {
+    auto db = Connection::Open(Path(), SQLITE_OPEN_READWRITE);
+    ASSERT_TRUE(db.ok());
+    const absl::Status damaged = db->Execute(
+        "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = "
+        "  replace(sql, 'imu_samples', 'imu_sampleq') WHERE name = 'segments'");
+    ASSERT_TRUE(damaged.ok()) << damaged;
+  }
+  ASSERT_TRUE(Open().ok());
+  std::vector<std::string> found;
+  const auto summary =
+      store_->maintenance()->Check([&](const StoreProblem& problem) {
+        found.push_back(problem.place + ": " + problem.description);
+        return true;
+      });
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  EXPECT_THAT(found,
+              ::testing::ElementsAre("schema: table segments, imu_samples of "
+                                     "type INTEGER is not there"));
 }
 
 TEST_F(MaintenanceTest, ABackupIsOneInstantWhileOthersWrite) {
