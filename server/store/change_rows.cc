@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/store/absences.h"
 #include "server/store/calibrations.h"
 #include "server/store/checksum.h"
 #include "server/store/clock.h"
@@ -101,13 +102,12 @@ absl::Status RestartTables(Connection* db,
                            std::int64_t rig,
                            std::int64_t first_sequence) {
   SELFCAL_RETURN_IF_ERROR(
-      Statement(db,
-                "DELETE FROM table_entries WHERE rig = ?1 AND segment IN "
-                "(SELECT segment FROM segments "
-                "  WHERE rig = ?1 AND sequence < ?2)",
-                rig,
-                first_sequence)
-          .Run());
+      LeaveTables(db,
+                  AbsenceCause::kDeviceChanged,
+                  "rig = ?3 AND segment IN (SELECT segment FROM segments "
+                  "  WHERE rig = ?3 AND sequence < ?4)",
+                  rig,
+                  first_sequence));
   return Statement(db,
                    "UPDATE tables SET scored = "
                    "  (SELECT count(*) FROM segments WHERE rig = ?1 "

@@ -74,7 +74,8 @@ absl::StatusOr<std::int64_t> EvictOne(Connection* db,
                 segment,
                 why)
           .Run());
-  SELFCAL_RETURN_IF_ERROR(RemoveFromTables(db, segment));
+  SELFCAL_RETURN_IF_ERROR(
+      RemoveFromTables(db, segment, AbsenceCause::kDataEvicted));
   SELFCAL_RETURN_IF_ERROR(
       Statement(db, "DELETE FROM payloads WHERE segment = ?1", segment).Run());
   SELFCAL_RETURN_IF_ERROR(
@@ -164,8 +165,11 @@ absl::Status DropOldSegments(Connection* db,
   SELFCAL_RETURN_IF_ERROR(read.status());
   if (dropped.empty()) return absl::OkStatus();
   for (const std::int64_t segment : dropped) {
-    for (const char* table :
-         {"segment_scores", "segment_information", "segments"}) {
+    for (const char* table : {"table_absences",
+                              "segment_scores",
+                              "segment_information",
+                              "segment_paths",
+                              "segments"}) {
       SELFCAL_RETURN_IF_ERROR(
           Statement(db,
                     fmt::format("DELETE FROM {} WHERE segment = ?1", table),

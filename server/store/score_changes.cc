@@ -2,11 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/selection/joint_selection.h"
+#include "server/store/absences.h"
 #include "server/store/change_rows.h"
 #include "server/store/changes.h"
 #include "server/store/events.h"
@@ -49,7 +51,8 @@ absl::Status SetAside(Connection* db,
                       std::int64_t segment,
                       const std::string& problem) {
   SELFCAL_RETURN_IF_ERROR(WriteProblem(db, segment, problem));
-  SELFCAL_RETURN_IF_ERROR(RemoveFromTables(db, segment));
+  SELFCAL_RETURN_IF_ERROR(
+      RemoveFromTables(db, segment, AbsenceCause::kUnusable));
   return AppendEvent(db,
                      rig,
                      EventKind::kSegmentUnusable,
@@ -105,6 +108,51 @@ absl::StatusOr<TableChange> OfferJointly(Connection* db,
       table);
 }
 
+// Writes down why what is not in the table after an offer is not.
+absl::Status ExplainOffer(Connection* db,
+                          const RigRow& rig,
+                          const SegmentKey& key,
+                          const SegmentRow& segment,
+                          const SegmentInformation& information,
+                          const TableChange& change,
+                          const Table& table) {
+  if (change.evicted) {
+    const auto in = std::find_if(table.entries.begin(),
+                                 table.entries.end(),
+                                 [&](const auto& e) { return e.key == key; });
+    SELFCAL_ASSIGN_OR_RETURN(const SegmentRow evicted,
+                             FindSegment(db, rig.rowid, change.evicted->key));
+    return WriteAbsence(db,
+                        evicted.rowid,
+                        table.group,
+                        AbsenceCause::kPushedOut,
+                        segment.rowid,
+                        in->entropy);
+  }
+  if (change.inserted) return absl::OkStatus();
+  const GroupScore* score = FindGroup(information, table.group);
+  const bool lost = score != nullptr && std::isfinite(score->entropy) &&
+                    score->gain >= rig.stored.rig.min_gain_nats &&
+                    !table.entries.empty();
+  if (!lost) {
+    return WriteAbsence(db,
+                        segment.rowid,
+                        table.group,
+                        AbsenceCause::kSaysTooLittle,
+                        std::nullopt,
+                        std::nullopt);
+  }
+  const TableEntry& worst = table.entries.back();
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow rival,
+                           FindSegment(db, rig.rowid, worst.key));
+  return WriteAbsence(db,
+                      segment.rowid,
+                      table.group,
+                      AbsenceCause::kOthersSayMore,
+                      rival.rowid,
+                      worst.entropy);
+}
+
 // Writes the score, and offers the segment to every table.
 absl::StatusOr<std::vector<std::string>> ScoreAndOffer(
     Connection* db,
@@ -125,6 +173,8 @@ absl::StatusOr<std::vector<std::string>> ScoreAndOffer(
     }
     if (!change) continue;
     SELFCAL_RETURN_IF_ERROR(WriteOffer(db, rig.rowid, key, *change, table));
+    SELFCAL_RETURN_IF_ERROR(
+        ExplainOffer(db, rig, key, segment, information, *change, table));
     if (change->inserted) {
       entered.push_back(table.group);
     }

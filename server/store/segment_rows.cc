@@ -5,6 +5,7 @@
 #include "server/store/clock.h"
 #include "server/store/quotas.h"
 #include "server/store/rigs.h"
+#include "server/store/segment_path.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -56,6 +57,7 @@ absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment) {
   packed.landmarks = static_cast<std::int64_t>(segment.landmarks.size());
   packed.observations = static_cast<std::int64_t>(segment.observations.size());
   packed.temperature_c = segment.temperature_c;
+  packed.path = PathOf(segment);
   SELFCAL_ASSIGN_OR_RETURN(packed.payload, PackSegment(segment));
   return packed;
 }
@@ -82,11 +84,13 @@ absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
                quotas));
   SELFCAL_RETURN_IF_ERROR(DropOldSegments(db, rig_id, rig, quotas));
   SELFCAL_RETURN_IF_ERROR(InsertMetadata(db, rig_id, segment));
+  const std::int64_t row = sqlite3_last_insert_rowid(db->handle());
+  SELFCAL_RETURN_IF_ERROR(InsertPath(db, row, segment.path));
   SELFCAL_RETURN_IF_ERROR(
       Statement(db,
                 "INSERT INTO payloads (segment, rig, data, raw_bytes, sha256) "
                 "VALUES (?1, ?2, ?3, ?4, ?5)",
-                std::int64_t{sqlite3_last_insert_rowid(db->handle())},
+                row,
                 rig_id,
                 BlobView{segment.payload.data},
                 segment.payload.raw_bytes,

@@ -36,6 +36,7 @@ struct NewSegment {
   std::int64_t landmarks = 0;
   std::int64_t observations = 0;
   std::optional<double> temperature_c;
+  std::vector<PathPoint> path;
   Payload payload;
 };
 

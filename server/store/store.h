@@ -29,6 +29,7 @@
 #include "core/model/segment.h"
 #include "core/selection/tables.h"
 #include "server/store/segment_query.h"
+#include "server/store/session.h"
 
 namespace selfcal::server {
 
@@ -289,6 +290,18 @@ class Store {
   }
   // FAILED_PRECONDITION if its data was dropped; DATA_LOSS if it is damaged.
   virtual absl::StatusOr<MotionSegment> GetSegmentData(
+      const std::string& rig, const SegmentKey& key) = 0;
+  // Sessions of a rig by name.
+  virtual absl::StatusOr<Listed<SessionSummary>> ListSessions(
+      const std::string& rig, const Page& page) = 0;
+  // Segments of one session in the order of their index. NOT_FOUND for a
+  // session of which nothing is kept.
+  virtual absl::StatusOr<Listed<SessionSegment>> ListSessionSegments(
+      const std::string& rig, const std::string& session, const Page& page) = 0;
+  virtual absl::StatusOr<SessionSummary> GetSession(
+      const std::string& rig, const std::string& session) = 0;
+  // Why tables do not hold the segment, as far as that was written down.
+  virtual absl::StatusOr<std::vector<TableAbsence>> ListAbsences(
       const std::string& rig, const SegmentKey& key) = 0;
   // The oldest unscored segments of all rigs, in the order of their arrival.
   struct Unscored {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "migrations/migrations.h"
+#include "server/store/absences.h"
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
 #include "server/store/changes.h"
@@ -19,6 +20,7 @@
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
+#include "server/store/session_rows.h"
 #include "server/store/shared_database.h"
 #include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
@@ -117,6 +119,30 @@ class SqliteStore : public Store {
                                return ReadPayload(db, rig, key);
                              }));
     return UnpackSegment(payload, SegmentText(rig, key));
+  }
+
+  absl::StatusOr<Listed<SessionSummary>> ListSessions(
+      const std::string& rig, const Page& page) override {
+    return Read([&](Connection* db) { return ListSessionRows(db, rig, page); });
+  }
+
+  absl::StatusOr<Listed<SessionSegment>> ListSessionSegments(
+      const std::string& rig,
+      const std::string& session,
+      const Page& page) override {
+    return Read([&](Connection* db) {
+      return ListSessionSegmentRows(db, rig, session, page);
+    });
+  }
+
+  absl::StatusOr<SessionSummary> GetSession(
+      const std::string& rig, const std::string& session) override {
+    return Read([&](Connection* db) { return ReadSession(db, rig, session); });
+  }
+
+  absl::StatusOr<std::vector<TableAbsence>> ListAbsences(
+      const std::string& rig, const SegmentKey& key) override {
+    return Read([&](Connection* db) { return ListAbsenceRows(db, rig, key); });
   }
 
   absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) override {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/store/absences.h"
 #include "server/store/segment_rows.h"
 #include "server/store/status_macros.h"
 
@@ -71,13 +72,12 @@ absl::StatusOr<std::vector<Table>> ReadFreshTables(Connection* db,
   const std::int64_t max_age_ns = rig.stored.policy.table_max_age_ns;
   if (max_age_ns > 0) {
     SELFCAL_RETURN_IF_ERROR(
-        Statement(db,
-                  "DELETE FROM table_entries WHERE rig = ?1 AND segment IN "
-                  "(SELECT segment FROM segments "
-                  "  WHERE rig = ?1 AND receive_time_ns < ?2)",
-                  rig.rowid,
-                  now_ns - max_age_ns)
-            .Run());
+        LeaveTables(db,
+                    AbsenceCause::kTooOld,
+                    "rig = ?3 AND segment IN (SELECT segment FROM segments "
+                    "  WHERE rig = ?3 AND receive_time_ns < ?4)",
+                    rig.rowid,
+                    now_ns - max_age_ns));
   }
   return ReadTables(db, rig.rowid);
 }
@@ -150,9 +150,10 @@ absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
   return groups;
 }
 
-absl::Status RemoveFromTables(Connection* db, std::int64_t segment) {
-  return Statement(db, "DELETE FROM table_entries WHERE segment = ?1", segment)
-      .Run();
+absl::Status RemoveFromTables(Connection* db,
+                              std::int64_t segment,
+                              AbsenceCause cause) {
+  return LeaveTables(db, cause, "segment = ?3", segment);
 }
 
 }  // namespace selfcal::server

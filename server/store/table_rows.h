@@ -43,7 +43,9 @@ absl::Status WriteOffer(Connection* db,
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
                                                          std::int64_t segment);
 
-// Takes a segment out of every table.
-absl::Status RemoveFromTables(Connection* db, std::int64_t segment);
+// Takes a segment out of every table that holds it.
+absl::Status RemoveFromTables(Connection* db,
+                              std::int64_t segment,
+                              AbsenceCause cause);
 
 }  // namespace selfcal::server

@@ -106,6 +106,17 @@ TEST_P(ChangesTest, SegmentsFromBeforeLeaveTheTables) {
       EXPECT_GE(entry.sequence, change.first_sequence) << table.group;
     }
   }
+  int left = 0;
+  for (std::int64_t k = 0; k < next_; ++k) {
+    const auto absences = store_->ListAbsences("a", {"s", k});
+    ASSERT_TRUE(absences.ok()) << absences.status();
+    for (const auto& absence : *absences) {
+      if (absence.cause != AbsenceCause::kDeviceChanged) continue;
+      EXPECT_LT(k + 1, change.first_sequence) << "from before";
+      ++left;
+    }
+  }
+  EXPECT_GT(left, 0);
   const StoredEvent event = Events().back();
   EXPECT_EQ(event.kind, EventKind::kChangeDetected);
   EXPECT_THAT(event.detail, HasSubstr("extrinsics"));

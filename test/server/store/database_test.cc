@@ -62,7 +62,7 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 6u);
+  ASSERT_EQ(migrations.size(), 7u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -82,6 +82,9 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[5].name, "0006_overview.sql");
   EXPECT_EQ(migrations[5].sha256,
             "3cb3665d806bd2ea106166e980914db83905fb4e8d37f528f0d14fbc07e5353c");
+  EXPECT_EQ(migrations[6].name, "0007_motion.sql");
+  EXPECT_EQ(migrations[6].sha256,
+            "3344c641d38933c0b427f462012cc45057b996865f62c0d7f09056fb0c40f679");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

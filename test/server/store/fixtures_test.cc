@@ -6,10 +6,10 @@
 #include <unistd.h>
 
 #include "migrations/migrations.h"
+#include "test/promise.h"
 #include "test/server/store/fault_vfs.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite_test.h"
-#include "test/promise.h"
 
 namespace selfcal::server {
 namespace {
@@ -45,6 +45,19 @@ class FixturesTest : public SqliteTest {
     const absl::Status loaded = db->Execute(sql);
     ASSERT_TRUE(loaded.ok()) << loaded;
     ASSERT_TRUE(db->Execute("PRAGMA journal_mode = WAL").ok());
+  }
+
+  // Paths and absences, which segments from before schema version 7 have not.
+  void ExpectMotion(bool kept) {
+    const auto listed = store_->ListSessionSegments("a", "s", {});
+    ASSERT_TRUE(listed.ok()) << listed.status();
+    ASSERT_EQ(listed->items.size(), 4u);
+    for (const SessionSegment& segment : listed->items) {
+      EXPECT_EQ(segment.path.size(), kept ? 8u : 0u);
+    }
+    const auto absences = store_->ListAbsences("a", {"s", 0});
+    ASSERT_TRUE(absences.ok()) << absences.status();
+    EXPECT_EQ(absences->size(), kept ? FixtureRig().groups.size() : 0u);
   }
 
   int Version(const std::string& path) {
@@ -87,6 +100,7 @@ TEST_F(FixturesTest, EverySchemaThatWasReleasedOpensWithAllItHeld) {
       continue;
     }
     ExpectFixture(store_.get());
+    ExpectMotion(version >= 7);
     // And works on.
     MotionSegment segment = FixtureSegments()[0];
     segment.key = {"later", 0};

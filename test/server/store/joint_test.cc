@@ -122,6 +122,8 @@ TEST_P(JointTest, TableHoldsTheChoiceAndItsDataAlways) {
       EXPECT_EQ((*store_->GetTables(id))[0].scored, k + 1);
       for (int i = 0; i <= k; ++i) {
         ASSERT_EQ(HasData(id, i), kept.contains(i)) << i << " after " << k;
+        const auto absences = store_->ListAbsences(id, {"s", i});
+        ASSERT_EQ(absences->empty(), kept.contains(i)) << i << " after " << k;
       }
     }
     EXPECT_EQ(static_cast<int>(TableIndices(id, 0).size()), settings.capacity);

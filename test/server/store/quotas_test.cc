@@ -81,6 +81,9 @@ TEST_F(QuotasTest, TheLeastInformativeDataGoesAndSaysWhy) {
     ASSERT_EQ(table.entries.size(), 1u);
     EXPECT_EQ(table.entries[0].key.index, 1);
   }
+  const auto absences = store_->ListAbsences("a", {"s", 0});
+  ASSERT_EQ(absences->size(), rig_.groups.size());
+  EXPECT_EQ(absences->front().cause, AbsenceCause::kDataEvicted);
 }
 
 TEST_F(QuotasTest, WhatWaitsForItsScoreIsNeverEvicted) {
@@ -158,6 +161,7 @@ TEST_F(QuotasTest, OldMetadataGoesButNotWhatACalibrationCameFrom) {
   ASSERT_EQ(Evictions().size(), 1u);
   EXPECT_THAT(Evictions()[0], HasSubstr("3 segments"));
   EXPECT_EQ(store_->GetSegment("a", {"s", 8})->sequence, 9);
+  EXPECT_EQ(store_->GetSession("a", "s")->segments, 6) << "paths go along";
   EXPECT_EQ(store_->GetCalibration("a", 2)->segments.size(), 2u);
 }
 

@@ -1,0 +1,54 @@
+#include "server/store/absences.h"
+
+#include "server/store/rigs.h"
+#include "server/store/segment_rows.h"
+
+namespace selfcal::server {
+
+absl::StatusOr<std::vector<TableAbsence>> ListAbsenceRows(
+    Connection* db, const std::string& rig, const SegmentKey& key) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row, FindSegment(db, rig_id, key));
+  Statement read(db,
+                 "SELECT a.group_name, a.cause, a.time_ns, r.session, "
+                 "  r.session_index, a.rival_entropy "
+                 "FROM table_absences a "
+                 "JOIN tables t ON t.rig = ?1 AND t.group_name = a.group_name "
+                 "LEFT JOIN segments r ON r.segment = a.rival "
+                 "WHERE a.segment = ?2 ORDER BY t.position",
+                 rig_id,
+                 row.rowid);
+  std::vector<TableAbsence> absences;
+  while (read.Next()) {
+    TableAbsence absence;
+    absence.group = read.Text(0);
+    absence.cause = static_cast<AbsenceCause>(read.Int(1));
+    absence.time_ns = read.Int(2);
+    if (!read.IsNull(3)) absence.rival = {read.Text(3), read.Int(4)};
+    if (!read.IsNull(5)) absence.rival_entropy = read.Double(5);
+    absences.push_back(std::move(absence));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return absences;
+}
+
+absl::Status WriteAbsence(Connection* db,
+                          std::int64_t segment,
+                          const std::string& group,
+                          AbsenceCause cause,
+                          std::optional<std::int64_t> rival,
+                          std::optional<double> rival_entropy) {
+  return Statement(db,
+                   "INSERT OR REPLACE INTO table_absences (segment, "
+                   "  group_name, cause, time_ns, rival, rival_entropy) "
+                   "VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+                   segment,
+                   group,
+                   static_cast<int>(cause),
+                   NowNs(),
+                   rival,
+                   rival_entropy)
+      .Run();
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,32 @@
+// The way of the device during a segment, in a few hundred bytes that stay when
+// its data goes.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/model/segment.h"
+#include "server/store/session.h"
+#include "server/store/statement.h"
+
+namespace selfcal::server {
+
+// Keyframes that are spread evenly, the first and the last among them.
+std::vector<PathPoint> PathOf(const MotionSegment& segment);
+
+std::string SerializePath(const std::vector<PathPoint>& path);
+// DATA_LOSS for bytes that are not what they should be, naming `what`.
+absl::StatusOr<std::vector<PathPoint>> ParsePath(std::string_view bytes,
+                                                 const std::string& what);
+
+// Inside a transaction of the caller.
+absl::Status InsertPath(Connection* db,
+                        std::int64_t segment,
+                        const std::vector<PathPoint>& path);
+
+}  // namespace selfcal::server
