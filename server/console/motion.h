@@ -1,0 +1,28 @@
+// Sessions, absences and residuals as messages of the console.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/information/segment_residuals.h"
+#include "core/model/segment.h"
+#include "server/console/motion.pb.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+console::SessionOverview Encode(const std::string& rig,
+                                const SessionSummary& session);
+
+// With at most this many positions, the first and the last among them.
+console::SessionPiece Encode(const std::string& rig,
+                             const SessionSegment& segment,
+                             int max_points);
+
+console::Absence Encode(const std::string& rig, const TableAbsence& absence);
+
+console::SegmentResiduals Encode(const SegmentResiduals& residuals,
+                                 const MotionSegment& segment,
+                                 int cameras);
+
+}  // namespace selfcal::server

@@ -1,0 +1,127 @@
+#include <algorithm>
+
+#include "proto/resource_names.h"
+#include "selfcal/v1/segment.pb.h"
+#include "server/console/call.h"
+#include "server/console/json.h"
+#include "server/console/motion.h"
+#include "server/encode/versions.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// Positions of one session that a page has to draw, however long it was; each
+// segment keeps its ends.
+constexpr std::int64_t kPointsOfSession = 16'000;
+
+// The rig of the address, for a caller who may list its segments.
+absl::StatusOr<std::string> RigOfSessions(const Call& call) {
+  v1::ListSegmentsRequest request;
+  request.set_parent(RigName(call.parts.at(0)));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  return RigOf(call);
+}
+
+// The segment of the address, for a caller who may make this call about it.
+template <typename Request>
+absl::StatusOr<SegmentNameParts> SegmentOf(const Call& call) {
+  Request request;
+  request.set_name(RigName(call.parts.at(0)) + "/segments/" + call.parts.at(1));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  const auto parts = ParseSegmentName(request.name());
+  if (parts) return *parts;
+  return absl::InvalidArgumentError(
+      "a segment's name is rigs/{rig}/segments/{session}~{index}; in an "
+      "address a '%' of the session stands as %25");
+}
+
+absl::StatusOr<StoredCalibration> VersionOf(const Call& call,
+                                            const std::string& rig,
+                                            std::int64_t otherwise) {
+  const std::string version = call.Query("version");
+  if (version == "active") return call.context.store->GetActiveCalibration(rig);
+  if (version.empty())
+    return call.context.store->GetCalibration(rig, otherwise);
+  const auto number = ParseCount(version);
+  if (number) return call.context.store->GetCalibration(rig, *number);
+  return absl::InvalidArgumentError(
+      "version is a number from 1 on, or 'active'; without it, that which the "
+      "segment was scored with");
+}
+
+}  // namespace
+
+Answer ListSessions(const Call& call) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOfSessions(call));
+  SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
+                           call.context.store->ListSessions(rig, page));
+  console::ListSessionsResponse response;
+  for (const SessionSummary& session : listed.items) {
+    *response.add_sessions() = Encode(rig, session);
+  }
+  response.set_next_page_token(listed.next_token);
+  return JsonResponse(response);
+}
+
+Answer GetTrajectory(const Call& call) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOfSessions(call));
+  const auto name = ParseChildName(
+      RigName(call.parts.at(0)) + "/sessions/" + call.parts.at(1), "sessions");
+  if (!name) {
+    return absl::InvalidArgumentError(
+        "a session stands in an address as in the name of its segments, with "
+        "%25 for a '%'");
+  }
+  const std::string& session = name->id;
+  SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const SessionSummary summary,
+                           call.context.store->GetSession(rig, session));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const auto listed,
+      call.context.store->ListSessionSegments(rig, session, page));
+  const auto points = std::clamp<std::int64_t>(
+      kPointsOfSession / std::max<std::int64_t>(1, summary.segments),
+      2,
+      kMaxPathPoints);
+  console::SessionTrajectory response;
+  *response.mutable_session() = Encode(rig, summary);
+  for (const SessionSegment& segment : listed.items) {
+    *response.add_segments() = Encode(rig, segment, static_cast<int>(points));
+  }
+  response.set_next_page_token(listed.next_token);
+  return JsonResponse(response);
+}
+
+Answer ListAbsences(const Call& call) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts name,
+                           SegmentOf<v1::GetSegmentRequest>(call));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const auto absences,
+      call.context.store->ListAbsences(name.rig, name.key));
+  console::ListAbsencesResponse response;
+  for (const TableAbsence& absence : absences) {
+    *response.add_absences() = Encode(name.rig, absence);
+  }
+  return JsonResponse(response);
+}
+
+Answer GetResiduals(const Call& call) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts name,
+                           SegmentOf<v1::GetSegmentDataRequest>(call));
+  Store* store = call.context.store;
+  SELFCAL_ASSIGN_OR_RETURN(const MotionSegment data,
+                           store->GetSegmentData(name.rig, name.key));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(name.rig));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration version,
+                           VersionOf(call, name.rig, data.calibration_version));
+  console::SegmentResiduals response =
+      Encode(EvaluateResiduals(rig.rig, version.theta, data),
+             data,
+             static_cast<int>(version.theta.cameras.size()));
+  response.set_calibration_version(version.version);
+  return JsonResponse(response);
+}
+
+}  // namespace selfcal::server
