@@ -192,11 +192,51 @@ const tests = {
     await r.page.keyboard.press('End');
     await r.sees('keyframe 20 of 20');
     assert.notEqual(await r.page.locator('circle.now').getAttribute('cx'), before);
+    // Residuals go with the time, and with the version.
+    await r.sees(/Camera 0: .* px rms over the/);
+    await r.sees('At version 1,');
+    assert.ok((await r.page.locator('g.observation line').count()) > 0);
     await r.picture('segment');
+    await r.page.getByLabel('Residuals at').selectOption('active');
+    await r.sees(/^At version [2-9],/);
+    await r.page.getByLabel('IMU residuals between keyframes').selectOption('0');
+    await r.page.getByRole('img', { name: /between keyframes: rotation/ }).waitFor();
     await r.page.getByRole('heading', { name: 'Motion' }).scrollIntoViewIfNeeded();
     await r.page.mouse.wheel(0, 300);
     await r.page.waitForTimeout(300);
     await r.detail('segment');
+  },
+
+  async 'a session shows its way, coloured by what each piece says'(r) {
+    await r.shows('/rigs/tablet/sessions', 'Sessions of tablet', ['walk'], 'sessions');
+    await r.page.getByRole('link', { name: 'walk', exact: true }).click();
+    await r.heading('Session walk');
+    await r.sees('richest first');
+    const { segments } = await r.api('rigs/tablet/sessions/walk/trajectory?page_size=100');
+    const kept = segments.filter((s) => s.tables.length > 0);
+    assert.ok(kept.length > 0 && kept.length < segments.length, 'all or none are kept');
+    assert.equal(await r.page.locator('circle.kept').count(), kept.length);
+    assert.equal(await r.page.locator('tbody tr').count(), kept.length);
+    // Each segment has its colour: the legend counts them.
+    const legend = await r.page.locator('.legend li').allTextContents();
+    const counts = legend.map((text) => Number(/: (\d+)/.exec(text)[1]));
+    assert.equal(counts.reduce((sum, n) => sum + n, 0), segments.length);
+    await r.picture('session');
+    const from = await r.page.locator('path.way').first().getAttribute('d');
+    await r.page.getByRole('button', { name: 'From above' }).click();
+    await r.page.waitForFunction(
+      (d) => document.querySelector('path.way').getAttribute('d') !== d, from);
+    const own = () => r.page.locator('circle.kept.own').count();
+    const before = await r.page.locator('thead').textContent();
+    await r.page.getByRole('combobox').selectOption({ index: 1 });
+    assert.notEqual(await r.page.locator('thead').textContent(), before);
+    assert.ok((await own()) > 0);
+    // A place on the way leads to its segment.
+    const picture = r.page.locator('.wide svg');
+    await picture.hover();
+    await r.sees('click to open it');
+    await picture.click();
+    await r.page.getByRole('heading', { level: 1, name: /^Segment walk~/ }).waitFor();
   },
 
   async 'a segment whose data is gone says so'(r) {
@@ -205,8 +245,20 @@ const tests = {
     assert.ok(gone, 'every segment has its data');
     await r.page.goto(`${r.base}/${gone.name}`);
     await r.sees('Its data was dropped');
-    await r.sees('not kept');
-    await r.picture('segment-dropped');
+    await r.sees(/not kept|kept until/);
+    // One that a later one pushed out of a table names it.
+    for (const { name } of segments) {
+      const { absences } = await r.api(name + '/absences');
+      const pushed = absences.find((absence) => absence.cause === 'PUSHED_OUT');
+      if (!pushed) continue;
+      await r.page.goto(`${r.base}/${name}`);
+      await r.sees('kept until');
+      const rival = r.page.getByRole('cell', { name: /kept until/ }).first().getByRole('link');
+      assert.equal(await rival.getAttribute('href'), '/' + pushed.rival);
+      await r.picture('segment-dropped');
+      return;
+    }
+    assert.fail('no segment was pushed out of a table');
   },
 
   async 'the history compares versions and shows their origin'(r) {

@@ -40,6 +40,7 @@ export interface Rig {
   createTime: string;
   groups: { group: string; patterns: string[] }[];
   tableSize: number;
+  factory: { cameras: { widthPx: number; heightPx: number }[] };
 }
 
 export interface Estimate {
@@ -174,6 +175,56 @@ export interface SegmentData {
     landmark: number[];
     zPx: number[];
   };
+}
+
+export interface Absence {
+  group: string;
+  cause: string;
+  time: string;
+  rival: string; // a segment
+  rivalEntropyNats?: number;
+}
+
+export interface SegmentResiduals {
+  calibrationVersion: string;
+  residualPx: number[]; // 2 for each observation
+  unused: number[]; // observations
+  notProjectable: number[];
+  cameras: {
+    camera: number;
+    observations: number;
+    inliers: number;
+    inlierRmsPx: number;
+  }[];
+  intervals?: { residual: number[]; whitened: number[] }; // 15 each
+  reprojectionMedianPx: number;
+  inertialRms: number[];
+}
+
+export interface SessionOverview {
+  name: string;
+  session: string;
+  segments: string;
+  firstReceived: string;
+  lastReceived: string;
+}
+
+export interface SessionPiece {
+  segment: string;
+  scored: boolean;
+  hasData: boolean;
+  startNs: string;
+  endNs: string;
+  seconds: number[];
+  positionsM: number[];
+  scores: { group: string; entropyNats: number; gainNats: number }[];
+  tables: string[];
+}
+
+export interface SessionTrajectory {
+  session: SessionOverview;
+  segments: SessionPiece[];
+  nextPageToken: string;
 }
 
 export interface Run {

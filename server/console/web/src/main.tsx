@@ -13,9 +13,11 @@ import { Rigs } from './pages/rigs';
 import { RunPage, Runs } from './pages/runs';
 import { SegmentPage } from './pages/segment';
 import { Segments } from './pages/segments';
+import { SessionPage, Sessions } from './pages/session';
 
 const kRigPages: [string, string][] = [
   ['', 'Overview'],
+  ['sessions', 'Sessions'],
   ['segments', 'Segments'],
   ['calibrations', 'Calibrations'],
   ['recalibrations', 'Runs'],
@@ -59,6 +61,13 @@ function Page(props: {
           <RunPage key={id} rig={rig} run={id} version={version} />
         ) : (
           <Runs rig={rig} version={version} />
+        );
+      }
+      if (page === 'sessions') {
+        return id ? (
+          <SessionPage key={id} rig={rig} session={id} version={version} />
+        ) : (
+          <Sessions rig={rig} version={version} />
         );
       }
       if (page === 'segments') {

@@ -16,6 +16,7 @@ export interface PlotProps {
   series: uPlot.Series[];
   x?: { label?: string; integers?: boolean; range?: [number, number] };
   y?: string;
+  log?: boolean; // of y
   bands?: uPlot.Band[];
   height?: number;
   cursor?: number; // index of the value that is pointed at
@@ -52,7 +53,10 @@ export function Plot(props: PlotProps) {
     const made = new uPlot(
       {
         ...size(),
-        scales: { x: { time: false, range: props.x?.range } },
+        scales: {
+          x: { time: false, range: props.x?.range },
+          y: { distr: props.log ? 3 : 1 },
+        },
         axes: [axis(props.x?.label, props.x?.integers), { ...axis(props.y), size: 64 }],
         series: [{}, ...props.series],
         bands: props.bands,

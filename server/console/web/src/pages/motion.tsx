@@ -1,123 +1,132 @@
-// Where the device went, and what its cameras saw, at one time of a segment.
+// A segment at one time of it: where the device was, what its cameras saw, what
+// its IMU measured, and what of all that is left unexplained.
 import { useMemo, useState } from 'preact/hooks';
-import type { SegmentData } from '../api';
-import { kColours } from '../plot';
+import type uPlot from 'uplot';
+import {
+  rigPath,
+  type Calibration,
+  type Rig,
+  type Segment,
+  type SegmentData,
+  type SegmentResiduals,
+} from '../api';
+import { Choice, Empty, Loaded } from '../parts';
+import { kColours, Plot } from '../plot';
+import { Residuals } from '../residuals';
+import { useRead } from '../state';
+import { Scene, type Mark, type Strand } from '../trajectory';
 
-const kSize = 320;
-const kMargin = 24;
-const kDegree = Math.PI / 180;
+function Trajectory(props: { positions: number[]; at: number }) {
+  const { positions } = props;
+  const strands = useMemo((): Strand[] => [{ ways: [positions], class: 'path' }], [positions]);
+  const place = (i: number) => positions.slice(3 * i, 3 * i + 3);
+  const keyframes = useMemo(
+    () =>
+      Array.from({ length: positions.length / 3 }, (_, i): Mark => ({
+        at: place(i),
+        class: 'keyframe',
+        radius: 2.5,
+      })),
+    [positions],
+  );
+  return (
+    <Scene
+      label="Trajectory of the IMU"
+      strands={strands}
+      marks={[...keyframes, { at: place(props.at), class: 'now', radius: 6 }]}
+    >
+      Trajectory
+    </Scene>
+  );
+}
 
 interface Point {
+  observation: number;
+  keyframe: number;
   x: number;
   y: number;
 }
 
-// Seen from a side, and from above by the tilt.
-function project(positions: number[], turn: number, tilt: number): Point[] {
-  const points: Point[] = [];
-  const [c, s] = [Math.cos(turn * kDegree), Math.sin(turn * kDegree)];
-  const [ct, st] = [Math.cos(tilt * kDegree), Math.sin(tilt * kDegree)];
-  for (let i = 0; i + 2 < positions.length; i += 3) {
-    const [x, y, z] = positions.slice(i, i + 3);
-    points.push({ x: c * x - s * y, y: -(ct * z + st * (s * x + c * y)) });
-  }
-  return points;
+// By landmark.
+function tracksOf(of: SegmentData['observations'], camera: number): Map<number, Point[]> {
+  const tracks = new Map<number, Point[]>();
+  of.camera.forEach((c, i) => {
+    if (c !== camera) return;
+    const point = {
+      observation: i,
+      keyframe: of.keyframe[i],
+      x: of.zPx[2 * i],
+      y: of.zPx[2 * i + 1],
+    };
+    const track = tracks.get(of.landmark[i]);
+    if (track) track.push(point);
+    else tracks.set(of.landmark[i], [point]);
+  });
+  return tracks;
 }
 
-function fitted(points: Point[]): { points: Point[]; scale: number } {
-  const xs = points.map((p) => p.x);
-  const ys = points.map((p) => p.y);
-  const [left, top] = [Math.min(...xs), Math.min(...ys)];
-  const width = Math.max(...xs) - left;
-  const height = Math.max(...ys) - top;
-  const scale = (kSize - 2 * kMargin) / (Math.max(width, height) || 1);
-  const dx = (kSize - scale * width) / 2;
-  const dy = (kSize - scale * height) / 2;
-  return {
-    points: points.map((p) => ({
-      x: dx + scale * (p.x - left),
-      y: dy + scale * (p.y - top),
-    })),
-    scale,
-  };
+// 1, 2 or 5 times a power of ten, at most x.
+function round(x: number): number {
+  const power = 10 ** Math.floor(Math.log10(x));
+  return [5, 2, 1].map((k) => k * power).find((k) => k <= x) ?? power;
 }
 
-// A round length that is a good part of the picture.
-function rod(scale: number): number {
-  const most = (kSize - 2 * kMargin) / 2 / scale;
-  const power = 10 ** Math.floor(Math.log10(most));
-  return [5, 2, 1].map((k) => k * power).find((length) => length <= most) ?? power;
+// By how much residuals are drawn longer: a typical one is a fortieth of the
+// image.
+function enlargement(residuals: SegmentResiduals, width: number): number {
+  return Math.max(1, round(width / 40 / Math.max(0.01, residuals.reprojectionMedianPx)));
 }
 
-export function Trajectory(props: { positions: number[]; at: number }) {
-  const [turn, setTurn] = useState(30);
-  const [tilt, setTilt] = useState(35);
-  const { points, scale } = useMemo(
-    () => fitted(project(props.positions, turn, tilt)),
-    [props.positions, turn, tilt],
-  );
-  const length = rod(scale);
-  const now = points[props.at];
-  const slider = (name: string, value: number, most: number, set: (v: number) => void) => (
-    <label>
-      {name}
-      <input
-        type="range"
-        min={-most}
-        max={most}
-        value={value}
-        onInput={(event) => set(Number(event.currentTarget.value))}
+// Of one camera: each landmark's way over the image, and at this keyframe the
+// residual of each observation, from where it was seen to where it is predicted.
+function Tracks(props: {
+  of: SegmentData['observations'];
+  at: number;
+  camera: number;
+  size: { widthPx: number; heightPx: number };
+  residuals: SegmentResiduals | null;
+}) {
+  const { residuals } = props;
+  const { widthPx: width, heightPx: height } = props.size;
+  const tracks = useMemo(() => tracksOf(props.of, props.camera), [props.of, props.camera]);
+  const unused = useMemo(() => new Set(residuals?.unused), [residuals]);
+  const scale = residuals ? enlargement(residuals, width) : 1;
+  const thin = width / 500;
+  const rodPx = round(width / 8 / scale); // of residual
+  const vector = (p: Point, colour: string) => {
+    const [dx, dy] = residuals!.residualPx.slice(2 * p.observation, 2 * p.observation + 2);
+    const out = unused.has(p.observation);
+    return (
+      <line
+        x1={p.x}
+        y1={p.y}
+        x2={p.x + scale * dx}
+        y2={p.y + scale * dy}
+        stroke={colour}
+        stroke-width={1.6 * thin}
+        stroke-dasharray={out ? `${3 * thin} ${3 * thin}` : undefined}
       />
-    </label>
-  );
-  return (
-    <figure>
-      <svg viewBox={`0 0 ${kSize} ${kSize}`} role="img" aria-label="Trajectory of the IMU">
-        <polyline points={points.map((p) => `${p.x},${p.y}`).join(' ')} class="path" />
-        {points.map((p, i) => (
-          <circle key={i} cx={p.x} cy={p.y} r={2.5} class="keyframe" />
-        ))}
-        {now && <circle cx={now.x} cy={now.y} r={6} class="now" />}
-        <line x1={kMargin} x2={kMargin + scale * length} y1={kSize - 8} y2={kSize - 8} class="rod" />
-        <text x={kMargin} y={kSize - 13}>
-          {length >= 1 ? `${length} m` : `${Math.round(length * 1000)} mm`}
-        </text>
-      </svg>
-      <figcaption>
-        Trajectory
-        {slider('Turn', turn, 180, setTurn)}
-        {slider('Tilt', tilt, 90, setTilt)}
-      </figcaption>
-    </figure>
-  );
-}
-
-// Of one camera: each landmark's way over the image, and where it is now.
-export function Tracks(props: { of: SegmentData['observations']; at: number }) {
-  const { camera, landmark, keyframe, zPx } = props.of;
-  const cameras = useMemo(() => [...new Set(camera)].sort((a, b) => a - b), [props.of]);
-  const [chosen, setChosen] = useState(0);
-  const { tracks, width, height } = useMemo(() => {
-    const tracks = new Map<number, { keyframe: number; x: number; y: number }[]>();
-    let [width, height] = [1, 1];
-    camera.forEach((c, i) => {
-      if (c !== (cameras[chosen] ?? 0)) return;
-      const [x, y] = [zPx[2 * i], zPx[2 * i + 1]];
-      width = Math.max(width, x);
-      height = Math.max(height, y);
-      const track = tracks.get(landmark[i]) ?? [];
-      track.push({ keyframe: keyframe[i], x, y });
-      tracks.set(landmark[i], track);
-    });
-    return { tracks, width: Math.ceil(width), height: Math.ceil(height) };
-  }, [props.of, chosen]);
+    );
+  };
+  const place = (p: Point, colour: string) => {
+    const r = width / 160;
+    return unused.has(p.observation) ? (
+      <path
+        d={`M${p.x - r} ${p.y - r}l${2 * r} ${2 * r}m0 ${-2 * r}l${-2 * r} ${2 * r}`}
+        stroke={colour}
+        stroke-width={1.6 * thin}
+      />
+    ) : (
+      <circle cx={p.x} cy={p.y} r={r} fill={colour} />
+    );
+  };
   return (
     <figure>
       <svg
         viewBox={`0 0 ${width} ${height}`}
         class="image"
         role="img"
-        aria-label={`Tracks of ${tracks.size} landmarks over the image`}
+        aria-label={`Tracks of ${tracks.size} landmarks over the image of camera ${props.camera}, with the residuals of this keyframe`}
       >
         {[...tracks].map(([id, track]) => (
           <polyline
@@ -125,32 +134,201 @@ export function Tracks(props: { of: SegmentData['observations']; at: number }) {
             points={track.map((p) => `${p.x},${p.y}`).join(' ')}
             fill="none"
             stroke={kColours[id % kColours.length]}
-            stroke-width={width / 500}
-            stroke-opacity={0.5}
+            stroke-width={thin}
+            stroke-opacity={0.35}
           />
         ))}
         {[...tracks].map(([id, track]) => {
           const now = track.find((p) => p.keyframe === props.at);
+          const colour = kColours[id % kColours.length];
           return now ? (
-            <circle key={id} cx={now.x} cy={now.y} r={width / 160} fill={kColours[id % kColours.length]} />
+            <g key={id} class="observation">
+              {place(now, colour)}
+              {residuals && vector(now, colour)}
+            </g>
           ) : null;
         })}
+        {residuals && (
+          <>
+            <line
+              x1={width / 20}
+              x2={width / 20 + scale * rodPx}
+              y1={height * 0.97}
+              y2={height * 0.97}
+              class="rod"
+            />
+            <text x={width / 20} y={height * 0.955} font-size={width / 32} class="rod-length">
+              {rodPx} px of residual
+            </text>
+          </>
+        )}
       </svg>
       <figcaption>
         Tracks over the image; points are those of this keyframe
-        {cameras.length > 1 && (
-          <label>
-            Camera
-            <select value={chosen} onChange={(event) => setChosen(Number(event.currentTarget.value))}>
-              {cameras.map((c, i) => (
-                <option key={c} value={i}>
-                  {c}
-                </option>
-              ))}
-            </select>
-          </label>
-        )}
+        {residuals &&
+          `, with residuals ${scale} times as long as they are; crosses and broken lines are left out of a score`}
       </figcaption>
     </figure>
+  );
+}
+
+// Values of one kind, three of each sample, against seconds.
+function triple(t: string[], values: number[]): uPlot.AlignedData {
+  const start = BigInt(t[0]);
+  const at = (offset: number) => t.map((_, i) => values[3 * i + offset]);
+  return [
+    t.map((time) => Number(BigInt(time) - start) / 1e9),
+    at(0),
+    at(1),
+    at(2),
+  ] as uPlot.AlignedData;
+}
+
+const kAxes = ['x', 'y', 'z'].map((label, i) => ({
+  label,
+  stroke: kColours[i],
+  width: 1,
+}));
+
+function nearest(times: string[], wanted: bigint): number {
+  let best = 0;
+  let least: bigint | null = null;
+  times.forEach((time, i) => {
+    const d = BigInt(time) - wanted;
+    const distance = d < 0n ? -d : d;
+    if (least === null || distance < least) {
+      least = distance;
+      best = i;
+    }
+  });
+  return best;
+}
+
+// At which version, and by which camera.
+function Choices(props: {
+  segment: Segment;
+  active: string | undefined;
+  version: string;
+  onVersion: (version: string) => void;
+  cameras: number;
+  camera: number;
+  onCamera: (camera: number) => void;
+}) {
+  const scored = props.segment.calibrationVersion;
+  return (
+    <div class="bar">
+      <Choice
+        label="Residuals at"
+        value={props.version}
+        of={[
+          [scored, `version ${scored}, which it was scored with`],
+          ...(props.active && props.active !== scored
+            ? [['active', `version ${props.active}, which is active`] as [string, string]]
+            : []),
+        ]}
+        onChoice={props.onVersion}
+      />
+      {props.cameras > 1 && (
+        <Choice
+          label="Camera"
+          value={String(props.camera)}
+          of={Array.from({ length: props.cameras }, (_, i) => [String(i), String(i)])}
+          onChoice={(camera) => props.onCamera(Number(camera))}
+        />
+      )}
+    </div>
+  );
+}
+
+function Motion(props: { rig: string; path: string; data: SegmentData; segment: Segment }) {
+  const { imu, keyframes, observations } = props.data;
+  const [at, setAt] = useState(0);
+  const [camera, setCamera] = useState(0);
+  const [version, setVersion] = useState(props.segment.calibrationVersion);
+  const rig = useRead<Rig>(rigPath(props.rig));
+  const active = useRead<Calibration>(rigPath(props.rig) + '/calibrations/active');
+  const residuals = useRead<SegmentResiduals>(`${props.path}/residuals?version=${version}`);
+  const gyro = useMemo(() => triple(imu.tNs, imu.gyro), [props.data]);
+  const accel = useMemo(() => triple(imu.tNs, imu.accel), [props.data]);
+  const keyframe = nearest(keyframes.tNs, BigInt(imu.tNs[at]));
+  const toKeyframe = (k: number) => setAt(nearest(imu.tNs, BigInt(keyframes.tNs[k])));
+  const seconds = (gyro[0][at] as number).toFixed(3);
+  const cameras = rig.value?.factory.cameras;
+  return (
+    <>
+      <label class="scrubber">
+        Time: {seconds} s, keyframe {keyframe + 1} of {keyframes.tNs.length}
+        <input
+          type="range"
+          min={0}
+          max={imu.tNs.length - 1}
+          value={at}
+          onInput={(event) => setAt(Number(event.currentTarget.value))}
+        />
+      </label>
+      <Choices
+        segment={props.segment}
+        active={active.value?.version}
+        version={version}
+        onVersion={setVersion}
+        cameras={cameras?.length ?? 1}
+        camera={camera}
+        onCamera={setCamera}
+      />
+      <div class="side">
+        <Trajectory positions={keyframes.pGi} at={keyframe} />
+        {cameras && (
+          <Tracks
+            of={observations}
+            at={keyframe}
+            camera={camera}
+            size={cameras[camera]}
+            residuals={residuals.value}
+          />
+        )}
+      </div>
+      <Plot label="Angular rates of the gyroscope" data={gyro} series={kAxes}
+        x={{ label: 'seconds' }} y="gyro [rad/s]" cursor={at} onCursor={setAt} height={200} />
+      <Plot label="Readings of the accelerometer" data={accel} series={kAxes}
+        x={{ label: 'seconds' }} y="accel [m/s²]" cursor={at} onCursor={setAt} height={200} />
+      <h2>Residuals</h2>
+      <Loaded read={residuals}>
+        {(value) => (
+          <Residuals
+            data={props.data}
+            residuals={value}
+            keyframe={keyframe}
+            onKeyframe={toKeyframe}
+            camera={camera}
+            end={gyro[0][imu.tNs.length - 1] as number}
+          />
+        )}
+      </Loaded>
+    </>
+  );
+}
+
+export function Data(props: { rig: string; path: string; segment: Segment }) {
+  const read = useRead<SegmentData>(props.segment.hasData ? props.path + '/data' : null);
+  if (!props.segment.hasData) {
+    return (
+      <Empty>
+        Its data was dropped
+        {props.segment.problem ? `: ${props.segment.problem}` : ', for no table and no run needs it'}
+        . What it says about the calibration is kept, and its way with that of its
+        session.
+      </Empty>
+    );
+  }
+  return (
+    <Loaded read={read}>
+      {(data) =>
+        data.imu.tNs.length === 0 ? (
+          <Empty>It has no IMU samples.</Empty>
+        ) : (
+          <Motion rig={props.rig} path={props.path} data={data} segment={props.segment} />
+        )
+      }
+    </Loaded>
   );
 }

@@ -25,6 +25,7 @@ import {
   When,
 } from '../parts';
 import { kColours, Plot } from '../plot';
+import { NewestSession } from './session';
 import { useRead } from '../state';
 
 // Of what the factory says, that is still not known.
@@ -282,6 +283,7 @@ export function RigPage(props: { rig: string; version: number }) {
       <Loaded read={{ value: rig.value && both && { rig: rig.value, both }, error: rig.error ?? factory.error }}>
         {(value) => <Knowledge rig={value.rig} of={value.both} />}
       </Loaded>
+      <NewestSession rig={props.rig} version={props.version} />
       <Loaded read={tables}>{(value) => <Tables of={value.tables} />}</Loaded>
       {rig.value && (
         <Entropies

@@ -1,35 +1,122 @@
-import { useMemo, useState } from 'preact/hooks';
-import type uPlot from 'uplot';
 import {
   idOf,
   pageOf,
   rigPath,
+  type Absence,
   type Direction,
   type Segment,
-  type SegmentData,
   type Table,
 } from '../api';
-import { bytes, component, number } from '../format';
-import { Badge, DataTable, Empty, Figures, Link, Loaded, Title, When } from '../parts';
-import { kColours, Plot } from '../plot';
+import { bytes, clock, component, number } from '../format';
+import { Badge, DataTable, Empty, Figures, Link, Loaded, SegmentLink, Title, When } from '../parts';
 import { useRead } from '../state';
-import { Tracks, Trajectory } from './motion';
+import { Data } from './motion';
+import { sessionOf } from './session';
+
+// The one table of a rig that chooses for all groups together.
+const kJoint = 'joint';
 
 type Score = Segment['scores'][number];
+type Entry = Table['entries'][number];
 
-// Why a table holds a segment, or does not, as far as the table tells.
-function why(score: Score, table: Table | undefined, segment: Segment): string {
-  if (!table) return '';
-  const worst = Math.max(...table.entries.map((e) => e.entropyNats));
-  const place = table.entries.findIndex((e) => e.segment === segment.name);
-  if (score.inTable) {
-    return `kept: place ${place + 1} of ${table.entries.length}, richest first`;
+// What the last entry of the table has, or why there is none to compare with.
+function worstOf(table: Table): string {
+  const last = table.entries[table.entries.length - 1] as Entry | undefined;
+  if (!last) return 'the table is empty now';
+  return `the worst that it holds now has ${number(last.entropyNats, 4)}`;
+}
+
+function Rival(props: { of: Absence; none: string }) {
+  return props.of.rival ? <SegmentLink name={props.of.rival} /> : <>{props.none}</>;
+}
+
+// Entropies stand only where the table goes by them.
+function Gone(props: { of: Absence; table: Table; entropy: number | undefined }) {
+  const { of, table, entropy } = props;
+  const values =
+    entropy !== undefined && of.rivalEntropyNats !== undefined
+      ? ` (entropy ${number(of.rivalEntropyNats, 4)}, this one ${number(entropy, 4)}; lower says more)`
+      : '';
+  const last = table.entries[table.entries.length - 1] as Entry | undefined;
+  const changed = last?.segment !== of.rival;
+  const now = entropy === undefined || !changed ? '' : '; ' + worstOf(table);
+  switch (of.cause) {
+    case 'SAYS_TOO_LITTLE':
+      return <>not kept: it adds too little to what is known without it</>;
+    case 'OTHERS_SAY_MORE':
+      return (
+        <>
+          not kept: the table was full, and its worst, <Rival of={of} none="since dropped" />, said
+          more{values}
+          {now}
+        </>
+      );
+    case 'PUSHED_OUT':
+      return (
+        <>
+          kept until <time dateTime={of.time}>{clock(of.time)}</time>, when{' '}
+          <Rival of={of} none="a segment that is since dropped" /> took its place{values}
+          {now}
+        </>
+      );
+    case 'TOO_OLD':
+      return (
+        <>
+          kept until <time dateTime={of.time}>{clock(of.time)}</time>, when it was older than the
+          rig's tables may hold
+        </>
+      );
+    case 'DEVICE_CHANGED':
+      return (
+        <>
+          kept until <time dateTime={of.time}>{clock(of.time)}</time>, when the device was found to
+          have changed: it speaks of the device before
+        </>
+      );
+    case 'DATA_EVICTED':
+      return (
+        <>
+          kept until <time dateTime={of.time}>{clock(of.time)}</time>, when its data was evicted for
+          newer segments
+        </>
+      );
+    case 'UNUSABLE':
+      return <>kept until it was found unusable</>;
+    default:
+      return <>not kept</>;
   }
+}
+
+// Why a table holds a segment, or does not: as it was written down, or for
+// segments from before that, as far as the table tells.
+function Why(props: {
+  segment: Segment;
+  table: Table | undefined;
+  absence: Absence | undefined;
+  entropy?: number; // where the table goes by it
+}) {
+  const { table, entropy } = props;
+  if (!table) return <>the rig chooses for all groups together</>;
+  const place = table.entries.findIndex((e) => e.segment === props.segment.name);
+  if (place >= 0) {
+    return (
+      <>
+        kept: place {place + 1} of {table.entries.length}, richest first; {worstOf(table)}
+      </>
+    );
+  }
+  if (props.absence) return <Gone of={props.absence} table={table} entropy={entropy} />;
+  const last = table.entries[table.entries.length - 1] as Entry | undefined;
   const full = table.entries.length >= table.capacity;
-  if (full && score.entropyNats >= worst) {
-    return `not kept: all ${table.entries.length} in the table say more (entropy at most ${number(worst, 4)})`;
+  if (full && last && entropy !== undefined && entropy >= last.entropyNats) {
+    return (
+      <>
+        not kept: its entropy of {number(entropy, 4)} is above that of all in the table;{' '}
+        {worstOf(table)}
+      </>
+    );
   }
-  return 'not kept: it says too little beyond the prior, or left the table by its age or a change of the device';
+  return <>not kept; why was not written down when it was scored</>;
 }
 
 function directions(of: Direction[]): string {
@@ -38,7 +125,7 @@ function directions(of: Direction[]): string {
     .join('; ');
 }
 
-function Information(props: { of: Segment; tables: Table[] }) {
+function Information(props: { of: Segment; tables: Table[]; absences: Absence[] }) {
   if (props.of.scores.length === 0) {
     return (
       <Empty>
@@ -49,108 +136,32 @@ function Information(props: { of: Segment; tables: Table[] }) {
     );
   }
   const tables = new Map(props.tables.map((t) => [idOf(t.name), t]));
+  const absences = new Map(props.absences.map((a) => [a.group, a]));
+  const reason = (group: string, entropy?: number) => (
+    <Why
+      segment={props.of}
+      table={tables.get(group)}
+      absence={absences.get(group)}
+      entropy={entropy}
+    />
+  );
+  const row = (score: Score) => [
+    score.group,
+    number(score.gainNats, 4),
+    number(score.entropyNats, 4),
+    `${score.rank} of ${score.size}`,
+    reason(score.group, score.entropyNats),
+    directions(score.unobserved) || 'nothing is missing',
+  ];
   return (
     <>
       <DataTable
         caption="What it says about each group"
         head={['Group', 'Gain [nats]', 'Entropy [nats]', 'Rank', 'Kept?', 'Does not show']}
-        rows={props.of.scores.map((score) => [
-          score.group,
-          number(score.gainNats, 4),
-          number(score.entropyNats, 4),
-          `${score.rank} of ${score.size}`,
-          why(score, tables.get(score.group), props.of),
-          directions(score.unobserved) || 'nothing is missing',
-        ])}
+        rows={props.of.scores.map(row)}
       />
+      {tables.has(kJoint) && <p>Of all groups together: {reason(kJoint)}.</p>}
     </>
-  );
-}
-
-// Values of one kind, three of each sample, against seconds.
-function triple(t: string[], values: number[]): uPlot.AlignedData {
-  const start = BigInt(t[0]);
-  const at = (offset: number) => t.map((_, i) => values[3 * i + offset]);
-  return [
-    t.map((time) => Number(BigInt(time) - start) / 1e9),
-    at(0),
-    at(1),
-    at(2),
-  ] as uPlot.AlignedData;
-}
-
-const kAxes = ['x', 'y', 'z'].map((label, i) => ({
-  label,
-  stroke: kColours[i],
-  width: 1,
-}));
-
-function nearest(times: string[], wanted: bigint): number {
-  let best = 0;
-  let least: bigint | null = null;
-  times.forEach((time, i) => {
-    const d = BigInt(time) - wanted;
-    const distance = d < 0n ? -d : d;
-    if (least === null || distance < least) {
-      least = distance;
-      best = i;
-    }
-  });
-  return best;
-}
-
-function Motion(props: { data: SegmentData }) {
-  const { imu, keyframes, observations } = props.data;
-  const [at, setAt] = useState(0);
-  const gyro = useMemo(() => triple(imu.tNs, imu.gyro), [props.data]);
-  const accel = useMemo(() => triple(imu.tNs, imu.accel), [props.data]);
-  const keyframe = nearest(keyframes.tNs, BigInt(imu.tNs[at]));
-  const seconds = (gyro[0][at] as number).toFixed(3);
-  return (
-    <>
-      <label class="scrubber">
-        Time: {seconds} s, keyframe {keyframe + 1} of {keyframes.tNs.length}
-        <input
-          type="range"
-          min={0}
-          max={imu.tNs.length - 1}
-          value={at}
-          onInput={(event) => setAt(Number(event.currentTarget.value))}
-        />
-      </label>
-      <div class="side">
-        <Trajectory positions={keyframes.pGi} at={keyframe} />
-        <Tracks of={observations} at={keyframe} />
-      </div>
-      <Plot label="Angular rates of the gyroscope" data={gyro} series={kAxes}
-        x={{ label: 'seconds' }} y="gyro [rad/s]" cursor={at} onCursor={setAt} height={200} />
-      <Plot label="Readings of the accelerometer" data={accel} series={kAxes}
-        x={{ label: 'seconds' }} y="accel [m/s²]" cursor={at} onCursor={setAt} height={200} />
-    </>
-  );
-}
-
-function Data(props: { path: string; segment: Segment }) {
-  const read = useRead<SegmentData>(props.segment.hasData ? props.path + '/data' : null);
-  if (!props.segment.hasData) {
-    return (
-      <Empty>
-        Its data was dropped
-        {props.segment.problem ? `: ${props.segment.problem}` : ', for no table and no run needs it'}
-        . What it says about the calibration is kept.
-      </Empty>
-    );
-  }
-  return (
-    <Loaded read={read}>
-      {(data) =>
-        data.imu.tNs.length === 0 ? (
-          <Empty>It has no IMU samples.</Empty>
-        ) : (
-          <Motion data={data} />
-        )
-      }
-    </Loaded>
   );
 }
 
@@ -158,6 +169,7 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
   const path = `${rigPath(props.rig)}/segments/${encodeURIComponent(props.segment)}`;
   const read = useRead<Segment>(path, props.version);
   const tables = useRead<{ tables: Table[] }>(rigPath(props.rig) + '/tables', props.version);
+  const absences = useRead<{ absences: Absence[] }>(path + '/absences', props.version);
   const title = 'Segment ' + decodeURIComponent(props.segment);
   return (
     <>
@@ -182,7 +194,11 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
             />
             {segment.problem && <p class="warning">{segment.problem}</p>}
             <h2>What it says</h2>
-            <Information of={segment} tables={tables.value?.tables ?? []} />
+            <Information
+              of={segment}
+              tables={tables.value?.tables ?? []}
+              absences={absences.value?.absences ?? []}
+            />
             {segment.residuals && (
               <Figures
                 of={[
@@ -194,10 +210,15 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
               />
             )}
             <h2>Motion</h2>
-            <Data path={path} segment={segment} />
+            <Data rig={props.rig} path={path} segment={segment} />
             <h2>Where it comes from</h2>
             <p>
               Number {segment.sequence} of <Link to={'/rigs/' + props.rig}>{props.rig}</Link>,
+              of the session{' '}
+              <Link to={pageOf(`rigs/${props.rig}/sessions/${sessionOf(segment.name)}`)}>
+                {decodeURIComponent(sessionOf(segment.name))}
+              </Link>
+              ,
               estimated with{' '}
               <Link to={pageOf(`rigs/${props.rig}/calibrations/${segment.calibrationVersion}`)}>
                 version {segment.calibrationVersion}

@@ -1,0 +1,180 @@
+// What a segment leaves unexplained: residuals of its observations and between
+// its keyframes, at one time of it.
+import { useMemo, useState } from 'preact/hooks';
+import type uPlot from 'uplot';
+import type { SegmentData, SegmentResiduals } from './api';
+import { number } from './format';
+import { Choice } from './parts';
+import { kColours, Plot } from './plot';
+
+// A logarithmic axis has no zero.
+const kLeast = 1e-3;
+
+interface Shown {
+  data: SegmentData;
+  residuals: SegmentResiduals;
+  keyframe: number;
+  end: number; // of the time axis, which the IMU's plots have too [s]
+  onKeyframe: (keyframe: number) => void;
+}
+
+function secondsOf(times: string[]): number[] {
+  const start = BigInt(times[0]);
+  return times.map((time) => Number(BigInt(time) - start) / 1e9);
+}
+
+const points = (label: string, stroke: string): uPlot.Series => ({
+  label,
+  stroke,
+  paths: () => null,
+  points: { show: true, size: 4, stroke, fill: stroke },
+});
+
+const kObservations = [points('used', kColours[0]), points('left out', kColours[1])];
+
+// Of one camera, each observation at the time of its keyframe.
+function Reprojections(props: Shown & { camera: number }) {
+  const { data, keyframes } = useMemo(() => {
+    const { observations } = props.data;
+    const { residualPx, unused, notProjectable } = props.residuals;
+    const [out, none] = [new Set(unused), new Set(notProjectable)];
+    const seconds = secondsOf(props.data.keyframes.tNs);
+    const chosen = observations.camera
+      .map((_, i) => i)
+      .filter((i) => observations.camera[i] === props.camera && !none.has(i))
+      .sort((a, b) => observations.keyframe[a] - observations.keyframe[b]);
+    const size = (i: number) =>
+      Math.max(kLeast, Math.hypot(residualPx[2 * i], residualPx[2 * i + 1]));
+    return {
+      data: [
+        chosen.map((i) => seconds[observations.keyframe[i]]),
+        chosen.map((i) => (out.has(i) ? null : size(i))),
+        chosen.map((i) => (out.has(i) ? size(i) : null)),
+      ] as uPlot.AlignedData,
+      keyframes: chosen.map((i) => observations.keyframe[i]),
+    };
+  }, [props.data, props.residuals, props.camera]);
+  return (
+    <Plot
+      label={`Reprojection residuals of camera ${props.camera} in pixels, by time`}
+      data={data}
+      series={kObservations}
+      x={{ label: 'seconds', range: [0, props.end] }}
+      y="residual [px]"
+      log
+      height={220}
+      cursor={Math.max(0, keyframes.indexOf(props.keyframe))}
+      onCursor={(i) => props.onKeyframe(keyframes[i])}
+    />
+  );
+}
+
+// Parts of the residual of an interval, as they come.
+const kParts = [
+  { name: 'rotation', unit: 'rad' },
+  { name: 'velocity', unit: 'm/s' },
+  { name: 'position', unit: 'm' },
+  { name: 'step of the accelerometer bias', unit: 'm/s²' },
+  { name: 'step of the gyroscope bias', unit: 'rad/s' },
+];
+const kSize = 15;
+const kWhitened = 'whitened';
+
+const lines = (labels: string[]): uPlot.Series[] =>
+  labels.map((label, i) => ({ label, stroke: kColours[i % kColours.length], width: 1.2 }));
+const kKinds: uPlot.Series[] = lines(kParts.map((part) => part.name)).map((series, i) => ({
+  ...series,
+  dash: i > 2 ? [6, 4] : undefined,
+}));
+const kAxes = lines(['x', 'y', 'z']);
+
+function intervalsOf(shown: Shown, part: string): uPlot.AlignedData {
+  const { whitened, residual } = shown.residuals.intervals!;
+  const seconds = secondsOf(shown.data.keyframes.tNs).slice(0, -1);
+  const three = (of: number[], k: number, kind: number) =>
+    of.slice(kSize * k + 3 * kind, kSize * k + 3 * kind + 3);
+  if (part === kWhitened) {
+    const rms = (k: number, kind: number) =>
+      Math.sqrt(three(whitened, k, kind).reduce((sum, x) => sum + x * x, 0) / 3);
+    return [seconds, ...kParts.map((_, kind) => seconds.map((_, k) => rms(k, kind)))] as uPlot.AlignedData;
+  }
+  const kind = Number(part);
+  return [
+    seconds,
+    ...[0, 1, 2].map((axis) => seconds.map((_, k) => three(residual, k, kind)[axis])),
+  ] as uPlot.AlignedData;
+}
+
+function Intervals(props: Shown) {
+  const [part, setPart] = useState(kWhitened);
+  const data = useMemo(() => intervalsOf(props, part), [props.data, props.residuals, part]);
+  const whitened = part === kWhitened;
+  const { name, unit } = whitened
+    ? { name: 'all, in standard deviations', unit: 'sigma' }
+    : kParts[Number(part)];
+  return (
+    <>
+      <div class="bar">
+        <Choice
+          label="IMU residuals between keyframes"
+          value={part}
+          of={[
+            [kWhitened, 'all, in standard deviations'],
+            ...kParts.map((p, i): [string, string] => [String(i), `${p.name} [${p.unit}]`]),
+          ]}
+          onChoice={setPart}
+        />
+      </div>
+      <Plot
+        key={part}
+        label={`IMU residuals of each interval between keyframes: ${name}`}
+        data={data}
+        series={whitened ? kKinds : kAxes}
+        x={{ label: 'seconds', range: [0, props.end] }}
+        y={whitened ? 'rms [sigma]' : `residual [${unit}]`}
+        height={220}
+        cursor={Math.min(props.keyframe, data[0].length - 1)}
+        onCursor={props.onKeyframe}
+      />
+    </>
+  );
+}
+
+function InWords(props: { of: SegmentResiduals }) {
+  const { cameras, inertialRms, calibrationVersion, notProjectable } = props.of;
+  const kinds = kParts
+    .map((part, i) => `${part.name} ${number(inertialRms[i] ?? NaN)}`)
+    .join(', ');
+  return (
+    <>
+      <ul>
+        {cameras.map((c) => (
+          <li key={c.camera}>
+            Camera {c.camera}: {number(c.inlierRmsPx)} px rms over the {c.inliers} of{' '}
+            {c.observations} observations that a score uses
+            {c.observations > c.inliers && `; ${c.observations - c.inliers} are left out`}.
+          </li>
+        ))}
+        {notProjectable.length > 0 && (
+          <li>{notProjectable.length} observations do not project and have no residual.</li>
+        )}
+        {inertialRms.length > 0 && <li>IMU, rms in standard deviations: {kinds}.</li>}
+      </ul>
+      <p class="quiet">
+        At version {calibrationVersion}, about the states that the client's SLAM
+        system sent; landmarks are moved as for a score, nothing else is. These
+        are not the residuals after a calibration: the page of its run has those.
+      </p>
+    </>
+  );
+}
+
+export function Residuals(props: Shown & { camera: number }) {
+  return (
+    <>
+      <InWords of={props.residuals} />
+      <Reprojections {...props} />
+      {props.residuals.intervals && <Intervals {...props} />}
+    </>
+  );
+}
