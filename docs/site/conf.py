@@ -25,6 +25,8 @@ breathe_projects = {"selfcal": os.environ["SELFCAL_SITE_DOXYGEN"]}
 breathe_default_project = "selfcal"
 breathe_default_members = ("members",)
 cpp_index_common_prefix = ["selfcal::", "selfcal::client::"]
+# Of the extra `mcap`, not in Debian.
+autodoc_mock_imports = ["foxglove_schemas_protobuf", "mcap_protobuf"]
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "undoc-members": True}
 autodoc_typehints = "signature"

@@ -81,6 +81,17 @@ class Daemon:
         for page in self._pages(self.segment_service.ListSegments, request):
             yield from page.segments
 
+    def segment_data(
+        self, rig_id: str, segment_id: str
+    ) -> segment.MotionSegment:
+        """What was sent, of `session~index` as in its name, while it is kept."""
+        return self.segment_service.GetSegmentData(
+            segment.GetSegmentDataRequest(
+                name=f"rigs/{rig_id}/segments/{segment_id}"
+            ),
+            timeout=self._timeout_s,
+        )
+
     def tables(self, rig_id: str) -> Iterable[segment.Table]:
         request = segment.ListTablesRequest(parent=f"rigs/{rig_id}")
         return self.segment_service.ListTables(

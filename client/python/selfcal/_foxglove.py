@@ -1,0 +1,241 @@
+"""Parts of a segment as messages of Foxglove's schemas; see selfcal.mcap."""
+
+from __future__ import annotations
+
+import struct
+from typing import Iterable, Iterator, List, Tuple
+
+from foxglove_schemas_protobuf import (
+    CameraCalibration_pb2,
+    FrameTransform_pb2,
+    ImageAnnotations_pb2,
+    KeyValuePair_pb2,
+    PackedElementField_pb2,
+    Point2_pb2,
+    PointCloud_pb2,
+    PointsAnnotation_pb2,
+    PoseInFrame_pb2,
+    Quaternion_pb2,
+    Vector3_pb2,
+)
+from google.protobuf import timestamp_pb2
+
+from selfcal import mcap_messages_pb2 as messages
+from selfcal.v1 import calibration_pb2 as v1
+from selfcal.v1 import segment_pb2
+
+Timed = Tuple[int, str, object]  # t_ns, topic, message
+
+_DISTORTION = {
+    v1.DISTORTION_MODEL_RADIAL_TANGENTIAL: "plumb_bob",
+    v1.DISTORTION_MODEL_EQUIDISTANT: "kannala_brandt",
+    v1.DISTORTION_MODEL_FOV: "fov",  # not one that Foxglove knows
+}
+
+
+def _stamp(t_ns: int) -> timestamp_pb2.Timestamp:
+    return timestamp_pb2.Timestamp(
+        seconds=t_ns // 10**9, nanos=t_ns % 10**9
+    )
+
+
+def _triples(values: Iterable[float]) -> Iterator[Tuple[float, float, float]]:
+    return zip(*[iter(values)] * 3)
+
+
+def _contract_vector(xyz: Tuple[float, float, float]) -> v1.Vector3:
+    return v1.Vector3(x=xyz[0], y=xyz[1], z=xyz[2])
+
+
+def _inverse(
+    q: v1.Quaternion, p: v1.Vector3
+) -> Tuple[Quaternion_pb2.Quaternion, Vector3_pb2.Vector3]:
+    """T_BA of T_AB = (q, p)."""
+    w, x, y, z = q.w, -q.x, -q.y, -q.z
+    # -q^-1 p: twice the cross products of Rodrigues' formula.
+    cross = (y * p.z - z * p.y, z * p.x - x * p.z, x * p.y - y * p.x)
+    again = (
+        y * cross[2] - z * cross[1],
+        z * cross[0] - x * cross[2],
+        x * cross[1] - y * cross[0],
+    )
+    turned = [
+        a + 2 * (w * b + c)
+        for a, b, c in zip((p.x, p.y, p.z), cross, again)
+    ]
+    return (
+        Quaternion_pb2.Quaternion(w=w, x=x, y=y, z=z),
+        Vector3_pb2.Vector3(x=-turned[0], y=-turned[1], z=-turned[2]),
+    )
+
+
+def sensors(
+    calibration: v1.CalibrationParameters, t_ns: int
+) -> Iterator[Timed]:
+    """Where the sensors are, and what the cameras are."""
+    parts = [("A", calibration.imu.q_ai, v1.Vector3())]
+    for number, camera in enumerate(calibration.cameras):
+        parts.append((f"cam{number}", camera.q_ci, camera.p_ci))
+    for frame, q, p in parts:
+        rotation, translation = _inverse(q, p)
+        yield t_ns, "/tf", FrameTransform_pb2.FrameTransform(
+            timestamp=_stamp(t_ns),
+            parent_frame_id="I",
+            child_frame_id=frame,
+            rotation=rotation,
+            translation=translation,
+        )
+    for number, camera in enumerate(calibration.cameras):
+        f, c = camera.f, camera.c
+        coefficients = list(camera.distortion)
+        if camera.distortion_model == v1.DISTORTION_MODEL_RADIAL_TANGENTIAL:
+            coefficients.append(0.0)  # k3
+        message = CameraCalibration_pb2.CameraCalibration(
+            timestamp=_stamp(t_ns),
+            frame_id=f"cam{number}",
+            width=camera.width_px,
+            height=camera.height_px,
+            distortion_model=_DISTORTION[camera.distortion_model],
+            D=coefficients,
+            K=[f.x, 0, c.x, 0, f.y, c.y, 0, 0, 1],
+            R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
+            P=[f.x, 0, c.x, 0, 0, f.y, c.y, 0, 0, 0, 1, 0],
+        )
+        yield t_ns, f"/cam{number}/calibration", message
+
+
+def keyframes(
+    keyframes: segment_pb2.MotionSegment.Keyframes,
+) -> Iterator[Timed]:
+    columns = zip(
+        keyframes.t_ns,
+        zip(*[iter(keyframes.q_gi)] * 4),
+        _triples(keyframes.p_gi),
+        _triples(keyframes.v_gi),
+        _triples(keyframes.b_a),
+        _triples(keyframes.b_g),
+    )
+    for t_ns, (w, x, y, z), p, v, b_a, b_g in columns:
+        rotation = Quaternion_pb2.Quaternion(w=w, x=x, y=y, z=z)
+        place = Vector3_pb2.Vector3(x=p[0], y=p[1], z=p[2])
+        yield t_ns, "/tf", FrameTransform_pb2.FrameTransform(
+            timestamp=_stamp(t_ns),
+            parent_frame_id="G",
+            child_frame_id="I",
+            rotation=rotation,
+            translation=place,
+        )
+        pose = PoseInFrame_pb2.PoseInFrame(
+            timestamp=_stamp(t_ns), frame_id="G"
+        )
+        pose.pose.position.CopyFrom(place)
+        pose.pose.orientation.CopyFrom(rotation)
+        yield t_ns, "/keyframes", pose
+        yield t_ns, "/motion", messages.KeyframeMotion(
+            timestamp=_stamp(t_ns),
+            v_gi=_contract_vector(v),
+            b_a=_contract_vector(b_a),
+            b_g=_contract_vector(b_g),
+        )
+
+
+def imu(samples: segment_pb2.MotionSegment.ImuSamples) -> Iterator[Timed]:
+    for t_ns, gyro, accel in zip(
+        samples.t_ns, _triples(samples.gyro), _triples(samples.accel)
+    ):
+        yield t_ns, "/imu", messages.ImuReading(
+            timestamp=_stamp(t_ns),
+            gyro=_contract_vector(gyro),
+            accel=_contract_vector(accel),
+        )
+
+
+def landmarks(segment: segment_pb2.MotionSegment) -> Iterator[Timed]:
+    if not segment.landmarks.id:
+        return
+    number = PackedElementField_pb2.PackedElementField
+    record = struct.Struct("<dddII")  # an id has 64 bits: in two parts
+    t_ns = segment.keyframes.t_ns[0]
+    fields = [
+        number(name=name, offset=8 * i, type=number.FLOAT64)
+        for i, name in enumerate("xyz")
+    ]
+    fields.append(number(name="id_low", offset=24, type=number.UINT32))
+    fields.append(number(name="id_high", offset=28, type=number.UINT32))
+    cloud = PointCloud_pb2.PointCloud(
+        timestamp=_stamp(t_ns),
+        frame_id="G",
+        point_stride=record.size,
+        fields=fields,
+        data=b"".join(
+            record.pack(*p, id & 0xFFFFFFFF, id >> 32)
+            for id, p in zip(
+                segment.landmarks.id, _triples(segment.landmarks.p_g)
+            )
+        ),
+    )
+    cloud.pose.orientation.w = 1
+    yield t_ns, "/landmarks", cloud
+
+
+def observations(segment: segment_pb2.MotionSegment) -> Iterator[Timed]:
+    seen: dict = {}
+    observations = segment.observations
+    for keyframe, camera, landmark, (u, v) in zip(
+        observations.keyframe,
+        observations.camera,
+        observations.landmark,
+        zip(*[iter(observations.z_px)] * 2),
+    ):
+        points, ids = seen.setdefault((keyframe, camera), ([], []))
+        points.append(Point2_pb2.Point2(x=u, y=v))
+        ids.append(str(segment.landmarks.id[landmark]))
+    for (keyframe, camera), (points, ids) in seen.items():
+        t_ns = segment.keyframes.t_ns[keyframe]
+        annotation = PointsAnnotation_pb2.PointsAnnotation(
+            timestamp=_stamp(t_ns),
+            type=PointsAnnotation_pb2.PointsAnnotation.POINTS,
+            points=points,
+            thickness=3,
+            metadata=[
+                KeyValuePair_pb2.KeyValuePair(
+                    key="landmarks", value=",".join(ids)
+                )
+            ],
+        )
+        annotation.outline_color.g = annotation.outline_color.a = 1
+        yield (
+            t_ns,
+            f"/cam{camera}/observations",
+            ImageAnnotations_pb2.ImageAnnotations(
+                timestamp=_stamp(t_ns), points=[annotation]
+            ),
+        )
+
+
+def losses(calibration: v1.CalibrationParameters) -> List[str]:
+    lost = []
+    for number, camera in enumerate(calibration.cameras):
+        if camera.distortion_model == v1.DISTORTION_MODEL_FOV:
+            lost.append(
+                f"cam{number}: Foxglove's schema does not know the FOV model; "
+                "it is named 'fov' with D = [w], and viewers that project "
+                "points into the image do so without distortion or not at all"
+            )
+        if camera.time_offset_s != 0:
+            lost.append(
+                f"cam{number}: the time offset of {camera.time_offset_s:g} s "
+                "has no place; images keep their own stamps"
+            )
+    scales = calibration.imu
+    if any(
+        value != nominal
+        for vector, nominal in (
+            (scales.s_g, 1), (scales.s_a, 1), (scales.m_g, 0), (scales.m_a, 0)
+        )
+        for value in (vector.x, vector.y, vector.z)
+    ):  # fmt: skip
+        lost.append(
+            "imu: scales and misalignments have no place; readings are raw"
+        )
+    return lost

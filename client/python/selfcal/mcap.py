@@ -1,0 +1,138 @@
+"""Segments as MCAP, with Foxglove's schemas, for Foxglove, Rerun and others::
+
+    python -m selfcal.mcap TARGET RIG FOLDER [SEGMENT...] [--version VERSION]
+
+writes a file for each session, FOLDER/SESSION.mcap, of the segments that are
+named (``session~index``) or of all whose data is kept. Needs the extra ``mcap``:
+``pip install 'selfcal[mcap]'``.
+
+Frames are G (the session's), I (the body), A (the accelerometer) and cam0,
+cam1, ...; times are those of the session's clock.
+
+==================== ================================== =====================
+topic                schema                             one message for each
+==================== ================================== =====================
+/tf                  foxglove.FrameTransform            keyframe: I in G; and
+                                                        segment: A, camN in I
+/keyframes           foxglove.PoseInFrame               keyframe: I in G
+/motion              selfcal.mcap.KeyframeMotion        keyframe
+/imu                 selfcal.mcap.ImuReading            sample
+/landmarks           foxglove.PointCloud                segment, in G
+/camN/calibration    foxglove.CameraCalibration         segment
+/camN/observations   foxglove.ImageAnnotations          keyframe
+==================== ================================== =====================
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import urllib.parse
+from typing import IO, Iterable, List, Union
+
+from selfcal.client import Tls, connect
+from selfcal.v1 import calibration_pb2 as v1
+from selfcal.v1 import segment_pb2
+
+try:
+    from mcap_protobuf.writer import Writer
+
+    from selfcal import _foxglove
+except ImportError as error:
+    raise ImportError(
+        "selfcal.mcap needs packages that are not installed, or are too old "
+        f"({error}): pip install 'selfcal[mcap]'"
+    ) from error
+
+__all__ = ["write"]
+
+def write(
+    output: Union[str, IO[bytes]],
+    segments: Iterable[segment_pb2.MotionSegment],
+    calibration: v1.CalibrationParameters,
+) -> List[str]:
+    """Writes segments of one session with the calibration that holds for them.
+
+    Returns what the file cannot say, a sentence each. Raises ValueError for
+    segments of several sessions, which have clocks and frames of their own, and
+    for times before zero, which MCAP has not.
+    """
+    timed: List[_foxglove.Timed] = []
+    sessions = set()
+    readings: set = set()  # neighbours share samples
+    names = []
+    for segment in segments:
+        sessions.add(segment.session)
+        names.append(f"{segment.session}~{segment.index}")
+        timed += _foxglove.sensors(calibration, segment.keyframes.t_ns[0])
+        timed += _foxglove.keyframes(segment.keyframes)
+        timed += [r for r in _foxglove.imu(segment.imu) if r[0] not in readings]
+        readings.update(segment.imu.t_ns)
+        timed += _foxglove.landmarks(segment)
+        timed += _foxglove.observations(segment)
+    if len(sessions) != 1:
+        raise ValueError(
+            f"one session for each file, not {len(sessions)}: each has a clock "
+            "and a frame of its own"
+        )
+    timed.sort(key=lambda entry: entry[0])
+    if timed[0][0] < 0:
+        raise ValueError("times before zero cannot be written as MCAP")
+    lost = _foxglove.losses(calibration)
+    writer = Writer(output)
+    for t_ns, topic, message in timed:
+        writer.write_message(topic, message, log_time=t_ns, publish_time=t_ns)
+    writer.add_metadata(
+        "selfcal", {"segments": " ".join(names), "lost": "\n".join(lost)}
+    )
+    writer.finish()
+    return lost
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m selfcal.mcap",
+        description="Writes segments of a rig as MCAP, a file for each session.",
+    )
+    parser.add_argument("target", help="unix:/path or host:port, as gRPC has it")
+    parser.add_argument("rig")
+    parser.add_argument("folder", help="gets SESSION.mcap; is made if need be")
+    parser.add_argument("segment", nargs="*", help="session~index; else all")
+    parser.add_argument("--version", default="active", help="of the calibration")
+    parser.add_argument("--force", action="store_true", help="overwrite files")
+    for flag in ("ca", "cert", "key"):
+        parser.add_argument(f"--{flag}", help="for host:port: PEM, as selfcal's")
+    return parser
+
+
+def main() -> int:
+    flags = _parser().parse_args()
+    os.makedirs(flags.folder, exist_ok=True)
+    tls = Tls(flags.ca, flags.cert, flags.key) if flags.ca else None
+    with connect(flags.target, tls) as daemon:
+        calibration = daemon.calibration(flags.rig, flags.version).parameters
+        names = flags.segment or [
+            segment.name.rsplit("/", 1)[1]
+            for segment in daemon.segments(flags.rig)
+            if segment.has_data
+        ]
+        sessions: dict = {}
+        for name in names:
+            data = daemon.segment_data(flags.rig, name)
+            sessions.setdefault(data.session, []).append(data)
+    for session, segments in sorted(sessions.items()):
+        name = urllib.parse.quote(session, safe="") + ".mcap"
+        path = os.path.join(flags.folder, name)
+        if os.path.exists(path) and not flags.force:
+            print(f"{path} is there already; --force", file=sys.stderr)
+            return 2
+        segments.sort(key=lambda segment: segment.index)
+        for line in write(path, segments, calibration):
+            print(f"lost: {line}", file=sys.stderr)
+        print(f"{path}\t{len(segments)} segments")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
