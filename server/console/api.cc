@@ -30,6 +30,7 @@ constexpr Route kRoutes[] = {
     {"GET", "rigs/*/segments/*", GetSegment},
     {"GET", "rigs/*/segments/*/data", GetSegmentData},
     {"GET", "rigs/*/segments/*/absences", ListAbsences},
+    {"GET", "rigs/*/segments/*/information", GetInformation},
     {"GET", "rigs/*/segments/*/residuals", GetResiduals},
     {"GET", "rigs/*/sessions", ListSessions},
     {"GET", "rigs/*/sessions/*/trajectory", GetTrajectory},

@@ -42,6 +42,7 @@ Answer ListSegments(const Call& call);
 Answer GetSegment(const Call& call);
 Answer GetSegmentData(const Call& call);
 Answer ListAbsences(const Call& call);
+Answer GetInformation(const Call& call);
 Answer GetResiduals(const Call& call);
 Answer ListSessions(const Call& call);
 Answer GetTrajectory(const Call& call);

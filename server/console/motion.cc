@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "core/information/fusion.h"
 #include "proto/resource_names.h"
 #include "server/encode/encode_parts.h"
 
@@ -58,6 +60,22 @@ console::Absence Encode(const std::string& rig, const TableAbsence& absence) {
   if (absence.rival) message.set_rival(SegmentName(rig, *absence.rival));
   if (absence.rival_entropy) {
     message.set_rival_entropy_nats(*absence.rival_entropy);
+  }
+  return message;
+}
+
+console::SegmentInformation Encode(const Rig& rig,
+                                   const SegmentInformation& information) {
+  const auto components = TangentComponents(rig.factory);
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  const FusedEstimate alone = Fuse(rig, std::span(&information, 1));
+  console::SegmentInformation message;
+  for (const int i : FreeComponents(rig)) {
+    console::ComponentInformation* added = message.add_components();
+    added->set_component(components[i].name);
+    added->set_unit(components[i].unit);
+    added->set_prior_sigma(prior(i));
+    added->set_sigma(std::sqrt(alone.covariance(i, i)));
   }
   return message;
 }

@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "core/information/segment_information.h"
 #include "core/information/segment_residuals.h"
+#include "core/model/rig.h"
 #include "core/model/segment.h"
 #include "server/console/motion.pb.h"
 #include "server/store/store.h"
@@ -20,6 +22,10 @@ console::SessionPiece Encode(const std::string& rig,
                              int max_points);
 
 console::Absence Encode(const std::string& rig, const TableAbsence& absence);
+
+// Of one segment with the prior of the rig (core/information/fusion.h).
+console::SegmentInformation Encode(const Rig& rig,
+                                   const SegmentInformation& information);
 
 console::SegmentResiduals Encode(const SegmentResiduals& residuals,
                                  const MotionSegment& segment,

@@ -107,6 +107,17 @@ Answer ListAbsences(const Call& call) {
   return JsonResponse(response);
 }
 
+Answer GetInformation(const Call& call) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts name,
+                           SegmentOf<v1::GetSegmentRequest>(call));
+  Store* store = call.context.store;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredSegment segment,
+                           store->GetSegment(name.rig, name.key));
+  if (!segment.information) return JsonResponse(console::SegmentInformation());
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(name.rig));
+  return JsonResponse(Encode(rig.rig, *segment.information));
+}
+
 Answer GetResiduals(const Call& call) {
   SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts name,
                            SegmentOf<v1::GetSegmentDataRequest>(call));

@@ -192,6 +192,8 @@ const tests = {
     await r.page.keyboard.press('End');
     await r.sees('keyframe 20 of 20');
     assert.notEqual(await r.page.locator('circle.now').getAttribute('cx'), before);
+    await r.page.getByText('What it says alone about each parameter').click();
+    await r.page.getByRole('row', { name: /focal length of camera 0, x \[px\]/ }).waitFor();
     // Residuals go with the time, and with the version.
     await r.sees(/Camera 0: .* px rms over the/);
     await r.sees('At version 1,');
@@ -201,6 +203,14 @@ const tests = {
     await r.sees(/^At version [2-9],/);
     await r.page.getByLabel('IMU residuals between keyframes').selectOption('0');
     await r.page.getByRole('img', { name: /between keyframes: rotation/ }).waitFor();
+    await r.page.setViewportSize({ width: 1000, height: 800 });
+    await r.page.waitForTimeout(300);
+    await r.page.setViewportSize({ width: 1200, height: 800 });
+    await r.sees('keyframe 20 of 20');
+    const plot = r.page.getByRole('img', { name: /^Reprojection residuals/ });
+    await plot.scrollIntoViewIfNeeded();
+    await plot.hover();
+    await r.sees(/keyframe ([2-9]|1\d) of 20/);
     await r.page.getByRole('heading', { name: 'Motion' }).scrollIntoViewIfNeeded();
     await r.page.mouse.wheel(0, 300);
     await r.page.waitForTimeout(300);
@@ -222,6 +232,7 @@ const tests = {
     const counts = legend.map((text) => Number(/: (\d+)/.exec(text)[1]));
     assert.equal(counts.reduce((sum, n) => sum + n, 0), segments.length);
     await r.picture('session');
+    await r.detail('session');
     const from = await r.page.locator('path.way').first().getAttribute('d');
     await r.page.getByRole('button', { name: 'From above' }).click();
     await r.page.waitForFunction(
@@ -246,6 +257,7 @@ const tests = {
     await r.page.goto(`${r.base}/${gone.name}`);
     await r.sees('Its data was dropped');
     await r.sees(/not kept|kept until/);
+    await r.picture('segment-dropped');
     // One that a later one pushed out of a table names it.
     for (const { name } of segments) {
       const { absences } = await r.api(name + '/absences');
@@ -255,7 +267,7 @@ const tests = {
       await r.sees('kept until');
       const rival = r.page.getByRole('cell', { name: /kept until/ }).first().getByRole('link');
       assert.equal(await rival.getAttribute('href'), '/' + pushed.rival);
-      await r.picture('segment-dropped');
+      await r.picture('segment-pushed-out');
       return;
     }
     assert.fail('no segment was pushed out of a table');

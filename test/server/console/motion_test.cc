@@ -108,6 +108,31 @@ TEST_F(MotionTest, AnEvictedSegmentSaysWhatCameInstead) {
       0u);
 }
 
+TEST_F(MotionTest, InformationIsTheSigmaOfEachComponentBeforeAndAfter) {
+  const Rig rig = AddRig("r");
+  AddSegments(rig, 2);
+  const std::string path = "/api/v1/rigs/r/segments/s~0/information";
+  EXPECT_TRUE(Get(path).json()["components"].empty()) << "no score";
+  // Says of the first component three times what the prior does.
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  SegmentInformation information = FakeInformation(rig, 1);
+  information.Lambda.setZero();
+  information.eta.setZero();
+  information.Lambda(0, 0) = 3 / (prior(0) * prior(0));
+  ASSERT_TRUE(store_->CommitScore("r", {"s", 0}, information).ok());
+  const auto components = Get(path).json()["components"];
+  ASSERT_EQ(components.size(), FreeComponents(rig).size());
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    const int i = FreeComponents(rig)[k];
+    EXPECT_EQ(components[k]["component"],
+              TangentComponents(rig.factory)[i].name);
+    EXPECT_EQ(components[k]["priorSigma"].get<double>(), prior(i));
+    EXPECT_NEAR(components[k]["sigma"].get<double>() / prior(i),
+                i == 0 ? 0.5 : 1,
+                1e-9);
+  }
+}
+
 TEST_F(MotionTest, ResidualsAreThoseOfTheCoreAtTheVersionThatIsAskedFor) {
   const Rig rig = AddRig("r");
   AddVersion(rig);  // version 2 has the values of version 1
@@ -149,6 +174,7 @@ TEST_F(MotionTest, MistakesSayWhatToDo) {
       {"rigs/r/sessions/s/trajectory?page_token=x", 400},
       {"rigs/r/segments/s~9/absences", 404},
       {"rigs/r/segments/x/absences", 400},
+      {"rigs/r/segments/s~9/information", 404},
       {"rigs/r/segments/s~0/residuals?version=7", 404},
       {"rigs/r/segments/s~0/residuals?version=x", 400},
       {"rigs/r/segments/s~9/residuals", 404},
@@ -172,6 +198,7 @@ TEST_F(MotionTest, EachCallNeedsTheRoleOnItsRig) {
   for (const char* path : {"/api/v1/rigs/r/sessions",
                            "/api/v1/rigs/r/sessions/s/trajectory",
                            "/api/v1/rigs/r/segments/s~0/absences",
+                           "/api/v1/rigs/r/segments/s~0/information",
                            "/api/v1/rigs/r/segments/s~0/residuals"}) {
     EXPECT_EQ(GetAs({{Role::kRead, "r"}}, path).status, 200) << path;
     EXPECT_EQ(GetAs({{Role::kRead, ""}}, path).status, 200) << path;

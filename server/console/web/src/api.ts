@@ -185,6 +185,14 @@ export interface Absence {
   rivalEntropyNats?: number;
 }
 
+// What a segment alone leaves to be known.
+export interface ComponentInformation {
+  component: string;
+  unit: string;
+  priorSigma: number;
+  sigma: number;
+}
+
 export interface SegmentResiduals {
   calibrationVersion: string;
   residualPx: number[]; // 2 for each observation

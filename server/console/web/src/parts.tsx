@@ -113,6 +113,28 @@ export function Meter(props: { value: number; of: number; label: string }) {
   );
 }
 
+// Of what the factory says, that is still not known.
+export const kWell = 0.1;
+export const kWeak = 0.5;
+
+// The part of a tolerance that a sigma is.
+export function Unknown(props: { ratio: number; of: string }) {
+  return (
+    <span class="meter">
+      <meter
+        min={0}
+        max={1}
+        low={kWell}
+        high={kWeak}
+        optimum={0}
+        value={Math.min(props.ratio, 1)}
+        aria-label={'part of the tolerance of ' + props.of}
+      />
+      {number(100 * props.ratio, 2)} %
+    </span>
+  );
+}
+
 export type Figure = [string, ComponentChildren];
 
 // What is null is not shown.

@@ -65,7 +65,9 @@ export function Plot(props: PlotProps) {
         hooks: {
           setCursor: [
             (u) => {
-              if (!moving.current && u.cursor.idx != null) {
+              // A change of its size tells of the cursor as well.
+              const pointed = !moving.current && u.over.matches(':hover');
+              if (pointed && u.cursor.idx != null) {
                 onCursor.current?.(u.cursor.idx);
               }
             },

@@ -80,13 +80,15 @@ const kParts = [
 const kSize = 15;
 const kWhitened = 'whitened';
 
-const lines = (labels: string[]): uPlot.Series[] =>
-  labels.map((label, i) => ({ label, stroke: kColours[i % kColours.length], width: 1.2 }));
-const kKinds: uPlot.Series[] = lines(kParts.map((part) => part.name)).map((series, i) => ({
-  ...series,
+// Lines of biases are broken.
+const kGrey = '#8a929c';
+const kKinds: uPlot.Series[] = kParts.map((part, i) => ({
+  label: part.name,
+  stroke: kColours[i] ?? kGrey,
+  width: 1.2,
   dash: i > 2 ? [6, 4] : undefined,
 }));
-const kAxes = lines(['x', 'y', 'z']);
+const kAxes = ['x', 'y', 'z'].map((label, i) => ({ label, stroke: kColours[i], width: 1.2 }));
 
 function intervalsOf(shown: Shown, part: string): uPlot.AlignedData {
   const { whitened, residual } = shown.residuals.intervals!;

@@ -22,15 +22,14 @@ import {
   Meter,
   SegmentLink,
   Title,
+  Unknown,
   When,
+  kWeak,
+  kWell,
 } from '../parts';
 import { kColours, Plot } from '../plot';
 import { NewestSession } from './session';
 import { useRead } from '../state';
-
-// Of what the factory says, that is still not known.
-const kWell = 0.1;
-const kWeak = 0.5;
 
 interface Known extends Estimate {
   tolerance: number;
@@ -69,18 +68,7 @@ function Group(props: { name: string; of: Known[] }) {
           quantity(e.value, e.unit),
           number(e.sigma),
           number(e.tolerance),
-          <span class="meter">
-            <meter
-              min={0}
-              max={1}
-              low={kWell}
-              high={kWeak}
-              optimum={0}
-              value={Math.min(e.ratio, 1)}
-              aria-label={'part of the tolerance of ' + component(e.component)}
-            />
-            {number(100 * e.ratio, 2)} %
-          </span>,
+          <Unknown ratio={e.ratio} of={component(e.component)} />,
         ])}
       />
     </section>

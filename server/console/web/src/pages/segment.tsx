@@ -3,12 +3,24 @@ import {
   pageOf,
   rigPath,
   type Absence,
+  type ComponentInformation,
   type Direction,
   type Segment,
   type Table,
 } from '../api';
 import { bytes, clock, component, number } from '../format';
-import { Badge, DataTable, Empty, Figures, Link, Loaded, SegmentLink, Title, When } from '../parts';
+import {
+  Badge,
+  DataTable,
+  Empty,
+  Figures,
+  Link,
+  Loaded,
+  SegmentLink,
+  Title,
+  Unknown,
+  When,
+} from '../parts';
 import { useRead } from '../state';
 import { Data } from './motion';
 import { sessionOf } from './session';
@@ -165,11 +177,39 @@ function Information(props: { of: Segment; tables: Table[]; absences: Absence[] 
   );
 }
 
+// By parameter, the ones that it says most about first.
+function Parameters(props: { of: ComponentInformation[] }) {
+  if (props.of.length === 0) return null;
+  const ratio = (c: ComponentInformation) => c.sigma / c.priorSigma;
+  const unit = (c: ComponentInformation) => (c.unit === '-' ? '' : ` [${c.unit}]`);
+  return (
+    <details>
+      <summary>What it says alone about each parameter</summary>
+      <DataTable
+        caption="What this segment alone says about each parameter"
+        head={['Parameter', 'Factory tolerance', 'Sigma with it', 'Still unknown']}
+        rows={[...props.of]
+          .sort((a, b) => ratio(a) - ratio(b))
+          .map((c) => [
+            component(c.component) + unit(c),
+            number(c.priorSigma),
+            number(c.sigma),
+            <Unknown ratio={ratio(c)} of={component(c.component)} />,
+          ])}
+      />
+    </details>
+  );
+}
+
 export function SegmentPage(props: { rig: string; segment: string; version: number }) {
   const path = `${rigPath(props.rig)}/segments/${encodeURIComponent(props.segment)}`;
   const read = useRead<Segment>(path, props.version);
   const tables = useRead<{ tables: Table[] }>(rigPath(props.rig) + '/tables', props.version);
   const absences = useRead<{ absences: Absence[] }>(path + '/absences', props.version);
+  const information = useRead<{ components: ComponentInformation[] }>(
+    path + '/information',
+    props.version,
+  );
   const title = 'Segment ' + decodeURIComponent(props.segment);
   return (
     <>
@@ -199,6 +239,7 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
               tables={tables.value?.tables ?? []}
               absences={absences.value?.absences ?? []}
             />
+            <Parameters of={information.value?.components ?? []} />
             {segment.residuals && (
               <Figures
                 of={[
