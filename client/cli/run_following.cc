@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <string>
 #include <thread>
 
@@ -39,9 +40,11 @@ void ShowProgress(const v1::Recalibration& run, Progress* progress) {
                              run.step_sigmas()));
 }
 
+using OnUpdate = std::function<void(const v1::Recalibration&)>;
+
 // One connection; *run is the last state that was told, if any was.
 grpc::Status WatchOnce(Service* stub,
-                       Progress* progress,
+                       const OnUpdate& on_update,
                        v1::Recalibration* run,
                        bool* told) {
   grpc::ClientContext call;
@@ -52,18 +55,19 @@ grpc::Status WatchOnce(Service* stub,
   while (stream->Read(&update)) {
     *run = update;
     *told = true;
-    ShowProgress(*run, progress);
+    on_update(*run);
   }
   return stream->Finish();
 }
 
-grpc::Status WatchToEnd(Service* stub, v1::Recalibration* run) {
+grpc::Status WatchToEnd(Service* stub,
+                        const OnUpdate& on_update,
+                        v1::Recalibration* run) {
   using Clock = std::chrono::steady_clock;
-  Progress progress("recalibration");
   auto give_up = Clock::now() + kPatience;
   while (!HasEnded(*run)) {
     bool told = false;
-    const grpc::Status status = WatchOnce(stub, &progress, run, &told);
+    const grpc::Status status = WatchOnce(stub, on_update, run, &told);
     if (!status.ok() && !IsUnreachable(status)) return status;
     if (told) give_up = Clock::now() + kPatience;
     if (!status.ok() && Clock::now() > give_up) return status;
@@ -118,10 +122,22 @@ void PrintRun(const Context& context, const v1::Recalibration& run) {
   context.Print(facts);
 }
 
-int FollowRun(Context* context, Service* stub, v1::Recalibration run) {
-  const grpc::Status status = WatchToEnd(stub, &run);
-  if (!status.ok()) return Fail(*context, status);
-  PrintRun(*context, run);
+int FollowRun(Context* context,
+              Service* stub,
+              v1::Recalibration run,
+              ShownAsJson shown) {
+  const bool lines = context->json && shown == ShownAsJson::kEachUpdate;
+  if (lines && HasEnded(run)) context->PrintJson(run, true);
+  {
+    Progress progress("recalibration");
+    const auto show = [&](const v1::Recalibration& update) {
+      ShowProgress(update, &progress);
+      if (lines) context->PrintJson(update, true);
+    };
+    const grpc::Status status = WatchToEnd(stub, show, &run);
+    if (!status.ok()) return Fail(*context, status);
+  }
+  if (!lines) PrintRun(*context, run);
   return ShowResult(context, run);
 }
 

@@ -8,10 +8,16 @@ namespace selfcal::client {
 
 void PrintRun(const Context& context, const v1::Recalibration& run);
 
+enum class ShownAsJson {
+  kEnd,         // one document
+  kEachUpdate,  // a line each, the end included
+};
+
 // Waits for the end of the run, through restarts of the daemon, and shows the
 // result. The exit code: kFailed if there is none that may be used.
 int FollowRun(Context* context,
               v1::RecalibrationService::StubInterface* stub,
-              v1::Recalibration run);
+              v1::Recalibration run,
+              ShownAsJson shown = ShownAsJson::kEnd);
 
 }  // namespace selfcal::client

@@ -82,7 +82,8 @@ int Watch(Context* context, const RunOptions& options) {
   const auto status =
       Ask(stub.get(), &Service::GetRecalibration, options, &run);
   if (!status.ok()) return Fail(*context, status);
-  return FollowRun(context, stub.get(), std::move(run));
+  return FollowRun(
+      context, stub.get(), std::move(run), ShownAsJson::kEachUpdate);
 }
 
 int Cancel(Context* context, const RunOptions& options) {
@@ -123,7 +124,7 @@ void AddRunCommands(CLI::App* app, Context* context) {
   add("show", "Show a run", Show);
   add("watch",
       "Wait for the end of a run and show the result; exits with 1 if that "
-      "was rejected",
+      "was rejected. With --json a line for each iteration",
       Watch);
   add("cancel",
       "End a run that is under way; what it found is given up",

@@ -49,7 +49,12 @@ CalibrationResult CalibrateReweighted(
   CalibrationResult result;
   for (int i = 0;; ++i) {
     const int iterations = result.iterations;
-    result = RunCalibration(taken, theta_start, segments, options, progress);
+    const ProgressCallback counted = [&](CalibrateProgress told) {
+      told.iteration += iterations;
+      told.max_iterations += iterations;
+      return !progress || progress(told);
+    };
+    result = RunCalibration(taken, theta_start, segments, options, counted);
     result.iterations += iterations;
     if (i == kMaxReweightings || result.status != CalibrateStatus::kConverged) {
       break;

@@ -54,9 +54,15 @@ struct CalibrateProgress {
   int max_iterations = 0;
   double cost = 0;
   double step_sigmas = 0;  // largest component of the last step of theta
+  Calibration theta = {};
+  // Of each tangent component: theta less theta_start, and its standard
+  // deviation as far as the last linearisation tells; what the data does not
+  // determine so far has that of the prior, what the rig holds fixed has 0.
+  Eigen::VectorXd moved = {};
+  Eigen::VectorXd sigmas = {};
 };
 
-// Returns false to cancel.
+// Returns false to cancel. Iterations do not go back.
 using ProgressCallback = std::function<bool(const CalibrateProgress&)>;
 
 enum class CalibrateStatus {

@@ -64,6 +64,7 @@ class Calibrator {
         problem_(FlattenSegments(rig, segments, partitioning_)),
         // A prior is centred where d = 0.
         reference_(options.prior ? options.prior->centre : theta_start),
+        start_(theta_start),
         start_d_(BoxMinus(theta_start, reference_)),
         estimate_{start_d_, problem_.keyframes},
         subspace_(WholeSubspace(rig)) {
@@ -207,10 +208,27 @@ class Calibrator {
   }
 
   bool Report(double step_sigmas) const {
-    return !progress_ || progress_({result_.iterations,
-                                    options_.max_iterations,
-                                    result_.final_cost,
-                                    step_sigmas});
+    return Tell(
+        result_.iterations, result_.final_cost, step_sigmas, estimate_.d);
+  }
+
+  bool Tell(int iteration,
+            double cost,
+            double step_sigmas,
+            const Eigen::VectorXd& d) const {
+    if (!progress_) {
+      return true;
+    }
+    const Calibration theta = BoxPlus(reference_, d);
+    const Eigen::VectorXd variances =
+        CovarianceWithHeld(rig_, subspace_, information_.Lambda).diagonal();
+    return progress_({.iteration = iteration,
+                      .max_iterations = options_.max_iterations,
+                      .cost = cost,
+                      .step_sigmas = step_sigmas,
+                      .theta = theta,
+                      .moved = BoxMinus(theta, start_),
+                      .sigmas = variances.cwiseMax(0).cwiseSqrt()});
   }
 
   bool Cancel() {
@@ -346,10 +364,7 @@ class Calibrator {
           if (step > 0) {
             small_steps = step < kSmallStepSigmas ? small_steps + 1 : 0;
           }
-          if (progress_ && !progress_({result_.iterations + iteration,
-                                       options_.max_iterations,
-                                       cost,
-                                       step})) {
+          if (!Tell(result_.iterations + iteration, cost, step, d)) {
             return SolverSignal::kCancel;
           }
           return small_steps >= kSmallSteps ? SolverSignal::kEnough
@@ -409,6 +424,7 @@ class Calibrator {
   Partitioning partitioning_;
   CalibrationProblem problem_;
   Calibration reference_;
+  Calibration start_;
   Eigen::VectorXd start_d_;
   CalibrationEstimate estimate_;
   ThetaSubspace subspace_;

@@ -34,7 +34,12 @@ bool HasEnded(RunState state) {
   return state != RunState::kPending && state != RunState::kRunning;
 }
 
-// Each iteration of a run, until it has ended.
+std::string RunLine(const StoredRun& run, const CalibrateProgress& progress) {
+  return "event: run\ndata: " +
+         JsonResponse(Encode(run, progress, nullptr)).body + "\n\n";
+}
+
+// Each iteration of a run from its first, until it has ended.
 Answer OpenRunStream(const Call& call, const std::string& name) {
   v1::WatchRecalibrationRequest request;
   request.set_name(name);
@@ -50,11 +55,10 @@ Answer OpenRunStream(const Call& call, const std::string& name) {
       auto subscription,
       call.context.pipeline->WatchRun(
           parts->rig, *run, [outbox](const RunUpdate& update) {
-            outbox->Put(
-                "event: run\ndata: " +
-                JsonResponse(Encode(update.run, update.progress, nullptr))
-                    .body +
-                "\n\n");
+            for (const CalibrateProgress& missed : update.missed) {
+              outbox->Put(RunLine(update.run, missed));
+            }
+            outbox->Put(RunLine(update.run, update.progress));
             if (HasEnded(update.run.state)) outbox->Close();
           }));
   HttpResponse response = StreamResponse(std::move(outbox));

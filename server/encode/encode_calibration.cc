@@ -25,38 +25,6 @@ v1::Calibration::State EncodeState(CalibrationState state) {
   return v1::Calibration::STATE_UNSPECIFIED;
 }
 
-v1::Recalibration::State EncodeState(RunState state) {
-  switch (state) {
-    case RunState::kPending:
-      return v1::Recalibration::PENDING;
-    case RunState::kRunning:
-      return v1::Recalibration::RUNNING;
-    case RunState::kSucceeded:
-      return v1::Recalibration::SUCCEEDED;
-    case RunState::kFailed:
-      return v1::Recalibration::FAILED;
-    case RunState::kCancelled:
-      return v1::Recalibration::CANCELLED;
-  }
-  return v1::Recalibration::STATE_UNSPECIFIED;
-}
-
-v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
-  switch (trigger) {
-    case RunTrigger::kTablesFull:
-      return v1::Recalibration::TABLES_FULL;
-    case RunTrigger::kTablesChanged:
-      return v1::Recalibration::TABLES_CHANGED;
-    case RunTrigger::kManual:
-      return v1::Recalibration::MANUAL;
-    case RunTrigger::kChangeDetected:
-      return v1::Recalibration::CHANGE_DETECTED;
-    case RunTrigger::kCalibrationAged:
-      return v1::Recalibration::CALIBRATION_AGED;
-  }
-  return v1::Recalibration::TRIGGER_UNSPECIFIED;
-}
-
 std::string StatusName(CalibrateStatus status) {
   switch (status) {
     case CalibrateStatus::kConverged:
@@ -69,43 +37,6 @@ std::string StatusName(CalibrateStatus status) {
       return "failed";
   }
   return "unknown";
-}
-
-void FillReport(const CalibrationResult& result,
-                double seconds,
-                v1::SolverReport* message) {
-  message->set_status(StatusName(result.status));
-  message->set_message(result.message);
-  message->set_iterations(result.iterations);
-  message->set_initial_cost(result.initial_cost);
-  message->set_final_cost(result.final_cost);
-  message->set_reprojection_rms_before_px(result.reprojection_rms_before_px);
-  message->set_reprojection_rms_after_px(result.reprojection_rms_after_px);
-  message->set_reprojection_median_before_px(
-      result.reprojection_median_before_px);
-  message->set_reprojection_median_after_px(
-      result.reprojection_median_after_px);
-  message->set_rank(result.rank);
-  message->set_components(result.rank +
-                          static_cast<int>(result.held_constant.size()));
-  AddDirections(result.held_constant, message->mutable_held_constant());
-  message->set_segments(result.segments);
-  message->set_partitions(result.partitions);
-  message->set_keyframes(result.keyframes);
-  message->set_landmarks(result.landmarks);
-  message->set_landmarks_dropped(result.landmarks_dropped);
-  message->set_observations(result.observations);
-  message->set_observations_dropped(result.observations_dropped);
-  message->set_track_noise_factor(result.track_noise_factor);
-  message->set_seconds(seconds);
-  for (const NoiseFactor& factor : result.noise_factors) {
-    v1::NoiseFactor* added = message->add_noise_factors();
-    added->set_kind(NoiseKindName(factor.kind));
-    added->set_factor(factor.factor);
-    added->set_log_sigma(factor.log_sigma);
-    added->set_redundancy(factor.redundancy);
-    added->set_determined(factor.determined());
-  }
 }
 
 void FillEstimates(const StoredCalibration& calibration,
@@ -174,15 +105,49 @@ void FillValidation(const StoredValidation& validation,
   held_out->set_active_probability(test.active.probability);
 }
 
-std::string CalibrationName(const std::string& rig, std::int64_t version) {
-  return ChildName(rig, "calibrations", std::to_string(version));
-}
-
 }  // namespace
+
+void FillReport(const CalibrationResult& result,
+                double seconds,
+                v1::SolverReport* message) {
+  message->set_status(StatusName(result.status));
+  message->set_message(result.message);
+  message->set_iterations(result.iterations);
+  message->set_initial_cost(result.initial_cost);
+  message->set_final_cost(result.final_cost);
+  message->set_reprojection_rms_before_px(result.reprojection_rms_before_px);
+  message->set_reprojection_rms_after_px(result.reprojection_rms_after_px);
+  message->set_reprojection_median_before_px(
+      result.reprojection_median_before_px);
+  message->set_reprojection_median_after_px(
+      result.reprojection_median_after_px);
+  message->set_rank(result.rank);
+  message->set_components(result.rank +
+                          static_cast<int>(result.held_constant.size()));
+  AddDirections(result.held_constant, message->mutable_held_constant());
+  message->set_segments(result.segments);
+  message->set_partitions(result.partitions);
+  message->set_keyframes(result.keyframes);
+  message->set_landmarks(result.landmarks);
+  message->set_landmarks_dropped(result.landmarks_dropped);
+  message->set_observations(result.observations);
+  message->set_observations_dropped(result.observations_dropped);
+  message->set_track_noise_factor(result.track_noise_factor);
+  message->set_seconds(seconds);
+  for (const NoiseFactor& factor : result.noise_factors) {
+    v1::NoiseFactor* added = message->add_noise_factors();
+    added->set_kind(NoiseKindName(factor.kind));
+    added->set_factor(factor.factor);
+    added->set_log_sigma(factor.log_sigma);
+    added->set_redundancy(factor.redundancy);
+    added->set_determined(factor.determined());
+  }
+}
 
 v1::Calibration Encode(const StoredCalibration& calibration) {
   v1::Calibration message;
-  message.set_name(CalibrationName(calibration.rig, calibration.version));
+  message.set_name(ChildName(
+      calibration.rig, "calibrations", std::to_string(calibration.version)));
   message.set_version(calibration.version);
   message.set_state(EncodeState(calibration.state));
   SetTime(calibration.create_time_ns, message.mutable_create_time());
@@ -201,37 +166,6 @@ v1::Calibration Encode(const StoredCalibration& calibration) {
     FillValidation(*calibration.validation,
                    calibration.state != CalibrationState::kRejected,
                    message.mutable_validation());
-  }
-  return message;
-}
-
-v1::Recalibration Encode(const StoredRun& run,
-                         const CalibrateProgress& progress,
-                         const StoredCalibration* calibration) {
-  v1::Recalibration message;
-  message.set_name(
-      ChildName(run.rig, "recalibrations", std::to_string(run.run)));
-  message.set_state(EncodeState(run.state));
-  message.set_trigger(EncodeTrigger(run.trigger));
-  SetTime(run.create_time_ns, message.mutable_create_time());
-  if (run.end_time_ns != 0) {
-    SetTime(run.end_time_ns, message.mutable_end_time());
-  }
-  for (const SegmentKey& key : run.segments) {
-    message.add_segments(SegmentName(run.rig, key));
-  }
-  message.set_iteration(progress.iteration);
-  message.set_max_iterations(progress.max_iterations);
-  message.set_cost(progress.cost);
-  message.set_step_sigmas(progress.step_sigmas);
-  message.set_message(run.message);
-  message.set_attempts(run.attempts);
-  if (run.calibration_version != 0) {
-    message.set_calibration(CalibrationName(run.rig, run.calibration_version));
-  }
-  if (calibration != nullptr && calibration->report) {
-    FillReport(
-        *calibration->report, calibration->seconds, message.mutable_solver());
   }
   return message;
 }

@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/calibration/calibrate.h"
 #include "core/information/segment_information.h"
 #include "selfcal/v1/calibration.pb.h"
+#include "selfcal/v1/calibration_service.pb.h"
 
 namespace selfcal::server {
 
@@ -30,5 +32,9 @@ void AddDirections(const std::vector<UnobservedDirection>& directions,
     }
   }
 }
+
+void FillReport(const CalibrationResult& result,
+                double seconds,
+                v1::SolverReport* message);
 
 }  // namespace selfcal::server

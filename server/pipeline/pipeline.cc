@@ -169,7 +169,13 @@ class PipelineImpl : public Pipeline {
       std::function<void(const RunUpdate&)> callback) override {
     const auto now = [&]() -> absl::StatusOr<RunUpdate> {
       SELFCAL_ASSIGN_OR_RETURN(StoredRun stored, store_->GetRun(rig, run));
-      return RunUpdate{std::move(stored), recalibrator_.ProgressOf(rig, run)};
+      RunUpdate update{std::move(stored)};
+      update.missed = recalibrator_.StepsOf(rig, run);
+      if (!update.missed.empty()) {
+        update.progress = std::move(update.missed.back());
+        update.missed.pop_back();
+      }
+      return update;
     };
     return run_watchers_.Watch(RunTopic(rig, run), std::move(callback), now);
   }

@@ -84,7 +84,9 @@ struct SubmitResult {
 // What a watcher of a run is told.
 struct RunUpdate {
   StoredRun run;
-  CalibrateProgress progress;
+  CalibrateProgress progress = {};
+  // In the first update of a watcher: the iterations that it has missed.
+  std::vector<CalibrateProgress> missed = {};
 };
 
 // A subscription; destroying it ends it (no callback runs after that). It may

@@ -89,10 +89,11 @@ absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
       fmt::format("recalibration {} of rig {} has ended", run, rig));
 }
 
-CalibrateProgress Recalibrator::ProgressOf(const std::string& rig,
-                                           std::int64_t run) {
+std::vector<CalibrateProgress> Recalibrator::StepsOf(const std::string& rig,
+                                                     std::int64_t run) {
   const std::lock_guard lock(mutex_);
-  return IsCurrent(rig, run) ? current_->progress : CalibrateProgress();
+  return IsCurrent(rig, run) ? current_->steps
+                             : std::vector<CalibrateProgress>();
 }
 
 bool Recalibrator::IsCurrent(const std::string& rig, std::int64_t run) const {

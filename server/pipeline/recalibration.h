@@ -49,8 +49,9 @@ class Recalibrator {
   void Wake();
   // As Pipeline::CancelRecalibration.
   absl::StatusOr<StoredRun> Cancel(const std::string& rig, std::int64_t run);
-  // How far the run is; zeros for one that is not at work.
-  CalibrateProgress ProgressOf(const std::string& rig, std::int64_t run);
+  // Each iteration of the run so far; nothing for one that is not at work.
+  std::vector<CalibrateProgress> StepsOf(const std::string& rig,
+                                         std::int64_t run);
 
  private:
   // The run that the thread works on.
@@ -58,7 +59,7 @@ class Recalibrator {
     std::string rig;
     std::int64_t run = 0;
     bool cancelled = false;
-    CalibrateProgress progress;
+    std::vector<CalibrateProgress> steps;
   };
   // What a run came to: a candidate, or why there is none.
   struct Outcome {
@@ -92,6 +93,7 @@ class Recalibrator {
       const std::vector<MotionSegment>& segments,
       const CalibrateOptions& options);
   void Report(const StoredRun& run, const CalibrateProgress& progress);
+  void TellEnd(const StoredRun& ended);
   // State, reasons and validation of the candidate against what is active.
   absl::Status Judge(const StoredRun& run, StoredCalibration* candidate);
   // Judges and stores it, again where another version became active meanwhile.

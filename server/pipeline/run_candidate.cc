@@ -121,9 +121,19 @@ void Recalibrator::Report(const StoredRun& run,
                           const CalibrateProgress& progress) {
   {
     const std::lock_guard lock(mutex_);
-    current_->progress = progress;
+    auto& steps = current_->steps;
+    if (steps.empty() || steps.back().iteration < progress.iteration) {
+      steps.push_back(progress);
+    }
   }
   run_watchers_->Publish(RunTopic(run.rig, run.run), {run, progress});
+}
+
+void Recalibrator::TellEnd(const StoredRun& ended) {
+  const auto steps = StepsOf(ended.rig, ended.run);
+  run_watchers_->Publish(
+      RunTopic(ended.rig, ended.run),
+      {ended, steps.empty() ? CalibrateProgress() : steps.back()});
 }
 
 absl::Status Recalibrator::Judge(const StoredRun& run,

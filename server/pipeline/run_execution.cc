@@ -151,8 +151,7 @@ absl::Status Recalibrator::Succeed(const StoredRun& run,
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun ended,
                            store_->GetRun(run.rig, run.run));
-  run_watchers_->Publish(RunTopic(run.rig, run.run),
-                         {ended, ProgressOf(run.rig, run.run)});
+  TellEnd(ended);
   return absl::OkStatus();
 }
 
@@ -165,8 +164,7 @@ absl::Status Recalibrator::End(const StoredRun& run,
                message);
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun ended,
                            store_->EndRun(run.rig, run.run, state, message));
-  run_watchers_->Publish(RunTopic(run.rig, run.run),
-                         {ended, ProgressOf(run.rig, run.run)});
+  TellEnd(ended);
   return absl::OkStatus();
 }
 

@@ -79,6 +79,9 @@ std::string EncodeProgress(const CalibrateProgress& progress) {
   message.set_max_iterations(progress.max_iterations);
   message.set_cost(progress.cost);
   message.set_step_sigmas(progress.step_sigmas);
+  *message.mutable_theta() = ToProto(progress.theta);
+  message.mutable_moved()->Add(progress.moved.begin(), progress.moved.end());
+  message.mutable_sigmas()->Add(progress.sigmas.begin(), progress.sigmas.end());
   return message.SerializeAsString();
 }
 
@@ -119,13 +122,22 @@ std::optional<Job> DecodeJob(std::string_view bytes) {
 
 std::optional<CalibrateProgress> DecodeProgress(std::string_view bytes) {
   worker::Progress message;
-  if (!Parse(bytes, &message)) {
+  CalibrateProgress progress;
+  if (!Parse(bytes, &message) ||
+      !FromProto(message.theta(), "", &progress.theta).empty() ||
+      message.moved_size() != TangentSize(progress.theta) ||
+      message.sigmas_size() != TangentSize(progress.theta)) {
     return std::nullopt;
   }
-  return CalibrateProgress{.iteration = message.iteration(),
-                           .max_iterations = message.max_iterations(),
-                           .cost = message.cost(),
-                           .step_sigmas = message.step_sigmas()};
+  progress.iteration = message.iteration();
+  progress.max_iterations = message.max_iterations();
+  progress.cost = message.cost();
+  progress.step_sigmas = message.step_sigmas();
+  progress.moved = Eigen::Map<const Eigen::VectorXd>(message.moved().data(),
+                                                     message.moved_size());
+  progress.sigmas = Eigen::Map<const Eigen::VectorXd>(message.sigmas().data(),
+                                                      message.sigmas_size());
+  return progress;
 }
 
 std::optional<CalibrationResult> DecodeResult(std::string_view bytes) {

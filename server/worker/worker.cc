@@ -148,7 +148,7 @@ CalibrationResult EndedBadly(int status) {
 bool Follow(int socket,
             const ProgressCallback& progress,
             const std::function<bool()>& interrupted) {
-  std::array<char, kMaxProgressBytes> buffer{};
+  std::vector<char> buffer(kMaxProgressBytes);
   for (;;) {
     if (interrupted && interrupted()) {
       return false;

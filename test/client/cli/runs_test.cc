@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "test/client/cli/commands_fixture.h"
 
@@ -49,6 +51,34 @@ TEST_F(RunsCommand, WatchesOneToItsEnd) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("state\tsucceeded\n"));
   EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255.123\tpx\t0.034\n"));
+}
+
+TEST_F(RunsCommand, WatchTellsEachUpdateAsALineOfJson) {
+  auto* parameter = daemon_.run[0].add_parameters();
+  parameter->set_component("cam0.focal.x");
+  parameter->set_moved(0.25);
+  parameter->set_sigma(0.5);
+  const Outcome outcome = Selfcal({"runs", "watch", "device", "3", "--json"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  std::istringstream lines(outcome.out);
+  std::vector<v1::Recalibration> updates;
+  for (std::string line; std::getline(lines, line);) {
+    updates.push_back(Parse<v1::Recalibration>(line));
+  }
+  ASSERT_GE(updates.size(), 2u);
+  ASSERT_EQ(updates.front().parameters_size(), 1);
+  EXPECT_EQ(updates.front().parameters(0).component(), "cam0.focal.x");
+  EXPECT_EQ(updates.front().parameters(0).moved(), 0.25);
+  EXPECT_EQ(updates.front().parameters(0).sigma(), 0.5);
+  EXPECT_EQ(updates.back().state(), v1::Recalibration::SUCCEEDED);
+}
+
+TEST_F(RunsCommand, WatchOfOneThatHasEndedTellsItsEnd) {
+  daemon_.run.erase(daemon_.run.begin());
+  const Outcome outcome = Selfcal({"runs", "watch", "device", "3", "--json"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(Parse<v1::Recalibration>(outcome.out).state(),
+            v1::Recalibration::SUCCEEDED);
 }
 
 TEST_F(RunsCommand, CancelsOne) {

@@ -193,6 +193,63 @@ TEST(Calibrate, CancelsAtOnce) {
   EXPECT_EQ(calls, 3);
 }
 
+TEST(Calibrate, ProgressTellsTheWayToTheResult) {
+  Scenario s = Simulated(HandheldRig("r"), SmallOptions(9), 3);
+  s.rig.fixed = {"imu.gyro.scale.*"};
+  std::vector<CalibrateProgress> told;
+  const CalibrationResult result =
+      Calibrate(s.rig,
+                s.rig.factory,
+                s.segments,
+                {},
+                [&](const CalibrateProgress& progress) {
+                  told.push_back(progress);
+                  return true;
+                });
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  ASSERT_GT(told.size(), 2u);
+  EXPECT_EQ(told.front().moved.norm(), 0);
+  for (std::size_t i = 1; i < told.size(); ++i) {
+    EXPECT_GE(told[i].iteration, told[i - 1].iteration);
+  }
+  const CalibrateProgress& last = told.back();
+  EXPECT_EQ(BoxMinus(last.theta, result.theta).norm(), 0);
+  EXPECT_EQ((last.moved - BoxMinus(result.theta, s.rig.factory)).norm(), 0);
+  const Eigen::VectorXd sigmas = result.covariance.diagonal().cwiseSqrt();
+  ASSERT_EQ(last.sigmas.size(), sigmas.size());
+  for (int i = 0; i < sigmas.size(); ++i) {
+    EXPECT_NEAR(last.sigmas[i], sigmas[i], 0.05 * sigmas[i]) << i;
+  }
+  EXPECT_EQ(last.sigmas.segment(kGyroScale, 3).norm(), 0);
+}
+
+// Weighted again, it begins anew; its iterations are counted on.
+TEST(Calibrate, IterationsAreCountedOnWhereNoiseIsReweighted) {
+  Scenario s = Simulated(HandheldRig("r"), SmallOptions(12), 3);
+  s.rig.pixel_sigma_px *= 3;
+  CalibrateOptions options;
+  options.reweight_noise = true;
+  std::vector<CalibrateProgress> told;
+  const CalibrationResult result =
+      Calibrate(s.rig,
+                s.rig.factory,
+                s.segments,
+                options,
+                [&](const CalibrateProgress& progress) {
+                  told.push_back(progress);
+                  return true;
+                });
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  EXPECT_EQ(told.back().iteration, result.iterations);
+  int begun = 0;
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    begun += told[i].moved.norm() == 0;
+    EXPECT_LE(told[i].iteration, told[i].max_iterations);
+    EXPECT_GE(told[i].iteration, i > 0 ? told[i - 1].iteration : 0);
+  }
+  EXPECT_GE(begun, 2);
+}
+
 TEST(Calibrate, InputThatCannotBeUsedSaysWhy) {
   const Scenario s = Simulated(HandheldRig("r"), SmallOptions(10), 1);
   EXPECT_EQ(Calibrate(s.rig, s.rig.factory, {}).status,

@@ -76,6 +76,39 @@ TEST_F(StreamTest, RunIsToldUntilItsEnd) {
   EXPECT_EQ(pipeline_->watchers(), 0u);
 }
 
+TEST_F(StreamTest, RunIsToldFromItsFirstIteration) {
+  const Rig rig = AddRig("a");
+  AddVersion(rig);
+  const auto run = store_->CreateManualRun("a");
+  ASSERT_TRUE(run.ok()) << run.status();
+  const auto wire = OpenStream("?run=rigs/a/recalibrations/2");
+  wire->ReadUntil("PENDING");
+  RunUpdate update{*run};
+  update.progress.iteration = 3;
+  update.progress.theta = rig.factory;
+  update.progress.theta.imu.s_g.x() = 1.5;
+  const auto size = TangentSize(rig.factory);
+  update.progress.moved = Eigen::VectorXd::Constant(size, 0.5);
+  update.progress.sigmas = Eigen::VectorXd::Zero(size);
+  update.progress.sigmas[0] = 0.25;
+  update.missed = {update.progress, update.progress};
+  update.missed[0].iteration = 1;
+  update.missed[1].iteration = 2;
+  pipeline_->Tell(update);
+  const std::string told = wire->ReadUntil("\"iteration\":3");
+  const auto first = told.find("\"iteration\":1");
+  const auto second = told.find("\"iteration\":2");
+  ASSERT_NE(first, told.npos);
+  ASSERT_NE(second, told.npos);
+  EXPECT_LT(first, second);
+  EXPECT_LT(second, told.find("\"iteration\":3"));
+  // What is held fixed is not among them.
+  EXPECT_THAT(
+      told,
+      HasSubstr(R"("parameters":[{"component":"imu.gyro.scale.x",)"
+                R"("unit":"-","value":1.5,"moved":0.5,"sigma":0.25}])"));
+}
+
 TEST_F(StreamTest, StreamsAreBounded) {
   std::vector<std::unique_ptr<Wire>> open;
   for (int i = 0; i < 16; ++i) {

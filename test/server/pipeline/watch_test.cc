@@ -1,3 +1,4 @@
+#include <atomic>
 #include <mutex>
 
 #include "test/server/pipeline/pipeline_test.h"
@@ -193,6 +194,46 @@ TEST_F(WatchTest, RunIsToldFromItsStateToItsEnd) {
   EXPECT_THAT(iterations, ::testing::ElementsAre(1, 2, 3));
   EXPECT_EQ(told.values().back().run.calibration_version, 2);
   EXPECT_EQ(told.values().back().progress.iteration, 3);
+}
+
+TEST_F(WatchTest, WhoComesLateIsToldTheIterationsBefore) {
+  CreateRig();
+  std::mutex gate;
+  gate.lock();
+  std::atomic<bool> iterated{false};
+  estimators_.calibrate = [&](const Rig& rig,
+                              const Calibration& start,
+                              const auto&,
+                              const auto&,
+                              const ProgressCallback& progress,
+                              const auto&) {
+    for (int k = 1; k <= 3; ++k) progress({k, 4, 10.0 / k, 1.0});
+    // Says again where it is, as a solver that begins anew.
+    progress({3, 4, 10.0 / 3, 0.0});
+    iterated = true;
+    const std::lock_guard wait(gate);
+    progress({4, 4, 2.5, 1.0});
+    return Converged(rig, start);
+  };
+  StartOne();
+  Submit(0);
+  ASSERT_TRUE(AllScored());
+  ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+  ASSERT_TRUE(Eventually([&] { return iterated.load(); }));
+  Told<RunUpdate> told;
+  const auto subscription = pipeline_->WatchRun(
+      "a", 1, [&](const RunUpdate& update) { told.Add(update); });
+  ASSERT_TRUE(subscription.ok());
+  const RunUpdate first = told.values().at(0);
+  EXPECT_EQ(first.progress.iteration, 3);
+  EXPECT_EQ(first.progress.step_sigmas, 1.0);
+  ASSERT_EQ(first.missed.size(), 2u);
+  EXPECT_EQ(first.missed[0].cost, 10.0);
+  EXPECT_EQ(first.missed[1].cost, 5.0);
+  gate.unlock();
+  ASSERT_TRUE(Eventually(
+      [&] { return told.values().back().run.state == RunState::kSucceeded; }));
+  EXPECT_TRUE(told.values().back().missed.empty());
 }
 
 TEST_F(WatchTest, EndedRunIsToldOnce) {

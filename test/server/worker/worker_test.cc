@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "server/worker/channel.h"
 #include "server/worker/job.h"
 #include "test/server/test_segments.h"
 
@@ -95,6 +96,28 @@ TEST_F(WorkerTest, ResultAndProgressAreThoseOfCalibrateToTheBit) {
   EXPECT_EQ(result.noise_factors.size(), expected.noise_factors.size());
   EXPECT_GT(here.size(), 2u);
   EXPECT_EQ(there, here);
+}
+
+// As many cameras as a rig may have.
+TEST_F(WorkerTest, ProgressOfTheLargestRigIsOnePacket) {
+  CalibrateProgress progress{7, 100, 0.1, 0.3, rig_.factory};
+  progress.theta.cameras.resize(kMaxCameras, rig_.factory.cameras[0]);
+  const int size = TangentSize(progress.theta);
+  progress.moved = Eigen::VectorXd::LinSpaced(size, -0.1, 0.7);
+  progress.sigmas = Eigen::VectorXd::LinSpaced(size, 0.01, 0.3);
+  const std::string bytes = EncodeProgress(progress);
+  EXPECT_LT(bytes.size(), kMaxProgressBytes);
+  const auto told = DecodeProgress(bytes);
+  ASSERT_TRUE(told.has_value());
+  EXPECT_EQ(told->iteration, 7);
+  EXPECT_EQ(told->max_iterations, 100);
+  EXPECT_EQ(told->cost, 0.1);
+  EXPECT_EQ(told->step_sigmas, 0.3);
+  EXPECT_EQ(BoxMinus(told->theta, progress.theta).norm(), 0);
+  EXPECT_EQ(told->moved, progress.moved);
+  EXPECT_EQ(told->sigmas, progress.sigmas);
+  progress.sigmas.conservativeResize(size - 1);
+  EXPECT_FALSE(DecodeProgress(EncodeProgress(progress)).has_value());
 }
 
 TEST_F(WorkerTest, AllOfAJobArrives) {
