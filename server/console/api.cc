@@ -38,6 +38,7 @@ constexpr Route kRoutes[] = {
     {"GET", "rigs/*/calibrations/*", GetCalibration},
     {"POST", "rigs/*/calibrations/*", ActivateCalibration},
     {"GET", "rigs/*/compare", CompareCalibrations},
+    {"GET", "rigs/*/coach", AdviseMotion},
     {"GET", "rigs/*/recalibrations", ListRuns},
     {"GET", "rigs/*/recalibrations/*", GetRun},
     {"GET", "rigs/*/events", ListEvents},

@@ -6,6 +6,7 @@
 #include "server/console/json.h"
 #include "server/encode/compare.h"
 #include "server/encode/encode.h"
+#include "server/encode/encode_coaching.h"
 #include "server/encode/reason.h"
 #include "server/encode/versions.h"
 #include "server/store/status_macros.h"
@@ -85,6 +86,25 @@ Answer ActivateCalibration(const Call& call) {
       call.context.pipeline->ActivateCalibration(
           rig, *version, call.request.caller.name, request.reason()));
   return JsonResponse(Encode(active));
+}
+
+// May take seconds at the first question about a version.
+Answer AdviseMotion(const Call& call) {
+  constexpr int kDefaultAdvice = 3;
+  v1::AdviseMotionRequest request;
+  request.set_parent(RigName(call.parts.at(0)));
+  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const int max_advice,
+      CountOf(call,
+              "max_advice",
+              kDefaultAdvice,
+              "max_advice is a number from 1 on; without it 3 motions are "
+              "told"));
+  SELFCAL_ASSIGN_OR_RETURN(const RigCoaching coaching,
+                           call.context.pipeline->AdviseMotion(rig));
+  return JsonResponse(Encode(coaching, max_advice));
 }
 
 Answer CompareCalibrations(const Call& call) {

@@ -28,6 +28,13 @@ struct Call {
 
 using Answer = absl::StatusOr<HttpResponse>;
 
+// A number from 1 on in the query; `without` if it is not there.
+// INVALID_ARGUMENT, with the rule, for anything else.
+absl::StatusOr<int> CountOf(const Call& call,
+                            const std::string& name,
+                            int without,
+                            std::string_view rule);
+
 // Size and token; INVALID_ARGUMENT for a size that is no number.
 absl::StatusOr<Page> PageOf(const Call& call);
 
@@ -50,6 +57,7 @@ Answer ListCalibrations(const Call& call);
 Answer GetCalibration(const Call& call);
 Answer ActivateCalibration(const Call& call);
 Answer CompareCalibrations(const Call& call);
+Answer AdviseMotion(const Call& call);
 Answer ListRuns(const Call& call);
 Answer GetRun(const Call& call);
 Answer ListEvents(const Call& call);

@@ -39,18 +39,29 @@ nlohmann::json GrantsOf(const Caller& caller) {
 
 }  // namespace
 
+absl::StatusOr<int> CountOf(const Call& call,
+                            const std::string& name,
+                            int without,
+                            std::string_view rule) {
+  const std::string text = call.Query(name);
+  if (text.empty()) return without;
+  int count = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, count);
+  if (error == std::errc() && rest == end && count >= 1) return count;
+  return absl::InvalidArgumentError(std::string(rule));
+}
+
 absl::StatusOr<Page> PageOf(const Call& call) {
   constexpr int kDefault = 50;
-  Page page{kDefault, call.Query("page_token")};
-  const std::string size = call.Query("page_size");
-  if (size.empty()) return page;
-  const char* end = size.data() + size.size();
-  const auto [rest, error] = std::from_chars(size.data(), end, page.size);
-  if (error != std::errc() || rest != end || page.size < 1) {
-    return absl::InvalidArgumentError(
-        "page_size is a number from 1 to 1000; without it a page has 50");
-  }
-  return page;
+  SELFCAL_ASSIGN_OR_RETURN(
+      const int size,
+      CountOf(call,
+              "page_size",
+              kDefault,
+              "page_size is a number from 1 to 1000; without it a page has "
+              "50"));
+  return Page{size, call.Query("page_token")};
 }
 
 absl::StatusOr<std::string> RigOf(const Call& call) {

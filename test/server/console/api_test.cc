@@ -3,6 +3,7 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.pb.h"
 #include "server/encode/encode.h"
+#include "server/encode/encode_coaching.h"
 #include "test/server/console/console_test.h"
 
 namespace selfcal::server {
@@ -128,6 +129,18 @@ TEST_F(ApiTest, TwoVersionsAreCompared) {
   EXPECT_EQ(Get("/api/v1/rigs/r/compare?a=1").status, 400);
 }
 
+TEST_F(ApiTest, TheCoachSaysWhatItSaysOverGrpc) {
+  AddRig("r");
+  const auto expected = pipeline_->AdviseMotion("r");
+  ASSERT_TRUE(expected.ok()) << expected.status();
+  const auto told =
+      Parsed<v1::AdviseMotionResponse>(Get("/api/v1/rigs/r/coach"));
+  EXPECT_EQ(told.SerializeAsString(), Encode(*expected, 3).SerializeAsString());
+  EXPECT_EQ(told.advice_size(), 3);
+  EXPECT_EQ(Get("/api/v1/rigs/r/coach?max_advice=1").json()["advice"].size(),
+            1u);
+}
+
 TEST_F(ApiTest, EventsComeNewestFirst) {
   AddRig("a");
   AddRig("b");
@@ -155,6 +168,8 @@ TEST_F(ApiTest, MistakesSayWhatToDo) {
       {"/api/v1/rigs?page_size=many", 400},
       {"/api/v1/rigs?page_token=zz", 400},
       {"/api/v1/rigs?order_by=colour", 400},
+      {"/api/v1/rigs/none/coach", 404},
+      {"/api/v1/rigs/r/coach?max_advice=all", 400},
       {"/api/v1/stream?run=r/1", 400},
       {"/api/v1/stream?rig=none", 404},
       {"/api/v1/nothing", 404},

@@ -1,4 +1,4 @@
-#include "server/service/encode_coaching.h"
+#include "server/encode/encode_coaching.h"
 
 #include <algorithm>
 #include <string>
