@@ -1,17 +1,19 @@
 // Opens every page of the console in Chromium against a selfcald with simulated
 // data, looks that it shows what it should, and keeps a picture of each.
 //
-//   node browser_test.mjs SELFCALD FILL_STATE WEB SCREENSHOTS
+//   node browser_test.mjs SELFCALD SELFCAL FILL_STATE SEND_SEGMENTS WEB SCREENSHOTS
 //
 // WEB has the node_modules. Exit code 77: no Chromium, skipped.
 import assert from 'node:assert/strict';
-import { execFileSync, spawn } from 'node:child_process';
-import { existsSync, mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { execFile, execFileSync, spawn } from 'node:child_process';
+import { existsSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { setTimeout as sleep } from 'node:timers/promises';
+import { promisify } from 'node:util';
 
-const [, , selfcald, fillState, web, screenshots] = process.argv;
+const [, , selfcald, selfcal, fillState, sendSegments, web, screenshots] = process.argv;
 const kChromium = '/usr/bin/chromium';
 const kPatience = 120_000;
 const kSkipped = 77;
@@ -24,9 +26,10 @@ const { chromium } = createRequire(join(web, 'package.json'))('playwright-core')
 
 // The daemon, once it says where its console is.
 function startDaemon(state) {
+  const address = 'unix:' + join(state, 's');
   const daemon = spawn(
     selfcald,
-    ['--state-dir', state, '--listen', 'unix:' + join(state, 's'),
+    ['--state-dir', state, '--listen', address, '--run-priority', 'low',
       '--console', '127.0.0.1:0', '--console-role', 'administer'],
     { stdio: ['ignore', 'ignore', 'pipe'] },
   );
@@ -45,7 +48,27 @@ function startDaemon(state) {
     daemon.kill('SIGTERM');
     assert.equal(await ended, 0, 'selfcald did not stop in order');
   };
-  return { url, stop };
+  return { url, stop, address, pid: daemon.pid };
+}
+
+const start = promisify(execFile);
+
+// Asks again and again until the answer is one.
+async function until(what, ask) {
+  const end = Date.now() + kPatience;
+  for (;;) {
+    const answer = await ask();
+    if (answer) return answer;
+    assert.ok(Date.now() < end, 'never came: ' + what);
+    await sleep(1);
+  }
+}
+
+// The process in which the daemon calibrates.
+function workerOf(pid) {
+  const children = readdirSync(`/proc/${pid}/task`)
+    .map((task) => readFileSync(`/proc/${pid}/task/${task}/children`, 'utf8'));
+  return Number(children.join(' ').trim().split(' ')[0]);
 }
 
 class Reader {
@@ -92,13 +115,12 @@ class Reader {
   }
   // Until what stands first in each row is as it should be.
   async rows(areRight) {
-    const end = Date.now() + kPatience;
-    for (;;) {
-      const names = await this.page.locator('tbody th').allTextContents();
-      if (areRight(names)) return;
-      assert.ok(Date.now() < end, 'rows are ' + names.join(', '));
-      await this.page.waitForTimeout(50);
-    }
+    let names = [];
+    await until('the right rows', async () => {
+      names = await this.page.locator('tbody th').allTextContents();
+      return areRight(names);
+    });
+    return names;
   }
   async picture(name) {
     // Chromium draws the page in front alone.
@@ -155,8 +177,11 @@ const tests = {
     await r.rows((names) => names.length === 1 && names[0] === 'tablet');
     assert.match(r.page.url(), /filter=tab/);
     await r.page.getByLabel('Name contains').fill('');
-    await r.page.getByLabel('Sorted by').selectOption('last_seen desc');
+    await r.page.getByRole('link', { name: 'Last seen' }).click();
+    await r.page.locator('th[aria-sort=ascending]', { hasText: 'Last seen' }).waitFor();
+    await r.page.getByRole('link', { name: 'Last seen' }).click();
     await r.rows((names) => names[0] === 'tablet');
+    assert.match(r.page.url(), /order_by=last_seen\+desc/);
     await r.page.reload();
     await r.rows((names) => names[0] === 'tablet');
   },
@@ -179,8 +204,57 @@ const tests = {
     await r.shows(rig + '/recalibrations', 'Runs of phone-001', ['No run yet'], 'runs-none');
   },
 
-  async 'a segment shows its motion and why it is kept'(r) {
+  async 'segments are filtered and sorted by their address'(r) {
     await r.shows('/rigs/tablet/segments', 'Segments of tablet', ['walk~0'], 'segments');
+    const expected = async (filter, order) => {
+      const query = new URLSearchParams({ filter, order_by: order });
+      const { segments } = await r.api('rigs/tablet/segments?' + query);
+      return segments.map((s) => s.name.slice(s.name.lastIndexOf('/') + 1)).join();
+    };
+    const filter = 'in_table = imu AND landmarks >= 1';
+    await r.page.getByLabel('Filter').fill(filter);
+    await r.page.keyboard.press('Enter');
+    const kept = await expected(filter, '');
+    const all = await expected('', '');
+    assert.ok(kept.length > 0 && kept.length < all.length, kept);
+    await r.rows((names) => names.join() === kept);
+    await r.page.getByLabel('Scores of').selectOption('camera');
+    await r.page.getByRole('link', { name: 'Gain [nats]' }).click();
+    const sorted = await expected(filter, 'gain.camera desc');
+    await r.rows((names) => names.join() === sorted);
+    await r.page.reload();
+    await r.rows((names) => names.join() === sorted);
+    assert.equal(await r.page.getByLabel('Filter').inputValue(), filter);
+    await r.page.locator('th[aria-sort=descending]', { hasText: 'Gain' }).waitFor();
+    // What is sorted by the score of one group goes on to be by another's.
+    await r.page.getByLabel('Scores of').selectOption('imu');
+    const other = await expected(filter, 'gain.imu desc');
+    await r.rows((names) => names.join() === other);
+    await r.page.getByText('What can be asked for').click();
+    await r.picture('segments-filtered');
+    await r.page.getByRole('link', { name: 'state = UNUSABLE' }).click();
+    await r.sees('No segment is as asked for');
+    await r.page.getByLabel('Filter').fill('');
+    await r.rows((names) => names.length > kept.split(',').length);
+  },
+
+  async 'a filter that cannot be read says why beside its field'(r) {
+    await r.open('/rigs/tablet/segments', 'Segments of tablet');
+    await r.sees('walk~0');
+    r.expectProblems = true;
+    await r.page.getByLabel('Filter').fill('colour = 1');
+    await r.page.getByRole('button', { name: 'Show' }).click();
+    await r.page.getByRole('alert').getByText("'colour' is not a field").waitFor();
+    assert.equal(await r.page.getByLabel('Filter').getAttribute('aria-invalid'), 'true');
+    await r.picture('segments-mistake');
+    r.expectProblems = false;
+    await r.page.getByLabel('Filter').fill('landmarks >= 1');
+    await r.page.keyboard.press('Enter');
+    await r.sees('walk~0');
+    assert.equal(await r.page.getByRole('alert').textContent(), '');
+  },
+
+  async 'a segment shows its motion and why it is kept'(r) {
     const { tables } = await r.api('rigs/tablet/tables');
     const { segment } = tables[0].entries[0];
     await r.page.goto(`${r.base}/${segment}`);
@@ -343,7 +417,7 @@ try {
   const other = new Reader(await browser.newPage(), base);
   for (const [name, run] of Object.entries(tests)) {
     console.log(name);
-    await run(reader, other);
+    await run(reader, other, daemon);
     assert.deepEqual([...reader.problems, ...other.problems], [], name);
   }
   console.log('a daemon that has stopped');

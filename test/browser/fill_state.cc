@@ -1,5 +1,6 @@
 // Fills a state folder for the test of the pages: a simulated device with its
-// segments, runs and versions, and many rigs that have sent nothing.
+// segments, runs and versions, one that has yet to send some, and many rigs
+// that send nothing.
 //
 //   fill_state FOLDER
 #include <fmt/format.h>
@@ -11,10 +12,10 @@
 #include <string>
 #include <thread>
 
-#include "core/simulation/simulate.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/status_macros.h"
 #include "server/store/store_sqlite.h"
+#include "test/browser/simulated_device.h"
 
 namespace selfcal::server {
 namespace {
@@ -34,21 +35,14 @@ absl::Status Settled(Store* store) {
 
 // Scored and calibrated on as the daemon does it.
 absl::Status AddDevice(Store* store, const std::string& id) {
-  Rig rig = HandheldRig(id);
-  rig.table_size = 4;
-  const Calibration truth = rig.factory;
-  rig.factory = PerturbCalibration(truth, {}, kSeed);
-  SELFCAL_RETURN_IF_ERROR(store->CreateRig(rig).status());
-  SimulationOptions options;
-  options.keyframes_per_segment = 20;
-  options.landmarks_in_view = 60;
-  const auto session = Simulate(
-      rig, truth, rig.factory, *MakeMixed(kSeconds, kSeed), "walk", options);
+  const SimulatedDevice device = MakeDevice(id);
+  SELFCAL_RETURN_IF_ERROR(store->CreateRig(device.rig).status());
   PipelineOptions pipeline_options;
   pipeline_options.program_version = "test";
   const auto pipeline = MakePipeline(store, pipeline_options);
   SELFCAL_RETURN_IF_ERROR(pipeline->Start());
-  for (const MotionSegment& segment : session.segments) {
+  for (const MotionSegment& segment :
+       Record(device, *MakeMixed(kSeconds, kSeed), "walk")) {
     SELFCAL_RETURN_IF_ERROR(
         pipeline->Submit(id, segment, [] { return false; }).status());
   }
@@ -67,6 +61,7 @@ absl::Status Fill(const std::filesystem::path& folder) {
     SELFCAL_RETURN_IF_ERROR(
         store->CreateRig(HandheldRig(fmt::format("phone-{:03}", i))).status());
   }
+  SELFCAL_RETURN_IF_ERROR(store->CreateRig(MakeDevice("headset").rig).status());
   return AddDevice(store.get(), "tablet");
 }
 

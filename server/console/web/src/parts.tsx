@@ -206,6 +206,7 @@ export function Choice(props: {
 export function DataTable(props: {
   caption: string;
   head: ComponentChildren[];
+  sorted?: ('ascending' | 'descending' | 'none' | undefined)[]; // each column
   rows: ComponentChildren[][];
 }) {
   return (
@@ -214,8 +215,10 @@ export function DataTable(props: {
         <caption>{props.caption}</caption>
         <thead>
           <tr>
-            {props.head.map((cell) => (
-              <th scope="col">{cell}</th>
+            {props.head.map((cell, column) => (
+              <th scope="col" aria-sort={props.sorted?.[column]}>
+                {cell}
+              </th>
             ))}
           </tr>
         </thead>

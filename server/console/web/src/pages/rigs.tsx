@@ -1,15 +1,8 @@
 import type { JSX } from 'preact';
 import { idOf, pageOf, type RigOverview } from '../api';
 import { ListPage, type Column } from '../list';
-import { Choice, Link, Meter, When } from '../parts';
+import { Link, Meter, Problem, When } from '../parts';
 import { go, useAddress, withQuery } from '../state';
-
-const kOrders: [string, string][] = [
-  ['', 'name'],
-  ['name desc', 'name, from the end'],
-  ['last_seen desc', 'seen last'],
-  ['last_seen', 'not seen for longest'],
-];
 
 function Alarms(props: { of: string[] }) {
   if (props.of.length === 0) return <span class="quiet">none</span>;
@@ -23,8 +16,12 @@ function Alarms(props: { of: string[] }) {
 }
 
 const kColumns: Column<RigOverview>[] = [
-  { head: 'Rig', cell: (rig) => <Link to={pageOf(rig.name)}>{idOf(rig.name)}</Link> },
-  { head: 'Last seen', cell: (rig) => <When time={rig.lastSeen} /> },
+  {
+    head: 'Rig',
+    cell: (rig) => <Link to={pageOf(rig.name)}>{idOf(rig.name)}</Link>,
+    order: 'name',
+  },
+  { head: 'Last seen', cell: (rig) => <When time={rig.lastSeen} />, order: 'last_seen' },
   {
     head: 'Active version',
     cell: (rig) => (
@@ -71,23 +68,20 @@ export function Rigs(props: { version: number }) {
       path="rigs"
       items="rigs"
       query={['filter', 'order_by']}
+      order={['name', 'asc']}
       version={props.version}
       columns={kColumns}
       next="Next rigs"
       empty={<Nothing filter={filter} />}
-    >
-      <form class="bar" role="search" onSubmit={(event) => event.preventDefault()}>
-        <label>
-          Name contains
-          <input type="search" value={filter} onInput={search} />
-        </label>
-        <Choice
-          label="Sorted by"
-          value={query.get('order_by') ?? ''}
-          of={kOrders}
-          onChoice={(order_by) => go(withQuery({ order_by, page_token: '' }))}
-        />
-      </form>
-    </ListPage>
+      above={(mistake) => (
+        <form class="bar" role="search" onSubmit={(event) => event.preventDefault()}>
+          <label>
+            Name contains
+            <input type="search" value={filter} onInput={search} />
+          </label>
+          {mistake && <Problem error={mistake} />}
+        </form>
+      )}
+    />
   );
 }

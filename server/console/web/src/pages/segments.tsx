@@ -1,49 +1,208 @@
-import { rigPath, type Segment } from '../api';
+// Which segments of a rig have come, of those that are asked for.
+import type { JSX } from 'preact';
+import { useEffect, useState } from 'preact/hooks';
+import { rigPath, type ApiError, type Rig, type Segment } from '../api';
 import { bytes, number } from '../format';
-import { ListPage, type Column } from '../list';
-import { Badge, SegmentLink, When } from '../parts';
+import { ListPage, orderOf, type Column } from '../list';
+import { Badge, Choice, Link, SegmentLink, When } from '../parts';
+import { go, useAddress, useRead, withQuery } from '../state';
 
 function kept(segment: Segment): string {
   const tables = segment.scores.filter((s) => s.inTable).map((s) => s.group);
   return tables.length > 0 ? tables.join(', ') : 'none';
 }
 
-const kColumns: Column<Segment>[] = [
-  { head: 'Segment', cell: (segment) => <SegmentLink name={segment.name} /> },
-  { head: 'Received', cell: (segment) => <When time={segment.receiveTime} /> },
-  { head: 'State', cell: (segment) => <Badge state={segment.state} /> },
-  { head: 'In tables', cell: kept },
-  {
-    head: 'Gain [nats]',
-    cell: (segment) =>
-      segment.scores.map((s) => `${s.group} ${number(s.gainNats)}`).join(', '),
-  },
-  {
-    head: 'Reprojection rms [px]',
-    cell: (segment) =>
-      segment.residuals ? number(segment.residuals.reprojectionRmsPx) : '',
-  },
-  {
-    head: 'Data',
-    cell: (segment) => (segment.hasData ? bytes(segment.payloadBytes) : 'dropped'),
-  },
-];
+// With what it says about one group.
+function columns(group: string): Column<Segment>[] {
+  const of = (segment: Segment, show: (score: Segment['scores'][number]) => string) => {
+    const score = segment.scores.find((s) => s.group === group);
+    return score ? show(score) : '';
+  };
+  return [
+    { head: 'Segment', cell: (segment) => <SegmentLink name={segment.name} /> },
+    {
+      head: 'Received',
+      cell: (segment) => <When time={segment.receiveTime} />,
+      order: 'receive_time',
+    },
+    { head: 'State', cell: (segment) => <Badge state={segment.state} /> },
+    { head: 'In tables', cell: kept },
+    {
+      head: 'Gain [nats]',
+      cell: (segment) => of(segment, (score) => number(score.gainNats)),
+      order: 'gain.' + group,
+    },
+    {
+      head: 'Entropy [nats]',
+      cell: (segment) => of(segment, (score) => number(score.entropyNats, 4)),
+      order: 'entropy.' + group,
+    },
+    { head: 'Landmarks', cell: (segment) => segment.landmarks, order: 'landmarks' },
+    { head: 'Observations', cell: (segment) => segment.observations, order: 'observations' },
+    {
+      head: 'Rms [px]',
+      cell: (segment) =>
+        segment.residuals ? number(segment.residuals.reprojectionRmsPx) : '',
+    },
+    {
+      head: '°C',
+      cell: (segment) =>
+        segment.temperatureC === undefined ? '' : number(segment.temperatureC),
+      order: 'temperature_c',
+    },
+    {
+      head: 'Data',
+      cell: (segment) => (segment.hasData ? bytes(segment.payloadBytes) : 'dropped'),
+    },
+  ];
+}
+
+function Help(props: { group: string }) {
+  const examples = [
+    'state = UNUSABLE',
+    `in_table = ${props.group} AND gain.${props.group} >= 2`,
+    'has_data = true AND landmarks < 40',
+    'receive_time >= 2026-11-21T04:00:00Z',
+  ];
+  return (
+    <details>
+      <summary>What can be asked for</summary>
+      <p>Conditions, with AND between them; all of them hold.</p>
+      <ul>
+        <li>
+          With <code>=</code>: <code>state</code> (STORED, SCORED or UNUSABLE),{' '}
+          <code>session</code>, <code>has_data</code> (true or false),{' '}
+          <code>in_table</code> (a group).
+        </li>
+        <li>
+          With <code>=</code> <code>&lt;</code> <code>&lt;=</code> <code>&gt;</code>{' '}
+          <code>&gt;=</code>: <code>receive_time</code>, <code>calibration_version</code>,{' '}
+          <code>landmarks</code>, <code>observations</code>, <code>temperature_c</code>,{' '}
+          <code>gain.GROUP</code> and <code>entropy.GROUP</code>, these of one group.
+        </li>
+        <li>A value with a space or other signs stands in double quotes.</li>
+      </ul>
+      <p>
+        For instance{' '}
+        {examples.map((example, i) => (
+          <>
+            {i > 0 && ', '}
+            <Link to={withQuery({ filter: example, page_token: '' })}>
+              <code>{example}</code>
+            </Link>
+          </>
+        ))}
+        .
+      </p>
+    </details>
+  );
+}
+
+function Filter(props: { mistake: ApiError | null; group: string; groups: string[] }) {
+  const address = useAddress().searchParams;
+  const filter = address.get('filter') ?? '';
+  const [draft, setDraft] = useState(filter);
+  useEffect(() => setDraft(filter), [filter]);
+  const show = (text: string) => go(withQuery({ filter: text.trim(), page_token: '' }));
+  const edit = (event: JSX.TargetedInputEvent<HTMLInputElement>) => {
+    setDraft(event.currentTarget.value);
+    if (event.currentTarget.value === '' && filter !== '') show('');
+  };
+  const submit = (event: JSX.TargetedSubmitEvent<HTMLFormElement>) => {
+    event.preventDefault();
+    show(draft);
+  };
+  // What is sorted by the score of a group goes on to be.
+  const choose = (group: string) =>
+    go(
+      withQuery({
+        group,
+        order_by: (address.get('order_by') ?? '').replace(/^(gain|entropy)\.\S+/, '$1.' + group),
+        page_token: '',
+      }),
+    );
+  return (
+    <form role="search" onSubmit={submit}>
+      <div class="bar">
+        <label class="wide">
+          Filter
+          <input
+            type="search"
+            value={draft}
+            placeholder="all segments"
+            spellcheck={false}
+            aria-invalid={props.mistake !== null}
+            aria-describedby="filter-mistake"
+            onInput={edit}
+          />
+        </label>
+        <button type="submit">Show</button>
+        <Choice
+          label="Scores of"
+          value={props.group}
+          of={props.groups.map((name) => [name, name])}
+          onChoice={choose}
+        />
+      </div>
+      <p id="filter-mistake" class="mistake" role="alert">
+        {props.mistake?.message}
+      </p>
+      <Help group={props.group} />
+    </form>
+  );
+}
+
+const kNewestFirst: ['receive_time', 'desc'] = ['receive_time', 'desc'];
+
+// Not known of every segment.
+const kNotOfAll = /^(gain|entropy|temperature_c)\b/;
+
+function Nothing(props: { rig: string; filter: string; order: string }) {
+  if (props.filter || props.order !== kNewestFirst[0]) {
+    return (
+      <p>
+        No segment is as asked for.{' '}
+        <Link to={withQuery({ filter: '', order_by: '', page_token: '' })}>
+          Show all, newest first
+        </Link>
+      </p>
+    );
+  }
+  return (
+    <p>
+      No segment has arrived yet. Send some with the client library, or{' '}
+      <code>selfcal import {props.rig} DIR</code>.
+    </p>
+  );
+}
 
 export function Segments(props: { rig: string; version: number }) {
+  const address = useAddress().searchParams;
+  const rig = useRead<Rig>(rigPath(props.rig));
+  const groups = rig.value?.groups.map((g) => g.group) ?? [];
+  const group = address.get('group') ?? groups[0] ?? '';
+  const [order] = orderOf(address, kNewestFirst);
   return (
     <ListPage
       title={'Segments of ' + props.rig}
       path={rigPath(props.rig) + '/segments'}
       items="segments"
+      query={['filter', 'order_by']}
+      order={kNewestFirst}
       version={props.version}
-      columns={kColumns}
-      next="Older segments"
+      columns={columns(group)}
+      next="Next segments"
       empty={
-        <>
-          No segment has arrived yet. Send some with the client library, or{' '}
-          <code>selfcal import {props.rig} DIR</code>.
-        </>
+        <Nothing rig={props.rig} filter={address.get('filter') ?? ''} order={order} />
       }
+      above={(mistake) => (
+        <>
+          <Filter mistake={mistake} group={group} groups={groups} />
+          {kNotOfAll.test(order) && !mistake && (
+            <p class="quiet">Segments of which what they are sorted by is not known are left out.</p>
+          )}
+        </>
+      )}
     />
   );
 }
