@@ -394,6 +394,38 @@ const tests = {
   async 'events of all rigs are listed'(r) {
     await r.shows('/events', 'Events', ['rig created'], 'all-events');
   },
+
+  async 'a run is drawn while it computes'(r, other, daemon) {
+    const started = start(selfcal, ['--target', daemon.address, 'recalibrate', 'tablet', '--no-wait']);
+    const worker = await until('a worker', () => workerOf(daemon.pid));
+    process.kill(worker, 'SIGSTOP');
+    try {
+      await started;
+      const [{ name }] = (await r.api('rigs/tablet/recalibrations')).recalibrations;
+      const number = name.slice(name.lastIndexOf('/') + 1);
+      const heading = `Run ${number} of tablet`;
+      await r.open('/' + name, heading);
+      // Lets it go on a little at a time, until the page has told of two.
+      await until('the second iteration', async () => {
+        process.kill(worker, 'SIGCONT');
+        await sleep(10);
+        process.kill(worker, 'SIGSTOP');
+        await sleep(50);
+        return r.page.getByText(/^Iteration ([2-9]|\d\d)/).count();
+      });
+      // Who opens it now sees it from the beginning.
+      await other.shows('/' + name, heading, ['Iteration ', 'focal length of camera 0, x']);
+      const way = await other.page.locator('.way .path').first().getAttribute('points');
+      assert.ok(way.split(' ').length >= 3, way);
+      await other.picture('run-live');
+    } finally {
+      process.kill(worker, 'SIGCONT');
+    }
+    // What was drawn stays when it has ended.
+    await r.sees('What the solver says');
+    await r.sees('Over the iterations');
+    await r.picture('run-ended');
+  },
 };
 
 const folder = mkdtempSync(join(tmpdir(), 'selfcal-browser-'));

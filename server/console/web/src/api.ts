@@ -235,6 +235,14 @@ export interface SessionTrajectory {
   nextPageToken: string;
 }
 
+export interface ComponentProgress {
+  component: string;
+  unit: string;
+  value: number;
+  moved: number; // from where the run began
+  sigma: number;
+}
+
 export interface Run {
   name: string;
   state: string;
@@ -250,6 +258,7 @@ export interface Run {
   message: string;
   attempts: number;
   solver?: Solver;
+  parameters: ComponentProgress[]; // in the stream alone
 }
 
 export interface Event {

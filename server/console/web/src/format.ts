@@ -78,8 +78,8 @@ export function component(name: string): string {
 }
 
 // With its unit, where it has one.
-export function quantity(value: number, unit: string): string {
-  return number(value, 6) + (unit === '-' ? '' : ' ' + unit);
+export function quantity(value: number, unit: string, digits = 6): string {
+  return number(value, digits) + (unit === '-' ? '' : ' ' + unit);
 }
 
 // A pattern with a '*' at either end.

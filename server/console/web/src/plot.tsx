@@ -2,6 +2,7 @@
 import { useEffect, useRef } from 'preact/hooks';
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
+import { number } from './format';
 
 export const kColours = ['#2f6fdb', '#d9822b', '#2a9d6f', '#a64ac9'];
 const dark = matchMedia('(prefers-color-scheme: dark)');
@@ -16,20 +17,39 @@ export interface PlotProps {
   series: uPlot.Series[];
   x?: { label?: string; integers?: boolean; range?: [number, number] };
   y?: string;
-  log?: boolean; // of y
+  log?: boolean; // of values above 0
   bands?: uPlot.Band[];
   height?: number;
   cursor?: number; // index of the value that is pointed at
   onCursor?: (index: number) => void;
 }
 
-function axis(label: string | undefined, integers = false): uPlot.Axis {
+// Of a logarithmic axis over decades, the powers of ten alone.
+function powers(_: uPlot, values: number[]): (number | null)[] {
+  const isPower = (value: number) => {
+    const power = Math.log10(value);
+    return Math.abs(power - Math.round(power)) < 1e-9;
+  };
+  return values.filter(isPower).length < 2
+    ? values
+    : values.map((value) => (isPower(value) ? value : null));
+}
+
+function axis(label: string | undefined, integers = false, log = false): uPlot.Axis {
+  const shown = log ? { filter: powers } : {};
   return {
     label,
     labelSize: label ? 22 : 0,
     stroke: () => ink('--quiet'),
-    grid: { stroke: () => ink('--line'), width: 1 },
-    ticks: { stroke: () => ink('--line'), width: 1 },
+    grid: { stroke: () => ink('--line'), width: 1, ...shown },
+    ticks: { stroke: () => ink('--line'), width: 1, ...shown },
+    ...(log
+      ? {
+          ...shown,
+          values: (_: uPlot, values: number[]) =>
+            values.map((value) => (value === null ? '' : number(value, 1))),
+        }
+      : {}),
     ...(integers
       ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] }
       : {}),
@@ -55,9 +75,12 @@ export function Plot(props: PlotProps) {
         ...size(),
         scales: {
           x: { time: false, range: props.x?.range },
-          y: { distr: props.log ? 3 : 1 },
+          y: props.log ? { distr: 3 } : {},
         },
-        axes: [axis(props.x?.label, props.x?.integers), { ...axis(props.y), size: 64 }],
+        axes: [
+          axis(props.x?.label, props.x?.integers),
+          { ...axis(props.y, false, props.log), size: 64 },
+        ],
         series: [{}, ...props.series],
         bands: props.bands,
         legend: { show: props.series.length > 1, live: false },

@@ -1,0 +1,110 @@
+// How a run comes to its result: the cost, and each parameter with its sigma
+// against where the run began, over the iterations.
+import { useMemo } from 'preact/hooks';
+import type uPlot from 'uplot';
+import type { ComponentProgress } from './api';
+import { component, number, quantity } from './format';
+import { DataTable } from './parts';
+import { kColours, Plot } from './plot';
+
+export interface Step {
+  iteration: number;
+  cost: number;
+  step: number; // largest of a parameter, in sigmas
+  parameters: ComponentProgress[];
+}
+
+const kWidth = 200;
+const kHeight = 34;
+const kEdge = 3;
+// A parameter that moves less does not show it in any digit that counts.
+const kStill = 0.01;
+
+// The way of one parameter, its sigma around it, and a line where it began.
+function Way(props: { of: ComponentProgress[]; label: string }) {
+  const ends = props.of.flatMap((p) => [p.moved - p.sigma, p.moved + p.sigma, 0]);
+  const [least, most] = [Math.min(...ends), Math.max(...ends)];
+  const x = (i: number) =>
+    kEdge + (i * (kWidth - 2 * kEdge)) / Math.max(1, props.of.length - 1);
+  const y = (value: number) =>
+    kHeight - kEdge - ((value - least) * (kHeight - 2 * kEdge)) / (most - least || 1);
+  const line = (value: (p: ComponentProgress) => number) =>
+    props.of.map((p, i) => `${x(i)},${y(value(p))}`);
+  const above = line((p) => p.moved + p.sigma);
+  const below = line((p) => p.moved - p.sigma).reverse();
+  const last = props.of.length - 1;
+  return (
+    <svg class="way" viewBox={`0 0 ${kWidth} ${kHeight}`} role="img" aria-label={props.label}>
+      <polygon points={[...above, ...below].join(' ')} class="spread" />
+      <line x1={0} x2={kWidth} y1={y(0)} y2={y(0)} class="start" />
+      <polyline points={line((p) => p.moved).join(' ')} class="path" />
+      <circle cx={x(last)} cy={y(props.of[last].moved)} r={2.5} class="keyframe" />
+    </svg>
+  );
+}
+
+function stillMoves(way: ComponentProgress[]): string {
+  if (way.length < 2) return '';
+  const [before, now] = way.slice(-2);
+  const sigmas = Math.abs(now.moved - before.moved) / now.sigma;
+  return sigmas < kStill ? `less than ${kStill}` : number(sigmas, 2);
+}
+
+function Parameters(props: { steps: Step[] }) {
+  const ways = new Map<string, ComponentProgress[]>();
+  for (const { parameters } of props.steps) {
+    for (const parameter of parameters) {
+      ways.set(parameter.component, [...(ways.get(parameter.component) ?? []), parameter]);
+    }
+  }
+  const rows = [...ways].map(([name, way]) => {
+    const now = way[way.length - 1];
+    const moved = quantity(now.moved, now.unit, 3);
+    const sigma = quantity(now.sigma, now.unit, 3);
+    return [
+      component(name),
+      quantity(now.value, now.unit),
+      moved,
+      sigma,
+      stillMoves(way),
+      <Way of={way} label={`${component(name)} has moved by ${moved}, sigma ${sigma}`} />,
+    ];
+  });
+  return (
+    <>
+      <h2>Parameters</h2>
+      <p class="quiet">
+        Each against where the run began (dashed), with one sigma either way as
+        the iteration knows it.
+      </p>
+      <DataTable
+        caption="Parameters by iteration"
+        head={['Parameter', 'Now', 'Moved by', 'Sigma', 'Last step [sigmas]', 'Over the iterations']}
+        rows={rows}
+      />
+    </>
+  );
+}
+
+export function Convergence(props: { steps: Step[] }) {
+  const { steps } = props;
+  const [cost, step] = useMemo(() => {
+    const x = steps.map((s) => s.iteration);
+    return [
+      [x, steps.map((s) => s.cost)] as uPlot.AlignedData,
+      [x, steps.map((s) => s.step)] as uPlot.AlignedData,
+    ];
+  }, [steps]);
+  const x = { label: 'iteration', integers: true };
+  return (
+    <>
+      <div class="side">
+        <Plot label="Cost by iteration" data={cost} x={x} y="cost" log={steps.every((s) => s.cost > 0)}
+          series={[{ label: 'cost', stroke: kColours[0], width: 2 }]} />
+        <Plot label="Largest step of a parameter by iteration" data={step} x={x} y="step [sigmas]"
+          series={[{ label: 'step', stroke: kColours[1], width: 2 }]} />
+      </div>
+      {steps.some((s) => s.parameters.length > 0) && <Parameters steps={steps} />}
+    </>
+  );
+}
