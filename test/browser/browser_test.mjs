@@ -395,6 +395,23 @@ const tests = {
     await r.shows('/events', 'Events', ['rig created'], 'all-events');
   },
 
+  async 'the coach follows the segments as they come'(r, other, daemon) {
+    await r.open('/rigs/headset', 'headset');
+    await r.page.getByRole('link', { name: 'The coach' }).click();
+    await r.heading('Coach of headset');
+    await r.sees('and 0 segments that a table');
+    const expected = () => r.page.locator('.advice').textContent();
+    const before = await expected();
+    assert.match(before, /\d % smaller/);
+    assert.equal(await r.page.locator('.advice').getAttribute('aria-live'), 'polite');
+    assert.equal(await r.page.locator('tbody tr').count(), 14);
+    await r.picture('coach');
+    await start(sendSegments, [daemon.address, 'headset', 'carried', '6']);
+    await r.sees(/and [1-9] segments? that a table/);
+    assert.notEqual(await expected(), before);
+    await r.shows('/rigs/tablet/coach', 'Coach of tablet', ['What is known worst']);
+  },
+
   async 'a run is drawn while it computes'(r, other, daemon) {
     const started = start(selfcal, ['--target', daemon.address, 'recalibrate', 'tablet', '--no-wait']);
     const worker = await until('a worker', () => workerOf(daemon.pid));

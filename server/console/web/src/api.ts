@@ -261,6 +261,31 @@ export interface Run {
   parameters: ComponentProgress[]; // in the stream alone
 }
 
+export interface Advice {
+  motion: string;
+  instruction: string;
+  gainNats: number;
+  groupGains: { group: string; gainNats: number }[];
+  sigmaChanges: {
+    component: string;
+    unit: string;
+    sigmaNow: number;
+    sigmaAfter: number;
+  }[];
+}
+
+export interface Coaching {
+  advice: Advice[]; // the most informative first
+  weakest: {
+    words: string;
+    sigmaByReference: number;
+    parts: Direction['parts'];
+  }[];
+  calibrationVersion: string;
+  segmentsSince: number;
+  segmentSeconds: number;
+}
+
 export interface Event {
   number: string;
   time: string;

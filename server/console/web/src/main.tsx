@@ -7,6 +7,7 @@ import type { Session } from './api';
 import { Empty, Link, Problem, Title } from './parts';
 import { useAddress, useLive, useRead } from './state';
 import { Calibrations } from './pages/calibrations';
+import { CoachPage } from './pages/coach';
 import { Events } from './pages/events';
 import { RigPage } from './pages/rig';
 import { Rigs } from './pages/rigs';
@@ -19,6 +20,7 @@ import { SessionPage, Sessions } from './pages/session';
 const kRigPages: [string, string][] = [
   ['', 'Overview'],
   ['sessions', 'Sessions'],
+  ['coach', 'Coach'],
   ['segments', 'Segments'],
   ['calibrations', 'Calibrations'],
   ['recalibrations', 'Runs'],
@@ -53,6 +55,7 @@ function Page(props: {
   if (top === 'rigs' && rig) {
     const shown = () => {
       if (!page) return <RigPage rig={rig} version={version} />;
+      if (page === 'coach') return <CoachPage rig={rig} version={version} />;
       if (page === 'events') return <Events rig={rig} version={version} />;
       if (page === 'calibrations' && !id) {
         return <Calibrations rig={rig} session={session} version={version} />;

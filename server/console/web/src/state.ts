@@ -41,29 +41,50 @@ export function withQuery(values: Record<string, string>): string {
 export interface Read<T> {
   value: T | null;
   error: ApiError | null;
+  busy: boolean; // a new answer is under way
 }
 
 // Reads a path, and again whenever `version` changes; what was read stays until
 // the new answer is there. A null path reads nothing.
 export function useRead<T>(path: string | null, version = 0): Read<T> {
-  const [read, setRead] = useState<Read<T> & { path: string | null }>({
-    value: null,
-    error: null,
-    path,
-  });
+  const [read, setRead] = useState<{
+    value: T | null;
+    error: ApiError | null;
+    path: string | null;
+    version: number;
+  }>({ value: null, error: null, path: null, version });
   useEffect(() => {
     if (path === null) return;
     let gone = false;
     get<T>(path).then(
-      (value) => !gone && setRead({ value, error: null, path }),
+      (value) => !gone && setRead({ value, error: null, path, version }),
       (failure: Failure) =>
-        !gone && setRead({ value: null, error: failure.error, path }),
+        !gone && setRead({ value: null, error: failure.error, path, version }),
     );
     return () => {
       gone = true;
     };
   }, [path, version]);
-  return read.path === path ? read : { value: null, error: null };
+  if (read.path !== path) return { value: null, error: null, busy: true };
+  return { ...read, busy: read.version !== version };
+}
+
+// The version, no more often than so: where an answer costs the daemon more.
+export function useCalm(version: number, leastMs: number): number {
+  const [calm, setCalm] = useState(version);
+  const last = useRef(0);
+  useEffect(() => {
+    if (version === calm) return;
+    const timer = setTimeout(
+      () => {
+        last.current = Date.now();
+        setCalm(version);
+      },
+      Math.max(0, last.current + leastMs - Date.now()),
+    );
+    return () => clearTimeout(timer);
+  }, [version, calm, leastMs]);
+  return calm;
 }
 
 // ------------------------------------------------------------- live

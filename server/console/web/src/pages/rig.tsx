@@ -103,6 +103,10 @@ function Knowledge(props: { rig: Rig; of: Known[] }) {
     <>
       <h2>What is weak</h2>
       <Weak of={props.of} />
+      <p>
+        <Link to={pageOf(props.rig.name) + '/coach'}>The coach</Link> says which
+        motion would teach the most now.
+      </p>
       <h2>How well it is known</h2>
       {props.rig.groups.map((group) => {
         const members = props.of.filter((e) =>
