@@ -368,6 +368,7 @@ const tests = {
   async 'mistakes in an address are explained'(r) {
     r.expectProblems = true;
     await r.shows('/rigs/none', 'none', ['rig none does not exist'], 'rig-unknown');
+    assert.equal(await r.page.getByRole('alert').count(), 1);
     await r.open('/nothing', 'There is no such page');
     await r.open('/rigs/tablet/segments/none~1', 'Segment none~1');
     await r.page.getByRole('alert').first().waitFor();

@@ -20,6 +20,7 @@ import {
   Link,
   Loaded,
   Meter,
+  Problem,
   SegmentLink,
   Title,
   Unknown,
@@ -252,6 +253,16 @@ export function RigPage(props: { rig: string; version: number }) {
       active.value && factory.value ? known(active.value, factory.value) : null,
     [active.value, factory.value],
   );
+  // Said once, not for each part of the page.
+  const problem = rig.error ?? active.error ?? factory.error ?? tables.error;
+  if (problem) {
+    return (
+      <>
+        <Title text={props.rig}>{props.rig}</Title>
+        <Problem error={problem} />
+      </>
+    );
+  }
   return (
     <>
       <Title text={props.rig}>{props.rig}</Title>
@@ -272,7 +283,7 @@ export function RigPage(props: { rig: string; version: number }) {
           />
         )}
       </Loaded>
-      <Loaded read={{ value: rig.value && both && { rig: rig.value, both }, error: rig.error ?? factory.error }}>
+      <Loaded read={{ value: rig.value && both && { rig: rig.value, both }, error: null }}>
         {(value) => <Knowledge rig={value.rig} of={value.both} />}
       </Loaded>
       <NewestSession rig={props.rig} version={props.version} />

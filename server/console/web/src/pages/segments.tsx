@@ -137,12 +137,14 @@ function Filter(props: { mistake: ApiError | null; group: string; groups: string
           />
         </label>
         <button type="submit">Show</button>
-        <Choice
-          label="Scores of"
-          value={props.group}
-          of={props.groups.map((name) => [name, name])}
-          onChoice={choose}
-        />
+        {props.groups.length > 0 && (
+          <Choice
+            label="Scores of"
+            value={props.group}
+            of={props.groups.map((name) => [name, name])}
+            onChoice={choose}
+          />
+        )}
       </div>
       <p id="filter-mistake" class="mistake" role="alert">
         {props.mistake?.message}
