@@ -407,6 +407,7 @@ const tests = {
     assert.equal(await r.page.locator('.advice').getAttribute('aria-live'), 'polite');
     assert.equal(await r.page.locator('tbody tr').count(), 14);
     await r.picture('coach');
+    await r.detail('coach');
     await start(sendSegments, [daemon.address, 'headset', 'carried', '6']);
     await r.sees(/and [1-9] segments? that a table/);
     assert.notEqual(await expected(), before);
@@ -436,6 +437,7 @@ const tests = {
       const way = await other.page.locator('.way .path').first().getAttribute('points');
       assert.ok(way.split(' ').length >= 3, way);
       await other.picture('run-live');
+      await other.detail('run');
     } finally {
       process.kill(worker, 'SIGCONT');
     }
