@@ -5,17 +5,18 @@
 //
 // WEB has the node_modules. Exit code 77: no Chromium, skipped.
 import assert from 'node:assert/strict';
-import { execFile, execFileSync, spawn } from 'node:child_process';
-import { existsSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync } from 'node:fs';
+import { execFile, execFileSync } from 'node:child_process';
+import { existsSync, mkdirSync, mkdtempSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
+import { startDaemon, workerOf } from './daemon.mjs';
+import { kPatience, Reader, until } from './reader.mjs';
 
 const [, , selfcald, selfcal, fillState, sendSegments, web, screenshots] = process.argv;
 const kChromium = '/usr/bin/chromium';
-const kPatience = 120_000;
 const kSkipped = 77;
 
 if (!existsSync(kChromium)) {
@@ -23,147 +24,7 @@ if (!existsSync(kChromium)) {
   process.exit(kSkipped);
 }
 const { chromium } = createRequire(join(web, 'package.json'))('playwright-core');
-
-// The daemon, once it says where its console is.
-function startDaemon(state) {
-  const address = 'unix:' + join(state, 's');
-  const daemon = spawn(
-    selfcald,
-    ['--state-dir', state, '--listen', address, '--run-priority', 'low',
-      '--console', '127.0.0.1:0', '--console-role', 'administer'],
-    { stdio: ['ignore', 'ignore', 'pipe'] },
-  );
-  const url = new Promise((resolve, reject) => {
-    let log = '';
-    daemon.stderr.on('data', (bytes) => {
-      log += bytes;
-      const found = /console: (http:\S+)/.exec(log);
-      if (found && log.includes('ready')) resolve(found[1]);
-    });
-    daemon.on('exit', (code) => reject(new Error(`selfcald ended (${code}):\n${log}`)));
-  });
-  const stop = async () => {
-    if (daemon.exitCode !== null) return;
-    const ended = new Promise((resolve) => daemon.on('exit', resolve));
-    daemon.kill('SIGTERM');
-    assert.equal(await ended, 0, 'selfcald did not stop in order');
-  };
-  return { url, stop, address, pid: daemon.pid };
-}
-
 const start = promisify(execFile);
-
-// Asks again and again until the answer is one.
-async function until(what, ask) {
-  const end = Date.now() + kPatience;
-  for (;;) {
-    const answer = await ask();
-    if (answer) return answer;
-    assert.ok(Date.now() < end, 'never came: ' + what);
-    await sleep(1);
-  }
-}
-
-// The process in which the daemon calibrates.
-function workerOf(pid) {
-  const children = readdirSync(`/proc/${pid}/task`)
-    .map((task) => readFileSync(`/proc/${pid}/task/${task}/children`, 'utf8'));
-  return Number(children.join(' ').trim().split(' ')[0]);
-}
-
-class Reader {
-  constructor(page, base) {
-    this.page = page;
-    this.base = base;
-    this.problems = [];
-    this.expectProblems = false;
-    page.on('pageerror', (error) => this.problems.push(String(error)));
-    page.on('console', (message) => {
-      if (message.type() === 'error' && !this.expectProblems) {
-        this.problems.push(message.text());
-      }
-    });
-    page.on('request', (request) => {
-      const { origin, protocol } = new URL(request.url());
-      if (protocol !== 'data:' && origin !== base) {
-        this.problems.push('asks elsewhere: ' + request.url());
-      }
-    });
-  }
-
-  async open(path, heading) {
-    await this.page.goto(this.base + path);
-    await this.heading(heading);
-  }
-  // A page that only has to show what it should.
-  async shows(path, heading, texts, picture) {
-    await this.open(path, heading);
-    for (const text of texts) await this.sees(text);
-    if (picture) await this.picture(picture);
-  }
-  // What the pages read.
-  async api(path) {
-    return (await fetch(this.base + '/api/v1/' + path)).json();
-  }
-  async heading(text) {
-    await this.page
-      .getByRole('heading', { level: 1, name: text, exact: true })
-      .waitFor({ timeout: kPatience });
-  }
-  async sees(text) {
-    await this.page.getByText(text).first().waitFor({ timeout: kPatience });
-  }
-  // Until what stands first in each row is as it should be.
-  async rows(areRight) {
-    let names = [];
-    await until('the right rows', async () => {
-      names = await this.page.locator('tbody th').allTextContents();
-      return areRight(names);
-    });
-    return names;
-  }
-  async picture(name) {
-    // Chromium draws the page in front alone.
-    await this.page.bringToFront();
-    for (const scheme of ['light', 'dark']) {
-      await this.page.emulateMedia({ colorScheme: scheme });
-      await this.page.waitForTimeout(200);
-      await this.page.screenshot({
-        path: join(screenshots, `${name}-${scheme}.png`),
-        fullPage: true,
-      });
-    }
-    await this.page.emulateMedia({ colorScheme: 'light' });
-    await this.usable(name);
-  }
-  // What the window shows, for docs/pictures.
-  async detail(name) {
-    await this.page.bringToFront();
-    await this.page.screenshot({ path: join(screenshots, `${name}-detail.png`) });
-  }
-  // What a screen reader needs: one heading of the page, names for controls,
-  // heads for tables, and nothing that is wider than the window.
-  async usable(name) {
-    const found = await this.page.evaluate(() => {
-      const named = (e) =>
-        e.labels?.length > 0 || e.getAttribute('aria-label') || e.textContent.trim();
-      const all = (query) => [...document.querySelectorAll(query)];
-      return {
-        headings: all('h1').length,
-        nameless: all('input, select, textarea, button, meter')
-          .filter((e) => !named(e)).map((e) => e.outerHTML),
-        headless: all('table:not(.u-legend)').filter((t) => !t.querySelector('th[scope=col]')).length,
-        pictures: all('[role=img]').filter((e) => !e.getAttribute('aria-label')).length,
-        wide: document.documentElement.scrollWidth - innerWidth,
-      };
-    });
-    assert.deepEqual(
-      { ...found, wide: Math.max(0, found.wide) },
-      { headings: 1, nameless: [], headless: 0, pictures: 0, wide: 0 },
-      name,
-    );
-  }
-}
 
 const tests = {
   async 'rigs are listed, filtered, sorted and paged by their address'(r) {
@@ -454,7 +315,7 @@ let daemon;
 let browser;
 try {
   execFileSync(fillState, [join(folder, 'state')], { stdio: 'inherit' });
-  daemon = startDaemon(join(folder, 'state'));
+  daemon = startDaemon(selfcald, join(folder, 'state'));
   const base = await daemon.url;
   browser = await chromium.launchPersistentContext(join(folder, 'profile'), {
     executablePath: kChromium,
@@ -465,8 +326,8 @@ try {
       '--disable-sync'],
   });
   browser.setDefaultTimeout(kPatience);
-  const reader = new Reader(await browser.newPage(), base);
-  const other = new Reader(await browser.newPage(), base);
+  const reader = new Reader(await browser.newPage(), base, screenshots);
+  const other = new Reader(await browser.newPage(), base, screenshots);
   for (const [name, run] of Object.entries(tests)) {
     console.log(name);
     await run(reader, other, daemon);
