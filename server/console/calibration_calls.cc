@@ -2,8 +2,7 @@
 
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.pb.h"
-#include "server/console/call.h"
-#include "server/console/json.h"
+#include "server/console/asked.h"
 #include "server/encode/compare.h"
 #include "server/encode/encode.h"
 #include "server/encode/encode_coaching.h"
@@ -16,9 +15,10 @@ namespace {
 
 constexpr std::string_view kActivate = ":activate";
 
-// A version by its number, or the active one.
-absl::StatusOr<StoredCalibration> Read(const Call& call,
-                                       const std::string& id) {
+}  // namespace
+
+absl::StatusOr<StoredCalibration> ReadVersion(const Call& call,
+                                              const std::string& id) {
   SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
   if (id == "active") return call.context.store->GetActiveCalibration(rig);
   const auto version = ParseCount(id);
@@ -27,22 +27,16 @@ absl::StatusOr<StoredCalibration> Read(const Call& call,
       "a version is a number from 1 on, or 'active'");
 }
 
-}  // namespace
-
 Answer ListCalibrations(const Call& call) {
-  v1::ListCalibrationsRequest request;
-  request.set_parent(RigName(call.parts.at(0)));
-  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
-  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig,
+                           ParentOf<v1::ListCalibrationsRequest>(call));
   SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
-  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
-                           call.context.store->ListCalibrations(rig, page));
-  v1::ListCalibrationsResponse response;
-  for (const StoredCalibration& calibration : listed.items) {
-    *response.add_calibrations() = Encode(calibration);
-  }
-  response.set_next_page_token(listed.next_token);
-  return JsonResponse(response);
+  return PageAnswer<v1::ListCalibrationsResponse>(
+      call.context.store->ListCalibrations(rig, page),
+      [](const StoredCalibration& calibration, auto* response) {
+        *response->add_calibrations() = Encode(calibration);
+        return absl::OkStatus();
+      });
 }
 
 Answer GetCalibration(const Call& call) {
@@ -51,7 +45,7 @@ Answer GetCalibration(const Call& call) {
       ChildName(call.parts.at(0), "calibrations", call.parts.at(1)));
   SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration calibration,
-                           Read(call, call.parts[1]));
+                           ReadVersion(call, call.parts[1]));
   return JsonResponse(Encode(calibration));
 }
 
@@ -113,9 +107,9 @@ Answer CompareCalibrations(const Call& call) {
   request.set_b(ChildName(call.parts[0], "calibrations", call.Query("b")));
   SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration a,
-                           Read(call, call.Query("a")));
+                           ReadVersion(call, call.Query("a")));
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration b,
-                           Read(call, call.Query("b")));
+                           ReadVersion(call, call.Query("b")));
   SELFCAL_ASSIGN_OR_RETURN(const v1::CompareCalibrationsResponse compared,
                            Compare(call.context.store, a, b));
   return JsonResponse(compared);

@@ -41,6 +41,11 @@ absl::StatusOr<Page> PageOf(const Call& call);
 // INVALID_ARGUMENT for what can be no id of a rig.
 absl::StatusOr<std::string> RigOf(const Call& call);
 
+// A version of the rig by number or "active"; INVALID_ARGUMENT for what is
+// neither.
+absl::StatusOr<StoredCalibration> ReadVersion(const Call& call,
+                                              const std::string& id);
+
 Answer GetSession(const Call& call);
 Answer ListRigs(const Call& call);
 Answer GetRig(const Call& call);

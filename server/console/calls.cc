@@ -4,8 +4,7 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/rig.pb.h"
 #include "selfcal/v1/store_service.pb.h"
-#include "server/console/call.h"
-#include "server/console/json.h"
+#include "server/console/asked.h"
 #include "server/console/overview.h"
 #include "server/encode/encode.h"
 #include "server/store/status_macros.h"
@@ -87,14 +86,12 @@ Answer ListRigs(const Call& call) {
       Authorise(call.request.caller, v1::ListRigsRequest()));
   SELFCAL_ASSIGN_OR_RETURN(const RigQuery query, QueryOf(call));
   SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
-  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
-                           call.context.store->ListRigSummaries(query, page));
-  console::ListRigOverviewsResponse response;
-  for (const RigSummary& rig : listed.items) {
-    *response.add_rigs() = Encode(rig);
-  }
-  response.set_next_page_token(listed.next_token);
-  return JsonResponse(response);
+  return PageAnswer<console::ListRigOverviewsResponse>(
+      call.context.store->ListRigSummaries(query, page),
+      [](const RigSummary& rig, auto* response) {
+        *response->add_rigs() = Encode(rig);
+        return absl::OkStatus();
+      });
 }
 
 Answer GetRig(const Call& call) {
@@ -118,14 +115,12 @@ Answer ListEvents(const Call& call) {
     SELFCAL_RETURN_IF_ERROR(call.context.store->GetRig(rig).status());
   }
   SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
-  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
-                           call.context.store->ListNewestEvents(page, rig));
-  v1::ListEventsResponse response;
-  for (const StoredEvent& event : listed.items) {
-    *response.add_events() = Encode(event);
-  }
-  response.set_next_page_token(listed.next_token);
-  return JsonResponse(response);
+  return PageAnswer<v1::ListEventsResponse>(
+      call.context.store->ListNewestEvents(page, rig),
+      [](const StoredEvent& event, auto* response) {
+        *response->add_events() = Encode(event);
+        return absl::OkStatus();
+      });
 }
 
 }  // namespace selfcal::server

@@ -2,8 +2,7 @@
 
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.pb.h"
-#include "server/console/call.h"
-#include "server/console/json.h"
+#include "server/console/asked.h"
 #include "server/console/motion.h"
 #include "server/encode/versions.h"
 #include "server/store/status_macros.h"
@@ -15,58 +14,31 @@ namespace {
 // segment keeps its ends.
 constexpr std::int64_t kPointsOfSession = 16'000;
 
-// The rig of the address, for a caller who may list its segments.
-absl::StatusOr<std::string> RigOfSessions(const Call& call) {
-  v1::ListSegmentsRequest request;
-  request.set_parent(RigName(call.parts.at(0)));
-  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
-  return RigOf(call);
-}
-
-// The segment of the address, for a caller who may make this call about it.
-template <typename Request>
-absl::StatusOr<SegmentNameParts> SegmentOf(const Call& call) {
-  Request request;
-  request.set_name(RigName(call.parts.at(0)) + "/segments/" + call.parts.at(1));
-  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
-  const auto parts = ParseSegmentName(request.name());
-  if (parts) return *parts;
-  return absl::InvalidArgumentError(
-      "a segment's name is rigs/{rig}/segments/{session}~{index}; in an "
-      "address a '%' of the session stands as %25");
-}
-
 absl::StatusOr<StoredCalibration> VersionOf(const Call& call,
                                             const std::string& rig,
                                             std::int64_t otherwise) {
   const std::string version = call.Query("version");
-  if (version == "active") return call.context.store->GetActiveCalibration(rig);
-  if (version.empty())
-    return call.context.store->GetCalibration(rig, otherwise);
-  const auto number = ParseCount(version);
-  if (number) return call.context.store->GetCalibration(rig, *number);
-  return absl::InvalidArgumentError(
-      "version is a number from 1 on, or 'active'; without it, that which the "
-      "segment was scored with");
+  return version.empty() ? call.context.store->GetCalibration(rig, otherwise)
+                         : ReadVersion(call, version);
 }
 
 }  // namespace
 
 Answer ListSessions(const Call& call) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOfSessions(call));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig,
+                           ParentOf<v1::ListSegmentsRequest>(call));
   SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
-  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
-                           call.context.store->ListSessions(rig, page));
-  console::ListSessionsResponse response;
-  for (const SessionSummary& session : listed.items) {
-    *response.add_sessions() = Encode(rig, session);
-  }
-  response.set_next_page_token(listed.next_token);
-  return JsonResponse(response);
+  return PageAnswer<console::ListSessionsResponse>(
+      call.context.store->ListSessions(rig, page),
+      [&](const SessionSummary& session, auto* response) {
+        *response->add_sessions() = Encode(rig, session);
+        return absl::OkStatus();
+      });
 }
 
 Answer GetTrajectory(const Call& call) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOfSessions(call));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig,
+                           ParentOf<v1::ListSegmentsRequest>(call));
   const auto name = ParseChildName(
       RigName(call.parts.at(0)) + "/sessions/" + call.parts.at(1), "sessions");
   if (!name) {

@@ -2,8 +2,7 @@
 #include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/rig.pb.h"
-#include "server/console/call.h"
-#include "server/console/json.h"
+#include "server/console/asked.h"
 #include "server/encode/encode.h"
 #include "server/encode/versions.h"
 #include "server/store/status_macros.h"
@@ -69,20 +68,16 @@ Answer OpenRunStream(const Call& call, const std::string& name) {
 }  // namespace
 
 Answer ListRuns(const Call& call) {
-  v1::ListRecalibrationsRequest request;
-  request.set_parent(RigName(call.parts.at(0)));
-  SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
-  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig,
+                           ParentOf<v1::ListRecalibrationsRequest>(call));
   SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
-  SELFCAL_ASSIGN_OR_RETURN(const auto listed,
-                           call.context.store->ListRuns(rig, page));
-  v1::ListRecalibrationsResponse response;
-  for (const StoredRun& run : listed.items) {
-    SELFCAL_ASSIGN_OR_RETURN(*response.add_recalibrations(),
-                             EncodeWithReport(call.context.store, run, {}));
-  }
-  response.set_next_page_token(listed.next_token);
-  return JsonResponse(response);
+  return PageAnswer<v1::ListRecalibrationsResponse>(
+      call.context.store->ListRuns(rig, page),
+      [&](const StoredRun& run, auto* response) -> absl::Status {
+        SELFCAL_ASSIGN_OR_RETURN(*response->add_recalibrations(),
+                                 EncodeWithReport(call.context.store, run, {}));
+        return absl::OkStatus();
+      });
 }
 
 Answer GetRun(const Call& call) {
