@@ -61,6 +61,7 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddCalibrationCommands(&app, &context);
     AddReportCommand(&app, &context);
     AddCoachCommand(&app, &context);
+    AddTopCommand(&app, &context);
     AddEventsCommand(&app, &context);
     AddDoctorCommand(&app, &context);
     AddBackupCommand(&app, &context);

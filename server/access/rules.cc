@@ -41,6 +41,7 @@ constexpr AccessRule kRules[] = {
     {"selfcal.v1.RecalibrationService.CancelRecalibration",
      Role::kAdminister,
      "name"},
+    {"selfcal.v1.ActivityService.ListActivity", Role::kRead, ""},
     {"selfcal.v1.StoreService.CheckStore", Role::kAdminister, ""},
     {"selfcal.v1.StoreService.BackupStore", Role::kAdminister, ""},
     {"selfcal.v1.StoreService.RestoreStore", Role::kAdminister, ""},

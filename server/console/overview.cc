@@ -4,6 +4,7 @@
 
 #include "proto/resource_names.h"
 #include "server/encode/encode_parts.h"
+#include "server/encode/table_fill.h"
 
 namespace selfcal::server {
 namespace {
@@ -40,14 +41,9 @@ console::RigOverview Encode(const RigSummary& rig) {
   }
   message.set_active_version(rig.active_version);
   SetTime(rig.active_since_ns, message.mutable_active_since());
-  int entries = 0;
-  int capacity = 0;
-  for (const Table& table : rig.tables) {
-    entries += static_cast<int>(table.entries.size());
-    capacity += static_cast<int>(table.capacity);
-  }
-  message.set_table_entries(entries);
-  message.set_table_capacity(capacity);
+  const TableFill fill = FillOf(rig.tables);
+  message.set_table_entries(fill.entries);
+  message.set_table_capacity(fill.capacity);
   AddAlarms(rig, &message);
   return message;
 }

@@ -8,6 +8,7 @@
 #include "proto/resource_names.h"
 #include "server/encode/shortened.h"
 #include "server/service/errors.h"
+#include "server/service/traffic.h"
 
 namespace selfcal::server {
 namespace {
@@ -47,7 +48,21 @@ SegmentStream::SegmentStream(const ServiceContext& context,
                              std::function<bool()> cancelled)
     : context_(context), cancelled_(std::move(cancelled)) {}
 
+SegmentStream::~SegmentStream() {
+  if (!parent_.empty()) context_.traffic->Closed(rig_);
+}
+
 bool SegmentStream::stopped() const { return context_.stopping->load(); }
+
+void SegmentStream::Answered(v1::StreamSegmentsResponse response,
+                             const Done& done) {
+  if (response.verdict() == v1::StreamSegmentsResponse::STORED) {
+    context_.traffic->Stored(rig_);
+  } else if (response.verdict() == v1::StreamSegmentsResponse::REJECTED) {
+    context_.traffic->Rejected(rig_);
+  }
+  done({grpc::Status::OK, std::move(response)});
+}
 
 grpc::Status SegmentStream::Open(const std::string& parent) {
   const auto rig = ParseRigName(parent);
@@ -58,6 +73,7 @@ grpc::Status SegmentStream::Open(const std::string& parent) {
   }
   parent_ = parent;
   rig_ = *rig;
+  context_.traffic->Opened(rig_);
   return grpc::Status::OK;
 }
 
@@ -76,13 +92,13 @@ void SegmentStream::Take(const v1::StreamSegmentsRequest& request,
              "is another rig than that of the first message; open a stream "
              "for each rig"}},
            &response);
-    return done({grpc::Status::OK, std::move(response)});
+    return Answered(std::move(response), done);
   }
   MotionSegment segment;
   const auto violations = FromProto(request.segment(), "", &segment);
   if (!violations.empty()) {
     Reject(violations, &response);
-    return done({grpc::Status::OK, std::move(response)});
+    return Answered(std::move(response), done);
   }
   context_.pipeline->BeginSubmit(
       rig_,
@@ -92,7 +108,9 @@ void SegmentStream::Take(const v1::StreamSegmentsRequest& request,
         Answer answer{grpc::Status::OK, response};
         if (result.ok()) {
           FillVerdict(*result, &answer.response);
-        } else if (stopped()) {
+          return Answered(std::move(answer.response), done);
+        }
+        if (stopped()) {
           answer.status = ShuttingDown();
         } else {
           answer.status =

@@ -23,6 +23,9 @@ class SegmentStream {
 
   // `cancelled` tells whether the caller has gone.
   SegmentStream(const ServiceContext& context, std::function<bool()> cancelled);
+  ~SegmentStream();
+  SegmentStream(const SegmentStream&) = delete;
+  SegmentStream& operator=(const SegmentStream&) = delete;
 
   // Takes one request; one thread calls. Waits while the daemon is behind, but
   // not for the disk. `done` is called once unless this throws: on this thread,
@@ -32,6 +35,8 @@ class SegmentStream {
  private:
   grpc::Status Open(const std::string& parent);
   bool stopped() const;
+  // Counts the verdict, then tells it.
+  void Answered(v1::StreamSegmentsResponse response, const Done& done);
 
   ServiceContext context_;
   std::function<bool()> cancelled_;

@@ -13,6 +13,7 @@
 #include "server/service/credentials.h"
 #include "server/service/grpc_log.h"
 #include "server/service/services.h"
+#include "server/service/traffic.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -24,6 +25,7 @@ constexpr const char* kServiceNames[] = {
     "selfcal.v1.CalibrationService",
     "selfcal.v1.RecalibrationService",
     "selfcal.v1.StoreService",
+    "selfcal.v1.ActivityService",
 };
 
 // Plugins of gRPC's builder are global and meant to be set once. The library
@@ -89,12 +91,14 @@ class GrpcServer final : public Server {
                                  options.local_role,
                                  options.max_rigs,
                                  options.max_segment_streams,
-                                 std::move(restored)};
+                                 std::move(restored),
+                                 &traffic_};
     services_.push_back(MakeRigService(context));
     services_.push_back(MakeSegmentService(context));
     services_.push_back(MakeCalibrationService(context));
     services_.push_back(MakeRecalibrationService(context));
     services_.push_back(MakeStoreService(context));
+    services_.push_back(MakeActivityService(context));
   }
 
   ~GrpcServer() override { Shutdown(std::chrono::milliseconds(0)); }
@@ -152,6 +156,7 @@ class GrpcServer final : public Server {
   }
 
   std::atomic<bool> stopping_ = false;
+  Traffic traffic_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
   std::unique_ptr<grpc::Server> server_;
   std::vector<std::string> addresses_;

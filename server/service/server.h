@@ -1,4 +1,4 @@
-// The gRPC server: the five services, grpc.health.v1 and reflection, on unix
+// The gRPC server: the six services, grpc.health.v1 and reflection, on unix
 // sockets or TCP ports (credentials.h says how each is opened). What a caller
 // may do is in server/access; health and reflection are for all who connect.
 // Any thread may call.

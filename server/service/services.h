@@ -1,4 +1,4 @@
-// The five services of the contract, each in a file of its own: decode the
+// The six services of the contract, each in a file of its own: decode the
 // request, authorise it, ask the store or the pipeline, encode the answer.
 // Nothing that comes from the network aborts or throws out of a handler.
 //
@@ -19,6 +19,8 @@
 
 namespace selfcal::server {
 
+class Traffic;  // traffic.h
+
 // All of it outlives the services.
 struct ServiceContext {
   Store* store = nullptr;
@@ -31,6 +33,7 @@ struct ServiceContext {
   int max_segment_streams = 256;  // at once
   // Called when a restored database waits for the next start; or nothing.
   std::function<void()> restored;
+  Traffic* traffic = nullptr;  // of segments, counted for ActivityService
 };
 
 std::unique_ptr<grpc::Service> MakeRigService(const ServiceContext& context);
@@ -41,5 +44,7 @@ std::unique_ptr<grpc::Service> MakeCalibrationService(
 std::unique_ptr<grpc::Service> MakeRecalibrationService(
     const ServiceContext& context);
 std::unique_ptr<grpc::Service> MakeStoreService(const ServiceContext& context);
+std::unique_ptr<grpc::Service> MakeActivityService(
+    const ServiceContext& context);
 
 }  // namespace selfcal::server

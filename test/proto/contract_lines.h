@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "selfcal/v1/activity_service.pb.h"
 #include "selfcal/v1/calibration.pb.h"
 #include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/recalibration.pb.h"
@@ -26,7 +27,8 @@ inline ContractFiles CompiledContract() {
           v1::GetRecalibrationRequest::descriptor()->file(),
           v1::GetRigRequest::descriptor()->file(),
           v1::GetSegmentRequest::descriptor()->file(),
-          v1::ListEventsRequest::descriptor()->file()};
+          v1::ListEventsRequest::descriptor()->file(),
+          v1::ListActivityRequest::descriptor()->file()};
 }
 
 namespace contract {

@@ -9,6 +9,8 @@ from typing import Callable, Iterable, Iterator, Optional, TypeVar
 import grpc
 
 from selfcal.v1 import (
+    activity_service_pb2 as activity,
+    activity_service_pb2_grpc as activity_grpc,
     calibration_service_pb2 as calibration,
     calibration_service_pb2_grpc as calibration_grpc,
     recalibration_pb2 as recalibration,
@@ -59,6 +61,8 @@ class Daemon:
         self.recalibration_service = (
             recalibration_grpc.RecalibrationServiceStub(channel)
         )
+
+        self.activity_service = activity_grpc.ActivityServiceStub(channel)
 
     def __enter__(self) -> Daemon:
         return self
@@ -141,6 +145,13 @@ class Daemon:
             self.recalibration_service.ListRecalibrations, request
         ):
             yield from page.recalibrations
+
+    def activity(self, rigs: int = 50) -> activity.ListActivityResponse:
+        """What goes on right now, of the rigs that sent last."""
+        return self.activity_service.ListActivity(
+            activity.ListActivityRequest(page_size=rigs),
+            timeout=self._timeout_s,
+        )
 
     def _pages(
         self, method: Callable[..., _Response], request: _Request

@@ -109,6 +109,8 @@ class PythonTest(unittest.TestCase):
             for answer in self.daemon.stream(map(segment_at_rest, range(3)))
         ]
         self.assertEqual(verdicts, [stored] * 3)
+        (rig,) = self.daemon.activity().rigs
+        self.assertEqual((rig.name, rig.traffic.stored), ("rigs/tablet", 3))
         frame = history.segment_frame(self.daemon, "tablet")
         self.assertEqual(
             list(frame.segment), ["rest~0", "rest~1", "rest~2"]

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "selfcal/v1/activity_service.pb.h"
 #include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/rig.pb.h"
@@ -22,7 +23,7 @@ namespace selfcal::server {
 
 using google::protobuf::MethodDescriptor;
 
-// Those of the five services; a test compares these with the services that the
+// Those of the six services; a test compares these with the services that the
 // server offers.
 inline std::vector<const google::protobuf::ServiceDescriptor*> Services() {
   std::vector<const google::protobuf::ServiceDescriptor*> services;
@@ -30,7 +31,8 @@ inline std::vector<const google::protobuf::ServiceDescriptor*> Services() {
                            v1::GetSegmentRequest::descriptor()->file(),
                            v1::GetCalibrationRequest::descriptor()->file(),
                            v1::GetRecalibrationRequest::descriptor()->file(),
-                           v1::ListEventsRequest::descriptor()->file()}) {
+                           v1::ListEventsRequest::descriptor()->file(),
+                           v1::ListActivityRequest::descriptor()->file()}) {
     for (int s = 0; s < file->service_count(); ++s) {
       services.push_back(file->service(s));
     }

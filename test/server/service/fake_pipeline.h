@@ -43,6 +43,9 @@ class FakePipeline final : public Pipeline {
                         {}};
   }
 
+  // Of every run, when a watch of it begins.
+  CalibrateProgress progress;
+
   // Replaces BeginSubmit: whoever takes `done` answers when it likes.
   std::function<void(const MotionSegment&, const SubmitDone& done)> begin_hook;
 
@@ -97,7 +100,7 @@ class FakePipeline final : public Pipeline {
     const std::lock_guard lock(mutex_);
     const auto stored = store_->GetRun(rig, run);
     if (!stored.ok()) return stored.status();
-    callback({*stored, {}});
+    callback({*stored, progress});
     return Subscribe(&run_watchers_, std::move(callback));
   }
 

@@ -1,0 +1,105 @@
+// top: what the daemon does right now, by rig.
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <optional>
+
+#include "client/cli/commands.h"
+#include "client/cli/screen.h"
+#include "client/cli/top_view.h"
+#include "selfcal/v1/activity_service.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Service = v1::ActivityService::StubInterface;
+
+constexpr int kMostRigs = 1000;  // of a page
+
+struct Options {
+  double interval_s = 2;
+  bool once = false;
+  int rigs = 50;
+};
+
+// The rigs that sent last: the daemon reads no more than these.
+grpc::Status Ask(Context* context,
+                 int rigs,
+                 v1::ListActivityResponse* activity) {
+  const auto stub = v1::ActivityService::NewStub(context->Channel());
+  v1::ListActivityRequest request;
+  request.set_page_size(rigs);
+  const grpc::Status status =
+      Call<Service>(stub.get(), &Service::ListActivity, request, activity);
+  // How a daemon answers that is about to end.
+  if (status.error_code() == grpc::StatusCode::CANCELLED) {
+    return grpc::Status(grpc::StatusCode::UNAVAILABLE, "it has stopped");
+  }
+  return status;
+}
+
+int Snapshot(Context* context, const Options& options) {
+  v1::ListActivityResponse activity;
+  const grpc::Status status = Ask(context, options.rigs, &activity);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(activity);
+  } else {
+    context->Print(ActivityTable(activity, context->terminal));
+  }
+  return kDone;
+}
+
+// Draws until it is told to end, or the daemon does not answer.
+grpc::Status Draw(Context* context, const Options& options, Screen* screen) {
+  const std::chrono::milliseconds interval(
+      static_cast<std::int64_t>(1000 * options.interval_s));
+  do {
+    const Screen::Size size = screen->size();
+    v1::ListActivityResponse activity;
+    const grpc::Status status =
+        Ask(context, std::min(RigsOnScreen(size.rows), kMostRigs), &activity);
+    if (!status.ok()) return status;
+    if (!screen->Show(ActivityScreen(activity, size.columns, size.rows))) {
+      break;
+    }
+  } while (screen->Wait(interval));
+  return grpc::Status::OK;
+}
+
+int Top(Context* context, const Options& options) {
+  if (options.once || context->json || !context->terminal) {
+    return Snapshot(context, options);
+  }
+  grpc::Status status;
+  {
+    Screen screen;
+    status = Draw(context, options, &screen);
+  }
+  return status.ok() ? kDone : Fail(*context, status);
+}
+
+}  // namespace
+
+void AddTopCommand(CLI::App* app, Context* context) {
+  CLI::App* top = app->add_subcommand(
+      "top",
+      "Show what goes on right now: rigs that sent last, streams, tables and "
+      "runs. On a terminal until Ctrl-C, into a pipe once");
+  const auto options = std::make_shared<Options>();
+  top->add_option("--interval", options->interval_s, "Seconds between drawings")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  top->add_flag(
+      "--once", options->once, "On a terminal, too, once and no more");
+  top->add_option("--rigs",
+                  options->rigs,
+                  "Once: so many rigs at most, those that sent last")
+      ->check(CLI::Range(1, kMostRigs))
+      ->capture_default_str();
+  top->callback([context, options] {
+    context->command = [context, options] { return Top(context, *options); };
+  });
+}
+
+}  // namespace selfcal::client
