@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "server/store/records.pb.h"
 #include "server/store/checksum.h"
 #include "server/store/record_parts.h"
+#include "server/store/records.pb.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {

@@ -12,7 +12,8 @@
 
 namespace selfcal::server {
 
-enum class SegmentState;
+// kUnusable: its data is damaged or cannot be scored; its problem says why.
+enum class SegmentState { kStored, kScored, kUnusable };
 
 struct SessionSummary {
   std::string session;
@@ -32,7 +33,7 @@ struct PathPoint {
 // A piece of the way of a session.
 struct SessionSegment {
   SegmentKey key;
-  SegmentState state{};
+  SegmentState state = SegmentState::kStored;
   bool has_data = false;
   std::int64_t start_ns = 0;  // clock of the session
   std::int64_t end_ns = 0;

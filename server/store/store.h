@@ -28,8 +28,10 @@
 #include "core/model/rig.h"
 #include "core/model/segment.h"
 #include "core/selection/tables.h"
+#include "server/store/rig_query.h"
 #include "server/store/segment_query.h"
 #include "server/store/session.h"
+#include "server/store/stored_event.h"
 
 namespace selfcal::server {
 
@@ -62,9 +64,6 @@ struct StoredRig {
   std::int64_t create_time_ns = 0;  // since the Unix epoch
   RigPolicy policy = {};
 };
-
-// kUnusable: its data is damaged or cannot be scored; `problem` says why.
-enum class SegmentState { kStored, kScored, kUnusable };
 
 struct StoredSegment {
   std::string rig;
@@ -203,28 +202,6 @@ struct ScoreCommit {
   std::optional<StoredChange> change;    // was detected
 };
 
-// One line of the log of what happened to a rig.
-enum class EventKind {
-  kRigCreated,
-  kRunStarted,
-  kRunEnded,
-  kCalibrationPublished,
-  kCalibrationRejected,
-  kSegmentUnusable,
-  kChangeDetected,
-  kDataEvicted,            // a quota was reached
-  kCalibrationActivated,   // by hand
-  kCalibrationRolledBack,  // by hand
-  kRunHeldBack,
-};
-struct StoredEvent {
-  std::int64_t event = 0;  // counts from 1
-  std::int64_t time_ns = 0;
-  std::string rig;
-  EventKind kind = EventKind::kRigCreated;
-  std::string detail;
-};
-
 // A rig in a list of many.
 struct RigSummary {
   std::string rig;
@@ -238,13 +215,6 @@ struct RigSummary {
   std::int64_t newest_run = 0;  // 0: none so far, as the change
   RunState run_state = RunState::kPending;
   std::int64_t newest_change_ns = 0;  // of the device
-};
-
-// Which rigs, and in which order.
-struct RigQuery {
-  std::string text;  // that the name contains; empty: every rig
-  enum class Order { kName, kLastSeen } order = Order::kName;
-  bool descending = false;
 };
 
 class StoreMaintenance;  // maintenance.h
@@ -294,8 +264,7 @@ class Store {
   // Sessions of a rig by name.
   virtual absl::StatusOr<Listed<SessionSummary>> ListSessions(
       const std::string& rig, const Page& page) = 0;
-  // Segments of one session in the order of their index. NOT_FOUND for a
-  // session of which nothing is kept.
+  // Of one session by index. NOT_FOUND if nothing is kept of it.
   virtual absl::StatusOr<Listed<SessionSegment>> ListSessionSegments(
       const std::string& rig, const std::string& session, const Page& page) = 0;
   virtual absl::StatusOr<SessionSummary> GetSession(

@@ -1,0 +1,14 @@
+// Which rigs a list shows, and in which order.
+#pragma once
+
+#include <string>
+
+namespace selfcal::server {
+
+struct RigQuery {
+  std::string text;  // that the name contains; empty: every rig
+  enum class Order { kName, kLastSeen } order = Order::kName;
+  bool descending = false;
+};
+
+}  // namespace selfcal::server
