@@ -3,8 +3,10 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <sched.h>
 #include <signal.h>
 #include <spawn.h>
+#include <spdlog/spdlog.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -13,10 +15,12 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "server/worker/channel.h"
@@ -105,25 +109,55 @@ class Process {
       throw SystemError("cannot start the solver");
     }
   }
+  // Does not wait for it where others keep the machine busy: it has to be
+  // scheduled to die, and at idle priority that may take many seconds.
   ~Process() {
-    if (pid_ > 0) {
-      kill(pid_, SIGKILL);
-      Wait();
-    }
+    if (pid_ <= 0) return;
+    kill(pid_, SIGKILL);
+    const sched_param parameters{};
+    sched_setscheduler(pid_, SCHED_OTHER, &parameters);  // who may, hastens it
+    if (!EndsWithin(kPatience)) WaitAside(pid_);
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
   // As waitpid().
   int Wait() {
-    int status = 0;
-    while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
-    }
+    const int status = WaitFor(pid_);
     pid_ = 0;
     return status;
   }
 
  private:
+  static constexpr std::chrono::milliseconds kPatience{200};
+
+  static int WaitFor(pid_t pid) {
+    int status = 0;
+    while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+    }
+    return status;
+  }
+
+  // It holds nothing that anyone waits for; without a thread it remains a
+  // zombie until the daemon ends.
+  static void WaitAside(pid_t pid) {
+    try {
+      std::thread([pid] { WaitFor(pid); }).detach();
+    } catch (const std::system_error& error) {
+      spdlog::warn("a solver that was ended is not waited for: {}",
+                   error.what());
+    }
+  }
+
+  bool EndsWithin(std::chrono::milliseconds time) const {
+    constexpr std::chrono::milliseconds kStep{2};
+    for (; time.count() > 0; time -= kStep) {
+      if (waitpid(pid_, nullptr, WNOHANG) != 0) return true;
+      std::this_thread::sleep_for(kStep);
+    }
+    return false;
+  }
+
   pid_t pid_ = 0;
 };
 

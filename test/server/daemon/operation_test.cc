@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -208,8 +209,14 @@ TEST_F(OperationTest, StopUnderLoadLosesNothing) {
     }
     const auto start = steady_clock::now();
     daemon->Signal(SIGTERM);
-    promise.lost += daemon->Wait() != 0 ||
-                    steady_clock::now() - start > std::chrono::seconds(10);
+    const std::optional<int> code = daemon->Wait();
+    const std::chrono::duration<double> taken = steady_clock::now() - start;
+    const bool kept = code == 0 && taken < std::chrono::seconds(10);
+    EXPECT_TRUE(kept) << "trial " << trial << ": exit code "
+                      << code.value_or(-1) << " after " << taken.count()
+                      << " s\n"
+                      << daemon->Log();
+    promise.lost += kept ? 0 : 1;
     for (std::thread& client : clients) client.join();
   }
   const auto daemon = StartAndWait();
@@ -228,6 +235,7 @@ TEST_F(OperationTest, StopUnderLoadLosesNothing) {
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());
   for (const std::string& name : acknowledged) {
+    EXPECT_EQ(found.count(name), 1u) << name << " was acknowledged";
     promise.lost += found.count(name) == 0;
   }
   EXPECT_GE(acknowledged.size(), 2u * kClients * trials);
