@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <string_view>
 
 #include "server/store/statement.h"
@@ -19,9 +20,9 @@ struct Bomb {
   int after_commit = 0;
   int iteration = 0;
 };
-Bomb bomb;      // of the child
-int commits;    // counted by the child, all threads of the store under a lock
-int committed;  // likewise
+Bomb bomb;  // of the child, as what it counts over all threads of the store
+std::atomic<int> commits;
+std::atomic<int> committed;
 
 int BeforeCommit(void*) {
   if (++commits == bomb.before_commit) raise(SIGKILL);
