@@ -3,10 +3,14 @@
 #include <microhttpd.h>
 #include <poll.h>
 #include <spdlog/spdlog.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <chrono>
+#include <condition_variable>
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
@@ -14,6 +18,7 @@
 #include <list>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "server/console/address.h"
@@ -37,6 +42,8 @@ constexpr std::size_t kStreamBlock = 16 << 10;
 constexpr std::chrono::milliseconds kHeartbeat{5000};
 // A reader that has gone is noticed so soon, and makes room for the next.
 constexpr std::chrono::milliseconds kLookForReader{100};
+// A stop waits so long for requests that are being answered.
+constexpr std::chrono::seconds kDrain{5};
 
 // libmicrohttpd keeps a pointer to it while a request is received and answered.
 struct Exchange {
@@ -81,6 +88,12 @@ MHD_Result AddHeader(void* to,
   return MHD_YES;
 }
 
+MHD_socket SocketOf(MHD_Connection* connection) {
+  const MHD_ConnectionInfo* info =
+      MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  return info == nullptr ? MHD_INVALID_SOCKET : info->connect_fd;
+}
+
 // Writing would not tell: the first write after a reader has gone succeeds.
 bool HasGone(MHD_socket reader) {
   pollfd state{reader, POLLRDHUP, 0};
@@ -123,9 +136,7 @@ MHD_Result Send(MHD_Connection* connection, HttpResponse answer) {
     sending->waiting = std::move(answer.body);
     sending->stream = std::move(answer.stream);
     sending->keep = std::move(answer.keep);
-    const MHD_ConnectionInfo* info =
-        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-    if (info != nullptr) sending->reader = info->connect_fd;
+    sending->reader = SocketOf(connection);
     response = MHD_create_response_from_callback(
         MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream, sending.get(), EndStream);
     if (response != nullptr) static_cast<void>(sending.release());
@@ -155,14 +166,10 @@ class MicroServer final : public HttpServer {
 
   ~MicroServer() override {
     if (daemon_ == nullptr) return;
-    {
-      const std::lock_guard lock(mutex_);
-      stopping_ = true;
-      for (const auto& weak : streams_) {
-        if (const auto stream = weak.lock()) stream->Close();
-      }
-    }
+    const MHD_socket listening = MHD_quiesce_daemon(daemon_);
+    EndConnections();
     MHD_stop_daemon(daemon_);
+    if (listening != MHD_INVALID_SOCKET) close(listening);
   }
 
   absl::Status Start(const SocketAddress& address, const TlsOptions& tls) {
@@ -182,8 +189,8 @@ class MicroServer final : public HttpServer {
     more.push_back({MHD_OPTION_END, 0, nullptr});
     daemon_ = MHD_start_daemon(flags,
                                0,
-                               nullptr,
-                               nullptr,
+                               &MicroServer::Accept,
+                               this,
                                &MicroServer::Access,
                                this,
                                MHD_OPTION_EXTERNAL_LOGGER,
@@ -202,6 +209,9 @@ class MicroServer final : public HttpServer {
                                MHD_OPTION_NOTIFY_COMPLETED,
                                &MicroServer::Completed,
                                nullptr,
+                               MHD_OPTION_NOTIFY_CONNECTION,
+                               &MicroServer::Connected,
+                               this,
                                MHD_OPTION_ARRAY,
                                more.data(),
                                MHD_OPTION_END);
@@ -220,6 +230,18 @@ class MicroServer final : public HttpServer {
   const std::string& url() const override { return url_; }
 
  private:
+  static MHD_Result Accept(void* self, const sockaddr*, socklen_t) {
+    return static_cast<MicroServer*>(self)->Announce() ? MHD_YES : MHD_NO;
+  }
+
+  static void Connected(void* self,
+                        MHD_Connection* connection,
+                        void**,
+                        MHD_ConnectionNotificationCode code) {
+    static_cast<MicroServer*>(self)->Count(
+        SocketOf(connection), code == MHD_CONNECTION_NOTIFY_STARTED);
+  }
+
   static MHD_Result Access(void* self,
                            MHD_Connection* connection,
                            const char* path,
@@ -297,6 +319,41 @@ class MicroServer final : public HttpServer {
     return CallerOf(static_cast<gnutls_session_t>(info->tls_session));
   }
 
+  // Whether one more connection may come; Count() says when it is there.
+  bool Announce() {
+    const std::lock_guard lock(mutex_);
+    announced_ = !stopping_;
+    return announced_;
+  }
+
+  void Count(MHD_socket connection, bool started) {
+    const std::lock_guard lock(mutex_);
+    if (started) {
+      announced_ = false;
+      connections_.insert(connection);
+    } else {
+      connections_.erase(connection);
+      disconnected_.notify_all();
+    }
+  }
+
+  // libmicrohttpd 0.9.75 takes no answer any more once it has been told to
+  // stop, not even its own to a malformed request, which it then follows
+  // through a null pointer. So it is told when no connection is left.
+  void EndConnections() {
+    std::unique_lock lock(mutex_);
+    stopping_ = true;
+    for (const auto& weak : streams_) {
+      if (const auto stream = weak.lock()) stream->Close();
+    }
+    const auto deadline = std::chrono::steady_clock::now() + kDrain;
+    while ((announced_ || !connections_.empty()) &&
+           std::chrono::steady_clock::now() < deadline) {
+      for (const MHD_socket socket : connections_) shutdown(socket, SHUT_RDWR);
+      disconnected_.wait_for(lock, std::chrono::milliseconds(20));
+    }
+  }
+
   // Whether one more stream may run.
   bool Admit(const std::shared_ptr<Outbox>& stream) {
     const std::lock_guard lock(mutex_);
@@ -310,8 +367,11 @@ class MicroServer final : public HttpServer {
   const Role local_role_;
   const bool loopback_;
   std::string url_;
-  std::mutex mutex_;  // guards the two below
+  std::mutex mutex_;  // guards the five below
   std::list<std::weak_ptr<Outbox>> streams_;
+  std::set<MHD_socket> connections_;
+  std::condition_variable disconnected_;
+  bool announced_ = false;  // a connection that is not among them yet
   bool stopping_ = false;
   MHD_Daemon* daemon_ = nullptr;
 };

@@ -1,6 +1,7 @@
 // What comes from the network ends no more than its own connection.
 #include <random>
 
+#include "test/promise.h"
 #include "test/server/console/console_test.h"
 
 namespace selfcal::server {
@@ -9,6 +10,11 @@ namespace {
 class HostileTest : public ConsoleTest {
  protected:
   void ExpectServing() { EXPECT_EQ(Get("/api/v1/rigs").status, 200); }
+  // Connections that were dropped are counted until the console has seen it.
+  void ExpectServingOnceTheyAreGone() {
+    for (int i = 0; i < 500 && Get("/").status != 200; ++i) usleep(10'000);
+    ExpectServing();
+  }
 };
 
 TEST_F(HostileTest, RequestsThatAreNone) {
@@ -49,7 +55,22 @@ TEST_F(HostileTest, NoiseIsSurvived) {
     Wire wire(port());
     wire.Send(bytes);
   }
-  ExpectServing();
+  ExpectServingOnceTheyAreGone();
+}
+
+// A promise: a stop while malformed requests come ends no more than the
+// console.
+TEST_F(HostileTest, MalformedRequestsDuringAStopAreSurvived) {
+  Promise promise("malformed requests during a stop end nothing");
+  for (int trials = Trials(200); promise.trials < trials; ++promise.trials) {
+    std::vector<std::unique_ptr<Wire>> wires;
+    for (int i = 0; i <= promise.trials % 40; ++i) {
+      wires.push_back(std::make_unique<Wire>(port()));
+      wires.back()->Send("GET / HTTP/1.1\r\n\r\n");  // names no host
+    }
+    Open(Role::kRead);
+    promise.lost += Get("/api/v1/rigs").status != 200;
+  }
 }
 
 TEST_F(HostileTest, TooMuchIsRefused) {
@@ -88,8 +109,7 @@ TEST_F(HostileTest, ConnectionsBeyondTheLimitDoNotHoldUpTheFirst) {
     held[0]->Send(" localhost\r\nConnection: close\r\n\r\n");
     EXPECT_NE(held[0]->ReadUntil("").find("200 OK"), std::string::npos);
   }
-  for (int i = 0; i < 500 && Get("/").status != 200; ++i) usleep(10'000);
-  ExpectServing();
+  ExpectServingOnceTheyAreGone();
 }
 
 }  // namespace
