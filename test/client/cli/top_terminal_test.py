@@ -6,6 +6,7 @@
 import fcntl
 import json
 import os
+import pathlib
 import pty
 import re
 import select
@@ -19,37 +20,12 @@ import time
 import unittest
 
 SELFCAL, SELFCALD = sys.argv[1:3]
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
+
+from device import RIG  # noqa: E402
+from running_daemon import RunningDaemon  # noqa: E402
+
 ENTER, LEAVE, HOME = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l", "\x1b[H"
-RIG = {
-    "factory": {
-        "imu": {
-            "s_g": {"x": 1, "y": 1, "z": 1},
-            "m_g": {},
-            "s_a": {"x": 1, "y": 1, "z": 1},
-            "m_a": {},
-            "q_ai": {"w": 1},
-        },
-        "cameras": [
-            {
-                "q_ci": {"w": 1},
-                "p_ci": {"x": 0.01},
-                "f": {"x": 260, "y": 260},
-                "c": {"x": 320, "y": 240},
-                "distortion_model": "DISTORTION_MODEL_FOV",
-                "distortion": [0.92],
-                "width_px": 640,
-                "height_px": 480,
-            }
-        ],
-    },
-    "imu_noise": {
-        "gyro_noise_density": 1.7e-4,
-        "accel_noise_density": 2e-3,
-        "gyro_bias_random_walk": 2e-5,
-        "accel_bias_random_walk": 3e-3,
-    },
-    "pixel_sigma_px": 0.8,
-}
 
 
 class Terminal:
@@ -95,17 +71,9 @@ class TopTest(unittest.TestCase):
     def setUp(self) -> None:
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        self.target = f"unix:{folder.name}/state/selfcald.sock"
-        self.daemon = subprocess.Popen(
-            [SELFCALD, "--state-dir", f"{folder.name}/state"],
-            stderr=subprocess.DEVNULL,
-        )
-        self.addCleanup(self.daemon.wait)
-        self.addCleanup(self.daemon.terminate)
-        for _ in range(200):
-            if self.selfcal("rig", "list").returncode == 0:
-                break
-            time.sleep(0.1)
+        self.running = RunningDaemon(SELFCALD, f"{folder.name}/state")
+        self.addCleanup(self.running.stop)
+        self.target = self.running.target
         for i in range(12):
             path = f"{folder.name}/rig.json"
             with open(path, "w", encoding="utf-8") as file:
@@ -155,8 +123,7 @@ class TopTest(unittest.TestCase):
     def test_leaves_the_terminal_as_it_was_when_the_daemon_goes(self) -> None:
         top = self.top("--interval", "0.1")
         top.read_until(lambda text: "\x1b[J" in text)
-        self.daemon.terminate()
-        self.daemon.wait()
+        self.running.stop()
         top.read_until(lambda text: "selfcal: " in text.split(LEAVE)[-1])
         self.assertEqual(top.text.count(LEAVE), 1)
         self.assertEqual(top.wait(), 3, top.text.split(LEAVE)[-1])

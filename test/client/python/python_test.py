@@ -5,53 +5,28 @@
 
 import math
 import os
+import pathlib
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 PACKAGE, EXAMPLE, SELFCALD = sys.argv[1:4]
-sys.path[:0] = [PACKAGE, os.path.dirname(EXAMPLE)]
+sys.path[:0] = [
+    PACKAGE,
+    os.path.dirname(EXAMPLE),
+    str(pathlib.Path(__file__).parents[1]),
+]
 
 import grpc  # noqa: E402
 
 import history  # noqa: E402
 import selfcal  # noqa: E402
+from device import RIG  # noqa: E402
 from google.protobuf import json_format  # noqa: E402
+from running_daemon import RunningDaemon  # noqa: E402
 from selfcal.v1 import rig_pb2, segment_pb2  # noqa: E402
 
-RIG = {
-    "name": "rigs/tablet",
-    "factory": {
-        "imu": {
-            "s_g": {"x": 1, "y": 1, "z": 1},
-            "m_g": {},
-            "s_a": {"x": 1, "y": 1, "z": 1},
-            "m_a": {},
-            "q_ai": {"w": 1},
-        },
-        "cameras": [
-            {
-                "q_ci": {"w": 1},
-                "p_ci": {"x": 0.01},
-                "f": {"x": 260, "y": 260},
-                "c": {"x": 320, "y": 240},
-                "distortion_model": "DISTORTION_MODEL_FOV",
-                "distortion": [0.92],
-                "width_px": 640,
-                "height_px": 480,
-            }
-        ],
-    },
-    "imu_noise": {
-        "gyro_noise_density": 1.7e-4,
-        "accel_noise_density": 2e-3,
-        "gyro_bias_random_walk": 2e-5,
-        "accel_bias_random_walk": 3e-3,
-    },
-    "pixel_sigma_px": 0.8,
-}
 KEYFRAMES = 12
 
 
@@ -81,25 +56,17 @@ class PythonTest(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = folder.name
-        socket = f"{self.folder}/state/selfcald.sock"
-        log = open(f"{self.folder}/log", "w", encoding="utf-8")
-        self.addCleanup(log.close)
-        process = subprocess.Popen(
-            [SELFCALD, "--state-dir", f"{self.folder}/state"], stderr=log
-        )
-        self.addCleanup(process.wait)
-        self.addCleanup(process.terminate)
-        while not os.path.exists(socket):
-            self.assertIsNone(process.poll(), "the daemon ended")
-            time.sleep(0.05)
-        self.target = f"unix:{socket}"
+        running = RunningDaemon(SELFCALD, f"{self.folder}/state")
+        self.addCleanup(running.stop)
+        self.target = running.target
         self.daemon = selfcal.connect(self.target)
         self.addCleanup(self.daemon.close)
         self.daemon.rig_service.CreateRig(
             rig_pb2.CreateRigRequest(
-                rig=json_format.ParseDict(RIG, rig_pb2.Rig())
-            ),
-            wait_for_ready=True,
+                rig=json_format.ParseDict(
+                    {"name": "rigs/tablet", **RIG}, rig_pb2.Rig()
+                )
+            )
         )
 
     def test_lists_what_was_streamed(self) -> None:
