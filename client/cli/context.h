@@ -67,7 +67,8 @@ int Fail(const Context& context, const grpc::Status& status);
 // For what this side could not read.
 int FailInput(const absl::Status& status);
 
-// True for what may pass when the daemon comes back.
+// True for what may pass when the daemon comes back. One that is about to end
+// cancels the calls it has.
 bool IsUnreachable(const grpc::Status& status);
 
 // A deadline for calls that answer at once.

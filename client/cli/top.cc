@@ -29,13 +29,7 @@ grpc::Status Ask(Context* context,
   const auto stub = v1::ActivityService::NewStub(context->Channel());
   v1::ListActivityRequest request;
   request.set_page_size(rigs);
-  const grpc::Status status =
-      Call<Service>(stub.get(), &Service::ListActivity, request, activity);
-  // How a daemon answers that is about to end.
-  if (status.error_code() == grpc::StatusCode::CANCELLED) {
-    return grpc::Status(grpc::StatusCode::UNAVAILABLE, "it has stopped");
-  }
-  return status;
+  return Call<Service>(stub.get(), &Service::ListActivity, request, activity);
 }
 
 int Snapshot(Context* context, const Options& options) {

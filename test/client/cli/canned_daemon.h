@@ -48,7 +48,8 @@ struct CannedDaemon final : v1::RigService::Service,
   grpc::Status refusal;                       // of CreateRig
   v1::CompareCalibrationsResponse differences;
   std::vector<v1::AdviseMotionResponse> advice;
-  int max_advice = -1;  // that was asked for
+  int max_advice = -1;    // that was asked for
+  bool stopping = false;  // and so cancels
   std::string last_name;
   std::string last_reason;
   std::vector<v1::MotionSegment> data;  // of the segments, while it is there
@@ -229,6 +230,7 @@ struct CannedDaemon final : v1::RigService::Service,
                             v1::AdviseMotionResponse* response) override {
     last_name = request->parent();
     max_advice = request->max_advice();
+    if (stopping) return grpc::Status::CANCELLED;
     if (advice.empty()) return {grpc::StatusCode::NOT_FOUND, "no such rig"};
     *response = advice.front();
     if (advice.size() > 1) advice.erase(advice.begin());

@@ -102,5 +102,12 @@ TEST_F(Commands, CoachSaysWhatTheDaemonRefuses) {
   }
 }
 
+TEST_F(Commands, CoachWatchSaysThatTheDaemonHasStopped) {
+  daemon_.stopping = true;
+  const Outcome outcome = Selfcal({"coach", "device", "--watch"});
+  EXPECT_EQ(outcome.code, kUnreachable);
+  EXPECT_THAT(outcome.err, HasSubstr("Is selfcald running?"));
+}
+
 }  // namespace
 }  // namespace selfcal::client
