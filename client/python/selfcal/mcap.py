@@ -27,9 +27,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import pathlib
 import sys
 import urllib.parse
-from typing import IO, Iterable, List, Union
+from typing import IO, Dict, Iterable, List, Tuple, Union
+
+import grpc
 
 from selfcal.client import Tls, connect
 from selfcal.v1 import calibration_pb2 as v1
@@ -106,9 +109,12 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main() -> int:
-    flags = _parser().parse_args()
-    os.makedirs(flags.folder, exist_ok=True)
+_Sessions = Dict[str, List[segment_pb2.MotionSegment]]
+
+
+def _fetch(
+    flags: argparse.Namespace,
+) -> Tuple[v1.CalibrationParameters, _Sessions]:
     tls = Tls(flags.ca, flags.cert, flags.key) if flags.ca else None
     with connect(flags.target, tls) as daemon:
         calibration = daemon.calibration(flags.rig, flags.version).parameters
@@ -117,10 +123,21 @@ def main() -> int:
             for segment in daemon.segments(flags.rig)
             if segment.has_data
         ]
-        sessions: dict = {}
+        sessions: _Sessions = {}
         for name in names:
             data = daemon.segment_data(flags.rig, name)
             sessions.setdefault(data.session, []).append(data)
+    return calibration, sessions
+
+
+def main() -> int:
+    flags = _parser().parse_args()
+    os.makedirs(flags.folder, exist_ok=True)
+    try:
+        calibration, sessions = _fetch(flags)
+    except grpc.RpcError as error:
+        print(f"{flags.target}: {error.details()}", file=sys.stderr)
+        return 3 if error.code() == grpc.StatusCode.UNAVAILABLE else 1
     for session, segments in sorted(sessions.items()):
         name = urllib.parse.quote(session, safe="") + ".mcap"
         path = os.path.join(flags.folder, name)
@@ -128,7 +145,14 @@ def main() -> int:
             print(f"{path} is there already; --force", file=sys.stderr)
             return 2
         segments.sort(key=lambda segment: segment.index)
-        for line in write(path, segments, calibration):
+        try:
+            lost = write(f"{path}.new", segments, calibration)
+            os.replace(f"{path}.new", path)
+        except (OSError, ValueError) as error:
+            pathlib.Path(f"{path}.new").unlink(missing_ok=True)
+            print(f"{path} is not written: {error}", file=sys.stderr)
+            return 2
+        for line in lost:
             print(f"lost: {line}", file=sys.stderr)
         print(f"{path}\t{len(segments)} segments")
     return 0

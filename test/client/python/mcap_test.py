@@ -6,20 +6,22 @@ schemas that stand in the file.
 
 import io
 import os
+import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 PACKAGE, EXTRA, SELFCALD, DEMO = sys.argv[1:5]
-sys.path[:0] = [PACKAGE, EXTRA]
+sys.path[:0] = [PACKAGE, EXTRA, str(pathlib.Path(__file__).parents[1])]
 
 import numpy as np  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
 from mcap_protobuf.decoder import DecoderFactory  # noqa: E402
 
 import selfcal  # noqa: E402
+from running_daemon import RunningDaemon  # noqa: E402
 from selfcal import apply, mcap  # noqa: E402
 from selfcal.v1 import calibration_pb2 as v1  # noqa: E402
 from selfcal.v1 import segment_pb2  # noqa: E402
@@ -50,13 +52,14 @@ def matrix(q) -> np.ndarray:
     return np.eye(3) + 2 * (q.w * x + x @ x)
 
 
-def run(arguments: list) -> subprocess.CompletedProcess:
+def run(arguments: list, **options) -> subprocess.CompletedProcess:
     return subprocess.run(
         [sys.executable, "-m", "selfcal.mcap", *arguments],
         env={**os.environ, "PYTHONPATH": f"{PACKAGE}:{EXTRA}"},
         capture_output=True,
         text=True,
         check=False,
+        **options,
     )
 
 
@@ -73,17 +76,12 @@ class McapTest(unittest.TestCase):
             stdout=subprocess.DEVNULL,
         )
         state = f"{cls.folder}/demo/state"
-        cls.target = f"unix:{state}/selfcald.sock"
-        daemon = subprocess.Popen(
-            [SELFCALD, "--state-dir", state], stderr=subprocess.DEVNULL
-        )
-        cls.addClassCleanup(daemon.wait)
-        cls.addClassCleanup(daemon.terminate)
-        for _ in range(300):
-            if run([cls.target, "simulated", f"{cls.folder}/out"]).returncode:
-                time.sleep(0.1)
-            else:
-                break
+        running = RunningDaemon(SELFCALD, state)
+        cls.addClassCleanup(running.stop)
+        cls.target = running.target
+        done = run([cls.target, "simulated", f"{cls.folder}/out"])
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr)
         with selfcal.connect(cls.target) as connection:
             cls.calibration = connection.calibration("simulated").parameters
             cls.segments = sorted(
@@ -282,6 +280,32 @@ class McapTest(unittest.TestCase):
         self.assertEqual(done.returncode, 2)
         self.assertIn("there already", done.stderr)
         self.assertEqual(run([*arguments, "--force"]).returncode, 0)
+
+    def test_leaves_the_old_file_when_the_disk_is_full(self) -> None:
+        folder = f"{self.folder}/full"
+        self.assertEqual(run([self.target, "simulated", folder]).returncode, 0)
+        before = pathlib.Path(f"{folder}/walk.mcap").read_bytes()
+        done = run(
+            [self.target, "simulated", folder, "--force"],
+            preexec_fn=lambda: resource.setrlimit(
+                resource.RLIMIT_FSIZE, (4096, 4096)
+            ),
+        )
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("walk.mcap is not written", done.stderr)
+        self.assertEqual(os.listdir(folder), ["walk.mcap"])
+        after = pathlib.Path(f"{folder}/walk.mcap").read_bytes()
+        self.assertEqual(after, before)
+
+    def test_says_what_the_daemon_does_not_have(self) -> None:
+        done = run([self.target, "unknown", f"{self.folder}/none"])
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("rig unknown does not exist", done.stderr)
+        self.assertEqual(len(done.stderr.splitlines()), 1)
+        gone = f"unix:{self.folder}/gone.sock"
+        done = run([gone, "simulated", f"{self.folder}/none"])
+        self.assertEqual(done.returncode, 3)
+        self.assertEqual(len(done.stderr.splitlines()), 1)
 
     def test_says_which_extra_is_missing(self) -> None:
         done = subprocess.run(
