@@ -45,11 +45,10 @@ constexpr double kWeakInformation = 100;
 constexpr char kNotDetermined[] =
     "the states of the keyframes are not determined";
 
-// Each round decides, from the present
-// estimate alone, which landmarks and observations to use and how the inertial
-// factors are whitened, then solves that problem; the rounds end when one no
-// longer moves theta. The end is thus a fixed point that does not remember the
-// way to it.
+// Each round decides, from the present estimate alone, which landmarks and
+// observations to use and how the inertial factors are whitened, then solves
+// that problem; the rounds end when one no longer moves theta. The end is thus
+// a fixed point that does not remember the way to it.
 class Calibrator {
  public:
   Calibrator(const Rig& rig,
