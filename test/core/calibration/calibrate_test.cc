@@ -103,7 +103,9 @@ TEST(Calibrate, OrderOfSegmentsDoesNotMatter) {
   std::reverse(s.segments.begin(), s.segments.end());
   std::swap(s.segments[0], s.segments[2]);
   const CalibrationResult b = Calibrate(s.rig, s.rig.factory, s.segments);
-  EXPECT_EQ(BoxMinus(a.theta, b.theta), Eigen::VectorXd::Zero(27));
+  // Both from a third: where products are fused with sums, the difference of
+  // equal rotations is not zero to the bit.
+  EXPECT_EQ(BoxMinus(a.theta, s.rig.factory), BoxMinus(b.theta, s.rig.factory));
   EXPECT_EQ(a.covariance, b.covariance);
 }
 
