@@ -148,9 +148,9 @@ TEST_F(ApiTest, EventsComeNewestFirst) {
   ASSERT_GE(all.size(), 2u);
   EXPECT_EQ(all[0]["rig"], "rigs/b");
   EXPECT_EQ(all.back()["kind"], "RIG_CREATED");
-  for (const auto& event : Get("/api/v1/rigs/a/events").json()["events"]) {
-    EXPECT_EQ(event["rig"], "rigs/a");
-  }
+  const auto of_one = Get("/api/v1/rigs/a/events").json()["events"];
+  ASSERT_FALSE(of_one.empty());
+  for (const auto& event : of_one) EXPECT_EQ(event["rig"], "rigs/a");
 }
 
 TEST_F(ApiTest, MistakesSayWhatToDo) {
