@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/calibration/noise_factor.h"
+#include "core/calibration/segment_fit.h"
 #include "core/calibration/theta_prior.h"
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
@@ -68,6 +69,7 @@ using ProgressCallback = std::function<bool(const CalibrateProgress&)>;
 enum class CalibrateStatus {
   kConverged,
   kNotConverged,  // max_iterations
+  kStalled,       // no step lowers the cost, yet the estimate is not settled
   kCancelled,
   kFailed,  // the solver could not use the problem; see message
 };
@@ -103,8 +105,14 @@ struct CalibrationResult {
   int observations = 0;  // used
   int observations_dropped = 0;
   // By what the noise that the rig states is off, one of each kind
-  // (noise_factors.h); empty where that cannot be told.
+  // (noise_factors.h); empty where no result was reached, or where they were
+  // not asked for.
   std::vector<NoiseFactor> noise_factors;
+  // One of each segment that was handed over, by key: also of those that the
+  // result does not use. Empty where no result was reached.
+  std::vector<SegmentFit> segment_fits;
+  // Of calibrations on two halves of the segments.
+  AgreementTest halves;
 };
 
 // Calibrates on the segments (valid for the rig, distinct keys, any order),

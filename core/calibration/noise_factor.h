@@ -30,6 +30,11 @@ struct NoiseFactor {
   double log_sigma = 0;  // standard deviation of the logarithm of the factor
   // So many residuals of this kind, whitened, are left to tell by.
   double redundancy = 0;
+  // The calibration was weighted with noise of this many times what the rig
+  // states.
+  double used = 1;
+  // The estimate of the factors converged; else the factor is where it stopped.
+  bool converged = true;
 
   bool determined() const { return log_sigma < kDeterminedLogSigma; }
 };

@@ -53,6 +53,10 @@ struct ResidualStatistics {
   // Root mean square of the whitened inertial residuals, by kind:
   // (rotation, velocity, position, b_a, b_g).
   std::vector<double> inertial_rms;
+  // Root of what the squares of all whitened residuals keep at the linear
+  // minimum over states, landmarks and theta, over their expectation: 1 where
+  // motion, noise and model are as stated. 0: not measured.
+  double fit = 0;
   // More than 20 % of the observations were left out.
   bool many_outliers = false;
 };

@@ -31,6 +31,8 @@ std::string StatusName(CalibrateStatus status) {
       return "converged";
     case CalibrateStatus::kNotConverged:
       return "not converged";
+    case CalibrateStatus::kStalled:
+      return "stalled";
     case CalibrateStatus::kCancelled:
       return "cancelled";
     case CalibrateStatus::kFailed:

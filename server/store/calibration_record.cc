@@ -15,6 +15,8 @@ SolverRecord::Status ToRecord(CalibrateStatus status) {
       return SolverRecord::CONVERGED;
     case CalibrateStatus::kNotConverged:
       return SolverRecord::NOT_CONVERGED;
+    case CalibrateStatus::kStalled:
+      return SolverRecord::STALLED;
     case CalibrateStatus::kCancelled:
       return SolverRecord::CANCELLED;
     case CalibrateStatus::kFailed:
@@ -29,6 +31,8 @@ CalibrateStatus FromRecord(SolverRecord::Status status) {
       return CalibrateStatus::kConverged;
     case SolverRecord::NOT_CONVERGED:
       return CalibrateStatus::kNotConverged;
+    case SolverRecord::STALLED:
+      return CalibrateStatus::kStalled;
     case SolverRecord::CANCELLED:
       return CalibrateStatus::kCancelled;
     default:

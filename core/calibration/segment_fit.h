@@ -1,0 +1,31 @@
+// How well each segment of a calibration agrees with all others, and both
+// halves of the segments with each other. Values.
+#pragma once
+
+#include <string>
+
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+// A chi-square test of two estimates that should agree.
+struct AgreementTest {
+  double statistic = 0;
+  int degrees = 0;         // 0: not tested
+  double probability = 1;  // of a statistic as large or larger by chance
+};
+
+struct SegmentFit {
+  SegmentKey key;
+  // Root mean square of its reprojection residuals, and of its whitened
+  // inertial residuals, each over what is expected of them with the noise that
+  // the calibration used: 1 where the model holds. 0: not measured.
+  double pixel_ratio = 0;
+  double inertial_ratio = 0;
+  // Its own estimate of theta against that of all others.
+  AgreementTest others;
+  // Why the result does not use the segment; empty if it does.
+  std::string excluded;
+};
+
+}  // namespace selfcal
