@@ -10,8 +10,6 @@
 namespace selfcal {
 namespace {
 
-constexpr int kMaxReweightings = 3;
-
 std::string CheckInput(const Rig& rig,
                        const Calibration& theta_start,
                        const std::optional<ThetaPrior>& prior,
@@ -37,38 +35,6 @@ std::string CheckInput(const Rig& rig,
   return "";
 }
 
-// Each time from the start, so that what is held is held there. The factors of
-// the result are of what the rig states.
-CalibrationResult CalibrateReweighted(
-    const Rig& rig,
-    const Calibration& theta_start,
-    const std::vector<const MotionSegment*>& segments,
-    const CalibrateOptions& options,
-    const ProgressCallback& progress) {
-  Rig taken = rig;
-  CalibrationResult result;
-  for (int i = 0;; ++i) {
-    const int iterations = result.iterations;
-    const ProgressCallback counted = [&](CalibrateProgress told) {
-      told.iteration += iterations;
-      told.max_iterations += iterations;
-      return !progress || progress(told);
-    };
-    result = RunCalibration(taken, theta_start, segments, options, counted);
-    result.iterations += iterations;
-    if (i == kMaxReweightings || result.status != CalibrateStatus::kConverged) {
-      break;
-    }
-    std::optional<Rig> next = Reweight(rig, taken, result.noise_factors);
-    if (!next) break;
-    taken = *std::move(next);
-  }
-  for (NoiseFactor& factor : result.noise_factors) {
-    factor.factor *= NoiseOf(factor.kind, taken) / NoiseOf(factor.kind, rig);
-  }
-  return result;
-}
-
 }  // namespace
 
 CalibrationResult Calibrate(const Rig& rig,
@@ -85,9 +51,7 @@ CalibrationResult Calibrate(const Rig& rig,
     result.theta = theta_start;
     return result;
   }
-  return options.reweight_noise
-             ? CalibrateReweighted(rig, theta_start, sorted, options, progress)
-             : RunCalibration(rig, theta_start, sorted, options, progress);
+  return RunCalibration(rig, theta_start, sorted, options, progress);
 }
 
 }  // namespace selfcal

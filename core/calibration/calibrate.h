@@ -42,9 +42,9 @@ struct CalibrateOptions {
   bool correlated_tracks = true;
   // Estimates by which factors the noise of the rig is off (noise_factors.h).
   bool noise_factors = true;
-  // Estimates them, takes the noise of the rig times what they are as far as
-  // the residuals determine it, and calibrates again, until nothing is far off.
-  bool reweight_noise = false;
+  // Weights by the noise of the rig times these factors, as far as the
+  // residuals determine them, instead of by what the rig states.
+  bool reweight_noise = true;
   int merge_landmarks = 15;  // partitions that share more are merged
   SolverKind solver = SolverKind::kStructured;
   int threads = 1;  // of Ceres

@@ -5,6 +5,7 @@
 
 #include "core/calibration/linear_range.h"
 #include "core/calibration/noise_factors.h"
+#include "core/calibration/noise_replica.h"
 #include "core/calibration/partition.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/screening.h"
@@ -42,6 +43,13 @@ constexpr double kLeastTrackNoise = 0.05;
 // where the linearisation no longer holds.
 constexpr double kWeakInformation = 100;
 
+constexpr int kMaxReweightings = 4;
+// Replicas with more noise, from which spurious information is told.
+constexpr int kReplicas = 3;
+constexpr std::uint64_t kReplicaSeed = 1;
+
+constexpr double Square(double x) { return x * x; }
+
 constexpr char kNotDetermined[] =
     "the states of the keyframes are not determined";
 
@@ -56,10 +64,12 @@ class Calibrator {
              const std::vector<const MotionSegment*>& segments,
              const CalibrateOptions& options,
              const ProgressCallback& progress)
-      : rig_(rig),
+      : stated_(rig),
+        rig_(rig),
         options_(options),
         progress_(progress),
         partitioning_(PartitionSegments(segments, options.merge_landmarks)),
+        segments_(segments),
         problem_(FlattenSegments(rig, segments, partitioning_)),
         // A prior is centred where d = 0.
         reference_(options.prior ? options.prior->centre : theta_start),
@@ -73,7 +83,8 @@ class Calibrator {
   }
 
   CalibrationResult Run() {
-    if (Start() && Solve() && WeighTracks() && ReleaseWeak()) {
+    if (Start() && Solve() && WeighNoise() && ReleaseWeak() &&
+        HoldSpurious()) {
       Finish();
     }
     return std::move(result_);
@@ -100,11 +111,51 @@ class Calibrator {
                                                       : SolveByRounds();
   }
 
-  // What the errors have in common along tracks is known only now that they
-  // are small: the minimum moves a little when tracks are weighted by it.
+  // By what the noise is off is known only now that residuals are small: the
+  // minimum moves a little when all is weighted by it, and the noise with it.
+  bool WeighNoise() {
+    for (int i = 0; result_.status == CalibrateStatus::kConverged; ++i) {
+      if (!WeighTracks()) return false;
+      if (result_.status != CalibrateStatus::kConverged ||
+          !options_.noise_factors) {
+        break;
+      }
+      EstimateNoise();
+      if (!options_.reweight_noise || i == kMaxReweightings) break;
+      const std::optional<Rig> next =
+          Reweight(stated_, rig_, result_.noise_factors);
+      if (!next) break;
+      TakeNoise(*next);
+      if (!Renew() || !Solve()) return false;
+    }
+    return true;
+  }
+
+  void EstimateNoise() {
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    // As the factors want them: without the track noise.
+    std::vector<ScreenedLandmark> landmarks = screening_.landmarks;
+    ScaleWeights(Square(screening_.track_noise_factor), &landmarks);
+    result_.noise_factors =
+        EstimateNoiseFactors(Round(basis), estimate_, landmarks, track_noise_);
+  }
+
+  // What the pixel errors of tracks have in common is measured anew with it.
+  void TakeNoise(const Rig& next) {
+    for (BiasLink& link : problem_.bias_links) {
+      link.sigmas.head<3>() *= next.imu_noise.accel_bias_random_walk /
+                               rig_.imu_noise.accel_bias_random_walk;
+      link.sigmas.tail<3>() *= next.imu_noise.gyro_bias_random_walk /
+                               rig_.imu_noise.gyro_bias_random_walk;
+    }
+    rig_ = next;
+    result_.track_noise_factor = 1;
+    SetTrackNoise(1, &screening_);
+  }
+
+  // What the errors have in common along tracks.
   bool WeighTracks() {
-    if (!options_.correlated_tracks ||
-        result_.status != CalibrateStatus::kConverged) {
+    if (!options_.correlated_tracks) {
       return true;
     }
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
@@ -133,7 +184,52 @@ class Calibrator {
     Hold(TrustedSubspace(rig_, range, kWeakInformation));
     weak_were_judged_ = true;
     Screen(&screening_);
-    return Inform(&screening_.loss) ? Solve() : Fail(kNotDetermined);
+    return Inform(&screening_.loss) ? Solve() && WeighNoise()
+                                    : Fail(kNotDetermined);
+  }
+
+  // Holds the directions of which the information is that of noise in states,
+  // until none is left.
+  bool HoldSpurious() {
+    while (result_.status == CalibrateStatus::kConverged &&
+           subspace_.estimated.cols() > 0) {
+      const Eigen::MatrixXd spurious = SpuriousDirections();
+      if (spurious.cols() == 0) break;
+      Eigen::MatrixXd held(spurious.rows(),
+                           subspace_.held.cols() + spurious.cols());
+      held << subspace_.held, spurious;
+      Hold(HoldDirections(rig_, information_.Lambda, held));
+      weak_were_judged_ = true;
+      Screen(&screening_);
+      if (!Inform(&screening_.loss)) return Fail(kNotDetermined);
+      if (!Solve() || !WeighNoise()) return false;
+    }
+    return true;
+  }
+
+  Eigen::MatrixXd SpuriousDirections() {
+    const Eigen::MatrixXd nothing(start_d_.size(), 0);
+    const SolverRound round = Round(nothing);
+    std::vector<Eigen::MatrixXd> under_noise;
+    Eigen::MatrixXd spurious(start_d_.size(), 0);
+    // Most often the first one shows that there is nothing to tell.
+    for (int i = 0; i < kReplicas && (i == 0 || spurious.cols() > 0); ++i) {
+      const auto information =
+          InformationUnderNoise(round,
+                                segments_,
+                                partitioning_,
+                                estimate_,
+                                screening_.landmarks,
+                                result_.track_noise_factor,
+                                kReplicaSeed + i);
+      if (information) under_noise.push_back(*information);
+      spurious = FindSpurious(rig_,
+                              subspace_,
+                              information_.Lambda,
+                              under_noise,
+                              i + 1 < kReplicas ? kMaybeSpurious : kSpurious);
+    }
+    return spurious;
   }
 
   // One step a round.
@@ -404,9 +500,9 @@ class Calibrator {
     SetTrackNoise(1, &screening_);
     result_.final_cost =
         RoundCost(Round(basis), estimate_, screening_.landmarks);
-    if (options_.noise_factors || options_.reweight_noise) {
-      result_.noise_factors = EstimateNoiseFactors(
-          Round(basis), estimate_, screening_.landmarks, track_noise_);
+    for (NoiseFactor& factor : result_.noise_factors) {
+      factor.used = NoiseOf(factor.kind, rig_) / NoiseOf(factor.kind, stated_);
+      factor.factor *= factor.used;
     }
     const ReprojectionStatistics after = Measure();
     result_.reprojection_rms_after_px = after.rms_px;
@@ -417,10 +513,12 @@ class Calibrator {
     result_.observations_dropped = screening_.observations_dropped;
   }
 
-  const Rig& rig_;
+  const Rig& stated_;
+  Rig rig_;  // with the noise that all is weighted by
   const CalibrateOptions& options_;
   const ProgressCallback& progress_;
   Partitioning partitioning_;
+  const std::vector<const MotionSegment*>& segments_;
   CalibrationProblem problem_;
   Calibration reference_;
   Calibration start_;

@@ -58,6 +58,25 @@ Linearised Linearise(const LandmarkScene& scene,
   return sum;
 }
 
+// The least inverse depth of a landmark whose information is H.
+double LeastInverseDepth(const Eigen::Matrix3d& H) {
+  const Eigen::LDLT<Eigen::Matrix3d> ldlt(H);
+  const double variance = ldlt.solve(Eigen::Vector3d::UnitZ().eval())(2);
+  return variance > 0 ? -kMaxBeyondInfinity * std::sqrt(variance)
+                      : -std::numeric_limits<double>::infinity();
+}
+
+// The step of the other two parameters where that of inverse depth is given.
+Eigen::Vector3d StepWithDepth(const Eigen::Matrix3d& H,
+                              const Eigen::Vector3d& g,
+                              double depth_step) {
+  const Eigen::Vector2d rhs =
+      g.head<2>() + H.topRightCorner<2, 1>() * depth_step;
+  Eigen::Vector3d step;
+  step << -H.topLeftCorner<2, 2>().ldlt().solve(rhs), depth_step;
+  return step;
+}
+
 }  // namespace
 
 LandmarkScene::LandmarkScene(const Calibration& theta,
@@ -141,6 +160,13 @@ RefinedPlace RefinePlace(const LandmarkScene& scene,
                          const RefineLimits& limits,
                          LandmarkPlace* place) {
   Linearised here = Linearise(scene, track, used, loss, *place);
+  double least = LeastInverseDepth(here.H);
+  if (limits.steps > 0 && place->inverse_depth.z() < 2 * least) {
+    place->inverse_depth.z() = 0;
+    here = Linearise(scene, track, used, loss, *place);
+    least = LeastInverseDepth(here.H);
+  }
+  bool behind = false;
   double damping = 1e-6;
   // Beyond the loss's scale the cost curves less than Gauss-Newton has it, so
   // that single steps crawl: while they gain more than was predicted, they are
@@ -150,7 +176,13 @@ RefinedPlace RefinePlace(const LandmarkScene& scene,
     Eigen::Matrix3d H = here.H;
     H.diagonal() *= 1 + damping;
     H.diagonal().array() += std::numeric_limits<double>::min();
-    const Eigen::Vector3d step = -H.ldlt().solve(here.g);
+    Eigen::Vector3d step = -H.ldlt().solve(here.g);
+    const double room = least - place->inverse_depth.z();
+    behind = stretch * step.z() < room;
+    if (behind) {
+      stretch = 1;
+      step = StepWithDepth(H, here.g, std::min(room, 0.0));
+    }
     if (!step.allFinite() || -step.dot(here.g) < limits.decrease) {
       break;
     }
@@ -162,13 +194,14 @@ RefinedPlace RefinePlace(const LandmarkScene& scene,
       stretch = here.cost - there.cost > predicted ? 2 * stretch : 1;
       *place = next;
       here = there;
+      least = LeastInverseDepth(here.H);
       damping *= 0.1;
     } else {
       stretch = 1;
       damping = std::max(damping * 100, 1e-3);
     }
   }
-  return {here.H, here.cost};
+  return {here.H, here.cost, behind};
 }
 
 std::vector<UsedObservation> AllOf(const Track& track) {

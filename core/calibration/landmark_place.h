@@ -23,6 +23,13 @@ namespace selfcal {
 // parallax within a round, as that of a device at rest, from running away.
 inline constexpr double kInverseDepthSigma = 10;
 
+// A landmark lies in front of the cameras that see it: its inverse depth is
+// held to more than so many of its own standard deviations below that of
+// infinity. Noise takes one that is far away a little below; a whole scene
+// beyond infinity is the mirror image of the true one, which fits the pixels
+// of a camera that turns about a point as well, with its lever arm reversed.
+inline constexpr double kMaxBeyondInfinity = 2;
+
 // No camera sees a point that is nearer to its centre.
 inline constexpr double kMinDistance_m = 0.01;
 
@@ -110,6 +117,9 @@ struct RefineLimits {
 struct RefinedPlace {
   Eigen::Matrix3d information;  // of (alpha, beta, rho)
   double cost = 0;  // sum of the loss and of the prior on inverse depth
+  // The minimum lies further beyond infinity than is allowed; the place is the
+  // best one that is.
+  bool behind = false;
 };
 
 // What an observation that does not project counts for [sigma]: as one beyond
@@ -117,7 +127,9 @@ struct RefinedPlace {
 inline constexpr double kNotProjectedSigmas = 1e3;
 
 // Minimises the robust reprojection cost of the observations `used`, and the
-// prior on inverse depth, by damped Gauss-Newton.
+// prior on inverse depth, by damped Gauss-Newton, where the landmark is in
+// front of the camera that it is anchored to. From a place behind it, the
+// search starts at infinity.
 RefinedPlace RefinePlace(const LandmarkScene& scene,
                          const Track& track,
                          std::span<const UsedObservation> used,

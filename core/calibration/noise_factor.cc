@@ -10,10 +10,9 @@ namespace {
 constexpr double kMostOff = 30;
 // What is hardly determined is still nearer to the truth, if it is so many
 // standard deviations off.
-constexpr double kOffSigmas = 3;
-// The logarithm of a factor that makes a difference: two standard deviations of
-// one that is just determined.
-constexpr double kLeastChange = 2 * kDeterminedLogSigma;
+constexpr double kOffSigmas = 2;
+// The logarithm of a factor that makes a difference.
+constexpr double kLeastChange = 0.05;
 
 // A reference into a Rig or a const Rig.
 template <typename AnyRig>

@@ -48,9 +48,9 @@ double NoiseOf(NoiseKind kind, const Rig& rig);
 void ScaleNoise(NoiseKind kind, double factor, Rig* rig);
 
 // The rig with the noise that `factors`, found with the noise of `taken`,
-// suggest: those that are determined, or off by more than three of their
+// suggest: those that are determined, or off by more than two of their
 // standard deviations. None is taken for more than 30 times what `stated`
-// states, either way. Nothing where all that is a difference of less than 20 %.
+// states, either way. Nothing where all that is a difference of less than 5 %.
 std::optional<Rig> Reweight(const Rig& stated,
                             const Rig& taken,
                             const std::vector<NoiseFactor>& factors);

@@ -23,7 +23,8 @@ constexpr double kDifference = 0.1;  // of logarithms
 // A step takes a variance by no more than so much, nor below this part of it.
 constexpr double kLongestStep = 1.5;  // of the logarithm of the factor
 constexpr double kLeastPart = 0.1;
-constexpr int kMaxSteps = 15;
+constexpr int kMaxSteps = 25;
+constexpr int kMaxHalvings = 3;
 // Settled when the next step is shorter, in standard deviations.
 constexpr double kSettledSigmas = 0.1;
 constexpr double kSettledSigmasOfGuess = 1;
@@ -154,21 +155,42 @@ bool IsSettled(const NoiseVector& change, const Informed& informed) {
   return true;
 }
 
+struct Maximum {
+  NoiseMatrix fisher;
+  bool converged = false;
+};
+
 // Fisher scoring of the variances, by which the expected squares are linear:
 // the first step comes near from anywhere. The information is then corrected by
-// what each step shows (Broyden). Nothing if it does not settle.
-std::optional<NoiseMatrix> Maximise(Likelihood* likelihood) {
+// what each step shows (Broyden). A step that does not bring the score nearer
+// to zero, in its own standard deviations, is halved. Nothing where the linear
+// system fails.
+std::optional<Maximum> Maximise(Likelihood* likelihood) {
   std::optional<Informed> informed = Inform(*likelihood);
   if (!informed) return std::nullopt;
   NoiseMatrix slope = informed->fisher;
+  const auto size_of = [&](const NoiseVector& score) {
+    return std::sqrt(score.dot(informed->fisher.ldlt().solve(score)));
+  };
   for (int i = 0; i < kMaxSteps; ++i) {
     const NoiseVector score = likelihood->Score();
-    const NoiseVector change = slope.partialPivLu().solve(score);
-    if (IsSettled(change, *informed)) return informed->fisher;
-    const NoiseVector step =
-        (0.5 * (1 + 2 * change.array()).max(kLeastPart).log())
-            .min(kLongestStep);
-    if (!likelihood->MoveTo(likelihood->at() + step)) return std::nullopt;
+    NoiseVector change = slope.partialPivLu().solve(score);
+    if (!change.allFinite() || change.dot(score) <= 0) {
+      slope = informed->fisher;
+      change = slope.ldlt().solve(score);
+    }
+    if (IsSettled(change, *informed)) return Maximum{informed->fisher, true};
+    const NoiseVector from = likelihood->at();
+    NoiseVector step = (0.5 * (1 + 2 * change.array()).max(kLeastPart).log())
+                           .min(kLongestStep);
+    const double before = size_of(score);
+    for (int halving = 0;; ++halving) {
+      if (!likelihood->MoveTo(from + step)) return std::nullopt;
+      if (halving == kMaxHalvings || size_of(likelihood->Score()) < before) {
+        break;
+      }
+      step *= 0.5;
+    }
     if (StillHolds(*informed, *likelihood)) {
       const NoiseVector shown = score - likelihood->Score();
       slope += (shown - slope * step) * step.transpose() / step.squaredNorm();
@@ -178,7 +200,7 @@ std::optional<NoiseMatrix> Maximise(Likelihood* likelihood) {
       slope = informed->fisher;
     }
   }
-  return std::nullopt;
+  return Maximum{informed->fisher, false};
 }
 
 // From the median residual, as if all were alike.
@@ -217,9 +239,9 @@ std::vector<NoiseFactor> EstimateNoiseFactors(
   start[IndexOf(NoiseKind::kPixel)] =
       std::log(GuessPixelFactor(round, estimate, landmarks));
   if (!likelihood.MoveTo(start)) return {};
-  const std::optional<NoiseMatrix> fisher = Maximise(&likelihood);
-  if (!fisher) return {};
-  const NoiseMatrix covariance = fisher->inverse();
+  const std::optional<Maximum> maximum = Maximise(&likelihood);
+  if (!maximum) return {};
+  const NoiseMatrix covariance = maximum->fisher.inverse();
   std::vector<NoiseFactor> factors;
   for (int i = 0; i < kNoiseKinds; ++i) {
     const double redundancy = likelihood.balance().redundancy[i];
@@ -228,7 +250,9 @@ std::vector<NoiseFactor> EstimateNoiseFactors(
     factors.push_back({static_cast<NoiseKind>(i),
                        std::exp(likelihood.at()[i]),
                        std::sqrt(std::max(covariance(i, i), least)),
-                       redundancy});
+                       redundancy,
+                       1,
+                       maximum->converged});
   }
   return factors;
 }

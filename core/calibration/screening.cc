@@ -155,7 +155,7 @@ std::optional<ScreenedLandmark> Judge(const LandmarkScene& scene,
                              track,
                              settled.place,
                              thresholds.loss.gate * scene.pixel_sigma_px());
-  if (!EnoughLeft(selected) || !(weight > 0)) {
+  if (settled.refined.behind || !EnoughLeft(selected) || !(weight > 0)) {
     return std::nullopt;
   }
   return ScreenedLandmark{
@@ -241,11 +241,13 @@ TrackPlaces PlacesBefore(const LandmarkScene& scene,
 
 }  // namespace
 
+void ScaleWeights(double factor, std::vector<ScreenedLandmark>* landmarks) {
+  for (ScreenedLandmark& landmark : *landmarks) landmark.weight *= factor;
+}
+
 void SetTrackNoise(double factor, Screening* screening) {
   const double ratio = screening->track_noise_factor / factor;
-  for (ScreenedLandmark& landmark : screening->landmarks) {
-    landmark.weight *= ratio * ratio;
-  }
+  ScaleWeights(ratio * ratio, &screening->landmarks);
   screening->track_noise_factor = factor;
 }
 

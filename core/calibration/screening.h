@@ -65,6 +65,9 @@ struct Screening {
   double track_noise_factor = 1;
 };
 
+// Multiplies the weights of all landmarks.
+void ScaleWeights(double factor, std::vector<ScreenedLandmark>* landmarks);
+
 // Takes the pixel errors for so many times larger (track_noise.h), instead of
 // what the factor was before.
 void SetTrackNoise(double factor, Screening* screening);

@@ -29,10 +29,17 @@ class DefiniteMatrix {
     return llt_.matrixLLT().diagonal().array().log().sum();
   }
   const Eigen::MatrixXd& Inverse();
+  // x^T A^-1 x.
+  double InverseSquare(const Eigen::VectorXd& x) {
+    whitened_ = x;
+    llt_.matrixL().solveInPlace(whitened_);
+    return whitened_.squaredNorm();
+  }
 
  private:
   Eigen::LLT<Eigen::MatrixXd> llt_;
   Eigen::MatrixXd inverse_, symmetric_;
+  Eigen::VectorXd whitened_;
 };
 
 class GroupScorer {

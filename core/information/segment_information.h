@@ -41,6 +41,14 @@ struct GroupScore {
   std::vector<UnobservedDirection> unobserved;  // size - rank of them
 };
 
+// Real recordings with states as a SLAM system gives them and noise as their
+// makers state it fit to within this factor. Beyond it a segment is not what
+// its factors take it for, and its information counts for less, by the square
+// of the excess.
+inline constexpr double kOrdinaryFit = 2;
+// With fewer rows to spare, a fit is not measured.
+inline constexpr double kLeastFitRedundancy = 50;
+
 struct ResidualStatistics {
   int observations = 0;
   int inliers = 0;          // used in the score
@@ -82,7 +90,8 @@ struct ScoreOptions {
 // Linearises all factors of the segment at its own states and theta0, whitens
 // them, eliminates landmarks and keyframes, and scores every group of the rig.
 // The segment must be valid for the rig. Components that the rig holds fixed
-// have zero rows in Lambda and eta.
+// have zero rows in Lambda and eta. Where the segment fits worse than
+// kOrdinaryFit, both are divided by the square of the excess.
 SegmentInformation ScoreSegment(const Rig& rig,
                                 const Calibration& theta0,
                                 const MotionSegment& segment,

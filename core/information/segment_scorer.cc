@@ -1,9 +1,30 @@
 #include "core/information/segment_scorer.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
 
 namespace selfcal {
 namespace {
+
+// Reprojections: two rows for each, in units of the pixel sigma.
+double PixelSquares(const ResidualStatistics& residuals,
+                    double pixel_sigma_px) {
+  const double rms = residuals.reprojection_rms_px / pixel_sigma_px;
+  return residuals.inliers * rms * rms;
+}
+
+// Rows less unknowns: pixels and inertial links against landmarks, states
+// without the gauge, and what is known of theta.
+double Redundancy(const MotionSegment& segment,
+                  const ResidualStatistics& residuals,
+                  int rank) {
+  constexpr int kGauge = 4;
+  const auto keyframes = static_cast<double>(segment.keyframes.size());
+  return 2.0 * residuals.inliers + kStateTangentSize * (keyframes - 1) -
+         3.0 * residuals.landmarks_used - kStateTangentSize * keyframes +
+         kGauge - rank;
+}
 
 // Information is never negative; what the elimination leaves below zero is
 // rounding.
@@ -18,6 +39,36 @@ Eigen::MatrixXd WithoutNegativePart(const Eigen::MatrixXd& Lambda) {
 }
 
 }  // namespace
+
+// What of all squares is left at the linear minimum, theta within its prior.
+// Returns what the information counts for.
+double SegmentScorer::MeasureFit(const Rig& rig,
+                                 const MotionSegment& segment,
+                                 const SharedInformation& theta,
+                                 SegmentInformation* result) {
+  const std::vector<int>& free = components_.free();
+  const auto size = static_cast<Eigen::Index>(free.size());
+  gradient_.resize(size);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    gradient_(j) = components_.prior()(free[j]) * theta.eta(free[j]);
+  }
+  posterior_ = normalised_;
+  posterior_.diagonal().array() += 1;
+  double squares =
+      PixelSquares(result->residuals, rig.pixel_sigma_px) + theta.constant;
+  if (definite_.Factor(posterior_)) {
+    squares -= definite_.InverseSquare(gradient_);
+  }
+  const double redundancy =
+      Redundancy(segment, result->residuals, result->rank);
+  if (!(redundancy >= kLeastFitRedundancy)) {
+    result->residuals.fit = 0;
+    return 1;
+  }
+  result->residuals.fit = std::sqrt(std::max(0.0, squares / redundancy));
+  const double excess = result->residuals.fit / kOrdinaryFit;
+  return excess > 1 ? 1 / (excess * excess) : 1;
+}
 
 void SegmentScorer::Score(const Rig& rig,
                           const Calibration& theta0,
@@ -60,6 +111,20 @@ void SegmentScorer::Score(const Rig& rig,
   if (!definite_.Factor(normalised_)) {
     normalised_ = WithoutNegativePart(normalised_);
   }
+  group_scorer_.Observe(normalised_,
+                        components_.free_names(),
+                        &result->rank,
+                        &result->unobserved,
+                        &observed_);
+  const double discount = MeasureFit(rig, segment, linearised.theta, result);
+  if (discount < 1) {
+    normalised_ *= discount;
+    group_scorer_.Observe(normalised_,
+                          components_.free_names(),
+                          &result->rank,
+                          &result->unobserved,
+                          &observed_);
+  }
   result->Lambda.setZero(prior.size(), prior.size());
   result->eta.setZero(prior.size());
   for (Eigen::Index j = 0; j < size; ++j) {
@@ -68,13 +133,8 @@ void SegmentScorer::Score(const Rig& rig,
       result->Lambda(free[i], free[j]) =
           normalised_(i, j) / (prior(free[i]) * prior(free[j]));
     }
-    result->eta(free[j]) = linearised.theta.eta(free[j]);
+    result->eta(free[j]) = discount * linearised.theta.eta(free[j]);
   }
-  group_scorer_.Observe(normalised_,
-                        components_.free_names(),
-                        &result->rank,
-                        &result->unobserved,
-                        &observed_);
   group_scorer_.Score(components_, normalised_, &result->groups);
 }
 

@@ -29,6 +29,11 @@ class SegmentScorer {
              SegmentInformation* result);
 
  private:
+  double MeasureFit(const Rig& rig,
+                    const MotionSegment& segment,
+                    const SharedInformation& theta,
+                    SegmentInformation* result);
+
   ObservationOrder order_;
   KeyframeMotions motions_;
   InlierSelector selector_;
@@ -36,7 +41,8 @@ class SegmentScorer {
   RigComponents components_;
   GroupScorer group_scorer_;
   DefiniteMatrix definite_, observed_;
-  Eigen::MatrixXd normalised_;
+  Eigen::MatrixXd normalised_, posterior_;
+  Eigen::VectorXd gradient_;
 };
 
 }  // namespace selfcal

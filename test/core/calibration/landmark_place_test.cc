@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
+
 #include "core/simulation/simulate.h"
 
 namespace selfcal {
@@ -49,6 +53,62 @@ TEST_F(OneView, NothingIsSeenInTheCentreOfACamera) {
 TEST_F(OneView, WhatIsAtInfinityIsSeen) {
   EXPECT_TRUE(Projects({0.1, -0.2, 1, 0}));
   EXPECT_FALSE(Projects({0.1, -0.2, -1, 0}));
+}
+
+// Two views of a point 2 m away, half a metre apart.
+class TwoViews : public ::testing::Test {
+ protected:
+  TwoViews() {
+    rig_.factory.cameras[0].q_CI.setIdentity();
+    rig_.factory.cameras[0].p_CI.setZero();
+    keyframes_[1].p_GI = {0.5, 0, 0};
+  }
+
+  // The track of a point, with the baseline seen in the other direction where
+  // it is mirrored.
+  Track Seen(const Eigen::Vector4d& point_G) const {
+    const LandmarkScene scene(rig_.factory, keyframes_, motions_, 1);
+    Track track;
+    for (int k = 0; k < 2; ++k) {
+      TrackObservation seen{.keyframe = k, .camera = 0, .z_px = {0, 0}};
+      EXPECT_TRUE(scene.Residual(seen, point_G, &seen.z_px, nullptr));
+      track.observations.push_back(seen);
+    }
+    return track;
+  }
+
+  RefinedPlace Refine(const Track& track, const Eigen::Vector4d& from_G) {
+    const LandmarkScene scene(rig_.factory, keyframes_, motions_, 1);
+    place_ = PlaceAt(scene, track, from_G);
+    return RefinePlace(
+        scene, track, AllOf(track), {.kind = LossKind::kNone}, {}, &place_);
+  }
+
+  Rig rig_ = HandheldRig("r");
+  std::vector<KeyframeState> keyframes_ = std::vector<KeyframeState>(2);
+  const KeyframeMotions motions_;
+  LandmarkPlace place_;
+};
+
+TEST_F(TwoViews, APointInFrontIsFound) {
+  const Eigen::Vector4d point(0.1, 0.2, 2, 1);
+  EXPECT_FALSE(Refine(Seen(point), {0.1, 0.2, 5, 1}).behind);
+  EXPECT_TRUE(place_.Homogeneous().hnormalized().isApprox(
+      point.hnormalized(), 1e-3));
+}
+
+// A mirrored point, as a reversed lever arm makes of all, has the same rays
+// and lies beyond infinity.
+TEST_F(TwoViews, AMirroredPointIsHeldNearInfinity) {
+  const Eigen::Vector4d mirrored(0.1, 0.2, 2, -1);
+  const RefinedPlace refined = Refine(Seen(mirrored), {0.1, 0.2, 20, 1});
+  EXPECT_TRUE(refined.behind);
+  const double sigma = std::sqrt(refined.information.inverse()(2, 2));
+  EXPECT_GT(place_.inverse_depth.z(), -2.5 * sigma);
+  EXPECT_GT(refined.cost, 100);
+  // Also from where it would like to be.
+  EXPECT_TRUE(Refine(Seen(mirrored), mirrored).behind);
+  EXPECT_GT(place_.inverse_depth.z(), -2.5 * sigma);
 }
 
 }  // namespace

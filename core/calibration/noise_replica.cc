@@ -1,0 +1,125 @@
+#include "core/calibration/noise_replica.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "core/calibration/linear_range.h"
+
+namespace selfcal {
+namespace {
+
+class NoiseSource {
+ public:
+  explicit NoiseSource(std::uint64_t seed) : engine_(seed) {}
+
+  template <typename Vector>
+  void Add(double sigma, Vector* values) {
+    for (int i = 0; i < values->size(); ++i) {
+      (*values)[i] += sigma * normal_(engine_);
+    }
+  }
+
+ private:
+  std::mt19937_64 engine_;
+  std::normal_distribution<double> normal_;
+};
+
+MotionSegment WithNoise(const MotionSegment& segment,
+                        const Rig& rig,
+                        double pixel_factor,
+                        NoiseSource* noise) {
+  MotionSegment noisy = segment;
+  const std::vector<ImuSample>& imu = segment.imu;
+  for (std::size_t i = 0; i < imu.size(); ++i) {
+    const std::size_t next = std::min(i + 1, imu.size() - 1);
+    const std::size_t last = next > 0 ? next - 1 : 0;
+    const double dt_s =
+        1e-9 * static_cast<double>(imu[next].t_ns - imu[last].t_ns);
+    if (!(dt_s > 0)) continue;
+    const double root = 1 / std::sqrt(dt_s);
+    noise->Add(rig.imu_noise.gyro_noise_density * root, &noisy.imu[i].gyro);
+    noise->Add(rig.imu_noise.accel_noise_density * root, &noisy.imu[i].accel);
+  }
+  for (Observation& seen : noisy.observations) {
+    noise->Add(pixel_factor * rig.pixel_sigma_px, &seen.z_px);
+  }
+  return noisy;
+}
+
+// Of the subspace, in units of the prior.
+Eigen::MatrixXd Reduced(const Rig& rig,
+                        const ThetaSubspace& subspace,
+                        const Eigen::MatrixXd& Lambda) {
+  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
+  return basis.transpose() * Lambda * basis;
+}
+
+}  // namespace
+
+Eigen::MatrixXd FindSpurious(const Rig& rig,
+                             const ThetaSubspace& subspace,
+                             const Eigen::MatrixXd& Lambda,
+                             const std::vector<Eigen::MatrixXd>& under_noise,
+                             double largest_growth) {
+  const Eigen::Index size = subspace.estimated.cols();
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(size, size);
+  for (const Eigen::MatrixXd& one : under_noise) {
+    mean += Reduced(rig, subspace, one) /
+            static_cast<double>(under_noise.size());
+  }
+  Eigen::MatrixXd spurious(subspace.estimated.rows(), 0);
+  if (under_noise.empty()) return spurious;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      Reduced(rig, subspace, Lambda));
+  const Eigen::LLT<Eigen::MatrixXd> noisy(mean);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    const Eigen::VectorXd u = eigen.eigenvectors().col(j);
+    const double grown =
+        1 / (u.dot(noisy.solve(u)) * eigen.eigenvalues()(j)) - 1;
+    if (!(grown > largest_growth)) continue;
+    spurious.conservativeResize(Eigen::NoChange, spurious.cols() + 1);
+    spurious.rightCols<1>() = subspace.estimated * u;
+  }
+  return spurious;
+}
+
+std::optional<Eigen::MatrixXd> InformationUnderNoise(
+    const SolverRound& round,
+    const std::vector<const MotionSegment*>& segments,
+    const Partitioning& partitioning,
+    const CalibrationEstimate& estimate,
+    const std::vector<ScreenedLandmark>& landmarks,
+    double pixel_factor,
+    std::uint64_t seed) {
+  NoiseSource noise(seed);
+  std::vector<MotionSegment> noisy;
+  for (const MotionSegment* segment : segments) {
+    noisy.push_back(WithNoise(*segment, round.rig, pixel_factor, &noise));
+  }
+  std::vector<const MotionSegment*> pointers;
+  for (const MotionSegment& segment : noisy) pointers.push_back(&segment);
+  const CalibrationProblem problem =
+      FlattenSegments(round.rig, pointers, partitioning);
+  KeyframeMotions motions;
+  MeasureMotions(round.rig,
+                 BoxPlus(round.reference, estimate.d),
+                 problem,
+                 estimate.keyframes,
+                 &motions);
+  const SolverRound replica = {.rig = round.rig,
+                               .reference = round.reference,
+                               .problem = problem,
+                               .motions = motions,
+                               .whitening = round.whitening,
+                               .basis = round.basis,
+                               .loss = round.loss,
+                               .prior_information = round.prior_information};
+  const LinearRange settled(replica, estimate, landmarks);
+  if (!settled.settled()) return std::nullopt;
+  return settled.information().Lambda;
+}
+
+}  // namespace selfcal
