@@ -1,14 +1,18 @@
 #include "core/calibration/calibrate.h"
 
-#include <optional>
+#include <algorithm>
 #include <utility>
 
 #include "core/calibration/calibration_run.h"
-#include "core/calibration/noise_factor.h"
 #include "core/calibration/partition.h"
+#include "core/calibration/segment_agreement.h"
+#include "core/information/segment_scorer.h"
 
 namespace selfcal {
 namespace {
+
+// Of calibrations after which segments were left out.
+constexpr int kMaxRounds = 3;
 
 std::string CheckInput(const Rig& rig,
                        const Calibration& theta_start,
@@ -35,6 +39,96 @@ std::string CheckInput(const Rig& rig,
   return "";
 }
 
+// The segments that are used, and why the others are not.
+class Selection {
+ public:
+  explicit Selection(const std::vector<const MotionSegment*>& segments)
+      : all_(segments), reasons_(segments.size()) {}
+
+  std::vector<const MotionSegment*> used() const {
+    std::vector<const MotionSegment*> used;
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      if (reasons_[i].empty()) used.push_back(all_[i]);
+    }
+    return used;
+  }
+
+  // Indices into what is used now.
+  void LeaveOut(const std::vector<Contradiction>& contradictions) {
+    std::vector<std::size_t> used;
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      if (reasons_[i].empty()) used.push_back(i);
+    }
+    for (const Contradiction& one : contradictions) {
+      reasons_[used[one.segment]] = one.reason;
+    }
+  }
+
+  // With those that are left out, by key.
+  void Complete(std::vector<SegmentFit>* fits) const {
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      if (reasons_[i].empty()) continue;
+      SegmentFit& fit = fits->emplace_back();
+      fit.key = all_[i]->key;
+      fit.excluded = reasons_[i];
+    }
+    std::sort(fits->begin(), fits->end(), [](const auto& a, const auto& b) {
+      return a.key < b.key;
+    });
+  }
+
+ private:
+  const std::vector<const MotionSegment*>& all_;
+  std::vector<std::string> reasons_;
+};
+
+std::vector<Contradiction> FindMisfitsOf(
+    const Rig& rig,
+    const Calibration& theta,
+    const std::vector<const MotionSegment*>& segments) {
+  std::vector<double> fits;
+  SegmentScorer scorer;
+  SegmentInformation information;
+  for (const MotionSegment* segment : segments) {
+    scorer.Score(rig, theta, *segment, {}, &information);
+    fits.push_back(information.residuals.fit);
+  }
+  return FindMisfits(fits);
+}
+
+// Calibrates, leaves out what contradicts the rest, and calibrates again.
+CalibrationResult CalibrateOnWhatAgrees(
+    const Rig& rig,
+    const Calibration& theta_start,
+    const std::vector<const MotionSegment*>& segments,
+    const CalibrateOptions& options,
+    const ProgressCallback& progress) {
+  Selection selection(segments);
+  selection.LeaveOut(FindMisfitsOf(rig, theta_start, segments));
+  CalibrationRun run;
+  int iterations = 0;
+  for (int round = 0;; ++round) {
+    const ProgressCallback counted = [&](CalibrateProgress made) {
+      made.iteration += iterations;
+      made.max_iterations += iterations;
+      return !progress || progress(made);
+    };
+    run = RunCalibration(rig, theta_start, selection.used(), options, counted);
+    run.result.iterations += iterations;
+    iterations = run.result.iterations;
+    if (round == kMaxRounds ||
+        run.result.status != CalibrateStatus::kConverged) {
+      break;
+    }
+    const std::vector<Contradiction> contradictions =
+        FindContradictions(run.evidence);
+    if (contradictions.empty()) break;
+    selection.LeaveOut(contradictions);
+  }
+  selection.Complete(&run.result.segment_fits);
+  return std::move(run.result);
+}
+
 }  // namespace
 
 CalibrationResult Calibrate(const Rig& rig,
@@ -51,7 +145,11 @@ CalibrationResult Calibrate(const Rig& rig,
     result.theta = theta_start;
     return result;
   }
-  return RunCalibration(rig, theta_start, sorted, options, progress);
+  return options.leave_out_contradictions
+             ? CalibrateOnWhatAgrees(
+                   rig, theta_start, sorted, options, progress)
+             : RunCalibration(rig, theta_start, sorted, options, progress)
+                   .result;
 }
 
 }  // namespace selfcal

@@ -45,6 +45,9 @@ struct CalibrateOptions {
   // Weights by the noise of the rig times these factors, as far as the
   // residuals determine them, instead of by what the rig states.
   bool reweight_noise = true;
+  // Segments that contradict the rest, by their residuals or by the theta that
+  // they show, are not used (segment_agreement.h).
+  bool leave_out_contradictions = true;
   int merge_landmarks = 15;  // partitions that share more are merged
   SolverKind solver = SolverKind::kStructured;
   int threads = 1;  // of Ceres

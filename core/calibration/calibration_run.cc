@@ -82,12 +82,11 @@ class Calibrator {
     result_.keyframes = static_cast<int>(problem_.keyframes.size());
   }
 
-  CalibrationResult Run() {
-    if (Start() && Solve() && WeighNoise() && ReleaseWeak() &&
-        HoldSpurious()) {
+  CalibrationRun Run() {
+    if (Start() && Solve() && WeighNoise() && ReleaseWeak() && HoldSpurious()) {
       Finish();
     }
-    return std::move(result_);
+    return {std::move(result_), std::move(evidence_)};
   }
 
  private:
@@ -214,14 +213,13 @@ class Calibrator {
     Eigen::MatrixXd spurious(start_d_.size(), 0);
     // Most often the first one shows that there is nothing to tell.
     for (int i = 0; i < kReplicas && (i == 0 || spurious.cols() > 0); ++i) {
-      const auto information =
-          InformationUnderNoise(round,
-                                segments_,
-                                partitioning_,
-                                estimate_,
-                                screening_.landmarks,
-                                result_.track_noise_factor,
-                                kReplicaSeed + i);
+      const auto information = InformationUnderNoise(round,
+                                                     segments_,
+                                                     partitioning_,
+                                                     estimate_,
+                                                     screening_.landmarks,
+                                                     result_.track_noise_factor,
+                                                     kReplicaSeed + i);
       if (information) under_noise.push_back(*information);
       spurious = FindSpurious(rig_,
                               subspace_,
@@ -504,6 +502,7 @@ class Calibrator {
       factor.used = NoiseOf(factor.kind, rig_) / NoiseOf(factor.kind, stated_);
       factor.factor *= factor.used;
     }
+    TestAgreement();
     const ReprojectionStatistics after = Measure();
     result_.reprojection_rms_after_px = after.rms_px;
     result_.reprojection_median_after_px = after.median_px;
@@ -511,6 +510,42 @@ class Calibrator {
     result_.landmarks_dropped = screening_.landmarks_dropped;
     result_.observations = screening_.observations;
     result_.observations_dropped = screening_.observations_dropped;
+  }
+
+  // Each segment by itself, at the minimum. Where they disagree by more than
+  // they say, so does the covariance.
+  void TestAgreement() {
+    Rig rig = rig_;
+    rig.pixel_sigma_px *= result_.track_noise_factor;
+    evidence_ = CollectEvidence(rig,
+                                result_.theta,
+                                segments_,
+                                problem_,
+                                estimate_.keyframes,
+                                screening_,
+                                subspace_,
+                                Expected());
+    const double excess = TestEach(&evidence_);
+    result_.covariance *= excess;
+    result_.halves = TestHalves(evidence_, excess);
+    for (const SegmentEvidence& one : evidence_) {
+      result_.segment_fits.push_back(one.fit);
+    }
+  }
+
+  // From the redundancy of each kind of residual.
+  ExpectedSquares Expected() const {
+    ExpectedSquares expected;
+    const auto links = static_cast<double>(problem_.inertial_links.size());
+    for (const NoiseFactor& factor : result_.noise_factors) {
+      if (factor.kind == NoiseKind::kPixel) {
+        expected.of_observation =
+            factor.redundancy / std::max(1, screening_.observations);
+      } else {
+        expected.of_link += factor.redundancy / links;
+      }
+    }
+    return expected;
   }
 
   const Rig& stated_;
@@ -535,16 +570,16 @@ class Calibrator {
   double moved_sigmas_ = 0;  // by the last step
   double track_noise_ = 0;   // as TrackNoiseFactor
   CalibrationResult result_;
+  std::vector<SegmentEvidence> evidence_;
 };
 
 }  // namespace
 
-CalibrationResult RunCalibration(
-    const Rig& rig,
-    const Calibration& theta_start,
-    const std::vector<const MotionSegment*>& segments,
-    const CalibrateOptions& options,
-    const ProgressCallback& progress) {
+CalibrationRun RunCalibration(const Rig& rig,
+                              const Calibration& theta_start,
+                              const std::vector<const MotionSegment*>& segments,
+                              const CalibrateOptions& options,
+                              const ProgressCallback& progress) {
   return Calibrator(rig, theta_start, segments, options, progress).Run();
 }
 

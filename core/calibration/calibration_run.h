@@ -1,21 +1,26 @@
-// One calibration from start to end, with the noise that the rig states: what
-// Calibrate() goes through, once or more often, after it has looked at its
-// input.
+// One calibration from start to end, on segments as they come: what Calibrate()
+// goes through, once or more often, after it has looked at its input.
 #pragma once
 
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/calibration/segment_agreement.h"
 
 namespace selfcal {
 
-// As Calibrate(), with segments in the order of their keys. Noise factors are
-// estimated, nothing is weighted by them.
-CalibrationResult RunCalibration(
-    const Rig& rig,
-    const Calibration& theta_start,
-    const std::vector<const MotionSegment*>& segments,
-    const CalibrateOptions& options,
-    const ProgressCallback& progress);
+struct CalibrationRun {
+  CalibrationResult result;
+  // Of each segment; empty where no minimum was reached.
+  std::vector<SegmentEvidence> evidence;
+};
+
+// As Calibrate(), with segments in the order of their keys, all of which are
+// used. They must outlive the call alone.
+CalibrationRun RunCalibration(const Rig& rig,
+                              const Calibration& theta_start,
+                              const std::vector<const MotionSegment*>& segments,
+                              const CalibrateOptions& options,
+                              const ProgressCallback& progress);
 
 }  // namespace selfcal

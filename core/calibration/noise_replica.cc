@@ -67,8 +67,8 @@ Eigen::MatrixXd FindSpurious(const Rig& rig,
   const Eigen::Index size = subspace.estimated.cols();
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(size, size);
   for (const Eigen::MatrixXd& one : under_noise) {
-    mean += Reduced(rig, subspace, one) /
-            static_cast<double>(under_noise.size());
+    mean +=
+        Reduced(rig, subspace, one) / static_cast<double>(under_noise.size());
   }
   Eigen::MatrixXd spurious(subspace.estimated.rows(), 0);
   if (under_noise.empty()) return spurious;

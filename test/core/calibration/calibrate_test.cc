@@ -259,8 +259,7 @@ TEST(Calibrate, IterationsAreCountedOnWhereNoiseIsReweighted) {
 TEST(Calibrate, NoiseThatIsStatedWrongIsUsedAsItIs) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(12), 3);
   s.rig.pixel_sigma_px /= 3;
-  const CalibrationResult result =
-      Calibrate(s.rig, s.rig.factory, s.segments);
+  const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
   ASSERT_EQ(result.noise_factors.size(), static_cast<std::size_t>(kNoiseKinds));
   const NoiseFactor& pixel = result.noise_factors.front();
   EXPECT_TRUE(pixel.converged);

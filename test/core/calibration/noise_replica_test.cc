@@ -59,12 +59,15 @@ TEST(FindSpurious, NamesDirectionsOfWhichInformationDoubles) {
   ASSERT_GT(free, 20);
   const Eigen::MatrixXd claimed = lambda(700, 1000);
   EXPECT_EQ(FindSpurious(rig, subspace, claimed, {}, kSpurious).cols(), 0);
-  EXPECT_EQ(FindSpurious(
-                rig, subspace, claimed, {lambda(720, 1010)}, kSpurious)
+  EXPECT_EQ(FindSpurious(rig, subspace, claimed, {lambda(720, 1010)}, kSpurious)
                 .cols(),
             0);
-  const Eigen::MatrixXd spurious = FindSpurious(
-      rig, subspace, claimed, {lambda(1500, 1010), lambda(1300, 990)}, kSpurious);
+  const Eigen::MatrixXd spurious =
+      FindSpurious(rig,
+                   subspace,
+                   claimed,
+                   {lambda(1500, 1010), lambda(1300, 990)},
+                   kSpurious);
   ASSERT_EQ(spurious.cols(), 1);
   EXPECT_NEAR(std::abs(spurious.col(0).dot(u)), 1, 1e-9);
 }

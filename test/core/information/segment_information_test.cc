@@ -295,5 +295,53 @@ TEST(ScoreSegment, ARealisticSlamSegmentKeepsItsObservations) {
   }
 }
 
+// What is left of all squares where states, landmarks and theta follow them is
+// what noise leaves, also from a factory's calibration.
+TEST(ScoreSegment, FitIsOneWhereNoiseIsAsStated) {
+  const Rig device = HandheldRig("handheld");
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Rig rig = device;
+    rig.factory = PerturbCalibration(device.factory, {}, seed);
+    SimulationOptions options;
+    options.seed = seed;
+    const MotionSegment segment = Simulate(rig,
+                                           device.factory,
+                                           rig.factory,
+                                           *MakeHandheld(4.1, 0.7, seed),
+                                           "session",
+                                           options)
+                                      .segments.front();
+    const SegmentInformation score = Score(rig, segment);
+    EXPECT_NEAR(score.residuals.fit, 1, 0.05);
+    Rig surer = rig;
+    surer.pixel_sigma_px /= 3;
+    const SegmentInformation sure = Score(surer, segment);
+    EXPECT_NEAR(sure.residuals.fit, 3, 0.3);
+  }
+}
+
+// One reading at the end of the sensor's range makes motion look vigorous; its
+// information is worth next to nothing.
+TEST(ScoreSegment, InformationCountsForLessWhereTheSegmentDoesNotFit) {
+  const Rig rig = HandheldRig("handheld");
+  SimulationOptions options;
+  options.seed = 3;
+  MotionSegment segment = Simulate(rig,
+                                   rig.factory,
+                                   rig.factory,
+                                   *MakeHandheld(4.1, 0.3, 3),
+                                   "session",
+                                   options)
+                              .segments.front();
+  const SegmentInformation good = Score(rig, segment);
+  segment.imu[segment.imu.size() / 2].gyro.x() = 100;
+  const SegmentInformation bad = Score(rig, segment);
+  EXPECT_LT(good.residuals.fit, 1.1);
+  EXPECT_GT(bad.residuals.fit, 2 * kOrdinaryFit);
+  for (std::size_t q = 0; q < good.groups.size(); ++q) {
+    EXPECT_LT(bad.groups[q].gain, good.groups[q].gain);
+  }
+}
+
 }  // namespace
 }  // namespace selfcal

@@ -1,0 +1,270 @@
+#include "core/calibration/segment_agreement.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/change/chi_square.h"
+#include "core/information/segment_information.h"
+
+namespace selfcal {
+namespace {
+
+// A direction is tested where both sides say more than the prior.
+constexpr double kObserved = 1;
+// Fewer have no majority.
+constexpr int kLeastSegments = 4;
+// By chance, over all segments of a calibration.
+constexpr double kChance = 1e-5;
+// Residuals so many times those of the other segments are not of the same kind.
+constexpr double kMaxRatio = 3;
+// A point further away than 1 / this [m] is as good as at infinity.
+constexpr double kLeastDepth = 1e-4;
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle =
+      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+AgreementTest Test(const Eigen::MatrixXd& Lambda,
+                   const Eigen::VectorXd& eta,
+                   const Eigen::MatrixXd& rest_Lambda,
+                   const Eigen::VectorXd& rest_eta,
+                   double excess) {
+  AgreementTest test;
+  Eigen::MatrixXd all = Lambda + rest_Lambda;
+  all.diagonal().array() += 1e-9 * all.trace();
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(all);
+  const Eigen::VectorXd score = eta - Lambda * ldlt.solve(eta + rest_eta);
+  const Eigen::MatrixXd covariance = Lambda - Lambda * ldlt.solve(Lambda);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      (covariance + covariance.transpose()) / 2);
+  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * score;
+  for (Eigen::Index i = 0; i < along.size(); ++i) {
+    if (!(eigen.eigenvalues()(i) > kObserved)) continue;
+    ++test.degrees;
+    test.statistic += along(i) * along(i) / eigen.eigenvalues()(i);
+  }
+  test.statistic /= excess;
+  if (test.degrees > 0) {
+    test.probability = ChiSquareTail(test.statistic, test.degrees);
+  }
+  return test;
+}
+
+// A segment at the estimate, with what is used of its observations.
+MotionSegment AtEstimate(const MotionSegment& segment,
+                         int first_keyframe,
+                         const CalibrationProblem& problem,
+                         const std::vector<KeyframeState>& keyframes,
+                         const Screening& screening) {
+  MotionSegment at = segment;
+  const auto count = static_cast<int>(segment.keyframes.size());
+  std::copy_n(keyframes.begin() + first_keyframe, count, at.keyframes.begin());
+  at.landmarks.clear();
+  at.observations.clear();
+  for (const ScreenedLandmark& landmark : screening.landmarks) {
+    const Track& track = problem.tracks[landmark.track];
+    const auto index = static_cast<int>(at.landmarks.size());
+    const std::size_t before = at.observations.size();
+    for (const UsedObservation& used : landmark.used) {
+      const TrackObservation& seen = track.observations[used.index];
+      const int k = seen.keyframe - first_keyframe;
+      if (k < 0 || k >= count) continue;
+      at.observations.push_back({k, seen.camera, index, seen.z_px});
+    }
+    if (at.observations.size() < before + 2) {
+      at.observations.resize(before);
+      continue;
+    }
+    const Eigen::Vector4d point = landmark.place.Homogeneous();
+    const double w = std::max(point(3), kLeastDepth);
+    at.landmarks.push_back({track.id, point.head<3>() / w});
+  }
+  return at;
+}
+
+std::string Percent(const char* what, double ratio, double usual) {
+  char text[160];
+  std::snprintf(text,
+                sizeof text,
+                "its %s residuals are %.1f times what is expected, those of "
+                "the other segments %.1f times",
+                what,
+                ratio,
+                usual);
+  return text;
+}
+
+}  // namespace
+
+std::vector<SegmentEvidence> CollectEvidence(
+    const Rig& rig,
+    const Calibration& theta,
+    const std::vector<const MotionSegment*>& segments,
+    const CalibrationProblem& problem,
+    const std::vector<KeyframeState>& keyframes,
+    const Screening& screening,
+    const ThetaSubspace& subspace,
+    const ExpectedSquares& expected) {
+  const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
+  std::vector<SegmentEvidence> evidence;
+  int first_keyframe = 0;
+  for (const MotionSegment* segment : segments) {
+    const MotionSegment at =
+        AtEstimate(*segment, first_keyframe, problem, keyframes, screening);
+    first_keyframe += static_cast<int>(segment->keyframes.size());
+    const SegmentInformation information = ScoreSegment(rig, theta, at);
+    SegmentEvidence& one = evidence.emplace_back();
+    one.fit.key = segment->key;
+    one.Lambda = basis.transpose() * information.Lambda * basis;
+    one.eta = basis.transpose() * information.eta;
+    const ResidualStatistics& residuals = information.residuals;
+    if (expected.of_observation > 0) {
+      one.fit.pixel_ratio = residuals.reprojection_rms_px / rig.pixel_sigma_px /
+                            std::sqrt(expected.of_observation);
+    }
+    double squares = 0;
+    for (const double rms : residuals.inertial_rms) squares += 3 * rms * rms;
+    if (expected.of_link > 0) {
+      one.fit.inertial_ratio = std::sqrt(squares / expected.of_link);
+    }
+  }
+  return evidence;
+}
+
+namespace {
+
+struct Sum {
+  Eigen::MatrixXd Lambda;
+  Eigen::VectorXd eta;
+
+  void Add(const SegmentEvidence& one, double sign = 1) {
+    if (Lambda.size() == 0) {
+      Lambda = Eigen::MatrixXd::Zero(one.eta.size(), one.eta.size());
+      eta = Eigen::VectorXd::Zero(one.eta.size());
+    }
+    Lambda += sign * one.Lambda;
+    eta += sign * one.eta;
+  }
+};
+
+AgreementTest TestOne(const SegmentEvidence& one, const Sum& all) {
+  Sum rest = all;
+  rest.Add(one, -1);
+  return Test(one.Lambda, one.eta, rest.Lambda, rest.eta, 1);
+}
+
+double PerDegree(const AgreementTest& test) {
+  return test.degrees > 0 ? test.statistic / test.degrees : 0;
+}
+
+}  // namespace
+
+double TestEach(std::vector<SegmentEvidence>* evidence) {
+  Sum all;
+  for (const SegmentEvidence& one : *evidence) all.Add(one);
+  double squares = 0;
+  int degrees = 0;
+  for (SegmentEvidence& one : *evidence) {
+    one.fit.others = TestOne(one, all);
+    squares += one.fit.others.statistic;
+    degrees += one.fit.others.degrees;
+  }
+  if (degrees == 0) return 1;
+  const double excess = squares / degrees;
+  // By chance it is as much above 1 once in a thousand times.
+  return excess > 1 + 3.1 * std::sqrt(2.0 / degrees) ? excess : 1;
+}
+
+AgreementTest TestHalves(const std::vector<SegmentEvidence>& evidence,
+                         double excess) {
+  if (evidence.size() < kLeastSegments) return {};
+  Sum first, second;
+  for (std::size_t i = 0; i < evidence.size(); ++i) {
+    (i < evidence.size() / 2 ? first : second).Add(evidence[i]);
+  }
+  return Test(first.Lambda, first.eta, second.Lambda, second.eta, excess);
+}
+
+std::vector<Contradiction> FindContradictions(
+    const std::vector<SegmentEvidence>& evidence) {
+  std::vector<Contradiction> found;
+  const auto size = static_cast<int>(evidence.size());
+  if (size < kLeastSegments) return found;
+  std::vector<int> left(evidence.size());
+  for (int i = 0; i < size; ++i) left[i] = i;
+  const auto usual = [&](double SegmentFit::*ratio) {
+    std::vector<double> values;
+    for (const int i : left) values.push_back(evidence[i].fit.*ratio);
+    return Median(std::move(values));
+  };
+  const double pixels = usual(&SegmentFit::pixel_ratio);
+  const double inertial = usual(&SegmentFit::inertial_ratio);
+  const auto leave_out = [&](int at, std::string reason) {
+    found.push_back({left[at], std::move(reason)});
+    left.erase(left.begin() + at);
+  };
+  for (int at = static_cast<int>(left.size()) - 1; at >= 0; --at) {
+    const SegmentFit& fit = evidence[left[at]].fit;
+    if (fit.inertial_ratio > kMaxRatio * std::max(1.0, inertial)) {
+      leave_out(at, Percent("inertial", fit.inertial_ratio, inertial));
+    } else if (fit.pixel_ratio > kMaxRatio * std::max(1.0, pixels)) {
+      leave_out(at, Percent("reprojection", fit.pixel_ratio, pixels));
+    }
+  }
+  while (static_cast<int>(left.size()) >= kLeastSegments &&
+         2 * static_cast<int>(left.size() - 1) > size) {
+    Sum all;
+    for (const int i : left) all.Add(evidence[i]);
+    std::vector<AgreementTest> tests;
+    std::vector<double> per_degree;
+    for (const int i : left) {
+      tests.push_back(TestOne(evidence[i], all));
+      per_degree.push_back(PerDegree(tests.back()));
+    }
+    const double scale = std::max(1.0, Median(per_degree));
+    const auto worst = static_cast<int>(
+        std::max_element(per_degree.begin(), per_degree.end()) -
+        per_degree.begin());
+    const AgreementTest& test = tests[worst];
+    if (test.degrees == 0 ||
+        ChiSquareTail(test.statistic / scale, test.degrees) >= kChance / size) {
+      break;
+    }
+    char text[160];
+    std::snprintf(text,
+                  sizeof text,
+                  "its calibration contradicts that of the other segments: "
+                  "chi-square %.0f with %d degrees, usual is %.1f a degree",
+                  test.statistic,
+                  test.degrees,
+                  scale);
+    leave_out(worst, text);
+  }
+  return found;
+}
+
+std::vector<Contradiction> FindMisfits(const std::vector<double>& fits) {
+  std::vector<Contradiction> found;
+  std::vector<double> measured;
+  std::copy_if(
+      fits.begin(), fits.end(), std::back_inserter(measured), [](double fit) {
+        return fit > 0;
+      });
+  if (measured.size() < kLeastSegments) return found;
+  const double usual = std::max(1.0, Median(measured));
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    if (fits[i] > kMaxRatio * usual) {
+      found.push_back({static_cast<int>(i), Percent("own", fits[i], usual)});
+    }
+  }
+  return found;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,79 @@
+// Whether the segments of a calibration agree: each with all others, and both
+// halves of them with each other; and which of them contradict the rest.
+//
+// At the minimum of a calibration each segment is linearised alone, at the
+// states and landmarks of the joint estimate. With information Lambda_i and
+// gradient eta_i of segment i, and sums over all others, the score
+//   S = eta_i - Lambda_i (Lambda_i + Lambda_r)^-1 (eta_i + eta_r)
+// is zero on average where both share one theta, with the covariance
+//   (Lambda_i^-1 + Lambda_r^-1)^-1,
+// so that its square in that covariance is chi-square distributed. Only
+// directions that both observe, better than the prior, are tested.
+//
+// Pure, any thread, deterministic.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/calibration/problem.h"
+#include "core/calibration/screening.h"
+#include "core/calibration/segment_fit.h"
+#include "core/calibration/subspace.h"
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+// What one segment says at the minimum, by the estimated directions in units of
+// the prior (r x r, r).
+struct SegmentEvidence {
+  Eigen::MatrixXd Lambda;
+  Eigen::VectorXd eta;
+  SegmentFit fit;  // its key and the ratios of its residuals
+};
+
+// Of residuals, over what is expected of them: by how many their squares exceed
+// those of one row in each inertial link, and in each reprojection.
+struct ExpectedSquares {
+  double of_link = 0;         // sum over the 15 rows; 0: not known
+  double of_observation = 0;  // sum over the two rows
+};
+
+// `rig` with the noise that the calibration was weighted with; `segments` as
+// its problem was made of them.
+std::vector<SegmentEvidence> CollectEvidence(
+    const Rig& rig,
+    const Calibration& theta,
+    const std::vector<const MotionSegment*>& segments,
+    const CalibrationProblem& problem,
+    const std::vector<KeyframeState>& keyframes,
+    const Screening& screening,
+    const ThetaSubspace& subspace,
+    const ExpectedSquares& expected);
+
+// Each against all others, in `fit.others`; returns by how much the squares of
+// all these tests exceed their expectation, 1 or more: where segments disagree
+// by more than they say, covariances are too small by that.
+double TestEach(std::vector<SegmentEvidence>* evidence);
+
+// The first half of the segments, in their order, against the second, with
+// variances larger by `excess`. Not tested with fewer than four.
+AgreementTest TestHalves(const std::vector<SegmentEvidence>& evidence,
+                         double excess);
+
+// The segments that contradict the rest, as a list of index and reason: one
+// after the other, those that fit worst, while a majority agrees. Measured by
+// what is usual for the others, since stated noise may be wrong for all.
+struct Contradiction {
+  int segment = 0;
+  std::string reason;
+};
+std::vector<Contradiction> FindContradictions(
+    const std::vector<SegmentEvidence>& evidence);
+
+// The same before anything is solved, from how well each segment fits by itself
+// (ResidualStatistics::fit; 0: not measured).
+std::vector<Contradiction> FindMisfits(const std::vector<double>& fits);
+
+}  // namespace selfcal

@@ -1,0 +1,199 @@
+// Segments that contradict the rest are found, named and not used.
+#include "core/calibration/segment_agreement.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+
+#include "core/calibration/calibrate.h"
+#include "core/simulation/simulate.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kSegments = 6;
+constexpr int kWrong = 2;
+
+struct Session {
+  Rig rig;
+  Calibration truth;
+  std::vector<MotionSegment> segments;
+};
+
+Session Simulated(int seed,
+                  std::uint64_t device_seed = 0,
+                  double moving_fraction = 0) {
+  Session session{HandheldRig("r"), {}, {}};
+  session.truth = session.rig.factory;
+  session.rig.factory = PerturbCalibration(session.truth, {}, seed);
+  const Calibration device =
+      device_seed > 0 ? PerturbCalibration(session.truth, {}, device_seed)
+                      : session.truth;
+  SimulationOptions options;
+  options.seed = seed;
+  options.landmarks_in_view = 60;
+  options.keyframes_per_segment = 30;
+  options.moving_fraction = moving_fraction;
+  session.segments = Simulate(session.rig,
+                              device,
+                              session.rig.factory,
+                              *MakeHandheld(3.0 * kSegments + 0.5, 0.7, seed),
+                              "session",
+                              options)
+                         .segments;
+  return session;
+}
+
+double LargestSigmas(const Session& session, const CalibrationResult& result) {
+  const Eigen::VectorXd error = BoxMinus(result.theta, session.truth);
+  double largest = 0;
+  for (const int i : FreeComponents(session.rig)) {
+    largest = std::max(largest,
+                       std::abs(error(i)) / std::sqrt(result.covariance(i, i)));
+  }
+  return largest;
+}
+
+void ExpectOnlyTheWrongOneIsLeftOut(const Session& session,
+                                    const std::string& reason) {
+  const CalibrationResult result =
+      Calibrate(session.rig, session.rig.factory, session.segments);
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
+  ASSERT_EQ(result.segment_fits.size(), session.segments.size());
+  for (int i = 0; i < kSegments; ++i) {
+    const SegmentFit& fit = result.segment_fits[i];
+    EXPECT_EQ(fit.key, session.segments[i].key);
+    if (i == kWrong) {
+      EXPECT_NE(fit.excluded.find(reason), std::string::npos) << fit.excluded;
+    } else {
+      EXPECT_EQ(fit.excluded, "") << i;
+    }
+  }
+  EXPECT_EQ(result.segments, kSegments - 1);
+  EXPECT_LT(LargestSigmas(session, result), 4.5);
+}
+
+TEST(Contradictions, NoneAreFoundAmongGoodSegments) {
+  const Session session = Simulated(1);
+  const CalibrationResult result =
+      Calibrate(session.rig, session.rig.factory, session.segments);
+  ASSERT_EQ(result.segment_fits.size(), session.segments.size());
+  for (const SegmentFit& fit : result.segment_fits) {
+    EXPECT_EQ(fit.excluded, "");
+    EXPECT_NEAR(fit.pixel_ratio, 1, 0.1);
+    EXPECT_NEAR(fit.inertial_ratio, 1, 0.5);
+    EXPECT_GT(fit.others.degrees, 15);
+    EXPECT_GT(fit.others.probability, 1e-4);
+  }
+  EXPECT_GT(result.halves.degrees, 20);
+  EXPECT_GT(result.halves.probability, 1e-4);
+}
+
+TEST(Contradictions, OneReadingOfTheGyroscopeAtTheEndOfItsRange) {
+  Session session = Simulated(2);
+  std::vector<ImuSample>& imu = session.segments[kWrong].imu;
+  imu[imu.size() / 2].gyro.x() = 35;
+  ExpectOnlyTheWrongOneIsLeftOut(session, "residuals");
+}
+
+TEST(Contradictions, StampsThatAreOffByTenMilliseconds) {
+  Session session = Simulated(3);
+  for (ImuSample& sample : session.segments[kWrong].imu) {
+    sample.t_ns += 10'000'000;
+  }
+  // Neighbours may not be joined across it.
+  session.segments[kWrong].key.session = "zz";
+  std::rotate(session.segments.begin() + kWrong,
+              session.segments.begin() + kWrong + 1,
+              session.segments.end());
+  const CalibrationResult result =
+      Calibrate(session.rig, session.rig.factory, session.segments);
+  ASSERT_EQ(result.segment_fits.size(), session.segments.size());
+  for (const SegmentFit& fit : result.segment_fits) {
+    EXPECT_EQ(fit.excluded.empty(), fit.key.session != "zz") << fit.excluded;
+  }
+  EXPECT_LT(LargestSigmas(session, result), 4.5);
+}
+
+TEST(Contradictions, ASegmentOfAnotherDevice) {
+  Session session = Simulated(4);
+  session.segments[kWrong] = Simulated(4, 77).segments[kWrong];
+  ExpectOnlyTheWrongOneIsLeftOut(session, "contradicts");
+}
+
+TEST(Contradictions, ASceneThatMoves) {
+  Session session = Simulated(5);
+  session.segments[kWrong] = Simulated(5, 0, 0.9).segments[kWrong];
+  ExpectOnlyTheWrongOneIsLeftOut(session, "residuals");
+}
+
+SegmentEvidence Drawn(double off_sigmas, std::mt19937* random) {
+  constexpr int kSize = 5;
+  std::normal_distribution<double> normal;
+  SegmentEvidence one;
+  one.Lambda = 100 * Eigen::MatrixXd::Identity(kSize, kSize);
+  one.eta.resize(kSize);
+  for (int i = 0; i < kSize; ++i) {
+    one.eta(i) = 10 * (normal(*random) + off_sigmas);
+  }
+  one.fit.pixel_ratio = one.fit.inertial_ratio = 1;
+  return one;
+}
+
+// Drawn from what the test takes for granted, it has the stated distribution.
+TEST(Agreement, HasTheChiSquareDistribution) {
+  std::mt19937 random(1);
+  constexpr int kTrials = 400;
+  double halves = 0, each = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<SegmentEvidence> evidence;
+    for (int i = 0; i < 8; ++i) evidence.push_back(Drawn(0, &random));
+    TestEach(&evidence);
+    each += evidence.front().fit.others.statistic / kTrials;
+    EXPECT_EQ(evidence.front().fit.others.degrees, 5);
+    halves += TestHalves(evidence, 1).statistic / kTrials;
+  }
+  // Mean 5, standard deviation of the mean sqrt(10 / 400) = 0.16.
+  EXPECT_NEAR(each, 5, 0.6);
+  EXPECT_NEAR(halves, 5, 0.6);
+}
+
+TEST(Agreement, HalvesThatDifferAreSeen) {
+  std::mt19937 random(2);
+  std::vector<SegmentEvidence> evidence;
+  for (int i = 0; i < 8; ++i)
+    evidence.push_back(Drawn(i < 4 ? 2 : -2, &random));
+  EXPECT_LT(TestHalves(evidence, 1).probability, 1e-6);
+}
+
+TEST(Agreement, AMinorityThatIsOffIsNamed) {
+  std::mt19937 random(3);
+  std::vector<SegmentEvidence> evidence;
+  for (int i = 0; i < 10; ++i) {
+    evidence.push_back(Drawn(i == 3 || i == 7 ? 20 : 0, &random));
+  }
+  std::vector<int> found;
+  for (const Contradiction& one : FindContradictions(evidence)) {
+    found.push_back(one.segment);
+  }
+  std::sort(found.begin(), found.end());
+  EXPECT_EQ(found, (std::vector<int>{3, 7}));
+}
+
+TEST(Misfits, AreMeasuredByWhatIsUsual) {
+  // Noise that is stated too small raises all alike.
+  EXPECT_TRUE(FindMisfits({10, 11, 9, 12, 10}).empty());
+  const auto found = FindMisfits({1, 1.1, 4, 0.9, 1});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].segment, 2);
+  // Not measured, or too few to compare with.
+  EXPECT_TRUE(FindMisfits({0, 0, 9, 0, 0}).empty());
+}
+
+}  // namespace
+}  // namespace selfcal
