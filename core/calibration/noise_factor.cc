@@ -70,8 +70,10 @@ std::optional<Rig> Reweight(const Rig& stated,
   Rig next = taken;
   double change = 0;
   for (const NoiseFactor& factor : factors) {
+    // Noise that is taken for larger than it is does no harm; for smaller, it
+    // makes a calibration surer than it may be.
     if (!factor.determined() &&
-        std::abs(std::log(factor.factor)) < kOffSigmas * factor.log_sigma) {
+        std::log(factor.factor) < kOffSigmas * factor.log_sigma) {
       continue;
     }
     const double before = NoiseOf(factor.kind, taken);
