@@ -254,7 +254,7 @@ void DefineRuns(Definer* define, DaemonOptions* options) {
             "Seconds without a segment after which the session of a rig has "
             "ended: changed tables then start a run; 0: only the end of a "
             "stream ends it")
-      ->check(CLI::Range(0, kMaxSeconds))
+      ->check(CLI::Range(0.0, static_cast<double>(kMaxSeconds)))
       ->capture_default_str();
 }
 
