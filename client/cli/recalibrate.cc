@@ -12,15 +12,22 @@ namespace {
 
 using Service = v1::RecalibrationService::StubInterface;
 
-int Recalibrate(Context* context, const std::string& rig, bool no_wait) {
+struct Options {
+  std::string rig;
+  bool force = false;
+  bool no_wait = false;
+};
+
+int Recalibrate(Context* context, const Options& options) {
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::StartRecalibrationRequest request;
-  request.set_parent(RigName(rig));
+  request.set_parent(RigName(options.rig));
+  request.set_force(options.force);
   v1::Recalibration run;
   const grpc::Status status =
       Call<Service>(stub.get(), &Service::StartRecalibration, request, &run);
   if (!status.ok()) return Fail(*context, status);
-  if (!no_wait) return FollowRun(context, stub.get(), std::move(run));
+  if (!options.no_wait) return FollowRun(context, stub.get(), std::move(run));
   PrintRun(*context, run);
   return kDone;
 }
@@ -32,13 +39,16 @@ void AddRecalibrateCommand(CLI::App* app, Context* context) {
       "recalibrate",
       "Calibrate on the segments of the tables; exits with 1 if the result was "
       "rejected");
-  const auto rig = std::make_shared<std::string>();
-  const auto no_wait = std::make_shared<bool>(false);
-  recalibrate->add_option("RIG", *rig)->required();
-  recalibrate->add_flag("--no-wait", *no_wait, "Start it and return");
-  recalibrate->callback([context, rig, no_wait] {
-    context->command = [context, rig, no_wait] {
-      return Recalibrate(context, *rig, *no_wait);
+  const auto options = std::make_shared<Options>();
+  recalibrate->add_option("RIG", options->rig)->required();
+  recalibrate->add_flag("--force",
+                        options->force,
+                        "Also if the tables have not changed since a version "
+                        "was computed on them");
+  recalibrate->add_flag("--no-wait", options->no_wait, "Start it and return");
+  recalibrate->callback([context, options] {
+    context->command = [context, options] {
+      return Recalibrate(context, *options);
     };
   });
 }

@@ -79,6 +79,11 @@ Facts Describe(const v1::Rig& rig) {
     facts.Add("prior sigma",
               fmt::format("{}: {:g}", prior.pattern(), prior.value()));
   }
+  for (const auto& walk : rig.walk_densities()) {
+    facts.Add(
+        "walk density",
+        fmt::format("{}: {:g} / sqrt(day)", walk.pattern(), walk.value()));
+  }
   for (const auto& pattern : rig.fixed()) facts.Add("fixed", pattern);
   facts.Add("time offset", rig.estimate_time_offset() ? "estimated" : "known");
   facts.Add("selection", SelectionText(rig.selection()));
@@ -173,6 +178,11 @@ void AddOverrides(CLI::App* create, RigInput* input) {
       "--gyro-bias-walk", input->gyro_bias_walk, "[rad/s^2/sqrt(Hz)]");
   create->add_option(
       "--accel-bias-walk", input->accel_bias_walk, "[m/s^3/sqrt(Hz)]");
+  create->add_option("--imu",
+                     input->imu,
+                     "How well the factory knows the IMU: consumer (scales to "
+                     "2 %, angles to 1 degree), factory-calibrated (0.3 %, 0.1 "
+                     "degrees) or unknown; prior sigmas of the file go before");
   create->add_option("--gravity", input->gravity_mps2, "[m/s^2]");
   create->add_option("--selection",
                      input->selection,

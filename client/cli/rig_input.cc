@@ -9,9 +9,11 @@
 #include <fstream>
 #include <iostream>
 #include <iterator>
+#include <utility>
 
 #include "client/cli/foreign_files.h"
 #include "client/import/vi_map.h"
+#include "core/model/imu_grades.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"
 
@@ -91,6 +93,24 @@ absl::Status SetSelection(const std::string& text, v1::Rig* rig) {
       "--selection {} is none of {}", text, fmt::join(known, ", ")));
 }
 
+// Before what the file has: that is said of single components.
+absl::Status SetImuTolerances(const std::string& text, v1::Rig* rig) {
+  const auto grade = ParseImuGrade(text);
+  if (!grade) {
+    return absl::InvalidArgumentError(fmt::format(
+        "--imu {} is none of consumer, factory-calibrated, unknown", text));
+  }
+  google::protobuf::RepeatedPtrField<v1::ComponentSetting> settings;
+  for (const ComponentSetting& tolerance : ImuTolerances(*grade)) {
+    v1::ComponentSetting* added = settings.Add();
+    added->set_pattern(tolerance.pattern);
+    added->set_value(tolerance.value);
+  }
+  settings.MergeFrom(rig->prior_sigmas());
+  *rig->mutable_prior_sigmas() = std::move(settings);
+  return absl::OkStatus();
+}
+
 google::protobuf::Duration Seconds(double seconds) {
   constexpr double kMost = 1e12;  // more is refused by the daemon anyway
   const double bounded = std::clamp(seconds, -kMost, kMost);
@@ -140,6 +160,10 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
   if (input.gravity_mps2) rig->set_gravity_mps2(*input.gravity_mps2);
   if (input.selection) {
     const absl::Status status = SetSelection(*input.selection, &*rig);
+    if (!status.ok()) return status;
+  }
+  if (input.imu) {
+    const absl::Status status = SetImuTolerances(*input.imu, &*rig);
     if (!status.ok()) return status;
   }
   if (input.table_size) rig->set_table_size(*input.table_size);

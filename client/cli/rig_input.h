@@ -27,6 +27,7 @@ struct RigInput {
   std::optional<double> gyro_bias_walk;
   std::optional<double> accel_bias_walk;
   std::optional<double> gravity_mps2;
+  std::optional<std::string> imu;  // a grade, as ParseImuGrade() reads it
   std::optional<std::string> selection;  // as SelectionText()
   std::optional<int> table_size;
   std::optional<double> min_gain_nats;

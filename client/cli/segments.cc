@@ -57,6 +57,16 @@ std::string TablesText(const v1::Segment& segment) {
   return text.empty() ? "-" : text;
 }
 
+Table UnusableTable(const v1::ListSegmentsResponse& segments) {
+  Table table({{"segment"}, {"received"}, {"problem"}});
+  for (const v1::Segment& segment : segments.segments()) {
+    table.Add({LastPart(segment.name()),
+               TimeText(segment.receive_time()),
+               segment.problem()});
+  }
+  return table;
+}
+
 Table ListTable(const v1::ListSegmentsResponse& segments) {
   std::vector<Column> columns = {{"segment"},
                                  {"state"},
@@ -118,6 +128,9 @@ Facts Describe(const v1::Segment& segment) {
             fmt::format("{:.3f} px", residuals.reprojection_median_px()));
   facts.Add("reprojection rms",
             fmt::format("{:.3f} px", residuals.reprojection_rms_px()));
+  if (residuals.fit() > 0) {
+    facts.Add("fit", fmt::format("{:.3g}", residuals.fit()));
+  }
   facts.Add("observed directions",
             fmt::format("{} of {}", segment.rank(), segment.components()));
   return facts;
@@ -129,12 +142,18 @@ Table Scores(const v1::Segment& segment) {
                {"gain [nat]", true},
                {"rank", true},
                {"in table"}});
+  const auto reason = [&](const std::string& group) {
+    for (const v1::TableExclusion& exclusion : segment.exclusions()) {
+      if (exclusion.group() == group) return "no: " + exclusion.reason();
+    }
+    return std::string("no");
+  };
   for (const v1::GroupScore& score : segment.scores()) {
     table.Add({score.group(),
                fmt::format("{:.3f}", score.entropy_nats()),
                fmt::format("{:.3f}", score.gain_nats()),
                fmt::format("{}/{}", score.rank(), score.size()),
-               score.in_table() ? "yes" : "no"});
+               score.in_table() ? "yes" : reason(score.group())});
   }
   return table;
 }
@@ -143,13 +162,22 @@ struct ListOptions {
   std::string rig;
   std::string filter;
   std::string order_by;
+  bool quarantined = false;
 };
+
+// The conditions of the list, those of the flag among them.
+std::string FilterOf(const ListOptions& options) {
+  constexpr char kUnusable[] = "state = UNUSABLE";
+  if (!options.quarantined) return options.filter;
+  return options.filter.empty() ? kUnusable
+                                : options.filter + " AND " + kUnusable;
+}
 
 int List(Context* context, const ListOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::ListSegmentsRequest request;
   request.set_parent(RigName(options.rig));
-  request.set_filter(options.filter);
+  request.set_filter(FilterOf(options));
   request.set_order_by(options.order_by);
   v1::ListSegmentsResponse segments;
   const auto status = CallForAllPages<Service>(
@@ -158,7 +186,8 @@ int List(Context* context, const ListOptions& options) {
   if (context->json) {
     context->PrintJson(segments);
   } else {
-    context->Print(ListTable(segments));
+    context->Print(options.quarantined ? UnusableTable(segments)
+                                       : ListTable(segments));
   }
   return kDone;
 }
@@ -186,6 +215,75 @@ int Show(Context* context, const std::string& rig, const std::string& id) {
   return kDone;
 }
 
+struct QuarantineOptions {
+  std::string rig;
+  std::string segments;  // a session, or one segment as in the list
+  std::string reason;
+};
+
+// False for a text that names neither a session nor a segment.
+bool NameSegments(const QuarantineOptions& options,
+                  v1::QuarantineSegmentsRequest* request) {
+  request->set_parent(RigName(options.rig));
+  const std::string id = LastPart(options.segments);
+  const bool one = id.find('~') != id.npos;
+  // As a segment of the session, whose characters are encoded alike.
+  const auto parts = ParseSegmentName(RigName(options.rig) + "/segments/" + id +
+                                      (one ? "" : "~0"));
+  if (!parts) return false;
+  request->set_session(parts->key.session);
+  if (one) request->set_index(parts->key.index);
+  return true;
+}
+
+int Quarantine(Context* context, const QuarantineOptions& options) {
+  v1::QuarantineSegmentsRequest request;
+  if (!NameSegments(options, &request)) {
+    return FailInput(absl::InvalidArgumentError(fmt::format(
+        "'{}' is neither a session nor a segment; selfcal segments list {} "
+        "shows them as session~index",
+        options.segments,
+        options.rig)));
+  }
+  request.set_reason(options.reason);
+  const auto stub = v1::SegmentService::NewStub(context->Channel());
+  v1::QuarantineSegmentsResponse response;
+  const auto status = Call<Service>(
+      stub.get(), &Service::QuarantineSegments, request, &response);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(response);
+    return kDone;
+  }
+  Facts facts;
+  facts.Add("quarantined", fmt::format("{}", response.quarantined()));
+  facts.Add("unusable before", fmt::format("{}", response.unusable()));
+  context->Print(facts);
+  return kDone;
+}
+
+void AddQuarantine(CLI::App* segments, Context* context) {
+  const auto options = std::make_shared<QuarantineOptions>();
+  CLI::App* quarantine = segments->add_subcommand(
+      "quarantine",
+      "Take a segment, or all of a session, out of everything for good");
+  quarantine->add_option("RIG", options->rig)->required();
+  quarantine
+      ->add_option("SEGMENT",
+                   options->segments,
+                   "As in the list, session~index; or a session")
+      ->required();
+  quarantine
+      ->add_option(
+          "--reason", options->reason, "Why; the event log keeps it with who")
+      ->required();
+  quarantine->callback([context, options] {
+    context->command = [context, options] {
+      return Quarantine(context, *options);
+    };
+  });
+}
+
 }  // namespace
 
 void AddSegmentCommands(CLI::App* app, Context* context) {
@@ -205,6 +303,9 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   list->add_option("--order-by",
                    options->order_by,
                    "A field, then asc or desc, as 'entropy.camera asc'");
+  list->add_flag("--quarantined",
+                 options->quarantined,
+                 "Those that are unusable or quarantined alone, with why");
   list->callback([context, options] {
     context->command = [context, options] { return List(context, *options); };
   });
@@ -218,6 +319,7 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
     context->command = [context, rig, id] { return Show(context, *rig, *id); };
   });
 
+  AddQuarantine(segments, context);
   AddSegmentExport(segments, context);
 }
 

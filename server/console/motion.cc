@@ -61,6 +61,8 @@ console::Absence Encode(const std::string& rig, const TableAbsence& absence) {
   if (absence.rival_entropy) {
     message.set_rival_entropy_nats(*absence.rival_entropy);
   }
+  if (absence.fit) message.set_fit(*absence.fit);
+  if (absence.fit_limit) message.set_fit_limit(*absence.fit_limit);
   return message;
 }
 

@@ -29,6 +29,7 @@ struct DaemonOptions {
   bool idle_runs = true;
   double max_run_minutes = 30;      // of a run; it fails then
   int max_run_memory_mib = 512;     // of a run; 0: no limit
+  double session_idle_s = 60;       // then a session has ended; 0: never
   std::string metrics = "off";      // or host:port of the loopback
   int metrics_rigs = 16;            // with series of their own
   std::string console = "off";      // or host:port

@@ -56,6 +56,8 @@ PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
   pipeline.program_version = SELFCAL_VERSION;
   pipeline.calibrate.solver = options.solver;
   pipeline.conditions = conditions;
+  pipeline.session_idle = std::chrono::round<std::chrono::milliseconds>(
+      std::chrono::duration<double>(options.session_idle_s));
   pipeline.max_run_time = std::chrono::round<std::chrono::milliseconds>(
       std::chrono::duration<double, std::ratio<60>>(options.max_run_minutes));
   pipeline.observer = observer;

@@ -248,6 +248,14 @@ void DefineRuns(Definer* define, DaemonOptions* options) {
             "MiB; a run that needs more fails; 0: no limit")
       ->check(CLI::Range(0, kMaxRunMemoryMib))
       ->capture_default_str();
+  define
+      ->Add("session-idle",
+            &options->session_idle_s,
+            "Seconds without a segment after which the session of a rig has "
+            "ended: changed tables then start a run; 0: only the end of a "
+            "stream ends it")
+      ->check(CLI::Range(0.0, static_cast<double>(kMaxSeconds)))
+      ->capture_default_str();
 }
 
 void DefineReports(Definer* define, DaemonOptions* options) {

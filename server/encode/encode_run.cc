@@ -34,6 +34,8 @@ v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
       return v1::Recalibration::CHANGE_DETECTED;
     case RunTrigger::kCalibrationAged:
       return v1::Recalibration::CALIBRATION_AGED;
+    case RunTrigger::kSessionEnded:
+      return v1::Recalibration::SESSION_ENDED;
   }
   return v1::Recalibration::TRIGGER_UNSPECIFIED;
 }

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "proto/convert.h"
@@ -47,9 +49,50 @@ void FillResiduals(const ResidualStatistics& residuals,
   message->mutable_inertial_rms()->Add(residuals.inertial_rms.begin(),
                                        residuals.inertial_rms.end());
   message->set_many_outliers(residuals.many_outliers);
+  message->set_fit(residuals.fit);
+}
+
+std::string ReasonText(const TableAbsence& absence) {
+  const std::string rival =
+      absence.rival
+          ? fmt::format("{}~{}", absence.rival->session, absence.rival->index)
+          : "a segment that is since dropped";
+  switch (absence.cause) {
+    case AbsenceCause::kSaysTooLittle:
+      return "insufficient gain";
+    case AbsenceCause::kOthersSayMore:
+      return "outranked by all in the full table, the last of them " + rival;
+    case AbsenceCause::kPushedOut:
+      return "displaced by " + rival;
+    case AbsenceCause::kTooOld:
+      return "older than the rig's table_max_age";
+    case AbsenceCause::kDeviceChanged:
+      return "from before a change of the device";
+    case AbsenceCause::kDataEvicted:
+      return "its data was evicted by a quota";
+    case AbsenceCause::kUnusable:
+      return "unusable; see problem";
+    case AbsenceCause::kDoesNotFit:
+      return fmt::format(
+          "does not fit: its residuals are {:.3g} times what is expected, and "
+          "up to {:.3g} is usual for this rig",
+          absence.fit.value_or(0),
+          absence.fit_limit.value_or(0));
+    case AbsenceCause::kManyOutliers:
+      return "more than a fifth of its observations are outliers";
+  }
+  return "unknown to this program";
 }
 
 }  // namespace
+
+v1::TableExclusion Encode(const TableAbsence& absence) {
+  v1::TableExclusion message;
+  message.set_group(absence.group);
+  message.set_reason(ReasonText(absence));
+  SetTime(absence.time_ns, message.mutable_time());
+  return message;
+}
 
 v1::Rig Encode(const StoredRig& rig) {
   v1::Rig message = ToProto(rig.rig);

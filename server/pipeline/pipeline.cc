@@ -70,13 +70,15 @@ class PipelineImpl : public Pipeline {
         run_watchers_(ObserveRuns(options.observer)),
         recalibrator_(
             store, options, estimators, &calibration_watchers_, &run_watchers_),
-        scoring_(store,
-                 options,
-                 ObserveScores(estimators, options.observer),
-                 [this](const StoredRun& run) {
-                   spdlog::info("run {} of rig {} is due", run.run, run.rig);
-                   recalibrator_.Wake();
-                 }) {}
+        scoring_(
+            store,
+            options,
+            ObserveScores(estimators, options.observer),
+            [this](const StoredRun& run) {
+              spdlog::info("run {} of rig {} is due", run.run, run.rig);
+              recalibrator_.Wake();
+            },
+            [this](const std::string& rig) { recalibrator_.NoteScore(rig); }) {}
 
   absl::Status Start() override {
     SELFCAL_RETURN_IF_ERROR(recalibrator_.Start());
@@ -117,14 +119,40 @@ class PipelineImpl : public Pipeline {
     }
     const absl::Status place = scoring_.TakePlace(cancelled);
     if (!place.ok()) return done(place);
+    recalibrator_.ContinueSession(rig);
     store_->BeginPutSegment(rig, segment, [this, done](const auto& verdict) {
       done(Settle(verdict));
     });
   }
 
-  absl::StatusOr<StoredRun> StartRecalibration(
-      const std::string& rig) override {
-    SELFCAL_ASSIGN_OR_RETURN(StoredRun run, store_->CreateManualRun(rig));
+  void EndSession(const std::string& rig) override {
+    recalibrator_.EndSession(rig);
+  }
+
+  absl::StatusOr<QuarantineCommit> QuarantineSegments(
+      const std::string& rig,
+      const std::string& session,
+      std::optional<std::int64_t> index,
+      const std::string& caller,
+      const std::string& reason) override {
+    const auto commit = scoring_.Quarantine(rig, [&] {
+      return store_->QuarantineSegments(rig, session, index, caller, reason);
+    });
+    if (!commit.ok()) return commit;
+    spdlog::warn("{} quarantines {} segments of session {} of rig {}: {}",
+                 caller,
+                 commit->quarantined,
+                 session,
+                 rig,
+                 reason);
+    return commit;
+  }
+
+  using Pipeline::StartRecalibration;
+  absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig,
+                                               bool force) override {
+    SELFCAL_ASSIGN_OR_RETURN(StoredRun run,
+                             store_->CreateManualRun(rig, force));
     recalibrator_.Wake();
     return run;
   }

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,9 @@ struct PipelineOptions {
   // How often runs that are held back are looked at again, and whether a
   // calibration has become old.
   std::chrono::milliseconds recheck = std::chrono::seconds(30);
+  // A rig of which no segment arrives for so long has ended its session; 0:
+  // only a caller ends one.
+  std::chrono::milliseconds session_idle = std::chrono::minutes(1);
   // A run that takes longer fails.
   std::chrono::milliseconds max_run_time = std::chrono::minutes(30);
   // Nanoseconds since the Unix epoch.
@@ -132,9 +136,24 @@ class Pipeline {
     done(Submit(rig, segment, cancelled));
   }
 
+  // A caller has sent all it has of a session of the rig, which may call for a
+  // run once it is scored (Store::StartSessionRuns). Does not wait for that.
+  virtual void EndSession(const std::string& rig) = 0;
+
+  // Store::QuarantineSegments.
+  virtual absl::StatusOr<QuarantineCommit> QuarantineSegments(
+      const std::string& rig,
+      const std::string& session,
+      std::optional<std::int64_t> index,
+      const std::string& caller,
+      const std::string& reason) = 0;
+
   // On the tables as they are (Store::CreateManualRun).
-  virtual absl::StatusOr<StoredRun> StartRecalibration(
-      const std::string& rig) = 0;
+  virtual absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig,
+                                                       bool force) = 0;
+  absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig) {
+    return StartRecalibration(rig, false);
+  }
   // Returns once the run has ended. FAILED_PRECONDITION if it has ended another
   // way; UNAVAILABLE if the pipeline stops meanwhile: the run then starts
   // again.

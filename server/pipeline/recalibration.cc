@@ -4,6 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <limits>
+#include <set>
 #include <utility>
 
 #include "server/pipeline/retry.h"
@@ -54,6 +56,33 @@ void Recalibrator::Stop() {
 void Recalibrator::Wake() {
   {
     const std::lock_guard lock(mutex_);
+    ++wakes_;
+  }
+  changed_.notify_all();
+}
+
+void Recalibrator::EndSession(const std::string& rig) {
+  Clock::duration grace = kSessionGrace;
+  if (options_.session_idle.count() > 0) {
+    grace = std::min<Clock::duration>(grace, options_.session_idle);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    ended_[rig] = Clock::now() + grace;
+    ++wakes_;
+  }
+  changed_.notify_all();
+}
+
+void Recalibrator::ContinueSession(const std::string& rig) {
+  const std::lock_guard lock(mutex_);
+  ended_.erase(rig);
+}
+
+void Recalibrator::NoteScore(const std::string& rig) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!ended_.contains(rig)) return;
     ++wakes_;
   }
   changed_.notify_all();
@@ -154,8 +183,49 @@ void Recalibrator::Loop() {
       continue;
     }
     backoff.Reset();
-    changed_.wait_for(lock, options_.recheck, woken);
+    changed_.wait_until(lock, NextLook(), woken);
   }
+}
+
+Recalibrator::Clock::time_point Recalibrator::NextLook() const {
+  const auto now = Clock::now();
+  Clock::time_point next = now + options_.recheck;
+  // One that is due already waits for scores or for a run, which wake.
+  for (const auto& [rig, due] : ended_) {
+    if (due > now) next = std::min(next, due);
+  }
+  return next;
+}
+
+absl::StatusOr<std::vector<std::string>> Recalibrator::EndedSessions() {
+  std::set<std::string> busy;
+  SELFCAL_ASSIGN_OR_RETURN(
+      const auto unscored,
+      store_->ListUnscored(std::numeric_limits<int>::max()));
+  for (const auto& segment : unscored) busy.insert(segment.rig);
+  SELFCAL_ASSIGN_OR_RETURN(const auto runs, store_->ListUnfinishedRuns());
+  for (const StoredRun& run : runs) busy.insert(run.rig);
+  std::vector<std::string> ended;
+  const auto now = Clock::now();
+  const std::lock_guard lock(mutex_);
+  for (const auto& [rig, due] : ended_) {
+    if (due <= now && !busy.contains(rig)) ended.push_back(rig);
+  }
+  return ended;
+}
+
+absl::Status Recalibrator::StartSessionRuns() {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> ended,
+                           EndedSessions());
+  const std::chrono::nanoseconds idle = options_.session_idle;
+  SELFCAL_RETURN_IF_ERROR(
+      store_
+          ->StartSessionRuns(
+              ended, idle.count() > 0 ? options_.now_ns() - idle.count() : 0)
+          .status());
+  const std::lock_guard lock(mutex_);
+  for (const std::string& rig : ended) ended_.erase(rig);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<Recalibrator::Execution> Recalibrator::ExecuteAll() {
@@ -163,6 +233,7 @@ absl::StatusOr<Recalibrator::Execution> Recalibrator::ExecuteAll() {
   for (bool any = true; any && worst != Execution::kTryLater;) {
     any = false;
     SELFCAL_RETURN_IF_ERROR(store_->StartAgedRuns(options_.now_ns()).status());
+    SELFCAL_RETURN_IF_ERROR(StartSessionRuns());
     SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredRun> runs,
                              store_->ListUnfinishedRuns());
     for (const StoredRun& run : runs) {

@@ -18,6 +18,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -33,6 +34,8 @@ namespace selfcal::server {
 class Recalibrator {
  public:
   static constexpr int kMaxAttempts = 3;
+  // A client whose connection broke is back within a few seconds.
+  static constexpr std::chrono::seconds kSessionGrace{5};
 
   // The watchers must outlive it.
   Recalibrator(Store* store,
@@ -47,6 +50,14 @@ class Recalibrator {
   void Stop();
   // There may be a new run in the store.
   void Wake();
+  // No more segments of the rig's session are to come; once this has stood for
+  // kSessionGrace without another, and all are scored, the store is asked for
+  // the run of its end.
+  void EndSession(const std::string& rig);
+  // Another segment has come after all.
+  void ContinueSession(const std::string& rig);
+  // A segment of the rig is scored.
+  void NoteScore(const std::string& rig);
   // As Pipeline::CancelRecalibration.
   absl::StatusOr<StoredRun> Cancel(const std::string& rig, std::int64_t run);
   // Each iteration of the run so far; nothing for one that is not at work.
@@ -69,7 +80,15 @@ class Recalibrator {
   };
   enum class Execution { kDone, kHeldBack, kTryLater };
 
+  using Clock = std::chrono::steady_clock;
+
   void Loop();
+  // Creates the runs of sessions that have ended.
+  absl::Status StartSessionRuns();
+  // Those that are due, and have nothing under way that comes first.
+  absl::StatusOr<std::vector<std::string>> EndedSessions();
+  // Until when to sleep. With the lock held.
+  Clock::time_point NextLook() const;
   // Of all unfinished runs; the worst of them.
   absl::StatusOr<Execution> ExecuteAll();
   Execution Execute(const StoredRun& run);
@@ -127,6 +146,7 @@ class Recalibrator {
   bool running_ = false;
   std::int64_t wakes_ = 0;
   std::optional<Current> current_;
+  std::map<std::string, Clock::time_point> ended_;  // rig -> when it is due
   std::thread thread_;
 };
 

@@ -141,6 +141,7 @@ absl::Status Recalibrator::Judge(const StoredRun& run,
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
   SELFCAL_ASSIGN_OR_RETURN(StoredCalibration active,
                            store_->GetActiveCalibration(run.rig));
+  active.covariance = CovarianceAt(rig, active, options_.now_ns());
   if (run.change > 0) {
     SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
                              store_->GetChange(run.rig, run.change));

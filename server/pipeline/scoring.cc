@@ -30,11 +30,13 @@ bool IsFinite(const SegmentInformation& information) {
 ScoringWorkers::ScoringWorkers(Store* store,
                                const PipelineOptions& options,
                                Estimators estimators,
-                               std::function<void(const StoredRun&)> on_run)
+                               std::function<void(const StoredRun&)> on_run,
+                               std::function<void(const std::string&)> on_done)
     : store_(store),
       options_(options),
       estimators_(std::move(estimators)),
-      on_run_(std::move(on_run)) {}
+      on_run_(std::move(on_run)),
+      on_done_(std::move(on_done)) {}
 
 ScoringWorkers::~ScoringWorkers() { Stop(); }
 
@@ -107,6 +109,24 @@ void ScoringWorkers::ReturnPlace() {
   changed_.notify_all();
 }
 
+absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
+    const std::string& rig,
+    const std::function<absl::StatusOr<QuarantineCommit>()>& change) {
+  absl::StatusOr<QuarantineCommit> commit = absl::UnknownError("");
+  {
+    // Under the lock no worker claims a segment, or is done with one: whoever
+    // has claimed one gives its place back.
+    const std::lock_guard lock(mutex_);
+    commit = change();
+    if (!commit.ok()) return commit;
+    for (const std::int64_t sequence : commit->unscored_sequences) {
+      if (!claimed_.contains({rig, sequence})) --backlog_;
+    }
+  }
+  changed_.notify_all();
+  return commit;
+}
+
 void ScoringWorkers::Run() {
   while (const std::optional<Claim> claim = NextClaim()) {
     Process(*claim);
@@ -149,6 +169,7 @@ void ScoringWorkers::Process(const Claim& claim) {
     --backlog_;
   }
   changed_.notify_all();
+  on_done_(claim.rig);
 }
 
 std::optional<absl::StatusOr<SegmentInformation>> ScoringWorkers::Score(

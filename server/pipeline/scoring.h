@@ -29,11 +29,13 @@ namespace selfcal::server {
 
 class ScoringWorkers {
  public:
-  // `on_run` is called on a worker for each run that a commit has started.
+  // `on_run` is called on a worker for each run that a commit has started,
+  // `on_done` for each segment that was scored or set aside, with its rig.
   ScoringWorkers(Store* store,
                  const PipelineOptions& options,
                  Estimators estimators,
-                 std::function<void(const StoredRun&)> on_run);
+                 std::function<void(const StoredRun&)> on_run,
+                 std::function<void(const std::string&)> on_done);
   ~ScoringWorkers();
 
   absl::Status Start();
@@ -47,6 +49,12 @@ class ScoringWorkers {
   // The place is filled by a stored segment, or was not needed.
   void FillPlace();
   void ReturnPlace();
+
+  // Store::QuarantineSegments, and gives back the places of those that were
+  // waiting for their score.
+  absl::StatusOr<QuarantineCommit> Quarantine(
+      const std::string& rig,
+      const std::function<absl::StatusOr<QuarantineCommit>()>& change);
 
  private:
   using Claim = Store::Unscored;
@@ -72,6 +80,7 @@ class ScoringWorkers {
   const PipelineOptions options_;
   const Estimators estimators_;
   const std::function<void(const StoredRun&)> on_run_;
+  const std::function<void(const std::string&)> on_done_;
 
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;

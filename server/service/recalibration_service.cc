@@ -42,7 +42,8 @@ class RecalibrationService final : public v1::RecalibrationService::Service {
     return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
-      const auto run = context_.pipeline->StartRecalibration(*rig);
+      const auto run =
+          context_.pipeline->StartRecalibration(*rig, request->force());
       if (!run.ok()) {
         return ToGrpc(run.status(),
                       {"selfcal.v1.Rig", request->parent(), "parent"});

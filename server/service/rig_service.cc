@@ -74,6 +74,10 @@ class RigService final : public v1::RigService::Service {
       violations.push_back({"rig." + violation.field, violation.message});
     }
     if (!violations.empty()) return InvalidFields(violations);
+    for (const Violation& violation : Validate(rig, policy.walk_densities)) {
+      violations.push_back({"rig." + violation.field, violation.message});
+    }
+    if (!violations.empty()) return InvalidFields(violations);
     const std::lock_guard lock(mutex_);
     const absl::StatusOr<std::int64_t> rigs = Count();
     if (!rigs.ok()) return ToGrpc(rigs.status(), {});

@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <atomic>
+#include <optional>
 
 #include "proto/convert.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 #include "server/encode/encode.h"
+#include "server/encode/reason.h"
 #include "server/encode/segment_filter.h"
 #include "server/encode/shortened.h"
 #include "server/service/caller.h"
@@ -74,6 +76,14 @@ class SegmentService final : public Service {
         return ToGrpc(segment.status(), {kSegmentType, request->name(), {}});
       }
       *response = Encode(*segment);
+      const auto absences =
+          context_.store->ListAbsences(parts->rig, parts->key);
+      if (!absences.ok()) {
+        return ToGrpc(absences.status(), {kSegmentType, request->name(), {}});
+      }
+      for (const TableAbsence& absence : *absences) {
+        *response->add_exclusions() = Encode(absence);
+      }
       return grpc::Status::OK;
     });
   }
@@ -132,6 +142,37 @@ class SegmentService final : public Service {
             subject);
       }
       *response = Encode(parts->rig, *table);
+      return grpc::Status::OK;
+    });
+  }
+
+  grpc::Status QuarantineSegments(
+      grpc::ServerContext* call,
+      const v1::QuarantineSegmentsRequest* request,
+      v1::QuarantineSegmentsResponse* response) override {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
+      const auto rig = ParseRigName(request->parent());
+      if (!rig) return BadName("parent", "rigs/{rig}");
+      if (request->session().empty()) {
+        return InvalidFields({{"session", "is empty; name the session"}});
+      }
+      if (!IsReason(request->reason())) {
+        return InvalidFields({{"reason", std::string(kReasonRule)}});
+      }
+      const auto commit = context_.pipeline->QuarantineSegments(
+          *rig,
+          request->session(),
+          request->has_index() ? std::optional(request->index()) : std::nullopt,
+          CallerName(*call),
+          request->reason());
+      if (!commit.ok()) {
+        return ToGrpc(commit.status(),
+                      {kSegmentType,
+                       request->parent() + "/segments/" + request->session(),
+                       {}});
+      }
+      response->set_quarantined(commit->quarantined);
+      response->set_unusable(commit->unusable);
       return grpc::Status::OK;
     });
   }

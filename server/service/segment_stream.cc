@@ -49,7 +49,9 @@ SegmentStream::SegmentStream(const ServiceContext& context,
     : context_(context), cancelled_(std::move(cancelled)) {}
 
 SegmentStream::~SegmentStream() {
-  if (!parent_.empty()) context_.traffic->Closed(rig_);
+  if (parent_.empty()) return;
+  context_.traffic->Closed(rig_);
+  if (stored_ && !stopped()) context_.pipeline->EndSession(rig_);
 }
 
 bool SegmentStream::stopped() const { return context_.stopping->load(); }
@@ -57,6 +59,7 @@ bool SegmentStream::stopped() const { return context_.stopping->load(); }
 void SegmentStream::Answered(v1::StreamSegmentsResponse response,
                              const Done& done) {
   if (response.verdict() == v1::StreamSegmentsResponse::STORED) {
+    stored_ = true;
     context_.traffic->Stored(rig_);
   } else if (response.verdict() == v1::StreamSegmentsResponse::REJECTED) {
     context_.traffic->Rejected(rig_);

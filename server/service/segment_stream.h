@@ -3,6 +3,7 @@
 
 #include <grpcpp/support/status.h>
 
+#include <atomic>
 #include <functional>
 #include <string>
 
@@ -23,6 +24,8 @@ class SegmentStream {
 
   // `cancelled` tells whether the caller has gone.
   SegmentStream(const ServiceContext& context, std::function<bool()> cancelled);
+  // The end of a stream that has stored something is the end of a session,
+  // unless the daemon stops.
   ~SegmentStream();
   SegmentStream(const SegmentStream&) = delete;
   SegmentStream& operator=(const SegmentStream&) = delete;
@@ -42,6 +45,7 @@ class SegmentStream {
   std::function<bool()> cancelled_;
   std::string parent_;  // empty until the first message
   std::string rig_;
+  std::atomic<bool> stored_ = false;  // anything
 };
 
 }  // namespace selfcal::server

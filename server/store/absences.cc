@@ -11,7 +11,7 @@ absl::StatusOr<std::vector<TableAbsence>> ListAbsenceRows(
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row, FindSegment(db, rig_id, key));
   Statement read(db,
                  "SELECT a.group_name, a.cause, a.time_ns, r.session, "
-                 "  r.session_index, a.rival_entropy "
+                 "  r.session_index, a.rival_entropy, a.fit, a.fit_limit "
                  "FROM table_absences a "
                  "JOIN tables t ON t.rig = ?1 AND t.group_name = a.group_name "
                  "LEFT JOIN segments r ON r.segment = a.rival "
@@ -26,6 +26,8 @@ absl::StatusOr<std::vector<TableAbsence>> ListAbsenceRows(
     absence.time_ns = read.Int(2);
     if (!read.IsNull(3)) absence.rival = {read.Text(3), read.Int(4)};
     if (!read.IsNull(5)) absence.rival_entropy = read.Double(5);
+    if (!read.IsNull(6)) absence.fit = read.Double(6);
+    if (!read.IsNull(7)) absence.fit_limit = read.Double(7);
     absences.push_back(std::move(absence));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());

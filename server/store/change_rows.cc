@@ -212,10 +212,12 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
                              ReadChange(db, rig.stored.rig.id, newest_change));
     first_sequence = last.first_sequence;
   }
-  const ConsistencyTester tester(
-      rig.stored.rig,
-      {active->theta, active->covariance, active->report->track_noise_factor},
-      options.inflation);
+  const std::int64_t now_ns = NowNs();
+  const ConsistencyTester tester(rig.stored.rig,
+                                 {active->theta,
+                                  CovarianceAt(rig.stored, *active, now_ns),
+                                  active->report->track_noise_factor},
+                                 options.inflation);
   SELFCAL_ASSIGN_OR_RETURN(
       const Newest newest,
       ReadNewest(db, rig, *active, first_sequence, tester, options.max_window));
@@ -226,7 +228,7 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
   StoredChange change;
   change.rig = rig.stored.rig.id;
   change.change = newest_change + 1;
-  change.time_ns = NowNs();
+  change.time_ns = now_ns;
   change.kind = found->kind;
   change.first_sequence =
       found->segments_since == 0

@@ -6,6 +6,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,10 +27,23 @@ absl::Status MarkUnusableRow(Connection* db,
                              const SegmentKey& key,
                              const std::string& problem);
 
+absl::StatusOr<QuarantineCommit> QuarantineSegmentRows(
+    Connection* db,
+    const std::string& rig,
+    const std::string& session,
+    std::optional<std::int64_t> index,
+    const std::string& caller,
+    const std::string& reason);
+
 absl::StatusOr<StoredRun> CreateManualRunRow(Connection* db,
-                                             const std::string& rig);
+                                             const std::string& rig,
+                                             bool force);
 absl::StatusOr<std::vector<StoredRun>> StartAgedRunRows(Connection* db,
                                                         std::int64_t now_ns);
+absl::StatusOr<std::vector<StoredRun>> StartSessionRunRows(
+    Connection* db,
+    const std::vector<std::string>& ended,
+    std::int64_t idle_since_ns);
 absl::Status HoldRunRow(Connection* db,
                         const std::string& rig,
                         std::int64_t run,

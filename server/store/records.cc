@@ -31,6 +31,7 @@ void PutResiduals(const ResidualStatistics& residuals,
     message->add_inertial_rms(rms);
   }
   message->set_many_outliers(residuals.many_outliers);
+  message->set_fit(residuals.fit);
 }
 
 ResidualStatistics GetResiduals(const v1::ResidualStatistics& message) {
@@ -46,6 +47,7 @@ ResidualStatistics GetResiduals(const v1::ResidualStatistics& message) {
   residuals.inertial_rms.assign(message.inertial_rms().begin(),
                                 message.inertial_rms().end());
   residuals.many_outliers = message.many_outliers();
+  residuals.fit = message.fit();
   return residuals;
 }
 

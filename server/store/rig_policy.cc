@@ -38,6 +38,21 @@ void PutPolicy(const RigPolicy& policy, v1::Rig* message) {
   if (policy.calibration_max_age_ns > 0) {
     Put(policy.calibration_max_age_ns, message->mutable_calibration_max_age());
   }
+  for (const WalkDensity& walk : policy.walk_densities) {
+    v1::ComponentSetting* added = message->add_walk_densities();
+    added->set_pattern(walk.pattern);
+    added->set_value(walk.density);
+  }
+}
+
+Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
+                             const StoredCalibration& calibration,
+                             std::int64_t time_ns) {
+  const auto age_ns = static_cast<double>(time_ns - calibration.create_time_ns);
+  return AgedCovariance(rig.rig,
+                        WalkDensities(rig.rig, rig.policy.walk_densities),
+                        calibration.covariance,
+                        age_ns / kNanosecondsOfDay);
 }
 
 std::vector<Violation> GetPolicy(const v1::Rig& message, RigPolicy* policy) {
@@ -54,6 +69,9 @@ std::vector<Violation> GetPolicy(const v1::Rig& message, RigPolicy* policy) {
       "calibration_max_age",
       &policy->calibration_max_age_ns,
       &violations);
+  for (const v1::ComponentSetting& walk : message.walk_densities()) {
+    policy->walk_densities.push_back({walk.pattern(), walk.value()});
+  }
   return violations;
 }
 

@@ -12,7 +12,8 @@ namespace selfcal::server {
 void PutPolicy(const RigPolicy& policy, v1::Rig* message);
 
 // Fills *policy, or returns every violation: durations are from 0 (no matter)
-// to a hundred years.
+// to a hundred years. Walk densities are for Validate of core/change/aged.h,
+// which knows the rig.
 std::vector<Violation> GetPolicy(const v1::Rig& message, RigPolicy* policy);
 
 }  // namespace selfcal::server

@@ -1,6 +1,8 @@
 // How a run comes to be: asked for, or called for by the tables.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
 #include "server/store/changes.h"
@@ -21,32 +23,6 @@ absl::StatusOr<std::int64_t> NewestRun(Connection* db,
       db,
       "SELECT coalesce(max(run), 0) FROM runs WHERE rig = ?1 AND " + condition,
       rig);
-}
-
-// What the trigger compares the tables with: the snapshot of the newest run,
-// however it ended, so that a failure is not repeated on the same data. Nothing
-// until the tables have started a run of their own since the last change: one
-// that was asked for on half-filled tables does not stand for the first full
-// ones.
-absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
-    Connection* db, const RigRow& rig) {
-  std::optional<std::vector<SegmentKey>> keys;
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
-                           NewestChange(db, rig.rowid));
-  SELFCAL_ASSIGN_OR_RETURN(
-      const std::int64_t triggered,
-      NewestRun(db,
-                rig.rowid,
-                fmt::format("cause IN (1, 2) AND change = {}", change)));
-  if (triggered == 0) {
-    return keys;
-  }
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest,
-                           NewestRun(db, rig.rowid, "1"));
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
-                           ReadRun(db, rig.stored.rig.id, newest));
-  keys = run.segments;
-  return keys;
 }
 
 absl::Status InsertSnapshot(Connection* db,
@@ -77,6 +53,8 @@ const char* TriggerText(RunTrigger trigger) {
       return "the tables are full again after a change";
     case RunTrigger::kCalibrationAged:
       return "the calibration is old";
+    case RunTrigger::kSessionEnded:
+      return "the session has ended, and the tables have changed";
     case RunTrigger::kManual:
       break;
   }
@@ -90,6 +68,7 @@ int CauseOf(RunTrigger trigger) {
     case RunTrigger::kChangeDetected:
       return 1;
     case RunTrigger::kTablesChanged:
+    case RunTrigger::kSessionEnded:
       return 2;
     case RunTrigger::kCalibrationAged:
       return 4;
@@ -99,7 +78,81 @@ int CauseOf(RunTrigger trigger) {
   return 3;
 }
 
+// Those that the result of a run is of, by key.
+absl::StatusOr<std::vector<SegmentKey>> UsedSegments(Connection* db,
+                                                     std::int64_t rig,
+                                                     std::int64_t run) {
+  Statement read(db,
+                 "SELECT s.session, s.session_index FROM run_segments x "
+                 "JOIN segments s USING (segment) "
+                 "WHERE x.rig = ?1 AND x.run = ?2 AND x.excluded = 0 "
+                 "ORDER BY s.session, s.session_index",
+                 rig,
+                 run);
+  std::vector<SegmentKey> keys;
+  while (read.Next()) {
+    keys.push_back({read.Text(0), read.Int(1)});
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return keys;
+}
+
+// FAILED_PRECONDITION if a run on these tables would find what the newest
+// version of a run already says: on the same segments, after the same change of
+// the device, and from where that run or its result left the calibration.
+absl::Status CheckThatTablesChanged(Connection* db,
+                                    const RigRow& rig,
+                                    const std::vector<Table>& tables) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest,
+                           NewestRun(db, rig.rowid, "state = 3"));
+  if (newest == 0) return absl::OkStatus();
+  const std::string& id = rig.stored.rig.id;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun last, ReadRun(db, id, newest));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentKey> used,
+                           UsedSegments(db, rig.rowid, newest));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
+                           NewestChange(db, rig.rowid));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active,
+                           ActiveVersion(db, rig.rowid));
+  std::vector<SegmentKey> held;
+  for (const TableEntry& entry : UnionOfTables(tables)) {
+    held.push_back(entry.key);
+  }
+  std::sort(held.begin(), held.end());
+  const bool same_start =
+      active == last.base_version || active == last.calibration_version;
+  if (held != used || change != last.change || !same_start) {
+    return absl::OkStatus();
+  }
+  return absl::FailedPreconditionError(fmt::format(
+      "the tables of rig {} have not changed since version {} was computed; "
+      "send segments with more motion, or force it to be computed anew",
+      id,
+      last.calibration_version));
+}
+
 }  // namespace
+
+absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
+    Connection* db, const RigRow& rig) {
+  std::optional<std::vector<SegmentKey>> keys;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
+                           NewestChange(db, rig.rowid));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t triggered,
+      NewestRun(db,
+                rig.rowid,
+                fmt::format("cause IN (1, 2) AND change = {}", change)));
+  if (triggered == 0) {
+    return keys;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest,
+                           NewestRun(db, rig.rowid, "1"));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
+                           ReadRun(db, rig.stored.rig.id, newest));
+  keys = run.segments;
+  return keys;
+}
 
 absl::StatusOr<StoredRun> InsertRun(Connection* db,
                                     const RigRow& rig,
@@ -135,13 +188,15 @@ absl::StatusOr<StoredRun> InsertRun(Connection* db,
   SELFCAL_RETURN_IF_ERROR(
       Statement(db,
                 "INSERT INTO runs (rig, run, state, cause, create_time_ns, "
-                "  base_version, change) VALUES (?1, ?2, 1, ?3, ?4, ?5, ?6)",
+                "  base_version, change, session_ended) "
+                "VALUES (?1, ?2, 1, ?3, ?4, ?5, ?6, ?7)",
                 rig.rowid,
                 run.run,
                 CauseOf(trigger),
                 run.create_time_ns,
                 run.base_version,
-                run.change)
+                run.change,
+                run.trigger == RunTrigger::kSessionEnded ? 1 : 0)
           .Run());
   SELFCAL_RETURN_IF_ERROR(InsertSnapshot(db, rig.rowid, run));
   SELFCAL_RETURN_IF_ERROR(AppendEvent(db,
@@ -178,12 +233,16 @@ absl::StatusOr<std::optional<StoredRun>> MaybeInsertRun(
 }
 
 absl::StatusOr<StoredRun> CreateManualRunRow(Connection* db,
-                                             const std::string& rig_name) {
+                                             const std::string& rig_name,
+                                             bool force) {
   Transaction transaction(db);
   SELFCAL_RETURN_IF_ERROR(transaction.status());
   SELFCAL_ASSIGN_OR_RETURN(const RigRow rig, ReadRig(db, rig_name));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
                            ReadFreshTables(db, rig, NowNs()));
+  if (!force) {
+    SELFCAL_RETURN_IF_ERROR(CheckThatTablesChanged(db, rig, tables));
+  }
   SELFCAL_ASSIGN_OR_RETURN(StoredRun run,
                            InsertRun(db, rig, tables, RunTrigger::kManual));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());

@@ -5,6 +5,7 @@
 #include "server/store/change_rows.h"
 #include "server/store/changes.h"
 #include "server/store/clock.h"
+#include "server/store/quarantine.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
@@ -129,7 +130,19 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
                     "were chosen",
                     change));
   }
+  SELFCAL_ASSIGN_OR_RETURN(const auto unusable,
+                           UnusableSegments(db, rig.rowid, run.run));
+  if (!unusable.empty()) {
+    judged.state = CalibrationState::kRejected;
+    judged.reasons.push_back(
+        fmt::format("{} became unusable since its segments were chosen",
+                    SegmentText(rig_name, unusable.front())));
+  }
   SELFCAL_RETURN_IF_ERROR(JudgeCandidate(db, rig.rowid, judged));
+  if (judged.state == CalibrationState::kActive && calibration.report) {
+    SELFCAL_RETURN_IF_ERROR(QuarantineExcluded(
+        db, rig.rowid, run, calibration.report->segment_fits));
+  }
   run.state = RunState::kSucceeded;
   run.end_time_ns = NowNs();
   run.calibration_version = judged.version;

@@ -14,7 +14,7 @@ namespace {
 constexpr char kColumns[] =
     "SELECT g.id, r.run, r.state, r.cause, r.create_time_ns, r.end_time_ns, "
     "  r.base_version, r.attempts, r.calibration_version, r.message, r.rig, "
-    "  r.change "
+    "  r.change, r.session_ended "
     "FROM runs r JOIN rigs g USING (rig) ";
 
 absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
@@ -34,13 +34,16 @@ absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
   return keys;
 }
 
-// From the columns cause and change.
-RunTrigger TriggerOf(std::int64_t cause, std::int64_t change) {
+// From the columns cause, change and session_ended.
+RunTrigger TriggerOf(std::int64_t cause,
+                     std::int64_t change,
+                     bool session_ended) {
   switch (cause) {
     case 1:
       return change > 0 ? RunTrigger::kChangeDetected : RunTrigger::kTablesFull;
     case 2:
-      return RunTrigger::kTablesChanged;
+      return session_ended ? RunTrigger::kSessionEnded
+                           : RunTrigger::kTablesChanged;
     case 4:
       return RunTrigger::kCalibrationAged;
     default:
@@ -53,7 +56,7 @@ absl::StatusOr<StoredRun> RunFromRow(Connection* db, const Statement& row) {
   run.rig = row.Text(0);
   run.run = row.Int(1);
   run.state = static_cast<RunState>(row.Int(2) - 1);
-  run.trigger = TriggerOf(row.Int(3), row.Int(11));
+  run.trigger = TriggerOf(row.Int(3), row.Int(11), row.Int(12) != 0);
   run.create_time_ns = row.Int(4);
   run.end_time_ns = row.Int(5);
   run.base_version = row.Int(6);

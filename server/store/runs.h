@@ -41,6 +41,14 @@ absl::StatusOr<StoredRun> InsertRun(Connection* db,
 absl::StatusOr<std::optional<StoredRun>> MaybeInsertRun(
     Connection* db, const RigRow& rig, const std::vector<Table>& tables);
 
+// What the trigger compares the tables with: the snapshot of the newest run,
+// however it ended, so that a failure is not repeated on the same data. Nothing
+// until the tables have started a run of their own since the last change: one
+// that was asked for on half-filled tables does not stand for the first full
+// ones.
+absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
+    Connection* db, const RigRow& rig);
+
 // Writes state, attempts, end_time_ns, calibration_version and message; an
 // event where the run ends.
 absl::Status UpdateRun(Connection* db, std::int64_t rig, const StoredRun& run);

@@ -1,4 +1,4 @@
-// What happens to a stored segment: it gets its score, or turns out unusable.
+// What happens to a stored segment: it gets its score.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,7 +11,8 @@
 #include "server/store/absences.h"
 #include "server/store/change_rows.h"
 #include "server/store/changes.h"
-#include "server/store/events.h"
+#include "server/store/fit_rows.h"
+#include "server/store/quarantine.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
@@ -42,21 +43,6 @@ std::optional<TableChange> OfferToGroup(const Rig& rig,
   return Offer({key, segment.sequence, score->entropy, score->gain},
                rig.min_gain_nats,
                table);
-}
-
-// Takes a segment that cannot be used out of everything.
-absl::Status SetAside(Connection* db,
-                      const std::string& rig,
-                      const SegmentKey& key,
-                      std::int64_t segment,
-                      const std::string& problem) {
-  SELFCAL_RETURN_IF_ERROR(WriteProblem(db, segment, problem));
-  SELFCAL_RETURN_IF_ERROR(
-      RemoveFromTables(db, segment, AbsenceCause::kUnusable));
-  return AppendEvent(db,
-                     rig,
-                     EventKind::kSegmentUnusable,
-                     fmt::format("{}: {}", SegmentText(rig, key), problem));
 }
 
 // The kept segments of a joint selection, in order of arrival. One whose
@@ -153,15 +139,14 @@ absl::Status ExplainOffer(Connection* db,
                       worst.entropy);
 }
 
-// Writes the score, and offers the segment to every table.
-absl::StatusOr<std::vector<std::string>> ScoreAndOffer(
+// Offers the segment to every table.
+absl::StatusOr<std::vector<std::string>> OfferToTables(
     Connection* db,
     const RigRow& rig,
     const SegmentRow& segment,
     const SegmentKey& key,
     const SegmentInformation& information,
     std::vector<Table>* tables) {
-  SELFCAL_RETURN_IF_ERROR(WriteScore(db, segment.rowid, information));
   std::vector<std::string> entered;
   for (Table& table : *tables) {
     std::optional<TableChange> change;
@@ -208,11 +193,21 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
   }
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t receive_time_ns,
                            ReceiveTime(db, segment.rowid));
+  SELFCAL_RETURN_IF_ERROR(WriteScore(db, segment.rowid, information));
+  SELFCAL_ASSIGN_OR_RETURN(const std::optional<double> largest_fit,
+                           ReadLargestFit(db, rig.rowid));
+  SELFCAL_RETURN_IF_ERROR(RemoveMisfits(db, rig.rowid, largest_fit));
   SELFCAL_ASSIGN_OR_RETURN(std::vector<Table> tables,
                            ReadFreshTables(db, rig, receive_time_ns));
   SELFCAL_ASSIGN_OR_RETURN(
-      commit.tables,
-      ScoreAndOffer(db, rig, segment, key, information, &tables));
+      const bool admitted,
+      AdmitByFit(
+          db, rig.rowid, segment.rowid, information.residuals, largest_fit));
+  if (admitted) {
+    SELFCAL_ASSIGN_OR_RETURN(
+        commit.tables,
+        OfferToTables(db, rig, segment, key, information, &tables));
+  }
   SELFCAL_ASSIGN_OR_RETURN(commit.change, MaybeInsertChange(db, rig, change));
   if (commit.change) {
     SELFCAL_ASSIGN_OR_RETURN(tables, ReadTables(db, rig.rowid));
@@ -222,23 +217,6 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
   SELFCAL_RETURN_IF_ERROR(DropUnreferencedPayloads(db, rig.rowid));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());
   return commit;
-}
-
-absl::Status MarkUnusableRow(Connection* db,
-                             const std::string& rig,
-                             const SegmentKey& key,
-                             const std::string& problem) {
-  Transaction transaction(db);
-  SELFCAL_RETURN_IF_ERROR(transaction.status());
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
-                           FindSegment(db, rig_id, key));
-  if (segment.state == SegmentState::kUnusable) {
-    return absl::OkStatus();
-  }
-  SELFCAL_RETURN_IF_ERROR(SetAside(db, rig, key, segment.rowid, problem));
-  SELFCAL_RETURN_IF_ERROR(DropUnreferencedPayloads(db, rig_id));
-  return transaction.Commit();
 }
 
 }  // namespace selfcal::server

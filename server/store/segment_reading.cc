@@ -2,6 +2,7 @@
 // information that is read here.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdint>
 
 #include "server/store/checksum.h"
@@ -125,7 +126,12 @@ absl::Status WriteScore(Connection* db,
                         std::int64_t segment,
                         const SegmentInformation& information) {
   SELFCAL_RETURN_IF_ERROR(
-      Statement(db, "UPDATE segments SET state = 2 WHERE segment = ?1", segment)
+      Statement(db,
+                "UPDATE segments SET state = 2, fit = ?2 WHERE segment = ?1",
+                segment,
+                std::isnan(information.residuals.fit)
+                    ? 0.0
+                    : information.residuals.fit)
           .Run());
   const std::string bytes = SerializeInformation(information);
   const std::string sha256 = Sha256(bytes);

@@ -12,7 +12,9 @@
 
 namespace selfcal::server {
 
-// kUnusable: its data is damaged or cannot be scored; its problem says why.
+// kUnusable: its data is damaged or cannot be scored, or it is quarantined: a
+// run has found that it contradicts the others, or an operator has. Its problem
+// says why; its information enters nothing any more.
 enum class SegmentState { kStored, kScored, kUnusable };
 
 struct SessionSummary {
@@ -60,6 +62,8 @@ enum class AbsenceCause {
   kDeviceChanged,
   kDataEvicted,  // by a quota
   kUnusable,
+  kDoesNotFit,    // its residuals, against those of the rig's other segments
+  kManyOutliers,  // too many of its observations were left out
 };
 
 // Why the table of a group does not hold a scored segment.
@@ -71,6 +75,9 @@ struct TableAbsence {
   // instead. The key is missing once nothing is kept of that segment.
   std::optional<SegmentKey> rival;
   std::optional<double> rival_entropy;  // [nat]
+  // kDoesNotFit: ResidualStatistics::fit, and the largest that fits.
+  std::optional<double> fit;
+  std::optional<double> fit_limit;
 };
 
 }  // namespace selfcal::server

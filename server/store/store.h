@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/change/aged.h"
 #include "core/change/detect_change.h"
 #include "core/information/segment_information.h"
 #include "core/model/rig.h"
@@ -55,6 +56,8 @@ struct RigPolicy {
   std::int64_t recalibration_min_interval_ns = 0;
   // A calibration that has been active for longer is computed anew.
   std::int64_t calibration_max_age_ns = 0;
+  // How fast components change by themselves (core/change/aged.h).
+  std::vector<WalkDensity> walk_densities;
 
   friend bool operator==(const RigPolicy&, const RigPolicy&) = default;
 };
@@ -155,6 +158,12 @@ struct StoredCalibration {
   std::int64_t activation = 0;
 };
 
+// What is known of it at a later time: its covariance, widened by the random
+// walk of the rig since it was computed.
+Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
+                             const StoredCalibration& calibration,
+                             std::int64_t time_ns);
+
 enum class RunState { kPending, kRunning, kSucceeded, kFailed, kCancelled };
 enum class RunTrigger {
   kTablesFull,
@@ -162,6 +171,7 @@ enum class RunTrigger {
   kManual,
   kChangeDetected,  // the tables are full again, for the first time since one
   kCalibrationAged,
+  kSessionEnded,  // and the tables have changed since the last run
 };
 
 struct StoredRun {
@@ -200,6 +210,14 @@ struct ScoreCommit {
   std::vector<std::string> tables;       // groups it entered
   std::optional<StoredRun> started_run;  // the trigger fired
   std::optional<StoredChange> change;    // was detected
+};
+
+// What a quarantine by hand did.
+struct QuarantineCommit {
+  std::int64_t quarantined = 0;
+  std::int64_t unusable = 0;  // that were so before
+  // Of the quarantined ones, those that were waiting for their score.
+  std::vector<std::int64_t> unscored_sequences;
 };
 
 // A rig in a list of many.
@@ -302,6 +320,16 @@ class Store {
                                     const SegmentKey& key,
                                     const std::string& problem) = 0;
 
+  // The same by hand, for one segment of a session or for all that are stored:
+  // an event keeps who did it and why. A run under way that uses one of them
+  // ends with a rejected calibration. NOT_FOUND if nothing is stored of it.
+  virtual absl::StatusOr<QuarantineCommit> QuarantineSegments(
+      const std::string& rig,
+      const std::string& session,
+      std::optional<std::int64_t> index,
+      const std::string& caller,
+      const std::string& reason) = 0;
+
   virtual absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) = 0;
 
@@ -331,9 +359,14 @@ class Store {
       const std::string& reason) = 0;
 
   // --- Runs.
-  // On the tables as they are. FAILED_PRECONDITION if they are empty or a run
-  // of the rig is unfinished.
-  virtual absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig) = 0;
+  // On the tables as they are. FAILED_PRECONDITION if they are empty, a run of
+  // the rig is unfinished, or, without `force`, a version was computed on the
+  // same tables, from the version that is active or to become it.
+  virtual absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
+                                                    bool force) = 0;
+  absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig) {
+    return CreateManualRun(rig, false);
+  }
   virtual absl::StatusOr<StoredRun> GetRun(const std::string& rig,
                                            std::int64_t run) = 0;
   virtual absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
@@ -347,6 +380,13 @@ class Store {
   // one began as long ago.
   virtual absl::StatusOr<std::vector<StoredRun>> StartAgedRuns(
       std::int64_t now_ns) = 0;
+  // Creates a run for each rig whose session has ended: it is one of `ended`,
+  // or its newest segment arrived before `idle_since_ns`. Only where the tables
+  // have started a run before (since the last change of the device) and have
+  // changed since the last one, all segments are scored and no run is
+  // unfinished.
+  virtual absl::StatusOr<std::vector<StoredRun>> StartSessionRuns(
+      const std::vector<std::string>& ended, std::int64_t idle_since_ns) = 0;
   // Writes down why a pending run does not begin yet; the first time with an
   // event.
   virtual absl::Status HoldRun(const std::string& rig,
@@ -372,7 +412,11 @@ class Store {
   // not yet: active (the one before becomes superseded) or rejected, as its
   // state, reasons and validation say. ABORTED if it was validated against
   // another version than is active now. Drops data that only the run
-  // referenced. May create the next run, as CommitScore does.
+  // referenced. May create the next run, as CommitScore does. Where it becomes
+  // active, segments that its report says it does not use
+  // (SegmentFit::excluded) are quarantined. It is rejected where the device has
+  // changed, or a segment of the run was quarantined, since the run was
+  // created.
   virtual absl::StatusOr<StoredCalibration> FinishRun(
       const std::string& rig,
       std::int64_t run,

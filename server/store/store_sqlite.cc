@@ -165,6 +165,17 @@ class SqliteStore : public Store {
         [&](Connection* db) { return MarkUnusableRow(db, rig, key, problem); });
   }
 
+  absl::StatusOr<QuarantineCommit> QuarantineSegments(
+      const std::string& rig,
+      const std::string& session,
+      std::optional<std::int64_t> index,
+      const std::string& caller,
+      const std::string& reason) override {
+    return Write([&](Connection* db) {
+      return QuarantineSegmentRows(db, rig, session, index, caller, reason);
+    });
+  }
+
   absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) override {
     return Read([&](Connection* db) -> absl::StatusOr<std::vector<Table>> {
@@ -211,8 +222,11 @@ class SqliteStore : public Store {
     });
   }
 
-  absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig) override {
-    return Write([&](Connection* db) { return CreateManualRunRow(db, rig); });
+  using Store::CreateManualRun;
+  absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
+                                            bool force) override {
+    return Write(
+        [&](Connection* db) { return CreateManualRunRow(db, rig, force); });
   }
 
   absl::StatusOr<StoredRun> GetRun(const std::string& rig,
@@ -232,6 +246,14 @@ class SqliteStore : public Store {
   absl::StatusOr<std::vector<StoredRun>> StartAgedRuns(
       std::int64_t now_ns) override {
     return Write([&](Connection* db) { return StartAgedRunRows(db, now_ns); });
+  }
+
+  absl::StatusOr<std::vector<StoredRun>> StartSessionRuns(
+      const std::vector<std::string>& ended,
+      std::int64_t idle_since_ns) override {
+    return Write([&](Connection* db) {
+      return StartSessionRunRows(db, ended, idle_since_ns);
+    });
   }
 
   absl::Status HoldRun(const std::string& rig,

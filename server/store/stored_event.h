@@ -19,6 +19,7 @@ enum class EventKind {
   kCalibrationActivated,   // by hand
   kCalibrationRolledBack,  // by hand
   kRunHeldBack,
+  kSegmentQuarantined,  // by a run, or by hand
 };
 
 struct StoredEvent {

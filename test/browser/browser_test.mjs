@@ -276,7 +276,7 @@ const tests = {
   },
 
   async 'a run is drawn while it computes'(r, other, daemon) {
-    const started = start(selfcal, ['--target', daemon.address, 'recalibrate', 'tablet', '--no-wait']);
+    const started = start(selfcal, ['--target', daemon.address, 'recalibrate', 'tablet', '--force', '--no-wait']);
     const worker = await until('a worker', () => workerOf(daemon.pid));
     process.kill(worker, 'SIGSTOP');
     try {

@@ -47,7 +47,7 @@ absl::Status AddDevice(Store* store, const std::string& id) {
         pipeline->Submit(id, segment, [] { return false; }).status());
   }
   SELFCAL_RETURN_IF_ERROR(Settled(store));
-  SELFCAL_RETURN_IF_ERROR(pipeline->StartRecalibration(id).status());
+  SELFCAL_RETURN_IF_ERROR(pipeline->StartRecalibration(id, true).status());
   SELFCAL_RETURN_IF_ERROR(Settled(store));
   pipeline->Stop();
   return absl::OkStatus();

@@ -57,6 +57,8 @@ struct CannedDaemon final : v1::RigService::Service,
   std::string last_filter;
   std::string last_order;
   v1::MotionSegment last_segment;      // that was sent
+  v1::QuarantineSegmentsRequest last_quarantine;
+  bool last_force = false;             // of a recalibration
   std::int64_t reject_index = -1;      // of the segments that are sent
   std::atomic<int> broken_watches{0};  // that many end before the run does
 
@@ -246,9 +248,19 @@ struct CannedDaemon final : v1::RigService::Service,
     return {grpc::StatusCode::UNAVAILABLE, "the daemon is stopping"};
   }
 
+  grpc::Status QuarantineSegments(
+      grpc::ServerContext*,
+      const v1::QuarantineSegmentsRequest* request,
+      v1::QuarantineSegmentsResponse* response) override {
+    last_quarantine = *request;
+    response->set_quarantined(3);
+    return grpc::Status::OK;
+  }
+
   grpc::Status StartRecalibration(grpc::ServerContext*,
-                                  const v1::StartRecalibrationRequest*,
+                                  const v1::StartRecalibrationRequest* request,
                                   v1::Recalibration* response) override {
+    last_force = request->force();
     if (run.empty()) {
       return {grpc::StatusCode::FAILED_PRECONDITION,
               "the tables are empty; send segments first"};

@@ -61,6 +61,63 @@ TEST(CommandsAlone, ADaemonThatIsAwayExitsWithThree) {
   }
 }
 
+TEST_F(Commands, QuarantinesASegmentOrASession) {
+  const Outcome one = Selfcal({"segments",
+                               "quarantine",
+                               "device",
+                               "walk%201~7",
+                               "--reason",
+                               "diverged"});
+  EXPECT_EQ(one.code, 0) << one.err;
+  EXPECT_THAT(one.out, HasSubstr("quarantined\t3\n"));
+  EXPECT_EQ(daemon_.last_quarantine.parent(), "rigs/device");
+  EXPECT_EQ(daemon_.last_quarantine.session(), "walk 1");
+  EXPECT_EQ(daemon_.last_quarantine.index(), 7);
+  EXPECT_EQ(daemon_.last_quarantine.reason(), "diverged");
+  EXPECT_EQ(
+      Selfcal({"segments", "quarantine", "device", "walk", "--reason", "x"})
+          .code,
+      0);
+  EXPECT_EQ(daemon_.last_quarantine.session(), "walk");
+  EXPECT_FALSE(daemon_.last_quarantine.has_index());
+  EXPECT_EQ(Selfcal({"segments", "quarantine", "device", "walk"}).code, 2);
+  EXPECT_EQ(
+      Selfcal({"segments", "quarantine", "device", "walk~x", "--reason", "x"})
+          .code,
+      2);
+}
+
+TEST_F(Commands, ListsWhatIsQuarantinedWithWhy) {
+  v1::Segment segment;
+  segment.set_name("rigs/device/segments/walk~7");
+  segment.set_state(v1::Segment::UNUSABLE);
+  segment.set_problem("quarantined by alice: diverged");
+  daemon_.segments = {segment};
+  const Outcome outcome =
+      Selfcal({"segments", "list", "device", "--quarantined"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(daemon_.last_filter, "state = UNUSABLE");
+  EXPECT_THAT(outcome.out, HasSubstr("walk~7"));
+  EXPECT_THAT(outcome.out, HasSubstr("quarantined by alice: diverged"));
+}
+
+TEST_F(Commands, TheGradeOfAnImuSetsItsTolerances) {
+  v1::Rig rig = ToProto(ARig("from_file"));
+  v1::ComponentSetting* own = rig.add_prior_sigmas();
+  own->set_pattern("imu.gyro.scale.x");
+  own->set_value(0.5);
+  const std::string file = WriteFile(ToJson(rig, false));
+  ASSERT_EQ(Selfcal({"rig", "create", file, "--imu", "consumer"}).code, 0);
+  const auto& sigmas = daemon_.rigs.back().prior_sigmas();
+  ASSERT_GT(sigmas.size(), 1);
+  EXPECT_EQ(sigmas[0].pattern(), "imu.gyro.scale.*");
+  EXPECT_EQ(sigmas[0].value(), 0.02);
+  EXPECT_EQ(sigmas[sigmas.size() - 1].pattern(), "imu.gyro.scale.x");
+  const Outcome wrong = Selfcal({"rig", "create", file, "--imu", "good"});
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("factory-calibrated"));
+}
+
 TEST_F(Commands, CreatesARigFromAFileWithOverrides) {
   const std::string file = WriteFile(ToJson(ToProto(ARig("from_file")), false));
   const Outcome outcome = Selfcal({"rig",

@@ -36,6 +36,13 @@ TEST_F(RecalibrateCommand, WaitsForTheEndAndShowsTheValues) {
   EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255.123\tpx\t0.034\n"));
 }
 
+TEST_F(RecalibrateCommand, ForcesWhatHasNotChanged) {
+  EXPECT_EQ(Selfcal({"recalibrate", "device", "--no-wait"}).code, 0);
+  EXPECT_FALSE(daemon_.last_force);
+  EXPECT_EQ(Selfcal({"recalibrate", "device", "--force", "--no-wait"}).code, 0);
+  EXPECT_TRUE(daemon_.last_force);
+}
+
 TEST_F(RecalibrateCommand, OutlivesTheConnection) {
   daemon_.broken_watches = 2;
   const Outcome outcome = Selfcal({"recalibrate", "device", "--json"});

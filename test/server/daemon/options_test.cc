@@ -81,6 +81,7 @@ TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
   EXPECT_EQ(options_.host, HostLimits());
   EXPECT_EQ(options_.max_run_minutes, 30);
   EXPECT_EQ(options_.max_run_memory_mib, 512);
+  EXPECT_EQ(options_.session_idle_s, 60);
   EXPECT_TRUE(options_.idle_runs);
   EXPECT_EQ(Parse({"--state-dir",
                    "s",
@@ -91,6 +92,8 @@ TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
                    "2.5",
                    "--max-run-memory",
                    "100",
+                   "--session-idle",
+                   "0.5",
                    "--run-priority",
                    "low"}),
             std::nullopt);
@@ -99,6 +102,7 @@ TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
   EXPECT_EQ(options_.host.max_load, 0.5);
   EXPECT_EQ(options_.max_run_minutes, 2.5);
   EXPECT_EQ(options_.max_run_memory_mib, 100);
+  EXPECT_EQ(options_.session_idle_s, 0.5);
   EXPECT_EQ(Parse({"--state-dir", "s", "--max-load", "-1"}), 2);
   EXPECT_EQ(Parse({"--state-dir", "s", "--max-run-minutes", "0"}), 2);
   EXPECT_EQ(Parse({"--state-dir", "s", "--max-run-memory", "-1"}), 2);

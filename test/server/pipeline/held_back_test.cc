@@ -36,6 +36,8 @@ class HeldBackTest : public PipelineTest {
   HeldBackTest() {
     options_.recheck = std::chrono::milliseconds(5);
     options_.conditions = &conditions_;
+    // Tests move the clock; none of them ends a session.
+    options_.session_idle = std::chrono::milliseconds(0);
     options_.now_ns = [this] { return NowNs() + ahead_ns_.load(); };
   }
   ~HeldBackTest() override { pipeline_.reset(); }
@@ -101,7 +103,7 @@ TEST_F(HeldBackTest, RunByHandDoesNotWait) {
   Submit(0);
   ASSERT_TRUE(AllScored());
   for (const int run : {1, 2}) {
-    ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+    ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());
     ASSERT_TRUE(RunIs(RunState::kSucceeded, run));
   }
 }
@@ -210,7 +212,7 @@ TEST_F(HeldBackTest, ActivationByHandDuringARunIsWhatItIsJudgedAgainst) {
     return Converged(rig, start);
   };
   StartOne();
-  ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+  ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());
   ASSERT_TRUE(Eventually([&] { return solving.load(); }));
   ASSERT_TRUE(pipeline_->ActivateCalibration("a", 1, "me", "drifts").ok());
   go_on = true;

@@ -98,7 +98,7 @@ TEST_F(RecalibrationTest, SolverStartsFromTheActiveVersionOnTheSnapshot) {
   FillTables();
   ASSERT_TRUE(RunIs(RunState::kSucceeded));
   EXPECT_EQ(segments_, 2u);
-  ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+  ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());
   ASSERT_TRUE(RunIs(RunState::kSucceeded, 2));
   const auto third = store_->GetActiveCalibration("a");
   EXPECT_EQ(third->version, 3);

@@ -34,7 +34,7 @@ class WatchTest : public PipelineTest {
   }
 
   void Recalibrate(std::int64_t run) {
-    ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+    ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());
     ASSERT_TRUE(RunIs(RunState::kSucceeded, run));
   }
 };
@@ -117,7 +117,7 @@ TEST_F(WatchTest, WatchersThatComeDuringPublicationsMissNothing) {
   std::vector<std::unique_ptr<Told<std::int64_t>>> told;
   std::vector<std::unique_ptr<Subscription>> subscriptions;
   for (int run = 1; run <= 5; ++run) {
-    ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+    ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());
     while (store_->GetRun("a", run)->state != RunState::kSucceeded) {
       told.push_back(std::make_unique<Told<std::int64_t>>());
       subscriptions.push_back(Watch(told.back().get()));
@@ -173,7 +173,7 @@ TEST_F(WatchTest, RunIsToldFromItsStateToItsEnd) {
   StartOne();
   Submit(0);
   ASSERT_TRUE(AllScored());
-  ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+  ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());
   ASSERT_TRUE(RunIs(RunState::kRunning));
   Told<RunUpdate> told;
   const auto subscription = pipeline_->WatchRun(
@@ -218,7 +218,7 @@ TEST_F(WatchTest, WhoComesLateIsToldTheIterationsBefore) {
   StartOne();
   Submit(0);
   ASSERT_TRUE(AllScored());
-  ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
+  ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());
   ASSERT_TRUE(Eventually([&] { return iterated.load(); }));
   Told<RunUpdate> told;
   const auto subscription = pipeline_->WatchRun(

@@ -82,7 +82,7 @@ TEST_F(WholeWayTest, LandmarksNeverMatchAcrossSessions) {
       ASSERT_TRUE(AllScored());
       ASSERT_TRUE(
           Eventually([&] { return store_->ListUnfinishedRuns()->empty(); }));
-      const auto run = pipeline_->StartRecalibration(rig.id);
+      const auto run = pipeline_->StartRecalibration(rig.id, true);
       ASSERT_TRUE(run.ok()) << run.status();
       ASSERT_TRUE(
           Eventually([&] { return store_->ListUnfinishedRuns()->empty(); }));

@@ -6,8 +6,10 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "server/pipeline/pipeline.h"
 
@@ -57,9 +59,30 @@ class FakePipeline final : public Pipeline {
     done(Submit(rig, segment, cancelled));
   }
 
-  absl::StatusOr<StoredRun> StartRecalibration(
-      const std::string& rig) override {
-    return store_->CreateManualRun(rig);
+  // Rigs whose sessions were ended, in that order.
+  std::vector<std::string> ended() {
+    const std::lock_guard lock(mutex_);
+    return ended_;
+  }
+
+  void EndSession(const std::string& rig) override {
+    const std::lock_guard lock(mutex_);
+    ended_.push_back(rig);
+  }
+
+  absl::StatusOr<QuarantineCommit> QuarantineSegments(
+      const std::string& rig,
+      const std::string& session,
+      std::optional<std::int64_t> index,
+      const std::string& caller,
+      const std::string& reason) override {
+    return store_->QuarantineSegments(rig, session, index, caller, reason);
+  }
+
+  using Pipeline::StartRecalibration;
+  absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig,
+                                               bool force) override {
+    return store_->CreateManualRun(rig, force);
   }
 
   absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
@@ -155,6 +178,7 @@ class FakePipeline final : public Pipeline {
   std::mutex mutex_;
   Watchers<StoredCalibration> calibration_watchers_;
   Watchers<RunUpdate> run_watchers_;
+  std::vector<std::string> ended_;
 };
 
 }  // namespace selfcal::server

@@ -7,10 +7,13 @@ using ::testing::ElementsAre;
 
 class RecalibrationServiceTest : public ServiceTest {
  protected:
-  grpc::Status Start(const std::string& parent, v1::Recalibration* run) {
+  grpc::Status Start(const std::string& parent,
+                     v1::Recalibration* run,
+                     bool force = false) {
     Context context;
     v1::StartRecalibrationRequest request;
     request.set_parent(parent);
+    request.set_force(force);
     return recalibrations_->StartRecalibration(&context, request, run);
   }
 
@@ -112,7 +115,7 @@ TEST_F(RecalibrationServiceTest, PagesHoldEveryRunNewestFirst) {
   v1::Recalibration run;
   ASSERT_TRUE(Start("rigs/r", &run).ok());
   FinishRun(rig, 1);
-  ASSERT_TRUE(Start("rigs/r", &run).ok());
+  ASSERT_TRUE(Start("rigs/r", &run, true).ok());
   v1::ListRecalibrationsResponse page;
   ASSERT_TRUE(List("rigs/r", 1, "", &page).ok());
   ASSERT_EQ(page.recalibrations_size(), 1);
@@ -122,6 +125,17 @@ TEST_F(RecalibrationServiceTest, PagesHoldEveryRunNewestFirst) {
   ASSERT_EQ(page.recalibrations_size(), 1);
   EXPECT_EQ(page.recalibrations(0).name(), "rigs/r/recalibrations/1");
   EXPECT_EQ(page.recalibrations(0).solver().iterations(), 7);
+}
+
+TEST_F(RecalibrationServiceTest, UnchangedTablesHaveToBeForced) {
+  const Rig rig = AddScored(1);
+  v1::Recalibration run;
+  ASSERT_TRUE(Start("rigs/r", &run).ok());
+  FinishRun(rig, 1);
+  const grpc::Status refused = Start("rigs/r", &run);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_THAT(refused.error_message(), ::testing::HasSubstr("version 2"));
+  EXPECT_TRUE(Start("rigs/r", &run, true).ok());
 }
 
 TEST_F(RecalibrationServiceTest, ListOfAnUnknownRigOrPageIsRefused) {

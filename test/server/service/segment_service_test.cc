@@ -94,6 +94,56 @@ TEST_F(SegmentServiceTest, UnusableSegmentSaysWhy) {
   EXPECT_EQ(read.problem(), "broken");
 }
 
+TEST_F(SegmentServiceTest, QuarantineTakesASegmentOutAndSaysWhy) {
+  AddScored(2);
+  Context context;
+  v1::QuarantineSegmentsRequest request;
+  request.set_parent("rigs/r");
+  request.set_session("s");
+  request.set_index(1);
+  v1::QuarantineSegmentsResponse response;
+  EXPECT_THAT(
+      BadFields(segments_->QuarantineSegments(&context, request, &response)),
+      ElementsAre("reason"));
+  request.set_reason("diverged");
+  Context again;
+  ASSERT_TRUE(segments_->QuarantineSegments(&again, request, &response).ok());
+  EXPECT_EQ(response.quarantined(), 1);
+  v1::Segment read;
+  ASSERT_TRUE(Get("rigs/r/segments/s~1", &read).ok());
+  EXPECT_EQ(read.state(), v1::Segment::UNUSABLE);
+  EXPECT_THAT(read.problem(), ::testing::HasSubstr("diverged"));
+  ASSERT_TRUE(Get("rigs/r/segments/s~0", &read).ok());
+  EXPECT_EQ(read.state(), v1::Segment::SCORED);
+  Context all;
+  request.clear_index();
+  ASSERT_TRUE(segments_->QuarantineSegments(&all, request, &response).ok());
+  EXPECT_EQ(response.quarantined(), 1);
+  EXPECT_EQ(response.unusable(), 1);
+  Context none;
+  request.set_session("t");
+  EXPECT_EQ(
+      segments_->QuarantineSegments(&none, request, &response).error_code(),
+      grpc::StatusCode::NOT_FOUND);
+}
+
+TEST_F(SegmentServiceTest, ASegmentThatDoesNotFitSaysWhyNoTableHoldsIt) {
+  const Rig rig = AddRig();
+  for (const MotionSegment& segment : TestSegments(rig, 5)) {
+    ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+    SegmentInformation information = TestInformation(rig, 9);
+    information.residuals.fit = segment.key.index == 4 ? 25 : 1.5;
+    ASSERT_TRUE(store_->CommitScore("r", segment.key, information).ok());
+  }
+  v1::Segment read;
+  ASSERT_TRUE(Get("rigs/r/segments/s~4", &read).ok());
+  EXPECT_EQ(read.residuals().fit(), 25);
+  ASSERT_EQ(read.exclusions_size(), static_cast<int>(rig.groups.size()));
+  EXPECT_EQ(read.exclusions(0).group(), rig.groups[0].name);
+  EXPECT_THAT(read.exclusions(0).reason(), ::testing::HasSubstr("25"));
+  EXPECT_THAT(read.exclusions(0).reason(), ::testing::HasSubstr("4.5"));
+}
+
 TEST_F(SegmentServiceTest, SegmentThatDoesNotExistIsNotFound) {
   v1::Segment read;
   ExpectNotFound(Get("rigs/r/segments/s~0", &read), "rigs/r/segments/s~0");

@@ -85,6 +85,31 @@ TEST_F(SegmentStreamTest, EverySegmentIsAnsweredInOrderAndStored) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
+TEST_F(SegmentStreamTest, ItsEndIsTheEndOfASessionIfItStoredAnything) {
+  const Rig rig = AddRig();
+  const MotionSegment segment = TestSegments(rig, 1)[0];
+  const auto ended = [&] {
+    for (int k = 0; k < 1000 && pipeline_->ended().empty(); ++k) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return pipeline_->ended();
+  };
+  {
+    Stream stream(segments_.get());
+    stream.Send(segment);
+    EXPECT_TRUE(pipeline_->ended().empty());
+    EXPECT_TRUE(stream.Finish().ok());
+  }
+  EXPECT_THAT(ended(), ::testing::ElementsAre("r"));
+  {
+    Stream stream(segments_.get());
+    EXPECT_EQ(stream.Send(segment).verdict(), Response::DUPLICATE);
+    EXPECT_TRUE(stream.Finish().ok());
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_THAT(ended(), ::testing::ElementsAre("r"));
+}
+
 TEST_F(SegmentStreamTest, SecondTimeIsADuplicate) {
   const auto segments = TestSegments(AddRig(), 1);
   Stream stream(segments_.get());

@@ -12,7 +12,8 @@ using ::testing::HasSubstr;
 class ChangesTest : public StoreTest {
  protected:
   void SetUp() override {
-    rig_ = CreateTestRig("a");
+    rig_ = TestRig("a");
+    ASSERT_TRUE(store_->CreateRig(rig_, policy_).ok());
     // Two segments fill the tables, and the run gives version 2.
     Many(2, zero_);
     ASSERT_TRUE(store_->BeginRun("a", 1).ok());
@@ -64,6 +65,7 @@ class ChangesTest : public StoreTest {
   }
 
   double track_noise_factor_ = 1;
+  RigPolicy policy_;
   Rig rig_;
   const Eigen::VectorXd zero_ =
       Eigen::VectorXd::Zero(TangentSize(HandheldRig("a").factory));
@@ -80,6 +82,19 @@ class ChangesTest : public StoreTest {
   std::int64_t first_after_ = 0;
 };
 SELFCAL_STORE_TEST_SUITE(ChangesTest);
+
+// Of a device that may have turned its camera by itself within a millisecond.
+class WalkingTest : public ChangesTest {
+ protected:
+  WalkingTest() { policy_.walk_densities = {{"*.q_CI.*", 1e6}}; }
+};
+SELFCAL_STORE_TEST_SUITE(WalkingTest);
+
+TEST_P(WalkingTest, WhatComponentsDoByThemselvesIsNoChange) {
+  EXPECT_EQ(store_->GetRig("a")->policy, policy_);
+  Many(6, zero_);
+  for (int i = 0; i < 16; ++i) EXPECT_FALSE(Next(turned_).change) << i;
+}
 
 TEST_P(ChangesTest, WithoutOneNothingHappens) {
   for (int i = 0; i < 40; ++i) {

@@ -43,7 +43,7 @@ class LifecycleTest : public StoreTest {
   }
 
   StoredRun Begin() {
-    const auto run = store_->CreateManualRun("a");
+    const auto run = store_->CreateManualRun("a", true);
     EXPECT_TRUE(run.ok()) << run.status();
     const auto begun = store_->BeginRun("a", run->run);
     EXPECT_TRUE(begun.ok()) << begun.status();

@@ -183,6 +183,8 @@ export interface Absence {
   time: string;
   rival: string; // a segment
   rivalEntropyNats?: number;
+  fit?: number; // of its residuals against what is expected
+  fitLimit?: number;
 }
 
 // What a segment alone leaves to be known.

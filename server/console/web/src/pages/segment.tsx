@@ -94,6 +94,15 @@ function Gone(props: { of: Absence; table: Table; entropy: number | undefined })
       );
     case 'UNUSABLE':
       return <>kept until it was found unusable</>;
+    case 'DOES_NOT_FIT':
+      return (
+        <>
+          excluded: it does not fit; its residuals are {number(of.fit ?? 0)} times what is expected, and
+          up to {number(of.fitLimit ?? 0)} is usual for this rig
+        </>
+      );
+    case 'MANY_OUTLIERS':
+      return <>excluded: more than a fifth of its observations are outliers</>;
     default:
       return <>not kept</>;
   }

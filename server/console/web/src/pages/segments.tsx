@@ -25,7 +25,15 @@ function columns(group: string): Column<Segment>[] {
       cell: (segment) => <When time={segment.receiveTime} />,
       order: 'receive_time',
     },
-    { head: 'State', cell: (segment) => <Badge state={segment.state} /> },
+    {
+      head: 'State',
+      cell: (segment) => (
+        <>
+          <Badge state={segment.state} />
+          {segment.state === 'UNUSABLE' && <> {segment.problem}</>}
+        </>
+      ),
+    },
     { head: 'In tables', cell: kept },
     {
       head: 'Gain [nats]',

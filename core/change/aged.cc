@@ -1,0 +1,60 @@
+#include "core/change/aged.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace selfcal {
+
+Eigen::VectorXd WalkDensities(const Rig& rig,
+                              const std::vector<WalkDensity>& walks) {
+  constexpr double kDefaultInReferenceSigmas = 0.01;
+  const auto components = TangentComponents(rig.factory);
+  Eigen::VectorXd densities = kDefaultInReferenceSigmas * ReferenceSigmas(rig);
+  for (const WalkDensity& walk : walks) {
+    for (const int i : MatchComponents(components, {walk.pattern})) {
+      densities[i] = walk.density;
+    }
+  }
+  return densities;
+}
+
+std::vector<Violation> Validate(const Rig& rig,
+                                const std::vector<WalkDensity>& walks) {
+  constexpr std::size_t kMaxWalks = 1024;
+  if (walks.size() > kMaxWalks) {
+    return {{"walk_densities",
+             "has " + std::to_string(walks.size()) + " elements; at most " +
+                 std::to_string(kMaxWalks) + " are allowed"}};
+  }
+  const auto components = TangentComponents(rig.factory);
+  std::vector<Violation> violations;
+  for (std::size_t i = 0; i < walks.size(); ++i) {
+    const std::string path = "walk_densities[" + std::to_string(i) + "]";
+    if (MatchComponents(components, {walks[i].pattern}).empty()) {
+      violations.push_back({path + ".pattern",
+                            "'" + walks[i].pattern +
+                                "' matches no component; use a name such "
+                                "as '" +
+                                components.front().name +
+                                "', or '*' at its begin or end"});
+    }
+    if (!(std::isfinite(walks[i].density) && walks[i].density >= 0)) {
+      violations.push_back({path + ".value", "is not a number of at least 0"});
+    }
+  }
+  return violations;
+}
+
+Eigen::MatrixXd AgedCovariance(const Rig& rig,
+                               const Eigen::VectorXd& densities,
+                               const Eigen::MatrixXd& covariance,
+                               double days) {
+  Eigen::MatrixXd aged = covariance;
+  for (const int i : FreeComponents(rig)) {
+    aged(i, i) += densities(i) * densities(i) * std::max(0.0, days);
+  }
+  return aged;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,34 @@
+// How well the segments of a rig fit, and those that do not, in the database.
+// All of it runs inside a transaction of the caller.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/information/segment_information.h"
+#include "server/store/statement.h"
+
+namespace selfcal::server {
+
+// LargestFit (core/selection) of the rig as it stands.
+absl::StatusOr<std::optional<double>> ReadLargestFit(Connection* db,
+                                                     std::int64_t rig);
+
+// Takes segments of a larger fit out of all tables, and writes down why.
+absl::Status RemoveMisfits(Connection* db,
+                           std::int64_t rig,
+                           std::optional<double> largest_fit);
+
+// False for a segment that the tables shall not be offered, of which is then
+// written down why no table holds it: it does not fit, or had many outliers.
+absl::StatusOr<bool> AdmitByFit(Connection* db,
+                                std::int64_t rig,
+                                std::int64_t segment,
+                                const ResidualStatistics& residuals,
+                                std::optional<double> largest_fit);
+
+}  // namespace selfcal::server
