@@ -7,7 +7,10 @@
 namespace selfcal {
 namespace {
 
-using MotionMatrix = Eigen::Matrix<double, 9, 9>;
+constexpr NoiseKind kInertialKinds[] = {NoiseKind::kGyro,
+                                        NoiseKind::kAccel,
+                                        NoiseKind::kGyroBiasWalk,
+                                        NoiseKind::kAccelBiasWalk};
 
 // A landmark that is lost for more keyframes than this counts as another one
 // when it is found again. That it ties the two places says next to nothing
@@ -56,29 +59,39 @@ double Consistency(const RobustLoss& loss, double variance) {
 
 }  // namespace
 
-std::vector<NoiseProblem::MotionNoise> NoiseProblem::SplitMotionNoise(
+std::vector<NoiseProblem::LinkNoise> NoiseProblem::SplitInertialNoise(
     const SolverRound& round,
     const ImuCalibration& imu,
     const std::vector<KeyframeState>& keyframes) {
-  const auto covariance = [&](const InertialLink& link, ImuNoise noise) {
-    InertialMatrix covariance;
-    EvaluateInertial(link.samples,
-                     keyframes[link.before],
-                     keyframes[link.after],
-                     imu,
-                     noise,
-                     round.rig.gravity_mps2,
-                     nullptr,
-                     &covariance);
-    return covariance.topLeftCorner<9, 9>().eval();
-  };
-  ImuNoise gyro = round.rig.imu_noise;
-  ImuNoise accel = gyro;
-  gyro.accel_noise_density = 0;
-  accel.gyro_noise_density = 0;
-  std::vector<MotionNoise> split;
+  std::array<ImuNoise, kNoiseKinds> alone;
+  for (const NoiseKind kind : kInertialKinds) {
+    Rig rig = round.rig;
+    for (const NoiseKind other : kInertialKinds) {
+      if (other != kind) ScaleNoise(other, 0, &rig);
+    }
+    alone[IndexOf(kind)] = rig.imu_noise;
+  }
+  std::vector<LinkNoise> split;
   for (const InertialLink& link : round.problem.inertial_links) {
-    split.push_back({covariance(link, gyro), covariance(link, accel)});
+    const auto covariance = [&](const ImuNoise& noise) {
+      InertialMatrix covariance;
+      EvaluateInertial(link.samples,
+                       keyframes[link.before],
+                       keyframes[link.after],
+                       imu,
+                       noise,
+                       round.rig.gravity_mps2,
+                       nullptr,
+                       &covariance);
+      return covariance;
+    };
+    LinkNoise& noise = split.emplace_back();
+    noise.gaps = covariance({0, 0, 0, 0});
+    noise.kinds.fill(InertialMatrix::Zero());
+    for (const NoiseKind kind : kInertialKinds) {
+      noise.kinds[IndexOf(kind)] =
+          covariance(alone[IndexOf(kind)]) - noise.gaps;
+    }
   }
   return split;
 }
@@ -90,7 +103,7 @@ NoiseProblem::NoiseProblem(const SolverRound& round,
     : round_(round),
       estimate_(estimate),
       track_noise_(track_noise),
-      motion_(SplitMotionNoise(
+      inertial_(SplitInertialNoise(
           round, BoxPlus(round.reference, estimate.d).imu, estimate.keyframes)),
       landmarks_(SplitWhereFoundAgain(round.problem, landmarks)),
       rig_(round.rig),
@@ -132,24 +145,20 @@ void NoiseProblem::ScaleLandmarks(double pixel_factor) {
 }
 
 void NoiseProblem::ScaleInertial(const NoiseVector& factors) {
-  const double gyro = factors[IndexOf(NoiseKind::kGyro)];
-  const double accel = factors[IndexOf(NoiseKind::kAccel)];
-  InertialResidual walks = InertialResidual::Zero();
-  walks.segment<3>(9).setConstant(factors[IndexOf(NoiseKind::kAccelBiasWalk)]);
-  walks.segment<3>(12).setConstant(factors[IndexOf(NoiseKind::kGyroBiasWalk)]);
-  for (std::size_t i = 0; i < motion_.size(); ++i) {
-    InertialMatrix covariance = InertialMatrix::Identity();
-    covariance.topLeftCorner<9, 9>() =
-        gyro * gyro * motion_[i].gyro + accel * accel * motion_[i].accel;
-    InertialMatrix W = SquareRootInformation(covariance);
-    for (int m = 9; m < 15; ++m) {
-      W(m, m) = round_.whitening[i](m, m) / walks[m];
+  for (std::size_t i = 0; i < inertial_.size(); ++i) {
+    InertialMatrix covariance = inertial_[i].gaps;
+    for (const NoiseKind kind : kInertialKinds) {
+      const double factor = factors[IndexOf(kind)];
+      covariance += factor * factor * inertial_[i].kinds[IndexOf(kind)];
     }
-    whitening_[i] = W;
+    whitening_[i] = SquareRootInformation(covariance);
   }
+  Eigen::Matrix<double, 6, 1> walks;
+  walks.head<3>().setConstant(factors[IndexOf(NoiseKind::kAccelBiasWalk)]);
+  walks.tail<3>().setConstant(factors[IndexOf(NoiseKind::kGyroBiasWalk)]);
   for (std::size_t i = 0; i < problem_.bias_links.size(); ++i) {
     problem_.bias_links[i].sigmas =
-        round_.problem.bias_links[i].sigmas.cwiseProduct(walks.tail<6>());
+        round_.problem.bias_links[i].sigmas.cwiseProduct(walks);
   }
 }
 
@@ -199,29 +208,20 @@ void NoiseProblem::AddMotion(const NoiseVector& factors,
     balance->squares[IndexOf(kind)] += squares;
     balance->redundancy[IndexOf(kind)] += redundancy;
   };
-  const double gyro = factors[IndexOf(NoiseKind::kGyro)];
-  for (std::size_t i = 0; i < motion_.size(); ++i) {
-    const ChainStateVector& e = posterior.inertial[i];
-    const ChainStateMatrix& C = posterior.inertial_covariance[i];
-    const auto W = whitening_[i].topLeftCorner<9, 9>();
-    // What of the whitened noise the gyroscope brings; the accelerometer
-    // brings the rest.
-    const MotionMatrix by_gyro =
-        gyro * gyro * W * motion_[i].gyro * W.transpose();
-    const MotionMatrix left =
-        MotionMatrix::Identity() - C.topLeftCorner<9, 9>();
-    const double squares = e.head<9>().dot(by_gyro * e.head<9>());
-    const double redundancy = by_gyro.cwiseProduct(left).sum();
-    add(NoiseKind::kGyro, squares, redundancy);
-    add(NoiseKind::kAccel,
-        e.head<9>().squaredNorm() - squares,
-        left.trace() - redundancy);
-    add(NoiseKind::kAccelBiasWalk,
-        e.segment<3>(9).squaredNorm(),
-        3 - C.diagonal().segment<3>(9).sum());
-    add(NoiseKind::kGyroBiasWalk,
-        e.segment<3>(12).squaredNorm(),
-        3 - C.diagonal().segment<3>(12).sum());
+  for (std::size_t i = 0; i < inertial_.size(); ++i) {
+    // Squares |e|^2 and their redundancy are sums over the kinds, and gaps:
+    // their parts of the covariance add up to W^-1 W^-T.
+    const InertialMatrix& W = whitening_[i];
+    const InertialResidual by_noise = W.transpose() * posterior.inertial[i];
+    const InertialMatrix left =
+        W.transpose() *
+        (InertialMatrix::Identity() - posterior.inertial_covariance[i]) * W;
+    for (const NoiseKind kind : kInertialKinds) {
+      const double factor = factors[IndexOf(kind)];
+      const InertialMatrix noise =
+          factor * factor * inertial_[i].kinds[IndexOf(kind)];
+      add(kind, by_noise.dot(noise * by_noise), noise.cwiseProduct(left).sum());
+    }
   }
   add(NoiseKind::kAccelBiasWalk,
       posterior.walk_squares.head<3>().sum(),

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -49,12 +50,15 @@ class NoiseProblem {
   bool PixelsCount() const { return excess_ <= 1; }
 
  private:
-  // Of the noise of one link's motion at unit factors, what each sensor brings.
-  struct MotionNoise {
-    Eigen::Matrix<double, 9, 9> gyro, accel;
+  // Of the covariance of one link at unit factors, what each kind brings, of
+  // which pixels bring nothing, and what is not known of gaps between samples.
+  // A walk moves the motion as well as the biases.
+  struct LinkNoise {
+    std::array<InertialMatrix, kNoiseKinds> kinds;
+    InertialMatrix gaps;
   };
 
-  static std::vector<MotionNoise> SplitMotionNoise(
+  static std::vector<LinkNoise> SplitInertialNoise(
       const SolverRound& round,
       const ImuCalibration& imu,
       const std::vector<KeyframeState>& keyframes);
@@ -73,7 +77,7 @@ class NoiseProblem {
   const SolverRound& round_;
   const CalibrationEstimate& estimate_;
   const double track_noise_;
-  const std::vector<MotionNoise> motion_;
+  const std::vector<LinkNoise> inertial_;
   // Scaled by the factors at hand.
   std::vector<ScreenedLandmark> landmarks_;
   double excess_ = 1;  // of the track noise over the pixel sigma

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/factor/inertial.h"
+#include "core/factor/sampling.h"
 
 namespace selfcal {
 namespace {
@@ -54,17 +55,21 @@ void AddTracks(const std::vector<const MotionSegment*>& segments,
 std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
                                           std::int64_t t0_ns,
                                           std::int64_t t1_ns) {
-  auto first = std::upper_bound(
-      imu.begin(), imu.end(), t0_ns, [](std::int64_t t, const ImuSample& s) {
-        return t < s.t_ns;
-      });
-  auto last = std::lower_bound(
-      first, imu.end(), t1_ns, [](const ImuSample& s, std::int64_t t) {
-        return s.t_ns < t;
-      });
-  first -= std::min<std::ptrdiff_t>(2, first - imu.begin());
-  last += std::min<std::ptrdiff_t>(2, imu.end() - last);
-  return {first, last};
+  const auto earlier = [](const ImuSample& s, std::int64_t t_ns) {
+    return s.t_ns < t_ns;
+  };
+  const auto first = std::lower_bound(imu.begin(), imu.end(), t0_ns, earlier);
+  const auto last = std::lower_bound(first, imu.end(), t1_ns, earlier);
+  const auto samples_before =
+      std::min<std::ptrdiff_t>(kSamplesBeyond, first - imu.begin());
+  const auto samples_after =
+      std::min<std::ptrdiff_t>(kSamplesBeyond, imu.end() - last);
+  const auto before =
+      std::lower_bound(imu.begin(), first, t0_ns - kReachBeyond_ns, earlier);
+  const auto after =
+      std::lower_bound(last, imu.end(), t1_ns + kReachBeyond_ns, earlier);
+  return {std::min(before, first - samples_before),
+          std::max(after, last + samples_after)};
 }
 
 CalibrationProblem FlattenSegments(

@@ -56,8 +56,8 @@ struct CalibrationProblem {
   std::vector<Track> tracks;  // by (partition, id)
 };
 
-// The samples from the last at or before t0_ns to the first at or after t1_ns,
-// and one more on either side: the integration looks at neighbours.
+// The samples that cover the time from t0_ns to t1_ns, and of those on either
+// side what tells all about it (sampling.h).
 std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
                                           std::int64_t t0_ns,
                                           std::int64_t t1_ns);

@@ -25,14 +25,14 @@ std::vector<InertialMatrix> WhitenInertialLinks(
 }
 
 InertialNoiseRoot NoiseRootOf(const InertialMatrix& W) {
-  const Eigen::Matrix<double, 9, 9> U =
-      W.topLeftCorner<9, 9>().triangularView<Eigen::Upper>().solve(
-          Eigen::Matrix<double, 9, 9>::Identity());
+  const InertialMatrix U =
+      W.triangularView<Eigen::Upper>().solve(InertialMatrix::Identity());
   InertialNoiseRoot root;
   for (int i = 0; i < 9; ++i) {
     for (int j = 0; j < 9; ++j) root.motion[i][j] = U(i, j);
+    for (int j = 0; j < 6; ++j) root.motion_by_bias[i][j] = U(i, 9 + j);
   }
-  for (int i = 0; i < 6; ++i) root.bias[i] = 1 / W(9 + i, 9 + i);
+  for (int i = 0; i < 6; ++i) root.bias[i] = U(9 + i, 9 + i);
   return root;
 }
 

@@ -56,15 +56,16 @@ InertialMatrix ResidualCovariance(const Preintegration& imu,
                                   const Vector3d& rotation_residual,
                                   const ImuNoise& noise) {
   InertialMatrix covariance = InertialMatrix::Zero();
-  auto motion = covariance.topLeftCorner<9, 9>();
-  motion = imu.covariance;
+  covariance.topLeftCorner<9, 9>() = imu.covariance;
   // All nine enter the residual negatively, the rotation through Log.
-  const Matrix3d J_l_inverse = RightJacobianInverse(-rotation_residual);
-  motion.topRows<3>() = (J_l_inverse * motion.topRows<3>()).eval();
-  motion.leftCols<3>() =
-      (motion.leftCols<3>() * J_l_inverse.transpose()).eval();
+  covariance.topRightCorner<9, 6>() = -imu.covariance_with_walk;
+  covariance.bottomLeftCorner<6, 9>() = -imu.covariance_with_walk.transpose();
   covariance.diagonal().tail<6>() =
       BiasWalkSigmas(noise, imu.dt_s).array().square();
+  const Matrix3d J_l_inverse = RightJacobianInverse(-rotation_residual);
+  covariance.topRows<3>() = (J_l_inverse * covariance.topRows<3>()).eval();
+  covariance.leftCols<3>() =
+      (covariance.leftCols<3>() * J_l_inverse.transpose()).eval();
   return covariance;
 }
 

@@ -4,13 +4,16 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <optional>
 
 #include "core/factor/inertial_kernel.h"
 #include "core/factor/preintegration_readings.h"
+#include "core/factor/sampling.h"
 
 namespace selfcal {
 namespace {
 
+using inertial::kDensities;
 using inertial::KernelInput;
 using inertial::kReadingSize;
 
@@ -59,40 +62,58 @@ std::array<Item*, W> Outputs(std::span<Item> items,
 }  // namespace
 
 template <int W>
-int InertialBatch::GatherReadings(std::span<const InertialLinkStates> links) {
-  constexpr int kRow = kReadingSize * W;
-  constexpr int kChunk = sizeof(Chunk) / sizeof(double);
-  const auto row = [&](int index) {
-    const std::size_t end = (static_cast<std::size_t>(index) + 1) * kRow;
-    const std::size_t chunks = (end + kChunk - 1) / kChunk;
-    if (readings_.size() < chunks) readings_.resize(2 * chunks);
-    return readings() + (end - kRow);
+int InertialBatch::GatherReadings(std::span<const InertialLinkStates> links,
+                                  const ImuNoise* noise) {
+  const auto row = [](std::vector<Chunk>* chunks, int size, int index) {
+    constexpr int kChunk = sizeof(Chunk) / sizeof(double);
+    const std::size_t end = (static_cast<std::size_t>(index) + 1) * size * W;
+    const std::size_t needed = (end + kChunk - 1) / kChunk;
+    if (chunks->size() < needed) chunks->resize(2 * needed);
+    return Numbers(chunks) + (end - size * W);
+  };
+  const auto reading = [&](int index) {
+    return row(&readings_, kReadingSize, index);
+  };
+  const auto density = [&](int index) {
+    return row(&densities_, kDensities, index);
   };
   int counts[W];
   for (int lane = 0; lane < W; ++lane) {
     const InertialLinkStates& link = links[lane];
+    const std::int64_t t0_ns = link.x0->t_ns, t1_ns = link.x1->t_ns;
+    std::optional<Sampling> sampling;
+    if (noise != nullptr) {
+      sampling.emplace(link.samples, t0_ns, t1_ns, *noise);
+    }
     int count = 0;
-    const auto add = [&](const ImuSample& sample, double h) {
-      double* to = row(count) + lane;
+    const auto add = [&](const ImuSample& sample, double h, std::size_t next) {
+      double* to = reading(count) + lane;
       to[0] = h;
       for (int i = 0; i < 3; ++i) {
         to[(1 + i) * W] = sample.gyro[i];
         to[(4 + i) * W] = sample.accel[i];
       }
+      if (sampling) {
+        const StepDensities of_step = sampling->At(next);
+        double* noise_to = density(count) + lane;
+        noise_to[0] = of_step.gyro;
+        noise_to[W] = of_step.accel;
+      }
       ++count;
     };
-    preintegration::VisitReadings(
-        link.samples, link.x0->t_ns, link.x1->t_ns, add);
+    preintegration::VisitReadings(link.samples, t0_ns, t1_ns, add);
     counts[lane] = count;
   }
   const int rows = *std::max_element(counts, counts + W);
   // Steps of length zero after the last of the shorter ones.
   for (int lane = 0; lane < W; ++lane) {
-    const double* last = row(counts[lane] - 1) + lane;
+    const double* last = reading(counts[lane] - 1) + lane;
     for (int i = counts[lane]; i < rows; ++i) {
-      double* to = row(i) + lane;
+      double* to = reading(i) + lane;
       to[0] = 0;
       for (int k = 1; k < kReadingSize; ++k) to[k * W] = last[k * W];
+      if (noise == nullptr) continue;
+      for (int k = 0; k < kDensities; ++k) density(i)[k * W + lane] = 0;
     }
   }
   return rows;
@@ -101,6 +122,7 @@ int InertialBatch::GatherReadings(std::span<const InertialLinkStates> links) {
 template <class Function>
 void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
                                  const ImuCalibration& imu,
+                                 const ImuNoise* noise,
                                  double gravity_mps2,
                                  const Function& run) {
   WithLanes(width_, [&]<int W>() {
@@ -120,8 +142,9 @@ void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
         input.dt_s[lane] = static_cast<double>(link.x1->t_ns - link.x0->t_ns) *
                            preintegration::kSecondsPerNanosecond;
       }
-      input.rows = GatherReadings<W>(group);
-      input.readings = readings();
+      input.rows = GatherReadings<W>(group, noise);
+      input.readings = Numbers(&readings_);
+      input.densities = Numbers(&densities_);
       run.template operator()<W>(input, first, count);
     }
   });
@@ -137,6 +160,7 @@ void InertialBatch::Linearise(std::span<const InertialLinkStates> links,
   ForEachGroup(
       links,
       imu,
+      &noise,
       gravity_mps2,
       [&]<int W>(
           const KernelInput<W>& input, std::size_t first, std::size_t n) {
@@ -158,6 +182,7 @@ void InertialBatch::LineariseWithRoots(
   ForEachGroup(
       links,
       imu,
+      nullptr,
       gravity_mps2,
       [&]<int W>(
           const KernelInput<W>& input, std::size_t first, std::size_t n) {
@@ -177,6 +202,7 @@ void InertialBatch::Residuals(std::span<const InertialLinkStates> links,
   ForEachGroup(
       links,
       imu,
+      nullptr,
       gravity_mps2,
       [&]<int W>(
           const KernelInput<W>& input, std::size_t first, std::size_t n) {

@@ -31,7 +31,8 @@ struct InertialTransition : ChainTransition {
 // their variance.
 struct InertialNoiseRoot {
   double motion[9][9];  // upper triangular
-  double bias[6];       // diagonal
+  double motion_by_bias[9][6];
+  double bias[6];  // diagonal
 };
 
 // The arguments of EvaluateInertial that differ from link to link.
@@ -75,22 +76,27 @@ class InertialBatch {
     double values[8];
   };
   // All chunks as one row of numbers.
-  double* readings() { return reinterpret_cast<double*>(readings_.data()); }
+  static double* Numbers(std::vector<Chunk>* chunks) {
+    return reinterpret_cast<double*>(chunks->data());
+  }
 
   // Calls run.operator()<W>(kernel input, first link, number of links) for each
   // group of W links.
   template <class Function>
   void ForEachGroup(std::span<const InertialLinkStates> links,
                     const ImuCalibration& imu,
+                    const ImuNoise* noise,
                     double gravity_mps2,
                     const Function& run);
 
-  // Lays the readings of W links side by side; returns the number of rows.
+  // Lays the readings of W links side by side, and their noise unless null;
+  // returns the number of rows.
   template <int W>
-  int GatherReadings(std::span<const InertialLinkStates> links);
+  int GatherReadings(std::span<const InertialLinkStates> links,
+                     const ImuNoise* noise);
 
   VectorWidth width_;
-  std::vector<Chunk> readings_;
+  std::vector<Chunk> readings_, densities_;
   InertialTransition unused_transition_;  // of lanes without a link
   InertialNoiseRoot unused_root_;
 };

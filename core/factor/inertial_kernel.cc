@@ -49,10 +49,20 @@ struct Link {
                 .R_IA = SameMatrix<W>(input.R_IA)},
         integrator(correct, noise, parts, Corrected(input.readings)) {
     const double* row = input.readings;
+    const double* densities = input.densities;
     for (int i = 1; i < input.rows; ++i) {
       row += kReadingSize * W;
-      integrator.Step(Corrected(row), Load<W>(row));
+      if (parts.covariance) {
+        densities += kDensities * W;
+        integrator.Step(Corrected(row),
+                        Load<W>(row),
+                        Load<W>(densities),
+                        Load<W>(densities + W));
+      } else {
+        integrator.Step(Corrected(row), Load<W>(row));
+      }
     }
+    if (parts.covariance) integrator.Finish();
     motion = MotionBetween<T>(x0, x1, dt, T(input.gravity_mps2));
     residual = ResidualOf<T>(x0, x1, motion, integrator.motion());
   }
@@ -78,6 +88,11 @@ NoiseRoot<Lanes<W>> LoadRoot(const InertialNoiseRoot* const* roots) {
         root.motion(i, j).Set(l, roots[l]->motion[i][j]);
       }
     }
+    for (int i = 0; i < 9; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        root.motion_by_bias(i, j).Set(l, roots[l]->motion_by_bias[i][j]);
+      }
+    }
     for (int i = 0; i < 6; ++i) root.bias[i].Set(l, roots[l]->bias[i]);
   }
   return root;
@@ -91,6 +106,9 @@ void StoreRoot(const NoiseRoot<Lanes<W>>& root,
       for (int j = 0; j < 9; ++j) {
         roots[l]->motion[i][j] = j < i ? 0.0 : root.motion(i, j)[l];
       }
+      for (int j = 0; j < 6; ++j) {
+        roots[l]->motion_by_bias[i][j] = root.motion_by_bias(i, j)[l];
+      }
     }
     for (int i = 0; i < 6; ++i) roots[l]->bias[i] = root.bias[i][l];
   }
@@ -103,12 +121,13 @@ NoiseRoot<Lanes<W>> RootOf(const Link<W>& link, const ImuNoise& noise) {
   const Vector3<T> r = link.residual.template segment<3>(kResidualRotation);
   const Matrix3<T> by_psi =
       RightJacobianInverse<T>(-r) * link.integrator.Delta_R().transpose();
-  RootOfMotionCovariance(link.integrator.covariance(), by_psi, &root.motion);
   const T root_dt = Sqrt(link.dt);
   for (int i = 0; i < 3; ++i) {
     root.bias[i] = noise.accel_bias_random_walk * root_dt;
     root.bias[3 + i] = noise.gyro_bias_random_walk * root_dt;
   }
+  RootOfMotionCovariance(
+      link.integrator.covariance(), link.integrator.walk(), by_psi, &root);
   return root;
 }
 
@@ -194,8 +213,10 @@ using Roots = InertialNoiseRoot* const*;
 using ConstRoots = const InertialNoiseRoot* const*;
 using Transitions = InertialTransition* const*;
 
-template void LineariseLinks<SELFCAL_LANES>(
-    const Input&, const ImuNoise&, Roots, Transitions);
+template void LineariseLinks<SELFCAL_LANES>(const Input&,
+                                            const ImuNoise&,
+                                            Roots,
+                                            Transitions);
 template void LineariseLinksWithRoots<SELFCAL_LANES>(const Input&,
                                                      ConstRoots,
                                                      Transitions);

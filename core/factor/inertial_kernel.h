@@ -12,6 +12,8 @@ namespace selfcal::inertial {
 // Of a row of readings: length of the step before it [s], gyro 3, accel 3. The
 // first has length zero.
 constexpr int kReadingSize = 7;
+// Gyroscope, accelerometer.
+constexpr int kDensities = 2;
 // q_GI (x, y, z, w), p_GI, v_GI, b_a, b_g.
 constexpr int kStateNumbers = 16;
 
@@ -20,6 +22,9 @@ template <int W>
 struct KernelInput {
   int rows = 0;
   const double* readings = nullptr;  // rows x kReadingSize x W
+  // Of the noise over the step before each reading, rows x kDensities x W. Only
+  // where roots are found from noise.
+  const double* densities = nullptr;
   double x0[kStateNumbers][W];
   double x1[kStateNumbers][W];
   double dt_s[W];

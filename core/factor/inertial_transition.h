@@ -19,6 +19,7 @@
 #include "core/elimination/small_cholesky.h"
 #include "core/factor/inertial_batch.h"
 #include "core/factor/inertial_terms.h"
+#include "core/factor/preintegration_bias_walk.h"
 #include "core/factor/preintegration_covariance.h"
 #include "core/factor/preintegration_jacobians.h"
 
@@ -38,6 +39,7 @@ struct State {
 template <typename T>
 struct NoiseRoot {
   Eigen::Matrix<T, 9, 9> motion;  // upper triangle; the lower is not set
+  Eigen::Matrix<T, 9, 6> motion_by_bias;
   Eigen::Matrix<T, 6, 1> bias;
 };
 
@@ -62,20 +64,39 @@ void UpperRoot(Eigen::Matrix<T, 9, 9>* C) {
   }
 }
 
-// `by_psi` is the derivative of the rotation residual by psi, up to its sign.
+// `by_psi` is the negative derivative of the rotation residual by psi. Needs
+// root->bias, the standard deviations of the walks.
 template <typename T>
 void RootOfMotionCovariance(
     const preintegration::MotionCovariance<T>& covariance,
+    const preintegration::BiasWalk<T>& walk,
     const Matrix3<T>& by_psi,
-    Eigen::Matrix<T, 9, 9>* root) {
+    NoiseRoot<T>* root) {
+  // Every error of the motion enters the residual negatively.
+  const Matrix3<T> with_gyro = -1.0 / root->bias[3] * walk.with_gyro().r;
+  Eigen::Matrix<T, 9, 6>& K = root->motion_by_bias;
+  K.template block<3, 3>(0, 0).setZero();
+  K.template block<3, 3>(0, 3) = by_psi * with_gyro;
+  K.template block<3, 3>(3, 0) = -1.0 / root->bias[0] * walk.with_accel().v;
+  K.template block<3, 3>(3, 3) = -1.0 / root->bias[3] * walk.with_gyro().v;
+  K.template block<3, 3>(6, 0) = -1.0 / root->bias[0] * walk.with_accel().p;
+  K.template block<3, 3>(6, 3) = -1.0 / root->bias[3] * walk.with_gyro().p;
+
+  Eigen::Matrix<T, 9, 9>& C = root->motion;
   const Matrix3<T> r_r = by_psi * covariance.rr();
-  root->template block<3, 3>(0, 0) = r_r * by_psi.transpose();
-  root->template block<3, 3>(0, 3) = by_psi * covariance.vr().transpose();
-  root->template block<3, 3>(0, 6) = by_psi * covariance.pr().transpose();
-  root->template block<3, 3>(3, 3) = covariance.vv();
-  root->template block<3, 3>(3, 6) = covariance.pv().transpose();
-  root->template block<3, 3>(6, 6) = covariance.pp();
-  UpperRoot(root);
+  C.template block<3, 3>(0, 0) = r_r * by_psi.transpose();
+  C.template block<3, 3>(0, 3) = by_psi * covariance.vr().transpose();
+  C.template block<3, 3>(0, 6) = by_psi * covariance.pr().transpose();
+  C.template block<3, 3>(3, 3) = covariance.vv();
+  C.template block<3, 3>(3, 6) = covariance.pv().transpose();
+  C.template block<3, 3>(6, 6) = covariance.pp();
+  // Given the biases at the end.
+  for (int j = 0; j < 9; ++j) {
+    for (int i = 0; i <= j; ++i) {
+      for (int k = i < 3 ? 3 : 0; k < 6; ++k) C(i, j) -= K(i, k) * K(j, k);
+    }
+  }
+  UpperRoot(&C);
 }
 
 // U^-1 r.
@@ -83,12 +104,13 @@ template <typename T>
 Eigen::Matrix<T, 15, 1> Whiten(const NoiseRoot<T>& root,
                                const Eigen::Matrix<T, 15, 1>& residual) {
   Eigen::Matrix<T, 15, 1> white;
+  for (int i = 0; i < 6; ++i) white[9 + i] = residual[9 + i] / root.bias[i];
   for (int i = 8; i >= 0; --i) {
     T sum = residual[i];
+    for (int k = 0; k < 6; ++k) sum -= root.motion_by_bias(i, k) * white[9 + k];
     for (int k = i + 1; k < 9; ++k) sum -= root.motion(i, k) * white[k];
     white[i] = sum / root.motion(i, i);
   }
-  for (int i = 0; i < 6; ++i) white[9 + i] = residual[9 + i] / root.bias[i];
   return white;
 }
 
@@ -125,15 +147,19 @@ class TransitionSolver {
         Carry(R_01_ * r.template segment<3>(kResidualRotation),
               -r.template segment<3>(kResidualVelocity),
               -r.template segment<3>(kResidualPosition));
+    const Vector3<T> phi = r.template segment<3>(kResidualRotation);
+    const Matrix3<T> turn = -R_01_ * RightJacobian<T>(phi);
     for (int c = 0; c < 6; ++c) {
       const Eigen::Matrix<T, 9, 1> x = OfMeasured(by.bias.col(c));
       Write<kTransitionColumns>(x, kTransitionNextAccelBias + c, rows->G);
-      Write<kTransitionNoise>(-root.bias[c] * x, 9 + c, rows->A);
+      const Column u = root.motion_by_bias.col(c);
+      Write<kTransitionNoise>(
+          OfNoise(turn, u) - root.bias[c] * x, 9 + c, rows->A);
       constant += r[kResidualAccelBias + c] * x;
     }
     Write<kTransitionColumns>(constant, kTransitionConstant, rows->G);
     WriteNextMotion(rows);
-    WriteNoise(root, rows);
+    WriteMotionNoise(turn, root, rows);
     for (int i = 0; i < 9; ++i) {
       rows->G[i][kTransitionColumns - 1] = T(0);
       rows->A[i][kTransitionNoise - 1] = T(0);
@@ -184,17 +210,20 @@ class TransitionSolver {
     }
   }
 
-  void WriteNoise(const NoiseRoot<T>& root, MotionRows<T>* rows) const {
-    const Vector3<T> phi = residual_.template segment<3>(kResidualRotation);
-    const Matrix3<T> turn = -R_01_ * RightJacobian<T>(phi);
+  // Of the residual of the motion; `turn` carries its rotation.
+  Column OfNoise(const Matrix3<T>& turn, const Column& u) const {
+    return Carry(turn * u.template head<3>(),
+                 u.template segment<3>(kResidualVelocity),
+                 u.template segment<3>(kResidualPosition));
+  }
+
+  void WriteMotionNoise(const Matrix3<T>& turn,
+                        const NoiseRoot<T>& root,
+                        MotionRows<T>* rows) const {
     for (int c = 0; c < 9; ++c) {
       Column u = Column::Zero();
       for (int i = 0; i <= c; ++i) u[i] = root.motion(i, c);
-      Write<kTransitionNoise>(Carry(turn * u.template head<3>(),
-                                    u.template segment<3>(kResidualVelocity),
-                                    u.template segment<3>(kResidualPosition)),
-                              c,
-                              rows->A);
+      Write<kTransitionNoise>(OfNoise(turn, u), c, rows->A);
     }
   }
 

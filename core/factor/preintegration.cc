@@ -4,6 +4,7 @@
 
 #include "core/factor/preintegration_integrator.h"
 #include "core/factor/preintegration_readings.h"
+#include "core/factor/sampling.h"
 
 namespace selfcal {
 namespace preintegration {
@@ -32,6 +33,10 @@ Preintegration Result(const Integrator<double>& integrator,
     const Eigen::Matrix3d p_r = c.pr() * R;
     result.covariance << R.transpose() * c.rr() * R, v_r.transpose(),
         p_r.transpose(), v_r, c.vv(), c.pv().transpose(), p_r, c.pv(), c.pp();
+    const GyroResponse<double>& gyro = integrator.walk().with_gyro();
+    const AccelResponse<double>& accel = integrator.walk().with_accel();
+    result.covariance_with_walk << Eigen::Matrix3d::Zero(),
+        R.transpose() * gyro.r, accel.v, gyro.v, accel.p, gyro.p;
   }
   return result;
 }
@@ -55,14 +60,20 @@ Preintegration Preintegrate(std::span<const ImuSample> samples,
       .T_a_inverse = imu.T_a().inverse(),
       .R_IA = imu.q_AI.toRotationMatrix().transpose()};
   std::optional<Integrator<double>> integrator;
-  VisitReadings(samples, t0_ns, t1_ns, [&](const ImuSample& sample, double h) {
+  std::optional<Sampling> sampling;
+  if (parts.covariance) sampling.emplace(samples, t0_ns, t1_ns, noise);
+  const auto visit = [&](const ImuSample& sample, double h, std::size_t next) {
     const Reading<double> reading = correct(sample.gyro, sample.accel);
-    if (integrator) {
-      integrator->Step(reading, h);
-    } else {
+    if (!integrator) {
       integrator.emplace(correct, noise, parts, reading);
+      return;
     }
-  });
+    const StepDensities densities =
+        sampling ? sampling->At(next) : StepDensities();
+    integrator->Step(reading, h, densities.gyro, densities.accel);
+  };
+  VisitReadings(samples, t0_ns, t1_ns, visit);
+  if (parts.covariance) integrator->Finish();
   return Result(*integrator,
                 parts,
                 static_cast<double>(t1_ns - t0_ns) * kSecondsPerNanosecond);

@@ -14,8 +14,10 @@
 // and what neighbouring intervals get wrong there cancels.
 //
 // The derivatives are those of this scheme, exactly. The noise of each sensor
-// is white in continuous time: over a step its mean has the variance
-// density^2 / h on the raw reading and passes through T^-1.
+// is white: over a step its mean has the variance density^2 / h on the raw
+// reading and passes through T^-1, more where samples are missing (sampling.h).
+// Biases walk from the beginning of the interval on, where they are what is
+// given (preintegration_bias_walk.h).
 //
 // Pure, any thread; allocates nothing.
 // Source: Schneider et al., ICRA 2017, III-B and III-D; Forster et al., "On-
@@ -47,8 +49,11 @@ struct Preintegration {
   // By (b_a 3, b_g 3), and by theta_i in the order of calibration.h.
   Eigen::Matrix<double, 9, 6> J_bias = Eigen::Matrix<double, 9, 6>::Zero();
   Eigen::Matrix<double, 9, 15> J_theta = Eigen::Matrix<double, 9, 15>::Zero();
-  // Of the nine, from the white noise of the sensors.
+  // Of the nine, from the white noise of the sensors and the walk of their
+  // biases; and of the nine with what (b_a 3, b_g 3) have walked by the end.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Matrix<double, 9, 6> covariance_with_walk =
+      Eigen::Matrix<double, 9, 6>::Zero();
 };
 
 // What to compute beside the motion; the rest stays zero.

@@ -8,6 +8,21 @@
 
 namespace selfcal::preintegration {
 
+// By errors of a raw reading that are constant in time: derivatives of (psi,
+// Delta_v, Delta_p), psi the left perturbation of the rotation; or covariances
+// of these with such errors.
+template <typename T>
+struct GyroResponse {
+  Matrix3<T> r = Matrix3<T>::Zero();
+  Matrix3<T> v = Matrix3<T>::Zero();
+  Matrix3<T> p = Matrix3<T>::Zero();
+};
+template <typename T>
+struct AccelResponse {
+  Matrix3<T> v = Matrix3<T>::Zero();
+  Matrix3<T> p = Matrix3<T>::Zero();
+};
+
 // Covariance of (psi, Delta_v, Delta_p), by blocks; psi is the left
 // perturbation of the rotation. Of the blocks on the diagonal, the lower
 // triangles.
@@ -72,6 +87,22 @@ class MotionCovariance {
     pp_ += s.h * s.h * (1.0 / 12) * vv;
   }
 
+  // A piece of a bias walk (preintegration_bias_walk.h): H J^T + J H^T, and
+  // c J_i J_j^T / (n_i + n_j + 1) of blocks i and j.
+  void AddWalk(const GyroResponse<T>& J, const GyroResponse<T>& H, T c) {
+    AddProducts(J.r, H.r, J.r, H.r, c * (1.0 / 3), &rr_);
+    AddProducts(J.v, H.v, J.r, H.r, c * (1.0 / 4), &vr_);
+    AddProducts(J.p, H.p, J.r, H.r, c * (1.0 / 5), &pr_);
+    AddProducts(J.v, H.v, J.v, H.v, c * (1.0 / 5), &vv_);
+    AddProducts(J.p, H.p, J.v, H.v, c * (1.0 / 6), &pv_);
+    AddProducts(J.p, H.p, J.p, H.p, c * (1.0 / 7), &pp_);
+  }
+  void AddWalk(const AccelResponse<T>& J, const AccelResponse<T>& H, T c) {
+    AddProducts(J.v, H.v, J.v, H.v, c * (1.0 / 3), &vv_);
+    AddProducts(J.p, H.p, J.v, H.v, c * (1.0 / 4), &pv_);
+    AddProducts(J.p, H.p, J.p, H.p, c * (1.0 / 5), &pp_);
+  }
+
   Matrix3<T> rr() const { return Symmetric(rr_); }
   const Matrix3<T>& vr() const { return vr_; }
   const Matrix3<T>& pr() const { return pr_; }
@@ -92,6 +123,18 @@ class MotionCovariance {
         (*m)(r, c) += a(r, 0) * a(c, 0) + a(r, 1) * a(c, 1) + a(r, 2) * a(c, 2);
       }
     }
+  }
+
+  // *m += H_i J_j^T + J_i H_j^T + c J_i J_j^T.
+  static void AddProducts(const Matrix3<T>& J_i,
+                          const Matrix3<T>& H_i,
+                          const Matrix3<T>& J_j,
+                          const Matrix3<T>& H_j,
+                          T c,
+                          Matrix3<T>* m) {
+    const Matrix3<T> by_J = H_i + c * J_i;
+    *m += by_J.lazyProduct(J_j.transpose());
+    *m += J_i.lazyProduct(H_j.transpose());
   }
 
   static Matrix3<T> Symmetric(const Matrix3<T>& lower) {

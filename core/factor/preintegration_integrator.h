@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "core/factor/preintegration.h"
+#include "core/factor/preintegration_bias_walk.h"
 #include "core/factor/preintegration_covariance.h"
 #include "core/factor/preintegration_jacobians.h"
 #include "core/factor/preintegration_step.h"
@@ -24,6 +25,9 @@ struct Motion {
   Vector3<T> Delta_p = Vector3<T>::Zero();
 };
 
+// Steps of a piece in which biases walk.
+inline constexpr int kWalkSteps = 24;
+
 template <typename T>
 class Integrator {
  public:
@@ -33,15 +37,17 @@ class Integrator {
              const PreintegrationParts& parts,
              const Reading<T>& first)
       : parts_(parts),
-        gyro_density_(noise.gyro_noise_density),
-        accel_density_(noise.accel_noise_density),
         correction_(correction),
         accel_correction_(correction.R_IA * correction.T_a_inverse),
         reading_(first),
-        f_(first.f) {}
+        f_(first.f),
+        walk_(noise.gyro_bias_random_walk, noise.accel_bias_random_walk) {}
 
-  // To the next reading, h [s] later.
-  SELFCAL_FLATTEN void Step(const Reading<T>& next, T h) {
+  // To the next reading, h [s] later, with the noise densities of the step.
+  SELFCAL_FLATTEN void Step(const Reading<T>& next,
+                            T h,
+                            T gyro_density = T(0),
+                            T accel_density = T(0)) {
     const T h2 = h * h;
     const Turn<T> turn_m(
         h * (3.0 / 8), h * (1.0 / 8), h2 * (1.0 / 96), reading_, next);
@@ -61,12 +67,19 @@ class Integrator {
     s.dp = h2 * (1.0 / 6) * (f_ + 2.0 * s.f_m);
 
     if (parts_.jacobians || parts_.covariance) {
-      Propagate(s, turn_m, A_m, turn_1, next);
+      Propagate(s, turn_m, A_m, turn_1, next, gyro_density, accel_density);
     }
     motion_.Delta_p += h * motion_.Delta_v + s.dp;
     motion_.Delta_v += s.dv;
     reading_ = next;
     f_ = s.f_1;
+    t_ += h;
+    if (parts_.covariance && ++steps_ % kWalkSteps == 0) AdvanceWalk();
+  }
+
+  // After the last step, if a covariance is wanted.
+  void Finish() {
+    if (steps_ % kWalkSteps != 0) AdvanceWalk();
   }
 
   const Motion<T>& motion() const { return motion_; }
@@ -75,8 +88,18 @@ class Integrator {
     return jacobians_.Result(correction_, accel_correction_);
   }
   const MotionCovariance<T>& covariance() const { return covariance_; }
+  const BiasWalk<T>& walk() const { return walk_; }
 
  private:
+  [[gnu::noinline]] void AdvanceWalk() {
+    walk_.Advance({t_,
+                   motion_.Delta_v,
+                   motion_.Delta_p,
+                   jacobians_.ByGyro(correction_.T_g_inverse),
+                   jacobians_.ByAccel(accel_correction_)},
+                  &covariance_);
+  }
+
   // The norm stays one to rounding: where it is off by e, it is off by 3/8 e^2
   // after that.
   void Turned(const Vector3<T>& phi) {
@@ -90,23 +113,22 @@ class Integrator {
                  const Turn<T>& turn_m,
                  const Matrix3<T>& A_m,
                  const Turn<T>& turn_1,
-                 const Reading<T>& next) {
+                 const Reading<T>& next,
+                 T gyro_density,
+                 T accel_density) {
     const RateResponse<T> rates = RespondToRates(s, turn_m, A_m, turn_1);
     const ForceResponse<T> force = RespondToForce(s);
-    if (parts_.jacobians) {
-      jacobians_.AddGyro(s, rates);
-      jacobians_.AddAccel(s, force, reading_, next);
-    }
+    // The walk of the biases needs derivatives as well.
+    jacobians_.AddGyro(s, rates);
+    jacobians_.AddAccel(s, force, reading_, next);
     if (parts_.covariance) {
       covariance_.Propagate(s);
-      covariance_.AddGyroNoise(
-          s, rates, correction_.T_g_inverse, gyro_density_);
-      covariance_.AddAccelNoise(s, force, accel_correction_, accel_density_);
+      covariance_.AddGyroNoise(s, rates, correction_.T_g_inverse, gyro_density);
+      covariance_.AddAccelNoise(s, force, accel_correction_, accel_density);
     }
   }
 
   const PreintegrationParts parts_;
-  const T gyro_density_, accel_density_;
   const Correction<T> correction_;
   const Matrix3<T> accel_correction_;
 
@@ -116,6 +138,9 @@ class Integrator {
   Matrix3<T> R_ = Matrix3<T>::Identity();
   MotionJacobians<T> jacobians_;
   MotionCovariance<T> covariance_;
+  int steps_ = 0;
+  T t_ = T(0);  // since the beginning
+  BiasWalk<T> walk_;
 };
 
 }  // namespace selfcal::preintegration

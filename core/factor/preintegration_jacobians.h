@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "core/factor/preintegration_covariance.h"
 #include "core/factor/preintegration_step.h"
 #include "core/model/calibration.h"
 
@@ -46,6 +47,18 @@ class MotionJacobians {
       p_accel_[1 + i] += s.h * v + s.h * a_0 * s.R_0 + s.h * a_m * s.R_m;
       v += a_0 * s.R_0 + 2.0 * a_m * s.R_m + a_1 * s.R_1;
     }
+  }
+
+  // By constant errors of the raw readings: the derivatives by the biases with
+  // the other sign.
+  GyroResponse<T> ByGyro(const Matrix3<T>& T_g_inverse) const {
+    return {psi_.template leftCols<3>().lazyProduct(T_g_inverse),
+            v_gyro_.template leftCols<3>().lazyProduct(T_g_inverse),
+            p_gyro_.template leftCols<3>().lazyProduct(T_g_inverse)};
+  }
+  AccelResponse<T> ByAccel(const Matrix3<T>& accel_correction) const {
+    return {v_accel_[0].lazyProduct(accel_correction),
+            p_accel_[0].lazyProduct(accel_correction)};
   }
 
   // `accel_correction` is R_AI^T T_a^-1.

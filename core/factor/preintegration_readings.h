@@ -62,8 +62,9 @@ inline ImuSample Interpolate(std::span<const ImuSample> samples,
           a.accel + part * (b.accel - a.accel)};
 }
 
-// Calls visit(sample, h) at the beginning of the interval with h = 0, and at
-// the end of each step with its length [s], which is not zero.
+// Calls visit(sample, h, next) at the beginning of the interval with h = 0, and
+// at the end of each step with its length [s], which is not zero; `next` is the
+// first sample at or after it.
 template <class Visitor>
 void VisitReadings(std::span<const ImuSample> samples,
                    std::int64_t t0_ns,
@@ -77,10 +78,11 @@ void VisitReadings(std::span<const ImuSample> samples,
           t0_ns,
           [](const ImuSample& s, std::int64_t t) { return s.t_ns < t; }) -
       samples.begin());
-  visit(Interpolate(samples, i, t0_ns), 0.0);
+  visit(Interpolate(samples, i, t0_ns), 0.0, i);
   std::int64_t t_ns = t0_ns;
   const auto advance = [&](std::int64_t next_ns, const ImuSample& sample) {
-    visit(sample, static_cast<double>(next_ns - t_ns) * kSecondsPerNanosecond);
+    visit(
+        sample, static_cast<double>(next_ns - t_ns) * kSecondsPerNanosecond, i);
     t_ns = next_ns;
   };
   // Only samples strictly inside: no step has length zero.

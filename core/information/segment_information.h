@@ -61,6 +61,9 @@ struct ResidualStatistics {
   // Root mean square of the whitened inertial residuals, by kind:
   // (rotation, velocity, position, b_a, b_g).
   std::vector<double> inertial_rms;
+  // Steps between IMU samples with room for more (core/factor/sampling.h).
+  int imu_gaps = 0;
+  double longest_imu_gap_s = 0;
   // Root of what the squares of all whitened residuals keep at the linear
   // minimum over states, landmarks and theta, over their expectation: 1 where
   // motion, noise and model are as stated. 0: not measured.

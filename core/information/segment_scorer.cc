@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/factor/sampling.h"
+
 namespace selfcal {
 namespace {
 
@@ -95,6 +97,9 @@ void SegmentScorer::Score(const Rig& rig,
   result->theta0 = theta0;
   result->residuals = selection.statistics;
   result->residuals.inertial_rms = linearised.inertial_rms;
+  const SampleGaps gaps = FindGaps(segment.imu);
+  result->residuals.imu_gaps = gaps.count;
+  result->residuals.longest_imu_gap_s = gaps.longest_s;
   SketchLandmarks(segment, selection.inliers, &result->landmarks);
 
   // In units of the prior, over the free components.

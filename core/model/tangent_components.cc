@@ -18,7 +18,10 @@ constexpr double kSigmaAccelMisalignment = 4e-2;
 constexpr double kSigmaAccelRotation = 3.5e-2;
 constexpr double kSigmaCameraRotation = 5e-3;
 constexpr double kSigmaCameraPosition = 1.3e-2;
-constexpr double kSigmaPixels = 1.5;  // of f and c
+// Of f and c, of images as wide as those of the recording: the same errors of
+// the same scene are more pixels of a finer image.
+constexpr double kSigmaPixels = 1.5;
+constexpr int kReferenceWidth_px = 640;
 constexpr double kSigmaFov = 2.7e-3;
 // The median over simulated segments of a hand-held device that is moved as
 // calmly as those.
@@ -76,8 +79,12 @@ void AppendCamera(const std::string& name,
   const auto xy = {"x", "y"};
   Append(name + ".q_CI", xyz, "rad", kSigmaCameraRotation, c);
   Append(name + ".p_CI", xyz, "m", kSigmaCameraPosition, c);
-  Append(name + ".focal", xy, "px", kSigmaPixels, c);
-  Append(name + ".principal", xy, "px", kSigmaPixels, c);
+  // A calibration without images has no resolution.
+  const int width_px =
+      camera.width_px > 0 ? camera.width_px : kReferenceWidth_px;
+  const double sigma_px = kSigmaPixels * width_px / kReferenceWidth_px;
+  Append(name + ".focal", xy, "px", sigma_px, c);
+  Append(name + ".principal", xy, "px", sigma_px, c);
   AppendDistortion(name + ".distortion", camera.model, c);
   c->push_back({name + ".time_offset", "s", kSigmaTimeOffset});
 }

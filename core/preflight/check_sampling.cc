@@ -8,16 +8,17 @@
 #include <string>
 #include <vector>
 
+#include "core/factor/sampling.h"
 #include "core/preflight/checks.h"
 
 namespace selfcal {
 namespace {
 
 constexpr std::size_t kMinSamples = 100;
-// A step this much over the median one has room for another sample.
-constexpr double kGap = 1.6;
 // Of all samples: fewer are no finding.
 constexpr double kMinShare = 5e-3;
+// A single gap of so much is one: what a hand did in it is not known.
+constexpr double kLongGap_s = 0.05;
 
 struct Counts {
   std::size_t samples = 0;
@@ -53,7 +54,7 @@ Counts Count(std::span<const MotionSegment> segments, double usual_ns) {
       const auto step = static_cast<double>(b.t_ns - a.t_ns);
       if (step <= 0) ++counts.bad_stamps;
       if (a.gyro == b.gyro && a.accel == b.accel) ++counts.equal_readings;
-      if (step < kGap * usual_ns) continue;
+      if (step < kGapRatio * usual_ns) continue;
       ++counts.gaps;
       counts.missing += static_cast<std::size_t>(step / usual_ns - 0.4);
       counts.longest_gap_s = std::max(counts.longest_gap_s, 1e-9 * step);
@@ -86,12 +87,13 @@ void CheckSampling(std::span<const MotionSegment> segments,
   diagnosis->checked.push_back(
       "dropped and repeated samples: " + std::to_string(counts.samples) +
       " at " + Figure(1e9 / usual_ns) + " Hz");
-  if (share(counts.missing) > kMinShare) {
+  if (share(counts.missing) > kMinShare || counts.longest_gap_s > kLongGap_s) {
     diagnosis->findings.push_back(
         {FindingKind::kDroppedSamples,
          "samples of the IMU are missing: about " +
              OfSamples(counts.missing, counts.samples + counts.missing) +
-             " in " + std::to_string(counts.gaps) + " gaps of up to " +
+             " in " + std::to_string(counts.gaps) +
+             (counts.gaps == 1 ? " gap of " : " gaps of up to ") +
              Figure(1e3 * counts.longest_gap_s) + " ms, at one in " +
              Figure(1e-6 * usual_ns) + " ms",
          "look for a queue that overflows between the driver and the segment "

@@ -68,6 +68,33 @@ ImuReadings SimulateImu(const Rig& rig,
   return readings;
 }
 
+std::vector<std::size_t> SamplesThatArrive(
+    const std::vector<ImuSample>& samples,
+    std::size_t from,
+    std::size_t to,
+    const SimulationOptions& options,
+    Random* random) {
+  const std::int64_t gap_ns = std::llround(options.imu_gap_s * 1e9);
+  std::int64_t gap_begin_ns = 0;
+  const std::int64_t room_ns = samples[to].t_ns - samples[from].t_ns - gap_ns;
+  const bool gap = gap_ns > 0 && room_ns > 0;
+  if (gap) {
+    const double at = random->Uniform(0, static_cast<double>(room_ns));
+    gap_begin_ns =
+        samples[SampleBefore(samples, samples[from].t_ns + std::llround(at))]
+            .t_ns;
+  }
+  std::vector<std::size_t> arrived;
+  for (std::size_t i = from; i <= to; ++i) {
+    const bool lost = options.imu_lost_fraction > 0 &&
+                      random->Chance(options.imu_lost_fraction);
+    const bool in_gap = gap && samples[i].t_ns > gap_begin_ns &&
+                        samples[i].t_ns < gap_begin_ns + gap_ns;
+    if (i == from || i == to || !(lost || in_gap)) arrived.push_back(i);
+  }
+  return arrived;
+}
+
 std::size_t SampleBefore(const std::vector<ImuSample>& samples,
                          std::int64_t t_ns) {
   const auto after = std::upper_bound(

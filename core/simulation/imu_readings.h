@@ -7,6 +7,7 @@
 
 #include "core/model/rig.h"
 #include "core/model/segment.h"
+#include "core/simulation/random.h"
 #include "core/simulation/simulate.h"
 
 namespace selfcal {
@@ -28,6 +29,15 @@ ImuReadings SimulateImu(const Rig& rig,
                         const ImuCalibration& imu,
                         const Trajectory& trajectory,
                         const SimulationOptions& options);
+
+// Of the samples of a segment, those that arrive: indices from `from` to `to`,
+// both among them.
+std::vector<std::size_t> SamplesThatArrive(
+    const std::vector<ImuSample>& samples,
+    std::size_t from,
+    std::size_t to,
+    const SimulationOptions& options,
+    Random* random);
 
 // Index of the last sample at or before t_ns; the samples must reach beyond it.
 std::size_t SampleBefore(const std::vector<ImuSample>& samples,

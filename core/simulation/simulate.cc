@@ -48,8 +48,10 @@ struct Recording {
 // Cuts segment after segment; begin and end are keyframes of the session.
 class Cutter {
  public:
-  explicit Cutter(const Recording& recording)
+  Cutter(const Recording& recording, const SimulationOptions& options)
       : recording_(recording),
+        options_(options),
+        lost_samples_(options.seed, kLostSampleStream),
         local_(recording.tracks.landmarks_G.size(), kUnseen) {}
 
   // Must be called for one segment after the other; end > begin. The IMU
@@ -84,7 +86,7 @@ class Cutter {
                  int end,
                  int imu_end,
                  MotionSegment* segment,
-                 MotionSegment* truth) const {
+                 MotionSegment* truth) {
     segment->keyframes.assign(recording_.slam.begin() + begin,
                               recording_.slam.begin() + end);
     truth->keyframes.assign(recording_.truth.begin() + begin,
@@ -94,11 +96,11 @@ class Cutter {
     const std::int64_t to_ns = recording_.truth[imu_end].t_ns;
     std::size_t to = SampleBefore(imu, to_ns);
     if (imu[to].t_ns < to_ns) ++to;
-    segment->imu.assign(imu.begin() + static_cast<std::ptrdiff_t>(from),
-                        imu.begin() + static_cast<std::ptrdiff_t>(to + 1));
-    const std::vector<ImuSample>& clean = recording_.imu.noise_free;
-    truth->imu.assign(clean.begin() + static_cast<std::ptrdiff_t>(from),
-                      clean.begin() + static_cast<std::ptrdiff_t>(to + 1));
+    for (const std::size_t i :
+         SamplesThatArrive(imu, from, to, options_, &lost_samples_)) {
+      segment->imu.push_back(imu[i]);
+      truth->imu.push_back(recording_.imu.noise_free[i]);
+    }
   }
 
   void CountObservations(std::size_t first) {
@@ -130,6 +132,8 @@ class Cutter {
   }
 
   const Recording& recording_;
+  const SimulationOptions& options_;
+  Random lost_samples_;
   std::vector<int> local_;
   std::size_t next_observation_ = 0;
 };
@@ -173,7 +177,7 @@ SimulatedSession Simulate(const Rig& rig,
                            rig.pixel_sigma_px,
                            options);
   SimulatedSession result;
-  Cutter cutter(recording);
+  Cutter cutter(recording, options);
   for (int s = 0; s < segments; ++s) {
     MotionSegment segment;
     segment.key = {session, s};

@@ -41,6 +41,11 @@ struct SimulationOptions {
   // real trackers drift, errors go together along a track.
   double pixel_correlation = 0;
   bool noise = true;  // false: perfect sensors, biases constant
+  // IMU samples that are lost, each for itself; and the length of a gap
+  // somewhere in each segment. The first and the last of a segment are never
+  // lost.
+  double imu_lost_fraction = 0;
+  double imu_gap_s = 0;
   // Errors of the SLAM system, one standard deviation. Most of each drifts
   // slowly, a small part is new with every keyframe.
   double slam_rotation_rad = 2e-3;  // roll and pitch; yaw drifts 3 times as far

@@ -11,6 +11,7 @@ void RunChange(Context* context);
 void RunCoach(Context* context);
 void RunEntropy(Context* context);
 void RunGroups(Context* context);
+void RunKeyframeRate(Context* context);
 void RunRunTime(Context* context);
 void RunRecordedChoice(Context* context);
 void RunRecordings(Context* context);
@@ -54,6 +55,9 @@ const std::vector<Experiment>& Experiments() {
       {"consistency",
        "is each estimator as sure as it says? NEES and coverage",
        RunConsistency},
+      {"keyframe_rate",
+       "sparse and dense keyframes, lost IMU samples: NEES",
+       RunKeyframeRate},
       {"noise_factors",
        "the factors by which the noise of a rig is off, found from residuals",
        RunNoiseFactors},

@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -130,18 +131,15 @@ class DenseRound {
       balance.squares[IndexOf(kind)] += squares;
       balance.redundancy[IndexOf(kind)] += redundancy;
     };
-    for (std::size_t i = 0; i < by_gyro_.size(); ++i) {
+    for (std::size_t i = 0; i < links_.size(); ++i) {
       const int row = 15 * static_cast<int>(i);
-      const auto e = left.segment<9>(row);
-      const Eigen::Matrix<double, 9, 9> unabsorbed =
-          Eigen::Matrix<double, 9, 9>::Identity() -
-          Q.middleRows<9>(row) * Q.middleRows<9>(row).transpose();
-      add(NoiseKind::kGyro,
-          e.dot(by_gyro_[i] * e),
-          (by_gyro_[i] * unabsorbed).trace());
-      add(NoiseKind::kAccel,
-          e.dot(by_accel_[i] * e),
-          (by_accel_[i] * unabsorbed).trace());
+      const auto e = left.segment<15>(row);
+      const InertialMatrix unabsorbed =
+          InertialMatrix::Identity() -
+          Q.middleRows<15>(row) * Q.middleRows<15>(row).transpose();
+      for (const auto& [kind, part] : links_[i]) {
+        add(kind, e.dot(part * e), (part * unabsorbed).trace());
+      }
     }
     for (int i = 0; i < Rows(); ++i) {
       if (rows_[i].kind) {
@@ -213,17 +211,22 @@ class DenseRound {
                               covariance);
     };
     InertialJacobians J;
-    InertialMatrix covariance, gyro, accel;
+    InertialMatrix covariance;
     const InertialResidual r = evaluate(rig_.imu_noise, &J, &covariance);
-    ImuNoise without = rig_.imu_noise;
-    without.accel_noise_density = 0;
-    evaluate(without, nullptr, &gyro);
-    without = rig_.imu_noise;
-    without.gyro_noise_density = 0;
-    evaluate(without, nullptr, &accel);
     const InertialMatrix W = SquareRootInformation(covariance);
-    by_gyro_.push_back((W * gyro * W.transpose()).topLeftCorner<9, 9>());
-    by_accel_.push_back((W * accel * W.transpose()).topLeftCorner<9, 9>());
+    std::map<NoiseKind, InertialMatrix>& parts = links_.emplace_back();
+    InertialMatrix gaps;
+    evaluate({0, 0, 0, 0}, nullptr, &gaps);
+    const auto add_part = [&](NoiseKind kind, double ImuNoise::*density) {
+      ImuNoise alone = {0, 0, 0, 0};
+      alone.*density = rig_.imu_noise.*density;
+      evaluate(alone, nullptr, &covariance);
+      parts[kind] = W * (covariance - gaps) * W.transpose();
+    };
+    add_part(NoiseKind::kGyro, &ImuNoise::gyro_noise_density);
+    add_part(NoiseKind::kAccel, &ImuNoise::accel_noise_density);
+    add_part(NoiseKind::kGyroBiasWalk, &ImuNoise::gyro_bias_random_walk);
+    add_part(NoiseKind::kAccelBiasWalk, &ImuNoise::accel_bias_random_walk);
     const InertialResidual white = W * r;
     const InertialMatrix x0 = W * J.x0, x1 = W * J.x1, by_theta = W * J.theta;
     for (int i = 0; i < 15; ++i) {
@@ -231,7 +234,6 @@ class DenseRound {
       row.J.segment<15>(15 * link.before) = x0.row(i);
       row.J.segment<15>(15 * link.after) = x1.row(i);
       row.J.segment<15>(theta_column_) = by_theta.row(i);
-      if (i >= 9) row.kind = WalkKind(i - 9);
     }
   }
 
@@ -325,7 +327,8 @@ class DenseRound {
   int first_pixel_row_ = 0;
   std::vector<Row> rows_;                    // inertial links first
   std::vector<std::vector<double>> shares_;  // of what each landmark stands on
-  std::vector<Eigen::Matrix<double, 9, 9>> by_gyro_, by_accel_;
+  // Of the whitened covariance of each link, what each kind brings.
+  std::vector<std::map<NoiseKind, InertialMatrix>> links_;
 };
 
 void ExpectEqualsDense(const Solved& solved, double track_noise) {
@@ -362,6 +365,17 @@ TEST(NoiseBalance, EqualsTheDenseOne) {
 
 TEST(NoiseBalance, WithTrackNoiseEqualsTheDenseOne) {
   ExpectEqualsDense({NoisyRig(), Walk(NoisyRig(), 2, 12, 50, 1)}, 1.5);
+}
+
+// Biases that walk as far as noise goes, so that they move the motion as well.
+TEST(NoiseBalance, WithStrongWalksAndLostSamplesEqualsTheDenseOne) {
+  Rig rig = NoisyRig();
+  rig.imu_noise.gyro_bias_random_walk = 5e-2;
+  rig.imu_noise.accel_bias_random_walk = 5e-1;
+  std::vector<MotionSegment> segments = Walk(rig, 2, 12, 50, 3);
+  std::vector<ImuSample>& imu = segments[1].imu;
+  imu.erase(imu.begin() + 90, imu.begin() + 105);
+  ExpectEqualsDense({rig, std::move(segments)}, 0);
 }
 
 TEST(NoiseBalance, OverAGapEqualsTheDenseOne) {

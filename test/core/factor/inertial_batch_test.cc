@@ -37,7 +37,10 @@ InertialResidual WhitenedOf(const InertialTransition& t) {
 InertialMatrix MatrixOf(const InertialNoiseRoot& root) {
   using RowMajor = Eigen::Matrix<double, 9, 9, Eigen::RowMajor>;
   InertialMatrix U = InertialMatrix::Zero();
+  using ByBias = Eigen::Matrix<double, 9, 6, Eigen::RowMajor>;
   U.topLeftCorner<9, 9>() = Eigen::Map<const RowMajor>(&root.motion[0][0]);
+  U.topRightCorner<9, 6>() =
+      Eigen::Map<const ByBias>(&root.motion_by_bias[0][0]);
   U.diagonal().tail<6>() =
       Eigen::Map<const Eigen::Matrix<double, 6, 1>>(root.bias);
   return U;
@@ -93,7 +96,7 @@ Problem RandomProblem(RandomValues& random, int count) {
     problem.links.push_back(RandomLink(random,
                                        problem.imu,
                                        random.LogUniform(50, 500),
-                                       random.Uniform(0.02, 0.2),
+                                       random.LogUniform(0.02, 1),
                                        angle * random.Normal3(1).normalized()));
   }
   return problem;

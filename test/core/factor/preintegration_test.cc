@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/factor/inertial.h"
 #include "core/model/so3.h"
 #include "test/core/factor/analytic_motion.h"
 #include "test/core/factor/random_values.h"
@@ -210,7 +211,9 @@ TEST(Preintegrate, WhereSamplesAreMissingReadingsStayLinear) {
 TEST(Preintegrate, SplitAtASampleTheTwoPartsComposeToTheWhole) {
   RandomValues random(5);
   for (int trial = 0; trial < 200; ++trial) {
-    const Integral integral = RandomIntegral(random, 200, 0.2);
+    Integral integral = RandomIntegral(random, 200, 0.2);
+    integral.noise.gyro_bias_random_walk = 0;
+    integral.noise.accel_bias_random_walk = 0;
     const std::int64_t split_ns = integral.samples[20].t_ns;
     const Preintegration a = integral.From(0, split_ns);
     const Preintegration b = integral.From(split_ns, integral.t1_ns);
@@ -239,6 +242,32 @@ TEST(Preintegrate, SplitAtASampleTheTwoPartsComposeToTheWhole) {
                                 by_b * b.covariance * by_b.transpose();
     EXPECT_LT((covariance - whole.covariance).norm(),
               1e-12 * whole.covariance.norm());
+
+    // Of walks alone: the biases of the second part begin where those of the
+    // first have walked to. Readings without any smoothness are no constant
+    // rotation and force, and the pieces in which the walk is found are not the
+    // same.
+    integral.noise = {.gyro_noise_density = 0, .accel_noise_density = 0};
+    const Preintegration walk_a = integral.From(0, split_ns);
+    const Preintegration walk_b = integral.From(split_ns, integral.t1_ns);
+    const Preintegration walk_whole = integral.Whole();
+    const Eigen::MatrixXd begin_b = -by_b * b.J_bias;
+    const Eigen::MatrixXd begun =
+        BiasWalkSigmas(integral.noise, a.dt_s).cwiseAbs2().asDiagonal();
+    const Eigen::MatrixXd together =
+        by_a * walk_a.covariance_with_walk * begin_b.transpose();
+    const Matrix9d walked = by_a * walk_a.covariance * by_a.transpose() +
+                            by_b * walk_b.covariance * by_b.transpose() +
+                            begin_b * begun * begin_b.transpose() + together +
+                            together.transpose();
+    EXPECT_LT((walked - walk_whole.covariance).norm(),
+              0.03 * walk_whole.covariance.norm());
+    const Eigen::MatrixXd with_walk = by_a * walk_a.covariance_with_walk +
+                                      begin_b * begun +
+                                      by_b * walk_b.covariance_with_walk;
+    EXPECT_LT((with_walk - walk_whole.covariance_with_walk).norm(),
+              0.03 * walk_whole.covariance_with_walk.norm());
+
     EXPECT_LT((by_a * a.J_theta + by_b * b.J_theta - whole.J_theta).norm(),
               1e-12 * whole.J_theta.norm());
     EXPECT_LT((by_a * a.J_bias + by_b * b.J_bias - whole.J_bias).norm(),

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/simulation/simulate.h"
 #include "test/core/information/test_segments.h"
 
 namespace selfcal {
@@ -271,6 +272,28 @@ TEST(ScoreSegment, TightDensitiesNeverBreakIt) {
       EXPECT_EQ(blind.rank, 0);
     }
   }
+}
+
+TEST(ScoreSegment, CountsTheGapsBetweenSamples) {
+  Rig rig = HandheldRig("a");
+  SimulationOptions options;
+  const auto statistics = [&] {
+    return ScoreSegment(rig,
+                        rig.factory,
+                        Simulate(rig,
+                                 rig.factory,
+                                 rig.factory,
+                                 *MakeHandheld(4.5, 0.5, 1),
+                                 "session",
+                                 options)
+                            .segments[0])
+        .residuals;
+  };
+  EXPECT_EQ(statistics().imu_gaps, 0);
+  EXPECT_EQ(statistics().longest_imu_gap_s, 0);
+  options.imu_gap_s = 0.1;
+  EXPECT_EQ(statistics().imu_gaps, 1);
+  EXPECT_NEAR(statistics().longest_imu_gap_s, 0.1, 0.0051);
 }
 
 TEST(ScoreSegment, ARealisticSlamSegmentKeepsItsObservations) {

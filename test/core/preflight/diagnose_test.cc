@@ -1,5 +1,6 @@
 #include "core/preflight/diagnose.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,6 +44,19 @@ TEST(Diagnose, SaysOfNoDataThatNothingWasChecked) {
   EXPECT_TRUE(diagnosis.findings.empty());
   EXPECT_TRUE(diagnosis.checked.empty());
   EXPECT_EQ(diagnosis.not_checked.size(), 5);
+}
+
+// Of 4000 samples a gap of 75 ms is no more than a few in a thousand.
+TEST(Diagnose, NamesASingleLongGap) {
+  FedData data = Clean();
+  std::vector<ImuSample>& imu = data.segments[2].imu;
+  imu.erase(imu.begin() + 300, imu.begin() + 314);
+  const Diagnosis diagnosis =
+      Diagnose(data.rig, data.rig.factory, data.segments);
+  ASSERT_EQ(diagnosis.findings.size(), 1u);
+  EXPECT_EQ(diagnosis.findings[0].kind, FindingKind::kDroppedSamples);
+  EXPECT_THAT(diagnosis.findings[0].cause,
+              testing::HasSubstr("in 1 gap of 75 ms"));
 }
 
 TEST(Diagnose, PassesOverWhatCannotBeUsed) {

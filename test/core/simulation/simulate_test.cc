@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -61,6 +63,56 @@ TEST(SimulateTest, ImuReachesToTheNextSegmentAndJoinsWithoutASeam) {
     EXPECT_EQ(before.accel, next.imu[0].accel);
     EXPECT_EQ(segment.imu.back().t_ns, next.imu[1].t_ns);
     EXPECT_EQ(segment.imu.back().gyro, next.imu[1].gyro);
+  }
+}
+
+TEST(SimulateTest, LostSamplesAreMissingAndAllElseIsAsItWas) {
+  const Rig rig = HandheldRig("a");
+  const auto simulate = [&](double lost_fraction, double gap_s) {
+    SimulationOptions options;
+    options.imu_lost_fraction = lost_fraction;
+    options.imu_gap_s = gap_s;
+    return Simulate(rig,
+                    rig.factory,
+                    rig.factory,
+                    *MakeHandheld(13, 0.5, 1),
+                    "session",
+                    options);
+  };
+  const SimulatedSession all = simulate(0, 0);
+  const SimulatedSession lost = simulate(0.05, 0);
+  const SimulatedSession gaps = simulate(0, 0.1);
+  ASSERT_EQ(all.segments.size(), 3u);
+  for (std::size_t s = 0; s < all.segments.size(); ++s) {
+    const MotionSegment& whole = all.segments[s];
+    for (const SimulatedSession* session : {&lost, &gaps}) {
+      const MotionSegment& segment = session->segments[s];
+      EXPECT_TRUE(Validate(segment, rig.factory).empty());
+      EXPECT_EQ(segment.imu.front().t_ns, whole.imu.front().t_ns);
+      EXPECT_EQ(segment.imu.back().t_ns, whole.imu.back().t_ns);
+      ASSERT_EQ(segment.imu.size(), session->truth[s].imu.size());
+      std::size_t i = 0;
+      for (const ImuSample& sample : segment.imu) {
+        while (whole.imu[i].t_ns < sample.t_ns) ++i;
+        EXPECT_EQ(sample.gyro, whole.imu[i].gyro);
+      }
+      EXPECT_EQ(segment.keyframes[3].p_GI, whole.keyframes[3].p_GI);
+    }
+    const auto count = static_cast<double>(whole.imu.size());
+    EXPECT_NEAR(static_cast<double>(lost.segments[s].imu.size()),
+                0.95 * count,
+                4 * std::sqrt(0.05 * count));
+    // 19 or 20 samples lie within 100 ms.
+    EXPECT_NEAR(
+        static_cast<double>(gaps.segments[s].imu.size()), count - 19.5, 0.6);
+    double longest_s = 0;
+    for (std::size_t i = 1; i < gaps.segments[s].imu.size(); ++i) {
+      longest_s = std::max(
+          longest_s,
+          1e-9 * static_cast<double>(gaps.segments[s].imu[i].t_ns -
+                                     gaps.segments[s].imu[i - 1].t_ns));
+    }
+    EXPECT_NEAR(longest_s, 0.1, 0.0051);
   }
 }
 
