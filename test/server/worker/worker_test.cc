@@ -154,6 +154,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   options_.noise_factors = false;
   options_.reweight_noise = true;
   options_.merge_landmarks = 3;
+  options_.leave_out_contradictions = false;
   options_.solver = SolverKind::kCeres;
   options_.threads = 2;
   limits_ = {.idle = true, .max_memory_bytes = 123};
@@ -174,6 +175,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   EXPECT_FALSE(job->options.noise_factors);
   EXPECT_TRUE(job->options.reweight_noise);
   EXPECT_EQ(job->options.merge_landmarks, 3);
+  EXPECT_FALSE(job->options.leave_out_contradictions);
   EXPECT_EQ(job->options.solver, SolverKind::kCeres);
   EXPECT_EQ(job->options.threads, 2);
   EXPECT_TRUE(job->limits.idle);
