@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "client/text/calibration_facts.h"
+#include "client/text/estimate_text.h"
 #include "client/text/text.h"
 
 namespace selfcal::client {
@@ -20,10 +21,11 @@ Facts DescribeCalibration(const v1::Calibration& calibration) {
 Table CalibrationValues(const v1::Calibration& calibration) {
   Table table({{"component"}, {"value", true}, {"unit"}, {"sigma", true}});
   for (const v1::ComponentEstimate& estimate : calibration.estimates()) {
+    const ShownEstimate shown = Shown(estimate);
     table.Add({estimate.component(),
-               ValueText(estimate.value(), estimate.sigma()),
-               estimate.unit(),
-               SigmaText(estimate.sigma())});
+               ValueText(shown.value, shown.sigma),
+               shown.unit,
+               SigmaText(shown.sigma)});
   }
   return table;
 }
@@ -56,12 +58,13 @@ Table DifferenceValues(const v1::CompareCalibrationsResponse& differences) {
                {"difference", true},
                {"sigma", true}});
   for (const auto& one : differences.differences()) {
+    const ShownDifference shown = Shown(one);
     table.Add({one.component(),
-               ValueText(one.value_a(), one.sigma()),
-               ValueText(one.value_b(), one.sigma()),
-               one.unit(),
-               ValueText(one.difference(), one.sigma()),
-               SigmaText(one.sigma())});
+               ValueText(shown.a, shown.sigma),
+               ValueText(shown.b, shown.sigma),
+               shown.unit,
+               ValueText(shown.difference, shown.sigma),
+               SigmaText(shown.sigma)});
   }
   return table;
 }
@@ -77,11 +80,12 @@ std::string OriginText(const v1::Calibration& calibration) {
 }
 
 std::string CalibrationLine(const v1::Calibration& calibration) {
-  return fmt::format("{}\t{}\t{}\t{}",
+  return fmt::format("{}\t{}\t{}\t{}\t{}",
                      calibration.version(),
                      StateText(calibration.state()),
                      TimeText(calibration.create_time()),
-                     OriginText(calibration));
+                     OriginText(calibration),
+                     VerdictText(calibration));
 }
 
 }  // namespace selfcal::client

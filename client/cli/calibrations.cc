@@ -6,6 +6,7 @@
 
 #include "client/cli/calibration_report.h"
 #include "client/cli/commands.h"
+#include "client/text/estimate_text.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
@@ -27,13 +28,18 @@ int List(Context* context, const std::string& rig) {
     context->PrintJson(calibrations);
     return kDone;
   }
-  Table table(
-      {{"version", true}, {"state"}, {"created"}, {"origin"}, {"reasons"}});
+  Table table({{"version", true},
+               {"state"},
+               {"created"},
+               {"origin"},
+               {"verdict"},
+               {"reasons"}});
   for (const v1::Calibration& calibration : calibrations.calibrations()) {
     table.Add({fmt::format("{}", calibration.version()),
                StateText(calibration.state()),
                TimeText(calibration.create_time()),
                OriginText(calibration),
+               VerdictText(calibration),
                fmt::format("{}", fmt::join(calibration.reasons(), " "))});
   }
   context->Print(table);

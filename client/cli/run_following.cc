@@ -10,6 +10,7 @@
 
 #include "client/cli/calibration_report.h"
 #include "client/cli/progress.h"
+#include "client/text/estimate_text.h"
 #include "client/text/text.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 
@@ -94,6 +95,10 @@ int ShowResult(Context* context, const v1::Recalibration& run) {
       &calibration);
   if (!status.ok()) return Fail(*context, status);
   if (!context->json) {
+    if (context->terminal) PrintText("\n");
+    Facts facts;
+    facts.Add("verdict", VerdictText(calibration));
+    context->Print(facts);
     if (context->terminal) PrintText("\n");
     context->Print(CalibrationValues(calibration));
   }

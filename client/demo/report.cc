@@ -8,8 +8,10 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <numbers>
 #include <utility>
 
+#include "client/text/estimate_text.h"
 #include "proto/convert.h"
 
 namespace selfcal::client {
@@ -208,6 +210,7 @@ void Report::Result(const v1::Calibration& factory,
       BoxMinus(after_theta, truth ? *truth : before_theta);
   Eigen::VectorXd truth_values;
   if (truth) truth_values = ReadableValues(*truth);
+  Line("rotations: degrees from the factory's");
   Line(fmt::format("{:<26}{:>5}{:>12}{:>12}{:>12}{:>11}{:>9}",
                    "parameter",
                    "unit",
@@ -226,13 +229,20 @@ void Report::Result(const v1::Calibration& factory,
     const double sigmas = difference[i] / after.sigma();
     within_3 += std::abs(sigmas) <= 3;
     largest = std::max(largest, std::abs(sigmas));
-    Line(fmt::format("{:<26}{:>5}{:>12}{:>12.5f}{:>12.5f}{:>11.2g}{:>9.2f}",
+    // Rotations in degrees from the factory's.
+    const bool turned = after.unit() == "rad";
+    const double unit = turned ? 180 / std::numbers::pi : 1;
+    const double off = turned ? 0 : before;
+    const auto shown = [&](const Eigen::VectorXd& from_factory) {
+      return fmt::format("{:.5f}", off + unit * from_factory[i]);
+    };
+    Line(fmt::format("{:<26}{:>5}{:>12}{:>12.5f}{:>12}{:>11.2g}{:>9.2f}",
                      after.component(),
-                     after.unit(),
-                     truth ? fmt::format("{:.5f}", truth_values[i]) : "",
-                     before,
-                     after.value(),
-                     after.sigma(),
+                     turned ? "deg" : after.unit(),
+                     truth ? shown(BoxMinus(*truth, before_theta)) : "",
+                     off,
+                     shown(BoxMinus(after_theta, before_theta)),
+                     unit * after.sigma(),
                      sigmas));
     nlohmann::json row = {{"parameter", after.component()},
                           {"unit", after.unit()},
@@ -244,6 +254,7 @@ void Report::Result(const v1::Calibration& factory,
     json_["parameters"].push_back(row);
   }
   json_["calibration"] = ToJson(estimate);
+  Line("verdict: " + VerdictText(estimate));
   json_["least_known"] = LeastKnown(factory, estimate);
   Line("least known, as sigma over the factory's: " +
        LeastKnown(factory, estimate));

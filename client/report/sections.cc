@@ -8,8 +8,8 @@
 
 #include "client/report/chart.h"
 #include "client/report/html.h"
-#include "client/report/verdict.h"
 #include "client/text/calibration_facts.h"
+#include "client/text/estimate_text.h"
 #include "client/text/text.h"
 
 namespace selfcal::client {
@@ -22,11 +22,18 @@ const v1::Calibration& Factory(const ReportData& data) {
   return v1::Calibration::default_instance();
 }
 
-std::string ClassOf(VerdictKind kind) {
-  if (kind == VerdictKind::kGood) return "good";
-  return kind == VerdictKind::kInconsistent || kind == VerdictKind::kRejected
-             ? "bad"
-             : "weak";
+std::string ClassOf(v1::Verdict::Kind kind) {
+  if (kind == v1::Verdict::GOOD) return "good";
+  return kind == v1::Verdict::NOT_TRUSTWORTHY ? "bad" : "weak";
+}
+
+// As it is shown; 0 if it was not estimated.
+double SigmaBefore(const v1::Calibration& factory,
+                   const std::string& component) {
+  for (const auto& estimate : factory.estimates()) {
+    if (estimate.component() == component) return Shown(estimate).sigma;
+  }
+  return 0;
 }
 
 // In the order of their arrival.
@@ -51,10 +58,10 @@ std::string Course(const ReportData& data, const std::string& component) {
     for (const auto& estimate : version.estimates()) {
       if (estimate.component() != component) continue;
       // The band of the factory would hide all others.
-      const double sigma = version.version() == 1 ? 0 : estimate.sigma();
+      const ShownEstimate shown = Shown(estimate);
       points.push_back({static_cast<double>(version.version()),
-                        estimate.value(),
-                        sigma,
+                        shown.value,
+                        version.version() == 1 ? 0 : shown.sigma,
                         false,
                         ""});
     }
@@ -68,16 +75,16 @@ std::string Course(const ReportData& data, const std::string& component) {
 }  // namespace
 
 std::string VerdictSection(const ReportData& data) {
-  const Verdict verdict = Judge(data.calibration, Factory(data));
+  const v1::Verdict& verdict = data.calibration.verdict();
   std::string sentences;
-  for (const std::string& sentence : verdict.sentences) {
+  for (const std::string& sentence : verdict.sentences()) {
     sentences += "<li>" + Escaped(sentence) + "</li>\n";
   }
   return fmt::format(
       "<div class=\"verdict {}\"><p><strong>Verdict: {}.</strong> State: {}, "
       "made {} UTC.</p>\n<ul>{}</ul></div>\n",
-      ClassOf(verdict.kind),
-      Escaped(VerdictText(verdict.kind)),
+      ClassOf(verdict.kind()),
+      Escaped(VerdictText(data.calibration)),
       Escaped(StateText(data.calibration.state())),
       Escaped(TimeText(data.calibration.create_time())),
       sentences);
@@ -93,14 +100,15 @@ std::string ParameterSection(const ReportData& data) {
                    {"observability"},
                    {"over the versions"}});
   for (const auto& estimate : data.calibration.estimates()) {
+    const ShownEstimate shown = Shown(estimate);
     const double before = SigmaBefore(Factory(data), estimate.component());
-    const double nats = std::log(before / estimate.sigma());
-    const bool known = before > 0 && estimate.sigma() > 0;
+    const double nats = std::log(before / shown.sigma);
+    const bool known = before > 0 && shown.sigma > 0;
     // A full bar: a sigma e^5 = 148 times smaller than before.
     table.Add({Escaped(estimate.component()),
-               ValueText(estimate.value(), estimate.sigma()),
-               SigmaText(estimate.sigma()),
-               Escaped(estimate.unit()),
+               ValueText(shown.value, shown.sigma),
+               SigmaText(shown.sigma),
+               Escaped(shown.unit),
                SigmaText(before),
                known ? fmt::format("{:.2f}", std::max(nats, 0.0)) : "held",
                known ? Bar(nats / 5, estimate.component() + ": learned") : "",
@@ -225,11 +233,16 @@ std::string OriginSection(const ReportData& data) {
 }
 
 std::string HistorySection(const ReportData& data) {
-  HtmlTable table(
-      {{"version", true}, {"state"}, {"made (UTC)"}, {"segments", true}, {""}});
+  HtmlTable table({{"version", true},
+                   {"state"},
+                   {"verdict"},
+                   {"made (UTC)"},
+                   {"segments", true},
+                   {""}});
   for (const v1::Calibration& version : data.versions) {
     table.Add({fmt::format("{}", version.version()),
                Escaped(StateText(version.state())),
+               Escaped(VerdictText(version)),
                TimeText(version.create_time()),
                version.has_provenance()
                    ? fmt::format("{}", version.provenance().segments_size())

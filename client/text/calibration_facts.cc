@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "client/text/estimate_text.h"
 #include "client/text/text.h"
 
 namespace selfcal::client {
@@ -46,15 +47,30 @@ void AddProvenance(const v1::Calibration::Provenance& provenance,
   if (!settings.empty()) Add(facts, "settings", settings);
 }
 
+void AddVerdict(const v1::Calibration& calibration, FactList* facts) {
+  Add(facts, "verdict", VerdictText(calibration));
+  // Those of one that is not trustworthy are the reasons.
+  if (calibration.verdict().kind() == v1::Verdict::NOT_TRUSTWORTHY) return;
+  const bool weak = calibration.verdict().kind() == v1::Verdict::WEAK;
+  for (const std::string& sentence : calibration.verdict().sentences()) {
+    Add(facts, weak ? "weak because" : "note", sentence);
+  }
+}
+
+std::string CheckText(const v1::Validation::Check& check) {
+  if (check.outcome() == v1::Validation::Check::NOT_TESTED) {
+    return fmt::format("{} not tested: {}", check.name(), check.sentence());
+  }
+  return fmt::format("{} {}: {:.3g}, limit {:.3g}",
+                     check.name(),
+                     check.passed() ? "passed" : "failed",
+                     check.value(),
+                     check.limit());
+}
+
 void AddValidation(const v1::Validation& validation, FactList* facts) {
   for (const auto& check : validation.checks()) {
-    Add(facts,
-        "check",
-        fmt::format("{} {}: {:.3g}, limit {:.3g}",
-                    check.name(),
-                    check.passed() ? "passed" : "failed",
-                    check.value(),
-                    check.limit()));
+    Add(facts, "check", CheckText(check));
   }
   const auto& held_out = validation.held_out();
   if (held_out.degrees() == 0) {
@@ -66,9 +82,10 @@ void AddValidation(const v1::Validation& validation, FactList* facts) {
   }
   Add(facts,
       "held-out segments",
-      fmt::format("{} ({} left out), {} degrees: chi-square {:.1f}, of "
-                  "version {} {:.1f}",
+      fmt::format("{} ({} scored anew, {} left out), {} degrees: chi-square "
+                  "{:.1f}, of version {} {:.1f}",
                   held_out.segments(),
+                  held_out.rescored(),
                   held_out.left_out(),
                   held_out.degrees(),
                   held_out.chi_square(),
@@ -86,15 +103,35 @@ std::string NoiseName(const std::string& kind) {
 }
 
 std::string NoiseText(const v1::NoiseFactor& factor) {
-  const std::string name = NoiseName(factor.kind());
-  return factor.determined()
-             ? fmt::format(
-                   "{}: residuals suggest {:.2f} times what the rig "
-                   "states (+- {:.0f} %)",
-                   name,
-                   factor.factor(),
-                   100 * factor.log_sigma())
-             : fmt::format("{}: residuals do not determine it", name);
+  std::string text = NoiseName(factor.kind()) + ": ";
+  text += factor.determined()
+              ? fmt::format(
+                    "residuals suggest {:.2f} times what the rig states (+- "
+                    "{:.0f} %)",
+                    factor.factor(),
+                    100 * factor.log_sigma())
+              : "residuals do not determine it";
+  if (factor.used() == 0) return text;  // from before it was recorded
+  if (!factor.converged()) text += ", the estimate did not converge";
+  return text + fmt::format("; {:.2f} times was used", factor.used());
+}
+
+void AddAgreement(const v1::SolverReport& solver, FactList* facts) {
+  const v1::AgreementTest& halves = solver.halves();
+  if (halves.degrees() > 0) {
+    Add(facts,
+        "halves of the segments",
+        fmt::format("chi-square {:.1f} with {} degrees, probability {:.2g}",
+                    halves.chi_square(),
+                    halves.degrees(),
+                    halves.probability()));
+  }
+  for (const v1::SegmentFit& fit : solver.segment_fits()) {
+    if (fit.excluded().empty()) continue;
+    Add(facts,
+        "excluded segment",
+        fmt::format("{}: {}", LastPart(fit.segment()), fit.excluded()));
+  }
 }
 
 void AddSolver(const v1::SolverReport& solver, FactList* facts) {
@@ -142,6 +179,7 @@ void AddSolver(const v1::SolverReport& solver, FactList* facts) {
   for (const auto& factor : solver.noise_factors()) {
     Add(facts, "noise", NoiseText(factor));
   }
+  AddAgreement(solver, facts);
 }
 
 }  // namespace
@@ -150,6 +188,7 @@ std::vector<Fact> CalibrationFacts(const v1::Calibration& calibration) {
   FactList facts;
   Add(&facts, "version", fmt::format("{}", calibration.version()));
   Add(&facts, "state", StateText(calibration.state()));
+  AddVerdict(calibration, &facts);
   Add(&facts, "created", TimeText(calibration.create_time()));
   for (const std::string& reason : calibration.reasons()) {
     Add(&facts, "rejected because", reason);

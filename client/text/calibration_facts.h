@@ -13,8 +13,8 @@ struct Fact {
   std::string text;
 };
 
-// State, provenance, validation and the solver's report, what was held constant
-// in words. A name may come more than once.
+// State, verdict, provenance, validation and the solver's report, what was held
+// constant in words. A name may come more than once.
 std::vector<Fact> CalibrationFacts(const v1::Calibration& calibration);
 
 }  // namespace selfcal::client

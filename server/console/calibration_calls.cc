@@ -33,8 +33,10 @@ Answer ListCalibrations(const Call& call) {
   SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));
   return PageAnswer<v1::ListCalibrationsResponse>(
       call.context.store->ListCalibrations(rig, page),
-      [](const StoredCalibration& calibration, auto* response) {
-        *response->add_calibrations() = Encode(calibration);
+      [&](const StoredCalibration& calibration,
+          auto* response) -> absl::Status {
+        SELFCAL_ASSIGN_OR_RETURN(*response->add_calibrations(),
+                                 Encode(call.context.store, calibration));
         return absl::OkStatus();
       });
 }
@@ -46,7 +48,9 @@ Answer GetCalibration(const Call& call) {
   SELFCAL_RETURN_IF_ERROR(Authorise(call.request.caller, request));
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration calibration,
                            ReadVersion(call, call.parts[1]));
-  return JsonResponse(Encode(calibration));
+  SELFCAL_ASSIGN_OR_RETURN(const v1::Calibration message,
+                           Encode(call.context.store, calibration));
+  return JsonResponse(message);
 }
 
 // The body is an ActivateCalibrationRequest; the address says which version.
@@ -79,7 +83,9 @@ Answer ActivateCalibration(const Call& call) {
       const StoredCalibration active,
       call.context.pipeline->ActivateCalibration(
           rig, *version, call.request.caller.name, request.reason()));
-  return JsonResponse(Encode(active));
+  SELFCAL_ASSIGN_OR_RETURN(const v1::Calibration message,
+                           Encode(call.context.store, active));
+  return JsonResponse(message);
 }
 
 // May take seconds at the first question about a version.

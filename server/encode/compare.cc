@@ -56,12 +56,16 @@ void FillDifferences(const Rig& rig,
   const auto components = TangentComponents(rig.factory);
   const Eigen::VectorXd values_a = ReadableValues(a.theta);
   const Eigen::VectorXd values_b = ReadableValues(b.theta);
+  const Eigen::VectorXd from_factory_a = BoxMinus(a.theta, rig.factory);
+  const Eigen::VectorXd from_factory_b = BoxMinus(b.theta, rig.factory);
   for (const int i : FreeComponents(rig)) {
     auto* difference = response->add_differences();
     difference->set_component(components[i].name);
     difference->set_unit(components[i].unit);
     difference->set_value_a(values_a[i]);
     difference->set_value_b(values_b[i]);
+    difference->set_from_factory_a(from_factory_a[i]);
+    difference->set_from_factory_b(from_factory_b[i]);
     difference->set_difference(compared.difference[i]);
     difference->set_sigma(compared.sigmas[i]);
   }

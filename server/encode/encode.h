@@ -19,8 +19,13 @@ v1::TableExclusion Encode(const TableAbsence& absence);
 v1::Event Encode(const StoredEvent& event);
 v1::Table Encode(const std::string& rig, const Table& table);
 
-// With an estimate for each tangent component, sigmas from the covariance.
-v1::Calibration Encode(const StoredCalibration& calibration);
+// With an estimate for each tangent component, also as its difference from the
+// value of `factory`, and sigmas from the covariance.
+v1::Calibration Encode(const StoredCalibration& calibration,
+                       const Calibration& factory);
+// The same with the factory's values of its rig.
+absl::StatusOr<v1::Calibration> Encode(Store* store,
+                                       const StoredCalibration& calibration);
 
 // `calibration` is the one that the run produced, null if there is none yet.
 v1::Recalibration Encode(const StoredRun& run,

@@ -5,6 +5,8 @@
 #include "proto/resource_names.h"
 #include "server/encode/encode.h"
 #include "server/encode/encode_parts.h"
+#include "server/pipeline/verdict.h"
+#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -42,17 +44,22 @@ std::string StatusName(CalibrateStatus status) {
 }
 
 void FillEstimates(const StoredCalibration& calibration,
+                   const Calibration& factory,
                    v1::Calibration* message) {
   const auto components = TangentComponents(calibration.theta);
   const Eigen::VectorXd values = ReadableValues(calibration.theta);
   const Eigen::MatrixXd& Sigma = calibration.covariance;
   const auto size = static_cast<Eigen::Index>(components.size());
   const bool has_covariance = Sigma.rows() == size && Sigma.cols() == size;
+  const bool has_factory = SameShape(calibration.theta, factory);
+  const Eigen::VectorXd from_factory =
+      has_factory ? BoxMinus(calibration.theta, factory) : Eigen::VectorXd();
   for (Eigen::Index i = 0; i < size; ++i) {
     v1::ComponentEstimate* estimate = message->add_estimates();
     estimate->set_component(components[i].name);
     estimate->set_unit(components[i].unit);
     estimate->set_value(values[i]);
+    if (has_factory) estimate->set_from_factory(from_factory[i]);
     if (!has_covariance) continue;
     estimate->set_sigma(std::sqrt(std::max(Sigma(i, i), 0.0)));
     for (Eigen::Index j = 0; j <= i; ++j) message->add_covariance(Sigma(i, j));
@@ -83,6 +90,57 @@ void FillProvenance(const StoredCalibration& calibration,
   temperature->set_max_c(temperatures.max_c);
 }
 
+v1::Verdict::Kind EncodeKind(VerdictKind kind) {
+  switch (kind) {
+    case VerdictKind::kUnknown:
+      return v1::Verdict::UNKNOWN;
+    case VerdictKind::kGood:
+      return v1::Verdict::GOOD;
+    case VerdictKind::kWeak:
+      return v1::Verdict::WEAK;
+    case VerdictKind::kNotTrustworthy:
+      return v1::Verdict::NOT_TRUSTWORTHY;
+    case VerdictKind::kFactory:
+      return v1::Verdict::FACTORY;
+  }
+  return v1::Verdict::UNKNOWN;
+}
+
+void FillVerdict(const Verdict& verdict, v1::Verdict* message) {
+  message->set_kind(EncodeKind(verdict.kind));
+  message->set_text(VerdictText(verdict.kind));
+  message->mutable_sentences()->Assign(verdict.sentences.begin(),
+                                       verdict.sentences.end());
+}
+
+v1::Validation::Check::Outcome EncodeOutcome(CheckOutcome outcome) {
+  switch (outcome) {
+    case CheckOutcome::kPassed:
+      return v1::Validation::Check::PASSED;
+    case CheckOutcome::kFailed:
+      return v1::Validation::Check::FAILED;
+    case CheckOutcome::kNotTested:
+      return v1::Validation::Check::NOT_TESTED;
+  }
+  return v1::Validation::Check::OUTCOME_UNSPECIFIED;
+}
+
+void FillAgreement(const AgreementTest& test, v1::AgreementTest* message) {
+  message->set_chi_square(test.statistic);
+  message->set_degrees(test.degrees);
+  message->set_probability(test.probability);
+}
+
+void FillNoiseFactor(const NoiseFactor& factor, v1::NoiseFactor* message) {
+  message->set_kind(NoiseKindName(factor.kind));
+  message->set_factor(factor.factor);
+  message->set_log_sigma(factor.log_sigma);
+  message->set_redundancy(factor.redundancy);
+  message->set_determined(factor.determined());
+  message->set_used(factor.used);
+  message->set_converged(factor.converged);
+}
+
 void FillValidation(const StoredValidation& validation,
                     bool accepted,
                     v1::Validation* message) {
@@ -94,12 +152,15 @@ void FillValidation(const StoredValidation& validation,
     added->set_name(check.name);
     added->set_value(check.value);
     added->set_limit(check.limit);
-    added->set_passed(check.passed);
+    added->set_passed(check.outcome == CheckOutcome::kPassed);
+    added->set_outcome(EncodeOutcome(check.outcome));
+    added->set_sentence(check.sentence);
   }
   const HeldOutTest& test = validation.held_out;
   auto* held_out = message->mutable_held_out();
   held_out->set_segments(test.segments);
   held_out->set_left_out(test.left_out);
+  held_out->set_rescored(test.rescored);
   held_out->set_degrees(test.candidate.degrees);
   held_out->set_chi_square(test.candidate.statistic);
   held_out->set_probability(test.candidate.probability);
@@ -109,7 +170,8 @@ void FillValidation(const StoredValidation& validation,
 
 }  // namespace
 
-void FillReport(const CalibrationResult& result,
+void FillReport(const std::string& rig,
+                const CalibrationResult& result,
                 double seconds,
                 v1::SolverReport* message) {
   message->set_status(StatusName(result.status));
@@ -137,16 +199,21 @@ void FillReport(const CalibrationResult& result,
   message->set_track_noise_factor(result.track_noise_factor);
   message->set_seconds(seconds);
   for (const NoiseFactor& factor : result.noise_factors) {
-    v1::NoiseFactor* added = message->add_noise_factors();
-    added->set_kind(NoiseKindName(factor.kind));
-    added->set_factor(factor.factor);
-    added->set_log_sigma(factor.log_sigma);
-    added->set_redundancy(factor.redundancy);
-    added->set_determined(factor.determined());
+    FillNoiseFactor(factor, message->add_noise_factors());
   }
+  for (const SegmentFit& fit : result.segment_fits) {
+    v1::SegmentFit* added = message->add_segment_fits();
+    added->set_segment(SegmentName(rig, fit.key));
+    added->set_pixel_ratio(fit.pixel_ratio);
+    added->set_inertial_ratio(fit.inertial_ratio);
+    FillAgreement(fit.others, added->mutable_others());
+    added->set_excluded(fit.excluded);
+  }
+  FillAgreement(result.halves, message->mutable_halves());
 }
 
-v1::Calibration Encode(const StoredCalibration& calibration) {
+v1::Calibration Encode(const StoredCalibration& calibration,
+                       const Calibration& factory) {
   v1::Calibration message;
   message.set_name(ChildName(
       calibration.rig, "calibrations", std::to_string(calibration.version)));
@@ -154,22 +221,31 @@ v1::Calibration Encode(const StoredCalibration& calibration) {
   message.set_state(EncodeState(calibration.state));
   SetTime(calibration.create_time_ns, message.mutable_create_time());
   *message.mutable_parameters() = ToProto(calibration.theta);
-  FillEstimates(calibration, &message);
+  FillEstimates(calibration, factory, &message);
   message.mutable_reasons()->Add(calibration.reasons.begin(),
                                  calibration.reasons.end());
   if (calibration.run) {
     FillProvenance(calibration, message.mutable_provenance());
   }
   if (calibration.report) {
-    FillReport(
-        *calibration.report, calibration.seconds, message.mutable_solver());
+    FillReport(calibration.rig,
+               *calibration.report,
+               calibration.seconds,
+               message.mutable_solver());
   }
   if (calibration.validation) {
     FillValidation(*calibration.validation,
                    calibration.state != CalibrationState::kRejected,
                    message.mutable_validation());
   }
+  FillVerdict(VerdictOf(calibration), message.mutable_verdict());
   return message;
+}
+
+absl::StatusOr<v1::Calibration> Encode(Store* store,
+                                       const StoredCalibration& calibration) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(calibration.rig));
+  return Encode(calibration, rig.rig.factory);
 }
 
 }  // namespace selfcal::server

@@ -4,6 +4,7 @@
 #include <google/protobuf/timestamp.pb.h>
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
@@ -33,7 +34,8 @@ void AddDirections(const std::vector<UnobservedDirection>& directions,
   }
 }
 
-void FillReport(const CalibrationResult& result,
+void FillReport(const std::string& rig,
+                const CalibrationResult& result,
                 double seconds,
                 v1::SolverReport* message);
 

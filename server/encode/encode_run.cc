@@ -86,8 +86,10 @@ v1::Recalibration Encode(const StoredRun& run,
         run.rig, "calibrations", std::to_string(run.calibration_version)));
   }
   if (calibration != nullptr && calibration->report) {
-    FillReport(
-        *calibration->report, calibration->seconds, message.mutable_solver());
+    FillReport(run.rig,
+               *calibration->report,
+               calibration->seconds,
+               message.mutable_solver());
   }
   return message;
 }

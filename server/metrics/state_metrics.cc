@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "server/pipeline/verdict.h"
+
 namespace selfcal::server {
 namespace {
 
@@ -44,6 +46,8 @@ void AddTables(Store* store,
   Gauge capacity("selfcal_table_capacity",
                  "Segments that the tables of a group can hold.");
   Gauge version("selfcal_active_version", "Number of the active calibration.");
+  Gauge verdict("selfcal_active_verdict",
+                "1, with the verdict on the active calibration as label.");
   for (const std::string& rig : rigs) {
     // Several groups may share the label "other".
     std::map<std::string, std::pair<double, double>> groups;
@@ -61,10 +65,13 @@ void AddTables(Store* store,
     const auto active = store->GetActiveCalibration(rig);
     if (!active.ok()) continue;
     version.Add({{"rig", rig}}, static_cast<double>(active->version));
+    verdict.Add(
+        {{"rig", rig}, {"verdict", VerdictText(VerdictOf(*active).kind)}}, 1);
   }
   families->push_back(entries.Take());
   families->push_back(capacity.Take());
   families->push_back(version.Take());
+  families->push_back(verdict.Take());
 }
 
 void AddQueue(Store* store, std::vector<MetricFamily>* families) {

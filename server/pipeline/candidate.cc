@@ -2,36 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
+#include <utility>
 
-#include "server/pipeline/held_out.h"
+#include "server/pipeline/candidate_checks.h"
 
 namespace selfcal::server {
 namespace {
 
-// A check whose value may be at most the limit.
-void AddCheck(const char* name,
-              double value,
-              double limit,
-              Judgement* judgement) {
-  judgement->validation.checks.push_back({name, value, limit, value <= limit});
-}
-
-void CheckSolver(const CalibrationResult& result, Judgement* judgement) {
-  const bool converged = result.status == CalibrateStatus::kConverged;
-  judgement->validation.checks.push_back(
-      {"converged", converged ? 1.0 : 0.0, 1.0, converged});
-  if (!converged) {
-    judgement->reasons.push_back(
-        fmt::format("the solver did not converge in {} iterations{}{}",
-                    result.iterations,
-                    result.message.empty() ? "" : ": ",
-                    result.message));
-  }
-}
-
-// What is wrong with the numbers as such; nothing else can be told then.
+// What is wrong with the numbers as such; nothing else can be checked then.
 std::string NumbersProblem(const Rig& rig, const CalibrationResult& result) {
   const Eigen::Index size = TangentSize(rig.factory);
   if (!SameShape(result.theta, rig.factory) ||
@@ -48,133 +26,111 @@ std::string NumbersProblem(const Rig& rig, const CalibrationResult& result) {
   return "";
 }
 
-bool CheckNumbers(const Rig& rig,
+std::string SolverFailure(const CalibrationResult& result) {
+  const std::string message =
+      result.message.empty() ? "" : " (" + result.message + ")";
+  switch (result.status) {
+    case CalibrateStatus::kConverged:
+      return "";
+    case CalibrateStatus::kStalled:
+      return fmt::format(
+          "The solver stalled after {} iterations{}: no step lowers the cost, "
+          "yet the estimate is not settled, so that its sigmas mean nothing. "
+          "Look for segments with large residuals (selfcal segments list), "
+          "and send richer motion.",
+          result.iterations,
+          message);
+    default:
+      return fmt::format(
+          "The solver did not converge in {} iterations{}: the estimate still "
+          "moves, so that its sigmas mean nothing. Look for segments with "
+          "large residuals (selfcal segments list), and send richer motion.",
+          result.iterations,
+          message);
+  }
+}
+
+void CheckSolver(const CalibrationResult& result,
+                 std::vector<ValidationCheck>* checks) {
+  const bool converged = result.status == CalibrateStatus::kConverged;
+  AddResult("converged", converged ? 1 : 0, 1, SolverFailure(result), checks);
+}
+
+void CheckNumbers(const Rig& rig,
                   const CalibrationResult& result,
-                  Judgement* judgement) {
-  std::vector<std::string> problems;
-  const std::string numbers = NumbersProblem(rig, result);
-  if (!numbers.empty()) {
-    problems.push_back(numbers);
-  } else {
+                  std::vector<ValidationCheck>* checks) {
+  constexpr char kRemedy[] =
+      "No device has such a calibration: check the tolerances of the rig "
+      "(prior_sigmas) and whether its segments are of this device.";
+  std::string failure = NumbersProblem(rig, result);
+  if (failure.empty()) {
     for (const Violation& violation : Validate(result.theta, "")) {
-      problems.push_back(
-          fmt::format("{}: {}", violation.field, violation.message));
+      failure += fmt::format("{}{}: {}",
+                             failure.empty() ? "" : "; ",
+                             violation.field,
+                             violation.message);
     }
   }
-  const bool usable = problems.empty();
-  judgement->validation.checks.push_back(
-      {"usable", usable ? 1.0 : 0.0, 1.0, usable});
-  judgement->reasons.insert(
-      judgement->reasons.end(), problems.begin(), problems.end());
-  return numbers.empty();
-}
-
-void CheckValues(const Rig& rig,
-                 const CalibrationResult& result,
-                 const CandidateLimits& limits,
-                 Judgement* judgement) {
-  const auto components = TangentComponents(rig.factory);
-  const Eigen::VectorXd change = BoxMinus(result.theta, rig.factory);
-  const Eigen::VectorXd prior = PriorSigmas(rig);
-  double largest = 0;
-  for (const int k : FreeComponents(rig)) {
-    const double sigmas = std::abs(change[k]) / prior[k];
-    largest = std::max(largest, sigmas);
-    if (!(sigmas <= limits.max_prior_sigmas)) {
-      judgement->reasons.push_back(fmt::format(
-          "{} is {:.1f} prior sigmas from the factory's value, at most {:.1f} "
-          "are plausible",
-          components[k].name,
-          sigmas,
-          limits.max_prior_sigmas));
-    }
-  }
-  AddCheck("prior_sigmas", largest, limits.max_prior_sigmas, judgement);
-}
-
-void CheckCertainty(const Rig& rig,
-                    const StoredCalibration& active,
-                    const CalibrationResult& result,
-                    const CandidateLimits& limits,
-                    Judgement* judgement) {
-  const auto components = TangentComponents(rig.factory);
-  const Eigen::VectorXd prior = PriorSigmas(rig);
-  const Eigen::VectorXd before = active.covariance.diagonal().cwiseSqrt();
-  const Eigen::VectorXd after = result.covariance.diagonal().cwiseSqrt();
-  double largest = 0;
-  for (const int k : FreeComponents(rig)) {
-    const double observed = limits.observed_below * prior[k];
-    if (!(before[k] < observed && after[k] < observed)) {
-      continue;
-    }
-    largest = std::max(largest, after[k] / before[k]);
-    if (after[k] > limits.max_sigma_growth * before[k]) {
-      judgement->reasons.push_back(fmt::format(
-          "the sigma of {} is {:.3g} {}, that of active version {} is {:.3g}: "
-          "at most {:.1f} times as much may become active",
-          components[k].name,
-          after[k],
-          components[k].unit,
-          active.version,
-          before[k],
-          limits.max_sigma_growth));
-    }
-  }
-  AddCheck("sigma_growth", largest, limits.max_sigma_growth, judgement);
-}
-
-void CheckHeldOut(const Rig& rig,
-                  const StoredCalibration& active,
-                  const CalibrationResult& result,
-                  const std::vector<SegmentInformation>& held_out,
-                  const CandidateLimits& limits,
-                  Judgement* judgement) {
-  const HeldOutTest test =
-      TestHeldOut(rig,
-                  {result.theta, result.covariance, result.track_noise_factor},
-                  {active.theta, active.covariance},
-                  held_out);
-  judgement->validation.held_out = test;
-  const bool passed =
-      test.candidate.probability >= limits.min_held_out_probability ||
-      test.candidate.probability > test.active.probability;
-  judgement->validation.checks.push_back({"held_out_probability",
-                                          test.candidate.probability,
-                                          limits.min_held_out_probability,
-                                          passed});
-  if (passed) {
-    return;
-  }
-  judgement->reasons.push_back(fmt::format(
-      "{} held-out segments do not fit it: chi-square {:.1f} with {} degrees "
-      "(probability {:.1e}, at least {:.1e} is asked for); to active version "
-      "{} they fit with {:.1f} (probability {:.1e})",
-      test.segments,
-      test.candidate.statistic,
-      test.candidate.degrees,
-      test.candidate.probability,
-      limits.min_held_out_probability,
-      active.version,
-      test.active.statistic,
-      test.active.probability));
+  if (!failure.empty()) failure = fmt::format("{}. {}", failure, kRemedy);
+  AddResult("usable", failure.empty() ? 1 : 0, 1, failure, checks);
 }
 
 }  // namespace
 
-Judgement JudgeCandidate(const Rig& rig,
-                         const StoredCalibration& active,
-                         const CalibrationResult& result,
-                         const std::vector<SegmentInformation>& held_out,
-                         const CandidateLimits& limits) {
-  Judgement judgement;
-  judgement.validation.active_version = active.version;
-  CheckSolver(result, &judgement);
-  if (CheckNumbers(rig, result, &judgement)) {
-    CheckValues(rig, result, limits, &judgement);
-    CheckCertainty(rig, active, result, limits, &judgement);
-    CheckHeldOut(rig, active, result, held_out, limits, &judgement);
+void AddResult(std::string name,
+               double value,
+               double limit,
+               std::string failure,
+               std::vector<ValidationCheck>* checks) {
+  const CheckOutcome outcome =
+      failure.empty() ? CheckOutcome::kPassed : CheckOutcome::kFailed;
+  checks->push_back(
+      {std::move(name), value, limit, outcome, std::move(failure)});
+}
+
+void AddNotTested(std::string name,
+                  double limit,
+                  std::string sentence,
+                  std::vector<ValidationCheck>* checks) {
+  checks->push_back({std::move(name),
+                     0,
+                     limit,
+                     CheckOutcome::kNotTested,
+                     std::move(sentence)});
+}
+
+CandidateValidation ValidateCandidate(const Rig& rig,
+                                      const CalibrationResult& result,
+                                      const CandidateEvidence& evidence,
+                                      const CandidateLimits& limits) {
+  CandidateValidation validated;
+  StoredValidation& validation = validated.validation;
+  validation.active_version = evidence.active.version;
+  CheckSolver(result, &validation.checks);
+  CheckNumbers(rig, result, &validation.checks);
+  if (HasUsableNumbers(rig, result)) {
+    const CheckContext context{rig, result, evidence, limits};
+    CheckFit(context, &validation.checks);
+    CheckEstimate(context, &validation.checks);
+    CheckConfirmation(context, &validation);
   }
-  return judgement;
+  for (const ValidationCheck& check : validation.checks) {
+    if (check.outcome == CheckOutcome::kFailed) {
+      validated.reasons.push_back(check.sentence);
+    }
+  }
+  return validated;
+}
+
+bool HasUsableNumbers(const Rig& rig, const CalibrationResult& result) {
+  return NumbersProblem(rig, result).empty();
+}
+
+double UsedNoise(const CalibrationResult& result, NoiseKind kind) {
+  for (const NoiseFactor& factor : result.noise_factors) {
+    if (factor.kind == kind) return factor.used;
+  }
+  return 1;
 }
 
 }  // namespace selfcal::server

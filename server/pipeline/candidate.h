@@ -1,54 +1,109 @@
 // Whether a calibration that the solver has found may become the active one
 // (method, section 6: a result is a candidate until it is validated).
 // Pure functions.
+//
+// Each check passes, fails, or could not be made. One that fails rejects the
+// candidate, with a sentence that has the value, what it means and what to do;
+// one that could not be made never counts as passed, and weakens the verdict.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/information/segment_information.h"
 #include "core/model/rig.h"
+#include "core/preflight/diagnose.h"
+#include "server/pipeline/held_out.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 
 struct CandidateLimits {
+  // At least this share of the observations must have been used. What is left
+  // out is outlying, near the border of the image, or of landmarks without
+  // depth: a twentieth on the recordings of Tango, EuRoC and an equidistant
+  // camera, a third with a quarter of the pixels at random. Where most is left
+  // out (99 % at a collapse) the result rests on what happened to fit.
+  double min_observations_used = 0.35;
+  // The same for segments: where the majority contradicts the others, none of
+  // them can be told to be right.
+  double min_segments_used = 0.5;
+  // Residuals over those that the noise which was used predicts: 1 where the
+  // model holds. Robust weights and heavy tails of real trackers make the
+  // root mean square up to 2.
+  double max_residual_ratio = 3;
+  // A noise factor over the one that was used, where the residuals tell. The
+  // estimator stops within 20 % of it, and a determined factor has a standard
+  // deviation of 10 % at most; by 1.5 every sigma is too small by half.
+  double max_noise_ratio = 1.5;
+  // Noise of more than so many times what the rig states is no noise: the
+  // residuals hold errors of the model or of the data.
+  double max_pixel_noise = 10;
+  double max_imu_noise = 20;
   // A component may lie this many prior sigmas from the factory's value.
   double max_prior_sigmas = 10;
-  // A component that both versions observe may lose at most this much.
+  // A component that the active version observes may lose at most this much.
   double max_sigma_growth = 1.5;
   // A component counts as observed where its sigma is below this part of the
   // prior's.
   double observed_below = 0.5;
-  // What held-out segments show may be at least so probable under the
+  // Of the agreement of halves, and of what held-out segments show under the
   // candidate.
-  double min_held_out_probability = 1e-4;
+  double min_probability = 1e-4;
 };
 
-struct Judgement {
+struct CandidateEvidence {
+  // What is active. After a change of the device that it does not know of, its
+  // covariance is the prior for the components that `changed` lists.
+  StoredCalibration active;
+  std::vector<int> changed;
+  HeldOutSegments held_out;
+  // Of the segments that the result uses, at the calibration that the run
+  // started from; nothing where they could not be read.
+  std::optional<Diagnosis> diagnosis;
+};
+
+struct CandidateValidation {
   StoredValidation validation;
-  // Why it must not become active, a sentence each; empty if it may.
+  // Why it must not become active, the sentences of the checks that failed;
+  // empty if it may.
   std::vector<std::string> reasons;
 };
 
-// Judges `result` against the active version, by
+// In this order:
 // - converged: the solver has;
 // - usable: the shape is that of the rig, every number is finite, every
-//   variance at least 0, and theta obeys the rules for a calibration;
+//   variance at least 0, and theta obeys the rules for a calibration. If the
+//   numbers are not, nothing else is checked;
+// - observations_used, segments_used: their shares;
+// - pixel_residuals: their root mean square over what the noise that was used
+//   predicts; segment_residuals: the largest such ratio of a segment, of pixels
+//   or of inertial residuals;
+// - noise: no factor contradicts the noise that was used, and none is beyond
+//   what noise can be;
+// - preflight: the segments show none of the usual mistakes (core/preflight)
+//   that bias a calibration;
 // - prior_sigmas: no free component is further from the factory's value than
 //   the tolerances allow;
-// - sigma_growth: no component that both observe has become much less certain
-//   than in `active`. The factory's version observes nothing: its sigmas are
-//   the prior;
+// - rank: at least as many directions are estimated as by `active`, less the
+//   components that have changed since;
+// - sigma_growth: no component that `active` observes has become much less
+//   certain, however uncertain it is now;
+// - halves: calibrations on two halves of the segments agree;
 // - held_out_probability: what segments show that it was not calibrated on is
-//   not too improbable under it (core/change), whichever of them is left out,
-//   or it is more probable than under the active version. Segments that were
-//   linearised far from the candidate cannot be tested, and are counted.
-Judgement JudgeCandidate(const Rig& rig,
-                         const StoredCalibration& active,
-                         const CalibrationResult& result,
-                         const std::vector<SegmentInformation>& held_out,
-                         const CandidateLimits& limits = {});
+//   not too improbable under it (held_out.h), whichever of them is left out;
+// - confirmed: at least one of the two tests before was made.
+CandidateValidation ValidateCandidate(const Rig& rig,
+                                      const CalibrationResult& result,
+                                      const CandidateEvidence& evidence,
+                                      const CandidateLimits& limits = {});
+
+// Whether the numbers are there at all: shape, finite, no negative variance.
+bool HasUsableNumbers(const Rig& rig, const CalibrationResult& result);
+
+// The noise of a kind that the calibration was weighted with, as a factor of
+// what the rig states.
+double UsedNoise(const CalibrationResult& result, NoiseKind kind);
 
 }  // namespace selfcal::server

@@ -1,27 +1,28 @@
 #include "server/pipeline/held_out.h"
 
+#include <algorithm>
+
 namespace selfcal::server {
 namespace {
 
 OffsetInformation Fuse(const ConsistencyTester& tester,
-                       const std::vector<const SegmentInformation*>& segments) {
-  OffsetInformation sum = tester.Offset(*segments.front());
+                       const std::vector<const HeldOutSegment*>& segments) {
+  OffsetInformation sum = tester.Offset(segments.front()->information);
   for (std::size_t k = 1; k < segments.size(); ++k) {
-    sum += tester.Offset(*segments[k]);
+    sum += tester.Offset(segments[k]->information);
   }
   return sum;
 }
 
 // Which segment to leave out; all are kept where there are only two.
-std::size_t LeastFitting(
-    const ConsistencyTester& tester,
-    const std::vector<const SegmentInformation*>& segments) {
+std::size_t LeastFitting(const ConsistencyTester& tester,
+                         const std::vector<const HeldOutSegment*>& segments) {
   const OffsetInformation sum = Fuse(tester, segments);
   std::size_t least = 0;
   double best = -1;
   for (std::size_t k = 0; k < segments.size(); ++k) {
     OffsetInformation rest = sum;
-    rest -= tester.Offset(*segments[k]);
+    rest -= tester.Offset(segments[k]->information);
     const double probability = tester.Test(rest).probability;
     if (probability > best) {
       best = probability;
@@ -36,12 +37,12 @@ std::size_t LeastFitting(
 HeldOutTest TestHeldOut(const Rig& rig,
                         const KnownCalibration& candidate,
                         const KnownCalibration& active,
-                        const std::vector<SegmentInformation>& segments) {
+                        const HeldOutSegments& segments) {
   const ConsistencyTester tester(rig, candidate);
   const ConsistencyTester before(rig, active, tester.inflation());
-  std::vector<const SegmentInformation*> tested;
-  for (const SegmentInformation& segment : segments) {
-    if (tester.Accepts(segment)) {
+  std::vector<const HeldOutSegment*> tested;
+  for (const HeldOutSegment& segment : segments) {
+    if (tester.Accepts(segment.information)) {
       tested.push_back(&segment);
     }
   }
@@ -53,6 +54,10 @@ HeldOutTest TestHeldOut(const Rig& rig,
   HeldOutTest test;
   test.segments = static_cast<int>(tested.size());
   test.left_out = static_cast<int>(segments.size() - tested.size());
+  test.rescored = static_cast<int>(
+      std::count_if(tested.begin(), tested.end(), [](const auto* segment) {
+        return segment->rescored;
+      }));
   if (!tested.empty()) {
     test.candidate = tester.Test(Fuse(tester, tested));
     test.active = before.Test(Fuse(before, tested));

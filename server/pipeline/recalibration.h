@@ -25,6 +25,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/preflight/diagnose.h"
+#include "server/pipeline/held_out.h"
 #include "server/pipeline/pipeline.h"
 #include "server/pipeline/watchers.h"
 #include "server/store/store.h"
@@ -113,9 +115,20 @@ class Recalibrator {
       const CalibrateOptions& options);
   void Report(const StoredRun& run, const CalibrateProgress& progress);
   void TellEnd(const StoredRun& ended);
-  // State, reasons and validation of the candidate against what is active.
-  absl::Status Judge(const StoredRun& run, StoredCalibration* candidate);
-  // Judges and stores it, again where another version became active meanwhile.
+  // State, reasons, validation and verdict of the candidate against what is
+  // active.
+  absl::Status Validate(const StoredRun& run, StoredCalibration* candidate);
+  absl::StatusOr<HeldOutSegments> GatherHeldOut(
+      const StoredRun& run, const Rig& rig, const CalibrationResult& result);
+  absl::StatusOr<std::optional<SegmentInformation>> Rescore(
+      const std::string& rig_id,
+      const SegmentKey& key,
+      const Rig& rig,
+      const Calibration& theta);
+  absl::StatusOr<std::optional<Diagnosis>> DiagnoseUsed(
+      const StoredRun& run, const Rig& rig, const CalibrationResult& result);
+  // Validates and stores it, again where another version became active
+  // meanwhile.
   absl::StatusOr<StoredCalibration> Finish(const StoredRun& run,
                                            StoredCalibration candidate);
   absl::Status Conclude(const StoredRun& run, const Outcome& outcome);

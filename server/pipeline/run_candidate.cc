@@ -1,22 +1,15 @@
-// How a run comes to its candidate, and what becomes of that.
+// How a run comes to its candidate.
 #include <fmt/format.h>
 
 #include <chrono>
 #include <utility>
 
 #include "server/pipeline/after_change.h"
-#include "server/pipeline/candidate.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/run_settings.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
-namespace {
-
-// Segments that a candidate is tested with.
-constexpr int kHeldOut = 8;
-
-}  // namespace
 
 absl::StatusOr<StoredCalibration> Recalibrator::EnsureCandidate(
     const StoredRun& run, std::optional<SegmentKey>* damaged) {
@@ -134,41 +127,6 @@ void Recalibrator::TellEnd(const StoredRun& ended) {
   run_watchers_->Publish(
       RunTopic(ended.rig, ended.run),
       {ended, steps.empty() ? CalibrateProgress() : steps.back()});
-}
-
-absl::Status Recalibrator::Judge(const StoredRun& run,
-                                 StoredCalibration* candidate) {
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
-  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration active,
-                           store_->GetActiveCalibration(run.rig));
-  active.covariance = CovarianceAt(rig, active, options_.now_ns());
-  if (run.change > 0) {
-    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
-                             store_->GetChange(run.rig, run.change));
-    if (active.version == change.base_version) {
-      active.covariance = CovarianceAfter(rig.rig, change, active.covariance);
-    }
-  }
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> held_out,
-                           store_->ListHeldOut(run.rig, run.run, kHeldOut));
-  Judgement judgement =
-      JudgeCandidate(rig.rig, active, candidate->report.value(), held_out);
-  candidate->state = judgement.reasons.empty() ? CalibrationState::kActive
-                                               : CalibrationState::kRejected;
-  candidate->reasons = std::move(judgement.reasons);
-  candidate->validation = std::move(judgement.validation);
-  return absl::OkStatus();
-}
-
-absl::StatusOr<StoredCalibration> Recalibrator::Finish(
-    const StoredRun& run, StoredCalibration candidate) {
-  for (;;) {
-    SELFCAL_RETURN_IF_ERROR(Judge(run, &candidate));
-    auto finished = store_->FinishRun(run.rig, run.run, candidate);
-    if (!absl::IsAborted(finished.status())) {
-      return finished;
-    }
-  }
 }
 
 }  // namespace selfcal::server

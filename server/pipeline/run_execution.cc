@@ -147,7 +147,7 @@ absl::Status Recalibrator::Succeed(const StoredRun& run,
     spdlog::warn("calibration {} of rig {} is rejected: {}",
                  stored.version,
                  stored.rig,
-                 fmt::join(stored.reasons, "; "));
+                 fmt::join(stored.reasons, " "));
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun ended,
                            store_->GetRun(run.rig, run.run));

@@ -28,8 +28,8 @@ class CalibrationService final : public v1::CalibrationService::Service {
     return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       StoredCalibration calibration;
       const auto status = Read("name", request->name(), &calibration);
-      if (status.ok()) *response = Encode(calibration);
-      return status;
+      return status.ok() ? Fill(calibration, request->name(), response)
+                         : status;
     });
   }
 
@@ -50,8 +50,7 @@ class CalibrationService final : public v1::CalibrationService::Service {
       if (!active.ok()) {
         return ToGrpc(active.status(), {kType, request->name(), "name"});
       }
-      *response = Encode(*active);
-      return grpc::Status::OK;
+      return Fill(*active, request->name(), response);
     });
   }
 
@@ -110,10 +109,9 @@ class CalibrationService final : public v1::CalibrationService::Service {
           [&](const Page& page) {
             return context_.store->ListCalibrations(*rig, page);
           },
-          [](const StoredCalibration& calibration,
-             v1::ListCalibrationsResponse* to) {
-            *to->add_calibrations() = Encode(calibration);
-            return grpc::Status::OK;
+          [&](const StoredCalibration& calibration,
+              v1::ListCalibrationsResponse* to) {
+            return Fill(calibration, request->parent(), to->add_calibrations());
           },
           response);
     });
@@ -143,12 +141,23 @@ class CalibrationService final : public v1::CalibrationService::Service {
                    [&](const StoredCalibration& active, bool*) {
                      if (active.version == told) return true;
                      told = active.version;
-                     return writer->Write(Encode(active));
+                     v1::Calibration message;
+                     return Fill(active, request->parent(), &message).ok() &&
+                            writer->Write(message);
                    });
     });
   }
 
  private:
+  grpc::Status Fill(const StoredCalibration& calibration,
+                    const std::string& name,
+                    v1::Calibration* message) {
+    auto encoded = Encode(context_.store, calibration);
+    if (!encoded.ok()) return ToGrpc(encoded.status(), {kType, name, {}});
+    *message = *std::move(encoded);
+    return grpc::Status::OK;
+  }
+
   // The version of that name.
   grpc::Status Read(std::string_view field,
                     const std::string& name,

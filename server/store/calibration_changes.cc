@@ -105,7 +105,7 @@ absl::Status JudgeCandidate(Connection* db,
       judged.rig,
       EventKind::kCalibrationRejected,
       fmt::format(
-          "version {}: {}", judged.version, fmt::join(judged.reasons, "; ")));
+          "version {}: {}", judged.version, fmt::join(judged.reasons, " ")));
 }
 
 absl::StatusOr<StoredCalibration> ActivateCalibrationRow(

@@ -40,6 +40,63 @@ CalibrateStatus FromRecord(SolverRecord::Status status) {
   }
 }
 
+void PutAgreement(const AgreementTest& test, v1::AgreementTest* message) {
+  message->set_chi_square(test.statistic);
+  message->set_degrees(test.degrees);
+  message->set_probability(test.probability);
+}
+
+AgreementTest GetAgreement(const v1::AgreementTest& message) {
+  // As before a test was made: one that is absent has no probability.
+  if (message.degrees() == 0) return {};
+  return {message.chi_square(), message.degrees(), message.probability()};
+}
+
+void PutNoiseFactor(const NoiseFactor& factor, v1::NoiseFactor* message) {
+  message->set_kind(NoiseKindName(factor.kind));
+  message->set_factor(factor.factor);
+  message->set_log_sigma(factor.log_sigma);
+  message->set_redundancy(factor.redundancy);
+  message->set_determined(factor.determined());
+  message->set_used(factor.used);
+  message->set_converged(factor.converged);
+}
+
+// Records from before noise was weighted by other than what the rig states, or
+// said so, have `used` 0.
+void GetNoiseFactor(const v1::NoiseFactor& message,
+                    std::vector<NoiseFactor>* factors) {
+  const auto kind = FindNoiseKind(message.kind());
+  if (!kind) return;
+  NoiseFactor factor;
+  factor.kind = *kind;
+  factor.factor = message.factor();
+  factor.log_sigma = message.log_sigma();
+  factor.redundancy = message.redundancy();
+  if (message.used() > 0) {
+    factor.used = message.used();
+    factor.converged = message.converged();
+  }
+  factors->push_back(factor);
+}
+
+void PutFit(const SegmentFit& fit, store::SegmentFitRecord* record) {
+  record->set_session(fit.key.session);
+  record->set_index(fit.key.index);
+  record->set_pixel_ratio(fit.pixel_ratio);
+  record->set_inertial_ratio(fit.inertial_ratio);
+  PutAgreement(fit.others, record->mutable_others());
+  record->set_excluded(fit.excluded);
+}
+
+SegmentFit GetFit(const store::SegmentFitRecord& record) {
+  return {{record.session(), record.index()},
+          record.pixel_ratio(),
+          record.inertial_ratio(),
+          GetAgreement(record.others()),
+          record.excluded()};
+}
+
 // theta and covariance are those of the calibration, and stored once.
 void PutSolver(const CalibrationResult& result, SolverRecord* record) {
   record->set_status(ToRecord(result.status));
@@ -63,13 +120,12 @@ void PutSolver(const CalibrationResult& result, SolverRecord* record) {
   record->set_observations_dropped(result.observations_dropped);
   record->set_track_noise_factor(result.track_noise_factor);
   for (const NoiseFactor& factor : result.noise_factors) {
-    v1::NoiseFactor* message = record->add_noise_factors();
-    message->set_kind(NoiseKindName(factor.kind));
-    message->set_factor(factor.factor);
-    message->set_log_sigma(factor.log_sigma);
-    message->set_redundancy(factor.redundancy);
-    message->set_determined(factor.determined());
+    PutNoiseFactor(factor, record->add_noise_factors());
   }
+  for (const SegmentFit& fit : result.segment_fits) {
+    PutFit(fit, record->add_segment_fits());
+  }
+  PutAgreement(result.halves, record->mutable_halves());
 }
 
 CalibrationResult GetSolver(const SolverRecord& record) {
@@ -94,11 +150,12 @@ CalibrationResult GetSolver(const SolverRecord& record) {
   result.observations_dropped = record.observations_dropped();
   result.track_noise_factor = record.track_noise_factor();
   for (const v1::NoiseFactor& message : record.noise_factors()) {
-    if (const auto kind = FindNoiseKind(message.kind())) {
-      result.noise_factors.push_back(
-          {*kind, message.factor(), message.log_sigma(), message.redundancy()});
-    }
+    GetNoiseFactor(message, &result.noise_factors);
   }
+  for (const store::SegmentFitRecord& fit : record.segment_fits()) {
+    result.segment_fits.push_back(GetFit(fit));
+  }
+  result.halves = GetAgreement(record.halves());
   return result;
 }
 

@@ -244,7 +244,7 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
   return change;
 }
 
-absl::StatusOr<std::vector<SegmentInformation>> ListHeldOutRows(
+absl::StatusOr<std::vector<Store::HeldOut>> ListHeldOutRows(
     Connection* db,
     const std::string& rig,
     std::int64_t run_number,
@@ -258,26 +258,31 @@ absl::StatusOr<std::vector<SegmentInformation>> ListHeldOutRows(
     first_sequence = change.first_sequence;
   }
   Statement read(db,
-                 "SELECT s.sequence, i.information, i.sha256 "
+                 "SELECT s.sequence, i.information, i.sha256, "
+                 "  s.session, s.session_index, "
+                 "  EXISTS (SELECT 1 FROM payloads p "
+                 "    WHERE p.segment = s.segment) AS has_data "
                  "FROM segments s JOIN segment_information i USING (segment) "
                  "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
                  "  AND NOT EXISTS (SELECT 1 FROM run_segments x "
                  "    WHERE x.rig = ?1 AND x.run = ?3 "
                  "      AND x.segment = s.segment) "
-                 "ORDER BY s.sequence DESC LIMIT ?4",
+                 "ORDER BY has_data DESC, s.sequence DESC LIMIT ?4",
                  rig_id,
                  first_sequence,
                  run_number,
                  limit);
-  std::vector<SegmentInformation> newest;
+  std::vector<Store::HeldOut> held_out;
   while (read.Next()) {
     auto information = ReadInformation(read);
     if (information.ok()) {
-      newest.push_back(*std::move(information));
+      held_out.push_back({{read.Text(3), read.Int(4)},
+                          read.Int(5) != 0,
+                          *std::move(information)});
     }
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
-  return newest;
+  return held_out;
 }
 
 }  // namespace selfcal::server

@@ -35,9 +35,8 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
 
 // The rest is not part of a transaction.
 
-// What the newest scored segments of a rig say that a run does not use, newest
-// first. Not from before the run's change, nor what is damaged.
-absl::StatusOr<std::vector<SegmentInformation>> ListHeldOutRows(
+// Store::ListHeldOut.
+absl::StatusOr<std::vector<Store::HeldOut>> ListHeldOutRows(
     Connection* db, const std::string& rig, std::int64_t run, int limit);
 
 }  // namespace selfcal::server

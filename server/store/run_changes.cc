@@ -41,7 +41,7 @@ absl::Status RejectCandidate(Connection* db,
   judged.version = *version;
   judged.state = CalibrationState::kRejected;
   judged.reasons = {
-      fmt::format("its run ended before it was validated: {}", run.message)};
+      fmt::format("Its run ended before it was validated: {}.", run.message)};
   return JudgeCandidate(db, rig, judged);
 }
 

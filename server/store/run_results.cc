@@ -121,13 +121,14 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
   judged.state = calibration.state;
   judged.reasons = calibration.reasons;
   judged.validation = calibration.validation;
+  judged.verdict = calibration.verdict;
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
                            NewestChange(db, rig.rowid));
   if (run.change != change) {
     judged.state = CalibrationState::kRejected;
     judged.reasons.push_back(
-        fmt::format("the device has changed (change {}) since its segments "
-                    "were chosen",
+        fmt::format("The device has changed (change {}) since its segments "
+                    "were chosen: the next run is on segments after that.",
                     change));
   }
   SELFCAL_ASSIGN_OR_RETURN(const auto unusable,

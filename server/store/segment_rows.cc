@@ -180,8 +180,17 @@ absl::Status DropUnreferencedPayloads(Connection* db, std::int64_t rig) {
              "  WHERE e.segment = payloads.segment) "
              "AND NOT EXISTS (SELECT 1 FROM run_segments x "
              "  JOIN runs r ON r.rig = x.rig AND r.run = x.run "
-             "  WHERE x.segment = payloads.segment AND r.state IN (1, 2))",
-             rig)
+             "  WHERE x.segment = payloads.segment AND r.state IN (1, 2)) "
+             "AND segment NOT IN (SELECT s.segment "
+             "  FROM payloads p JOIN segments s USING (segment) "
+             "  WHERE p.rig = ?1 AND s.state = 2 "
+             "  AND s.sequence >= (SELECT coalesce(max(c.first_sequence), 0) "
+             "    FROM changes c WHERE c.rig = ?1) "
+             "  AND NOT EXISTS (SELECT 1 FROM table_entries e "
+             "    WHERE e.segment = s.segment) "
+             "  ORDER BY s.sequence DESC LIMIT ?2)",
+             rig,
+             Store::kReserve)
       .Run();
 }
 

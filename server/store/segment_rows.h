@@ -87,7 +87,9 @@ absl::Status WriteProblem(Connection* db,
                           const std::string& problem);
 
 // Drops the data of every segment of the rig that neither waits for its score
-// nor is in a table or an unfinished run.
+// nor is in a table or an unfinished run, nor is of the reserve for held-out
+// tests: the newest Store::kReserve scored ones that no table holds, none from
+// before the newest change of the device.
 absl::Status DropUnreferencedPayloads(Connection* db, std::int64_t rig);
 
 }  // namespace selfcal::server

@@ -102,27 +102,49 @@ enum class CalibrationState {
   kRolledBack,
 };
 
+// A check that could not be made never counts as passed.
+enum class CheckOutcome { kPassed, kFailed, kNotTested };
+
 struct ValidationCheck {
   std::string name;
   double value = 0;
   double limit = 0;
-  bool passed = false;
+  CheckOutcome outcome = CheckOutcome::kNotTested;
+  // The value, what it means and what to do. Of one that passed only where
+  // there is something to note.
+  std::string sentence = {};
 };
 
-// Of segments that a candidate was not calibrated on: how well it says before
-// what they show, and how well the active version does.
+// Of segments that a candidate was not calibrated on: how well it predicts what
+// they show, and how well the active version does.
 struct HeldOutTest {
   int segments = 0;  // that were tested
-  int left_out = 0;  // that could not be tested
+  int left_out = 0;  // that could not be tested, or fit worst
   ConsistencyTest candidate;
   ConsistencyTest active;
+  int rescored = 0;  // of `segments`: scored again at the candidate
 };
 
-// What a candidate was judged by.
+// The checks of a candidate.
 struct StoredValidation {
-  std::int64_t active_version = 0;  // that it was judged against
+  std::int64_t active_version = 0;  // that it was validated against
   std::vector<ValidationCheck> checks;
   HeldOutTest held_out;
+};
+
+enum class VerdictKind {
+  kUnknown,  // not validated yet, or from before there were verdicts
+  kGood,
+  kWeak,
+  kNotTrustworthy,
+  kFactory,
+};
+
+// What a version is good for, computed once, when it was validated
+// (server/pipeline/verdict.h). Every interface shows this one.
+struct Verdict {
+  VerdictKind kind = VerdictKind::kUnknown;
+  std::vector<std::string> sentences;  // what it rests on
 };
 
 // Of the device in the segments of a calibration that say so.
@@ -152,6 +174,7 @@ struct StoredCalibration {
   std::vector<std::pair<std::string, std::string>> settings;
   std::optional<CalibrationResult> report;     // of the solver
   std::optional<StoredValidation> validation;  // of one that was a candidate
+  Verdict verdict;                             // the same
   double seconds = 0;                          // it took
   // Counts the activations of all rigs: that of its newest, 0 if it never was
   // active.
@@ -333,9 +356,17 @@ class Store {
   virtual absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) = 0;
 
-  // What the newest scored segments say that the run does not use, newest
-  // first; none from before its change of the device, none that is damaged.
-  virtual absl::StatusOr<std::vector<SegmentInformation>> ListHeldOut(
+  // Scored segments that the run does not use: first those with data, each part
+  // newest first. None from before its change of the device, none whose
+  // information is damaged. For this the data of the newest kReserve scored
+  // segments that no table holds is kept.
+  static constexpr int kReserve = 4;
+  struct HeldOut {
+    SegmentKey key;
+    bool has_data = false;
+    SegmentInformation information;
+  };
+  virtual absl::StatusOr<std::vector<HeldOut>> ListHeldOut(
       const std::string& rig, std::int64_t run, int limit) = 0;
 
   virtual absl::StatusOr<StoredChange> GetChange(const std::string& rig,

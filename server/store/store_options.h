@@ -14,7 +14,8 @@ struct Quotas {
   // waits for its score or that an unfinished run needs.
   std::int64_t max_payload_bytes_per_rig = 0;
   // Metadata and information of one rig's segments, the newest kept; never of
-  // one that has data, is in a table, or that a run or a calibration used.
+  // one that waits for its score, is in a table, or that a run or a calibration
+  // used.
   std::int64_t max_segments_per_rig = 0;
   std::int64_t max_segment_age_s = 0;  // the same by the time of arrival
   // The whole database. Near it new segments are refused, so that what is

@@ -184,8 +184,9 @@ class SqliteStore : public Store {
     });
   }
 
-  absl::StatusOr<std::vector<SegmentInformation>> ListHeldOut(
-      const std::string& rig, std::int64_t run, int limit) override {
+  absl::StatusOr<std::vector<HeldOut>> ListHeldOut(const std::string& rig,
+                                                   std::int64_t run,
+                                                   int limit) override {
     return Read(
         [&](Connection* db) { return ListHeldOutRows(db, rig, run, limit); });
   }

@@ -1,4 +1,4 @@
-// The record of what a candidate was judged by.
+// The record of how a candidate was validated.
 #include "server/store/record_parts.h"
 #include "server/store/records.h"
 
@@ -7,6 +7,7 @@ namespace {
 
 void PutHeldOut(const HeldOutTest& test, v1::Validation::HeldOut* message) {
   message->set_segments(test.segments);
+  message->set_rescored(test.rescored);
   message->set_left_out(test.left_out);
   message->set_degrees(test.candidate.degrees);
   message->set_chi_square(test.candidate.statistic);
@@ -18,6 +19,7 @@ void PutHeldOut(const HeldOutTest& test, v1::Validation::HeldOut* message) {
 HeldOutTest GetHeldOut(const v1::Validation::HeldOut& message) {
   HeldOutTest test;
   test.segments = message.segments();
+  test.rescored = message.rescored();
   test.left_out = message.left_out();
   test.candidate = {
       message.chi_square(), message.degrees(), message.probability()};
@@ -25,6 +27,71 @@ HeldOutTest GetHeldOut(const v1::Validation::HeldOut& message) {
                  message.degrees(),
                  message.active_probability()};
   return test;
+}
+
+v1::Validation::Check::Outcome ToRecord(CheckOutcome outcome) {
+  switch (outcome) {
+    case CheckOutcome::kPassed:
+      return v1::Validation::Check::PASSED;
+    case CheckOutcome::kFailed:
+      return v1::Validation::Check::FAILED;
+    case CheckOutcome::kNotTested:
+      return v1::Validation::Check::NOT_TESTED;
+  }
+  return v1::Validation::Check::OUTCOME_UNSPECIFIED;
+}
+
+CheckOutcome OutcomeOf(const v1::Validation::Check& check) {
+  switch (check.outcome()) {
+    case v1::Validation::Check::PASSED:
+      return CheckOutcome::kPassed;
+    case v1::Validation::Check::FAILED:
+      return CheckOutcome::kFailed;
+    case v1::Validation::Check::NOT_TESTED:
+      return CheckOutcome::kNotTested;
+    default:  // from before it was recorded
+      return check.passed() ? CheckOutcome::kPassed : CheckOutcome::kFailed;
+  }
+}
+
+v1::Verdict::Kind ToRecord(VerdictKind kind) {
+  switch (kind) {
+    case VerdictKind::kUnknown:
+      return v1::Verdict::UNKNOWN;
+    case VerdictKind::kGood:
+      return v1::Verdict::GOOD;
+    case VerdictKind::kWeak:
+      return v1::Verdict::WEAK;
+    case VerdictKind::kNotTrustworthy:
+      return v1::Verdict::NOT_TRUSTWORTHY;
+    case VerdictKind::kFactory:
+      return v1::Verdict::FACTORY;
+  }
+  return v1::Verdict::UNKNOWN;
+}
+
+VerdictKind FromRecord(v1::Verdict::Kind kind) {
+  switch (kind) {
+    case v1::Verdict::GOOD:
+      return VerdictKind::kGood;
+    case v1::Verdict::WEAK:
+      return VerdictKind::kWeak;
+    case v1::Verdict::NOT_TRUSTWORTHY:
+      return VerdictKind::kNotTrustworthy;
+    case v1::Verdict::FACTORY:
+      return VerdictKind::kFactory;
+    default:
+      return VerdictKind::kUnknown;
+  }
+}
+
+void PutCheck(const ValidationCheck& check, v1::Validation::Check* message) {
+  message->set_name(check.name);
+  message->set_value(check.value);
+  message->set_limit(check.limit);
+  message->set_passed(check.outcome == CheckOutcome::kPassed);
+  message->set_outcome(ToRecord(check.outcome));
+  message->set_sentence(check.sentence);
 }
 
 }  // namespace
@@ -42,14 +109,13 @@ std::string SerializeValidation(const StoredCalibration& judged) {
                              : v1::Validation::ACCEPTED);
     message->set_active_version(judged.validation->active_version);
     for (const ValidationCheck& check : judged.validation->checks) {
-      v1::Validation::Check* added = message->add_checks();
-      added->set_name(check.name);
-      added->set_value(check.value);
-      added->set_limit(check.limit);
-      added->set_passed(check.passed);
+      PutCheck(check, message->add_checks());
     }
     PutHeldOut(judged.validation->held_out, message->mutable_held_out());
   }
+  record.mutable_verdict()->set_kind(ToRecord(judged.verdict.kind));
+  record.mutable_verdict()->mutable_sentences()->Assign(
+      judged.verdict.sentences.begin(), judged.verdict.sentences.end());
   return record.SerializeAsString();
 }
 
@@ -63,6 +129,9 @@ absl::Status ParseValidation(std::string_view bytes,
     return DamagedRecord("the validation of " + what);
   }
   calibration->reasons.assign(record.reasons().begin(), record.reasons().end());
+  calibration->verdict = {FromRecord(record.verdict().kind()),
+                          {record.verdict().sentences().begin(),
+                           record.verdict().sentences().end()}};
   if (!record.has_validation()) {
     return absl::OkStatus();
   }
@@ -70,8 +139,11 @@ absl::Status ParseValidation(std::string_view bytes,
   StoredValidation& validation = calibration->validation.emplace();
   validation.active_version = message.active_version();
   for (const v1::Validation::Check& check : message.checks()) {
-    validation.checks.push_back(
-        {check.name(), check.value(), check.limit(), check.passed()});
+    validation.checks.push_back({check.name(),
+                                 check.value(),
+                                 check.limit(),
+                                 OutcomeOf(check),
+                                 check.sentence()});
   }
   validation.held_out = GetHeldOut(message.held_out());
   return absl::OkStatus();

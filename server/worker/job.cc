@@ -31,6 +31,7 @@ void PutOptions(const CalibrateOptions& options, worker::Options* message) {
   message->set_merge_landmarks(options.merge_landmarks);
   message->set_solver(static_cast<int>(options.solver));
   message->set_threads(options.threads);
+  message->set_leave_out_contradictions(options.leave_out_contradictions);
 }
 
 bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
@@ -50,6 +51,7 @@ bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
   options->merge_landmarks = message.merge_landmarks();
   options->solver = static_cast<SolverKind>(message.solver());
   options->threads = message.threads();
+  options->leave_out_contradictions = message.leave_out_contradictions();
   return true;
 }
 

@@ -50,9 +50,12 @@ def calibration_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:
             {
                 "version": version.version,
                 "state": states.Name(version.state),
+                "verdict": version.verdict.text,
                 "component": estimate.component,
                 "unit": estimate.unit,
                 "value": estimate.value,
+                # Of a rotation, whose vector may change its sign.
+                "from_factory": estimate.from_factory,
                 "sigma": estimate.sigma,
             }
             for version in daemon.calibrations(rig)

@@ -293,6 +293,34 @@ TEST_F(Commands, ShowsACalibrationWithItsOriginAndValues) {
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/7");
 }
 
+TEST_F(Commands, ShowsTheStoredVerdictWithEachVersion) {
+  daemon_.calibrations = {Version(1), Version(2)};
+  v1::Verdict* verdict = daemon_.calibrations[1].mutable_verdict();
+  verdict->set_kind(v1::Verdict::WEAK);
+  verdict->set_text("weak");
+  verdict->add_sentences("Hardly learned: cam0.p_CI.z.");
+  const Outcome shown = Selfcal({"calibrations", "show", "device"});
+  EXPECT_THAT(shown.out, HasSubstr("verdict\tweak\n"));
+  EXPECT_THAT(shown.out,
+              HasSubstr("weak because\tHardly learned: cam0.p_CI.z.\n"));
+  const Outcome listed = Selfcal({"calibrations", "list", "device"});
+  EXPECT_THAT(listed.out, HasSubstr("\tweak\t"));
+  EXPECT_THAT(listed.out, HasSubstr("\tunknown\t")) << "an older daemon's";
+}
+
+TEST_F(Commands, ShowsRotationsInDegreesFromTheFactorys) {
+  daemon_.calibrations = {Version(1)};
+  auto* rotation = daemon_.calibrations[0].add_estimates();
+  rotation->set_component("cam0.q_CI.x");
+  rotation->set_unit("rad");
+  rotation->set_value(-3.14);
+  rotation->set_from_factory(0.01);
+  rotation->set_sigma(0.001);
+  const Outcome outcome = Selfcal({"calibrations", "show", "device"});
+  EXPECT_THAT(outcome.out,
+              HasSubstr("cam0.q_CI.x\t0.573\tdeg from factory\t0.057\n"));
+}
+
 TEST_F(Commands, ActivateSaysWhichAndWhy) {
   daemon_.calibrations = {Version(1)};
   const Outcome outcome = Selfcal(

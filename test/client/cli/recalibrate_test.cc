@@ -33,6 +33,7 @@ TEST_F(RecalibrateCommand, WaitsForTheEndAndShowsTheValues) {
   EXPECT_EQ(outcome.err, "") << "no progress bar but on a terminal";
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/2");
   EXPECT_THAT(outcome.out, HasSubstr("state\tsucceeded\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("verdict\tunknown\n"));
   EXPECT_THAT(outcome.out, HasSubstr("cam0.focal.x\t255.123\tpx\t0.034\n"));
 }
 

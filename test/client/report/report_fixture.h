@@ -21,7 +21,13 @@ inline v1::Calibration AVersion(int version, double sigma) {
     estimate->set_sigma(sigma);
     estimate->set_unit("px");
   }
-  if (version == 1) return calibration;
+  if (version == 1) {
+    calibration.mutable_verdict()->set_kind(v1::Verdict::FACTORY);
+    calibration.mutable_verdict()->set_text("factory");
+    return calibration;
+  }
+  calibration.mutable_verdict()->set_kind(v1::Verdict::GOOD);
+  calibration.mutable_verdict()->set_text("good");
   calibration.mutable_provenance()->set_recalibration(
       "rigs/device/recalibrations/1");
   calibration.mutable_provenance()->add_segments("rigs/device/segments/walk~0");

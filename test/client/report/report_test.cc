@@ -43,6 +43,36 @@ TEST(Report, BeginsWithItsVerdict) {
   EXPECT_LT(verdict, html.find("id=\"parameters\""));
 }
 
+TEST(Report, ShowsTheStoredVerdictWithItsSentences) {
+  ReportData data = ADevice();
+  v1::Verdict* verdict = data.calibration.mutable_verdict();
+  verdict->set_kind(v1::Verdict::NOT_TRUSTWORTHY);
+  verdict->set_text("not trustworthy");
+  verdict->add_sentences("The solver stalled.");
+  EXPECT_THAT(WriteReport(data),
+              HasSubstr("<div class=\"verdict bad\"><p><strong>Verdict: not "
+                        "trustworthy.</strong>"));
+  EXPECT_THAT(WriteReport(data), HasSubstr("<li>The solver stalled.</li>"));
+}
+
+TEST(Report, ShowsRotationsInDegreesFromTheFactorys) {
+  ReportData data = ADevice();
+  for (v1::Calibration* version : {&data.calibration, &data.versions[1]}) {
+    auto* rotation = version->mutable_estimates(0);
+    rotation->set_component("cam0.q_CI.x");
+    rotation->set_unit("rad");
+    rotation->set_value(3.14);
+    rotation->set_from_factory(version->version() == 1 ? 0 : 0.01);
+    rotation->set_sigma(version->version() == 1 ? 0.1 : 0.001);
+  }
+  EXPECT_THAT(WriteReport(data),
+              HasSubstr("<td>cam0.q_CI.x</td><td class=\"number\">0.573</td>"
+                        "<td class=\"number\">0.057</td>"
+                        "<td>deg from factory</td>"
+                        "<td class=\"number\">5.7</td>"
+                        "<td class=\"number\">4.61</td>"));
+}
+
 TEST(Report, IsOneFileOfBalancedHtml) {
   const std::string html = WriteReport(ADevice());
   EXPECT_TRUE(IsBalanced(html));
@@ -66,8 +96,9 @@ TEST(Report, SaysWhereItCameFromAndWhatWasChecked) {
   const std::string html = WriteReport(ADevice());
   EXPECT_THAT(html, HasSubstr("<td>started from</td><td>version 0</td>"));
   EXPECT_THAT(html,
-              HasSubstr("<td>held-out segments</td><td>3 (0 left out), 60 "
-                        "degrees: chi-square 58.0, of version 0 0.0</td>"));
+              HasSubstr("<td>held-out segments</td><td>3 (0 scored anew, "
+                        "0 left out), 60 degrees: chi-square 58.0, of version "
+                        "0 0.0</td>"));
 }
 
 TEST(Report, MarksSegmentsThatItUsesAndThatTablesKeep) {
@@ -106,7 +137,7 @@ TEST(Report, OfADeviceWithoutAnythingIsStillAReport) {
   data.calibration = AVersion(1, 1);
   data.versions = {data.calibration};
   const std::string html = WriteReport(data);
-  EXPECT_THAT(html, HasSubstr("Verdict: the factory&#39;s."));
+  EXPECT_THAT(html, HasSubstr("Verdict: factory."));
   EXPECT_TRUE(IsBalanced(html));
 }
 

@@ -66,7 +66,12 @@ TEST_F(MotionTest, ATrajectoryHasEverySegmentAlsoThoseWithoutData) {
   const Rig rig = AddRig("r");
   const auto segments = AddSegments(rig, 3);
   Score(rig, 0, -9);
-  Score(rig, 1, -8, 0);  // says too little: its data goes
+  Score(rig, 1, -8, 0);  // gains too little: its data goes with the reserve
+  for (MotionSegment& segment : AddSegments(rig, Store::kReserve, "later")) {
+    ASSERT_TRUE(
+        store_->CommitScore(rig.id, segment.key, FakeInformation(rig, -8, 0))
+            .ok());
+  }
   const auto trajectory =
       Get("/api/v1/rigs/r/sessions/s/trajectory?page_size=2").json();
   ASSERT_EQ(trajectory["segments"].size(), 2u);

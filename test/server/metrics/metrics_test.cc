@@ -79,7 +79,8 @@ TEST_F(MetricsTest, EventsAreCounted) {
         "selfcal_queue_length 1",
         "selfcal_table_entries{rig=\"a\",group=\"imu\"} 0",
         "selfcal_table_capacity{rig=\"a\",group=\"imu\"} 2",
-        "selfcal_active_version{rig=\"a\"} 1"}) {
+        "selfcal_active_version{rig=\"a\"} 1",
+        "selfcal_active_verdict{rig=\"a\",verdict=\"factory\"} 1"}) {
     EXPECT_THAT(series, HasSubstr(line));
   }
 }

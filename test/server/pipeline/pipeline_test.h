@@ -62,6 +62,8 @@ class PipelineTest : public ::testing::Test {
     result.theta = start;
     result.theta.cameras[0].f.x() += 0.5;
     result.covariance = PriorSigmas(rig).cwiseAbs2().asDiagonal();
+    result.observations = 1000;
+    result.halves = {25, 26, 0.5};
     return result;
   }
 

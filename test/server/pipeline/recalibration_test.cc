@@ -73,6 +73,7 @@ TEST_F(RecalibrationTest, NoiseIsReweightedWhereTheRigSaysSo) {
     reweighted[rig.id] = options.reweight_noise;
     return Converged(rig, start);
   };
+  options_.calibrate.reweight_noise = false;  // the default is to do so
   Rig rig = TestRig("b");
   rig.reweight_noise = true;
   ASSERT_TRUE(store_->CreateRig(rig).ok());

@@ -1,3 +1,8 @@
+#include <cmath>
+#include <numbers>
+
+#include "core/model/so3.h"
+#include "server/encode/encode.h"
 #include "test/server/service/service_test.h"
 
 namespace selfcal::server {
@@ -239,16 +244,42 @@ TEST_F(CalibrationServiceTest, WhatItWasJudgedByIsShown) {
   rejected.settings = {{"loss", "huber"}};
   rejected.validation = StoredValidation();
   rejected.validation->active_version = 1;
-  rejected.validation->checks = {{"held_out_probability", 0.5e-9, 1e-4, false}};
-  rejected.validation->held_out = {5, 3, {99, 26, 0.5e-9}, {20, 26, 0.8}};
+  rejected.validation->checks = {
+      {"held_out_probability", 0.5e-9, 1e-4, CheckOutcome::kFailed, "No fit."},
+      {"halves", 0, 1e-4, CheckOutcome::kNotTested, "Too few."}};
+  rejected.validation->held_out = {5, 3, {99, 26, 0.5e-9}, {20, 26, 0.8}, 4};
+  rejected.verdict = {VerdictKind::kNotTrustworthy, {"does not fit"}};
+  rejected.report = CalibrationResult();
+  rejected.report->segment_fits = {{{"s", 0}, 1.5, 893, {}, "a spike"}};
+  rejected.report->halves = {30, 26, 0.25};
+  rejected.report->noise_factors = {
+      {NoiseKind::kGyro, 3, 0.05, 100, 2.9, true}};
   ASSERT_TRUE(store_->FinishRun(rig.id, run->run, rejected).ok());
   v1::Calibration read;
   ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
   EXPECT_EQ(read.validation().verdict(), v1::Validation::REJECTED);
-  ASSERT_EQ(read.validation().checks_size(), 1);
+  ASSERT_EQ(read.validation().checks_size(), 2);
   EXPECT_EQ(read.validation().checks(0).value(), 0.5e-9);
   EXPECT_FALSE(read.validation().checks(0).passed());
+  EXPECT_EQ(read.validation().checks(0).outcome(),
+            v1::Validation::Check::FAILED);
+  EXPECT_EQ(read.validation().checks(0).sentence(), "No fit.");
+  EXPECT_FALSE(read.validation().checks(1).passed());
+  EXPECT_EQ(read.validation().checks(1).outcome(),
+            v1::Validation::Check::NOT_TESTED);
+  EXPECT_EQ(read.verdict().kind(), v1::Verdict::NOT_TRUSTWORTHY);
+  EXPECT_EQ(read.verdict().text(), "not trustworthy");
+  EXPECT_THAT(read.verdict().sentences(), ElementsAre("does not fit"));
+  ASSERT_EQ(read.solver().segment_fits_size(), 1);
+  EXPECT_EQ(read.solver().segment_fits(0).segment(), "rigs/r/segments/s~0");
+  EXPECT_EQ(read.solver().segment_fits(0).inertial_ratio(), 893);
+  EXPECT_EQ(read.solver().segment_fits(0).excluded(), "a spike");
+  EXPECT_EQ(read.solver().halves().chi_square(), 30);
+  EXPECT_EQ(read.solver().halves().probability(), 0.25);
+  EXPECT_EQ(read.solver().noise_factors(0).used(), 2.9);
+  EXPECT_TRUE(read.solver().noise_factors(0).converged());
   EXPECT_EQ(read.validation().held_out().left_out(), 3);
+  EXPECT_EQ(read.validation().held_out().rescored(), 4);
   EXPECT_EQ(read.validation().held_out().chi_square(), 99);
   EXPECT_EQ(read.validation().held_out().active_probability(), 0.8);
   ASSERT_EQ(read.provenance().settings_size(), 1);
@@ -256,6 +287,31 @@ TEST_F(CalibrationServiceTest, WhatItWasJudgedByIsShown) {
   EXPECT_GE(read.provenance().schema_version(), 3);
   EXPECT_EQ(Activate("rigs/r/calibrations/2", "why not", &read).error_code(),
             grpc::StatusCode::FAILED_PRECONDITION);
+}
+
+// Near pi the rotation vectors of two versions point to opposite sides.
+TEST_F(CalibrationServiceTest, RotationsAreToldFromTheFactorys) {
+  Rig rig = TestRig("turned");
+  constexpr double kPi = std::numbers::pi;
+  rig.factory.cameras[0].q_CI = Exp({kPi - 0.001, 0, 0});
+  const auto estimate = [&](const Calibration& theta) {
+    StoredCalibration version;
+    version.rig = rig.id;
+    version.theta = theta;
+    const v1::Calibration encoded = Encode(version, rig.factory);
+    for (const auto& one : encoded.estimates()) {
+      if (one.component() == "cam0.q_CI.x") return one;
+    }
+    ADD_FAILURE();
+    return v1::ComponentEstimate();
+  };
+  const auto before = estimate(rig.factory);
+  Calibration turned = rig.factory;
+  turned.cameras[0].q_CI = turned.cameras[0].q_CI * Exp({0.003, 0, 0});
+  const auto after = estimate(turned);
+  EXPECT_GT(std::abs(after.value() - before.value()), 6);
+  EXPECT_NEAR(before.from_factory(), 0, 1e-12);
+  EXPECT_NEAR(after.from_factory(), 0.003, 1e-9);
 }
 
 TEST_F(CalibrationServiceTest, VersionsAreCompared) {

@@ -1,3 +1,5 @@
+#include "server/store/records.h"
+#include "server/store/records.pb.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -33,8 +35,13 @@ class CalibrationsTest : public StoreTest {
     report.iterations = 12;
     report.final_cost = 1.0 / 9;
     report.rank = size - 1;
-    report.noise_factors = {{NoiseKind::kAccel, 1.0 / 7, 0.03, 100.5},
-                            {NoiseKind::kGyroBiasWalk, 2, 1.5, 0.25}};
+    report.noise_factors = {
+        {NoiseKind::kAccel, 1.0 / 7, 0.03, 100.5, 1.0 / 6, true},
+        {NoiseKind::kGyroBiasWalk, 2, 1.5, 0.25, 1, false}};
+    report.segment_fits = {
+        {{"s", 0}, 1.0 / 3, 1.0 / 13, {26.5, 25, 1.0 / 17}, ""},
+        {{"s", 1}, 0, 893, {}, "its inertial residuals"}};
+    report.halves = {1.0 / 19, 26, 1.0 / 23};
     report.held_constant = {{{{"imu.gyro.scale.x", 1.0}}, 0.2}};
     report.observations = 1234;
     report.track_noise_factor = 1.0 / 0.7;
@@ -77,9 +84,79 @@ TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   EXPECT_EQ(factor.log_sigma, 0.03);
   EXPECT_EQ(factor.redundancy, 100.5);
   EXPECT_TRUE(factor.determined());
+  EXPECT_EQ(factor.used, 1.0 / 6);
+  EXPECT_TRUE(factor.converged);
   EXPECT_FALSE(stored->report->noise_factors[1].determined());
+  EXPECT_FALSE(stored->report->noise_factors[1].converged);
+  ASSERT_EQ(stored->report->segment_fits.size(), 2u);
+  const SegmentFit& fit = stored->report->segment_fits[0];
+  EXPECT_EQ(fit.key, (SegmentKey{"s", 0}));
+  EXPECT_EQ(fit.pixel_ratio, 1.0 / 3);
+  EXPECT_EQ(fit.inertial_ratio, 1.0 / 13);
+  EXPECT_EQ(fit.others.statistic, 26.5);
+  EXPECT_EQ(fit.others.degrees, 25);
+  EXPECT_EQ(fit.others.probability, 1.0 / 17);
+  EXPECT_EQ(fit.excluded, "");
+  EXPECT_EQ(stored->report->segment_fits[1].others.probability, 1);
+  EXPECT_EQ(stored->report->segment_fits[1].excluded, "its inertial residuals");
+  EXPECT_EQ(stored->report->halves.statistic, 1.0 / 19);
+  EXPECT_EQ(stored->report->halves.degrees, 26);
+  EXPECT_EQ(stored->report->halves.probability, 1.0 / 23);
   ASSERT_EQ(stored->report->held_constant.size(), 1u);
   ExpectSameCalibration(stored->report->theta, candidate.theta);
+}
+
+TEST_P(CalibrationsTest, AStalledSolverIsRememberedAsThat) {
+  const Rig rig = RigWithRun("a");
+  StoredCalibration candidate = Candidate(rig);
+  candidate.state = CalibrationState::kRejected;
+  candidate.report->status = CalibrateStatus::kStalled;
+  ASSERT_TRUE(store_->FinishRun("a", 1, candidate).ok());
+  EXPECT_EQ(store_->GetCalibration("a", 2)->report->status,
+            CalibrateStatus::kStalled);
+}
+
+// Without what is recorded since.
+TEST(CalibrationRecord, OfAnOlderVersionReadsAsNotTested) {
+  const Rig rig = TestRig("a");
+  StoredCalibration version;
+  version.rig = "a";
+  version.version = 2;
+  version.run = 1;
+  version.theta = rig.factory;
+  const int size = TangentSize(rig.factory);
+  version.covariance = Eigen::MatrixXd::Identity(size, size);
+  version.report = CalibrationResult();
+  version.report->noise_factors = {{NoiseKind::kGyro, 3, 0.05, 100}};
+  version.validation = StoredValidation();
+  version.validation->checks = {{"converged", 1, 1, CheckOutcome::kPassed},
+                                {"rank", 1, 2, CheckOutcome::kFailed}};
+  store::CalibrationRecord record;
+  ASSERT_TRUE(record.ParseFromString(SerializeCalibration(version)));
+  auto* factor = record.mutable_solver()->mutable_noise_factors(0);
+  factor->clear_used();
+  factor->clear_converged();
+  record.mutable_solver()->clear_halves();
+  store::ValidationRecord validation;
+  ASSERT_TRUE(validation.ParseFromString(SerializeValidation(version)));
+  validation.clear_verdict();
+  for (auto& check : *validation.mutable_validation()->mutable_checks()) {
+    check.clear_outcome();
+    check.clear_sentence();
+  }
+
+  auto read = ParseCalibration(record.SerializeAsString(), "it");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->report->noise_factors[0].used, 1);
+  EXPECT_TRUE(read->report->noise_factors[0].converged);
+  EXPECT_TRUE(read->report->segment_fits.empty());
+  EXPECT_EQ(read->report->halves.degrees, 0);
+  EXPECT_EQ(read->report->halves.probability, 1);
+  ASSERT_TRUE(
+      ParseValidation(validation.SerializeAsString(), "it", &*read).ok());
+  EXPECT_EQ(read->verdict.kind, VerdictKind::kUnknown);
+  EXPECT_EQ(read->validation->checks[0].outcome, CheckOutcome::kPassed);
+  EXPECT_EQ(read->validation->checks[1].outcome, CheckOutcome::kFailed);
 }
 
 TEST_P(CalibrationsTest, VersionTellsTheTemperaturesOfItsSegments) {

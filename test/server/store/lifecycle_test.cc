@@ -168,9 +168,12 @@ TEST_P(LifecycleTest, RejectedOneKeepsReasonsAndFigures) {
   judged.reasons = {"does not fit"};
   StoredValidation validation;
   validation.active_version = 1;
-  validation.checks = {{"converged", 1, 1, true},
-                       {"held_out_probability", 1e-9, 1e-4, false}};
-  validation.held_out = {5, 3, {123.5, 26, 1e-9}, {21.5, 26, 0.7}};
+  validation.checks = {
+      {"converged", 1, 1, CheckOutcome::kPassed, "noted"},
+      {"halves", 0, 1e-4, CheckOutcome::kNotTested, "too few segments"},
+      {"held_out_probability", 1e-9, 1e-4, CheckOutcome::kFailed, "no fit"}};
+  validation.held_out = {5, 3, {123.5, 26, 1e-9}, {21.5, 26, 0.7}, 2};
+  judged.verdict = {VerdictKind::kNotTrustworthy, {"does not fit"}};
   judged.validation = validation;
   ASSERT_TRUE(store_->FinishRun("a", run.run, judged).ok());
   Reopen();
@@ -179,10 +182,16 @@ TEST_P(LifecycleTest, RejectedOneKeepsReasonsAndFigures) {
   EXPECT_THAT(kept->reasons, ElementsAre("does not fit"));
   ASSERT_TRUE(kept->validation.has_value());
   EXPECT_EQ(kept->validation->active_version, 1);
-  ASSERT_EQ(kept->validation->checks.size(), 2u);
-  EXPECT_EQ(kept->validation->checks[1].name, "held_out_probability");
-  EXPECT_EQ(kept->validation->checks[1].value, 1e-9);
-  EXPECT_FALSE(kept->validation->checks[1].passed);
+  ASSERT_EQ(kept->validation->checks.size(), 3u);
+  EXPECT_EQ(kept->validation->checks[0].outcome, CheckOutcome::kPassed);
+  EXPECT_EQ(kept->validation->checks[0].sentence, "noted");
+  EXPECT_EQ(kept->validation->checks[1].outcome, CheckOutcome::kNotTested);
+  EXPECT_EQ(kept->validation->checks[2].name, "held_out_probability");
+  EXPECT_EQ(kept->validation->checks[2].value, 1e-9);
+  EXPECT_EQ(kept->validation->checks[2].outcome, CheckOutcome::kFailed);
+  EXPECT_EQ(kept->verdict.kind, VerdictKind::kNotTrustworthy);
+  EXPECT_THAT(kept->verdict.sentences, ElementsAre("does not fit"));
+  EXPECT_EQ(kept->validation->held_out.rescored, 2);
   EXPECT_EQ(kept->validation->held_out.segments, 5);
   EXPECT_EQ(kept->validation->held_out.left_out, 3);
   EXPECT_EQ(kept->validation->held_out.candidate.statistic, 123.5);

@@ -65,6 +65,7 @@ TEST_P(RunsTest, UnfinishedRunKeepsItsDataAndItsEndDropsIt) {
     Score(rig, k, -k);
   }
   EXPECT_THAT(TableIndices("a", 0), ElementsAre(3, 2));
+  RenewReserve(rig);
   EXPECT_TRUE(HasData("a", 0));
   EXPECT_TRUE(HasData("a", 1));
   Reopen();
@@ -82,6 +83,7 @@ TEST_P(RunsTest, FinishingStartsTheNextIfTheTablesHaveChanged) {
     Put("a", k);
     Score(rig, k, -k);
   }
+  RenewReserve(rig);
   ASSERT_TRUE(store_->BeginRun("a", 1).ok());
   ASSERT_TRUE(store_->FinishRun("a", 1, Calibration(rig)).ok());
   EXPECT_FALSE(HasData("a", 0));

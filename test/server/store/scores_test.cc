@@ -71,6 +71,7 @@ TEST_P(ScoresTest, EvictionDropsTheDataAndKeepsTheInformation) {
   ASSERT_TRUE(store_->EndRun("a", 1, RunState::kCancelled, "test").ok());
   Score(rig, 2, 2.0);
   EXPECT_THAT(TableIndices("a", 0), ElementsAre(1, 2));
+  RenewReserve(rig);
   EXPECT_FALSE(HasData("a", 0));
   EXPECT_TRUE(HasData("a", 1));
   EXPECT_TRUE(HasData("a", 2));
@@ -98,8 +99,9 @@ TEST_P(ScoresTest, SegmentThatGainsTooLittleEntersNoTable) {
   Put("a", 0);
   const ScoreCommit commit = Score(rig, 0, -5.0, rig.min_gain_nats - 1e-9);
   EXPECT_TRUE(commit.tables.empty());
-  EXPECT_FALSE(HasData("a", 0));
   EXPECT_EQ((*store_->GetTables("a"))[0].scored, 1);
+  RenewReserve(rig);
+  EXPECT_FALSE(HasData("a", 0));
 }
 
 TEST_P(ScoresTest, SecondScoreOfASegmentChangesNothing) {

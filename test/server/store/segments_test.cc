@@ -77,9 +77,10 @@ TEST_P(SegmentsTest, SameSegmentTwiceChangesNothing) {
   ASSERT_TRUE(again.ok());
   EXPECT_EQ(*again, PutVerdict::kDuplicate);
   Score(rig, 0, 1.0, 0.0);  // enters no table: its data goes
+  RenewReserve(rig);
   EXPECT_EQ(*store_->PutSegment("a", Segment(0)), PutVerdict::kDuplicate);
   EXPECT_FALSE(HasData("a", 0));
-  EXPECT_EQ(store_->ListSegments("a", {})->items.size(), 1u);
+  EXPECT_EQ(store_->ListSegments("a", {})->items.size(), 1u + Store::kReserve);
 }
 
 TEST_P(SegmentsTest, KeysAreApartByRigAndSession) {

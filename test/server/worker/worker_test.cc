@@ -98,6 +98,31 @@ TEST_F(WorkerTest, ResultAndProgressAreThoseOfCalibrateToTheBit) {
   EXPECT_EQ(there, here);
 }
 
+// Whatever this estimator leaves empty.
+TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
+  CalibrationResult result;
+  result.status = CalibrateStatus::kStalled;
+  result.theta = rig_.factory;
+  const int size = TangentSize(rig_.factory);
+  result.covariance = Eigen::MatrixXd::Identity(size, size);
+  result.Lambda = result.covariance;
+  result.noise_factors = {{NoiseKind::kGyro, 3, 0.05, 100, 2.9, false}};
+  result.segment_fits = {{{"s", 7}, 1.5, 893, {40, 25, 0.03}, "a spike"}};
+  result.halves = {30, 26, 0.25};
+  const auto decoded = DecodeResult(EncodeResult(result));
+  ASSERT_TRUE(decoded.has_value());
+  EXPECT_EQ(decoded->status, CalibrateStatus::kStalled);
+  ASSERT_EQ(decoded->noise_factors.size(), 1u);
+  EXPECT_EQ(decoded->noise_factors[0].used, 2.9);
+  EXPECT_FALSE(decoded->noise_factors[0].converged);
+  ASSERT_EQ(decoded->segment_fits.size(), 1u);
+  EXPECT_EQ(decoded->segment_fits[0].key, (SegmentKey{"s", 7}));
+  EXPECT_EQ(decoded->segment_fits[0].inertial_ratio, 893);
+  EXPECT_EQ(decoded->segment_fits[0].others.degrees, 25);
+  EXPECT_EQ(decoded->segment_fits[0].excluded, "a spike");
+  EXPECT_EQ(decoded->halves.probability, 0.25);
+}
+
 // As many cameras as a rig may have.
 TEST_F(WorkerTest, ProgressOfTheLargestRigIsOnePacket) {
   CalibrateProgress progress{7, 100, 0.1, 0.3, rig_.factory};
@@ -129,6 +154,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   options_.noise_factors = false;
   options_.reweight_noise = true;
   options_.merge_landmarks = 3;
+  options_.leave_out_contradictions = false;
   options_.solver = SolverKind::kCeres;
   options_.threads = 2;
   limits_ = {.idle = true, .max_memory_bytes = 123};
@@ -149,6 +175,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   EXPECT_FALSE(job->options.noise_factors);
   EXPECT_TRUE(job->options.reweight_noise);
   EXPECT_EQ(job->options.merge_landmarks, 3);
+  EXPECT_FALSE(job->options.leave_out_contradictions);
   EXPECT_EQ(job->options.solver, SolverKind::kCeres);
   EXPECT_EQ(job->options.threads, 2);
   EXPECT_TRUE(job->limits.idle);

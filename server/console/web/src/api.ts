@@ -48,6 +48,7 @@ export interface Estimate {
   unit: string;
   value: number;
   sigma: number;
+  fromFactory?: number;
 }
 
 export interface Direction {
@@ -70,7 +71,23 @@ export interface Solver {
   keyframes: number;
   landmarks: number;
   observations: number;
+  observationsDropped: number;
   seconds: number;
+  noiseFactors: {
+    kind: string;
+    factor: number;
+    logSigma: number;
+    determined: boolean;
+    used: number;
+    converged: boolean;
+  }[];
+  segmentFits: {
+    segment: string;
+    pixelRatio: number;
+    inertialRatio: number;
+    excluded: string;
+  }[];
+  halves?: { chiSquare: number; degrees: number; probability: number };
 }
 
 export interface Calibration {
@@ -87,12 +104,21 @@ export interface Calibration {
     programVersion: string;
   };
   solver?: Solver;
+  verdict?: { kind: string; text: string; sentences: string[] };
   validation?: {
     verdict: string;
     activeVersion: string;
-    checks: { name: string; value: number; limit: number; passed: boolean }[];
+    checks: {
+      name: string;
+      value: number;
+      limit: number;
+      passed: boolean;
+      outcome: string;
+      sentence: string;
+    }[];
     heldOut?: {
       segments: number;
+      rescored: number;
       degrees: number;
       chiSquare: number;
       probability: number;
@@ -112,6 +138,8 @@ export interface Comparison {
     valueB: number;
     difference: number;
     sigma: number;
+    fromFactoryA?: number;
+    fromFactoryB?: number;
   }[];
   chiSquare: number;
   degrees: number;

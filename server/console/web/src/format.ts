@@ -92,3 +92,22 @@ export function matches(pattern: string, name: string): boolean {
   if (end) return name.startsWith(text);
   return name === pattern;
 }
+
+const kDegrees = 180 / Math.PI;
+
+// A rotation as what it differs by from the factory's value, in degrees: near
+// pi, rotation vectors change their sign though nothing has moved.
+export function shown(estimate: {
+  unit: string;
+  value: number;
+  sigma: number;
+  fromFactory?: number;
+}): { value: number; sigma: number; unit: string } {
+  const { unit, value, sigma, fromFactory } = estimate;
+  if (unit !== 'rad' || fromFactory === undefined) return { value, sigma, unit };
+  return {
+    value: kDegrees * fromFactory,
+    sigma: kDegrees * sigma,
+    unit: 'deg from factory',
+  };
+}

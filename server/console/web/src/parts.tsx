@@ -86,6 +86,8 @@ const kTones: Record<string, string> = {
   ACTIVE: 'good',
   SUCCEEDED: 'good',
   ACCEPTED: 'good',
+  GOOD: 'good',
+  NOT_TRUSTWORTHY: 'bad',
   SCORED: 'good',
   REJECTED: 'bad',
   FAILED: 'bad',

@@ -11,8 +11,9 @@ import {
   type Calibration,
   type Comparison,
   type Session,
+  type Solver,
 } from '../api';
-import { component, number, quantity, words } from '../format';
+import { component, number, quantity, shown, words } from '../format';
 import {
   Badge,
   Choice,
@@ -21,6 +22,7 @@ import {
   Link,
   Loaded,
   Problem,
+  SegmentLink,
   SegmentLinks,
   solverFigures,
   Title,
@@ -30,6 +32,12 @@ import { kColours, Plot } from '../plot';
 import { go, useAddress, useRead, withQuery } from '../state';
 
 const kBand = 2; // sigmas either way
+
+// As it is shown.
+function estimateOf(version: Calibration, name: string) {
+  const estimate = version.estimates.find((e) => e.component === name);
+  return estimate && shown(estimate);
+}
 
 function History(props: { of: Calibration[] }) {
   const query = useAddress().searchParams;
@@ -41,7 +49,7 @@ function History(props: { of: Calibration[] }) {
     .map((e) => e.component);
   const chosen = query.get('parameter') ?? names[0];
   const data = useMemo(() => {
-    const at = versions.map((v) => v.estimates.find((e) => e.component === chosen));
+    const at = versions.map((v) => estimateOf(v, chosen));
     return [
       versions.map((v) => Number(v.version)),
       at.map((e) => e?.value ?? null),
@@ -49,7 +57,7 @@ function History(props: { of: Calibration[] }) {
       at.map((e) => (e ? e.value - kBand * e.sigma : null)),
     ] as uPlot.AlignedData;
   }, [props.of, chosen, factory]);
-  const unit = versions[0].estimates.find((e) => e.component === chosen)?.unit ?? '';
+  const unit = estimateOf(versions[0], chosen)?.unit ?? '';
   const bound = { stroke: kColours[0] + '66', width: 1, points: { show: false } };
   return (
     <>
@@ -123,12 +131,17 @@ function Difference(props: { rig: string; of: Calibration[] }) {
               head={['Parameter', `Version ${compared.versionA}`, `Version ${compared.versionB}`, 'Difference', 'Sigma', 'In sigmas']}
               rows={compared.differences.map((d) => {
                 const sigmas = Math.abs(d.difference) / d.sigma;
+                const side = (value: number, fromFactory?: number) =>
+                  shown({ ...d, value, fromFactory });
+                const a = side(d.valueA, d.fromFactoryA);
+                const b = side(d.valueB, d.fromFactoryB);
+                const by = side(d.difference, d.fromFactoryA === undefined ? undefined : d.difference);
                 return [
                   component(d.component),
-                  quantity(d.valueA, d.unit),
-                  quantity(d.valueB, d.unit),
-                  number(d.difference),
-                  number(d.sigma),
+                  quantity(a.value, a.unit),
+                  quantity(b.value, b.unit),
+                  number(by.value),
+                  number(by.sigma),
                   <span class={sigmas > 3 ? 'strong' : ''}>{d.sigma > 0 ? number(sigmas, 2) : ''}</span>,
                 ];
               })}
@@ -191,7 +204,30 @@ function Activate(props: { calibration: Calibration; active: string; onEnd: () =
   );
 }
 
+const kOutcomes: Record<string, string> = {
+  PASSED: 'passed',
+  FAILED: 'failed',
+  NOT_TESTED: 'not tested',
+};
+
 function Verdict(props: { of: Calibration }) {
+  const verdict = props.of.verdict;
+  if (!verdict) return null;
+  return (
+    <>
+      <p>
+        Verdict: <Badge state={verdict.kind} />
+      </p>
+      {verdict.sentences.map((sentence) => (
+        <p class={verdict.kind === 'NOT_TRUSTWORTHY' ? 'warning' : 'quiet'} key={sentence}>
+          {sentence}
+        </p>
+      ))}
+    </>
+  );
+}
+
+function Validation(props: { of: Calibration }) {
   const validation = props.of.validation;
   if (!validation) return null;
   const held = validation.heldOut;
@@ -200,20 +236,25 @@ function Verdict(props: { of: Calibration }) {
       <h3>
         Validation <Badge state={validation.verdict} />
       </h3>
-      <p class="quiet">Judged against version {validation.activeVersion}.</p>
+      <p class="quiet">Validated against version {validation.activeVersion}.</p>
       <DataTable
         caption="Checks"
-        head={['Check', 'Value', 'Limit', 'Passed']}
-        rows={validation.checks.map((check) => [
-          words(check.name),
-          number(check.value),
-          number(check.limit),
-          check.passed ? 'yes' : <strong>no</strong>,
-        ])}
+        head={['Check', 'Value', 'Limit', 'Outcome']}
+        rows={validation.checks.map((check) => {
+          const outcome = kOutcomes[check.outcome] ?? (check.passed ? 'passed' : 'failed');
+          const made = outcome !== 'not tested';
+          return [
+            words(check.name),
+            made ? number(check.value) : '',
+            made ? number(check.limit) : '',
+            outcome === 'failed' ? <strong>{outcome}</strong> : outcome,
+          ];
+        })}
       />
       {held && held.degrees > 0 && (
         <p>
-          On {held.segments} segments that it was not calibrated on: chi-square{' '}
+          On {held.segments} segments that it was not calibrated on ({held.rescored} scored
+          anew): chi-square{' '}
           {number(held.chiSquare)} with {held.degrees} degrees (probability{' '}
           {number(held.probability)}); the version before: {number(held.activeChiSquare)}.
         </p>
@@ -237,6 +278,42 @@ function Origin(props: { of: Calibration }) {
   );
 }
 
+function Noise(props: { of: Solver }) {
+  if (props.of.noiseFactors.length === 0) return null;
+  return (
+    <DataTable
+      caption="Noise, as factors of what the rig states"
+      head={['Kind', 'Residuals suggest', 'Used']}
+      rows={props.of.noiseFactors.map((factor) => [
+        words(factor.kind),
+        factor.determined
+          ? `${number(factor.factor)} (+- ${number(100 * factor.logSigma, 2)} %)`
+          : 'not determined',
+        factor.used === 0
+          ? ''
+          : number(factor.used) + (factor.converged ? '' : ' (not converged)'),
+      ])}
+    />
+  );
+}
+
+// By their fit, where it was measured.
+function Fits(props: { of: Solver }) {
+  if (props.of.segmentFits.length === 0) return null;
+  return (
+    <DataTable
+      caption="Residuals of each segment, over what its noise predicts"
+      head={['Segment', 'Pixels', 'IMU', 'Excluded']}
+      rows={props.of.segmentFits.map((fit) => [
+        <SegmentLink name={fit.segment} />,
+        fit.pixelRatio > 0 ? number(fit.pixelRatio) : '',
+        fit.inertialRatio > 0 ? number(fit.inertialRatio) : '',
+        fit.excluded,
+      ])}
+    />
+  );
+}
+
 function Version(props: { of: Calibration }) {
   const heading = useRef<HTMLHeadingElement>(null);
   useEffect(() => heading.current?.scrollIntoView(), [props.of.version]);
@@ -246,30 +323,35 @@ function Version(props: { of: Calibration }) {
       <h2 ref={heading}>
         Version {props.of.version} <Badge state={props.of.state} />
       </h2>
-      {props.of.reasons.map((reason) => (
-        <p class="warning" key={reason}>
-          {reason}
-        </p>
-      ))}
+      <Verdict of={props.of} />
       <Origin of={props.of} />
       {solver && (
         <Figures
           of={[
             ['Solver', solver.status],
             ...Object.values(solverFigures(solver)),
+            [
+              'Observations used',
+              `${solver.observations} of ${solver.observations + solver.observationsDropped}`,
+            ],
           ]}
         />
       )}
-      <Verdict of={props.of} />
+      <Validation of={props.of} />
+      {solver && <Noise of={solver} />}
+      {solver && <Fits of={solver} />}
       <h3>Parameters</h3>
       <DataTable
         caption={'Parameters of version ' + props.of.version}
         head={['Parameter', 'Value', 'Sigma']}
-        rows={props.of.estimates.map((e) => [
-          component(e.component),
-          quantity(e.value, e.unit),
-          e.sigma > 0 ? number(e.sigma) : 'held',
-        ])}
+        rows={props.of.estimates.map((e) => {
+          const { value, sigma, unit } = shown(e);
+          return [
+            component(e.component),
+            quantity(value, unit),
+            sigma > 0 ? number(sigma) : 'held',
+          ];
+        })}
       />
     </section>
   );
@@ -299,14 +381,14 @@ export function Calibrations(props: { rig: string; session: Session | null; vers
               {nextPageToken && <p class="quiet">The newest 100 versions.</p>}
               <DataTable
                 caption="Versions"
-                  head={['Version', 'State', 'Created', 'Validation', 'Segments', 'Reprojection rms [px]', ...(may ? ['Change'] : [])]}
+                  head={['Version', 'State', 'Verdict', 'Created', 'Segments', 'Reprojection rms [px]', ...(may ? ['Change'] : [])]}
                 rows={calibrations.map((c) => [
                   <Link to={pageOf(c.name)} current={c.version === shown}>
                     {c.version === '1' ? '1 (factory)' : c.version}
                   </Link>,
                   <Badge state={c.state} />,
+                  c.verdict ? <Badge state={c.verdict.kind} /> : '',
                   <When time={c.createTime} />,
-                  c.validation ? <Badge state={c.validation.verdict} /> : '',
                   c.provenance?.segments.length ?? '',
                   c.solver ? number(c.solver.reprojectionRmsAfterPx) : '',
                   ...(may

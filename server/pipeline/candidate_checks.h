@@ -1,0 +1,45 @@
+// The checks of a candidate, by what they look at. Each adds one or more to the
+// list. Internal to the validation (candidate.h).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/pipeline/candidate.h"
+
+namespace selfcal::server {
+
+struct CheckContext {
+  const Rig& rig;
+  const CalibrationResult& result;
+  const CandidateEvidence& evidence;
+  const CandidateLimits& limits;
+};
+
+// Adds a check that passed, or, with a sentence that says why not, failed.
+void AddResult(std::string name,
+               double value,
+               double limit,
+               std::string failure,
+               std::vector<ValidationCheck>* checks);
+
+void AddNotTested(std::string name,
+                  double limit,
+                  std::string sentence,
+                  std::vector<ValidationCheck>* checks);
+
+// candidate_fit.cc: how well the data fits the result. observations_used,
+// segments_used, pixel_residuals, segment_residuals, noise, preflight.
+void CheckFit(const CheckContext& context,
+              std::vector<ValidationCheck>* checks);
+
+// candidate_estimate.cc: the estimate against the factory's and the active one.
+// prior_sigmas, rank, sigma_growth.
+void CheckEstimate(const CheckContext& context,
+                   std::vector<ValidationCheck>* checks);
+
+// candidate_confirmation.cc: halves, held_out_probability, confirmed.
+void CheckConfirmation(const CheckContext& context,
+                       StoredValidation* validation);
+
+}  // namespace selfcal::server

@@ -1,0 +1,101 @@
+// Whether data confirms a candidate that did not make it: its own halves, and
+// segments that it was not calibrated on.
+#include <fmt/format.h>
+
+#include "server/pipeline/candidate_checks.h"
+
+namespace selfcal::server {
+namespace {
+
+void CheckHalves(const CheckContext& context,
+                 std::vector<ValidationCheck>* checks) {
+  const AgreementTest& halves = context.result.halves;
+  const double limit = context.limits.min_probability;
+  if (halves.degrees == 0) {
+    AddNotTested("halves",
+                 limit,
+                 "Calibrations on two halves of the segments could not be "
+                 "compared.",
+                 checks);
+    return;
+  }
+  std::string failure;
+  if (!(halves.probability >= limit)) {
+    failure = fmt::format(
+        "Calibrations on two halves of the segments contradict each other: "
+        "chi-square {:.1f} with {} degrees (probability {:.1e}, at least "
+        "{:.0e} is asked for). Segments are corrupted, or the device changed "
+        "between them: look for those that fit worst, and send new motion.",
+        halves.statistic,
+        halves.degrees,
+        halves.probability,
+        limit);
+  }
+  AddResult("halves", halves.probability, limit, failure, checks);
+}
+
+void CheckHeldOut(const CheckContext& context, StoredValidation* validation) {
+  const StoredCalibration& active = context.evidence.active;
+  const double limit = context.limits.min_probability;
+  const HeldOutTest test = TestHeldOut(context.rig,
+                                       {context.result.theta,
+                                        context.result.covariance,
+                                        context.result.track_noise_factor},
+                                       {active.theta, active.covariance},
+                                       context.evidence.held_out);
+  validation->held_out = test;
+  if (test.candidate.degrees == 0) {
+    const int all = test.segments + test.left_out;
+    AddNotTested(
+        "held_out_probability",
+        limit,
+        all == 0
+            ? "No segment was held out to test it on."
+            : fmt::format("None of the {} segments that were held out could "
+                          "be tested.",
+                          all),
+        &validation->checks);
+    return;
+  }
+  std::string failure;
+  if (!(test.candidate.probability >= limit)) {
+    failure = fmt::format(
+        "{} held-out segments do not fit it: chi-square {:.1f} with {} degrees "
+        "(probability {:.1e}, at least {:.0e} is asked for); to active version "
+        "{} they fit with {:.1f}. Segments of the run are corrupted or of "
+        "another device, or the device has changed: send new motion.",
+        test.segments,
+        test.candidate.statistic,
+        test.candidate.degrees,
+        test.candidate.probability,
+        limit,
+        active.version,
+        test.active.statistic);
+  }
+  AddResult("held_out_probability",
+            test.candidate.probability,
+            limit,
+            failure,
+            &validation->checks);
+}
+
+}  // namespace
+
+void CheckConfirmation(const CheckContext& context,
+                       StoredValidation* validation) {
+  CheckHalves(context, &validation->checks);
+  CheckHeldOut(context, validation);
+  const int tests = (context.result.halves.degrees > 0 ? 1 : 0) +
+                    (validation->held_out.candidate.degrees > 0 ? 1 : 0);
+  AddResult("confirmed",
+            tests,
+            1,
+            tests > 0 ? ""
+                      : "Nothing but its own fit speaks for it: neither halves "
+                        "of its segments nor held-out segments could be "
+                        "tested. Send more motion, so that there are segments "
+                        "to test it on.",
+            &validation->checks);
+}
+
+}  // namespace selfcal::server

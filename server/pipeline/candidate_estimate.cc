@@ -1,0 +1,117 @@
+// The estimate of a candidate against the factory's and the active one.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/pipeline/candidate_checks.h"
+
+namespace selfcal::server {
+namespace {
+
+// ", and 2 others" after the worst of `count`.
+std::string AndOthers(int count) {
+  if (count < 2) return "";
+  return count == 2 ? ", and one other"
+                    : fmt::format(", and {} others", count - 1);
+}
+
+void CheckValues(const CheckContext& context,
+                 std::vector<ValidationCheck>* checks) {
+  const Rig& rig = context.rig;
+  const double limit = context.limits.max_prior_sigmas;
+  const Eigen::VectorXd change = BoxMinus(context.result.theta, rig.factory);
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  double largest = 0;
+  int worst = 0;
+  int beyond = 0;
+  for (const int k : FreeComponents(rig)) {
+    const double sigmas = std::abs(change[k]) / prior[k];
+    beyond += sigmas <= limit ? 0 : 1;
+    if (!(sigmas <= largest)) {
+      largest = sigmas;
+      worst = k;
+    }
+  }
+  std::string failure;
+  if (beyond > 0) {
+    failure = fmt::format(
+        "{} is {:.1f} prior sigmas from the factory's value{}: at most {:.1f} "
+        "are plausible. Check the tolerances (prior_sigmas); for a device "
+        "that was rebuilt, create a new rig.",
+        TangentComponents(rig.factory)[worst].name,
+        largest,
+        AndOthers(beyond),
+        limit);
+  }
+  AddResult("prior_sigmas", largest, limit, failure, checks);
+}
+
+void CheckRank(const CheckContext& context,
+               std::vector<ValidationCheck>* checks) {
+  const StoredCalibration& active = context.evidence.active;
+  const int before = active.report ? active.report->rank : 0;
+  const auto changed = static_cast<int>(context.evidence.changed.size());
+  const int least = std::max(0, before - changed);
+  const int rank = context.result.rank;
+  std::string failure;
+  if (rank < least) {
+    failure = fmt::format(
+        "It estimates {} directions, and active version {} estimates {}: the "
+        "segments show less than was known before. Send richer motion "
+        "(selfcal coach says which).",
+        rank,
+        active.version,
+        before);
+  }
+  AddResult("rank", rank, least, failure, checks);
+}
+
+void CheckCertainty(const CheckContext& context,
+                    std::vector<ValidationCheck>* checks) {
+  const StoredCalibration& active = context.evidence.active;
+  const double limit = context.limits.max_sigma_growth;
+  const auto components = TangentComponents(context.rig.factory);
+  const Eigen::VectorXd prior = PriorSigmas(context.rig);
+  const Eigen::VectorXd before = active.covariance.diagonal().cwiseSqrt();
+  const Eigen::VectorXd after =
+      context.result.covariance.diagonal().cwiseSqrt();
+  double largest = 0;
+  int worst = 0;
+  int beyond = 0;
+  for (const int k : FreeComponents(context.rig)) {
+    if (!(before[k] < context.limits.observed_below * prior[k])) continue;
+    const double growth = after[k] / before[k];
+    beyond += growth <= limit ? 0 : 1;
+    if (!(growth <= largest)) {
+      largest = growth;
+      worst = k;
+    }
+  }
+  std::string failure;
+  if (beyond > 0) {
+    failure = fmt::format(
+        "The sigma of {} is {:.3g} {}, that of active version {} is {:.3g}{}: "
+        "at most {:.1f} times as much may become active. Send richer motion "
+        "(selfcal coach says which).",
+        components[worst].name,
+        after[worst],
+        components[worst].unit,
+        active.version,
+        before[worst],
+        AndOthers(beyond),
+        limit);
+  }
+  AddResult("sigma_growth", largest, limit, failure, checks);
+}
+
+}  // namespace
+
+void CheckEstimate(const CheckContext& context,
+                   std::vector<ValidationCheck>* checks) {
+  CheckValues(context, checks);
+  CheckRank(context, checks);
+  CheckCertainty(context, checks);
+}
+
+}  // namespace selfcal::server

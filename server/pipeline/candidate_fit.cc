@@ -1,0 +1,268 @@
+// How well the data of a candidate fits it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "server/pipeline/candidate_checks.h"
+
+namespace selfcal::server {
+namespace {
+
+// What is hardly determined still tells, if it is so many standard deviations
+// off.
+constexpr double kOffSigmas = 3;
+
+void CheckObservations(const CheckContext& context,
+                       std::vector<ValidationCheck>* checks) {
+  const CalibrationResult& result = context.result;
+  const double all = static_cast<double>(result.observations) +
+                     static_cast<double>(result.observations_dropped);
+  const double share = all > 0 ? result.observations / all : 0;
+  const double limit = context.limits.min_observations_used;
+  std::string failure;
+  if (!(share >= limit)) {
+    failure = fmt::format(
+        "{} of {} observations were used ({:.1f} %, at least {:.0f} % are "
+        "asked for): the result rests on what happened to fit. Check tracks, "
+        "landmarks and stamps of what is sent (selfcal preflight).",
+        result.observations,
+        all,
+        100 * share,
+        100 * limit);
+  }
+  AddResult("observations_used", share, limit, failure, checks);
+}
+
+void CheckSegments(const CheckContext& context,
+                   std::vector<ValidationCheck>* checks) {
+  const auto& fits = context.result.segment_fits;
+  const double limit = context.limits.min_segments_used;
+  if (fits.empty()) {
+    AddNotTested("segments_used",
+                 limit,
+                 "The segments were not tested against each other.",
+                 checks);
+    return;
+  }
+  const auto excluded =
+      std::count_if(fits.begin(), fits.end(), [](const SegmentFit& fit) {
+        return !fit.excluded.empty();
+      });
+  const auto all = static_cast<double>(fits.size());
+  const double share = 1 - static_cast<double>(excluded) / all;
+  std::string failure;
+  if (!(share >= limit)) {
+    failure = fmt::format(
+        "{} of {} segments contradict the others: where the majority does, "
+        "none of them can be told to be right. Check what the SLAM system "
+        "sends (selfcal preflight), and send new motion.",
+        excluded,
+        all);
+  }
+  AddResult("segments_used", share, limit, failure, checks);
+}
+
+void CheckPixels(const CheckContext& context,
+                 std::vector<ValidationCheck>* checks) {
+  const CalibrationResult& result = context.result;
+  const double limit = context.limits.max_residual_ratio;
+  // Errors that go together along tracks are at least partly a larger sigma.
+  const double noise =
+      std::max(UsedNoise(result, NoiseKind::kPixel), result.track_noise_factor);
+  // An observation has two components.
+  const double expected_px =
+      std::numbers::sqrt2 * context.rig.pixel_sigma_px * noise;
+  const double ratio = result.reprojection_rms_after_px / expected_px;
+  std::string failure;
+  if (!(ratio <= limit)) {
+    failure = fmt::format(
+        "The reprojection error of {:.3g} px (rms) is {:.1f} times what the "
+        "noise predicts, at most {:.1f} times are plausible: the model does "
+        "not explain what was seen. Check the pixel sigma of the rig, the "
+        "tracks and the stamps (selfcal preflight).",
+        result.reprojection_rms_after_px,
+        ratio,
+        limit);
+  }
+  AddResult("pixel_residuals", ratio, limit, failure, checks);
+}
+
+std::string SegmentText(const SegmentKey& key) {
+  return fmt::format("{}~{}", key.session, key.index);
+}
+
+void CheckSegmentResiduals(const CheckContext& context,
+                           std::vector<ValidationCheck>* checks) {
+  const double limit = context.limits.max_residual_ratio;
+  const SegmentFit* worst = nullptr;
+  double largest = 0;
+  for (const SegmentFit& fit : context.result.segment_fits) {
+    if (!fit.excluded.empty()) continue;
+    double ratio = std::max(fit.pixel_ratio, fit.inertial_ratio);
+    if (!std::isfinite(fit.pixel_ratio + fit.inertial_ratio)) {
+      ratio = std::numeric_limits<double>::infinity();
+    }
+    if (ratio > largest) {
+      largest = ratio;
+      worst = &fit;
+    }
+  }
+  if (worst == nullptr) {
+    AddNotTested("segment_residuals",
+                 limit,
+                 "The residuals of the segments by sensor were not measured.",
+                 checks);
+    return;
+  }
+  std::string failure;
+  if (!(largest <= limit)) {
+    failure = fmt::format(
+        "The {} residuals of segment {} are {:.1f} times what the noise that "
+        "was used predicts, at most {:.1f} times are plausible: one sensor "
+        "contradicts the others. Look at it (selfcal segments show).",
+        worst->inertial_ratio >= worst->pixel_ratio ? "inertial" : "pixel",
+        SegmentText(worst->key),
+        largest,
+        limit);
+  }
+  AddResult("segment_residuals", largest, limit, failure, checks);
+}
+
+// Whether the residuals show that noise is larger than what was used.
+bool Contradicts(const NoiseFactor& factor, double limit) {
+  const double off = std::log(factor.factor / factor.used);
+  return off > std::max(std::log(limit), kOffSigmas * factor.log_sigma);
+}
+
+std::string NoiseFailure(const CheckContext& context,
+                         const NoiseFactor& factor) {
+  const CandidateLimits& limits = context.limits;
+  if (Contradicts(factor, limits.max_noise_ratio)) {
+    return fmt::format(
+        "The {} noise is {:.2f} times what the rig states (+- {:.0f} %), and "
+        "{:.2f} times was used: the sigmas are too small. Correct the noise "
+        "of the rig, or let it be estimated.",
+        NoiseKindName(factor.kind),
+        factor.factor,
+        100 * factor.log_sigma,
+        factor.used);
+  }
+  const double most = factor.kind == NoiseKind::kPixel ? limits.max_pixel_noise
+                                                       : limits.max_imu_noise;
+  if (factor.used > most) {
+    return fmt::format(
+        "The {} noise was taken for {:.1f} times what the rig states, at most "
+        "{:.0f} times can be noise: the data or the model is wrong, or the "
+        "noise of the rig is. Check both (selfcal preflight, data sheet).",
+        NoiseKindName(factor.kind),
+        factor.used,
+        most);
+  }
+  return "";
+}
+
+void CheckNoise(const CheckContext& context,
+                std::vector<ValidationCheck>* checks) {
+  const double limit = context.limits.max_noise_ratio;
+  double largest = 0;
+  std::string failure;
+  std::string not_converged;
+  for (const NoiseFactor& factor : context.result.noise_factors) {
+    if (!factor.converged) {
+      not_converged += (not_converged.empty() ? "" : ", ");
+      not_converged += NoiseKindName(factor.kind);
+    }
+    if (factor.determined()) {
+      largest = std::max(largest, factor.factor / factor.used);
+    }
+    if (failure.empty()) failure = NoiseFailure(context, factor);
+  }
+  if (!failure.empty()) {
+    AddResult("noise", largest, limit, failure, checks);
+  } else if (context.result.noise_factors.empty()) {
+    AddNotTested("noise",
+                 limit,
+                 "The noise could not be estimated: the sigmas rest on what "
+                 "the rig states.",
+                 checks);
+  } else if (!not_converged.empty()) {
+    AddNotTested("noise",
+                 limit,
+                 fmt::format("The estimate of the noise did not converge ({}): "
+                             "the sigmas rest on what was used.",
+                             not_converged),
+                 checks);
+  } else {
+    AddResult("noise", largest, limit, "", checks);
+  }
+}
+
+bool EstimatesTimeOffset(const Rig& rig) {
+  const std::vector<int> free = FreeComponents(rig);
+  for (int j = 0; j < static_cast<int>(rig.factory.cameras.size()); ++j) {
+    if (std::binary_search(
+            free.begin(), free.end(), TimeOffsetComponent(rig.factory, j))) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// Whether what was found biases the calibration. Lost, repeated and saturated
+// samples are noise in some segments, which their residuals show; a time offset
+// is none where it is estimated.
+bool Biases(const Rig& rig, const Finding& finding) {
+  switch (finding.kind) {
+    case FindingKind::kDroppedSamples:
+    case FindingKind::kRepeatedSamples:
+    case FindingKind::kSaturation:
+      return false;
+    case FindingKind::kTimeOffset:
+      return !EstimatesTimeOffset(rig);
+    default:
+      return true;
+  }
+}
+
+void CheckPreflight(const CheckContext& context,
+                    std::vector<ValidationCheck>* checks) {
+  if (!context.evidence.diagnosis) {
+    AddNotTested("preflight",
+                 0,
+                 "The segments could not be read for the preflight checks.",
+                 checks);
+    return;
+  }
+  int biasing = 0;
+  std::string failure;
+  std::string notes;
+  for (const Finding& finding : context.evidence.diagnosis->findings) {
+    const bool biases = Biases(context.rig, finding);
+    biasing += biases ? 1 : 0;
+    std::string* text = biases ? &failure : &notes;
+    *text += fmt::format("{}Preflight found {}: {}; {}.",
+                         text->empty() ? "" : " ",
+                         FindingName(finding.kind),
+                         finding.cause,
+                         finding.remedy);
+  }
+  AddResult("preflight", biasing, 0, failure, checks);
+  if (failure.empty()) checks->back().sentence = notes;
+}
+
+}  // namespace
+
+void CheckFit(const CheckContext& context,
+              std::vector<ValidationCheck>* checks) {
+  CheckObservations(context, checks);
+  CheckSegments(context, checks);
+  CheckPixels(context, checks);
+  CheckSegmentResiduals(context, checks);
+  CheckNoise(context, checks);
+  CheckPreflight(context, checks);
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,159 @@
+// What becomes of a run's candidate: the evidence is gathered, and it is
+// validated against what is active.
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "core/change/concerned.h"
+#include "server/pipeline/after_change.h"
+#include "server/pipeline/candidate.h"
+#include "server/pipeline/recalibration.h"
+#include "server/pipeline/verdict.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// Segments that a candidate is tested with.
+constexpr int kHeldOut = 8;
+// What was scored with the noise that the rig states is worth testing with as
+// long as the noise that was used is not larger than so many times that.
+constexpr double kMaxNoiseOff = 1.5;
+
+// The rig with the noise that the calibration was weighted with.
+Rig WithUsedNoise(const Rig& rig, const CalibrationResult& result) {
+  Rig used = rig;
+  for (const NoiseFactor& factor : result.noise_factors) {
+    ScaleNoise(factor.kind, factor.used, &used);
+  }
+  return used;
+}
+
+bool StatedNoiseHolds(const CalibrationResult& result) {
+  return std::all_of(
+      result.noise_factors.begin(),
+      result.noise_factors.end(),
+      [](const NoiseFactor& factor) { return factor.used <= kMaxNoiseOff; });
+}
+
+bool IsExcluded(const CalibrationResult& result, const SegmentKey& key) {
+  return std::any_of(result.segment_fits.begin(),
+                     result.segment_fits.end(),
+                     [&](const SegmentFit& fit) {
+                       return fit.key == key && !fit.excluded.empty();
+                     });
+}
+
+}  // namespace
+
+// Nothing where the data cannot be used; an error where it cannot be read now.
+absl::StatusOr<std::optional<SegmentInformation>> Recalibrator::Rescore(
+    const std::string& rig_id,
+    const SegmentKey& key,
+    const Rig& rig,
+    const Calibration& theta) {
+  const auto segment = store_->GetSegmentData(rig_id, key);
+  if (absl::IsDataLoss(segment.status()) ||
+      absl::IsFailedPrecondition(segment.status())) {
+    return std::nullopt;
+  }
+  SELFCAL_RETURN_IF_ERROR(segment.status());
+  try {
+    return estimators_.score(rig, theta, *segment);
+  } catch (const std::exception& error) {
+    spdlog::warn("held-out segment {}~{} of rig {} cannot be scored: {}",
+                 key.session,
+                 key.index,
+                 rig_id,
+                 error.what());
+    return std::nullopt;
+  }
+}
+
+absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
+    const StoredRun& run, const Rig& rig, const CalibrationResult& result) {
+  HeldOutSegments segments;
+  if (!HasUsableNumbers(rig, result)) return segments;
+  SELFCAL_ASSIGN_OR_RETURN(std::vector<Store::HeldOut> held_out,
+                           store_->ListHeldOut(run.rig, run.run, kHeldOut));
+  const Rig used = WithUsedNoise(rig, result);
+  const bool stated_noise_holds = StatedNoiseHolds(result);
+  for (Store::HeldOut& one : held_out) {
+    std::optional<SegmentInformation> again;
+    if (one.has_data) {
+      SELFCAL_ASSIGN_OR_RETURN(again,
+                               Rescore(run.rig, one.key, used, result.theta));
+    }
+    if (again) {
+      segments.push_back({*std::move(again), true});
+    } else if (stated_noise_holds) {
+      segments.push_back({std::move(one.information), false});
+    }
+  }
+  return segments;
+}
+
+// Nothing where the data of a segment is damaged, or gone.
+absl::StatusOr<std::optional<Diagnosis>> Recalibrator::DiagnoseUsed(
+    const StoredRun& run, const Rig& rig, const CalibrationResult& result) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration base,
+                           store_->GetCalibration(run.rig, run.base_version));
+  std::vector<MotionSegment> segments;
+  for (const SegmentKey& key : run.segments) {
+    if (IsExcluded(result, key)) continue;
+    auto segment = store_->GetSegmentData(run.rig, key);
+    if (absl::IsDataLoss(segment.status()) ||
+        absl::IsFailedPrecondition(segment.status())) {
+      return std::nullopt;
+    }
+    SELFCAL_RETURN_IF_ERROR(segment.status());
+    segments.push_back(*std::move(segment));
+  }
+  return Diagnose(rig, base.theta, segments);
+}
+
+absl::Status Recalibrator::Validate(const StoredRun& run,
+                                    StoredCalibration* candidate) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
+  const CalibrationResult& result = candidate->report.value();
+  CandidateEvidence evidence;
+  SELFCAL_ASSIGN_OR_RETURN(evidence.active,
+                           store_->GetActiveCalibration(run.rig));
+  evidence.active.covariance =
+      CovarianceAt(rig, evidence.active, options_.now_ns());
+  if (run.change > 0) {
+    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
+                             store_->GetChange(run.rig, run.change));
+    if (evidence.active.version == change.base_version) {
+      evidence.active.covariance =
+          CovarianceAfter(rig.rig, change, evidence.active.covariance);
+      evidence.changed = ConcernedComponents(rig.rig, change.groups);
+    }
+  }
+  SELFCAL_ASSIGN_OR_RETURN(evidence.held_out,
+                           GatherHeldOut(run, rig.rig, result));
+  SELFCAL_ASSIGN_OR_RETURN(evidence.diagnosis,
+                           DiagnoseUsed(run, rig.rig, result));
+  CandidateValidation validated = ValidateCandidate(rig.rig, result, evidence);
+  candidate->verdict = MakeVerdict(rig.rig, result, validated);
+  candidate->state = validated.reasons.empty() ? CalibrationState::kActive
+                                               : CalibrationState::kRejected;
+  candidate->reasons = std::move(validated.reasons);
+  candidate->validation = std::move(validated.validation);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<StoredCalibration> Recalibrator::Finish(
+    const StoredRun& run, StoredCalibration candidate) {
+  for (;;) {
+    SELFCAL_RETURN_IF_ERROR(Validate(run, &candidate));
+    auto finished = store_->FinishRun(run.rig, run.run, candidate);
+    if (!absl::IsAborted(finished.status())) {
+      return finished;
+    }
+  }
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,112 @@
+#include "client/text/calibration_facts.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace selfcal::client {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// The texts under a name.
+std::vector<std::string> Texts(const v1::Calibration& calibration,
+                               const std::string& name) {
+  std::vector<std::string> texts;
+  for (const Fact& fact : CalibrationFacts(calibration)) {
+    if (fact.name == name) texts.push_back(fact.text);
+  }
+  return texts;
+}
+
+v1::NoiseFactor* AddNoise(v1::Calibration* calibration, double used) {
+  auto* factor = calibration->mutable_solver()->add_noise_factors();
+  factor->set_kind("gyro");
+  factor->set_factor(3.02);
+  factor->set_log_sigma(0.047);
+  factor->set_determined(true);
+  factor->set_used(used);
+  factor->set_converged(true);
+  return factor;
+}
+
+TEST(CalibrationFacts, SayWhichNoiseWasUsed) {
+  v1::Calibration calibration;
+  v1::NoiseFactor* factor = AddNoise(&calibration, 2.97);
+  EXPECT_THAT(Texts(calibration, "noise"),
+              ElementsAre("gyro noise: residuals suggest 3.02 times what the "
+                          "rig states (+- 5 %); 2.97 times was used"));
+  factor->set_converged(false);
+  EXPECT_THAT(Texts(calibration, "noise"),
+              ElementsAre(HasSubstr("did not converge; 2.97 times was used")));
+  factor->set_used(0);  // an older version
+  EXPECT_THAT(Texts(calibration, "noise"),
+              ElementsAre("gyro noise: residuals suggest 3.02 times what the "
+                          "rig states (+- 5 %)"));
+}
+
+TEST(CalibrationFacts, GiveTheVerdictWithItsReasons) {
+  v1::Calibration calibration;
+  EXPECT_THAT(Texts(calibration, "verdict"), ElementsAre("unknown"));
+  v1::Verdict* verdict = calibration.mutable_verdict();
+  verdict->set_kind(v1::Verdict::WEAK);
+  verdict->set_text("weak");
+  verdict->add_sentences("Hardly learned: cam0.p_CI.z.");
+  EXPECT_THAT(Texts(calibration, "verdict"), ElementsAre("weak"));
+  EXPECT_THAT(Texts(calibration, "weak because"),
+              ElementsAre("Hardly learned: cam0.p_CI.z."));
+}
+
+TEST(CalibrationFacts, GiveTheReasonsOfARejectedOneOnce) {
+  v1::Calibration calibration;
+  calibration.add_reasons("The solver stalled.");
+  calibration.mutable_verdict()->set_kind(v1::Verdict::NOT_TRUSTWORTHY);
+  calibration.mutable_verdict()->set_text("not trustworthy");
+  calibration.mutable_verdict()->add_sentences("The solver stalled.");
+  EXPECT_THAT(Texts(calibration, "verdict"), ElementsAre("not trustworthy"));
+  EXPECT_THAT(Texts(calibration, "rejected because"),
+              ElementsAre("The solver stalled."));
+  EXPECT_THAT(Texts(calibration, "note"), IsEmpty());
+}
+
+TEST(CalibrationFacts, TellAFailedCheckFromOneThatWasNotMade) {
+  v1::Calibration calibration;
+  auto* check = calibration.mutable_validation()->add_checks();
+  check->set_name("halves");
+  check->set_outcome(v1::Validation::Check::NOT_TESTED);
+  check->set_sentence("There were too few segments.");
+  check = calibration.mutable_validation()->add_checks();
+  check->set_name("rank");
+  check->set_value(0);
+  check->set_limit(26);
+  check->set_outcome(v1::Validation::Check::FAILED);
+  check = calibration.mutable_validation()->add_checks();
+  check->set_name("converged");  // of an older daemon
+  check->set_value(1);
+  check->set_limit(1);
+  check->set_passed(true);
+  EXPECT_THAT(Texts(calibration, "check"),
+              ElementsAre("halves not tested: There were too few segments.",
+                          "rank failed: 0, limit 26",
+                          "converged passed: 1, limit 1"));
+}
+
+TEST(CalibrationFacts, NameSegmentsThatWereExcluded) {
+  v1::Calibration calibration;
+  calibration.mutable_solver()->add_segment_fits()->set_segment(
+      "rigs/a/segments/walk~1");
+  auto* fit = calibration.mutable_solver()->add_segment_fits();
+  fit->set_segment("rigs/a/segments/walk~2");
+  fit->set_excluded("it contradicts the others");
+  calibration.mutable_solver()->mutable_halves()->set_degrees(26);
+  calibration.mutable_solver()->mutable_halves()->set_chi_square(25.5);
+  EXPECT_THAT(Texts(calibration, "excluded segment"),
+              ElementsAre("walk~2: it contradicts the others"));
+  EXPECT_THAT(Texts(calibration, "halves of the segments"),
+              Contains(HasSubstr("25.5 with 26 degrees")));
+}
+
+}  // namespace
+}  // namespace selfcal::client
