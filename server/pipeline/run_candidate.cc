@@ -8,6 +8,7 @@
 #include "server/pipeline/candidate.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/run_settings.h"
+#include "server/pipeline/stored_information.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -45,7 +46,9 @@ absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
     SELFCAL_ASSIGN_OR_RETURN(
         const StoredCalibration before,
         store_->GetCalibration(run.rig, change.base_version));
-    options.prior = KnownAfter(rig.rig, change, before);
+    SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
+                             ListInformation(store_, run.rig, run.segments));
+    options.prior = KnownAfter(rig.rig, change, before, since);
   }
   SELFCAL_ASSIGN_OR_RETURN(
       CalibrationResult result,
@@ -145,7 +148,9 @@ absl::Status Recalibrator::Judge(const StoredRun& run,
     SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
                              store_->GetChange(run.rig, run.change));
     if (active.version == change.base_version) {
-      active.covariance = CovarianceAfter(rig.rig, change, active.covariance);
+      SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
+                               ListInformation(store_, run.rig, run.segments));
+      active.covariance = CovarianceAfter(rig.rig, change, active, since);
     }
   }
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> held_out,
