@@ -13,6 +13,10 @@ namespace {
 // As everywhere: a direction is observed if the data says more than the prior.
 constexpr double kObserved = 1.0;
 
+// Of the reach of a segment: the sigma of what it takes for known there.
+// Simulated rotations in place are off by up to one and a half of it.
+constexpr double kReachError = 2.0;
+
 // Eigenvectors of a symmetric matrix with their eigenvalues, of those observed.
 struct Observed {
   explicit Observed(const Eigen::MatrixXd& information) {
@@ -41,6 +45,11 @@ OffsetInformation& OffsetInformation::operator+=(
     const OffsetInformation& other) {
   Lambda += other.Lambda;
   eta += other.eta;
+  if (reach.size() == 0) {
+    reach = other.reach;
+  } else if (other.reach.size() > 0) {
+    reach = reach.cwiseMax(other.reach);
+  }
   return *this;
 }
 
@@ -59,18 +68,15 @@ ConsistencyTester::ConsistencyTester(const Rig& rig,
           std::pow(std::max(1.0, active.track_noise_factor), 2))),
       free_(FreeComponents(rig)),
       prior_(PriorSigmas(rig)(free_)),
-      reference_(ReferenceSigmas(rig)(free_)) {
+      reference_(ReferenceSigmas(rig)(free_)),
+      blocks_(ParameterBlocks(rig)),
+      groups_(GroupBlocks(rig)) {
   const Eigen::VectorXd scale = prior_.cwiseInverse();
   Sigma_ =
       scale.asDiagonal() * active.covariance(free_, free_) * scale.asDiagonal();
-  for (const ParameterGroup& settings : rig.groups) {
-    Group group{settings.name, {}};
-    for (const int i : GroupComponents(rig, settings)) {
-      const auto at = std::lower_bound(free_.begin(), free_.end(), i);
-      group.at.push_back(static_cast<int>(at - free_.begin()));
-    }
-    groups_.push_back(std::move(group));
-  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Sigma_);
+  root_ = eigen.eigenvectors() *
+          eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
 bool ConsistencyTester::Accepts(const SegmentInformation& information) const {
@@ -92,8 +98,22 @@ OffsetInformation ConsistencyTester::Offset(
   const Eigen::MatrixXd Lambda = information.Lambda(free_, free_);
   const Eigen::VectorXd at = BoxMinus(information.theta0, theta_)(free_);
   const Eigen::VectorXd eta = information.eta(free_) + Lambda * at;
-  return {prior_.asDiagonal() * Lambda * prior_.asDiagonal() / inflation_,
-          prior_.cwiseProduct(eta) / inflation_};
+  OffsetInformation offset{
+      prior_.asDiagonal() * Lambda * prior_.asDiagonal() / inflation_,
+      prior_.cwiseProduct(eta) / inflation_};
+  if (!at.isZero(0)) {
+    offset.reach = kReachError * at.cwiseAbs().cwiseQuotient(prior_);
+  }
+  return offset;
+}
+
+Eigen::MatrixXd ConsistencyTester::Covariance(
+    const OffsetInformation& offset) const {
+  Eigen::MatrixXd covariance = Sigma_;
+  if (offset.reach.size() > 0) {
+    covariance.diagonal() += offset.reach.cwiseAbs2();
+  }
+  return covariance;
 }
 
 ConsistencyTest ConsistencyTester::Test(const OffsetInformation& offset) const {
@@ -102,7 +122,7 @@ ConsistencyTest ConsistencyTester::Test(const OffsetInformation& offset) const {
   const Eigen::VectorXd variances = observed.values.cwiseInverse();
   const Eigen::VectorXd delta =
       variances.cwiseProduct(U.transpose() * offset.eta);
-  Eigen::MatrixXd covariance = U.transpose() * Sigma_ * U;
+  Eigen::MatrixXd covariance = U.transpose() * Covariance(offset) * U;
   covariance.diagonal() += variances;
   return TestNormal(delta, covariance);
 }
@@ -120,9 +140,9 @@ std::vector<GroupConsistency> ConsistencyTester::TestGroups(
   const Eigen::MatrixXd K = (Lambda + one).ldlt().solve(one);
   const Eigen::VectorXd delta = K * offset.eta;
   const Eigen::MatrixXd covariance =
-      K * (Lambda + Lambda * Sigma_ * Lambda) * K.transpose();
+      K * (Lambda + Lambda * Covariance(offset) * Lambda) * K.transpose();
   std::vector<GroupConsistency> tests;
-  for (const Group& group : groups_) {
+  for (const ParameterBlock& group : groups_) {
     const auto k = static_cast<Eigen::Index>(group.at.size());
     const Eigen::MatrixXd posterior = K(group.at, group.at);
     const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(k, k);

@@ -8,11 +8,13 @@
 // chi-square distributed with as many degrees of freedom. Segments that share
 // nothing are fused by adding their information.
 //
-// The information of a segment is linear. It is used where the calibration at
-// which it was linearised is near the active one: within kMaxLinearisation
-// reference sigmas in every component. (Simulated with the SLAM system's states
-// as they are, d has the stated distribution up to there; at twice that its
-// mean is 1.2 times the degrees.)
+// The information of a segment is linear, and taken at the states of the SLAM
+// system. Where noise in these looks like motion, it claims to know what the
+// motion does not show: that theta is where it was linearised. That is no
+// evidence for a change. So the distance from there to the active calibration
+// makes an unknown error of the segment, of a standard deviation twice as large
+// in each component: its reach. A segment from over kMaxLinearisation reference
+// sigmas away is not tested at all.
 //
 // Pure, deterministic, any thread.
 #pragma once
@@ -22,13 +24,14 @@
 #include <string>
 #include <vector>
 
+#include "core/change/parameter_blocks.h"
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 
 namespace selfcal {
 
-inline constexpr double kMaxLinearisation = 2.0;  // reference sigmas
+inline constexpr double kMaxLinearisation = 1.0;  // reference sigmas
 
 // A calibration and how well it is known.
 struct KnownCalibration {
@@ -55,8 +58,12 @@ struct GroupConsistency {
 struct OffsetInformation {
   Eigen::MatrixXd Lambda;
   Eigen::VectorXd eta;
+  // By component, of the one that reaches furthest; empty: linearised at the
+  // active calibration.
+  Eigen::VectorXd reach = {};
 
   OffsetInformation& operator+=(const OffsetInformation& other);
+  // Keeps the reach.
   OffsetInformation& operator-=(const OffsetInformation& other);
 };
 
@@ -82,15 +89,20 @@ class ConsistencyTester {
   OffsetInformation Offset(const SegmentInformation& information) const;
 
   ConsistencyTest Test(const OffsetInformation& offset) const;
-  // In the order of rig.groups.
+  // In the order of rig.groups, each with all others unknown.
   std::vector<GroupConsistency> TestGroups(
       const OffsetInformation& offset) const;
 
+  // The covariance of the active calibration is root root^T, of the free
+  // components in units of the prior's sigmas.
+  const Eigen::MatrixXd& root() const { return root_; }
+  const std::vector<ParameterBlock>& blocks() const { return blocks_; }
+  // Of rig.groups, in their order.
+  const std::vector<ParameterBlock>& groups() const { return groups_; }
+
  private:
-  struct Group {
-    std::string name;
-    std::vector<int> at;  // among the free components
-  };
+  // With the reach of segments.
+  Eigen::MatrixXd Covariance(const OffsetInformation& offset) const;
 
   const Calibration theta_;
   const double inflation_;
@@ -98,7 +110,9 @@ class ConsistencyTester {
   const Eigen::VectorXd prior_;      // sigmas of the free components
   const Eigen::VectorXd reference_;  // sigmas of the free components
   Eigen::MatrixXd Sigma_;            // of the free components, in prior units
-  std::vector<Group> groups_;
+  Eigen::MatrixXd root_;             // of Sigma_
+  const std::vector<ParameterBlock> blocks_;
+  const std::vector<ParameterBlock> groups_;
 };
 
 }  // namespace selfcal

@@ -1,83 +1,79 @@
 #include "core/change/detect_change.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <span>
 
+#include "core/change/course.h"
+#include "core/change/course_search.h"
+
 namespace selfcal {
 namespace {
 
-constexpr int kSmallestWindow = 2;
+constexpr int kShortestStep = 2;
+constexpr int kShortestRamp = 8;
 
-int CountWindows(int max_window) {
+// The size of the next longer step to try.
+int Longer(int n) { return n + std::max(1, n / 4); }
+
+int CountCourses(int max_window) {
   int count = 0;
-  for (int n = kSmallestWindow; n <= max_window; n *= 2) ++count;
+  for (int n = kShortestStep; n <= max_window; n = Longer(n)) ++count;
+  for (int n = kShortestRamp; n <= max_window; n *= 2) ++count;
   return count;
 }
 
-OffsetInformation Fuse(std::span<const OffsetInformation> segments) {
-  OffsetInformation sum = segments.front();
-  for (const OffsetInformation& segment : segments.subspan(1)) sum += segment;
-  return sum;
-}
-
-// The test of a window with that segment left out that speaks loudest for a
-// change: the largest probability.
-double ProbabilityWithoutOne(const ConsistencyTester& tester,
-                             std::span<const OffsetInformation> window,
-                             const OffsetInformation& sum) {
-  double largest = 0;
-  for (const OffsetInformation& segment : window) {
-    OffsetInformation rest = sum;
-    rest -= segment;
-    largest = std::max(largest, tester.Test(rest).probability);
+void TryAll(const ConsistencyTester& tester,
+            std::span<const OffsetInformation> segments,
+            CourseSearch* search) {
+  const int count = static_cast<int>(segments.size());
+  Course step = MakeCourse(segments, StepCourse(count, 0), tester.root());
+  int after = 0;
+  for (int n = kShortestStep; n <= count; n = Longer(n)) {
+    for (; after < n; ++after) {
+      const OffsetInformation& segment = segments[count - 1 - after];
+      step.Remove(segment, 0);
+      step.Add(segment, 1);
+    }
+    search->Try(StepCourse(count, n), step);
   }
-  return largest;
+  for (int n = kShortestRamp; n <= count; n *= 2) {
+    const Eigen::VectorXd weights = RampCourse(count, n);
+    search->Try(weights, MakeCourse(segments, weights, tester.root()));
+  }
 }
 
-// ln of how much more probable the data is under an offset of which nothing is
-// known but the prior, than under none.
-double LogEvidence(const OffsetInformation& offset) {
-  Eigen::MatrixXd posterior = offset.Lambda;
-  posterior.diagonal().array() += 1;
-  const Eigen::LLT<Eigen::MatrixXd> llt(posterior);
-  return offset.eta.dot(llt.solve(offset.eta)) / 2 -
-         llt.matrixLLT().diagonal().array().log().sum();
-}
+// The evidence of every course of one kind over the newest segments.
+struct Evidence {
+  std::vector<double> step;  // [n - 1]: before the newest n
+  std::vector<double> ramp;  // [n - 2]: over the newest n
+};
 
-// [n - 1]: the evidence for a step before the newest n segments.
-std::vector<double> StepEvidence(std::span<const OffsetInformation> segments) {
-  std::vector<double> evidence;
-  OffsetInformation sum = segments.back();
-  evidence.push_back(LogEvidence(sum));
-  for (std::size_t n = 2; n <= segments.size(); ++n) {
-    sum += segments[segments.size() - n];
-    evidence.push_back(LogEvidence(sum));
+Evidence EvidenceOfAll(const ConsistencyTester& tester,
+                       std::span<const OffsetInformation> segments,
+                       const FoundCourse& found) {
+  const int count = static_cast<int>(segments.size());
+  const auto of = [&](const Eigen::VectorXd& weights) {
+    const Course course = MakeCourse(segments, weights, tester.root());
+    return LogEvidence(course.Change(), found.block->basis) /
+           found.heterogeneity;
+  };
+  Evidence evidence;
+  for (int n = 1; n <= count; ++n) {
+    evidence.step.push_back(of(StepCourse(count, n)));
+    if (n > 1) evidence.ramp.push_back(of(RampCourse(count, n)));
   }
   return evidence;
 }
 
-// Of an offset that grows evenly over the newest n segments to what it is now.
-double RampEvidence(std::span<const OffsetInformation> segments, int n) {
-  const auto newest = segments.last(n);
-  OffsetInformation sum = newest.back();
-  for (int i = 0; i + 1 < n; ++i) {
-    const double share = (i + 1.0) / n;
-    sum.Lambda += share * share * newest[i].Lambda;
-    sum.eta += share * newest[i].eta;
-  }
-  return LogEvidence(sum);
-}
-
-double Largest(const std::vector<double>& values) {
-  return *std::max_element(values.begin(), values.end());
+std::size_t Largest(const std::vector<double>& values) {
+  return std::max_element(values.begin(), values.end()) - values.begin();
 }
 
 // The most segments that all come after the change with the probability, less
 // the oldest of them: the change may lie within it.
 int SegmentsSince(const std::vector<double>& evidence, double probability) {
-  const double largest = Largest(evidence);
+  const double largest = evidence[Largest(evidence)];
   double total = 0;
   for (const double e : evidence) total += std::exp(e - largest);
   double sum = 0;
@@ -88,25 +84,44 @@ int SegmentsSince(const std::vector<double>& evidence, double probability) {
   return 0;
 }
 
-ChangeKind Kind(std::span<const OffsetInformation> segments,
-                const std::vector<double>& step) {
-  double ramp = RampEvidence(segments, 2);
-  for (int n = 3; n <= static_cast<int>(segments.size()); ++n) {
-    ramp = std::max(ramp, RampEvidence(segments, n));
-  }
-  return ramp > Largest(step) ? ChangeKind::kDrift : ChangeKind::kSudden;
-}
-
-std::vector<std::string> Concerned(const std::vector<GroupConsistency>& groups,
-                                   double level) {
+std::vector<std::string> Names(const std::vector<GroupConcern>& groups) {
   std::vector<std::string> names;
-  for (const GroupConsistency& group : groups) {
-    if (group.test.probability < level) names.push_back(group.group);
+  for (const GroupConcern& group : groups) {
+    if (group.concerned) names.push_back(group.group);
   }
   if (!names.empty()) return names;
   // None stands out: whichever it is, all are concerned.
-  for (const GroupConsistency& group : groups) names.push_back(group.group);
+  for (const GroupConcern& group : groups) names.push_back(group.group);
   return names;
+}
+
+Change Describe(const ConsistencyTester& tester,
+                std::span<const OffsetInformation> segments,
+                const FoundCourse& found,
+                const ChangeOptions& options) {
+  Change change;
+  change.window = static_cast<int>((found.weights.array() > 0).count());
+  change.block = found.block->name;
+  change.test = found.test;
+  const Evidence evidence = EvidenceOfAll(tester, segments, found);
+  const std::size_t step = Largest(evidence.step);
+  const std::size_t ramp = Largest(evidence.ramp);
+  const bool drifts = evidence.ramp[ramp] > evidence.step[step];
+  change.kind = drifts ? ChangeKind::kDrift : ChangeKind::kSudden;
+  change.segments_since =
+      SegmentsSince(evidence.step, options.since_probability);
+  const int count = static_cast<int>(segments.size());
+  const Course course =
+      MakeCourse(segments,
+                 drifts ? RampCourse(count, static_cast<int>(ramp) + 2)
+                        : StepCourse(count, static_cast<int>(step) + 1),
+                 tester.root());
+  OffsetInformation information = course.Change();
+  information.Lambda /= found.heterogeneity;
+  information.eta /= found.heterogeneity;
+  change.groups = FindConcerned(tester, information, options.group_level);
+  change.concerned = Names(change.groups);
+  return change;
 }
 
 }  // namespace
@@ -114,33 +129,14 @@ std::vector<std::string> Concerned(const std::vector<GroupConsistency>& groups,
 std::optional<Change> DetectChange(const ConsistencyTester& tester,
                                    const std::vector<OffsetInformation>& newest,
                                    const ChangeOptions& options) {
-  std::span<const OffsetInformation> segments(newest);
-  segments = segments.last(
-      std::min(segments.size(), static_cast<std::size_t>(options.max_window)));
-  const int size = static_cast<int>(segments.size());
-  const double level =
-      options.false_alarm_rate / CountWindows(options.max_window);
-  for (int n = kSmallestWindow; n <= size; n *= 2) {
-    const auto window = segments.last(n);
-    const OffsetInformation sum = Fuse(window);
-    const ConsistencyTest test = tester.Test(sum);
-    if (test.probability >= level ||
-        ProbabilityWithoutOne(tester, window, sum) >= level) {
-      continue;
-    }
-    Change change;
-    change.window = n;
-    change.test = test;
-    const std::vector<double> step = StepEvidence(segments);
-    change.kind = Kind(segments, step);
-    change.segments_since = SegmentsSince(step, options.since_probability);
-    const auto after = std::max_element(step.begin(), step.end());
-    change.groups =
-        tester.TestGroups(Fuse(segments.last(after - step.begin() + 1)));
-    change.concerned = Concerned(change.groups, options.group_level);
-    return change;
-  }
-  return std::nullopt;
+  const std::span<const OffsetInformation> segments = std::span(newest).last(
+      std::min(newest.size(), static_cast<std::size_t>(options.max_window)));
+  const auto tests = static_cast<double>(CountCourses(options.max_window)) *
+                     static_cast<double>(tester.blocks().size());
+  CourseSearch search(tester, segments, options.false_alarm_rate / tests);
+  TryAll(tester, segments, &search);
+  if (!search.best()) return std::nullopt;
+  return Describe(tester, segments, *search.best(), options);
 }
 
 }  // namespace selfcal

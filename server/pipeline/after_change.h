@@ -3,23 +3,33 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 
 #include "core/calibration/theta_prior.h"
+#include "core/information/segment_information.h"
 #include "core/model/rig.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 
-// The prior of the runs after it: what `before` (change.base_version) knows of
-// the components that the change does not concern.
+// `since`: what the segments since the change show. `before` is the
+// calibration from before it (change.base_version). Groups that the change was
+// not found to concern may have changed all the same, by as much as these
+// segments would not show: what was known of them is as much less certain
+// (core/change/group_concern.h).
+
+// The prior of the runs after it: what `before` knows of the components that
+// the change does not concern.
 ThetaPrior KnownAfter(const Rig& rig,
                       const StoredChange& change,
-                      const StoredCalibration& before);
+                      const StoredCalibration& before,
+                      std::span<const SegmentInformation> since);
 
-// A covariance from before the change, with the rig's prior for the components
-// that it concerns.
+// The covariance of `before`, with the rig's prior for the components that the
+// change concerns.
 Eigen::MatrixXd CovarianceAfter(const Rig& rig,
                                 const StoredChange& change,
-                                const Eigen::MatrixXd& covariance);
+                                const StoredCalibration& before,
+                                std::span<const SegmentInformation> since);
 
 }  // namespace selfcal::server

@@ -7,6 +7,7 @@
 
 #include "core/selection/tables.h"
 #include "server/pipeline/after_change.h"
+#include "server/pipeline/stored_information.h"
 #include "server/store/records.h"
 #include "server/store/status_macros.h"
 
@@ -39,18 +40,14 @@ absl::StatusOr<std::vector<SegmentInformation>> InformationSince(
     Store* store, const StoredCalibration& active) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
                            store->GetTables(active.rig));
-  std::vector<SegmentInformation> since;
+  std::vector<SegmentKey> since;
   for (const TableEntry& entry : UnionOfTables(tables)) {
     const auto& used = active.segments;
-    if (std::find(used.begin(), used.end(), entry.key) != used.end()) continue;
-    auto segment = store->GetSegment(active.rig, entry.key);
-    if (absl::IsDataLoss(segment.status())) continue;
-    SELFCAL_RETURN_IF_ERROR(segment.status());
-    if (segment->information) {
-      since.push_back(*std::move(segment->information));
+    if (std::find(used.begin(), used.end(), entry.key) == used.end()) {
+      since.push_back(entry.key);
     }
   }
-  return since;
+  return ListInformation(store, active.rig, since);
 }
 
 }  // namespace
@@ -61,11 +58,11 @@ absl::StatusOr<RigCoaching> RigCoach::Advise(const std::string& rig_name) {
                            store_->GetActiveCalibration(rig_name));
   SELFCAL_ASSIGN_OR_RETURN(const std::optional<StoredChange> change,
                            NewestChange(store_, rig_name));
-  if (change && change->base_version == active.version) {
-    active.covariance = CovarianceAfter(rig.rig, *change, active.covariance);
-  }
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
                            InformationSince(store_, active));
+  if (change && change->base_version == active.version) {
+    active.covariance = CovarianceAfter(rig.rig, *change, active, since);
+  }
   const Eigen::MatrixXd known =
       KnownInformation(rig.rig, active.theta, active.covariance, since);
   if (!known.allFinite()) {

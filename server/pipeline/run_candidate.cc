@@ -7,6 +7,7 @@
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/run_settings.h"
+#include "server/pipeline/stored_information.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -38,7 +39,9 @@ absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
     SELFCAL_ASSIGN_OR_RETURN(
         const StoredCalibration before,
         store_->GetCalibration(run.rig, change.base_version));
-    options.prior = KnownAfter(rig.rig, change, before);
+    SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
+                             ListInformation(store_, run.rig, run.segments));
+    options.prior = KnownAfter(rig.rig, change, before, since);
   }
   SELFCAL_ASSIGN_OR_RETURN(
       CalibrationResult result,

@@ -10,6 +10,7 @@
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/candidate.h"
 #include "server/pipeline/recalibration.h"
+#include "server/pipeline/stored_information.h"
 #include "server/pipeline/verdict.h"
 #include "server/store/status_macros.h"
 
@@ -127,8 +128,10 @@ absl::Status Recalibrator::Validate(const StoredRun& run,
     SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
                              store_->GetChange(run.rig, run.change));
     if (evidence.active.version == change.base_version) {
+      SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
+                               ListInformation(store_, run.rig, run.segments));
       evidence.active.covariance =
-          CovarianceAfter(rig.rig, change, evidence.active.covariance);
+          CovarianceAfter(rig.rig, change, evidence.active, since);
       evidence.changed = ConcernedComponents(rig.rig, change.groups);
     }
   }

@@ -26,7 +26,8 @@ absl::StatusOr<SegmentInformation> ReadInformation(const Statement& row) {
   return ParseInformation(bytes, kWhat);
 }
 
-// The newest segments that can be tested, oldest first.
+// The newest segments that can be tested, oldest first: `count` of twice as
+// many.
 struct Newest {
   std::vector<OffsetInformation> segments;
   std::vector<std::int64_t> sequences;
@@ -49,9 +50,9 @@ absl::StatusOr<Newest> ReadNewest(Connection* db,
                  rig.rowid,
                  first_sequence,
                  active.version,
-                 count);
+                 2 * count);
   Newest newest;
-  while (read.Next()) {
+  while (static_cast<int>(newest.segments.size()) < count && read.Next()) {
     const auto information = ReadInformation(read);
     if (!information.ok() || !tester.Accepts(*information)) {
       continue;
@@ -84,7 +85,7 @@ std::string Describe(const Change& found, const StoredChange& change) {
   return fmt::format(
       "change {} ({}): calibration {} does not fit the segments from sequence "
       "{} on; concerned: {}; chi-square {:.1f} with {} degrees over {} "
-      "segments "
+      "segments, {} changed "
       "(probability {:.1e}; variances of segments times {:.2f})",
       change.change,
       found.kind == ChangeKind::kSudden ? "sudden" : "drift",
@@ -94,6 +95,7 @@ std::string Describe(const Change& found, const StoredChange& change) {
       found.test.statistic,
       found.test.degrees,
       found.window,
+      found.block == "all" ? "anything" : found.block,
       found.test.probability,
       change.inflation);
 }

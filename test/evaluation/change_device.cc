@@ -31,6 +31,13 @@ class Stretch final : public Trajectory {
 }  // namespace
 
 ChangeDevice MakeChangeDevice(int index) {
+  return MakeChangeDevice(
+      index,
+      *MakeHandheld(
+          kActiveSegments * kChangeSegment_s + kMargin_s, 0.7, 1000 + index));
+}
+
+ChangeDevice MakeChangeDevice(int index, const Trajectory& motion) {
   ChangeDevice device{HandheldRig("device"), {}, {}};
   device.truth = device.rig.factory;
   device.rig.factory = PerturbCalibration(device.truth, {}, index + 1);
@@ -39,13 +46,7 @@ ChangeDevice MakeChangeDevice(int index) {
   // As in datasets.h: else each keyframe has to be eliminated against all.
   options.revisit_fraction = 0;
   const auto session = Simulate(
-      device.rig,
-      device.truth,
-      device.rig.factory,
-      *MakeHandheld(
-          kActiveSegments * kChangeSegment_s + kMargin_s, 0.7, options.seed),
-      "active",
-      options);
+      device.rig, device.truth, device.rig.factory, motion, "active", options);
   const CalibrationResult result = Calibrate(
       device.rig, device.rig.factory, session.segments, ComparedOptions());
   if (result.status != CalibrateStatus::kConverged) {

@@ -23,6 +23,8 @@ struct ChangeDevice {
 
 // Another factory calibration and another session for each index.
 ChangeDevice MakeChangeDevice(int index);
+// Of a session of that motion.
+ChangeDevice MakeChangeDevice(int index, const Trajectory& motion);
 
 // The first camera turns about an axis askew to all others, or its focal
 // lengths grow: at once, or by as much with every segment.
@@ -51,7 +53,7 @@ class ChangeUse {
   const std::unique_ptr<Trajectory> motion_;
 };
 
-// The parts of the experiment: tables, plots and figures.
+// The parts of the experiment "change": tables, plots and figures.
 // False alarms of segments in sequence (change_rates.cc).
 void RunChangeRates(const ChangeDevice& device,
                     const std::vector<SegmentInformation>& pool,

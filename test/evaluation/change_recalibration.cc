@@ -2,6 +2,7 @@
 // and that on tables that were not started anew.
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/change/concerned.h"
 #include "core/change/detect_change.h"
+#include "core/change/group_concern.h"
 #include "test/evaluation/change_device.h"
 #include "test/evaluation/estimators.h"
 #include "test/evaluation/statistics.h"
@@ -64,11 +66,17 @@ std::vector<MotionSegment> Kept(const Rig& rig, const Sent& sent, int first) {
           rig, {sent.information.begin() + first, sent.information.end()}));
 }
 
-// What stays known of the groups that are not concerned.
+// What stays known of the groups that are not concerned, as far as the segments
+// since do not show otherwise.
 ThetaPrior KnownAfter(const ChangeDevice& device, const Sent& sent) {
+  const Eigen::MatrixXd doubt =
+      DoubtOfUnconcerned(device.rig,
+                         device.active,
+                         std::span(sent.information).subspan(sent.first_after),
+                         sent.concerned);
   return MarginalPrior(device.rig,
                        device.active.theta,
-                       device.active.covariance,
+                       device.active.covariance + doubt,
                        UnconcernedComponents(device.rig, sent.concerned));
 }
 

@@ -8,6 +8,9 @@ void RunDatasets(Context* context);
 void RunGainThreshold(Context* context);
 void RunBatchMatch(Context* context);
 void RunChange(Context* context);
+void RunTurnCalm(Context* context);
+void RunDriftFocal(Context* context);
+void RunRotationFalseAlarms(Context* context);
 void RunCoach(Context* context);
 void RunEntropy(Context* context);
 void RunGroups(Context* context);
@@ -34,6 +37,17 @@ const std::vector<Experiment>& Experiments() {
        "informative segments against batch and information gain (Table I)",
        RunBatchMatch},
       {"change", "change of the device: false alarms and delay", RunChange},
+      {"turn_calm",
+       "a camera turned by 0.2 degrees between calm sessions, and calibrations "
+       "on segments from before and after it",
+       RunTurnCalm},
+      {"drift_focal",
+       "a focal length that drifts by a pixel in ten minutes",
+       RunDriftFocal},
+      {"rotation_false_alarms",
+       "false alarms on motions that do not show all of theta, scored at the "
+       "active version and elsewhere",
+       RunRotationFalseAlarms},
       {"entropy", "does the entropy find informative segments?", RunEntropy},
       {"groups", "several groups of parameters against one", RunGroups},
       {"run_time", "run-time of each, side by side (Table II)", RunRunTime},

@@ -101,16 +101,34 @@ TEST_F(ConsistencyTesterTest, TestsNothingWhereNothingIsObserved) {
   }
 }
 
-TEST_F(ConsistencyTesterTest, DoesNotDependOnWhereASegmentWasLinearised) {
+TEST_F(ConsistencyTesterTest, TakesASegmentToTheActiveCalibration) {
   const Eigen::VectorXd truth = random_.Direction(rig_);
   const SegmentInformation here = random_.Segment(rig_, rig_.factory, truth);
   SegmentInformation there = here;
   const Eigen::VectorXd moved = 0.1 * random_.Direction(rig_);
   there.theta0 = BoxPlus(rig_.factory, moved);
   there.eta -= there.Lambda * moved;
-  const double expected = tester_.Test(tester_.Offset(here)).statistic;
-  EXPECT_NEAR(
-      tester_.Test(tester_.Offset(there)).statistic, expected, 1e-6 * expected);
+  const OffsetInformation offset = tester_.Offset(here);
+  const OffsetInformation taken = tester_.Offset(there);
+  EXPECT_LT((taken.Lambda - offset.Lambda).norm(), 1e-9 * offset.Lambda.norm());
+  EXPECT_LT((taken.eta - offset.eta).norm(), 1e-6 * offset.eta.norm());
+  EXPECT_EQ(offset.reach.size(), 0);
+  EXPECT_EQ(taken.reach.size(), offset.eta.size());
+}
+
+// Noise in the states of the SLAM system that looks like motion: it claims that
+// theta is where the segment was linearised, however that is.
+TEST_F(ConsistencyTesterTest, DoesNotBelieveThatThetaIsWhereItWasLinearised) {
+  const ConsistencyTester exact(rig_, FactoryKnownTo(rig_, 1e-4));
+  const Eigen::VectorXd moved = 0.9 * random_.Direction(rig_);
+  SegmentInformation claims =
+      random_.Segment(rig_, BoxPlus(rig_.factory, moved), zero_, 1e4);
+  ASSERT_TRUE(exact.Accepts(claims));
+  EXPECT_GT(exact.Test(exact.Offset(claims)).probability, 0.01);
+  // The same of a segment that was linearised here is a change.
+  claims.theta0 = rig_.factory;
+  claims.eta += claims.Lambda * moved;
+  EXPECT_LT(exact.Test(exact.Offset(claims)).probability, 1e-9);
 }
 
 // The covariance of a calibration is that with the noise it found: only what

@@ -18,7 +18,7 @@ class DetectChangeTest : public ::testing::Test {
   void Next(const Eigen::VectorXd& offset, double strength = 1) {
     newest_.push_back(
         tester_.Offset(random_.Segment(rig_, rig_.factory, offset, strength)));
-    if (newest_.size() > 16) newest_.erase(newest_.begin());
+    if (newest_.size() > 64) newest_.erase(newest_.begin());
   }
   void Many(int count, const Eigen::VectorXd& offset) {
     for (int i = 0; i < count; ++i) Next(offset);
@@ -124,6 +124,49 @@ TEST_F(DetectChangeTest, FindsADriftThatNoSegmentShowsAlone) {
   }
   EXPECT_EQ(found, 10);
   EXPECT_GE(drifts, 6);
+}
+
+TEST_F(DetectChangeTest, FindsASmallChangeOfFewParameters) {
+  int found = 0;
+  for (int trial = 0; trial < 10; ++trial) {
+    newest_.clear();
+    Many(12, zero_);
+    std::optional<Change> change;
+    for (int i = 0; i < 10 && !change; ++i) {
+      Next(Sigmas(3, "cam0.q_CI.y"));
+      change = Detect();
+    }
+    if (!change) continue;
+    ++found;
+    EXPECT_EQ(change->block, "cam0.q_CI");
+    EXPECT_THAT(change->concerned, ElementsAre("extrinsics"));
+  }
+  EXPECT_GE(found, 8);
+}
+
+TEST_F(DetectChangeTest, BelievesSegmentsAsFarAsTheyAgree) {
+  // Each is off by something of its own, ten times what it claims.
+  for (int i = 0; i < 40; ++i) {
+    Next(10 * random_.Direction(rig_));
+    EXPECT_FALSE(Detect()) << i;
+  }
+}
+
+// Segments of an earlier version whose information is noise taken for motion:
+// they claim that theta is what that version had it.
+TEST_F(DetectChangeTest, ClaimsFromElsewhereAreNoChange) {
+  Many(8, zero_);
+  const Calibration elsewhere =
+      BoxPlus(rig_.factory, 0.9 * random_.Direction(rig_));
+  for (int i = 0; i < 40; ++i) {
+    newest_.push_back(
+        tester_.Offset(random_.Segment(rig_, elsewhere, zero_, 4)));
+    EXPECT_FALSE(Detect()) << i;
+  }
+  for (int i = 0; i < 16; ++i) {
+    Next(zero_);
+    EXPECT_FALSE(Detect()) << i << " segments after them";
+  }
 }
 
 TEST_F(DetectChangeTest, ACarefulFactorNeedsMoreEvidence) {

@@ -1,0 +1,62 @@
+#include "core/change/course_search.h"
+
+#include <algorithm>
+
+#include "core/change/chi_square.h"
+#include "core/change/group_concern.h"
+
+namespace selfcal {
+namespace {
+
+ConsistencyTest Noisier(ConsistencyTest test, double heterogeneity) {
+  test.statistic /= heterogeneity;
+  test.probability = ChiSquareTail(test.statistic, test.degrees);
+  return test;
+}
+
+}  // namespace
+
+// The first that reaches the level will do: most often it is the same segment
+// that many tests hang on.
+double CourseSearch::ProbabilityWithoutOne(const Eigen::VectorXd& weights,
+                                           const Course& course,
+                                           const Eigen::MatrixXd& B,
+                                           double heterogeneity) {
+  double largest = 0;
+  for (std::size_t k = 0; k < segments_.size(); ++k) {
+    const std::size_t i = (suspect_ + k) % segments_.size();
+    Course rest = course;
+    rest.Remove(segments_[i], weights(static_cast<Eigen::Index>(i)));
+    const ConsistencyTest test = TestSpan(rest.Change(), B);
+    const double probability =
+        test.degrees == 0 ? 1 : Noisier(test, heterogeneity).probability;
+    largest = std::max(largest, probability);
+    if (largest >= level_) {
+      suspect_ = i;
+      break;
+    }
+  }
+  return largest;
+}
+
+void CourseSearch::Try(const Eigen::VectorXd& weights, const Course& course) {
+  const OffsetInformation change = course.Change();
+  for (const ParameterBlock& block : tester_.blocks()) {
+    const ConsistencyTest plain = TestSpan(change, block.basis);
+    if (plain.degrees == 0 || plain.probability >= level_) continue;
+    if (!heterogeneity_) heterogeneity_.emplace(segments_);
+    const double heterogeneity =
+        heterogeneity_->Of(weights, course, block.basis);
+    const ConsistencyTest test = Noisier(plain, heterogeneity);
+    const double evidence = LogEvidence(change, block.basis) / heterogeneity;
+    if (test.probability >= level_ || (best_ && evidence <= best_->evidence)) {
+      continue;
+    }
+    const double without_one =
+        ProbabilityWithoutOne(weights, course, block.basis, heterogeneity);
+    if (without_one >= level_) continue;
+    best_ = {weights, &block, test, without_one, heterogeneity, evidence};
+  }
+}
+
+}  // namespace selfcal

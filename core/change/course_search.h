@@ -1,0 +1,54 @@
+// The search for a change over courses and blocks of parameters, that detection
+// (detect_change.h) and the test of a set (split.h) have in common.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+
+#include "core/change/consistency.h"
+#include "core/change/course.h"
+#include "core/change/heterogeneity.h"
+
+namespace selfcal {
+
+struct FoundCourse {
+  Eigen::VectorXd weights;  // of the segments
+  const ParameterBlock* block = nullptr;
+  ConsistencyTest test;    // with the noise by which segments differ
+  double without_one = 1;  // largest probability with one segment left out
+  double heterogeneity = 1;
+  double evidence = 0;  // ln, for the change
+};
+
+// Of one thread. Tester and segments must outlive it.
+class CourseSearch {
+ public:
+  // A test must be less probable than `level`, with the noise by which the
+  // segments differ and whichever one of them is left out.
+  CourseSearch(const ConsistencyTester& tester,
+               std::span<const OffsetInformation> segments,
+               double level)
+      : tester_(tester), segments_(segments), level_(level) {}
+
+  // `course` is that of the segments with these weights.
+  void Try(const Eigen::VectorXd& weights, const Course& course);
+
+  // The course and block with the most evidence so far.
+  const std::optional<FoundCourse>& best() const { return best_; }
+
+ private:
+  double ProbabilityWithoutOne(const Eigen::VectorXd& weights,
+                               const Course& course,
+                               const Eigen::MatrixXd& B,
+                               double heterogeneity);
+
+  const ConsistencyTester& tester_;
+  const std::span<const OffsetInformation> segments_;
+  const double level_;
+  std::optional<Heterogeneity> heterogeneity_;  // once it is needed
+  std::size_t suspect_ = 0;  // without which a test did not stand
+  std::optional<FoundCourse> best_;
+};
+
+}  // namespace selfcal

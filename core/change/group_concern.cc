@@ -1,0 +1,161 @@
+#include "core/change/group_concern.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "core/change/concerned.h"
+#include "core/change/course.h"
+
+namespace selfcal {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Sizes of a change of a group that may have gone unnoticed, in prior sigmas.
+constexpr std::array<double, 5> kSizes = {0.01, 0.03, 0.1, 0.3, 1};
+
+// What is left for others if the change is one of the components `at` as well,
+// of which nothing is known but the prior.
+OffsetInformation Eliminate(const OffsetInformation& change,
+                            const std::vector<int>& at) {
+  if (at.empty()) return change;
+  MatrixXd block = change.Lambda(at, at);
+  block.diagonal().array() += 1;
+  const MatrixXd across = change.Lambda(Eigen::all, at);
+  const MatrixXd gain = block.llt().solve(across.transpose()).transpose();
+  return {change.Lambda - gain * across.transpose(),
+          change.eta - gain * change.eta(at)};
+}
+
+std::vector<int> Union(std::vector<int> a, const std::vector<int>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  std::sort(a.begin(), a.end());
+  a.erase(std::unique(a.begin(), a.end()), a.end());
+  return a;
+}
+
+// The directions of the block outside of the components `at`.
+MatrixXd Without(const ParameterBlock& block, const std::vector<int>& at) {
+  std::vector<Eigen::Index> rest;
+  for (std::size_t k = 0; k < block.at.size(); ++k) {
+    if (!std::binary_search(at.begin(), at.end(), block.at[k])) {
+      rest.push_back(static_cast<Eigen::Index>(k));
+    }
+  }
+  return block.basis(Eigen::all, rest);
+}
+
+// E[y y^T] of a change B y that may have been, given L and s along B.
+MatrixXd SecondMoment(const MatrixXd& L, const VectorXd& s) {
+  std::vector<double> logs = {0};  // of no change at all, at even odds
+  std::vector<MatrixXd> moments = {MatrixXd::Zero(L.rows(), L.cols())};
+  const MatrixXd one = MatrixXd::Identity(L.rows(), L.cols());
+  for (const double size : kSizes) {
+    const Eigen::LLT<MatrixXd> llt(L + one / (size * size));
+    const VectorXd mean = llt.solve(s);
+    const double log_det = 2 * llt.matrixLLT().diagonal().array().log().sum() +
+                           2 * static_cast<double>(s.size()) * std::log(size);
+    logs.push_back(s.dot(mean) / 2 - log_det / 2 -
+                   std::log(static_cast<double>(kSizes.size())));
+    moments.push_back(llt.solve(one) + mean * mean.transpose());
+  }
+  const double largest = *std::max_element(logs.begin(), logs.end());
+  double total = 0;
+  MatrixXd moment = MatrixXd::Zero(L.rows(), L.cols());
+  for (std::size_t k = 0; k < logs.size(); ++k) {
+    const double weight = std::exp(logs[k] - largest);
+    total += weight;
+    moment += weight * moments[k];
+  }
+  return moment / total;
+}
+
+}  // namespace
+
+double LogEvidence(const OffsetInformation& change,
+                   const MatrixXd& B,
+                   double sigma) {
+  MatrixXd posterior = sigma * sigma * (B.transpose() * change.Lambda * B);
+  posterior.diagonal().array() += 1;
+  const VectorXd s = sigma * (B.transpose() * change.eta);
+  const Eigen::LLT<MatrixXd> llt(posterior);
+  return s.dot(llt.solve(s)) / 2 -
+         llt.matrixLLT().diagonal().array().log().sum();
+}
+
+std::vector<GroupConcern> FindConcerned(const ConsistencyTester& tester,
+                                        const OffsetInformation& change,
+                                        double level) {
+  const std::vector<ParameterBlock>& groups = tester.groups();
+  std::vector<GroupConcern> concerns;
+  for (const ParameterBlock& group : groups)
+    concerns.push_back({group.name, {}});
+  std::vector<int> found;
+  for (std::size_t round = 0; round < groups.size(); ++round) {
+    const OffsetInformation rest = Eliminate(change, found);
+    std::optional<std::size_t> best;
+    double evidence = 0;
+    for (std::size_t q = 0; q < groups.size(); ++q) {
+      if (concerns[q].concerned) continue;
+      const MatrixXd B = Without(groups[q], found);
+      concerns[q].test = TestSpan(rest, B);
+      if (concerns[q].test.probability >= level) continue;
+      const double of_group = LogEvidence(rest, B);
+      if (!best || of_group > evidence) {
+        best = q;
+        evidence = of_group;
+      }
+    }
+    if (!best) break;
+    concerns[*best].concerned = true;
+    found = Union(found, groups[*best].at);
+  }
+  return concerns;
+}
+
+MatrixXd DoubtOfUnconcerned(const Rig& rig,
+                            const KnownCalibration& before,
+                            std::span<const SegmentInformation> since,
+                            const std::vector<std::string>& concerned) {
+  const ConsistencyTester tester(rig, before);
+  Course course(tester.root());
+  bool any = false;
+  for (const SegmentInformation& information : since) {
+    if (!tester.Accepts(information)) continue;
+    course.Add(tester.Offset(information), 1);
+    any = true;
+  }
+  const std::vector<int> free = FreeComponents(rig);
+  const auto size = static_cast<Eigen::Index>(free.size());
+  OffsetInformation change{MatrixXd::Zero(size, size), VectorXd::Zero(size)};
+  if (any) change = course.Change();
+  std::vector<int> changed;
+  for (const ParameterBlock& group : tester.groups()) {
+    if (std::count(concerned.begin(), concerned.end(), group.name) > 0) {
+      changed = Union(changed, group.at);
+    }
+  }
+  const OffsetInformation rest = Eliminate(change, changed);
+  MatrixXd doubt = MatrixXd::Zero(size, size);
+  std::vector<int> done = changed;
+  for (const ParameterBlock& group : tester.groups()) {
+    const MatrixXd B = Without(group, done);
+    if (B.cols() == 0) continue;
+    doubt += B *
+             SecondMoment(B.transpose() * rest.Lambda * B,
+                          B.transpose() * rest.eta) *
+             B.transpose();
+    done = Union(done, group.at);
+  }
+  const VectorXd sigmas = PriorSigmas(rig);
+  MatrixXd tangent = MatrixXd::Zero(sigmas.size(), sigmas.size());
+  tangent(free, free) =
+      sigmas(free).asDiagonal() * doubt * sigmas(free).asDiagonal();
+  return tangent;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,177 @@
+// A camera turned by 0.2 degrees between two sessions of calm motion: after how
+// many segments it is found, how many the test of a known turn would take, and
+// whether a set of segments from before and after it is found out.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/change/course.h"
+#include "core/change/detect_change.h"
+#include "core/change/split.h"
+#include "core/simulation/simulate.h"
+#include "test/evaluation/change_device.h"
+#include "test/evaluation/statistics.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kFirstDevice = 41000;  // seeds of their own
+constexpr int kActive = 16;          // segments of the session before
+constexpr int kBefore = 10;          // segments of the next before the turn
+constexpr int kAfter = 24;
+
+const DeviceChange kTurn{"turn 0.2 deg", "extrinsics", false, 0.2, 0};
+
+struct Outcome {
+  std::optional<int> delay;
+  bool false_alarm = false;
+  bool group = false;
+  // Noncentrality of the turn in ten segments: the square of the sigmas by
+  // which a test of this turn alone sees it.
+  double shown = 0;
+  double mixed = 1;    // probability of the set from before and after
+  double unmixed = 1;  // of as large a set from after it
+};
+
+std::vector<SegmentInformation> ScoreSession(const ChangeDevice& device,
+                                             const Calibration& truth,
+                                             double excitation,
+                                             int segments,
+                                             std::uint64_t seed) {
+  SimulationOptions options;
+  options.seed = seed;
+  options.revisit_fraction = 0;
+  const auto session = Simulate(
+      device.rig,
+      truth,
+      device.active.theta,
+      *MakeHandheld(segments * kChangeSegment_s + 0.5, excitation, seed),
+      "use",
+      options);
+  std::vector<SegmentInformation> all;
+  for (const MotionSegment& segment : session.segments) {
+    all.push_back(ScoreSegment(device.rig, device.active.theta, segment));
+  }
+  return all;
+}
+
+double Shown(const ConsistencyTester& tester,
+             const ChangeDevice& device,
+             const std::vector<SegmentInformation>& after) {
+  Course course(tester.root());
+  for (int i = 0; i < 10; ++i) course.Add(tester.Offset(after[i]), 1);
+  const std::vector<int> free = FreeComponents(device.rig);
+  const Eigen::VectorXd turn =
+      BoxMinus(kTurn.After(device.truth, 1), device.truth)(free).cwiseQuotient(
+          PriorSigmas(device.rig)(free));
+  return turn.dot(course.Change().Lambda * turn);
+}
+
+double SplitProbability(const ChangeDevice& device,
+                        const std::vector<SegmentInformation>& segments) {
+  std::vector<std::int64_t> times;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    times.push_back(static_cast<std::int64_t>(i * kChangeSegment_s * 1e9));
+  }
+  return TestSplit(device.rig, device.active.theta, segments, times)
+      .probability;
+}
+
+Outcome Run(int index, double excitation) {
+  const ChangeDevice device = MakeChangeDevice(
+      index,
+      *MakeHandheld(kActive * kChangeSegment_s + 0.5, excitation, index));
+  const auto before =
+      ScoreSession(device, device.truth, excitation, kBefore, 100'000 + index);
+  const auto after = ScoreSession(device,
+                                  kTurn.After(device.truth, 1),
+                                  excitation,
+                                  kAfter,
+                                  200'000 + index);
+  const ConsistencyTester tester(device.rig, device.active);
+  Outcome outcome;
+  outcome.shown = Shown(tester, device, after);
+  std::vector<OffsetInformation> newest;
+  for (const SegmentInformation& information : before) {
+    newest.push_back(tester.Offset(information));
+    outcome.false_alarm |= DetectChange(tester, newest).has_value();
+  }
+  for (int i = 0; i < kAfter && !outcome.delay; ++i) {
+    newest.push_back(tester.Offset(after[i]));
+    const auto change = DetectChange(tester, newest);
+    if (!change) continue;
+    outcome.delay = i + 1;
+    outcome.group = std::count(change->concerned.begin(),
+                               change->concerned.end(),
+                               kTurn.group) > 0;
+  }
+  std::vector<SegmentInformation> mixed = before;
+  mixed.insert(mixed.end(), after.begin(), after.begin() + kBefore);
+  outcome.mixed = SplitProbability(device, mixed);
+  outcome.unmixed =
+      SplitProbability(device, {after.begin(), after.begin() + 2 * kBefore});
+  return outcome;
+}
+
+double Share(const std::vector<Outcome>& outcomes, bool (*is)(const Outcome&)) {
+  return static_cast<double>(
+             std::count_if(outcomes.begin(), outcomes.end(), is)) /
+         static_cast<double>(outcomes.size());
+}
+
+}  // namespace
+
+void RunTurnCalm(Context* context) {
+  const std::vector<double> excitations = {0.1, 0.2, 0.3};
+  const int devices = context->quick() ? 1 : 8;
+  const auto count = static_cast<int>(excitations.size());
+  std::vector<std::vector<Outcome>> all(count, std::vector<Outcome>(devices));
+  context->ForEach(count * devices, [&](int i) {
+    all[i / devices][i % devices] =
+        Run(kFirstDevice + i, excitations[i / devices]);
+  });
+  ResultTable table({"excitation",
+                     "devices",
+                     "turn in ten segments [sigma of a test of it alone]",
+                     "found within 10",
+                     "found within 24",
+                     "delay, median",
+                     "right group concerned",
+                     "false alarms before it",
+                     "mixed sets found (1 %)",
+                     "unmixed sets found (1 %)"});
+  for (int e = 0; e < count; ++e) {
+    std::vector<double> delays, shown;
+    for (const Outcome& outcome : all[e]) {
+      delays.push_back(outcome.delay.value_or(kAfter + 1));
+      shown.push_back(std::sqrt(outcome.shown));
+    }
+    const auto share = [&](bool (*is)(const Outcome&)) {
+      return Share(all[e], is);
+    };
+    table.Add({excitations[e],
+               static_cast<long>(devices),
+               Mean(shown),
+               share([](auto& o) { return o.delay && *o.delay <= 10; }),
+               share([](auto& o) { return o.delay.has_value(); }),
+               MedianOf(delays),
+               share([](auto& o) { return o.group; }),
+               share([](auto& o) { return o.false_alarm; }),
+               share([](auto& o) { return o.mixed < 0.01; }),
+               share([](auto& o) { return o.unmixed < 0.01; })});
+    if (e == 0) continue;  // too little is shown there for any test
+    const std::string at = "_at_excitation_0." + std::to_string(e + 1);
+    context->AtMost("turn_calm.median_delay" + at,
+                    MedianOf(delays),
+                    10,
+                    {.unit = "segments"});
+    context->AtLeast("turn_calm.mixed_sets_found" + at,
+                     share([](auto& o) { return o.mixed < 0.01; }),
+                     0.75);
+  }
+  context->WriteTable("turn_calm", table);
+}
+
+}  // namespace selfcal
