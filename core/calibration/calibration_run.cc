@@ -135,6 +135,8 @@ class Calibrator {
     // As the factors want them: without the track noise.
     std::vector<ScreenedLandmark> landmarks = screening_.landmarks;
     ScaleWeights(Square(screening_.track_noise_factor), &landmarks);
+    // The factors bring a linear system of their own.
+    linearised_.system.ReleaseChains();
     result_.noise_factors =
         EstimateNoiseFactors(Round(basis), estimate_, landmarks, track_noise_);
   }
@@ -209,6 +211,7 @@ class Calibrator {
   Eigen::MatrixXd SpuriousDirections() {
     const Eigen::MatrixXd nothing(start_d_.size(), 0);
     const SolverRound round = Round(nothing);
+    linearised_.system.ReleaseChains();  // each replica brings its own
     std::vector<Eigen::MatrixXd> under_noise;
     Eigen::MatrixXd spurious(start_d_.size(), 0);
     // Most often the first one shows that there is nothing to tell.

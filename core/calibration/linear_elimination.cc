@@ -151,7 +151,10 @@ void LinearSystem::Linearise(const Rig& rig,
   interface_.setZero(interface_size_, interface_size_);
   interface_theta_.setZero(interface_size_, size);
   interface_eta_.setZero(interface_size_);
+  Chain* finished = &chains_.back();  // by the linearisation before
   for (Chain& chain : chains_) {
+    chain.elimination.TakeScratch(&finished->elimination);
+    finished = &chain;
     chain.elimination.Start({chain.range.end - chain.range.begin,
                              camera_sizes_,
                              chain.tracks,

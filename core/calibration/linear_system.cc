@@ -102,6 +102,11 @@ std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem) {
   return chains;
 }
 
+void LinearSystem::ReleaseChains() {
+  chains_.clear();
+  chains_.shrink_to_fit();
+}
+
 void LinearSystem::StartChains(const CalibrationProblem& problem,
                                int cameras,
                                double damping) {
@@ -165,6 +170,7 @@ void LinearSystem::SortByView(const CalibrationProblem& problem,
       const TrackObservation& o = track.observations[used.index];
       seen_.push_back({.view = o.keyframe * cameras + o.camera,
                        .landmark = static_cast<int>(i),
+                       .piece = PieceOf(track, used.index),
                        .z_px = o.z_px,
                        .share = landmarks[i].weight * used.weight});
     }
@@ -227,21 +233,26 @@ int LinearSystem::KeepInChain(int place, int size, Chain* chain) {
   return kept;
 }
 
-void LinearSystem::AddToTrack(int chain_index,
-                              int landmark,
-                              std::span<Seen> track) {
+// A piece of a track, those without weight left out.
+void LinearSystem::AddPiece(int landmark,
+                            std::span<Seen> piece,
+                            Chain* chain) {
   const int cameras = static_cast<int>(camera_sizes_.size());
-  Chain& chain = chains_[chain_index];
-  for (Seen& seen : track) {
+  for (Seen& seen : piece) {
     if (seen.weight == 0) continue;
-    seen.factor = static_cast<int>(chain.track_keyframes.size());
-    chain.track_keyframes.push_back(seen.view / cameras - chain.range.begin);
+    seen.factor = static_cast<int>(chain->track_keyframes.size());
+    chain->track_keyframes.push_back(seen.view / cameras - chain->range.begin);
   }
-  chain.tracks.push_back(static_cast<int>(chain.track_keyframes.size()));
-  chain.landmarks.push_back(landmark);
   const int place = interface_of_landmark_[landmark];
-  chain.kept_landmarks.push_back(
-      place == kNone ? kNone : KeepInChain(place, 3, &chain));
+  int kept = kNone;
+  if (place != kNone) {
+    kept = !chain->landmarks.empty() && chain->landmarks.back() == landmark
+               ? chain->kept_landmarks.back()
+               : KeepInChain(place, 3, chain);
+  }
+  chain->tracks.push_back(static_cast<int>(chain->track_keyframes.size()));
+  chain->landmarks.push_back(landmark);
+  chain->kept_landmarks.push_back(kept);
 }
 
 // The tracks of each chain, of landmarks that enough observations hold.
@@ -252,14 +263,11 @@ void LinearSystem::FindTracks() {
     const std::span<Seen> track(seen_.data() + seen_begin_[m],
                                 seen_begin_[m + 1] - seen_begin_[m]);
     int held = 0;
-    int first = kNone, last = kNone;  // chains that hold it
-    const auto chain_of = [&](const Seen& seen) {
-      return chain_of_keyframe_[seen.view / cameras];
-    };
+    int first = kNone, last = kNone;  // pieces that hold it
     for (const Seen& seen : track) {
       if (seen.weight == 0) continue;
       ++held;
-      last = chain_of(seen);
+      last = seen.piece;
       if (first == kNone) first = last;
     }
     if (held < kMinObservations) continue;
@@ -267,18 +275,17 @@ void LinearSystem::FindTracks() {
       interface_of_landmark_[m] = interface_size_;
       interface_size_ += 3;
     }
-    // In parts by chain, those without weight left out.
     for (std::size_t begin = 0; begin < track.size();) {
       std::size_t end = begin + 1;
-      while (end < track.size() &&
-             chain_of(track[end]) == chain_of(track[begin])) {
+      while (end < track.size() && track[end].piece == track[begin].piece) {
         ++end;
       }
-      const std::span<Seen> part = track.subspan(begin, end - begin);
-      if (std::any_of(part.begin(), part.end(), [](const Seen& seen) {
+      const std::span<Seen> piece = track.subspan(begin, end - begin);
+      if (std::any_of(piece.begin(), piece.end(), [](const Seen& seen) {
             return seen.weight > 0;
           })) {
-        AddToTrack(chain_of(part.front()), static_cast<int>(m), part);
+        const int chain = chain_of_keyframe_[piece.front().view / cameras];
+        AddPiece(static_cast<int>(m), piece, &chains_[chain]);
       }
       begin = end;
     }

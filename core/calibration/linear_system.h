@@ -7,6 +7,8 @@
 // several of them see, and for each gap over which biases walk their value in
 // the middle of the walk, so that each end is tied to it by half of the
 // variance. Together with theta these make a small dense system, the interface.
+// A landmark whose track has pieces that lie far apart in one chain is kept as
+// well, since all keyframes between two pieces would be in the front else.
 //
 // Minimised is
 //   F(d) = sum |r + J d|^2 over all factors + the priors
@@ -96,6 +98,10 @@ class LinearSystem {
   // Of theta's tangent. Not finite where the factors are not.
   const SharedInformation& information() const { return information_; }
 
+  // Frees the memory that steps and posterior need: until the next
+  // linearisation only the information remains.
+  void ReleaseChains();
+
   // What the best steps of keyframes and landmarks take off F while theta
   // stays; with a step s of it, F falls by
   //   decrease + 2 eta^T s - s^T Lambda s.
@@ -141,6 +147,7 @@ class LinearSystem {
   struct Seen {
     int view;  // keyframe and camera
     int landmark;
+    int piece;  // of its track
     Eigen::Vector2d z_px;
     double share = 1;   // what screening leaves of it
     double weight = 0;  // of its rows; 0: it says nothing
@@ -151,7 +158,7 @@ class LinearSystem {
   void StartChains(const CalibrationProblem& problem,
                    int cameras,
                    double damping);
-  void AddToTrack(int chain, int landmark, std::span<Seen> seen);
+  void AddPiece(int landmark, std::span<Seen> seen, Chain* chain);
   int KeepInChain(int place, int size, Chain* chain);
   void KeepWalks(const CalibrationProblem& problem);
   Eigen::VectorXd InterfaceStep(const Eigen::VectorXd& theta_step) const;

@@ -12,19 +12,17 @@ constexpr NoiseKind kInertialKinds[] = {NoiseKind::kGyro,
                                         NoiseKind::kGyroBiasWalk,
                                         NoiseKind::kAccelBiasWalk};
 
-// A landmark that is lost for more keyframes than this counts as another one
-// when it is found again. That it ties the two places says next to nothing
-// about noise, and would keep the keyframes between in every front of the
-// elimination.
-constexpr int kMaxLost = 10;
 constexpr std::size_t kMinObservations = 2;
 
-std::vector<ScreenedLandmark> SplitWhereFoundAgain(
+// Each piece of a track becomes a landmark of its own: that it ties distant
+// keyframes says next to nothing about noise, and costs unknowns in every front
+// of the elimination.
+std::vector<ScreenedLandmark> SplitIntoPieces(
     const CalibrationProblem& problem,
     const std::vector<ScreenedLandmark>& landmarks) {
   std::vector<ScreenedLandmark> parts;
   for (const ScreenedLandmark& whole : landmarks) {
-    const auto& seen = problem.tracks[whole.track].observations;
+    const Track& track = problem.tracks[whole.track];
     ScreenedLandmark part = whole;
     const auto finish = [&] {
       if (part.used.size() >= kMinObservations) parts.push_back(part);
@@ -33,8 +31,8 @@ std::vector<ScreenedLandmark> SplitWhereFoundAgain(
     part.used.clear();
     for (const UsedObservation& used : whole.used) {
       if (!part.used.empty() &&
-          seen[used.index].keyframe - seen[part.used.back().index].keyframe >
-              kMaxLost) {
+          PieceOf(track, used.index) !=
+              PieceOf(track, part.used.back().index)) {
         finish();
       }
       part.used.push_back(used);
@@ -105,7 +103,7 @@ NoiseProblem::NoiseProblem(const SolverRound& round,
       track_noise_(track_noise),
       inertial_(SplitInertialNoise(
           round, BoxPlus(round.reference, estimate.d).imu, estimate.keyframes)),
-      landmarks_(SplitWhereFoundAgain(round.problem, landmarks)),
+      landmarks_(SplitIntoPieces(round.problem, landmarks)),
       rig_(round.rig),
       problem_(round.problem),
       whitening_(round.whitening) {}

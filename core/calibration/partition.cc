@@ -7,13 +7,6 @@
 namespace selfcal {
 namespace {
 
-// A partition in the making. A session has ids of its own, so that partitions
-// of different sessions have nothing in common whatever their numbers.
-struct Part {
-  std::vector<int> segments;
-  std::vector<std::uint64_t> observed;  // landmark ids, sorted, distinct
-};
-
 std::vector<std::uint64_t> ObservedIds(const MotionSegment& segment) {
   std::vector<std::uint64_t> ids;
   ids.reserve(segment.observations.size());
@@ -40,55 +33,61 @@ int CountCommon(const std::vector<std::uint64_t>& a,
   return count;
 }
 
-void MergeInto(Part* a, Part&& b) {
-  a->segments.insert(a->segments.end(), b.segments.begin(), b.segments.end());
+void MergeInto(Observers* a, Observers&& b) {
+  a->members.insert(a->members.end(), b.members.begin(), b.members.end());
   std::vector<std::uint64_t> ids;
-  ids.reserve(a->observed.size() + b.observed.size());
-  std::set_union(a->observed.begin(),
-                 a->observed.end(),
-                 b.observed.begin(),
-                 b.observed.end(),
+  ids.reserve(a->landmarks.size() + b.landmarks.size());
+  std::set_union(a->landmarks.begin(),
+                 a->landmarks.end(),
+                 b.landmarks.begin(),
+                 b.landmarks.end(),
                  std::back_inserter(ids));
-  a->observed = std::move(ids);
+  a->landmarks = std::move(ids);
 }
 
+// Of one session.
 bool Joinable(const MotionSegment& before, const MotionSegment& after) {
   const std::int64_t first_ns = after.keyframes.front().t_ns;
-  return before.key.session == after.key.session &&
-         before.key.index + 1 == after.key.index &&
+  return before.key.index + 1 == after.key.index &&
          before.keyframes.back().t_ns < first_ns &&
          before.imu.back().t_ns >= first_ns;
 }
 
-// Merges pairs until none is over the threshold. What two partitions have in
-// common only grows when either grows, so the outcome is unique.
-void MergeByLandmarks(const std::vector<const MotionSegment*>& segments,
-                      int merge_landmarks,
-                      std::vector<Part>* parts) {
-  const auto session = [&](const Part& part) -> const std::string& {
-    return segments[part.segments.front()]->key.session;
-  };
-  for (std::size_t i = 0; i < parts->size();) {
+// Moves the partitions of one session to the result.
+void Finish(int merge_landmarks,
+            std::vector<Observers>* parts,
+            std::vector<std::vector<int>>* partitions) {
+  MergeObservers(merge_landmarks, parts);
+  for (Observers& part : *parts) {
+    std::sort(part.members.begin(), part.members.end());
+    partitions->push_back(std::move(part.members));
+  }
+  parts->clear();
+}
+
+}  // namespace
+
+// Merges pairs until none is over the threshold. What two sets have in common
+// only grows when either grows, so the outcome is unique.
+void MergeObservers(int merge_landmarks, std::vector<Observers>* sets) {
+  for (std::size_t i = 0; i < sets->size();) {
     bool merged = false;
-    for (std::size_t j = i + 1; j < parts->size();) {
-      Part& a = (*parts)[i];
-      Part& b = (*parts)[j];
-      if (session(a) == session(b) &&
-          CountCommon(a.observed, b.observed) > merge_landmarks) {
+    for (std::size_t j = i + 1; j < sets->size();) {
+      Observers& a = (*sets)[i];
+      Observers& b = (*sets)[j];
+      if (CountCommon(a.landmarks, b.landmarks) > merge_landmarks) {
         MergeInto(&a, std::move(b));
-        parts->erase(parts->begin() + static_cast<std::ptrdiff_t>(j));
+        sets->erase(sets->begin() + static_cast<std::ptrdiff_t>(j));
         merged = true;
       } else {
         ++j;
       }
     }
-    // The grown partition may now reach those that it did not reach before,
-    // also those that stand before it in the list.
+    // The grown set may now reach those that it did not reach before, also
+    // those that stand before it in the list.
     i = merged ? 0 : i + 1;
   }
 }
-
-}  // namespace
 
 std::vector<const MotionSegment*> SortByKey(
     const std::vector<MotionSegment>& segments) {
@@ -108,15 +107,21 @@ std::vector<const MotionSegment*> SortByKey(
 Partitioning PartitionSegments(
     const std::vector<const MotionSegment*>& segments, int merge_landmarks) {
   Partitioning result;
-  std::vector<Part> parts;
+  result.merge_landmarks = merge_landmarks;
+  // Of one session: another has ids of its own, so that partitions of different
+  // sessions have nothing in common whatever their numbers.
+  std::vector<Observers> parts;
   for (int i = 0; i < static_cast<int>(segments.size()); ++i) {
-    Part part{{i}, ObservedIds(*segments[i])};
-    if (i > 0 && Joinable(*segments[i - 1], *segments[i])) {
+    Observers part{{i}, ObservedIds(*segments[i])};
+    const bool same_session =
+        i > 0 && segments[i - 1]->key.session == segments[i]->key.session;
+    if (!same_session) {
+      Finish(merge_landmarks, &parts, &result.partitions);
+    } else if (Joinable(*segments[i - 1], *segments[i])) {
       result.joints.push_back({i - 1, i});
       MergeInto(&parts.back(), std::move(part));
       continue;
-    }
-    if (i > 0 && segments[i - 1]->key.session == segments[i]->key.session) {
+    } else {
       const std::int64_t dt_ns = segments[i]->keyframes.front().t_ns -
                                  segments[i - 1]->keyframes.back().t_ns;
       if (dt_ns > 0) {
@@ -125,11 +130,7 @@ Partitioning PartitionSegments(
     }
     parts.push_back(std::move(part));
   }
-  MergeByLandmarks(segments, merge_landmarks, &parts);
-  for (Part& part : parts) {
-    std::sort(part.segments.begin(), part.segments.end());
-    result.partitions.push_back(std::move(part.segments));
-  }
+  Finish(merge_landmarks, &parts, &result.partitions);
   std::sort(result.partitions.begin(), result.partitions.end());
   return result;
 }

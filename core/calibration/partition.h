@@ -6,6 +6,7 @@
 // Pure functions of their arguments, callable from any thread.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "core/model/segment.h"
@@ -33,7 +34,18 @@ struct Partitioning {
   std::vector<std::vector<int>> partitions;
   std::vector<SegmentJoint> joints;
   std::vector<SegmentGap> gaps;
+  int merge_landmarks = 0;  // as it was asked for
 };
+
+// What observes landmarks: segments, or chains of keyframes.
+struct Observers {
+  std::vector<int> members;
+  std::vector<std::uint64_t> landmarks;  // ids, sorted, distinct
+};
+
+// Merges sets of one session while two of them observe more than
+// merge_landmarks common ids.
+void MergeObservers(int merge_landmarks, std::vector<Observers>* sets);
 
 // The segments in the order of their keys, on which everything else works, so
 // that no result depends on the order in which they were handed over. The

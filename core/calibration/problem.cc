@@ -1,10 +1,13 @@
 #include "core/calibration/problem.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <tuple>
 #include <utility>
 
+#include "core/calibration/map_sharing.h"
+#include "core/calibration/track_depth.h"
 #include "core/factor/inertial.h"
 #include "core/factor/sampling.h"
 
@@ -24,12 +27,18 @@ void AddInertialLinks(const MotionSegment& segment,
   }
 }
 
-// Appends one track for each landmark of a partition, sorted by id.
-void AddTracks(const std::vector<const MotionSegment*>& segments,
-               const std::vector<int>& partition,
-               const std::vector<int>& first_keyframe,
-               std::vector<Track>* tracks) {
+// One track for each landmark of a partition, sorted by id, and where the map
+// of the SLAM system has it.
+struct PartitionTracks {
+  std::vector<Track> tracks;
+  std::vector<Eigen::Vector3d> landmarks_G;
+};
+
+PartitionTracks CollectTracks(const std::vector<const MotionSegment*>& segments,
+                              const std::vector<int>& partition,
+                              const std::vector<int>& first_keyframe) {
   std::map<std::uint64_t, Track> by_id;
+  std::map<std::uint64_t, Eigen::Vector3d> places_G;
   for (const int s : partition) {
     for (const Observation& seen : segments[s]->observations) {
       const std::uint64_t id = segments[s]->landmarks[seen.landmark].id;
@@ -37,8 +46,10 @@ void AddTracks(const std::vector<const MotionSegment*>& segments,
       track.id = id;
       track.observations.push_back(
           {first_keyframe[s] + seen.keyframe, seen.camera, seen.z_px});
+      places_G[id] = segments[s]->landmarks[seen.landmark].p_G;
     }
   }
+  PartitionTracks result;
   for (auto& [id, track] : by_id) {
     std::sort(track.observations.begin(),
               track.observations.end(),
@@ -46,11 +57,35 @@ void AddTracks(const std::vector<const MotionSegment*>& segments,
                 return std::tie(a.keyframe, a.camera) <
                        std::tie(b.keyframe, b.camera);
               });
-    tracks->push_back(std::move(track));
+    result.tracks.push_back(std::move(track));
+    result.landmarks_G.push_back(places_G[id]);
   }
+  return result;
+}
+
+// The chains that the segments of a partition start.
+std::vector<int> ChainsOf(const CalibrationProblem& problem,
+                          const std::vector<int>& partition,
+                          const std::vector<int>& first_keyframe) {
+  const std::vector<int>& starts = problem.chain_starts;
+  std::vector<int> chains;
+  for (const int s : partition) {
+    const auto at =
+        std::lower_bound(starts.begin(), starts.end(), first_keyframe[s]);
+    if (at != starts.end() && *at == first_keyframe[s]) {
+      chains.push_back(static_cast<int>(at - starts.begin()));
+    }
+  }
+  return chains;
 }
 
 }  // namespace
+
+int PieceOf(const Track& track, int observation) {
+  const auto next = std::upper_bound(
+      track.later_pieces.begin(), track.later_pieces.end(), observation);
+  return static_cast<int>(next - track.later_pieces.begin());
+}
 
 std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
                                           std::int64_t t0_ns,
@@ -75,7 +110,8 @@ std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
 CalibrationProblem FlattenSegments(
     const Rig& rig,
     const std::vector<const MotionSegment*>& segments,
-    const Partitioning& partitioning) {
+    const Partitioning& partitioning,
+    const SharingLimits& limits) {
   CalibrationProblem problem;
   std::vector<int> first_keyframe;
   std::vector<bool> starts_chain(segments.size(), true);
@@ -108,8 +144,22 @@ CalibrationProblem FlattenSegments(
     }
   }
   for (const std::vector<int>& partition : partitioning.partitions) {
-    problem.gauge_keyframes.push_back(first_keyframe[partition.front()]);
-    AddTracks(segments, partition, first_keyframe, &problem.tracks);
+    PartitionTracks all = CollectTracks(segments, partition, first_keyframe);
+    const std::vector<bool> with_depth =
+        TracksWithDepth(rig, problem.keyframes, all.tracks, all.landmarks_G);
+    SharedMap map = ShareMap(limits,
+                             partitioning.merge_landmarks,
+                             problem.chain_starts,
+                             ChainsOf(problem, partition, first_keyframe),
+                             std::move(all.tracks),
+                             with_depth);
+    for (const std::vector<int>& connected : map.connected) {
+      problem.gauge_keyframes.push_back(
+          problem.chain_starts[connected.front()]);
+    }
+    std::move(map.tracks.begin(),
+              map.tracks.end(),
+              std::back_inserter(problem.tracks));
   }
   return problem;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/calibration/partition.h"
+#include "core/calibration/sharing_limits.h"
 #include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
@@ -23,11 +24,18 @@ struct TrackObservation {
 };
 
 // One landmark as one partition sees it. A landmark seen in several partitions
-// is a track, and later a variable, for each.
+// is a track, and later a variable, for each; and so may be parts of it that
+// lie far apart within one (map_sharing.h).
 struct Track {
   std::uint64_t id = 0;
-  std::vector<TrackObservation> observations;  // by (keyframe, camera)
+  std::vector<TrackObservation> observations = {};  // by (keyframe, camera)
+  // Where a piece begins that lies far from the one before, or in another
+  // chain: indices into the observations, ascending, above zero.
+  std::vector<int> later_pieces = {};
 };
+
+// The number of pieces that begin before or at an observation, less one.
+int PieceOf(const Track& track, int observation);
 
 // The IMU samples that cover the time between two keyframes.
 struct InertialLink {
@@ -47,13 +55,14 @@ struct CalibrationProblem {
   std::vector<KeyframeState> keyframes;  // as the SLAM system estimated them
   // About each keyframe, those of its segment, which must outlive them.
   std::vector<std::span<const ImuSample>> samples;
-  // First keyframe of each partition: carries the gauge.
+  // First keyframe of each set of chains that share landmarks: carries the
+  // gauge.
   std::vector<int> gauge_keyframes;
   // First keyframe of each chain of inertial links.
   std::vector<int> chain_starts;
   std::vector<InertialLink> inertial_links;
   std::vector<BiasLink> bias_links;
-  std::vector<Track> tracks;  // by (partition, id)
+  std::vector<Track> tracks;  // by (partition, id, time)
 };
 
 // The samples that cover the time from t0_ns to t1_ns, and of those on either
@@ -66,7 +75,8 @@ std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
 CalibrationProblem FlattenSegments(
     const Rig& rig,
     const std::vector<const MotionSegment*>& segments,
-    const Partitioning& partitioning);
+    const Partitioning& partitioning,
+    const SharingLimits& limits = {});
 
 // The motions about all keyframes at an estimate.
 void MeasureMotions(const Rig& rig,

@@ -58,14 +58,31 @@ void ChainElimination::LayOut(const ChainShape& shape) {
 void ChainElimination::Start(const ChainShape& shape, Record record) {
   structure_.Find(shape.keyframes, shape.tracks, shape.track_keyframes);
   LayOut(shape);
-  PlacePanels(shape);
+  FindViews(shape);
   record_ = record;
   steps_.clear();
   products_.clear();
+  if (record == Record::kSteps) ReserveSteps();
   first_place_ = 0;
   slots_ = 0;
   current_ = 0;
   begun_ = false;
+}
+
+void ChainElimination::TakeScratch(ChainElimination* finished) {
+  for (const auto buffer : {&ChainElimination::front_,
+                            &ChainElimination::group_panels_,
+                            &ChainElimination::own_poses_,
+                            &ChainElimination::gram_,
+                            &ChainElimination::keyframe_sums_,
+                            &ChainElimination::coupling_,
+                            &ChainElimination::substituted_,
+                            &ChainElimination::product_,
+                            &ChainElimination::half_,
+                            &ChainElimination::link_terms_}) {
+    (this->*buffer).swap(finished->*buffer);
+  }
+  targets_.swap(finished->targets_);
 }
 
 void ChainElimination::OpenSlots(int slots) {

@@ -103,6 +103,10 @@ class ChainElimination {
   enum class Record { kNothing, kSteps };
   void Start(const ChainShape& shape, Record record = Record::kNothing);
 
+  // Takes over the memory that `finished`, after its Finish(), needs only for
+  // the next chain that it begins: what it has recorded stays.
+  void TakeScratch(ChainElimination* finished);
+
   using PoseRotation = Eigen::Matrix<double, kChainPoseSize, 3>;
 
   // First, in any order: the factors of one keyframe and camera, as rows of
@@ -147,14 +151,17 @@ class ChainElimination {
   class CovarianceWalk;
 
   void LayOut(const ChainShape& shape);
-  void PlacePanels(const ChainShape& shape);
+  void FindViews(const ChainShape& shape);
   void ExpandGram(int keyframe, int camera, const PoseRotation* by_rotation);
   void CollectPoses(int count);
   void SpreadPoses(int count, const PoseRotation& by_rotation);
   void BeginKeyframe();
   void OpenSlots(int slots);
   void EliminateLandmarks();
+  double* PoseRow(int landmark, int row);
+  int PosesOf(int landmark) const;
   Eigen::Matrix3d PreparePanel(int landmark, double* panel, int stride);
+  void RecordPanel(int landmark, const double* panel, int stride);
   void SetRoot(int landmark, Eigen::Matrix3d information);
   void KeepLandmark(int landmark,
                     const Eigen::Matrix3d& information,
@@ -168,6 +175,7 @@ class ChainElimination {
   void Eliminate(const std::vector<double>& terms);
   void AddPosesWithFixed(const ChainTransition& link);
   void EliminateByItself();
+  void ReserveSteps();
   void RecordStep(const ChainTransition* link);
   Eigen::VectorXd SharedInPlaces(const Eigen::VectorXd& shared) const;
   void PlaceStates(int keyframe,
@@ -207,20 +215,29 @@ class ChainElimination {
   int constant_ = 0;
   int fixed_ = 0;
 
-  // Of each landmark: for each camera 3 rows of sums; its panel of 3 rows over
-  // the front from the landmark parameters on; the Cholesky factor of its
-  // information, with inverse diagonal.
-  struct Panel {
-    std::size_t begin;
-    int stride;
-  };
-  std::vector<double> sums_, panels_, landmark_priors_, roots_;
-  std::vector<Panel> panel_of_landmark_;
+  // Of each landmark: for each camera 3 rows of sums; 3 rows over the poses
+  // that see it; the Cholesky factor of its information, with inverse diagonal.
+  // Once it is eliminated, and where steps are recorded, the rows over poses
+  // are those of its panel, and the first 3 rows of the sums those over
+  // landmark parameters and constant.
+  std::vector<double> sums_, pose_rows_, landmark_priors_, roots_;
   std::vector<int> kept_landmarks_;  // -1: eliminated
   std::vector<int> sums_offsets_;
   int sums_size_ = 0;
   std::vector<int> landmark_of_observation_;
   std::size_t landmarks_count_ = 0;
+  // The poses that see landmark m, by time, from views_begin_[m] on; and of
+  // each observation the place of its pose among all of these.
+  struct View {
+    int keyframe;
+    int slot;  // when the landmark goes
+  };
+  std::vector<View> views_;
+  std::vector<int> views_begin_;
+  std::vector<int> view_of_observation_;
+  // Panels of the landmarks that go together, 3 rows each over the front from
+  // the landmark parameters on.
+  std::vector<double> group_panels_;
   std::vector<LandmarkTarget> targets_;
   struct PosePanel {
     double* data;

@@ -10,43 +10,43 @@ namespace selfcal {
 
 using namespace chain;
 
-void ChainElimination::PlacePanels(const ChainShape& shape) {
+void ChainElimination::FindViews(const ChainShape& shape) {
   landmarks_count_ = shape.tracks.size() - 1;
   const std::size_t landmarks = landmarks_count_;
   kept_landmarks_.assign(landmarks, kEliminated);
   std::copy(shape.kept_landmarks.begin(),
             shape.kept_landmarks.end(),
             kept_landmarks_.begin());
-  GrowTo(landmarks, &panel_of_landmark_);
   GrowTo(6 * landmarks, &roots_);
   sums_.assign(landmarks * sums_size_, 0);
   landmark_priors_.assign(landmarks * 9, 0);
   GrowTo(shape.track_keyframes.size(), &landmark_of_observation_);
+  GrowTo(shape.track_keyframes.size(), &view_of_observation_);
+  views_.clear();
+  views_begin_.assign(1, 0);
   for (std::size_t m = 0; m < landmarks; ++m) {
-    std::fill(landmark_of_observation_.begin() + shape.tracks[m],
-              landmark_of_observation_.begin() + shape.tracks[m + 1],
-              static_cast<int>(m));
-  }
-  const int shared = fixed_ - landmark_place_;
-  std::size_t end = 0;
-  for (int k = 0; k < shape.keyframes; ++k) {
-    const std::span<const int> group = structure_.Landmarks(k);
-    if (group.empty()) continue;
-    const int longest = structure_.Slots(group.front()) * kPose;
-    const int stride = shared + WholeVectors(longest) + kZeros;
-    for (const int m : group) {
-      panel_of_landmark_[m] = {end, stride};
-      end += static_cast<std::size_t>(3) * stride;
+    for (int o = shape.tracks[m]; o < shape.tracks[m + 1]; ++o) {
+      landmark_of_observation_[o] = static_cast<int>(m);
+      const int keyframe = shape.track_keyframes[o];
+      if (o == shape.tracks[m] || views_.back().keyframe != keyframe) {
+        views_.push_back({keyframe, structure_.Slot(o)});
+      }
+      view_of_observation_[o] = static_cast<int>(views_.size()) - 1;
     }
+    views_begin_.push_back(static_cast<int>(views_.size()));
   }
-  GrowTo(end, &panels_);
-  for (std::size_t m = 0; m < landmarks; ++m) {
-    const Panel& panel = panel_of_landmark_[m];
-    const int poses = structure_.Slots(static_cast<int>(m)) * kPose + kZeros;
-    for (int j = 0; j < 3; ++j) {
-      Zero(&panels_[panel.begin + j * panel.stride + shared], poses);
-    }
-  }
+  pose_rows_.assign(views_.size() * 3 * kPose, 0);
+}
+
+// Doubles in a row over the poses that see a landmark.
+int ChainElimination::PosesOf(int landmark) const {
+  return (views_begin_[landmark + 1] - views_begin_[landmark]) * kPose;
+}
+
+double* ChainElimination::PoseRow(int landmark, int row) {
+  return &pose_rows_[static_cast<std::size_t>(views_begin_[landmark]) * 3 *
+                     kPose] +
+         row * PosesOf(landmark);
 }
 
 // Adds the products of all columns of a run, which are in gram_, to those of
@@ -114,14 +114,13 @@ void ChainElimination::AddObservations(int keyframe,
   const int gram_stride = stride + kPanelPad;
   const int count = static_cast<int>(observations.size());
   GrowTo(observations.size(), &targets_);
-  const int shared = fixed_ - landmark_place_;
   for (int i = 0; i < count; ++i) {
     const int o = observations[i];
     const int m = landmark_of_observation_[o];
-    const Panel& panel = panel_of_landmark_[m];
+    const int view = view_of_observation_[o] - views_begin_[m];
     targets_[i] = {&sums_[m * sums_size_ + sums_offsets_[camera]],
-                   &panels_[panel.begin + shared + structure_.Slot(o) * kPose],
-                   panel.stride};
+                   PoseRow(m, 0) + view * kPose,
+                   PosesOf(m)};
   }
   if (by_rotation != nullptr) CollectPoses(count);
   Zero(gram_.data(), static_cast<std::size_t>(gram_stride) * stride);
@@ -171,15 +170,23 @@ void ChainElimination::AddLandmarkPrior(int landmark,
   }
 }
 
-// The panel of a landmark from its sums. Returns its information.
+// The panel of a landmark, `stride` from row to row, from its sums and its rows
+// over poses. Returns its information.
 Eigen::Matrix3d ChainElimination::PreparePanel(int landmark,
                                                double* panel,
                                                int stride) {
   const double* prior = &landmark_priors_[9 * landmark];
+  const int shared_places = fixed_ - landmark_place_;
   Eigen::Matrix3d H;
   for (int j = 0; j < 3; ++j) {
     double* row = panel + j * stride;
-    Zero(row, fixed_ - landmark_place_);
+    Zero(row, stride);
+    const double* by_pose = PoseRow(landmark, j);
+    for (int v = views_begin_[landmark]; v < views_begin_[landmark + 1]; ++v) {
+      std::copy_n(
+          by_pose, kPose, row + shared_places + views_[v].slot * kPose);
+      by_pose += kPose;
+    }
     for (int i = 0; i <= j; ++i) H(j, i) = prior[j * (j + 1) / 2 + i];
     row[landmark_shared_] = prior[6 + j];
     for (std::size_t c = 0; c < camera_sizes_.size(); ++c) {
@@ -195,6 +202,22 @@ Eigen::Matrix3d ChainElimination::PreparePanel(int landmark,
   }
   H.triangularView<Eigen::StrictlyUpper>() = H.transpose();
   return H;
+}
+
+// The other way round, for the way back.
+void ChainElimination::RecordPanel(int landmark,
+                                   const double* panel,
+                                   int stride) {
+  double* shared = &sums_[landmark * sums_size_];
+  for (int j = 0; j < 3; ++j) {
+    const double* row = panel + j * stride;
+    shared = std::copy_n(row, landmark_shared_ + 1, shared);
+    row += fixed_ - landmark_place_;
+    double* by_pose = PoseRow(landmark, j);
+    for (int v = views_begin_[landmark]; v < views_begin_[landmark + 1]; ++v) {
+      by_pose = std::copy_n(row + views_[v].slot * kPose, kPose, by_pose);
+    }
+  }
 }
 
 void ChainElimination::SetRoot(int landmark, Eigen::Matrix3d information) {
@@ -235,32 +258,34 @@ void ChainElimination::KeepLandmark(int landmark,
 void ChainElimination::EliminateLandmarks() {
   const std::span<const int> group = structure_.Landmarks(current_);
   if (group.empty()) return;
-  const Panel& first = panel_of_landmark_[group.front()];
-  const int stride = first.stride;
   const int shared = fixed_ - landmark_place_;
   const int slots = structure_.Slots(group.front());
+  const int stride = shared + WholeVectors(slots * kPose) + kZeros;
   const int depth = 3 * static_cast<int>(group.size());
+  GrowTo(static_cast<std::size_t>(depth) * stride, &group_panels_);
   depths_.assign(slots, 0);
   for (const int m : group) depths_[structure_.Slots(m) - 1] += 3;
   for (int s = slots - 1; s > 0; --s) depths_[s - 1] += depths_[s];
-  for (const int m : group) {
-    double* panel = &panels_[panel_of_landmark_[m].begin];
-    const Eigen::Matrix3d information = PreparePanel(m, panel, stride);
+  const auto panel_of = [&](std::size_t place) {
+    return &group_panels_[place * 3 * stride];
+  };
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    const int m = group[i];
+    const Eigen::Matrix3d information = PreparePanel(m, panel_of(i), stride);
     if (kept_landmarks_[m] == kEliminated) {
       SetRoot(m, information);
     } else {
-      KeepLandmark(m, information, panel, stride);
+      KeepLandmark(m, information, panel_of(i), stride);
     }
   }
-  const double* panel = &panels_[first.begin];
-  const ConstPanel by_shared = {panel, stride};
-  const ConstPanel by_pose = {panel + shared, stride};
+  const ConstPanel by_shared = {group_panels_.data(), stride};
+  const ConstPanel by_pose = {group_panels_.data() + shared, stride};
   WithKernels([&](auto kernels) {
-    for (const int m : group) {
-      kernels.SolveThreeRows(&roots_[6 * m],
-                             &panels_[panel_of_landmark_[m].begin],
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      kernels.SolveThreeRows(&roots_[6 * group[i]],
+                             panel_of(i),
                              stride,
-                             shared + structure_.Slots(m) * kPose);
+                             shared + structure_.Slots(group[i]) * kPose);
     }
     kernels.AddSquare(-1,
                       by_shared,
@@ -278,6 +303,10 @@ void ChainElimination::EliminateLandmarks() {
     kernels.AddSquare(
         -1, by_pose, slots * kPose, stairs, FrontAt(Pose(0), Pose(0)));
   });
+  if (record_ == Record::kNothing) return;
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    RecordPanel(group[i], panel_of(i), stride);
+  }
 }
 
 }  // namespace selfcal

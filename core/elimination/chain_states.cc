@@ -211,6 +211,18 @@ void ChainElimination::AddPosesWithFixed(const ChainTransition& link) {
   });
 }
 
+// As much as will be recorded, and no more.
+void ChainElimination::ReserveSteps() {
+  const int keyframes = structure_.keyframes();
+  std::size_t size = 0;
+  for (int k = 0; k < keyframes; ++k) {
+    const int rest = static_cast<int>(structure_.Poses(k).size()) - 1;
+    size += static_cast<std::size_t>(kState) * (fixed_ + rest * kPose);
+  }
+  steps_.reserve(keyframes);
+  products_.reserve(size);
+}
+
 void ChainElimination::RecordStep(const ChainTransition* link) {
   if (record_ == Record::kNothing) return;
   const int size = fixed_ + PosesSize();

@@ -68,37 +68,34 @@ void ChainElimination::FindSteps(
     }
   }
 
-  for (int k = 0; k < keyframes; ++k) {
-    // The order of slots when the landmarks went.
-    const std::span<const int> poses = structure_.Poses(k);
-    const int swap = structure_.SwapWithNext(k);
-    for (std::size_t s = 0; s < poses.size(); ++s) {
-      const auto slot = static_cast<int>(s);
-      const int from = slot == 1 ? swap : slot == swap ? 1 : slot;
-      z.segment<kPose>(fixed_ + slot * kPose) =
-          (*states)[poses[from]].head<kPose>();
+  for (std::size_t m = 0; m < landmarks_count_; ++m) {
+    Eigen::Vector3d& x = (*landmarks)[m];
+    if (kept_landmarks_[m] != kEliminated) {
+      x = z.segment<3>(kKeptPlace + kept_landmarks_[m]);
+      continue;
     }
-    for (const int m : structure_.Landmarks(k)) {
-      if (kept_landmarks_[m] >= 0) {
-        (*landmarks)[m] = z.segment<3>(kKeptPlace + kept_landmarks_[m]);
-        continue;
-      }
-      const Panel& panel = panel_of_landmark_[m];
-      const int shared_places = fixed_ - landmark_place_;
-      const int size = shared_places + structure_.Slots(m) * kPose;
-      Eigen::Vector3d y;
-      for (int j = 0; j < 3; ++j) {
-        const Eigen::Map<const Eigen::VectorXd> row(
-            &panels_[panel.begin + j * panel.stride], size);
-        y(j) = row.dot(z.segment(landmark_place_, size));
-      }
-      // L^T x = -y, the diagonal of L inverted.
-      const double* L = &roots_[6 * m];
-      Eigen::Vector3d& x = (*landmarks)[m];
-      x(2) = -y(2) * L[5];
-      x(1) = (-y(1) - L[4] * x(2)) * L[2];
-      x(0) = (-y(0) - L[1] * x(1) - L[3] * x(2)) * L[0];
+    const auto rows = [](const double* data, Eigen::Index columns) {
+      return Eigen::Map<
+          const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>>(
+          data, 3, columns);
+    };
+    const int begin = views_begin_[m];
+    const int count = views_begin_[m + 1] - begin;
+    const auto by_pose =
+        rows(&pose_rows_[static_cast<std::size_t>(begin) * 3 * kPose],
+             count * kPose);
+    const Eigen::Index shared_places = landmark_shared_ + 1;
+    Eigen::Vector3d y = rows(&sums_[m * sums_size_], shared_places) *
+                        z.segment(landmark_place_, shared_places);
+    for (int v = 0; v < count; ++v) {
+      y += by_pose.middleCols<kPose>(v * kPose) *
+           (*states)[views_[begin + v].keyframe].head<kPose>();
     }
+    // L^T x = -y, the diagonal of L inverted.
+    const double* L = &roots_[6 * m];
+    x(2) = -y(2) * L[5];
+    x(1) = (-y(1) - L[4] * x(2)) * L[2];
+    x(0) = (-y(0) - L[1] * x(1) - L[3] * x(2)) * L[0];
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/factor/inertial.h"
+#include "core/simulation/simulate.h"
 #include "test/core/calibration/hand_made_segments.h"
 
 namespace selfcal {
@@ -10,7 +11,8 @@ namespace {
 
 CalibrationProblem Flatten(const std::vector<MotionSegment>& segments) {
   const std::vector<const MotionSegment*> sorted = SortByKey(segments);
-  return FlattenSegments(Rig(), sorted, PartitionSegments(sorted, 15));
+  return FlattenSegments(
+      HandheldRig("r"), sorted, PartitionSegments(sorted, 15));
 }
 
 // Two joined segments, one after a gap in a partition of its own, and one of
@@ -30,14 +32,40 @@ TEST(Problem, GaugeIsCarriedByTheFirstKeyframeOfEachPartition) {
   EXPECT_EQ(problem.chain_starts, (std::vector<int>{0, 8, 12}));
 }
 
+// Every keyframe sees all landmarks, from positions that are `step_m` apart.
+MotionSegment Passing(MotionSegment segment, double step_m) {
+  const std::vector<Observation> first = segment.observations;
+  for (int k = 0; k < static_cast<int>(segment.keyframes.size()); ++k) {
+    segment.keyframes[k].p_GI.x() = k * step_m;
+    for (Observation seen : first) {
+      seen.keyframe = k;
+      if (k > 0) segment.observations.push_back(seen);
+    }
+  }
+  return segment;
+}
+
+// Two of one session with 20 landmarks in common.
+std::vector<MotionSegment> TwoSegments(double step_m) {
+  return {
+      Passing(HandMadeSegment("a", 0, 0, 0.4, IdRange(0, 20)), step_m),
+      Passing(HandMadeSegment("a", 7, 5.0, 5.4, IdRange(0, 20)), step_m)};
+}
+
 TEST(Problem, MergedPartitionsHaveOneGaugeButTwoChains) {
-  const std::vector<MotionSegment> segments = {
-      HandMadeSegment("a", 0, 0, 0.4, IdRange(0, 20)),
-      HandMadeSegment("a", 7, 5.0, 5.4, IdRange(0, 20))};
+  const std::vector<MotionSegment> segments = TwoSegments(0.1);
   const CalibrationProblem problem = Flatten(segments);
   EXPECT_EQ(problem.gauge_keyframes, (std::vector<int>{0}));
   EXPECT_EQ(problem.chain_starts, (std::vector<int>{0, 4}));
   EXPECT_EQ(problem.tracks.size(), 20u);
+}
+
+// Nothing of what they have in common will survive screening.
+TEST(Problem, WithoutParallaxCommonLandmarksConnectNothing) {
+  const std::vector<MotionSegment> segments = TwoSegments(1e-4);
+  const CalibrationProblem problem = Flatten(segments);
+  EXPECT_EQ(problem.gauge_keyframes, (std::vector<int>{0, 4}));
+  EXPECT_EQ(problem.tracks.size(), 40u);
 }
 
 TEST(Problem, ALandmarkIsOneTrackWithinAPartitionAndSplitBetweenThem) {
@@ -79,7 +107,7 @@ TEST(Problem, BiasesWalkOverAGapOfOneSessionOnly) {
   EXPECT_EQ(problem.bias_links[0].before, 7);
   EXPECT_EQ(problem.bias_links[0].after, 8);
   EXPECT_TRUE(problem.bias_links[0].sigmas.isApprox(
-      BiasWalkSigmas(Rig().imu_noise, 5.0 - 0.7)));
+      BiasWalkSigmas(HandheldRig("r").imu_noise, 5.0 - 0.7)));
 }
 
 }  // namespace

@@ -1,0 +1,28 @@
+// How much may connect what lies far apart in a problem (map_sharing.h).
+#pragma once
+
+#include <limits>
+
+namespace selfcal {
+
+struct SharingLimits {
+  // A landmark that is lost for more keyframes begins a new piece of its track.
+  int max_lost = 10;
+  // Keyframes from the first to the last of a piece: two segments of the usual
+  // length. Tracks of cameras that move are shorter.
+  int max_length = 80;
+  // Landmarks that connect pieces: those of one chain, and all of a partition.
+  int of_chain = 32;
+  int of_partition = 128;
+
+  // Everything stays connected, at any cost.
+  static constexpr SharingLimits None() {
+    constexpr int kMax = std::numeric_limits<int>::max();
+    return {.max_lost = kMax,
+            .max_length = kMax,
+            .of_chain = kMax,
+            .of_partition = kMax};
+  }
+};
+
+}  // namespace selfcal

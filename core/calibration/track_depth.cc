@@ -1,0 +1,76 @@
+#include "core/calibration/track_depth.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "core/calibration/screening.h"
+
+namespace selfcal {
+namespace {
+
+// What a track says about the inverse depth of its landmark, along its ray from
+// the middle of the cameras that see it.
+struct InverseDepth {
+  double value = 0;        // [1/m]
+  double information = 0;  // [m^2]
+};
+
+// A camera that is off the others by b across the ray sees a point of inverse
+// depth rho turned by b rho. At errors of one pixel, so that what is connected
+// does not depend on what is found about noise.
+InverseDepth Predict(const Rig& rig,
+                     std::span<const KeyframeState> keyframes,
+                     const Track& track,
+                     const Eigen::Vector3d& landmark_G) {
+  const auto position_G = [&](const TrackObservation& seen) {
+    const KeyframeState& x = keyframes[seen.keyframe];
+    const CameraCalibration& camera = rig.factory.cameras[seen.camera];
+    return Eigen::Vector3d(x.p_GI -
+                           x.q_GI * (camera.q_CI.conjugate() * camera.p_CI));
+  };
+  Eigen::Vector3d middle_G = Eigen::Vector3d::Zero();
+  for (const TrackObservation& seen : track.observations) {
+    middle_G += position_G(seen);
+  }
+  middle_G /= static_cast<double>(track.observations.size());
+  const Eigen::Vector3d ray_G = landmark_G - middle_G;
+  const double distance_m = ray_G.norm();
+  if (!(distance_m > 0)) return {};
+  InverseDepth result{1 / distance_m, 0};
+  for (const TrackObservation& seen : track.observations) {
+    const double across_m =
+        (position_G(seen) - middle_G).cross(ray_G).norm() / distance_m;
+    const double px_m =
+        rig.factory.cameras[seen.camera].f.minCoeff() * across_m;
+    result.information += px_m * px_m;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<bool> TracksWithDepth(
+    const Rig& rig,
+    std::span<const KeyframeState> keyframes,
+    std::span<const Track> tracks,
+    std::span<const Eigen::Vector3d> landmarks_G) {
+  std::vector<InverseDepth> depths;
+  std::vector<double> values;
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    depths.push_back(Predict(rig, keyframes, tracks[t], landmarks_G[t]));
+    values.push_back(depths.back().value);
+  }
+  std::vector<bool> with_depth;
+  if (tracks.empty()) return with_depth;
+  const auto median = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), median, values.end());
+  const double sigma = kMaxDepthUncertainty * *median;
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    with_depth.push_back(tracks[t].observations.size() >=
+                             kMinTrackObservations &&
+                         depths[t].information * sigma * sigma > 1);
+  }
+  return with_depth;
+}
+
+}  // namespace selfcal
