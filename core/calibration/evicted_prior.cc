@@ -107,8 +107,8 @@ EvictedPrior PriorOfEvicted(const Rig& rig,
         std::max(1.0, options.noise_factor) * std::max(1.0, segment.fit);
     const double weight =
         ReachWeight(std::max(1, result.segments), reach) / (noise * noise);
-    all.AgeTo(segment.ends->first.t_ns);
-    with_data.AgeTo(segment.ends->first.t_ns);
+    all.AgeTo(segment.time_ns);
+    with_data.AgeTo(segment.time_ns);
     all.Add(*segment.ends, weight);
     if (segment.calibrated_on) with_data.Add(*segment.ends, weight);
   }

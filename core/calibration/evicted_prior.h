@@ -15,6 +15,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <span>
 
 #include "core/calibration/theta_prior.h"
@@ -34,11 +35,13 @@ struct RememberedSegment {
   // (ResidualStatistics::fit): its noise counts as so many times larger. At
   // most 1: as expected, or not measured.
   double fit = 1;
+  // When it was recorded, by a clock that all sessions share: for the walk.
+  std::int64_t time_ns = 0;
 };
 
 struct EvictedPriorOptions {
   // theta random-walks by these densities (D) [tangent units / sqrt(s)]: what
-  // is old says less. Empty: theta is constant.
+  // is older than the newest segment says less. Empty: theta is constant.
   Eigen::VectorXd walk = {};
   // The noise is so many times what the rig states, as an earlier calibration
   // found (CalibrationResult::track_noise_factor).

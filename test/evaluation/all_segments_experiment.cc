@@ -129,7 +129,7 @@ class DeviceInUse {
     for (const int i : kept()) Linearise(i);
     std::vector<RememberedSegment> remembered;
     for (const Remembered& one : memory_) {
-      remembered.push_back({&one.ends, one.has_data});
+      remembered.push_back({.ends = &one.ends, .calibrated_on = one.has_data});
     }
     const EvictedPrior evicted = PriorOfEvicted(rig_, newest_, remembered);
     reach_ = evicted.reach;

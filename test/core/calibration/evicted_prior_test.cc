@@ -41,7 +41,9 @@ class EvictedPriorTest : public ::testing::Test {
   std::vector<RememberedSegment> Remembered(
       const std::vector<int>& with_data) const {
     std::vector<RememberedSegment> all;
-    for (const SegmentEnds& ends : ends_) all.push_back({&ends, false});
+    for (const SegmentEnds& ends : ends_) {
+      all.push_back({.ends = &ends, .time_ns = ends.first.t_ns});
+    }
     for (const int i : with_data) all[i].calibrated_on = true;
     return all;
   }
