@@ -180,6 +180,18 @@ void ChainElimination::AddKeptBias(int kept, const KeptBiasRows& rows) {
   }
 }
 
+void ChainElimination::AddKeptState(int kept,
+                                    const ChainStateVector& information) {
+  BeginKeyframe();
+  for (int m = 0; m < kState; ++m) {
+    const int state = m < kPose ? Pose(0) + m : kMotionPlace + m - kPose;
+    const int place = kKeptPlace + kept + m;
+    Front(state, state) += information[m];
+    Front(place, place) += information[m];
+    Front(std::max(state, place), std::min(state, place)) -= information[m];
+  }
+}
+
 void ChainElimination::Advance(const ChainTransition& link) {
   BeginKeyframe();
   TakeState();

@@ -11,7 +11,7 @@
 //    poses]
 // where the motion (velocity and biases) is that of the current keyframe, and
 // what is kept is shared with other chains: landmarks that they see as well,
-// and biases that walk from one to the next. For
+// biases that walk from one to the next, and states at which they meet. For
 // tracks of bounded length the cost is linear in the number of keyframes; a
 // track through the whole chain is as good, and costs a front as wide as the
 // chain.
@@ -126,6 +126,9 @@ class ChainElimination {
   // if it has any, and the link to the next, or the end.
   void AddPrior(const ChainStateMatrix& information);
   void AddKeptBias(int kept, const KeptBiasRows& rows);
+  // Ties the state of the keyframe to 15 kept unknowns x: its offset from them
+  // has the given information, which must be positive.
+  void AddKeptState(int kept, const ChainStateVector& information);
   void Advance(const ChainTransition& link);
   void Finish(SharedInformation* result);
 

@@ -20,7 +20,29 @@ constexpr double kGaugeSigma_rad = 1e-3;
 
 double Information(double sigma) { return 1 / (sigma * sigma); }
 
-// Weak prior on velocity and biases.
+// An end is a copy of the state of a keyframe, equal to it but for errors that
+// are small against what the link to the next keyframe leaves uncertain.
+constexpr double kEndTieRotation_rad = 1e-6;
+constexpr double kEndTiePosition_m = 1e-6;
+constexpr double kEndTieVelocity_mps = 1e-5;
+constexpr double kEndTieAccelBias_mps2 = 1e-5;
+constexpr double kEndTieGyroBias_radps = 1e-7;
+
+ChainStateVector EndTies() {
+  ChainStateVector information;
+  const auto set = [&](int at, double sigma) {
+    information.segment<3>(at).setConstant(Information(sigma));
+  };
+  set(kStateRotation, kEndTieRotation_rad);
+  set(kStatePosition, kEndTiePosition_m);
+  set(kStateVelocity, kEndTieVelocity_mps);
+  set(kStateAccelBias, kEndTieAccelBias_mps2);
+  set(kStateGyroBias, kEndTieGyroBias_radps);
+  return information;
+}
+
+}  // namespace
+
 ChainStateMatrix MotionPrior() {
   ChainStateVector prior = ChainStateVector::Zero();
   prior.segment<3>(kStateVelocity)
@@ -45,8 +67,6 @@ ChainStateMatrix GaugePrior(const KeyframeState& x) {
       .setConstant(Information(kGaugeSigma_m));
   return prior;
 }
-
-}  // namespace
 
 void SegmentLineariser::FindTracks(const MotionSegment& segment,
                                    const InlierSelection& selection,
@@ -140,21 +160,23 @@ void SegmentLineariser::LineariseAlone(const Rig& rig,
   LineariseLinks(rig, theta0, segment);
 }
 
-const LinearisedSegment& SegmentLineariser::Eliminate(
-    const Rig& rig,
-    const Calibration& theta0,
-    const MotionSegment& segment,
-    const KeyframeMotions& motions,
-    const InlierSelection& selection,
-    const ObservationOrder& order,
-    int gauge_keyframe) {
+void SegmentLineariser::StartChain(const Rig& rig,
+                                   const Calibration& theta0,
+                                   const MotionSegment& segment,
+                                   const KeyframeMotions& motions,
+                                   const InlierSelection& selection,
+                                   const ObservationOrder& order,
+                                   int kept) {
   camera_sizes_.clear();
   for (const CameraCalibration& camera : theta0.cameras) {
     camera_sizes_.push_back(CameraTangentSize(camera));
   }
   FindTracks(segment, selection, order);
-  const int keyframes = static_cast<int>(segment.keyframes.size());
-  elimination_.Start({keyframes, camera_sizes_, tracks_, track_keyframes_});
+  elimination_.Start({.keyframes = static_cast<int>(segment.keyframes.size()),
+                      .camera_sizes = camera_sizes_,
+                      .tracks = tracks_,
+                      .track_keyframes = track_keyframes_,
+                      .kept = kept});
   LineariseViews(rig,
                  theta0,
                  segment,
@@ -171,13 +193,25 @@ const LinearisedSegment& SegmentLineariser::Eliminate(
                            run.begin, run.end - run.begin),
                        turn ? &*turn : nullptr);
                  });
-  LineariseLinks(rig, theta0, segment);
   const Eigen::Matrix3d landmark_prior =
       Information(kLandmarkPriorSigma_m) * Eigen::Matrix3d::Identity();
   for (std::size_t m = 0; m + 1 < tracks_.size(); ++m) {
     elimination_.AddLandmarkPrior(
         static_cast<int>(m), landmark_prior, Eigen::Vector3d::Zero());
   }
+}
+
+const LinearisedSegment& SegmentLineariser::Eliminate(
+    const Rig& rig,
+    const Calibration& theta0,
+    const MotionSegment& segment,
+    const KeyframeMotions& motions,
+    const InlierSelection& selection,
+    const ObservationOrder& order,
+    int gauge_keyframe) {
+  StartChain(rig, theta0, segment, motions, selection, order, 0);
+  LineariseLinks(rig, theta0, segment);
+  const int keyframes = static_cast<int>(segment.keyframes.size());
   for (int k = 0; k < keyframes; ++k) {
     if (k == 0) elimination_.AddPrior(MotionPrior());
     if (k == gauge_keyframe) {
@@ -185,6 +219,24 @@ const LinearisedSegment& SegmentLineariser::Eliminate(
     }
     if (k + 1 < keyframes) elimination_.Advance(transitions_[k]);
   }
+  elimination_.Finish(&result_.theta);
+  return result_;
+}
+
+const LinearisedSegment& SegmentLineariser::EliminateToEnds(
+    const Rig& rig,
+    const Calibration& theta0,
+    const MotionSegment& segment,
+    const KeyframeMotions& motions,
+    const InlierSelection& selection,
+    const ObservationOrder& order) {
+  StartChain(
+      rig, theta0, segment, motions, selection, order, 2 * kChainStateSize);
+  LineariseLinks(rig, theta0, segment);
+  const int keyframes = static_cast<int>(segment.keyframes.size());
+  elimination_.AddKeptState(0, EndTies());
+  for (int k = 0; k + 1 < keyframes; ++k) elimination_.Advance(transitions_[k]);
+  elimination_.AddKeptState(kChainStateSize, EndTies());
   elimination_.Finish(&result_.theta);
   return result_;
 }

@@ -17,6 +17,12 @@
 
 namespace selfcal {
 
+// Information about the states of the first keyframe of a chain, in the sizes
+// of weak_priors.h: about its velocity and biases; and about what nothing
+// shows, the gauge, which is held.
+ChainStateMatrix MotionPrior();
+ChainStateMatrix GaugePrior(const KeyframeState& x);
+
 struct LinearisedSegment {
   SharedInformation theta;  // of all of its tangent, in its units
   // Root mean square of the whitened inertial residuals, by kind (rotation,
@@ -44,6 +50,17 @@ class SegmentLineariser {
                                      const ObservationOrder& order,
                                      int gauge_keyframe);
 
+  // The same without priors on states, down to theta and the states of the
+  // first and the last keyframe, in this order: information about D + 30
+  // unknowns, of which position and rotation about gravity of both keyframes
+  // together are free.
+  const LinearisedSegment& EliminateToEnds(const Rig& rig,
+                                           const Calibration& theta0,
+                                           const MotionSegment& segment,
+                                           const KeyframeMotions& motions,
+                                           const InlierSelection& selection,
+                                           const ObservationOrder& order);
+
   // The same factors without their elimination: what a benchmark compares with.
   void LineariseAlone(const Rig& rig,
                       const Calibration& theta0,
@@ -65,6 +82,14 @@ class SegmentLineariser {
   void LineariseLinks(const Rig& rig,
                       const Calibration& theta0,
                       const MotionSegment& segment);
+  // All factors but those of links, for a chain with so many kept unknowns.
+  void StartChain(const Rig& rig,
+                  const Calibration& theta0,
+                  const MotionSegment& segment,
+                  const KeyframeMotions& motions,
+                  const InlierSelection& selection,
+                  const ObservationOrder& order,
+                  int kept);
 
   ReprojectionBatch reprojection_;
   InertialBatch inertial_;

@@ -3,6 +3,7 @@
 namespace selfcal {
 
 // One file each: <name>_experiment.cc.
+void RunAllSegments(Context* context);
 void RunConsistency(Context* context);
 void RunDatasets(Context* context);
 void RunGainThreshold(Context* context);
@@ -66,6 +67,9 @@ const std::vector<Experiment>& Experiments() {
       {"fusion",
        "the estimate from stored information alone, against the full solve",
        RunFusion},
+      {"all_segments",
+       "calibrations with the information of all segments, against batch",
+       RunAllSegments},
       {"consistency",
        "is each estimator as sure as it says? NEES and coverage",
        RunConsistency},

@@ -196,6 +196,10 @@ Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
     kept = chain.kept;
     chain.kept += 3;
   }
+  FillNormal(random, &chain.kept_state);
+  chain.kept_state = chain.kept_state.cwiseAbs2();
+  chain.kept_state_at = chain.kept;
+  chain.kept += kChainStateSize;
   const auto rows = [&] {
     KeptBiasRows result;
     FillNormal(random, &result.by_bias);
@@ -246,6 +250,9 @@ SharedInformation Eliminate(const Chain& chain,
     if (chain.kept_bias && k + 1 == chain.keyframes()) {
       elimination->AddKeptBias(chain.kept - 6, chain.kept_bias->second);
     }
+    if (chain.kept_bias && k == chain.keyframes() / 2) {
+      elimination->AddKeptState(chain.kept_state_at, chain.kept_state);
+    }
     if (k + 1 < chain.keyframes()) {
       elimination->Advance(Solve(chain.links[k]));
     }
@@ -261,8 +268,8 @@ DenseProblem MakeDense(const Chain& chain) {
   const int shared = states + kChainStateSize * chain.keyframes();
   const int columns = shared + chain.shared_size();
   // Rows of zeros below, so that there are never fewer rows than columns.
-  int rows =
-      columns + 12 + kChainStateSize * static_cast<int>(chain.links.size());
+  int rows = columns + 12 +
+             kChainStateSize * (static_cast<int>(chain.links.size()) + 1);
   for (const auto& track : chain.landmarks) {
     rows += 2 * static_cast<int>(track.size());
   }
@@ -320,6 +327,12 @@ DenseProblem MakeDense(const Chain& chain) {
     };
     add(0, chain.kept_bias->first);
     add(chain.keyframes() - 1, chain.kept_bias->second);
+    const ChainStateVector root = chain.kept_state.cwiseSqrt();
+    const int at = states + kChainStateSize * (chain.keyframes() / 2);
+    dense.J.block<15, 15>(row, at) = root.asDiagonal();
+    dense.J.block<15, 15>(row, kept + chain.kept_state_at) -=
+        root.asDiagonal().toDenseMatrix();
+    row += kChainStateSize;
   }
   // The unknowns that kept landmarks do not use.
   for (int m = 0; m < landmarks; ++m) {

@@ -37,10 +37,13 @@ struct Chain {
   std::vector<std::vector<ChainObservation>> landmarks;
   double landmark_prior = 0;             // information
   Eigen::Vector3d landmark_prior_slope;  // g of x^T H x + 2 g^T x
-  // Landmarks that are kept, by three unknowns each; after them six unknowns
-  // that rows connect with the biases of the first and the last keyframe.
+  // Landmarks that are kept, by three unknowns each; after them 15 unknowns to
+  // which the state of the keyframe in the middle is tied, and six that rows
+  // connect with the biases of the first and the last keyframe.
   std::vector<int> kept_landmarks;  // first unknown of each, or -1
   int kept = 0;
+  int kept_state_at = 0;
+  ChainStateVector kept_state = ChainStateVector::Zero();  // information
   std::optional<std::pair<KeptBiasRows, KeptBiasRows>> kept_bias;
 
   int keyframes() const { return static_cast<int>(priors.size()); }
@@ -55,7 +58,8 @@ struct RandomChainShape {
   double seen = 0.8;  // of the keyframes within a track
   // Tracks that are seen once more, from any keyframe after them.
   double found_again = 0;
-  double kept = 0;      // part of the landmarks; if any, biases as well
+  // Part of the landmarks; if any, a state and biases as well.
+  double kept = 0;
   bool turned = false;  // each keyframe and every second camera on its own
 };
 

@@ -1,0 +1,65 @@
+#include "core/information/segment_ends.h"
+
+#include <algorithm>
+
+#include "core/information/inliers.h"
+#include "core/information/linearisation.h"
+#include "core/information/observation_order.h"
+
+namespace selfcal {
+namespace {
+
+// Samples before the last keyframe: the integration looks at neighbours.
+constexpr int kSamplesBefore = 2;
+
+std::vector<ImuSample> Tail(const MotionSegment& segment) {
+  const auto after =
+      std::upper_bound(segment.imu.begin(),
+                       segment.imu.end(),
+                       segment.keyframes.back().t_ns,
+                       [](std::int64_t t_ns, const ImuSample& sample) {
+                         return t_ns < sample.t_ns;
+                       });
+  const auto before =
+      std::min<std::ptrdiff_t>(kSamplesBefore, after - segment.imu.begin());
+  return {after - before, segment.imu.end()};
+}
+
+}  // namespace
+
+SegmentEnds SummariseEnds(const Rig& rig,
+                          const Calibration& theta0,
+                          const MotionSegment& segment,
+                          const ScoreOptions& options) {
+  ObservationOrder order;
+  order.Find(segment, static_cast<int>(theta0.cameras.size()));
+  const KeyframeMotions motions = SegmentMotions(rig, theta0, segment);
+  InlierSelector selector;
+  SegmentLineariser lineariser;
+  const SharedInformation& information =
+      lineariser
+          .EliminateToEnds(
+              rig,
+              theta0,
+              segment,
+              motions,
+              selector.Select(
+                  theta0, rig.pixel_sigma_px, segment, motions, order, options),
+              order)
+          .theta;
+  std::vector<int> used = FreeComponents(rig);
+  const auto size = static_cast<int>(information.eta.size());
+  for (int i = TangentSize(theta0); i < size; ++i) used.push_back(i);
+  SegmentEnds ends{.key = segment.key,
+                   .theta0 = theta0,
+                   .first = segment.keyframes.front(),
+                   .last = segment.keyframes.back(),
+                   .Lambda = Eigen::MatrixXd::Zero(size, size),
+                   .eta = Eigen::VectorXd::Zero(size),
+                   .tail = Tail(segment)};
+  ends.Lambda(used, used) = information.Lambda(used, used);
+  ends.eta(used) = information.eta(used);
+  return ends;
+}
+
+}  // namespace selfcal
