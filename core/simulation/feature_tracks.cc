@@ -34,15 +34,18 @@ class Tracker {
   Tracker(const Calibration& theta,
           double pixel_sigma_px,
           const Exposures& exposures,
+          const Exposures& closed,
           const SimulationOptions& options)
       : theta_(theta),
         exposures_(exposures),
+        closed_(closed),
         options_(options),
         pixel_sigma_px_(options.noise ? pixel_sigma_px : 0),
         random_(options.seed, kTrackStream),
         noise_(options.seed, kPixelNoiseStream),
         outliers_(options.seed, kOutlierStream),
         moving_(options.seed, kMovingLandmarkStream),
+        blur_(options.seed, kBlurStream),
         tracked_(theta.cameras.size()),
         errors_(theta.cameras.size()) {}
 
@@ -153,14 +156,16 @@ class Tracker {
 
   // True pixel of a landmark; false where the camera does not see it.
   bool Sees(int camera, int landmark, Eigen::Vector2d* z_px) const {
-    return SeesPoint(camera, tracks_.landmarks_G[landmark], z_px);
+    return SeesPoint(
+        exposures_, camera, tracks_.landmarks_G[landmark], z_px);
   }
 
-  bool SeesPoint(int camera,
+  bool SeesPoint(const Exposures& exposures,
+                 int camera,
                  const Eigen::Vector3d& p_G,
                  Eigen::Vector2d* z_px) const {
     const CameraCalibration& c = theta_.cameras[camera];
-    const KeyframeState& x = exposures_[camera][keyframe_];
+    const KeyframeState& x = exposures[camera][keyframe_];
     const Eigen::Vector3d p_I = x.q_GI.conjugate() * (p_G - x.p_GI);
     const Eigen::Vector3d p_C = c.q_CI * p_I + c.p_CI;
     const double depth_m = p_C.norm();
@@ -185,6 +190,19 @@ class Tracker {
     return error;
   }
 
+  // Of the pixel of a point that moves in the image while the shutter is open,
+  // along its way. A point that leaves the image meanwhile is not blurred.
+  Eigen::Vector2d BlurError(int camera,
+                            const Eigen::Vector3d& p_G,
+                            const Eigen::Vector2d& z_px) {
+    Eigen::Vector2d end_px;
+    if (options_.exposure_s <= 0 || !options_.noise ||
+        !SeesPoint(closed_, camera, p_G, &end_px)) {
+      return Eigen::Vector2d::Zero();
+    }
+    return options_.blur_error * blur_.Normal() * (end_px - z_px);
+  }
+
   // Adds the observation unless its pixel, before or after noise, is outside.
   bool Observe(int camera, int landmark) {
     const CameraCalibration& c = theta_.cameras[camera];
@@ -195,13 +213,14 @@ class Tracker {
     if (!Sees(camera, landmark, &observation.true_px)) return false;
     const double moved_s =
         (keyframe_ - made_[landmark]) / options_.keyframe_rate_hz;
-    if (!SeesPoint(
-            camera,
-            tracks_.landmarks_G[landmark] + moved_s * velocities_mps_[landmark],
-            &observation.measured_px)) {
+    const Eigen::Vector3d p_G =
+        tracks_.landmarks_G[landmark] + moved_s * velocities_mps_[landmark];
+    if (!SeesPoint(exposures_, camera, p_G, &observation.measured_px)) {
       return false;
     }
-    observation.measured_px += pixel_sigma_px_ * NextError(camera, landmark);
+    observation.measured_px +=
+        pixel_sigma_px_ * NextError(camera, landmark) +
+        BlurError(camera, p_G, observation.measured_px);
     if (!InsideImage(c, observation.measured_px)) return false;
     const Eigen::Vector2d elsewhere = RandomPixel(c, &outliers_);
     if (outliers_.Chance(options_.outlier_fraction)) {
@@ -214,12 +233,14 @@ class Tracker {
 
   const Calibration& theta_;
   const Exposures& exposures_;
+  const Exposures& closed_;
   const SimulationOptions& options_;
   const double pixel_sigma_px_;
   Random random_;
   Random noise_;
   Random outliers_;
   Random moving_;
+  Random blur_;
   int keyframe_ = 0;
   FeatureTracks tracks_;
   struct TrackError {
@@ -240,8 +261,9 @@ class Tracker {
 FeatureTracks SimulateTracks(const Calibration& theta,
                              double pixel_sigma_px,
                              const Exposures& exposures,
-                             const SimulationOptions& options) {
-  Tracker tracker(theta, pixel_sigma_px, exposures, options);
+                             const SimulationOptions& options,
+                             const Exposures& closed) {
+  Tracker tracker(theta, pixel_sigma_px, exposures, closed, options);
   for (std::size_t k = 0; k < exposures.front().size(); ++k) {
     tracker.Step(static_cast<int>(k));
   }

@@ -25,11 +25,13 @@ struct FeatureTracks {
   std::vector<FeatureObservation> observations;  // in order of the keyframes
 };
 
-// Tracks over all keyframes, given their true exposures. Every pixel, true and
-// measured, lies inside the image.
+// Tracks over all keyframes, given their true exposures; `closed` are those
+// when the shutter has closed, needed with options.exposure_s > 0 alone. Every
+// pixel, true and measured, lies inside the image.
 FeatureTracks SimulateTracks(const Calibration& theta,
                              double pixel_sigma_px,
                              const Exposures& exposures,
-                             const SimulationOptions& options);
+                             const SimulationOptions& options,
+                             const Exposures& closed = {});
 
 }  // namespace selfcal

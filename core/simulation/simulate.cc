@@ -138,6 +138,20 @@ class Cutter {
   std::size_t next_observation_ = 0;
 };
 
+// Where the cameras are when the shutter has closed; nothing where it is open
+// for no time.
+Exposures ShutterClosed(const Calibration& theta_true,
+                        const Recording& recording,
+                        const Trajectory& trajectory,
+                        const SimulationOptions& options) {
+  if (options.exposure_s <= 0) return {};
+  Calibration later = theta_true;
+  for (CameraCalibration& camera : later.cameras) {
+    camera.time_offset_s += options.exposure_s;
+  }
+  return TrueExposures(later, recording.truth, trajectory, recording.imu);
+}
+
 }  // namespace
 
 SimulatedSession Simulate(const Rig& rig,
@@ -148,10 +162,10 @@ SimulatedSession Simulate(const Rig& rig,
                           const SimulationOptions& options) {
   Recording recording;
   recording.imu = SimulateImu(rig, theta_true.imu, trajectory, options);
-  recording.truth = TrueKeyframes(trajectory,
-                                  recording.imu,
-                                  ExposureMargins(theta_true, theta_slam),
-                                  options);
+  TimeMargins margins = ExposureMargins(theta_true, theta_slam);
+  margins.after_s += options.exposure_s;
+  recording.truth =
+      TrueKeyframes(trajectory, recording.imu, margins, options);
   const int N = options.keyframes_per_segment;
   const int segments = static_cast<int>(recording.truth.size()) / N;
   recording.truth.resize(static_cast<std::size_t>(segments) * N);
@@ -159,7 +173,8 @@ SimulatedSession Simulate(const Rig& rig,
       theta_true,
       rig.pixel_sigma_px,
       TrueExposures(theta_true, recording.truth, trajectory, recording.imu),
-      options);
+      options,
+      ShutterClosed(theta_true, recording, trajectory, options));
   const double delay_s = KeyframeDelay(theta_true, theta_slam);
   const std::vector<KeyframeState> meant =
       StatesLater(recording.truth, trajectory, recording.imu, delay_s);

@@ -40,6 +40,11 @@ struct SimulationOptions {
   // Of the pixel error of a track with that in the keyframe before, in [0, 1):
   // real trackers drift, errors go together along a track.
   double pixel_correlation = 0;
+  // How long the shutter is open. What moves in the image meanwhile is blurred,
+  // and found with a further error along the blur of blur_error times its
+  // length, one standard deviation.
+  double exposure_s = 0;
+  double blur_error = 0.15;
   bool noise = true;  // false: perfect sensors, biases constant
   // IMU samples that are lost, each for itself; and the length of a gap
   // somewhere in each segment. The first and the last of a segment are never

@@ -47,6 +47,22 @@ std::unique_ptr<Trajectory> MakeHandheld(double duration_s,
 // joined smoothly; begins with 5 s of rest.
 std::unique_ptr<Trajectory> MakeMixed(double duration_s, std::uint64_t seed);
 
+// The body turns about a pivot, such as a wrist or the head of a tripod, and
+// moves no further than that carries it.
+struct RotationInPlaceOptions {
+  // The pivot in the frame of the body [m]: zero where the IMU is at it.
+  Eigen::Vector3d pivot_I = Eigen::Vector3d::Zero();
+  // Standard deviation of the pivot's own motion on each axis, at 0.3 to 2 Hz:
+  // no hand keeps a point at rest. 0: it does.
+  double pivot_jitter_m = 3e-3;
+  // Of the rotation: 1 is vigorous (1 to 3 rad/s), 0 at rest.
+  double excitation = 1;
+};
+std::unique_ptr<Trajectory> MakeRotationInPlace(
+    double duration_s,
+    const RotationInPlaceOptions& options,
+    std::uint64_t seed);
+
 // A pose with its time, as in a line of a TUM file.
 struct TimedPose {
   double t_s = 0;

@@ -25,6 +25,8 @@ void RunSelection(Context* context);
 void RunNoiseFactors(Context* context);
 void RunWrongNoise(Context* context);
 void RunDegenerate(Context* context);
+void RunTrust(Context* context);
+void RunOpenVinsScenario(Context* context);
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> all = {
@@ -88,6 +90,12 @@ const std::vector<Experiment>& Experiments() {
       {"coach",
        "recorded time to a target sigma: following the coach, or carried about",
        RunCoach},
+      {"trust",
+       "devices of all kinds through the daemon's pipeline: silent failures",
+       RunTrust},
+      {"openvins_scenario",
+       "tables and batch on the scenario of OpenVINS's simulator",
+       RunOpenVinsScenario},
   };
   return all;
 }

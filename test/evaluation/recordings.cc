@@ -34,14 +34,22 @@ std::optional<RecordedDevice> ReadTango() {
   return tango;
 }
 
+std::optional<RecordedDevice> ReadEuroc(int keyframes) {
+  return Read("euroc_v1_01", {""}, {keyframes, {}, {}});
+}
+
+std::optional<RecordedDevice> ReadRoom() {
+  return Read("equidistant_room", {""}, {20, {}, {}});
+}
+
 std::vector<RecordedDevice> ReadRecordings() {
   std::vector<RecordedDevice> all;
   const auto add = [&](std::optional<RecordedDevice> device) {
     if (device) all.push_back(std::move(*device));
   };
   add(ReadTango());
-  add(Read("euroc_v1_01", {""}, {20, {}, {}}));
-  add(Read("equidistant_room", {""}, {20, {}, {}}));
+  add(ReadEuroc(20));
+  add(ReadRoom());
   return all;
 }
 

@@ -22,6 +22,12 @@ struct RecordedDevice {
 // very loose ones of the file. Nothing where the recording is missing.
 std::optional<RecordedDevice> ReadTango();
 
+// EuRoC V1_01 in segments of so many keyframes, a second apart, with the
+// states of its odometry; the equidistant room in segments of 20. Nothing where
+// the recording is missing.
+std::optional<RecordedDevice> ReadEuroc(int keyframes);
+std::optional<RecordedDevice> ReadRoom();
+
 // All that are there: the above, EuRoC V1_01 and the equidistant room in
 // segments of 20 keyframes.
 std::vector<RecordedDevice> ReadRecordings();

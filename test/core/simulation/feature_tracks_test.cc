@@ -13,10 +13,11 @@
 namespace selfcal {
 namespace {
 
-std::vector<KeyframeState> Keyframes(const Trajectory& trajectory) {
+std::vector<KeyframeState> Keyframes(const Trajectory& trajectory,
+                                     double late_s = 0) {
   std::vector<KeyframeState> keyframes;
-  for (double t = 0; t < trajectory.duration_s(); t += 0.1) {
-    const BodyMotion motion = trajectory.At(t);
+  for (double t = 0; t + 0.1 < trajectory.duration_s(); t += 0.1) {
+    const BodyMotion motion = trajectory.At(t + late_s);
     KeyframeState state;
     state.q_GI = motion.q_GI;
     state.p_GI = motion.p_GI;
@@ -205,6 +206,55 @@ TEST(FeatureTracksTest, TheWantedFractionOfLandmarksMoves) {
   }
   ASSERT_GT(n, 1000);
   EXPECT_NEAR(moved / n, 0.2, 5 * std::sqrt(0.2 * 0.8 / n));
+}
+
+// The errors lie along the blur and are as large a part of it as stated, by
+// projections of the landmarks at both ends of the exposure.
+TEST(FeatureTracksTest, BlurMakesErrorsAlongTheWayOfALandmarkInTheImage) {
+  constexpr double kExposure_s = 0.01;
+  const Rig rig = HandheldRig("a");
+  const CameraCalibration& camera = rig.factory.cameras[0];
+  const auto motion = MakeHandheld(60, 1, 5);
+  const Exposures open = {Keyframes(*motion)};
+  const Exposures closed = {Keyframes(*motion, kExposure_s)};
+  SimulationOptions options;
+  options.exposure_s = kExposure_s;
+  options.blur_error = 0.2;
+  const FeatureTracks tracks =
+      SimulateTracks(rig.factory, 0, open, options, closed);
+  double square = 0, n = 0;
+  for (const FeatureObservation& z : tracks.observations) {
+    const KeyframeState& x = closed[0][z.keyframe];
+    const Eigen::Vector3d p_I =
+        x.q_GI.conjugate() * (tracks.landmarks_G[z.landmark] - x.p_GI);
+    Eigen::Vector2d end_px;
+    if (!Project(camera, camera.q_CI * p_I + camera.p_CI, &end_px, nullptr)) {
+      continue;
+    }
+    const Eigen::Vector2d blur_px = end_px - z.true_px;
+    const Eigen::Vector2d error_px = z.measured_px - z.true_px;
+    const double part = error_px.dot(blur_px) / blur_px.squaredNorm();
+    if (part == 0) continue;  // it left the image meanwhile
+    ASSERT_LT((error_px - part * blur_px).norm(), 1e-6 * blur_px.norm());
+    square += part * part;
+    ++n;
+  }
+  ASSERT_GT(n, 10'000);
+  EXPECT_NEAR(std::sqrt(square / n), 0.2, 5 * 0.2 / std::sqrt(2 * n));
+}
+
+TEST(FeatureTracksTest, WithoutExposureTimeNothingIsBlurred) {
+  const Rig rig = HandheldRig("a");
+  const auto keyframes = Keyframes(*MakeHandheld(20, 1, 5));
+  SimulationOptions options;
+  const FeatureTracks sharp = Tracks(rig, 0.8, keyframes, options);
+  options.blur_error = 1;
+  const FeatureTracks same = Tracks(rig, 0.8, keyframes, options);
+  ASSERT_EQ(sharp.observations.size(), same.observations.size());
+  for (std::size_t i = 0; i < sharp.observations.size(); ++i) {
+    ASSERT_EQ(sharp.observations[i].measured_px,
+              same.observations[i].measured_px);
+  }
 }
 
 TEST(FeatureTracksTest, NewLandmarksLieBetweenTheDepthsOfTheOptions) {
