@@ -92,9 +92,6 @@ Facts Describe(const v1::Rig& rig) {
   facts.Add("retrigger fraction",
             fmt::format("{:g}", rig.retrigger_fraction()));
   AddPolicy(rig, &facts);
-  facts.Add("noise",
-            rig.reweight_noise() ? "re-weighted by what residuals suggest"
-                                 : "as stated");
   return facts;
 }
 
@@ -209,7 +206,8 @@ void AddOverrides(CLI::App* create, RigInput* input) {
                      "[s]");
   create->add_flag("--reweight-noise",
                    input->reweight_noise,
-                   "Weight by the noise that the residuals suggest");
+                   "No matter: recalibrations always weight by the noise "
+                   "that their residuals show");
   create->add_option("--fixed",
                      input->fixed,
                      "Never estimate the components of this name, '*' at "
