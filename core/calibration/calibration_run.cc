@@ -1,6 +1,8 @@
 #include "core/calibration/calibration_run.h"
 
 #include <algorithm>
+#include <iomanip>
+#include <sstream>
 #include <utility>
 
 #include "core/calibration/linear_range.h"
@@ -31,6 +33,8 @@ constexpr double kMaxStepSigmas = 0.05;
 // far beyond where it is one.
 constexpr int kSmallSteps = 3;
 constexpr double kSmallStepSigmas = 0.005;
+// Damping that is next to nothing where states are determined.
+constexpr double kSettledDamping = 1;
 // With steps that take less off the cost [half squares].
 constexpr double kSmallDecrease = 0.1;
 // Largest change of theta by a round at convergence, in sigmas.
@@ -248,11 +252,16 @@ class Calibrator {
       const bool small = step.lower && moved_sigmas_ < kSmallStepSigmas &&
                          linearised_.cost - step.cost < kSmallDecrease;
       small_steps = small ? small_steps + 1 : 0;
-      if (undamped_sigmas < kMaxStepSigmas || small_steps == kSmallSteps) {
+      if (undamped_sigmas < kMaxStepSigmas) {
         result_.status = CalibrateStatus::kConverged;
         break;
       }
-      if (!step.lower || result_.iterations >= options_.max_iterations) {
+      if (!step.lower || small_steps == kSmallSteps) {
+        result_.status = IsSettled() ? CalibrateStatus::kConverged
+                                     : CalibrateStatus::kStalled;
+        break;
+      }
+      if (result_.iterations >= options_.max_iterations) {
         break;
       }
       if (!Renew()) {
@@ -260,6 +269,27 @@ class Calibrator {
       }
     }
     return true;
+  }
+
+  // Whether theta would stay where it is, if states that are hardly determined
+  // did not step further than they are linear: an undamped step lets these
+  // drag theta along, and no such step comes true.
+  bool IsSettled() {
+    const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
+    LinearisedRound damped;
+    if (!LineariseRound(Round(basis),
+                        estimate_,
+                        screening_.landmarks,
+                        &screening_.loss,
+                        &damped,
+                        kSettledDamping)) {
+      return false;
+    }
+    const SharedInformation& at = damped.by_offset;
+    left_sigmas_ = LargestInSigmas(
+        SubspaceStep(rig_, subspace_, at.Lambda, at.eta),
+        SubspaceCovariance(rig_, subspace_, at.Lambda));
+    return left_sigmas_ < kMaxStepSigmas;
   }
 
   // Decides anew what is used and what is held. As holding moves the estimate,
@@ -483,7 +513,14 @@ class Calibrator {
   }
 
   void Finish() {
-    if (result_.status != CalibrateStatus::kConverged) {
+    if (result_.status == CalibrateStatus::kStalled) {
+      std::ostringstream message;
+      message << std::setprecision(2)
+              << "no step lowers the cost, and the next one would move theta "
+                 "by "
+              << left_sigmas_ << " sigma";
+      result_.message = message.str();
+    } else if (result_.status != CalibrateStatus::kConverged) {
       result_.status = CalibrateStatus::kNotConverged;
       result_.message = "the estimate still moves after " +
                         std::to_string(result_.iterations) + " iterations";
@@ -571,6 +608,7 @@ class Calibrator {
   Eigen::MatrixXd covariance_d_;
   bool weak_were_judged_ = false;
   double moved_sigmas_ = 0;  // by the last step
+  double left_sigmas_ = 0;   // of the step that a stalled estimate is short of
   double track_noise_ = 0;   // as TrackNoiseFactor
   CalibrationResult result_;
   std::vector<SegmentEvidence> evidence_;

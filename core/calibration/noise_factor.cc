@@ -10,7 +10,7 @@ namespace {
 constexpr double kMostOff = 30;
 // What is hardly determined is still nearer to the truth, if it is so many
 // standard deviations off.
-constexpr double kOffSigmas = 2;
+constexpr double kOffSigmas = 1;
 // The logarithm of a factor that makes a difference.
 constexpr double kLeastChange = 0.05;
 

@@ -7,6 +7,9 @@
 namespace selfcal::server {
 namespace {
 
+// With fewer, what chance makes of a ratio is no ground to reject.
+constexpr int kLeastDegrees = 50;
+
 void CheckHalves(const CheckContext& context,
                  std::vector<ValidationCheck>* checks) {
   const AgreementTest& halves = context.result.halves;
@@ -32,6 +35,41 @@ void CheckHalves(const CheckContext& context,
         limit);
   }
   AddResult("halves", halves.probability, limit, failure, checks);
+}
+
+// Of the tests of each segment against all others. Where the squares exceed
+// their expectation by as much, errors are not those of noise, and what is
+// common to all segments cannot be told from it.
+void CheckDisagreement(const CheckContext& context,
+                       std::vector<ValidationCheck>* checks) {
+  const double limit = context.limits.max_disagreement;
+  double squares = 0;
+  int degrees = 0;
+  for (const SegmentFit& fit : context.result.segment_fits) {
+    if (!fit.excluded.empty()) continue;
+    squares += fit.others.statistic;
+    degrees += fit.others.degrees;
+  }
+  if (degrees < kLeastDegrees) {
+    AddNotTested("disagreement",
+                 limit,
+                 "Too little is known by several segments to compare them.",
+                 checks);
+    return;
+  }
+  const double excess = squares / degrees;
+  std::string failure;
+  if (!(excess <= limit)) {
+    failure = fmt::format(
+        "The segments contradict one another by {:.2f} times the variance that "
+        "noise explains, over {} degrees; at most {:.1f} is noise. Something "
+        "that is not modelled acts on all of them: look at the stamps, at lost "
+        "samples, at the camera model and at the noise that is stated.",
+        excess,
+        degrees,
+        limit);
+  }
+  AddResult("disagreement", excess, limit, failure, checks);
 }
 
 void CheckHeldOut(const CheckContext& context, StoredValidation* validation) {
@@ -84,6 +122,7 @@ void CheckHeldOut(const CheckContext& context, StoredValidation* validation) {
 void CheckConfirmation(const CheckContext& context,
                        StoredValidation* validation) {
   CheckHalves(context, &validation->checks);
+  CheckDisagreement(context, &validation->checks);
   CheckHeldOut(context, validation);
   const int tests = (context.result.halves.degrees > 0 ? 1 : 0) +
                     (validation->held_out.candidate.degrees > 0 ? 1 : 0);
