@@ -286,9 +286,9 @@ class Calibrator {
       return false;
     }
     const SharedInformation& at = damped.by_offset;
-    left_sigmas_ = LargestInSigmas(
-        SubspaceStep(rig_, subspace_, at.Lambda, at.eta),
-        SubspaceCovariance(rig_, subspace_, at.Lambda));
+    left_sigmas_ =
+        LargestInSigmas(SubspaceStep(rig_, subspace_, at.Lambda, at.eta),
+                        SubspaceCovariance(rig_, subspace_, at.Lambda));
     return left_sigmas_ < kMaxStepSigmas;
   }
 
@@ -564,7 +564,7 @@ class Calibrator {
                                 estimate_.keyframes,
                                 screening_,
                                 subspace_,
-                                Expected());
+                                SquaresOfAReprojection());
     const double excess = TestEach(&evidence_);
     result_.covariance *= excess;
     result_.halves = TestHalves(evidence_, excess);
@@ -573,19 +573,15 @@ class Calibrator {
     }
   }
 
-  // From the redundancy of each kind of residual.
-  ExpectedSquares Expected() const {
-    ExpectedSquares expected;
-    const auto links = static_cast<double>(problem_.inertial_links.size());
+  // Sum over the two rows of a reprojection, from the redundancy of all; 0: not
+  // known.
+  double SquaresOfAReprojection() const {
     for (const NoiseFactor& factor : result_.noise_factors) {
       if (factor.kind == NoiseKind::kPixel) {
-        expected.of_observation =
-            factor.redundancy / std::max(1, screening_.observations);
-      } else {
-        expected.of_link += factor.redundancy / links;
+        return factor.redundancy / std::max(1, screening_.observations);
       }
     }
-    return expected;
+    return 0;
   }
 
   const Rig& stated_;

@@ -37,6 +37,7 @@ AgreementTest Test(const Eigen::MatrixXd& Lambda,
                    const Eigen::VectorXd& rest_eta,
                    double excess) {
   AgreementTest test;
+  if (Lambda.size() == 0) return test;
   Eigen::MatrixXd all = Lambda + rest_Lambda;
   all.diagonal().array() += 1e-9 * all.trace();
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(all);
@@ -101,6 +102,19 @@ std::string Percent(const char* what, double ratio, double usual) {
   return text;
 }
 
+// Most of an inertial residual is absorbed by the states that it connects, and
+// how much differs from rig to rig: each is compared with the others.
+void RelateInertial(std::vector<SegmentEvidence>* evidence) {
+  std::vector<double> values;
+  for (const SegmentEvidence& one : *evidence) {
+    values.push_back(one.fit.inertial_ratio);
+  }
+  const double usual = Median(std::move(values));
+  for (SegmentEvidence& one : *evidence) {
+    one.fit.inertial_ratio = usual > 0 ? one.fit.inertial_ratio / usual : 0;
+  }
+}
+
 }  // namespace
 
 std::vector<SegmentEvidence> CollectEvidence(
@@ -111,7 +125,7 @@ std::vector<SegmentEvidence> CollectEvidence(
     const std::vector<KeyframeState>& keyframes,
     const Screening& screening,
     const ThetaSubspace& subspace,
-    const ExpectedSquares& expected) {
+    double squares_of_a_reprojection) {
   const Eigen::MatrixXd basis = TangentBasis(rig, subspace);
   std::vector<SegmentEvidence> evidence;
   int first_keyframe = 0;
@@ -125,16 +139,15 @@ std::vector<SegmentEvidence> CollectEvidence(
     one.Lambda = basis.transpose() * information.Lambda * basis;
     one.eta = basis.transpose() * information.eta;
     const ResidualStatistics& residuals = information.residuals;
-    if (expected.of_observation > 0) {
+    if (squares_of_a_reprojection > 0) {
       one.fit.pixel_ratio = residuals.reprojection_rms_px / rig.pixel_sigma_px /
-                            std::sqrt(expected.of_observation);
+                            std::sqrt(squares_of_a_reprojection);
     }
     double squares = 0;
     for (const double rms : residuals.inertial_rms) squares += 3 * rms * rms;
-    if (expected.of_link > 0) {
-      one.fit.inertial_ratio = std::sqrt(squares / expected.of_link);
-    }
+    one.fit.inertial_ratio = std::sqrt(squares);
   }
+  RelateInertial(&evidence);
   return evidence;
 }
 

@@ -33,15 +33,9 @@ struct SegmentEvidence {
   SegmentFit fit;  // its key and the ratios of its residuals
 };
 
-// Of residuals, over what is expected of them: by how many their squares exceed
-// those of one row in each inertial link, and in each reprojection.
-struct ExpectedSquares {
-  double of_link = 0;         // sum over the 15 rows; 0: not known
-  double of_observation = 0;  // sum over the two rows
-};
-
 // `rig` with the noise that the calibration was weighted with; `segments` as
-// its problem was made of them.
+// its problem was made of them; the squares that are expected of the two rows
+// of a reprojection, 0 if that is not known.
 std::vector<SegmentEvidence> CollectEvidence(
     const Rig& rig,
     const Calibration& theta,
@@ -50,7 +44,7 @@ std::vector<SegmentEvidence> CollectEvidence(
     const std::vector<KeyframeState>& keyframes,
     const Screening& screening,
     const ThetaSubspace& subspace,
-    const ExpectedSquares& expected);
+    double squares_of_a_reprojection);
 
 // Each against all others, in `fit.others`; returns by how much the squares of
 // all these tests exceed their expectation, 1 or more: where segments disagree

@@ -17,9 +17,9 @@ struct AgreementTest {
 
 struct SegmentFit {
   SegmentKey key;
-  // Root mean square of its reprojection residuals, and of its whitened
-  // inertial residuals, each over what is expected of them with the noise that
-  // the calibration used: 1 where the model holds. 0: not measured.
+  // Root mean square of its reprojection residuals over what the noise that the
+  // calibration used predicts, 1 where the model holds; and that of its whitened
+  // inertial residuals over the median of all segments. 0: not measured.
   double pixel_ratio = 0;
   double inertial_ratio = 0;
   // Its own estimate of theta against that of all others.

@@ -201,6 +201,8 @@ TEST(Calibrate, CancelsAtOnce) {
 TEST(Calibrate, ProgressTellsTheWayToTheResult) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(9), 3);
   s.rig.fixed = {"imu.gyro.scale.*"};
+  // At the truth: what is held at a wrong value makes segments disagree.
+  s.rig.factory.imu.s_g = s.truth.imu.s_g;
   std::vector<CalibrateProgress> told;
   const CalibrationResult result =
       Calibrate(s.rig,

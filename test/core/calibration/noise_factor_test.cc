@@ -36,7 +36,7 @@ TEST(Reweight, TakesWhatIsDeterminedOrFarOff) {
                              {{NoiseKind::kPixel, 1.1, 0.01},
                               {NoiseKind::kGyro, 3, 0.05},
                               {NoiseKind::kAccel, 3, 0.3},
-                              {NoiseKind::kGyroBiasWalk, 3, 0.6},
+                              {NoiseKind::kGyroBiasWalk, 3, 1.2},
                               {NoiseKind::kAccelBiasWalk, 0.1, 2}});
   ASSERT_TRUE(next.has_value());
   EXPECT_DOUBLE_EQ(next->pixel_sigma_px, 1.1 * rig.pixel_sigma_px);
@@ -52,7 +52,7 @@ TEST(Reweight, TakesWhatIsDeterminedOrFarOff) {
 TEST(Reweight, EndsWhereNothingIsFarOff) {
   const Rig rig = HandheldRig("r");
   EXPECT_FALSE(Reweight(rig, rig, {{NoiseKind::kGyro, 1.04, 0.01}}));
-  EXPECT_FALSE(Reweight(rig, rig, {{NoiseKind::kGyro, 2, 0.5}}));
+  EXPECT_FALSE(Reweight(rig, rig, {{NoiseKind::kGyro, 2, 0.8}}));
   EXPECT_FALSE(Reweight(rig, rig, {}));
   EXPECT_TRUE(Reweight(rig, rig, {{NoiseKind::kGyro, 0.7, 0.01}}));
 }
