@@ -62,21 +62,31 @@ void Course::Remove(const OffsetInformation& segment, double weight) {
   at->h1 -= weight * segment.eta;
 }
 
+// Both errors of the reach, with (e, x) in one: what they add to the segments
+// is made of the same sums.
+void Course::EliminateReach(Sums* sums) {
+  const Eigen::Index size = sums->h0.size();
+  MatrixXd M(2 * size, 2 * size);
+  M << sums->L0, sums->L1, sums->L1.transpose(), sums->L2;
+  VectorXd h(2 * size);
+  h << sums->h0, sums->h1;
+  VectorXd sigmas(2 * size);
+  sigmas << sums->reach, sums->reach;
+  const MatrixXd gain = M * ErrorCovariance(M, sigmas.asDiagonal());
+  M -= (gain * M).eval();
+  h -= gain * VectorXd(h);
+  sums->L0 = M.topLeftCorner(size, size);
+  sums->L1 = M.topRightCorner(size, size);
+  sums->L2 = M.bottomRightCorner(size, size);
+  sums->h0 = h.head(size);
+  sums->h1 = h.tail(size);
+}
+
 Course::Sums Course::Total() const {
   Sums total;
   for (const Sums& sums : sums_) {
     Sums part = sums;
-    if (sums.reach.size() > 0) {
-      const MatrixXd gain = ErrorCovariance(sums.L0, sums.reach.asDiagonal());
-      const MatrixXd of_error = gain * sums.L0;
-      const MatrixXd of_change = gain * sums.L1;
-      const VectorXd of_offset = gain * sums.h0;
-      part.L0 -= sums.L0 * of_error;
-      part.L1 -= sums.L0 * of_change;
-      part.L2 -= sums.L1 * of_change;
-      part.h0 -= sums.L0 * of_offset;
-      part.h1 -= sums.L1 * of_offset;
-    }
+    if (sums.reach.size() > 0) EliminateReach(&part);
     if (total.L0.size() == 0) {
       total = std::move(part);
       continue;

@@ -12,11 +12,12 @@
 //   L = L2 - L1 (Sigma^-1 + L0)^-1 L1,   s = h1 - L1 (Sigma^-1 + L0)^-1 h0,
 //   Lk = sum w_i^k Lambda_i,             hk = sum w_i^k eta_i,
 //
-// has s ~ N(L x, L). Segments that were linearised elsewhere have an error of
-// their reach besides (consistency.h), those at one place the same: it is
-// eliminated before. Segments from before the change make e smaller: whatever
-// all segments have in common is no change. A change within the span of B,
-// x = B y, is tested by
+// has s ~ N(L x, L). Segments that were linearised elsewhere have errors of
+// their reach besides (consistency.h), a + w_i b, each as large: those of one
+// motion the same, but those that follow may be of another motion, which takes
+// other noise for what it shows. Both are eliminated before. Segments from
+// before the change make e smaller: whatever all segments have in common is no
+// change. A change within the span of B, x = B y, is tested by
 //
 //   d = (B^T s)^T (B^T L B)^-1 (B^T s),
 //
@@ -57,6 +58,7 @@ class Course {
     Eigen::MatrixXd L0, L1, L2;
     Eigen::VectorXd h0, h1;
   };
+  static void EliminateReach(Sums* sums);
   Sums Total() const;  // with the errors of their reach eliminated
 
   const Eigen::MatrixXd* root_;

@@ -19,7 +19,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kFirstDevice = 43000;  // seeds of their own
+constexpr int kFirstDevice = 44000;  // seeds of their own
 constexpr int kEach = 10;            // segments of a kind in a row
 constexpr double kReach = 0.9;       // largest, in reference sigmas
 

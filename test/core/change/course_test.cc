@@ -38,7 +38,8 @@ OffsetInformation LeastSquares(const std::vector<OffsetInformation>& segments,
     for (Eigen::Index j = 0; j < count; ++j) {
       Eigen::MatrixXd error = Sigma;
       if (segments[i].reach.size() > 0 && segments[j].reach.size() > 0) {
-        error.diagonal() += segments[i].reach.cwiseAbs2();
+        error.diagonal() +=
+            (1 + weights(i) * weights(j)) * segments[i].reach.cwiseAbs2();
       }
       C.block(i * size, j * size, size, size) =
           segments[i].Lambda * error * segments[j].Lambda;

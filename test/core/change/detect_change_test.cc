@@ -169,6 +169,19 @@ TEST_F(DetectChangeTest, ClaimsFromElsewhereAreNoChange) {
   }
 }
 
+// As they are, but with another motion before: what is taken for known there
+// differs from motion to motion.
+TEST_F(DetectChangeTest, NeitherAreThoseOfAnotherMotion) {
+  const Eigen::VectorXd off = 0.9 * random_.Direction(rig_);
+  const Calibration elsewhere = BoxPlus(rig_.factory, off);
+  for (int i = 0; i < 40; ++i) {
+    // The first show where theta is, the others claim that it is there.
+    newest_.push_back(tester_.Offset(random_.Segment(
+        rig_, elsewhere, i < 15 ? Eigen::VectorXd(-off) : zero_, 100)));
+    EXPECT_FALSE(Detect()) << i;
+  }
+}
+
 TEST_F(DetectChangeTest, ACarefulFactorNeedsMoreEvidence) {
   Many(14, zero_);
   Many(2, Sigmas(12, "cam0.principal.x"));
