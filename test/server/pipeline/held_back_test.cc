@@ -191,7 +191,7 @@ TEST_F(HeldBackTest, RunGoesOnFromTheCandidateThatItHasStored) {
   EXPECT_EQ(active->version, 2);
   ASSERT_TRUE(active->validation.has_value());
   EXPECT_EQ(active->validation->active_version, 1);
-  EXPECT_EQ(active->validation->checks.size(), 14u);
+  EXPECT_EQ(active->validation->checks.size(), 15u);
 }
 
 TEST_F(HeldBackTest, ActivationByHandDuringARunIsWhatItIsJudgedAgainst) {

@@ -56,7 +56,7 @@ class PolicyTest : public StoreTest {
 SELFCAL_STORE_TEST_SUITE(PolicyTest);
 
 TEST_P(PolicyTest, ComesBackAsItWasGiven) {
-  const RigPolicy policy{1, 2 * kSecond + 5, 3 * kSecond};
+  const RigPolicy policy{1, 2 * kSecond + 5, 3 * kSecond, {}};
   Create(policy);
   CreateTestRig("b");
   Reopen();
