@@ -94,11 +94,19 @@ class OldClientsTest : public ServiceTest {
   }
 
   // What the pipeline would have done with the segments: they fill the tables,
-  // and the run that this starts gives a version.
+  // and the run that this starts gives a version. Another segment enters one of
+  // the tables since: on unchanged ones nothing is calibrated anew.
   void FinishFirstRun() {
     const Rig rig = store_->GetRig("r")->rig;
     for (std::int64_t index : {0, 1}) Score(rig, {"walk", index}, 10);
     FinishRun(rig, 1);
+    const MotionSegment segment = TestSegments(rig, 1).front();
+    ASSERT_TRUE(store_->PutSegment(rig.id, segment).ok());
+    SegmentInformation information = TestInformation(rig, 20);
+    for (std::size_t q = 1; q < information.groups.size(); ++q) {
+      information.groups[q].gain = 0;
+    }
+    ASSERT_TRUE(store_->CommitScore(rig.id, segment.key, information).ok());
   }
 };
 
