@@ -82,8 +82,10 @@ absl::Status QuarantineExcluded(Connection* db,
                                 const std::vector<SegmentFit>& fits) {
   for (const SegmentFit& fit : fits) {
     if (fit.excluded.empty()) continue;
-    SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
-                             FindSegment(db, rig, fit.key));
+    const auto found = FindSegment(db, rig, fit.key);
+    // One that is not kept any more is no reason to lose the calibration.
+    if (absl::IsNotFound(found.status())) continue;
+    SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, found);
     SELFCAL_RETURN_IF_ERROR(
         Statement(db,
                   "UPDATE run_segments SET excluded = 1 "

@@ -264,7 +264,8 @@ TEST_P(CalibrationsTest, OnlyARunningRunCanProduceOne) {
   EXPECT_TRUE(absl::IsFailedPrecondition(
       store_->FinishRun("a", 1, Candidate(rig)).status()));
   ASSERT_TRUE(store_->BeginRun("a", 1).ok());
-  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  const auto finished = store_->FinishRun("a", 1, Candidate(rig));
+  ASSERT_TRUE(finished.ok()) << finished.status();
   EXPECT_TRUE(absl::IsFailedPrecondition(
       store_->FinishRun("a", 1, Candidate(rig)).status()));
   EXPECT_EQ(store_->ListCalibrations("a", {})->items.size(), 2u);

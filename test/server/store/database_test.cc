@@ -62,7 +62,7 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 7u);
+  ASSERT_EQ(migrations.size(), 8u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -85,6 +85,9 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[6].name, "0007_motion.sql");
   EXPECT_EQ(migrations[6].sha256,
             "3344c641d38933c0b427f462012cc45057b996865f62c0d7f09056fb0c40f679");
+  EXPECT_EQ(migrations[7].name, "0008_quarantine.sql");
+  EXPECT_EQ(migrations[7].sha256,
+            "b61cf9b4edd752aa17fe53a69d60cfcdf1c85957f206905384bc9add7ed9d6fe");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

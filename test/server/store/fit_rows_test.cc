@@ -50,7 +50,6 @@ TEST_P(FitRowsTest, AVigorousSegmentThatDoesNotFitEntersNoTable) {
   EXPECT_EQ(absence->fit, 20);
   ASSERT_TRUE(absence->fit_limit.has_value());
   EXPECT_NEAR(*absence->fit_limit, 3 * 1.2, 0.5);
-  EXPECT_FALSE(HasData("a", 6));
   Reopen();
   EXPECT_EQ(store_->GetSegment("a", {"s", 6})->information->residuals.fit, 20);
 }
