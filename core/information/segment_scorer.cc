@@ -72,6 +72,20 @@ double SegmentScorer::MeasureFit(const Rig& rig,
   return excess > 1 ? 1 / (excess * excess) : 1;
 }
 
+const LinearisedSegment& SegmentScorer::Eliminate(
+    const Rig& rig,
+    const Calibration& theta0,
+    const MotionSegment& segment,
+    const InlierSelection& selection,
+    int gauge_keyframe) {
+  if (elimination_) {
+    eliminated_ = elimination_(rig, theta0, segment, selection, gauge_keyframe);
+    return eliminated_;
+  }
+  return lineariser_.Eliminate(
+      rig, theta0, segment, motions_, selection, order_, gauge_keyframe);
+}
+
 void SegmentScorer::Score(const Rig& rig,
                           const Calibration& theta0,
                           const MotionSegment& segment,
@@ -87,13 +101,7 @@ void SegmentScorer::Score(const Rig& rig,
   const InlierSelection& selection = selector_.Select(
       theta0, rig.pixel_sigma_px, segment, motions_, order_, options);
   const LinearisedSegment& linearised =
-      lineariser_.Eliminate(rig,
-                            theta0,
-                            segment,
-                            motions_,
-                            selection,
-                            order_,
-                            options.gauge_keyframe);
+      Eliminate(rig, theta0, segment, selection, options.gauge_keyframe);
   result->theta0 = theta0;
   result->residuals = selection.statistics;
   result->residuals.inertial_rms = linearised.inertial_rms;

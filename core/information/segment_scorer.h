@@ -5,6 +5,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
+#include <utility>
 
 #include "core/factor/keyframe_motion.h"
 #include "core/information/group_scorer.h"
@@ -18,8 +20,19 @@ namespace selfcal {
 
 class SegmentScorer {
  public:
+  // Does what SegmentLineariser::Eliminate does, in another way.
+  using Elimination =
+      std::function<LinearisedSegment(const Rig& rig,
+                                      const Calibration& theta0,
+                                      const MotionSegment& segment,
+                                      const InlierSelection& selection,
+                                      int gauge_keyframe)>;
+
   explicit SegmentScorer(VectorWidth width = WidestVectors())
       : selector_(width), lineariser_(width) {}
+  // Scores by that elimination in place of the structured one.
+  explicit SegmentScorer(Elimination elimination)
+      : elimination_(std::move(elimination)) {}
 
   // As ScoreSegment(); *result is overwritten.
   void Score(const Rig& rig,
@@ -34,6 +47,14 @@ class SegmentScorer {
                     const SharedInformation& theta,
                     SegmentInformation* result);
 
+  const LinearisedSegment& Eliminate(const Rig& rig,
+                                     const Calibration& theta0,
+                                     const MotionSegment& segment,
+                                     const InlierSelection& selection,
+                                     int gauge_keyframe);
+
+  Elimination elimination_;       // none: the structured one
+  LinearisedSegment eliminated_;  // by elimination_
   ObservationOrder order_;
   KeyframeMotions motions_;
   InlierSelector selector_;

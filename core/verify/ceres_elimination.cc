@@ -1,0 +1,104 @@
+#include "core/verify/ceres_elimination.h"
+
+#include <ceres/crs_matrix.h>
+#include <ceres/problem.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "core/verify/cholmod_elimination.h"
+#include "core/verify/scorer.h"
+#include "core/verify/segment_problem.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kKinds = kStateTangentSize / 3;
+
+struct Evaluated {
+  Eigen::SparseMatrix<double, Eigen::RowMajor> J;
+  Eigen::VectorXd r;
+};
+
+Evaluated Evaluate(SegmentProblem* segment) {
+  ceres::Problem::EvaluateOptions options;
+  options.num_threads = 1;
+  options.parameter_blocks = segment->BlocksInOrder();
+  std::vector<double> residuals;
+  ceres::CRSMatrix jacobian;
+  if (!segment->problem()->Evaluate(
+          options, nullptr, &residuals, nullptr, &jacobian)) {
+    throw std::runtime_error("Ceres cannot evaluate the factors of a segment");
+  }
+  // Eigen sorts the columns of a row while it copies.
+  using Columns = Eigen::SparseMatrix<double, Eigen::ColMajor>;
+  const Columns by_column =
+      Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
+          jacobian.num_rows,
+          jacobian.num_cols,
+          static_cast<Eigen::Index>(jacobian.values.size()),
+          jacobian.rows.data(),
+          jacobian.cols.data(),
+          jacobian.values.data());
+  return {by_column,
+          Eigen::Map<const Eigen::VectorXd>(
+              residuals.data(), static_cast<Eigen::Index>(residuals.size()))};
+}
+
+// Root mean squares by kind (rotation, velocity, position, b_a, b_g).
+std::vector<double> RootMeanSquares(const Eigen::VectorXd& whitened) {
+  std::vector<double> rms(kKinds, 0);
+  const Eigen::Index links = whitened.size() / kStateTangentSize;
+  for (int kind = 0; kind < kKinds; ++kind) {
+    double sum = 0;
+    for (Eigen::Index link = 0; link < links; ++link) {
+      sum += whitened.segment<3>(kStateTangentSize * link + 3 * kind)
+                 .squaredNorm();
+    }
+    rms[kind] = std::sqrt(sum / (3.0 * static_cast<double>(links)));
+  }
+  return rms;
+}
+
+}  // namespace
+
+bool HasCeres() { return true; }
+
+LinearisedSegment EliminateByCeres(const Rig& rig,
+                                   const Calibration& theta0,
+                                   const MotionSegment& segment,
+                                   const InlierSelection& selection,
+                                   int gauge_keyframe) {
+  SegmentProblem problem(rig, theta0, segment, selection, gauge_keyframe);
+  const Evaluated evaluated = Evaluate(&problem);
+  const Eigen::VectorXd inertial = evaluated.r.segment(
+      2 * static_cast<Eigen::Index>(selection.inliers.size()),
+      kStateTangentSize *
+          (static_cast<Eigen::Index>(segment.keyframes.size()) - 1));
+  const std::vector<int> free = FreeComponents(rig);
+  const auto size = static_cast<Eigen::Index>(free.size());
+  const auto eliminated = EliminateByCholmod(evaluated.J, evaluated.r, size);
+  if (!eliminated) {
+    throw std::runtime_error(
+        "CHOLMOD finds the factors of a segment not positive definite; choose "
+        "the scorer \"structured\"");
+  }
+  LinearisedSegment result;
+  result.inertial_rms = RootMeanSquares(inertial);
+  const Eigen::VectorXd prior = PriorSigmas(rig);
+  const Eigen::VectorXd unit = prior(free).cwiseInverse();
+  // Without the rig's prior, which made it definite.
+  const Eigen::MatrixXd of_data =
+      eliminated->Lambda - Eigen::MatrixXd::Identity(size, size);
+  result.theta.Lambda = Eigen::MatrixXd::Zero(prior.size(), prior.size());
+  result.theta.Lambda(free, free) =
+      unit.asDiagonal() * of_data * unit.asDiagonal();
+  result.theta.eta = Eigen::VectorXd::Zero(prior.size());
+  result.theta.eta(free) = unit.cwiseProduct(eliminated->eta);
+  result.theta.constant =
+      eliminated->squares - evaluated.r.squaredNorm() + inertial.squaredNorm();
+  return result;
+}
+
+}  // namespace selfcal
