@@ -12,10 +12,11 @@ constexpr char kFooter[] =
     "On a terminal the output is a table. Into a pipe it is one record a line, "
     "its fields\nseparated by tabs, without a header. With --json it is the "
     "contract's message in\nproto3 JSON: one document, or one line each for "
-    "import,\ncalibrations watch, runs watch, coach --watch and doctor.\n\n"
+    "import,\ncalibrations watch, runs watch, coach --watch, verify and "
+    "doctor.\n\n"
     "Exit codes: 0 done; 1 the daemon refused, what was asked for failed, or "
-    "preflight\nfound something; 2 wrong usage or unusable input; 3 the daemon "
-    "cannot be\nreached; 4 doctor found damage.";
+    "preflight\nor verify found something; 2 wrong usage or unusable input; 3 "
+    "the daemon\ncannot be reached; 4 doctor found damage.";
 
 void AddGlobalOptions(CLI::App* app, Context* context) {
   app->set_version_flag("--version", "selfcal " SELFCAL_VERSION);
@@ -61,6 +62,7 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddCalibrationCommands(&app, &context);
     AddReportCommand(&app, &context);
     AddCoachCommand(&app, &context);
+    AddVerifyCommand(&app, &context);
     AddTopCommand(&app, &context);
     AddEventsCommand(&app, &context);
     AddDoctorCommand(&app, &context);

@@ -22,6 +22,7 @@ void AddReportCommand(CLI::App* app, Context* context);
 void AddCoachCommand(CLI::App* app, Context* context);
 // To `calibrations`.
 void AddCalibrationExport(CLI::App* calibrations, Context* context);
+void AddVerifyCommand(CLI::App* app, Context* context);
 void AddTopCommand(CLI::App* app, Context* context);
 void AddEventsCommand(CLI::App* app, Context* context);
 void AddDoctorCommand(CLI::App* app, Context* context);

@@ -33,6 +33,7 @@ constexpr AccessRule kRules[] = {
      "name"},
     {"selfcal.v1.CalibrationService.CompareCalibrations", Role::kRead, "a,b"},
     {"selfcal.v1.CalibrationService.AdviseMotion", Role::kRead, "parent"},
+    {"selfcal.v1.CalibrationService.VerifyRig", Role::kAdminister, "parent"},
     {"selfcal.v1.RecalibrationService.StartRecalibration",
      Role::kAdminister,
      "parent"},

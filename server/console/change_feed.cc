@@ -47,6 +47,10 @@ void ChangeFeed::OnRun(const StoredRun& run) {
   Tell("runs", run.rig);
 }
 
+void ChangeFeed::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
+  if (next_ != nullptr) next_->OnCheck(subject, outcome);
+}
+
 std::shared_ptr<Outbox> ChangeFeed::Subscribe(const std::string& rig) {
   auto outbox = std::make_shared<Outbox>(Line("everything", ""));
   // At once: a page that waits for its stream sees that it stands.

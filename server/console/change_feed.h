@@ -28,6 +28,7 @@ class ChangeFeed final : public PipelineObserver {
   void OnVerdict(const std::string& rig, Verdict verdict) override;
   void OnScore(const SegmentInformation& information, double seconds) override;
   void OnRun(const StoredRun& run) override;
+  void OnCheck(CheckSubject subject, VerificationOutcome outcome) override;
 
   // Server-sent events, from now on; of one rig, or all with an empty name.
   // The feed forgets it when nobody holds it.

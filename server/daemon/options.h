@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/calibration/calibrate.h"
+#include "core/verify/scorer.h"
 #include "server/host/host_conditions.h"
 #include "server/service/server.h"
 #include "server/store/store_options.h"
@@ -24,6 +25,9 @@ struct DaemonOptions {
   int scoring_threads = 1;
   int max_backlog = 64;  // stored and unscored segments; then streams wait
   SolverKind solver = SolverKind::kStructured;
+  ScorerKind scorer = ScorerKind::kStructured;
+  // Of scores and calibrations: computed by the other core as well.
+  double verify_share = 0;
   StoreOptions store;
   HostLimits host;  // for runs that nobody asks for
   bool idle_runs = true;

@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "server/console/console.h"
 #include "server/daemon/log.h"
@@ -55,6 +56,8 @@ PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
   pipeline.max_backlog = options.max_backlog;
   pipeline.program_version = SELFCAL_VERSION;
   pipeline.calibrate.solver = options.solver;
+  pipeline.scorer = options.scorer;
+  pipeline.verify_share = options.verify_share;
   pipeline.conditions = conditions;
   pipeline.session_idle = std::chrono::round<std::chrono::milliseconds>(
       std::chrono::duration<double>(options.session_idle_s));
@@ -64,15 +67,23 @@ PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
   return pipeline;
 }
 
-// Calibrates in a worker: this program again.
+// Calibrates, and scores for a check, in a worker: this program again.
 Estimators EstimatorsOfPipeline(const DaemonOptions& options) {
   WorkerLimits limits;
   limits.idle = options.idle_runs;
   limits.max_memory_bytes = std::int64_t{options.max_run_memory_mib} << 20;
   Estimators estimators = CoreEstimators();
-  estimators.calibrate = [limits](const auto&... input) {
-    return CalibrateInWorker(
-        {"/proc/self/exe", kWorkerArgument}, limits, input...);
+  if (options.scorer == ScorerKind::kCeres) {
+    estimators.score = [](const auto&... input) {
+      return ScoreSegmentBy(ScorerKind::kCeres, input...);
+    };
+  }
+  const std::vector<std::string> worker = {"/proc/self/exe", kWorkerArgument};
+  estimators.calibrate = [worker, limits](const auto&... input) {
+    return CalibrateInWorker(worker, limits, input...);
+  };
+  estimators.score_by = [worker, limits](const auto&... input) {
+    return ScoreInWorker(worker, limits, input...);
   };
   return estimators;
 }
@@ -95,6 +106,17 @@ ConsoleOptions OptionsOfConsole(const DaemonOptions& options) {
           options.console_role,
           options.server.tls,
           SELFCAL_VERSION};
+}
+
+// Whether the scores that are asked of Ceres can be computed.
+absl::Status CheckCeres(const DaemonOptions& options) {
+  if (HasCeres()) return absl::OkStatus();
+  const bool scores = options.scorer == ScorerKind::kCeres;
+  if (!scores && options.verify_share == 0) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      fmt::format("{}: this program was built without Ceres; take the setting "
+                  "out, or use a build with SELFCAL_CERES=ON",
+                  scores ? "scorer" : "verify-share"));
 }
 
 // Null where it is off.
@@ -141,6 +163,9 @@ std::optional<int> ServeOnce(
   // First, so that it watches over the end of all that follows.
   std::optional<StopDeadline> deadline;
   RaiseFileLimit();
+  if (absl::Status status = CheckCeres(options); !status.ok()) {
+    return Failed("cannot start", status);
+  }
   const auto lock = StateLock::Take(options.state_dir);
   if (!lock.ok()) return Failed("cannot start", lock.status());
   const std::string database = (options.state_dir / "selfcal.db").string();
@@ -203,7 +228,8 @@ std::optional<int> ServeOnce(
 }  // namespace
 
 int Check(const DaemonOptions& options) {
-  absl::Status status = CheckServerOptions(options.server);
+  absl::Status status = CheckCeres(options);
+  if (status.ok()) status = CheckServerOptions(options.server);
   if (status.ok() && options.metrics != "off") {
     status = CheckMetricsAddress(options.metrics);
   }

@@ -198,6 +198,21 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
           {"ceres", SolverKind::kCeres}}))
       ->default_str("structured");
   define
+      ->Add("scorer",
+            &options->scorer,
+            "What scores segments; both come to the same to rounding")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ScorerKind>{
+          {"structured", ScorerKind::kStructured},
+          {"ceres", ScorerKind::kCeres}}))
+      ->default_str("structured");
+  define
+      ->Add("verify-share",
+            &options->verify_share,
+            "Share of new scores and calibrations that is computed by the "
+            "other core as well, while the device is idle, and compared")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  define
       ->Add("change-inflation",
             &options->store.change.inflation,
             "Factor on the variances of segments in the test for a change of "

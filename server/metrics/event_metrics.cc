@@ -26,6 +26,25 @@ const char* VerdictLabel(PipelineObserver::Verdict verdict) {
   return "failed";
 }
 
+const char* OutcomeLabel(VerificationOutcome outcome) {
+  switch (outcome) {
+    case VerificationOutcome::kAgrees:
+      return "agrees";
+    case VerificationOutcome::kDiffers:
+      return "differs";
+    case VerificationOutcome::kNotCompared:
+      return "not_compared";
+  }
+  return "not_compared";
+}
+
+prometheus::Labels CheckLabels(PipelineObserver::CheckSubject subject,
+                               VerificationOutcome outcome) {
+  const bool score = subject == PipelineObserver::CheckSubject::kScore;
+  return {{"subject", score ? "score" : "calibration"},
+          {"outcome", OutcomeLabel(outcome)}};
+}
+
 }  // namespace
 
 EventMetrics::EventMetrics(Store* store,
@@ -56,7 +75,13 @@ EventMetrics::EventMetrics(Store* store,
                        .Name("selfcal_run_seconds")
                        .Help("Time from the start of a run to its end.")
                        .Register(*registry)
-                       .Add({}, kRunSeconds)) {
+                       .Add({}, kRunSeconds)),
+      checks_(prometheus::BuildCounter()
+                  .Name("selfcal_checks_total")
+                  .Help("Scores and calibrations computed by both cores, by "
+                        "outcome; differs: by more than rounding or "
+                        "convergence explains.")
+                  .Register(*registry)) {
   // A series that is there from the start makes the first event a step.
   for (const Verdict verdict : {Verdict::kStored,
                                 Verdict::kDuplicate,
@@ -66,6 +91,15 @@ EventMetrics::EventMetrics(Store* store,
   }
   for (const char* outcome : {"activated", "rejected", "failed", "cancelled"}) {
     runs_.Add({{"outcome", outcome}});
+  }
+  for (const CheckSubject subject :
+       {CheckSubject::kScore, CheckSubject::kCalibration}) {
+    for (const VerificationOutcome outcome :
+         {VerificationOutcome::kAgrees,
+          VerificationOutcome::kDiffers,
+          VerificationOutcome::kNotCompared}) {
+      checks_.Add(CheckLabels(subject, outcome));
+    }
   }
 }
 
@@ -103,6 +137,10 @@ void EventMetrics::OnRun(const StoredRun& run) {
     }
   }
   runs_.Add({{"outcome", Outcome(run)}}).Increment();
+}
+
+void EventMetrics::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
+  checks_.Add(CheckLabels(subject, outcome)).Increment();
 }
 
 std::string EventMetrics::Outcome(const StoredRun& run) const {

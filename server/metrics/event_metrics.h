@@ -26,6 +26,7 @@ class EventMetrics final : public PipelineObserver {
   void OnVerdict(const std::string& rig, Verdict verdict) override;
   void OnScore(const SegmentInformation& information, double seconds) override;
   void OnRun(const StoredRun& run) override;
+  void OnCheck(CheckSubject subject, VerificationOutcome outcome) override;
 
  private:
   using RunId = std::pair<std::string, std::int64_t>;
@@ -40,6 +41,7 @@ class EventMetrics final : public PipelineObserver {
   prometheus::Family<prometheus::Histogram>& entropy_;
   prometheus::Family<prometheus::Counter>& runs_;
   prometheus::Histogram& run_seconds_;
+  prometheus::Family<prometheus::Counter>& checks_;
   std::mutex mutex_;  // guards what follows
   // Runs at work; one, as a rule.
   std::map<RunId, std::chrono::steady_clock::time_point> started_;

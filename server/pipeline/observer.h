@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/information/segment_information.h"
+#include "server/pipeline/verification.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -24,6 +25,10 @@ class PipelineObserver {
                        double seconds) = 0;
   // A run began, came one iteration further, or ended.
   virtual void OnRun(const StoredRun& run) = 0;
+
+  enum class CheckSubject { kScore, kCalibration };
+  // Something was computed by both cores.
+  virtual void OnCheck(CheckSubject subject, VerificationOutcome outcome) = 0;
 };
 
 }  // namespace selfcal::server

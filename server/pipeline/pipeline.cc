@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <future>
 #include <memory>
 #include <utility>
@@ -12,6 +13,8 @@
 #include "core/information/segment_scorer.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/scoring.h"
+#include "server/pipeline/verification_sampler.h"
+#include "server/pipeline/verifier.h"
 #include "server/pipeline/watchers.h"
 #include "server/store/status_macros.h"
 
@@ -52,9 +55,38 @@ Estimators ObserveScores(Estimators estimators, PipelineObserver* observer) {
   return estimators;
 }
 
-std::function<void(const RunUpdate&)> ObserveRuns(PipelineObserver* observer) {
-  if (observer == nullptr) return nullptr;
-  return [observer](const RunUpdate& update) { observer->OnRun(update.run); };
+// The estimators with each score offered to the sampler.
+Estimators SampleScores(Estimators estimators, VerificationSampler* sampler) {
+  const auto score = estimators.score;
+  estimators.score = [=](const Rig& rig,
+                         const Calibration& theta0,
+                         const MotionSegment& segment) {
+    SegmentInformation information = score(rig, theta0, segment);
+    sampler->OnScore(rig, segment, information);
+    return information;
+  };
+  return estimators;
+}
+
+std::function<void(const RunUpdate&)> ObserveRuns(
+    PipelineObserver* observer, VerificationSampler* sampler) {
+  return [observer, sampler](const RunUpdate& update) {
+    if (observer != nullptr) observer->OnRun(update.run);
+    sampler->OnRun(update.run);
+  };
+}
+
+absl::StatusOr<SegmentInformation> ScoreByCore(
+    ScorerKind scorer,
+    const Rig& rig,
+    const Calibration& theta0,
+    const MotionSegment& segment,
+    const std::function<bool()>& /*interrupted*/) {
+  try {
+    return ScoreSegmentBy(scorer, rig, theta0, segment);
+  } catch (const std::exception& error) {
+    return absl::InternalError(error.what());
+  }
 }
 
 // Wires the two kinds of threads, and does on the caller's thread what comes
@@ -67,31 +99,41 @@ class PipelineImpl : public Pipeline {
       : store_(store),
         options_(options),
         coach_(store),
-        run_watchers_(ObserveRuns(options.observer)),
+        verifier_(store, options, estimators),
+        sampler_(store, options, &verifier_),
+        run_watchers_(ObserveRuns(options.observer, &sampler_)),
         recalibrator_(
             store, options, estimators, &calibration_watchers_, &run_watchers_),
         scoring_(
             store,
             options,
-            ObserveScores(estimators, options.observer),
+            SampleScores(ObserveScores(estimators, options.observer),
+                         &sampler_),
             [this](const StoredRun& run) {
               spdlog::info("run {} of rig {} is due", run.run, run.rig);
               recalibrator_.Wake();
             },
             [this](const std::string& rig) { recalibrator_.NoteScore(rig); }) {}
 
+  // A check that is under way is not waited for.
+  ~PipelineImpl() override { Stop(); }
+
   absl::Status Start() override {
     SELFCAL_RETURN_IF_ERROR(recalibrator_.Start());
     const absl::Status status = scoring_.Start();
     if (!status.ok()) {
       recalibrator_.Stop();
+      return status;
     }
+    sampler_.Start();
     return status;
   }
 
   void Stop() override {
+    verifier_.Stop();
     scoring_.Stop();
     recalibrator_.Stop();
+    sampler_.Stop();
   }
 
   absl::StatusOr<SubmitResult> Submit(
@@ -183,6 +225,13 @@ class PipelineImpl : public Pipeline {
     return coach_.Advise(rig);
   }
 
+  absl::StatusOr<Verification> VerifyRig(
+      const std::string& rig,
+      const OnVerificationStep& on_step,
+      const std::function<bool()>& interrupted) override {
+    return verifier_.VerifyRig(rig, on_step, interrupted);
+  }
+
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const StoredCalibration&)> callback) override {
@@ -268,6 +317,8 @@ class PipelineImpl : public Pipeline {
   Store* const store_;
   const PipelineOptions options_;
   RigCoach coach_;
+  Verifier verifier_;
+  VerificationSampler sampler_;
   Watchers<StoredCalibration> calibration_watchers_;
   Watchers<RunUpdate> run_watchers_;
   Recalibrator recalibrator_;
@@ -299,7 +350,8 @@ Estimators CoreEstimators() {
              const ProgressCallback& progress,
              const std::function<bool()>&) {
             return Calibrate(rig, theta_start, segments, options, progress);
-          }};
+          },
+          ScoreByCore};
 }
 
 std::unique_ptr<Pipeline> MakePipeline(Store* store,

@@ -21,8 +21,10 @@
 #include "core/calibration/calibrate.h"
 #include "core/information/segment_information.h"
 #include "core/model/segment.h"
+#include "core/verify/scorer.h"
 #include "server/pipeline/coaching.h"
 #include "server/pipeline/observer.h"
+#include "server/pipeline/verification.h"
 #include "server/store/clock.h"
 #include "server/store/store.h"
 
@@ -44,6 +46,10 @@ struct PipelineOptions {
   std::string program_version;
   SegmentLimits limits;
   CalibrateOptions calibrate;
+  ScorerKind scorer = ScorerKind::kStructured;  // that Estimators::score is
+  // Of new scores and calibrations, the share that is verified while the device
+  // is idle (verification_sampler.h), in [0, 1].
+  double verify_share = 0;
   PipelineObserver* observer = nullptr;  // must outlive the pipeline
   // Outlives the pipeline; none: every time is one.
   Conditions* conditions = nullptr;
@@ -72,10 +78,18 @@ struct Estimators {
                                   const ProgressCallback& progress,
                                   const std::function<bool()>& interrupted)>
       calibrate;
+  // By either core, for a check. CANCELLED where it was interrupted.
+  std::function<absl::StatusOr<SegmentInformation>(
+      ScorerKind scorer,
+      const Rig& rig,
+      const Calibration& theta0,
+      const MotionSegment& segment,
+      const std::function<bool()>& interrupted)>
+      score_by;
 };
 
-// ScoreSegment and Calibrate of core; that asks nobody whether it is
-// interrupted between two calls of `progress`.
+// ScoreSegment, Calibrate and ScoreSegmentBy of core; they ask nobody whether
+// they are interrupted, but for calls of `progress`.
 Estimators CoreEstimators();
 
 // The verdict on one segment; durable when it is kStored or kDuplicate.
@@ -171,6 +185,17 @@ class Pipeline {
   // (coaching.h). The first call for a version takes as long as simulating a
   // segment of every motion.
   virtual absl::StatusOr<RigCoaching> AdviseMotion(const std::string& rig) = 0;
+
+  // Computes the scores of all segments whose data is kept, and the active
+  // calibration, by both cores on what is kept, and compares them; a difference
+  // is kept as an event and with the version (Store::ReportDisagreement). One
+  // at a time: FAILED_PRECONDITION while another is under way. `interrupted` is
+  // asked every few milliseconds; CANCELLED then. Takes minutes; `on_step` is
+  // called on this thread.
+  virtual absl::StatusOr<Verification> VerifyRig(
+      const std::string& rig,
+      const OnVerificationStep& on_step,
+      const std::function<bool()>& interrupted) = 0;
 
   // The callback gets the active calibration of the rig at once (on the calling
   // thread), then each that becomes active, in the order in which they did:

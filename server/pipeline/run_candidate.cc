@@ -4,10 +4,9 @@
 #include <chrono>
 #include <utility>
 
-#include "server/pipeline/after_change.h"
 #include "server/pipeline/recalibration.h"
+#include "server/pipeline/run_options.h"
 #include "server/pipeline/run_settings.h"
-#include "server/pipeline/stored_information.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -31,18 +30,8 @@ absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
                            store_->GetCalibration(run.rig, run.base_version));
   std::vector<MotionSegment> segments;
   SELFCAL_RETURN_IF_ERROR(LoadSegments(run, &segments, damaged));
-  CalibrateOptions options = options_.calibrate;
-  options.reweight_noise |= rig.rig.reweight_noise;
-  if (run.change > 0) {
-    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
-                             store_->GetChange(run.rig, run.change));
-    SELFCAL_ASSIGN_OR_RETURN(
-        const StoredCalibration before,
-        store_->GetCalibration(run.rig, change.base_version));
-    SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
-                             ListInformation(store_, run.rig, run.segments));
-    options.prior = KnownAfter(rig.rig, change, before, since);
-  }
+  SELFCAL_ASSIGN_OR_RETURN(const CalibrateOptions options,
+                           OptionsOfRun(store_, options_.calibrate, rig, run));
   SELFCAL_ASSIGN_OR_RETURN(
       CalibrationResult result,
       RunSolver(run, rig.rig, base.theta, segments, options));

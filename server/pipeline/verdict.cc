@@ -109,6 +109,9 @@ Verdict VerdictOf(const StoredCalibration& calibration) {
   if (calibration.state == CalibrationState::kRejected) {
     return {VerdictKind::kNotTrustworthy, calibration.reasons};
   }
+  if (!calibration.disagreement.empty()) {
+    return {VerdictKind::kNotTrustworthy, {calibration.disagreement}};
+  }
   if (calibration.verdict.kind != VerdictKind::kUnknown) {
     return calibration.verdict;
   }

@@ -25,7 +25,8 @@ Verdict MakeVerdict(const Rig& rig,
 
 // Of a version as it is stored: that which was stored with it. The factory's is
 // kFactory, a rejected one not trustworthy for the reasons that it was rejected
-// for, one from before there were verdicts unknown.
+// for, one on which a verification found the cores to disagree not trustworthy
+// for that, one from before there were verdicts unknown.
 Verdict VerdictOf(const StoredCalibration& calibration);
 
 // "good", "weak", "not trustworthy", "factory", "unknown".

@@ -3,6 +3,7 @@
 #include "server/encode/compare.h"
 #include "server/encode/encode.h"
 #include "server/encode/encode_coaching.h"
+#include "server/encode/encode_verification.h"
 #include "server/encode/reason.h"
 #include "server/encode/versions.h"
 #include "server/service/caller.h"
@@ -92,6 +93,29 @@ class CalibrationService final : public v1::CalibrationService::Service {
       *response = Encode(
           *coaching,
           request->max_advice() > 0 ? request->max_advice() : kDefaultAdvice);
+      return grpc::Status::OK;
+    });
+  }
+
+  grpc::Status VerifyRig(
+      grpc::ServerContext* call,
+      const v1::VerifyRigRequest* request,
+      grpc::ServerWriter<v1::VerifyRigResponse>* writer) override {
+    return Authorised(context_, *call, *request, [&]() -> grpc::Status {
+      const auto rig = ParseRigName(request->parent());
+      if (!rig) return BadName("parent", "rigs/{rig}");
+      const auto verification = context_.pipeline->VerifyRig(
+          *rig,
+          [&](const VerificationStep& step) {
+            writer->Write(Encode(*rig, step));
+          },
+          [&] { return call->IsCancelled() || context_.stopping->load(); });
+      if (context_.stopping->load()) return ShuttingDown();
+      if (!verification.ok()) {
+        return ToGrpc(verification.status(),
+                      {"selfcal.v1.Rig", request->parent(), "parent"});
+      }
+      writer->Write(Encode(*verification));
       return grpc::Status::OK;
     });
   }

@@ -1,10 +1,11 @@
-// How a version of a calibration is written and judged.
+// How a version of a calibration is written, judged and found wrong.
 #include <fmt/format.h>
 
 #include "server/store/calibration_states.h"
 #include "server/store/calibrations.h"
 #include "server/store/changes.h"
 #include "server/store/checksum.h"
+#include "server/store/clock.h"
 #include "server/store/events.h"
 #include "server/store/records.h"
 #include "server/store/rigs.h"
@@ -151,6 +152,31 @@ absl::StatusOr<StoredCalibration> ActivateCalibrationRow(
                            ReadCalibration(db, rig, version));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());
   return activated;
+}
+
+absl::Status ReportDisagreementRow(Connection* db,
+                                   const std::string& rig,
+                                   std::int64_t version,
+                                   const std::string& finding) {
+  Transaction transaction(db);
+  SELFCAL_RETURN_IF_ERROR(transaction.status());
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  SELFCAL_RETURN_IF_ERROR(ReadCalibration(db, rig, version).status());
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(db,
+                "INSERT INTO disagreements (rig, version, time_ns, finding) "
+                "VALUES (?1, ?2, ?3, ?4) ON CONFLICT DO NOTHING",
+                rig_id,
+                version,
+                NowNs(),
+                finding)
+          .Run());
+  SELFCAL_RETURN_IF_ERROR(
+      AppendEvent(db,
+                  rig,
+                  EventKind::kCoresDisagree,
+                  fmt::format("version {}: {}", version, finding)));
+  return transaction.Commit();
 }
 
 }  // namespace selfcal::server

@@ -17,7 +17,9 @@ constexpr char kColumns[] =
     "SELECT c.version, c.state, c.create_time_ns, c.run, c.content, c.sha256, "
     "  v.content, v.sha256, "
     "  (SELECT coalesce(max(a.activation), 0) FROM activations a "
-    "   WHERE a.rig = c.rig AND a.version = c.version) "
+    "   WHERE a.rig = c.rig AND a.version = c.version), "
+    "  (SELECT coalesce(max(d.finding), '') FROM disagreements d "
+    "   WHERE d.rig = c.rig AND d.version = c.version) "
     "FROM calibrations c LEFT JOIN validations v USING (rig, version) ";
 
 absl::Status ReadSegmentKeys(Connection* db,
@@ -82,6 +84,7 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
     SELFCAL_RETURN_IF_ERROR(ParseValidation(validation, what, &calibration));
   }
   calibration.activation = row.Int(8);
+  calibration.disagreement = row.Text(9);
   SELFCAL_RETURN_IF_ERROR(ReadSegmentKeys(db, rig_id, &calibration));
   SELFCAL_RETURN_IF_ERROR(ReadTemperatures(db, rig_id, &calibration));
   return calibration;

@@ -68,6 +68,11 @@ absl::StatusOr<StoredCalibration> ActivateCalibrationRow(
     std::int64_t version,
     const std::string& caller,
     const std::string& reason);
+
+absl::Status ReportDisagreementRow(Connection* db,
+                                   const std::string& rig,
+                                   std::int64_t version,
+                                   const std::string& finding);
 absl::StatusOr<StoredCalibration> FinishRunRow(
     Connection* db,
     const std::string& rig,

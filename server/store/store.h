@@ -176,6 +176,9 @@ struct StoredCalibration {
   std::optional<StoredValidation> validation;  // of one that was a candidate
   Verdict verdict;                             // the same
   double seconds = 0;                          // it took
+  // What a verification found, by which the two cores disagree on what this
+  // version stands on: it is not to be trusted. Empty: nothing.
+  std::string disagreement;
   // Counts the activations of all rigs: that of its newest, 0 if it never was
   // active.
   std::int64_t activation = 0;
@@ -388,6 +391,13 @@ class Store {
       std::int64_t version,
       const std::string& caller,
       const std::string& reason) = 0;
+
+  // Keeps what a verification found, by which the two cores disagree, in an
+  // event, and with the version that it concerns. A version keeps the first
+  // finding.
+  virtual absl::Status ReportDisagreement(const std::string& rig,
+                                          std::int64_t version,
+                                          const std::string& finding) = 0;
 
   // --- Runs.
   // On the tables as they are. FAILED_PRECONDITION if they are empty, a run of

@@ -223,6 +223,14 @@ class SqliteStore : public Store {
     });
   }
 
+  absl::Status ReportDisagreement(const std::string& rig,
+                                  std::int64_t version,
+                                  const std::string& finding) override {
+    return Write([&](Connection* db) {
+      return ReportDisagreementRow(db, rig, version, finding);
+    });
+  }
+
   using Store::CreateManualRun;
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
                                             bool force) override {

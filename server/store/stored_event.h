@@ -20,6 +20,7 @@ enum class EventKind {
   kCalibrationRolledBack,  // by hand
   kRunHeldBack,
   kSegmentQuarantined,  // by a run, or by hand
+  kCoresDisagree,       // a verification found a difference
 };
 
 struct StoredEvent {

@@ -34,6 +34,11 @@ void PutOptions(const CalibrateOptions& options, worker::Options* message) {
   message->set_leave_out_contradictions(options.leave_out_contradictions);
 }
 
+void PutLimits(const WorkerLimits& limits, worker::Limits* message) {
+  message->set_idle(limits.idle);
+  message->set_max_memory_bytes(limits.max_memory_bytes);
+}
+
 bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
   options->loss = static_cast<LossKind>(message.loss());
   options->loss_scale = message.loss_scale();
@@ -69,8 +74,22 @@ std::string EncodeJob(const Rig& rig,
     *job.add_segments() = ToProto(segment);
   }
   PutOptions(options, job.mutable_options());
-  job.mutable_limits()->set_idle(limits.idle);
-  job.mutable_limits()->set_max_memory_bytes(limits.max_memory_bytes);
+  PutLimits(limits, job.mutable_limits());
+  std::string bytes;
+  return job.SerializeToString(&bytes) ? bytes : "";
+}
+
+std::string EncodeScoreJob(ScorerKind scorer,
+                           const Rig& rig,
+                           const Calibration& theta0,
+                           const MotionSegment& segment,
+                           const WorkerLimits& limits) {
+  worker::Job job;
+  *job.mutable_rig() = ToProto(rig);
+  *job.mutable_theta_start() = ToProto(theta0);
+  *job.add_segments() = ToProto(segment);
+  job.mutable_score()->set_scorer(static_cast<int>(scorer));
+  PutLimits(limits, job.mutable_limits());
   std::string bytes;
   return job.SerializeToString(&bytes) ? bytes : "";
 }
@@ -102,13 +121,24 @@ std::string EncodeResult(const CalibrationResult& result) {
   return message.SerializeAsString();
 }
 
+std::string EncodeScore(const SegmentInformation& information) {
+  worker::Result message;
+  message.set_score(SerializeInformation(information));
+  return message.SerializeAsString();
+}
+
 std::optional<Job> DecodeJob(std::string_view bytes) {
   worker::Job message;
   Job job;
   if (!Parse(bytes, &message) ||
       !FromProto(message.rig(), "", &job.rig).empty() ||
-      !FromProto(message.theta_start(), "", &job.theta_start).empty() ||
-      !GetOptions(message.options(), &job.options)) {
+      !FromProto(message.theta_start(), "", &job.theta_start).empty()) {
+    return std::nullopt;
+  }
+  if (message.has_score()) {
+    if (message.segments_size() != 1) return std::nullopt;
+    job.scorer = static_cast<ScorerKind>(message.score().scorer());
+  } else if (!GetOptions(message.options(), &job.options)) {
     return std::nullopt;
   }
   job.segments.resize(message.segments_size());
@@ -162,6 +192,15 @@ std::optional<CalibrationResult> DecodeResult(std::string_view bytes) {
     return std::nullopt;
   }
   return result;
+}
+
+absl::StatusOr<SegmentInformation> DecodeScore(std::string_view bytes) {
+  worker::Result message;
+  if (!Parse(bytes, &message)) {
+    return absl::InternalError("its process ended without a result");
+  }
+  if (message.has_failure()) return absl::InternalError(message.failure());
+  return ParseInformation(message.score(), "the worker's result");
 }
 
 }  // namespace selfcal::server

@@ -1,6 +1,9 @@
-// Between a calibration's input and result and the bytes (job.proto) that go to
-// a worker and come back. Doubles come back as they were, to the bit.
+// Between the input and result of a calibration or a score and the bytes
+// (job.proto) that go to a worker and come back. Doubles come back as they
+// were, to the bit.
 #pragma once
+
+#include <absl/status/statusor.h>
 
 #include <optional>
 #include <string>
@@ -11,6 +14,7 @@
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
+#include "core/verify/scorer.h"
 #include "server/worker/worker.h"
 
 namespace selfcal::server {
@@ -21,6 +25,8 @@ struct Job {
   std::vector<MotionSegment> segments;
   CalibrateOptions options;
   WorkerLimits limits;
+  // Score the one segment at theta_start; nothing: calibrate.
+  std::optional<ScorerKind> scorer = std::nullopt;
 };
 
 // Empty where it is more than a message can hold (2 GiB).
@@ -29,12 +35,22 @@ std::string EncodeJob(const Rig& rig,
                       const std::vector<MotionSegment>& segments,
                       const CalibrateOptions& options,
                       const WorkerLimits& limits);
+std::string EncodeScoreJob(ScorerKind scorer,
+                           const Rig& rig,
+                           const Calibration& theta0,
+                           const MotionSegment& segment,
+                           const WorkerLimits& limits);
 std::string EncodeProgress(const CalibrateProgress& progress);
 std::string EncodeResult(const CalibrationResult& result);
+std::string EncodeScore(const SegmentInformation& information);
 
 // Nothing where the bytes are not what the functions above made.
 std::optional<Job> DecodeJob(std::string_view bytes);
 std::optional<CalibrateProgress> DecodeProgress(std::string_view bytes);
 std::optional<CalibrationResult> DecodeResult(std::string_view bytes);
+
+// INTERNAL with the failure that EncodeResult() was given, or where the bytes
+// are not what EncodeScore() made.
+absl::StatusOr<SegmentInformation> DecodeScore(std::string_view bytes);
 
 }  // namespace selfcal::server

@@ -59,17 +59,27 @@ CalibrationResult Failure(std::string message) {
   return result;
 }
 
-CalibrationResult Solve(const Job& job) {
+std::string Compute(const Job& job) {
+  if (job.scorer) {
+    return EncodeScore(ScoreSegmentBy(
+        *job.scorer, job.rig, job.theta_start, job.segments.front()));
+  }
+  return EncodeResult(
+      Calibrate(job.rig, job.theta_start, job.segments, job.options, Tell));
+}
+
+// The bytes of the result.
+std::string Solve(const Job& job) {
   LimitMemory(job.limits.max_memory_bytes);
   try {
-    return Calibrate(job.rig, job.theta_start, job.segments, job.options, Tell);
+    return Compute(job);
   } catch (const std::bad_alloc&) {
-    return Failure(fmt::format(
+    return EncodeResult(Failure(fmt::format(
         "it needs more than the {} MiB of memory that a run may take; smaller "
         "tables need less",
-        job.limits.max_memory_bytes >> 20));
+        job.limits.max_memory_bytes >> 20)));
   } catch (const std::exception& error) {
-    return Failure(error.what());
+    return EncodeResult(Failure(error.what()));
   }
 }
 
@@ -83,7 +93,7 @@ int RunWorker() {
     return EXIT_FAILURE;
   }
   job->limits.idle ? BecomeIdle() : StandBack();
-  WriteWhole(kResultFile, EncodeResult(Solve(*job)));
+  WriteWhole(kResultFile, Solve(*job));
   return EXIT_SUCCESS;
 }
 

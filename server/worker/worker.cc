@@ -161,21 +161,20 @@ class Process {
   pid_t pid_ = 0;
 };
 
-CalibrationResult Ended(CalibrateStatus status, std::string message) {
-  CalibrationResult result;
-  result.status = status;
-  result.message = std::move(message);
-  return result;
-}
+// What became of a worker: the bytes of its result, or why there are none.
+struct Finished {
+  CalibrateStatus status = CalibrateStatus::kFailed;
+  std::string message;
+  std::string result;
+};
 
-CalibrationResult EndedBadly(int status) {
-  return Ended(CalibrateStatus::kFailed,
-               WIFSIGNALED(status)
-                   ? fmt::format("its process ended by signal {} ({})",
-                                 WTERMSIG(status),
-                                 strsignal(WTERMSIG(status)))
-                   : fmt::format("its process ended with exit code {}",
-                                 WEXITSTATUS(status)));
+std::string WhyItEnded(int status) {
+  return WIFSIGNALED(status)
+             ? fmt::format("its process ended by signal {} ({})",
+                           WTERMSIG(status),
+                           strsignal(WTERMSIG(status)))
+             : fmt::format("its process ended with exit code {}",
+                           WEXITSTATUS(status));
 }
 
 // Until the worker closes its end. False if it is not wanted any longer.
@@ -203,6 +202,31 @@ bool Follow(int socket,
   }
 }
 
+Finished RunJob(const std::vector<std::string>& command,
+                std::string bytes,
+                const ProgressCallback& progress,
+                const std::function<bool()>& interrupted) {
+  if (bytes.empty()) {
+    return {CalibrateStatus::kFailed,
+            "its segments are more than 2 GiB; make the tables smaller",
+            ""};
+  }
+  const Descriptor job = MakeFile("selfcal-job");
+  const Descriptor result = MakeFile("selfcal-result");
+  WriteWhole(job.get(), bytes);
+  bytes = std::string();  // the worker has it
+  Sockets sockets;
+  Process process(command, job.get(), sockets.workers.get(), result.get());
+  sockets.workers.Close();
+  if (!Follow(sockets.ours.get(), progress, interrupted)) {
+    return {CalibrateStatus::kCancelled, "cancelled", ""};
+  }
+  if (const int status = process.Wait(); status != 0) {
+    return {CalibrateStatus::kFailed, WhyItEnded(status), ""};
+  }
+  return {CalibrateStatus::kConverged, "", ReadWhole(result.get())};
+}
+
 }  // namespace
 
 CalibrationResult CalibrateInWorker(const std::vector<std::string>& command,
@@ -213,30 +237,42 @@ CalibrationResult CalibrateInWorker(const std::vector<std::string>& command,
                                     const CalibrateOptions& options,
                                     const ProgressCallback& progress,
                                     const std::function<bool()>& interrupted) {
-  const Descriptor job = MakeFile("selfcal-job");
-  const Descriptor result = MakeFile("selfcal-result");
-  {
-    const std::string bytes =
-        EncodeJob(rig, theta_start, segments, options, limits);
-    if (bytes.empty()) {
-      return Ended(CalibrateStatus::kFailed,
-                   "its segments are more than 2 GiB; make the tables smaller");
-    }
-    WriteWhole(job.get(), bytes);
+  Finished finished =
+      RunJob(command,
+             EncodeJob(rig, theta_start, segments, options, limits),
+             progress,
+             interrupted);
+  if (finished.status == CalibrateStatus::kConverged) {
+    auto read = DecodeResult(finished.result);
+    if (read) return *std::move(read);
+    finished = {
+        CalibrateStatus::kFailed, "its process ended without a result", ""};
   }
-  Sockets sockets;
-  Process process(command, job.get(), sockets.workers.get(), result.get());
-  sockets.workers.Close();
-  if (!Follow(sockets.ours.get(), progress, interrupted)) {
-    return Ended(CalibrateStatus::kCancelled, "cancelled");
+  CalibrationResult result;
+  result.status = finished.status;
+  result.message = std::move(finished.message);
+  return result;
+}
+
+absl::StatusOr<SegmentInformation> ScoreInWorker(
+    const std::vector<std::string>& command,
+    const WorkerLimits& limits,
+    ScorerKind scorer,
+    const Rig& rig,
+    const Calibration& theta0,
+    const MotionSegment& segment,
+    const std::function<bool()>& interrupted) {
+  const Finished finished =
+      RunJob(command,
+             EncodeScoreJob(scorer, rig, theta0, segment, limits),
+             nullptr,
+             interrupted);
+  if (finished.status == CalibrateStatus::kConverged) {
+    return DecodeScore(finished.result);
   }
-  if (const int status = process.Wait(); status != 0) {
-    return EndedBadly(status);
-  }
-  auto read = DecodeResult(ReadWhole(result.get()));
-  return read ? *std::move(read)
-              : Ended(CalibrateStatus::kFailed,
-                      "its process ended without a result");
+  return finished.status == CalibrateStatus::kCancelled
+             ? absl::CancelledError(finished.message)
+             : absl::InternalError(finished.message);
 }
 
 }  // namespace selfcal::server

@@ -1,11 +1,13 @@
-// Calibrates in a process of its own: the daemon lives on whatever becomes of
-// the solver, what it took is given back whole, it can be limited in memory, be
-// idle in CPU and I/O, and be ended at any instant.
+// Calibrates, or scores for a check, in a process of its own: the daemon lives
+// on whatever becomes of the solver, what it took is given back whole, it can
+// be limited in memory, be idle in CPU and I/O, and be ended at any instant.
 //
 // The worker is the same program with kWorkerArgument. It gets the job in a
 // file without a name, tells its progress through a socket, and leaves the
 // result in another such file. It dies with the thread that started it.
 #pragma once
+
+#include <absl/status/statusor.h>
 
 #include <cstdint>
 #include <functional>
@@ -16,6 +18,7 @@
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
+#include "core/verify/scorer.h"
 
 namespace selfcal::server {
 
@@ -40,6 +43,17 @@ CalibrationResult CalibrateInWorker(const std::vector<std::string>& command,
                                     const CalibrateOptions& options,
                                     const ProgressCallback& progress,
                                     const std::function<bool()>& interrupted);
+
+// As ScoreSegmentBy() of core, with `interrupted` as above: CANCELLED then.
+// INTERNAL with a message where there is no score.
+absl::StatusOr<SegmentInformation> ScoreInWorker(
+    const std::vector<std::string>& command,
+    const WorkerLimits& limits,
+    ScorerKind scorer,
+    const Rig& rig,
+    const Calibration& theta0,
+    const MotionSegment& segment,
+    const std::function<bool()>& interrupted);
 
 // The worker: what main() returns for kWorkerArgument. Call before any thread
 // is started.

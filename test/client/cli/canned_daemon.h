@@ -48,6 +48,7 @@ struct CannedDaemon final : v1::RigService::Service,
   grpc::Status refusal;                       // of CreateRig
   v1::CompareCalibrationsResponse differences;
   std::vector<v1::AdviseMotionResponse> advice;
+  std::vector<v1::VerifyRigResponse> verification;
   int max_advice = -1;    // that was asked for
   bool stopping = false;  // and so cancels
   std::string last_name;
@@ -225,6 +226,16 @@ struct CannedDaemon final : v1::RigService::Service,
     last_name = request->a() + " " + request->b();
     *response = differences;
     return grpc::Status::OK;
+  }
+  grpc::Status VerifyRig(
+      grpc::ServerContext*,
+      const v1::VerifyRigRequest* request,
+      grpc::ServerWriter<v1::VerifyRigResponse>* writer) override {
+    last_name = request->parent();
+    for (const auto& response : verification) writer->Write(response);
+    return verification.empty()
+               ? grpc::Status(grpc::StatusCode::NOT_FOUND, "no such rig")
+               : grpc::Status::OK;
   }
   // The answers in turn; the last stays.
   grpc::Status AdviseMotion(grpc::ServerContext*,

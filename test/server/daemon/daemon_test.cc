@@ -103,6 +103,34 @@ TEST_F(DaemonTest, RecalibrationRunsToItsEndBeforeItsWatcher) {
   EXPECT_GT(run.solver().iterations(), 0);
 }
 
+// Scores by Ceres in the daemon; the checks in processes of their own.
+TEST_F(DaemonTest, BothCoresAgreeOnWhatItHasComputed) {
+  const auto daemon =
+      StartAndWait({"--scorer", "ceres", "--run-priority", "low"});
+  CreateRig();
+  Stream(TestSegments(TestRig("r"), 4));
+  ASSERT_TRUE(AllScored());
+  EXPECT_EQ(WatchToTheEnd("rigs/r/recalibrations/1").state(),
+            v1::Recalibration::SUCCEEDED);
+  grpc::ClientContext context;
+  v1::VerifyRigRequest request;
+  request.set_parent("rigs/r");
+  const auto stub = v1::CalibrationService::NewStub(channel_);
+  const auto reader = stub->VerifyRig(&context, request);
+  v1::VerifyRigResponse response;
+  while (reader->Read(&response)) {
+    if (response.has_score()) {
+      EXPECT_EQ(response.score().outcome(), v1::VerifyRigResponse::AGREES)
+          << response.ShortDebugString();
+    }
+  }
+  const auto status = reader->Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  ASSERT_TRUE(response.has_summary());
+  EXPECT_GE(response.summary().scores(), 2);
+  EXPECT_EQ(response.summary().finding(), "");
+}
+
 TEST_F(DaemonTest, WhatCannotStartSaysWhy) {
   std::ofstream(state_) << "a file, no folder";
   const auto no_folder = Start();

@@ -76,6 +76,20 @@ TEST_F(OptionsTest, SolverHasAName) {
   EXPECT_EQ(Parse({"--state-dir", "s", "--solver", "other"}), 2);
 }
 
+TEST_F(OptionsTest, ScorerHasANameAndVerificationAShare) {
+  EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
+  EXPECT_EQ(options_.scorer, ScorerKind::kStructured);
+  EXPECT_EQ(options_.verify_share, 0);
+  EXPECT_EQ(
+      Parse(
+          {"--state-dir", "s", "--scorer", "ceres", "--verify-share", "0.25"}),
+      std::nullopt);
+  EXPECT_EQ(options_.scorer, ScorerKind::kCeres);
+  EXPECT_EQ(options_.verify_share, 0.25);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--scorer", "other"}), 2);
+  EXPECT_EQ(Parse({"--state-dir", "s", "--verify-share", "1.5"}), 2);
+}
+
 TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
   EXPECT_EQ(options_.host, HostLimits());

@@ -42,6 +42,8 @@ TEST_F(MetricsTest, SeriesAreThereBeforeTheFirstEvent) {
   for (const std::string line : {"selfcal_build_info{version=\"1.2.3\"} 1",
                                  "selfcal_segments_total{verdict=\"stored\"} 0",
                                  "selfcal_runs_total{outcome=\"activated\"} 0",
+                                 "selfcal_checks_total{outcome=\"differs\","
+                                 "subject=\"calibration\"} 0",
                                  "selfcal_queue_length 0",
                                  "selfcal_database_bytes{file=\"database\"} ",
                                  "selfcal_disk_free_bytes ",

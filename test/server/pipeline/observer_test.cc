@@ -24,6 +24,7 @@ class Recorder final : public PipelineObserver {
     const std::lock_guard lock(mutex_);
     runs_.push_back(run.state);
   }
+  void OnCheck(CheckSubject, VerificationOutcome) override {}
 
   int Count(const std::string& rig, Verdict verdict) {
     const std::lock_guard lock(mutex_);

@@ -37,6 +37,10 @@ TEST(VerdictTest, ThatOfAVersionIsTheStoredOne) {
   version.verdict = {VerdictKind::kGood, {"noted"}};
   EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kGood);
   EXPECT_THAT(VerdictOf(version).sentences, ElementsAre("noted"));
+  version.disagreement = "The two cores disagree.";
+  EXPECT_EQ(VerdictOf(version).kind, VerdictKind::kNotTrustworthy);
+  EXPECT_THAT(VerdictOf(version).sentences,
+              ElementsAre("The two cores disagree."));
   // The store rejects what no longer holds, whatever was found before.
   version.state = CalibrationState::kRejected;
   version.reasons = {"The device has changed."};

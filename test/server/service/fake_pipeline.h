@@ -106,6 +106,20 @@ class FakePipeline final : public Pipeline {
     return coach_.Advise(rig);
   }
 
+  // Replaces VerifyRig.
+  std::function<absl::StatusOr<Verification>(const OnVerificationStep&,
+                                             const std::function<bool()>&)>
+      verify_hook;
+
+  absl::StatusOr<Verification> VerifyRig(
+      const std::string& rig,
+      const OnVerificationStep& on_step,
+      const std::function<bool()>& interrupted) override {
+    const auto stored = store_->GetRig(rig);
+    if (!stored.ok()) return stored.status();
+    return verify_hook ? verify_hook(on_step, interrupted) : Verification();
+  }
+
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const StoredCalibration&)> callback) override {

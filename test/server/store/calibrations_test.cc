@@ -51,6 +51,36 @@ class CalibrationsTest : public StoreTest {
 };
 SELFCAL_STORE_TEST_SUITE(CalibrationsTest);
 
+TEST_P(CalibrationsTest, TheFirstDisagreementStaysWithItsVersion) {
+  const Rig rig = RigWithRun("a");
+  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  EXPECT_EQ(store_->GetActiveCalibration("a")->disagreement, "");
+  ASSERT_TRUE(store_->ReportDisagreement("a", 2, "by 3 sigma").ok());
+  ASSERT_TRUE(store_->ReportDisagreement("a", 2, "by 5 sigma").ok());
+  EXPECT_TRUE(
+      absl::IsNotFound(store_->ReportDisagreement("a", 3, "by 1 sigma")));
+  EXPECT_TRUE(
+      absl::IsNotFound(store_->ReportDisagreement("b", 1, "by 1 sigma")));
+  Reopen();
+  const auto active = store_->GetActiveCalibration("a");
+  ASSERT_TRUE(active.ok()) << active.status();
+  EXPECT_EQ(active->state, CalibrationState::kActive);
+  EXPECT_EQ(active->disagreement, "by 3 sigma");
+  EXPECT_EQ(store_->GetCalibration("a", 1)->disagreement, "");
+  EXPECT_EQ(store_->ListCalibrations("a", {})->items[0].disagreement,
+            "by 3 sigma");
+  std::vector<std::string> details;
+  const auto events = store_->ListEvents({100, ""}, "a");
+  ASSERT_TRUE(events.ok()) << events.status();
+  for (const StoredEvent& event : events->items) {
+    if (event.kind == EventKind::kCoresDisagree) {
+      details.push_back(event.detail);
+    }
+  }
+  EXPECT_THAT(details,
+              ElementsAre("version 2: by 3 sigma", "version 2: by 5 sigma"));
+}
+
 TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   const Rig rig = RigWithRun("a");
   const StoredCalibration candidate = Candidate(rig);

@@ -62,7 +62,7 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 8u);
+  ASSERT_EQ(migrations.size(), 9u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -88,6 +88,9 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[7].name, "0008_quarantine.sql");
   EXPECT_EQ(migrations[7].sha256,
             "b61cf9b4edd752aa17fe53a69d60cfcdf1c85957f206905384bc9add7ed9d6fe");
+  EXPECT_EQ(migrations[8].name, "0009_verification.sql");
+  EXPECT_EQ(migrations[8].sha256,
+            "83bdf9b72ebe3006be94809d01f1702034e6b6c1b18e9788510f423356daa141");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

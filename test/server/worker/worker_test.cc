@@ -183,6 +183,36 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   EXPECT_FALSE(DecodeJob("not a job").has_value());
 }
 
+TEST_F(WorkerTest, AScoreIsThatOfItsScorerToTheBit) {
+  for (const ScorerKind scorer :
+       {ScorerKind::kStructured, ScorerKind::kCeres}) {
+    const auto score = ScoreInWorker(
+        kWorker, limits_, scorer, rig_, rig_.factory, segments_[1], nullptr);
+    ASSERT_TRUE(score.ok()) << score.status();
+    EXPECT_EQ(
+        EncodeScore(*score),
+        EncodeScore(ScoreSegmentBy(scorer, rig_, rig_.factory, segments_[1])));
+  }
+}
+
+TEST_F(WorkerTest, AScoreThatIsNotComputedSaysWhy) {
+  const auto by = [&](const std::vector<std::string>& command,
+                      const std::function<bool()>& interrupted) {
+    return ScoreInWorker(command,
+                         limits_,
+                         ScorerKind::kCeres,
+                         rig_,
+                         rig_.factory,
+                         segments_[0],
+                         interrupted)
+        .status();
+  };
+  EXPECT_TRUE(
+      absl::IsCancelled(by({"/bin/sleep", "100000"}, [] { return true; })));
+  EXPECT_THAT(std::string(by({"/bin/sh", "-c", "exit 3"}, nullptr).message()),
+              HasSubstr("exit code 3"));
+}
+
 // A worker that says nothing for hours.
 TEST_F(WorkerTest, AnInterruptedOneIsKilledWhereverItIs) {
   pid_t child = 0;

@@ -1,0 +1,16 @@
+// Verifications as messages of the contract.
+#pragma once
+
+#include <string>
+
+#include "selfcal/v1/calibration_service.pb.h"
+#include "server/pipeline/verification.h"
+
+namespace selfcal::server {
+
+v1::VerifyRigResponse Encode(const std::string& rig,
+                             const VerificationStep& step);
+// With the summary.
+v1::VerifyRigResponse Encode(const Verification& verification);
+
+}  // namespace selfcal::server

@@ -1,0 +1,27 @@
+#include "server/pipeline/run_options.h"
+
+#include <vector>
+
+#include "server/pipeline/after_change.h"
+#include "server/pipeline/stored_information.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+
+absl::StatusOr<CalibrateOptions> OptionsOfRun(Store* store,
+                                              CalibrateOptions options,
+                                              const StoredRig& rig,
+                                              const StoredRun& run) {
+  options.reweight_noise |= rig.rig.reweight_noise;
+  if (run.change == 0) return options;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
+                           store->GetChange(run.rig, run.change));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration before,
+                           store->GetCalibration(run.rig, change.base_version));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
+                           ListInformation(store, run.rig, run.segments));
+  options.prior = KnownAfter(rig.rig, change, before, since);
+  return options;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,18 @@
+// The options that a run calibrates with.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include "core/calibration/calibrate.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+// `options` with what rig and run add to them: after a change of the device,
+// what is still known. Errors of the store.
+absl::StatusOr<CalibrateOptions> OptionsOfRun(Store* store,
+                                              CalibrateOptions options,
+                                              const StoredRig& rig,
+                                              const StoredRun& run);
+
+}  // namespace selfcal::server

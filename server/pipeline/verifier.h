@@ -1,0 +1,87 @@
+// Computes scores and calibrations of a rig by both cores on what is kept, and
+// compares them. What differs by more than rounding or convergence explains is
+// kept as an event, and with the version that was checked: for scores, on which
+// tables, tests of candidates and change detection stand, the active one.
+//
+// Any thread may call; it computes on the caller's.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "server/pipeline/pipeline.h"
+#include "server/pipeline/verification.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+class Verifier {
+ public:
+  // The store must outlive it.
+  Verifier(Store* store,
+           const PipelineOptions& options,
+           const Estimators& estimators)
+      : store_(store), options_(options), estimators_(estimators) {}
+
+  // From now on every call returns soon, with CANCELLED.
+  void Stop() { stopped_ = true; }
+
+  // As Pipeline::VerifyRig.
+  absl::StatusOr<Verification> VerifyRig(
+      const std::string& rig,
+      const OnVerificationStep& on_step,
+      const std::function<bool()>& interrupted);
+
+  // The score of one segment by the core that has not computed `information`.
+  absl::StatusOr<ScoreCheck> CheckScore(
+      const Rig& rig,
+      const MotionSegment& segment,
+      const SegmentInformation& information,
+      const std::function<bool()>& interrupted);
+
+  // A version by both cores, on those of its segments whose data is kept. They
+  // start from the version, so that both are soon done where it is right.
+  absl::StatusOr<CalibrationCheck> CheckCalibration(
+      const std::string& rig,
+      std::int64_t version,
+      const std::function<bool()>& interrupted);
+
+  // Tells the observer of each check, and keeps the finding, if there is one.
+  absl::Status Conclude(const std::string& rig,
+                        const Verification& verification);
+
+ private:
+  using Interrupted = std::function<bool()>;
+
+  Interrupted OrStopped(const Interrupted& interrupted) const;
+  absl::StatusOr<std::vector<StoredSegment>> KeptSegments(
+      const std::string& rig);
+  absl::StatusOr<ScoreCheck> CheckStored(const StoredRig& rig,
+                                         const StoredSegment& segment,
+                                         const Interrupted& interrupted);
+  absl::Status LoadSegments(const StoredCalibration& version,
+                            std::vector<MotionSegment>* segments,
+                            CalibrationCheck* check);
+  absl::StatusOr<CalibrationResult> Solve(
+      SolverKind solver,
+      const Rig& rig,
+      const Calibration& start,
+      const std::vector<MotionSegment>& segments,
+      CalibrateOptions options,
+      const Interrupted& interrupted);
+
+  Store* const store_;
+  const PipelineOptions options_;
+  const Estimators estimators_;
+  std::atomic<bool> stopped_ = false;
+  std::mutex mutex_;  // held by VerifyRig
+};
+
+}  // namespace selfcal::server
