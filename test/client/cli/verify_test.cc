@@ -15,7 +15,7 @@ Response Score(const std::string& index,
   response.mutable_score()->set_segment("rigs/device/segments/s~" + index);
   response.mutable_score()->set_outcome(outcome);
   response.mutable_score()->set_entropy_difference_nats(2.5e-10);
-  response.mutable_score()->set_information_difference(1.25e-9);
+  response.mutable_score()->set_information_difference(1.2e-9);
   response.mutable_score()->set_estimate_difference_sigmas(3e-9);
   response.mutable_score()->set_message(message);
   return response;

@@ -302,7 +302,7 @@ TEST_F(VerificationTest, ARunIsVerifiedToo) {
   // The segments are scored: what comes now is a run.
   options_.verify_share = 1;
   StartOne();
-  const auto run = pipeline_->StartRecalibration("a");
+  const auto run = pipeline_->StartRecalibration("a", true);
   ASSERT_TRUE(run.ok()) << run.status();
   ASSERT_TRUE(RunIs(RunState::kSucceeded, run->run));
   EXPECT_TRUE(Eventually([&] {
