@@ -142,7 +142,8 @@ class Calibrator {
     // The factors bring a linear system of their own.
     linearised_.system.ReleaseChains();
     result_.noise_factors =
-        EstimateNoiseFactors(Round(basis), estimate_, landmarks, track_noise_);
+        EstimateNoiseFactors(
+            stated_, Round(basis), estimate_, landmarks, track_noise_);
   }
 
   // What the pixel errors of tracks have in common is measured anew with it.

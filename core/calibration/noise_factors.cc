@@ -19,6 +19,9 @@ constexpr double kMedianOfRayleigh = 1.1774100225154747;
 // Where nothing is known about a factor, its logarithm is within so much of
 // zero.
 const double kPriorLogSigma = std::log(10.0);
+// Statements about an IMU are wrong together, if they are: given one of its
+// factors, the logarithms of the others are within so much of it.
+const double kApartLogSigma = std::log(3.0);
 constexpr double kDifference = 0.1;  // of logarithms
 // A step takes a variance by no more than so much, nor below this part of it.
 constexpr double kLongestStep = 1.5;  // of the logarithm of the factor
@@ -27,18 +30,35 @@ constexpr int kMaxSteps = 25;
 constexpr int kMaxHalvings = 3;
 // Settled when the next step is shorter, in standard deviations.
 constexpr double kSettledSigmas = 0.1;
-constexpr double kSettledSigmasOfGuess = 1;
-// A Fisher information taken further away than this is taken again, if that is
-// of a kind that may be determined: of redundancy r, it is at most 2 r.
-constexpr double kNear = 0.3;
+constexpr double kSettledSigmasOfGuess = 0.3;
+// Of redundancy r, the Fisher information is at most 2 r.
 constexpr double kMayBeDetermined = 0.5 / Square(kDeterminedLogSigma);
+// A Fisher information taken further away than this is taken again, if that is
+// of a kind of which it may say more than the prior: noise that is stated far
+// too small leaves next to no redundancy where it is stated, and much where it
+// is.
+constexpr double kNear = 0.3;
+constexpr double kMaySayMore = 0.5;
+
+// Of the logarithms of the factors over what the rig states.
+NoiseMatrix PriorInformation() {
+  NoiseMatrix covariance =
+      NoiseMatrix::Constant(Square(kPriorLogSigma) - Square(kApartLogSigma));
+  constexpr int kPixel = IndexOf(NoiseKind::kPixel);
+  covariance.row(kPixel).setZero();
+  covariance.col(kPixel).setZero();
+  covariance.diagonal().setConstant(Square(kPriorLogSigma));
+  return covariance.inverse();
+}
 
 // Score and Fisher information of the logarithms of the factors, with the
 // prior. The Fisher information of a restricted likelihood follows from how the
 // redundancies change with the factors.
 class Likelihood {
  public:
-  explicit Likelihood(NoiseProblem* problem) : problem_(problem) {}
+  // `taken`: logarithms of the noise of the problem over what the rig states.
+  Likelihood(NoiseProblem* problem, const NoiseVector& taken)
+      : problem_(problem), taken_(taken) {}
 
   bool MoveTo(const NoiseVector& at) {
     const std::optional<NoiseBalance> balance = problem_->Evaluate(at);
@@ -52,7 +72,7 @@ class Likelihood {
   const NoiseBalance& balance() const { return balance_; }
 
   NoiseVector Score() const {
-    return balance_.squares - balance_.redundancy - Prior() * at_;
+    return balance_.squares - balance_.redundancy - prior_ * (taken_ + at_);
   }
 
   // From two differences: a walk has to do with the noise of its own sensor
@@ -91,15 +111,12 @@ class Likelihood {
     fisher.diagonal() += 2 * balance_.redundancy;
     // What differences leave of nothing may be less than that.
     const Eigen::SelfAdjointEigenSolver<NoiseMatrix> eigen(fisher);
-    return eigen.eigenvectors() *
-           (eigen.eigenvalues().array().max(0) + Prior())
-               .matrix()
-               .asDiagonal() *
-           eigen.eigenvectors().transpose();
+    return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
+               eigen.eigenvectors().transpose() +
+           prior_;
   }
 
  private:
-  static double Prior() { return 1 / Square(kPriorLogSigma); }
   static void SetBoth(int i, int j, double value, NoiseMatrix* matrix) {
     (*matrix)(i, j) = (*matrix)(j, i) = value;
   }
@@ -113,6 +130,8 @@ class Likelihood {
   }
 
   NoiseProblem* problem_;
+  const NoiseVector taken_;
+  const NoiseMatrix prior_ = PriorInformation();
   NoiseVector at_ = NoiseVector::Zero();
   NoiseBalance balance_;
 };
@@ -132,7 +151,7 @@ std::optional<Informed> Inform(const Likelihood& likelihood) {
 bool StillHolds(const Informed& informed, const Likelihood& likelihood) {
   for (int i = 0; i < kNoiseKinds; ++i) {
     if (std::max(informed.redundancy[i], likelihood.balance().redundancy[i]) >
-            kMayBeDetermined &&
+            kMaySayMore &&
         std::abs(likelihood.at()[i] - informed.at[i]) > kNear) {
       return false;
     }
@@ -229,12 +248,18 @@ double GuessPixelFactor(const SolverRound& round,
 }  // namespace
 
 std::vector<NoiseFactor> EstimateNoiseFactors(
+    const Rig& stated,
     const SolverRound& round,
     const CalibrationEstimate& estimate,
     const std::vector<ScreenedLandmark>& landmarks,
     double track_noise) {
   NoiseProblem problem(round, estimate, landmarks, track_noise);
-  Likelihood likelihood(&problem);
+  NoiseVector taken;
+  for (int i = 0; i < kNoiseKinds; ++i) {
+    const auto kind = static_cast<NoiseKind>(i);
+    taken[i] = std::log(NoiseOf(kind, round.rig) / NoiseOf(kind, stated));
+  }
+  Likelihood likelihood(&problem, taken);
   NoiseVector start = NoiseVector::Zero();
   start[IndexOf(NoiseKind::kPixel)] =
       std::log(GuessPixelFactor(round, estimate, landmarks));
@@ -246,7 +271,7 @@ std::vector<NoiseFactor> EstimateNoiseFactors(
   for (int i = 0; i < kNoiseKinds; ++i) {
     const double redundancy = likelihood.balance().redundancy[i];
     // The information may be that of a place further off.
-    const double least = 1 / (2 * redundancy + 1 / Square(kPriorLogSigma));
+    const double least = 1 / (2 * redundancy + PriorInformation()(i, i));
     factors.push_back({static_cast<NoiseKind>(i),
                        std::exp(likelihood.at()[i]),
                        std::sqrt(std::max(covariance(i, i), least)),

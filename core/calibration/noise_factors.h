@@ -26,12 +26,17 @@
 
 namespace selfcal {
 
+// Factors are over the noise of round.rig. Before residuals are looked at, they
+// are not far from what the rig states (`stated`), and those of the IMU not far
+// from each other: where only some are determined, the others follow.
+//
 // At the end of a round, with `round` as it was solved, but for landmarks
 // without the track noise. That is as TrackNoiseFactor (track_noise.h): where
 // it is larger than the pixel sigma is off, errors go together along tracks,
 // and what reprojections say of all else is weighted by it. Empty where the
 // linear system fails.
 std::vector<NoiseFactor> EstimateNoiseFactors(
+    const Rig& stated,
     const SolverRound& round,
     const CalibrationEstimate& estimate,
     const std::vector<ScreenedLandmark>& landmarks,
