@@ -134,6 +134,26 @@ void AddAgreement(const v1::SolverReport& solver, FactList* facts) {
   }
 }
 
+void AddEvicted(const v1::EvictedUse& use, FactList* facts) {
+  if (!use.unused().empty()) {
+    Add(facts, "segments without data", "not used: " + use.unused());
+    return;
+  }
+  if (use.segments() == 0) return;
+  std::string text = fmt::format(
+      "{} used, linearised up to {:.2g} sigma_ref "
+      "from here",
+      use.segments(),
+      use.reach());
+  if (use.too_far() > 0) {
+    text += fmt::format("; {} too far away", use.too_far());
+  }
+  if (use.contradicting() > 0) {
+    text += fmt::format("; {} contradict the others", use.contradicting());
+  }
+  Add(facts, "segments without data", text);
+}
+
 void AddSolver(const v1::SolverReport& solver, FactList* facts) {
   Add(facts,
       "solver",
@@ -180,6 +200,7 @@ void AddSolver(const v1::SolverReport& solver, FactList* facts) {
     Add(facts, "noise", NoiseText(factor));
   }
   AddAgreement(solver, facts);
+  AddEvicted(solver.evicted(), facts);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ constexpr int kMaxRounds = 3;
 
 std::string CheckInput(const Rig& rig,
                        const Calibration& theta_start,
-                       const std::optional<ThetaPrior>& prior,
+                       const CalibrateOptions& options,
                        const std::vector<const MotionSegment*>& sorted) {
   if (sorted.empty()) {
     return "no segments to calibrate on";
@@ -24,11 +24,23 @@ std::string CheckInput(const Rig& rig,
   if (!SameShape(rig.factory, theta_start)) {
     return "the calibration to start from has other cameras than the rig";
   }
+  const std::optional<ThetaPrior>& prior = options.prior;
   if (prior && (!SameShape(rig.factory, prior->centre) ||
                 prior->information.rows() != TangentSize(rig.factory) ||
                 prior->information.cols() != TangentSize(rig.factory) ||
                 !prior->information.allFinite())) {
     return "the prior on theta does not have the shape of the rig";
+  }
+  const int size = TangentSize(rig.factory);
+  const bool whole = std::all_of(
+      options.remembered.begin(), options.remembered.end(), [&](auto& one) {
+        return !one.ends || (SameShape(rig.factory, one.ends->theta0) &&
+                             one.ends->Lambda.rows() == size + kEndUnknowns &&
+                             one.ends->Lambda.cols() == size + kEndUnknowns &&
+                             one.ends->eta.size() == size + kEndUnknowns);
+      });
+  if (!whole || (options.walk.size() > 0 && options.walk.size() != size)) {
+    return "what is remembered of segments does not have the shape of the rig";
   }
   for (std::size_t i = 1; i < sorted.size(); ++i) {
     if (sorted[i - 1]->key == sorted[i]->key) {
@@ -96,6 +108,22 @@ std::vector<Contradiction> FindMisfitsOf(
   return FindMisfits(fits);
 }
 
+// What segments without data say about the result, where there is one.
+void CompleteByRemembered(const Rig& rig,
+                          const std::vector<const MotionSegment*>& used,
+                          const CalibrateOptions& options,
+                          CalibrationRun* run) {
+  if (run->evidence.empty() || options.remembered.empty()) return;
+  CompletedEstimate completed =
+      FuseEvicted(rig, run->estimate, used, options.remembered, options.walk);
+  CalibrationResult& result = run->result;
+  result.evicted = std::move(completed.use);
+  if (result.evicted.segments == 0) return;
+  result.theta = std::move(completed.theta);
+  result.covariance = std::move(completed.covariance);
+  result.Lambda += completed.Lambda;
+}
+
 // Calibrates, leaves out what contradicts the rest, and calibrates again.
 CalibrationResult CalibrateOnWhatAgrees(
     const Rig& rig,
@@ -125,6 +153,7 @@ CalibrationResult CalibrateOnWhatAgrees(
     if (contradictions.empty()) break;
     selection.LeaveOut(contradictions);
   }
+  CompleteByRemembered(rig, selection.used(), options, &run);
   selection.Complete(&run.result.segment_fits);
   return std::move(run.result);
 }
@@ -137,19 +166,20 @@ CalibrationResult Calibrate(const Rig& rig,
                             const CalibrateOptions& options,
                             const ProgressCallback& progress) {
   const std::vector<const MotionSegment*> sorted = SortByKey(segments);
-  const std::string problem =
-      CheckInput(rig, theta_start, options.prior, sorted);
+  const std::string problem = CheckInput(rig, theta_start, options, sorted);
   if (!problem.empty()) {
     CalibrationResult result;
     result.message = problem;
     result.theta = theta_start;
     return result;
   }
-  return options.leave_out_contradictions
-             ? CalibrateOnWhatAgrees(
-                   rig, theta_start, sorted, options, progress)
-             : RunCalibration(rig, theta_start, sorted, options, progress)
-                   .result;
+  if (options.leave_out_contradictions) {
+    return CalibrateOnWhatAgrees(rig, theta_start, sorted, options, progress);
+  }
+  CalibrationRun run =
+      RunCalibration(rig, theta_start, sorted, options, progress);
+  CompleteByRemembered(rig, sorted, options, &run);
+  return std::move(run.result);
 }
 
 }  // namespace selfcal

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/calibration/noise_factor.h"
+#include "core/calibration/remembered_segment.h"
 #include "core/calibration/segment_fit.h"
 #include "core/calibration/theta_prior.h"
 #include "core/information/segment_information.h"
@@ -48,6 +49,14 @@ struct CalibrateOptions {
   // Segments that contradict the rest, by their residuals or by the theta that
   // they show, are not used (segment_agreement.h).
   bool leave_out_contradictions = true;
+  // All segments of the device that are worth using, in the order of time, each
+  // session in one run: those that the calibration has the data of, and, with
+  // their ends, those that it has not. The result is completed by what these
+  // say (evicted_fusion.h).
+  std::vector<RememberedSegment> remembered = {};
+  // theta random-walks by these densities (D) [tangent units / sqrt(s)], so
+  // that what is remembered says less the older it is. Empty: it does not.
+  Eigen::VectorXd walk = {};
   int merge_landmarks = 15;  // partitions that share more are merged
   SolverKind solver = SolverKind::kStructured;
   int threads = 1;  // of Ceres
@@ -85,8 +94,8 @@ struct CalibrationResult {
   // a direction that was held constant keeps the prior's variance, so that no
   // sigma is ever small for what was not shown.
   Eigen::MatrixXd covariance;
-  // Information about theta (D x D, tangent at theta) of the data alone, also
-  // along directions that were held constant.
+  // Information about theta (D x D, tangent at theta) of the data, and of what
+  // is remembered, also along directions that were held constant.
   Eigen::MatrixXd Lambda;
   int rank = 0;  // estimated directions
   std::vector<UnobservedDirection> held_constant;
@@ -116,6 +125,8 @@ struct CalibrationResult {
   std::vector<SegmentFit> segment_fits;
   // Of calibrations on two halves of the segments.
   AgreementTest halves;
+  // What the result has from segments without data.
+  EvictedUse evicted;
 };
 
 // Calibrates on the segments (valid for the rig, distinct keys, any order),

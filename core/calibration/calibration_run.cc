@@ -90,7 +90,8 @@ class Calibrator {
     if (Start() && Solve() && WeighNoise() && ReleaseWeak() && HoldSpurious()) {
       Finish();
     }
-    return {std::move(result_), std::move(evidence_)};
+    return {
+        std::move(result_), std::move(evidence_), std::move(data_estimate_)};
   }
 
  private:
@@ -141,9 +142,8 @@ class Calibrator {
     ScaleWeights(Square(screening_.track_noise_factor), &landmarks);
     // The factors bring a linear system of their own.
     linearised_.system.ReleaseChains();
-    result_.noise_factors =
-        EstimateNoiseFactors(
-            stated_, Round(basis), estimate_, landmarks, track_noise_);
+    result_.noise_factors = EstimateNoiseFactors(
+        stated_, Round(basis), estimate_, landmarks, track_noise_);
   }
 
   // What the pixel errors of tracks have in common is measured anew with it.
@@ -543,7 +543,7 @@ class Calibrator {
       factor.used = NoiseOf(factor.kind, rig_) / NoiseOf(factor.kind, stated_);
       factor.factor *= factor.used;
     }
-    TestAgreement();
+    TestSegments();
     const ReprojectionStatistics after = Measure();
     result_.reprojection_rms_after_px = after.rms_px;
     result_.reprojection_median_after_px = after.median_px;
@@ -555,7 +555,7 @@ class Calibrator {
 
   // Each segment by itself, at the minimum. Where they disagree by more than
   // they say, so does the covariance.
-  void TestAgreement() {
+  void TestSegments() {
     Rig rig = rig_;
     rig.pixel_sigma_px *= result_.track_noise_factor;
     evidence_ = CollectEvidence(rig,
@@ -568,10 +568,27 @@ class Calibrator {
                                 SquaresOfAReprojection());
     const double excess = TestEach(&evidence_);
     result_.covariance *= excess;
+    data_estimate_ = {.reference = reference_,
+                      .d = estimate_.d,
+                      .subspace = subspace_,
+                      .Lambda = information_.Lambda,
+                      .excess = excess,
+                      .noise_factor = LargestNoise()};
     result_.halves = TestHalves(evidence_, excess);
     for (const SegmentEvidence& one : evidence_) {
       result_.segment_fits.push_back(one.fit);
     }
+  }
+
+  // Over what the rig states, of all kinds.
+  double LargestNoise() const {
+    double largest = 1;
+    for (const NoiseFactor& factor : result_.noise_factors) {
+      const double tracks =
+          factor.kind == NoiseKind::kPixel ? result_.track_noise_factor : 1;
+      largest = std::max(largest, factor.used * tracks);
+    }
+    return largest;
   }
 
   // Sum over the two rows of a reprojection, from the redundancy of all; 0: not
@@ -609,6 +626,7 @@ class Calibrator {
   double track_noise_ = 0;   // as TrackNoiseFactor
   CalibrationResult result_;
   std::vector<SegmentEvidence> evidence_;
+  DataEstimate data_estimate_;
 };
 
 }  // namespace

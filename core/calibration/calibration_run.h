@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/calibration/evicted_fusion.h"
 #include "core/calibration/segment_agreement.h"
 
 namespace selfcal {
@@ -13,6 +14,7 @@ struct CalibrationRun {
   CalibrationResult result;
   // Of each segment; empty where no minimum was reached.
   std::vector<SegmentEvidence> evidence;
+  DataEstimate estimate;  // what the result says; where there is evidence
 };
 
 // As Calibrate(), with segments in the order of their keys, all of which are

@@ -12,8 +12,6 @@
 namespace selfcal {
 namespace {
 
-// A direction is tested where both sides say more than the prior.
-constexpr double kObserved = 1;
 // Fewer have no majority.
 constexpr int kLeastSegments = 4;
 // By chance, over all segments of a calibration.
@@ -29,33 +27,6 @@ double Median(std::vector<double> values) {
       values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
-}
-
-AgreementTest Test(const Eigen::MatrixXd& Lambda,
-                   const Eigen::VectorXd& eta,
-                   const Eigen::MatrixXd& rest_Lambda,
-                   const Eigen::VectorXd& rest_eta,
-                   double excess) {
-  AgreementTest test;
-  if (Lambda.size() == 0) return test;
-  Eigen::MatrixXd all = Lambda + rest_Lambda;
-  all.diagonal().array() += 1e-9 * all.trace();
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(all);
-  const Eigen::VectorXd score = eta - Lambda * ldlt.solve(eta + rest_eta);
-  const Eigen::MatrixXd covariance = Lambda - Lambda * ldlt.solve(Lambda);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      (covariance + covariance.transpose()) / 2);
-  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * score;
-  for (Eigen::Index i = 0; i < along.size(); ++i) {
-    if (!(eigen.eigenvalues()(i) > kObserved)) continue;
-    ++test.degrees;
-    test.statistic += along(i) * along(i) / eigen.eigenvalues()(i);
-  }
-  test.statistic /= excess;
-  if (test.degrees > 0) {
-    test.probability = ChiSquareTail(test.statistic, test.degrees);
-  }
-  return test;
 }
 
 // A segment at the estimate, with what is used of its observations.
@@ -170,7 +141,7 @@ struct Sum {
 AgreementTest TestOne(const SegmentEvidence& one, const Sum& all) {
   Sum rest = all;
   rest.Add(one, -1);
-  return Test(one.Lambda, one.eta, rest.Lambda, rest.eta, 1);
+  return TestAgreement(one.Lambda, one.eta, rest.Lambda, rest.eta, 1);
 }
 
 double PerDegree(const AgreementTest& test) {
@@ -202,7 +173,8 @@ AgreementTest TestHalves(const std::vector<SegmentEvidence>& evidence,
   for (std::size_t i = 0; i < evidence.size(); ++i) {
     (i < evidence.size() / 2 ? first : second).Add(evidence[i]);
   }
-  return Test(first.Lambda, first.eta, second.Lambda, second.eta, excess);
+  return TestAgreement(
+      first.Lambda, first.eta, second.Lambda, second.eta, excess);
 }
 
 std::vector<Contradiction> FindContradictions(

@@ -2,13 +2,8 @@
 // halves of them with each other; and which of them contradict the rest.
 //
 // At the minimum of a calibration each segment is linearised alone, at the
-// states and landmarks of the joint estimate. With information Lambda_i and
-// gradient eta_i of segment i, and sums over all others, the score
-//   S = eta_i - Lambda_i (Lambda_i + Lambda_r)^-1 (eta_i + eta_r)
-// is zero on average where both share one theta, with the covariance
-//   (Lambda_i^-1 + Lambda_r^-1)^-1,
-// so that its square in that covariance is chi-square distributed. Only
-// directions that both observe, better than the prior, are tested.
+// states and landmarks of the joint estimate, and tested against the sum of all
+// others (agreement_test.h).
 //
 // Pure, any thread, deterministic.
 #pragma once

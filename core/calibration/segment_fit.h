@@ -4,16 +4,10 @@
 
 #include <string>
 
+#include "core/calibration/agreement_test.h"
 #include "core/model/segment.h"
 
 namespace selfcal {
-
-// A chi-square test of two estimates that should agree.
-struct AgreementTest {
-  double statistic = 0;
-  int degrees = 0;         // 0: not tested
-  double probability = 1;  // of a statistic as large or larger by chance
-};
 
 struct SegmentFit {
   SegmentKey key;

@@ -22,12 +22,15 @@
 
 namespace selfcal {
 
+// Unknowns of the two states, 15 each.
+inline constexpr int kEndUnknowns = 30;
+
 struct SegmentEnds {
   SegmentKey key;
   // Where it was linearised.
   Calibration theta0;
   KeyframeState first, last;
-  // Over D + 30 unknowns: theta [-] theta0, then the offsets of both states.
+  // Over D + kEndUnknowns: theta [-] theta0, then the offsets of both states.
   // Of the data alone; zero rows for components that the rig holds fixed.
   Eigen::MatrixXd Lambda;
   Eigen::VectorXd eta;

@@ -131,6 +131,15 @@ void FillAgreement(const AgreementTest& test, v1::AgreementTest* message) {
   message->set_probability(test.probability);
 }
 
+void FillEvicted(const EvictedUse& use, v1::EvictedUse* message) {
+  message->set_segments(use.segments);
+  message->set_too_far(use.too_far);
+  message->set_contradicting(use.contradicting);
+  message->set_reach(use.reach);
+  FillAgreement(use.agreement, message->mutable_agreement());
+  message->set_unused(use.unused);
+}
+
 void FillNoiseFactor(const NoiseFactor& factor, v1::NoiseFactor* message) {
   message->set_kind(NoiseKindName(factor.kind));
   message->set_factor(factor.factor);
@@ -210,6 +219,7 @@ void FillReport(const std::string& rig,
     added->set_excluded(fit.excluded);
   }
   FillAgreement(result.halves, message->mutable_halves());
+  FillEvicted(result.evicted, message->mutable_evicted());
 }
 
 v1::Calibration Encode(const StoredCalibration& calibration,

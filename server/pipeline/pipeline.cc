@@ -12,6 +12,7 @@
 
 #include "core/information/segment_scorer.h"
 #include "server/pipeline/recalibration.h"
+#include "server/pipeline/rescoring.h"
 #include "server/pipeline/scoring.h"
 #include "server/pipeline/verification_sampler.h"
 #include "server/pipeline/verifier.h"
@@ -98,6 +99,7 @@ class PipelineImpl : public Pipeline {
                const Estimators& estimators)
       : store_(store),
         options_(options),
+        estimators_(estimators),
         coach_(store),
         verifier_(store, options, estimators),
         sampler_(store, options, &verifier_),
@@ -218,6 +220,7 @@ class PipelineImpl : public Pipeline {
                  rig,
                  reason);
     calibration_watchers_.Publish(rig, active);
+    RescoreKept(store_, estimators_, rig, [] { return false; });
     return active;
   }
 
@@ -316,6 +319,7 @@ class PipelineImpl : public Pipeline {
 
   Store* const store_;
   const PipelineOptions options_;
+  const Estimators estimators_;
   RigCoach coach_;
   Verifier verifier_;
   VerificationSampler sampler_;
@@ -351,7 +355,12 @@ Estimators CoreEstimators() {
              const std::function<bool()>&) {
             return Calibrate(rig, theta_start, segments, options, progress);
           },
-          ScoreByCore};
+          ScoreByCore,
+          [](const Rig& rig,
+             const Calibration& theta0,
+             const MotionSegment& segment) {
+            return SummariseEnds(rig, theta0, segment);
+          }};
 }
 
 std::unique_ptr<Pipeline> MakePipeline(Store* store,

@@ -86,9 +86,13 @@ struct Estimators {
       const MotionSegment& segment,
       const std::function<bool()>& interrupted)>
       score_by;
+  // What is remembered of a segment; none: nothing is.
+  std::function<SegmentEnds(
+      const Rig& rig, const Calibration& theta0, const MotionSegment& segment)>
+      ends = nullptr;
 };
 
-// ScoreSegment, Calibrate and ScoreSegmentBy of core; they ask nobody whether
+// ScoreSegment, Calibrate, ScoreSegmentBy and SummariseEnds of core; they ask nobody whether
 // they are interrupted, but for calls of `progress`.
 Estimators CoreEstimators();
 

@@ -1,7 +1,9 @@
 #include "server/pipeline/run_options.h"
 
+#include <cmath>
 #include <vector>
 
+#include "core/change/aged.h"
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/stored_information.h"
 #include "server/store/status_macros.h"
@@ -13,6 +15,10 @@ absl::StatusOr<CalibrateOptions> OptionsOfRun(Store* store,
                                               const StoredRig& rig,
                                               const StoredRun& run) {
   options.reweight_noise |= rig.rig.reweight_noise;
+  SELFCAL_ASSIGN_OR_RETURN(options.remembered,
+                           store->ListRemembered(run.rig, run.run));
+  options.walk = WalkDensities(rig.rig, rig.policy.walk_densities) /
+                 std::sqrt(kNanosecondsOfDay * 1e-9);
   if (run.change == 0) return options;
   SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
                            store->GetChange(run.rig, run.change));

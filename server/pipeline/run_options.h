@@ -8,8 +8,9 @@
 
 namespace selfcal::server {
 
-// `options` with what rig and run add to them: after a change of the device,
-// what is still known. Errors of the store.
+// `options` with what rig and run add to them: what is remembered of segments
+// without data, and, after a change of the device, what is still known. Errors
+// of the store.
 absl::StatusOr<CalibrateOptions> OptionsOfRun(Store* store,
                                               CalibrateOptions options,
                                               const StoredRig& rig,

@@ -73,6 +73,8 @@ absl::StatusOr<std::optional<SegmentInformation>> Recalibrator::Rescore(
   }
 }
 
+// Segments without data are held out only where the result does not stand on
+// what is remembered of them.
 absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
     const StoredRun& run, const Rig& rig, const CalibrationResult& result) {
   HeldOutSegments segments;
@@ -89,7 +91,7 @@ absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
     }
     if (again) {
       segments.push_back({*std::move(again), true});
-    } else if (stated_noise_holds) {
+    } else if (stated_noise_holds && result.evicted.segments == 0) {
       segments.push_back({std::move(one.information), false});
     }
   }

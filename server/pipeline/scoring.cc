@@ -21,8 +21,12 @@ std::string Name(const Store::Unscored& claim) {
       "segment {}~{} of rig {}", claim.key.session, claim.key.index, claim.rig);
 }
 
-bool IsFinite(const SegmentInformation& information) {
-  return information.Lambda.allFinite() && information.eta.allFinite();
+template <typename Score>
+bool IsFinite(const Score& score) {
+  return score.information.Lambda.allFinite() &&
+         score.information.eta.allFinite() &&
+         (!score.ends ||
+          (score.ends->Lambda.allFinite() && score.ends->eta.allFinite()));
 }
 
 }  // namespace
@@ -159,7 +163,7 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
 }
 
 void ScoringWorkers::Process(const Claim& claim) {
-  const auto score = Score(claim);
+  const auto score = FindScore(claim);
   if (score && WaitForTurn(claim)) {
     Commit(claim, *score);
   }
@@ -172,9 +176,9 @@ void ScoringWorkers::Process(const Claim& claim) {
   on_done_(claim.rig);
 }
 
-std::optional<absl::StatusOr<SegmentInformation>> ScoringWorkers::Score(
+std::optional<absl::StatusOr<ScoringWorkers::Score>> ScoringWorkers::FindScore(
     const Claim& claim) {
-  absl::StatusOr<SegmentInformation> score = absl::UnknownError("");
+  absl::StatusOr<Score> score = absl::UnknownError("");
   const absl::Status status = Retry([&] {
     try {
       score = TryScore(claim);
@@ -190,20 +194,21 @@ std::optional<absl::StatusOr<SegmentInformation>> ScoringWorkers::Score(
   return score;
 }
 
-absl::StatusOr<SegmentInformation> ScoringWorkers::TryScore(
+absl::StatusOr<ScoringWorkers::Score> ScoringWorkers::TryScore(
     const Claim& claim) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(claim.rig));
   SELFCAL_ASSIGN_OR_RETURN(const MotionSegment segment,
                            store_->GetSegmentData(claim.rig, claim.key));
-  SELFCAL_ASSIGN_OR_RETURN(
-      const StoredCalibration calibration,
-      store_->GetCalibration(claim.rig, segment.calibration_version));
-  SegmentInformation information =
-      estimators_.score(rig.rig, calibration.theta, segment);
-  if (!IsFinite(information)) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
+                           store_->GetActiveCalibration(claim.rig));
+  Score score{estimators_.score(rig.rig, active.theta, segment), std::nullopt};
+  if (estimators_.ends) {
+    score.ends = estimators_.ends(rig.rig, active.theta, segment);
+  }
+  if (!IsFinite(score)) {
     return absl::InternalError("its information is not finite");
   }
-  return information;
+  return score;
 }
 
 bool ScoringWorkers::WaitForTurn(const Claim& claim) {
@@ -217,7 +222,7 @@ bool ScoringWorkers::WaitForTurn(const Claim& claim) {
 }
 
 void ScoringWorkers::Commit(const Claim& claim,
-                            const absl::StatusOr<SegmentInformation>& score) {
+                            const absl::StatusOr<Score>& score) {
   const absl::Status status =
       score.ok() ? Retry([&] { return TryCommit(claim, *score); })
                  : score.status();
@@ -226,11 +231,10 @@ void ScoringWorkers::Commit(const Claim& claim,
   }
 }
 
-absl::Status ScoringWorkers::TryCommit(const Claim& claim,
-                                       const SegmentInformation& information) {
+absl::Status ScoringWorkers::TryCommit(const Claim& claim, const Score& score) {
   SELFCAL_ASSIGN_OR_RETURN(
       const ScoreCommit commit,
-      store_->CommitScore(claim.rig, claim.key, information));
+      store_->CommitScore(claim.rig, claim.key, score.information, score.ends));
   spdlog::info("{} is scored; tables: [{}]",
                Name(claim),
                fmt::join(commit.tables, ", "));

@@ -3,8 +3,9 @@
 // rig are committed. What is claimed is known in memory only: after a crash the
 // store still lists it as unscored.
 //
-// A score is a function of what is stored (rig, the calibration version that
-// the segment names, segment), so that it comes out the same after a restart.
+// A segment is scored at the calibration that is active, whatever version its
+// states were estimated with: scores are about today's calibration, also those
+// of a SLAM process that never takes a new version.
 #pragma once
 
 #include <absl/status/status.h>
@@ -58,18 +59,21 @@ class ScoringWorkers {
 
  private:
   using Claim = Store::Unscored;
+  // What is computed of a segment.
+  struct Score {
+    SegmentInformation information;
+    std::optional<SegmentEnds> ends;
+  };
 
   void Run();
   std::optional<Claim> NextClaim();
   void Process(const Claim& claim);
-  // The information, or what is wrong with the segment. Nothing when stopping.
-  std::optional<absl::StatusOr<SegmentInformation>> Score(const Claim& claim);
-  absl::StatusOr<SegmentInformation> TryScore(const Claim& claim);
+  // The score, or what is wrong with the segment. Nothing when stopping.
+  std::optional<absl::StatusOr<Score>> FindScore(const Claim& claim);
+  absl::StatusOr<Score> TryScore(const Claim& claim);
   bool WaitForTurn(const Claim& claim);
-  void Commit(const Claim& claim,
-              const absl::StatusOr<SegmentInformation>& score);
-  absl::Status TryCommit(const Claim& claim,
-                         const SegmentInformation& information);
+  void Commit(const Claim& claim, const absl::StatusOr<Score>& score);
+  absl::Status TryCommit(const Claim& claim, const Score& score);
   void SetAside(const Claim& claim, const absl::Status& why);
   // Calls until it succeeds or fails for good; then, or when stopping, returns
   // what came last.

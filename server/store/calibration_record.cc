@@ -97,6 +97,24 @@ SegmentFit GetFit(const store::SegmentFitRecord& record) {
           record.excluded()};
 }
 
+void PutEvicted(const EvictedUse& use, v1::EvictedUse* message) {
+  message->set_segments(use.segments);
+  message->set_too_far(use.too_far);
+  message->set_contradicting(use.contradicting);
+  message->set_reach(use.reach);
+  PutAgreement(use.agreement, message->mutable_agreement());
+  message->set_unused(use.unused);
+}
+
+EvictedUse GetEvicted(const v1::EvictedUse& message) {
+  return {message.segments(),
+          message.too_far(),
+          message.contradicting(),
+          message.reach(),
+          GetAgreement(message.agreement()),
+          message.unused()};
+}
+
 // theta and covariance are those of the calibration, and stored once.
 void PutSolver(const CalibrationResult& result, SolverRecord* record) {
   record->set_status(ToRecord(result.status));
@@ -126,6 +144,7 @@ void PutSolver(const CalibrationResult& result, SolverRecord* record) {
     PutFit(fit, record->add_segment_fits());
   }
   PutAgreement(result.halves, record->mutable_halves());
+  PutEvicted(result.evicted, record->mutable_evicted());
 }
 
 CalibrationResult GetSolver(const SolverRecord& record) {
@@ -156,6 +175,7 @@ CalibrationResult GetSolver(const SolverRecord& record) {
     result.segment_fits.push_back(GetFit(fit));
   }
   result.halves = GetAgreement(record.halves());
+  result.evicted = GetEvicted(record.evicted());
   return result;
 }
 

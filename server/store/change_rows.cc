@@ -14,6 +14,7 @@
 #include "server/store/events.h"
 #include "server/store/records.h"
 #include "server/store/runs.h"
+#include "server/store/segment_ends.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -241,6 +242,7 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
   change.groups = found->concerned;
   SELFCAL_RETURN_IF_ERROR(InsertChange(db, rig.rowid, change));
   SELFCAL_RETURN_IF_ERROR(RestartTables(db, rig.rowid, change.first_sequence));
+  SELFCAL_RETURN_IF_ERROR(ForgetBefore(db, rig.rowid, change.first_sequence));
   SELFCAL_RETURN_IF_ERROR(AppendEvent(
       db, change.rig, EventKind::kChangeDetected, Describe(*found, change)));
   return change;

@@ -20,7 +20,14 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
     const std::string& rig,
     const SegmentKey& key,
     const SegmentInformation& information,
+    const std::optional<SegmentEnds>& ends,
     const ChangeOptions& change);
+
+absl::Status ReplaceScoreRows(Connection* db,
+                              const std::string& rig,
+                              const SegmentKey& key,
+                              const SegmentInformation& information,
+                              const SegmentEnds& ends);
 
 absl::Status MarkUnusableRow(Connection* db,
                              const std::string& rig,

@@ -9,6 +9,7 @@
 #include "server/store/changes.h"
 #include "server/store/events.h"
 #include "server/store/rigs.h"
+#include "server/store/segment_ends.h"
 #include "server/store/segment_rows.h"
 #include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
@@ -61,6 +62,7 @@ absl::Status MakeUnusable(Connection* db,
                           std::int64_t segment,
                           const std::string& problem) {
   SELFCAL_RETURN_IF_ERROR(WriteProblem(db, segment, problem));
+  SELFCAL_RETURN_IF_ERROR(ForgetSegment(db, segment));
   return RemoveFromTables(db, segment, AbsenceCause::kUnusable);
 }
 

@@ -169,6 +169,7 @@ absl::Status DropOldSegments(Connection* db,
                               "table_absences",
                               "segment_scores",
                               "segment_information",
+                              "segment_ends",
                               "segment_paths",
                               "segments"}) {
       SELFCAL_RETURN_IF_ERROR(

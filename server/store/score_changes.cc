@@ -15,6 +15,7 @@
 #include "server/store/quarantine.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
+#include "server/store/segment_ends.h"
 #include "server/store/segment_rows.h"
 #include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
@@ -174,6 +175,7 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
     const std::string& rig_name,
     const SegmentKey& key,
     const SegmentInformation& information,
+    const std::optional<SegmentEnds>& ends,
     const ChangeOptions& change) {
   Transaction transaction(db);
   SELFCAL_RETURN_IF_ERROR(transaction.status());
@@ -194,6 +196,9 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t receive_time_ns,
                            ReceiveTime(db, segment.rowid));
   SELFCAL_RETURN_IF_ERROR(WriteScore(db, segment.rowid, information));
+  if (ends) {
+    SELFCAL_RETURN_IF_ERROR(WriteEnds(db, rig.rowid, segment.rowid, *ends));
+  }
   SELFCAL_ASSIGN_OR_RETURN(const std::optional<double> largest_fit,
                            ReadLargestFit(db, rig.rowid));
   SELFCAL_RETURN_IF_ERROR(RemoveMisfits(db, rig.rowid, largest_fit));
@@ -217,6 +222,31 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
   SELFCAL_RETURN_IF_ERROR(DropUnreferencedPayloads(db, rig.rowid));
   SELFCAL_RETURN_IF_ERROR(transaction.Commit());
   return commit;
+}
+
+absl::Status ReplaceScoreRows(Connection* db,
+                              const std::string& rig_name,
+                              const SegmentKey& key,
+                              const SegmentInformation& information,
+                              const SegmentEnds& ends) {
+  Transaction transaction(db);
+  SELFCAL_RETURN_IF_ERROR(transaction.status());
+  SELFCAL_ASSIGN_OR_RETURN(const RigRow rig, ReadRig(db, rig_name));
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
+                           FindSegment(db, rig.rowid, key));
+  SELFCAL_ASSIGN_OR_RETURN(const bool has_data, HasData(db, segment.rowid));
+  if (segment.state != SegmentState::kScored || !has_data) {
+    return absl::OkStatus();
+  }
+  SELFCAL_RETURN_IF_ERROR(WriteScore(db, segment.rowid, information));
+  SELFCAL_RETURN_IF_ERROR(WriteEnds(db, rig.rowid, segment.rowid, ends));
+  // What entries of a joint selection say is of all of them together.
+  const bool by_score = rig.stored.rig.selection == Selection::kTables;
+  for (const GroupScore& score : information.groups) {
+    if (!by_score || !std::isfinite(score.entropy)) continue;
+    SELFCAL_RETURN_IF_ERROR(WriteEntryScore(db, segment.rowid, score));
+  }
+  return transaction.Commit();
 }
 
 }  // namespace selfcal::server

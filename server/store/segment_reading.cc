@@ -137,8 +137,8 @@ absl::Status WriteScore(Connection* db,
   const std::string sha256 = Sha256(bytes);
   SELFCAL_RETURN_IF_ERROR(
       Statement(db,
-                "INSERT INTO segment_information (segment, information, "
-                "  sha256) VALUES (?1, ?2, ?3)",
+                "INSERT OR REPLACE INTO segment_information (segment, "
+                "  information, sha256) VALUES (?1, ?2, ?3)",
                 segment,
                 BlobView{bytes},
                 BlobView{sha256})
@@ -146,8 +146,8 @@ absl::Status WriteScore(Connection* db,
   for (const GroupScore& score : information.groups) {
     SELFCAL_RETURN_IF_ERROR(
         Statement(db,
-                  "INSERT INTO segment_scores (segment, group_name, entropy, "
-                  "  gain, rank) VALUES (?1, ?2, ?3, ?4, ?5)",
+                  "INSERT OR REPLACE INTO segment_scores (segment, group_name, "
+                  "  entropy, gain, rank) VALUES (?1, ?2, ?3, ?4, ?5)",
                   segment,
                   score.group,
                   score.entropy,
@@ -156,6 +156,27 @@ absl::Status WriteScore(Connection* db,
             .Run());
   }
   return absl::OkStatus();
+}
+
+absl::StatusOr<bool> HasData(Connection* db, std::int64_t segment) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t count,
+      ReadInt(db, "SELECT count(*) FROM payloads WHERE segment = ?1", segment));
+  return count > 0;
+}
+
+absl::StatusOr<std::vector<SegmentKey>> ListScoredWithDataRows(
+    Connection* db, const std::string& rig) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  Statement read(db,
+                 "SELECT s.session, s.session_index "
+                 "FROM payloads p JOIN segments s USING (segment) "
+                 "WHERE p.rig = ?1 AND s.state = 2 ORDER BY s.segment",
+                 rig_id);
+  std::vector<SegmentKey> keys;
+  while (read.Next()) keys.push_back({read.Text(0), read.Int(1)});
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return keys;
 }
 
 }  // namespace selfcal::server

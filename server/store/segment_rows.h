@@ -74,9 +74,16 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
 absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
                                                               int limit);
 
+// Store::ListScoredWithData.
+absl::StatusOr<std::vector<SegmentKey>> ListScoredWithDataRows(
+    Connection* db, const std::string& rig);
+
 // The rest runs inside a transaction of the caller.
 
-// Stored -> scored, with its information and the scores of its groups.
+absl::StatusOr<bool> HasData(Connection* db, std::int64_t segment);
+
+// Stored or scored -> scored, with its information and the scores of its
+// groups, in place of earlier ones.
 absl::Status WriteScore(Connection* db,
                         std::int64_t segment,
                         const SegmentInformation& information);

@@ -25,6 +25,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/change/aged.h"
 #include "core/change/detect_change.h"
+#include "core/information/segment_ends.h"
 #include "core/information/segment_information.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
@@ -324,7 +325,8 @@ class Store {
   };
   virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) = 0;
 
-  // Writes the information of one stored segment, takes segments out of the
+  // Writes the information of one stored segment, and what it says with the
+  // states at its ends where that is known, takes segments out of the
   // tables that were too old when it arrived, offers it to the tables,
   // tests the newest segments for a change of the device (core/change), drops
   // the data of segments that neither a table nor an unfinished run references,
@@ -336,7 +338,34 @@ class Store {
   virtual absl::StatusOr<ScoreCommit> CommitScore(
       const std::string& rig,
       const SegmentKey& key,
-      const SegmentInformation& information) = 0;
+      const SegmentInformation& information,
+      const std::optional<SegmentEnds>& ends) = 0;
+  absl::StatusOr<ScoreCommit> CommitScore(
+      const std::string& rig,
+      const SegmentKey& key,
+      const SegmentInformation& information) {
+    return CommitScore(rig, key, information, std::nullopt);
+  }
+
+  // Puts a later score of a scored segment in place of its first one, also in
+  // the tables that hold it. Changes nothing else, and nothing where its data
+  // is gone.
+  virtual absl::Status ReplaceScore(const std::string& rig,
+                                    const SegmentKey& key,
+                                    const SegmentInformation& information,
+                                    const SegmentEnds& ends) = 0;
+
+  // Scored segments that have their data, in order of arrival.
+  virtual absl::StatusOr<std::vector<SegmentKey>> ListScoredWithData(
+      const std::string& rig) = 0;
+
+  // What is known of segments beside the data of those that the run uses, in
+  // the order of time, each session in one run: of those without data what they
+  // say (of the newest kRemembered), of the others that they are there. None
+  // from before its change of the device, none that does not fit.
+  static constexpr int kRemembered = 256;
+  virtual absl::StatusOr<std::vector<RememberedSegment>> ListRemembered(
+      const std::string& rig, std::int64_t run) = 0;
 
   // Takes a segment that cannot be used out of the queue and out of the tables
   // for good, and drops its data unless an unfinished run references it. An

@@ -19,6 +19,7 @@
 #include "server/store/rig_summaries.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
+#include "server/store/segment_ends.h"
 #include "server/store/segment_rows.h"
 #include "server/store/session_rows.h"
 #include "server/store/shared_database.h"
@@ -152,10 +153,32 @@ class SqliteStore : public Store {
   absl::StatusOr<ScoreCommit> CommitScore(
       const std::string& rig,
       const SegmentKey& key,
-      const SegmentInformation& information) override {
+      const SegmentInformation& information,
+      const std::optional<SegmentEnds>& ends) override {
     return Write([&](Connection* db) {
-      return CommitScoreRows(db, rig, key, information, options_.change);
+      return CommitScoreRows(db, rig, key, information, ends, options_.change);
     });
+  }
+
+  absl::Status ReplaceScore(const std::string& rig,
+                            const SegmentKey& key,
+                            const SegmentInformation& information,
+                            const SegmentEnds& ends) override {
+    return Write([&](Connection* db) {
+      return ReplaceScoreRows(db, rig, key, information, ends);
+    });
+  }
+
+  absl::StatusOr<std::vector<SegmentKey>> ListScoredWithData(
+      const std::string& rig) override {
+    return Read(
+        [&](Connection* db) { return ListScoredWithDataRows(db, rig); });
+  }
+
+  absl::StatusOr<std::vector<RememberedSegment>> ListRemembered(
+      const std::string& rig, std::int64_t run) override {
+    return Read(
+        [&](Connection* db) { return ListRememberedRows(db, rig, run); });
   }
 
   absl::Status MarkUnusable(const std::string& rig,

@@ -150,6 +150,19 @@ absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
   return groups;
 }
 
+absl::Status WriteEntryScore(Connection* db,
+                             std::int64_t segment,
+                             const GroupScore& score) {
+  return Statement(db,
+                   "UPDATE table_entries SET entropy = ?3, gain = ?4 "
+                   "WHERE segment = ?1 AND group_name = ?2",
+                   segment,
+                   score.group,
+                   score.entropy,
+                   score.gain)
+      .Run();
+}
+
 absl::Status RemoveFromTables(Connection* db,
                               std::int64_t segment,
                               AbsenceCause cause) {

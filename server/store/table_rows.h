@@ -43,6 +43,11 @@ absl::Status WriteOffer(Connection* db,
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
                                                          std::int64_t segment);
 
+// A later score of a segment in the table of its group, if that holds it.
+absl::Status WriteEntryScore(Connection* db,
+                             std::int64_t segment,
+                             const GroupScore& score);
+
 // Takes a segment out of every table that holds it.
 absl::Status RemoveFromTables(Connection* db,
                               std::int64_t segment,

@@ -5,6 +5,7 @@
 #include "proto/convert.h"
 #include "server/store/record_parts.h"
 #include "server/store/records.h"
+#include "server/store/segment_ends.h"
 #include "server/worker/job.pb.h"
 
 namespace selfcal::server {
@@ -13,6 +14,18 @@ namespace {
 template <typename Message>
 bool Parse(std::string_view bytes, Message* message) {
   return message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+}
+
+void PutRemembered(const CalibrateOptions& options, worker::Options* message) {
+  for (const RememberedSegment& one : options.remembered) {
+    worker::Remembered* added = message->add_remembered();
+    added->set_session(one.key.session);
+    added->set_index(one.key.index);
+    if (one.ends) added->set_ends(SerializeEnds(*one.ends));
+    added->set_fit(one.fit);
+    added->set_time_ns(one.time_ns);
+  }
+  PutVector(options.walk, message->mutable_walk());
 }
 
 void PutOptions(const CalibrateOptions& options, worker::Options* message) {
@@ -32,11 +45,27 @@ void PutOptions(const CalibrateOptions& options, worker::Options* message) {
   message->set_solver(static_cast<int>(options.solver));
   message->set_threads(options.threads);
   message->set_leave_out_contradictions(options.leave_out_contradictions);
+  PutRemembered(options, message);
 }
 
 void PutLimits(const WorkerLimits& limits, worker::Limits* message) {
   message->set_idle(limits.idle);
   message->set_max_memory_bytes(limits.max_memory_bytes);
+}
+
+bool GetRemembered(const worker::Options& message, CalibrateOptions* options) {
+  for (const worker::Remembered& one : message.remembered()) {
+    RememberedSegment& added = options->remembered.emplace_back();
+    added.key = {one.session(), one.index()};
+    added.fit = one.fit();
+    added.time_ns = one.time_ns();
+    if (one.ends().empty()) continue;
+    auto ends = ParseEnds(one.ends());
+    if (!ends.ok()) return false;
+    added.ends = *std::move(ends);
+  }
+  options->walk = GetVector(message.walk());
+  return true;
 }
 
 bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
@@ -57,7 +86,7 @@ bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
   options->solver = static_cast<SolverKind>(message.solver());
   options->threads = message.threads();
   options->leave_out_contradictions = message.leave_out_contradictions();
-  return true;
+  return GetRemembered(message, options);
 }
 
 }  // namespace

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/calibration/evicted_prior.h"
 #include "core/information/fusion.h"
 #include "core/information/segment_ends.h"
 #include "core/information/segment_scorer.h"
@@ -90,13 +89,14 @@ class DeviceInUse {
 
   CalibrationResult Calibrate(Kind kind) {
     CalibrateOptions options = ComparedOptions();
-    if (kind == kEnds) options.prior = PriorByEnds();
+    if (kind == kEnds) options.remembered = Remember();
     if (kind == kScores) options.prior = PriorByScores();
     const CalibrationResult result =
         selfcal::Calibrate(rig_,
                            newest_,
                            Pick(segments_, kind == kBatch ? Seen() : kept()),
                            options);
+    if (kind == kEnds) reach_ = result.evicted.reach;
     if (result.status != CalibrateStatus::kConverged) {
       throw std::runtime_error(
           fmt::format("a calibration ({}) did not converge: {}",
@@ -125,16 +125,14 @@ class DeviceInUse {
     scorer_.Score(rig_, newest_, segments_[i], {}, &memory_[i].score);
   }
 
-  std::optional<ThetaPrior> PriorByEnds() {
-    for (const int i : kept()) Linearise(i);
+  std::vector<RememberedSegment> Remember() const {
     std::vector<RememberedSegment> remembered;
-    for (const Remembered& one : memory_) {
-      remembered.push_back({.ends = &one.ends, .calibrated_on = one.has_data});
+    for (std::size_t i = 0; i < memory_.size(); ++i) {
+      RememberedSegment& one = remembered.emplace_back();
+      one.key = segments_[i].key;
+      if (!memory_[i].has_data) one.ends = memory_[i].ends;
     }
-    const EvictedPrior evicted = PriorOfEvicted(rig_, newest_, remembered);
-    reach_ = evicted.reach;
-    if (evicted.segments == 0) return std::nullopt;
-    return evicted.prior;
+    return remembered;
   }
 
   // The sum of the scores of evicted segments: each by itself.

@@ -9,7 +9,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int kCorruptEvery = 5;    // of a session: 20 percent
+constexpr int kCorruptEvery = 5;  // of a session: 20 percent
 constexpr int kSpikeEvery = 10;
 constexpr double kLate_s = 0.01;
 constexpr double kLostScale = 0.7;
@@ -19,7 +19,7 @@ constexpr double kGoodSession_s = 1.5 * kTrustSession_s;
 using Corruption = std::function<MotionSegment(
     const TrustDevice& device, const SimulatedSession& session, int i)>;
 
-// The same device as it is, and with every so many-th segment corrupt.
+// A device with every so many-th segment corrupt; clean, without these.
 TrustKind Corrupt(std::string name,
                   std::string about,
                   std::uint64_t first_seed,
@@ -31,17 +31,21 @@ TrustKind Corrupt(std::string name,
   const auto make = [=](std::uint64_t seed, bool corrupted) {
     TrustDevice device = device_of(seed);
     const TrustDevice base = device;
-    AddSession(  MakeHandheld(kGoodSession_s, 1, seed),
+    AddSession(MakeHandheld(kGoodSession_s, 1, seed),
                "handheld",
                TrustOptions(seed),
                &device,
                [=](const Calibration&, SimulatedSession* session) {
-                 if (!corrupted) return;
                  const SimulatedSession good = *session;
+                 session->segments.clear();
                  const int count = static_cast<int>(good.segments.size());
-                 for (int i = static_cast<int>(seed) % every; i < count;
-                      i += every) {
-                   session->segments[i] = corrupt(base, good, i);
+                 const int first = static_cast<int>(seed) % every;
+                 for (int i = 0; i < count; ++i) {
+                   if (i % every != first) {
+                     session->segments.push_back(good.segments[i]);
+                   } else if (corrupted) {
+                     session->segments.push_back(corrupt(base, good, i));
+                   }
                  }
                });
     return device;
@@ -92,7 +96,7 @@ MotionSegment OtherDevice(const TrustDevice& device,
 TrustDevice DivergedThenGood(std::uint64_t seed, bool diverged) {
   TrustDevice device = MakeTrustDevice(seed, 8);
   if (diverged) {
-    AddSession(  MakeHandheld(kTrustSession_s, 1, seed + 1),
+    AddSession(MakeHandheld(kTrustSession_s, 1, seed + 1),
                "diverged",
                TrustOptions(seed + 1),
                &device,
@@ -111,19 +115,17 @@ TrustKind BadSample(std::string name,
                     std::uint64_t first_seed,
                     int quick_devices,
                     double value_radps) {
-  return Corrupt(std::move(name),
-                 "one corrupt reading of the gyroscope in each tenth segment",
-                 first_seed,
-                 10,
-                 quick_devices,
-                 Mono,
-                 kSpikeEvery,
-                 [=](const TrustDevice&,
-                     const SimulatedSession& session,
-                     int i) {
-                   return CorruptGyroSample(
-                       session.segments[i], value_radps, i);
-                 });
+  return Corrupt(
+      std::move(name),
+      "one corrupt reading of the gyroscope in each tenth segment",
+      first_seed,
+      10,
+      quick_devices,
+      Mono,
+      kSpikeEvery,
+      [=](const TrustDevice&, const SimulatedSession& session, int i) {
+        return CorruptGyroSample(session.segments[i], value_radps, i);
+      });
 }
 
 }  // namespace
@@ -161,22 +163,20 @@ std::vector<TrustKind> CorruptionKinds() {
               Mono,
               kCorruptEvery,
               OtherDevice),
-      Corrupt("corrupt_20_percent_scene",
-              "in every fifth segment half of the scene moves",
-              43'000,
-              8,
-              0,
-              Mono,
-              kCorruptEvery,
-              [](const TrustDevice& device,
-                 const SimulatedSession& session,
-                 int i) {
-                return MoveScene(session.segments[i],
-                                 session.truth[i],
-                                 *device.truth,
-                                 {},
-                                 i);
-              }),
+      Corrupt(
+          "corrupt_20_percent_scene",
+          "in every fifth segment half of the scene moves",
+          43'000,
+          8,
+          0,
+          Mono,
+          kCorruptEvery,
+          [](const TrustDevice& device,
+             const SimulatedSession& session,
+             int i) {
+            return MoveScene(
+                session.segments[i], session.truth[i], *device.truth, {}, i);
+          }),
       Corrupt("corrupt_20_percent_scale",
               "in every fifth segment SLAM has lost the scale",
               44'000,

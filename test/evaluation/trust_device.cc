@@ -90,6 +90,7 @@ class Driver {
       for (const MotionSegment& segment : session.segments) {
         Send(segment, active.version);
       }
+      EndSession();
     }
     Finish();
     return std::move(outcome_);
@@ -111,6 +112,20 @@ class Driver {
                       violation.message));
     }
     ++outcome_.segments;
+    WaitUntilIdle();
+    outcome_.pipeline_seconds +=
+        Seconds(std::chrono::steady_clock::now() - begin);
+    NoteNews();
+  }
+
+  // The run that the end of a session calls for, without the pause that it
+  // waits for another segment: none where the tables have not changed.
+  void EndSession() {
+    const auto begin = std::chrono::steady_clock::now();
+    const auto run = pipeline_->StartRecalibration(name_);
+    if (!run.ok() && !absl::IsFailedPrecondition(run.status())) {
+      Check(run.status());
+    }
     WaitUntilIdle();
     outcome_.pipeline_seconds +=
         Seconds(std::chrono::steady_clock::now() - begin);

@@ -24,7 +24,7 @@ struct TrustKind {
   int quick_devices;
   // Nothing where a recording that it needs is missing.
   std::function<std::optional<TrustDevice>(std::uint64_t seed)> make;
-  // The same device without what is wrong with its data, where results are to
+  // The same device without the segments that are wrong, where results are to
   // agree; empty: no such device.
   std::function<std::optional<TrustDevice>(std::uint64_t seed)> clean = {};
 };

@@ -62,7 +62,7 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 9u);
+  ASSERT_EQ(migrations.size(), 10u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -91,6 +91,9 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[8].name, "0009_verification.sql");
   EXPECT_EQ(migrations[8].sha256,
             "83bdf9b72ebe3006be94809d01f1702034e6b6c1b18e9788510f423356daa141");
+  EXPECT_EQ(migrations[9].name, "0010_segment_ends.sql");
+  EXPECT_EQ(migrations[9].sha256,
+            "3df89de6874b16777da0c78e0a806a250ebb17739e27d4d58734bd5abe2d7d7d");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

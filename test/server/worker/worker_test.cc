@@ -109,6 +109,7 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   result.noise_factors = {{NoiseKind::kGyro, 3, 0.05, 100, 2.9, false}};
   result.segment_fits = {{{"s", 7}, 1.5, 893, {40, 25, 0.03}, "a spike"}};
   result.halves = {30, 26, 0.25};
+  result.evicted = {9, 1, 2, 0.75, {20, 24, 0.7}, "not at all"};
   const auto decoded = DecodeResult(EncodeResult(result));
   ASSERT_TRUE(decoded.has_value());
   EXPECT_EQ(decoded->status, CalibrateStatus::kStalled);
@@ -121,6 +122,12 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   EXPECT_EQ(decoded->segment_fits[0].others.degrees, 25);
   EXPECT_EQ(decoded->segment_fits[0].excluded, "a spike");
   EXPECT_EQ(decoded->halves.probability, 0.25);
+  EXPECT_EQ(decoded->evicted.segments, 9);
+  EXPECT_EQ(decoded->evicted.too_far, 1);
+  EXPECT_EQ(decoded->evicted.contradicting, 2);
+  EXPECT_EQ(decoded->evicted.reach, 0.75);
+  EXPECT_EQ(decoded->evicted.agreement.degrees, 24);
+  EXPECT_EQ(decoded->evicted.unused, "not at all");
 }
 
 // As many cameras as a rig may have.
@@ -157,6 +164,12 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   options_.leave_out_contradictions = false;
   options_.solver = SolverKind::kCeres;
   options_.threads = 2;
+  options_.remembered = {
+      {.key = {"s", 3}, .fit = 1.25, .time_ns = 77},
+      {.key = {"s", 4},
+       .ends = SummariseEnds(rig_, rig_.factory, segments_[0])}};
+  options_.walk =
+      Eigen::VectorXd::LinSpaced(TangentSize(rig_.factory), 0.1, 0.2);
   limits_ = {.idle = true, .max_memory_bytes = 123};
   const std::string bytes =
       EncodeJob(rig_, rig_.factory, segments_, options_, limits_);
@@ -178,6 +191,14 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   EXPECT_FALSE(job->options.leave_out_contradictions);
   EXPECT_EQ(job->options.solver, SolverKind::kCeres);
   EXPECT_EQ(job->options.threads, 2);
+  ASSERT_EQ(job->options.remembered.size(), 2u);
+  EXPECT_EQ(job->options.remembered[0].key, (SegmentKey{"s", 3}));
+  EXPECT_FALSE(job->options.remembered[0].ends);
+  EXPECT_EQ(job->options.remembered[0].fit, 1.25);
+  EXPECT_EQ(job->options.remembered[0].time_ns, 77);
+  EXPECT_EQ(job->options.remembered[1].ends->Lambda,
+            options_.remembered[1].ends->Lambda);
+  EXPECT_EQ(job->options.walk, options_.walk);
   EXPECT_TRUE(job->limits.idle);
   EXPECT_EQ(job->limits.max_memory_bytes, 123);
   EXPECT_FALSE(DecodeJob("not a job").has_value());

@@ -1,9 +1,9 @@
-// What segments without data say about theta, as the prior of a calibration on
-// those that still have it.
+// What segments without data say about theta beside those that a calibration
+// stands on.
 //
 // All segments are joined at their ends (session_chain.h), and from what they
 // say together is taken what those of the calibration say among themselves:
-//   Lambda_prior = Lambda(all) - Lambda(of the calibration),
+//   Lambda(evicted) = Lambda(all) - Lambda(of the calibration),
 // and eta alike. Data only adds information, so that the difference is
 // semidefinite. It holds what an evicted segment says about theta, and what it
 // says through the states of a neighbour that is calibrated on: nothing counts
@@ -18,7 +18,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/calibration/theta_prior.h"
+#include "core/information/fusion.h"
 #include "core/information/segment_ends.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
@@ -26,7 +26,7 @@
 namespace selfcal {
 
 // One segment of all; `ends` must outlive the call.
-struct RememberedSegment {
+struct JoinedSegment {
   const SegmentEnds* ends = nullptr;
   // The calibration has its data. Its ends should be linearised at the point,
   // as its data allows.
@@ -39,12 +39,11 @@ struct RememberedSegment {
   std::int64_t time_ns = 0;
 };
 
-struct EvictedPriorOptions {
+struct EvictedOptions {
   // theta random-walks by these densities (D) [tangent units / sqrt(s)]: what
   // is older than the newest segment says less. Empty: theta is constant.
   Eigen::VectorXd walk = {};
-  // The noise is so many times what the rig states, as an earlier calibration
-  // found (CalibrationResult::track_noise_factor).
+  // The noise is so many times what the rig states, as the calibration found.
   double noise_factor = 1;
 };
 
@@ -52,11 +51,11 @@ struct EvictedPriorOptions {
 // free components in reference sigmas, is left out.
 inline constexpr double kMaxReach = 2.0;
 
-struct EvictedPrior {
-  ThetaPrior prior;
-  int segments = 0;  // without data, that the prior stands on
-  int left_out = 0;  // linearised too far away
-  double reach = 0;  // the largest of those that the prior stands on
+struct EvictedInformation {
+  ThetaInformation information;  // about theta [-] point
+  int segments = 0;              // without data, that it stands on
+  int left_out = 0;              // linearised too far away
+  double reach = 0;              // the largest of those that it stands on
 };
 
 // Weight of the k-th segment (from 1) that was linearised so far from the point
@@ -69,9 +68,9 @@ double ReachWeight(int k, double reach);
 
 // Segments in the order of time, each session in one run. A segment that
 // contradicts the others is for the caller to leave out.
-EvictedPrior PriorOfEvicted(const Rig& rig,
-                            const Calibration& point,
-                            std::span<const RememberedSegment> segments,
-                            const EvictedPriorOptions& options = {});
+EvictedInformation InformationOfEvicted(const Rig& rig,
+                                        const Calibration& point,
+                                        std::span<const JoinedSegment> segments,
+                                        const EvictedOptions& options = {});
 
 }  // namespace selfcal

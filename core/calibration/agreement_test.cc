@@ -1,0 +1,43 @@
+#include "core/calibration/agreement_test.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "core/change/chi_square.h"
+
+namespace selfcal {
+namespace {
+
+// A direction is tested where both sides say more than the prior.
+constexpr double kObserved = 1;
+
+}  // namespace
+
+AgreementTest TestAgreement(const Eigen::MatrixXd& Lambda,
+                            const Eigen::VectorXd& eta,
+                            const Eigen::MatrixXd& rest_Lambda,
+                            const Eigen::VectorXd& rest_eta,
+                            double excess) {
+  AgreementTest test;
+  if (Lambda.size() == 0) return test;
+  Eigen::MatrixXd all = Lambda + rest_Lambda;
+  all.diagonal().array() += 1e-9 * all.trace();
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(all);
+  const Eigen::VectorXd score = eta - Lambda * ldlt.solve(eta + rest_eta);
+  const Eigen::MatrixXd covariance = Lambda - Lambda * ldlt.solve(Lambda);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      (covariance + covariance.transpose()) / 2);
+  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * score;
+  for (Eigen::Index i = 0; i < along.size(); ++i) {
+    if (!(eigen.eigenvalues()(i) > kObserved)) continue;
+    ++test.degrees;
+    test.statistic += along(i) * along(i) / eigen.eigenvalues()(i);
+  }
+  test.statistic /= excess;
+  if (test.degrees > 0) {
+    test.probability = ChiSquareTail(test.statistic, test.degrees);
+  }
+  return test;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,169 @@
+#include "core/calibration/evicted_fusion.h"
+
+#include <algorithm>
+#include <deque>
+#include <utility>
+
+#include "core/calibration/evicted_information.h"
+
+namespace selfcal {
+namespace {
+
+// A segment whose residuals are so many times larger than expected is not of
+// the same kind as the others.
+constexpr double kMaxFit = 2;
+// By chance, over all segments.
+constexpr double kChance = 1e-3;
+
+// Information about d, by the determined directions.
+struct Reduced {
+  Eigen::MatrixXd Lambda;  // r x r
+  Eigen::VectorXd eta;     // r
+};
+
+class Fusion {
+ public:
+  Fusion(const Rig& rig,
+         const DataEstimate& estimate,
+         const std::vector<const MotionSegment*>& segments,
+         const Eigen::VectorXd& walk)
+      : rig_(rig),
+        at_(estimate),
+        theta_(BoxPlus(estimate.reference, estimate.d)),
+        by_offset_(ThetaByOffset(estimate.reference, estimate.d)),
+        basis_(TangentBasis(rig, estimate.subspace)),
+        with_data_(basis_.transpose() * estimate.Lambda * basis_) {
+    options_.walk = walk;
+    options_.noise_factor = estimate.noise_factor;
+    for (const MotionSegment* segment : segments) {
+      own_.push_back(SummariseEnds(rig, theta_, *segment));
+    }
+  }
+
+  CompletedEstimate Run(const std::vector<RememberedSegment>& remembered) {
+    Join(remembered);
+    const auto evicted = Count();
+    if (evicted == 0 || basis_.cols() == 0) return std::move(result_);
+    result_.use.contradicting = LeaveOutContradictions();
+    if (2 * result_.use.contradicting > evicted) {
+      result_.use.unused =
+          "most of them contradict the segments whose data is kept";
+      return std::move(result_);
+    }
+    Add();
+    return std::move(result_);
+  }
+
+ private:
+  // The segments of the chain, in its order.
+  void Join(const std::vector<RememberedSegment>& remembered) {
+    for (const RememberedSegment& one : remembered) {
+      const auto own =
+          std::find_if(own_.begin(), own_.end(), [&](const auto& ends) {
+            return ends.key == one.key;
+          });
+      if (own != own_.end()) {
+        joined_.push_back({&*own, true, one.fit, one.time_ns});
+      } else if (one.ends && one.fit <= kMaxFit) {
+        joined_.push_back({&*one.ends, false, one.fit, one.time_ns});
+      }
+    }
+  }
+
+  std::ptrdiff_t Count() const {
+    return std::count_if(joined_.begin(), joined_.end(), [](const auto& one) {
+      return !one.calibrated_on;
+    });
+  }
+
+  Eigen::MatrixXd Covariance(const Eigen::MatrixXd& Lambda) const {
+    return at_.excess * by_offset_ *
+           CovarianceWithHeld(rig_, at_.subspace, Lambda) *
+           by_offset_.transpose();
+  }
+
+  // By the determined directions.
+  Reduced ReducedOf(const ThetaInformation& information) const {
+    const Eigen::MatrixXd step = by_offset_ * basis_;
+    return {step.transpose() * information.Lambda * step,
+            step.transpose() * information.eta};
+  }
+
+  AgreementTest TestWithData(const Reduced& one) const {
+    return TestAgreement(one.Lambda,
+                         one.eta,
+                         with_data_,
+                         Eigen::VectorXd::Zero(one.eta.size()),
+                         at_.excess);
+  }
+
+  // Each evicted segment by itself.
+  int LeaveOutContradictions() {
+    const double limit = kChance / static_cast<double>(Count());
+    return static_cast<int>(
+        std::erase_if(joined_, [&](const JoinedSegment& one) {
+          if (one.calibrated_on) return false;
+          const EvictedInformation alone =
+              InformationOfEvicted(rig_, theta_, {&one, 1}, options_);
+          return alone.segments > 0 &&
+                 TestWithData(ReducedOf(alone.information)).probability < limit;
+        }));
+  }
+
+  void Add() {
+    const EvictedInformation evicted =
+        InformationOfEvicted(rig_, theta_, joined_, options_);
+    EvictedUse& use = result_.use;
+    use.too_far = evicted.left_out;
+    if (evicted.segments == 0) {
+      use.unused = "they were linearised too far from the result";
+      return;
+    }
+    use.agreement = TestWithData(ReducedOf(evicted.information));
+    if (use.agreement.probability < kChance) {
+      use.unused = "together they contradict the segments whose data is kept";
+      return;
+    }
+    use.segments = evicted.segments;
+    use.reach = evicted.reach;
+    // Where they differ by more than they say, they say less.
+    const double weight =
+        use.agreement.degrees > 0
+            ? std::min(1.0, use.agreement.degrees / use.agreement.statistic)
+            : 1;
+    const Eigen::MatrixXd all = at_.Lambda + weight * by_offset_.transpose() *
+                                                 evicted.information.Lambda *
+                                                 by_offset_;
+    const Eigen::VectorXd step =
+        SubspaceStep(rig_,
+                     at_.subspace,
+                     all,
+                     weight * by_offset_.transpose() * evicted.information.eta);
+    result_.theta = BoxPlus(at_.reference, at_.d + step);
+    result_.covariance = Covariance(all);
+    result_.Lambda = weight * evicted.information.Lambda;
+  }
+
+  const Rig& rig_;
+  const DataEstimate& at_;
+  const Calibration theta_;
+  const Eigen::MatrixXd by_offset_;
+  const Eigen::MatrixXd basis_;
+  const Eigen::MatrixXd with_data_;
+  EvictedOptions options_;
+  std::deque<SegmentEnds> own_;
+  std::vector<JoinedSegment> joined_;
+  CompletedEstimate result_;
+};
+
+}  // namespace
+
+CompletedEstimate FuseEvicted(const Rig& rig,
+                              const DataEstimate& estimate,
+                              const std::vector<const MotionSegment*>& segments,
+                              const std::vector<RememberedSegment>& remembered,
+                              const Eigen::VectorXd& walk) {
+  return Fusion(rig, estimate, segments, walk).Run(remembered);
+}
+
+}  // namespace selfcal

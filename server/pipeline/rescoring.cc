@@ -1,0 +1,60 @@
+#include "server/pipeline/rescoring.h"
+
+#include <absl/status/status.h>
+#include <spdlog/spdlog.h>
+
+#include <exception>
+#include <vector>
+
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::Status TryRescore(Store* store,
+                        const Estimators& estimators,
+                        const std::string& rig_id,
+                        const std::function<bool()>& interrupted) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(rig_id));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
+                           store->GetActiveCalibration(rig_id));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentKey> keys,
+                           store->ListScoredWithData(rig_id));
+  for (const SegmentKey& key : keys) {
+    if (interrupted()) break;
+    const auto segment = store->GetSegmentData(rig_id, key);
+    if (absl::IsDataLoss(segment.status()) ||
+        absl::IsFailedPrecondition(segment.status())) {
+      continue;  // damaged, which the next run finds, or dropped meanwhile
+    }
+    SELFCAL_RETURN_IF_ERROR(segment.status());
+    SELFCAL_RETURN_IF_ERROR(
+        store->ReplaceScore(rig_id,
+                            key,
+                            estimators.score(rig.rig, active.theta, *segment),
+                            estimators.ends(rig.rig, active.theta, *segment)));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void RescoreKept(Store* store,
+                 const Estimators& estimators,
+                 const std::string& rig,
+                 const std::function<bool()>& interrupted) {
+  if (!estimators.ends) return;
+  absl::Status status;
+  try {
+    status = TryRescore(store, estimators, rig, interrupted);
+  } catch (const std::exception& error) {
+    status = absl::InternalError(error.what());
+  }
+  if (!status.ok()) {
+    spdlog::warn("not all kept segments of rig {} are scored anew: {}",
+                 rig,
+                 status.ToString());
+  }
+}
+
+}  // namespace selfcal::server

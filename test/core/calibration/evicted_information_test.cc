@@ -1,0 +1,163 @@
+#include "core/calibration/evicted_information.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <vector>
+
+#include "core/simulation/simulate.h"
+
+namespace selfcal {
+namespace {
+
+// A session of eight segments.
+class EvictedInformationTest : public ::testing::Test {
+ protected:
+  EvictedInformationTest() : truth_(rig_.factory) {
+    rig_.factory = PerturbCalibration(truth_, {}, 1);
+    SimulationOptions options;
+    options.seed = 5;
+    options.keyframes_per_segment = 20;
+    options.landmarks_in_view = 60;
+    options.revisit_fraction = 0;
+    segments_ = Simulate(rig_,
+                         truth_,
+                         rig_.factory,
+                         *MakeHandheld(16.5, 1, 5),
+                         "session",
+                         options)
+                    .segments;
+  }
+
+  // All segments, linearised there.
+  void SummariseAt(const Calibration& theta) {
+    ends_.clear();
+    for (const MotionSegment& segment : segments_) {
+      ends_.push_back(SummariseEnds(rig_, theta, segment));
+    }
+  }
+
+  std::vector<JoinedSegment> Remembered(
+      const std::vector<int>& with_data) const {
+    std::vector<JoinedSegment> all;
+    for (const SegmentEnds& ends : ends_) {
+      all.push_back({.ends = &ends, .time_ns = ends.first.t_ns});
+    }
+    for (const int i : with_data) all[i].calibrated_on = true;
+    return all;
+  }
+
+  double InPriorUnits(const Eigen::MatrixXd& information, bool smallest) const {
+    const std::vector<int> free = FreeComponents(rig_);
+    const Eigen::VectorXd scale = PriorSigmas(rig_)(free);
+    const Eigen::VectorXd values =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
+            scale.asDiagonal() * information(free, free) * scale.asDiagonal())
+            .eigenvalues();
+    return smallest ? values.minCoeff() : values.maxCoeff();
+  }
+
+  // The offset from the point that it says, with the rig's prior.
+  Eigen::VectorXd Solve(const EvictedInformation& evicted) const {
+    Eigen::MatrixXd Lambda = evicted.information.Lambda;
+    Lambda.diagonal() += PriorSigmas(rig_).cwiseAbs2().cwiseInverse();
+    return Lambda.ldlt().solve(evicted.information.eta);
+  }
+
+  const std::vector<int> kept_ = {1, 2, 5};
+  Rig rig_ = HandheldRig("r");
+  Calibration truth_;
+  std::vector<MotionSegment> segments_;
+  std::vector<SegmentEnds> ends_;
+};
+
+TEST_F(EvictedInformationTest, IsNothingWhereAllSegmentsHaveTheirData) {
+  SummariseAt(truth_);
+  const EvictedInformation evicted =
+      InformationOfEvicted(rig_, truth_, Remembered({0, 1, 2, 3, 4, 5, 6, 7}));
+  EXPECT_EQ(evicted.segments, 0);
+  EXPECT_TRUE(evicted.information.Lambda.isZero());
+  EXPECT_TRUE(evicted.information.eta.isZero());
+}
+
+// Data never takes information away.
+TEST_F(EvictedInformationTest, IsSemidefiniteWhateverHasData) {
+  SummariseAt(truth_);
+  for (const std::vector<int>& set :
+       {std::vector<int>{}, {0}, {3, 4}, {0, 7}, {1, 2, 3, 4, 5, 6}}) {
+    const EvictedInformation evicted =
+        InformationOfEvicted(rig_, truth_, Remembered(set));
+    EXPECT_GE(InPriorUnits(evicted.information.Lambda, true), -1e-6);
+    EXPECT_GT(InPriorUnits(evicted.information.Lambda, false), 1e3);
+  }
+}
+
+TEST_F(EvictedInformationTest, CountsForLessFromFarAndNothingFromTooFar) {
+  const Eigen::VectorXd reference = ReferenceSigmas(rig_);
+  const Calibration near = BoxPlus(truth_, 1.0 * reference);
+  const Calibration far = BoxPlus(truth_, 2.1 * reference);
+  SummariseAt(truth_);
+  const double here = InPriorUnits(
+      InformationOfEvicted(rig_, truth_, Remembered(kept_)).information.Lambda,
+      false);
+  const EvictedInformation from_near =
+      InformationOfEvicted(rig_, near, Remembered(kept_));
+  EXPECT_NEAR(from_near.reach, 1, 0.05);
+  EXPECT_LT(InPriorUnits(from_near.information.Lambda, false), here);
+  const EvictedInformation from_far =
+      InformationOfEvicted(rig_, far, Remembered(kept_));
+  EXPECT_EQ(from_far.segments, 0);
+  EXPECT_EQ(from_far.left_out, 5);
+}
+
+TEST_F(EvictedInformationTest, CountsForLessWithMoreNoiseAndWithAge) {
+  SummariseAt(truth_);
+  const auto most = [&](const EvictedOptions& options) {
+    return InPriorUnits(
+        InformationOfEvicted(rig_, truth_, Remembered(kept_), options)
+            .information.Lambda,
+        false);
+  };
+  const double plain = most({});
+  EXPECT_LT(most({.noise_factor = 2}), 0.4 * plain);
+  // In the 8 s from the middle of the session it walks a reference sigma.
+  EvictedOptions ageing;
+  ageing.walk = ReferenceSigmas(rig_) / std::sqrt(8.0);
+  EXPECT_LT(most(ageing), 0.2 * plain);
+}
+
+// Of a segment of other data under the same key.
+TEST_F(EvictedInformationTest, CountsForLessWhereASegmentFitsBadly) {
+  SummariseAt(truth_);
+  std::vector<JoinedSegment> all = Remembered(kept_);
+  const EvictedInformation plain = InformationOfEvicted(rig_, truth_, all);
+  SegmentEnds wrong = ends_[3];
+  wrong.eta.head(TangentSize(truth_)) +=
+      wrong.Lambda.topLeftCorner(27, 27) * ReferenceSigmas(rig_);
+  all[3].ends = &wrong;
+  const auto moved = [&](double fit) {
+    all[3].fit = fit;
+    return (Solve(InformationOfEvicted(rig_, truth_, all)) - Solve(plain))
+        .cwiseQuotient(ReferenceSigmas(rig_))
+        .norm();
+  };
+  EXPECT_LT(moved(5), 0.25 * moved(1));
+  EXPECT_EQ(moved(0), moved(1));
+}
+
+TEST(ReachWeight, GivesSegmentsThatErrTogetherABoundedSum) {
+  EXPECT_EQ(ReachWeight(1, 0), 1);
+  EXPECT_EQ(ReachWeight(1000, 0), 1);
+  for (const double reach : {0.3, 1.0, 1.7}) {
+    double sum = 0;
+    for (int k = 1; k <= 400; ++k) sum += ReachWeight(k, reach);
+    // As the covariance of the sum is said to grow.
+    const double loss = 1 + 0.015 * 400 * std::pow(reach, 4);
+    EXPECT_NEAR(sum, 400 / loss, 1.0);
+  }
+}
+
+}  // namespace
+}  // namespace selfcal
