@@ -11,6 +11,8 @@ constexpr double kMostOff = 30;
 // What is hardly determined is still nearer to the truth, if it is so many
 // standard deviations off.
 constexpr double kOffSigmas = 1;
+// The variance of a logarithm counts up to this.
+constexpr double kMostUncertain = 0.5;
 // The logarithm of a factor that makes a difference.
 constexpr double kLeastChange = 0.05;
 
@@ -78,8 +80,11 @@ std::optional<Rig> Reweight(const Rig& stated,
     }
     const double before = NoiseOf(factor.kind, taken);
     const double most = kMostOff * NoiseOf(factor.kind, stated);
-    const double after =
-        std::clamp(factor.factor * before, most / (kMostOff * kMostOff), most);
+    // Of the variance, which counts, the mean over what the factor may be.
+    const double uncertain =
+        std::exp(std::min(factor.log_sigma * factor.log_sigma, kMostUncertain));
+    const double after = std::clamp(
+        factor.factor * uncertain * before, most / (kMostOff * kMostOff), most);
     ScaleNoise(factor.kind, after / before, &next);
     change = std::max(change, std::abs(std::log(after / before)));
   }

@@ -49,7 +49,8 @@ void ScaleNoise(NoiseKind kind, double factor, Rig* rig);
 
 // The rig with the noise that `factors`, found with the noise of `taken`,
 // suggest: those that are determined, or larger than one by more than one of
-// their standard deviations. None is taken for more than 30 times what `stated`
+// their standard deviations, each with the mean of the variance that it may
+// stand for. None is taken for more than 30 times what `stated`
 // states, either way. Nothing where all that is a difference of less than 5 %.
 std::optional<Rig> Reweight(const Rig& stated,
                             const Rig& taken,

@@ -21,7 +21,7 @@ constexpr double kMedianOfRayleigh = 1.1774100225154747;
 const double kPriorLogSigma = std::log(10.0);
 // Statements about an IMU are wrong together, if they are: given one of its
 // factors, the logarithms of the others are within so much of it.
-const double kApartLogSigma = std::log(3.0);
+const double kApartLogSigma = std::log(2.0);
 constexpr double kDifference = 0.1;  // of logarithms
 // A step takes a variance by no more than so much, nor below this part of it.
 constexpr double kLongestStep = 1.5;  // of the logarithm of the factor
