@@ -1,10 +1,12 @@
 #include "core/calibration/evicted_fusion.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <deque>
 #include <utility>
 
 #include "core/calibration/evicted_information.h"
+#include "core/calibration/memory_split.h"
 
 namespace selfcal {
 namespace {
@@ -14,6 +16,22 @@ namespace {
 constexpr double kMaxFit = 2;
 // By chance, over all segments.
 constexpr double kChance = 1e-3;
+// What is remembered is done without where its newest part differs from the
+// rest by what is less likely: that costs certainty, and not to notice a small
+// change costs honesty.
+constexpr double kSplitChance = 0.02;
+
+std::string Differs(const MemorySplit& split) {
+  char text[200];
+  std::snprintf(text,
+                sizeof text,
+                "the newest %d of all segments show another %s than those "
+                "before (probability %.1g): the device may have changed",
+                split.newer,
+                split.block.c_str(),
+                split.probability);
+  return text;
+}
 
 // Information about d, by the determined directions.
 struct Reduced {
@@ -48,6 +66,12 @@ class Fusion {
     if (2 * result_.use.contradicting > evicted) {
       result_.use.unused =
           "most of them contradict the segments whose data is kept";
+      return std::move(result_);
+    }
+    const MemorySplit split = FindSplit(
+        rig_, theta_, at_.subspace.estimated, at_.excess, joined_, options_);
+    if (split.probability < kSplitChance) {
+      result_.use.unused = Differs(split);
       return std::move(result_);
     }
     Add();

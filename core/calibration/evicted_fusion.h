@@ -52,7 +52,8 @@ struct CompletedEstimate {
 // have no ends and are not in `segments` are passed over. `walk`: as
 // EvictedOptions. `rig` states its noise, with which the ends were computed.
 // Nothing is added, and `use.unused` says why, where most of them, or all
-// together, contradict the estimate, or were linearised too far from it.
+// together, contradict the estimate, or were linearised too far from it, or
+// where the newest segments differ from those before (memory_split.h).
 CompletedEstimate FuseEvicted(const Rig& rig,
                               const DataEstimate& estimate,
                               const std::vector<const MotionSegment*>& segments,

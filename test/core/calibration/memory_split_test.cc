@@ -1,0 +1,80 @@
+#include "core/calibration/memory_split.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/calibration/subspace.h"
+#include "core/simulation/simulate.h"
+
+namespace selfcal {
+namespace {
+
+// Two sessions of eight segments, linearised at the truth of the first.
+class MemorySplitTest : public ::testing::Test {
+ protected:
+  void AddSession(const std::string& name,
+                  const Calibration& truth,
+                  std::uint64_t seed) {
+    SimulationOptions options;
+    options.seed = seed;
+    options.keyframes_per_segment = 20;
+    options.landmarks_in_view = 60;
+    options.revisit_fraction = 0;
+    const auto session = Simulate(
+        rig_, truth, truth, *MakeHandheld(16.5, 1, seed), name, options);
+    for (const MotionSegment& segment : session.segments) {
+      ends_.push_back(SummariseEnds(rig_, rig_.factory, segment));
+    }
+  }
+
+  MemorySplit Find() const {
+    std::vector<JoinedSegment> joined;
+    for (const SegmentEnds& ends : ends_) joined.push_back({.ends = &ends});
+    return FindSplit(
+        rig_, rig_.factory, WholeSubspace(rig_).estimated, 1, joined, {});
+  }
+
+  Rig rig_ = HandheldRig("r");
+  std::vector<SegmentEnds> ends_;
+};
+
+TEST_F(MemorySplitTest, OneDeviceDoesNotDiffer) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    ends_.clear();
+    AddSession("one", rig_.factory, seed);
+    AddSession("two", rig_.factory, 100 + seed);
+    ASSERT_EQ(ends_.size(), 16u);
+    EXPECT_GT(Find().probability, 0.01) << seed;
+  }
+}
+
+// By a fifth of a degree.
+TEST_F(MemorySplitTest, ATurnedCameraDiffersAndIsNamed) {
+  Calibration turned = rig_.factory;
+  turned.cameras[0].q_CI = turned.cameras[0].q_CI *
+                           Eigen::Quaterniond(Eigen::AngleAxisd(
+                               3.5e-3, Eigen::Vector3d(1, 2, 2).normalized()));
+  AddSession("one", rig_.factory, 1);
+  AddSession("two", turned, 101);
+  const MemorySplit split = Find();
+  EXPECT_LT(split.probability, 1e-6);
+  EXPECT_THAT((std::vector<std::string>{"cam0.q_CI", "extrinsics"}),
+              ::testing::Contains(split.block));
+  EXPECT_GE(split.newer, 6);
+  EXPECT_LE(split.newer, 9);
+}
+
+TEST_F(MemorySplitTest, OfFewSegmentsNothingIsTested) {
+  AddSession("one", rig_.factory, 1);
+  ends_.resize(3);
+  EXPECT_EQ(Find().probability, 1);
+  EXPECT_EQ(Find().newer, 0);
+}
+
+}  // namespace
+}  // namespace selfcal
