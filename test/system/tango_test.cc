@@ -15,7 +15,7 @@
 namespace selfcal::client {
 namespace {
 
-constexpr CalibrateOptions kOptions{.threads = 2};
+const CalibrateOptions kOptions{.threads = 2};
 
 // What the tables of the rig hold after all segments.
 std::vector<MotionSegment> Kept(const Device& device) {
