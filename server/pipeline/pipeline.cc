@@ -220,7 +220,7 @@ class PipelineImpl : public Pipeline {
                  rig,
                  reason);
     calibration_watchers_.Publish(rig, active);
-    RescoreKept(store_, estimators_, rig, [] { return false; });
+    RescoreKept(store_, estimators_, rig, active.theta);
     return active;
   }
 

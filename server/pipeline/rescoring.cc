@@ -14,14 +14,11 @@ namespace {
 absl::Status TryRescore(Store* store,
                         const Estimators& estimators,
                         const std::string& rig_id,
-                        const std::function<bool()>& interrupted) {
+                        const Calibration& theta) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(rig_id));
-  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
-                           store->GetActiveCalibration(rig_id));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentKey> keys,
                            store->ListScoredWithData(rig_id));
   for (const SegmentKey& key : keys) {
-    if (interrupted()) break;
     const auto segment = store->GetSegmentData(rig_id, key);
     if (absl::IsDataLoss(segment.status()) ||
         absl::IsFailedPrecondition(segment.status())) {
@@ -31,8 +28,8 @@ absl::Status TryRescore(Store* store,
     SELFCAL_RETURN_IF_ERROR(
         store->ReplaceScore(rig_id,
                             key,
-                            estimators.score(rig.rig, active.theta, *segment),
-                            estimators.ends(rig.rig, active.theta, *segment)));
+                            estimators.score(rig.rig, theta, *segment),
+                            estimators.ends(rig.rig, theta, *segment)));
   }
   return absl::OkStatus();
 }
@@ -42,11 +39,11 @@ absl::Status TryRescore(Store* store,
 void RescoreKept(Store* store,
                  const Estimators& estimators,
                  const std::string& rig,
-                 const std::function<bool()>& interrupted) {
+                 const Calibration& theta) {
   if (!estimators.ends) return;
   absl::Status status;
   try {
-    status = TryRescore(store, estimators, rig, interrupted);
+    status = TryRescore(store, estimators, rig, theta);
   } catch (const std::exception& error) {
     status = absl::InternalError(error.what());
   }

@@ -1,24 +1,23 @@
 // Scores of kept segments about today's calibration.
 #pragma once
 
-#include <functional>
 #include <string>
 
+#include "core/model/calibration.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 
-// Scores all segments of the rig whose data is kept anew, at the calibration
-// that is active: tables, change detection and predictions then stand on it,
-// and what is remembered of a segment that loses its data was linearised near
-// by. Costs milliseconds a segment. Ends early where `interrupted` returns
-// true. A segment that cannot be read, scored or written keeps the score
-// that it has, and the log says why. Nothing where the estimators compute no
-// ends.
+// Scores all segments of the rig whose data is kept anew, at `theta`: the
+// calibration that is active, or about to be. Tables, change detection and
+// predictions then stand on it, and what is remembered of a segment that loses
+// its data was linearised near by. Costs milliseconds a segment. A segment that
+// cannot be read, scored or written keeps the score that it has, and the log
+// says why. Nothing where the estimators compute no ends.
 void RescoreKept(Store* store,
-                         const Estimators& estimators,
-                         const std::string& rig,
-                         const std::function<bool()>& interrupted);
+                 const Estimators& estimators,
+                 const std::string& rig,
+                 const Calibration& theta);
 
 }  // namespace selfcal::server

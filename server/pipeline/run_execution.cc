@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "server/pipeline/recalibration.h"
-#include "server/pipeline/rescoring.h"
 #include "server/pipeline/retry.h"
 #include "server/store/status_macros.h"
 
@@ -144,8 +143,6 @@ absl::Status Recalibrator::Succeed(const StoredRun& run,
   if (stored.state == CalibrationState::kActive) {
     spdlog::info("rig {} has calibration {}", stored.rig, stored.version);
     calibration_watchers_->Publish(stored.rig, stored);
-    RescoreKept(
-        store_, estimators_, stored.rig, [this] { return Interrupted(); });
   } else {
     spdlog::warn("calibration {} of rig {} is rejected: {}",
                  stored.version,

@@ -10,6 +10,7 @@
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/candidate.h"
 #include "server/pipeline/recalibration.h"
+#include "server/pipeline/rescoring.h"
 #include "server/pipeline/stored_information.h"
 #include "server/pipeline/verdict.h"
 #include "server/store/status_macros.h"
@@ -154,10 +155,21 @@ absl::StatusOr<StoredCalibration> Recalibrator::Finish(
     const StoredRun& run, StoredCalibration candidate) {
   for (;;) {
     SELFCAL_RETURN_IF_ERROR(Validate(run, &candidate));
-    auto finished = store_->FinishRun(run.rig, run.run, candidate);
-    if (!absl::IsAborted(finished.status())) {
-      return finished;
+    // Before the run ends: a crash between the two repeats it, and whoever sees
+    // the version sees the scores at it.
+    const bool becomes_active = candidate.state == CalibrationState::kActive;
+    if (becomes_active) {
+      RescoreKept(store_, estimators_, run.rig, candidate.theta);
     }
+    auto finished = store_->FinishRun(run.rig, run.run, candidate);
+    if (absl::IsAborted(finished.status())) continue;
+    if (becomes_active && finished.ok() &&
+        finished->state != CalibrationState::kActive) {
+      SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
+                               store_->GetActiveCalibration(run.rig));
+      RescoreKept(store_, estimators_, run.rig, active.theta);
+    }
+    return finished;
   }
 }
 

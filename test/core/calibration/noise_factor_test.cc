@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/simulation/simulate.h"
 
 namespace selfcal {
@@ -39,10 +41,12 @@ TEST(Reweight, TakesWhatIsDeterminedOrFarOff) {
                               {NoiseKind::kGyroBiasWalk, 3, 1.2},
                               {NoiseKind::kAccelBiasWalk, 0.1, 2}});
   ASSERT_TRUE(next.has_value());
-  EXPECT_DOUBLE_EQ(next->pixel_sigma_px, 1.1 * rig.pixel_sigma_px);
-  EXPECT_DOUBLE_EQ(Gyro(*next), 3 * Gyro(rig));
+  // The root of the mean variance: larger by the variance of the logarithm.
+  EXPECT_DOUBLE_EQ(next->pixel_sigma_px,
+                   1.1 * std::exp(1e-4) * rig.pixel_sigma_px);
+  EXPECT_DOUBLE_EQ(Gyro(*next), 3 * std::exp(2.5e-3) * Gyro(rig));
   EXPECT_DOUBLE_EQ(next->imu_noise.accel_noise_density,
-                   3 * rig.imu_noise.accel_noise_density);
+                   3 * std::exp(0.09) * rig.imu_noise.accel_noise_density);
   EXPECT_EQ(next->imu_noise.gyro_bias_random_walk,
             rig.imu_noise.gyro_bias_random_walk);
   EXPECT_EQ(next->imu_noise.accel_bias_random_walk,

@@ -171,7 +171,7 @@ TEST(Gravity, IsTheScaleOfTheAccelerometer) {
   rig.gravity_mps2 = 9.83;
   SimulationOptions options;
   const SimulatedSession session =
-      Simulate(rig, truth, truth, *MakeHandheld(16.5, 1, 1), "s", options);
+      Simulate(rig, truth, truth, *MakeHandheld(32.5, 1, 1), "s", options);
   const auto scales = [&](double gravity_mps2) {
     Rig believed = rig;
     believed.gravity_mps2 = gravity_mps2;
