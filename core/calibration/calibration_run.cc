@@ -580,10 +580,15 @@ class Calibrator {
     }
   }
 
-  // Over what the rig states, of all kinds.
+  // Over what the rig states, of all kinds but the walks, which are hardly ever
+  // determined and matter least.
   double LargestNoise() const {
     double largest = 1;
     for (const NoiseFactor& factor : result_.noise_factors) {
+      if (factor.kind == NoiseKind::kGyroBiasWalk ||
+          factor.kind == NoiseKind::kAccelBiasWalk) {
+        continue;
+      }
       const double tracks =
           factor.kind == NoiseKind::kPixel ? result_.track_noise_factor : 1;
       largest = std::max(largest, factor.used * tracks);

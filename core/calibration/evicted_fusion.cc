@@ -16,6 +16,8 @@ namespace {
 constexpr double kMaxFit = 2;
 // By chance, over all segments.
 constexpr double kChance = 1e-3;
+// What is more likely than this is left to chance.
+constexpr double kLikely = 0.05;
 // What is remembered is done without where its newest part differs from the
 // rest by what is less likely: that costs certainty, and not to notice a small
 // change costs honesty.
@@ -150,11 +152,10 @@ class Fusion {
     }
     use.segments = evicted.segments;
     use.reach = evicted.reach;
-    // Where they differ by more than they say, they say less.
-    const double weight =
-        use.agreement.degrees > 0
-            ? std::min(1.0, use.agreement.degrees / use.agreement.statistic)
-            : 1;
+    // Where they differ by more than chance explains, they say less.
+    const double weight = use.agreement.probability < kLikely
+                              ? use.agreement.degrees / use.agreement.statistic
+                              : 1;
     const Eigen::MatrixXd all = at_.Lambda + weight * by_offset_.transpose() *
                                                  evicted.information.Lambda *
                                                  by_offset_;

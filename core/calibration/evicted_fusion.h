@@ -32,9 +32,9 @@ struct DataEstimate {
   Eigen::MatrixXd Lambda;
   // Covariances are larger by this: segments disagree by more than they say.
   double excess = 1;
-  // The noise is at most so many times what the rig states, of any kind: what
-  // was linearised with the stated noise counts as if all were so large, and
-  // says no more than it should, whatever kind it is.
+  // The noise of pixels and IMU is at most so many times what the rig states:
+  // what was linearised with the stated noise counts as if all were so large,
+  // and says no more than it should, whatever kind it is.
   double noise_factor = 1;
 };
 

@@ -33,7 +33,7 @@ struct EvictedUse {
   // rms over the free components in reference sigmas.
   double reach = 0;
   // Of all used ones together with the segments with data. Where it is more
-  // than expected, what they say was taken for as much less.
+  // than chance explains (5 %), what they say was taken for as much less.
   AgreementTest agreement;
   // Why none was used; empty where some were, or there were none.
   std::string unused;
