@@ -46,7 +46,7 @@ std::string DifferenceText(const Response::CalibrationCheck& check) {
       100 * check.covariance_difference());
 }
 
-// Of each check, as it is done.
+// Prints each check as it is done.
 void Print(const Context& context, const Response& response) {
   Table line({{""}, {""}, {""}});
   if (response.has_score()) {

@@ -11,7 +11,7 @@
 namespace selfcal {
 namespace {
 
-// Of calibrations after which segments were left out.
+// Limits the calibrations that leave segments out.
 constexpr int kMaxRounds = 3;
 
 std::string CheckInput(const Rig& rig,
@@ -76,7 +76,7 @@ class Selection {
     }
   }
 
-  // With those that are left out, by key.
+  // Adds those that are left out; sorts by key.
   void Complete(std::vector<SegmentFit>* fits) const {
     for (std::size_t i = 0; i < all_.size(); ++i) {
       if (reasons_[i].empty()) continue;

@@ -573,27 +573,12 @@ class Calibrator {
                       .subspace = subspace_,
                       .Lambda = information_.Lambda,
                       .excess = excess,
-                      .noise_factor = LargestNoise()};
+                      .noise_factor = LargestNoise(result_.noise_factors,
+                                                   result_.track_noise_factor)};
     result_.halves = TestHalves(evidence_, excess);
     for (const SegmentEvidence& one : evidence_) {
       result_.segment_fits.push_back(one.fit);
     }
-  }
-
-  // Over what the rig states, of all kinds but the walks, which are hardly ever
-  // determined and matter least.
-  double LargestNoise() const {
-    double largest = 1;
-    for (const NoiseFactor& factor : result_.noise_factors) {
-      if (factor.kind == NoiseKind::kGyroBiasWalk ||
-          factor.kind == NoiseKind::kAccelBiasWalk) {
-        continue;
-      }
-      const double tracks =
-          factor.kind == NoiseKind::kPixel ? result_.track_noise_factor : 1;
-      largest = std::max(largest, factor.used * tracks);
-    }
-    return largest;
   }
 
   // Sum over the two rows of a reprojection, from the redundancy of all; 0: not

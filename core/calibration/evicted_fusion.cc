@@ -14,16 +14,11 @@ namespace {
 // A segment whose residuals are so many times larger than expected is not of
 // the same kind as the others.
 constexpr double kMaxFit = 2;
-// By chance, over all segments.
+// The chance that any segment is left out wrongly.
 constexpr double kChance = 1e-3;
-// What is more likely than this is left to chance.
+// A difference that is more probable than this counts as chance.
 constexpr double kLikely = 0.05;
-// What is remembered is done without where its newest part differs from the
-// rest by what is less likely: that costs certainty, and not to notice a small
-// change costs honesty.
-constexpr double kSplitChance = 0.02;
-
-std::string Differs(const MemorySplit& split) {
+std::string Differs(const DeviceSplit& split) {
   char text[200];
   std::snprintf(text,
                 sizeof text,
@@ -62,21 +57,25 @@ class Fusion {
 
   CompletedEstimate Run(const std::vector<RememberedSegment>& remembered) {
     Join(remembered);
+    if (basis_.cols() == 0) return std::move(result_);
     const auto evicted = Count();
-    if (evicted == 0 || basis_.cols() == 0) return std::move(result_);
-    result_.use.contradicting = LeaveOutContradictions();
-    if (2 * result_.use.contradicting > evicted) {
-      result_.use.unused =
-          "most of them contradict the segments whose data is kept";
+    EvictedUse& use = result_.use;
+    if (evicted > 0) use.contradicting = LeaveOutContradictions();
+    if (2 * use.contradicting > evicted) {
+      use.unused = "most of them contradict the segments whose data is kept";
       return std::move(result_);
     }
-    const MemorySplit split = FindSplit(
+    // To do without what is remembered costs certainty, not to notice a small
+    // change costs honesty: a split need not be sure for that.
+    const DeviceSplit split = FindSplit(
         rig_, theta_, at_.subspace.estimated, at_.excess, joined_, options_);
-    if (split.probability < kSplitChance) {
-      result_.use.unused = Differs(split);
-      return std::move(result_);
+    if (split.probability < kRareSplit) use.split = split;
+    if (evicted == 0) return std::move(result_);
+    if (use.split) {
+      use.unused = Differs(split);
+    } else {
+      Add();
     }
-    Add();
     return std::move(result_);
   }
 
@@ -108,7 +107,7 @@ class Fusion {
            by_offset_.transpose();
   }
 
-  // By the determined directions.
+  // The same information by the determined directions.
   Reduced ReducedOf(const ThetaInformation& information) const {
     const Eigen::MatrixXd step = by_offset_ * basis_;
     return {step.transpose() * information.Lambda * step,
@@ -152,7 +151,7 @@ class Fusion {
     }
     use.segments = evicted.segments;
     use.reach = evicted.reach;
-    // Where they differ by more than chance explains, they say less.
+    // They say less where they differ by more than chance explains.
     const double weight = use.agreement.probability < kLikely
                               ? use.agreement.degrees / use.agreement.statistic
                               : 1;

@@ -53,7 +53,8 @@ struct CompletedEstimate {
 // EvictedOptions. `rig` states its noise, with which the ends were computed.
 // Nothing is added, and `use.unused` says why, where most of them, or all
 // together, contradict the estimate, or were linearised too far from it, or
-// where the newest segments differ from those before (memory_split.h).
+// where the newest of all segments differ from those before (memory_split.h):
+// that is told also where none is without data.
 CompletedEstimate FuseEvicted(const Rig& rig,
                               const DataEstimate& estimate,
                               const std::vector<const MotionSegment*>& segments,

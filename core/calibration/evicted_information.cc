@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/information/session_chain.h"
 
@@ -45,6 +46,53 @@ class AgeingChain {
   bool begun_ = false;
 };
 
+// The weights of segments in the order in which they are asked for.
+class SegmentWeights {
+ public:
+  SegmentWeights(const Rig& rig,
+                 const Calibration& point,
+                 const EvictedOptions& options)
+      : rig_(rig),
+        point_(point),
+        noise_factor_(std::max(1.0, options.noise_factor)) {}
+
+  // Of one whose linearisation counts; nothing where that is too far away.
+  std::optional<double> Next(const JoinedSegment& segment) {
+    const double reach = ReachOf(segment);
+    if (!(reach <= kMaxReach)) {
+      ++too_far_;
+      return std::nullopt;
+    }
+    ++segments_;
+    reach_ = std::max(reach_, reach);
+    return WeightAt(segment, reach);
+  }
+  // Of one whose linearisation was made at the point, as its data allows.
+  double OfCalibrated(const JoinedSegment& segment) const {
+    return WeightAt(segment, ReachOf(segment));
+  }
+
+  int segments() const { return segments_; }
+  int too_far() const { return too_far_; }
+  double reach() const { return reach_; }
+
+ private:
+  double ReachOf(const JoinedSegment& segment) const {
+    return Reach(rig_, segment.ends->theta0, point_);
+  }
+  double WeightAt(const JoinedSegment& segment, double reach) const {
+    const double noise = noise_factor_ * std::max(1.0, segment.fit);
+    return ReachWeight(std::max(1, segments_), reach) / (noise * noise);
+  }
+
+  const Rig& rig_;
+  const Calibration& point_;
+  const double noise_factor_;
+  int segments_ = 0;
+  int too_far_ = 0;
+  double reach_ = 0;
+};
+
 }  // namespace
 
 double ReachWeight(int k, double reach) {
@@ -56,33 +104,43 @@ EvictedInformation InformationOfEvicted(const Rig& rig,
                                         const Calibration& point,
                                         std::span<const JoinedSegment> segments,
                                         const EvictedOptions& options) {
-  EvictedInformation result;
+  SegmentWeights weights(rig, point, options);
   AgeingChain all(rig, point, options.walk);
   AgeingChain with_data(rig, point, options.walk);
   for (const JoinedSegment& segment : segments) {
-    const double reach = Reach(rig, segment.ends->theta0, point);
-    if (!segment.calibrated_on) {
-      if (!(reach <= kMaxReach)) {
-        ++result.left_out;
-        continue;
-      }
-      ++result.segments;
-      result.reach = std::max(result.reach, reach);
-    }
-    const double noise =
-        std::max(1.0, options.noise_factor) * std::max(1.0, segment.fit);
-    const double weight =
-        ReachWeight(std::max(1, result.segments), reach) / (noise * noise);
+    const std::optional<double> weight = segment.calibrated_on
+                                             ? weights.OfCalibrated(segment)
+                                             : weights.Next(segment);
+    if (!weight) continue;
     all.AgeTo(segment.time_ns);
     with_data.AgeTo(segment.time_ns);
-    all.Add(*segment.ends, weight);
-    if (segment.calibrated_on) with_data.Add(*segment.ends, weight);
+    all.Add(*segment.ends, *weight);
+    if (segment.calibrated_on) with_data.Add(*segment.ends, *weight);
   }
+  EvictedInformation result;
   result.information = all.Theta();
   const ThetaInformation theirs = with_data.Theta();
   result.information.Lambda -= theirs.Lambda;
   result.information.eta -= theirs.eta;
+  result.segments = weights.segments();
+  result.left_out = weights.too_far();
+  result.reach = weights.reach();
   return result;
+}
+
+ThetaInformation InformationOfAll(const Rig& rig,
+                                  const Calibration& point,
+                                  std::span<const JoinedSegment> segments,
+                                  const EvictedOptions& options) {
+  SegmentWeights weights(rig, point, options);
+  AgeingChain all(rig, point, options.walk);
+  for (const JoinedSegment& segment : segments) {
+    const std::optional<double> weight = weights.Next(segment);
+    if (!weight) continue;
+    all.AgeTo(segment.time_ns);
+    all.Add(*segment.ends, *weight);
+  }
+  return all.Theta();
 }
 
 }  // namespace selfcal

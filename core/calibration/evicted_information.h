@@ -31,9 +31,9 @@ struct JoinedSegment {
   // The calibration has its data. Its ends should be linearised at the point,
   // as its data allows.
   bool calibrated_on = false;
-  // By how much its residuals are larger than expected
-  // (ResidualStatistics::fit): its noise counts as so many times larger. At
-  // most 1: as expected, or not measured.
+  // Its residuals over what is expected of them (ResidualStatistics::fit): its
+  // noise counts as so many times larger. At most 1: as expected, or not
+  // measured.
   double fit = 1;
   // When it was recorded, by a clock that all sessions share: for the walk.
   std::int64_t time_ns = 0;
@@ -72,5 +72,12 @@ EvictedInformation InformationOfEvicted(const Rig& rig,
                                         const Calibration& point,
                                         std::span<const JoinedSegment> segments,
                                         const EvictedOptions& options = {});
+
+// About theta [-] point, of all segments alike, whether the calibration has
+// their data or not; those that were linearised too far away are left out.
+ThetaInformation InformationOfAll(const Rig& rig,
+                                  const Calibration& point,
+                                  std::span<const JoinedSegment> segments,
+                                  const EvictedOptions& options = {});
 
 }  // namespace selfcal

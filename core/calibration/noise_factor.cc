@@ -92,4 +92,18 @@ std::optional<Rig> Reweight(const Rig& stated,
   return next;
 }
 
+double LargestNoise(const std::vector<NoiseFactor>& factors,
+                    double track_noise) {
+  double largest = 1;
+  for (const NoiseFactor& factor : factors) {
+    if (factor.kind == NoiseKind::kGyroBiasWalk ||
+        factor.kind == NoiseKind::kAccelBiasWalk) {
+      continue;
+    }
+    const double tracks = factor.kind == NoiseKind::kPixel ? track_noise : 1;
+    largest = std::max(largest, factor.used * tracks);
+  }
+  return largest;
+}
+
 }  // namespace selfcal

@@ -50,10 +50,16 @@ void ScaleNoise(NoiseKind kind, double factor, Rig* rig);
 // The rig with the noise that `factors`, found with the noise of `taken`,
 // suggest: those that are determined, or larger than one by more than one of
 // their standard deviations, each with the mean of the variance that it may
-// stand for. None is taken for more than 30 times what `stated`
-// states, either way. Nothing where all that is a difference of less than 5 %.
+// stand for. None is taken for more than 30 times what `stated` states, either
+// way. Nothing where all that is a difference of less than 5 %.
 std::optional<Rig> Reweight(const Rig& stated,
                             const Rig& taken,
                             const std::vector<NoiseFactor>& factors);
+
+// The largest NoiseFactor::used, at least 1, of all kinds but the walks, which
+// are hardly ever determined and matter least; pixels are noisier by
+// `track_noise` besides.
+double LargestNoise(const std::vector<NoiseFactor>& factors,
+                    double track_noise);
 
 }  // namespace selfcal

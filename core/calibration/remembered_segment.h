@@ -5,8 +5,9 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "core/calibration/agreement_test.h"
+#include "core/calibration/agreement.h"
 #include "core/information/segment_ends.h"
 #include "core/model/segment.h"
 
@@ -22,11 +23,24 @@ struct RememberedSegment {
   std::int64_t time_ns = 0;
 };
 
+// The segments from `first` on show another theta than those before.
+struct DeviceSplit {
+  // By chance, with the number of splits and parameters that were tried
+  // accounted for; 1: none was tried.
+  double probability = 1;
+  // The same at this split, whichever single segment is left out: the largest.
+  double without_one = 1;
+  int newer = 0;      // segments from `first` on
+  SegmentKey first;   // the oldest of these
+  std::string block;  // parameters that differ (parameter_blocks.h)
+  std::vector<std::string> concerned;  // groups, in the order of the rig
+};
+
 // What a result has from segments without data.
 struct EvictedUse {
   int segments = 0;  // that it stands on, besides those with data
-  // Not used: linearised too far from the result, or contradicting what the
-  // segments with data say.
+  // Left out: contradicting what the segments with data say, or, where others
+  // are used, linearised too far from the result.
   int too_far = 0;
   int contradicting = 0;
   // The largest distance from where a used one was linearised to the result,
@@ -37,6 +51,9 @@ struct EvictedUse {
   AgreementTest agreement;
   // Why none was used; empty where some were, or there were none.
   std::string unused;
+  // Where the segments, with data and without, differ by more than chance
+  // explains (2 %).
+  std::optional<DeviceSplit> split = std::nullopt;
 };
 
 }  // namespace selfcal

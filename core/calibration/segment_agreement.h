@@ -3,7 +3,7 @@
 //
 // At the minimum of a calibration each segment is linearised alone, at the
 // states and landmarks of the joint estimate, and tested against the sum of all
-// others (agreement_test.h).
+// others (agreement.h).
 //
 // Pure, any thread, deterministic.
 #pragma once

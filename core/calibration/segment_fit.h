@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/calibration/agreement_test.h"
+#include "core/calibration/agreement.h"
 #include "core/model/segment.h"
 
 namespace selfcal {

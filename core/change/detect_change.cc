@@ -84,17 +84,6 @@ int SegmentsSince(const std::vector<double>& evidence, double probability) {
   return 0;
 }
 
-std::vector<std::string> Names(const std::vector<GroupConcern>& groups) {
-  std::vector<std::string> names;
-  for (const GroupConcern& group : groups) {
-    if (group.concerned) names.push_back(group.group);
-  }
-  if (!names.empty()) return names;
-  // None stands out: whichever it is, all are concerned.
-  for (const GroupConcern& group : groups) names.push_back(group.group);
-  return names;
-}
-
 Change Describe(const ConsistencyTester& tester,
                 std::span<const OffsetInformation> segments,
                 const FoundCourse& found,
@@ -119,8 +108,9 @@ Change Describe(const ConsistencyTester& tester,
   OffsetInformation information = course.Change();
   information.Lambda /= found.heterogeneity;
   information.eta /= found.heterogeneity;
-  change.groups = FindConcerned(tester, information, options.group_level);
-  change.concerned = Names(change.groups);
+  change.groups =
+      FindConcerned(tester.groups(), information, options.group_level);
+  change.concerned = ConcernedNames(change.groups);
   return change;
 }
 

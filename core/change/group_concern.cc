@@ -87,10 +87,10 @@ double LogEvidence(const OffsetInformation& change,
          llt.matrixLLT().diagonal().array().log().sum();
 }
 
-std::vector<GroupConcern> FindConcerned(const ConsistencyTester& tester,
-                                        const OffsetInformation& change,
-                                        double level) {
-  const std::vector<ParameterBlock>& groups = tester.groups();
+std::vector<GroupConcern> FindConcerned(
+    const std::vector<ParameterBlock>& groups,
+    const OffsetInformation& change,
+    double level) {
   std::vector<GroupConcern> concerns;
   for (const ParameterBlock& group : groups)
     concerns.push_back({group.name, {}});
@@ -115,6 +115,17 @@ std::vector<GroupConcern> FindConcerned(const ConsistencyTester& tester,
     found = Union(found, groups[*best].at);
   }
   return concerns;
+}
+
+std::vector<std::string> ConcernedNames(
+    const std::vector<GroupConcern>& groups) {
+  std::vector<std::string> names;
+  for (const GroupConcern& group : groups) {
+    if (group.concerned) names.push_back(group.group);
+  }
+  if (!names.empty()) return names;
+  for (const GroupConcern& group : groups) names.push_back(group.group);
+  return names;
 }
 
 MatrixXd DoubtOfUnconcerned(const Rig& rig,

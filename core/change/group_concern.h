@@ -28,12 +28,18 @@ struct GroupConcern {
   bool concerned = false;
 };
 
-// In the order of the tester's groups. The group that explains the change best
-// is concerned where its probability is below `level`; then each of the rest
-// that is so with these eliminated. None may be.
-std::vector<GroupConcern> FindConcerned(const ConsistencyTester& tester,
-                                        const OffsetInformation& change,
-                                        double level);
+// In the order of the groups (GroupBlocks). The group that explains the change
+// best is concerned where its probability is below `level`; then each of the
+// rest that is so with these eliminated. None may be.
+std::vector<GroupConcern> FindConcerned(
+    const std::vector<ParameterBlock>& groups,
+    const OffsetInformation& change,
+    double level);
+
+// The names of those that are concerned. Where none stands out, of all:
+// whichever it is, it is among them.
+std::vector<std::string> ConcernedNames(
+    const std::vector<GroupConcern>& groups);
 
 // What the groups that a change was not found to concern may have changed by
 // all the same: E[x x^T] of each, D x D in the units of the tangent, 0 for

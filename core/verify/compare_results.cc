@@ -25,6 +25,11 @@ std::string WhyIncomparable(const CalibrationResult& a,
     return "the solvers use " + std::to_string(a.segments) + " and " +
            std::to_string(b.segments) + " segments";
   }
+  if (a.evicted.segments != b.evicted.segments) {
+    return "the results are completed by " +
+           std::to_string(a.evicted.segments) + " and " +
+           std::to_string(b.evicted.segments) + " segments without data";
+  }
   return "";
 }
 

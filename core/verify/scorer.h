@@ -4,7 +4,7 @@
 // kStructured is ScoreSegment() of core/information: kernels over vectors, and
 // an elimination along the chain of keyframes. kCeres evaluates the factors of
 // core/factor/ceres_factors.h in a ceres::Problem, and factorises its Jacobian
-// with theta last by CHOLMOD: some fifty times slower. Both stand on the same
+// with theta last by CHOLMOD, which takes far longer. Both stand on the same
 // inliers and landmarks (InlierSelector), weak priors and gauge, and score the
 // groups by the same code.
 //

@@ -6,6 +6,7 @@
 #include <exception>
 #include <vector>
 
+#include "server/pipeline/stored_information.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -16,10 +17,10 @@ absl::Status TryRescore(Store* store,
                         const std::string& rig_id,
                         const Calibration& theta) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(rig_id));
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentKey> keys,
-                           store->ListScoredWithData(rig_id));
-  for (const SegmentKey& key : keys) {
-    const auto segment = store->GetSegmentData(rig_id, key);
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredSegment> kept,
+                           ListKept(store, rig_id));
+  for (const StoredSegment& stored : kept) {
+    const auto segment = store->GetSegmentData(rig_id, stored.key);
     if (absl::IsDataLoss(segment.status()) ||
         absl::IsFailedPrecondition(segment.status())) {
       continue;  // damaged, which the next run finds, or dropped meanwhile
@@ -27,7 +28,7 @@ absl::Status TryRescore(Store* store,
     SELFCAL_RETURN_IF_ERROR(segment.status());
     SELFCAL_RETURN_IF_ERROR(
         store->ReplaceScore(rig_id,
-                            key,
+                            stored.key,
                             estimators.score(rig.rig, theta, *segment),
                             estimators.ends(rig.rig, theta, *segment)));
   }

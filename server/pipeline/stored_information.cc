@@ -5,6 +5,11 @@
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
+namespace {
+
+constexpr int kPageSize = 100;
+
+}  // namespace
 
 absl::StatusOr<std::vector<SegmentInformation>> ListInformation(
     Store* store,
@@ -20,6 +25,25 @@ absl::StatusOr<std::vector<SegmentInformation>> ListInformation(
     }
   }
   return list;
+}
+
+absl::StatusOr<std::vector<StoredSegment>> ListKept(Store* store,
+                                                    const std::string& rig) {
+  SegmentQuery query;
+  query.has_data = true;
+  query.descending = false;
+  std::vector<StoredSegment> segments;
+  Page page{kPageSize, ""};
+  do {
+    SELFCAL_ASSIGN_OR_RETURN(Listed<StoredSegment> listed,
+                             store->ListSegments(rig, query, page));
+    for (StoredSegment& segment : listed.items) {
+      // What waits for its score is no score yet.
+      if (segment.information) segments.push_back(std::move(segment));
+    }
+    page.token = listed.next_token;
+  } while (!page.token.empty());
+  return segments;
 }
 
 }  // namespace selfcal::server

@@ -18,4 +18,9 @@ namespace selfcal::server {
 absl::StatusOr<std::vector<SegmentInformation>> ListInformation(
     Store* store, const std::string& rig, std::span<const SegmentKey> segments);
 
+// The scored segments that have their data, in order of arrival. Errors of the
+// store.
+absl::StatusOr<std::vector<StoredSegment>> ListKept(Store* store,
+                                                    const std::string& rig);
+
 }  // namespace selfcal::server

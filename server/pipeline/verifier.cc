@@ -7,12 +7,11 @@
 #include <utility>
 
 #include "server/pipeline/run_options.h"
+#include "server/pipeline/stored_information.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
-
-constexpr int kPageSize = 100;
 
 absl::Status Interruption() {
   return absl::CancelledError("the verification was interrupted");
@@ -56,7 +55,7 @@ absl::StatusOr<Verification> Verifier::VerifyRig(
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
                            store_->GetActiveCalibration(rig_name));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredSegment> segments,
-                           KeptSegments(rig_name));
+                           ListKept(store_, rig_name));
   Verification verification;
   verification.version = active.version;
   VerificationStep step;
@@ -85,25 +84,6 @@ absl::StatusOr<Verification> Verifier::VerifyRig(
   }
   SELFCAL_RETURN_IF_ERROR(Conclude(rig_name, verification));
   return verification;
-}
-
-absl::StatusOr<std::vector<StoredSegment>> Verifier::KeptSegments(
-    const std::string& rig) {
-  SegmentQuery query;
-  query.has_data = true;
-  query.descending = false;
-  std::vector<StoredSegment> segments;
-  Page page{kPageSize, ""};
-  do {
-    SELFCAL_ASSIGN_OR_RETURN(Listed<StoredSegment> listed,
-                             store_->ListSegments(rig, query, page));
-    for (StoredSegment& segment : listed.items) {
-      // What waits for its score is no score yet.
-      if (segment.information) segments.push_back(std::move(segment));
-    }
-    page.token = listed.next_token;
-  } while (!page.token.empty());
-  return segments;
 }
 
 absl::StatusOr<ScoreCheck> Verifier::CheckStored(

@@ -61,8 +61,6 @@ class Verifier {
   using Interrupted = std::function<bool()>;
 
   Interrupted OrStopped(const Interrupted& interrupted) const;
-  absl::StatusOr<std::vector<StoredSegment>> KeptSegments(
-      const std::string& rig);
   absl::StatusOr<ScoreCheck> CheckStored(const StoredRig& rig,
                                          const StoredSegment& segment,
                                          const Interrupted& interrupted);

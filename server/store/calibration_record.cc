@@ -115,6 +115,26 @@ EvictedUse GetEvicted(const v1::EvictedUse& message) {
           message.unused()};
 }
 
+void PutSplit(const DeviceSplit& split, store::DeviceSplitRecord* record) {
+  record->set_probability(split.probability);
+  record->set_without_one(split.without_one);
+  record->set_newer(split.newer);
+  record->set_session(split.first.session);
+  record->set_index(split.first.index);
+  record->set_block(split.block);
+  record->mutable_concerned()->Assign(split.concerned.begin(),
+                                      split.concerned.end());
+}
+
+DeviceSplit GetSplit(const store::DeviceSplitRecord& record) {
+  return {record.probability(),
+          record.without_one(),
+          record.newer(),
+          {record.session(), record.index()},
+          record.block(),
+          {record.concerned().begin(), record.concerned().end()}};
+}
+
 // theta and covariance are those of the calibration, and stored once.
 void PutSolver(const CalibrationResult& result, SolverRecord* record) {
   record->set_status(ToRecord(result.status));
@@ -145,6 +165,9 @@ void PutSolver(const CalibrationResult& result, SolverRecord* record) {
   }
   PutAgreement(result.halves, record->mutable_halves());
   PutEvicted(result.evicted, record->mutable_evicted());
+  if (result.evicted.split) {
+    PutSplit(*result.evicted.split, record->mutable_split());
+  }
 }
 
 CalibrationResult GetSolver(const SolverRecord& record) {
@@ -176,6 +199,7 @@ CalibrationResult GetSolver(const SolverRecord& record) {
   }
   result.halves = GetAgreement(record.halves());
   result.evicted = GetEvicted(record.evicted());
+  if (record.has_split()) result.evicted.split = GetSplit(record.split());
   return result;
 }
 

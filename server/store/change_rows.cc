@@ -15,10 +15,15 @@
 #include "server/store/records.h"
 #include "server/store/runs.h"
 #include "server/store/segment_ends.h"
+#include "server/store/segment_rows.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
+
+// A run is as likely to find a change where there is none as the tests of so
+// many single segments: about as many come between two runs.
+constexpr double kSegmentsOfARun = 10;
 
 absl::StatusOr<SegmentInformation> ReadInformation(const Statement& row) {
   constexpr char kWhat[] = "the information of a segment";
@@ -121,6 +126,23 @@ absl::Status RestartTables(Connection* db,
       .Run();
 }
 
+std::string Describe(const DeviceSplit& split,
+                     const StoredChange& change,
+                     std::int64_t run) {
+  return fmt::format(
+      "change {}: among the segments of recalibration {} the newest {}, from "
+      "sequence {} on, show another {} than those before; concerned: {} "
+      "(probability {:.1e}, {:.1e} whichever of them is left out)",
+      change.change,
+      run,
+      split.newer,
+      change.first_sequence,
+      split.block == "all" ? "theta" : split.block,
+      fmt::join(change.groups, ", "),
+      split.probability,
+      split.without_one);
+}
+
 absl::Status InsertChange(Connection* db,
                           std::int64_t rig,
                           const StoredChange& change) {
@@ -148,6 +170,18 @@ absl::Status InsertChange(Connection* db,
                                 .Run());
   }
   return absl::OkStatus();
+}
+
+// Writes the change and its event, and has all start anew with the segments
+// after it.
+absl::Status StartAfter(Connection* db,
+                        std::int64_t rig,
+                        const StoredChange& change,
+                        const std::string& description) {
+  SELFCAL_RETURN_IF_ERROR(InsertChange(db, rig, change));
+  SELFCAL_RETURN_IF_ERROR(RestartTables(db, rig, change.first_sequence));
+  SELFCAL_RETURN_IF_ERROR(ForgetBefore(db, rig, change.first_sequence));
+  return AppendEvent(db, change.rig, EventKind::kChangeDetected, description);
 }
 
 }  // namespace
@@ -194,6 +228,15 @@ absl::StatusOr<StoredChange> ReadChange(Connection* db,
   return change;
 }
 
+absl::StatusOr<std::int64_t> FirstSequenceSince(Connection* db,
+                                                const std::string& rig,
+                                                std::int64_t change) {
+  if (change == 0) return 1;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredChange stored,
+                           ReadChange(db, rig, change));
+  return stored.first_sequence;
+}
+
 absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
     Connection* db, const RigRow& rig, const ChangeOptions& options) {
   const std::optional<StoredChange> none;
@@ -209,12 +252,9 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
   if (!stands) {
     return none;
   }
-  std::int64_t first_sequence = 1;
-  if (newest_change > 0) {
-    SELFCAL_ASSIGN_OR_RETURN(const StoredChange last,
-                             ReadChange(db, rig.stored.rig.id, newest_change));
-    first_sequence = last.first_sequence;
-  }
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t first_sequence,
+      FirstSequenceSince(db, rig.stored.rig.id, newest_change));
   const std::int64_t now_ns = NowNs();
   const ConsistencyTester tester(rig.stored.rig,
                                  {active->theta,
@@ -240,11 +280,40 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
   change.base_version = active->version;
   change.inflation = tester.inflation();
   change.groups = found->concerned;
-  SELFCAL_RETURN_IF_ERROR(InsertChange(db, rig.rowid, change));
-  SELFCAL_RETURN_IF_ERROR(RestartTables(db, rig.rowid, change.first_sequence));
-  SELFCAL_RETURN_IF_ERROR(ForgetBefore(db, rig.rowid, change.first_sequence));
-  SELFCAL_RETURN_IF_ERROR(AppendEvent(
-      db, change.rig, EventKind::kChangeDetected, Describe(*found, change)));
+  SELFCAL_RETURN_IF_ERROR(
+      StartAfter(db, rig.rowid, change, Describe(*found, change)));
+  return change;
+}
+
+absl::StatusOr<std::optional<StoredChange>> MaybeInsertSplit(
+    Connection* db,
+    const RigRow& rig,
+    const StoredRun& run,
+    const StoredCalibration& result,
+    const ChangeOptions& options) {
+  const std::optional<StoredChange> none;
+  if (!result.report || !result.report->evicted.split) return none;
+  const DeviceSplit& split = *result.report->evicted.split;
+  if (!(split.without_one < kSegmentsOfARun * options.false_alarm_rate)) {
+    return none;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest_change,
+                           NewestChange(db, rig.rowid));
+  if (run.change != newest_change) return none;
+  const auto first = FindSegment(db, rig.rowid, split.first);
+  if (absl::IsNotFound(first.status())) return none;  // deleted meanwhile
+  SELFCAL_RETURN_IF_ERROR(first.status());
+  StoredChange change;
+  change.rig = rig.stored.rig.id;
+  change.change = newest_change + 1;
+  change.time_ns = NowNs();
+  change.kind = ChangeKind::kSudden;
+  change.first_sequence = first->sequence;
+  change.base_version = run.base_version;
+  change.inflation = 1;
+  change.groups = split.concerned;
+  SELFCAL_RETURN_IF_ERROR(
+      StartAfter(db, rig.rowid, change, Describe(split, change, run.run)));
   return change;
 }
 
@@ -255,12 +324,8 @@ absl::StatusOr<std::vector<Store::HeldOut>> ListHeldOutRows(
     int limit) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun run, ReadRun(db, rig, run_number));
-  std::int64_t first_sequence = 1;
-  if (run.change > 0) {
-    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
-                             ReadChange(db, rig, run.change));
-    first_sequence = change.first_sequence;
-  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
+                           FirstSequenceSince(db, rig, run.change));
   Statement read(db,
                  "SELECT s.sequence, i.information, i.sha256, "
                  "  s.session, s.session_index, "

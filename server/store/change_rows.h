@@ -33,7 +33,22 @@ absl::StatusOr<StoredChange> ReadChange(Connection* db,
 absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
     Connection* db, const RigRow& rig, const ChangeOptions& options);
 
+// The same where the result of a run tells that the segments that it knows of
+// differ (DeviceSplit) and the device has not been found changed since the run
+// was created.
+absl::StatusOr<std::optional<StoredChange>> MaybeInsertSplit(
+    Connection* db,
+    const RigRow& rig,
+    const StoredRun& run,
+    const StoredCalibration& result,
+    const ChangeOptions& options);
+
 // The rest is not part of a transaction.
+
+// Segments of a smaller sequence lie before the change; 0: there was none.
+absl::StatusOr<std::int64_t> FirstSequenceSince(Connection* db,
+                                                const std::string& rig,
+                                                std::int64_t change);
 
 // Store::ListHeldOut.
 absl::StatusOr<std::vector<Store::HeldOut>> ListHeldOutRows(

@@ -84,7 +84,8 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
     Connection* db,
     const std::string& rig,
     std::int64_t run,
-    const StoredCalibration& calibration);
+    const StoredCalibration& calibration,
+    const ChangeOptions& change);
 absl::StatusOr<StoredRun> EndRunRow(Connection* db,
                                     const std::string& rig,
                                     std::int64_t run,

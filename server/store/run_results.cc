@@ -104,7 +104,8 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
     Connection* db,
     const std::string& rig_name,
     std::int64_t run_number,
-    const StoredCalibration& calibration) {
+    const StoredCalibration& calibration,
+    const ChangeOptions& change_options) {
   if (calibration.state != CalibrationState::kActive &&
       calibration.state != CalibrationState::kRejected) {
     return absl::InvalidArgumentError(
@@ -122,9 +123,17 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
   judged.reasons = calibration.reasons;
   judged.validation = calibration.validation;
   judged.verdict = calibration.verdict;
+  SELFCAL_ASSIGN_OR_RETURN(
+      const auto split, MaybeInsertSplit(db, rig, run, judged, change_options));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
                            NewestChange(db, rig.rowid));
-  if (run.change != change) {
+  if (split) {
+    judged.state = CalibrationState::kRejected;
+    judged.reasons.push_back(
+        fmt::format("The device has changed (change {}) among its segments: "
+                    "the next run is on segments after that.",
+                    change));
+  } else if (run.change != change) {
     judged.state = CalibrationState::kRejected;
     judged.reasons.push_back(
         fmt::format("The device has changed (change {}) since its segments "

@@ -78,12 +78,8 @@ absl::StatusOr<std::vector<RememberedSegment>> ListRememberedRows(
     Connection* db, const std::string& rig, std::int64_t run_number) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun run, ReadRun(db, rig, run_number));
-  std::int64_t first_sequence = 1;
-  if (run.change > 0) {
-    SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
-                             ReadChange(db, rig, run.change));
-    first_sequence = change.first_sequence;
-  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
+                           FirstSequenceSince(db, rig, run.change));
   // Sessions in the order in which they began. What was kept out of the tables
   // because it does not fit is not worth remembering either.
   Statement read(db,

@@ -165,18 +165,4 @@ absl::StatusOr<bool> HasData(Connection* db, std::int64_t segment) {
   return count > 0;
 }
 
-absl::StatusOr<std::vector<SegmentKey>> ListScoredWithDataRows(
-    Connection* db, const std::string& rig) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  Statement read(db,
-                 "SELECT s.session, s.session_index "
-                 "FROM payloads p JOIN segments s USING (segment) "
-                 "WHERE p.rig = ?1 AND s.state = 2 ORDER BY s.segment",
-                 rig_id);
-  std::vector<SegmentKey> keys;
-  while (read.Next()) keys.push_back({read.Text(0), read.Int(1)});
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return keys;
-}
-
 }  // namespace selfcal::server

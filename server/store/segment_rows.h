@@ -74,10 +74,6 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
 absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
                                                               int limit);
 
-// Store::ListScoredWithData.
-absl::StatusOr<std::vector<SegmentKey>> ListScoredWithDataRows(
-    Connection* db, const std::string& rig);
-
 // The rest runs inside a transaction of the caller.
 
 absl::StatusOr<bool> HasData(Connection* db, std::int64_t segment);

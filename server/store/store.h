@@ -355,10 +355,6 @@ class Store {
                                     const SegmentInformation& information,
                                     const SegmentEnds& ends) = 0;
 
-  // Scored segments that have their data, in order of arrival.
-  virtual absl::StatusOr<std::vector<SegmentKey>> ListScoredWithData(
-      const std::string& rig) = 0;
-
   // What is known of segments beside the data of those that the run uses, in
   // the order of time, each session in one run: of those without data what they
   // say (of the newest kRemembered), of the others that they are there. None
@@ -486,7 +482,9 @@ class Store {
   // active, segments that its report says it does not use
   // (SegmentFit::excluded) are quarantined. It is rejected where the device has
   // changed, or a segment of the run was quarantined, since the run was
-  // created.
+  // created; and where its report tells surely enough for StoreOptions::change
+  // that the device changed among its segments (EvictedUse::split), which then
+  // is a change of the device, as in CommitScore.
   virtual absl::StatusOr<StoredCalibration> FinishRun(
       const std::string& rig,
       std::int64_t run,

@@ -169,12 +169,6 @@ class SqliteStore : public Store {
     });
   }
 
-  absl::StatusOr<std::vector<SegmentKey>> ListScoredWithData(
-      const std::string& rig) override {
-    return Read(
-        [&](Connection* db) { return ListScoredWithDataRows(db, rig); });
-  }
-
   absl::StatusOr<std::vector<RememberedSegment>> ListRemembered(
       const std::string& rig, std::int64_t run) override {
     return Read(
@@ -324,7 +318,7 @@ class SqliteStore : public Store {
       std::int64_t run,
       const StoredCalibration& calibration) override {
     return Write([&](Connection* db) {
-      return FinishRunRow(db, rig, run, calibration);
+      return FinishRunRow(db, rig, run, calibration, options_.change);
     });
   }
 

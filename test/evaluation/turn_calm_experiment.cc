@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "core/calibration/memory_split.h"
+#include "core/calibration/subspace.h"
 #include "core/change/course.h"
 #include "core/change/detect_change.h"
-#include "core/change/split.h"
 #include "core/simulation/simulate.h"
 #include "test/evaluation/change_device.h"
 #include "test/evaluation/statistics.h"
@@ -21,11 +23,13 @@ constexpr int kFirstDevice = 41000;  // seeds of their own
 constexpr int kActive = 16;          // segments of the session before
 constexpr int kBefore = 10;          // segments of the next before the turn
 constexpr int kAfter = 24;
+constexpr double kSure = 1e-4;  // of a split, as a run takes it for a change
 
 const DeviceChange kTurn{"turn 0.2 deg", "extrinsics", false, 0.2, 0};
 
 struct Outcome {
-  std::optional<int> delay;
+  std::optional<int> delay;         // of the test of single segments
+  std::optional<int> joined_delay;  // of that of segments joined at their ends
   bool false_alarm = false;
   bool group = false;
   // Noncentrality of the turn in ten segments: the square of the sigmas by
@@ -35,11 +39,18 @@ struct Outcome {
   double unmixed = 1;  // of as large a set from after it
 };
 
-std::vector<SegmentInformation> ScoreSession(const ChangeDevice& device,
-                                             const Calibration& truth,
-                                             double excitation,
-                                             int segments,
-                                             std::uint64_t seed) {
+// What the segments of a session show, by themselves and joined.
+struct ScoredSession {
+  std::vector<SegmentInformation> segments;
+  std::vector<SegmentEnds> ends;
+};
+
+ScoredSession ScoreSession(const ChangeDevice& device,
+                           const Calibration& truth,
+                           double excitation,
+                           int segments,
+                           const std::string& name,
+                           std::uint64_t seed) {
   SimulationOptions options;
   options.seed = seed;
   options.revisit_fraction = 0;
@@ -48,13 +59,16 @@ std::vector<SegmentInformation> ScoreSession(const ChangeDevice& device,
       truth,
       device.active.theta,
       *MakeHandheld(segments * kChangeSegment_s + 0.5, excitation, seed),
-      "use",
+      name,
       options);
-  std::vector<SegmentInformation> all;
+  ScoredSession scored;
   for (const MotionSegment& segment : session.segments) {
-    all.push_back(ScoreSegment(device.rig, device.active.theta, segment));
+    scored.segments.push_back(
+        ScoreSegment(device.rig, device.active.theta, segment));
+    scored.ends.push_back(
+        SummariseEnds(device.rig, device.active.theta, segment));
   }
-  return all;
+  return scored;
 }
 
 double Shown(const ConsistencyTester& tester,
@@ -70,36 +84,42 @@ double Shown(const ConsistencyTester& tester,
 }
 
 double SplitProbability(const ChangeDevice& device,
-                        const std::vector<SegmentInformation>& segments) {
-  std::vector<std::int64_t> times;
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    times.push_back(static_cast<std::int64_t>(i * kChangeSegment_s * 1e9));
-  }
-  return TestSplit(device.rig, device.active.theta, segments, times)
-      .probability;
+                        std::span<const SegmentEnds> before,
+                        std::span<const SegmentEnds> after) {
+  std::vector<JoinedSegment> joined;
+  for (const SegmentEnds& ends : before) joined.push_back({.ends = &ends});
+  for (const SegmentEnds& ends : after) joined.push_back({.ends = &ends});
+  return FindSplit(device.rig,
+                   device.active.theta,
+                   WholeSubspace(device.rig).estimated,
+                   1,
+                   joined,
+                   {})
+      .without_one;
 }
 
 Outcome Run(int index, double excitation) {
   const ChangeDevice device = MakeChangeDevice(
       index,
       *MakeHandheld(kActive * kChangeSegment_s + 0.5, excitation, index));
-  const auto before =
-      ScoreSession(device, device.truth, excitation, kBefore, 100'000 + index);
+  const auto before = ScoreSession(
+      device, device.truth, excitation, kBefore, "before", 100'000 + index);
   const auto after = ScoreSession(device,
                                   kTurn.After(device.truth, 1),
                                   excitation,
                                   kAfter,
+                                  "after",
                                   200'000 + index);
   const ConsistencyTester tester(device.rig, device.active);
   Outcome outcome;
-  outcome.shown = Shown(tester, device, after);
+  outcome.shown = Shown(tester, device, after.segments);
   std::vector<OffsetInformation> newest;
-  for (const SegmentInformation& information : before) {
+  for (const SegmentInformation& information : before.segments) {
     newest.push_back(tester.Offset(information));
     outcome.false_alarm |= DetectChange(tester, newest).has_value();
   }
   for (int i = 0; i < kAfter && !outcome.delay; ++i) {
-    newest.push_back(tester.Offset(after[i]));
+    newest.push_back(tester.Offset(after.segments[i]));
     const auto change = DetectChange(tester, newest);
     if (!change) continue;
     outcome.delay = i + 1;
@@ -107,11 +127,15 @@ Outcome Run(int index, double excitation) {
                                change->concerned.end(),
                                kTurn.group) > 0;
   }
-  std::vector<SegmentInformation> mixed = before;
-  mixed.insert(mixed.end(), after.begin(), after.begin() + kBefore);
-  outcome.mixed = SplitProbability(device, mixed);
-  outcome.unmixed =
-      SplitProbability(device, {after.begin(), after.begin() + 2 * kBefore});
+  const std::span<const SegmentEnds> ends(after.ends);
+  for (int i = 2; i <= kAfter && !outcome.joined_delay; ++i) {
+    const double probability =
+        SplitProbability(device, before.ends, ends.first(i));
+    if (probability < kSure) outcome.joined_delay = i;
+  }
+  outcome.mixed = SplitProbability(device, before.ends, ends.first(kBefore));
+  outcome.unmixed = SplitProbability(
+      device, ends.first(kBefore), ends.subspan(kBefore, kBefore));
   return outcome;
 }
 
@@ -138,29 +162,35 @@ void RunTurnCalm(Context* context) {
                      "found within 10",
                      "found within 24",
                      "delay, median",
+                     "joined: found within 10",
+                     "joined: delay, median",
                      "right group concerned",
                      "false alarms before it",
                      "mixed sets found (1 %)",
                      "unmixed sets found (1 %)"});
   for (int e = 0; e < count; ++e) {
-    std::vector<double> delays, shown;
+    std::vector<double> delays, joined_delays, shown;
     for (const Outcome& outcome : all[e]) {
       delays.push_back(outcome.delay.value_or(kAfter + 1));
+      joined_delays.push_back(outcome.joined_delay.value_or(kAfter + 1));
       shown.push_back(std::sqrt(outcome.shown));
     }
     const auto share = [&](bool (*is)(const Outcome&)) {
       return Share(all[e], is);
     };
-    table.Add({excitations[e],
-               static_cast<long>(devices),
-               Mean(shown),
-               share([](auto& o) { return o.delay && *o.delay <= 10; }),
-               share([](auto& o) { return o.delay.has_value(); }),
-               MedianOf(delays),
-               share([](auto& o) { return o.group; }),
-               share([](auto& o) { return o.false_alarm; }),
-               share([](auto& o) { return o.mixed < 0.01; }),
-               share([](auto& o) { return o.unmixed < 0.01; })});
+    table.Add(
+        {excitations[e],
+         static_cast<long>(devices),
+         Mean(shown),
+         share([](auto& o) { return o.delay && *o.delay <= 10; }),
+         share([](auto& o) { return o.delay.has_value(); }),
+         MedianOf(delays),
+         share([](auto& o) { return o.joined_delay && *o.joined_delay <= 10; }),
+         MedianOf(joined_delays),
+         share([](auto& o) { return o.group; }),
+         share([](auto& o) { return o.false_alarm; }),
+         share([](auto& o) { return o.mixed < 0.01; }),
+         share([](auto& o) { return o.unmixed < 0.01; })});
     if (e == 0) continue;  // too little is shown there for any test
     const std::string at = "_at_excitation_0." + std::to_string(e + 1);
     context->AtMost("turn_calm.median_delay" + at,

@@ -22,14 +22,14 @@ class EvictedFusionTest : public ::testing::Test {
     segments_ = Session(*MakeHandheld(16.5, 1, 5));
   }
 
-  std::vector<MotionSegment> Session(const Trajectory& motion) const {
+  std::vector<MotionSegment> Session(
+      const Trajectory& motion, const std::string& name = "session") const {
     SimulationOptions options;
     options.seed = 5;
     options.keyframes_per_segment = 20;
     options.landmarks_in_view = 60;
     options.revisit_fraction = 0;
-    return Simulate(rig_, truth_, rig_.factory, motion, "session", options)
-        .segments;
+    return Simulate(rig_, truth_, rig_.factory, motion, name, options).segments;
   }
 
   // All but those with data as they are linearised at theta.
@@ -114,6 +114,28 @@ TEST_F(EvictedFusionTest, WithoutMemoryNothingChanges) {
 }
 
 // Segments of the wrong device beside true ones.
+// A quarter of a degree between two sessions, of which all data is there.
+TEST_F(EvictedFusionTest, TellsThatTheDataIsOfTwoDevices) {
+  Eigen::VectorXd turn = Eigen::VectorXd::Zero(TangentSize(truth_));
+  const int i =
+      MatchComponents(TangentComponents(truth_), {"cam0.q_CI.x"}).at(0);
+  turn(i) = 4e-3;
+  truth_ = BoxPlus(truth_, turn);
+  const auto later = Session(*MakeHandheld(16.5, 1, 6), "later");
+  segments_.insert(segments_.end(), later.begin(), later.end());
+  std::vector<RememberedSegment> own;
+  std::set<std::int64_t> picked;
+  for (const std::int64_t k : {1, 2, 5, 6, 9, 10, 13, 14}) {
+    picked.insert(k);
+    own.push_back({.key = segments_[k].key});
+  }
+  const CalibrationResult mixed = CalibrateOn(picked, own);
+  ASSERT_TRUE(mixed.evicted.split);
+  EXPECT_LT(mixed.evicted.split->without_one, 1e-4);
+  EXPECT_EQ(mixed.evicted.split->first, (SegmentKey{"later", 1}));
+  EXPECT_EQ(mixed.evicted.unused, "");
+}
+
 TEST_F(EvictedFusionTest, LeavesOutWhatContradictsTheData) {
   const CalibrationResult alone = CalibrateOn(kept_, {});
   std::vector<RememberedSegment> remembered = RememberedAt(alone.theta);

@@ -32,7 +32,7 @@ class MemorySplitTest : public ::testing::Test {
     }
   }
 
-  MemorySplit Find() const {
+  DeviceSplit Find() const {
     std::vector<JoinedSegment> joined;
     for (const SegmentEnds& ends : ends_) joined.push_back({.ends = &ends});
     return FindSplit(
@@ -61,12 +61,29 @@ TEST_F(MemorySplitTest, ATurnedCameraDiffersAndIsNamed) {
                                3.5e-3, Eigen::Vector3d(1, 2, 2).normalized()));
   AddSession("one", rig_.factory, 1);
   AddSession("two", turned, 101);
-  const MemorySplit split = Find();
+  const DeviceSplit split = Find();
   EXPECT_LT(split.probability, 1e-6);
   EXPECT_THAT((std::vector<std::string>{"cam0.q_CI", "extrinsics"}),
               ::testing::Contains(split.block));
   EXPECT_GE(split.newer, 6);
   EXPECT_LE(split.newer, 9);
+  EXPECT_EQ(split.first, ends_[16 - split.newer].key);
+  EXPECT_THAT(split.concerned, ::testing::Contains("extrinsics"));
+  EXPECT_GE(split.without_one, split.probability);
+  EXPECT_LT(split.without_one, 1e-4);
+}
+
+// It stands out, but not once it is left out.
+TEST_F(MemorySplitTest, OneBadSegmentIsNoSureSplit) {
+  AddSession("one", rig_.factory, 1);
+  AddSession("two", rig_.factory, 101);
+  const int i =
+      MatchComponents(TangentComponents(rig_.factory), {"cam0.focal.x"}).at(0);
+  SegmentEnds& bad = ends_[14];
+  bad.eta += 30 * ReferenceSigmas(rig_)(i) * bad.Lambda.col(i);
+  const DeviceSplit split = Find();
+  EXPECT_LT(split.probability, 1e-4);
+  EXPECT_GT(split.without_one, 1e-3);
 }
 
 TEST_F(MemorySplitTest, OfFewSegmentsNothingIsTested) {

@@ -36,7 +36,8 @@ class GroupConcernTest : public ::testing::Test {
       course.Add(tester_.Offset(segment), 1);
     }
     std::vector<std::string> names;
-    for (const auto& group : FindConcerned(tester_, course.Change(), 0.001)) {
+    for (const auto& group :
+         FindConcerned(tester_.groups(), course.Change(), 0.001)) {
       if (group.concerned) names.push_back(group.group);
     }
     return names;

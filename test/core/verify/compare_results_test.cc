@@ -81,6 +81,9 @@ TEST_F(CompareResultsTest, DoesNotCompareWhatDidNotConvergeOrHoldsMore) {
   other = result_;
   other.status = CalibrateStatus::kNotConverged;
   EXPECT_NE(CompareResults(rig_, result_, other).incomparable, "");
+  other = result_;
+  other.evicted.segments += 1;  // on one side alone, what is remembered helps
+  EXPECT_NE(CompareResults(rig_, result_, other).incomparable, "");
 }
 
 TEST_F(CompareResultsTest, WhatIsNotANumberDiffers) {

@@ -1,4 +1,5 @@
 // What is remembered of segments without data, with the estimators of core.
+#include "server/pipeline/stored_information.h"
 #include "test/server/pipeline/pipeline_test.h"
 
 namespace selfcal::server {
@@ -90,11 +91,10 @@ TEST_F(MemoryTest, KeptSegmentsAreScoredAnewAtAVersionThatBecomesActive) {
   SubmitAll();
   const auto at_active = [&] {
     const Calibration active = store_->GetActiveCalibration("a")->theta;
-    const auto keys = store_->ListScoredWithData("a");
-    EXPECT_GE(keys->size(), 4u);
-    return std::all_of(keys->begin(), keys->end(), [&](const auto& key) {
-      return BoxMinus(store_->GetSegment("a", key)->information->theta0, active)
-                 .norm() == 0;
+    const auto kept = ListKept(store_.get(), "a");
+    EXPECT_GE(kept->size(), 4u);
+    return std::all_of(kept->begin(), kept->end(), [&](const auto& segment) {
+      return BoxMinus(segment.information->theta0, active).norm() == 0;
     });
   };
   ASSERT_GT(store_->GetActiveCalibration("a")->version, 1);

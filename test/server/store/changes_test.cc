@@ -219,6 +219,73 @@ TEST_P(ChangesTest, ARunFromBeforeIsRejected) {
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, change.base_version);
 }
 
+// The segments of the next run are of two devices, as its result tells.
+class SplitRunTest : public ChangesTest {
+ protected:
+  StoredCalibration FinishSplit(double without_one) {
+    std::optional<StoredRun> run;
+    while (!run && next_ < 200) run = Next(zero_).started_run;
+    EXPECT_TRUE(run);
+    run_ = *run;
+    EXPECT_TRUE(store_->BeginRun("a", run->run).ok());
+    StoredCalibration result = Result(rig_.factory);
+    result.report->evicted.split = {.probability = without_one / 2,
+                                    .without_one = without_one,
+                                    .newer = 3,
+                                    .first = {"s", next_ - 3},
+                                    .block = "cam0.q_CI",
+                                    .concerned = {"extrinsics"}};
+    const auto finished = store_->FinishRun("a", run->run, result);
+    EXPECT_TRUE(finished.ok()) << finished.status();
+    return finished.value_or(StoredCalibration());
+  }
+
+  StoredRun run_;
+};
+SELFCAL_STORE_TEST_SUITE(SplitRunTest);
+
+TEST_P(SplitRunTest, ASureOneIsAChangeOfTheDevice) {
+  const StoredCalibration finished = FinishSplit(0.9e-4);
+  EXPECT_EQ(finished.state, CalibrationState::kRejected);
+  EXPECT_THAT(finished.reasons, ElementsAre(HasSubstr("change 1")));
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, run_.base_version);
+  const auto change = store_->GetChange("a", 1);
+  ASSERT_TRUE(change.ok()) << change.status();
+  EXPECT_EQ(change->first_sequence, next_ - 3 + 1);  // indices count from 0
+  EXPECT_EQ(change->base_version, run_.base_version);
+  EXPECT_EQ(change->kind, ChangeKind::kSudden);
+  EXPECT_THAT(change->groups, ElementsAre("extrinsics"));
+  const auto tables = store_->GetTables("a");
+  ASSERT_TRUE(tables.ok()) << tables.status();
+  for (const Table& table : *tables) {
+    EXPECT_EQ(table.scored, 3);
+    for (const TableEntry& entry : table.entries) {
+      EXPECT_GE(entry.sequence, change->first_sequence) << table.group;
+    }
+  }
+  const std::vector<StoredEvent> events = Events();
+  EXPECT_EQ(std::count_if(events.begin(),
+                          events.end(),
+                          [](const StoredEvent& event) {
+                            return event.kind == EventKind::kChangeDetected &&
+                                   event.detail.find("cam0.q_CI") !=
+                                       std::string::npos;
+                          }),
+            1);
+  // The split is kept with the candidate.
+  Reopen();
+  const auto report = store_->GetCalibration("a", finished.version)->report;
+  ASSERT_TRUE(report && report->evicted.split);
+  EXPECT_EQ(report->evicted.split->first, (SegmentKey{"s", next_ - 3}));
+  EXPECT_EQ(report->evicted.split->newer, 3);
+  EXPECT_THAT(report->evicted.split->concerned, ElementsAre("extrinsics"));
+}
+
+TEST_P(SplitRunTest, OneThatIsNotSureIsNone) {
+  EXPECT_EQ(FinishSplit(1.1e-4).state, CalibrationState::kActive);
+  EXPECT_TRUE(absl::IsNotFound(store_->GetChange("a", 1).status()));
+}
+
 TEST_P(ChangesTest, IsFoundTheSameAcrossRestarts) {
   Many(6, zero_);
   first_after_ = next_;

@@ -181,17 +181,6 @@ TEST_P(RememberedTest, NoScoreTakesThePlaceWhereTheDataIsGone) {
       "a", {"s", 77}, FakeInformation(rig_, 1), FakeEnds(rig_, {"s", 77}))));
 }
 
-TEST_P(RememberedTest, WhatHasDataIsListedInTheOrderOfArrival) {
-  for (int k = 2; k < 4 + Store::kReserve; ++k) Take(k, 50);
-  Put("a", 30);  // not scored
-  const auto keys = store_->ListScoredWithData("a");
-  ASSERT_TRUE(keys.ok()) << keys.status();
-  std::vector<std::int64_t> indices;
-  for (const SegmentKey& key : *keys) indices.push_back(key.index);
-  EXPECT_THAT(indices, ElementsAre(0, 1, 4, 5, 6, 7));
-  EXPECT_TRUE(absl::IsNotFound(store_->ListScoredWithData("b").status()));
-}
-
 SELFCAL_STORE_TEST_SUITE(RememberedTest);
 
 }  // namespace

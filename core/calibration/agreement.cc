@@ -1,4 +1,4 @@
-#include "core/calibration/agreement_test.h"
+#include "core/calibration/agreement.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

@@ -12,7 +12,7 @@ struct AgreementTest {
   double probability = 1;  // of a statistic as large or larger by chance
 };
 
-// Of what one says against what the rest say, both as information about the
+// Tests what one says against what the rest say, both as information about the
 // same offset, in units of the prior, with variances larger by `excess`. With
 // one theta,
 //   S = eta - Lambda (Lambda + Lambda_r)^-1 (eta + eta_r)
