@@ -1,61 +1,98 @@
 #include "core/calibration/memory_split.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
+#include <cstddef>
+#include <utility>
 #include <vector>
 
-#include "core/change/chi_square.h"
+#include "core/change/course.h"
 #include "core/change/group_concern.h"
 #include "core/change/parameter_blocks.h"
 
 namespace selfcal {
 namespace {
 
-constexpr int kFewest = 2;  // segments on either side
-// A block may have no part in what is estimated.
-constexpr double kNothing = 1e-9;
+constexpr int kLongestPart = 4;   // segments
+constexpr int kFewest = 2;        // segments on either side of a step
+constexpr int kShortestRamp = 3;  // parts
+// Of a drift, what is near enough to what the device is now.
+constexpr double kDrifted = 2.0 / 3;
 // A group is concerned where its test is less probable than this.
 constexpr double kConcerned = 0.01;
 
-// Of theta, by the estimated directions.
-struct Side {
-  Eigen::VectorXd mean;
-  Eigen::MatrixXd covariance;
+// Joined segments of one session, by index.
+struct Part {
+  int first = 0;
+  int count = 0;
 };
 
-// The newer side less the older one, by the estimated directions.
-struct Difference {
-  Eigen::VectorXd mean;
-  Eigen::MatrixXd information;
+// A course that is tried.
+struct Trial {
+  ChangeKind kind = ChangeKind::kSudden;
+  Eigen::VectorXd weights;  // by part
+  // As many tests as it counts for: the smallest of all probabilities times
+  // this is rarely small by chance.
+  double tests = 1;
 };
 
-// How many of the newest: each half as many again as before.
-std::vector<int> SplitsOf(int count) {
-  std::vector<int> splits;
-  for (int newer = kFewest; newer <= count - kFewest;
-       newer += std::max(1, newer / 2)) {
-    splits.push_back(newer);
-  }
-  return splits;
+// The size of the next longer course to try.
+int Longer(int n) { return n + std::max(1, n / 2); }
+
+bool BeginSession(std::span<const JoinedSegment> segments, int i) {
+  return i == 0 ||
+         segments[i].ends->key.session != segments[i - 1].ends->key.session;
 }
 
-// Of a difference, if it is one of the block alone.
-double ProbabilityOf(const Difference& difference,
-                     const Eigen::MatrixXd& block) {
-  const Eigen::MatrixXd by_block = block.transpose() * difference.information;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(by_block * block);
-  const Eigen::VectorXd along =
-      eigen.eigenvectors().transpose() * (by_block * difference.mean);
-  double squares = 0;
-  int degrees = 0;
-  for (Eigen::Index i = 0; i < along.size(); ++i) {
-    if (!(eigen.eigenvalues()(i) > kNothing)) continue;
-    ++degrees;
-    squares += along(i) * along(i) / eigen.eigenvalues()(i);
+// Each session in parts of nearly one size.
+std::vector<Part> Cut(std::span<const JoinedSegment> segments) {
+  const auto count = static_cast<int>(segments.size());
+  std::vector<Part> parts;
+  for (int begin = 0, end = 0; begin < count; begin = end) {
+    end = begin + 1;
+    while (end < count && !BeginSession(segments, end)) ++end;
+    const int pieces = (end - begin + kLongestPart - 1) / kLongestPart;
+    for (int k = 0; k < pieces; ++k) {
+      const int first = begin + k * (end - begin) / pieces;
+      parts.push_back(
+          {first, begin + (k + 1) * (end - begin) / pieces - first});
+    }
   }
-  return degrees > 0 ? ChiSquareTail(squares, degrees) : 1;
+  return parts;
+}
+
+std::vector<Trial> Trials(std::span<const JoinedSegment> segments,
+                          const std::vector<Part>& parts,
+                          std::size_t blocks) {
+  const auto count = static_cast<int>(parts.size());
+  const auto total = static_cast<int>(segments.size());
+  const auto is_step = [&](int newest) {
+    const int first = parts[count - newest].first;
+    return first >= kFewest && total - first >= kFewest;
+  };
+  std::vector<Trial> between, within, ramps;
+  for (int n = 1; n < count; ++n) {
+    if (is_step(n) && BeginSession(segments, parts[count - n].first)) {
+      between.push_back({ChangeKind::kSudden, StepCourse(count, n)});
+    }
+  }
+  for (int n = 1; n < count; n = Longer(n)) {
+    if (is_step(n))
+      within.push_back({ChangeKind::kSudden, StepCourse(count, n)});
+  }
+  for (int n = kShortestRamp; n <= count; n = Longer(n)) {
+    ramps.push_back({ChangeKind::kDrift, RampCourse(count, n)});
+  }
+  std::vector<Trial> trials;
+  const auto add = [&](std::vector<Trial>& some, double share) {
+    for (Trial& trial : some) {
+      trial.tests = static_cast<double>(some.size() * blocks) / share;
+      trials.push_back(std::move(trial));
+    }
+  };
+  add(between, 0.5);
+  add(within, 0.25);
+  add(ramps, 0.25);
+  return trials;
 }
 
 class SplitSearch {
@@ -69,100 +106,101 @@ class SplitSearch {
       : rig_(rig),
         theta_(theta),
         free_(FreeComponents(rig)),
-        scale_(PriorSigmas(rig)(free_)),
         directions_(estimated(free_, Eigen::all)),
+        onto_(directions_.transpose() * PriorSigmas(rig)(free_).asDiagonal()),
+        prior_(Eigen::MatrixXd::Identity(onto_.cols(), onto_.cols())),
         excess_(excess),
-        segments_(segments.begin(), segments.end()),
+        segments_(segments),
         options_(options),
-        blocks_(ParameterBlocks(rig)) {}
+        blocks_(ParameterBlocks(rig)),
+        parts_(Cut(segments)) {
+    for (const Part& part : parts_) {
+      shown_.push_back(ShownBy(segments.subspan(part.first, part.count)));
+    }
+  }
 
-  DeviceSplit Run() {
+  DeviceSplit Run() const {
     DeviceSplit best;
+    const std::vector<Trial> trials = Trials(segments_, parts_, blocks_.size());
+    const Trial* trial = nullptr;
     const ParameterBlock* block = nullptr;
-    const std::vector<int> splits =
-        SplitsOf(static_cast<int>(segments_.size()));
-    tests_ = static_cast<double>(splits.size() * blocks_.size());
-    for (const int newer : splits) {
-      const Difference difference = Compare(segments_, newer);
+    for (const Trial& tried : trials) {
+      const OffsetInformation change = Change(shown_, tried.weights);
       for (const ParameterBlock& one : blocks_) {
-        const double probability = Probability(difference, one);
+        const double probability =
+            tried.tests * TestSpan(change, one.basis).probability;
         if (probability < best.probability) {
           best.probability = probability;
-          best.newer = newer;
+          trial = &tried;
           block = &one;
         }
       }
     }
-    if (block == nullptr) return best;
+    if (trial == nullptr) return best;
+    best.kind = trial->kind;
     best.block = block->name;
-    best.first = segments_[segments_.size() - best.newer].ends->key;
+    const int first = FirstSince(trial->weights);
+    best.first = segments_[first].ends->key;
+    best.newer = static_cast<int>(segments_.size()) - first;
     if (best.probability < kRareSplit) {
-      best.without_one = WithoutOne(best.newer, *block);
-      best.concerned = Concerned(Compare(segments_, best.newer));
+      best.without_one = WithoutOne(*trial, *block);
+      best.concerned = ConcernedNames(FindConcerned(
+          GroupBlocks(rig_), Change(shown_, trial->weights), kConcerned));
     }
     return best;
   }
 
  private:
-  double Probability(const Difference& difference,
-                     const ParameterBlock& block) const {
-    return std::min(
-        1.0,
-        tests_ *
-            ProbabilityOf(difference, directions_.transpose() * block.basis));
-  }
-
-  Side ShownBy(std::span<const JoinedSegment> part) const {
+  // Of the free components in units of the prior, along the directions.
+  OffsetInformation ShownBy(std::span<const JoinedSegment> segments) const {
     const ThetaInformation information =
-        InformationOfAll(rig_, theta_, part, options_);
-    Eigen::MatrixXd Lambda = directions_.transpose() * scale_.asDiagonal() *
-                             information.Lambda(free_, free_) *
-                             scale_.asDiagonal() * directions_;
-    Lambda.diagonal().array() += 1;  // the prior's
-    const Eigen::LLT<Eigen::MatrixXd> solver(Lambda);
-    return {
-        solver.solve(directions_.transpose() *
-                     scale_.cwiseProduct(information.eta(free_))),
-        solver.solve(Eigen::MatrixXd::Identity(Lambda.rows(), Lambda.cols()))};
+        InformationOfAll(rig_, theta_, segments, options_);
+    const Eigen::MatrixXd Lambda =
+        onto_ * information.Lambda(free_, free_) * onto_.transpose();
+    return {directions_ * Lambda * directions_.transpose() / excess_,
+            directions_ * (onto_ * information.eta(free_)) / excess_};
   }
 
-  Difference Compare(std::span<const JoinedSegment> all, int newer) const {
-    const Side before = ShownBy(all.first(all.size() - newer));
-    const Side after = ShownBy(all.last(newer));
-    return {after.mean - before.mean,
-            (excess_ * (after.covariance + before.covariance)).inverse()};
+  OffsetInformation Change(const std::vector<OffsetInformation>& shown,
+                           const Eigen::VectorXd& weights) const {
+    return MakeCourse(shown, weights, prior_).Change();
   }
 
-  double WithoutOne(int newer, const ParameterBlock& block) const {
+  int FirstSince(const Eigen::VectorXd& weights) const {
+    int part = 0;
+    while (weights(part) < kDrifted) ++part;
+    return parts_[part].first;
+  }
+
+  double WithoutOne(const Trial& trial, const ParameterBlock& block) const {
     double largest = 0;
-    const auto count = static_cast<int>(segments_.size());
-    for (int i = 0; i < count; ++i) {
-      std::vector<JoinedSegment> rest = segments_;
-      rest.erase(rest.begin() + i);
-      const int left = i < count - newer ? newer : newer - 1;
-      largest = std::max(largest, Probability(Compare(rest, left), block));
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const auto part = segments_.subspan(parts_[i].first, parts_[i].count);
+      for (std::size_t k = 0; k < part.size(); ++k) {
+        std::vector<JoinedSegment> rest(part.begin(), part.end());
+        rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(k));
+        std::vector<OffsetInformation> shown = shown_;
+        shown[i] = ShownBy(rest);
+        largest = std::max(
+            largest,
+            TestSpan(Change(shown, trial.weights), block.basis).probability);
+      }
     }
-    return largest;
-  }
-
-  std::vector<std::string> Concerned(const Difference& difference) const {
-    const Eigen::MatrixXd by_free = directions_ * difference.information;
-    return ConcernedNames(FindConcerned(
-        GroupBlocks(rig_),
-        {by_free * directions_.transpose(), by_free * difference.mean},
-        kConcerned));
+    return std::min(1.0, trial.tests * largest);
   }
 
   const Rig& rig_;
   const Calibration& theta_;
   const std::vector<int> free_;
-  const Eigen::VectorXd scale_;       // prior sigmas of free components
-  const Eigen::MatrixXd directions_;  // of free components
+  const Eigen::MatrixXd directions_;  // of free components in prior units
+  const Eigen::MatrixXd onto_;        // these, from the units of the tangent
+  const Eigen::MatrixXd prior_;       // root of its covariance, in its units
   const double excess_;
-  const std::vector<JoinedSegment> segments_;
+  const std::span<const JoinedSegment> segments_;
   const EvictedOptions& options_;
   const std::vector<ParameterBlock> blocks_;
-  double tests_ = 1;
+  const std::vector<Part> parts_;
+  std::vector<OffsetInformation> shown_;  // by part
 };
 
 }  // namespace

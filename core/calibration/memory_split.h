@@ -2,12 +2,17 @@
 // its newest show another than those before?
 //
 // A change that is too small for single segments to show stands out where
-// segments are joined at their ends (session_chain.h) and few parameters are
-// tested at a time, as if all others had stayed: what the segments newer than a
-// point in time show against what those before show. A set of segments from
-// before and after a change gives a calibration that is neither, and fits new
-// segments half as badly as the one before: that its own segments differ gives
-// it away.
+// neighbours are joined at their ends (session_chain.h) and few parameters are
+// tested at a time, as if all others had stayed. A set of segments from before
+// and after a change gives a calibration that is neither, and fits new segments
+// half as badly as the one before: that its own segments differ gives it away.
+//
+// Each session is cut into parts of a few joined segments. Steps and ramps over
+// the parts are tried as courses of a change (core/change/course.h) about the
+// calibration, of which nothing is known but the prior. A device is handled,
+// and grows warm or cold, between sessions more than within one: a half of what
+// may be found by chance is for steps between sessions, a quarter for other
+// steps, a quarter for ramps.
 //
 // Pure, any thread, deterministic.
 #pragma once
@@ -23,13 +28,13 @@
 namespace selfcal {
 
 // A split is looked at closer below this probability.
-inline constexpr double kRareSplit = 0.02;
+inline constexpr double kRareSplit = 0.05;
 
-// The split that is least probable. Segments in the order of time, linearised
-// near `theta`; `estimated` are the orthonormal directions in units of the
-// prior (D x r) that data determines (subspace.h), to which the test keeps.
-// Variances are larger by `excess`. Of a split that is not rare, `without_one`
-// is 1 and no group is concerned.
+// The split that is least probable. Segments in the order of time, each session
+// in one run, linearised near `theta`; `estimated` are the orthonormal
+// directions in units of the prior (D x r) that data determines (subspace.h),
+// to which the test keeps. Variances are larger by `excess`. Of a split that is
+// not rare, `without_one` is 1 and no group is concerned.
 DeviceSplit FindSplit(const Rig& rig,
                       const Calibration& theta,
                       const Eigen::MatrixXd& estimated,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/calibration/agreement.h"
+#include "core/change/detect_change.h"
 #include "core/information/segment_ends.h"
 #include "core/model/segment.h"
 
@@ -30,7 +31,10 @@ struct DeviceSplit {
   double probability = 1;
   // The same at this split, whichever single segment is left out: the largest.
   double without_one = 1;
-  int newer = 0;      // segments from `first` on
+  ChangeKind kind = ChangeKind::kSudden;
+  // Segments from `first` on; of a drift, those that are near to what the
+  // device is now.
+  int newer = 0;
   SegmentKey first;   // the oldest of these
   std::string block;  // parameters that differ (parameter_blocks.h)
   std::vector<std::string> concerned;  // groups, in the order of the rig
@@ -52,7 +56,7 @@ struct EvictedUse {
   // Why none was used; empty where some were, or there were none.
   std::string unused;
   // Where the segments, with data and without, differ by more than chance
-  // explains (2 %).
+  // explains (5 %).
   std::optional<DeviceSplit> split = std::nullopt;
 };
 

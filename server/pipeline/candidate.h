@@ -93,7 +93,9 @@ struct CandidateValidation {
 // - rank: at least as many directions are estimated as by `active`, less the
 //   components that have changed since;
 // - sigma_growth: no component that `active` observes has become much less
-//   certain, however uncertain it is now;
+//   certain, however uncertain it is now; not tested where the segments differ
+//   so that the device may have changed (EvictedUse::split): then `active` is
+//   in doubt, and to be less certain is honest;
 // - halves: calibrations on two halves of the segments agree;
 // - disagreement: each segment agrees with all others as far as noise allows;
 // - held_out_probability: what segments show that it was not calibrated on is

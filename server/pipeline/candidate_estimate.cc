@@ -71,6 +71,21 @@ void CheckCertainty(const CheckContext& context,
                     std::vector<ValidationCheck>* checks) {
   const StoredCalibration& active = context.evidence.active;
   const double limit = context.limits.max_sigma_growth;
+  if (const auto& split = context.result.evicted.split) {
+    AddNotTested(
+        "sigma_growth",
+        limit,
+        fmt::format("The newest {} segments show another {} than those "
+                    "before (probability {:.1g}): the device may have "
+                    "changed, and what was known to active version {} "
+                    "is in doubt.",
+                    split->newer,
+                    split->block == "all" ? "theta" : split->block,
+                    split->probability,
+                    active.version),
+        checks);
+    return;
+  }
   const auto components = TangentComponents(context.rig.factory);
   const Eigen::VectorXd prior = PriorSigmas(context.rig);
   const Eigen::VectorXd before = active.covariance.diagonal().cwiseSqrt();

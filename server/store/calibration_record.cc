@@ -118,6 +118,7 @@ EvictedUse GetEvicted(const v1::EvictedUse& message) {
 void PutSplit(const DeviceSplit& split, store::DeviceSplitRecord* record) {
   record->set_probability(split.probability);
   record->set_without_one(split.without_one);
+  record->set_drift(split.kind == ChangeKind::kDrift);
   record->set_newer(split.newer);
   record->set_session(split.first.session);
   record->set_index(split.first.index);
@@ -129,6 +130,7 @@ void PutSplit(const DeviceSplit& split, store::DeviceSplitRecord* record) {
 DeviceSplit GetSplit(const store::DeviceSplitRecord& record) {
   return {record.probability(),
           record.without_one(),
+          record.drift() ? ChangeKind::kDrift : ChangeKind::kSudden,
           record.newer(),
           {record.session(), record.index()},
           record.block(),

@@ -307,7 +307,7 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertSplit(
   change.rig = rig.stored.rig.id;
   change.change = newest_change + 1;
   change.time_ns = NowNs();
-  change.kind = ChangeKind::kSudden;
+  change.kind = split.kind;
   change.first_sequence = first->sequence;
   change.base_version = run.base_version;
   change.inflation = 1;
