@@ -8,18 +8,34 @@
 namespace selfcal {
 namespace {
 
-// Of what was measured; nothing with fewer than `least` of them.
-std::optional<double> MedianFit(const std::vector<double>& fits, int least) {
+// Of a normal distribution, over its median distance to the median.
+constexpr double kSigmaOfMedianDistance = 1.4826;
+
+// The lower one of an even number; of one value or more.
+double Median(std::vector<double> values) {
+  const auto middle =
+      values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// By what was measured; nothing with fewer than `min_compared` of them.
+std::optional<double> LargestOf(const std::vector<double>& fits,
+                                const FitPolicy& policy) {
   std::vector<double> measured;
   std::copy_if(
       fits.begin(), fits.end(), std::back_inserter(measured), [](double fit) {
         return std::isfinite(fit) && fit > 0;
       });
-  if (measured.empty() || std::ssize(measured) < least) return std::nullopt;
-  const auto middle =
-      measured.begin() + static_cast<std::ptrdiff_t>((measured.size() - 1) / 2);
-  std::nth_element(measured.begin(), middle, measured.end());
-  return *middle;
+  if (measured.empty() || std::ssize(measured) < policy.min_compared) {
+    return std::nullopt;
+  }
+  const double usual = Median(measured);
+  for (double& fit : measured) fit = std::abs(fit - usual);
+  const double sigma = kSigmaOfMedianDistance * Median(std::move(measured));
+  return std::clamp(usual + policy.max_deviations * sigma,
+                    policy.least_ratio * usual,
+                    policy.max_ratio * usual);
 }
 
 }  // namespace
@@ -27,11 +43,11 @@ std::optional<double> MedianFit(const std::vector<double>& fits, int least) {
 std::optional<double> LargestFit(const std::vector<double>& newest,
                                  const std::vector<double>& kept,
                                  const FitPolicy& policy) {
-  std::optional<double> usual = MedianFit(newest, policy.min_compared);
-  const std::optional<double> of_kept = MedianFit(kept, policy.min_compared);
-  if (of_kept && (!usual || *of_kept < *usual)) usual = of_kept;
-  if (!usual) return std::nullopt;
-  return std::max(1.0, policy.max_ratio * *usual);
+  std::optional<double> largest = LargestOf(newest, policy);
+  const std::optional<double> of_kept = LargestOf(kept, policy);
+  if (of_kept && (!largest || *of_kept < *largest)) largest = of_kept;
+  if (!largest) return std::nullopt;
+  return std::max(1.0, *largest);
 }
 
 }  // namespace selfcal

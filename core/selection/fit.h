@@ -12,11 +12,18 @@
 namespace selfcal {
 
 struct FitPolicy {
+  // Largest fit over the median: 1 plus so many standard deviations of the fits
+  // over their median (a robust one, from their median distance to it), within
+  // the bounds below.
+  double max_deviations = 10;
   // Residuals of sound segments differ with how fast the device moves and how
-  // the tracker copes. Information is divided by the square of the fit: three
-  // times the residuals of the others are a ninth of what the motion claims,
-  // so that little is lost where such a segment was sound after all, and what
-  // is broken by far exceeds it.
+  // the tracker copes: by up to a fifth from the median in the recordings and
+  // in simulated scenes of which a tenth moves. Stamps that are off by 10 ms
+  // and exchanged cameras double them.
+  double least_ratio = 1.5;
+  // Information is divided by the square of the fit: three times the residuals
+  // of the others are a ninth of what the motion claims, so that little is lost
+  // where such a segment was sound after all.
   double max_ratio = 3;
   // The newest segments of a rig, for their median.
   int newest = 16;
@@ -28,10 +35,10 @@ struct FitPolicy {
 // fits of the newest scored segments, `kept` of those in the tables; those that
 // were not measured (0) do not count.
 //
-// It is max_ratio times the median, the smaller one of both kinds: where the
-// first segments of a rig are bad they fill the tables, and leave them once the
-// newest are mostly good; a bad session between good ones may outnumber these
-// among the newest, and still does not fit to what is kept. What lies within
+// It is the smaller one that follows from both kinds: where the first segments
+// of a rig are bad they fill the tables, and leave them once the newest are
+// mostly good; a bad session between good ones may outnumber these among the
+// newest, and still does not fit to what is kept. What lies within
 // the stated noise (a fit of 1) always fits. Nothing: too few to compare with.
 std::optional<double> LargestFit(const std::vector<double>& newest,
                                  const std::vector<double>& kept,

@@ -11,6 +11,34 @@ TEST(FitTest, IsComparedWithTheMedianOfTheNewest) {
   EXPECT_DOUBLE_EQ(*largest, 3 * 1.4);
 }
 
+TEST(FitTest, IsComparedWithHowMuchFitsDiffer) {
+  // All alike, and more different: a tenth of the median as the median
+  // distance, 1.4826 times that as the standard deviation.
+  EXPECT_DOUBLE_EQ(*LargestFit({1.99, 2, 2, 2.01, 2}, {}), 1.5 * 2);
+  EXPECT_DOUBLE_EQ(*LargestFit({1.6, 1.8, 2, 2.2, 2.4}, {}), 2 + 10 * 0.29652);
+  // One in five segments has stamps that are off: simulated.
+  EXPECT_LT(*LargestFit({1.01, 1.01, 1.91, 1.01, 0.99, 1.01, 1.0, 1.86}, {}),
+            1.86);
+  // One landmark in ten moves, and nothing is wrong: simulated.
+  EXPECT_GT(*LargestFit({1.15,
+                         1.14,
+                         1.27,
+                         1.2,
+                         1.16,
+                         1.23,
+                         1.18,
+                         1.17,
+                         1.17,
+                         1.15,
+                         1.17,
+                         1.36,
+                         1.22,
+                         1.16,
+                         1.26},
+                        {}),
+            1.36);
+}
+
 TEST(FitTest, NoiseThatIsStatedWrongRaisesAllAlike) {
   const auto largest = LargestFit({10, 11, 9, 10.5, 9.5}, {10, 9, 11, 10});
   ASSERT_TRUE(largest.has_value());
@@ -29,17 +57,17 @@ TEST(FitTest, FewSegmentsAreNoComparison) {
 
 TEST(FitTest, WhatWasNotMeasuredDoesNotCount) {
   EXPECT_FALSE(LargestFit({0, 0, 0, 0, 1, 1, 1}, {}).has_value());
-  EXPECT_EQ(LargestFit({0, 0, 0, 2, 2, 2, 2}, {}), 6.0);
+  EXPECT_EQ(LargestFit({0, 0, 0, 2, 2, 2, 2}, {}), 3.0);
 }
 
 TEST(FitTest, ABadSessionAmongGoodOnesIsComparedWithWhatIsKept) {
   const std::vector<double> bad(16, 40.0);
-  EXPECT_EQ(LargestFit(bad, {1, 1, 1, 1}), 3.0);
+  EXPECT_EQ(LargestFit(bad, {1, 1, 1, 1}), 1.5);
 }
 
 TEST(FitTest, GoodSegmentsAfterBadOnesMakeTheseMisfits) {
   const std::vector<double> newest = {1, 1, 1, 1, 1, 40, 40, 40, 40};
-  EXPECT_EQ(LargestFit(newest, {40, 40, 40, 40, 40, 40, 40, 1}), 3.0);
+  EXPECT_EQ(LargestFit(newest, {40, 40, 40, 40, 40, 40, 40, 1}), 1.5);
 }
 
 }  // namespace
