@@ -12,6 +12,7 @@
 #include "server/store/checksum.h"
 #include "server/store/clock.h"
 #include "server/store/events.h"
+#include "server/store/fit_rows.h"
 #include "server/store/records.h"
 #include "server/store/runs.h"
 #include "server/store/segment_ends.h"
@@ -45,18 +46,21 @@ absl::StatusOr<Newest> ReadNewest(Connection* db,
                                   std::int64_t first_sequence,
                                   const ConsistencyTester& tester,
                                   int count) {
-  Statement read(db,
-                 "SELECT s.sequence, i.information, i.sha256 "
-                 "FROM segments s JOIN segment_information i USING (segment) "
-                 "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
-                 "  AND NOT EXISTS (SELECT 1 FROM calibration_segments c "
-                 "    WHERE c.rig = ?1 AND c.version = ?3 "
-                 "      AND c.segment = s.segment) "
-                 "ORDER BY s.sequence DESC LIMIT ?4",
-                 rig.rowid,
-                 first_sequence,
-                 active.version,
-                 2 * count);
+  Statement read(
+      db,
+      fmt::format("SELECT s.sequence, i.information, i.sha256 FROM segments "
+                  "s JOIN segment_information i USING (segment) "
+                  "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
+                  "  AND {} "
+                  "  AND NOT EXISTS (SELECT 1 FROM calibration_segments c "
+                  "    WHERE c.rig = ?1 AND c.version = ?3 "
+                  "      AND c.segment = s.segment) "
+                  "ORDER BY s.sequence DESC LIMIT ?4",
+                  kFits),
+      rig.rowid,
+      first_sequence,
+      active.version,
+      2 * count);
   Newest newest;
   while (static_cast<int>(newest.segments.size()) < count && read.Next()) {
     const auto information = ReadInformation(read);
@@ -326,21 +330,25 @@ absl::StatusOr<std::vector<Store::HeldOut>> ListHeldOutRows(
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun run, ReadRun(db, rig, run_number));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
                            FirstSequenceSince(db, rig, run.change));
-  Statement read(db,
-                 "SELECT s.sequence, i.information, i.sha256, "
-                 "  s.session, s.session_index, "
-                 "  EXISTS (SELECT 1 FROM payloads p "
-                 "    WHERE p.segment = s.segment) AS has_data "
-                 "FROM segments s JOIN segment_information i USING (segment) "
-                 "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
-                 "  AND NOT EXISTS (SELECT 1 FROM run_segments x "
-                 "    WHERE x.rig = ?1 AND x.run = ?3 "
-                 "      AND x.segment = s.segment) "
-                 "ORDER BY has_data DESC, s.sequence DESC LIMIT ?4",
-                 rig_id,
-                 first_sequence,
-                 run_number,
-                 limit);
+  Statement read(
+      db,
+      fmt::format("SELECT s.sequence, i.information, i.sha256, "
+                  "  s.session, s.session_index, "
+                  "  EXISTS (SELECT 1 FROM payloads p "
+                  "    WHERE p.segment = s.segment) AS has_data "
+                  "FROM segments s JOIN segment_information i USING "
+                  "(segment) "
+                  "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
+                  "  AND {} "
+                  "  AND NOT EXISTS (SELECT 1 FROM run_segments x "
+                  "    WHERE x.rig = ?1 AND x.run = ?3 "
+                  "      AND x.segment = s.segment) "
+                  "ORDER BY has_data DESC, s.sequence DESC LIMIT ?4",
+                  kFits),
+      rig_id,
+      first_sequence,
+      run_number,
+      limit);
   std::vector<Store::HeldOut> held_out;
   while (read.Next()) {
     auto information = ReadInformation(read);

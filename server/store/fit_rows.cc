@@ -8,6 +8,11 @@
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
+
+// As in kFits.
+static_assert(static_cast<int>(AbsenceCause::kDoesNotFit) == 8 &&
+              static_cast<int>(AbsenceCause::kManyOutliers) == 9);
+
 namespace {
 
 absl::StatusOr<std::vector<double>> ReadFits(Statement* read) {

@@ -7,7 +7,7 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
+#include <string_view>
 
 #include "core/information/segment_information.h"
 #include "server/store/statement.h"
@@ -22,6 +22,14 @@ absl::StatusOr<std::optional<double>> ReadLargestFit(Connection* db,
 absl::Status RemoveMisfits(Connection* db,
                            std::int64_t rig,
                            std::optional<double> largest_fit);
+
+// Condition on a row `s` of segments: the segment was not kept out of the
+// tables, or taken out of them, for how badly it fits. One that was is evidence
+// for nothing: it is not remembered, tests no candidate, and shows no change of
+// the device.
+inline constexpr std::string_view kFits =
+    "NOT EXISTS (SELECT 1 FROM table_absences a "
+    "  WHERE a.segment = s.segment AND a.cause IN (8, 9))";
 
 // False for a segment that the tables shall not be offered, of which is then
 // written down why no table holds it: it does not fit, or had many outliers.

@@ -1,11 +1,14 @@
 #include "server/store/segment_ends.h"
 
+#include <fmt/format.h>
+
 #include <optional>
 #include <utility>
 
 #include "proto/convert.h"
 #include "server/store/change_rows.h"
 #include "server/store/checksum.h"
+#include "server/store/fit_rows.h"
 #include "server/store/record_parts.h"
 #include "server/store/records.pb.h"
 #include "server/store/rigs.h"
@@ -80,23 +83,21 @@ absl::StatusOr<std::vector<RememberedSegment>> ListRememberedRows(
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun run, ReadRun(db, rig, run_number));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
                            FirstSequenceSince(db, rig, run.change));
-  // Sessions in the order in which they began. What was kept out of the tables
-  // because it does not fit is not worth remembering either.
-  Statement read(db,
-                 "SELECT s.session, s.session_index, s.fit, s.receive_time_ns, "
-                 "  e.ends, e.sha256, "
-                 "  EXISTS (SELECT 1 FROM payloads p "
-                 "    WHERE p.segment = s.segment) "
-                 "FROM segment_ends e JOIN segments s USING (segment) "
-                 "WHERE e.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
-                 "  AND NOT EXISTS (SELECT 1 FROM table_absences a "
-                 "    WHERE a.segment = s.segment AND a.cause IN (?3, ?4)) "
-                 "ORDER BY min(s.sequence) OVER (PARTITION BY s.session), "
-                 "  s.session_index",
-                 rig_id,
-                 first_sequence,
-                 static_cast<int>(AbsenceCause::kDoesNotFit),
-                 static_cast<int>(AbsenceCause::kManyOutliers));
+  // Sessions in the order in which they began.
+  Statement read(
+      db,
+      fmt::format("SELECT s.session, s.session_index, s.fit, "
+                  "  s.receive_time_ns, e.ends, e.sha256, "
+                  "  EXISTS (SELECT 1 FROM payloads p "
+                  "    WHERE p.segment = s.segment) "
+                  "FROM segment_ends e JOIN segments s USING (segment) "
+                  "WHERE e.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
+                  "  AND {} "
+                  "ORDER BY min(s.sequence) OVER (PARTITION BY s.session), "
+                  "  s.session_index",
+                  kFits),
+      rig_id,
+      first_sequence);
   std::vector<RememberedSegment> remembered;
   while (read.Next()) {
     RememberedSegment one;

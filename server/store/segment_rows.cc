@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "server/store/clock.h"
+#include "server/store/fit_rows.h"
 #include "server/store/quotas.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_path.h"
@@ -173,22 +174,26 @@ absl::Status WriteProblem(Connection* db,
 absl::Status DropUnreferencedPayloads(Connection* db, std::int64_t rig) {
   return Statement(
              db,
-             "DELETE FROM payloads WHERE rig = ?1 "
-             "AND NOT EXISTS (SELECT 1 FROM segments s "
-             "  WHERE s.segment = payloads.segment AND s.state = 1) "
-             "AND NOT EXISTS (SELECT 1 FROM table_entries e "
-             "  WHERE e.segment = payloads.segment) "
-             "AND NOT EXISTS (SELECT 1 FROM run_segments x "
-             "  JOIN runs r ON r.rig = x.rig AND r.run = x.run "
-             "  WHERE x.segment = payloads.segment AND r.state IN (1, 2)) "
-             "AND segment NOT IN (SELECT s.segment "
-             "  FROM payloads p JOIN segments s USING (segment) "
-             "  WHERE p.rig = ?1 AND s.state = 2 "
-             "  AND s.sequence >= (SELECT coalesce(max(c.first_sequence), 0) "
-             "    FROM changes c WHERE c.rig = ?1) "
-             "  AND NOT EXISTS (SELECT 1 FROM table_entries e "
-             "    WHERE e.segment = s.segment) "
-             "  ORDER BY s.sequence DESC LIMIT ?2)",
+             fmt::format(
+                 "DELETE FROM payloads WHERE rig = ?1 "
+                 "AND NOT EXISTS (SELECT 1 FROM segments s "
+                 "  WHERE s.segment = payloads.segment AND s.state = 1) "
+                 "AND NOT EXISTS (SELECT 1 FROM table_entries e "
+                 "  WHERE e.segment = payloads.segment) "
+                 "AND NOT EXISTS (SELECT 1 FROM run_segments x "
+                 "  JOIN runs r ON r.rig = x.rig AND r.run = x.run "
+                 "  WHERE x.segment = payloads.segment AND r.state IN (1, 2)) "
+                 "AND segment NOT IN (SELECT s.segment "
+                 "  FROM payloads p JOIN segments s USING (segment) "
+                 "  WHERE p.rig = ?1 AND s.state = 2 "
+                 "  AND s.sequence >= (SELECT coalesce(max(c.first_sequence), "
+                 "0) "
+                 "    FROM changes c WHERE c.rig = ?1) "
+                 "  AND {} "
+                 "  AND NOT EXISTS (SELECT 1 FROM table_entries e "
+                 "    WHERE e.segment = s.segment) "
+                 "  ORDER BY s.sequence DESC LIMIT ?2)",
+                 kFits),
              rig,
              Store::kReserve)
       .Run();

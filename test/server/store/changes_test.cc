@@ -34,10 +34,11 @@ class ChangesTest : public StoreTest {
   }
 
   // Puts and scores the next segment of a device that is off by `offset`.
-  ScoreCommit Next(const Eigen::VectorXd& offset) {
+  ScoreCommit Next(const Eigen::VectorXd& offset, double fit = 1) {
     Put("a", next_);
     SegmentInformation information =
         random_.Segment(rig_, rig_.factory, offset);
+    information.residuals.fit = fit;
     information.groups = ScoreGroups(rig_, information.Lambda);
     const auto commit = store_->CommitScore("a", {"s", next_++}, information);
     EXPECT_TRUE(commit.ok()) << commit.status();
@@ -101,6 +102,11 @@ TEST_P(ChangesTest, WithoutOneNothingHappens) {
     EXPECT_FALSE(Next(zero_).change) << "segment " << i;
   }
   EXPECT_TRUE(absl::IsNotFound(store_->GetChange("a", 1).status()));
+}
+
+TEST_P(ChangesTest, SegmentsThatDoNotFitShowNone) {
+  Many(6, zero_);
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(Next(turned_, 2).change) << i;
 }
 
 TEST_P(ChangesTest, SegmentsFromBeforeLeaveTheTables) {

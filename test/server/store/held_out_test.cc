@@ -77,6 +77,16 @@ TEST_P(HeldOutRowsTest, WhatIsUnusableIsNotKept) {
   EXPECT_THAT(HeldOut(5), ElementsAre());
 }
 
+TEST_P(HeldOutRowsTest, WhatDoesNotFitIsNotKept) {
+  Outside(2, 3);
+  Put("a", 5);
+  SegmentInformation misfit = FakeInformation(rig_, 50.0);
+  misfit.residuals.many_outliers = true;
+  ASSERT_TRUE(store_->CommitScore("a", {"s", 5}, misfit).ok());
+  EXPECT_FALSE(HasData("a", 5));
+  EXPECT_THAT(HeldOut(5), ElementsAre(4, 3, 2));
+}
+
 SELFCAL_STORE_TEST_SUITE(HeldOutRowsTest);
 
 }  // namespace
