@@ -144,10 +144,9 @@ CalibrationResult CalibrateOnWhatAgrees(
     run = RunCalibration(rig, theta_start, selection.used(), options, counted);
     run.result.iterations += iterations;
     iterations = run.result.iterations;
-    if (round == kMaxRounds ||
-        run.result.status != CalibrateStatus::kConverged) {
-      break;
-    }
+    if (round == kMaxRounds) break;
+    // Segments that contradict the rest may be why it did not converge; there
+    // is no evidence where it was cancelled or failed.
     const std::vector<Contradiction> contradictions =
         FindContradictions(run.evidence);
     if (contradictions.empty()) break;

@@ -126,6 +126,23 @@ TEST(Contradictions, ASegmentOfAnotherDevice) {
   ExpectOnlyTheWrongOneIsLeftOut(session, "contradicts");
 }
 
+TEST(Contradictions, AreFoundWhereTheyKeepItFromConverging) {
+  Session session = Simulated(4);
+  session.segments[kWrong] = Simulated(4, 77).segments[kWrong];
+  CalibrateOptions options;
+  options.max_iterations = 8;
+  options.leave_out_contradictions = false;
+  const CalibrationResult with_it =
+      Calibrate(session.rig, session.rig.factory, session.segments, options);
+  ASSERT_EQ(with_it.status, CalibrateStatus::kNotConverged);
+  options.leave_out_contradictions = true;
+  const CalibrationResult without_it =
+      Calibrate(session.rig, session.rig.factory, session.segments, options);
+  EXPECT_EQ(without_it.status, CalibrateStatus::kConverged);
+  EXPECT_EQ(without_it.segments, kSegments - 1);
+  EXPECT_NE(without_it.segment_fits[kWrong].excluded, "");
+}
+
 TEST(Contradictions, ASceneThatMoves) {
   Session session = Simulated(5);
   session.segments[kWrong] = Simulated(5, 0, 0.9).segments[kWrong];
