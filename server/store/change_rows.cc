@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/change/isolated.h"
 #include "server/store/absences.h"
 #include "server/store/calibrations.h"
 #include "server/store/checksum.h"
@@ -34,7 +35,7 @@ absl::StatusOr<SegmentInformation> ReadInformation(const Statement& row) {
 }
 
 // The newest segments that can be tested, oldest first: `count` of twice as
-// many.
+// many, but for those that are isolated (core/change/isolated.h).
 struct Newest {
   std::vector<OffsetInformation> segments;
   std::vector<std::int64_t> sequences;
@@ -73,6 +74,12 @@ absl::StatusOr<Newest> ReadNewest(Connection* db,
   SELFCAL_RETURN_IF_ERROR(read.status());
   std::reverse(newest.segments.begin(), newest.segments.end());
   std::reverse(newest.sequences.begin(), newest.sequences.end());
+  std::vector<int> isolated = FindIsolated(newest.segments);
+  std::reverse(isolated.begin(), isolated.end());
+  for (const int i : isolated) {
+    newest.segments.erase(newest.segments.begin() + i);
+    newest.sequences.erase(newest.sequences.begin() + i);
+  }
   return newest;
 }
 

@@ -104,6 +104,13 @@ TEST_P(ChangesTest, WithoutOneNothingHappens) {
   EXPECT_TRUE(absl::IsNotFound(store_->GetChange("a", 1).status()));
 }
 
+TEST_P(ChangesTest, SegmentsOfOtherDevicesShowNone) {
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::VectorXd other = 40 * random_.Direction(rig_);
+    EXPECT_FALSE(Next(i % 5 == 3 ? other : zero_).change) << i;
+  }
+}
+
 TEST_P(ChangesTest, SegmentsThatDoNotFitShowNone) {
   Many(6, zero_);
   for (int i = 0; i < 8; ++i) EXPECT_FALSE(Next(turned_, 2).change) << i;
