@@ -147,8 +147,8 @@ CalibrationResult CalibrateOnWhatAgrees(
     if (round == kMaxRounds) break;
     // Segments that contradict the rest may be why it did not converge; there
     // is no evidence where it was cancelled or failed.
-    const std::vector<Contradiction> contradictions =
-        FindContradictions(run.evidence);
+    const std::vector<Contradiction> contradictions = FindContradictions(
+        run.evidence, run.result.status == CalibrateStatus::kConverged);
     if (contradictions.empty()) break;
     selection.LeaveOut(contradictions);
   }

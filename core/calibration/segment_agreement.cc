@@ -178,7 +178,7 @@ AgreementTest TestHalves(const std::vector<SegmentEvidence>& evidence,
 }
 
 std::vector<Contradiction> FindContradictions(
-    const std::vector<SegmentEvidence>& evidence) {
+    const std::vector<SegmentEvidence>& evidence, bool converged) {
   std::vector<Contradiction> found;
   const auto size = static_cast<int>(evidence.size());
   if (size < kLeastSegments) return found;
@@ -195,7 +195,7 @@ std::vector<Contradiction> FindContradictions(
     found.push_back({left[at], std::move(reason)});
     left.erase(left.begin() + at);
   };
-  for (int at = static_cast<int>(left.size()) - 1; at >= 0; --at) {
+  for (int at = size - 1; converged && at >= 0; --at) {
     const SegmentFit& fit = evidence[left[at]].fit;
     if (fit.inertial_ratio > kMaxRatio * std::max(1.0, inertial)) {
       leave_out(at, Percent("inertial", fit.inertial_ratio, inertial));

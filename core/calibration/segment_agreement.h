@@ -53,13 +53,15 @@ AgreementTest TestHalves(const std::vector<SegmentEvidence>& evidence,
 
 // The segments that contradict the rest, as a list of index and reason: one
 // after the other, those that fit worst, while a majority agrees. Measured by
-// what is usual for the others, since stated noise may be wrong for all.
+// what is usual for the others, since stated noise may be wrong for all. Where
+// the estimate has not converged, by their theta alone: neighbours of a segment
+// that is wrong then have large residuals as well.
 struct Contradiction {
   int segment = 0;
   std::string reason;
 };
 std::vector<Contradiction> FindContradictions(
-    const std::vector<SegmentEvidence>& evidence);
+    const std::vector<SegmentEvidence>& evidence, bool converged);
 
 // The same before anything is solved, from how well each segment fits by itself
 // (ResidualStatistics::fit; 0: not measured).

@@ -195,11 +195,24 @@ TEST(Agreement, AMinorityThatIsOffIsNamed) {
     evidence.push_back(Drawn(i == 3 || i == 7 ? 20 : 0, &random));
   }
   std::vector<int> found;
-  for (const Contradiction& one : FindContradictions(evidence)) {
+  for (const Contradiction& one : FindContradictions(evidence, true)) {
     found.push_back(one.segment);
   }
   std::sort(found.begin(), found.end());
   EXPECT_EQ(found, (std::vector<int>{3, 7}));
+}
+
+TEST(Agreement, LargeResidualsCountAtAMinimumAlone) {
+  std::mt19937 random(4);
+  std::vector<SegmentEvidence> evidence;
+  for (int i = 0; i < 10; ++i) {
+    evidence.push_back(Drawn(i == 3 ? 20 : 0, &random));
+    evidence.back().fit.inertial_ratio = i == 4 ? 4 : 1;
+  }
+  EXPECT_EQ(FindContradictions(evidence, true).size(), 2u);
+  const auto found = FindContradictions(evidence, false);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].segment, 3);
 }
 
 TEST(Misfits, AreMeasuredByWhatIsUsual) {
