@@ -141,7 +141,7 @@ TEST_F(SegmentServiceTest, ASegmentThatDoesNotFitSaysWhyNoTableHoldsIt) {
   ASSERT_EQ(read.exclusions_size(), static_cast<int>(rig.groups.size()));
   EXPECT_EQ(read.exclusions(0).group(), rig.groups[0].name);
   EXPECT_THAT(read.exclusions(0).reason(), ::testing::HasSubstr("25"));
-  EXPECT_THAT(read.exclusions(0).reason(), ::testing::HasSubstr("4.5"));
+  EXPECT_THAT(read.exclusions(0).reason(), ::testing::HasSubstr("2.25"));
 }
 
 TEST_F(SegmentServiceTest, SegmentThatDoesNotExistIsNotFound) {
