@@ -131,6 +131,12 @@ Facts Describe(const v1::Segment& segment) {
   if (residuals.fit() > 0) {
     facts.Add("fit", fmt::format("{:.3g}", residuals.fit()));
   }
+  if (residuals.imu_gaps() > 0) {
+    facts.Add("IMU gaps",
+              fmt::format("{}, the longest {:.0f} ms",
+                          residuals.imu_gaps(),
+                          1e3 * residuals.longest_imu_gap_s()));
+  }
   facts.Add("observed directions",
             fmt::format("{} of {}", segment.rank(), segment.components()));
   return facts;

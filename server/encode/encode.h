@@ -20,10 +20,11 @@ v1::Event Encode(const StoredEvent& event);
 v1::Table Encode(const std::string& rig, const Table& table);
 
 // With an estimate for each tangent component, also as its difference from the
-// value of `factory`, and sigmas from the covariance.
+// factory's value of its rig, sigmas from the covariance, and the walk that the
+// rig states.
 v1::Calibration Encode(const StoredCalibration& calibration,
-                       const Calibration& factory);
-// The same with the factory's values of its rig.
+                       const StoredRig& rig);
+// The same with its rig.
 absl::StatusOr<v1::Calibration> Encode(Store* store,
                                        const StoredCalibration& calibration);
 

@@ -44,13 +44,16 @@ std::string StatusName(CalibrateStatus status) {
 }
 
 void FillEstimates(const StoredCalibration& calibration,
-                   const Calibration& factory,
+                   const StoredRig& rig,
                    v1::Calibration* message) {
+  const Calibration& factory = rig.rig.factory;
   const auto components = TangentComponents(calibration.theta);
   const Eigen::VectorXd values = ReadableValues(calibration.theta);
   const Eigen::MatrixXd& Sigma = calibration.covariance;
   const auto size = static_cast<Eigen::Index>(components.size());
   const bool has_covariance = Sigma.rows() == size && Sigma.cols() == size;
+  const Eigen::VectorXd walk =
+      WalkDensities(rig.rig, rig.policy.walk_densities);
   const bool has_factory = SameShape(calibration.theta, factory);
   const Eigen::VectorXd from_factory =
       has_factory ? BoxMinus(calibration.theta, factory) : Eigen::VectorXd();
@@ -60,6 +63,7 @@ void FillEstimates(const StoredCalibration& calibration,
     estimate->set_unit(components[i].unit);
     estimate->set_value(values[i]);
     if (has_factory) estimate->set_from_factory(from_factory[i]);
+    estimate->set_walk(walk[i]);
     if (!has_covariance) continue;
     estimate->set_sigma(std::sqrt(std::max(Sigma(i, i), 0.0)));
     for (Eigen::Index j = 0; j <= i; ++j) message->add_covariance(Sigma(i, j));
@@ -223,7 +227,7 @@ void FillReport(const std::string& rig,
 }
 
 v1::Calibration Encode(const StoredCalibration& calibration,
-                       const Calibration& factory) {
+                       const StoredRig& rig) {
   v1::Calibration message;
   message.set_name(ChildName(
       calibration.rig, "calibrations", std::to_string(calibration.version)));
@@ -231,7 +235,7 @@ v1::Calibration Encode(const StoredCalibration& calibration,
   message.set_state(EncodeState(calibration.state));
   SetTime(calibration.create_time_ns, message.mutable_create_time());
   *message.mutable_parameters() = ToProto(calibration.theta);
-  FillEstimates(calibration, factory, &message);
+  FillEstimates(calibration, rig, &message);
   message.mutable_reasons()->Add(calibration.reasons.begin(),
                                  calibration.reasons.end());
   if (calibration.run) {
@@ -255,7 +259,7 @@ v1::Calibration Encode(const StoredCalibration& calibration,
 absl::StatusOr<v1::Calibration> Encode(Store* store,
                                        const StoredCalibration& calibration) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(calibration.rig));
-  return Encode(calibration, rig.rig.factory);
+  return Encode(calibration, rig);
 }
 
 }  // namespace selfcal::server

@@ -50,6 +50,8 @@ void FillResiduals(const ResidualStatistics& residuals,
                                        residuals.inertial_rms.end());
   message->set_many_outliers(residuals.many_outliers);
   message->set_fit(residuals.fit);
+  message->set_imu_gaps(residuals.imu_gaps);
+  message->set_longest_imu_gap_s(residuals.longest_imu_gap_s);
 }
 
 std::string ReasonText(const TableAbsence& absence) {

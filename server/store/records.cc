@@ -32,6 +32,8 @@ void PutResiduals(const ResidualStatistics& residuals,
   }
   message->set_many_outliers(residuals.many_outliers);
   message->set_fit(residuals.fit);
+  message->set_imu_gaps(residuals.imu_gaps);
+  message->set_longest_imu_gap_s(residuals.longest_imu_gap_s);
 }
 
 ResidualStatistics GetResiduals(const v1::ResidualStatistics& message) {
@@ -48,6 +50,8 @@ ResidualStatistics GetResiduals(const v1::ResidualStatistics& message) {
                                 message.inertial_rms().end());
   residuals.many_outliers = message.many_outliers();
   residuals.fit = message.fit();
+  residuals.imu_gaps = message.imu_gaps();
+  residuals.longest_imu_gap_s = message.longest_imu_gap_s();
   return residuals;
 }
 

@@ -55,7 +55,7 @@ TEST_F(ApiTest, ValuesAreThoseOfTheContract) {
     EXPECT_EQ(Parsed<v1::Calibration>(
                   Get("/api/v1/rigs/r/calibrations/" + std::string(path)))
                   .SerializeAsString(),
-              Encode(active, rig.factory).SerializeAsString());
+              Encode(active, *store_->GetRig("r")).SerializeAsString());
   }
   v1::Segment segment = Encode(*store_->GetSegment("r", {"s", 0}));
   EXPECT_EQ(Parsed<v1::Segment>(Get("/api/v1/rigs/r/segments/s~0"))

@@ -298,7 +298,7 @@ TEST_F(CalibrationServiceTest, RotationsAreToldFromTheFactorys) {
     StoredCalibration version;
     version.rig = rig.id;
     version.theta = theta;
-    const v1::Calibration encoded = Encode(version, rig.factory);
+    const v1::Calibration encoded = Encode(version, StoredRig{rig});
     for (const auto& one : encoded.estimates()) {
       if (one.component() == "cam0.q_CI.x") return one;
     }
@@ -312,6 +312,25 @@ TEST_F(CalibrationServiceTest, RotationsAreToldFromTheFactorys) {
   EXPECT_GT(std::abs(after.value() - before.value()), 6);
   EXPECT_NEAR(before.from_factory(), 0, 1e-12);
   EXPECT_NEAR(after.from_factory(), 0.003, 1e-9);
+}
+
+TEST_F(CalibrationServiceTest, SigmasComeWithTheWalkOfTheRig) {
+  StoredRig rig{TestRig("old")};
+  rig.policy.walk_densities = {{"cam0.focal.x", 0.3}};
+  StoredCalibration version;
+  version.rig = "old";
+  version.theta = rig.rig.factory;
+  int stated = 0;
+  const v1::Calibration encoded = Encode(version, rig);
+  for (const auto& estimate : encoded.estimates()) {
+    if (estimate.component() == "cam0.focal.x") {
+      EXPECT_EQ(estimate.walk(), 0.3);
+      ++stated;
+    } else {
+      EXPECT_NE(estimate.walk(), 0.3) << estimate.component();
+    }
+  }
+  EXPECT_EQ(stated, 1);
 }
 
 TEST_F(CalibrationServiceTest, VersionsAreCompared) {

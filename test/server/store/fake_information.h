@@ -39,6 +39,8 @@ inline SegmentInformation FakeInformation(const Rig& rig,
   information.residuals.observations = 100;
   information.residuals.inliers = 90;
   information.residuals.reprojection_rms_px = std::abs(normal(random));
+  information.residuals.imu_gaps = 2;
+  information.residuals.longest_imu_gap_s = 0.25;
   information.residuals.inertial_rms = {0.1, 0.2, 0.3, 0.4, 1.0 / 3};
   return information;
 }
