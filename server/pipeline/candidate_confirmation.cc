@@ -2,6 +2,9 @@
 // segments that it was not calibrated on.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "server/pipeline/candidate_checks.h"
 
 namespace selfcal::server {
@@ -37,12 +40,20 @@ void CheckHalves(const CheckContext& context,
   AddResult("halves", halves.probability, limit, failure, checks);
 }
 
+// The variance over its expectation that noise exceeds once in a thousand times
+// (Wilson and Hilferty's approximation of the chi-square distribution).
+double LargestByChance(int degrees) {
+  constexpr double kSigmas = 3.09;  // of a normal distribution, one-sided
+  if (degrees == 0) return 0;
+  const double variance = 2 / (9.0 * degrees);
+  return std::pow(1 - variance + kSigmas * std::sqrt(variance), 3);
+}
+
 // Of the tests of each segment against all others. Where the squares exceed
 // their expectation by as much, errors are not those of noise, and what is
 // common to all segments cannot be told from it.
 void CheckDisagreement(const CheckContext& context,
                        std::vector<ValidationCheck>* checks) {
-  const double limit = context.limits.max_disagreement;
   double squares = 0;
   int degrees = 0;
   for (const SegmentFit& fit : context.result.segment_fits) {
@@ -50,6 +61,8 @@ void CheckDisagreement(const CheckContext& context,
     squares += fit.others.statistic;
     degrees += fit.others.degrees;
   }
+  const double limit =
+      std::max(context.limits.max_disagreement, LargestByChance(degrees));
   if (degrees < kLeastDegrees) {
     AddNotTested("disagreement",
                  limit,
@@ -62,7 +75,7 @@ void CheckDisagreement(const CheckContext& context,
   if (!(excess <= limit)) {
     failure = fmt::format(
         "The segments contradict one another by {:.2f} times the variance that "
-        "noise explains, over {} degrees; at most {:.1f} is noise. Something "
+        "noise explains, over {} degrees; at most {:.2f} is noise. Something "
         "that is not modelled acts on all of them: look at the stamps, at lost "
         "samples, at the camera model and at the noise that is stated.",
         excess,

@@ -245,6 +245,24 @@ TEST_F(CandidateTest, HalvesMustAgree) {
   EXPECT_THAT(Problem("halves"), AllOf(HasSubstr("83"), HasSubstr("9.0e-08")));
 }
 
+// Of eight segments: what is too much depends on how much was compared.
+TEST_F(CandidateTest, SegmentsMustAgreeAsFarAsNoiseAllows) {
+  const auto compare = [&](int degrees, double excess) {
+    for (SegmentFit& fit : result_.segment_fits) {
+      fit.others = {excess * degrees, degrees, 0.5};
+    }
+    return OutcomeOf("disagreement");
+  };
+  EXPECT_EQ(compare(4, 9), CheckOutcome::kNotTested);
+  EXPECT_EQ(compare(8, 1.55), CheckOutcome::kPassed);  // 64: up to 1.63
+  EXPECT_EQ(compare(8, 1.7), CheckOutcome::kFailed);
+  EXPECT_EQ(compare(26, 1.32), CheckOutcome::kPassed);  // 208: up to 1.33
+  EXPECT_EQ(compare(26, 1.4), CheckOutcome::kFailed);
+  EXPECT_EQ(compare(200, 1.29), CheckOutcome::kPassed);
+  EXPECT_EQ(compare(200, 1.31), CheckOutcome::kFailed);
+  EXPECT_THAT(Problem("disagreement"), HasSubstr("1.31 times the variance"));
+}
+
 TEST_F(CandidateTest, WithoutAnyTestOfOtherDataItIsNotConfirmed) {
   result_.halves = {};
   EXPECT_EQ(OutcomeOf("halves"), CheckOutcome::kNotTested);
