@@ -12,6 +12,9 @@ namespace {
 
 using FactList = std::vector<Fact>;
 
+// A change that is less probable is not worth a line.
+constexpr double kWorthTelling = 0.1;
+
 void Add(FactList* facts, std::string name, std::string text) {
   facts->push_back({std::move(name), std::move(text)});
 }
@@ -134,6 +137,15 @@ void AddAgreement(const v1::SolverReport& solver, FactList* facts) {
   }
 }
 
+void AddChange(const v1::EvictedUse& use, FactList* facts) {
+  if (use.change_probability() < kWorthTelling) return;
+  Add(facts,
+      "device changed",
+      fmt::format("among its segments with probability {:.2g}; sigmas account "
+                  "for that",
+                  use.change_probability()));
+}
+
 void AddEvicted(const v1::EvictedUse& use, FactList* facts) {
   if (!use.unused().empty()) {
     Add(facts, "segments without data", "not used: " + use.unused());
@@ -201,6 +213,7 @@ void AddSolver(const v1::SolverReport& solver, FactList* facts) {
   }
   AddAgreement(solver, facts);
   AddEvicted(solver.evicted(), facts);
+  AddChange(solver.evicted(), facts);
 }
 
 }  // namespace

@@ -115,10 +115,14 @@ void CompleteByRemembered(const Rig& rig,
                           CalibrationRun* run) {
   if (run->evidence.empty() || options.remembered.empty()) return;
   CompletedEstimate completed =
-      FuseEvicted(rig, run->estimate, used, options.remembered, options.walk);
+      FuseEvicted(rig,
+                  run->estimate,
+                  used,
+                  options.remembered,
+                  {.walk = options.walk, .changing = options.changing});
   CalibrationResult& result = run->result;
   result.evicted = std::move(completed.use);
-  if (result.evicted.segments == 0) return;
+  if (completed.covariance.size() == 0) return;
   result.theta = std::move(completed.theta);
   result.covariance = std::move(completed.covariance);
   result.Lambda += completed.Lambda;

@@ -57,6 +57,9 @@ struct CalibrateOptions {
   // theta random-walks by these densities (D) [tangent units / sqrt(s)], so
   // that what is remembered says less the older it is. Empty: it does not.
   Eigen::VectorXd walk = {};
+  // Groups of parameters that have changed before, and may go on to
+  // (memory_split.h).
+  std::vector<std::string> changing = {};
   int merge_landmarks = 15;  // partitions that share more are merged
   SolverKind solver = SolverKind::kStructured;
   int threads = 1;  // of Ceres

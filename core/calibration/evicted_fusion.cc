@@ -1,12 +1,12 @@
 #include "core/calibration/evicted_fusion.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <deque>
+#include <iterator>
 #include <utility>
 
-#include "core/calibration/evicted_information.h"
 #include "core/calibration/memory_split.h"
+#include "core/information/segment_scorer.h"
 
 namespace selfcal {
 namespace {
@@ -18,17 +18,6 @@ constexpr double kMaxFit = 2;
 constexpr double kChance = 1e-3;
 // A difference that is more probable than this counts as chance.
 constexpr double kLikely = 0.05;
-std::string Differs(const DeviceSplit& split) {
-  char text[200];
-  std::snprintf(text,
-                sizeof text,
-                "the newest %d of all segments show another %s than those "
-                "before (probability %.1g): the device may have changed",
-                split.newer,
-                split.block.c_str(),
-                split.probability);
-  return text;
-}
 
 // Information about d, by the determined directions.
 struct Reduced {
@@ -36,22 +25,32 @@ struct Reduced {
   Eigen::VectorXd eta;     // r
 };
 
+// One with data, at the estimate: what was stored of it is of another place.
+struct OwnSegment {
+  SegmentEnds ends;
+  double fit = 1;
+};
+
 class Fusion {
  public:
   Fusion(const Rig& rig,
          const DataEstimate& estimate,
          const std::vector<const MotionSegment*>& segments,
-         const Eigen::VectorXd& walk)
+         const EvictedOptions& options)
       : rig_(rig),
         at_(estimate),
         theta_(BoxPlus(estimate.reference, estimate.d)),
         by_offset_(ThetaByOffset(estimate.reference, estimate.d)),
         basis_(TangentBasis(rig, estimate.subspace)),
-        with_data_(basis_.transpose() * estimate.Lambda * basis_) {
-    options_.walk = walk;
+        with_data_(basis_.transpose() * estimate.Lambda * basis_),
+        options_(options) {
     options_.noise_factor = estimate.noise_factor;
+    SegmentScorer scorer;
+    SegmentInformation information;
     for (const MotionSegment* segment : segments) {
-      own_.push_back(SummariseEnds(rig, theta_, *segment));
+      scorer.Score(rig, theta_, *segment, {}, &information);
+      own_.push_back(
+          {SummariseEnds(rig, theta_, *segment), information.residuals.fit});
     }
   }
 
@@ -65,17 +64,11 @@ class Fusion {
       use.unused = "most of them contradict the segments whose data is kept";
       return std::move(result_);
     }
-    // To do without what is remembered costs certainty, not to notice a small
-    // change costs honesty: a split need not be sure for that.
-    const DeviceSplit split = FindSplit(
-        rig_, theta_, at_.subspace.estimated, at_.excess, joined_, options_);
-    if (split.probability < kRareSplit) use.split = split;
-    if (evicted == 0) return std::move(result_);
-    if (use.split) {
-      use.unused = Differs(split);
-    } else {
-      Add();
-    }
+    const SplitFindings found = FindSplit(
+        rig_, theta_, at_.subspace.estimated, at_.excess, Near(), options_);
+    if (found.split.probability < kRareSplit) use.split = found.split;
+    if (evicted > 0) Add();
+    if (found.doubt) AddDoubt(*found.doubt);
     return std::move(result_);
   }
 
@@ -84,11 +77,11 @@ class Fusion {
   void Join(const std::vector<RememberedSegment>& remembered) {
     for (const RememberedSegment& one : remembered) {
       const auto own =
-          std::find_if(own_.begin(), own_.end(), [&](const auto& ends) {
-            return ends.key == one.key;
+          std::find_if(own_.begin(), own_.end(), [&](const auto& segment) {
+            return segment.ends.key == one.key;
           });
       if (own != own_.end()) {
-        joined_.push_back({&*own, true, one.fit, one.time_ns});
+        joined_.push_back({&own->ends, true, own->fit, one.time_ns});
       } else if (one.ends && one.fit <= kMaxFit) {
         joined_.push_back({&*one.ends, false, one.fit, one.time_ns});
       }
@@ -99,6 +92,17 @@ class Fusion {
     return std::count_if(joined_.begin(), joined_.end(), [](const auto& one) {
       return !one.calibrated_on;
     });
+  }
+
+  std::vector<JoinedSegment> Near() const {
+    std::vector<JoinedSegment> near;
+    std::copy_if(joined_.begin(),
+                 joined_.end(),
+                 std::back_inserter(near),
+                 [&](const JoinedSegment& one) {
+                   return !IsTooFar(rig_, *one.ends, theta_);
+                 });
+    return near;
   }
 
   Eigen::MatrixXd Covariance(const Eigen::MatrixXd& Lambda) const {
@@ -168,6 +172,20 @@ class Fusion {
     result_.Lambda = weight * evicted.information.Lambda;
   }
 
+  // That the device may have changed.
+  void AddDoubt(const ChangeDoubt& doubt) {
+    if (result_.use.segments == 0) {
+      result_.theta = theta_;
+      result_.covariance = Covariance(at_.Lambda);
+      result_.Lambda =
+          Eigen::MatrixXd::Zero(at_.Lambda.rows(), at_.Lambda.cols());
+    }
+    result_.theta = BoxPlus(result_.theta, doubt.step);
+    result_.covariance += doubt.covariance;
+    result_.use.change_probability = doubt.probability;
+    result_.use.change_sigmas = doubt.covariance.diagonal().cwiseSqrt();
+  }
+
   const Rig& rig_;
   const DataEstimate& at_;
   const Calibration theta_;
@@ -175,7 +193,7 @@ class Fusion {
   const Eigen::MatrixXd basis_;
   const Eigen::MatrixXd with_data_;
   EvictedOptions options_;
-  std::deque<SegmentEnds> own_;
+  std::deque<OwnSegment> own_;
   std::vector<JoinedSegment> joined_;
   CompletedEstimate result_;
 };
@@ -186,8 +204,8 @@ CompletedEstimate FuseEvicted(const Rig& rig,
                               const DataEstimate& estimate,
                               const std::vector<const MotionSegment*>& segments,
                               const std::vector<RememberedSegment>& remembered,
-                              const Eigen::VectorXd& walk) {
-  return Fusion(rig, estimate, segments, walk).Run(remembered);
+                              const EvictedOptions& options) {
+  return Fusion(rig, estimate, segments, options).Run(remembered);
 }
 
 }  // namespace selfcal

@@ -14,6 +14,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "core/calibration/evicted_information.h"
 #include "core/calibration/remembered_segment.h"
 #include "core/calibration/subspace.h"
 #include "core/model/calibration.h"
@@ -38,7 +39,7 @@ struct DataEstimate {
   double noise_factor = 1;
 };
 
-// Where no segment is used, nothing but `use` is set.
+// Where nothing is added to the estimate from data, nothing but `use` is set.
 struct CompletedEstimate {
   Calibration theta;
   Eigen::MatrixXd covariance;  // D x D, tangent at theta
@@ -49,16 +50,17 @@ struct CompletedEstimate {
 
 // `segments` are those with data that the estimate stands on; `remembered`
 // come in the order of time, each session in one run: of these, those that
-// have no ends and are not in `segments` are passed over. `walk`: as
-// EvictedOptions. `rig` states its noise, with which the ends were computed.
-// Nothing is added, and `use.unused` says why, where most of them, or all
-// together, contradict the estimate, or were linearised too far from it, or
-// where the newest of all segments differ from those before (memory_split.h):
-// that is told also where none is without data.
+// have no ends and are not in `segments` are passed over. `options`
+// say nothing about noise: `estimate` does. `rig` states its noise, with which
+// the ends were computed. None is used, and `use.unused` says why, where most
+// of them, or all together, contradict the estimate, or were linearised too far
+// from it. Whether the newest of all segments differ from those before
+// (memory_split.h) is told, and the result accounts for what is left open, also
+// where none is without data.
 CompletedEstimate FuseEvicted(const Rig& rig,
                               const DataEstimate& estimate,
                               const std::vector<const MotionSegment*>& segments,
                               const std::vector<RememberedSegment>& remembered,
-                              const Eigen::VectorXd& walk);
+                              const EvictedOptions& options);
 
 }  // namespace selfcal

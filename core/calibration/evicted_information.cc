@@ -18,6 +18,17 @@ double Reach(const Rig& rig, const Calibration& from, const Calibration& to) {
   return std::sqrt(offset.squaredNorm() / static_cast<double>(free.size()));
 }
 
+// Within a session by its own clock. Between sessions in whole seconds: they
+// share no clock that is better.
+double SecondsBetween(const JoinedSegment& a, const JoinedSegment& b) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  if (a.ends->key.session == b.ends->key.session) {
+    return static_cast<double>(b.ends->first.t_ns - a.ends->first.t_ns) /
+           static_cast<double>(kSecond);
+  }
+  return static_cast<double>((b.time_ns - a.time_ns) / kSecond);
+}
+
 // A chain that ages between its segments.
 class AgeingChain {
  public:
@@ -26,13 +37,12 @@ class AgeingChain {
               const Eigen::VectorXd& walk)
       : chain_(rig, point), variance_per_s_(walk.cwiseAbs2()) {}
 
-  void AgeTo(std::int64_t t_ns) {
-    const double dt_s = static_cast<double>(t_ns - t_ns_) * 1e-9;
-    if (begun_ && dt_s > 0 && variance_per_s_.size() > 0) {
+  void AgeTo(const JoinedSegment& segment) {
+    const double dt_s = last_ ? SecondsBetween(*last_, segment) : 0;
+    if (dt_s > 0 && variance_per_s_.size() > 0) {
       chain_.Age(dt_s * variance_per_s_);
     }
-    begun_ = true;
-    t_ns_ = t_ns;
+    last_ = segment;
   }
   void Add(const SegmentEnds& segment, double weight) {
     chain_.Add(segment, weight);
@@ -42,8 +52,7 @@ class AgeingChain {
  private:
   SessionChain chain_;
   const Eigen::VectorXd variance_per_s_;
-  std::int64_t t_ns_ = 0;
-  bool begun_ = false;
+  std::optional<JoinedSegment> last_;
 };
 
 // The weights of segments in the order in which they are asked for.
@@ -95,6 +104,12 @@ class SegmentWeights {
 
 }  // namespace
 
+bool IsTooFar(const Rig& rig,
+              const SegmentEnds& ends,
+              const Calibration& point) {
+  return !(Reach(rig, ends.theta0, point) <= kMaxReach);
+}
+
 double ReachWeight(int k, double reach) {
   const double loss = 1 + kReachError * k * std::pow(reach, 4);
   return 1 / (loss * loss);
@@ -112,8 +127,8 @@ EvictedInformation InformationOfEvicted(const Rig& rig,
                                              ? weights.OfCalibrated(segment)
                                              : weights.Next(segment);
     if (!weight) continue;
-    all.AgeTo(segment.time_ns);
-    with_data.AgeTo(segment.time_ns);
+    all.AgeTo(segment);
+    with_data.AgeTo(segment);
     all.Add(*segment.ends, *weight);
     if (segment.calibrated_on) with_data.Add(*segment.ends, *weight);
   }
@@ -137,7 +152,7 @@ ThetaInformation InformationOfAll(const Rig& rig,
   for (const JoinedSegment& segment : segments) {
     const std::optional<double> weight = weights.Next(segment);
     if (!weight) continue;
-    all.AgeTo(segment.time_ns);
+    all.AgeTo(segment);
     all.Add(*segment.ends, *weight);
   }
   return all.Theta();

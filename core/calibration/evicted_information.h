@@ -17,6 +17,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "core/information/fusion.h"
 #include "core/information/segment_ends.h"
@@ -35,7 +37,7 @@ struct JoinedSegment {
   // noise counts as so many times larger. At most 1: as expected, or not
   // measured.
   double fit = 1;
-  // When it was recorded, by a clock that all sessions share: for the walk.
+  // When it was received: for the walk between sessions.
   std::int64_t time_ns = 0;
 };
 
@@ -45,11 +47,16 @@ struct EvictedOptions {
   Eigen::VectorXd walk = {};
   // The noise is so many times what the rig states, as the calibration found.
   double noise_factor = 1;
+  // Groups of parameters that have changed before, and may go on to.
+  std::vector<std::string> changing = {};
 };
 
 // A segment that was linearised further than this from the point, rms over the
 // free components in reference sigmas, is left out.
 inline constexpr double kMaxReach = 2.0;
+bool IsTooFar(const Rig& rig,
+              const SegmentEnds& ends,
+              const Calibration& point);
 
 struct EvictedInformation {
   ThetaInformation information;  // about theta [-] point

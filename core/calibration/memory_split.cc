@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/change/change_mixture.h"
+#include "core/change/concerned.h"
 #include "core/change/course.h"
 #include "core/change/group_concern.h"
 #include "core/change/parameter_blocks.h"
@@ -19,6 +21,11 @@ constexpr int kShortestRamp = 3;  // parts
 constexpr double kDrifted = 2.0 / 3;
 // A group is concerned where its test is less probable than this.
 constexpr double kConcerned = 0.01;
+// That a device changed while its segments were recorded, before they are
+// looked at.
+constexpr double kChanged = 0.5;
+// That a group goes on to change.
+constexpr double kGoesOn = 0.5;
 
 // Joined segments of one session, by index.
 struct Part {
@@ -30,9 +37,8 @@ struct Part {
 struct Trial {
   ChangeKind kind = ChangeKind::kSudden;
   Eigen::VectorXd weights;  // by part
-  // As many tests as it counts for: the smallest of all probabilities times
-  // this is rarely small by chance.
-  double tests = 1;
+  // Of what may be found by chance, and of what is thought likely.
+  double share = 1;
 };
 
 // The size of the next longer course to try.
@@ -61,8 +67,7 @@ std::vector<Part> Cut(std::span<const JoinedSegment> segments) {
 }
 
 std::vector<Trial> Trials(std::span<const JoinedSegment> segments,
-                          const std::vector<Part>& parts,
-                          std::size_t blocks) {
+                          const std::vector<Part>& parts) {
   const auto count = static_cast<int>(parts.size());
   const auto total = static_cast<int>(segments.size());
   const auto is_step = [&](int newest) {
@@ -85,7 +90,7 @@ std::vector<Trial> Trials(std::span<const JoinedSegment> segments,
   std::vector<Trial> trials;
   const auto add = [&](std::vector<Trial>& some, double share) {
     for (Trial& trial : some) {
-      trial.tests = static_cast<double>(some.size() * blocks) / share;
+      trial.share = share / static_cast<double>(some.size());
       trials.push_back(std::move(trial));
     }
   };
@@ -119,16 +124,22 @@ class SplitSearch {
     }
   }
 
-  DeviceSplit Run() const {
-    DeviceSplit best;
-    const std::vector<Trial> trials = Trials(segments_, parts_, blocks_.size());
+  SplitFindings Run() const {
+    SplitFindings findings;
+    DeviceSplit& best = findings.split;
+    const std::vector<Trial> trials = Trials(segments_, parts_);
+    if (trials.empty() || onto_.rows() == 0) return findings;
     const Trial* trial = nullptr;
     const ParameterBlock* block = nullptr;
+    ChangeMixture mixture;
+    const double others = AddGoingOn(&mixture);
     for (const Trial& tried : trials) {
-      const OffsetInformation change = Change(shown_, tried.weights);
+      const Seen seen = SeenOf(tried.weights);
       for (const ParameterBlock& one : blocks_) {
+        const double share = tried.share * one.share;
+        AddTo(&mixture, seen, one, others * share);
         const double probability =
-            tried.tests * TestSpan(change, one.basis).probability;
+            TestSpan(seen.change, one.basis).probability / share;
         if (probability < best.probability) {
           best.probability = probability;
           trial = &tried;
@@ -136,7 +147,8 @@ class SplitSearch {
         }
       }
     }
-    if (trial == nullptr) return best;
+    findings.doubt = mixture.Doubt();
+    if (trial == nullptr) return findings;
     best.kind = trial->kind;
     best.block = block->name;
     const int first = FirstSince(trial->weights);
@@ -147,7 +159,7 @@ class SplitSearch {
       best.concerned = ConcernedNames(FindConcerned(
           GroupBlocks(rig_), Change(shown_, trial->weights), kConcerned));
     }
-    return best;
+    return findings;
   }
 
  private:
@@ -159,6 +171,65 @@ class SplitSearch {
         onto_ * information.Lambda(free_, free_) * onto_.transpose();
     return {directions_ * Lambda * directions_.transpose() / excess_,
             directions_ * (onto_ * information.eta(free_)) / excess_};
+  }
+
+  // What the parts show of a change of some course, and what it makes theta now
+  // (in tangent units).
+  struct Seen {
+    OffsetInformation change;
+    Eigen::MatrixXd by_change;
+  };
+  Seen SeenOf(const Eigen::VectorXd& weights) const {
+    const Course course = MakeCourse(shown_, weights, prior_);
+    return {course.Change(), OntoTangent(course.OffsetByChange(1))};
+  }
+  static void AddTo(ChangeMixture* mixture,
+                    const Seen& seen,
+                    const ParameterBlock& block,
+                    double prior) {
+    mixture->Add(block.basis.transpose() * seen.change.Lambda * block.basis,
+                 block.basis.transpose() * seen.change.eta,
+                 seen.by_change * block.basis,
+                 prior);
+  }
+
+  // That groups which have changed before go on to do so, evenly over all of
+  // the segments. Returns the prior of other changes.
+  double AddGoingOn(ChangeMixture* mixture) const {
+    const auto of = BlocksOf(options_.changing);
+    if (of.empty()) return kChanged;
+    double shares = 0;
+    for (const ParameterBlock* one : of) shares += one->share;
+    const auto parts = static_cast<int>(parts_.size());
+    const Seen seen = SeenOf(RampCourse(parts, parts));
+    for (const ParameterBlock* one : of) {
+      AddTo(mixture, seen, *one, kGoesOn * one->share / shares);
+    }
+    return (1 - kGoesOn) * kChanged;
+  }
+
+  // Blocks of components that are all of the groups of these names.
+  std::vector<const ParameterBlock*> BlocksOf(
+      const std::vector<std::string>& groups) const {
+    std::vector<const ParameterBlock*> found;
+    const std::vector<int> of = ConcernedComponents(rig_, groups);
+    for (const ParameterBlock& block : blocks_) {
+      if (std::all_of(block.at.begin(), block.at.end(), [&](int k) {
+            return std::binary_search(of.begin(), of.end(), free_[k]);
+          })) {
+        found.push_back(&block);
+      }
+    }
+    return found;
+  }
+
+  // Rows of the free components in units of the prior, along the directions.
+  Eigen::MatrixXd OntoTangent(const Eigen::MatrixXd& rows) const {
+    const Eigen::VectorXd sigmas = PriorSigmas(rig_);
+    Eigen::MatrixXd tangent = Eigen::MatrixXd::Zero(sigmas.size(), rows.cols());
+    tangent(free_, Eigen::all) = sigmas(free_).asDiagonal() * directions_ *
+                                 (directions_.transpose() * rows);
+    return tangent;
   }
 
   OffsetInformation Change(const std::vector<OffsetInformation>& shown,
@@ -186,7 +257,7 @@ class SplitSearch {
             TestSpan(Change(shown, trial.weights), block.basis).probability);
       }
     }
-    return std::min(1.0, trial.tests * largest);
+    return std::min(1.0, largest / (trial.share * block.share));
   }
 
   const Rig& rig_;
@@ -205,12 +276,12 @@ class SplitSearch {
 
 }  // namespace
 
-DeviceSplit FindSplit(const Rig& rig,
-                      const Calibration& theta,
-                      const Eigen::MatrixXd& estimated,
-                      double excess,
-                      std::span<const JoinedSegment> segments,
-                      const EvictedOptions& options) {
+SplitFindings FindSplit(const Rig& rig,
+                        const Calibration& theta,
+                        const Eigen::MatrixXd& estimated,
+                        double excess,
+                        std::span<const JoinedSegment> segments,
+                        const EvictedOptions& options) {
   return SplitSearch(rig, theta, estimated, excess, segments, options).Run();
 }
 

@@ -14,14 +14,20 @@
 // may be found by chance is for steps between sessions, a quarter for other
 // steps, a quarter for ramps.
 //
+// What no test finds is not excluded by that: all courses and parameters that
+// are tried are weighed against no change at all
+// (core/change/change_mixture.h), with these shares of one prior.
+//
 // Pure, any thread, deterministic.
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 
 #include "core/calibration/evicted_information.h"
 #include "core/calibration/remembered_segment.h"
+#include "core/change/change_mixture.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 
@@ -30,16 +36,24 @@ namespace selfcal {
 // A split is looked at closer below this probability.
 inline constexpr double kRareSplit = 0.05;
 
-// The split that is least probable. Segments in the order of time, each session
-// in one run, linearised near `theta`; `estimated` are the orthonormal
-// directions in units of the prior (D x r) that data determines (subspace.h),
-// to which the test keeps. Variances are larger by `excess`. Of a split that is
-// not rare, `without_one` is 1 and no group is concerned.
-DeviceSplit FindSplit(const Rig& rig,
-                      const Calibration& theta,
-                      const Eigen::MatrixXd& estimated,
-                      double excess,
-                      std::span<const JoinedSegment> segments,
-                      const EvictedOptions& options);
+struct SplitFindings {
+  // The one that is least probable. Of one that is not rare, `without_one` is 1
+  // and no group is concerned.
+  DeviceSplit split;
+  // What all that were tried leave open about theta at the newest segment, in
+  // units of the tangent (D); nothing where none was tried.
+  std::optional<ChangeDoubt> doubt;
+};
+
+// Segments in the order of time, each session in one run, linearised near
+// `theta`; `estimated` are the orthonormal directions in units of the prior
+// (D x r) that data determines (subspace.h), to which tests and doubt keep.
+// Variances are larger by `excess`.
+SplitFindings FindSplit(const Rig& rig,
+                        const Calibration& theta,
+                        const Eigen::MatrixXd& estimated,
+                        double excess,
+                        std::span<const JoinedSegment> segments,
+                        const EvictedOptions& options);
 
 }  // namespace selfcal

@@ -2,6 +2,7 @@
 // what it makes of them (evicted_fusion.h). Values.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -19,7 +20,8 @@ struct RememberedSegment {
   SegmentKey key;
   // What it says; nothing for one that has its data.
   std::optional<SegmentEnds> ends = std::nullopt;
-  double fit = 0;  // ResidualStatistics::fit; 0: not measured
+  // ResidualStatistics::fit of one without data; 0: not measured.
+  double fit = 0;
   // When it was recorded, by a clock that all sessions share.
   std::int64_t time_ns = 0;
 };
@@ -58,6 +60,12 @@ struct EvictedUse {
   // Where the segments, with data and without, differ by more than chance
   // explains (5 %).
   std::optional<DeviceSplit> split = std::nullopt;
+  // That the device changed while they were recorded, given what they show; 0
+  // where that was not looked at. What it leaves open is in the covariance of
+  // the result: of each component, this standard deviation (D) beside what
+  // would be there without it.
+  double change_probability = 0;
+  Eigen::VectorXd change_sigmas = {};
 };
 
 }  // namespace selfcal

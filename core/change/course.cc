@@ -113,6 +113,13 @@ VectorXd Course::Offset(const VectorXd& x, double weight) const {
          weight * x;
 }
 
+MatrixXd Course::OffsetByChange(double weight) const {
+  const Sums total = Total();
+  MatrixXd by_change = -ErrorCovariance(total.L0, *root_) * total.L1;
+  by_change.diagonal().array() += weight;
+  return by_change;
+}
+
 ConsistencyTest TestSpan(const OffsetInformation& change, const MatrixXd& B) {
   const MatrixXd L = B.transpose() * change.Lambda * B;
   const VectorXd s = B.transpose() * change.eta;

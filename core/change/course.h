@@ -50,6 +50,8 @@ class Course {
   OffsetInformation Change() const;
   // The offset e + w x that all of them show of a segment of weight w, given x.
   Eigen::VectorXd Offset(const Eigen::VectorXd& x, double weight) const;
+  // Its derivative by x.
+  Eigen::MatrixXd OffsetByChange(double weight) const;
 
  private:
   // Of the segments that were linearised at one place.

@@ -24,8 +24,9 @@ struct FoundCourse {
 // Of one thread. Tester and segments must outlive it.
 class CourseSearch {
  public:
-  // A test must be less probable than `level`, with the noise by which the
-  // segments differ and whichever one of them is left out.
+  // A test must be less probable than the share of its block in `level`, with
+  // the noise by which the segments differ and whichever one of them is left
+  // out.
   CourseSearch(const ConsistencyTester& tester,
                std::span<const OffsetInformation> segments,
                double level)
@@ -40,7 +41,7 @@ class CourseSearch {
  private:
   double ProbabilityWithoutOne(const Eigen::VectorXd& weights,
                                const Course& course,
-                               const Eigen::MatrixXd& B,
+                               const ParameterBlock& block,
                                double heterogeneity);
 
   const ConsistencyTester& tester_;

@@ -121,9 +121,8 @@ std::optional<Change> DetectChange(const ConsistencyTester& tester,
                                    const ChangeOptions& options) {
   const std::span<const OffsetInformation> segments = std::span(newest).last(
       std::min(newest.size(), static_cast<std::size_t>(options.max_window)));
-  const auto tests = static_cast<double>(CountCourses(options.max_window)) *
-                     static_cast<double>(tester.blocks().size());
-  CourseSearch search(tester, segments, options.false_alarm_rate / tests);
+  const auto courses = static_cast<double>(CountCourses(options.max_window));
+  CourseSearch search(tester, segments, options.false_alarm_rate / courses);
   TryAll(tester, segments, &search);
   if (!search.best()) return std::nullopt;
   return Describe(tester, segments, *search.best(), options);

@@ -10,7 +10,8 @@
 // the segments differ from each other, if that is larger than they claim.
 //
 // Rate of false alarms: each of these tests is chi-square distributed, its
-// level the stated rate over their number. Whatever they have in common, and
+// level the stated rate over the number of courses, times the share of its
+// part of theta. Whatever they have in common, and
 // the error of the active calibration with them, the probability of an alarm at
 // one segment is thus at most the stated rate.
 //

@@ -2,12 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
+#include "core/change/change_mixture.h"
 #include "core/change/concerned.h"
 #include "core/change/course.h"
+#include "core/change/sized_change.h"
 
 namespace selfcal {
 namespace {
@@ -15,8 +16,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Sizes of a change of a group that may have gone unnoticed, in prior sigmas.
-constexpr std::array<double, 5> kSizes = {0.01, 0.03, 0.1, 0.3, 1};
+constexpr double kEvenOdds = 0.5;
 
 // What is left for others if the change is one of the components `at` as well,
 // of which nothing is known but the prior.
@@ -51,27 +51,10 @@ MatrixXd Without(const ParameterBlock& block, const std::vector<int>& at) {
 
 // E[y y^T] of a change B y that may have been, given L and s along B.
 MatrixXd SecondMoment(const MatrixXd& L, const VectorXd& s) {
-  std::vector<double> logs = {0};  // of no change at all, at even odds
-  std::vector<MatrixXd> moments = {MatrixXd::Zero(L.rows(), L.cols())};
-  const MatrixXd one = MatrixXd::Identity(L.rows(), L.cols());
-  for (const double size : kSizes) {
-    const Eigen::LLT<MatrixXd> llt(L + one / (size * size));
-    const VectorXd mean = llt.solve(s);
-    const double log_det = 2 * llt.matrixLLT().diagonal().array().log().sum() +
-                           2 * static_cast<double>(s.size()) * std::log(size);
-    logs.push_back(s.dot(mean) / 2 - log_det / 2 -
-                   std::log(static_cast<double>(kSizes.size())));
-    moments.push_back(llt.solve(one) + mean * mean.transpose());
-  }
-  const double largest = *std::max_element(logs.begin(), logs.end());
-  double total = 0;
-  MatrixXd moment = MatrixXd::Zero(L.rows(), L.cols());
-  for (std::size_t k = 0; k < logs.size(); ++k) {
-    const double weight = std::exp(logs[k] - largest);
-    total += weight;
-    moment += weight * moments[k];
-  }
-  return moment / total;
+  ChangeMixture mixture;
+  mixture.Add(L, s, MatrixXd::Identity(L.rows(), L.cols()), kEvenOdds);
+  const ChangeDoubt doubt = mixture.Doubt();
+  return doubt.covariance + doubt.step * doubt.step.transpose();
 }
 
 }  // namespace
@@ -79,12 +62,10 @@ MatrixXd SecondMoment(const MatrixXd& L, const VectorXd& s) {
 double LogEvidence(const OffsetInformation& change,
                    const MatrixXd& B,
                    double sigma) {
-  MatrixXd posterior = sigma * sigma * (B.transpose() * change.Lambda * B);
-  posterior.diagonal().array() += 1;
-  const VectorXd s = sigma * (B.transpose() * change.eta);
-  const Eigen::LLT<MatrixXd> llt(posterior);
-  return s.dot(llt.solve(s)) / 2 -
-         llt.matrixLLT().diagonal().array().log().sum();
+  return ChangeOfSize(B.transpose() * change.Lambda * B,
+                      B.transpose() * change.eta,
+                      sigma)
+      .log_evidence;
 }
 
 std::vector<GroupConcern> FindConcerned(

@@ -21,9 +21,29 @@ ParameterBlock Components(std::string name,
                           Eigen::Index free) {
   const auto count = static_cast<Eigen::Index>(at.size());
   ParameterBlock block{
-      std::move(name), Eigen::MatrixXd::Zero(free, count), std::move(at)};
+      std::move(name), Eigen::MatrixXd::Zero(free, count), std::move(at), 0};
   for (Eigen::Index k = 0; k < count; ++k) block.basis(block.at[k], k) = 1;
   return block;
+}
+
+// `stems` of the free components.
+void SetShares(const std::vector<std::string>& stems,
+               std::vector<ParameterBlock>* blocks) {
+  const auto changes_by_itself = [&](const ParameterBlock& block) {
+    return block.name.ends_with(".zoom") ||
+           std::all_of(block.at.begin(), block.at.end(), [&](int k) {
+             return stems[k].ends_with(".q_CI");
+           });
+  };
+  const auto all = static_cast<double>(blocks->size());
+  const auto likely = static_cast<double>(
+      std::count_if(blocks->begin(), blocks->end(), changes_by_itself));
+  const bool alike = likely == 0 || likely == all;
+  for (ParameterBlock& block : *blocks) {
+    block.share =
+        alike ? 1 / all
+              : 0.5 / (changes_by_itself(block) ? likely : all - likely);
+  }
 }
 
 void AddUnlessKnown(ParameterBlock block, std::vector<ParameterBlock>* blocks) {
@@ -64,9 +84,11 @@ std::vector<ParameterBlock> ParameterBlocks(const Rig& rig) {
     AddUnlessKnown(std::move(group), &blocks);
   }
   const auto components = TangentComponents(rig.factory);
+  std::vector<std::string> names;
   std::map<std::string, std::vector<int>> stems;
   for (std::size_t k = 0; k < free.size(); ++k) {
-    stems[Stem(components[free[k]].name)].push_back(static_cast<int>(k));
+    names.push_back(Stem(components[free[k]].name));
+    stems[names.back()].push_back(static_cast<int>(k));
   }
   for (auto& [stem, at] : stems) {
     AddUnlessKnown(Components(stem, at, size), &blocks);
@@ -76,7 +98,7 @@ std::vector<ParameterBlock> ParameterBlocks(const Rig& rig) {
     const auto focal = stems.find(camera + ".focal");
     if (focal == stems.end() || focal->second.size() != 2) continue;
     ParameterBlock zoom{
-        camera + ".zoom", Eigen::MatrixXd::Zero(size, 1), focal->second};
+        camera + ".zoom", Eigen::MatrixXd::Zero(size, 1), focal->second, 0};
     for (int axis = 0; axis < 2; ++axis) {
       const int k = zoom.at[axis];
       zoom.basis(k, 0) = rig.factory.cameras[c].f(axis) / prior(k);
@@ -84,6 +106,7 @@ std::vector<ParameterBlock> ParameterBlocks(const Rig& rig) {
     zoom.basis.normalize();
     AddUnlessKnown(std::move(zoom), &blocks);
   }
+  SetShares(names, &blocks);
   return blocks;
 }
 

@@ -142,6 +142,9 @@ void FillEvicted(const EvictedUse& use, v1::EvictedUse* message) {
   message->set_reach(use.reach);
   FillAgreement(use.agreement, message->mutable_agreement());
   message->set_unused(use.unused);
+  message->set_change_probability(use.change_probability);
+  message->mutable_change_sigmas()->Assign(use.change_sigmas.begin(),
+                                           use.change_sigmas.end());
 }
 
 void FillNoiseFactor(const NoiseFactor& factor, v1::NoiseFactor* message) {

@@ -1,5 +1,8 @@
 #include "server/pipeline/after_change.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "core/change/concerned.h"
 #include "core/change/group_concern.h"
 
@@ -43,6 +46,22 @@ Eigen::MatrixXd CovarianceAfter(const Rig& rig,
     after(i, i) = sigmas(i) * sigmas(i);
   }
   return after;
+}
+
+std::vector<std::string> ChangingGroups(
+    const StoredChange& newest, const std::optional<StoredChange>& earlier) {
+  if (newest.kind == ChangeKind::kDrift) return newest.groups;
+  std::vector<std::string> again;
+  if (!earlier) return again;
+  std::copy_if(newest.groups.begin(),
+               newest.groups.end(),
+               std::back_inserter(again),
+               [&](const std::string& group) {
+                 return std::count(earlier->groups.begin(),
+                                   earlier->groups.end(),
+                                   group) > 0;
+               });
+  return again;
 }
 
 }  // namespace selfcal::server

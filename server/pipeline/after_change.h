@@ -3,7 +3,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "core/calibration/theta_prior.h"
 #include "core/information/segment_information.h"
@@ -31,5 +34,10 @@ Eigen::MatrixXd CovarianceAfter(const Rig& rig,
                                 const StoredChange& change,
                                 const StoredCalibration& before,
                                 std::span<const SegmentInformation> since);
+
+// Groups of parameters that may go on to change: those of a drift, or of two
+// changes that follow each other.
+std::vector<std::string> ChangingGroups(
+    const StoredChange& newest, const std::optional<StoredChange>& earlier);
 
 }  // namespace selfcal::server

@@ -1,6 +1,7 @@
 #include "server/pipeline/run_options.h"
 
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "core/change/aged.h"
@@ -27,6 +28,12 @@ absl::StatusOr<CalibrateOptions> OptionsOfRun(Store* store,
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
                            ListInformation(store, run.rig, run.segments));
   options.prior = KnownAfter(rig.rig, change, before, since);
+  std::optional<StoredChange> earlier;
+  if (run.change > 1) {
+    SELFCAL_ASSIGN_OR_RETURN(earlier,
+                             store->GetChange(run.rig, run.change - 1));
+  }
+  options.changing = ChangingGroups(change, earlier);
   return options;
 }
 

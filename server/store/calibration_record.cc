@@ -104,15 +104,21 @@ void PutEvicted(const EvictedUse& use, v1::EvictedUse* message) {
   message->set_reach(use.reach);
   PutAgreement(use.agreement, message->mutable_agreement());
   message->set_unused(use.unused);
+  message->set_change_probability(use.change_probability);
+  PutVector(use.change_sigmas, message->mutable_change_sigmas());
 }
 
 EvictedUse GetEvicted(const v1::EvictedUse& message) {
-  return {message.segments(),
-          message.too_far(),
-          message.contradicting(),
-          message.reach(),
-          GetAgreement(message.agreement()),
-          message.unused()};
+  EvictedUse use;
+  use.segments = message.segments();
+  use.too_far = message.too_far();
+  use.contradicting = message.contradicting();
+  use.reach = message.reach();
+  use.agreement = GetAgreement(message.agreement());
+  use.unused = message.unused();
+  use.change_probability = message.change_probability();
+  use.change_sigmas = GetVector(message.change_sigmas());
+  return use;
 }
 
 void PutSplit(const DeviceSplit& split, store::DeviceSplitRecord* record) {

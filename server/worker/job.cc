@@ -26,6 +26,8 @@ void PutRemembered(const CalibrateOptions& options, worker::Options* message) {
     added->set_time_ns(one.time_ns);
   }
   PutVector(options.walk, message->mutable_walk());
+  message->mutable_changing()->Assign(options.changing.begin(),
+                                      options.changing.end());
 }
 
 void PutOptions(const CalibrateOptions& options, worker::Options* message) {
@@ -65,6 +67,8 @@ bool GetRemembered(const worker::Options& message, CalibrateOptions* options) {
     added.ends = *std::move(ends);
   }
   options->walk = GetVector(message.walk());
+  options->changing.assign(message.changing().begin(),
+                           message.changing().end());
   return true;
 }
 

@@ -95,7 +95,7 @@ double SplitProbability(const ChangeDevice& device,
                    1,
                    joined,
                    {})
-      .without_one;
+      .split.without_one;
 }
 
 Outcome Run(int index, double excitation) {

@@ -108,5 +108,15 @@ TEST(CalibrationFacts, NameSegmentsThatWereExcluded) {
               Contains(HasSubstr("25.5 with 26 degrees")));
 }
 
+TEST(CalibrationFacts, TellThatTheDeviceMayHaveChanged) {
+  v1::Calibration calibration;
+  v1::EvictedUse& use = *calibration.mutable_solver()->mutable_evicted();
+  use.set_change_probability(0.04);
+  EXPECT_THAT(Texts(calibration, "device changed"), IsEmpty());
+  use.set_change_probability(0.62);
+  EXPECT_THAT(Texts(calibration, "device changed"),
+              ElementsAre(HasSubstr("probability 0.62")));
+}
+
 }  // namespace
 }  // namespace selfcal::client

@@ -134,6 +134,12 @@ TEST_F(EvictedFusionTest, TellsThatTheDataIsOfTwoDevices) {
   EXPECT_LT(mixed.evicted.split->without_one, 1e-4);
   EXPECT_EQ(mixed.evicted.split->first, (SegmentKey{"later", 1}));
   EXPECT_EQ(mixed.evicted.unused, "");
+  // The result is that of the newer device all the same.
+  EXPECT_GT(mixed.evicted.change_probability, 0.999);
+  EXPECT_LT(LargestInSigmas(BoxMinus(mixed.theta, truth_), mixed.covariance),
+            3.5);
+  EXPECT_GT(mixed.evicted.change_sigmas(i), 0);
+  EXPECT_LT(mixed.evicted.change_sigmas(i), std::sqrt(mixed.covariance(i, i)));
 }
 
 TEST_F(EvictedFusionTest, LeavesOutWhatContradictsTheData) {

@@ -32,11 +32,13 @@ class MemorySplitTest : public ::testing::Test {
     }
   }
 
-  DeviceSplit Find() const {
+  DeviceSplit Find() const { return FindAll().split; }
+
+  SplitFindings FindAll(const EvictedOptions& options = {}) const {
     std::vector<JoinedSegment> joined;
     for (const SegmentEnds& ends : ends_) joined.push_back({.ends = &ends});
     return FindSplit(
-        rig_, rig_.factory, WholeSubspace(rig_).estimated, 1, joined, {});
+        rig_, rig_.factory, WholeSubspace(rig_).estimated, 1, joined, options);
   }
 
   Rig rig_ = HandheldRig("r");
@@ -73,6 +75,55 @@ TEST_F(MemorySplitTest, ATurnedCameraDiffersAndIsNamed) {
   EXPECT_LT(split.without_one, 1e-4);
 }
 
+// In sigmas of the prior, along the component.
+double Largest(const Eigen::VectorXd& step, const Rig& rig) {
+  return step.cwiseAbs().cwiseQuotient(PriorSigmas(rig)).maxCoeff();
+}
+
+TEST_F(MemorySplitTest, WithoutAChangeLittleIsLeftOpen) {
+  AddSession("one", rig_.factory, 1);
+  AddSession("two", rig_.factory, 101);
+  const auto doubt = FindAll().doubt;
+  ASSERT_TRUE(doubt);
+  EXPECT_LT(doubt->probability, 0.5);
+  EXPECT_LT(Largest(doubt->step, rig_), 0.01);
+}
+
+// What all segments say together lies between the two.
+TEST_F(MemorySplitTest, TheMeanFollowsATurnedCamera) {
+  const int q =
+      MatchComponents(TangentComponents(rig_.factory), {"cam0.q_CI.y"}).at(0);
+  Eigen::VectorXd turn = Eigen::VectorXd::Zero(TangentSize(rig_.factory));
+  turn(q) = 3.5e-3;
+  AddSession("one", rig_.factory, 1);
+  AddSession("two", BoxPlus(rig_.factory, turn), 101);
+  const auto doubt = FindAll().doubt;
+  ASSERT_TRUE(doubt);
+  EXPECT_GT(doubt->probability, 1 - 1e-6);
+  EXPECT_GT(doubt->step(q), 0.25 * turn(q));
+  EXPECT_LT(doubt->step(q), 0.75 * turn(q));
+}
+
+// A tenth of a pixel in all shows in no test.
+TEST_F(MemorySplitTest, WhatHasChangedIsExpectedToGoOn) {
+  Calibration zoomed = rig_.factory;
+  zoomed.cameras[0].f.array() += 0.1;
+  AddSession("one", rig_.factory, 3);
+  AddSession("two", zoomed, 103);
+  EXPECT_GT(Find().probability, 0.05);
+  const auto known = FindAll({.changing = {"camera"}}).doubt;
+  const auto unknown = FindAll().doubt;
+  ASSERT_TRUE(known && unknown);
+  EXPECT_GT(known->probability, unknown->probability);
+  const auto components = TangentComponents(rig_.factory);
+  const int focal = MatchComponents(components, {"cam0.focal.x"}).at(0);
+  EXPECT_GT(known->covariance(focal, focal),
+            1.5 * unknown->covariance(focal, focal));
+  // That of other groups is half as likely.
+  const int gyro = MatchComponents(components, {"imu.gyro.scale.x"}).at(0);
+  EXPECT_LT(known->covariance(gyro, gyro), unknown->covariance(gyro, gyro));
+}
+
 // It stands out, but not once it is left out.
 TEST_F(MemorySplitTest, OneBadSegmentIsNoSureSplit) {
   AddSession("one", rig_.factory, 1);
@@ -91,6 +142,7 @@ TEST_F(MemorySplitTest, OfFewSegmentsNothingIsTested) {
   ends_.resize(3);
   EXPECT_EQ(Find().probability, 1);
   EXPECT_EQ(Find().newer, 0);
+  EXPECT_FALSE(FindAll().doubt);
 }
 
 }  // namespace

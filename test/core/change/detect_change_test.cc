@@ -49,7 +49,7 @@ TEST_F(DetectChangeTest, AlarmsAtMostAtTheStatedRateWithoutAChange) {
   options_.false_alarm_rate = 0.05;
   int alarms = 0;
   int tests = 0;
-  for (int device = 0; device < 60; ++device) {
+  for (int device = 0; device < 200; ++device) {
     const Eigen::VectorXd error = random_.Noise(active_.covariance);
     newest_.clear();
     for (int i = 0; i < 40; ++i) {

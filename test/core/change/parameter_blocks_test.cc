@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,32 @@ TEST(ParameterBlocks, LeaveOutWhatIsFixedAndWhatIsThereAlready) {
                                               "cam0.focal",
                                               "cam0.principal",
                                               "cam0.distortion"));
+}
+
+std::map<std::string, double> Shares(const Rig& rig) {
+  std::map<std::string, double> shares;
+  for (const ParameterBlock& block : ParameterBlocks(rig)) {
+    shares[block.name] = block.share;
+  }
+  return shares;
+}
+
+TEST(ParameterBlocks, HalfIsForWhatChangesByItself) {
+  std::map<std::string, double> shares = Shares(HandheldRig("a"));
+  ASSERT_EQ(shares.size(), 15u);
+  EXPECT_DOUBLE_EQ(shares["cam0.q_CI"], 0.25);
+  EXPECT_DOUBLE_EQ(shares["cam0.zoom"], 0.25);
+  EXPECT_DOUBLE_EQ(shares["all"], 0.5 / 13);
+  EXPECT_DOUBLE_EQ(shares["imu.q_AI"], 0.5 / 13);
+  Rig rig = HandheldRig("a");
+  rig.fixed = {"cam0.*"};
+  shares = Shares(rig);
+  double sum = 0;
+  for (const auto& [name, share] : shares) {
+    EXPECT_DOUBLE_EQ(share, 1.0 / static_cast<double>(shares.size())) << name;
+    sum += share;
+  }
+  EXPECT_NEAR(sum, 1, 1e-12);
 }
 
 }  // namespace

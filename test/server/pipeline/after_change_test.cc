@@ -1,5 +1,6 @@
 #include "server/pipeline/after_change.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -58,6 +59,20 @@ TEST(AfterChange, OnlyWhatIsNotConcernedStaysKnown) {
       EXPECT_GT(prior.information(i, i), 0) << components[i].name;
     }
   }
+}
+
+TEST(AfterChange, ADriftAndWhatChangesAgainMayGoOn) {
+  StoredChange newest;
+  newest.groups = {"camera", "extrinsics"};
+  EXPECT_THAT(ChangingGroups(newest, std::nullopt), ::testing::IsEmpty());
+  StoredChange earlier;
+  earlier.kind = ChangeKind::kDrift;
+  earlier.groups = {"imu", "extrinsics"};
+  EXPECT_THAT(ChangingGroups(newest, earlier),
+              ::testing::ElementsAre("extrinsics"));
+  newest.kind = ChangeKind::kDrift;
+  EXPECT_THAT(ChangingGroups(newest, std::nullopt),
+              ::testing::ElementsAre("camera", "extrinsics"));
 }
 
 }  // namespace

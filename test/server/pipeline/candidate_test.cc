@@ -207,6 +207,17 @@ TEST_F(CandidateTest, SigmaMayNotGrowByMoreThanHalf) {
               HasSubstr(TangentComponents(rig_.factory)[5].name));
 }
 
+// The estimate knows as much as before; the device may have changed since.
+TEST_F(CandidateTest, TheChanceOfAChangeIsNoLossOfCertainty) {
+  const double before = evidence_.active.covariance(5, 5);
+  result_.covariance(5, 5) = 3 * before;
+  EXPECT_NE(Problem("sigma_growth"), "");
+  result_.evicted.change_sigmas =
+      Eigen::VectorXd::Zero(result_.covariance.rows());
+  result_.evicted.change_sigmas(5) = std::sqrt(2 * before);
+  EXPECT_THAT(Problems(), IsEmpty());
+}
+
 // A mild loss was rejected, and a total one accepted.
 TEST_F(CandidateTest, WhatWasKnownMayNotBeLost) {
   const double prior = PriorSigmas(rig_)[5];

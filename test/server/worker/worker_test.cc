@@ -110,6 +110,8 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   result.segment_fits = {{{"s", 7}, 1.5, 893, {40, 25, 0.03}, "a spike"}};
   result.halves = {30, 26, 0.25};
   result.evicted = {9, 1, 2, 0.75, {20, 24, 0.7}, "not at all"};
+  result.evicted.change_probability = 0.125;
+  result.evicted.change_sigmas = Eigen::VectorXd::LinSpaced(size, 0, 1);
   const auto decoded = DecodeResult(EncodeResult(result));
   ASSERT_TRUE(decoded.has_value());
   EXPECT_EQ(decoded->status, CalibrateStatus::kStalled);
@@ -128,6 +130,8 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   EXPECT_EQ(decoded->evicted.reach, 0.75);
   EXPECT_EQ(decoded->evicted.agreement.degrees, 24);
   EXPECT_EQ(decoded->evicted.unused, "not at all");
+  EXPECT_EQ(decoded->evicted.change_probability, 0.125);
+  EXPECT_EQ(decoded->evicted.change_sigmas, result.evicted.change_sigmas);
 }
 
 // As many cameras as a rig may have.
@@ -168,6 +172,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
       {.key = {"s", 3}, .fit = 1.25, .time_ns = 77},
       {.key = {"s", 4},
        .ends = SummariseEnds(rig_, rig_.factory, segments_[0])}};
+  options_.changing = {"camera"};
   options_.walk =
       Eigen::VectorXd::LinSpaced(TangentSize(rig_.factory), 0.1, 0.2);
   limits_ = {.idle = true, .max_memory_bytes = 123};
@@ -199,6 +204,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   EXPECT_EQ(job->options.remembered[1].ends->Lambda,
             options_.remembered[1].ends->Lambda);
   EXPECT_EQ(job->options.walk, options_.walk);
+  EXPECT_EQ(job->options.changing, options_.changing);
   EXPECT_TRUE(job->limits.idle);
   EXPECT_EQ(job->limits.max_memory_bytes, 123);
   EXPECT_FALSE(DecodeJob("not a job").has_value());
