@@ -14,6 +14,7 @@
 #include "server/store/clock.h"
 #include "server/store/events.h"
 #include "server/store/fit_rows.h"
+#include "server/store/quarantine.h"
 #include "server/store/records.h"
 #include "server/store/runs.h"
 #include "server/store/segment_ends.h"
@@ -34,11 +35,18 @@ absl::StatusOr<SegmentInformation> ReadInformation(const Statement& row) {
   return ParseInformation(bytes, kWhat);
 }
 
+struct SegmentId {
+  std::int64_t rowid = 0;
+  SegmentKey key;
+};
+
 // The newest segments that can be tested, oldest first: `count` of twice as
 // many, but for those that are isolated (core/change/isolated.h).
 struct Newest {
   std::vector<OffsetInformation> segments;
   std::vector<std::int64_t> sequences;
+  // Those between two neighbours that both contradict them.
+  std::vector<SegmentId> isolated;
 };
 
 absl::StatusOr<Newest> ReadNewest(Connection* db,
@@ -49,7 +57,8 @@ absl::StatusOr<Newest> ReadNewest(Connection* db,
                                   int count) {
   Statement read(
       db,
-      fmt::format("SELECT s.sequence, i.information, i.sha256 FROM segments "
+      fmt::format("SELECT s.sequence, i.information, i.sha256, s.segment, "
+                  "  s.session, s.session_index FROM segments "
                   "s JOIN segment_information i USING (segment) "
                   "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
                   "  AND {} "
@@ -63,20 +72,25 @@ absl::StatusOr<Newest> ReadNewest(Connection* db,
       active.version,
       2 * count);
   Newest newest;
+  std::vector<SegmentId> ids;
   while (static_cast<int>(newest.segments.size()) < count && read.Next()) {
     const auto information = ReadInformation(read);
     if (!information.ok() || !tester.Accepts(*information)) {
       continue;
     }
     newest.sequences.push_back(read.Int(0));
+    ids.push_back({read.Int(3), {read.Text(4), read.Int(5)}});
     newest.segments.push_back(tester.Offset(*information));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   std::reverse(newest.segments.begin(), newest.segments.end());
   std::reverse(newest.sequences.begin(), newest.sequences.end());
+  std::reverse(ids.begin(), ids.end());
   std::vector<int> isolated = FindIsolated(newest.segments);
   std::reverse(isolated.begin(), isolated.end());
+  const auto last = static_cast<int>(newest.segments.size()) - 1;
   for (const int i : isolated) {
+    if (i > 0 && i < last) newest.isolated.push_back(ids[i]);
     newest.segments.erase(newest.segments.begin() + i);
     newest.sequences.erase(newest.sequences.begin() + i);
   }
@@ -248,20 +262,21 @@ absl::StatusOr<std::int64_t> FirstSequenceSince(Connection* db,
   return stored.first_sequence;
 }
 
-absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
-    Connection* db, const RigRow& rig, const ChangeOptions& options) {
-  const std::optional<StoredChange> none;
+absl::StatusOr<NewestJudged> JudgeNewest(Connection* db,
+                                         const RigRow& rig,
+                                         const ChangeOptions& options) {
+  NewestJudged judged;
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest_change,
                            NewestChange(db, rig.rowid));
   const auto active = ReadActiveCalibration(db, rig.stored.rig.id);
   if (absl::IsDataLoss(active.status())) {
-    return none;
+    return judged;
   }
   SELFCAL_RETURN_IF_ERROR(active.status());
   SELFCAL_ASSIGN_OR_RETURN(const bool stands,
                            StandsSince(db, *active, newest_change));
   if (!stands) {
-    return none;
+    return judged;
   }
   SELFCAL_ASSIGN_OR_RETURN(
       const std::int64_t first_sequence,
@@ -275,9 +290,21 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
   SELFCAL_ASSIGN_OR_RETURN(
       const Newest newest,
       ReadNewest(db, rig, *active, first_sequence, tester, options.max_window));
+  for (const SegmentId& id : newest.isolated) {
+    SELFCAL_RETURN_IF_ERROR(Quarantine(
+        db,
+        rig.stored.rig.id,
+        id.key,
+        id.rowid,
+        fmt::format("it shows another theta than the segments before and after "
+                    "it, at the scores of version {}: it is corrupt, or of "
+                    "another device",
+                    active->version)));
+  }
+  judged.quarantined = static_cast<int>(newest.isolated.size());
   const auto found = DetectChange(tester, newest.segments, options);
   if (!found) {
-    return none;
+    return judged;
   }
   StoredChange change;
   change.rig = rig.stored.rig.id;
@@ -293,7 +320,8 @@ absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
   change.groups = found->concerned;
   SELFCAL_RETURN_IF_ERROR(
       StartAfter(db, rig.rowid, change, Describe(*found, change)));
-  return change;
+  judged.change = std::move(change);
+  return judged;
 }
 
 absl::StatusOr<std::optional<StoredChange>> MaybeInsertSplit(

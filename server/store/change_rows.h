@@ -25,17 +25,24 @@ absl::StatusOr<StoredChange> ReadChange(Connection* db,
                                         const std::string& rig,
                                         std::int64_t change);
 
+struct NewestJudged {
+  std::optional<StoredChange> change;
+  int quarantined = 0;  // segments
+};
+
 // Tests the newest scored segments of the rig against its active calibration,
 // if that came of a run since the last change. Those that entered it are not
-// looked at, nor what is damaged. Where the device has changed: writes the
-// change and its event, and has the tables start anew with the segments after
-// it.
-absl::StatusOr<std::optional<StoredChange>> MaybeInsertChange(
-    Connection* db, const RigRow& rig, const ChangeOptions& options);
+// looked at, nor what is damaged. One that shows another theta than both of its
+// neighbours (core/change/isolated.h) is quarantined. Where the device has
+// changed: writes the change and its event, and has the tables start anew with
+// the segments after it.
+absl::StatusOr<NewestJudged> JudgeNewest(Connection* db,
+                                         const RigRow& rig,
+                                         const ChangeOptions& options);
 
-// The same where the result of a run tells that the segments that it knows of
-// differ (DeviceSplit) and the device has not been found changed since the run
-// was created.
+// Where the result of a run tells that the segments that it knows of differ
+// (DeviceSplit), and the device has not been found changed since the run was
+// created: writes the change, and so on.
 absl::StatusOr<std::optional<StoredChange>> MaybeInsertSplit(
     Connection* db,
     const RigRow& rig,

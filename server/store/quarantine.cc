@@ -78,6 +78,18 @@ absl::Status SetAside(Connection* db,
                      fmt::format("{}: {}", SegmentText(rig, key), problem));
 }
 
+absl::Status Quarantine(Connection* db,
+                        const std::string& rig,
+                        const SegmentKey& key,
+                        std::int64_t segment,
+                        const std::string& problem) {
+  SELFCAL_RETURN_IF_ERROR(MakeUnusable(db, segment, problem));
+  return AppendEvent(db,
+                     rig,
+                     EventKind::kSegmentQuarantined,
+                     fmt::format("{}: {}", SegmentText(rig, key), problem));
+}
+
 absl::Status QuarantineExcluded(Connection* db,
                                 std::int64_t rig,
                                 const StoredRun& run,
@@ -99,12 +111,8 @@ absl::Status QuarantineExcluded(Connection* db,
     if (segment.state == SegmentState::kUnusable) continue;
     const std::string problem =
         fmt::format("quarantined by run {}: {}", run.run, fit.excluded);
-    SELFCAL_RETURN_IF_ERROR(MakeUnusable(db, segment.rowid, problem));
-    SELFCAL_RETURN_IF_ERROR(AppendEvent(
-        db,
-        run.rig,
-        EventKind::kSegmentQuarantined,
-        fmt::format("{}: {}", SegmentText(run.rig, fit.key), problem)));
+    SELFCAL_RETURN_IF_ERROR(
+        Quarantine(db, run.rig, fit.key, segment.rowid, problem));
   }
   return absl::OkStatus();
 }

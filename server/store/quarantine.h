@@ -30,6 +30,13 @@ absl::Status SetAside(Connection* db,
                       std::int64_t segment,
                       const std::string& problem);
 
+// The same for one that contradicts others, with an event.
+absl::Status Quarantine(Connection* db,
+                        const std::string& rig,
+                        const SegmentKey& key,
+                        std::int64_t segment,
+                        const std::string& problem);
+
 // Quarantines the segments of a run that its result does not use, with an event
 // each.
 absl::Status QuarantineExcluded(Connection* db,

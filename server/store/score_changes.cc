@@ -213,8 +213,10 @@ absl::StatusOr<ScoreCommit> CommitScoreRows(
         commit.tables,
         OfferToTables(db, rig, segment, key, information, &tables));
   }
-  SELFCAL_ASSIGN_OR_RETURN(commit.change, MaybeInsertChange(db, rig, change));
-  if (commit.change) {
+  SELFCAL_ASSIGN_OR_RETURN(const NewestJudged judged,
+                           JudgeNewest(db, rig, change));
+  commit.change = judged.change;
+  if (judged.change || judged.quarantined > 0) {
     SELFCAL_ASSIGN_OR_RETURN(tables, ReadTables(db, rig.rowid));
     SELFCAL_ASSIGN_OR_RETURN(commit.tables, TablesOfSegment(db, segment.rowid));
   }

@@ -111,6 +111,38 @@ TEST_P(ChangesTest, SegmentsOfOtherDevicesShowNone) {
   }
 }
 
+// As soon as the segment after it shows that the device is still the same.
+TEST_P(ChangesTest, SegmentsOfOtherDevicesAreQuarantined) {
+  Many(4, zero_);
+  const SegmentKey other = {"s", next_};
+  Next(40 * random_.Direction(rig_));
+  const auto quarantined = [&] {
+    std::vector<std::string> texts;
+    for (const StoredEvent& event : Events()) {
+      if (event.kind == EventKind::kSegmentQuarantined) {
+        texts.push_back(event.detail);
+      }
+    }
+    return texts;
+  };
+  EXPECT_THAT(quarantined(), ::testing::IsEmpty());
+  Next(zero_);
+  EXPECT_THAT(quarantined(),
+              ElementsAre(::testing::HasSubstr("another theta than")));
+  const auto tables = store_->GetTables("a");
+  ASSERT_TRUE(tables.ok()) << tables.status();
+  for (const Table& table : *tables) {
+    for (const auto& entry : table.entries) {
+      EXPECT_NE(entry.key, other) << table.group;
+    }
+  }
+  Many(6, zero_);
+  EXPECT_EQ(quarantined().size(), 1u);
+  // A device that has changed stays changed.
+  Shock();
+  EXPECT_EQ(quarantined().size(), 1u);
+}
+
 TEST_P(ChangesTest, SegmentsThatDoNotFitShowNone) {
   Many(6, zero_);
   for (int i = 0; i < 8; ++i) EXPECT_FALSE(Next(turned_, 2).change) << i;
