@@ -1,6 +1,7 @@
 // Runs because a session has ended: the active version shall be computed on the
 // tables as the session leaves them, however little has changed since the rule
-// of change last fired.
+// of change last fired, and on what is remembered of all segments, once that is
+// half as many again.
 #include <set>
 #include <string_view>
 
@@ -16,7 +17,9 @@ namespace {
 
 // Of a rig: it has had a run and none is unfinished, no segment waits for its
 // score, and the tables hold a segment that the newest run was not created
-// with, or have lost one to a quarantine that the run did not bring about.
+// with, or have lost one to a quarantine that the run did not bring about; or
+// of the segments that a run may use without their data, a third have come
+// since the newest run was created.
 constexpr std::string_view kChanged =
     "WITH newest AS (SELECT rig, max(run) AS run FROM runs GROUP BY rig) "
     "SELECT r.id FROM rigs r JOIN newest n ON n.rig = r.rig "
@@ -29,7 +32,12 @@ constexpr std::string_view kChanged =
     "      AND x.run = n.run AND x.segment = e.segment)) "
     "  OR EXISTS (SELECT 1 FROM run_segments x JOIN segments s USING (segment) "
     "    WHERE x.rig = n.rig AND x.run = n.run AND x.excluded = 0 "
-    "      AND s.state = 3)) "
+    "      AND s.state = 3) "
+    "  OR (SELECT sum(s.receive_time_ns > u.create_time_ns) > 0 "
+    "      AND 3 * sum(s.receive_time_ns > u.create_time_ns) >= count(*) "
+    "    FROM segment_ends e JOIN segments s USING (segment) "
+    "    JOIN runs u ON u.rig = n.rig AND u.run = n.run "
+    "    WHERE e.rig = r.rig AND s.state = 2)) "
     "AND NOT EXISTS (SELECT 1 FROM segments s "
     "  WHERE s.rig = r.rig AND s.state = 1) "
     "ORDER BY r.rig";

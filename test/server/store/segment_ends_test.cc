@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "test/server/store/fake_ends.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -10,28 +11,6 @@ namespace {
 using ::testing::ElementsAre;
 
 // Numbers out of a generator.
-SegmentEnds FakeEnds(const Rig& rig, const SegmentKey& key) {
-  std::mt19937 random(static_cast<unsigned>(key.index) + 1);
-  std::normal_distribution<double> normal;
-  const auto draw = [&](auto) { return normal(random); };
-  const int size = TangentSize(rig.factory) + kEndUnknowns;
-  const Eigen::MatrixXd root =
-      Eigen::MatrixXd::Zero(size, size).unaryExpr(draw);
-  SegmentEnds ends;
-  ends.key = key;
-  ends.theta0 = rig.factory;
-  ends.first.t_ns = 1'000 * key.index;
-  ends.last.t_ns = ends.first.t_ns + 500;
-  ends.last.p_GI = {1.0 / 3, 2, 3};
-  ends.last.q_GI = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
-  ends.last.b_g = {0.1, 0.2, 0.3};
-  ends.Lambda = root * root.transpose();
-  ends.eta = Eigen::VectorXd::Zero(size).unaryExpr(draw);
-  ends.tail = {{ends.last.t_ns - 5, {1, 2, 3}, {4, 5, 6}},
-               {ends.last.t_ns + 5, {7, 8, 9}, {1, 1, 0.1}}};
-  return ends;
-}
-
 void ExpectSame(const SegmentEnds& a, const SegmentEnds& b) {
   EXPECT_EQ(a.key, b.key);
   ExpectSameCalibration(a.theta0, b.theta0);

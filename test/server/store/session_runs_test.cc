@@ -1,6 +1,7 @@
 // Runs at the end of a session, and runs by hand on tables that have not
 // changed.
 #include "server/store/clock.h"
+#include "test/server/store/fake_ends.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -69,6 +70,36 @@ TEST_P(SessionRunsTest, TablesThatHaveChangedStartARunWhenTheSessionEnds) {
   EXPECT_THAT(End(), IsEmpty());  // it is under way
   Finish(2);
   EXPECT_THAT(End(), IsEmpty());  // nothing has changed since
+}
+
+// None of which enters a table.
+TEST_P(SessionRunsTest, AThirdMoreThatIsRememberedStartsARun) {
+  const auto remember = [&](std::int64_t index, double entropy, double gain) {
+    Put("a", index);
+    const SegmentKey key = {"s", index};
+    ASSERT_TRUE(store_
+                    ->CommitScore("a",
+                                  key,
+                                  FakeInformation(rig_, entropy, gain, 7),
+                                  FakeEnds(rig_, key))
+                    .ok());
+  };
+  for (int k = 0; k < 4; ++k) remember(k, 10 + k, 5);
+  Finish(1);
+  remember(4, 99, 0);
+  EXPECT_THAT(End(), IsEmpty());
+  remember(5, 99, 0);
+  const auto started = End();
+  ASSERT_THAT(started, SizeIs(1));
+  EXPECT_EQ(started[0].trigger, RunTrigger::kSessionEnded);
+  EXPECT_THAT(started[0].segments, SizeIs(4));
+  Finish(2);
+  EXPECT_THAT(End(), IsEmpty());
+  remember(6, 99, 0);
+  remember(7, 99, 0);
+  EXPECT_THAT(End(), IsEmpty());  // two of eight
+  remember(8, 99, 0);
+  EXPECT_THAT(End(), SizeIs(1));
 }
 
 TEST_P(SessionRunsTest, AFailureIsNotRepeatedOnTheSameTables) {
