@@ -48,6 +48,17 @@ bool IsExcluded(const CalibrationResult& result, const SegmentKey& key) {
                      });
 }
 
+// Whether it knows nothing of the device since the change: its run was created
+// before it, though that may be what found it.
+absl::StatusOr<bool> IsFromBefore(Store* store,
+                                  const StoredCalibration& active,
+                                  std::int64_t change) {
+  if (!active.run) return true;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run,
+                           store->GetRun(active.rig, *active.run));
+  return run.change < change;
+}
+
 }  // namespace
 
 // Nothing where the data cannot be used; an error where it cannot be read now.
@@ -130,7 +141,9 @@ absl::Status Recalibrator::Validate(const StoredRun& run,
   if (run.change > 0) {
     SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
                              store_->GetChange(run.rig, run.change));
-    if (evidence.active.version == change.base_version) {
+    SELFCAL_ASSIGN_OR_RETURN(const bool from_before,
+                             IsFromBefore(store_, evidence.active, run.change));
+    if (from_before) {
       SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
                                ListInformation(store_, run.rig, run.segments));
       evidence.active.covariance =

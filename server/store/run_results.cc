@@ -127,13 +127,9 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
       const auto split, MaybeInsertSplit(db, rig, run, judged, change_options));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
                            NewestChange(db, rig.rowid));
-  if (split) {
-    judged.state = CalibrationState::kRejected;
-    judged.reasons.push_back(
-        fmt::format("The device has changed (change {}) among its segments: "
-                    "the next run is on segments after that.",
-                    change));
-  } else if (run.change != change) {
+  // A change among its own segments is in the result: its theta is that of the
+  // newest of them.
+  if (!split && run.change != change) {
     judged.state = CalibrationState::kRejected;
     judged.reasons.push_back(
         fmt::format("The device has changed (change {}) since its segments "
@@ -149,7 +145,10 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
                     SegmentText(rig_name, unusable.front())));
   }
   SELFCAL_RETURN_IF_ERROR(JudgeCandidate(db, rig.rowid, judged));
-  if (judged.state == CalibrationState::kActive && calibration.report) {
+  // From a changed device those before the change may contradict those after
+  // it.
+  if (judged.state == CalibrationState::kActive && calibration.report &&
+      !split) {
     SELFCAL_RETURN_IF_ERROR(QuarantineExcluded(
         db, rig.rowid, run, calibration.report->segment_fits));
   }

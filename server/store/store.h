@@ -482,9 +482,9 @@ class Store {
   // active, segments that its report says it does not use
   // (SegmentFit::excluded) are quarantined. It is rejected where the device has
   // changed, or a segment of the run was quarantined, since the run was
-  // created; and where its report tells surely enough for StoreOptions::change
-  // that the device changed among its segments (EvictedUse::split), which then
-  // is a change of the device, as in CommitScore.
+  // created. Where its report tells surely enough for StoreOptions::change that
+  // the device changed among its segments (EvictedUse::split) that is a change
+  // of the device, as in CommitScore, and none of them is quarantined.
   virtual absl::StatusOr<StoredCalibration> FinishRun(
       const std::string& rig,
       std::int64_t run,
