@@ -25,7 +25,7 @@ struct Reduced {
   Eigen::VectorXd eta;     // r
 };
 
-// One with data, at the estimate: what was stored of it is of another place.
+// A segment with data, linearised and measured at the estimate.
 struct OwnSegment {
   SegmentEnds ends;
   double fit = 1;
@@ -94,6 +94,7 @@ class Fusion {
     });
   }
 
+  // Segments that were linearised near enough to be compared.
   std::vector<JoinedSegment> Near() const {
     std::vector<JoinedSegment> near;
     std::copy_if(joined_.begin(),
@@ -172,7 +173,7 @@ class Fusion {
     result_.Lambda = weight * evicted.information.Lambda;
   }
 
-  // That the device may have changed.
+  // Accounts for the chance that the device changed.
   void AddDoubt(const ChangeDoubt& doubt) {
     if (result_.use.segments == 0) {
       result_.theta = theta_;

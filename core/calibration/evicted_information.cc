@@ -18,8 +18,8 @@ double Reach(const Rig& rig, const Calibration& from, const Calibration& to) {
   return std::sqrt(offset.squaredNorm() / static_cast<double>(free.size()));
 }
 
-// Within a session by its own clock. Between sessions in whole seconds: they
-// share no clock that is better.
+// Time from one segment to the next: within a session by its own clock; between
+// sessions, which share no better one, in whole seconds of the receiver's.
 double SecondsBetween(const JoinedSegment& a, const JoinedSegment& b) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   if (a.ends->key.session == b.ends->key.session) {

@@ -21,10 +21,9 @@ constexpr int kShortestRamp = 3;  // parts
 constexpr double kDrifted = 2.0 / 3;
 // A group is concerned where its test is less probable than this.
 constexpr double kConcerned = 0.01;
-// That a device changed while its segments were recorded, before they are
-// looked at.
+// The prior probability that a device changed while its segments were recorded.
 constexpr double kChanged = 0.5;
-// That a group goes on to change.
+// The prior probability that groups that have changed go on to.
 constexpr double kGoesOn = 0.5;
 
 // Joined segments of one session, by index.
@@ -37,7 +36,7 @@ struct Part {
 struct Trial {
   ChangeKind kind = ChangeKind::kSudden;
   Eigen::VectorXd weights;  // by part
-  // Of what may be found by chance, and of what is thought likely.
+  // Its part of the level of tests and of the prior of a change.
   double share = 1;
 };
 
@@ -173,8 +172,8 @@ class SplitSearch {
             directions_ * (onto_ * information.eta(free_)) / excess_};
   }
 
-  // What the parts show of a change of some course, and what it makes theta now
-  // (in tangent units).
+  // The information of the parts about a change of some course, and the
+  // derivative by it of theta now (in tangent units).
   struct Seen {
     OffsetInformation change;
     Eigen::MatrixXd by_change;
@@ -193,8 +192,8 @@ class SplitSearch {
                  prior);
   }
 
-  // That groups which have changed before go on to do so, evenly over all of
-  // the segments. Returns the prior of other changes.
+  // Adds the hypotheses that groups which have changed before go on to, evenly
+  // over all of the segments. Returns the prior of other changes.
   double AddGoingOn(ChangeMixture* mixture) const {
     const auto of = BlocksOf(options_.changing);
     if (of.empty()) return kChanged;
@@ -208,7 +207,7 @@ class SplitSearch {
     return (1 - kGoesOn) * kChanged;
   }
 
-  // Blocks of components that are all of the groups of these names.
+  // Blocks whose components all belong to groups of these names.
   std::vector<const ParameterBlock*> BlocksOf(
       const std::vector<std::string>& groups) const {
     std::vector<const ParameterBlock*> found;

@@ -14,7 +14,7 @@
 // may be found by chance is for steps between sessions, a quarter for other
 // steps, a quarter for ramps.
 //
-// What no test finds is not excluded by that: all courses and parameters that
+// A change that no test finds is not excluded: all courses and parameters that
 // are tried are weighed against no change at all
 // (core/change/change_mixture.h), with these shares of one prior.
 //
@@ -37,11 +37,11 @@ namespace selfcal {
 inline constexpr double kRareSplit = 0.05;
 
 struct SplitFindings {
-  // The one that is least probable. Of one that is not rare, `without_one` is 1
-  // and no group is concerned.
+  // The least probable one. If it is not rare, `without_one` is 1 and no group
+  // is concerned.
   DeviceSplit split;
-  // What all that were tried leave open about theta at the newest segment, in
-  // units of the tangent (D); nothing where none was tried.
+  // The chance of a change about theta of the newest segment, in units of the
+  // tangent (D); nothing where no course could be tried.
   std::optional<ChangeDoubt> doubt;
 };
 

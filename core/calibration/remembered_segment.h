@@ -22,7 +22,7 @@ struct RememberedSegment {
   std::optional<SegmentEnds> ends = std::nullopt;
   // ResidualStatistics::fit of one without data; 0: not measured.
   double fit = 0;
-  // When it was recorded, by a clock that all sessions share.
+  // When it was received: for the walk between sessions.
   std::int64_t time_ns = 0;
 };
 
@@ -60,10 +60,10 @@ struct EvictedUse {
   // Where the segments, with data and without, differ by more than chance
   // explains (5 %).
   std::optional<DeviceSplit> split = std::nullopt;
-  // That the device changed while they were recorded, given what they show; 0
-  // where that was not looked at. What it leaves open is in the covariance of
-  // the result: of each component, this standard deviation (D) beside what
-  // would be there without it.
+  // Posterior probability that the device changed while they were recorded; 0
+  // if that was not examined. The covariance of the result accounts for it: by
+  // component (D), its variance is the square of this larger than without a
+  // change.
   double change_probability = 0;
   Eigen::VectorXd change_sigmas = {};
 };

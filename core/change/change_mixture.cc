@@ -27,28 +27,34 @@ void ChangeMixture::Add(const MatrixXd& L,
 }
 
 ChangeDoubt ChangeMixture::Doubt() const {
-  const double log_constant = std::log(no_change_);
-  double largest = log_constant;
+  double largest = std::log(no_change_);
   for (const Hypothesis& one : hypotheses_) {
     largest = std::max(largest, one.log_weight);
   }
-  double total = std::exp(log_constant - largest);
-  double changed = 0;
+  const double no_change = no_change_ * std::exp(-largest);
+  const auto weight = [&](const Hypothesis& one) {
+    return std::exp(one.log_weight - largest);
+  };
   const Eigen::Index size = hypotheses_.front().by_change.rows();
-  VectorXd step = VectorXd::Zero(size);
-  MatrixXd moment = MatrixXd::Zero(size, size);
+  ChangeDoubt doubt{0, VectorXd::Zero(size), MatrixXd::Zero(size, size)};
+  double changed = 0;
   for (const Hypothesis& one : hypotheses_) {
-    const double weight = std::exp(one.log_weight - largest);
-    changed += weight;
-    step += weight * (one.by_change * one.mean);
-    moment += weight * one.by_change *
-              (one.covariance + one.mean * one.mean.transpose()) *
-              one.by_change.transpose();
+    changed += weight(one);
+    doubt.step += weight(one) * (one.by_change * one.mean);
   }
-  total += changed;
-  step /= total;
-  moment /= total;
-  return {changed / total, step, moment - step * step.transpose()};
+  const double total = no_change + changed;
+  doubt.probability = changed / total;
+  doubt.step /= total;
+  // About the mean: a sum of squares, which rounding leaves semidefinite.
+  doubt.covariance = no_change * doubt.step * doubt.step.transpose();
+  for (const Hypothesis& one : hypotheses_) {
+    const VectorXd from_mean = one.by_change * one.mean - doubt.step;
+    doubt.covariance += weight(one) * (one.by_change * one.covariance *
+                                           one.by_change.transpose() +
+                                       from_mean * from_mean.transpose());
+  }
+  doubt.covariance /= total;
+  return doubt;
 }
 
 }  // namespace selfcal

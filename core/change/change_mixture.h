@@ -1,5 +1,5 @@
-// What theta is at the end of segments of a device that may have changed among
-// them: a mixture of no change and of every course of one that is thought of.
+// The theta of the newest segment of a device that may have changed among its
+// segments: a mixture of no change and of every course of one that is tried.
 //
 // A test that finds no change leaves it possible: too small to be noticed, or
 // too recent. An estimate that takes theta for constant is then off by a part

@@ -22,8 +22,8 @@ struct ParameterBlock {
   Eigen::MatrixXd basis;
   // Free components of it, ascending.
   std::vector<int> at;
-  // Of what may be found by chance, and of what is thought likely: of all
-  // ParameterBlocks together 1.
+  // Its part of the level of tests and of the prior of a change; those of all
+  // ParameterBlocks sum to 1.
   double share = 0;
 };
 

@@ -1,5 +1,5 @@
-// A change of which the size is known, as a hypothesis: normal, of so many
-// prior sigmas in each of its directions, given what segments show of it.
+// A hypothesis: a change of known size, normal with so many prior sigmas in
+// each of its directions, given what segments show of it.
 //
 // Pure, deterministic, any thread.
 #pragma once
@@ -9,20 +9,20 @@
 
 namespace selfcal {
 
-// Sizes of a change that is not sure, in prior sigmas, each as likely as
-// another: how large it is is not known, by orders of magnitude.
+// Sizes of an uncertain change, in prior sigmas, each as likely as another: its
+// order of magnitude is not known.
 inline constexpr std::array<double, 5> kChangeSizes = {0.01, 0.03, 0.1, 0.3, 1};
 
 struct SizedChange {
   // ln of how much more probable the data is than without any change.
   double log_evidence = 0;
-  // Of y, given that it changed.
+  // The posterior of y, given that it changed.
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };
 
-// Of a change y ~ N(0, size^2 I) of which L and s are the information: s ~
-// N(L y, L).
+// The change is y ~ N(0, size^2 I); L and s are the information about it:
+// s ~ N(L y, L).
 SizedChange ChangeOfSize(const Eigen::MatrixXd& L,
                          const Eigen::VectorXd& s,
                          double size);

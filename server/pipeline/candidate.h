@@ -51,7 +51,7 @@ struct CandidateLimits {
   // Of the agreement of halves, and of what held-out segments show under the
   // candidate.
   double min_probability = 1e-4;
-  // Of the variances by which segments differ, over those that noise explains;
+  // Largest variance by which segments differ, over that which noise explains;
   // more where few degrees are tested and chance alone exceeds it once in a
   // thousand times. Simulated devices of ten kinds have 0.76 to 1.21, a Tango
   // 0.9 to 1.1, EuRoC V1_01 with unoptimised states at 1 keyframe a second 1.4
@@ -95,9 +95,10 @@ struct CandidateValidation {
 // - rank: at least as many directions are estimated as by `active`, less the
 //   components that have changed since;
 // - sigma_growth: no component that `active` observes has become much less
-//   certain, however uncertain it is now; not tested where the segments differ
-//   so that the device may have changed (EvictedUse::split): then `active` is
-//   in doubt, and to be less certain is honest;
+//   certain, however uncertain it is now, but for what the chance of a change
+//   of the device adds (EvictedUse::change_sigmas); not tested where the
+//   segments differ so that the device may have changed (EvictedUse::split):
+//   then `active` is in doubt, and to be less certain is honest;
 // - halves: calibrations on two halves of the segments agree;
 // - disagreement: each segment agrees with all others as far as noise allows;
 // - held_out_probability: what segments show that it was not calibrated on is

@@ -48,8 +48,8 @@ bool IsExcluded(const CalibrationResult& result, const SegmentKey& key) {
                      });
 }
 
-// Whether it knows nothing of the device since the change: its run was created
-// before it, though that may be what found it.
+// True for a version of a run that was created before the change was found,
+// also where that run found it: its tables held segments from before.
 absl::StatusOr<bool> IsFromBefore(Store* store,
                                   const StoredCalibration& active,
                                   std::int64_t change) {

@@ -291,11 +291,12 @@ absl::StatusOr<NewestJudged> JudgeNewest(Connection* db,
       const Newest newest,
       ReadNewest(db, rig, *active, first_sequence, tester, options.max_window));
   for (const SegmentId& id : newest.isolated) {
-    SELFCAL_RETURN_IF_ERROR(Quarantine(
+    SELFCAL_RETURN_IF_ERROR(SetAside(
         db,
         rig.stored.rig.id,
         id.key,
         id.rowid,
+        EventKind::kSegmentQuarantined,
         fmt::format("it shows another theta than the segments before and after "
                     "it, at the scores of version {}: it is corrupt, or of "
                     "another device",

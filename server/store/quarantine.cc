@@ -70,24 +70,11 @@ absl::Status SetAside(Connection* db,
                       const std::string& rig,
                       const SegmentKey& key,
                       std::int64_t segment,
+                      EventKind event,
                       const std::string& problem) {
   SELFCAL_RETURN_IF_ERROR(MakeUnusable(db, segment, problem));
-  return AppendEvent(db,
-                     rig,
-                     EventKind::kSegmentUnusable,
-                     fmt::format("{}: {}", SegmentText(rig, key), problem));
-}
-
-absl::Status Quarantine(Connection* db,
-                        const std::string& rig,
-                        const SegmentKey& key,
-                        std::int64_t segment,
-                        const std::string& problem) {
-  SELFCAL_RETURN_IF_ERROR(MakeUnusable(db, segment, problem));
-  return AppendEvent(db,
-                     rig,
-                     EventKind::kSegmentQuarantined,
-                     fmt::format("{}: {}", SegmentText(rig, key), problem));
+  return AppendEvent(
+      db, rig, event, fmt::format("{}: {}", SegmentText(rig, key), problem));
 }
 
 absl::Status QuarantineExcluded(Connection* db,
@@ -111,8 +98,12 @@ absl::Status QuarantineExcluded(Connection* db,
     if (segment.state == SegmentState::kUnusable) continue;
     const std::string problem =
         fmt::format("quarantined by run {}: {}", run.run, fit.excluded);
-    SELFCAL_RETURN_IF_ERROR(
-        Quarantine(db, run.rig, fit.key, segment.rowid, problem));
+    SELFCAL_RETURN_IF_ERROR(SetAside(db,
+                                     run.rig,
+                                     fit.key,
+                                     segment.rowid,
+                                     EventKind::kSegmentQuarantined,
+                                     problem));
   }
   return absl::OkStatus();
 }
@@ -147,7 +138,8 @@ absl::Status MarkUnusableRow(Connection* db,
   if (segment.state == SegmentState::kUnusable) {
     return absl::OkStatus();
   }
-  SELFCAL_RETURN_IF_ERROR(SetAside(db, rig, key, segment.rowid, problem));
+  SELFCAL_RETURN_IF_ERROR(SetAside(
+      db, rig, key, segment.rowid, EventKind::kSegmentUnusable, problem));
   SELFCAL_RETURN_IF_ERROR(DropUnreferencedPayloads(db, rig_id));
   return transaction.Commit();
 }

@@ -23,19 +23,14 @@ absl::Status MakeUnusable(Connection* db,
                           std::int64_t segment,
                           const std::string& problem);
 
-// The same for one that is damaged or cannot be scored, with an event.
+// The same with an event: kSegmentUnusable for one that is damaged or cannot be
+// scored, kSegmentQuarantined for one that contradicts others.
 absl::Status SetAside(Connection* db,
                       const std::string& rig,
                       const SegmentKey& key,
                       std::int64_t segment,
+                      EventKind event,
                       const std::string& problem);
-
-// The same for one that contradicts others, with an event.
-absl::Status Quarantine(Connection* db,
-                        const std::string& rig,
-                        const SegmentKey& key,
-                        std::int64_t segment,
-                        const std::string& problem);
 
 // Quarantines the segments of a run that its result does not use, with an event
 // each.

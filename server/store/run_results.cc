@@ -127,8 +127,8 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
       const auto split, MaybeInsertSplit(db, rig, run, judged, change_options));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change,
                            NewestChange(db, rig.rowid));
-  // A change among its own segments is in the result: its theta is that of the
-  // newest of them.
+  // The result accounts for a change among its own segments: its theta is that
+  // of the newest of them.
   if (!split && run.change != change) {
     judged.state = CalibrationState::kRejected;
     judged.reasons.push_back(
@@ -145,8 +145,7 @@ absl::StatusOr<StoredCalibration> FinishRunRow(
                     SegmentText(rig_name, unusable.front())));
   }
   SELFCAL_RETURN_IF_ERROR(JudgeCandidate(db, rig.rowid, judged));
-  // From a changed device those before the change may contradict those after
-  // it.
+  // Segments of a changed device contradict each other, and none is wrong.
   if (judged.state == CalibrationState::kActive && calibration.report &&
       !split) {
     SELFCAL_RETURN_IF_ERROR(QuarantineExcluded(

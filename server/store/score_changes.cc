@@ -63,6 +63,7 @@ absl::StatusOr<std::vector<Candidate>> ReadKept(Connection* db,
                    rig.stored.rig.id,
                    entry.key,
                    row.rowid,
+                   EventKind::kSegmentUnusable,
                    std::string(segment.status().message())));
       continue;
     }

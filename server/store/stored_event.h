@@ -19,7 +19,7 @@ enum class EventKind {
   kCalibrationActivated,   // by hand
   kCalibrationRolledBack,  // by hand
   kRunHeldBack,
-  kSegmentQuarantined,  // by a run, or by hand
+  kSegmentQuarantined,  // by a run, neighbours, or by hand
   kCoresDisagree,       // a verification found a difference
 };
 

@@ -113,7 +113,6 @@ TEST_F(EvictedFusionTest, WithoutMemoryNothingChanges) {
   EXPECT_EQ(same.evicted.unused, "");
 }
 
-// Segments of the wrong device beside true ones.
 // A quarter of a degree between two sessions, of which all data is there.
 TEST_F(EvictedFusionTest, TellsThatTheDataIsOfTwoDevices) {
   Eigen::VectorXd turn = Eigen::VectorXd::Zero(TangentSize(truth_));

@@ -89,7 +89,7 @@ TEST_F(MemorySplitTest, WithoutAChangeLittleIsLeftOpen) {
   EXPECT_LT(Largest(doubt->step, rig_), 0.01);
 }
 
-// What all segments say together lies between the two.
+// The estimate of all segments lies between the two.
 TEST_F(MemorySplitTest, TheMeanFollowsATurnedCamera) {
   const int q =
       MatchComponents(TangentComponents(rig_.factory), {"cam0.q_CI.y"}).at(0);

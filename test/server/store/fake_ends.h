@@ -1,4 +1,4 @@
-// Ends of a segment that was never recorded.
+// Ends of a segment that was never recorded: numbers out of a generator.
 #pragma once
 
 #include <random>

@@ -10,7 +10,6 @@ namespace {
 
 using ::testing::ElementsAre;
 
-// Numbers out of a generator.
 void ExpectSame(const SegmentEnds& a, const SegmentEnds& b) {
   EXPECT_EQ(a.key, b.key);
   ExpectSameCalibration(a.theta0, b.theta0);
