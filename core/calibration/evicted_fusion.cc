@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/calibration/memory_split.h"
+#include "core/calibration/settled_ends.h"
 #include "core/information/segment_scorer.h"
 
 namespace selfcal {
@@ -49,8 +50,8 @@ class Fusion {
     SegmentInformation information;
     for (const MotionSegment* segment : segments) {
       scorer.Score(rig, theta_, *segment, {}, &information);
-      own_.push_back(
-          {SummariseEnds(rig, theta_, *segment), information.residuals.fit});
+      own_.push_back({SummariseSettledEnds(rig, theta_, *segment),
+                      information.residuals.fit});
     }
   }
 

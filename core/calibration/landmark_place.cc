@@ -10,6 +10,8 @@
 namespace selfcal {
 namespace {
 
+// No point is further away than 1 / this [m].
+constexpr double kLeastInverseDepth = 1e-4;
 // A change of inverse depth that is small against it.
 constexpr double kMaxRelativeStep = 0.5;
 
@@ -124,6 +126,11 @@ bool LandmarkScene::Residual(const TrackObservation& seen,
     *by_p_C = jacobians.point;
   }
   return true;
+}
+
+Eigen::Vector3d LandmarkPlace::Point() const {
+  const Eigen::Vector4d point = Homogeneous();
+  return point.head<3>() / std::max(point(3), kLeastInverseDepth);
 }
 
 void LandmarkPlace::Move(const Eigen::Vector3d& step) {

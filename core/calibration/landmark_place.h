@@ -87,6 +87,9 @@ struct LandmarkPlace {
   Eigen::Vector4d Homogeneous() const {
     return anchor.ToHomogeneous(inverse_depth);
   }
+  // In G [m]; one further away than 10 km at that depth, which is as good as
+  // infinity.
+  Eigen::Vector3d Point() const;
 
   // Goes a linear step in (alpha, beta, rho): as a point in space where the
   // step is small against its depth, so that it slides along with the

@@ -18,8 +18,6 @@ constexpr int kLeastSegments = 4;
 constexpr double kChance = 1e-5;
 // Residuals so many times those of the other segments are not of the same kind.
 constexpr double kMaxRatio = 3;
-// A point further away than 1 / this [m] is as good as at infinity.
-constexpr double kLeastDepth = 1e-4;
 
 double Median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -54,9 +52,7 @@ MotionSegment AtEstimate(const MotionSegment& segment,
       at.observations.resize(before);
       continue;
     }
-    const Eigen::Vector4d point = landmark.place.Homogeneous();
-    const double w = std::max(point(3), kLeastDepth);
-    at.landmarks.push_back({track.id, point.head<3>() / w});
+    at.landmarks.push_back({track.id, landmark.place.Point()});
   }
   return at;
 }

@@ -10,6 +10,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/calibration/settled_ends.h"
 #include "core/information/segment_scorer.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/rescoring.h"
@@ -359,7 +360,7 @@ Estimators CoreEstimators() {
           [](const Rig& rig,
              const Calibration& theta0,
              const MotionSegment& segment) {
-            return SummariseEnds(rig, theta0, segment);
+            return SummariseSettledEnds(rig, theta0, segment);
           }};
 }
 

@@ -92,8 +92,8 @@ struct Estimators {
       ends = nullptr;
 };
 
-// ScoreSegment, Calibrate, ScoreSegmentBy and SummariseEnds of core; they ask
-// nobody whether they are interrupted, but for calls of `progress`.
+// ScoreSegment, Calibrate, ScoreSegmentBy and SummariseSettledEnds of core;
+// they ask nobody whether they are interrupted, but for calls of `progress`.
 Estimators CoreEstimators();
 
 // The verdict on one segment; durable when it is kStored or kDuplicate.

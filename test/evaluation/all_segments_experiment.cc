@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/calibration/settled_ends.h"
 #include "core/information/fusion.h"
-#include "core/information/segment_ends.h"
 #include "core/information/segment_scorer.h"
 #include "core/selection/tables.h"
 #include "core/simulation/simulate.h"
@@ -121,7 +121,7 @@ class DeviceInUse {
   }
 
   void Linearise(int i) {
-    memory_[i].ends = SummariseEnds(rig_, newest_, segments_[i]);
+    memory_[i].ends = SummariseSettledEnds(rig_, newest_, segments_[i]);
     scorer_.Score(rig_, newest_, segments_[i], {}, &memory_[i].score);
   }
 

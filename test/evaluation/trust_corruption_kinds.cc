@@ -19,7 +19,8 @@ constexpr double kGoodSession_s = 1.5 * kTrustSession_s;
 using Corruption = std::function<MotionSegment(
     const TrustDevice& device, const SimulatedSession& session, int i)>;
 
-// A device with every so many-th segment corrupt; clean, without these.
+// A device with every so many-th segment corrupt; clean, with what `clean` has
+// in its place, or without it.
 TrustKind Corrupt(std::string name,
                   std::string about,
                   std::uint64_t first_seed,
@@ -27,7 +28,8 @@ TrustKind Corrupt(std::string name,
                   int quick_devices,
                   TrustDevice (*device_of)(std::uint64_t seed),
                   int every,
-                  Corruption corrupt) {
+                  Corruption corrupt,
+                  Corruption clean = nullptr) {
   const auto make = [=](std::uint64_t seed, bool corrupted) {
     TrustDevice device = device_of(seed);
     const TrustDevice base = device;
@@ -43,8 +45,9 @@ TrustKind Corrupt(std::string name,
                  for (int i = 0; i < count; ++i) {
                    if (i % every != first) {
                      session->segments.push_back(good.segments[i]);
-                   } else if (corrupted) {
-                     session->segments.push_back(corrupt(base, good, i));
+                   } else if (const Corruption& one =
+                                  corrupted ? corrupt : clean) {
+                     session->segments.push_back(one(base, good, i));
                    }
                  }
                });
@@ -177,17 +180,22 @@ std::vector<TrustKind> CorruptionKinds() {
             return MoveScene(
                 session.segments[i], session.truth[i], *device.truth, {}, i);
           }),
-      Corrupt("corrupt_20_percent_scale",
-              "in every fifth segment SLAM has lost the scale",
-              44'000,
-              8,
-              0,
-              Mono,
-              kCorruptEvery,
-              [](const TrustDevice&, const SimulatedSession& session, int i) {
-                return LoseScale(session.segments[i],
-                                 i % 2 == 0 ? kLostScale : 1 / kLostScale);
-              }),
+      Corrupt(
+          "corrupt_20_percent_scale",
+          "in every fifth segment SLAM has lost the scale",
+          44'000,
+          8,
+          0,
+          Mono,
+          kCorruptEvery,
+          [](const TrustDevice&, const SimulatedSession& session, int i) {
+            return LoseScale(session.segments[i],
+                             i % 2 == 0 ? kLostScale : 1 / kLostScale);
+          },
+          // Readings and tracks are sound, only the states are not.
+          [](const TrustDevice&, const SimulatedSession& session, int i) {
+            return session.segments[i];
+          }),
       BadSample("one_bad_sample_35", 45'000, 0, 35),
       BadSample("one_bad_sample_999", 46'000, 1, 999),
       {"diverged_then_good",

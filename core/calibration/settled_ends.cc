@@ -1,0 +1,135 @@
+#include "core/calibration/settled_ends.h"
+
+#include <Eigen/Cholesky>
+#include <cstdint>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/calibration/partition.h"
+#include "core/calibration/problem.h"
+#include "core/calibration/screening.h"
+#include "core/calibration/structured_solver.h"
+#include "core/calibration/theta_information.h"
+#include "core/factor/keyframe_motion.h"
+
+namespace selfcal {
+namespace {
+
+// What is used of the segment is decided anew so often.
+constexpr int kMaxRounds = 3;
+constexpr int kMaxIterations = 10;
+// A minimum is near enough when an iteration takes less off the cost [half
+// squares], and what is used when a round does.
+constexpr double kEnough = 0.1;
+
+// States of a SLAM system are sound where their velocities are this near to
+// those of the minimum [m/s, and a part of the velocity]: those of filters,
+// also in simulation, lie within 0.04 m/s as a rule and 0.12 m/s at most; with
+// a scale that is off by a third they are 0.2 m/s off when carried by hand.
+constexpr double kSoundVelocity_mps = 0.1;
+constexpr double kSoundVelocityPart = 0.1;
+// Fixes what no segment determines: position and yaw.
+constexpr double kGaugeInformation = 1;
+
+// Iterates until little is left to gain. Nothing: states are not determined.
+std::optional<SolverOutcome> Settle(const SolverRound& round,
+                                    CalibrationEstimate* estimate,
+                                    std::vector<ScreenedLandmark>* landmarks) {
+  double last = 0;
+  const SolverOutcome outcome = SolveRoundByStructure(
+      round,
+      [&](int iteration, double cost, const Eigen::VectorXd&) {
+        const bool enough = iteration > 0 && last - cost < kEnough;
+        last = cost;
+        return enough ? SolverSignal::kEnough : SolverSignal::kGoOn;
+      },
+      estimate,
+      landmarks);
+  if (outcome.status == SolverStatus::kFailed) return std::nullopt;
+  return outcome;
+}
+
+// The segment with these states, and landmarks where they were brought to.
+MotionSegment At(const MotionSegment& segment,
+                 const CalibrationProblem& problem,
+                 const CalibrationEstimate& estimate,
+                 const std::vector<ScreenedLandmark>& landmarks) {
+  MotionSegment at = segment;
+  at.keyframes = estimate.keyframes;
+  std::unordered_map<std::uint64_t, Eigen::Vector3d> places;
+  for (const ScreenedLandmark& landmark : landmarks) {
+    places.emplace(problem.tracks[landmark.track].id, landmark.place.Point());
+  }
+  for (Landmark& landmark : at.landmarks) {
+    const auto found = places.find(landmark.id);
+    if (found != places.end()) landmark.p_G = found->second;
+  }
+  return at;
+}
+
+}  // namespace
+
+bool IsFarFromMinimum(const SegmentEnds& ends) {
+  Eigen::MatrixXd Lambda =
+      ends.Lambda.bottomRightCorner<kEndUnknowns, kEndUnknowns>();
+  Lambda.diagonal().array() += kGaugeInformation;
+  const Eigen::VectorXd step =
+      Lambda.ldlt().solve(ends.eta.tail<kEndUnknowns>());
+  const auto is_off = [&](const KeyframeState& state, int at) {
+    return step.segment<3>(at + kStateVelocity).norm() >
+           kSoundVelocity_mps + kSoundVelocityPart * state.v_GI.norm();
+  };
+  return is_off(ends.first, 0) || is_off(ends.last, kStateTangentSize);
+}
+
+MotionSegment SettleSegment(const Rig& rig,
+                            const Calibration& theta,
+                            const MotionSegment& segment) {
+  const std::vector<const MotionSegment*> segments = {&segment};
+  const CalibrateOptions options;
+  const CalibrationProblem problem = FlattenSegments(
+      rig, segments, PartitionSegments(segments, options.merge_landmarks));
+  const Eigen::Index size = TangentSize(theta);
+  const Eigen::MatrixXd held(size, 0);
+  CalibrationEstimate estimate{Eigen::VectorXd::Zero(size), problem.keyframes};
+  KeyframeMotions motions;
+  Screening screening;
+  for (int i = 0; i < kMaxRounds; ++i) {
+    MeasureMotions(rig, theta, problem, estimate.keyframes, &motions);
+    screening = ScreenLandmarks(rig,
+                                theta,
+                                problem,
+                                estimate.keyframes,
+                                motions,
+                                options,
+                                i == 0 ? nullptr : &screening);
+    RefineOnWhatIsUsed(
+        rig, theta, problem, estimate.keyframes, motions, &screening);
+    const std::vector<InertialMatrix> whitening =
+        WhitenInertialLinks(rig, theta.imu, problem, estimate.keyframes);
+    const SolverRound round = {.rig = rig,
+                               .reference = theta,
+                               .problem = problem,
+                               .motions = motions,
+                               .whitening = whitening,
+                               .basis = held,
+                               .loss = screening.loss,
+                               .max_iterations = kMaxIterations};
+    const auto outcome = Settle(round, &estimate, &screening.landmarks);
+    if (!outcome) return segment;
+    if (outcome->initial_cost - outcome->final_cost < kEnough) break;
+  }
+  return At(segment, problem, estimate, screening.landmarks);
+}
+
+SegmentEnds SummariseSettledEnds(const Rig& rig,
+                                 const Calibration& theta0,
+                                 const MotionSegment& segment) {
+  SegmentEnds ends = SummariseEnds(rig, theta0, segment);
+  if (!IsFarFromMinimum(ends)) return ends;
+  return SummariseEnds(rig, theta0, SettleSegment(rig, theta0, segment));
+}
+
+}  // namespace selfcal
