@@ -151,7 +151,7 @@ def main() -> None:
         (out / f"{names[-1]}.md").write_text(_Page(file).whole())
     (out / "index.md").write_text(
         "# gRPC\n\nThe contract `selfcal.v1`, made from its files; "
-        "[the interface](../../api.md) says how its parts go together.\n\n"
+        "[the API](../../api.md) explains how its parts work together.\n\n"
         "```{toctree}\n" + "\n".join(sorted(names)) + "\n```\n"
     )
 

@@ -77,7 +77,7 @@ def main() -> None:
         (out / f"{path.stem}.md").write_text(text + "\n")
     (out / "index.md").write_text(
         "# C++\n\nThe client library, by its headers as they are installed; "
-        "[the interface](../../api.md#the-client-library) says how they are "
+        "[the API](../../api.md#the-client-library) explains how they are "
         "linked, and what may run at the same time.\n\n"
         "```{toctree}\n" + "\n".join(names) + "\n```\n"
     )
