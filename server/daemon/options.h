@@ -10,9 +10,9 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/verify/scorer.h"
+#include "server/domain/domain_options.h"
 #include "server/host/host_conditions.h"
 #include "server/service/server.h"
-#include "server/store/store_options.h"
 
 namespace selfcal::server {
 
@@ -28,7 +28,7 @@ struct DaemonOptions {
   ScorerKind scorer = ScorerKind::kStructured;
   // Of scores and calibrations: computed by the other core as well.
   double verify_share = 0;
-  StoreOptions store;
+  DomainOptions domain;
   HostLimits host;  // for runs that nobody asks for
   bool idle_runs = true;
   double max_run_minutes = 30;      // of a run; it fails then

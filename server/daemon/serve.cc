@@ -19,6 +19,7 @@
 #include "server/daemon/service_manager.h"
 #include "server/daemon/state_lock.h"
 #include "server/daemon/stop.h"
+#include "server/domain/domain.h"
 #include "server/host/host_conditions.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
@@ -170,8 +171,10 @@ std::optional<int> ServeOnce(
   if (!lock.ok()) return Failed("cannot start", lock.status());
   const std::string database = (options.state_dir / "selfcal.db").string();
   NotifyStatus("opening the database, with migrations if it is older");
-  const auto store = MakeSqliteStore(database, options.store);
+  const auto store =
+      MakeSqliteStore(database, options.domain.quotas.max_database_bytes);
   if (!store.ok()) return Failed("cannot open " + database, store.status());
+  Domain domain(store->get(), options.domain);
   const auto metrics = OpenMetrics(options, database, store->get());
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
@@ -183,7 +186,7 @@ std::optional<int> ServeOnce(
   }
   const auto conditions = MakeHostConditions(options.host);
   const auto pipeline =
-      MakePipeline(store->get(),
+      MakePipeline(&domain,
                    OptionsOfPipeline(options, conditions.get(), observer),
                    EstimatorsOfPipeline(options));
   if (absl::Status started = pipeline->Start(); !started.ok()) {
@@ -196,7 +199,7 @@ std::optional<int> ServeOnce(
     return Failed("cannot open the console", console.status());
   }
   const auto server =
-      MakeServer(store->get(), pipeline.get(), options.server, AskToStartAnew);
+      MakeServer(&domain, pipeline.get(), options.server, AskToStartAnew);
   if (!server.ok()) {
     pipeline->Stop();
     return Failed("cannot serve", server.status());

@@ -214,14 +214,14 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
       ->capture_default_str();
   define
       ->Add("change-inflation",
-            &options->store.change.inflation,
+            &options->domain.change.inflation,
             "Factor on the variances of segments in the test for a change of "
             "the device [what the active calibration found: the square of its "
             "track noise factor]")
       ->check(CLI::Range(1.0, kMaxInflation));
   define
       ->Add("change-false-alarms",
-            &options->store.change.false_alarm_rate,
+            &options->domain.change.false_alarm_rate,
             "Bound on false alarms of that test, for each segment; 0 turns it "
             "off")
       ->check(CLI::Range(0.0, 1.0))
@@ -323,7 +323,7 @@ void DefineSettings(CLI::App* app,
              "exist [STATE_DIRECTORY]");
   DefineAccess(&define, &options->server);
   DefineLimits(&define, options);
-  DefineQuotas(&define, &options->store.quotas);
+  DefineQuotas(&define, &options->domain.quotas);
   DefineEstimation(&define, options);
   DefineRuns(&define, options);
   DefineReports(&define, options);

@@ -95,20 +95,24 @@ absl::StatusOr<SegmentInformation> ScoreByCore(
 // before them.
 class PipelineImpl : public Pipeline {
  public:
-  PipelineImpl(Store* store,
+  PipelineImpl(Domain* domain,
                const PipelineOptions& options,
                const Estimators& estimators)
-      : store_(store),
+      : domain_(domain),
+        store_(domain->store()),
         options_(options),
         estimators_(estimators),
-        coach_(store),
-        verifier_(store, options, estimators),
-        sampler_(store, options, &verifier_),
+        coach_(store_),
+        verifier_(domain, options, estimators),
+        sampler_(store_, options, &verifier_),
         run_watchers_(ObserveRuns(options.observer, &sampler_)),
-        recalibrator_(
-            store, options, estimators, &calibration_watchers_, &run_watchers_),
+        recalibrator_(domain,
+                      options,
+                      estimators,
+                      &calibration_watchers_,
+                      &run_watchers_),
         scoring_(
-            store,
+            domain,
             options,
             SampleScores(ObserveScores(estimators, options.observer),
                          &sampler_),
@@ -165,7 +169,7 @@ class PipelineImpl : public Pipeline {
     const absl::Status place = scoring_.TakePlace(cancelled);
     if (!place.ok()) return done(place);
     recalibrator_.ContinueSession(rig);
-    store_->BeginPutSegment(rig, segment, [this, done](const auto& verdict) {
+    domain_->BeginPutSegment(rig, segment, [this, done](const auto& verdict) {
       done(Settle(verdict));
     });
   }
@@ -181,7 +185,7 @@ class PipelineImpl : public Pipeline {
       const std::string& caller,
       const std::string& reason) override {
     const auto commit = scoring_.Quarantine(rig, [&] {
-      return store_->QuarantineSegments(rig, session, index, caller, reason);
+      return domain_->QuarantineSegments(rig, session, index, caller, reason);
     });
     if (!commit.ok()) return commit;
     spdlog::warn("{} quarantines {} segments of session {} of rig {}: {}",
@@ -197,7 +201,7 @@ class PipelineImpl : public Pipeline {
   absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig,
                                                bool force) override {
     SELFCAL_ASSIGN_OR_RETURN(StoredRun run,
-                             store_->CreateManualRun(rig, force));
+                             domain_->CreateManualRun(rig, force));
     recalibrator_.Wake();
     return run;
   }
@@ -214,14 +218,14 @@ class PipelineImpl : public Pipeline {
       const std::string& reason) override {
     SELFCAL_ASSIGN_OR_RETURN(
         StoredCalibration active,
-        store_->ActivateCalibration(rig, version, caller, reason));
+        domain_->ActivateCalibration(rig, version, caller, reason));
     spdlog::warn("{} makes calibration {} of rig {} the active one: {}",
                  caller,
                  version,
                  rig,
                  reason);
     calibration_watchers_.Publish(rig, active);
-    RescoreKept(store_, estimators_, rig, active.theta);
+    RescoreKept(domain_, estimators_, rig, active.theta);
     return active;
   }
 
@@ -318,6 +322,7 @@ class PipelineImpl : public Pipeline {
     return violations;
   }
 
+  Domain* const domain_;
   Store* const store_;
   const PipelineOptions options_;
   const Estimators estimators_;
@@ -364,10 +369,10 @@ Estimators CoreEstimators() {
           }};
 }
 
-std::unique_ptr<Pipeline> MakePipeline(Store* store,
+std::unique_ptr<Pipeline> MakePipeline(Domain* domain,
                                        const PipelineOptions& options,
                                        Estimators estimators) {
-  return std::make_unique<PipelineImpl>(store, options, estimators);
+  return std::make_unique<PipelineImpl>(domain, options, estimators);
 }
 
 }  // namespace selfcal::server

@@ -22,10 +22,10 @@
 #include "core/information/segment_information.h"
 #include "core/model/segment.h"
 #include "core/verify/scorer.h"
+#include "server/domain/domain.h"
 #include "server/pipeline/coaching.h"
 #include "server/pipeline/observer.h"
 #include "server/pipeline/verification.h"
-#include "server/store/clock.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -155,10 +155,10 @@ class Pipeline {
   }
 
   // A caller has sent all it has of a session of the rig, which may call for a
-  // run once it is scored (Store::StartSessionRuns). Does not wait for that.
+  // run once it is scored (Domain::StartSessionRuns). Does not wait for that.
   virtual void EndSession(const std::string& rig) = 0;
 
-  // Store::QuarantineSegments.
+  // Domain::QuarantineSegments.
   virtual absl::StatusOr<QuarantineCommit> QuarantineSegments(
       const std::string& rig,
       const std::string& session,
@@ -166,7 +166,7 @@ class Pipeline {
       const std::string& caller,
       const std::string& reason) = 0;
 
-  // On the tables as they are (Store::CreateManualRun).
+  // On the tables as they are (Domain::CreateManualRun).
   virtual absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig,
                                                        bool force) = 0;
   absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig) {
@@ -178,7 +178,7 @@ class Pipeline {
   virtual absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
                                                         std::int64_t run) = 0;
 
-  // Store::ActivateCalibration, and tells the watchers.
+  // Domain::ActivateCalibration, and tells the watchers.
   virtual absl::StatusOr<StoredCalibration> ActivateCalibration(
       const std::string& rig,
       std::int64_t version,
@@ -192,7 +192,7 @@ class Pipeline {
 
   // Computes the scores of all segments whose data is kept, and the active
   // calibration, by both cores on what is kept, and compares them; a difference
-  // is kept as an event and with the version (Store::ReportDisagreement). One
+  // is kept as an event and with the version (Domain::ReportDisagreement). One
   // at a time: FAILED_PRECONDITION while another is under way. `interrupted` is
   // asked every few milliseconds; CANCELLED then. Takes minutes; `on_step` is
   // called on this thread.
@@ -216,9 +216,9 @@ class Pipeline {
       std::function<void(const RunUpdate&)> callback) = 0;
 };
 
-// `store` must outlive the pipeline.
+// `domain` must outlive the pipeline.
 std::unique_ptr<Pipeline> MakePipeline(
-    Store* store,
+    Domain* domain,
     const PipelineOptions& options,
     Estimators estimators = CoreEstimators());
 

@@ -16,12 +16,13 @@ std::string RunTopic(const std::string& rig, std::int64_t run) {
   return fmt::format("{}/{}", rig, run);
 }
 
-Recalibrator::Recalibrator(Store* store,
+Recalibrator::Recalibrator(Domain* domain,
                            const PipelineOptions& options,
                            Estimators estimators,
                            Watchers<StoredCalibration>* calibration_watchers,
                            Watchers<RunUpdate>* run_watchers)
-    : store_(store),
+    : domain_(domain),
+      store_(domain->store()),
       options_(options),
       estimators_(std::move(estimators)),
       calibration_watchers_(calibration_watchers),
@@ -94,7 +95,7 @@ absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
     std::unique_lock lock(mutex_);
     if (!IsCurrent(rig, run)) {
       // Under the lock: the thread cannot begin it meanwhile.
-      auto ended = store_->EndRun(
+      auto ended = domain_->EndRun(
           rig, run, RunState::kCancelled, "cancelled on request");
       lock.unlock();
       if (ended.ok()) {
@@ -219,7 +220,7 @@ absl::Status Recalibrator::StartSessionRuns() {
                            EndedSessions());
   const std::chrono::nanoseconds idle = options_.session_idle;
   SELFCAL_RETURN_IF_ERROR(
-      store_
+      domain_
           ->StartSessionRuns(
               ended, idle.count() > 0 ? options_.now_ns() - idle.count() : 0)
           .status());
@@ -232,7 +233,7 @@ absl::StatusOr<Recalibrator::Execution> Recalibrator::ExecuteAll() {
   auto worst = Execution::kDone;
   for (bool any = true; any && worst != Execution::kTryLater;) {
     any = false;
-    SELFCAL_RETURN_IF_ERROR(store_->StartAgedRuns(options_.now_ns()).status());
+    SELFCAL_RETURN_IF_ERROR(domain_->StartAgedRuns(options_.now_ns()).status());
     SELFCAL_RETURN_IF_ERROR(StartSessionRuns());
     SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredRun> runs,
                              store_->ListUnfinishedRuns());

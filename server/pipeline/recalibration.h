@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "core/preflight/diagnose.h"
+#include "server/domain/domain.h"
 #include "server/pipeline/held_out.h"
 #include "server/pipeline/pipeline.h"
 #include "server/pipeline/watchers.h"
@@ -40,7 +41,7 @@ class Recalibrator {
   static constexpr std::chrono::seconds kSessionGrace{5};
 
   // The watchers must outlive it.
-  Recalibrator(Store* store,
+  Recalibrator(Domain* domain,
                const PipelineOptions& options,
                Estimators estimators,
                Watchers<StoredCalibration>* calibration_watchers,
@@ -148,6 +149,7 @@ class Recalibrator {
   absl::StatusOr<StoredCalibration> Retry(
       const std::function<absl::StatusOr<StoredCalibration>()>& call);
 
+  Domain* const domain_;
   Store* const store_;
   const PipelineOptions options_;
   const Estimators estimators_;

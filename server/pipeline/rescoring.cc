@@ -12,10 +12,11 @@
 namespace selfcal::server {
 namespace {
 
-absl::Status TryRescore(Store* store,
+absl::Status TryRescore(Domain* domain,
                         const Estimators& estimators,
                         const std::string& rig_id,
                         const Calibration& theta) {
+  Store* const store = domain->store();
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(rig_id));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredSegment> kept,
                            ListKept(store, rig_id));
@@ -27,24 +28,24 @@ absl::Status TryRescore(Store* store,
     }
     SELFCAL_RETURN_IF_ERROR(segment.status());
     SELFCAL_RETURN_IF_ERROR(
-        store->ReplaceScore(rig_id,
-                            stored.key,
-                            estimators.score(rig.rig, theta, *segment),
-                            estimators.ends(rig.rig, theta, *segment)));
+        domain->ReplaceScore(rig_id,
+                             stored.key,
+                             estimators.score(rig.rig, theta, *segment),
+                             estimators.ends(rig.rig, theta, *segment)));
   }
   return absl::OkStatus();
 }
 
 }  // namespace
 
-void RescoreKept(Store* store,
+void RescoreKept(Domain* domain,
                  const Estimators& estimators,
                  const std::string& rig,
                  const Calibration& theta) {
   if (!estimators.ends) return;
   absl::Status status;
   try {
-    status = TryRescore(store, estimators, rig, theta);
+    status = TryRescore(domain, estimators, rig, theta);
   } catch (const std::exception& error) {
     status = absl::InternalError(error.what());
   }

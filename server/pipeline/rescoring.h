@@ -4,8 +4,8 @@
 #include <string>
 
 #include "core/model/calibration.h"
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
-#include "server/store/store.h"
 
 namespace selfcal::server {
 
@@ -15,7 +15,7 @@ namespace selfcal::server {
 // its data was linearised near by. A segment that cannot be read, scored or
 // written keeps the score that it has, and the log says why. Nothing where the
 // estimators compute no ends.
-void RescoreKept(Store* store,
+void RescoreKept(Domain* domain,
                  const Estimators& estimators,
                  const std::string& rig,
                  const Calibration& theta);

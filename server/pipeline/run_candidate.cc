@@ -19,7 +19,8 @@ absl::StatusOr<StoredCalibration> Recalibrator::EnsureCandidate(
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration found,
                            FindCandidate(run, damaged));
-  return Retry([&] { return store_->StoreCandidate(run.rig, run.run, found); });
+  return Retry(
+      [&] { return domain_->StoreCandidate(run.rig, run.run, found); });
 }
 
 absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
@@ -31,7 +32,7 @@ absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
   std::vector<MotionSegment> segments;
   SELFCAL_RETURN_IF_ERROR(LoadSegments(run, &segments, damaged));
   SELFCAL_ASSIGN_OR_RETURN(const CalibrateOptions options,
-                           OptionsOfRun(store_, options_.calibrate, rig, run));
+                           OptionsOfRun(domain_, options_.calibrate, rig, run));
   SELFCAL_ASSIGN_OR_RETURN(
       CalibrationResult result,
       RunSolver(run, rig.rig, base.theta, segments, options));

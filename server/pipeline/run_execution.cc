@@ -32,7 +32,7 @@ Recalibrator::Execution Recalibrator::Execute(const StoredRun& pending) {
     if (!running_) {
       return Execution::kDone;
     }
-    begun = store_->BeginRun(pending.rig, pending.run);
+    begun = domain_->BeginRun(pending.rig, pending.run);
     if (begun.ok()) {
       current_ = Current{pending.rig, pending.run, false, {}};
     }
@@ -71,7 +71,7 @@ Recalibrator::Execution Recalibrator::Hold(const StoredRun& run,
   if (run.message == reason) {
     return Execution::kHeldBack;
   }
-  const absl::Status held = store_->HoldRun(run.rig, run.run, reason);
+  const absl::Status held = domain_->HoldRun(run.rig, run.run, reason);
   if (!held.ok()) {
     // One that was cancelled meanwhile is done.
     return absl::IsFailedPrecondition(held) ? Execution::kDone
@@ -119,13 +119,13 @@ absl::Status Recalibrator::Conclude(const StoredRun& run,
   }
   if (absl::IsCancelled(outcome.status) || IsTransient(outcome.status)) {
     // A stop, or the disk: the run goes back, and starts again later.
-    SELFCAL_RETURN_IF_ERROR(store_->ReleaseRun(run.rig, run.run).status());
+    SELFCAL_RETURN_IF_ERROR(domain_->ReleaseRun(run.rig, run.run).status());
     return IsTransient(outcome.status) ? outcome.status : absl::OkStatus();
   }
   const std::string message(outcome.status.message());
   SELFCAL_RETURN_IF_ERROR(End(run, RunState::kFailed, message));
   return outcome.damaged
-             ? store_->MarkUnusable(run.rig, *outcome.damaged, message)
+             ? domain_->MarkUnusable(run.rig, *outcome.damaged, message)
              : absl::OkStatus();
 }
 
@@ -163,7 +163,7 @@ absl::Status Recalibrator::End(const StoredRun& run,
                run.rig,
                message);
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun ended,
-                           store_->EndRun(run.rig, run.run, state, message));
+                           domain_->EndRun(run.rig, run.run, state, message));
   TellEnd(ended);
   return absl::OkStatus();
 }

@@ -11,13 +11,14 @@
 
 namespace selfcal::server {
 
-absl::StatusOr<CalibrateOptions> OptionsOfRun(Store* store,
+absl::StatusOr<CalibrateOptions> OptionsOfRun(Domain* domain,
                                               CalibrateOptions options,
                                               const StoredRig& rig,
                                               const StoredRun& run) {
+  Store* const store = domain->store();
   options.reweight_noise |= rig.rig.reweight_noise;
   SELFCAL_ASSIGN_OR_RETURN(options.remembered,
-                           store->ListRemembered(run.rig, run.run));
+                           domain->ListRemembered(run.rig, run.run));
   options.walk = WalkDensities(rig.rig, rig.policy.walk_densities) /
                  std::sqrt(kNanosecondsOfDay * 1e-9);
   if (run.change == 0) return options;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/change/concerned.h"
+#include "server/domain/device_change.h"
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/candidate.h"
 #include "server/pipeline/recalibration.h"
@@ -91,11 +92,11 @@ absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
     const StoredRun& run, const Rig& rig, const CalibrationResult& result) {
   HeldOutSegments segments;
   if (!HasUsableNumbers(rig, result)) return segments;
-  SELFCAL_ASSIGN_OR_RETURN(std::vector<Store::HeldOut> held_out,
-                           store_->ListHeldOut(run.rig, run.run, kHeldOut));
+  SELFCAL_ASSIGN_OR_RETURN(std::vector<HeldOut> held_out,
+                           domain_->ListHeldOut(run.rig, run.run, kHeldOut));
   const Rig used = WithUsedNoise(rig, result);
   const bool stated_noise_holds = StatedNoiseHolds(result);
-  for (Store::HeldOut& one : held_out) {
+  for (HeldOut& one : held_out) {
     std::optional<SegmentInformation> again;
     if (one.has_data) {
       SELFCAL_ASSIGN_OR_RETURN(again,
@@ -172,15 +173,15 @@ absl::StatusOr<StoredCalibration> Recalibrator::Finish(
     // the version sees the scores at it.
     const bool becomes_active = candidate.state == CalibrationState::kActive;
     if (becomes_active) {
-      RescoreKept(store_, estimators_, run.rig, candidate.theta);
+      RescoreKept(domain_, estimators_, run.rig, candidate.theta);
     }
-    auto finished = store_->FinishRun(run.rig, run.run, candidate);
+    auto finished = domain_->FinishRun(run.rig, run.run, candidate);
     if (absl::IsAborted(finished.status())) continue;
     if (becomes_active && finished.ok() &&
         finished->state != CalibrationState::kActive) {
       SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
                                store_->GetActiveCalibration(run.rig));
-      RescoreKept(store_, estimators_, run.rig, active.theta);
+      RescoreKept(domain_, estimators_, run.rig, active.theta);
     }
     return finished;
   }

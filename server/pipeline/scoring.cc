@@ -31,12 +31,13 @@ bool IsFinite(const Score& score) {
 
 }  // namespace
 
-ScoringWorkers::ScoringWorkers(Store* store,
+ScoringWorkers::ScoringWorkers(Domain* domain,
                                const PipelineOptions& options,
                                Estimators estimators,
                                std::function<void(const StoredRun&)> on_run,
                                std::function<void(const std::string&)> on_done)
-    : store_(store),
+    : domain_(domain),
+      store_(domain->store()),
       options_(options),
       estimators_(std::move(estimators)),
       on_run_(std::move(on_run)),
@@ -234,7 +235,8 @@ void ScoringWorkers::Commit(const Claim& claim,
 absl::Status ScoringWorkers::TryCommit(const Claim& claim, const Score& score) {
   SELFCAL_ASSIGN_OR_RETURN(
       const ScoreCommit commit,
-      store_->CommitScore(claim.rig, claim.key, score.information, score.ends));
+      domain_->CommitScore(
+          claim.rig, claim.key, score.information, score.ends));
   spdlog::info("{} is scored; tables: [{}]",
                Name(claim),
                fmt::join(commit.tables, ", "));
@@ -256,7 +258,7 @@ void ScoringWorkers::SetAside(const Claim& claim, const absl::Status& why) {
   Backoff backoff;
   for (;;) {
     const absl::Status status =
-        store_->MarkUnusable(claim.rig, claim.key, problem);
+        domain_->MarkUnusable(claim.rig, claim.key, problem);
     if (status.ok() || absl::IsNotFound(status)) {
       return;
     }

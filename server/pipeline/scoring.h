@@ -23,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/store.h"
 
@@ -32,7 +33,7 @@ class ScoringWorkers {
  public:
   // `on_run` is called on a worker for each run that a commit has started,
   // `on_done` for each segment that was scored or set aside, with its rig.
-  ScoringWorkers(Store* store,
+  ScoringWorkers(Domain* domain,
                  const PipelineOptions& options,
                  Estimators estimators,
                  std::function<void(const StoredRun&)> on_run,
@@ -51,7 +52,7 @@ class ScoringWorkers {
   void FillPlace();
   void ReturnPlace();
 
-  // Store::QuarantineSegments, and gives back the places of those that were
+  // Domain::QuarantineSegments, and gives back the places of those that were
   // waiting for their score.
   absl::StatusOr<QuarantineCommit> Quarantine(
       const std::string& rig,
@@ -80,6 +81,7 @@ class ScoringWorkers {
   absl::Status Retry(const std::function<absl::Status()>& call);
   bool Pause(std::chrono::milliseconds time);  // false when stopping
 
+  Domain* const domain_;
   Store* const store_;
   const PipelineOptions options_;
   const Estimators estimators_;

@@ -151,7 +151,7 @@ absl::StatusOr<CalibrationCheck> Verifier::CheckCalibration(
       const StoredRun run,
       store_->GetRun(rig_name, calibration.run.value_or(0)));
   SELFCAL_ASSIGN_OR_RETURN(const CalibrateOptions options,
-                           OptionsOfRun(store_, options_.calibrate, rig, run));
+                           OptionsOfRun(domain_, options_.calibrate, rig, run));
   CalibrationCheck check;
   check.version = version;
   std::vector<MotionSegment> segments;
@@ -243,7 +243,7 @@ absl::Status Verifier::Conclude(const std::string& rig,
   const std::string finding = Finding(verification);
   if (finding.empty()) return absl::OkStatus();
   spdlog::error("rig {}, version {}: {}", rig, verification.version, finding);
-  return store_->ReportDisagreement(rig, verification.version, finding);
+  return domain_->ReportDisagreement(rig, verification.version, finding);
 }
 
 }  // namespace selfcal::server

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
 #include "server/pipeline/verification.h"
 #include "server/store/store.h"
@@ -24,11 +25,14 @@ namespace selfcal::server {
 
 class Verifier {
  public:
-  // The store must outlive it.
-  Verifier(Store* store,
+  // `domain` must outlive it.
+  Verifier(Domain* domain,
            const PipelineOptions& options,
            const Estimators& estimators)
-      : store_(store), options_(options), estimators_(estimators) {}
+      : domain_(domain),
+        store_(domain->store()),
+        options_(options),
+        estimators_(estimators) {}
 
   // From now on every call returns soon, with CANCELLED.
   void Stop() { stopped_ = true; }
@@ -75,6 +79,7 @@ class Verifier {
       CalibrateOptions options,
       const Interrupted& interrupted);
 
+  Domain* const domain_;
   Store* const store_;
   const PipelineOptions options_;
   const Estimators estimators_;

@@ -2,6 +2,7 @@
 
 #include "proto/resource_names.h"
 #include "selfcal/v1/activity_service.grpc.pb.h"
+#include "server/domain/clock.h"
 #include "server/encode/encode.h"
 #include "server/encode/encode_parts.h"
 #include "server/encode/table_fill.h"
@@ -10,7 +11,6 @@
 #include "server/service/paging.h"
 #include "server/service/services.h"
 #include "server/service/traffic.h"
-#include "server/store/clock.h"
 
 namespace selfcal::server {
 namespace {

@@ -88,7 +88,7 @@ class RigService final : public v1::RigService::Service {
                         "allows; ask the operator to raise it"),
                     {});
     }
-    const auto created = context_.store->CreateRig(rig, policy);
+    const auto created = context_.domain->CreateRig(rig, policy);
     if (!created.ok()) {
       return ToGrpc(created.status(), {kType, request.rig().name(), "rig"});
     }

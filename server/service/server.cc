@@ -81,11 +81,12 @@ void AddAddresses(const ServerOptions& options,
 
 class GrpcServer final : public Server {
  public:
-  GrpcServer(Store* store,
+  GrpcServer(Domain* domain,
              Pipeline* pipeline,
              const ServerOptions& options,
              std::function<void()> restored) {
-    const ServiceContext context{store,
+    const ServiceContext context{domain,
+                                 domain->store(),
                                  pipeline,
                                  &stopping_,
                                  options.local_role,
@@ -166,13 +167,13 @@ class GrpcServer final : public Server {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
-    Store* store,
+    Domain* domain,
     Pipeline* pipeline,
     const ServerOptions& options,
     std::function<void()> restored) {
   SELFCAL_RETURN_IF_ERROR(CheckServerOptions(options));
   auto server = std::make_unique<GrpcServer>(
-      store, pipeline, options, std::move(restored));
+      domain, pipeline, options, std::move(restored));
   if (absl::Status started = server->Start(options); !started.ok()) {
     return started;
   }

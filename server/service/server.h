@@ -15,8 +15,8 @@
 
 #include "server/access/grants.h"
 #include "server/access/tls_options.h"
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
-#include "server/store/store.h"
 
 namespace selfcal::server {
 
@@ -66,12 +66,12 @@ class Server {
   virtual void Shutdown(std::chrono::milliseconds deadline) = 0;
 };
 
-// Starts a server; `store` and `pipeline` must outlive it. `restored` is called
-// on one of its threads when a restored database waits for the next start.
-// Errors of CheckServerOptions; UNAVAILABLE if an address cannot be listened
-// on.
+// Starts a server; `domain` and `pipeline` must outlive it. `restored` is
+// called on one of its threads when a restored database waits for the next
+// start. Errors of CheckServerOptions; UNAVAILABLE if an address cannot be
+// listened on.
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
-    Store* store,
+    Domain* domain,
     Pipeline* pipeline,
     const ServerOptions& options,
     std::function<void()> restored = nullptr);

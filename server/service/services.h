@@ -14,8 +14,8 @@
 #include <memory>
 
 #include "server/access/grants.h"
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
-#include "server/store/store.h"
 
 namespace selfcal::server {
 
@@ -23,7 +23,8 @@ class Traffic;  // traffic.h
 
 // All of it outlives the services.
 struct ServiceContext {
-  Store* store = nullptr;
+  Domain* domain = nullptr;
+  Store* store = nullptr;  // of `domain`
   Pipeline* pipeline = nullptr;
   // Once true, watches and streams end with UNAVAILABLE.
   const std::atomic<bool>* stopping = nullptr;

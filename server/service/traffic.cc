@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/store/clock.h"
+#include "server/domain/clock.h"
 
 namespace selfcal::server {
 namespace {

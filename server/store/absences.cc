@@ -2,13 +2,20 @@
 
 #include "server/store/rigs.h"
 #include "server/store/segment_rows.h"
+#include "server/store/statement.h"
+#include "server/store/status_macros.h"
 
 namespace selfcal::server {
+
+// As in kFits.
+static_assert(static_cast<int>(AbsenceCause::kDoesNotFit) == 8 &&
+              static_cast<int>(AbsenceCause::kManyOutliers) == 9);
 
 absl::StatusOr<std::vector<TableAbsence>> ListAbsenceRows(
     Connection* db, const std::string& rig, const SegmentKey& key) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row, FindSegment(db, rig_id, key));
+  UnitOfWork tx(db, rig, rig_id, 0);
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row, FindSegment(&tx, key));
   Statement read(db,
                  "SELECT a.group_name, a.cause, a.time_ns, r.session, "
                  "  r.session_index, a.rival_entropy, a.fit, a.fit_limit "
@@ -34,22 +41,23 @@ absl::StatusOr<std::vector<TableAbsence>> ListAbsenceRows(
   return absences;
 }
 
-absl::Status WriteAbsence(Connection* db,
+absl::Status WriteAbsence(UnitOfWork* tx,
                           std::int64_t segment,
                           const std::string& group,
-                          AbsenceCause cause,
-                          std::optional<std::int64_t> rival,
-                          std::optional<double> rival_entropy) {
-  return Statement(db,
+                          const Absence& absence) {
+  return Statement(tx->db(),
                    "INSERT OR REPLACE INTO table_absences (segment, "
-                   "  group_name, cause, time_ns, rival, rival_entropy) "
-                   "VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+                   "  group_name, cause, time_ns, rival, rival_entropy, fit, "
+                   "  fit_limit) "
+                   "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
                    segment,
                    group,
-                   static_cast<int>(cause),
-                   NowNs(),
-                   rival,
-                   rival_entropy)
+                   static_cast<int>(absence.cause),
+                   tx->time_ns(),
+                   absence.rival,
+                   absence.rival_entropy,
+                   absence.fit,
+                   absence.fit_limit)
       .Run();
 }
 

@@ -3,7 +3,6 @@
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
-#include <fmt/format.h>
 
 #include <cstdint>
 #include <optional>
@@ -11,10 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "server/store/clock.h"
 #include "server/store/session.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
+#include "server/store/unit_of_work.h"
 
 namespace selfcal::server {
 
@@ -22,43 +19,28 @@ namespace selfcal::server {
 absl::StatusOr<std::vector<TableAbsence>> ListAbsenceRows(
     Connection* db, const std::string& rig, const SegmentKey& key);
 
-// The rest runs inside a transaction of the caller.
+// Condition on a row `s` of segments: the tables were not refused to it, nor
+// was it taken out of them, for its residuals. One that was is evidence for
+// nothing: it is not remembered, tests no candidate, and shows no change of the
+// device.
+inline constexpr std::string_view kFits =
+    "NOT EXISTS (SELECT 1 FROM table_absences a "
+    "  WHERE a.segment = s.segment AND a.cause IN (8, 9))";
 
-// Instead of what was known of the segment and the group before.
-absl::Status WriteAbsence(Connection* db,
+// --- Within a unit of work.
+
+// Instead of what was known of the segment and the group before; the time is
+// that of the unit of work.
+struct Absence {
+  AbsenceCause cause = AbsenceCause::kSaysTooLittle;
+  std::optional<std::int64_t> rival = std::nullopt;  // row of a segment
+  std::optional<double> rival_entropy = std::nullopt;
+  std::optional<double> fit = std::nullopt;
+  std::optional<double> fit_limit = std::nullopt;
+};
+absl::Status WriteAbsence(UnitOfWork* tx,
                           std::int64_t segment,
                           const std::string& group,
-                          AbsenceCause cause,
-                          std::optional<std::int64_t> rival,
-                          std::optional<double> rival_entropy);
-
-// Takes entries out of their tables, and writes down why. `which` is a
-// condition on the columns of table_entries; its arguments count from ?3.
-template <typename... Args>
-absl::Status LeaveTables(Connection* db,
-                         AbsenceCause cause,
-                         std::string_view which,
-                         const Args&... args) {
-  SELFCAL_RETURN_IF_ERROR(
-      Statement(db,
-                fmt::format("INSERT OR REPLACE INTO table_absences "
-                            "(segment, group_name, cause, time_ns) "
-                            "SELECT segment, group_name, ?1, ?2 "
-                            "FROM table_entries WHERE {}",
-                            which),
-                static_cast<int>(cause),
-                NowNs(),
-                args...)
-          .Run());
-  // ?1 and ?2 are not in the condition, and have to stand somewhere.
-  return Statement(db,
-                   fmt::format("DELETE FROM table_entries WHERE {} "
-                               "AND ?1 IS NOT NULL AND ?2 IS NOT NULL",
-                               which),
-                   static_cast<int>(cause),
-                   NowNs(),
-                   args...)
-      .Run();
-}
+                          const Absence& absence);
 
 }  // namespace selfcal::server

@@ -8,6 +8,7 @@
 #include "server/store/paging.h"
 #include "server/store/records.h"
 #include "server/store/rigs.h"
+#include "server/store/statement.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -90,6 +91,19 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
   return calibration;
 }
 
+absl::StatusOr<std::int64_t> ActiveVersionOf(Connection* db, std::int64_t rig) {
+  Statement read(
+      db, "SELECT version FROM calibrations WHERE rig = ?1 AND state = 1", rig);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  if (!found) {
+    return absl::DataLossError(
+        "the rig has no active calibration; restore the database from a "
+        "backup");
+  }
+  return read.Int(0);
+}
+
 }  // namespace
 
 absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
@@ -113,7 +127,7 @@ absl::StatusOr<StoredCalibration> ReadActiveCalibration(
     Connection* db, const std::string& rig) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t version,
-                           ActiveVersion(db, rig_id));
+                           ActiveVersionOf(db, rig_id));
   return ReadCalibration(db, rig, version);
 }
 
@@ -142,19 +156,6 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
   return listed;
 }
 
-absl::StatusOr<std::int64_t> ActiveVersion(Connection* db, std::int64_t rig) {
-  Statement read(
-      db, "SELECT version FROM calibrations WHERE rig = ?1 AND state = 1", rig);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  if (!found) {
-    return absl::DataLossError(
-        "the rig has no active calibration; restore the database from a "
-        "backup");
-  }
-  return read.Int(0);
-}
-
 absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(Connection* db,
                                                            std::int64_t rig,
                                                            std::int64_t run) {
@@ -171,11 +172,52 @@ absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(Connection* db,
   return version;
 }
 
-absl::StatusOr<std::int64_t> NextVersion(Connection* db, std::int64_t rig) {
-  return ReadInt(db,
+absl::StatusOr<StoredCalibration> CandidateCalibration(Connection* db,
+                                                       const std::string& rig,
+                                                       std::int64_t run) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  SELFCAL_ASSIGN_OR_RETURN(const auto version, CandidateOfRun(db, rig_id, run));
+  if (!version) {
+    return absl::NotFoundError(
+        fmt::format("recalibration {} of rig {} has no candidate", run, rig));
+  }
+  return ReadCalibration(db, rig, *version);
+}
+
+absl::StatusOr<StoredCalibration> ReadCalibration(UnitOfWork* tx,
+                                                  std::int64_t version) {
+  return ReadCalibration(tx->db(), tx->rig(), version);
+}
+
+absl::StatusOr<StoredCalibration> ReadActiveCalibration(UnitOfWork* tx) {
+  return ReadActiveCalibration(tx->db(), tx->rig());
+}
+
+absl::StatusOr<std::int64_t> ActiveVersion(UnitOfWork* tx) {
+  return ActiveVersionOf(tx->db(), tx->rig_row());
+}
+
+absl::StatusOr<std::int64_t> NextVersion(UnitOfWork* tx) {
+  return ReadInt(tx->db(),
                  "SELECT coalesce(max(version), 0) + 1 FROM calibrations "
                  "WHERE rig = ?1",
-                 rig);
+                 tx->rig_row());
+}
+
+absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(UnitOfWork* tx,
+                                                           std::int64_t run) {
+  return CandidateOfRun(tx->db(), tx->rig_row(), run);
+}
+
+absl::StatusOr<std::int64_t> ActivationTime(UnitOfWork* tx,
+                                            std::int64_t activation) {
+  return ReadInt(tx->db(),
+                 "SELECT time_ns FROM activations WHERE activation = ?1",
+                 activation);
+}
+
+absl::StatusOr<std::int64_t> SchemaVersion(UnitOfWork* tx) {
+  return ReadInt(tx->db(), "PRAGMA user_version");
 }
 
 }  // namespace selfcal::server

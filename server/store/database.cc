@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "server/store/clock.h"
 #include "server/store/database_file.h"
 #include "server/store/status_macros.h"
 
@@ -45,11 +44,11 @@ absl::Status ApplyOne(Connection* connection,
   SELFCAL_RETURN_IF_ERROR(connection->Execute(std::string(migration.sql)));
   SELFCAL_RETURN_IF_ERROR(
       Statement(connection,
-                "INSERT INTO schema_migrations VALUES (?1, ?2, ?3, ?4)",
+                "INSERT INTO schema_migrations VALUES (?1, ?2, ?3, "
+                "  CAST(strftime('%s', 'now') AS INTEGER) * 1000000000)",
                 version,
                 migration.name,
-                migration.sha256,
-                NowNs())
+                migration.sha256)
           .Run());
   SELFCAL_RETURN_IF_ERROR(connection->Execute(
       fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}",

@@ -2,8 +2,8 @@
 
 #include <limits>
 
-#include "server/store/clock.h"
 #include "server/store/paging.h"
+#include "server/store/statement.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -37,15 +37,14 @@ absl::StatusOr<Listed<StoredEvent>> ReadPage(Connection* db,
 
 }  // namespace
 
-absl::Status AppendEvent(Connection* db,
-                         const std::string& rig,
+absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail) {
-  return Statement(db,
+  return Statement(tx->db(),
                    "INSERT INTO events (time_ns, rig, kind, detail) "
                    "VALUES (?1, ?2, ?3, ?4)",
-                   NowNs(),
-                   rig,
+                   tx->time_ns(),
+                   tx->rig(),
                    static_cast<int>(kind) + 1,
                    detail)
       .Run();

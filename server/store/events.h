@@ -6,14 +6,12 @@
 
 #include <string>
 
-#include "server/store/statement.h"
 #include "server/store/store.h"
+#include "server/store/unit_of_work.h"
 
 namespace selfcal::server {
 
-// Within the transaction that does what the event tells.
-absl::Status AppendEvent(Connection* db,
-                         const std::string& rig,
+absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail);
 

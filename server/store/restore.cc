@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -14,7 +15,6 @@
 #include "migrations/migrations.h"
 #include "server/store/check.h"
 #include "server/store/checksum.h"
-#include "server/store/clock.h"
 #include "server/store/database.h"
 #include "server/store/database_file.h"
 #include "server/store/status_macros.h"
@@ -117,7 +117,7 @@ class FileRestoration final : public Restoration {
           "checksum: send it again");
     }
     SELFCAL_RETURN_IF_ERROR(VerifyApart(arriving_));
-    const std::string time = std::to_string(NowNs() / 1'000'000'000);
+    const std::string time = std::to_string(std::time(nullptr));
     SELFCAL_RETURN_IF_ERROR(
         RenameDurably(arriving_, path_ + std::string(kWaiting) + time));
     return path_ + ".before-restore-" + time;

@@ -45,16 +45,6 @@ void PutPolicy(const RigPolicy& policy, v1::Rig* message) {
   }
 }
 
-Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
-                             const StoredCalibration& calibration,
-                             std::int64_t time_ns) {
-  const auto age_ns = static_cast<double>(time_ns - calibration.create_time_ns);
-  return AgedCovariance(rig.rig,
-                        WalkDensities(rig.rig, rig.policy.walk_densities),
-                        calibration.covariance,
-                        age_ns / kNanosecondsOfDay);
-}
-
 std::vector<Violation> GetPolicy(const v1::Rig& message, RigPolicy* policy) {
   std::vector<Violation> violations;
   Get(message.table_max_age(),

@@ -2,14 +2,11 @@
 
 #include <fmt/format.h>
 
-#include "server/store/calibrations.h"
 #include "server/store/checksum.h"
-#include "server/store/clock.h"
-#include "server/store/events.h"
 #include "server/store/paging.h"
 #include "server/store/records.h"
+#include "server/store/statement.h"
 #include "server/store/status_macros.h"
-#include "server/store/table_rows.h"
 
 namespace selfcal::server {
 namespace {
@@ -32,57 +29,36 @@ absl::StatusOr<StoredRig> RigFromRow(const Statement& row, int column) {
   return stored;
 }
 
-// What is known of the factory's calibration are its tolerances.
-StoredCalibration FactoryCalibration(const Rig& rig) {
-  Eigen::VectorXd variances = Eigen::VectorXd::Zero(TangentSize(rig.factory));
-  const Eigen::VectorXd sigmas = PriorSigmas(rig);
-  for (const int component : FreeComponents(rig)) {
-    variances[component] = sigmas[component] * sigmas[component];
-  }
-  StoredCalibration calibration;
-  calibration.rig = rig.id;
-  calibration.version = 1;
-  calibration.state = CalibrationState::kActive;
-  calibration.theta = rig.factory;
-  calibration.covariance = variances.asDiagonal();
-  return calibration;
+absl::StatusOr<std::vector<std::string>> ReadNames(Statement* read) {
+  std::vector<std::string> names;
+  while (read->Next()) names.push_back(read->Text(0));
+  SELFCAL_RETURN_IF_ERROR(read->status());
+  return names;
 }
 
 }  // namespace
 
-absl::StatusOr<StoredRig> CreateRigRow(Connection* db,
-                                       const Rig& rig,
-                                       const RigPolicy& policy) {
-  Transaction transaction(db);
-  SELFCAL_RETURN_IF_ERROR(transaction.status());
-  Statement existing(db, "SELECT 1 FROM rigs WHERE id = ?1", rig.id);
+absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig) {
+  const std::string& id = rig.rig.id;
+  Statement existing(db, "SELECT 1 FROM rigs WHERE id = ?1", id);
   const bool exists = existing.Next();
   SELFCAL_RETURN_IF_ERROR(existing.status());
   if (exists) {
     return absl::AlreadyExistsError(
-        fmt::format("rig {} exists; choose another name", rig.id));
+        fmt::format("rig {} exists; choose another name", id));
   }
-  StoredRig stored{rig, NowNs(), policy};
-  const std::string bytes = SerializeRig(stored);
+  const std::string bytes = SerializeRig(rig);
   const std::string sha256 = Sha256(bytes);
   SELFCAL_RETURN_IF_ERROR(
       Statement(db,
                 "INSERT INTO rigs (id, create_time_ns, definition, sha256) "
                 "VALUES (?1, ?2, ?3, ?4)",
-                rig.id,
-                stored.create_time_ns,
+                id,
+                rig.create_time_ns,
                 BlobView{bytes},
                 BlobView{sha256})
           .Run());
-  const std::int64_t rowid = sqlite3_last_insert_rowid(db->handle());
-  SELFCAL_RETURN_IF_ERROR(InsertTables(db, rowid, MakeTables(rig)));
-  SELFCAL_RETURN_IF_ERROR(
-      AppendEvent(db, rig.id, EventKind::kRigCreated, "created"));
-  StoredCalibration factory = FactoryCalibration(rig);
-  factory.create_time_ns = stored.create_time_ns;
-  SELFCAL_RETURN_IF_ERROR(InsertFactory(db, rowid, factory));
-  SELFCAL_RETURN_IF_ERROR(transaction.Commit());
-  return stored;
+  return LastInsertedRow(db);
 }
 
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig) {
@@ -95,9 +71,9 @@ absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig) {
   return read.Int(0);
 }
 
-absl::StatusOr<RigRow> ReadRig(Connection* db, const std::string& rig) {
+absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig) {
   Statement read(db,
-                 "SELECT rig, id, create_time_ns, definition, sha256 "
+                 "SELECT id, create_time_ns, definition, sha256 "
                  "FROM rigs WHERE id = ?1",
                  rig);
   const bool found = read.Next();
@@ -105,10 +81,25 @@ absl::StatusOr<RigRow> ReadRig(Connection* db, const std::string& rig) {
   if (!found) {
     return NoSuchRig(rig);
   }
-  RigRow row;
-  row.rowid = read.Int(0);
-  SELFCAL_ASSIGN_OR_RETURN(row.stored, RigFromRow(read, 1));
-  return row;
+  return RigFromRow(read, 0);
+}
+
+absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx) {
+  return ReadRig(tx->db(), tx->rig());
+}
+
+absl::StatusOr<std::vector<std::string>> RigNames(Connection* db) {
+  Statement read(db, "SELECT id FROM rigs ORDER BY rig");
+  return ReadNames(&read);
+}
+
+absl::StatusOr<std::vector<std::string>> IdleRigNames(
+    Connection* db, std::int64_t idle_since_ns) {
+  Statement read(db,
+                 "SELECT id FROM rigs WHERE last_seen_ns > 0 "
+                 "AND last_seen_ns <= ?1 ORDER BY rig",
+                 idle_since_ns);
+  return ReadNames(&read);
 }
 
 absl::StatusOr<Listed<StoredRig>> ListRigRows(Connection* db,

@@ -5,25 +5,26 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
-#include "server/store/statement.h"
 #include "server/store/store.h"
+#include "server/store/unit_of_work.h"
 
 namespace selfcal::server {
 
-struct RigRow {
-  std::int64_t rowid = 0;
-  StoredRig stored;
-};
-
-// With its tables and version 1, in one transaction. ALREADY_EXISTS.
-absl::StatusOr<StoredRig> CreateRigRow(Connection* db,
-                                       const Rig& rig,
-                                       const RigPolicy& policy);
+// Returns its row. ALREADY_EXISTS.
+absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig);
 
 // NOT_FOUND.
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig);
-absl::StatusOr<RigRow> ReadRig(Connection* db, const std::string& rig);
+// NOT_FOUND; DATA_LOSS if it is not as it was written.
+absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig);
+absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);
+
+absl::StatusOr<std::vector<std::string>> RigNames(Connection* db);
+// Store::ListIdleRigs.
+absl::StatusOr<std::vector<std::string>> IdleRigNames(
+    Connection* db, std::int64_t idle_since_ns);
 
 // By name.
 absl::StatusOr<Listed<StoredRig>> ListRigRows(Connection* db, const Page& page);

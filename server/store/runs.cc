@@ -4,8 +4,9 @@
 
 #include <cstdint>
 
-#include "server/store/events.h"
 #include "server/store/paging.h"
+#include "server/store/rigs.h"
+#include "server/store/statement.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -17,6 +18,13 @@ constexpr char kColumns[] =
     "  r.change, r.session_ended "
     "FROM runs r JOIN rigs g USING (rig) ";
 
+absl::StatusOr<std::vector<SegmentKey>> ReadKeys(Statement* read) {
+  std::vector<SegmentKey> keys;
+  while (read->Next()) keys.push_back({read->Text(0), read->Int(1)});
+  SELFCAL_RETURN_IF_ERROR(read->status());
+  return keys;
+}
+
 absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
                                                      std::int64_t rig,
                                                      std::int64_t run) {
@@ -26,12 +34,7 @@ absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
                  "WHERE x.rig = ?1 AND x.run = ?2 ORDER BY s.sequence",
                  rig,
                  run);
-  std::vector<SegmentKey> keys;
-  while (read.Next()) {
-    keys.push_back({read.Text(0), read.Int(1)});
-  }
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  return keys;
+  return ReadKeys(&read);
 }
 
 // From the columns cause, change and session_ended.
@@ -80,16 +83,29 @@ absl::StatusOr<std::vector<StoredRun>> ReadAll(Connection* db,
   return runs;
 }
 
-std::string EndText(const StoredRun& run) {
-  switch (run.state) {
-    case RunState::kSucceeded:
-      return fmt::format(
-          "run {} produced version {}", run.run, run.calibration_version);
-    case RunState::kCancelled:
-      return fmt::format("run {} was cancelled: {}", run.run, run.message);
-    default:
-      return fmt::format("run {} failed: {}", run.run, run.message);
+// In the column cause.
+int CauseOf(RunTrigger trigger) {
+  switch (trigger) {
+    case RunTrigger::kTablesFull:
+    case RunTrigger::kChangeDetected:
+      return 1;
+    case RunTrigger::kTablesChanged:
+    case RunTrigger::kSessionEnded:
+      return 2;
+    case RunTrigger::kCalibrationAged:
+      return 4;
+    case RunTrigger::kManual:
+      break;
   }
+  return 3;
+}
+
+absl::StatusOr<std::int64_t> NewestWhere(UnitOfWork* tx,
+                                         const std::string& condition) {
+  return ReadInt(
+      tx->db(),
+      "SELECT coalesce(max(run), 0) FROM runs WHERE rig = ?1 AND " + condition,
+      tx->rig_row());
 }
 
 }  // namespace
@@ -139,24 +155,108 @@ absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(Connection* db) {
   return ReadAll(db, &read);
 }
 
-absl::Status UpdateRun(Connection* db, std::int64_t rig, const StoredRun& run) {
+absl::StatusOr<StoredRun> ReadRun(UnitOfWork* tx, std::int64_t run) {
+  return ReadRun(tx->db(), tx->rig(), run);
+}
+
+absl::StatusOr<std::int64_t> NewestRun(UnitOfWork* tx) {
+  return NewestWhere(tx, "1");
+}
+
+absl::StatusOr<std::int64_t> UnfinishedRun(UnitOfWork* tx) {
+  return NewestWhere(tx, "state IN (1, 2)");
+}
+
+absl::StatusOr<std::int64_t> NewestSucceededRun(UnitOfWork* tx) {
+  return NewestWhere(tx, "state = 3");
+}
+
+absl::StatusOr<std::int64_t> NewestRunOfTables(UnitOfWork* tx,
+                                               std::int64_t change) {
+  return NewestWhere(tx,
+                     fmt::format("cause IN (1, 2) AND change = {}", change));
+}
+
+absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
   SELFCAL_RETURN_IF_ERROR(
-      Statement(db,
-                "UPDATE runs SET state = ?3, attempts = ?4, end_time_ns = ?5, "
-                "  calibration_version = ?6, message = ?7 "
-                "WHERE rig = ?1 AND run = ?2",
-                rig,
+      Statement(tx->db(),
+                "INSERT INTO runs (rig, run, state, cause, create_time_ns, "
+                "  base_version, change, session_ended) "
+                "VALUES (?1, ?2, 1, ?3, ?4, ?5, ?6, ?7)",
+                tx->rig_row(),
                 run.run,
-                static_cast<int>(run.state) + 1,
-                run.attempts,
-                run.end_time_ns,
-                run.calibration_version,
-                run.message)
+                CauseOf(run.trigger),
+                run.create_time_ns,
+                run.base_version,
+                run.change,
+                run.trigger == RunTrigger::kSessionEnded ? 1 : 0)
           .Run());
-  if (run.end_time_ns == 0) {
-    return absl::OkStatus();
+  for (const SegmentKey& key : run.segments) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(tx->db(),
+                  "INSERT INTO run_segments (rig, run, segment) "
+                  "SELECT ?1, ?2, segment FROM segments "
+                  "WHERE rig = ?1 AND session = ?3 AND session_index = ?4",
+                  tx->rig_row(),
+                  run.run,
+                  key.session,
+                  key.index)
+            .Run());
   }
-  return AppendEvent(db, run.rig, EventKind::kRunEnded, EndText(run));
+  return absl::OkStatus();
+}
+
+absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run) {
+  return Statement(tx->db(),
+                   "UPDATE runs SET state = ?3, attempts = ?4, "
+                   "  end_time_ns = ?5, calibration_version = ?6, "
+                   "  message = ?7 WHERE rig = ?1 AND run = ?2",
+                   tx->rig_row(),
+                   run.run,
+                   static_cast<int>(run.state) + 1,
+                   run.attempts,
+                   run.end_time_ns,
+                   run.calibration_version,
+                   run.message)
+      .Run();
+}
+
+absl::Status MarkExcluded(UnitOfWork* tx,
+                          std::int64_t run,
+                          std::int64_t segment) {
+  return Statement(tx->db(),
+                   "UPDATE run_segments SET excluded = 1 "
+                   "WHERE rig = ?1 AND run = ?2 AND segment = ?3",
+                   tx->rig_row(),
+                   run,
+                   segment)
+      .Run();
+}
+
+absl::StatusOr<std::vector<SegmentKey>> UsedSegments(UnitOfWork* tx,
+                                                     std::int64_t run) {
+  Statement read(tx->db(),
+                 "SELECT s.session, s.session_index FROM run_segments x "
+                 "JOIN segments s USING (segment) "
+                 "WHERE x.rig = ?1 AND x.run = ?2 AND x.excluded = 0 "
+                 "ORDER BY s.session, s.session_index",
+                 tx->rig_row(),
+                 run);
+  return ReadKeys(&read);
+}
+
+absl::StatusOr<std::vector<SegmentKey>> UnusableSegments(UnitOfWork* tx,
+                                                         std::int64_t run,
+                                                         bool only_used) {
+  Statement read(tx->db(),
+                 "SELECT s.session, s.session_index FROM run_segments x "
+                 "JOIN segments s USING (segment) "
+                 "WHERE x.rig = ?1 AND x.run = ?2 AND s.state = 3 "
+                 "AND (?3 = 0 OR x.excluded = 0) ORDER BY s.sequence",
+                 tx->rig_row(),
+                 run,
+                 only_used ? 1 : 0);
+  return ReadKeys(&read);
 }
 
 }  // namespace selfcal::server

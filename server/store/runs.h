@@ -1,19 +1,16 @@
-// Runs of the solver, in the database: written with their trigger and the
-// snapshot of the tables, so that a restart finds them.
+// Records of runs of the solver: with their trigger and the snapshot of the
+// tables, so that a restart finds them.
 #pragma once
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "core/selection/tables.h"
-#include "server/store/rigs.h"
-#include "server/store/statement.h"
 #include "server/store/store.h"
+#include "server/store/unit_of_work.h"
 
 namespace selfcal::server {
 
@@ -28,29 +25,34 @@ absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
 // Of all rigs, oldest first.
 absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(Connection* db);
 
-// The rest runs inside a transaction of the caller.
+// --- Within a unit of work.
 
-// FAILED_PRECONDITION if the tables are empty or a run is unfinished.
-absl::StatusOr<StoredRun> InsertRun(Connection* db,
-                                    const RigRow& rig,
-                                    const std::vector<Table>& tables,
-                                    RunTrigger trigger);
+// NOT_FOUND.
+absl::StatusOr<StoredRun> ReadRun(UnitOfWork* tx, std::int64_t run);
 
-// Creates the run that the tables call for, if they do and no run is
-// unfinished.
-absl::StatusOr<std::optional<StoredRun>> MaybeInsertRun(
-    Connection* db, const RigRow& rig, const std::vector<Table>& tables);
+// Numbers of runs of the rig; 0: there is none.
+absl::StatusOr<std::int64_t> NewestRun(UnitOfWork* tx);
+absl::StatusOr<std::int64_t> UnfinishedRun(UnitOfWork* tx);
+absl::StatusOr<std::int64_t> NewestSucceededRun(UnitOfWork* tx);
+// That the tables started by themselves since this change of the device.
+absl::StatusOr<std::int64_t> NewestRunOfTables(UnitOfWork* tx,
+                                               std::int64_t change);
 
-// What the trigger compares the tables with: the snapshot of the newest run,
-// however it ended, so that a failure is not repeated on the same data. Nothing
-// until the tables have started a run of their own since the last change: one
-// that was asked for on half-filled tables does not stand for the first full
-// ones.
-absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
-    Connection* db, const RigRow& rig);
-
-// Writes state, attempts, end_time_ns, calibration_version and message; an
-// event where the run ends.
-absl::Status UpdateRun(Connection* db, std::int64_t rig, const StoredRun& run);
+// With its snapshot of segments; pending.
+absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run);
+// Writes state, attempts, end_time_ns, calibration_version and message.
+absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run);
+// The result of the run does not use this segment of its snapshot.
+absl::Status MarkExcluded(UnitOfWork* tx,
+                          std::int64_t run,
+                          std::int64_t segment);
+// Segments of the snapshot that the result uses, by key.
+absl::StatusOr<std::vector<SegmentKey>> UsedSegments(UnitOfWork* tx,
+                                                     std::int64_t run);
+// Segments of the snapshot that are unusable by now, in order of arrival: all,
+// or those that the result uses.
+absl::StatusOr<std::vector<SegmentKey>> UnusableSegments(UnitOfWork* tx,
+                                                         std::int64_t run,
+                                                         bool only_used);
 
 }  // namespace selfcal::server

@@ -6,13 +6,11 @@
 #include <utility>
 
 #include "proto/convert.h"
-#include "server/store/change_rows.h"
+#include "server/store/absences.h"
 #include "server/store/checksum.h"
-#include "server/store/fit_rows.h"
 #include "server/store/record_parts.h"
 #include "server/store/records.pb.h"
-#include "server/store/rigs.h"
-#include "server/store/runs.h"
+#include "server/store/statement.h"
 #include "server/store/status_macros.h"
 #include "server/store/store.h"
 
@@ -36,6 +34,13 @@ bool GetTriangle(const google::protobuf::RepeatedField<double>& values,
     }
   }
   return true;
+}
+
+absl::StatusOr<std::vector<std::int64_t>> ReadInts(Statement* read) {
+  std::vector<std::int64_t> values;
+  while (read->Next()) values.push_back(read->Int(0));
+  SELFCAL_RETURN_IF_ERROR(read->status());
+  return values;
 }
 
 }  // namespace
@@ -77,17 +82,12 @@ absl::StatusOr<SegmentEnds> ParseEnds(std::string_view bytes) {
   return ends;
 }
 
-absl::StatusOr<std::vector<RememberedSegment>> ListRememberedRows(
-    Connection* db, const std::string& rig, std::int64_t run_number) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run, ReadRun(db, rig, run_number));
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
-                           FirstSequenceSince(db, rig, run.change));
-  // Sessions in the order in which they began.
+absl::StatusOr<std::vector<EndsRow>> ReadEnds(UnitOfWork* tx,
+                                              std::int64_t first_sequence) {
   Statement read(
-      db,
-      fmt::format("SELECT s.session, s.session_index, s.fit, "
-                  "  s.receive_time_ns, e.ends, e.sha256, "
+      tx->db(),
+      fmt::format("SELECT s.segment, s.session, s.session_index, s.sequence, "
+                  "  s.receive_time_ns, s.fit, e.ends, e.sha256, "
                   "  EXISTS (SELECT 1 FROM payloads p "
                   "    WHERE p.segment = s.segment) "
                   "FROM segment_ends e JOIN segments s USING (segment) "
@@ -96,66 +96,73 @@ absl::StatusOr<std::vector<RememberedSegment>> ListRememberedRows(
                   "ORDER BY min(s.sequence) OVER (PARTITION BY s.session), "
                   "  s.session_index",
                   kFits),
-      rig_id,
+      tx->rig_row(),
       first_sequence);
-  std::vector<RememberedSegment> remembered;
+  std::vector<EndsRow> rows;
   while (read.Next()) {
-    RememberedSegment one;
-    one.key = {read.Text(0), read.Int(1)};
-    one.fit = read.Double(2);
-    one.time_ns = read.Int(3);
-    if (read.Int(6) == 0) {
-      const std::string bytes = read.Text(4);
-      if (!VerifySha256(bytes, read.Text(5), kWhat).ok()) continue;
+    EndsRow row{.segment = {.rowid = read.Int(0),
+                            .key = {read.Text(1), read.Int(2)},
+                            .sequence = read.Int(3),
+                            .state = SegmentState::kScored,
+                            .receive_time_ns = read.Int(4),
+                            .fit = read.Double(5)},
+                .has_data = read.Int(8) != 0};
+    const std::string bytes = row.has_data ? "" : read.Text(6);
+    if (!row.has_data && VerifySha256(bytes, read.Text(7), kWhat).ok()) {
       auto ends = ParseEnds(bytes);
-      if (!ends.ok()) continue;
-      one.ends = *std::move(ends);
+      if (ends.ok()) row.ends = *std::move(ends);
     }
-    remembered.push_back(std::move(one));
+    rows.push_back(std::move(row));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
-  return remembered;
+  return rows;
 }
 
-absl::Status WriteEnds(Connection* db,
-                       std::int64_t rig,
+absl::StatusOr<std::vector<std::int64_t>> ArrivalsOfEnds(UnitOfWork* tx) {
+  Statement read(tx->db(),
+                 "SELECT s.receive_time_ns FROM segment_ends e "
+                 "JOIN segments s USING (segment) "
+                 "WHERE e.rig = ?1 AND s.state = 2",
+                 tx->rig_row());
+  return ReadInts(&read);
+}
+
+absl::StatusOr<std::vector<std::int64_t>> EndsWithoutData(UnitOfWork* tx) {
+  Statement read(tx->db(),
+                 "SELECT e.segment FROM segment_ends e WHERE e.rig = ?1 "
+                 "AND NOT EXISTS (SELECT 1 FROM payloads p "
+                 "  WHERE p.segment = e.segment) ORDER BY e.segment DESC",
+                 tx->rig_row());
+  return ReadInts(&read);
+}
+
+absl::Status WriteEnds(UnitOfWork* tx,
                        std::int64_t segment,
                        const SegmentEnds& ends) {
   const std::string bytes = SerializeEnds(ends);
   const std::string sha256 = Sha256(bytes);
-  SELFCAL_RETURN_IF_ERROR(
-      Statement(db,
-                "INSERT OR REPLACE INTO segment_ends (segment, rig, ends, "
-                "  sha256) VALUES (?1, ?2, ?3, ?4)",
-                segment,
-                rig,
-                BlobView{bytes},
-                BlobView{sha256})
-          .Run());
-  return Statement(db,
-                   "DELETE FROM segment_ends WHERE segment IN "
-                   "  (SELECT e.segment FROM segment_ends e WHERE e.rig = ?1 "
-                   "     AND NOT EXISTS (SELECT 1 FROM payloads p "
-                   "       WHERE p.segment = e.segment) "
-                   "   ORDER BY e.segment DESC LIMIT -1 OFFSET ?2)",
-                   rig,
-                   Store::kRemembered)
+  return Statement(tx->db(),
+                   "INSERT OR REPLACE INTO segment_ends (segment, rig, ends, "
+                   "  sha256) VALUES (?1, ?2, ?3, ?4)",
+                   segment,
+                   tx->rig_row(),
+                   BlobView{bytes},
+                   BlobView{sha256})
       .Run();
 }
 
-absl::Status ForgetSegment(Connection* db, std::int64_t segment) {
-  return Statement(db, "DELETE FROM segment_ends WHERE segment = ?1", segment)
+absl::Status DeleteEnds(UnitOfWork* tx, std::int64_t segment) {
+  return Statement(
+             tx->db(), "DELETE FROM segment_ends WHERE segment = ?1", segment)
       .Run();
 }
 
-absl::Status ForgetBefore(Connection* db,
-                          std::int64_t rig,
-                          std::int64_t first_sequence) {
-  return Statement(db,
+absl::Status DeleteEndsBefore(UnitOfWork* tx, std::int64_t first_sequence) {
+  return Statement(tx->db(),
                    "DELETE FROM segment_ends WHERE rig = ?1 AND segment IN "
                    "  (SELECT segment FROM segments "
                    "   WHERE rig = ?1 AND sequence < ?2)",
-                   rig,
+                   tx->rig_row(),
                    first_sequence)
       .Run();
 }

@@ -1,18 +1,19 @@
-// What segments say together with the states at their ends, in the database:
-// what is remembered of them when their data is gone.
+// Records of the ends of segments (core/information/segment_ends.h), which stay
+// when their data is gone.
 #pragma once
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "core/calibration/remembered_segment.h"
 #include "core/information/segment_ends.h"
-#include "server/store/statement.h"
+#include "server/store/segment_rows.h"
+#include "server/store/unit_of_work.h"
 
 namespace selfcal::server {
 
@@ -20,22 +21,29 @@ std::string SerializeEnds(const SegmentEnds& ends);
 // DATA_LOSS for bytes that are not what they should be.
 absl::StatusOr<SegmentEnds> ParseEnds(std::string_view bytes);
 
-// Store::ListRemembered.
-absl::StatusOr<std::vector<RememberedSegment>> ListRememberedRows(
-    Connection* db, const std::string& rig, std::int64_t run);
+// --- Within a unit of work.
 
-// The rest runs inside a transaction of the caller.
+// A scored segment that has ends.
+struct EndsRow {
+  SegmentRow segment;
+  bool has_data = false;
+  // Read for segments without data; missing where they are damaged.
+  std::optional<SegmentEnds> ends = std::nullopt;
+};
+// Those from this sequence on, of the segments that VisitScored visits:
+// sessions in the order in which they began, each by index.
+absl::StatusOr<std::vector<EndsRow>> ReadEnds(UnitOfWork* tx,
+                                              std::int64_t first_sequence);
+// When the scored segments that have ends arrived [ns].
+absl::StatusOr<std::vector<std::int64_t>> ArrivalsOfEnds(UnitOfWork* tx);
+// Rows of the segments that have ends and no data, newest first.
+absl::StatusOr<std::vector<std::int64_t>> EndsWithoutData(UnitOfWork* tx);
 
-// In place of what was remembered of the segment. Forgets the oldest of the
-// rig's segments without data beyond Store::kRemembered.
-absl::Status WriteEnds(Connection* db,
-                       std::int64_t rig,
+// In place of those that the segment had.
+absl::Status WriteEnds(UnitOfWork* tx,
                        std::int64_t segment,
                        const SegmentEnds& ends);
-
-absl::Status ForgetSegment(Connection* db, std::int64_t segment);
-absl::Status ForgetBefore(Connection* db,
-                          std::int64_t rig,
-                          std::int64_t first_sequence);
+absl::Status DeleteEnds(UnitOfWork* tx, std::int64_t segment);
+absl::Status DeleteEndsBefore(UnitOfWork* tx, std::int64_t first_sequence);
 
 }  // namespace selfcal::server

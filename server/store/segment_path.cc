@@ -5,6 +5,7 @@
 #include "server/store/checksum.h"
 #include "server/store/record_parts.h"
 #include "server/store/records.pb.h"
+#include "server/store/statement.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -49,12 +50,12 @@ absl::StatusOr<std::vector<PathPoint>> ParsePath(std::string_view bytes,
   return path;
 }
 
-absl::Status InsertPath(Connection* db,
+absl::Status InsertPath(UnitOfWork* tx,
                         std::int64_t segment,
                         const std::vector<PathPoint>& path) {
   const std::string bytes = SerializePath(path);
   const std::string sha256 = Sha256(bytes);
-  return Statement(db,
+  return Statement(tx->db(),
                    "INSERT INTO segment_paths (segment, path, sha256) "
                    "VALUES (?1, ?2, ?3)",
                    segment,

@@ -12,7 +12,7 @@
 
 #include "core/model/segment.h"
 #include "server/store/session.h"
-#include "server/store/statement.h"
+#include "server/store/unit_of_work.h"
 
 namespace selfcal::server {
 
@@ -24,8 +24,7 @@ std::string SerializePath(const std::vector<PathPoint>& path);
 absl::StatusOr<std::vector<PathPoint>> ParsePath(std::string_view bytes,
                                                  const std::string& what);
 
-// Inside a transaction of the caller.
-absl::Status InsertPath(Connection* db,
+absl::Status InsertPath(UnitOfWork* tx,
                         std::int64_t segment,
                         const std::vector<PathPoint>& path);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "server/store/absences.h"
 #include "server/store/checksum.h"
 #include "server/store/paging.h"
 #include "server/store/records.h"
@@ -122,11 +123,11 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
   return listed;
 }
 
-absl::Status WriteScore(Connection* db,
+absl::Status WriteScore(UnitOfWork* tx,
                         std::int64_t segment,
                         const SegmentInformation& information) {
   SELFCAL_RETURN_IF_ERROR(
-      Statement(db,
+      Statement(tx->db(),
                 "UPDATE segments SET state = 2, fit = ?2 WHERE segment = ?1",
                 segment,
                 std::isnan(information.residuals.fit)
@@ -136,7 +137,7 @@ absl::Status WriteScore(Connection* db,
   const std::string bytes = SerializeInformation(information);
   const std::string sha256 = Sha256(bytes);
   SELFCAL_RETURN_IF_ERROR(
-      Statement(db,
+      Statement(tx->db(),
                 "INSERT OR REPLACE INTO segment_information (segment, "
                 "  information, sha256) VALUES (?1, ?2, ?3)",
                 segment,
@@ -145,7 +146,7 @@ absl::Status WriteScore(Connection* db,
           .Run());
   for (const GroupScore& score : information.groups) {
     SELFCAL_RETURN_IF_ERROR(
-        Statement(db,
+        Statement(tx->db(),
                   "INSERT OR REPLACE INTO segment_scores (segment, group_name, "
                   "  entropy, gain, rank) VALUES (?1, ?2, ?3, ?4, ?5)",
                   segment,
@@ -158,11 +159,51 @@ absl::Status WriteScore(Connection* db,
   return absl::OkStatus();
 }
 
-absl::StatusOr<bool> HasData(Connection* db, std::int64_t segment) {
-  SELFCAL_ASSIGN_OR_RETURN(
-      const std::int64_t count,
-      ReadInt(db, "SELECT count(*) FROM payloads WHERE segment = ?1", segment));
-  return count > 0;
+absl::Status VisitScored(
+    UnitOfWork* tx,
+    const ScoredFilter& filter,
+    const std::function<bool(const ScoredSegment&)>& visit) {
+  constexpr char kWhat[] = "the information of a segment";
+  Statement read(
+      tx->db(),
+      fmt::format("SELECT s.segment, s.session, s.session_index, s.sequence, "
+                  "  s.receive_time_ns, s.fit, i.information, i.sha256, "
+                  "  EXISTS (SELECT 1 FROM payloads p "
+                  "    WHERE p.segment = s.segment) AS has_data "
+                  "FROM segments s JOIN segment_information i USING (segment) "
+                  "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
+                  "  AND {} "
+                  "  AND NOT EXISTS (SELECT 1 FROM run_segments x "
+                  "    WHERE x.rig = ?1 AND x.run = ?3 "
+                  "      AND x.segment = s.segment) "
+                  "  AND NOT EXISTS (SELECT 1 FROM calibration_segments c "
+                  "    WHERE c.rig = ?1 AND c.version = ?4 "
+                  "      AND c.segment = s.segment) "
+                  "ORDER BY {} s.sequence DESC LIMIT ?5",
+                  kFits,
+                  filter.with_data_first ? "has_data DESC," : ""),
+      tx->rig_row(),
+      filter.first_sequence,
+      filter.not_in_run,
+      filter.not_in_version,
+      filter.limit);
+  while (read.Next()) {
+    const std::string bytes = read.Text(6);
+    const absl::Status intact = VerifySha256(bytes, read.Text(7), kWhat);
+    const ScoredSegment scored{
+        .segment = {.rowid = read.Int(0),
+                    .key = {read.Text(1), read.Int(2)},
+                    .sequence = read.Int(3),
+                    .state = SegmentState::kScored,
+                    .receive_time_ns = read.Int(4),
+                    .fit = read.Double(5)},
+        .has_data = read.Int(8) != 0,
+        .information = intact.ok()
+                           ? ParseInformation(bytes, kWhat)
+                           : absl::StatusOr<SegmentInformation>(intact)};
+    if (!visit(scored)) break;
+  }
+  return read.status();
 }
 
 }  // namespace selfcal::server

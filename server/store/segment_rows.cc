@@ -2,41 +2,33 @@
 
 #include <fmt/format.h>
 
-#include "server/store/clock.h"
-#include "server/store/fit_rows.h"
-#include "server/store/quotas.h"
+#include "server/store/absences.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_path.h"
+#include "server/store/statement.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
 
-absl::Status InsertMetadata(Connection* db,
-                            std::int64_t rig,
-                            const NewSegment& segment) {
-  return Statement(
-             db,
-             "INSERT INTO segments (rig, session, session_index, sequence, "
-             "  state, receive_time_ns, calibration_version, start_ns, end_ns, "
-             "  keyframes, imu_samples, landmarks, observations, "
-             "  temperature_c) "
-             "VALUES (?1, ?2, ?3, (SELECT coalesce(max(sequence), 0) + 1 "
-             "    FROM segments WHERE rig = ?1), "
-             "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
-             rig,
-             segment.key.session,
-             segment.key.index,
-             NowNs(),
-             segment.calibration_version,
-             segment.start_ns,
-             segment.end_ns,
-             segment.keyframes,
-             segment.imu_samples,
-             segment.landmarks,
-             segment.observations,
-             segment.temperature_c)
-      .Run();
+constexpr char kColumns[] =
+    "s.segment, s.session, s.session_index, s.sequence, s.state, "
+    "s.receive_time_ns, s.fit";
+
+SegmentRow RowOf(const Statement& row) {
+  return {.rowid = row.Int(0),
+          .key = {row.Text(1), row.Int(2)},
+          .sequence = row.Int(3),
+          .state = static_cast<SegmentState>(row.Int(4) - 1),
+          .receive_time_ns = row.Int(5),
+          .fit = row.Double(6)};
+}
+
+absl::StatusOr<std::vector<SegmentRow>> ReadRows(Statement* read) {
+  std::vector<SegmentRow> rows;
+  while (read->Next()) rows.push_back(RowOf(*read));
+  SELFCAL_RETURN_IF_ERROR(read->status());
+  return rows;
 }
 
 }  // namespace
@@ -63,68 +55,141 @@ absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment) {
   return packed;
 }
 
-absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
-                                         const std::string& rig,
-                                         const NewSegment& segment,
-                                         const Quotas& quotas) {
-  Transaction transaction(db);
-  SELFCAL_RETURN_IF_ERROR(transaction.status());
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  const auto existing = FindSegment(db, rig_id, segment.key);
-  if (existing.ok()) {
-    return PutVerdict::kDuplicate;
-  }
-  if (!absl::IsNotFound(existing.status())) {
-    return existing.status();
-  }
-  SELFCAL_RETURN_IF_ERROR(
-      MakeRoom(db,
-               rig_id,
-               rig,
-               static_cast<std::int64_t>(segment.payload.data.size()),
-               quotas));
-  SELFCAL_RETURN_IF_ERROR(DropOldSegments(db, rig_id, rig, quotas));
-  SELFCAL_RETURN_IF_ERROR(InsertMetadata(db, rig_id, segment));
-  const std::int64_t row = sqlite3_last_insert_rowid(db->handle());
-  SELFCAL_RETURN_IF_ERROR(InsertPath(db, row, segment.path));
-  SELFCAL_RETURN_IF_ERROR(
-      Statement(db,
-                "INSERT INTO payloads (segment, rig, data, raw_bytes, sha256) "
-                "VALUES (?1, ?2, ?3, ?4, ?5)",
-                row,
-                rig_id,
-                BlobView{segment.payload.data},
-                segment.payload.raw_bytes,
-                BlobView{segment.payload.sha256})
-          .Run());
-  SELFCAL_RETURN_IF_ERROR(transaction.Commit());
-  return PutVerdict::kStored;
-}
-
-absl::StatusOr<SegmentRow> FindSegment(Connection* db,
-                                       std::int64_t rig,
-                                       const SegmentKey& key) {
-  Statement read(db,
-                 "SELECT segment, sequence, state FROM segments "
-                 "WHERE rig = ?1 AND session = ?2 AND session_index = ?3",
-                 rig,
+absl::StatusOr<SegmentRow> FindSegment(UnitOfWork* tx, const SegmentKey& key) {
+  Statement read(tx->db(),
+                 fmt::format("SELECT {} FROM segments s WHERE s.rig = ?1 "
+                             "AND s.session = ?2 AND s.session_index = ?3",
+                             kColumns),
+                 tx->rig_row(),
                  key.session,
                  key.index);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  if (!found) {
-    return absl::NotFoundError(fmt::format(
-        "segment {}~{} was never received", key.session, key.index));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentRow> rows, ReadRows(&read));
+  if (rows.empty()) {
+    return absl::NotFoundError(SegmentText(tx->rig(), key) +
+                               " was never received");
   }
-  return SegmentRow{
-      read.Int(0), read.Int(1), static_cast<SegmentState>(read.Int(2) - 1)};
+  return rows.front();
+}
+
+absl::StatusOr<StoredSegment> ReadSegment(UnitOfWork* tx,
+                                          const SegmentKey& key) {
+  return ReadSegment(tx->db(), tx->rig(), key);
+}
+
+absl::StatusOr<std::vector<SegmentRow>> SegmentsOfSession(
+    UnitOfWork* tx,
+    const std::string& session,
+    std::optional<std::int64_t> index) {
+  Statement read(tx->db(),
+                 fmt::format("SELECT {} FROM segments s WHERE s.rig = ?1 "
+                             "AND s.session = ?2 "
+                             "AND (?3 IS NULL OR s.session_index = ?3) "
+                             "ORDER BY s.sequence",
+                             kColumns),
+                 tx->rig_row(),
+                 session,
+                 index);
+  return ReadRows(&read);
+}
+
+absl::StatusOr<bool> HasUnscored(UnitOfWork* tx) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t found,
+                           ReadInt(tx->db(),
+                                   "SELECT EXISTS (SELECT 1 FROM segments "
+                                   "  WHERE rig = ?1 AND state = 1)",
+                                   tx->rig_row()));
+  return found != 0;
+}
+
+absl::StatusOr<std::int64_t> CountScored(UnitOfWork* tx,
+                                         std::int64_t first_sequence) {
+  return ReadInt(tx->db(),
+                 "SELECT count(*) FROM segments "
+                 "WHERE rig = ?1 AND state = 2 AND sequence >= ?2",
+                 tx->rig_row(),
+                 first_sequence);
+}
+
+absl::StatusOr<std::int64_t> NewestSequence(UnitOfWork* tx) {
+  return ReadInt(tx->db(),
+                 "SELECT max(sequence) FROM segments WHERE rig = ?1",
+                 tx->rig_row());
+}
+
+absl::StatusOr<std::vector<double>> NewestFits(UnitOfWork* tx, int limit) {
+  Statement read(tx->db(),
+                 "SELECT fit FROM segments WHERE rig = ?1 AND state = 2 "
+                 "ORDER BY sequence DESC LIMIT ?2",
+                 tx->rig_row(),
+                 limit);
+  std::vector<double> fits;
+  while (read.Next()) fits.push_back(read.Double(0));
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return fits;
+}
+
+absl::StatusOr<std::vector<SegmentRow>> UnreferencedSegments(UnitOfWork* tx,
+                                                             int limit) {
+  Statement read(
+      tx->db(),
+      fmt::format("SELECT {} FROM segments s "
+                  "WHERE s.rig = ?1 AND s.state <> 1 "
+                  "AND NOT EXISTS (SELECT 1 FROM table_entries e "
+                  "  WHERE e.segment = s.segment) "
+                  "AND NOT EXISTS (SELECT 1 FROM run_segments x "
+                  "  WHERE x.segment = s.segment) "
+                  "AND NOT EXISTS (SELECT 1 FROM calibration_segments c "
+                  "  WHERE c.segment = s.segment) "
+                  "ORDER BY s.sequence LIMIT ?2",
+                  kColumns),
+      tx->rig_row(),
+      limit);
+  return ReadRows(&read);
+}
+
+absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(
+          tx->db(),
+          "INSERT INTO segments (rig, session, session_index, sequence, "
+          "  state, receive_time_ns, calibration_version, start_ns, end_ns, "
+          "  keyframes, imu_samples, landmarks, observations, "
+          "  temperature_c) "
+          "VALUES (?1, ?2, ?3, (SELECT coalesce(max(sequence), 0) + 1 "
+          "    FROM segments WHERE rig = ?1), "
+          "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+          tx->rig_row(),
+          segment.key.session,
+          segment.key.index,
+          tx->time_ns(),
+          segment.calibration_version,
+          segment.start_ns,
+          segment.end_ns,
+          segment.keyframes,
+          segment.imu_samples,
+          segment.landmarks,
+          segment.observations,
+          segment.temperature_c)
+          .Run());
+  const std::int64_t row = LastInsertedRow(tx->db());
+  SELFCAL_RETURN_IF_ERROR(InsertPath(tx, row, segment.path));
+  return Statement(tx->db(),
+                   "INSERT INTO payloads (segment, rig, data, raw_bytes, "
+                   "  sha256) VALUES (?1, ?2, ?3, ?4, ?5)",
+                   row,
+                   tx->rig_row(),
+                   BlobView{segment.payload.data},
+                   segment.payload.raw_bytes,
+                   BlobView{segment.payload.sha256})
+      .Run();
 }
 
 absl::StatusOr<Payload> ReadPayload(Connection* db,
                                     const std::string& rig,
                                     const SegmentKey& key) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row, FindSegment(db, rig_id, key));
+  UnitOfWork tx(db, rig, rig_id, 0);
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row, FindSegment(&tx, key));
   Statement read(
       db,
       "SELECT data, raw_bytes, sha256 FROM payloads WHERE segment = ?1",
@@ -160,10 +225,10 @@ absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
   return unscored;
 }
 
-absl::Status WriteProblem(Connection* db,
-                          std::int64_t segment,
-                          const std::string& problem) {
-  return Statement(db,
+absl::Status WriteUnusable(UnitOfWork* tx,
+                           std::int64_t segment,
+                           const std::string& problem) {
+  return Statement(tx->db(),
                    "UPDATE segments SET state = 3, problem = ?2 "
                    "WHERE segment = ?1",
                    segment,
@@ -171,31 +236,79 @@ absl::Status WriteProblem(Connection* db,
       .Run();
 }
 
-absl::Status DropUnreferencedPayloads(Connection* db, std::int64_t rig) {
-  return Statement(
-             db,
-             fmt::format(
-                 "DELETE FROM payloads WHERE rig = ?1 "
-                 "AND NOT EXISTS (SELECT 1 FROM segments s "
-                 "  WHERE s.segment = payloads.segment AND s.state = 1) "
-                 "AND NOT EXISTS (SELECT 1 FROM table_entries e "
-                 "  WHERE e.segment = payloads.segment) "
-                 "AND NOT EXISTS (SELECT 1 FROM run_segments x "
-                 "  JOIN runs r ON r.rig = x.rig AND r.run = x.run "
-                 "  WHERE x.segment = payloads.segment AND r.state IN (1, 2)) "
-                 "AND segment NOT IN (SELECT s.segment "
-                 "  FROM payloads p JOIN segments s USING (segment) "
-                 "  WHERE p.rig = ?1 AND s.state = 2 "
-                 "  AND s.sequence >= (SELECT coalesce(max(c.first_sequence), "
-                 "0) "
-                 "    FROM changes c WHERE c.rig = ?1) "
-                 "  AND {} "
-                 "  AND NOT EXISTS (SELECT 1 FROM table_entries e "
-                 "    WHERE e.segment = s.segment) "
-                 "  ORDER BY s.sequence DESC LIMIT ?2)",
-                 kFits),
-             rig,
-             Store::kReserve)
+absl::Status WriteProblem(UnitOfWork* tx,
+                          std::int64_t segment,
+                          const std::string& problem) {
+  return Statement(tx->db(),
+                   "UPDATE segments SET problem = ?2 WHERE segment = ?1",
+                   segment,
+                   problem)
+      .Run();
+}
+
+absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t segment) {
+  for (const char* table : {"payloads",
+                            "table_absences",
+                            "segment_scores",
+                            "segment_information",
+                            "segment_ends",
+                            "segment_paths",
+                            "segments"}) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(tx->db(),
+                  fmt::format("DELETE FROM {} WHERE segment = ?1", table),
+                  segment)
+            .Run());
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<DataHolder>> DataHolders(UnitOfWork* tx) {
+  Statement read(
+      tx->db(),
+      fmt::format("SELECT {}, length(p.data), "
+                  "  EXISTS (SELECT 1 FROM run_segments x JOIN runs r "
+                  "    ON r.rig = x.rig AND r.run = x.run "
+                  "    WHERE x.segment = p.segment AND r.state IN (1, 2)), "
+                  "  (SELECT max(e.gain) FROM table_entries e "
+                  "    WHERE e.segment = p.segment), "
+                  "  NOT {} "
+                  "FROM payloads p JOIN segments s USING (segment) "
+                  "WHERE p.rig = ?1 AND s.state <> 1 ORDER BY s.segment",
+                  kColumns,
+                  kFits),
+      tx->rig_row());
+  std::vector<DataHolder> holders;
+  while (read.Next()) {
+    DataHolder& holder = holders.emplace_back();
+    holder.segment = RowOf(read);
+    holder.bytes = read.Int(7);
+    holder.in_unfinished_run = read.Int(8) != 0;
+    if (!read.IsNull(9)) holder.gain = read.Double(9);
+    holder.misfit = read.Int(10) != 0;
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return holders;
+}
+
+absl::StatusOr<std::int64_t> DataBytes(UnitOfWork* tx) {
+  return ReadInt(tx->db(),
+                 "SELECT coalesce(sum(length(data)), 0) FROM payloads "
+                 "WHERE rig = ?1",
+                 tx->rig_row());
+}
+
+absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t segment) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t count,
+      ReadInt(tx->db(),
+              "SELECT count(*) FROM payloads WHERE segment = ?1",
+              segment));
+  return count > 0;
+}
+
+absl::Status DeleteData(UnitOfWork* tx, std::int64_t segment) {
+  return Statement(tx->db(), "DELETE FROM payloads WHERE segment = ?1", segment)
       .Run();
 }
 

@@ -1,25 +1,28 @@
-// Segments in the database: metadata, data, information.
+// Records of segments: metadata, data, information.
 #pragma once
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "server/store/payload.h"
-#include "server/store/statement.h"
 #include "server/store/store.h"
-#include "server/store/store_options.h"
+#include "server/store/unit_of_work.h"
 
 namespace selfcal::server {
 
 struct SegmentRow {
   std::int64_t rowid = 0;
+  SegmentKey key;
   std::int64_t sequence = 0;
   SegmentState state = SegmentState::kStored;
+  std::int64_t receive_time_ns = 0;
+  double fit = 0;  // ResidualStatistics::fit; 0: not measured
 };
 
 // "segment <session>~<index> of rig <rig>", for messages.
@@ -43,17 +46,6 @@ struct NewSegment {
 // Compresses: the larger part of the work, and needs no database.
 absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment);
 
-// In one transaction. NOT_FOUND for the rig; RESOURCE_EXHAUSTED by a quota.
-absl::StatusOr<PutVerdict> PutSegmentRow(Connection* db,
-                                         const std::string& rig,
-                                         const NewSegment& segment,
-                                         const Quotas& quotas);
-
-// NOT_FOUND.
-absl::StatusOr<SegmentRow> FindSegment(Connection* db,
-                                       std::int64_t rig,
-                                       const SegmentKey& key);
-
 // DATA_LOSS if its information is damaged.
 absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
                                           const std::string& rig,
@@ -74,25 +66,83 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
 absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
                                                               int limit);
 
-// The rest runs inside a transaction of the caller.
+// --- Within a unit of work.
 
-absl::StatusOr<bool> HasData(Connection* db, std::int64_t segment);
+// NOT_FOUND.
+absl::StatusOr<SegmentRow> FindSegment(UnitOfWork* tx, const SegmentKey& key);
+absl::StatusOr<StoredSegment> ReadSegment(UnitOfWork* tx,
+                                          const SegmentKey& key);
+// All of a session in order of arrival, or the one with this index.
+absl::StatusOr<std::vector<SegmentRow>> SegmentsOfSession(
+    UnitOfWork* tx,
+    const std::string& session,
+    std::optional<std::int64_t> index);
+// Stored and not scored yet.
+absl::StatusOr<bool> HasUnscored(UnitOfWork* tx);
+absl::StatusOr<std::int64_t> CountScored(UnitOfWork* tx,
+                                         std::int64_t first_sequence);
+// 0 if there are none.
+absl::StatusOr<std::int64_t> NewestSequence(UnitOfWork* tx);
+// Fits of the newest scored segments.
+absl::StatusOr<std::vector<double>> NewestFits(UnitOfWork* tx, int limit);
+// Segments that do not wait for their score and that no table, run or
+// calibration refers to; oldest first.
+absl::StatusOr<std::vector<SegmentRow>> UnreferencedSegments(UnitOfWork* tx,
+                                                             int limit);
 
+// Scored segments whose information is looked through.
+struct ScoredFilter {
+  std::int64_t first_sequence = 1;
+  // Neither in the snapshot of this run, nor used for this version; 0: any.
+  std::int64_t not_in_run = 0;
+  std::int64_t not_in_version = 0;
+  bool with_data_first = false;  // each part newest first
+  int limit = 0;
+};
+struct ScoredSegment {
+  SegmentRow segment;
+  bool has_data = false;
+  absl::StatusOr<SegmentInformation> information;  // DATA_LOSS if damaged
+};
+// Calls `visit` with those that tables were not refused to for their residuals
+// (AbsenceCause::kDoesNotFit, kManyOutliers), until it returns false.
+absl::Status VisitScored(
+    UnitOfWork* tx,
+    const ScoredFilter& filter,
+    const std::function<bool(const ScoredSegment&)>& visit);
+
+// A segment whose data is kept and that does not wait for its score.
+struct DataHolder {
+  SegmentRow segment;
+  std::int64_t bytes = 0;  // compressed
+  bool in_unfinished_run = false;
+  // The largest in the tables that hold it; nothing: none does.
+  std::optional<double> gain;
+  bool misfit = false;  // as for VisitScored
+};
+// In order of arrival.
+absl::StatusOr<std::vector<DataHolder>> DataHolders(UnitOfWork* tx);
+// Of all segments, compressed.
+absl::StatusOr<std::int64_t> DataBytes(UnitOfWork* tx);
+absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t segment);
+absl::Status DeleteData(UnitOfWork* tx, std::int64_t segment);
+
+// Waits for its score. The key must be new.
+absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment);
 // Stored or scored -> scored, with its information and the scores of its
 // groups, in place of earlier ones.
-absl::Status WriteScore(Connection* db,
+absl::Status WriteScore(UnitOfWork* tx,
                         std::int64_t segment,
                         const SegmentInformation& information);
-
 // Any state -> unusable.
-absl::Status WriteProblem(Connection* db,
+absl::Status WriteUnusable(UnitOfWork* tx,
+                           std::int64_t segment,
+                           const std::string& problem);
+// Why its data is gone.
+absl::Status WriteProblem(UnitOfWork* tx,
                           std::int64_t segment,
                           const std::string& problem);
-
-// Drops the data of every segment of the rig that neither waits for its score
-// nor is in a table or an unfinished run, nor is of the reserve for held-out
-// tests: the newest Store::kReserve scored ones that no table holds, none from
-// before the newest change of the device.
-absl::Status DropUnreferencedPayloads(Connection* db, std::int64_t rig);
+// All that is known of it. Nothing may refer to it.
+absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t segment);
 
 }  // namespace selfcal::server

@@ -240,4 +240,8 @@ Snapshot::~Snapshot() {
   }
 }
 
+std::int64_t LastInsertedRow(Connection* db) {
+  return sqlite3_last_insert_rowid(db->handle());
+}
+
 }  // namespace selfcal::server

@@ -149,6 +149,9 @@ class Snapshot {
   absl::Status status_;
 };
 
+// The row that the last INSERT made.
+std::int64_t LastInsertedRow(Connection* db);
+
 // The number that `sql` gives in its first row; 0 without one.
 template <typename... Args>
 absl::StatusOr<std::int64_t> ReadInt(Connection* db,

@@ -1,11 +1,12 @@
-// What selfcald keeps, in the language of the domain. The SQLite store
+// Records of everything that selfcald keeps, and transactions on them. It holds
+// no policy: server/domain decides what is written. The SQLite store
 // (store_sqlite.h) is the implementation; another engine proves itself by the
 // same tests.
 //
-// Every method that changes something does so as a whole or not at all: when it
-// returns OK the change is committed and synced, when it returns an error
-// nothing has changed. Changes that come at the same time may share one commit
-// and its sync. Any thread may call; writes are serialised inside.
+// A transaction happens as a whole or not at all: when Transact returns OK it
+// is committed and synced, when it returns an error nothing has changed.
+// Transactions that come at the same time may share one commit and its sync.
+// Any thread may call; writes are serialised inside.
 // Errors: NOT_FOUND, ALREADY_EXISTS, FAILED_PRECONDITION from the caller's
 // side; RESOURCE_EXHAUSTED (disk full), DATA_LOSS (a checksum does not match),
 // UNAVAILABLE from the environment.
@@ -91,8 +92,6 @@ struct StoredSegment {
   // run needs the data.
   std::string problem;
 };
-
-enum class PutVerdict { kStored, kDuplicate };
 
 // What may become what: calibration_states.h.
 enum class CalibrationState {
@@ -185,12 +184,6 @@ struct StoredCalibration {
   std::int64_t activation = 0;
 };
 
-// What is known of it at a later time: its covariance, widened by the random
-// walk of the rig since it was computed.
-Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
-                             const StoredCalibration& calibration,
-                             std::int64_t time_ns);
-
 enum class RunState { kPending, kRunning, kSucceeded, kFailed, kCancelled };
 enum class RunTrigger {
   kTablesFull,
@@ -232,21 +225,6 @@ struct StoredChange {
   double inflation = 1;             // of the variances of segments in the test
 };
 
-// What the commit of a score did.
-struct ScoreCommit {
-  std::vector<std::string> tables;       // groups it entered
-  std::optional<StoredRun> started_run;  // the trigger fired
-  std::optional<StoredChange> change;    // was detected
-};
-
-// What a quarantine by hand did.
-struct QuarantineCommit {
-  std::int64_t quarantined = 0;
-  std::int64_t unusable = 0;  // that were so before
-  // Of the quarantined ones, those that were waiting for their score.
-  std::vector<std::int64_t> unscored_sequences;
-};
-
 // A rig in a list of many.
 struct RigSummary {
   std::string rig;
@@ -263,37 +241,49 @@ struct RigSummary {
 };
 
 class StoreMaintenance;  // maintenance.h
+class UnitOfWork;        // unit_of_work.h
 
 class Store {
  public:
   virtual ~Store() = default;
 
-  // --- Rigs. Creating one also stores its factory calibration as version 1,
-  // active, and its empty tables.
-  virtual absl::StatusOr<StoredRig> CreateRig(const Rig& rig,
-                                              const RigPolicy& policy) = 0;
-  absl::StatusOr<StoredRig> CreateRig(const Rig& rig) {
-    return CreateRig(rig, {});
-  }
+  // --- Transactions. `work` uses the record functions of this module on its
+  // unit of work; it must be short, and may run again if the commit that it was
+  // part of failed for another reason.
+  using Work = std::function<absl::Status(UnitOfWork*)>;
+  using Done = std::function<void(const absl::Status&)>;
+
+  // Commits what `work` writes, unless it returns an error. `time_ns` is
+  // stamped on what is written. NOT_FOUND for the rig.
+  virtual absl::Status Transact(const std::string& rig,
+                                std::int64_t time_ns,
+                                const Work& work) = 0;
+  // The same without waiting. What one thread begins is carried out in that
+  // order. `done` is called once, on a thread of the store; it must be short
+  // and must not call the store.
+  virtual void BeginTransaction(const std::string& rig,
+                                std::int64_t time_ns,
+                                Work work,
+                                Done done) = 0;
+  // The same for a rig that is inserted first; stamped with its creation time.
+  // ALREADY_EXISTS.
+  virtual absl::Status InsertRig(const StoredRig& rig, const Work& work) = 0;
+  // `work` only reads, one state of the database.
+  virtual absl::Status Inspect(const std::string& rig, const Work& work) = 0;
+
+  // --- Rigs.
   virtual absl::StatusOr<StoredRig> GetRig(const std::string& rig) = 0;
   virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) = 0;
   // Reads no more than the page, however many rigs there are, unless it looks
   // for a text.
   virtual absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
       const RigQuery& query, const Page& page) = 0;
+  virtual absl::StatusOr<std::vector<std::string>> ListRigNames() = 0;
+  // Names of rigs whose newest segment arrived, but not after this time.
+  virtual absl::StatusOr<std::vector<std::string>> ListIdleRigs(
+      std::int64_t idle_since_ns) = 0;
 
-  // --- Segments. `segment` must be valid for the rig. The same key again
-  // changes nothing. RESOURCE_EXHAUSTED where a quota leaves no room.
-  virtual absl::StatusOr<PutVerdict> PutSegment(
-      const std::string& rig, const MotionSegment& segment) = 0;
-  // The same without waiting for the disk. What one thread puts is stored in
-  // that order. `done` is called once: on this thread where the segment is
-  // refused before it is written, else on one of the store's; it must be short
-  // and not call the store.
-  using PutDone = std::function<void(const absl::StatusOr<PutVerdict>&)>;
-  virtual void BeginPutSegment(const std::string& rig,
-                               const MotionSegment& segment,
-                               PutDone done) = 0;
+  // --- Segments.
   virtual absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
                                                    const SegmentKey& key) = 0;
   virtual absl::StatusOr<Listed<StoredSegment>> ListSegments(
@@ -324,78 +314,8 @@ class Store {
     std::int64_t sequence;
   };
   virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) = 0;
-
-  // Writes the information of one stored segment, and what it says with the
-  // states at its ends where that is known, takes segments out of the
-  // tables that were too old when it arrived, offers it to the tables,
-  // tests the newest segments for a change of the device (core/change), drops
-  // the data of segments that neither a table nor an unfinished run references,
-  // and, where EvaluateTrigger says so and no run is unfinished, creates the
-  // run with its snapshot. A segment that is scored already changes nothing.
-  // Where the device has changed, the segments from before leave all tables,
-  // which start anew, and what they were scored for is over: a run that was
-  // created before the change ends with a rejected calibration.
-  virtual absl::StatusOr<ScoreCommit> CommitScore(
-      const std::string& rig,
-      const SegmentKey& key,
-      const SegmentInformation& information,
-      const std::optional<SegmentEnds>& ends) = 0;
-  absl::StatusOr<ScoreCommit> CommitScore(
-      const std::string& rig,
-      const SegmentKey& key,
-      const SegmentInformation& information) {
-    return CommitScore(rig, key, information, std::nullopt);
-  }
-
-  // Puts a later score of a scored segment in place of its first one, also in
-  // the tables that hold it. Changes nothing else, and nothing where its data
-  // is gone.
-  virtual absl::Status ReplaceScore(const std::string& rig,
-                                    const SegmentKey& key,
-                                    const SegmentInformation& information,
-                                    const SegmentEnds& ends) = 0;
-
-  // What is known of segments beside the data of those that the run uses, in
-  // the order of time, each session in one run: of those without data what they
-  // say (of the newest kRemembered), of the others that they are there. None
-  // from before its change of the device, none that does not fit.
-  static constexpr int kRemembered = 256;
-  virtual absl::StatusOr<std::vector<RememberedSegment>> ListRemembered(
-      const std::string& rig, std::int64_t run) = 0;
-
-  // Takes a segment that cannot be used out of the queue and out of the tables
-  // for good, and drops its data unless an unfinished run references it. An
-  // event records the problem. A segment that is unusable already stays as it
-  // is.
-  virtual absl::Status MarkUnusable(const std::string& rig,
-                                    const SegmentKey& key,
-                                    const std::string& problem) = 0;
-
-  // The same by hand, for one segment of a session or for all that are stored:
-  // an event keeps who did it and why. A run under way that uses one of them
-  // ends with a rejected calibration. NOT_FOUND if nothing is stored of it.
-  virtual absl::StatusOr<QuarantineCommit> QuarantineSegments(
-      const std::string& rig,
-      const std::string& session,
-      std::optional<std::int64_t> index,
-      const std::string& caller,
-      const std::string& reason) = 0;
-
   virtual absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) = 0;
-
-  // Scored segments that the run does not use: first those with data, each part
-  // newest first. None from before its change of the device, none whose
-  // information is damaged. For this the data of the newest kReserve scored
-  // segments that no table holds is kept.
-  static constexpr int kReserve = 4;
-  struct HeldOut {
-    SegmentKey key;
-    bool has_data = false;
-    SegmentInformation information;
-  };
-  virtual absl::StatusOr<std::vector<HeldOut>> ListHeldOut(
-      const std::string& rig, std::int64_t run, int limit) = 0;
 
   virtual absl::StatusOr<StoredChange> GetChange(const std::string& rig,
                                                  std::int64_t change) = 0;
@@ -407,32 +327,11 @@ class Store {
       const std::string& rig) = 0;
   virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
       const std::string& rig, const Page& page) = 0;
-  // Makes a version active by hand; an event keeps who did it and why. What was
-  // active becomes superseded, or rolled back if it is the newer of the two.
-  // The version that is active already changes nothing. FAILED_PRECONDITION for
-  // a candidate or a rejected one.
-  virtual absl::StatusOr<StoredCalibration> ActivateCalibration(
-      const std::string& rig,
-      std::int64_t version,
-      const std::string& caller,
-      const std::string& reason) = 0;
-
-  // Keeps what a verification found, by which the two cores disagree, in an
-  // event, and with the version that it concerns. A version keeps the first
-  // finding.
-  virtual absl::Status ReportDisagreement(const std::string& rig,
-                                          std::int64_t version,
-                                          const std::string& finding) = 0;
+  // The candidate that a run has stored; NOT_FOUND if it has none.
+  virtual absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
+                                                         std::int64_t run) = 0;
 
   // --- Runs.
-  // On the tables as they are. FAILED_PRECONDITION if they are empty, a run of
-  // the rig is unfinished, or, without `force`, a version was computed on the
-  // same tables, from the version that is active or to become it.
-  virtual absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
-                                                    bool force) = 0;
-  absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig) {
-    return CreateManualRun(rig, false);
-  }
   virtual absl::StatusOr<StoredRun> GetRun(const std::string& rig,
                                            std::int64_t run) = 0;
   virtual absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
@@ -440,61 +339,6 @@ class Store {
   // Pending or running runs of all rigs, oldest first: after a restart a
   // running one starts again.
   virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns() = 0;
-  // Creates a run for each rig whose calibration came from a run and has been
-  // active for longer than the rig's policy says, where the tables hold a
-  // segment that the last run did not use, no run is unfinished, and the last
-  // one began as long ago.
-  virtual absl::StatusOr<std::vector<StoredRun>> StartAgedRuns(
-      std::int64_t now_ns) = 0;
-  // Creates a run for each rig whose session has ended: it is one of `ended`,
-  // or its newest segment arrived before `idle_since_ns`. Only where the tables
-  // have started a run before (since the last change of the device) and have
-  // changed since the last one, all segments are scored and no run is
-  // unfinished.
-  virtual absl::StatusOr<std::vector<StoredRun>> StartSessionRuns(
-      const std::vector<std::string>& ended, std::int64_t idle_since_ns) = 0;
-  // Writes down why a pending run does not begin yet; the first time with an
-  // event.
-  virtual absl::Status HoldRun(const std::string& rig,
-                               std::int64_t run,
-                               const std::string& reason) = 0;
-  // Pending or running -> running, one attempt more.
-  virtual absl::StatusOr<StoredRun> BeginRun(const std::string& rig,
-                                             std::int64_t run) = 0;
-  // Running -> pending, the attempt not counted: an orderly stop gives it back.
-  virtual absl::StatusOr<StoredRun> ReleaseRun(const std::string& rig,
-                                               std::int64_t run) = 0;
-  // Stores what a running run has found as the next version, a candidate; where
-  // it has one already, changes nothing and returns that. The version is
-  // assigned here.
-  virtual absl::StatusOr<StoredCalibration> StoreCandidate(
-      const std::string& rig,
-      std::int64_t run,
-      const StoredCalibration& calibration) = 0;
-  // The candidate that a run has stored; NOT_FOUND if it has none.
-  virtual absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
-                                                         std::int64_t run) = 0;
-  // Ends a running run with its calibration, stored as a candidate if it was
-  // not yet: active (the one before becomes superseded) or rejected, as its
-  // state, reasons and validation say. ABORTED if it was validated against
-  // another version than is active now. Drops data that only the run
-  // referenced. May create the next run, as CommitScore does. Where it becomes
-  // active, segments that its report says it does not use
-  // (SegmentFit::excluded) are quarantined. It is rejected where the device has
-  // changed, or a segment of the run was quarantined, since the run was
-  // created. Where its report tells surely enough for StoreOptions::change that
-  // the device changed among its segments (EvictedUse::split) that is a change
-  // of the device, as in CommitScore, and none of them is quarantined.
-  virtual absl::StatusOr<StoredCalibration> FinishRun(
-      const std::string& rig,
-      std::int64_t run,
-      const StoredCalibration& calibration) = 0;
-  // Ends it without a calibration: kFailed or kCancelled. If it has a candidate
-  // that is rejected, with the message.
-  virtual absl::StatusOr<StoredRun> EndRun(const std::string& rig,
-                                           std::int64_t run,
-                                           RunState state,
-                                           const std::string& message) = 0;
 
   // --- Events, oldest or newest first; of one rig unless it is empty. They are
   // only ever appended.

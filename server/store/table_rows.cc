@@ -1,9 +1,6 @@
 #include "server/store/table_rows.h"
 
-#include <algorithm>
-
-#include "server/store/absences.h"
-#include "server/store/segment_rows.h"
+#include "server/store/statement.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -29,24 +26,6 @@ absl::Status ReadEntries(Connection* db, std::int64_t rig, Table* table) {
 
 }  // namespace
 
-absl::Status InsertTables(Connection* db,
-                          std::int64_t rig,
-                          const std::vector<Table>& tables) {
-  int position = 0;
-  for (const Table& table : tables) {
-    SELFCAL_RETURN_IF_ERROR(
-        Statement(db,
-                  "INSERT INTO tables (rig, group_name, position, capacity, "
-                  "  scored) VALUES (?1, ?2, ?3, ?4, 0)",
-                  rig,
-                  table.group,
-                  position++,
-                  table.capacity)
-            .Run());
-  }
-  return absl::OkStatus();
-}
-
 absl::StatusOr<std::vector<Table>> ReadTables(Connection* db,
                                               std::int64_t rig) {
   Statement read(db,
@@ -66,74 +45,6 @@ absl::StatusOr<std::vector<Table>> ReadTables(Connection* db,
   return tables;
 }
 
-absl::StatusOr<std::vector<Table>> ReadFreshTables(Connection* db,
-                                                   const RigRow& rig,
-                                                   std::int64_t now_ns) {
-  const std::int64_t max_age_ns = rig.stored.policy.table_max_age_ns;
-  if (max_age_ns > 0) {
-    SELFCAL_RETURN_IF_ERROR(
-        LeaveTables(db,
-                    AbsenceCause::kTooOld,
-                    "rig = ?3 AND segment IN (SELECT segment FROM segments "
-                    "  WHERE rig = ?3 AND receive_time_ns < ?4)",
-                    rig.rowid,
-                    now_ns - max_age_ns));
-  }
-  return ReadTables(db, rig.rowid);
-}
-
-absl::StatusOr<std::int64_t> ReceiveTime(Connection* db, std::int64_t segment) {
-  return ReadInt(
-      db, "SELECT receive_time_ns FROM segments WHERE segment = ?1", segment);
-}
-
-absl::Status WriteOffer(Connection* db,
-                        std::int64_t rig,
-                        const SegmentKey& key,
-                        const TableChange& change,
-                        const Table& table) {
-  SELFCAL_RETURN_IF_ERROR(Statement(db,
-                                    "UPDATE tables SET scored = ?3 "
-                                    "WHERE rig = ?1 AND group_name = ?2",
-                                    rig,
-                                    table.group,
-                                    table.scored)
-                              .Run());
-  if (change.evicted) {
-    SELFCAL_RETURN_IF_ERROR(
-        Statement(db,
-                  "DELETE FROM table_entries "
-                  "WHERE rig = ?1 AND group_name = ?2 AND segment = "
-                  "  (SELECT segment FROM segments WHERE rig = ?1 "
-                  "   AND session = ?3 AND session_index = ?4)",
-                  rig,
-                  table.group,
-                  change.evicted->key.session,
-                  change.evicted->key.index)
-            .Run());
-  }
-  if (change.inserted) {
-    const auto entry = std::find_if(
-        table.entries.begin(), table.entries.end(), [&](const TableEntry& e) {
-          return e.key == key;
-        });
-    SELFCAL_RETURN_IF_ERROR(
-        Statement(db,
-                  "INSERT INTO table_entries (rig, group_name, segment, "
-                  "  entropy, gain) "
-                  "SELECT ?1, ?2, segment, ?5, ?6 FROM segments "
-                  "WHERE rig = ?1 AND session = ?3 AND session_index = ?4",
-                  rig,
-                  table.group,
-                  key.session,
-                  key.index,
-                  entry->entropy,
-                  entry->gain)
-            .Run());
-  }
-  return absl::OkStatus();
-}
-
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
                                                          std::int64_t segment) {
   Statement read(db,
@@ -150,10 +61,75 @@ absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
   return groups;
 }
 
-absl::Status WriteEntryScore(Connection* db,
+absl::Status InsertTables(UnitOfWork* tx, const std::vector<Table>& tables) {
+  int position = 0;
+  for (const Table& table : tables) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(tx->db(),
+                  "INSERT INTO tables (rig, group_name, position, capacity, "
+                  "  scored) VALUES (?1, ?2, ?3, ?4, 0)",
+                  tx->rig_row(),
+                  table.group,
+                  position++,
+                  table.capacity)
+            .Run());
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<Table>> ReadTables(UnitOfWork* tx) {
+  return ReadTables(tx->db(), tx->rig_row());
+}
+
+absl::StatusOr<std::vector<std::string>> TablesOfSegment(UnitOfWork* tx,
+                                                         std::int64_t segment) {
+  return TablesOfSegment(tx->db(), segment);
+}
+
+absl::Status WriteScored(UnitOfWork* tx,
+                         const std::string& group,
+                         std::int64_t scored) {
+  return Statement(tx->db(),
+                   "UPDATE tables SET scored = ?3 "
+                   "WHERE rig = ?1 AND group_name = ?2",
+                   tx->rig_row(),
+                   group,
+                   scored)
+      .Run();
+}
+
+absl::Status InsertEntry(UnitOfWork* tx,
+                         const std::string& group,
+                         std::int64_t segment,
+                         double entropy,
+                         double gain) {
+  return Statement(tx->db(),
+                   "INSERT INTO table_entries (rig, group_name, segment, "
+                   "  entropy, gain) VALUES (?1, ?2, ?3, ?4, ?5)",
+                   tx->rig_row(),
+                   group,
+                   segment,
+                   entropy,
+                   gain)
+      .Run();
+}
+
+absl::Status DeleteEntry(UnitOfWork* tx,
+                         const std::string& group,
+                         std::int64_t segment) {
+  return Statement(tx->db(),
+                   "DELETE FROM table_entries "
+                   "WHERE rig = ?1 AND group_name = ?2 AND segment = ?3",
+                   tx->rig_row(),
+                   group,
+                   segment)
+      .Run();
+}
+
+absl::Status WriteEntryScore(UnitOfWork* tx,
                              std::int64_t segment,
                              const GroupScore& score) {
-  return Statement(db,
+  return Statement(tx->db(),
                    "UPDATE table_entries SET entropy = ?3, gain = ?4 "
                    "WHERE segment = ?1 AND group_name = ?2",
                    segment,
@@ -161,12 +137,6 @@ absl::Status WriteEntryScore(Connection* db,
                    score.entropy,
                    score.gain)
       .Run();
-}
-
-absl::Status RemoveFromTables(Connection* db,
-                              std::int64_t segment,
-                              AbsenceCause cause) {
-  return LeaveTables(db, cause, "segment = ?3", segment);
 }
 
 }  // namespace selfcal::server

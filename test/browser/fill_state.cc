@@ -12,6 +12,7 @@
 #include <string>
 #include <thread>
 
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/status_macros.h"
 #include "server/store/store_sqlite.h"
@@ -34,21 +35,21 @@ absl::Status Settled(Store* store) {
 }
 
 // Scored and calibrated on as the daemon does it.
-absl::Status AddDevice(Store* store, const std::string& id) {
+absl::Status AddDevice(Domain* domain, const std::string& id) {
   const SimulatedDevice device = MakeDevice(id);
-  SELFCAL_RETURN_IF_ERROR(store->CreateRig(device.rig).status());
+  SELFCAL_RETURN_IF_ERROR(domain->CreateRig(device.rig).status());
   PipelineOptions pipeline_options;
   pipeline_options.program_version = "test";
-  const auto pipeline = MakePipeline(store, pipeline_options);
+  const auto pipeline = MakePipeline(domain, pipeline_options);
   SELFCAL_RETURN_IF_ERROR(pipeline->Start());
   for (const MotionSegment& segment :
        Record(device, *MakeMixed(kSeconds, kSeed), "walk")) {
     SELFCAL_RETURN_IF_ERROR(
         pipeline->Submit(id, segment, [] { return false; }).status());
   }
-  SELFCAL_RETURN_IF_ERROR(Settled(store));
+  SELFCAL_RETURN_IF_ERROR(Settled(domain->store()));
   SELFCAL_RETURN_IF_ERROR(pipeline->StartRecalibration(id, true).status());
-  SELFCAL_RETURN_IF_ERROR(Settled(store));
+  SELFCAL_RETURN_IF_ERROR(Settled(domain->store()));
   pipeline->Stop();
   return absl::OkStatus();
 }
@@ -57,12 +58,13 @@ absl::Status Fill(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   SELFCAL_ASSIGN_OR_RETURN(const auto store,
                            MakeSqliteStore(folder / "selfcal.db"));
+  Domain domain(store.get());
   for (int i = 1; i <= kIdleRigs; ++i) {
     SELFCAL_RETURN_IF_ERROR(
-        store->CreateRig(HandheldRig(fmt::format("phone-{:03}", i))).status());
+        domain.CreateRig(HandheldRig(fmt::format("phone-{:03}", i))).status());
   }
-  SELFCAL_RETURN_IF_ERROR(store->CreateRig(MakeDevice("headset").rig).status());
-  return AddDevice(store.get(), "tablet");
+  SELFCAL_RETURN_IF_ERROR(domain.CreateRig(MakeDevice("headset").rig).status());
+  return AddDevice(&domain, "tablet");
 }
 
 }  // namespace

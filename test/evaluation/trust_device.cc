@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/change/chi_square.h"
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/store_sqlite.h"
 #include "test/evaluation/statistics.h"
@@ -69,8 +70,9 @@ class Driver {
   explicit Driver(const TrustDevice& device)
       : device_(device), name_(device.rig.id) {
     store_ = Get(server::MakeSqliteStore(scratch_.File("selfcal.db")));
-    Check(store_->CreateRig(device.rig).status());
-    pipeline_ = server::MakePipeline(store_.get(), {});
+    domain_.emplace(store_.get());
+    Check(domain_->CreateRig(device.rig).status());
+    pipeline_ = server::MakePipeline(&*domain_, {});
     Check(pipeline_->Start());
   }
 
@@ -216,6 +218,7 @@ class Driver {
   const std::string name_;
   const Scratch scratch_;
   std::unique_ptr<server::Store> store_;
+  std::optional<server::Domain> domain_;
   std::unique_ptr<server::Pipeline> pipeline_;
   std::optional<Calibration> truth_;  // of the session
   std::int64_t last_run_ = 0;

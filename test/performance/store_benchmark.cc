@@ -24,6 +24,7 @@
 
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
+#include "server/domain/domain.h"
 #include "server/store/store_sqlite.h"
 #include "test/server/store/fault_vfs.h"
 
@@ -50,8 +51,8 @@ double Seconds(Clock::duration time) {
 // One after the other, as a stream: at most kUnderWay unacknowledged.
 class Stream {
  public:
-  Stream(Store* store, std::string session)
-      : store_(store), session_(std::move(session)) {}
+  Stream(Domain* domain, std::string session)
+      : domain_(domain), session_(std::move(session)) {}
 
   void Send(MotionSegment segment, int count) {
     segment.key.session = session_;
@@ -62,7 +63,7 @@ class Stream {
         changed_.wait(lock, [this] { return under_way_ < kUnderWay; });
         ++under_way_;
       }
-      store_->BeginPutSegment("bench", segment, [this](const auto& verdict) {
+      domain_->BeginPutSegment("bench", segment, [this](const auto& verdict) {
         const std::lock_guard lock(mutex_);
         if (!verdict.ok()) ++failed_;
         --under_way_;
@@ -75,7 +76,7 @@ class Stream {
   int failed() const { return failed_; }
 
  private:
-  Store* const store_;
+  Domain* const domain_;
   const std::string session_;
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -108,7 +109,8 @@ Measured MeasureStore(const Options& options, const MotionSegment& segment) {
   FaultVfs vfs;
   auto store = MakeSqliteStore(path);
   if (!store.ok()) throw std::runtime_error(store.status().ToString());
-  if (!(*store)->CreateRig(HandheldRig("bench")).ok()) {
+  Domain domain(store->get());
+  if (!domain.CreateRig(HandheldRig("bench")).ok()) {
     throw std::runtime_error("cannot create the rig");
   }
   Measured measured;
@@ -120,7 +122,7 @@ Measured MeasureStore(const Options& options, const MotionSegment& segment) {
   const int each = options.segments / options.streams;
   for (int k = 0; k < options.streams; ++k) {
     threads.emplace_back([&, k] {
-      Stream stream(store->get(), fmt::format("s{}", k));
+      Stream stream(&domain, fmt::format("s{}", k));
       stream.Send(segment, each);
       failed += stream.failed();
     });

@@ -88,14 +88,14 @@ TEST_F(ApiTest, DataOfASegmentIsReadWhileItIsKept) {
   const Rig rig = AddRig("r");
   MotionSegment segment = TestSegments(rig, 1)[0];
   segment.key.session = "a b/c";
-  ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+  ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
   // The name of the segment has "a%20b%2Fc", and '%' is %25 in an address.
   const std::string path = "/api/v1/rigs/r/segments/a%2520b%252Fc~0";
   const auto data = Parsed<v1::MotionSegment>(Get(path + "/data"));
   EXPECT_EQ(data.session(), "a b/c");
   EXPECT_EQ(data.keyframes().t_ns_size(),
             static_cast<int>(segment.keyframes.size()));
-  ASSERT_TRUE(store_->MarkUnusable("r", segment.key, "test").ok());
+  ASSERT_TRUE(domain_->MarkUnusable("r", segment.key, "test").ok());
   EXPECT_EQ(Get(path).json()["hasData"], false);
   EXPECT_EQ(Get(path + "/data").status, 409);
 }
@@ -104,7 +104,7 @@ TEST_F(ApiTest, SegmentsAreFilteredAndSorted) {
   const Rig rig = AddRig("r");
   for (const char* session : {"a", "b"}) {
     for (const MotionSegment& segment : TestSegments(rig, 2, session)) {
-      ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+      ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
     }
   }
   const std::string path = "/api/v1/rigs/r/segments";

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -83,7 +84,8 @@ class ConsoleTest : public ::testing::Test {
     auto store = MakeSqliteStore(folder_ / "test.db");
     if (!store.ok()) throw std::runtime_error(store.status().ToString());
     store_ = *std::move(store);
-    pipeline_ = std::make_unique<FakePipeline>(store_.get());
+    domain_.emplace(store_.get());
+    pipeline_ = std::make_unique<FakePipeline>(&*domain_);
     feed_ = std::make_unique<ChangeFeed>(store_.get(), nullptr);
     Open(Role::kRead);
   }
@@ -142,7 +144,7 @@ class ConsoleTest : public ::testing::Test {
 
   Rig AddRig(const std::string& id) {
     const Rig rig = TestRig(id);
-    const auto created = store_->CreateRig(rig);
+    const auto created = domain_->CreateRig(rig);
     EXPECT_TRUE(created.ok()) << created.status();
     return rig;
   }
@@ -150,21 +152,22 @@ class ConsoleTest : public ::testing::Test {
   // A second version of the rig, active.
   void AddVersion(const Rig& rig) {
     const MotionSegment segment = TestSegments(rig, 1)[0];
-    ASSERT_TRUE(store_->PutSegment(rig.id, segment).ok());
+    ASSERT_TRUE(domain_->PutSegment(rig.id, segment).ok());
     SegmentInformation information = TestInformation(rig, 9);
     information.unobserved = {{{{"imu.gyro.scale.x", 1}}, 0.5}};
     information.groups[0].unobserved = information.unobserved;
-    ASSERT_TRUE(store_->CommitScore(rig.id, segment.key, information).ok());
-    const auto run = store_->CreateManualRun(rig.id);
+    ASSERT_TRUE(domain_->CommitScore(rig.id, segment.key, information).ok());
+    const auto run = domain_->CreateManualRun(rig.id);
     ASSERT_TRUE(run.ok()) << run.status();
-    ASSERT_TRUE(store_->BeginRun(rig.id, run->run).ok());
+    ASSERT_TRUE(domain_->BeginRun(rig.id, run->run).ok());
     const auto finished =
-        store_->FinishRun(rig.id, run->run, TestCalibration(rig, *run));
+        domain_->FinishRun(rig.id, run->run, TestCalibration(rig, *run));
     ASSERT_TRUE(finished.ok()) << finished.status();
   }
 
   std::filesystem::path folder_;
   std::unique_ptr<Store> store_;
+  std::optional<Domain> domain_;
   std::unique_ptr<FakePipeline> pipeline_;
   std::unique_ptr<ChangeFeed> feed_;
   std::unique_ptr<Console> console_;

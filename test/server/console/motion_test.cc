@@ -17,13 +17,13 @@ class MotionTest : public ConsoleTest {
                                          const std::string& session = "s") {
     auto segments = TestSegments(rig, count, session);
     for (const MotionSegment& segment : segments) {
-      EXPECT_TRUE(store_->PutSegment(rig.id, segment).ok());
+      EXPECT_TRUE(domain_->PutSegment(rig.id, segment).ok());
     }
     return segments;
   }
 
   void Score(const Rig& rig, int index, double entropy, double gain = 5) {
-    ASSERT_TRUE(store_
+    ASSERT_TRUE(domain_
                     ->CommitScore(rig.id,
                                   {"s", index},
                                   FakeInformation(rig, entropy, gain))
@@ -67,9 +67,9 @@ TEST_F(MotionTest, ATrajectoryHasEverySegmentAlsoThoseWithoutData) {
   const auto segments = AddSegments(rig, 3);
   Score(rig, 0, -9);
   Score(rig, 1, -8, 0);  // gains too little: its data goes with the reserve
-  for (MotionSegment& segment : AddSegments(rig, Store::kReserve, "later")) {
+  for (MotionSegment& segment : AddSegments(rig, kReserve, "later")) {
     ASSERT_TRUE(
-        store_->CommitScore(rig.id, segment.key, FakeInformation(rig, -8, 0))
+        domain_->CommitScore(rig.id, segment.key, FakeInformation(rig, -8, 0))
             .ok());
   }
   const auto trajectory =
@@ -124,7 +124,7 @@ TEST_F(MotionTest, InformationIsTheSigmaOfEachComponentBeforeAndAfter) {
   information.Lambda.setZero();
   information.eta.setZero();
   information.Lambda(0, 0) = 3 / (prior(0) * prior(0));
-  ASSERT_TRUE(store_->CommitScore("r", {"s", 0}, information).ok());
+  ASSERT_TRUE(domain_->CommitScore("r", {"s", 0}, information).ok());
   const auto components = Get(path).json()["components"];
   ASSERT_EQ(components.size(), FreeComponents(rig).size());
   for (std::size_t k = 0; k < components.size(); ++k) {
@@ -142,7 +142,7 @@ TEST_F(MotionTest, ResidualsAreThoseOfTheCoreAtTheVersionThatIsAskedFor) {
   const Rig rig = AddRig("r");
   AddVersion(rig);  // version 2 has the values of version 1
   const MotionSegment segment = TestSegments(rig, 1, "other")[0];
-  ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+  ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
   const SegmentResiduals expected =
       EvaluateResiduals(rig, rig.factory, segment);
   const std::string path = "/api/v1/rigs/r/segments/other~0/residuals";
@@ -189,7 +189,7 @@ TEST_F(MotionTest, MistakesSayWhatToDo) {
     EXPECT_EQ(reply.status, status) << path << ": " << reply.body;
     EXPECT_NE(reply.json().value("whatToDo", ""), "") << path;
   }
-  ASSERT_TRUE(store_->MarkUnusable("r", {"s", 0}, "test").ok());
+  ASSERT_TRUE(domain_->MarkUnusable("r", {"s", 0}, "test").ok());
   const Reply gone = Get("/api/v1/rigs/r/segments/s~0/residuals");
   EXPECT_EQ(gone.status, 409);
   EXPECT_THAT(gone.body, HasSubstr("was dropped"));

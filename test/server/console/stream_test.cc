@@ -59,7 +59,7 @@ TEST_F(StreamTest, TellsWhatIsWrittenIntoTheLogOfEvents) {
 
 TEST_F(StreamTest, RunIsToldUntilItsEnd) {
   AddVersion(AddRig("a"));
-  const auto run = store_->CreateManualRun("a", true);
+  const auto run = domain_->CreateManualRun("a", true);
   ASSERT_TRUE(run.ok()) << run.status();
   const auto wire = OpenStream("?run=rigs/a/recalibrations/2");
   EXPECT_THAT(wire->ReadUntil("PENDING"), HasSubstr("event: run"));
@@ -79,7 +79,7 @@ TEST_F(StreamTest, RunIsToldUntilItsEnd) {
 TEST_F(StreamTest, RunIsToldFromItsFirstIteration) {
   const Rig rig = AddRig("a");
   AddVersion(rig);
-  const auto run = store_->CreateManualRun("a", true);
+  const auto run = domain_->CreateManualRun("a", true);
   ASSERT_TRUE(run.ok()) << run.status();
   const auto wire = OpenStream("?run=rigs/a/recalibrations/2");
   wire->ReadUntil("PENDING");

@@ -140,7 +140,7 @@ TEST_F(OptionsTest, ConsoleIsOffAndOnlyReadsUnlessToldOtherwise) {
 
 TEST_F(OptionsTest, TestForAChangeIsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
-  EXPECT_EQ(options_.store.change.inflation, std::nullopt);
+  EXPECT_EQ(options_.domain.change.inflation, std::nullopt);
   EXPECT_EQ(Parse({"--state-dir",
                    "s",
                    "--change-inflation",
@@ -148,8 +148,8 @@ TEST_F(OptionsTest, TestForAChangeIsSet) {
                    "--change-false-alarms",
                    "1e-4"}),
             std::nullopt);
-  EXPECT_EQ(options_.store.change.inflation, 1);
-  EXPECT_EQ(options_.store.change.false_alarm_rate, 1e-4);
+  EXPECT_EQ(options_.domain.change.inflation, 1);
+  EXPECT_EQ(options_.domain.change.false_alarm_rate, 1e-4);
   EXPECT_EQ(Parse({"--state-dir", "s", "--change-inflation", "0.5"}), 2);
   EXPECT_EQ(Parse({"--state-dir", "s", "--change-false-alarms", "2"}), 2);
 }

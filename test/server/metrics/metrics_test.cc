@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/domain/domain.h"
 #include "server/store/store_sqlite.h"
 #include "test/server/http_get.h"
 #include "test/server/store/fake_information.h"
@@ -20,6 +21,7 @@ class MetricsTest : public ::testing::Test {
  protected:
   MetricsTest() {
     store_ = *MakeSqliteStore(folder_.File("test.db"));
+    domain_.emplace(store_.get());
     MetricsOptions options;
     options.address = "127.0.0.1:0";
     options.rigs = 2;
@@ -34,6 +36,7 @@ class MetricsTest : public ::testing::Test {
 
   TempFolder folder_;
   std::unique_ptr<Store> store_;
+  std::optional<Domain> domain_;
   std::unique_ptr<Metrics> metrics_;
 };
 
@@ -55,9 +58,9 @@ TEST_F(MetricsTest, SeriesAreThereBeforeTheFirstEvent) {
 TEST_F(MetricsTest, EventsAreCounted) {
   PipelineObserver* const observer = metrics_->observer();
   const Rig rig = TestRig("a");
-  ASSERT_TRUE(store_->CreateRig(rig).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
   const auto segments = TestSegments(rig, 2);
-  ASSERT_TRUE(store_->PutSegment("a", segments[0]).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", segments[0]).ok());
   observer->OnVerdict("a", Verdict::kStored);
   observer->OnVerdict("a", Verdict::kStored);
   observer->OnVerdict("a", Verdict::kRejected);
@@ -89,7 +92,7 @@ TEST_F(MetricsTest, EventsAreCounted) {
 
 TEST_F(MetricsTest, SeriesDoNotGrowWithTheRigs) {
   for (const std::string rig : {"a", "b", "c"}) {
-    ASSERT_TRUE(store_->CreateRig(TestRig(rig)).ok());
+    ASSERT_TRUE(domain_->CreateRig(TestRig(rig)).ok());
     metrics_->observer()->OnVerdict(rig, Verdict::kStored);
   }
   const std::string series = Scrape();

@@ -59,7 +59,7 @@ TEST_F(ChangePipelineTest, AKnockedDeviceIsCalibratedOnWhatCameAfterIt) {
   const Calibration truth = rig.factory;
   rig.factory = PerturbCalibration(truth, {}, 1);
   rig.table_size = 4;
-  ASSERT_TRUE(store_->CreateRig(rig).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
   StartOne();
   const auto factory = store_->GetActiveCalibration("a");
   SubmitAll(Session(rig, truth, *factory, 6, "first", 1));

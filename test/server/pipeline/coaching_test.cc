@@ -20,10 +20,10 @@ class Coaching : public PipelineTest {
              const Eigen::MatrixXd& Lambda,
              double entropy = 0) {
     const MotionSegment segment = Segment(index);
-    ASSERT_TRUE(store_->PutSegment(rig.id, segment).ok());
+    ASSERT_TRUE(domain_->PutSegment(rig.id, segment).ok());
     SegmentInformation information = FakeInformation(rig, entropy);
     information.Lambda = Lambda;
-    ASSERT_TRUE(store_->CommitScore(rig.id, segment.key, information).ok());
+    ASSERT_TRUE(domain_->CommitScore(rig.id, segment.key, information).ok());
   }
 
   static double SigmaNow(const RigCoaching& coaching, int i) {
@@ -103,10 +103,10 @@ TEST_F(Coaching, DoesNotBelieveAVersionOfWhatHasChangedSince) {
   std::int64_t index = 0;
   const auto next = [&]() -> std::optional<StoredChange> {
     const MotionSegment segment = Segment(index++);
-    EXPECT_TRUE(store_->PutSegment("a", segment).ok());
+    EXPECT_TRUE(domain_->PutSegment("a", segment).ok());
     SegmentInformation information = random.Segment(rig, rig.factory, offset);
     information.groups = ScoreGroups(rig, information.Lambda);
-    const auto commit = store_->CommitScore("a", segment.key, information);
+    const auto commit = domain_->CommitScore("a", segment.key, information);
     EXPECT_TRUE(commit.ok()) << commit.status();
     return commit->change;
   };
@@ -118,8 +118,8 @@ TEST_F(Coaching, DoesNotBelieveAVersionOfWhatHasChangedSince) {
   version.report = CalibrationResult();
   version.report->status = CalibrateStatus::kConverged;
   version.report->track_noise_factor = 1;
-  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
-  ASSERT_TRUE(store_->FinishRun("a", 1, version).ok());
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, version).ok());
   for (int i = 0; i < 6; ++i) EXPECT_FALSE(next());
   RigCoach coach(store_.get());
   const auto before = coach.Advise("a");

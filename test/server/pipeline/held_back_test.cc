@@ -5,7 +5,7 @@
 
 #include <mutex>
 
-#include "server/store/clock.h"
+#include "server/domain/clock.h"
 #include "test/server/pipeline/pipeline_test.h"
 
 namespace selfcal::server {
@@ -97,7 +97,7 @@ TEST_F(HeldBackTest, RunThatWaitsCanBeCancelled) {
 TEST_F(HeldBackTest, RunByHandDoesNotWait) {
   RigPolicy policy;
   policy.recalibration_min_interval_ns = 3600 * kSecond;
-  ASSERT_TRUE(store_->CreateRig(TestRig("a"), policy).ok());
+  ASSERT_TRUE(domain_->CreateRig(TestRig("a"), policy).ok());
   conditions_.Set("the device runs on battery");
   StartOne();
   Submit(0);
@@ -111,7 +111,7 @@ TEST_F(HeldBackTest, RunByHandDoesNotWait) {
 TEST_F(HeldBackTest, NextRunWaitsForTheMinimumInterval) {
   RigPolicy policy;
   policy.recalibration_min_interval_ns = 3600 * kSecond;
-  ASSERT_TRUE(store_->CreateRig(TestRig("a"), policy).ok());
+  ASSERT_TRUE(domain_->CreateRig(TestRig("a"), policy).ok());
   StartOne();
   FillTables();
   ASSERT_TRUE(RunIs(RunState::kSucceeded));
@@ -127,7 +127,7 @@ TEST_F(HeldBackTest, OldCalibrationIsComputedAnew) {
   rig.retrigger_fraction = 1;
   RigPolicy policy;
   policy.calibration_max_age_ns = 3600 * kSecond;
-  ASSERT_TRUE(store_->CreateRig(rig, policy).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig, policy).ok());
   StartOne();
   FillTables();
   ASSERT_TRUE(RunIs(RunState::kSucceeded));
@@ -176,14 +176,14 @@ TEST_F(HeldBackTest, RunGoesOnFromTheCandidateThatItHasStored) {
   ASSERT_TRUE(MessageIs("wait"));
   pipeline_->Stop();
   // As if the daemon had died after it had stored what it found.
-  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
   const auto factory = store_->GetActiveCalibration("a");
   StoredCalibration found;
   const CalibrationResult result = Converged(TestRig("a"), factory->theta);
   found.theta = result.theta;
   found.covariance = result.covariance;
   found.report = result;
-  ASSERT_TRUE(store_->StoreCandidate("a", 1, found).ok());
+  ASSERT_TRUE(domain_->StoreCandidate("a", 1, found).ok());
   Restart();
   ASSERT_TRUE(RunIs(RunState::kSucceeded));
   EXPECT_EQ(solves, 0);

@@ -13,7 +13,7 @@ class MemoryTest : public PipelineTest {
 
   // One by one, each followed by the run that it triggers.
   void SubmitAll() {
-    ASSERT_TRUE(store_->CreateRig(TestRig("a")).ok());
+    ASSERT_TRUE(domain_->CreateRig(TestRig("a")).ok());
     StartOne();
     for (const MotionSegment& segment : TestSegments(TestRig("a"), kSegments)) {
       ASSERT_TRUE(pipeline_->Submit("a", segment, nullptr).ok());
@@ -83,7 +83,7 @@ TEST_F(MemoryTest, HeldOutAreThoseWithDataAlone) {
   ASSERT_GT(informed.report->evicted.segments, 0);
   const HeldOutTest& held_out = informed.validation->held_out;
   EXPECT_GT(held_out.segments, 0);
-  EXPECT_LE(held_out.segments + held_out.left_out, Store::kReserve);
+  EXPECT_LE(held_out.segments + held_out.left_out, kReserve);
   EXPECT_EQ(held_out.rescored, held_out.segments);
 }
 

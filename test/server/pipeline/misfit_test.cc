@@ -14,7 +14,7 @@ class MisfitTest : public PipelineTest {
   MisfitTest() {
     rig_ = TestRig("a");
     rig_.table_size = 4;
-    EXPECT_TRUE(store_->CreateRig(rig_).ok());
+    EXPECT_TRUE(domain_->CreateRig(rig_).ok());
     // With the fit of the reprojections alone, measured here: nothing of this
     // depends on how a score comes to its own.
     estimators_.score = [](const Rig& rig,

@@ -9,10 +9,12 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/store_sqlite.h"
 #include "test/server/store/fake_information.h"
@@ -75,16 +77,18 @@ class PipelineTest : public ::testing::Test {
   }
 
   void OpenStore() {
+    domain_.reset();
     store_.reset();
     auto store = MakeSqliteStore(folder_.File("selfcal.db"));
     ASSERT_TRUE(store.ok()) << store.status();
     store_ = *std::move(store);
+    domain_.emplace(store_.get());
   }
 
   // Ends the pipeline, if there is one, and makes one of the estimators.
   void MakeOne() {
     pipeline_.reset();
-    pipeline_ = MakePipeline(store_.get(), options_, estimators_);
+    pipeline_ = MakePipeline(&*domain_, options_, estimators_);
   }
   void StartOne() {
     MakeOne();
@@ -100,7 +104,7 @@ class PipelineTest : public ::testing::Test {
 
   Rig CreateRig(const std::string& id = "a") {
     const Rig rig = TestRig(id);
-    EXPECT_TRUE(store_->CreateRig(rig).ok());
+    EXPECT_TRUE(domain_->CreateRig(rig).ok());
     return rig;
   }
 
@@ -136,6 +140,7 @@ class PipelineTest : public ::testing::Test {
 
   TempFolder folder_;
   std::unique_ptr<Store> store_;
+  std::optional<Domain> domain_;
   PipelineOptions options_;
   Estimators estimators_;
   std::unique_ptr<Pipeline> pipeline_;

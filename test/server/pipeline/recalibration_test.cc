@@ -76,7 +76,7 @@ TEST_F(RecalibrationTest, NoiseIsReweightedWhereTheRigSaysSo) {
   options_.calibrate.reweight_noise = false;  // the default is to do so
   Rig rig = TestRig("b");
   rig.reweight_noise = true;
-  ASSERT_TRUE(store_->CreateRig(rig).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
   CreateRig();
   StartOne();
   FillTables();
@@ -134,12 +134,12 @@ TEST_F(RecalibrationTest, RunThatCrashedStartsAgainButNotForEver) {
   ASSERT_TRUE(Eventually([&] { return solves_ == 1; }));
   pipeline_->Stop();
   // As if the daemon had died in it, twice, then a third time.
-  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
-  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
   ASSERT_TRUE(pipeline_->Start().ok());
   ASSERT_TRUE(Eventually([&] { return solves_ == 2; }));
   pipeline_->Stop();
-  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
   EXPECT_EQ(store_->GetRun("a", 1)->attempts, 3);
   ASSERT_TRUE(pipeline_->Start().ok());
   ASSERT_TRUE(RunIs(RunState::kFailed));

@@ -78,7 +78,8 @@ bool Ended(Store* store) {
   sqlite3_auto_extension(reinterpret_cast<void (*)()>(Watch));
   auto store = MakeSqliteStore(path);
   if (!store.ok()) _exit(2);
-  const auto rig = (*store)->CreateRig(TestRig("a"));
+  Domain domain(store->get());
+  const auto rig = domain.CreateRig(TestRig("a"));
   if (!rig.ok() && !absl::IsAlreadyExists(rig.status())) _exit(3);
   Estimators estimators;
   estimators.score =
@@ -94,7 +95,7 @@ bool Ended(Store* store) {
     return Solve(rig, start, progress);
   };
   PipelineOptions options;
-  const auto pipeline = MakePipeline(store->get(), options, estimators);
+  const auto pipeline = MakePipeline(&domain, options, estimators);
   if (!pipeline->Start().ok()) _exit(4);
   for (const std::int64_t index : {0, 1}) {
     if (!pipeline->Submit("a", Segment(index), nullptr).ok()) _exit(5);

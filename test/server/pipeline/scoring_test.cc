@@ -31,8 +31,8 @@ TEST_F(ScoringTest, WhatWasStoredBeforeTheStartIsScored) {
   CreateRig();
   CreateRig("b");
   for (int k = 0; k < 5; ++k) {
-    ASSERT_TRUE(store_->PutSegment("a", Segment(k)).ok());
-    ASSERT_TRUE(store_->PutSegment("b", Segment(k)).ok());
+    ASSERT_TRUE(domain_->PutSegment("a", Segment(k)).ok());
+    ASSERT_TRUE(domain_->PutSegment("b", Segment(k)).ok());
   }
   OpenStore();
   StartOne();
@@ -107,7 +107,7 @@ TEST_F(ScoringTest, ScoreIsTakenAtTheVersionThatIsActive) {
 TEST_F(ScoringTest, DamagedSegmentDoesNotHoldUpTheOthers) {
   CreateRig();
   for (int k = 0; k < 3; ++k) {
-    ASSERT_TRUE(store_->PutSegment("a", Segment(k)).ok());
+    ASSERT_TRUE(domain_->PutSegment("a", Segment(k)).ok());
   }
   DamageData(1);
   StartOne();

@@ -1,6 +1,6 @@
 // The end of a session starts a run where the tables have changed; segments
 // that are quarantined leave the queue.
-#include "server/store/clock.h"
+#include "server/domain/clock.h"
 #include "test/server/pipeline/pipeline_test.h"
 
 namespace selfcal::server {
@@ -23,7 +23,7 @@ class SessionEndTest : public PipelineTest {
   void ChangeTables() {
     Rig rig = TestRig("a");
     rig.table_size = 4;
-    ASSERT_TRUE(store_->CreateRig(rig).ok());
+    ASSERT_TRUE(domain_->CreateRig(rig).ok());
     StartOne();
     for (int k = 0; k < 4; ++k) Submit(k);
     ASSERT_TRUE(AllScored());

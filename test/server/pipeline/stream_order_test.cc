@@ -21,7 +21,7 @@ class StreamOrderTest : public PipelineTest {
   void Create(const std::string& id) {
     Rig rig = TestRig(id);
     rig.table_size = 4;
-    ASSERT_TRUE(store_->CreateRig(rig).ok());
+    ASSERT_TRUE(domain_->CreateRig(rig).ok());
   }
 
   Content TablesOf(const std::string& rig) {

@@ -67,7 +67,7 @@ class VerificationTest : public PipelineTest {
   void SubmitSegments() {
     Rig rig = TestRig("a");
     rig.table_size = kSegments;
-    ASSERT_TRUE(store_->CreateRig(rig).ok());
+    ASSERT_TRUE(domain_->CreateRig(rig).ok());
     StartOne();
     for (const MotionSegment& segment : TestSegments(rig, kSegments)) {
       const auto result = pipeline_->Submit("a", segment, nullptr);

@@ -12,7 +12,7 @@ class WholeWayTest : public PipelineTest {
 TEST_F(WholeWayTest, SimulatedSegmentsFillTheTablesAndGiveAVersion) {
   Rig rig = TestRig("a");
   rig.table_size = 4;
-  ASSERT_TRUE(store_->CreateRig(rig).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
   const auto segments = TestSegments(rig, 6);
   StartOne();
   for (const MotionSegment& segment : segments) {
@@ -42,7 +42,7 @@ TEST_F(WholeWayTest, ScoresAreTheSameAfterAStop) {
   for (const int trial : {0, 1}) {
     Rig rig = TestRig("rig" + std::to_string(trial));
     rig.table_size = 50;
-    ASSERT_TRUE(store_->CreateRig(rig).ok());
+    ASSERT_TRUE(domain_->CreateRig(rig).ok());
     StartOne();
     for (const MotionSegment& segment : segments) {
       ASSERT_TRUE(pipeline_->Submit(rig.id, segment, nullptr).ok());
@@ -69,7 +69,7 @@ TEST_F(WholeWayTest, LandmarksNeverMatchAcrossSessions) {
       Rig rig = TestRig(std::string(offset == 0 ? "same" : "other") +
                         (selection == Selection::kTables ? "" : "-joint"));
       rig.selection = selection;
-      ASSERT_TRUE(store_->CreateRig(rig).ok());
+      ASSERT_TRUE(domain_->CreateRig(rig).ok());
       StartOne();
       auto segments = TestSegments(rig, 2, "one", 1);
       for (MotionSegment& segment : TestSegments(rig, 2, "two", 2)) {

@@ -43,7 +43,7 @@ class AccessTest : public ServiceTest {
                    certificates_.Key("server"),
                    certificates_.Pem("ca"),
                    1};
-    auto server = MakeServer(store_.get(), pipeline_.get(), options);
+    auto server = MakeServer(&*domain_, pipeline_.get(), options);
     if (!server.ok()) throw std::runtime_error(server.status().ToString());
     tls_server_ = std::move(*server);
   }
@@ -216,7 +216,7 @@ TEST_F(AccessTest, NewCertificatesAreTakenWithoutARestart) {
 class OpeningTest : public ServiceTest {
  protected:
   absl::Status Open(const ServerOptions& options) {
-    return MakeServer(store_.get(), pipeline_.get(), options).status();
+    return MakeServer(&*domain_, pipeline_.get(), options).status();
   }
   Certificates certificates_;
 };
@@ -269,7 +269,7 @@ TEST_F(OpeningTest, SocketHasTheModeAndGroupThatWereSet) {
   const std::string path = folder_ / "socket";
   options.listen = {"unix:" + path};
   options.socket.mode = 0620;
-  const auto server = MakeServer(store_.get(), pipeline_.get(), options);
+  const auto server = MakeServer(&*domain_, pipeline_.get(), options);
   ASSERT_TRUE(server.ok()) << server.status();
   struct stat status {};
   ASSERT_EQ(stat(path.c_str(), &status), 0);

@@ -47,8 +47,8 @@ TEST_F(ActivityServiceTest, ARigThatSentLastComesFirst) {
   const Rig a = AddRig("a");
   const Rig b = AddRig("b");
   AddRig("c");
-  ASSERT_TRUE(store_->PutSegment("b", TestSegments(b, 1)[0]).ok());
-  ASSERT_TRUE(store_->PutSegment("a", TestSegments(a, 1)[0]).ok());
+  ASSERT_TRUE(domain_->PutSegment("b", TestSegments(b, 1)[0]).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", TestSegments(a, 1)[0]).ok());
   const auto first = List(2);
   ASSERT_EQ(first.rigs_size(), 2);
   EXPECT_EQ(first.rigs(0).name(), "rigs/a");
@@ -116,7 +116,7 @@ TEST_F(ActivityServiceTest, CountsStreamsAndVerdicts) {
 TEST_F(ActivityServiceTest, TellsARunUntilItHasEnded) {
   const Rig rig = AddScored(1);
   EXPECT_FALSE(List().rigs(0).has_run());
-  const auto run = store_->CreateManualRun(rig.id);
+  const auto run = domain_->CreateManualRun(rig.id);
   ASSERT_TRUE(run.ok()) << run.status();
   pipeline_->progress.iteration = 4;
   pipeline_->progress.max_iterations = 100;

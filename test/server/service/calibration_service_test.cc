@@ -15,7 +15,7 @@ class CalibrationServiceTest : public ServiceTest {
   // A rig whose second version is active.
   Rig AddCalibrated() {
     Rig rig = AddScored(1);
-    const auto run = store_->CreateManualRun(rig.id);
+    const auto run = domain_->CreateManualRun(rig.id);
     EXPECT_TRUE(run.ok()) << run.status();
     FinishRun(rig, run->run);
     return rig;
@@ -95,7 +95,7 @@ TEST_F(CalibrationServiceTest, VersionShowsTheTemperaturesOfItsSegments) {
   segments[0].temperature_c = 20;
   segments[1].temperature_c = 31;
   for (const MotionSegment& segment : segments) {
-    ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+    ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
     Score(rig, segment.key, 10);
   }
   FinishRun(rig, 1);
@@ -171,7 +171,7 @@ TEST_F(CalibrationServiceTest, WatchBeginsWithTheActiveAndGetsTheNext) {
   v1::Calibration seen;
   ASSERT_TRUE(reader->Read(&seen));
   EXPECT_EQ(seen.version(), 1);
-  const auto run = store_->CreateManualRun(rig.id);
+  const auto run = domain_->CreateManualRun(rig.id);
   ASSERT_TRUE(run.ok());
   pipeline_->Publish(FinishRun(rig, run->run));
   ASSERT_TRUE(reader->Read(&seen));
@@ -236,8 +236,8 @@ TEST_F(CalibrationServiceTest, ActivationNeedsAVersionAndAReason) {
 
 TEST_F(CalibrationServiceTest, WhatItWasJudgedByIsShown) {
   const Rig rig = AddScored(1);
-  const auto run = store_->CreateManualRun(rig.id);
-  ASSERT_TRUE(store_->BeginRun(rig.id, run->run).ok());
+  const auto run = domain_->CreateManualRun(rig.id);
+  ASSERT_TRUE(domain_->BeginRun(rig.id, run->run).ok());
   StoredCalibration rejected = *store_->GetActiveCalibration(rig.id);
   rejected.state = CalibrationState::kRejected;
   rejected.reasons = {"does not fit"};
@@ -254,7 +254,7 @@ TEST_F(CalibrationServiceTest, WhatItWasJudgedByIsShown) {
   rejected.report->halves = {30, 26, 0.25};
   rejected.report->noise_factors = {
       {NoiseKind::kGyro, 3, 0.05, 100, 2.9, true}};
-  ASSERT_TRUE(store_->FinishRun(rig.id, run->run, rejected).ok());
+  ASSERT_TRUE(domain_->FinishRun(rig.id, run->run, rejected).ok());
   v1::Calibration read;
   ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
   EXPECT_EQ(read.validation().verdict(), v1::Validation::REJECTED);

@@ -11,13 +11,15 @@
 #include <utility>
 #include <vector>
 
+#include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
 
 namespace selfcal::server {
 
 class FakePipeline final : public Pipeline {
  public:
-  explicit FakePipeline(Store* store) : store_(store), coach_(store) {}
+  explicit FakePipeline(Domain* domain)
+      : domain_(domain), store_(domain->store()), coach_(store_) {}
 
   absl::Status Start() override { return absl::OkStatus(); }
   void Stop() override {}
@@ -37,7 +39,7 @@ class FakePipeline final : public Pipeline {
     if (!violations.empty()) {
       return SubmitResult{SubmitResult::Verdict::kRejected, violations};
     }
-    const auto put = store_->PutSegment(rig, segment);
+    const auto put = domain_->PutSegment(rig, segment);
     if (!put.ok()) return put.status();
     return SubmitResult{*put == PutVerdict::kStored
                             ? SubmitResult::Verdict::kStored
@@ -76,18 +78,18 @@ class FakePipeline final : public Pipeline {
       std::optional<std::int64_t> index,
       const std::string& caller,
       const std::string& reason) override {
-    return store_->QuarantineSegments(rig, session, index, caller, reason);
+    return domain_->QuarantineSegments(rig, session, index, caller, reason);
   }
 
   using Pipeline::StartRecalibration;
   absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig,
                                                bool force) override {
-    return store_->CreateManualRun(rig, force);
+    return domain_->CreateManualRun(rig, force);
   }
 
   absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
                                                 std::int64_t run) override {
-    auto ended = store_->EndRun(rig, run, RunState::kCancelled, "by hand");
+    auto ended = domain_->EndRun(rig, run, RunState::kCancelled, "by hand");
     if (ended.ok()) Tell({*ended, {}});
     return ended;
   }
@@ -97,7 +99,7 @@ class FakePipeline final : public Pipeline {
       std::int64_t version,
       const std::string& caller,
       const std::string& reason) override {
-    auto active = store_->ActivateCalibration(rig, version, caller, reason);
+    auto active = domain_->ActivateCalibration(rig, version, caller, reason);
     if (active.ok()) Publish(*active);
     return active;
   }
@@ -187,6 +189,7 @@ class FakePipeline final : public Pipeline {
         &mutex_, watchers, std::prev(watchers->end()));
   }
 
+  Domain* domain_;
   Store* store_;
   RigCoach coach_;
   std::mutex mutex_;

@@ -101,12 +101,12 @@ class OldClientsTest : public ServiceTest {
     for (std::int64_t index : {0, 1}) Score(rig, {"walk", index}, 10);
     FinishRun(rig, 1);
     const MotionSegment segment = TestSegments(rig, 1).front();
-    ASSERT_TRUE(store_->PutSegment(rig.id, segment).ok());
+    ASSERT_TRUE(domain_->PutSegment(rig.id, segment).ok());
     SegmentInformation information = TestInformation(rig, 20);
     for (std::size_t q = 1; q < information.groups.size(); ++q) {
       information.groups[q].gain = 0;
     }
-    ASSERT_TRUE(store_->CommitScore(rig.id, segment.key, information).ok());
+    ASSERT_TRUE(domain_->CommitScore(rig.id, segment.key, information).ok());
   }
 };
 

@@ -194,7 +194,7 @@ TEST_F(RecalibrationServiceTest, CancelledRunIsOverForItsWatcherToo) {
   AddScored(1);
   v1::Recalibration run;
   ASSERT_TRUE(Start("rigs/r", &run).ok());
-  ASSERT_TRUE(store_->BeginRun("r", 1).ok());
+  ASSERT_TRUE(domain_->BeginRun("r", 1).ok());
   Context context;
   const auto reader = Watch(&context, run.name());
   v1::Recalibration seen;

@@ -189,7 +189,7 @@ TEST_F(RigServiceTest, PageIsCutToWhatAClientReceivesByDefault) {
   }
   for (int i = 0; i < 100; ++i) {
     rig.id = "r" + std::to_string(i);
-    ASSERT_TRUE(store_->CreateRig(rig).ok());
+    ASSERT_TRUE(domain_->CreateRig(rig).ok());
   }
   int rigs = 0;
   std::string token;

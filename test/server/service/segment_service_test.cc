@@ -46,7 +46,7 @@ class SegmentServiceTest : public ServiceTest {
 TEST_F(SegmentServiceTest, StoredSegmentShowsItsCountsAndNoScore) {
   const Rig rig = AddRig();
   MotionSegment segment = TestSegments(rig, 1, "a b~c")[0];
-  ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+  ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
   v1::Segment read;
   ASSERT_TRUE(Get("rigs/r/segments/a%20b%7Ec~0", &read).ok());
   EXPECT_EQ(read.name(), "rigs/r/segments/a%20b%7Ec~0");
@@ -86,8 +86,8 @@ TEST_F(SegmentServiceTest, ScoredSegmentShowsItsScoresAndTables) {
 TEST_F(SegmentServiceTest, UnusableSegmentSaysWhy) {
   const Rig rig = AddRig();
   const MotionSegment segment = TestSegments(rig, 1)[0];
-  ASSERT_TRUE(store_->PutSegment("r", segment).ok());
-  ASSERT_TRUE(store_->MarkUnusable("r", segment.key, "broken").ok());
+  ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
+  ASSERT_TRUE(domain_->MarkUnusable("r", segment.key, "broken").ok());
   v1::Segment read;
   ASSERT_TRUE(Get("rigs/r/segments/s~0", &read).ok());
   EXPECT_EQ(read.state(), v1::Segment::UNUSABLE);
@@ -130,10 +130,10 @@ TEST_F(SegmentServiceTest, QuarantineTakesASegmentOutAndSaysWhy) {
 TEST_F(SegmentServiceTest, ASegmentThatDoesNotFitSaysWhyNoTableHoldsIt) {
   const Rig rig = AddRig();
   for (const MotionSegment& segment : TestSegments(rig, 5)) {
-    ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+    ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
     SegmentInformation information = TestInformation(rig, 9);
     information.residuals.fit = segment.key.index == 4 ? 25 : 1.5;
-    ASSERT_TRUE(store_->CommitScore("r", segment.key, information).ok());
+    ASSERT_TRUE(domain_->CommitScore("r", segment.key, information).ok());
   }
   v1::Segment read;
   ASSERT_TRUE(Get("rigs/r/segments/s~4", &read).ok());
@@ -168,7 +168,7 @@ TEST_F(SegmentServiceTest, WhatIsNoNameIsRefused) {
 
 TEST_F(SegmentServiceTest, PagesHoldEverySegmentOnceNewestFirst) {
   for (const MotionSegment& segment : TestSegments(AddRig(), 5)) {
-    ASSERT_TRUE(store_->PutSegment("r", segment).ok());
+    ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
   }
   std::vector<std::int64_t> sequences;
   std::string token;
@@ -195,7 +195,7 @@ TEST_F(SegmentServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
 TEST_F(SegmentServiceTest, DataComesBackAsItWasSentWhileItIsKept) {
   // The tables keep two, the reserve some, and the first goes with the run that
   // used it.
-  constexpr int kCount = 3 + Store::kReserve;
+  constexpr int kCount = 3 + kReserve;
   const Rig rig = AddScored(kCount);
   FinishRun(rig, 1);
   const auto sent = TestSegments(rig, kCount, "s");
@@ -226,7 +226,7 @@ TEST_F(SegmentServiceTest, DataComesBackAsItWasSentWhileItIsKept) {
 TEST_F(SegmentServiceTest, ListsByFilterInAnOrder) {
   const Rig rig = AddScored(3);
   ASSERT_TRUE(
-      store_->PutSegment("r", TestSegments(rig, 1, "unscored")[0]).ok());
+      domain_->PutSegment("r", TestSegments(rig, 1, "unscored")[0]).ok());
   Context context;
   v1::ListSegmentsRequest request;
   request.set_parent("rigs/r");

@@ -106,7 +106,7 @@ TEST_F(ServerTest, FreePortIsTakenAndNamed) {
   ServerOptions options;
   options.listen = {"insecure:127.0.0.1:0",
                     "unix:" + (folder_ / "other").string()};
-  const auto server = MakeServer(store_.get(), pipeline_.get(), options);
+  const auto server = MakeServer(&*domain_, pipeline_.get(), options);
   ASSERT_TRUE(server.ok()) << server.status();
   EXPECT_THAT((*server)->addresses(),
               ElementsAre(StartsWith("127.0.0.1:"), options.listen[1]));
@@ -120,18 +120,18 @@ TEST_F(ServerTest, FreePortIsTakenAndNamed) {
 TEST_F(ServerTest, AddressInUseOrImpossibleIsAnError) {
   ServerOptions options;
   options.listen = {"insecure:127.0.0.1:0"};
-  const auto first = MakeServer(store_.get(), pipeline_.get(), options);
+  const auto first = MakeServer(&*domain_, pipeline_.get(), options);
   ASSERT_TRUE(first.ok()) << first.status();
   for (const std::string& address : {"insecure:" + (*first)->addresses()[0],
                                      std::string("unix:/no/such/folder/socket"),
                                      "unix:/" + std::string(200, 'x')}) {
     options.listen = {address};
-    const auto second = MakeServer(store_.get(), pipeline_.get(), options);
+    const auto second = MakeServer(&*domain_, pipeline_.get(), options);
     EXPECT_EQ(second.status().code(), absl::StatusCode::kUnavailable);
     EXPECT_THAT(std::string(second.status().message()), HasSubstr(address));
   }
   options.listen.clear();
-  EXPECT_EQ(MakeServer(store_.get(), pipeline_.get(), options).status().code(),
+  EXPECT_EQ(MakeServer(&*domain_, pipeline_.get(), options).status().code(),
             absl::StatusCode::kInvalidArgument);
 }
 

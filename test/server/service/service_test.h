@@ -9,6 +9,7 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -73,7 +74,8 @@ class ServiceTest : public ::testing::Test {
     auto store = MakeSqliteStore(folder_ / "test.db");
     if (!store.ok()) throw std::runtime_error(store.status().ToString());
     store_ = std::move(*store);
-    pipeline_ = std::make_unique<FakePipeline>(store_.get());
+    domain_.emplace(store_.get());
+    pipeline_ = std::make_unique<FakePipeline>(&*domain_);
     StartServer(ServerOptions());
   }
 
@@ -85,7 +87,7 @@ class ServiceTest : public ::testing::Test {
   void StartServer(ServerOptions options) {
     server_.reset();
     options.listen = {"unix:" + (folder_ / "s").string()};
-    auto server = MakeServer(store_.get(), pipeline_.get(), options);
+    auto server = MakeServer(&*domain_, pipeline_.get(), options);
     if (!server.ok()) throw std::runtime_error(server.status().ToString());
     server_ = std::move(*server);
     // A channel of its own for each server: no backoff from the one before.
@@ -102,7 +104,7 @@ class ServiceTest : public ::testing::Test {
   // Creates rigs/{id} in the store.
   Rig AddRig(const std::string& id = "r") {
     const Rig rig = TestRig(id);
-    const auto created = store_->CreateRig(rig);
+    const auto created = domain_->CreateRig(rig);
     EXPECT_TRUE(created.ok()) << created.status();
     return rig;
   }
@@ -110,7 +112,7 @@ class ServiceTest : public ::testing::Test {
   // Puts a score with this information gain for every group.
   void Score(const Rig& rig, const SegmentKey& key, double gain) {
     const auto committed =
-        store_->CommitScore(rig.id, key, TestInformation(rig, gain));
+        domain_->CommitScore(rig.id, key, TestInformation(rig, gain));
     EXPECT_TRUE(committed.ok()) << committed.status();
   }
 
@@ -119,7 +121,7 @@ class ServiceTest : public ::testing::Test {
     const Rig rig = AddRig();
     double gain = 10;
     for (const MotionSegment& segment : TestSegments(rig, count)) {
-      EXPECT_TRUE(store_->PutSegment(rig.id, segment).ok());
+      EXPECT_TRUE(domain_->PutSegment(rig.id, segment).ok());
       Score(rig, segment.key, gain++);
     }
     return rig;
@@ -127,7 +129,7 @@ class ServiceTest : public ::testing::Test {
 
   // Ends the unfinished run of the rig with an active calibration.
   StoredCalibration FinishRun(const Rig& rig, std::int64_t run) {
-    EXPECT_TRUE(store_->BeginRun(rig.id, run).ok());
+    EXPECT_TRUE(domain_->BeginRun(rig.id, run).ok());
     StoredCalibration calibration =
         TestCalibration(rig, *store_->GetRun(rig.id, run));
     calibration.report = CalibrationResult();
@@ -135,13 +137,14 @@ class ServiceTest : public ::testing::Test {
     calibration.report->theta = rig.factory;
     calibration.report->covariance = calibration.covariance;
     calibration.report->iterations = 7;
-    const auto finished = store_->FinishRun(rig.id, run, calibration);
+    const auto finished = domain_->FinishRun(rig.id, run, calibration);
     EXPECT_TRUE(finished.ok()) << finished.status();
     return *finished;
   }
 
   std::filesystem::path folder_;
   std::unique_ptr<Store> store_;
+  std::optional<Domain> domain_;
   std::unique_ptr<FakePipeline> pipeline_;
   std::unique_ptr<Server> server_;
   std::shared_ptr<grpc::Channel> channel_;

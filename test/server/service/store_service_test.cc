@@ -108,6 +108,7 @@ TEST_F(StoreServiceTest, ABackupIsADatabaseAndCanBeRestored) {
   server_.reset();
   store_.reset();
   store_ = *MakeSqliteStore(folder_ / "test.db");
+  domain_.emplace(store_.get());
   EXPECT_EQ(store_->ListSegments(rig.id, {})->items.size(), 2u);
   EXPECT_TRUE(std::filesystem::exists(response.previous_database()));
 }
@@ -126,8 +127,8 @@ TEST_F(StoreServiceTest, EventsAreListedOldestFirstAndByRig) {
   AddRig("a");
   AddRig("b");
   for (const auto& segment : TestSegments(TestRig("b"), 1)) {
-    ASSERT_TRUE(store_->PutSegment("b", segment).ok());
-    ASSERT_TRUE(store_->MarkUnusable("b", segment.key, "a reason").ok());
+    ASSERT_TRUE(domain_->PutSegment("b", segment).ok());
+    ASSERT_TRUE(domain_->MarkUnusable("b", segment.key, "a reason").ok());
   }
   v1::ListEventsRequest request;
   v1::ListEventsResponse events;

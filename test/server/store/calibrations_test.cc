@@ -16,7 +16,7 @@ class CalibrationsTest : public StoreTest {
       Put(id, k);
       Score(rig, k, k);
     }
-    EXPECT_TRUE(store_->BeginRun(id, 1).ok());
+    EXPECT_TRUE(domain_->BeginRun(id, 1).ok());
     return rig;
   }
 
@@ -53,14 +53,14 @@ SELFCAL_STORE_TEST_SUITE(CalibrationsTest);
 
 TEST_P(CalibrationsTest, TheFirstDisagreementStaysWithItsVersion) {
   const Rig rig = RigWithRun("a");
-  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, Candidate(rig)).ok());
   EXPECT_EQ(store_->GetActiveCalibration("a")->disagreement, "");
-  ASSERT_TRUE(store_->ReportDisagreement("a", 2, "by 3 sigma").ok());
-  ASSERT_TRUE(store_->ReportDisagreement("a", 2, "by 5 sigma").ok());
+  ASSERT_TRUE(domain_->ReportDisagreement("a", 2, "by 3 sigma").ok());
+  ASSERT_TRUE(domain_->ReportDisagreement("a", 2, "by 5 sigma").ok());
   EXPECT_TRUE(
-      absl::IsNotFound(store_->ReportDisagreement("a", 3, "by 1 sigma")));
+      absl::IsNotFound(domain_->ReportDisagreement("a", 3, "by 1 sigma")));
   EXPECT_TRUE(
-      absl::IsNotFound(store_->ReportDisagreement("b", 1, "by 1 sigma")));
+      absl::IsNotFound(domain_->ReportDisagreement("b", 1, "by 1 sigma")));
   Reopen();
   const auto active = store_->GetActiveCalibration("a");
   ASSERT_TRUE(active.ok()) << active.status();
@@ -84,7 +84,7 @@ TEST_P(CalibrationsTest, TheFirstDisagreementStaysWithItsVersion) {
 TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   const Rig rig = RigWithRun("a");
   const StoredCalibration candidate = Candidate(rig);
-  const auto finished = store_->FinishRun("a", 1, candidate);
+  const auto finished = domain_->FinishRun("a", 1, candidate);
   ASSERT_TRUE(finished.ok()) << finished.status();
   EXPECT_EQ(finished->version, 2);
   Reopen();
@@ -141,7 +141,7 @@ TEST_P(CalibrationsTest, AStalledSolverIsRememberedAsThat) {
   StoredCalibration candidate = Candidate(rig);
   candidate.state = CalibrationState::kRejected;
   candidate.report->status = CalibrateStatus::kStalled;
-  ASSERT_TRUE(store_->FinishRun("a", 1, candidate).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, candidate).ok());
   EXPECT_EQ(store_->GetCalibration("a", 2)->report->status,
             CalibrateStatus::kStalled);
 }
@@ -195,11 +195,11 @@ TEST_P(CalibrationsTest, VersionTellsTheTemperaturesOfItsSegments) {
   for (int k = 0; k < 2; ++k) {
     MotionSegment segment = Segment(k);
     segment.temperature_c = 20 + 5 * k;
-    ASSERT_TRUE(store_->PutSegment("a", segment).ok());
+    ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
     Score(rig, k, k);
   }
-  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
-  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, Candidate(rig)).ok());
   const auto stored = store_->GetActiveCalibration("a");
   ASSERT_TRUE(stored.ok()) << stored.status();
   ASSERT_TRUE(stored->temperatures.has_value());
@@ -213,7 +213,7 @@ TEST_P(CalibrationsTest, VersionTellsTheTemperaturesOfItsSegments) {
 
 TEST_P(CalibrationsTest, VersionTellsNoTemperatureThatNoSegmentHas) {
   const Rig rig = RigWithRun("a");
-  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, Candidate(rig)).ok());
   EXPECT_FALSE(store_->GetActiveCalibration("a")->temperatures.has_value());
 }
 
@@ -227,7 +227,7 @@ TEST_P(CalibrationsTest, OldVersionHasKnownTimeOffsets) {
   const Eigen::MatrixXd old =
       candidate.covariance.topLeftCorner(size - 1, size - 1);
   candidate.covariance = old;
-  ASSERT_TRUE(store_->FinishRun("a", 1, candidate).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, candidate).ok());
   const auto stored = store_->GetActiveCalibration("a");
   ASSERT_TRUE(stored.ok()) << stored.status();
   ASSERT_EQ(stored->covariance.rows(), size);
@@ -239,7 +239,7 @@ TEST_P(CalibrationsTest, OldVersionHasKnownTimeOffsets) {
 
 TEST_P(CalibrationsTest, ActiveOneSupersedesTheOneBefore) {
   const Rig rig = RigWithRun("a");
-  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, Candidate(rig)).ok());
   EXPECT_EQ(store_->GetCalibration("a", 1)->state,
             CalibrationState::kSuperseded);
   EXPECT_EQ(store_->GetCalibration("a", 2)->state, CalibrationState::kActive);
@@ -254,7 +254,7 @@ TEST_P(CalibrationsTest, RejectedOneIsKeptWithItsReasons) {
   StoredCalibration candidate = Candidate(rig);
   candidate.state = CalibrationState::kRejected;
   candidate.reasons = {"too far", "too vague"};
-  ASSERT_TRUE(store_->FinishRun("a", 1, candidate).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, candidate).ok());
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
   const auto rejected = store_->GetCalibration("a", 2);
   EXPECT_EQ(rejected->state, CalibrationState::kRejected);
@@ -276,7 +276,7 @@ TEST_P(CalibrationsTest, RejectedOneIsKeptWithItsReasons) {
 
 TEST_P(CalibrationsTest, VersionsAreListedNewestFirst) {
   const Rig rig = RigWithRun("a");
-  ASSERT_TRUE(store_->FinishRun("a", 1, Candidate(rig)).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", 1, Candidate(rig)).ok());
   const auto first = store_->ListCalibrations("a", {1, ""});
   ASSERT_TRUE(first.ok());
   EXPECT_EQ(first->items.front().version, 2);
@@ -290,14 +290,14 @@ TEST_P(CalibrationsTest, OnlyARunningRunCanProduceOne) {
   const Rig rig = CreateTestRig("a");
   Put("a", 0);
   Score(rig, 0, 1.0);
-  ASSERT_TRUE(store_->CreateManualRun("a").ok());
+  ASSERT_TRUE(domain_->CreateManualRun("a").ok());
   EXPECT_TRUE(absl::IsFailedPrecondition(
-      store_->FinishRun("a", 1, Candidate(rig)).status()));
-  ASSERT_TRUE(store_->BeginRun("a", 1).ok());
-  const auto finished = store_->FinishRun("a", 1, Candidate(rig));
+      domain_->FinishRun("a", 1, Candidate(rig)).status()));
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
+  const auto finished = domain_->FinishRun("a", 1, Candidate(rig));
   ASSERT_TRUE(finished.ok()) << finished.status();
   EXPECT_TRUE(absl::IsFailedPrecondition(
-      store_->FinishRun("a", 1, Candidate(rig)).status()));
+      domain_->FinishRun("a", 1, Candidate(rig)).status()));
   EXPECT_EQ(store_->ListCalibrations("a", {})->items.size(), 2u);
 }
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/store/store.h"
+#include "server/domain/domain.h"
 #include "test/server/store/fake_information.h"
 #include "test/server/test_segments.h"
 
@@ -23,21 +23,22 @@ inline std::vector<MotionSegment> FixtureSegments() {
 
 // False if the store refuses any of it.
 inline bool WriteFixture(Store* store) {
+  Domain domain(store);
   const Rig rig = FixtureRig();
-  if (!store->CreateRig(rig).ok()) return false;
+  if (!domain.CreateRig(rig).ok()) return false;
   for (const MotionSegment& segment : FixtureSegments()) {
-    if (!store->PutSegment("a", segment).ok()) return false;
+    if (!domain.PutSegment("a", segment).ok()) return false;
     if (segment.key.index == 3) break;
     const auto seed = static_cast<unsigned>(segment.key.index);
-    if (!store
-             ->CommitScore(
+    if (!domain
+             .CommitScore(
                  "a", segment.key, FakeInformation(rig, 3.0 - seed, 5, seed))
              .ok()) {
       return false;
     }
   }
   // The tables became full with the second segment.
-  const auto run = store->BeginRun("a", 1);
+  const auto run = domain.BeginRun("a", 1);
   if (!run.ok()) return false;
   const auto size = TangentSize(rig.factory);
   StoredCalibration calibration;
@@ -52,7 +53,7 @@ inline bool WriteFixture(Store* store) {
   calibration.report = CalibrationResult();
   calibration.report->theta = calibration.theta;
   calibration.report->covariance = calibration.covariance;
-  return store->FinishRun("a", 1, calibration).ok();
+  return domain.FinishRun("a", 1, calibration).ok();
 }
 
 inline void ExpectFixture(Store* store) {

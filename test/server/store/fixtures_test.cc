@@ -104,8 +104,8 @@ TEST_F(FixturesTest, EverySchemaThatWasReleasedOpensWithAllItHeld) {
     // And works on.
     MotionSegment segment = FixtureSegments()[0];
     segment.key = {"later", 0};
-    EXPECT_TRUE(store_->PutSegment("a", segment).ok());
-    EXPECT_TRUE(store_
+    EXPECT_TRUE(domain_->PutSegment("a", segment).ok());
+    EXPECT_TRUE(domain_
                     ->CommitScore(
                         "a", {"s", 3}, FakeInformation(FixtureRig(), 0.5, 5, 9))
                     .ok());

@@ -27,17 +27,17 @@ class IoFaultTest : public SqliteTest {
       std::filesystem::remove(Path() + suffix);
     }
     ASSERT_TRUE(Open().ok());
-    ASSERT_TRUE(store_->CreateRig(rig_).ok());
+    ASSERT_TRUE(domain_->CreateRig(rig_).ok());
   }
 
   // Puts and scores; what was acknowledged.
   std::set<int> PutAndScore() {
     std::set<int> stored;
     for (int k = 0; k < kSegments; ++k) {
-      if (store_->PutSegment("a", Segment(k)).ok()) stored.insert(k);
+      if (domain_->PutSegment("a", Segment(k)).ok()) stored.insert(k);
     }
     for (const int k : stored) {
-      const auto commit = store_->CommitScore(
+      const auto commit = domain_->CommitScore(
           "a", {"s", k}, FakeInformation(rig_, 1.0 + k, 5, k));
       EXPECT_TRUE(commit.ok() || absl::IsUnavailable(commit.status()))
           << commit.status();
@@ -83,7 +83,7 @@ class IoFaultTest : public SqliteTest {
       ASSERT_TRUE(Open().ok());
       promise->lost += Missing(stored);
       for (int k = 0; k < kSegments; ++k) {
-        const auto again = store_->PutSegment("a", Segment(k));
+        const auto again = domain_->PutSegment("a", Segment(k));
         ASSERT_TRUE(again.ok()) << again.status();
         if (stored.contains(k)) {
           EXPECT_EQ(*again, PutVerdict::kDuplicate);
@@ -121,7 +121,7 @@ TEST_F(IoFaultTest, EveryAcknowledgedCommitWasSynced) {
   const int segments = Trials(50);
   for (int k = 0; k < segments; ++k) {
     const int before = vfs_.syncs("-wal");
-    ASSERT_TRUE(store_->PutSegment("a", Segment(k)).ok());
+    ASSERT_TRUE(domain_->PutSegment("a", Segment(k)).ok());
     ++promise.trials;
     if (vfs_.syncs("-wal") < before + 1) ++promise.lost;
   }
@@ -137,7 +137,7 @@ TEST_F(IoFaultTest, AFullDiskRefusesKeepsWhatItHasAndRecovers) {
     std::set<int> stored;
     absl::Status refused;
     for (int k = 0; k < 1000 && refused.ok(); ++k) {
-      refused = store_->PutSegment("a", Segment(k)).status();
+      refused = domain_->PutSegment("a", Segment(k)).status();
       if (refused.ok()) stored.insert(k);
     }
     ++promise.trials;
@@ -145,7 +145,7 @@ TEST_F(IoFaultTest, AFullDiskRefusesKeepsWhatItHasAndRecovers) {
     promise.lost += Missing(stored);
     vfs_.SetMaxFileBytes(0);
     const int next = static_cast<int>(stored.size());
-    EXPECT_TRUE(store_->PutSegment("a", Segment(next)).ok());
+    EXPECT_TRUE(domain_->PutSegment("a", Segment(next)).ok());
     stored.insert(next);
     store_.reset();
     EXPECT_EQ(IntegrityOf(Path()), "ok");
@@ -158,7 +158,7 @@ TEST_F(IoFaultTest, AFullDiskRefusesKeepsWhatItHasAndRecovers) {
 TEST_F(IoFaultTest, WhatIsDamagedAfterAnErrorIsNotServed) {
   StartAnew();
   for (int k = 0; k < 20; ++k) {
-    ASSERT_TRUE(store_->PutSegment("a", Segment(k)).ok());
+    ASSERT_TRUE(domain_->PutSegment("a", Segment(k)).ok());
   }
   store_.reset();  // all of it is in the file
   ASSERT_TRUE(Open().ok());
@@ -174,9 +174,9 @@ TEST_F(IoFaultTest, WhatIsDamagedAfterAnErrorIsNotServed) {
   vfs_.SetFault([](int, Kind kind) {
     return kind == Kind::kSync ? SQLITE_IOERR_FSYNC : SQLITE_OK;
   });
-  EXPECT_FALSE(store_->PutSegment("a", Segment(20)).ok());
+  EXPECT_FALSE(domain_->PutSegment("a", Segment(20)).ok());
   vfs_.Heal();
-  EXPECT_FALSE(store_->PutSegment("a", Segment(21)).ok());
+  EXPECT_FALSE(domain_->PutSegment("a", Segment(21)).ok());
   EXPECT_FALSE(store_->GetRig("a").ok());
 }
 

@@ -32,13 +32,14 @@ class KillTest : public StoreTest {
   [[noreturn]] void Write(const Rig& rig, int acknowledgements) {
     auto store = GetParam().open(folder_);
     if (!store.ok()) _exit(2);
+    Domain domain(store->get());
     for (int k = 0; k < kSegments; ++k) {
       const char byte = static_cast<char>(k % 128);
-      if (!(*store)->PutSegment(rig.id, Segment(k)).ok() ||
+      if (!domain.PutSegment(rig.id, Segment(k)).ok() ||
           write(acknowledgements, &byte, 1) != 1) {
         _exit(3);
       }
-      const auto commit = (*store)->CommitScore(
+      const auto commit = domain.CommitScore(
           rig.id, {"s", k}, FakeInformation(rig, EntropyOf(k)));
       if (!commit.ok() || write(acknowledgements, &byte, 1) != 1) _exit(4);
     }
@@ -97,13 +98,14 @@ class KillTest : public StoreTest {
   [[noreturn]] void WriteGroups(int acknowledgements) {
     auto store = GetParam().open(folder_);
     if (!store.ok()) _exit(2);
+    Domain domain(store->get());
     std::vector<std::thread> threads;
     for (int stream = 0; stream < kStreams; ++stream) {
-      threads.emplace_back([&store, stream, acknowledgements] {
+      threads.emplace_back([&domain, stream, acknowledgements] {
         const std::string session = "stream" + std::to_string(stream);
         const char byte = static_cast<char>(stream);
         for (int k = 0; k < kSegments; ++k) {
-          if (!(*store)->PutSegment("a", Segment(k, session)).ok() ||
+          if (!domain.PutSegment("a", Segment(k, session)).ok() ||
               write(acknowledgements, &byte, 1) != 1) {
             _exit(3);
           }
@@ -243,7 +245,7 @@ TEST_P(KillTest, KilledCreationLeavesNothingOrAWholeDatabase) {
     ASSERT_EQ(waitpid(child, nullptr, 0), child);
     ++promise.trials;
     Reopen();
-    const bool works = store_->CreateRig(TestRig("a")).ok();
+    const bool works = domain_->CreateRig(TestRig("a")).ok();
     EXPECT_TRUE(works);
     if (!works) ++promise.lost;
   }

@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "migrations/migrations.h"
-#include "server/store/calibration_states.h"
+#include "server/domain/calibration_life.h"
 #include "server/store/statement.h"
 #include "test/promise.h"
 #include "test/server/store/store_test.h"
@@ -43,16 +43,16 @@ class LifecycleTest : public StoreTest {
   }
 
   StoredRun Begin() {
-    const auto run = store_->CreateManualRun("a", true);
+    const auto run = domain_->CreateManualRun("a", true);
     EXPECT_TRUE(run.ok()) << run.status();
-    const auto begun = store_->BeginRun("a", run->run);
+    const auto begun = domain_->BeginRun("a", run->run);
     EXPECT_TRUE(begun.ok()) << begun.status();
     return *begun;
   }
 
   StoredCalibration Finish(CalibrationState verdict) {
     const StoredRun run = Begin();
-    const auto finished = store_->FinishRun("a", run.run, Found(verdict));
+    const auto finished = domain_->FinishRun("a", run.run, Found(verdict));
     EXPECT_TRUE(finished.ok()) << finished.status();
     return *finished;
   }
@@ -124,8 +124,8 @@ TEST_P(LifecycleTest, DatabaseLetsOnlyCandidatesAndTheFactorysBegin) {
 TEST_P(LifecycleTest, CandidateIsKeptUntilItIsJudged) {
   const StoredRun run = Begin();
   EXPECT_TRUE(absl::IsNotFound(store_->GetCandidate("a", run.run).status()));
-  const auto candidate =
-      store_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate));
+  const auto candidate = domain_->StoreCandidate(
+      "a", run.run, Found(CalibrationState::kCandidate));
   ASSERT_TRUE(candidate.ok()) << candidate.status();
   EXPECT_EQ(candidate->version, 2);
   Reopen();
@@ -139,11 +139,11 @@ TEST_P(LifecycleTest, CandidateIsKeptUntilItIsJudged) {
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
   // A second one changes nothing.
   EXPECT_EQ(
-      store_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
+      domain_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
           ->version,
       2);
   ASSERT_TRUE(
-      store_->FinishRun("a", run.run, Found(CalibrationState::kActive)).ok());
+      domain_->FinishRun("a", run.run, Found(CalibrationState::kActive)).ok());
   EXPECT_EQ(StateOf(2), CalibrationState::kActive);
   EXPECT_EQ(store_->ListCalibrations("a", {})->items.size(), 2u);
   EXPECT_TRUE(absl::IsNotFound(store_->GetCandidate("a", run.run).status()));
@@ -152,10 +152,10 @@ TEST_P(LifecycleTest, CandidateIsKeptUntilItIsJudged) {
 TEST_P(LifecycleTest, CandidateOfARunThatEndsOtherwiseIsRejected) {
   const StoredRun run = Begin();
   ASSERT_TRUE(
-      store_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
+      domain_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
           .ok());
   ASSERT_TRUE(
-      store_->EndRun("a", run.run, RunState::kCancelled, "by hand").ok());
+      domain_->EndRun("a", run.run, RunState::kCancelled, "by hand").ok());
   const auto rejected = store_->GetCalibration("a", 2);
   EXPECT_EQ(rejected->state, CalibrationState::kRejected);
   ASSERT_EQ(rejected->reasons.size(), 1u);
@@ -175,7 +175,7 @@ TEST_P(LifecycleTest, RejectedOneKeepsReasonsAndFigures) {
   validation.held_out = {5, 3, {123.5, 26, 1e-9}, {21.5, 26, 0.7}, 2};
   judged.verdict = {VerdictKind::kNotTrustworthy, {"does not fit"}};
   judged.validation = validation;
-  ASSERT_TRUE(store_->FinishRun("a", run.run, judged).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", run.run, judged).ok());
   Reopen();
   const auto kept = store_->GetCalibration("a", 2);
   EXPECT_EQ(kept->state, CalibrationState::kRejected);
@@ -204,19 +204,19 @@ TEST_P(LifecycleTest, OneJudgedAgainstAnotherThanTheActiveIsJudgedAgain) {
   StoredCalibration judged = Found(CalibrationState::kActive);
   judged.validation = StoredValidation();
   judged.validation->active_version = 2;
-  ASSERT_TRUE(store_->ActivateCalibration("a", 1, "me", "drifts").ok());
+  ASSERT_TRUE(domain_->ActivateCalibration("a", 1, "me", "drifts").ok());
   EXPECT_TRUE(
-      absl::IsAborted(store_->FinishRun("a", run.run, judged).status()));
+      absl::IsAborted(domain_->FinishRun("a", run.run, judged).status()));
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
   judged.validation->active_version = 1;
-  ASSERT_TRUE(store_->FinishRun("a", run.run, judged).ok());
+  ASSERT_TRUE(domain_->FinishRun("a", run.run, judged).ok());
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, 3);
 }
 
 TEST_P(LifecycleTest, RollBackIsLoggedWithWhoAndWhy) {
   Finish(CalibrationState::kActive);
   const auto active =
-      store_->ActivateCalibration("a", 1, "cn=operator", "it drifts");
+      domain_->ActivateCalibration("a", 1, "cn=operator", "it drifts");
   ASSERT_TRUE(active.ok()) << active.status();
   EXPECT_EQ(active->state, CalibrationState::kActive);
   EXPECT_EQ(StateOf(2), CalibrationState::kRolledBack);
@@ -226,7 +226,7 @@ TEST_P(LifecycleTest, RollBackIsLoggedWithWhoAndWhy) {
   EXPECT_THAT(LastEvent().detail, HasSubstr("it drifts"));
   EXPECT_GT(active->activation, store_->GetCalibration("a", 2)->activation);
   // And forth again.
-  ASSERT_TRUE(store_->ActivateCalibration("a", 2, "me", "it does not").ok());
+  ASSERT_TRUE(domain_->ActivateCalibration("a", 2, "me", "it does not").ok());
   EXPECT_EQ(StateOf(1), CalibrationState::kSuperseded);
   EXPECT_EQ(StateOf(2), CalibrationState::kActive);
   EXPECT_EQ(LastEvent().kind, EventKind::kCalibrationActivated);
@@ -236,7 +236,7 @@ TEST_P(LifecycleTest, ActivatingTheActiveOneChangesNothing) {
   Finish(CalibrationState::kActive);
   const StoredEvent last = LastEvent();
   const auto before = store_->GetActiveCalibration("a");
-  const auto again = store_->ActivateCalibration("a", 2, "me", "twice");
+  const auto again = domain_->ActivateCalibration("a", 2, "me", "twice");
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_EQ(again->activation, before->activation);
   EXPECT_EQ(LastEvent().event, last.event);
@@ -246,22 +246,22 @@ TEST_P(LifecycleTest, WhatWasNeverValidatedIsNotActivated) {
   Finish(CalibrationState::kRejected);
   const StoredRun run = Begin();
   ASSERT_TRUE(
-      store_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
+      domain_->StoreCandidate("a", run.run, Found(CalibrationState::kCandidate))
           .ok());
   for (const std::int64_t version : {2, 3}) {
     EXPECT_TRUE(absl::IsFailedPrecondition(
-        store_->ActivateCalibration("a", version, "me", "why not").status()))
+        domain_->ActivateCalibration("a", version, "me", "why not").status()))
         << version;
   }
   EXPECT_TRUE(absl::IsNotFound(
-      store_->ActivateCalibration("a", 9, "me", "why not").status()));
+      domain_->ActivateCalibration("a", 9, "me", "why not").status()));
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
 }
 
 TEST_P(LifecycleTest, NextRunStartsFromTheOneThatWasMadeActive) {
   Finish(CalibrationState::kActive);
   Finish(CalibrationState::kActive);
-  ASSERT_TRUE(store_->ActivateCalibration("a", 2, "me", "3 drifts").ok());
+  ASSERT_TRUE(domain_->ActivateCalibration("a", 2, "me", "3 drifts").ok());
   EXPECT_EQ(Begin().base_version, 2);
 }
 
@@ -300,7 +300,7 @@ TEST_P(LifecycleTest, AVersionReadsTheSameForEver) {
     const StoredCalibration made = Finish(
         k % 3 == 0 ? CalibrationState::kRejected : CalibrationState::kActive);
     if (k % 4 == 3) {
-      EXPECT_TRUE(store_->ActivateCalibration("a", 1, "me", "test").ok());
+      EXPECT_TRUE(domain_->ActivateCalibration("a", 1, "me", "test").ok());
     }
     EXPECT_EQ(made.version, k + 2);
   }

@@ -101,7 +101,7 @@ TEST_F(MaintenanceTest, ABackupIsOneInstantWhileOthersWrite) {
   std::atomic<int> stored = 0;
   std::thread writer([&] {
     for (int k = 100; !stop; ++k) {
-      if (store_->PutSegment("a", Segment(k)).ok()) stored = k;
+      if (domain_->PutSegment("a", Segment(k)).ok()) stored = k;
     }
   });
   for (int trial = 0; trial < 5; ++trial) {
@@ -128,7 +128,7 @@ TEST_F(MaintenanceTest, ABackupIsOneInstantWhileOthersWrite) {
 
 TEST_F(MaintenanceTest, ABackupTakesThePlaceAtTheNextStart) {
   const std::string bytes = BackUp();
-  ASSERT_TRUE(store_->PutSegment("a", Segment(50)).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", Segment(50)).ok());
   const auto previous = Restore(bytes, Sha256(bytes));
   ASSERT_TRUE(previous.ok()) << previous.status();
   // Until then nothing has changed, and one is enough.
@@ -183,7 +183,7 @@ TEST_F(MaintenanceTest, WhatIsNoBackupIsRefusedAndChangesNothing) {
 TEST_F(MaintenanceTest, ATakeOverThatIsKilledGoesOnAtTheNextStart) {
   Promise promise("a restore survives a kill at any instant");
   const std::string backup = BackUp();
-  ASSERT_TRUE(store_->PutSegment("a", Segment(50)).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", Segment(50)).ok());
   const std::string database = ReadBytes(Path());
   const std::string log = ReadBytes(Path() + "-wal");
   ASSERT_FALSE(log.empty());

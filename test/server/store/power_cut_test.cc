@@ -72,7 +72,7 @@ class PowerCutTest : public SqliteTest {
   // A rig on the disk, everything synced.
   void Prepare() {
     ASSERT_TRUE(Open().ok());
-    ASSERT_TRUE(store_->CreateRig(rig_).ok());
+    ASSERT_TRUE(domain_->CreateRig(rig_).ok());
     store_.reset();
     before_ = ReadBytes(Path());
   }
@@ -87,9 +87,9 @@ class PowerCutTest : public SqliteTest {
         store_.reset();
         EXPECT_TRUE(Open().ok());
       }
-      EXPECT_TRUE(store_->PutSegment("a", Segment(k)).ok());
+      EXPECT_TRUE(domain_->PutSegment("a", Segment(k)).ok());
       vfs.Mark(k + 1);
-      EXPECT_TRUE(store_
+      EXPECT_TRUE(domain_
                       ->CommitScore(
                           "a", {"s", k}, FakeInformation(rig_, 10.0 - k, 5, k))
                       .ok());

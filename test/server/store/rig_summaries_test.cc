@@ -82,7 +82,7 @@ TEST_P(RigSummariesTest, TellsWhatARigHas) {
 
   Put("a", 0);
   Score(rig, 0, -10);
-  ASSERT_TRUE(store_->CreateManualRun("a").ok());
+  ASSERT_TRUE(domain_->CreateManualRun("a").ok());
   listed = store_->ListRigSummaries({}, {});
   ASSERT_TRUE(listed.ok()) << listed.status();
   const RigSummary used = listed->items[0];

@@ -15,7 +15,7 @@ TEST_P(RigsTest, RigComesBackToTheBitAfterReopening) {
   rig.retrigger_fraction = 0.7;
   rig.factory.cameras[0].time_offset_s = 1.0 / 77;
   rig.estimate_time_offset = true;
-  const auto created = store_->CreateRig(rig);
+  const auto created = domain_->CreateRig(rig);
   ASSERT_TRUE(created.ok()) << created.status();
   Reopen();
   const auto stored = store_->GetRig("a");
@@ -36,7 +36,7 @@ TEST_P(RigsTest, RigComesBackToTheBitAfterReopening) {
 TEST_P(RigsTest, FactoryIsVersionOneWithTheTolerancesAsCovariance) {
   Rig rig = TestRig("a");
   rig.fixed = {"imu.gyro.scale.*"};
-  ASSERT_TRUE(store_->CreateRig(rig).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
   const auto factory = store_->GetActiveCalibration("a");
   ASSERT_TRUE(factory.ok()) << factory.status();
   EXPECT_EQ(factory->version, 1);
@@ -66,25 +66,25 @@ TEST_P(RigsTest, SameNameTwiceIsRefusedAndChangesNothing) {
   CreateTestRig("a");
   Rig other = TestRig("a");
   other.table_size = 99;
-  EXPECT_TRUE(absl::IsAlreadyExists(store_->CreateRig(other).status()));
+  EXPECT_TRUE(absl::IsAlreadyExists(domain_->CreateRig(other).status()));
   EXPECT_EQ(store_->GetRig("a")->rig.table_size, TestRig("a").table_size);
   EXPECT_EQ(store_->ListCalibrations("a", {})->items.size(), 1u);
 }
 
 TEST_P(RigsTest, UnknownRigIsNotFoundEverywhere) {
   EXPECT_TRUE(absl::IsNotFound(store_->GetRig("x").status()));
-  EXPECT_TRUE(absl::IsNotFound(store_->PutSegment("x", Segment(0)).status()));
+  EXPECT_TRUE(absl::IsNotFound(domain_->PutSegment("x", Segment(0)).status()));
   EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("x", {"s", 0}).status()));
   EXPECT_TRUE(absl::IsNotFound(store_->ListSegments("x", {}).status()));
   EXPECT_TRUE(absl::IsNotFound(store_->GetTables("x").status()));
   EXPECT_TRUE(absl::IsNotFound(store_->GetActiveCalibration("x").status()));
   EXPECT_TRUE(absl::IsNotFound(store_->ListCalibrations("x", {}).status()));
-  EXPECT_TRUE(absl::IsNotFound(store_->CreateManualRun("x").status()));
+  EXPECT_TRUE(absl::IsNotFound(domain_->CreateManualRun("x").status()));
   EXPECT_TRUE(absl::IsNotFound(store_->GetRun("x", 1).status()));
   EXPECT_TRUE(absl::IsNotFound(store_->ListRuns("x", {}).status()));
   const auto information = FakeInformation(TestRig("x"), 1);
   EXPECT_TRUE(absl::IsNotFound(
-      store_->CommitScore("x", {"s", 0}, information).status()));
+      domain_->CommitScore("x", {"s", 0}, information).status()));
 }
 
 TEST_P(RigsTest, CreationIsAnEvent) {

@@ -45,8 +45,8 @@ class RememberedTest : public StoreTest {
   }
 
   void Take(std::int64_t k, double entropy, const std::string& session = "s") {
-    ASSERT_TRUE(store_->PutSegment("a", Segment(k, session)).ok());
-    ASSERT_TRUE(store_
+    ASSERT_TRUE(domain_->PutSegment("a", Segment(k, session)).ok());
+    ASSERT_TRUE(domain_
                     ->CommitScore("a",
                                   {session, k},
                                   FakeInformation(rig_, entropy),
@@ -57,7 +57,7 @@ class RememberedTest : public StoreTest {
   // By index; whether each is remembered by its ends.
   std::vector<std::pair<std::int64_t, bool>> Remembered(std::int64_t run = 1) {
     std::vector<std::pair<std::int64_t, bool>> listed;
-    const auto remembered = store_->ListRemembered("a", run);
+    const auto remembered = domain_->ListRemembered("a", run);
     EXPECT_TRUE(remembered.ok()) << remembered.status();
     for (const RememberedSegment& one : *remembered) {
       listed.emplace_back(one.key.index, one.ends.has_value());
@@ -71,7 +71,7 @@ class RememberedTest : public StoreTest {
 };
 
 TEST_P(RememberedTest, WhatLosesItsDataIsKnownByItsEnds) {
-  for (int k = 2; k < 2 + Store::kReserve + 2; ++k) Take(k, 50);
+  for (int k = 2; k < 2 + kReserve + 2; ++k) Take(k, 50);
   Reopen();
   EXPECT_THAT(Remembered(),
               ElementsAre(std::pair(0, false),
@@ -95,13 +95,13 @@ TEST_P(RememberedTest, SessionsFollowEachOther) {
 }
 
 TEST_P(RememberedTest, WhatIsUnusableOrDoesNotFitIsForgotten) {
-  for (int k = 2; k < 2 + Store::kReserve + 2; ++k) Take(k, 50);
-  ASSERT_TRUE(store_->MarkUnusable("a", {"s", 2}, "damaged").ok());
+  for (int k = 2; k < 2 + kReserve + 2; ++k) Take(k, 50);
+  ASSERT_TRUE(domain_->MarkUnusable("a", {"s", 2}, "damaged").ok());
   SegmentInformation outliers = FakeInformation(rig_, 50);
   outliers.residuals.many_outliers = true;
-  ASSERT_TRUE(store_->PutSegment("a", Segment(8)).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", Segment(8)).ok());
   ASSERT_TRUE(
-      store_->CommitScore("a", {"s", 8}, outliers, FakeEnds(rig_, {"s", 8}))
+      domain_->CommitScore("a", {"s", 8}, outliers, FakeEnds(rig_, {"s", 8}))
           .ok());
   std::map<std::int64_t, bool> listed;
   for (const auto& one : Remembered()) listed.insert(one);
@@ -111,13 +111,13 @@ TEST_P(RememberedTest, WhatIsUnusableOrDoesNotFitIsForgotten) {
 }
 
 TEST_P(RememberedTest, ThereIsABoundAndTheOldestGo) {
-  constexpr int kSegments = Store::kRemembered + Store::kReserve + 5;
+  constexpr int kSegments = kRemembered + kReserve + 5;
   for (int k = 2; k < 2 + kSegments; ++k) Take(k, 50);
   const auto listed = Remembered();
   // The tables, the bounded memory, the reserve, and what lost its data since
   // something was last forgotten.
-  EXPECT_GE(listed.size(), 2u + Store::kRemembered + Store::kReserve);
-  EXPECT_LE(listed.size(), 2u + Store::kRemembered + Store::kReserve + 1);
+  EXPECT_GE(listed.size(), 2u + kRemembered + kReserve);
+  EXPECT_LE(listed.size(), 2u + kRemembered + kReserve + 1);
   EXPECT_EQ(listed.front(), std::pair(std::int64_t{0}, false));
   EXPECT_GT(listed[2].first, 5);
   EXPECT_EQ(listed.back().first, 1 + kSegments);
@@ -127,7 +127,7 @@ TEST_P(RememberedTest, ALaterScoreTakesThePlaceOfTheFirst) {
   SegmentInformation better = FakeInformation(rig_, -70.0, 6.0);
   better.theta0.cameras[0].f.x() += 1;
   const SegmentEnds ends = FakeEnds(rig_, {"s", 1});
-  ASSERT_TRUE(store_->ReplaceScore("a", {"s", 1}, better, ends).ok());
+  ASSERT_TRUE(domain_->ReplaceScore("a", {"s", 1}, better, ends).ok());
   const auto segment = store_->GetSegment("a", {"s", 1});
   ASSERT_TRUE(segment.ok() && segment->information);
   EXPECT_EQ(segment->information->theta0.cameras[0].f.x(),
@@ -144,9 +144,9 @@ TEST_P(RememberedTest, ALaterScoreTakesThePlaceOfTheFirst) {
 }
 
 TEST_P(RememberedTest, NoScoreTakesThePlaceWhereTheDataIsGone) {
-  for (int k = 2; k < 3 + Store::kReserve; ++k) Take(k, 50);
+  for (int k = 2; k < 3 + kReserve; ++k) Take(k, 50);
   ASSERT_FALSE(HasData("a", 2));
-  ASSERT_TRUE(store_
+  ASSERT_TRUE(domain_
                   ->ReplaceScore("a",
                                  {"s", 2},
                                  FakeInformation(rig_, -99.0),
@@ -155,7 +155,7 @@ TEST_P(RememberedTest, NoScoreTakesThePlaceWhereTheDataIsGone) {
   EXPECT_EQ(store_->GetSegment("a", {"s", 2})->information->groups[0].entropy,
             50.0);
   EXPECT_THAT(Remembered(), ::testing::Contains(std::pair(2, true)));
-  EXPECT_TRUE(absl::IsNotFound(store_->ReplaceScore(
+  EXPECT_TRUE(absl::IsNotFound(domain_->ReplaceScore(
       "a", {"s", 77}, FakeInformation(rig_, 1), FakeEnds(rig_, {"s", 77}))));
 }
 

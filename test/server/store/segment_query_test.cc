@@ -25,9 +25,9 @@ class SegmentQueryTest : public StoreTest {
         return seen.landmark >= static_cast<int>(segment.landmarks.size());
       });
       if (k % 2 == 0) segment.temperature_c = std::round(draw(random));
-      ASSERT_TRUE(store_->PutSegment("a", segment).ok());
+      ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
       if (k >= 30) continue;
-      ASSERT_TRUE(store_
+      ASSERT_TRUE(domain_
                       ->CommitScore("a",
                                     segment.key,
                                     FakeInformation(rig,

@@ -9,7 +9,7 @@ SELFCAL_STORE_TEST_SUITE(SegmentsTest);
 TEST_P(SegmentsTest, DataComesBackToTheBitAfterReopening) {
   CreateTestRig("a");
   const MotionSegment segment = Segment(3);
-  ASSERT_TRUE(store_->PutSegment("a", segment).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
   Reopen();
   const auto data = store_->GetSegmentData("a", segment.key);
   ASSERT_TRUE(data.ok()) << data.status();
@@ -33,7 +33,7 @@ TEST_P(SegmentsTest, DataComesBackToTheBitAfterReopening) {
 TEST_P(SegmentsTest, MetadataTellsWhatWasReceived) {
   CreateTestRig("a");
   const MotionSegment segment = Segment(3);
-  ASSERT_TRUE(store_->PutSegment("a", segment).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
   const auto stored = store_->GetSegment("a", segment.key);
   ASSERT_TRUE(stored.ok()) << stored.status();
   EXPECT_EQ(stored->rig, "a");
@@ -59,8 +59,8 @@ TEST_P(SegmentsTest, TemperatureIsKeptWhereItIsKnown) {
   CreateTestRig("a");
   MotionSegment warm = Segment(0);
   warm.temperature_c = -7.25;
-  ASSERT_TRUE(store_->PutSegment("a", warm).ok());
-  ASSERT_TRUE(store_->PutSegment("a", Segment(1)).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", warm).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", Segment(1)).ok());
   Reopen();
   EXPECT_EQ(store_->GetSegment("a", warm.key)->temperature_c, -7.25);
   EXPECT_EQ(store_->GetSegmentData("a", warm.key)->temperature_c, -7.25);
@@ -73,22 +73,22 @@ TEST_P(SegmentsTest, TemperatureIsKeptWhereItIsKnown) {
 TEST_P(SegmentsTest, SameSegmentTwiceChangesNothing) {
   const Rig rig = CreateTestRig("a");
   Put("a", 0);
-  const auto again = store_->PutSegment("a", Segment(0));
+  const auto again = domain_->PutSegment("a", Segment(0));
   ASSERT_TRUE(again.ok());
   EXPECT_EQ(*again, PutVerdict::kDuplicate);
   Score(rig, 0, 1.0, 0.0);  // enters no table: its data goes
   RenewReserve(rig);
-  EXPECT_EQ(*store_->PutSegment("a", Segment(0)), PutVerdict::kDuplicate);
+  EXPECT_EQ(*domain_->PutSegment("a", Segment(0)), PutVerdict::kDuplicate);
   EXPECT_FALSE(HasData("a", 0));
-  EXPECT_EQ(store_->ListSegments("a", {})->items.size(), 1u + Store::kReserve);
+  EXPECT_EQ(store_->ListSegments("a", {})->items.size(), 1u + kReserve);
 }
 
 TEST_P(SegmentsTest, KeysAreApartByRigAndSession) {
   CreateTestRig("a");
   CreateTestRig("b");
-  EXPECT_EQ(*store_->PutSegment("a", Segment(0, "s")), PutVerdict::kStored);
-  EXPECT_EQ(*store_->PutSegment("a", Segment(0, "t")), PutVerdict::kStored);
-  EXPECT_EQ(*store_->PutSegment("b", Segment(0, "s")), PutVerdict::kStored);
+  EXPECT_EQ(*domain_->PutSegment("a", Segment(0, "s")), PutVerdict::kStored);
+  EXPECT_EQ(*domain_->PutSegment("a", Segment(0, "t")), PutVerdict::kStored);
+  EXPECT_EQ(*domain_->PutSegment("b", Segment(0, "s")), PutVerdict::kStored);
   EXPECT_EQ(store_->GetSegment("a", {"t", 0})->sequence, 2);
   EXPECT_EQ(store_->GetSegment("b", {"s", 0})->sequence, 1);
   EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("b", {"t", 0}).status()));
@@ -166,8 +166,8 @@ TEST_P(SegmentsTest, UnusableLeavesQueueAndTablesAndSaysWhy) {
   Put("a", 0);
   Put("a", 1);
   Score(rig, 1, 1.0);
-  ASSERT_TRUE(store_->MarkUnusable("a", {"s", 0}, "bit rot").ok());
-  ASSERT_TRUE(store_->MarkUnusable("a", {"s", 1}, "more of it").ok());
+  ASSERT_TRUE(domain_->MarkUnusable("a", {"s", 0}, "bit rot").ok());
+  ASSERT_TRUE(domain_->MarkUnusable("a", {"s", 1}, "more of it").ok());
   EXPECT_TRUE(store_->ListUnscored(10)->empty());
   EXPECT_TRUE(TableIndices("a", 0).empty());
   EXPECT_FALSE(HasData("a", 0));
@@ -178,7 +178,7 @@ TEST_P(SegmentsTest, UnusableLeavesQueueAndTablesAndSaysWhy) {
   EXPECT_EQ(store_->ListEvents({})->items.back().kind,
             EventKind::kSegmentUnusable);
   EXPECT_TRUE(absl::IsFailedPrecondition(
-      store_->CommitScore("a", {"s", 0}, FakeInformation(rig, 1)).status()));
+      domain_->CommitScore("a", {"s", 0}, FakeInformation(rig, 1)).status()));
 }
 
 }  // namespace

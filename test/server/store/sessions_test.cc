@@ -12,7 +12,7 @@ using ::testing::ElementsAre;
 class SessionsTest : public StoreTest {
  protected:
   void PutIn(const std::string& session, std::int64_t index) {
-    const auto verdict = store_->PutSegment("a", Segment(index, session));
+    const auto verdict = domain_->PutSegment("a", Segment(index, session));
     ASSERT_TRUE(verdict.ok()) << verdict.status();
   }
 
@@ -106,7 +106,7 @@ TEST_P(SessionsTest, ThePathStaysWhenTheDataGoes) {
   Reopen();
   const MotionSegment segment = Segment(0);
   const auto all = All("s", 10);
-  ASSERT_EQ(all.size(), 1u + Store::kReserve);
+  ASSERT_EQ(all.size(), 1u + kReserve);
   ASSERT_EQ(all[0].path.size(), segment.keyframes.size()) << "all of 8";
   EXPECT_EQ(all[0].start_ns, segment.keyframes.front().t_ns);
   for (std::size_t k = 0; k < segment.keyframes.size(); ++k) {
@@ -133,7 +133,7 @@ TEST_P(SessionsTest, APathHasSixteenPointsOfALongSegment) {
     state.p_GI.x() = k;
     segment.keyframes.push_back(state);
   }
-  ASSERT_TRUE(store_->PutSegment("a", segment).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
   const auto all = All("s", 10);
   ASSERT_EQ(all.size(), 1u);
   ASSERT_EQ(static_cast<int>(all[0].path.size()), kMaxPathPoints);
@@ -207,7 +207,7 @@ TEST_P(SessionsTest, ASegmentThatBecameTooOldSaysSo) {
   RigPolicy policy;
   policy.table_max_age_ns = 1;
   const Rig rig = TestRig("a");
-  ASSERT_TRUE(store_->CreateRig(rig, policy).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig, policy).ok());
   Put("a", 0);
   Score(rig, 0, 1.0);
   Put("a", 1);
@@ -221,7 +221,7 @@ TEST_P(SessionsTest, ASegmentThatIsSetAsideSaysSo) {
   const Rig rig = CreateTestRig("a");
   Put("a", 0);
   Score(rig, 0, 1.0);
-  ASSERT_TRUE(store_->MarkUnusable("a", {"s", 0}, "broken").ok());
+  ASSERT_TRUE(domain_->MarkUnusable("a", {"s", 0}, "broken").ok());
   const auto absences = store_->ListAbsences("a", {"s", 0});
   ASSERT_EQ(absences->size(), rig.groups.size());
   EXPECT_EQ(absences->front().cause, AbsenceCause::kUnusable);
@@ -233,10 +233,10 @@ class LongSessionTest : public SqliteTest {
  protected:
   void SetUp() override {
     ASSERT_TRUE(Open().ok());
-    ASSERT_TRUE(store_->CreateRig(rig_).ok());
-    ASSERT_TRUE(store_->PutSegment("a", Segment(0)).ok());
+    ASSERT_TRUE(domain_->CreateRig(rig_).ok());
+    ASSERT_TRUE(domain_->PutSegment("a", Segment(0)).ok());
     ASSERT_TRUE(
-        store_->CommitScore("a", {"s", 0}, FakeInformation(rig_, 1, 5)).ok());
+        domain_->CommitScore("a", {"s", 0}, FakeInformation(rig_, 1, 5)).ok());
     store_.reset();
   }
   void Execute(const std::string& sql) {

@@ -57,9 +57,12 @@ class SqliteTest : public ::testing::Test {
     return segment;
   }
 
-  absl::Status Open(const StoreOptions& options = {}) {
-    auto opened = MakeSqliteStore(Path(), options);
-    if (opened.ok()) store_ = *std::move(opened);
+  absl::Status Open(const DomainOptions& options = {}) {
+    auto opened = MakeSqliteStore(Path(), options.quotas.max_database_bytes);
+    if (opened.ok()) {
+      store_ = *std::move(opened);
+      domain_.emplace(store_.get(), options);
+    }
     return opened.status();
   }
 
@@ -68,6 +71,7 @@ class SqliteTest : public ::testing::Test {
   MemoryFolder folder_;
   const Rig rig_ = TestRig("a");
   std::unique_ptr<Store> store_;
+  std::optional<Domain> domain_;
 };
 
 }  // namespace selfcal::server

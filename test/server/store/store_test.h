@@ -8,9 +8,11 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "server/domain/domain.h"
 #include "server/store/statement.h"
 #include "server/store/store.h"
 #include "server/store/store_sqlite.h"
@@ -50,15 +52,17 @@ class StoreTest : public ::testing::TestWithParam<Engine> {
 
   // As a restart of the daemon does.
   void Reopen() {
+    domain_.reset();
     store_.reset();
     auto opened = GetParam().open(folder_);
     ASSERT_TRUE(opened.ok()) << opened.status();
     store_ = *std::move(opened);
+    domain_.emplace(store_.get());
   }
 
   Rig CreateTestRig(const std::string& id) {
     const Rig rig = TestRig(id);
-    EXPECT_TRUE(store_->CreateRig(rig).ok());
+    EXPECT_TRUE(domain_->CreateRig(rig).ok());
     return rig;
   }
 
@@ -73,7 +77,7 @@ class StoreTest : public ::testing::TestWithParam<Engine> {
   }
 
   void Put(const std::string& rig, std::int64_t index) {
-    const auto verdict = store_->PutSegment(rig, Segment(index));
+    const auto verdict = domain_->PutSegment(rig, Segment(index));
     ASSERT_TRUE(verdict.ok()) << verdict.status();
     ASSERT_EQ(*verdict, PutVerdict::kStored);
   }
@@ -82,7 +86,7 @@ class StoreTest : public ::testing::TestWithParam<Engine> {
                     std::int64_t index,
                     double entropy,
                     double gain = 5) {
-    const auto commit = store_->CommitScore(
+    const auto commit = domain_->CommitScore(
         rig.id,
         {"s", index},
         FakeInformation(rig, entropy, gain, static_cast<unsigned>(index)));
@@ -93,7 +97,7 @@ class StoreTest : public ::testing::TestWithParam<Engine> {
   // The reserve for held-out tests is of the newest that no table holds: what
   // came before these is of it no more.
   void RenewReserve(const Rig& rig, std::int64_t first_index = 1000) {
-    for (int k = 0; k < Store::kReserve; ++k) {
+    for (int k = 0; k < kReserve; ++k) {
       Put(rig.id, first_index + k);
       Score(rig, first_index + k, 99, 0.0);
     }
@@ -120,6 +124,7 @@ class StoreTest : public ::testing::TestWithParam<Engine> {
 
   TempFolder folder_;
   std::unique_ptr<Store> store_;
+  std::optional<Domain> domain_;
 };
 
 #define SELFCAL_STORE_TEST_SUITE(fixture)                                      \

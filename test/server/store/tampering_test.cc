@@ -40,7 +40,7 @@ class TamperingTest : public SqliteTest {
 };
 
 TEST_F(TamperingTest, CalibrationCannotBeChangedOrDeleted) {
-  ASSERT_TRUE(store_->CreateRig(rig_).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
   store_.reset();
   for (const char* sql : {"UPDATE calibrations SET content = x'00'",
                           "UPDATE calibrations SET sha256 = x'00'",
@@ -55,8 +55,8 @@ TEST_F(TamperingTest, CalibrationCannotBeChangedOrDeleted) {
 }
 
 TEST_F(TamperingTest, DamagedDataIsNoticed) {
-  ASSERT_TRUE(store_->CreateRig(rig_).ok());
-  ASSERT_TRUE(store_->PutSegment("a", Segment(0)).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", Segment(0)).ok());
   Damage("payloads", "data");
   const absl::Status status = store_->GetSegmentData("a", {"s", 0}).status();
   EXPECT_TRUE(absl::IsDataLoss(status)) << status;
@@ -64,14 +64,14 @@ TEST_F(TamperingTest, DamagedDataIsNoticed) {
 }
 
 TEST_F(TamperingTest, DamagedCalibrationIsNoticed) {
-  ASSERT_TRUE(store_->CreateRig(rig_).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
   Damage("calibrations", "content");
   EXPECT_TRUE(absl::IsDataLoss(store_->GetActiveCalibration("a").status()));
 }
 
 TEST_F(TamperingTest, CalibrationInAnotherRowIsNoticed) {
-  ASSERT_TRUE(store_->CreateRig(rig_).ok());
-  ASSERT_TRUE(store_->CreateRig(TestRig("b")).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
+  ASSERT_TRUE(domain_->CreateRig(TestRig("b")).ok());
   store_.reset();
   ASSERT_TRUE(
       Execute("DROP TRIGGER calibrations_never_change;"
@@ -86,18 +86,18 @@ TEST_F(TamperingTest, CalibrationInAnotherRowIsNoticed) {
 }
 
 TEST_F(TamperingTest, DamagedRigIsNoticed) {
-  ASSERT_TRUE(store_->CreateRig(rig_).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
   Damage("rigs", "definition");
   EXPECT_TRUE(absl::IsDataLoss(store_->GetRig("a").status()));
 }
 
 TEST_F(TamperingTest, DamagedInformationIsNoticedAndHidesNoOther) {
-  ASSERT_TRUE(store_->CreateRig(rig_).ok());
-  ASSERT_TRUE(store_->PutSegment("a", Segment(0)).ok());
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", Segment(0)).ok());
   ASSERT_TRUE(
-      store_->CommitScore("a", {"s", 0}, FakeInformation(rig_, 1.0)).ok());
+      domain_->CommitScore("a", {"s", 0}, FakeInformation(rig_, 1.0)).ok());
   Damage("segment_information", "information");
-  ASSERT_TRUE(store_->PutSegment("a", Segment(1)).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", Segment(1)).ok());
   EXPECT_TRUE(absl::IsDataLoss(store_->GetSegment("a", {"s", 0}).status()));
   const auto listed = store_->ListSegments("a", {});
   ASSERT_TRUE(listed.ok()) << listed.status();

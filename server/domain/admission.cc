@@ -1,0 +1,74 @@
+#include "server/domain/admission.h"
+
+#include <utility>
+#include <vector>
+
+#include "core/selection/fit.h"
+#include "server/domain/exclusion.h"
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
+
+namespace selfcal::server {
+namespace {
+
+// Segments that tables hold, each once.
+absl::StatusOr<std::vector<SegmentRow>> KeptSegments(UnitOfWork* tx) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
+  std::vector<SegmentRow> kept;
+  for (const TableEntry& entry : UnionOfTables(tables)) {
+    SELFCAL_ASSIGN_OR_RETURN(SegmentRow segment, FindSegment(tx, entry.key));
+    kept.push_back(std::move(segment));
+  }
+  return kept;
+}
+
+}  // namespace
+
+absl::StatusOr<std::optional<double>> LargestFitOfRig(UnitOfWork* tx) {
+  const FitPolicy policy;
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<double> newest,
+                           NewestFits(tx, policy.newest));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentRow> kept,
+                           KeptSegments(tx));
+  std::vector<double> fits;
+  for (const SegmentRow& segment : kept) fits.push_back(segment.fit);
+  return LargestFit(newest, fits, policy);
+}
+
+absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit) {
+  if (!largest_fit) return absl::OkStatus();
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentRow> kept,
+                           KeptSegments(tx));
+  for (const SegmentRow& segment : kept) {
+    if (segment.fit <= *largest_fit) continue;
+    SELFCAL_RETURN_IF_ERROR(LeaveTables(tx,
+                                        segment.rowid,
+                                        {.cause = AbsenceCause::kDoesNotFit,
+                                         .fit = segment.fit,
+                                         .fit_limit = largest_fit}));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<bool> AdmitByFit(UnitOfWork* tx,
+                                std::int64_t segment,
+                                const ResidualStatistics& residuals,
+                                std::optional<double> largest_fit) {
+  if (largest_fit && residuals.fit > *largest_fit) {
+    SELFCAL_RETURN_IF_ERROR(RefuseTables(tx,
+                                         segment,
+                                         {.cause = AbsenceCause::kDoesNotFit,
+                                          .fit = residuals.fit,
+                                          .fit_limit = largest_fit}));
+    return false;
+  }
+  if (residuals.many_outliers) {
+    SELFCAL_RETURN_IF_ERROR(
+        RefuseTables(tx, segment, {.cause = AbsenceCause::kManyOutliers}));
+    return false;
+  }
+  return true;
+}
+
+}  // namespace selfcal::server

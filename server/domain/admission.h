@@ -1,0 +1,30 @@
+// Which segments fit well enough to be offered to the tables
+// (core/selection/fit.h).
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <optional>
+
+#include "core/information/segment_information.h"
+#include "server/store/unit_of_work.h"
+
+namespace selfcal::server {
+
+// LargestFit of the rig as it is.
+absl::StatusOr<std::optional<double>> LargestFitOfRig(UnitOfWork* tx);
+
+// Takes segments with a larger fit out of all tables.
+absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit);
+
+// False for a segment that is not offered to the tables, because it does not
+// fit or because too many of its observations are outliers; the reason is
+// recorded.
+absl::StatusOr<bool> AdmitByFit(UnitOfWork* tx,
+                                std::int64_t segment,
+                                const ResidualStatistics& residuals,
+                                std::optional<double> largest_fit);
+
+}  // namespace selfcal::server

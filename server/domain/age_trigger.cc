@@ -1,0 +1,37 @@
+#include "server/domain/age_trigger.h"
+
+#include <vector>
+
+#include "server/domain/retention.h"
+#include "server/domain/run_creation.h"
+#include "server/store/calibrations.h"
+#include "server/store/runs.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+
+absl::StatusOr<std::optional<StoredRun>> CreateAgedRun(UnitOfWork* tx,
+                                                       const StoredRig& rig,
+                                                       std::int64_t now_ns) {
+  const std::optional<StoredRun> none;
+  if (rig.policy.calibration_max_age_ns <= 0) return none;
+  const std::int64_t before = now_ns - rig.policy.calibration_max_age_ns;
+  const auto active = ReadActiveCalibration(tx);
+  if (absl::IsDataLoss(active.status())) return none;
+  SELFCAL_RETURN_IF_ERROR(active.status());
+  if (!active->run) return none;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t since,
+                           ActivationTime(tx, active->activation));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestRun(tx));
+  if (since > before || newest == 0) return none;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun last, ReadRun(tx, newest));
+  if (last.end_time_ns == 0 || last.create_time_ns > before) return none;
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
+                           RemoveAgedEntries(tx, rig, now_ns));
+  if (!HoldAnother(tables, last)) return none;
+  SELFCAL_ASSIGN_OR_RETURN(StoredRun run,
+                           CreateRun(tx, tables, RunTrigger::kCalibrationAged));
+  return run;
+}
+
+}  // namespace selfcal::server

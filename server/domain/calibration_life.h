@@ -1,0 +1,50 @@
+// The life of a calibration:
+//
+//   candidate -> active       it was validated
+//   candidate -> rejected     it was not; the end
+//   active -> superseded      a newer one became active
+//   active -> rolled back     an older one was activated manually
+//   superseded -> active      manually
+//   rolled back -> active     manually
+//
+// The factory calibration begins as active, every other as a candidate.
+// Triggers of the schema refuse everything else.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+
+#include "server/store/store.h"
+#include "server/store/unit_of_work.h"
+
+namespace selfcal::server {
+
+bool MayBecome(CalibrationState from, CalibrationState to);
+
+// "rolled back".
+const char* StateName(CalibrationState state);
+
+// Writes the factory calibration of a new rig, active: what is known of it are
+// the tolerances.
+absl::Status StoreFactoryCalibration(UnitOfWork* tx, const StoredRig& rig);
+
+// Candidate -> active or rejected, as the state of `validated` says, with its
+// reasons and validation, and the event. What was active is superseded.
+absl::Status EndValidation(UnitOfWork* tx, const StoredCalibration& validated);
+
+// Domain::ActivateCalibration.
+absl::StatusOr<StoredCalibration> ActivateCalibration(
+    UnitOfWork* tx,
+    std::int64_t version,
+    const std::string& caller,
+    const std::string& reason);
+
+// Domain::ReportDisagreement.
+absl::Status ReportDisagreement(UnitOfWork* tx,
+                                std::int64_t version,
+                                const std::string& finding);
+
+}  // namespace selfcal::server

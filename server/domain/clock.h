@@ -1,0 +1,19 @@
+// The clock whose time is stamped on what is stored.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+
+namespace selfcal::server {
+
+// Nanoseconds since the Unix epoch.
+inline std::int64_t NowNs() {
+  return std::chrono::nanoseconds(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+using Clock = std::function<std::int64_t()>;
+
+}  // namespace selfcal::server

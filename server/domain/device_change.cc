@@ -1,0 +1,252 @@
+#include "server/domain/device_change.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "core/change/aged.h"
+#include "core/change/isolated.h"
+#include "server/domain/exclusion.h"
+#include "server/domain/quarantine.h"
+#include "server/store/calibrations.h"
+#include "server/store/change_rows.h"
+#include "server/store/events.h"
+#include "server/store/runs.h"
+#include "server/store/segment_ends.h"
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
+
+namespace selfcal::server {
+namespace {
+
+// A run is as likely to find a change where there is none as the tests of so
+// many single segments: about as many come between two runs.
+constexpr double kSegmentsOfARun = 10;
+
+// The newest segments that can be tested, oldest first: `count` of twice as
+// many, without those that are isolated (core/change/isolated.h).
+struct Newest {
+  std::vector<OffsetInformation> segments;
+  std::vector<std::int64_t> sequences;
+  // Those between two neighbours that both contradict them.
+  std::vector<SegmentRow> isolated;
+};
+
+absl::StatusOr<Newest> ReadNewest(UnitOfWork* tx,
+                                  const StoredCalibration& active,
+                                  std::int64_t first_sequence,
+                                  const ConsistencyTester& tester,
+                                  int count) {
+  Newest newest;
+  std::vector<SegmentRow> rows;
+  SELFCAL_RETURN_IF_ERROR(VisitScored(
+      tx,
+      {.first_sequence = first_sequence,
+       .not_in_version = active.version,
+       .limit = 2 * count},
+      [&](const ScoredSegment& scored) {
+        if (scored.information.ok() && tester.Accepts(*scored.information)) {
+          rows.push_back(scored.segment);
+          newest.segments.push_back(tester.Offset(*scored.information));
+        }
+        return static_cast<int>(rows.size()) < count;
+      }));
+  std::reverse(newest.segments.begin(), newest.segments.end());
+  std::reverse(rows.begin(), rows.end());
+  std::vector<int> isolated = FindIsolated(newest.segments);
+  std::reverse(isolated.begin(), isolated.end());
+  const auto last = static_cast<int>(newest.segments.size()) - 1;
+  for (const int i : isolated) {
+    if (i > 0 && i < last) newest.isolated.push_back(rows[i]);
+    newest.segments.erase(newest.segments.begin() + i);
+    rows.erase(rows.begin() + i);
+  }
+  for (const SegmentRow& row : rows) newest.sequences.push_back(row.sequence);
+  return newest;
+}
+
+// True if segments can be tested against the calibration: the factory's is a
+// prior, not an estimate; one from before the last change is no longer that of
+// the device; and one from before the noise of tracks was measured claims
+// sigmas that are too small.
+absl::StatusOr<bool> IsTestable(UnitOfWork* tx,
+                                const StoredCalibration& active,
+                                std::int64_t change) {
+  if (!active.run || !active.report || active.report->track_noise_factor == 0) {
+    return false;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run, ReadRun(tx, *active.run));
+  return run.change == change;
+}
+
+std::string Describe(const Change& found, const StoredChange& change) {
+  return fmt::format(
+      "change {} ({}): calibration {} does not fit the segments from sequence "
+      "{} on; concerned: {}; chi-square {:.1f} with {} degrees over {} "
+      "segments, {} changed "
+      "(probability {:.1e}; variances of segments times {:.2f})",
+      change.change,
+      found.kind == ChangeKind::kSudden ? "sudden" : "drift",
+      change.base_version,
+      change.first_sequence,
+      fmt::join(change.groups, ", "),
+      found.test.statistic,
+      found.test.degrees,
+      found.window,
+      found.block == "all" ? "anything" : found.block,
+      found.test.probability,
+      change.inflation);
+}
+
+std::string Describe(const DeviceSplit& split,
+                     const StoredChange& change,
+                     std::int64_t run) {
+  return fmt::format(
+      "change {}: among the segments of recalibration {} the newest {}, from "
+      "sequence {} on, show another {} than those before; concerned: {} "
+      "(probability {:.1e}, {:.1e} whichever of them is left out)",
+      change.change,
+      run,
+      split.newer,
+      change.first_sequence,
+      split.block == "all" ? "theta" : split.block,
+      fmt::join(change.groups, ", "),
+      split.probability,
+      split.without_one);
+}
+
+absl::Status RestartTables(UnitOfWork* tx, std::int64_t first_sequence) {
+  SELFCAL_RETURN_IF_ERROR(LeaveTablesIf(
+      tx, AbsenceCause::kDeviceChanged, [&](const TableEntry& entry) {
+        return entry.sequence < first_sequence;
+      }));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t scored,
+                           CountScored(tx, first_sequence));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
+  for (const Table& table : tables) {
+    SELFCAL_RETURN_IF_ERROR(WriteScored(tx, table.group, scored));
+  }
+  return absl::OkStatus();
+}
+
+// Stores the change and its event; tables and memory start again after it.
+absl::Status StartAfter(UnitOfWork* tx,
+                        const StoredChange& change,
+                        const std::string& description) {
+  SELFCAL_RETURN_IF_ERROR(InsertChange(tx, change));
+  SELFCAL_RETURN_IF_ERROR(RestartTables(tx, change.first_sequence));
+  SELFCAL_RETURN_IF_ERROR(DeleteEndsBefore(tx, change.first_sequence));
+  return AppendEvent(tx, EventKind::kChangeDetected, description);
+}
+
+}  // namespace
+
+Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
+                             const StoredCalibration& calibration,
+                             std::int64_t time_ns) {
+  const auto age_ns = static_cast<double>(time_ns - calibration.create_time_ns);
+  return AgedCovariance(rig.rig,
+                        WalkDensities(rig.rig, rig.policy.walk_densities),
+                        calibration.covariance,
+                        age_ns / kNanosecondsOfDay);
+}
+
+absl::StatusOr<std::int64_t> FirstSequenceSince(UnitOfWork* tx,
+                                                std::int64_t change) {
+  if (change == 0) return 1;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredChange stored, ReadChange(tx, change));
+  return stored.first_sequence;
+}
+
+absl::StatusOr<NewestExamined> ExamineNewest(UnitOfWork* tx,
+                                             const StoredRig& rig,
+                                             const ChangeOptions& options) {
+  NewestExamined examined;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest_change, NewestChange(tx));
+  const auto active = ReadActiveCalibration(tx);
+  if (absl::IsDataLoss(active.status())) {
+    return examined;
+  }
+  SELFCAL_RETURN_IF_ERROR(active.status());
+  SELFCAL_ASSIGN_OR_RETURN(const bool testable,
+                           IsTestable(tx, *active, newest_change));
+  if (!testable) {
+    return examined;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
+                           FirstSequenceSince(tx, newest_change));
+  const ConsistencyTester tester(rig.rig,
+                                 {active->theta,
+                                  CovarianceAt(rig, *active, tx->time_ns()),
+                                  active->report->track_noise_factor},
+                                 options.inflation);
+  SELFCAL_ASSIGN_OR_RETURN(
+      const Newest newest,
+      ReadNewest(tx, *active, first_sequence, tester, options.max_window));
+  for (const SegmentRow& segment : newest.isolated) {
+    SELFCAL_RETURN_IF_ERROR(Quarantine(
+        tx,
+        segment,
+        EventKind::kSegmentQuarantined,
+        fmt::format("it shows another theta than the segments before and after "
+                    "it, at the scores of version {}: it is corrupt, or of "
+                    "another device",
+                    active->version)));
+  }
+  examined.quarantined = static_cast<int>(newest.isolated.size());
+  const auto found = DetectChange(tester, newest.segments, options);
+  if (!found) {
+    return examined;
+  }
+  StoredChange change;
+  change.rig = tx->rig();
+  change.change = newest_change + 1;
+  change.time_ns = tx->time_ns();
+  change.kind = found->kind;
+  change.first_sequence =
+      found->segments_since == 0
+          ? newest.sequences.back() + 1
+          : newest.sequences[newest.sequences.size() - found->segments_since];
+  change.base_version = active->version;
+  change.inflation = tester.inflation();
+  change.groups = found->concerned;
+  SELFCAL_RETURN_IF_ERROR(StartAfter(tx, change, Describe(*found, change)));
+  examined.change = std::move(change);
+  return examined;
+}
+
+absl::StatusOr<std::optional<StoredChange>> StoreSplit(
+    UnitOfWork* tx,
+    const StoredRun& run,
+    const StoredCalibration& result,
+    const ChangeOptions& options) {
+  const std::optional<StoredChange> none;
+  if (!result.report || !result.report->evicted.split) return none;
+  const DeviceSplit& split = *result.report->evicted.split;
+  if (!(split.without_one < kSegmentsOfARun * options.false_alarm_rate)) {
+    return none;
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest_change, NewestChange(tx));
+  if (run.change != newest_change) return none;
+  const auto first = FindSegment(tx, split.first);
+  if (absl::IsNotFound(first.status())) return none;  // deleted meanwhile
+  SELFCAL_RETURN_IF_ERROR(first.status());
+  StoredChange change;
+  change.rig = tx->rig();
+  change.change = newest_change + 1;
+  change.time_ns = tx->time_ns();
+  change.kind = split.kind;
+  change.first_sequence = first->sequence;
+  change.base_version = run.base_version;
+  change.inflation = 1;
+  change.groups = split.concerned;
+  SELFCAL_RETURN_IF_ERROR(
+      StartAfter(tx, change, Describe(split, change, run.run)));
+  return change;
+}
+
+}  // namespace selfcal::server

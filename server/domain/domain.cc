@@ -1,0 +1,239 @@
+#include "server/domain/domain.h"
+
+#include <future>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "server/domain/age_trigger.h"
+#include "server/domain/calibration_life.h"
+#include "server/domain/intake.h"
+#include "server/domain/run_creation.h"
+#include "server/domain/run_life.h"
+#include "server/domain/run_results.h"
+#include "server/domain/session_trigger.h"
+#include "server/store/events.h"
+#include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
+#include "server/store/transact.h"
+
+namespace selfcal::server {
+
+absl::StatusOr<StoredRig> Domain::CreateRig(const Rig& rig,
+                                            const RigPolicy& policy) {
+  const StoredRig stored{rig, clock_(), policy};
+  SELFCAL_RETURN_IF_ERROR(store_->InsertRig(stored, [&](UnitOfWork* tx) {
+    SELFCAL_RETURN_IF_ERROR(InsertTables(tx, MakeTables(rig)));
+    SELFCAL_RETURN_IF_ERROR(AppendEvent(tx, EventKind::kRigCreated, "created"));
+    return StoreFactoryCalibration(tx, stored);
+  }));
+  return stored;
+}
+
+absl::StatusOr<PutVerdict> Domain::PutSegment(const std::string& rig,
+                                              const MotionSegment& segment) {
+  const auto verdict =
+      std::make_shared<std::promise<absl::StatusOr<PutVerdict>>>();
+  BeginPutSegment(rig, segment, [verdict](const auto& answer) {
+    verdict->set_value(answer);
+  });
+  return verdict->get_future().get();
+}
+
+void Domain::BeginPutSegment(const std::string& rig,
+                             const MotionSegment& segment,
+                             PutDone done) {
+  auto packed = PackNewSegment(segment);
+  if (!packed.ok()) return done(packed.status());
+  // Shared by the transaction and by what is notified of it.
+  struct Put {
+    NewSegment segment;
+    PutVerdict verdict;
+  };
+  const auto put =
+      std::make_shared<Put>(Put{*std::move(packed), PutVerdict::kStored});
+  store_->BeginTransaction(
+      rig,
+      clock_(),
+      [put, quotas = options_.quotas](UnitOfWork* tx) {
+        const auto stored = StoreSegment(tx, put->segment, quotas);
+        put->verdict = stored.ok() && *stored ? PutVerdict::kStored
+                                              : PutVerdict::kDuplicate;
+        return stored.status();
+      },
+      [put, done = std::move(done)](const absl::Status& status) {
+        if (status.ok()) {
+          done(put->verdict);
+        } else {
+          done(status);
+        }
+      });
+}
+
+absl::StatusOr<ScoreCommit> Domain::CommitScore(
+    const std::string& rig,
+    const SegmentKey& key,
+    const SegmentInformation& information,
+    const std::optional<SegmentEnds>& ends) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::CommitScore(tx, key, information, ends, options_.change);
+  });
+}
+
+absl::Status Domain::ReplaceScore(const std::string& rig,
+                                  const SegmentKey& key,
+                                  const SegmentInformation& information,
+                                  const SegmentEnds& ends) {
+  return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
+    return server::ReplaceScore(tx, key, information, ends);
+  });
+}
+
+absl::Status Domain::MarkUnusable(const std::string& rig,
+                                  const SegmentKey& key,
+                                  const std::string& problem) {
+  return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
+    return server::MarkUnusable(tx, key, problem);
+  });
+}
+
+absl::StatusOr<QuarantineCommit> Domain::QuarantineSegments(
+    const std::string& rig,
+    const std::string& session,
+    std::optional<std::int64_t> index,
+    const std::string& caller,
+    const std::string& reason) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::QuarantineSegments(tx, session, index, caller, reason);
+  });
+}
+
+absl::StatusOr<std::vector<RememberedSegment>> Domain::ListRemembered(
+    const std::string& rig, std::int64_t run) {
+  return InspectFor(store_, rig, [&](UnitOfWork* tx) {
+    return server::ListRemembered(tx, run);
+  });
+}
+
+absl::StatusOr<std::vector<HeldOut>> Domain::ListHeldOut(const std::string& rig,
+                                                         std::int64_t run,
+                                                         int limit) {
+  return InspectFor(store_, rig, [&](UnitOfWork* tx) {
+    return server::ListHeldOut(tx, run, limit);
+  });
+}
+
+absl::StatusOr<StoredCalibration> Domain::ActivateCalibration(
+    const std::string& rig,
+    std::int64_t version,
+    const std::string& caller,
+    const std::string& reason) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::ActivateCalibration(tx, version, caller, reason);
+  });
+}
+
+absl::Status Domain::ReportDisagreement(const std::string& rig,
+                                        std::int64_t version,
+                                        const std::string& finding) {
+  return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
+    return server::ReportDisagreement(tx, version, finding);
+  });
+}
+
+absl::StatusOr<StoredRun> Domain::CreateManualRun(const std::string& rig,
+                                                  bool force) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::CreateManualRun(tx, force);
+  });
+}
+
+absl::StatusOr<std::vector<StoredRun>> Domain::StartAgedRuns(
+    std::int64_t now_ns) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> names,
+                           store_->ListRigNames());
+  std::vector<StoredRun> started;
+  for (const std::string& name : names) {
+    const auto rig = store_->GetRig(name);
+    // A damaged one must not hold up the others.
+    if (!rig.ok() || rig->policy.calibration_max_age_ns <= 0) continue;
+    SELFCAL_ASSIGN_OR_RETURN(
+        auto run, TransactFor(store_, name, clock_(), [&](UnitOfWork* tx) {
+          return CreateAgedRun(tx, *rig, now_ns);
+        }));
+    if (run) started.push_back(*std::move(run));
+  }
+  return started;
+}
+
+absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
+    const std::vector<std::string>& ended, std::int64_t idle_since_ns) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> idle,
+                           store_->ListIdleRigs(idle_since_ns));
+  std::set<std::string> names(idle.begin(), idle.end());
+  names.insert(ended.begin(), ended.end());
+  std::vector<StoredRun> started;
+  for (const std::string& name : names) {
+    const auto due = InspectFor(
+        store_, name, [&](UnitOfWork* tx) { return IsSessionRunDue(tx); });
+    // Neither a damaged one nor one that is gone must hold up the others.
+    if (!due.ok() || !*due) continue;
+    SELFCAL_ASSIGN_OR_RETURN(
+        auto run, TransactFor(store_, name, clock_(), [&](UnitOfWork* tx) {
+          return CreateSessionRun(tx);
+        }));
+    if (run) started.push_back(*std::move(run));
+  }
+  return started;
+}
+
+absl::Status Domain::HoldRun(const std::string& rig,
+                             std::int64_t run,
+                             const std::string& reason) {
+  return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
+    return server::HoldRun(tx, run, reason);
+  });
+}
+
+absl::StatusOr<StoredRun> Domain::BeginRun(const std::string& rig,
+                                           std::int64_t run) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::BeginRun(tx, run);
+  });
+}
+
+absl::StatusOr<StoredRun> Domain::ReleaseRun(const std::string& rig,
+                                             std::int64_t run) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::ReleaseRun(tx, run);
+  });
+}
+
+absl::StatusOr<StoredCalibration> Domain::StoreCandidate(
+    const std::string& rig,
+    std::int64_t run,
+    const StoredCalibration& calibration) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::StoreCandidate(tx, run, calibration);
+  });
+}
+
+absl::StatusOr<StoredCalibration> Domain::FinishRun(
+    const std::string& rig,
+    std::int64_t run,
+    const StoredCalibration& calibration) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::FinishRun(tx, run, calibration, options_.change);
+  });
+}
+
+absl::StatusOr<StoredRun> Domain::EndRun(const std::string& rig,
+                                         std::int64_t run,
+                                         RunState state,
+                                         const std::string& message) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::EndRun(tx, run, state, message);
+  });
+}
+
+}  // namespace selfcal::server

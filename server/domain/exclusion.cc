@@ -1,0 +1,52 @@
+#include "server/domain/exclusion.h"
+
+#include <string>
+#include <vector>
+
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
+
+namespace selfcal::server {
+
+absl::Status LeaveTables(UnitOfWork* tx,
+                         std::int64_t segment,
+                         const Absence& reason) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> groups,
+                           TablesOfSegment(tx, segment));
+  for (const std::string& group : groups) {
+    SELFCAL_RETURN_IF_ERROR(WriteAbsence(tx, segment, group, reason));
+    SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, group, segment));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status LeaveTablesIf(
+    UnitOfWork* tx,
+    AbsenceCause cause,
+    const std::function<bool(const TableEntry&)>& leaves) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
+  for (const Table& table : tables) {
+    for (const TableEntry& entry : table.entries) {
+      if (!leaves(entry)) continue;
+      SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
+                               FindSegment(tx, entry.key));
+      SELFCAL_RETURN_IF_ERROR(
+          WriteAbsence(tx, segment.rowid, table.group, {.cause = cause}));
+      SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, segment.rowid));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RefuseTables(UnitOfWork* tx,
+                          std::int64_t segment,
+                          const Absence& reason) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
+  for (const Table& table : tables) {
+    SELFCAL_RETURN_IF_ERROR(WriteAbsence(tx, segment, table.group, reason));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace selfcal::server

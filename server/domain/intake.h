@@ -1,0 +1,18 @@
+// A segment that was received is stored, within the quotas of its rig.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include "server/domain/domain_options.h"
+#include "server/store/segment_rows.h"
+#include "server/store/unit_of_work.h"
+
+namespace selfcal::server {
+
+// False if a segment with this key is stored already. RESOURCE_EXHAUSTED,
+// naming the quota, where there is no room.
+absl::StatusOr<bool> StoreSegment(UnitOfWork* tx,
+                                  const NewSegment& segment,
+                                  const Quotas& quotas);
+
+}  // namespace selfcal::server

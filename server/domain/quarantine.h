@@ -1,0 +1,54 @@
+// Segments that are taken out of everything: damaged ones, those that
+// contradict the others, and those that an operator names.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibration/segment_fit.h"
+#include "server/store/segment_rows.h"
+#include "server/store/store.h"
+#include "server/store/unit_of_work.h"
+
+namespace selfcal::server {
+
+// What a quarantine by an operator did.
+struct QuarantineCommit {
+  std::int64_t quarantined = 0;
+  std::int64_t unusable = 0;  // that were so before
+  // Of the quarantined ones, those that were waiting for their score.
+  std::vector<std::int64_t> unscored_sequences;
+};
+
+// Any state -> unusable, out of all tables, with an event: kSegmentUnusable for
+// a segment that is damaged or cannot be scored, kSegmentQuarantined for one
+// that contradicts others. Its data stays until DropUnneededData.
+absl::Status Quarantine(UnitOfWork* tx,
+                        const SegmentRow& segment,
+                        EventKind event,
+                        const std::string& problem);
+
+// Quarantines the segments of a run that its result does not use.
+absl::Status QuarantineExcluded(UnitOfWork* tx,
+                                std::int64_t run,
+                                const std::vector<SegmentFit>& fits);
+
+// Domain::MarkUnusable.
+absl::Status MarkUnusable(UnitOfWork* tx,
+                          const SegmentKey& key,
+                          const std::string& problem);
+
+// Domain::QuarantineSegments.
+absl::StatusOr<QuarantineCommit> QuarantineSegments(
+    UnitOfWork* tx,
+    const std::string& session,
+    std::optional<std::int64_t> index,
+    const std::string& caller,
+    const std::string& reason);
+
+}  // namespace selfcal::server

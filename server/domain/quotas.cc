@@ -1,0 +1,133 @@
+#include "server/domain/quotas.h"
+
+#include <absl/status/statusor.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "server/domain/exclusion.h"
+#include "server/store/database_size.h"
+#include "server/store/events.h"
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// Part of the database for scores, runs and calibrations of what is stored.
+constexpr double kReservedPart = 0.1;
+constexpr int kMaxDropped = 100;
+
+absl::Status CheckDatabaseSize(UnitOfWork* tx,
+                               std::int64_t bytes,
+                               const Quotas& quotas) {
+  if (quotas.max_database_bytes == 0) return absl::OkStatus();
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t used, UsedBytes(tx));
+  const auto open = static_cast<std::int64_t>(
+      (1 - kReservedPart) * static_cast<double>(quotas.max_database_bytes));
+  if (used + bytes <= open) return absl::OkStatus();
+  return absl::ResourceExhaustedError(fmt::format(
+      "the database holds {} of at most {} bytes, of which a tenth is kept for "
+      "results: raise max-database-bytes, or set a quota by rig",
+      used,
+      quotas.max_database_bytes));
+}
+
+// The segment with data that is worth least: in no table, or with the smallest
+// gain in those that hold it; the older one of equals.
+std::vector<DataHolder>::iterator LeastInformative(
+    std::vector<DataHolder>* holders) {
+  const auto end =
+      std::remove_if(holders->begin(), holders->end(), [](const auto& holder) {
+        return holder.in_unfinished_run;
+      });
+  holders->erase(end, holders->end());
+  return std::min_element(
+      holders->begin(), holders->end(), [](const auto& a, const auto& b) {
+        return a.gain < b.gain;  // nothing is less than any value
+      });
+}
+
+absl::Status Evict(UnitOfWork* tx,
+                   const DataHolder& holder,
+                   const Quotas& quotas) {
+  const std::string why = fmt::format(
+      "its data of {} bytes was evicted for newer segments: the data of a rig "
+      "is limited to {} bytes",
+      holder.bytes,
+      quotas.max_payload_bytes_per_rig);
+  const std::int64_t segment = holder.segment.rowid;
+  SELFCAL_RETURN_IF_ERROR(WriteProblem(tx, segment, why));
+  SELFCAL_RETURN_IF_ERROR(
+      LeaveTables(tx, segment, {.cause = AbsenceCause::kDataEvicted}));
+  SELFCAL_RETURN_IF_ERROR(DeleteData(tx, segment));
+  return AppendEvent(
+      tx,
+      EventKind::kDataEvicted,
+      fmt::format("{}: {}", SegmentText(tx->rig(), holder.segment.key), why));
+}
+
+}  // namespace
+
+absl::Status MakeRoom(UnitOfWork* tx,
+                      std::int64_t bytes,
+                      const Quotas& quotas) {
+  SELFCAL_RETURN_IF_ERROR(CheckDatabaseSize(tx, bytes, quotas));
+  const std::int64_t limit = quotas.max_payload_bytes_per_rig;
+  if (limit == 0) return absl::OkStatus();
+  SELFCAL_ASSIGN_OR_RETURN(std::int64_t used, DataBytes(tx));
+  if (used + bytes <= limit) return absl::OkStatus();
+  SELFCAL_ASSIGN_OR_RETURN(std::vector<DataHolder> holders, DataHolders(tx));
+  while (used + bytes > limit) {
+    const auto least = LeastInformative(&holders);
+    if (least == holders.end()) {
+      return absl::ResourceExhaustedError(fmt::format(
+          "rig {} holds {} of at most {} bytes of data, all of it waiting for "
+          "its score or in use by a run, and this segment has {}: try again "
+          "later, or raise max-payload-bytes-per-rig",
+          tx->rig(),
+          used,
+          limit,
+          bytes));
+    }
+    SELFCAL_RETURN_IF_ERROR(Evict(tx, *least, quotas));
+    used -= least->bytes;
+    holders.erase(least);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DropOldSegments(UnitOfWork* tx, const Quotas& quotas) {
+  if (quotas.max_segments_per_rig == 0 && quotas.max_segment_age_s == 0) {
+    return absl::OkStatus();
+  }
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestSequence(tx));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentRow> unreferenced,
+                           UnreferencedSegments(tx, kMaxDropped));
+  int dropped = 0;
+  for (const SegmentRow& segment : unreferenced) {
+    // The newest stays whatever its age: sequences count on from it.
+    if (segment.sequence == newest) continue;
+    const bool too_many =
+        quotas.max_segments_per_rig > 0 &&
+        segment.sequence <= newest - quotas.max_segments_per_rig;
+    const bool too_old = quotas.max_segment_age_s > 0 &&
+                         segment.receive_time_ns <
+                             tx->time_ns() - quotas.max_segment_age_s * kSecond;
+    if (!too_many && !too_old) continue;
+    SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, segment.rowid));
+    ++dropped;
+  }
+  if (dropped == 0) return absl::OkStatus();
+  return AppendEvent(
+      tx,
+      EventKind::kDataEvicted,
+      fmt::format("metadata of {} segments that nothing refers to was dropped: "
+                  "older or more than the rig keeps",
+                  dropped));
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,72 @@
+#include "server/domain/retention.h"
+
+#include <algorithm>
+#include <functional>
+
+#include "server/domain/device_change.h"
+#include "server/domain/exclusion.h"
+#include "server/domain/memory.h"
+#include "server/store/change_rows.h"
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
+
+namespace selfcal::server {
+namespace {
+
+bool IsReferenced(const DataHolder& holder) {
+  return holder.gain.has_value() || holder.in_unfinished_run;
+}
+
+// The smallest sequence of a segment of the reserve.
+std::int64_t BeginOfReserve(const std::vector<DataHolder>& holders,
+                            std::int64_t first_sequence) {
+  std::vector<std::int64_t> sequences;
+  for (const DataHolder& holder : holders) {
+    if (holder.segment.state == SegmentState::kScored && !holder.gain &&
+        !holder.misfit && holder.segment.sequence >= first_sequence) {
+      sequences.push_back(holder.segment.sequence);
+    }
+  }
+  std::sort(sequences.begin(), sequences.end(), std::greater<>());
+  if (sequences.size() > kReserve) return sequences[kReserve - 1];
+  return first_sequence;
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<Table>> RemoveAgedEntries(UnitOfWork* tx,
+                                                     const StoredRig& rig,
+                                                     std::int64_t now_ns) {
+  const std::int64_t max_age_ns = rig.policy.table_max_age_ns;
+  if (max_age_ns > 0) {
+    SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
+    for (const TableEntry& entry : UnionOfTables(tables)) {
+      SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
+                               FindSegment(tx, entry.key));
+      if (segment.receive_time_ns >= now_ns - max_age_ns) continue;
+      SELFCAL_RETURN_IF_ERROR(
+          LeaveTables(tx, segment.rowid, {.cause = AbsenceCause::kTooOld}));
+    }
+  }
+  return ReadTables(tx);
+}
+
+absl::Status DropUnneededData(UnitOfWork* tx) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<DataHolder> holders,
+                           DataHolders(tx));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change, NewestChange(tx));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
+                           FirstSequenceSince(tx, change));
+  const std::int64_t reserve = BeginOfReserve(holders, first_sequence);
+  for (const DataHolder& holder : holders) {
+    const bool in_reserve = holder.segment.state == SegmentState::kScored &&
+                            !holder.misfit &&
+                            holder.segment.sequence >= reserve;
+    if (IsReferenced(holder) || in_reserve) continue;
+    SELFCAL_RETURN_IF_ERROR(DeleteData(tx, holder.segment.rowid));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,29 @@
+// The life of a run: pending -> running -> succeeded, failed or cancelled.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+
+#include "server/store/store.h"
+#include "server/store/unit_of_work.h"
+
+namespace selfcal::server {
+
+// As the methods of Domain.
+absl::Status HoldRun(UnitOfWork* tx,
+                     std::int64_t run,
+                     const std::string& reason);
+absl::StatusOr<StoredRun> BeginRun(UnitOfWork* tx, std::int64_t run);
+absl::StatusOr<StoredRun> ReleaseRun(UnitOfWork* tx, std::int64_t run);
+absl::StatusOr<StoredRun> EndRun(UnitOfWork* tx,
+                                 std::int64_t run,
+                                 RunState state,
+                                 const std::string& message);
+
+// A running run has ended: writes its state and the event.
+absl::Status WriteEnd(UnitOfWork* tx, const StoredRun& run);
+
+}  // namespace selfcal::server

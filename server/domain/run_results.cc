@@ -1,0 +1,151 @@
+#include "server/domain/run_results.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+#include <vector>
+
+#include "server/domain/calibration_life.h"
+#include "server/domain/device_change.h"
+#include "server/domain/quarantine.h"
+#include "server/domain/retention.h"
+#include "server/domain/run_creation.h"
+#include "server/domain/run_life.h"
+#include "server/store/calibrations.h"
+#include "server/store/change_rows.h"
+#include "server/store/rigs.h"
+#include "server/store/runs.h"
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::StatusOr<StoredRun> ReadRunningRun(UnitOfWork* tx, std::int64_t number) {
+  SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRun(tx, number));
+  if (run.state != RunState::kRunning) {
+    return absl::FailedPreconditionError(fmt::format(
+        "recalibration {} of rig {} is not running", number, tx->rig()));
+  }
+  return run;
+}
+
+// The candidate of the run: the one that it has, or a new one.
+absl::StatusOr<StoredCalibration> EnsureCandidate(
+    UnitOfWork* tx,
+    const StoredRun& run,
+    const StoredCalibration& calibration) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto version, CandidateOfRun(tx, run.run));
+  if (version) {
+    return ReadCalibration(tx, *version);
+  }
+  StoredCalibration stored = calibration;
+  SELFCAL_ASSIGN_OR_RETURN(stored.version, NextVersion(tx));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t schema, SchemaVersion(tx));
+  stored.schema_version = static_cast<int>(schema);
+  stored.rig = run.rig;
+  stored.state = CalibrationState::kCandidate;
+  stored.create_time_ns = tx->time_ns();
+  stored.run = run.run;
+  stored.base_version = run.base_version;
+  stored.segments = run.segments;
+  stored.reasons.clear();
+  stored.validation.reset();
+  SELFCAL_RETURN_IF_ERROR(InsertCalibration(tx, stored));
+  return stored;
+}
+
+// It was compared with the version that is active now.
+absl::Status CheckValidation(UnitOfWork* tx,
+                             const StoredCalibration& calibration) {
+  if (!calibration.validation) {
+    return absl::OkStatus();
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active, ActiveVersion(tx));
+  if (calibration.validation->active_version != active) {
+    return absl::AbortedError(
+        fmt::format("it was validated against version {}, but {} is active now",
+                    calibration.validation->active_version,
+                    active));
+  }
+  return absl::OkStatus();
+}
+
+// What has happened since the run was created may reject its result.
+absl::Status RejectIfOutdated(UnitOfWork* tx,
+                              const StoredRun& run,
+                              bool has_split,
+                              StoredCalibration* validated) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change, NewestChange(tx));
+  // The result accounts for a change among its own segments: its theta is that
+  // of the newest of them.
+  if (!has_split && run.change != change) {
+    validated->state = CalibrationState::kRejected;
+    validated->reasons.push_back(
+        fmt::format("The device has changed (change {}) since its segments "
+                    "were chosen: the next run is on segments after that.",
+                    change));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const auto unusable,
+                           UnusableSegments(tx, run.run, false));
+  if (!unusable.empty()) {
+    validated->state = CalibrationState::kRejected;
+    validated->reasons.push_back(
+        fmt::format("{} became unusable since its segments were chosen",
+                    SegmentText(tx->rig(), unusable.front())));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<StoredCalibration> StoreCandidate(
+    UnitOfWork* tx,
+    std::int64_t run_number,
+    const StoredCalibration& calibration) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRun run, ReadRunningRun(tx, run_number));
+  return EnsureCandidate(tx, run, calibration);
+}
+
+absl::StatusOr<StoredCalibration> FinishRun(
+    UnitOfWork* tx,
+    std::int64_t run_number,
+    const StoredCalibration& calibration,
+    const ChangeOptions& options) {
+  if (calibration.state != CalibrationState::kActive &&
+      calibration.state != CalibrationState::kRejected) {
+    return absl::InvalidArgumentError(
+        "a run ends with a calibration that is active or rejected");
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
+  SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRunningRun(tx, run_number));
+  SELFCAL_RETURN_IF_ERROR(CheckValidation(tx, calibration));
+  SELFCAL_ASSIGN_OR_RETURN(StoredCalibration validated,
+                           EnsureCandidate(tx, run, calibration));
+  validated.state = calibration.state;
+  validated.reasons = calibration.reasons;
+  validated.validation = calibration.validation;
+  validated.verdict = calibration.verdict;
+  SELFCAL_ASSIGN_OR_RETURN(const auto split,
+                           StoreSplit(tx, run, validated, options));
+  SELFCAL_RETURN_IF_ERROR(
+      RejectIfOutdated(tx, run, split.has_value(), &validated));
+  SELFCAL_RETURN_IF_ERROR(EndValidation(tx, validated));
+  // Segments of a changed device contradict each other, and none is wrong.
+  if (validated.state == CalibrationState::kActive && calibration.report &&
+      !split) {
+    SELFCAL_RETURN_IF_ERROR(
+        QuarantineExcluded(tx, run.run, calibration.report->segment_fits));
+  }
+  run.state = RunState::kSucceeded;
+  run.end_time_ns = tx->time_ns();
+  run.calibration_version = validated.version;
+  SELFCAL_RETURN_IF_ERROR(WriteEnd(tx, run));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
+                           RemoveAgedEntries(tx, rig, tx->time_ns()));
+  SELFCAL_RETURN_IF_ERROR(CreateRunOfTables(tx, rig, tables).status());
+  SELFCAL_RETURN_IF_ERROR(DropUnneededData(tx));
+  return ReadCalibration(tx, validated.version);
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,88 @@
+#include "server/domain/score_commit.h"
+
+#include <cmath>
+
+#include "server/domain/admission.h"
+#include "server/domain/device_change.h"
+#include "server/domain/memory.h"
+#include "server/domain/offers.h"
+#include "server/domain/retention.h"
+#include "server/domain/run_creation.h"
+#include "server/store/rigs.h"
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+#include "server/store/table_rows.h"
+
+namespace selfcal::server {
+
+absl::StatusOr<ScoreCommit> CommitScore(UnitOfWork* tx,
+                                        const SegmentKey& key,
+                                        const SegmentInformation& information,
+                                        const std::optional<SegmentEnds>& ends,
+                                        const ChangeOptions& options) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
+  ScoreCommit commit;
+  if (segment.state == SegmentState::kScored) {
+    SELFCAL_ASSIGN_OR_RETURN(commit.tables, TablesOfSegment(tx, segment.rowid));
+    return commit;
+  }
+  if (segment.state == SegmentState::kUnusable) {
+    return absl::FailedPreconditionError(
+        SegmentText(tx->rig(), key) +
+        " was found unusable; send it anew under "
+        "another session");
+  }
+  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.rowid, information));
+  if (ends) {
+    SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.rowid, *ends));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::optional<double> largest_fit,
+                           LargestFitOfRig(tx));
+  SELFCAL_RETURN_IF_ERROR(RemoveMisfits(tx, largest_fit));
+  // By the time at which it arrived, however long it waited for its score.
+  SELFCAL_ASSIGN_OR_RETURN(std::vector<Table> tables,
+                           RemoveAgedEntries(tx, rig, segment.receive_time_ns));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const bool admitted,
+      AdmitByFit(tx, segment.rowid, information.residuals, largest_fit));
+  if (admitted) {
+    SELFCAL_ASSIGN_OR_RETURN(
+        commit.tables,
+        OfferToTables(tx, rig.rig, segment, information, &tables));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const NewestExamined examined,
+                           ExamineNewest(tx, rig, options));
+  commit.change = examined.change;
+  if (examined.change || examined.quarantined > 0) {
+    SELFCAL_ASSIGN_OR_RETURN(tables, ReadTables(tx));
+    SELFCAL_ASSIGN_OR_RETURN(commit.tables, TablesOfSegment(tx, segment.rowid));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(commit.started_run,
+                           CreateRunOfTables(tx, rig, tables));
+  SELFCAL_RETURN_IF_ERROR(DropUnneededData(tx));
+  return commit;
+}
+
+absl::Status ReplaceScore(UnitOfWork* tx,
+                          const SegmentKey& key,
+                          const SegmentInformation& information,
+                          const SegmentEnds& ends) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
+  SELFCAL_ASSIGN_OR_RETURN(const bool has_data, HasData(tx, segment.rowid));
+  if (segment.state != SegmentState::kScored || !has_data) {
+    return absl::OkStatus();
+  }
+  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.rowid, information));
+  SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.rowid, ends));
+  // Entries of a joint selection have scores of all of them together.
+  const bool by_score = rig.rig.selection == Selection::kTables;
+  for (const GroupScore& score : information.groups) {
+    if (!by_score || !std::isfinite(score.entropy)) continue;
+    SELFCAL_RETURN_IF_ERROR(WriteEntryScore(tx, segment.rowid, score));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,40 @@
+// The score of a stored segment is committed: it is offered to the tables, the
+// newest segments are examined for a device change, and a run may start.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/change/detect_change.h"
+#include "core/information/segment_ends.h"
+#include "core/information/segment_information.h"
+#include "server/store/store.h"
+#include "server/store/unit_of_work.h"
+
+namespace selfcal::server {
+
+// What the commit of a score did.
+struct ScoreCommit {
+  std::vector<std::string> tables;       // groups it entered
+  std::optional<StoredRun> started_run;  // the trigger fired
+  std::optional<StoredChange> change;    // was detected
+};
+
+// Domain::CommitScore.
+absl::StatusOr<ScoreCommit> CommitScore(UnitOfWork* tx,
+                                        const SegmentKey& key,
+                                        const SegmentInformation& information,
+                                        const std::optional<SegmentEnds>& ends,
+                                        const ChangeOptions& options);
+
+// Domain::ReplaceScore.
+absl::Status ReplaceScore(UnitOfWork* tx,
+                          const SegmentKey& key,
+                          const SegmentInformation& information,
+                          const SegmentEnds& ends);
+
+}  // namespace selfcal::server

@@ -1,0 +1,102 @@
+// How versions of a calibration are written.
+#include "server/store/calibrations.h"
+#include "server/store/checksum.h"
+#include "server/store/records.h"
+#include "server/store/statement.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::Status InsertContent(UnitOfWork* tx,
+                           const StoredCalibration& calibration) {
+  const std::string content = SerializeCalibration(calibration);
+  const std::string sha256 = Sha256(content);
+  // A version that no run produced has run 0 here, which becomes NULL.
+  return Statement(
+             tx->db(),
+             "INSERT INTO calibrations (rig, version, state, create_time_ns, "
+             "  run, content, sha256) "
+             "VALUES (?1, ?2, ?3, ?4, nullif(?5, 0), ?6, ?7)",
+             tx->rig_row(),
+             calibration.version,
+             static_cast<int>(calibration.state) + 1,
+             calibration.create_time_ns,
+             calibration.run.value_or(0),
+             BlobView{content},
+             BlobView{sha256})
+      .Run();
+}
+
+}  // namespace
+
+absl::Status InsertCalibration(UnitOfWork* tx,
+                               const StoredCalibration& calibration) {
+  SELFCAL_RETURN_IF_ERROR(InsertContent(tx, calibration));
+  for (const SegmentKey& key : calibration.segments) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(tx->db(),
+                  "INSERT INTO calibration_segments (rig, version, segment) "
+                  "SELECT ?1, ?2, segment FROM segments "
+                  "WHERE rig = ?1 AND session = ?3 AND session_index = ?4",
+                  tx->rig_row(),
+                  calibration.version,
+                  key.session,
+                  key.index)
+            .Run());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status InsertValidation(UnitOfWork* tx,
+                              const StoredCalibration& calibration) {
+  const std::string content = SerializeValidation(calibration);
+  const std::string sha256 = Sha256(content);
+  return Statement(tx->db(),
+                   "INSERT INTO validations (rig, version, content, sha256) "
+                   "VALUES (?1, ?2, ?3, ?4)",
+                   tx->rig_row(),
+                   calibration.version,
+                   BlobView{content},
+                   BlobView{sha256})
+      .Run();
+}
+
+absl::Status WriteState(UnitOfWork* tx,
+                        std::int64_t version,
+                        CalibrationState from,
+                        CalibrationState to) {
+  return Statement(tx->db(),
+                   "UPDATE calibrations SET state = ?4 "
+                   "WHERE rig = ?1 AND version = ?2 AND state = ?3",
+                   tx->rig_row(),
+                   version,
+                   static_cast<int>(from) + 1,
+                   static_cast<int>(to) + 1)
+      .Run();
+}
+
+absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version) {
+  return Statement(tx->db(),
+                   "INSERT INTO activations (rig, version, time_ns) "
+                   "VALUES (?1, ?2, ?3)",
+                   tx->rig_row(),
+                   version,
+                   tx->time_ns())
+      .Run();
+}
+
+absl::Status InsertDisagreement(UnitOfWork* tx,
+                                std::int64_t version,
+                                const std::string& finding) {
+  return Statement(tx->db(),
+                   "INSERT INTO disagreements (rig, version, time_ns, finding) "
+                   "VALUES (?1, ?2, ?3, ?4) ON CONFLICT DO NOTHING",
+                   tx->rig_row(),
+                   version,
+                   tx->time_ns(),
+                   finding)
+      .Run();
+}
+
+}  // namespace selfcal::server

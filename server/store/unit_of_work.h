@@ -1,0 +1,44 @@
+// One transaction about one rig: a handle for the functions of this module that
+// read and write records (rigs.h, segment_rows.h, table_rows.h, runs.h,
+// calibrations.h, change_rows.h, events.h, ...). They hold no policy: what is
+// written, and when, is decided by the caller.
+//
+// Store::Transact opens a unit of work that writes, Store::Inspect one that
+// only reads. Not thread-safe; valid during the call that it is passed to.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace selfcal::server {
+
+class Connection;  // statement.h
+
+class UnitOfWork {
+ public:
+  UnitOfWork(Connection* db,
+             std::string rig,
+             std::int64_t rig_row,
+             std::int64_t time_ns)
+      : db_(db), rig_(std::move(rig)), rig_row_(rig_row), time_ns_(time_ns) {}
+  UnitOfWork(const UnitOfWork&) = delete;
+  UnitOfWork& operator=(const UnitOfWork&) = delete;
+
+  // Name of the rig; it exists.
+  const std::string& rig() const { return rig_; }
+  // Stamped on what is written [ns since the Unix epoch].
+  std::int64_t time_ns() const { return time_ns_; }
+
+  // For the statements of this module.
+  Connection* db() const { return db_; }
+  std::int64_t rig_row() const { return rig_row_; }
+
+ private:
+  Connection* db_;
+  std::string rig_;
+  std::int64_t rig_row_;
+  std::int64_t time_ns_;
+};
+
+}  // namespace selfcal::server
