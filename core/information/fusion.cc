@@ -10,8 +10,8 @@
 namespace selfcal {
 namespace {
 
-// The coordinates of rotations are curved: the step is repeated from where it
-// led to until it is this small, in sigmas of the prior.
+// The coordinates of rotations are nonlinear: the step is repeated from its
+// result until it is this small, in sigmas of the prior.
 constexpr double kSmallStep = 1e-9;
 constexpr int kMaxSteps = 20;
 
@@ -40,7 +40,8 @@ class FusionProblem {
   }
 
  private:
-  // Of the free components, in units of the prior, about `point`.
+  // Information about the free components, in units of the prior, about
+  // `point`.
   ThetaInformation Normalised(const SegmentInformation& information,
                               const Calibration& point) const {
     const ThetaInformation there = Transport(information, point);
@@ -99,10 +100,11 @@ class FusionProblem {
     return std::sqrt(largest / static_cast<double>(components_.free().size()));
   }
 
-  // At the estimate, a segment's eta is what it would still move. Of covariance
-  // L - L C L if all is as modelled, with C that of the estimate; so a
-  // quadratic form of any weight has a known expectation. The weight (L + 1)^-1
-  // takes each direction by how well the segment knows it against the prior.
+  // At the estimate, eta of a segment is its remaining gradient. If all is as
+  // modelled, its covariance is L - L C L, with the covariance C of the
+  // estimate; the expectation of a quadratic form with any weight follows. The
+  // weight (L + 1)^-1 scales each direction by the information of the segment
+  // relative to the prior.
   double Heterogeneity(const Eigen::MatrixXd& covariance) const {
     double sum = 0;
     double expected = 0;
@@ -119,9 +121,9 @@ class FusionProblem {
   const Rig& rig_;
   const RigComponents components_;
   const std::span<const SegmentInformation> segments_;
-  SegmentInformation prior_;  // that of the rig, as if a segment had shown it
+  SegmentInformation prior_;  // that of the rig, in the form of a segment
 
-  // About the point of the last Linearise().
+  // About the linearisation point of the last Linearise().
   std::vector<ThetaInformation> parts_;
   Eigen::MatrixXd sum_;  // of the segments
   Eigen::LLT<Eigen::MatrixXd> posterior_;

@@ -1,11 +1,12 @@
-// What all segments ever scored say together, without their data: information
-// of segments that share nothing adds, so that their sum with the prior gives
-// one Gauss-Newton step of the whole calibration, and its covariance.
+// The joint information of all segments ever scored, without their data. The
+// information of segments that share nothing is additive, so that the sum with
+// the prior gives one Gauss-Newton step of the whole calibration, and its
+// covariance.
 //
-// The step is as good as the linearisation: each segment stands at the states
-// of its SLAM system and at the calibration that it was scored with, and cannot
-// be linearised anew without its data. docs/concepts.md says how far that is
-// from a recalibration; `reach` tells when it is too far.
+// The step is as good as the linearisation: each segment is linearised at the
+// states of its SLAM system and at the calibration that it was scored with, and
+// cannot be relinearised without its data. docs/concepts.md states how far that
+// is from a recalibration; `reach` shows when it is too far.
 //
 // Pure functions, callable from any thread, deterministic.
 #pragma once
@@ -26,41 +27,41 @@ struct ThetaInformation {
   Eigen::VectorXd eta;     // D
 };
 
-// The same information by the offset from another point: with
-// b = point [-] theta0, theta [-] theta0 = b + J_r(b)^-1 (theta [-] point) to
-// first order, where J_r stands on the rotations alone. `point` must have the
-// shape of information.theta0.
+// Transports the same information to the offset from another point: with b =
+// point [-] theta0, theta [-] theta0 = b + J_r(b)^-1 (theta [-] point) to first
+// order, where J_r acts on the rotations only. `point` must have the shape of
+// information.theta0.
 ThetaInformation Transport(const SegmentInformation& information,
                            const Calibration& point);
 
-// With a reach [reference sigmas] up to here, the covariance of the fused
-// estimate tells how far it is from the truth (docs/evaluation.md).
+// Up to this reach [reference sigmas], the covariance of the fused estimate
+// states its actual error (docs/evaluation.md).
 inline constexpr double kEnoughReach = 0.5;
 
 struct FusedEstimate {
   Calibration theta;
-  // D x D, tangent at theta: of the data and the prior. Zero rows for
-  // components that the rig holds fixed.
+  // D x D, tangent at theta: covariance given the data and the prior. Rows of
+  // components that the rig holds fixed are zero.
   Eigen::MatrixXd covariance;
-  // Of the data alone, as of one segment.
+  // Rank of the data alone, as for one segment.
   int rank = 0;
   std::vector<UnobservedDirection> unobserved;
   int segments = 0;
-  // How much more the segments differ than their information says: the sum of
-  // (theta_i [-] theta)^2, weighted by what each knows, against its
-  // expectation. 1 where the noise is that of the rig, whatever the reach:
-  // segments that were all scored at the same wrong calibration are wrong
-  // together. 0 without segments.
+  // Ratio of the differences among the segments to those that their information
+  // predicts: the sum of (theta_i [-] theta)^2, weighted by the information of
+  // each, over its expectation. It is 1 if the noise is that of the rig,
+  // regardless of the reach: segments that were all scored at the same wrong
+  // calibration have a common error. 0 without segments.
   double heterogeneity = 0;
-  // From the calibration at which a segment was scored to the estimate, in
-  // reference sigmas: rms over the free components, the largest of all
-  // segments. 0 without segments.
+  // Distance from the calibration at which a segment was scored to the
+  // estimate, in reference sigmas: rms over the free components, maximum over
+  // the segments. 0 without segments.
   double reach = 0;
 };
 
-// The sum of all segments and of the rig's prior about rig.factory. Segments
-// may have been scored at different calibrations; each must have the shape of
-// rig.factory. Fixed components keep the factory's value.
+// Sums the information of all segments and of the rig's prior about
+// rig.factory. Segments may have been scored at different calibrations; each
+// must have the shape of rig.factory. Fixed components keep the factory value.
 FusedEstimate Fuse(const Rig& rig,
                    std::span<const SegmentInformation> segments);
 

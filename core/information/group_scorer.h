@@ -1,6 +1,6 @@
-// The scores that follow from the information of theta alone. A workspace:
-// nothing is allocated for a rig whose groups have the sizes of the last one,
-// where every direction is observed.
+// Scores that follow from the information about theta alone. A workspace: it
+// allocates nothing for a rig whose groups have the sizes of the last one, if
+// every direction is observed.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -15,10 +15,11 @@
 
 namespace selfcal {
 
-// Symmetric positive definite matrices of one size.
+// Cholesky factorisation of symmetric positive definite matrices of one size.
 class DefiniteMatrix {
  public:
-  // False, and nothing else may be asked, where it is not positive definite.
+  // Returns false if the matrix is not positive definite; the other functions
+  // must then not be called.
   template <class Matrix>
   bool Factor(const Matrix& matrix) {
     llt_.compute(matrix);
@@ -45,13 +46,13 @@ class DefiniteMatrix {
 class GroupScorer {
  public:
   // `information` is that of the free components in units of the prior,
-  // symmetric, positive semidefinite.
+  // symmetric and positive semidefinite.
   void Score(const RigComponents& components,
              const Eigen::MatrixXd& information,
              std::vector<GroupScore>* scores);
 
-  // Of a block of such information: AnalyseObservability without its price
-  // where every direction is observed.
+  // Analyses the observability of a block of such information: as
+  // AnalyseObservability, but without its cost if every direction is observed.
   void Observe(const Eigen::MatrixXd& information,
                std::span<const std::string> names,
                int* rank,

@@ -13,13 +13,13 @@ namespace {
 // Median of the norm of a two-dimensional normal vector of unit sigma.
 constexpr double kMedianOfRayleigh = 1.1774100225154747;
 constexpr double kManyOutliers = 0.2;
-// The first step does nearly all: under a calibration that is off as a
-// factory's, it takes the median residual from 8 px to 2 px.
+// The first step does nearly everything: with a calibration as inaccurate as a
+// factory calibration, it reduces the median residual from 8 px to 2 px.
 constexpr int kMaxSteps = 2;
 constexpr double kHuberSigmas = 2.0;
 // Relative to the distance from the first keyframe that sees the landmark.
 constexpr double kDistancePrior = 0.5;
-// A step that promises less than this of chi-square is not worth its price.
+// A step with a smaller expected decrease of chi-square is not worth its cost.
 constexpr double kNegligibleDecrease = 1;
 
 bool Projects(double square) { return square >= 0; }
@@ -50,7 +50,7 @@ void InlierSelector::StartLandmarks(const MotionSegment& segment,
   }
 }
 
-// Sums and squares of the landmarks that move, at their trial points.
+// Sums and squares of the moving landmarks, at their trial points.
 void InlierSelector::Evaluate(const Calibration& theta0,
                               double pixel_sigma_px,
                               const MotionSegment& segment,
@@ -75,7 +75,8 @@ void InlierSelector::Evaluate(const Calibration& theta0,
   }
 }
 
-// The next trial point of each landmark that still moves. Whether one does.
+// Computes the next trial point of each moving landmark. Returns true if there
+// is one.
 bool InlierSelector::ProposeSteps(const MotionSegment& segment) {
   bool any = false;
   for (std::size_t m = 0; m < moving_.size(); ++m) {
@@ -103,7 +104,7 @@ bool InlierSelector::ProposeSteps(const MotionSegment& segment) {
   return any;
 }
 
-// Keeps what a trial improved; what it did not, no longer moves.
+// Accepts trial points that are better; the other landmarks stop moving.
 void InlierSelector::TakeSteps(const ObservationOrder& order) {
   for (std::size_t m = 0; m < moving_.size(); ++m) {
     if (!moving_[m]) continue;
@@ -122,8 +123,8 @@ void InlierSelector::TakeSteps(const ObservationOrder& order) {
   }
 }
 
-// Of the norms [px]; zero where nothing projects. All but what lies about the
-// median of a sample is counted, not sorted.
+// Median of the norms [px]; zero if nothing projects. Only values near the
+// median of a sample are sorted, the others are counted.
 double InlierSelector::MedianOfProjected() {
   constexpr std::size_t kStep = 29;
   sorted_.clear();

@@ -1,5 +1,6 @@
-// Which observations of a segment a score stands on, and where its landmarks
-// are linearised. Pure, deterministic for one width of vectors.
+// Selection of the observations of a segment that its score is based on, and of
+// the points at which its landmarks are linearised. Pure, deterministic for one
+// width of vectors.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,34 +18,35 @@
 namespace selfcal {
 
 struct InlierSelection {
-  // In G [m], one for each landmark of the segment: refined where that lowers
-  // the robust reprojection error, else as the SLAM system gave it.
+  // Positions in G [m], one for each landmark of the segment: refined if that
+  // reduces the robust reprojection error, else as the SLAM system estimated
+  // them.
   std::vector<Eigen::Vector3d> landmarks;
   // Indices into segment.observations, sorted by (landmark, keyframe, camera).
   std::vector<int> inliers;
-  // All but inertial_rms.
+  // All fields but inertial_rms.
   ResidualStatistics statistics;
 };
 
-// Moves each landmark by up to two Gauss-Newton steps with the keyframes held,
-// so that the noise of a landmark does not hide which of its observations is
-// wrong; then leaves out what does not project, what lies further than
-// options.outlier_gate robust standard deviations (from the median residual of
-// the segment, at least pixel_sigma_px) from its prediction, and landmarks with
-// fewer than two observations left.
+// Moves each landmark by up to two Gauss-Newton steps with the keyframes held
+// constant, so that the noise of a landmark does not hide outliers among its
+// observations. Then it excludes observations that do not project or are
+// further than options.outlier_gate robust standard deviations (estimated from
+// the median residual of the segment, at least pixel_sigma_px) from their
+// prediction, and landmarks with fewer than two remaining observations.
 //
-// A step lowers the Huber cost of a landmark. Its distance is held weakly, to
-// about half of itself, so that a point without parallax stays where it was; a
-// step that loses an observation that projected is not taken.
+// A step decreases the Huber cost of a landmark. A weak prior, with a sigma of
+// about half the distance, holds the distance of the landmark, so that a point
+// without parallax stays in place; a step after which an observation no longer
+// projects is rejected.
 //
-// A workspace for one thread: nothing is allocated once it has seen the largest
-// segment.
+// A workspace for one thread: it allocates nothing after the largest segment.
 class InlierSelector {
  public:
   explicit InlierSelector(VectorWidth width = WidestVectors())
       : kernels_(width) {}
 
-  // `motions` and `order` are those of the segment. The result is good until
+  // `motions` and `order` are those of the segment. The result is valid until
   // the next call.
   const InlierSelection& Select(const Calibration& theta0,
                                 double pixel_sigma_px,
@@ -72,16 +74,15 @@ class InlierSelector {
   ObservationRuns runs_;
   InlierSelection result_;
   std::vector<double> trial_points_;   // 3 for each landmark
-  std::vector<double> trial_squares_;  // of a run
+  std::vector<double> trial_squares_;  // of one run
   std::vector<double> distance_priors_;
   std::vector<char> moving_;
   std::vector<LandmarkSums> sums_, trial_sums_;
-  // Squared residuals [px^2] by observation; negative where it does not
-  // project.
+  // Squared residuals [px^2] by observation; negative if it does not project.
   std::vector<double> squares_, new_squares_, sorted_;
 };
 
-// The same for one segment.
+// Selects the inliers of one segment.
 InlierSelection SelectInliers(const Rig& rig,
                               const Calibration& theta0,
                               const MotionSegment& segment,

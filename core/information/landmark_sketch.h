@@ -1,9 +1,9 @@
-// Which landmarks a segment sees, in a size that can be kept for every segment
-// ever scored: the 256 of smallest hash, a sample that is drawn alike for all
-// segments, so that the overlap of two can be told from their sketches
-// (bottom-k sketch, Cohen and Kaplan 2007). A segment with fewer landmarks is
-// known entirely; of a larger one, shares are known with a standard error of at
-// most 3 % (1 / (2 sqrt(256))).
+// The landmarks of a segment in a size that can be kept for every segment ever
+// scored: the 256 of smallest hash. The sample is drawn in the same way for all
+// segments, so that the overlap of two segments can be estimated from their
+// sketches (bottom-k sketch, Cohen and Kaplan 2007). The sketch of a segment
+// with fewer landmarks is complete; for a larger one, shares have a standard
+// error of at most 3 % (1 / (2 sqrt(256))).
 #pragma once
 
 #include <cstdint>
@@ -29,15 +29,16 @@ struct LandmarkSketch {
                          const LandmarkSketch&) = default;
 };
 
-// One-to-one, and without structure where ids have one (the finaliser of
+// A one-to-one hash that removes any structure of the ids (the finaliser of
 // splitmix64, Steele, Lea and Flood 2014).
 std::uint64_t LandmarkHash(std::uint64_t id);
 
-// The hash up to which the sketch holds every landmark of the segment.
+// Largest hash up to which the sketch contains every landmark of the segment.
 std::uint64_t KnownUpTo(const LandmarkSketch& sketch);
 
-// Of the observations that were used: indices into segment.observations, those
-// of a landmark in one run. Keeps the memory of *sketch.
+// Sketches the landmarks of the observations that were used: indices into
+// segment.observations, with those of a landmark consecutive. Reuses the memory
+// of *sketch.
 void SketchLandmarks(const MotionSegment& segment,
                      std::span<const int> observations,
                      LandmarkSketch* sketch);

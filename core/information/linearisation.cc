@@ -12,16 +12,16 @@ namespace {
 
 constexpr int kKinds = kStateTangentSize / 3;
 
-// The gauge is a prior as well: the rest of the problem does not depend on it,
-// so any proper one gives what removing its four directions does. This size
+// The gauge is also a prior: the rest of the problem does not depend on it, so
+// any proper prior is equivalent to removing its four directions. This sigma
 // keeps the numbers near those of the inertial factors.
 constexpr double kGaugeSigma_m = 1e-3;
 constexpr double kGaugeSigma_rad = 1e-3;
 
 double Information(double sigma) { return 1 / (sigma * sigma); }
 
-// An end is a copy of the state of a keyframe, equal to it but for errors that
-// are small against what the link to the next keyframe leaves uncertain.
+// An end is a copy of the state of a keyframe, equal to it up to errors that
+// are small relative to the uncertainty of the link to the next keyframe.
 constexpr double kEndTieRotation_rad = 1e-6;
 constexpr double kEndTiePosition_m = 1e-6;
 constexpr double kEndTieVelocity_mps = 1e-5;
@@ -54,7 +54,7 @@ ChainStateMatrix MotionPrior() {
   return prior.asDiagonal();
 }
 
-// Holds position and rotation about gravity; the tilt weakly.
+// Holds position and rotation about gravity; constrains the tilt weakly.
 ChainStateMatrix GaugePrior(const KeyframeState& x) {
   ChainStateMatrix prior = ChainStateMatrix::Zero();
   const Eigen::Matrix3d R_IG = x.q_GI.toRotationMatrix().transpose();
@@ -99,7 +99,7 @@ void SegmentLineariser::FindTracks(const MotionSegment& segment,
 }
 
 // Calls use(run, arrays, rows) for the rows of each keyframe and camera, while
-// they are near.
+// they are in the cache.
 template <typename Use>
 void SegmentLineariser::LineariseViews(const Rig& rig,
                                        const Calibration& theta0,
@@ -107,7 +107,7 @@ void SegmentLineariser::LineariseViews(const Rig& rig,
                                        const KeyframeMotions& motions,
                                        const Use& use) {
   for (const ObservationRuns::Run& run : runs_.runs()) {
-    // The kernels may write a whole vector beyond the last.
+    // The kernels may write a whole vector past the last element.
     const std::size_t rows = 2 * (run.end - run.begin + kPanelPad);
     const std::size_t size =
         rows * RowsStride(CameraTangentSize(theta0.cameras[run.camera]));

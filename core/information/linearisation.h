@@ -17,21 +17,20 @@
 
 namespace selfcal {
 
-// Information about the states of the first keyframe of a chain, in the sizes
-// of weak_priors.h: about its velocity and biases; and about what nothing
-// shows, the gauge, which is held.
+// Information about the states of the first keyframe of a chain, with the
+// sigmas of weak_priors.h: about its velocity and biases, and about the gauge,
+// which is unobservable and held constant.
 ChainStateMatrix MotionPrior();
 ChainStateMatrix GaugePrior(const KeyframeState& x);
 
 struct LinearisedSegment {
-  SharedInformation theta;  // of all of its tangent, in its units
+  SharedInformation theta;  // over the whole tangent, in its units
   // Root mean square of the whitened inertial residuals, by kind (rotation,
   // velocity, position, b_a, b_g).
   std::vector<double> inertial_rms;
 };
 
-// A workspace for one thread: nothing is allocated once it has seen the largest
-// segment.
+// A workspace for one thread: it allocates nothing after the largest segment.
 class SegmentLineariser {
  public:
   explicit SegmentLineariser(VectorWidth width = WidestVectors())
@@ -39,9 +38,10 @@ class SegmentLineariser {
 
   // Linearises the inliers, all inertial factors and the weak priors of
   // weak_priors.h at the segment's states, the selection's landmarks and
-  // theta0, and eliminates everything but theta. The keyframe gauge_keyframe is
-  // held in position and in rotation about gravity. `motions` and `order` are
-  // those of the segment. The result is good until the next call.
+  // theta0, and eliminates everything but theta. The position of keyframe
+  // gauge_keyframe and its rotation about gravity are held constant. `motions`
+  // and `order` are those of the segment. The result is valid until the next
+  // call.
   const LinearisedSegment& Eliminate(const Rig& rig,
                                      const Calibration& theta0,
                                      const MotionSegment& segment,
@@ -50,10 +50,10 @@ class SegmentLineariser {
                                      const ObservationOrder& order,
                                      int gauge_keyframe);
 
-  // The same without priors on states, down to theta and the states of the
-  // first and the last keyframe, in this order: information about D + 30
-  // unknowns, of which position and rotation about gravity of both keyframes
-  // together are free.
+  // As Eliminate, but without priors on states, and down to theta and the
+  // states of the first and the last keyframe, in this order: information about
+  // D + 30 unknowns. The position of both keyframes together and their rotation
+  // about gravity are free.
   const LinearisedSegment& EliminateToEnds(const Rig& rig,
                                            const Calibration& theta0,
                                            const MotionSegment& segment,
@@ -61,7 +61,8 @@ class SegmentLineariser {
                                            const InlierSelection& selection,
                                            const ObservationOrder& order);
 
-  // The same factors without their elimination: what a benchmark compares with.
+  // Linearises the same factors without eliminating them; a baseline for
+  // benchmarks.
   void LineariseAlone(const Rig& rig,
                       const Calibration& theta0,
                       const MotionSegment& segment,
@@ -82,7 +83,7 @@ class SegmentLineariser {
   void LineariseLinks(const Rig& rig,
                       const Calibration& theta0,
                       const MotionSegment& segment);
-  // All factors but those of links, for a chain with so many kept unknowns.
+  // Adds all factors but the links, for a chain with this many kept unknowns.
   void StartChain(const Rig& rig,
                   const Calibration& theta0,
                   const MotionSegment& segment,
@@ -99,9 +100,9 @@ class SegmentLineariser {
   ObservationRuns runs_;
   std::vector<double> points_;  // homogeneous p_G of the landmarks, 4 each
   std::vector<int> camera_sizes_;
-  // The inliers as the elimination counts them: by landmark.
+  // Inliers in the order of the elimination: by landmark.
   std::vector<int> tracks_, track_keyframes_;
-  std::vector<int> factor_of_observation_;  // -1 for what is no inlier
+  std::vector<int> factor_of_observation_;  // -1 for an outlier
   std::vector<int> factors_;                // by view
   std::vector<double> rows_;                // of one run
   std::vector<InertialLinkStates> links_;

@@ -1,7 +1,6 @@
-// The observations of a segment in the two orders that its score walks through:
-// by keyframe and camera, in which they are evaluated, and by landmark, in
-// which they are eliminated. A workspace: finding the orders of the next
-// segment keeps the memory.
+// The observations of a segment in the two orders that a score needs: by
+// keyframe and camera, for their evaluation, and by landmark, for the
+// elimination. A workspace: sorting the next segment reuses the memory.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +20,7 @@ class ObservationOrder {
 
   // Indices into segment.observations, sorted by (landmark, keyframe, camera).
   std::span<const int> ByLandmark() const { return by_landmark_; }
-  // Those of one landmark.
+  // Part of ByLandmark() that belongs to one landmark.
   std::span<const int> Track(int landmark) const {
     return ByLandmark().subspan(
         track_begin_[landmark],
@@ -35,10 +34,11 @@ class ObservationOrder {
   std::vector<int> by_view_, begin_;
 };
 
-// Some of the observations, by view, as the kernels take them.
+// A subset of the observations, by view, in the form that the kernels need.
 class ObservationRuns {
  public:
-  // Those with keep(index into segment.observations), in the order given.
+  // Selects those with keep(index into segment.observations), in the given
+  // order.
   template <typename Keep>
   void Select(const MotionSegment& segment,
               std::span<const int> by_view,
@@ -66,11 +66,11 @@ class ObservationRuns {
   struct Run {
     int keyframe;
     int camera;
-    int begin;  // among the selected ones
+    int begin;  // index among the selected ones
     int end;
   };
   std::span<const Run> runs() const { return runs_; }
-  // Of the selected ones, indices into segment.observations.
+  // Indices of the selected ones into segment.observations.
   std::span<const int> indices() const { return indices_; }
 
   ObservationRun Arrays(const Run& run,

@@ -1,5 +1,5 @@
-// What a score needs of a rig, found once: its free components, their scales,
-// names and groups.
+// The properties of a rig that a score needs, computed once: its free
+// components, their scales, names and groups.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@ class RigComponents {
  public:
   struct Group {
     std::string name;
-    std::vector<int> at;             // among the free components, sorted
+    std::vector<int> at;  // indices among the free components, sorted
     std::vector<std::string> names;  // of its components
     double log_scale = 0;            // sum of ln(prior / reference)
   };
@@ -22,21 +22,21 @@ class RigComponents {
   RigComponents() = default;
   explicit RigComponents(const Rig& rig);
 
-  // Whether this is what the rig's constructor would give.
+  // Returns true if the constructor would give the same for `rig`.
   bool Fits(const Rig& rig) const;
 
   int size() const { return static_cast<int>(prior_.size()); }
   const std::vector<int>& free() const { return free_; }
   const std::vector<std::string>& free_names() const { return free_names_; }
   const Eigen::VectorXd& prior() const { return prior_; }  // of all components
-  // Of each camera.
+  // One for each camera.
   const std::vector<char>& estimated_time_offsets() const {
     return estimated_time_offsets_;
   }
   const std::vector<Group>& groups() const { return groups_; }
 
  private:
-  // What all of this follows from.
+  // Settings from which all of this is derived.
   std::vector<DistortionModel> models_;
   std::vector<ParameterGroup> group_settings_;
   std::vector<ComponentSetting> prior_sigmas_;

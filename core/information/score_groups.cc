@@ -10,10 +10,11 @@
 namespace selfcal {
 namespace {
 
-// Less information than this part of the prior's, a sigma over a thousand times
-// the prior's, is none: the entropy without a prior does not exist there.
+// Information below this fraction of the prior's, a sigma over a thousand times
+// the prior's, is treated as none: the entropy without a prior does not exist.
 constexpr double kUndetermined = 1e-6;
-// A group is determined if it has no larger share in an undetermined direction.
+// A group is determined if its share in every undetermined direction is at most
+// this.
 constexpr double kShare = 1e-6;
 
 // 1/2 ln det of a symmetric positive definite matrix.
@@ -28,7 +29,7 @@ double Constant(std::size_t k) {
          std::log(2 * std::numbers::pi * std::numbers::e);
 }
 
-// Of the free components, in units of the prior.
+// Information of the free components, in units of the prior.
 Eigen::MatrixXd Normalise(const RigComponents& components,
                           const Eigen::MatrixXd& Lambda) {
   const std::vector<int>& free = components.free();

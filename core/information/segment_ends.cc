@@ -9,7 +9,7 @@
 namespace selfcal {
 namespace {
 
-// Samples before the last keyframe: the integration looks at neighbours.
+// Samples before the last keyframe, which the integration needs as neighbours.
 constexpr int kSamplesBefore = 2;
 
 std::vector<ImuSample> Tail(const MotionSegment& segment) {

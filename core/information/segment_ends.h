@@ -1,15 +1,16 @@
-// The information of a segment about theta and about the states of its first
-// and its last keyframe, small enough to be kept when the data is gone.
+// The information of a segment about theta and the states of its first and last
+// keyframe, small enough to be kept when the data is gone.
 //
-// By themselves, segments do not know tilt, velocity and biases at their first
-// keyframe, and what they say about theta alone (segment_information.h) does
-// without what their neighbours know of these: summed over a session it claims
+// A single segment does not observe tilt, velocity and biases at its first
+// keyframe. Its information about theta alone (segment_information.h) lacks
+// what its neighbours know about these states: the sum over a session gives
 // sigmas of 1.05 to 1.6 times those of a calibration on all data. With both
 // ends, neighbours can be joined later as if they were one segment
-// (session_chain.h); what is left out then is that landmarks continue, which
-// is worth 4 to 10 %.
+// (session_chain.h); this neglects only that landmarks continue from one to the
+// next, which is worth 4 to 10 %.
 //
-// Pure functions, any thread, deterministic for one width of vectors.
+// Pure functions, callable from any thread, deterministic for one width of
+// vectors.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,25 +23,26 @@
 
 namespace selfcal {
 
-// Unknowns of the two states, 15 each.
+// Dimension of the two states, 15 each.
 inline constexpr int kEndUnknowns = 30;
 
 struct SegmentEnds {
   SegmentKey key;
-  // Where it was linearised.
+  // Linearisation point.
   Calibration theta0;
   KeyframeState first, last;
-  // Over D + kEndUnknowns: theta [-] theta0, then the offsets of both states.
-  // Of the data alone; zero rows for components that the rig holds fixed.
+  // Information about D + kEndUnknowns: theta [-] theta0, then the offsets of
+  // both states. It is that of the data alone; rows of components that the rig
+  // holds fixed are zero.
   Eigen::MatrixXd Lambda;
   Eigen::VectorXd eta;
-  // About and after the last keyframe: up to the first keyframe of the next
-  // segment, where that follows directly.
+  // Samples about and after the last keyframe: up to the first keyframe of the
+  // next segment, if that follows directly.
   std::vector<ImuSample> tail;
 };
 
-// As ScoreSegment(), of the same inliers. The segment must be valid for the
-// rig.
+// Computes the ends of a segment from the same inliers as ScoreSegment(). The
+// segment must be valid for the rig.
 SegmentEnds SummariseEnds(const Rig& rig,
                           const Calibration& theta0,
                           const MotionSegment& segment,

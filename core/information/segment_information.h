@@ -1,5 +1,5 @@
-// What one segment says about theta (section IV-A of the paper), as a value of
-// a few kilobytes that is kept for every segment ever scored.
+// The information of one segment about theta (section IV-A of the paper), as a
+// value of a few kilobytes that is kept for every segment ever scored.
 //
 // All matrices are in the tangent units of calibration.h. Pure functions of
 // their arguments, callable from any thread, deterministic to the bit.
@@ -17,36 +17,39 @@
 
 namespace selfcal {
 
-// A direction of theta of which the data says less than the prior: a unit
-// vector in units of the prior's sigmas, given by its largest parts.
+// An unobservable direction of theta, about which the data has less information
+// than the prior: a unit vector in units of the prior's sigmas, given by its
+// largest parts.
 struct UnobservedDirection {
   struct Part {
     std::string component;
     double weight;
   };
-  std::vector<Part> parts;   // largest first; at least 90 % of the square
-  double information_ratio;  // of the data against the prior, in [0, 1)
+  std::vector<Part> parts;   // largest first; at least 90 % of the squared norm
+  double information_ratio;  // of the data relative to the prior, in [0, 1)
 };
 
 // The score of one group q of k components.
 struct GroupScore {
   std::string group;
   int size = 0;  // k
-  // H_q of the posterior, normalised by sigma_ref [nat]; lower is richer.
+  // H_q of the posterior, normalised by sigma_ref [nat]; lower is more
+  // informative.
   double entropy = 0;
   // H_q of the prior minus H_q of the posterior [nat], >= 0.
   double gain = 0;
-  // Directions of the group in which the data says more than the prior.
+  // Number of directions of the group with more information from the data than
+  // from the prior.
   int rank = 0;
   std::vector<UnobservedDirection> unobserved;  // size - rank of them
 };
 
-// Real recordings with states as a SLAM system gives them and noise as their
-// makers state it fit to within this factor. Beyond it a segment is not what
-// its factors take it for, and its information counts for less, by the square
-// of the excess.
+// Real recordings with states from a SLAM system and noise as specified by the
+// manufacturer have a fit within this factor. Beyond it, the factors do not
+// model the segment well, and its information is reduced by the square of the
+// excess.
 inline constexpr double kOrdinaryFit = 2;
-// With fewer rows to spare, a fit is not measured.
+// With less redundancy, a fit is not measured.
 inline constexpr double kLeastFitRedundancy = 50;
 
 struct ResidualStatistics {
@@ -61,14 +64,15 @@ struct ResidualStatistics {
   // Root mean square of the whitened inertial residuals, by kind:
   // (rotation, velocity, position, b_a, b_g).
   std::vector<double> inertial_rms;
-  // Steps between IMU samples with room for more (core/factor/sampling.h).
+  // Intervals between IMU samples in which samples are missing
+  // (core/factor/sampling.h).
   int imu_gaps = 0;
   double longest_imu_gap_s = 0;
-  // Root of what the squares of all whitened residuals keep at the linear
-  // minimum over states, landmarks and theta, over their expectation: 1 where
-  // motion, noise and model are as stated. 0: not measured.
+  // Root of the remaining squared whitened residuals at the linear minimum over
+  // states, landmarks and theta, over their expectation: 1 if motion, noise and
+  // model are as stated. 0: not measured.
   double fit = 0;
-  // More than 20 % of the observations were left out.
+  // More than 20 % of the observations were excluded.
   bool many_outliers = false;
 };
 
@@ -80,36 +84,38 @@ struct SegmentInformation {
   std::vector<UnobservedDirection> unobserved;
   std::vector<GroupScore> groups;  // in the order of rig.groups
   ResidualStatistics residuals;
-  LandmarkSketch landmarks;  // that are used
+  LandmarkSketch landmarks;  // those that are used
 };
 
 struct ScoreOptions {
-  int gauge_keyframe = 0;  // carries the fix of position and yaw
+  int gauge_keyframe = 0;  // holds the gauge: position and yaw
   // Observations with a residual over this many robust standard deviations
-  // (from the median) are left out; landmarks with fewer than two left are too.
+  // (estimated from the median) are excluded; so are landmarks with fewer than
+  // two remaining ones.
   double outlier_gate = 5.0;
 };
 
 // Linearises all factors of the segment at its own states and theta0, whitens
 // them, eliminates landmarks and keyframes, and scores every group of the rig.
-// The segment must be valid for the rig. Components that the rig holds fixed
-// have zero rows in Lambda and eta. Where the segment fits worse than
+// The segment must be valid for the rig. Rows of Lambda and eta are zero for
+// components that the rig holds fixed. If the fit of the segment exceeds
 // kOrdinaryFit, both are divided by the square of the excess.
 SegmentInformation ScoreSegment(const Rig& rig,
                                 const Calibration& theta0,
                                 const MotionSegment& segment,
                                 const ScoreOptions& options = {});
 
-// The scores that follow from Lambda alone: used by ScoreSegment, and again
-// where the groups of a rig or its prior change.
+// Computes the scores, which follow from Lambda alone: used by ScoreSegment,
+// and again when the groups of a rig or its prior change.
 std::vector<GroupScore> ScoreGroups(const Rig& rig,
                                     const Eigen::MatrixXd& Lambda);
 
 // H = 1/2 ln((2 pi e)^k det Sigma_bar) of a covariance normalised by sigma_ref.
 double Entropy(const Eigen::MatrixXd& Sigma, const Eigen::VectorXd& sigma_ref);
 
-// Entropies without a prior, the paper's form, one for each group; a group with
-// a direction that the data does not determine has none (NaN is never used).
+// Computes entropies without a prior, as in the paper, one for each group;
+// nullopt for a group with a direction that the data does not determine (NaN is
+// never used).
 std::vector<std::optional<double>> EntropiesWithoutPrior(
     const Rig& rig, const Eigen::MatrixXd& Lambda);
 

@@ -1,8 +1,8 @@
-// The residuals of a segment one by one, as its score takes them: what a person
-// looks at to see which of them are large. States are those of the SLAM system,
-// landmarks those of InlierSelection; nothing is calibrated.
+// Individual residuals of a segment as its score uses them, for a person who
+// looks for large ones. States are those of the SLAM system, landmarks those of
+// InlierSelection; nothing is estimated.
 //
-// Pure, any thread, deterministic for one width of vectors.
+// Pure, callable from any thread, deterministic for one width of vectors.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,14 +17,15 @@
 namespace selfcal {
 
 struct ObservationResidual {
-  bool projects = false;  // else there is no residual
+  bool projects = false;  // otherwise there is no residual
   bool inlier = false;    // used in a score
   Eigen::Vector2d residual_px =
       Eigen::Vector2d::Zero();  // predicted - measured
 };
 
-// Between a keyframe and the next. Parts as EvaluateInertial has them: rotation
-// [rad], velocity [m/s], position [m], steps of the biases [m/s^2], [rad/s].
+// Residual between consecutive keyframes. Parts as in EvaluateInertial:
+// rotation [rad], velocity [m/s], position [m], steps of the biases [m/s^2],
+// [rad/s].
 struct IntervalResidual {
   InertialResidual residual;
   InertialResidual whitened;  // in standard deviations, without correlations
@@ -33,11 +34,11 @@ struct IntervalResidual {
 struct SegmentResiduals {
   std::vector<ObservationResidual> observations;  // as in the segment
   std::vector<IntervalResidual> intervals;
-  ResidualStatistics statistics;  // as of a score
+  ResidualStatistics statistics;  // as in a score
 };
 
-// The segment must be valid for the rig, and theta have the shape of the
-// factory's calibration.
+// The segment must be valid for the rig, and theta must have the shape of the
+// factory calibration.
 SegmentResiduals EvaluateResiduals(const Rig& rig,
                                    const Calibration& theta,
                                    const MotionSegment& segment,

@@ -9,15 +9,16 @@
 namespace selfcal {
 namespace {
 
-// Reprojections: two rows for each, in units of the pixel sigma.
+// Sum of squares of the reprojections: two rows for each, in units of the pixel
+// sigma.
 double PixelSquares(const ResidualStatistics& residuals,
                     double pixel_sigma_px) {
   const double rms = residuals.reprojection_rms_px / pixel_sigma_px;
   return residuals.inliers * rms * rms;
 }
 
-// Rows less unknowns: pixels and inertial links against landmarks, states
-// without the gauge, and what is known of theta.
+// Rows minus unknowns: pixels and inertial links minus landmarks, states
+// without the gauge, and observed directions of theta.
 double Redundancy(const MotionSegment& segment,
                   const ResidualStatistics& residuals,
                   int rank) {
@@ -28,8 +29,8 @@ double Redundancy(const MotionSegment& segment,
          kGauge - rank;
 }
 
-// Information is never negative; what the elimination leaves below zero is
-// rounding.
+// Information is never negative; negative eigenvalues after the elimination are
+// rounding errors.
 Eigen::MatrixXd WithoutNegativePart(const Eigen::MatrixXd& Lambda) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Lambda);
   if (eigen.eigenvalues().minCoeff() >= 0) return Lambda;
@@ -42,8 +43,8 @@ Eigen::MatrixXd WithoutNegativePart(const Eigen::MatrixXd& Lambda) {
 
 }  // namespace
 
-// What of all squares is left at the linear minimum, theta within its prior.
-// Returns what the information counts for.
+// Measures the remaining squares at the linear minimum, with theta constrained
+// by its prior. Returns the weight of the information.
 double SegmentScorer::MeasureFit(const Rig& rig,
                                  const MotionSegment& segment,
                                  const SharedInformation& theta,
@@ -110,7 +111,7 @@ void SegmentScorer::Score(const Rig& rig,
   result->residuals.longest_imu_gap_s = gaps.longest_s;
   SketchLandmarks(segment, selection.inliers, &result->landmarks);
 
-  // In units of the prior, over the free components.
+  // Over the free components, in units of the prior.
   const std::vector<int>& free = components_.free();
   const Eigen::VectorXd& prior = components_.prior();
   const auto size = static_cast<Eigen::Index>(free.size());
@@ -141,7 +142,8 @@ void SegmentScorer::Score(const Rig& rig,
   result->Lambda.setZero(prior.size(), prior.size());
   result->eta.setZero(prior.size());
   for (Eigen::Index j = 0; j < size; ++j) {
-    // Coefficient by coefficient, so that it stays symmetric to the bit.
+    // Each coefficient is scaled alone, so that the matrix stays symmetric to
+    // the bit.
     for (Eigen::Index i = 0; i < size; ++i) {
       result->Lambda(free[i], free[j]) =
           normalised_(i, j) / (prior(free[i]) * prior(free[j]));

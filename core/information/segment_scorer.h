@@ -1,7 +1,6 @@
-// Scores segments: ScoreSegment() of segment_information.h with the memory that
-// it works in, for one thread. Nothing is allocated once it has seen the
-// largest segment of a rig, but for the names of directions that a segment does
-// not observe.
+// Scores segments: ScoreSegment() of segment_information.h with a reusable
+// workspace, for one thread. After the largest segment of a rig it allocates
+// nothing except the names of unobservable directions.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +19,7 @@ namespace selfcal {
 
 class SegmentScorer {
  public:
-  // Does what SegmentLineariser::Eliminate does, in another way.
+  // An alternative implementation of SegmentLineariser::Eliminate.
   using Elimination =
       std::function<LinearisedSegment(const Rig& rig,
                                       const Calibration& theta0,
@@ -30,7 +29,7 @@ class SegmentScorer {
 
   explicit SegmentScorer(VectorWidth width = WidestVectors())
       : selector_(width), lineariser_(width) {}
-  // Scores by that elimination in place of the structured one.
+  // Uses `elimination` instead of the structured one.
   explicit SegmentScorer(Elimination elimination)
       : elimination_(std::move(elimination)) {}
 
@@ -53,7 +52,7 @@ class SegmentScorer {
                                      const InlierSelection& selection,
                                      int gauge_keyframe);
 
-  Elimination elimination_;       // none: the structured one
+  Elimination elimination_;       // empty: the structured one
   LinearisedSegment eliminated_;  // by elimination_
   ObservationOrder order_;
   KeyframeMotions motions_;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kState = kStateTangentSize;
 
-// The information of a segment about theta [-] point and its ends.
+// Information of a segment about theta [-] point and its ends.
 ThetaInformation About(const Calibration& point, const SegmentEnds& segment) {
   const Eigen::VectorXd b = BoxMinus(point, segment.theta0);
   const auto D = b.size();
@@ -21,7 +21,7 @@ ThetaInformation About(const Calibration& point, const SegmentEnds& segment) {
           M.transpose() * (segment.eta - segment.Lambda.leftCols(D) * b)};
 }
 
-// Lambda and eta over all but the unknowns [begin, begin + count).
+// Lambda and eta after elimination of the unknowns [begin, begin + count).
 ThetaInformation Eliminated(const Eigen::MatrixXd& Lambda,
                             const Eigen::VectorXd& eta,
                             int begin,
@@ -30,7 +30,8 @@ ThetaInformation Eliminated(const Eigen::MatrixXd& Lambda,
   for (int i = 0; i < static_cast<int>(eta.size()); ++i) {
     (i >= begin && i < begin + count ? gone : rest).push_back(i);
   }
-  // Of unit diagonal: the units of states differ by far.
+  // Scaled to a unit diagonal: the units of states differ by orders of
+  // magnitude.
   const Eigen::VectorXd scale =
       Lambda.diagonal()(gone).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd inner =
@@ -56,7 +57,7 @@ SessionChain::SessionChain(const Rig& rig, const Calibration& point)
 void SessionChain::Add(const SegmentEnds& segment, double weight) {
   const bool same_session = end_ && end_->key.session == segment.key.session;
   if (end_ && !same_session) Eliminate(theta_, kState);
-  // Over theta, the newest state where the session goes on, and both ends.
+  // Over theta, the newest state if the session continues, and both ends.
   const int before = same_session ? kState : 0;
   const int size = theta_ + before + 2 * kState;
   const int first = theta_ + before;
@@ -137,8 +138,9 @@ void SessionChain::Eliminate(int begin, int count) {
   eta_ = std::move(rest.eta);
 }
 
-// With w the walk, theta + w is what is asked for from now on: the information
-// about it is what remains when w, known to its variances, is eliminated.
+// With w the walk, theta + w is the quantity of interest from now on: its
+// information is what remains after w, with its variances as a prior, is
+// eliminated.
 void SessionChain::Age(const Eigen::VectorXd& variances) {
   std::vector<int> walking;
   for (int i = 0; i < theta_; ++i) {

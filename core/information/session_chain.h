@@ -1,10 +1,11 @@
-// What segments say together about theta, joined at their ends: a filter over
-// theta and the state of the newest keyframe, which takes a segment at a time.
+// The joint information of segments about theta, joined at their ends: a filter
+// over theta and the state of the newest keyframe, to which segments are added
+// one at a time.
 //
 // Segments of a session that follow each other directly are joined by the IMU
-// samples between them; over a gap, their biases by the random walk; sessions
-// by theta alone. Landmarks that continue from one segment to the next are two
-// landmarks here.
+// samples between them; across a gap, their biases are joined by the random
+// walk; sessions are joined by theta alone. A landmark that continues from one
+// segment to the next is modelled as two landmarks.
 //
 // One object is for one thread. Deterministic.
 #pragma once
@@ -21,19 +22,20 @@ namespace selfcal {
 
 class SessionChain {
  public:
-  // Information is about theta [-] point.
+  // The information is about theta [-] point.
   SessionChain(const Rig& rig, const Calibration& point);
 
-  // Segments in the order of time, each session in one run. `weight` in (0, 1]
-  // is a factor on all that the segment says: the inverse of one on its
-  // covariance. The segment must have the shape of the rig.
+  // Adds a segment. Segments come in the order of time, with those of a session
+  // consecutive. `weight` in (0, 1] scales all information of the segment: its
+  // inverse scales the covariance. The segment must have the shape of the rig.
   void Add(const SegmentEnds& segment, double weight = 1);
 
-  // theta random-walks by these variances (D, tangent units): what was added
-  // so far says less of what it is from now on.
+  // Adds a random walk of theta with these variances (D, tangent units):
+  // segments added before have less information about theta from now on.
   void Age(const Eigen::VectorXd& variances);
 
-  // Of all segments so far, the states of the newest eliminated.
+  // Information of all segments so far, with the state of the newest keyframe
+  // eliminated.
   ThetaInformation Theta() const;
 
  private:
@@ -52,7 +54,7 @@ class SessionChain {
   const Calibration point_;
   const int theta_;  // D
   // Over theta and the state of the newest keyframe, if there is one; while a
-  // segment is added also over its ends.
+  // segment is being added, also over its ends.
   Eigen::MatrixXd Lambda_;
   Eigen::VectorXd eta_;
   std::optional<End> end_;

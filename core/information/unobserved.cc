@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kObserved = 1.0;
 constexpr double kPartsOfSquare = 0.9;
-// Diagonal entries of a projector that differ by less are equal, and the first
-// component wins: rounding does not choose.
+// Diagonal entries of a projector that differ by less are treated as equal, and
+// the first component is chosen, so that rounding does not decide.
 constexpr double kTie = 1e-6;
 
 int FirstLargest(const Eigen::VectorXd& values) {
@@ -22,7 +22,8 @@ int FirstLargest(const Eigen::VectorXd& values) {
 }
 
 // Orthonormal basis of the span of the columns of U: Cholesky with pivoting of
-// the projector U U^T, whose columns are the unit vectors cast on the span.
+// the projector U U^T, whose columns are the unit vectors projected on the
+// span.
 std::vector<Eigen::VectorXd> AlignedBasis(const Eigen::MatrixXd& U) {
   Eigen::MatrixXd projector = U * U.transpose();
   std::vector<Eigen::VectorXd> basis;

@@ -1,13 +1,14 @@
-// The very weak proper priors under the score, centred at the linearisation
-// point: they make every problem positive definite, also that of a device at
-// rest or without a single observation. Each is a standard deviation far beyond
-// what a device could show in a segment, and far beyond what theta's own prior
-// could explain: at rest, a scale of the accelerometer that is off by 0.4 looks
-// like a bias of 4 m/s^2, and must not be told from one.
+// Very weak proper priors of a score, centred at the linearisation point. They
+// make every problem positive definite, also for a device at rest or without a
+// single observation. Each is a standard deviation far beyond any possible
+// value within a segment, and far beyond what theta's own prior could explain:
+// at rest, a scale error of the accelerometer of 0.4 looks like a bias of 4
+// m/s^2, and must remain indistinguishable from it.
 //
-// Velocity and biases have it on the first keyframe alone, from where the
-// inertial factors carry it on: on every keyframe it would grow with their
-// number. Tilt has it on the keyframe that carries the gauge.
+// Velocity and biases have a prior on the first keyframe only, from which the
+// inertial factors propagate it: with one on every keyframe, its weight would
+// grow with their number. Tilt has a prior on the keyframe that holds the
+// gauge.
 #pragma once
 
 namespace selfcal {
@@ -16,8 +17,8 @@ inline constexpr double kLandmarkPriorSigma_m = 1e3;
 inline constexpr double kVelocityPriorSigma_mps = 1e2;
 inline constexpr double kAccelBiasPriorSigma_mps2 = 1e2;
 inline constexpr double kGyroBiasPriorSigma_radps = 10;
-// Of roll and pitch: needed in free fall only, where nothing shows which way is
-// down.
+// Sigma of roll and pitch: needed in free fall only, where gravity is
+// unobservable.
 inline constexpr double kTiltPriorSigma_rad = 10;
 
 }  // namespace selfcal

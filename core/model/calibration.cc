@@ -127,8 +127,8 @@ bool SameShape(const Calibration& a, const Calibration& b) {
 }
 
 Eigen::VectorXd ReadableValues(const Calibration& theta) {
-  // The deviation from the calibration that is zero in everything: rotations
-  // become Log(q), scalars themselves.
+  // Difference to the calibration in which everything is zero: rotations become
+  // Log(q), scalars remain.
   Calibration zero = theta;
   zero.imu.s_g.setZero();
   zero.imu.m_g.setZero();

@@ -1,12 +1,12 @@
-// theta: everything that selfcal estimates about a device, as one value with a
-// tangent space of named components.
+// theta, the calibration parameters of a device, as one value with a tangent
+// space of named components.
 //
 // Order of the tangent, 15 + sum over cameras of (6 + 4 + distortion + 1):
 //   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3;
 //   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1.
-// Rotations are perturbed on the right (so3.h), all else is added.
-// Source: Schneider et al., ICRA 2017, sections III-B and III-C; the time
-// offset goes beyond it.
+// Rotations are perturbed on the right (so3.h); all other components are
+// additive. Source: Schneider et al., ICRA 2017, sections III-B and III-C; the
+// time offset is an extension.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +18,7 @@
 
 namespace selfcal {
 
-// Bounds what one calibration can make others allocate.
+// Limits the memory that one calibration from a client can claim.
 inline constexpr int kMaxCameras = 16;
 
 inline constexpr int kImuTangentSize = 15;
@@ -34,7 +34,8 @@ inline constexpr int kCameraPosition = 3;
 inline constexpr int kCameraIntrinsics = 6;
 inline constexpr int kCameraDistortion = kCameraIntrinsics + 4;
 
-// theta_i: gyro reads T_g w + b_g, accelerometer T_a R_AI f_I + b_a.
+// theta_i: the gyroscope reads T_g w + b_g, the accelerometer T_a R_AI f_I +
+// b_a.
 struct ImuCalibration {
   Eigen::Vector3d s_g = Eigen::Vector3d::Ones();  // [-]
   Eigen::Vector3d m_g = Eigen::Vector3d::Zero();  // [-]
@@ -53,24 +54,24 @@ struct Calibration {
   std::vector<CameraCalibration> cameras;
 };
 
-// One component of the tangent. The one list of names and units in the
-// project: every table, message and export takes them from here.
+// One component of the tangent. TangentComponents() is the only list of names
+// and units in the project: every table, message and export uses it.
 struct TangentComponent {
   std::string name;  // "imu.gyro.scale.x", "cam0.focal.x", "cam0.p_CI.x"
   std::string unit;  // "-", "rad", "m", "px", "s"
-  // Expected standard deviation after one reference segment, in `unit`; the
-  // same on the axes of a block, so that an entropy does not depend on how a
-  // frame is turned.
+  // Expected standard deviation after one reference segment, in `unit`. It is
+  // the same for all axes of a block, so that an entropy does not depend on the
+  // orientation of a frame.
   double sigma_ref;
 };
 
 // Dimension of the tangent of a calibration.
 int TangentSize(const Calibration& theta);
 
-// Dimension of camera j's part of the tangent, and where it begins.
+// Dimension of the tangent of camera j, and its offset in that of theta.
 int CameraTangentSize(const CameraCalibration& camera);
 int CameraTangentOffset(const Calibration& theta, int camera);
-// Where camera j's time offset is: the last of its part.
+// Index of the time offset of camera j, the last component of its tangent.
 int TimeOffsetComponent(const Calibration& theta, int camera);
 
 // The components in the order of the tangent.
@@ -83,17 +84,18 @@ Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta);
 // distortion models (SameShape). Rotations give Log(R_b^T R_a).
 Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b);
 
-// The derivative of (reference [+] d) [-] theta by d, at theta = reference [+]
-// d: the identity but for the right Jacobians of rotations. Turned round, it
-// takes what is known about the offset from one point to that from another.
+// Derivative of (reference [+] d) [-] theta with respect to d, at theta =
+// reference [+] d. It is the identity except for the right Jacobians of
+// rotations. Its inverse maps an offset from one point to the offset from
+// another.
 Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
                               const Eigen::VectorXd& d);
 
 // Same number of cameras, each with the same distortion model.
 bool SameShape(const Calibration& a, const Calibration& b);
 
-// Value of one component for a person to read: the scalar itself, and for a
-// rotation the component of its rotation vector Log(q) [rad]. Same order.
+// Value of each component for display: the scalar itself, and for a rotation
+// the component of its rotation vector Log(q) [rad]. Order as in the tangent.
 Eigen::VectorXd ReadableValues(const Calibration& theta);
 
 }  // namespace selfcal

@@ -1,4 +1,4 @@
-// Validation of a calibration: what every other room may rely on.
+// Validation of a calibration; all other modules rely on it.
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -11,7 +11,7 @@ namespace selfcal {
 namespace {
 
 constexpr double kQuaternionTolerance = 1e-6;
-// Far beyond any real device; within them nothing overflows.
+// Far beyond any real device; values within these limits do not overflow.
 constexpr double kMaxScale = 10;
 constexpr double kMaxMisalignment = 10;
 constexpr double kMaxPosition_m = 1e3;
@@ -25,7 +25,7 @@ void AddIf(const std::string& field, std::string fault, ViolationList* list) {
   if (!fault.empty()) list->Add(field, std::move(fault));
 }
 
-// What is wrong with numbers that must lie in [0 or beyond, limit].
+// Describes the fault of numbers that must be positive and at most `limit`.
 template <class Vector>
 std::string PositiveFault(const Vector& v, double limit) {
   if (!v.allFinite()) return "is not finite";
@@ -96,7 +96,7 @@ void CheckCamera(const CameraCalibration& camera,
 
 std::vector<Violation> Validate(const Calibration& theta,
                                 const std::string& prefix) {
-  // More cannot come from at most kMaxCameras cameras.
+  // kMaxCameras cameras cannot produce more violations.
   ViolationList list(9 * (kMaxCameras + 1));
   const std::string begin = prefix.empty() ? "" : prefix + ".";
   CheckImu(theta.imu, begin + "imu", &list);

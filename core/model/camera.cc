@@ -8,10 +8,10 @@
 namespace selfcal {
 namespace {
 
-// Parameters up to this cannot overflow; nothing physical is beyond.
+// Parameters up to this cannot overflow; no physical value is larger.
 constexpr double kMaxParameter = 1e9;
 
-// False for NaN.
+// Returns false for NaN.
 bool Usable(double value) { return std::abs(value) <= kMaxParameter; }
 
 bool UsableParameters(const CameraCalibration& camera) {

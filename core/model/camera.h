@@ -3,10 +3,10 @@
 // A point p_C (camera frame, z forward, any positive scale) has the normalised
 // coordinates u = (x/z, y/z), the distorted ones d = distort(u), and the pixel
 //   z_x = f_x d_x + c_x,   z_y = f_y d_y + c_y.
-// Each distortion model is a file of its own (distortion_fov.h, ...) with the
-// same static interface and its mathematics; this header is all that other
-// rooms include. Pure functions, callable from any thread. A point that cannot
-// be projected is reported by the return value, never as a NaN.
+// Each distortion model is a separate file (distortion_fov.h, ...) with the
+// same static interface and the mathematics; other modules include only this
+// header. Pure functions, callable from any thread. A point that cannot be
+// projected is reported by the return value, never as a NaN.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,11 +30,11 @@ int DistortionSize(DistortionModel model);
 // "fov", "radial-tangential", "equidistant".
 std::string_view DistortionName(DistortionModel model);
 
-// Coefficients of a model, at most kMaxDistortion, kept without allocation.
+// Coefficients of a model, at most kMaxDistortion, stored without allocation.
 using DistortionVector =
     Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxDistortion, 1>;
 
-// theta_c of the paper, and the constants of the sensor.
+// theta_c of the paper, and constants of the sensor.
 struct CameraCalibration {
   // T_CI: takes a point from the body frame I to the camera frame C.
   Eigen::Quaterniond q_CI = Eigen::Quaterniond::Identity();
@@ -43,36 +43,37 @@ struct CameraCalibration {
   Eigen::Vector2d c = Eigen::Vector2d::Zero();     // [px]
   DistortionModel model = DistortionModel::kFov;
   DistortionVector distortion = DistortionVector::Zero(1);
-  // t_imu = t_camera + time_offset_s: an image with the stamp t was exposed at
-  // t + time_offset_s on the clock of the IMU.
+  // t_imu = t_camera + time_offset_s: an image with the timestamp t was exposed
+  // at t + time_offset_s on the clock of the IMU.
   double time_offset_s = 0;
-  int width_px = 0;  // of the image; constant, never estimated
+  int width_px = 0;  // of the image; constant, not estimated
   int height_px = 0;
 
-  // f, c and the distortion: the number of columns of d z / d intrinsics.
+  // Size of (f, c, distortion): the number of columns of d z / d intrinsics.
   int IntrinsicsSize() const { return 4 + static_cast<int>(distortion.size()); }
 };
 
-// Derivatives of the pixel, in px per unit of the argument.
+// Derivatives of the pixel coordinates, in px per unit of the argument.
 struct ProjectionJacobians {
-  Eigen::Matrix<double, 2, 3> point;  // by p_C
-  // By (f_x, f_y, c_x, c_y, distortion): 2 x IntrinsicsSize().
+  Eigen::Matrix<double, 2, 3> point;  // with respect to p_C
+  // With respect to (f_x, f_y, c_x, c_y, distortion): 2 x IntrinsicsSize().
   Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxIntrinsics> intrinsics;
 };
 
 // Projects p_C to the pixel *z_px, and fills *jacobians unless it is null.
-// Returns false, leaving both untouched, for a point behind the camera plane or
-// within 1e-6 rad of it, for one outside the region in which the model is
-// one-to-one, and for points or parameters that are not finite or beyond
-// anything physical. Does not look at the borders of the image.
+// Returns false and changes neither for a point behind the camera plane or
+// within 1e-6 rad of it, for a point outside the region in which the model is
+// one-to-one, and for points or parameters that are not finite or are beyond
+// any physical value. It does not check the borders of the image.
 bool Project(const CameraCalibration& camera,
              const Eigen::Vector3d& p_C,
              Eigen::Vector2d* z_px,
              ProjectionJacobians* jacobians);
 
-// The unit bearing in C of a pixel: the inverse of Project up to scale, in
-// closed form for kFov, by a guarded Newton iteration for the others. Returns
-// false, leaving *bearing_C untouched, for a pixel that no point projects to.
+// Computes the unit bearing in C of a pixel: the inverse of Project up to
+// scale, in closed form for kFov, by a safeguarded Newton iteration for the
+// others. Returns false and does not change *bearing_C for a pixel to which no
+// point projects.
 bool Unproject(const CameraCalibration& camera,
                const Eigen::Vector2d& z_px,
                Eigen::Vector3d* bearing_C);

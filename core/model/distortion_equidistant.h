@@ -6,7 +6,7 @@
 //   P(Q) = 1 + k1 Q + k2 Q^2 + k3 Q^3 + k4 Q^4,   d = (theta_d / r_u) u.
 //
 // With q = r_u^2 and g(q) = atan(sqrt(q)) / sqrt(q), so that theta^2 = q g^2,
-// nothing is divided by the radius:
+// the model needs no division by the radius:
 //
 //   d = s u,   s = g(q) P(Q),   Q = q g(q)^2.
 //
@@ -16,10 +16,10 @@
 //   dd/du  = s I + 2 ds/dq u u^T
 //   dd/dk_i = g Q^i u
 //
-// The model is one-to-one as long as theta_d rises, up to the first zero of
+// The model is one-to-one as long as theta_d increases, up to the first zero of
 // 1 + 3 k1 Q + 5 k2 Q^2 + 7 k3 Q^3 + 9 k4 Q^4. The inverse solves
 // theta_d(theta) = |d| by Newton's method inside a bracket of [0, pi/2], with
-// bisection where a step leaves it; then u = tan(theta) d / |d|.
+// bisection when a step leaves the bracket; then u = tan(theta) d / |d|.
 #pragma once
 
 #include <Eigen/Core>
@@ -41,9 +41,9 @@ class DistortionEquidistant {
   explicit DistortionEquidistant(std::span<const double, kSize> k)
       : k_{k[0], k[1], k[2], k[3]} {}
 
-  // d = distort(u), with derivatives by u and by (k1 .. k4) unless null. False
-  // where the model is not one-to-one; what is set there means nothing. T is
-  // double or Lanes.
+  // Computes d = distort(u), and its derivatives with respect to u and (k1 ..
+  // k4) unless these are null. Returns false where the model is not one-to-one;
+  // the outputs are then meaningless. T is double or Lanes.
   template <typename T>
   auto Distort(const Eigen::Matrix<T, 2, 1>& u,
                Eigen::Matrix<T, 2, 1>* d,
@@ -74,23 +74,24 @@ class DistortionEquidistant {
     return ProfileRises(k_, Q);
   }
 
-  // The inverse of Distort. Returns false and sets nothing where there is none.
+  // Inverse of Distort. Returns false and sets nothing where there is none.
   bool Undistort(const Eigen::Vector2d& d, Eigen::Vector2d* u) const {
     const double theta_d = d.stableNorm();
     double theta;
     if (!SolveAngle(theta_d, &theta)) return false;
-    // Near the axis the ratio of the two radii is 1, which 0/0 does not say.
+    // On the axis the ratio of the two radii is 1; computed, it would be 0/0.
     *u = theta_d > 0 ? Eigen::Vector2d(std::tan(theta) * (d / theta_d)) : d;
     return true;
   }
 
  private:
-  // theta in [0, pi/2] with theta_d(theta) = theta_d, in the rising part.
+  // Finds theta in [0, pi/2] with theta_d(theta) = theta_d, where theta_d
+  // increases.
   bool SolveAngle(double theta_d, double* theta) const {
     const std::array<double, 4>& k = k_;
     constexpr int kMaxIterations = 100;
-    // The iteration ends at rounding, well below the error that is accepted; a
-    // larger one is left over where the profile ends below theta_d.
+    // The iteration converges to rounding error, well below the accepted error;
+    // a larger error remains where the profile ends below theta_d.
     constexpr double kAccepted = 1e-12;
     double low = 0;
     double high = std::numbers::pi / 2;

@@ -3,20 +3,20 @@
 //
 //   r_d = atan(2 r_u tan(w/2)) / w,   d = (r_d / r_u) u,   0 <= |w| < pi.
 //
-// With A(w) = 2 tan(w/2) / w and q = 4 tan^2(w/2) r_u^2 it reads
+// With A(w) = 2 tan(w/2) / w and q = 4 tan^2(w/2) r_u^2 this is
 //
 //   d = s u,   s = A(w) g(q),   g(q) = atan(sqrt(q)) / sqrt(q),
 //
-// in which both limits are regular: A -> 1 as w -> 0 (no distortion), and
-// g -> 1 as q -> 0 (the axis). The model is even in w. Derivatives, with
-// t = tan(w/2), dt/dw = (1 + t^2) / 2 and A = h(w/2), h = tan(x)/x:
+// with regular limits: A -> 1 as w -> 0 (no distortion), and g -> 1 as q -> 0
+// (the axis). The model is even in w. Derivatives, with t = tan(w/2), dt/dw =
+// (1 + t^2) / 2 and A = h(w/2), h = tan(x)/x:
 //
 //   ds/d(r_u^2) = A g'(q) 4 t^2
 //   ds/dw       = h'(w/2) / 2 g(q) + A g'(q) 4 t (1 + t^2) r_u^2
 //   dd/du       = s I + 2 ds/d(r_u^2) u u^T
 //   dd/dw       = ds/dw u
 //
-// r_d rises with r_u everywhere and tends to (pi/2) / w: the inverse
+// r_d increases with r_u everywhere and tends to (pi/2) / w: the inverse
 //
 //   r_u = tan(r_d w) / (2 tan(w/2)) = r_d h(r_d w) / A(w)
 //
@@ -44,9 +44,9 @@ class DistortionFov {
         A_(TanRatio(valid_ ? w / 2 : 0)),
         t_(A_.value * w / 2) {}
 
-  // d = distort(u), with derivatives by u and by (w) unless null. False where
-  // the model is not defined; what is set there means nothing. T is double or
-  // Lanes.
+  // Computes d = distort(u), and its derivatives with respect to u and (w)
+  // unless these are null. Returns false where the model is not defined; the
+  // outputs are then meaningless. T is double or Lanes.
   template <typename T>
   auto Distort(const Eigen::Matrix<T, 2, 1>& u,
                Eigen::Matrix<T, 2, 1>* d,
@@ -71,7 +71,7 @@ class DistortionFov {
     return T(valid_ ? 1 : 0) > T(0);
   }
 
-  // The inverse of Distort. Returns false and sets nothing where there is none.
+  // Inverse of Distort. Returns false and sets nothing where there is none.
   bool Undistort(const Eigen::Vector2d& d, Eigen::Vector2d* u) const {
     const double angle = d.stableNorm() * std::abs(w_);
     if (!(valid_ && angle < std::numbers::pi / 2)) return false;

@@ -13,16 +13,16 @@
 //
 // dd/du is symmetric: d is the gradient of a potential, and the model is
 // one-to-one on a convex region in which dd/du is positive definite. Without
-// tangential terms its eigenvalues are L and the slope of the radial profile,
-// 1 + 3 k1 r^2 + 5 k2 r^4, and the region is the disc up to the first zero of
-// the slope. The tangential terms of a real lens move its edge a little; so a
-// point is valid if the profile rises all the way to it and dd/du at the point
-// is positive definite.
+// tangential terms its eigenvalues are L and the slope of the radial profile, 1
+// + 3 k1 r^2 + 5 k2 r^4, and the region is the disc up to the first zero of the
+// slope. The tangential terms of a real lens move its boundary only slightly. A
+// point is therefore valid if the profile increases from the axis to the point
+// and dd/du is positive definite at the point.
 //
-// The inverse has no closed form. Newton's method on d(u) = d, started on the
-// axis, with steps halved until they stay in the region and lower the error:
-// the error falls at every step, so the iteration ends, also for a d without
-// an inverse, against the edge of the region.
+// The inverse has no closed form. It is Newton's method on d(u) = d, started on
+// the axis, with steps halved until they stay in the region and reduce the
+// error. The error decreases at every step, so the iteration terminates; for a
+// d without an inverse it does so at the boundary of the region.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,9 +45,9 @@ class DistortionRadialTangential {
         p1_(coefficients[2]),
         p2_(coefficients[3]) {}
 
-  // d = distort(u), with derivatives by u and by (k1, k2, p1, p2) unless null.
-  // False where the model is not one-to-one; what is set there means nothing.
-  // T is double or Lanes.
+  // Computes d = distort(u), and its derivatives with respect to u and (k1, k2,
+  // p1, p2) unless these are null. Returns false where the model is not
+  // one-to-one; the outputs are then meaningless. T is double or Lanes.
   template <typename T>
   auto Distort(const Eigen::Matrix<T, 2, 1>& u,
                Eigen::Matrix<T, 2, 1>* d,
@@ -76,12 +76,12 @@ class DistortionRadialTangential {
            J(0, 0) * J(1, 1) - J(0, 1) * J(1, 0) > T(0);
   }
 
-  // The inverse of Distort. Returns false and sets nothing where there is none.
+  // Inverse of Distort. Returns false and sets nothing where there is none.
   bool Undistort(const Eigen::Vector2d& d, Eigen::Vector2d* u) const {
     constexpr int kMaxIterations = 100;
     constexpr int kMaxHalvings = 30;
-    // Newton's method ends at rounding, well below the error that is accepted;
-    // a larger one is left over where the region ends before d.
+    // Newton's method converges to rounding error, well below the accepted
+    // error; a larger error remains where the region ends before d.
     constexpr double kRounding = 2e-16;
     constexpr double kAccepted = 1e-12;
     const double scale = 1 + d.stableNorm();
@@ -110,7 +110,8 @@ class DistortionRadialTangential {
         J = candidate_J;
         error = candidate_error;
       }
-      if (!better) break;  // at rounding, or against the edge of the region
+      if (!better)
+        break;  // at rounding error, or at the boundary of the region
     }
     if (!(error <= kAccepted * scale)) return false;
     *u = point;

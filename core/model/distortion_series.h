@@ -1,20 +1,21 @@
-// The two functions behind the distortion models that are 0/0 on the axis,
-// with their derivatives, to about 1e-13 everywhere.
+// The two functions of the distortion models that are 0/0 on the axis, with
+// their derivatives, accurate to about 1e-13 everywhere.
 //
 //   g(q) = atan(sqrt(q)) / sqrt(q) = 1 - q/3 + q^2/5 - q^3/7 + ...
 //   g'(q) = (1 / (1 + q) - g) / (2 q) = -1/3 + 2q/5 - 3q^2/7 + ...
 //   h(x) = tan(x) / x = 1 + x^2/3 + 2x^4/15 + 17x^6/315 + ...
 //   h'(x) = (1 + tan^2(x) - h) / x
 //
-// Written in q = r^2, g is smooth through zero, so that no model divides by a
-// radius. In vectors the angle is halved twice, atan(x) = 2 atan(x / (1 + s))
-// with s = sqrt(1 + x^2), after which the series is short for every q; in
-// squares,
+// As a function of q = r^2, g is smooth at zero, so that no model divides by a
+// radius. The vectorised form halves the angle twice, atan(x) = 2 atan(x / (1 +
+// s)) with s = sqrt(1 + x^2), after which the series is short for every q; in
+// terms of squares,
 //
 //   q -> (s - 1) / (s + 1),   g(q) = 2 / (1 + s) g((s - 1) / (s + 1)).
 //
-// The closed forms of the derivatives cancel near zero: they lose eps / q and
-// eps / x^2. Series are used below the points where both meet at about 1e-13.
+// The closed forms of the derivatives suffer from cancellation near zero: they
+// lose eps / q and eps / x^2. Series are used below the points where both
+// errors are about 1e-13.
 #pragma once
 
 #include <cmath>
@@ -29,7 +30,7 @@ struct ValueAndDerivative {
   T derivative;
 };
 
-// g for q >= 0, to rounding.
+// g for q >= 0, accurate to rounding error.
 inline double AtanRatioValue(double q) {
   if (q < 1e-2) {
     double value = 0;
@@ -40,7 +41,8 @@ inline double AtanRatioValue(double q) {
   return std::atan(root) / root;
 }
 
-// The library has no arc tangent of vectors. To a few roundings.
+// Vectorised g, accurate to a few rounding errors; Eigen has no vectorised arc
+// tangent.
 template <int W>
 Lanes<W> AtanRatioValue(Lanes<W> q) {
   Lanes<W> halved = q;  // below tan^2(pi / 8) = 0.172 in the end
@@ -51,7 +53,7 @@ Lanes<W> AtanRatioValue(Lanes<W> q) {
     factor *= inverse;
     halved = (s - 1.0) * inverse;
   }
-  // Even and odd terms apart, which do not wait for each other.
+  // Separate sums of even and odd terms shorten the dependency chain.
   const Lanes<W> square = halved * halved;
   Lanes<W> even = 1.0 / 41;
   Lanes<W> odd = 1.0 / 43;

@@ -1,6 +1,7 @@
-// What an IMU's readings mean under a calibration: the inverse of
+// The physical quantities behind the readings of an IMU under a calibration:
+// the inverse of
 //   gyro = T_g w_I + b_g,   accel = T_a R_AI f_I + b_a.
-// A program that applies a calibration needs this and camera.h, nothing else.
+// A program that applies a calibration needs only this header and camera.h.
 // Pure functions, callable from any thread.
 #pragma once
 
@@ -10,15 +11,15 @@
 
 namespace selfcal {
 
-// In the body frame I.
+// Angular rate and specific force in the body frame I.
 struct BodyRates {
   Eigen::Vector3d w_I;  // angular rate [rad/s]
   Eigen::Vector3d f_I;  // specific force: acceleration minus gravity [m/s^2]
 };
 
-// What a pair of readings says, with the biases that hold at its time: b_g in
-// I, b_a in the accelerometer's frame A, both as the SLAM system estimates them
-// and as a keyframe of a segment has them. A calibration that is valid
+// Corrects a pair of readings with the calibration and the biases at its time:
+// b_g in I, b_a in the accelerometer frame A, both as the SLAM system estimates
+// them and as a keyframe of a segment stores them. A valid calibration
 // (positive scales) has an inverse.
 BodyRates CorrectImu(const ImuCalibration& imu,
                      const Eigen::Vector3d& gyro,   // [rad/s]

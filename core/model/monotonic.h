@@ -1,6 +1,6 @@
-// Where a radial profile r (1 + k_1 r^2 + k_2 r^4 + ...) rises: a distortion
-// model is one-to-one up to the first zero of its derivative, and must not be
-// used beyond it, although the formula gives a number there.
+// Tests whether a radial profile r (1 + k_1 r^2 + k_2 r^4 + ...) is increasing.
+// A distortion model is one-to-one up to the first zero of its derivative, and
+// must not be used beyond it, although the formula gives a number there.
 #pragma once
 
 #include <array>
@@ -11,11 +11,11 @@
 
 namespace selfcal {
 
-// True if the polynomial with Bernstein coefficients b on [0, 1] is positive
-// there. The curve lies in the convex hull of its coefficients and ends in the
-// first and the last one; where that decides nothing, the interval is halved
-// (de Casteljau). What is still open after `halvings` touches zero to rounding
-// and counts as not positive.
+// Returns true if the polynomial with Bernstein coefficients b is positive on
+// [0, 1]. The curve lies in the convex hull of its coefficients and its end
+// points are the first and the last one; if that does not decide, the interval
+// is halved (de Casteljau). A polynomial that is undecided after `halvings`
+// touches zero up to rounding and is treated as not positive.
 template <std::size_t N>
 bool PositiveInBernsteinForm(const std::array<double, N>& b, int halvings) {
   if (!(b.front() > 0 && b.back() > 0)) return false;
@@ -35,17 +35,19 @@ bool PositiveInBernsteinForm(const std::array<double, N>& b, int halvings) {
          PositiveInBernsteinForm(right, halvings - 1);
 }
 
-// True if the polynomial with the coefficients a[0] .. a[degree] is positive on
-// [0, 1]. The degree is 2 or 4.
+// Returns true if the polynomial with the coefficients a[0] .. a[degree] is
+// positive on [0, 1]. The degree is 2 or 4.
 bool PositiveOnUnitInterval(const double* a, int degree);
 
-// True if the derivative of r (1 + sum k_i r^(2i)) is positive on [0, r], with
-// q = r^2: the polynomial 1 + sum (2i + 1) k_i q^i on [0, q]. False if anything
-// is not a number. T is double or Lanes, no integer: powers would overflow.
+// Returns true if the derivative of r (1 + sum k_i r^(2i)) is positive on [0,
+// r], with q = r^2: the polynomial 1 + sum (2i + 1) k_i q^i on [0, q]. Returns
+// false if any input is NaN. T is double or Lanes, not an integer: powers would
+// overflow.
 template <std::size_t N, typename T>
 requires(!std::is_integral_v<T>) auto ProfileRises(
     const std::array<double, N>& k, T q) {
-  // Scaled to [0, 1]; no power of q is computed that is not needed.
+  // The variable is scaled to [0, 1]; only the powers of q that occur are
+  // computed.
   std::array<T, N + 1> a;
   a[0] = T(1);
   T power(1);
@@ -55,7 +57,7 @@ requires(!std::is_integral_v<T>) auto ProfileRises(
     a[i] = static_cast<double>(2 * i + 1) * k[i - 1] * power;
     negative += Select(a[i] >= T(0), T(0), a[i]);
   }
-  // Nearly every point of a real lens is decided here.
+  // This bound decides for nearly every point of a real lens.
   const auto surely = 1.0 + negative > T(0);
   if (All(surely)) return surely;
   return surely || AskEachLane<T>([&](int lane) {

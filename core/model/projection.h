@@ -1,6 +1,6 @@
 // The projection of camera.h as a template over the scalar, for one point or
-// several at once, and over the distortion model, which is prepared once for
-// many points. Internal to core/model and core/factor.
+// for several at once, and over the distortion model, which is prepared once
+// for many points. Internal to core/model and core/factor.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,16 +14,16 @@
 
 namespace selfcal {
 
-// A ray within about this angle [rad] of the camera plane is not seen.
+// A ray within about this angle [rad] of the camera plane is not visible.
 inline constexpr double kMinDepthRatio = 1e-6;
-// Depths between these bounds cannot overflow in a projection or in its
-// derivatives; nothing physical is outside, in any unit.
+// Depths between these bounds cannot cause overflow in a projection or its
+// derivatives; no physical depth is outside, in any unit.
 inline constexpr double kMinDepth = 1e-100;
 inline constexpr double kMaxDepth = 1e100;
 
 // Calls visit(model) with the camera's distortion model, prepared from its
-// coefficients. Returns a default value for a number of coefficients that is
-// not the model's.
+// coefficients. Returns a default value if the number of coefficients does not
+// match the model.
 template <class Visitor>
 auto VisitDistortion(const CameraCalibration& camera, const Visitor& visit)
     -> decltype(visit(DistortionFov(0.0))) {
@@ -46,7 +46,7 @@ auto VisitDistortion(const CameraCalibration& camera, const Visitor& visit)
   return {};
 }
 
-// z = f d + c, as plain numbers.
+// Parameters of z = f d + c as plain numbers.
 struct Pinhole {
   double f[2];
   double c[2];
@@ -55,8 +55,8 @@ inline Pinhole PinholeOf(const CameraCalibration& camera) {
   return {{camera.f.x(), camera.f.y()}, {camera.c.x(), camera.c.y()}};
 }
 
-// What the derivatives of a pixel z = f d + c consist of. By f they are d on
-// the diagonal, by c the identity.
+// Parts of the derivatives of a pixel z = f d + c. The derivative with respect
+// to f is diagonal with d; the one with respect to c is the identity.
 template <typename T, int kSize>
 struct ProjectionParts {
   Eigen::Matrix<T, 2, 1> d;               // distorted coordinates
@@ -64,9 +64,9 @@ struct ProjectionParts {
   Eigen::Matrix<T, 2, kSize> distortion;  // dz / d coefficients
 };
 
-// Projects p_C to *z_px, and fills *parts unless it is null. False, and what is
-// set means nothing, where Project() of camera.h says so; the parameters of the
-// camera are not looked at.
+// Projects p_C to *z_px, and fills *parts unless it is null. Returns false
+// where Project() of camera.h does; the outputs are then meaningless. The
+// parameters of the camera are not checked.
 template <typename T, class Model>
 auto ProjectWith(const Pinhole& pinhole,
                  const Model& model,
@@ -74,7 +74,7 @@ auto ProjectWith(const Pinhole& pinhole,
                  Eigen::Matrix<T, 2, 1>* z_px,
                  ProjectionParts<T, Model::kSize>* parts) {
   const T depth = p_C[2];
-  // False for NaN.
+  // These comparisons are false for NaN.
   const auto in_front = depth >= T(kMinDepth) && depth <= T(kMaxDepth) &&
                         Abs(p_C[0]) * kMinDepthRatio <= depth &&
                         Abs(p_C[1]) * kMinDepthRatio <= depth;

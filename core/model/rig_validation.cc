@@ -17,7 +17,7 @@ constexpr std::size_t kMaxPatterns = 1024;
 constexpr int kMaxTableSize = 10'000;
 constexpr int kMaxViolations = 1000;
 
-// What is wrong with the last part of a resource's name.
+// Describes the fault of a resource id; empty if there is none.
 std::string NameFault(const std::string& name) {
   const bool in_alphabet = std::all_of(name.begin(), name.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' ||
@@ -45,7 +45,7 @@ void CheckImuNoise(const ImuNoise& noise, ViolationList* list) {
       "imu_noise.accel_bias_random_walk", noise.accel_bias_random_walk, list);
 }
 
-// Adds a violation for a list too long to be looked at.
+// Adds a violation and returns false for a list that is too long to inspect.
 bool CheckCount(const std::string& field,
                 std::size_t count,
                 std::size_t max_count,
@@ -57,7 +57,7 @@ bool CheckCount(const std::string& field,
   return false;
 }
 
-// Patterns that stand for nothing are spelling mistakes.
+// A pattern that matches nothing is treated as a spelling mistake.
 void CheckPattern(const std::vector<TangentComponent>& components,
                   const std::string& field,
                   const std::string& pattern,
@@ -78,7 +78,7 @@ void CheckPatterns(const std::vector<TangentComponent>& components,
   }
 }
 
-// For a group of time offsets where these are not estimated.
+// Hint for a group of time offsets in a rig that does not estimate them.
 std::string TimeOffsetHint(const Rig& rig, const ParameterGroup& group) {
   Rig estimating = rig;
   estimating.estimate_time_offset = true;
@@ -166,8 +166,8 @@ std::vector<Violation> Validate(const Rig& rig) {
   CheckImuNoise(rig.imu_noise, &list);
   CheckPositive("pixel_sigma_px", rig.pixel_sigma_px, &list);
   CheckPositive("gravity_mps2", rig.gravity_mps2, &list);
-  // Without a list of cameras that may be looked at there are no components
-  // for patterns to match.
+  // Without a valid number of cameras there are no components for patterns to
+  // match.
   const std::size_t cameras = rig.factory.cameras.size();
   if (cameras >= 1 && cameras <= static_cast<std::size_t>(kMaxCameras)) {
     const auto components = TangentComponents(rig.factory);

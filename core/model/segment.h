@@ -1,9 +1,9 @@
 // The motion segment: N consecutive keyframes of one session with the IMU
-// samples between them and the landmarks they see, as a SLAM system estimated
-// them.
+// samples between them and the landmarks observed from them, as a SLAM system
+// estimated them.
 //
-// Frames: G is gravity-aligned (z up) and fixed for a session, I is the body
-// (gyroscope) frame. Times are nanoseconds of one clock for a session.
+// Frames: G is gravity-aligned (z up) and constant during a session, I is the
+// body (gyroscope) frame. Times are nanoseconds of one clock during a session.
 #pragma once
 
 #include <Eigen/Core>
@@ -36,7 +36,7 @@ inline constexpr int kStateGyroBias = 12;
 KeyframeState BoxPlus(const KeyframeState& state,
                       const Eigen::Matrix<double, 15, 1>& delta);
 
-// Raw readings, biases and intrinsics not removed.
+// Raw readings; biases and intrinsics are not corrected.
 struct ImuSample {
   std::int64_t t_ns = 0;
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   // w~ [rad/s]
@@ -48,7 +48,8 @@ struct Landmark {
   Eigen::Vector3d p_G = Eigen::Vector3d::Zero();  // [m]
 };
 
-// Keyframe, camera and landmark are indices into the segment and the rig.
+// Keyframe and landmark are indices into the segment, camera is one into the
+// rig.
 struct Observation {
   std::int32_t keyframe = 0;
   std::int32_t camera = 0;
@@ -56,7 +57,7 @@ struct Observation {
   Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
 };
 
-// Identity of a segment within a rig: the same key is the same segment.
+// Identity of a segment within a rig: equal keys mean the same segment.
 struct SegmentKey {
   std::string session;     // 1 to 128 printable ASCII characters
   std::int64_t index = 0;  // counts the segments of the session from 0
@@ -67,28 +68,29 @@ struct SegmentKey {
 
 struct MotionSegment {
   SegmentKey key;
-  // Version of the calibration that the SLAM system estimated the states with;
-  // they are linearised there.
+  // Version of the calibration with which the SLAM system estimated the states;
+  // it is also the linearisation point.
   std::int64_t calibration_version = 1;
   std::vector<KeyframeState> keyframes;  // strictly increasing in time
   // Strictly increasing in time, from at or before the first keyframe to at or
-  // after the last. Where the next segment of the session follows directly,
-  // they reach to its first keyframe, so that neighbours can be joined.
+  // after the last. If the next segment of the session follows directly, the
+  // samples extend to its first keyframe, so that neighbours can be joined.
   std::vector<ImuSample> imu;
   std::vector<Landmark> landmarks;        // ids distinct
   std::vector<Observation> observations;  // any order, at most one for each
                                           // (keyframe, camera, landmark)
-  // Of the device, in degrees Celsius, where it is known.
+  // Temperature of the device in degrees Celsius, if known.
   std::optional<double> temperature_c = std::nullopt;
 };
 
-// One way in which a value breaks its rules: where, and what to do.
+// One violated rule: the field, and what to do.
 struct Violation {
   std::string field;    // path, e.g. "keyframes[3].q_GI"
   std::string message;  // e.g. "norm is 0.93; send a unit quaternion"
 };
 
-// What a segment may be. Counts bound the memory one message can claim.
+// Limits of a valid segment. The counts bound the memory that one message can
+// claim.
 struct SegmentLimits {
   int min_keyframes = 2;
   int max_keyframes = 2000;
@@ -105,19 +107,20 @@ struct SegmentLimits {
   double pixel_margin_px = 1;  // outside the image
   double min_temperature_c = -100;
   double max_temperature_c = 200;
-  int max_violations = 100;  // the list is cut there; one more entry,
-                             // without a field, says so
+  int max_violations = 100;  // the list is truncated here; one more entry,
+                             // without a field, reports that
 };
 
 struct Calibration;  // core/model/calibration.h
 
-// Every violation of the rules above, in the order of the fields; empty means
-// that all other rooms can use the segment without looking again. `theta` tells
-// the number of cameras and the size of their images. Checks finiteness,
-// times, unit quaternions, indices, duplicates, cover by IMU samples, counts;
-// a list with too many elements is refused without looking at them. Samples may
-// reach at most max_keyframe_gap_s beyond the last keyframe, and times lie
-// within 4e18 ns of zero, so that their differences do not overflow.
+// Returns every violation of the rules above, in the order of the fields. An
+// empty list means that all other modules can use the segment without further
+// checks. `theta` provides the number of cameras and the size of their images.
+// The function checks finiteness, times, unit quaternions, indices, duplicates,
+// coverage by IMU samples, and counts; a list with too many elements is
+// rejected without inspection. Samples may extend at most max_keyframe_gap_s
+// beyond the last keyframe, and times lie within 4e18 ns of zero, so that their
+// differences do not overflow.
 std::vector<Violation> Validate(const MotionSegment& segment,
                                 const Calibration& theta,
                                 const SegmentLimits& limits = {});

@@ -1,4 +1,4 @@
-// Validation of a motion segment, one function for one part of it.
+// Validation of a motion segment, with one function for each part.
 #include <algorithm>
 #include <compare>
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace selfcal {
 namespace {
 
 constexpr std::size_t kMaxSessionLength = 128;
-// About 126 years to both sides: sums and differences of times cannot overflow.
+// About 126 years in either direction: sums and differences cannot overflow.
 constexpr std::int64_t kMaxTime_ns = 4'000'000'000'000'000'000;
 
 bool TimeInRange(std::int64_t t_ns) {
@@ -58,7 +58,7 @@ void CheckTemperature(const MotionSegment& segment,
                       ViolationList* list) {
   if (!segment.temperature_c) return;
   const double c = *segment.temperature_c;
-  // Not a number compares as false.
+  // The comparison is false for NaN.
   if (c >= limits.min_temperature_c && c <= limits.max_temperature_c) return;
   list->Add("temperature_c",
             std::to_string(c) +
@@ -66,7 +66,7 @@ void CheckTemperature(const MotionSegment& segment,
                 "leave it out");
 }
 
-// Adds a violation and returns false if the list may not even be looked at.
+// Adds a violation and returns false if the list must not be inspected.
 bool CheckCount(std::string_view field,
                 std::size_t count,
                 int min_count,
@@ -95,7 +95,7 @@ void AddIf(std::string_view list_name,
   list->Add(ElementPath(list_name, index, member), std::move(fault));
 }
 
-// What is wrong with element i's time, against the one before it.
+// Describes the fault of the time of element i, relative to the previous one.
 template <class Timed>
 std::string TimeFault(const std::vector<Timed>& elements,
                       std::size_t i,
@@ -175,7 +175,7 @@ void CheckImu(const MotionSegment& segment,
   }
 }
 
-// The samples must reach over all keyframes, and not far beyond.
+// The samples must cover all keyframes, and not extend far beyond them.
 void CheckImuCover(const MotionSegment& segment,
                    const SegmentLimits& limits,
                    ViolationList* list) {
@@ -205,7 +205,7 @@ void CheckImuCover(const MotionSegment& segment,
   }
 }
 
-// For each key, the index of the first equal one before it, or -1.
+// For each key, returns the index of the first equal key before it, or -1.
 template <class Key>
 std::vector<std::int64_t> EarlierEquals(const std::vector<Key>& keys) {
   std::vector<std::int64_t> order(keys.size());
@@ -247,7 +247,7 @@ void CheckLandmarks(const MotionSegment& segment,
   }
 }
 
-// What is wrong with an index into `count` things, named by `what`.
+// Describes the fault of an index into `count` elements called `what`.
 std::string IndexFault(std::int32_t index,
                        std::size_t count,
                        std::string_view what) {

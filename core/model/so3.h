@@ -1,10 +1,10 @@
-// Rotations: exponential and logarithm of SO(3), and the Jacobians that every
-// factor needs.
+// Rotations: exponential and logarithm of SO(3), and its Jacobians, which every
+// factor uses.
 //
 // Conventions of the whole project: quaternions are Hamilton and unit, R_AB
-// turns coordinates in B into coordinates in A, and a rotation is perturbed on
-// its right, R_AB Exp(delta), with delta in rad in frame B. Pure functions,
-// callable from any thread.
+// transforms coordinates in B into coordinates in A, and a rotation is
+// perturbed on the right, R_AB Exp(delta), with delta in rad in frame B. Pure
+// functions, callable from any thread.
 //
 // Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in
 // robotics" (2018), appendix B.
@@ -15,14 +15,14 @@
 
 namespace selfcal {
 
-// The matrix [v]x with [v]x u = v x u.
+// Matrix [v]x with [v]x u = v x u.
 Eigen::Matrix3d Skew(const Eigen::Vector3d& v);
 
-// Unit quaternion of the rotation vector phi [rad]; exact series near zero.
+// Unit quaternion of the rotation vector phi [rad]; uses a series near zero.
 Eigen::Quaterniond Exp(const Eigen::Vector3d& phi);
 
-// Rotation vector [rad] of the shorter way, norm in [0, pi]. Precise also near
-// zero and near pi; q and -q give the same vector.
+// Rotation vector [rad] of the shorter rotation, with a norm in [0, pi].
+// Accurate also near zero and near pi; q and -q give the same vector.
 Eigen::Vector3d Log(const Eigen::Quaterniond& q);
 
 // J_r(phi): Exp(phi + d) = Exp(phi) Exp(J_r(phi) d) to first order.

@@ -1,9 +1,9 @@
 // The functions of so3.h as templates over the scalar, for one rotation or
 // several at once. Internal to core/model and core/factor.
 //
-// Up to kSeriesAngle the series are exact to rounding; beyond it, which is far
-// more than an inertial sensor turns between two samples, the closed forms of
-// each lane by itself lose nothing.
+// Up to kSeriesAngle the series are exact to rounding. Beyond it, which is far
+// more than an inertial sensor rotates between two samples, each lane uses the
+// closed forms, which lose no accuracy there.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +16,7 @@
 
 namespace selfcal {
 
-// [rad]. The first term that each series leaves out counts 1e-17 there.
+// [rad]. The first truncated term of each series is 1e-17 there.
 constexpr double kSeriesAngle = 0.5;
 
 // c0 + c1 x + c2 x^2 + ...
@@ -29,7 +29,8 @@ T Polynomial(T x, double c, Rest... rest) {
   return c + x * Polynomial(x, rest...);
 }
 
-// The value of the series, or the closed form where angle2 is beyond it.
+// Returns the value of the series, or the closed form where angle2 is beyond
+// it.
 template <typename T, typename Function>
 T BeyondSeries(T angle2, T series, Function closed_form) {
   const auto beyond = angle2 > T(kSeriesAngle * kSeriesAngle);
@@ -77,8 +78,8 @@ Eigen::Quaternion<T> Exp(const Eigen::Matrix<T, 3, 1>& phi) {
   return q;
 }
 
-// At a rotation by exactly pi both signs of q are equally short: the one whose
-// first component other than zero is positive.
+// For a rotation by exactly pi both signs of q are equally short; the result is
+// the one whose first nonzero component is positive.
 template <typename T>
 Eigen::Matrix<T, 3, 1> Log(const Eigen::Quaternion<T>& q) {
   const T zero(0);
@@ -87,14 +88,14 @@ Eigen::Matrix<T, 3, 1> Log(const Eigen::Quaternion<T>& q) {
       v[0] < zero ||
       (!(v[0] > zero) && (v[1] < zero || (!(v[1] > zero) && v[2] < zero)));
   const auto flip = q.w() < zero || (!(q.w() > zero) && begins_negative);
-  // The arc tangent is precise at both ends: the arc sine would lose half of
+  // The arc tangent is accurate at both ends; the arc sine would lose half of
   // the digits near pi, the arc cosine near zero. At pi, w is zero.
   const T w = Max(Abs(q.w()), T(1e-150));
   const T factor = 2.0 * AtanRatioValue(v.squaredNorm() / (w * w)) / w;
   return Select(flip, -factor, factor) * v;
 }
 
-// What rotations by phi and their derivatives consist of.
+// Coefficients of rotations by phi and of their derivatives.
 template <typename T>
 struct RotationTerms {
   T a;  // (1 - cos) / angle^2
@@ -159,8 +160,8 @@ Eigen::Matrix<T, 3, 3> RightJacobian(const Eigen::Matrix<T, 3, 1>& phi) {
 template <typename T>
 Eigen::Matrix<T, 3, 3> RightJacobianInverse(const Eigen::Matrix<T, 3, 1>& phi) {
   const T angle2 = phi.squaredNorm();
-  // (1 - angle / 2 cot(angle / 2)) / angle^2; with the half angle nothing is
-  // singular before 2 pi.
+  // (1 - angle / 2 cot(angle / 2)) / angle^2; in terms of the half angle it has
+  // no singularity below 2 pi.
   const T c =
       BeyondSeries(angle2,
                    Polynomial(angle2,

@@ -1,4 +1,4 @@
-// The list of names, units and reference sigmas of the tangent of theta.
+// Names, units and reference sigmas of the tangent of theta.
 #include <initializer_list>
 #include <string>
 #include <utility>
@@ -9,7 +9,7 @@
 namespace selfcal {
 namespace {
 
-// Expected standard deviations after one reference segment: statistics over 22
+// Expected standard deviations after one reference segment: statistics of 22
 // moving segments of a hand-held recording with a FOV camera.
 constexpr double kSigmaGyroScale = 6e-3;
 constexpr double kSigmaGyroMisalignment = 7e-3;
@@ -18,17 +18,17 @@ constexpr double kSigmaAccelMisalignment = 4e-2;
 constexpr double kSigmaAccelRotation = 3.5e-2;
 constexpr double kSigmaCameraRotation = 5e-3;
 constexpr double kSigmaCameraPosition = 1.3e-2;
-// Of f and c, of images as wide as those of the recording: the same errors of
-// the same scene are more pixels of a finer image.
+// Sigma of f and c for images as wide as those of the recording: in a finer
+// image the same errors of the same scene are more pixels.
 constexpr double kSigmaPixels = 1.5;
 constexpr int kReferenceWidth_px = 640;
 constexpr double kSigmaFov = 2.7e-3;
-// The median over simulated segments of a hand-held device that is moved as
-// calmly as those.
+// Median over simulated segments of a hand-held device that moves as calmly as
+// in that recording.
 constexpr double kSigmaTimeOffset = 6e-4;
-// Chosen, not measured: what moves a point at the edge of a usual image by
-// about as many pixels as kSigmaPixels. They shift every entropy of a group by
-// one constant and rank nothing.
+// Chosen, not measured: the value that moves a point at the edge of a typical
+// image by about kSigmaPixels pixels. These sigmas shift every entropy of a
+// group by one constant and do not affect the ranking.
 constexpr double kSigmaRadial = 5e-3;
 constexpr double kSigmaTangential = 5e-4;
 constexpr double kSigmaEquidistant = 5e-3;

@@ -17,7 +17,7 @@
 
 namespace selfcal {
 
-// A number as a person reads it in a message.
+// Formats a number for a message.
 inline std::string Readable(double value) {
   std::array<char, 32> text;
   std::snprintf(text.data(), text.size(), "%.6g", value);
@@ -48,11 +48,11 @@ class ViolationList {
     violations_.push_back({std::move(field), std::move(message)});
   }
 
-  // Whether something was left out: nothing more will be listed, and loops
+  // Returns true if violations were dropped: no more are recorded, and loops
   // over long lists may end.
   bool cut() const { return cut_; }
 
-  // The violations; if some were left out, the last entry says so.
+  // Returns the violations; if some were dropped, the last entry reports that.
   std::vector<Violation> Take() {
     if (cut_) {
       violations_.push_back({"",
@@ -69,7 +69,7 @@ class ViolationList {
   std::vector<Violation> violations_;
 };
 
-// What is wrong with a rotation; empty if nothing is.
+// Describes the fault of a rotation; empty if there is none.
 inline std::string QuaternionFault(const Eigen::Quaterniond& q,
                                    double tolerance) {
   if (!q.coeffs().allFinite()) return "is not finite";
@@ -78,7 +78,8 @@ inline std::string QuaternionFault(const Eigen::Quaterniond& q,
   return "norm is " + Readable(norm) + "; send a unit quaternion";
 }
 
-// What is wrong with a vector that must be finite and no longer than `limit`.
+// Describes the fault of a vector that must be finite and no longer than
+// `limit`; empty if there is none.
 inline std::string VectorFault(const Eigen::Vector3d& v,
                                double limit,
                                std::string_view unit) {
