@@ -8,7 +8,7 @@
 namespace selfcal {
 namespace {
 
-// A direction is tested where both sides say more than the prior.
+// A direction is tested if both sides have more information than the prior.
 constexpr double kObserved = 1;
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace selfcal {
 namespace {
 
-// Limits the calibrations that leave segments out.
+// Limits the number of calibrations after segments were excluded.
 constexpr int kMaxRounds = 3;
 
 std::string CheckInput(const Rig& rig,
@@ -51,7 +51,7 @@ std::string CheckInput(const Rig& rig,
   return "";
 }
 
-// The segments that are used, and why the others are not.
+// The used segments, and the reasons for the exclusion of the others.
 class Selection {
  public:
   explicit Selection(const std::vector<const MotionSegment*>& segments)
@@ -65,7 +65,7 @@ class Selection {
     return used;
   }
 
-  // Indices into what is used now.
+  // Excludes segments; indices refer to the currently used ones.
   void LeaveOut(const std::vector<Contradiction>& contradictions) {
     std::vector<std::size_t> used;
     for (std::size_t i = 0; i < all_.size(); ++i) {
@@ -76,7 +76,7 @@ class Selection {
     }
   }
 
-  // Adds those that are left out; sorts by key.
+  // Adds the excluded ones; sorts by key.
   void Complete(std::vector<SegmentFit>* fits) const {
     for (std::size_t i = 0; i < all_.size(); ++i) {
       if (reasons_[i].empty()) continue;
@@ -108,7 +108,8 @@ std::vector<Contradiction> FindMisfitsOf(
   return FindMisfits(fits);
 }
 
-// What segments without data say about the result, where there is one.
+// Completes the result, if there is one, by the information of segments without
+// data.
 void CompleteByRemembered(const Rig& rig,
                           const std::vector<const MotionSegment*>& used,
                           const CalibrateOptions& options,
@@ -128,7 +129,7 @@ void CompleteByRemembered(const Rig& rig,
   result.Lambda += completed.Lambda;
 }
 
-// Calibrates, leaves out what contradicts the rest, and calibrates again.
+// Calibrates, excludes segments that contradict the rest, and calibrates again.
 CalibrationResult CalibrateOnWhatAgrees(
     const Rig& rig,
     const Calibration& theta_start,
@@ -149,8 +150,8 @@ CalibrationResult CalibrateOnWhatAgrees(
     run.result.iterations += iterations;
     iterations = run.result.iterations;
     if (round == kMaxRounds) break;
-    // Segments that contradict the rest may be why it did not converge; there
-    // is no evidence where it was cancelled or failed.
+    // Segments that contradict the rest may be the reason why it did not
+    // converge; there is no evidence if it was cancelled or failed.
     const std::vector<Contradiction> contradictions = FindContradictions(
         run.evidence, run.result.status == CalibrateStatus::kConverged);
     if (contradictions.empty()) break;

@@ -20,35 +20,35 @@
 namespace selfcal {
 namespace {
 
-// Bounds the rounds; they end by convergence after two to four as a rule.
+// Limits the number of rounds; usually they converge after two to four.
 constexpr int kMaxRounds = 12;
-// The first round only has to come near enough to tell outliers.
+// The first round only has to come near enough to detect outliers.
 constexpr double kFirstTolerance = 1e-4;
 constexpr double kTolerance = 1e-8;
 // Largest undamped Gauss-Newton step of theta at convergence, in sigmas.
 constexpr double kMaxStepSigmas = 0.05;
-// A round ends when theta made so many steps below so many sigmas in a row:
-// landmarks of little weight may go on slipping for long, and move nothing; so
-// may the scale of a scene that nothing shows, and an undamped step then goes
-// far beyond where it is one.
+// A round ends after this many consecutive steps of theta below
+// kSmallStepSigmas: landmarks of low weight may keep drifting for long without
+// any effect; so may an unobservable scale of the scene, along which an
+// undamped step goes far beyond its linear range.
 constexpr int kSmallSteps = 3;
 constexpr double kSmallStepSigmas = 0.005;
-// Damping that is next to nothing where states are determined.
+// Damping that is negligible for states that are determined.
 constexpr double kSettledDamping = 1;
-// With steps that take less off the cost [half squares].
+// A step is small only if it reduces the cost by less than this [half squares].
 constexpr double kSmallDecrease = 0.1;
 // Largest change of theta by a round at convergence, in sigmas.
 constexpr double kMaxRoundSigmas = 0.02;
-// Pixel errors that make sigmas of theta larger by less than this part are
-// weighted as independent ones.
+// Correlated pixel errors that increase the sigmas of theta by less than this
+// fraction are treated as independent.
 constexpr double kLeastTrackNoise = 0.05;
-// In units of the prior. What the data says less about is held until all else
-// is estimated: from a start that is off, the estimate would wander along it to
-// where the linearisation no longer holds.
+// In units of the prior. Directions with less information from the data are
+// held constant until all others are estimated: from a poor start, the estimate
+// would move along them out of the range of the linearisation.
 constexpr double kWeakInformation = 100;
 
 constexpr int kMaxReweightings = 4;
-// Replicas with more noise, from which spurious information is told.
+// Replicas with added noise, by which spurious information is detected.
 constexpr int kReplicas = 3;
 constexpr std::uint64_t kReplicaSeed = 1;
 
@@ -57,10 +57,10 @@ constexpr double Square(double x) { return x * x; }
 constexpr char kNotDetermined[] =
     "the states of the keyframes are not determined";
 
-// Each round decides, from the present estimate alone, which landmarks and
-// observations to use and how the inertial factors are whitened, then solves
-// that problem; the rounds end when one no longer moves theta. The end is thus
-// a fixed point that does not remember the way to it.
+// Each round selects landmarks and observations and whitens the inertial
+// factors, from the current estimate alone, then solves that problem; the
+// rounds end when one no longer moves theta. The result is thus a fixed point
+// that does not depend on the path to it.
 class Calibrator {
  public:
   Calibrator(const Rig& rig,
@@ -75,7 +75,7 @@ class Calibrator {
         partitioning_(PartitionSegments(segments, options.merge_landmarks)),
         segments_(segments),
         problem_(FlattenSegments(rig, segments, partitioning_)),
-        // A prior is centred where d = 0.
+        // A prior is centred at d = 0.
         reference_(options.prior ? options.prior->centre : theta_start),
         start_(theta_start),
         start_d_(BoxMinus(theta_start, reference_)),
@@ -95,8 +95,8 @@ class Calibrator {
   }
 
  private:
-  // What follows returns false where the calibration ends without a result:
-  // cancelled, or failed.
+  // The following functions return false if the calibration ends without a
+  // result: cancelled, or failed.
   bool Start() {
     Screen(nullptr);
     const ReprojectionStatistics before = Measure();
@@ -115,8 +115,9 @@ class Calibrator {
                                                       : SolveByRounds();
   }
 
-  // By what the noise is off is known only now that residuals are small: the
-  // minimum moves a little when all is weighted by it, and the noise with it.
+  // The noise scales can be estimated only now that residuals are small.
+  // Weighting by them moves the minimum slightly, and thereby the noise scales,
+  // so that this is repeated.
   bool WeighNoise() {
     for (int i = 0; result_.status == CalibrateStatus::kConverged; ++i) {
       if (!WeighTracks()) return false;
@@ -137,16 +138,16 @@ class Calibrator {
 
   void EstimateNoise() {
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
-    // As the factors want them: without the track noise.
+    // The noise scales require weights without the track noise.
     std::vector<ScreenedLandmark> landmarks = screening_.landmarks;
     ScaleWeights(Square(screening_.track_noise_factor), &landmarks);
-    // The factors bring a linear system of their own.
+    // The estimation of the noise scales has its own linear system.
     linearised_.system.ReleaseChains();
     result_.noise_factors = EstimateNoiseFactors(
         stated_, Round(basis), estimate_, landmarks, track_noise_);
   }
 
-  // What the pixel errors of tracks have in common is measured anew with it.
+  // The correlation along tracks is measured again with the new noise.
   void TakeNoise(const Rig& next) {
     for (BiasLink& link : problem_.bias_links) {
       link.sigmas.head<3>() *= next.imu_noise.accel_bias_random_walk /
@@ -159,7 +160,7 @@ class Calibrator {
     SetTrackNoise(1, &screening_);
   }
 
-  // What the errors have in common along tracks.
+  // Weights by the correlation of errors along tracks.
   bool WeighTracks() {
     if (!options_.correlated_tracks) {
       return true;
@@ -175,8 +176,8 @@ class Calibrator {
     return Renew() && Solve();
   }
 
-  // So far all is held that the data says little about. Some of it follows the
-  // linearisation as far as its sigma reaches, and is estimated after all.
+  // Until now all weakly observed directions are held constant. Those whose
+  // linearisation holds within their sigma are estimated after all.
   bool ReleaseWeak() {
     if (subspace_.held.cols() == 0 ||
         result_.status != CalibrateStatus::kConverged) {
@@ -194,7 +195,7 @@ class Calibrator {
                                     : Fail(kNotDetermined);
   }
 
-  // Holds the directions of which the information is that of noise in states,
+  // Holds directions constant whose information stems from noise in states,
   // until none is left.
   bool HoldSpurious() {
     while (result_.status == CalibrateStatus::kConverged &&
@@ -216,10 +217,10 @@ class Calibrator {
   Eigen::MatrixXd SpuriousDirections() {
     const Eigen::MatrixXd nothing(start_d_.size(), 0);
     const SolverRound round = Round(nothing);
-    linearised_.system.ReleaseChains();  // each replica brings its own
+    linearised_.system.ReleaseChains();  // each replica has its own
     std::vector<Eigen::MatrixXd> under_noise;
     Eigen::MatrixXd spurious(start_d_.size(), 0);
-    // Most often the first one shows that there is nothing to tell.
+    // The first replica usually shows that nothing is spurious.
     for (int i = 0; i < kReplicas && (i == 0 || spurious.cols() > 0); ++i) {
       const auto information = InformationUnderNoise(round,
                                                      segments_,
@@ -238,7 +239,7 @@ class Calibrator {
     return spurious;
   }
 
-  // One step a round.
+  // Screens and relinearises after every step.
   bool SolveBySteps() {
     if (!Report(0)) {
       return Cancel();
@@ -272,9 +273,9 @@ class Calibrator {
     return true;
   }
 
-  // Whether theta would stay where it is, if states that are hardly determined
-  // did not step further than they are linear: an undamped step lets these
-  // drag theta along, and no such step comes true.
+  // Returns true if theta would not move, provided that weakly determined
+  // states do not leave their linear range: in an undamped step these drag
+  // theta along, and no such step is ever accepted.
   bool IsSettled() {
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
     LinearisedRound damped;
@@ -293,8 +294,9 @@ class Calibrator {
     return left_sigmas_ < kMaxStepSigmas;
   }
 
-  // Decides anew what is used and what is held. As holding moves the estimate,
-  // that goes on until the present subspace stays.
+  // Repeats the selection of observations and of held directions. As holding a
+  // direction moves the estimate, this is repeated until the subspace is
+  // unchanged.
   bool Renew() {
     do {
       Screen(&screening_);
@@ -372,7 +374,7 @@ class Calibrator {
 
   Calibration Theta() const { return BoxPlus(reference_, estimate_.d); }
 
-  // Decides anew what the next round stands on.
+  // Repeats the selection of everything that the next round is based on.
   void Screen(const Screening* before) {
     const Calibration theta = Theta();
     MeasureMotions(rig_, theta, problem_, estimate_.keyframes, &motions_);
@@ -394,8 +396,8 @@ class Calibrator {
                                screening_.landmarks);
   }
 
-  // Information and covariance of the offset d at the estimate. False if
-  // states are not determined.
+  // Updates information and covariance of the offset d at the estimate. Returns
+  // false if states are not determined.
   bool Inform(const RobustLoss* loss) {
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
     if (!LineariseRound(Round(basis),
@@ -410,9 +412,10 @@ class Calibrator {
     return covariance_d_.allFinite();
   }
 
-  // At a start far from the optimum all residuals are large: what can be
-  // observed is judged without the weights that they get. As weights only take
-  // information away, there is nothing to judge if all is observed with them.
+  // At a start far from the optimum all residuals are large, so that
+  // observability is assessed without their robust weights. As weights can only
+  // reduce information, this is unnecessary if everything is observed with
+  // them.
   bool FindSubspace() {
     if (!Inform(&screening_.loss)) {
       return false;
@@ -429,8 +432,8 @@ class Calibrator {
     return Inform(&screening_.loss);
   }
 
-  // Holds what the data does not observe, at its start value. Returns whether
-  // the present subspace stays as large as it was.
+  // Holds directions that the data does not observe at their start value.
+  // Returns true if the size of the estimated subspace did not change.
   bool ChooseSubspace() {
     const auto held = static_cast<int>(subspace_.held.cols());
     ThetaSubspace observed =
@@ -487,7 +490,7 @@ class Calibrator {
         [&](int iteration, double cost, const Eigen::VectorXd& d) {
           const double step = LargestInSigmas(d - d_last, covariance_d_);
           d_last = d;
-          // A rejected step does not move theta, and counts for nothing.
+          // A rejected step does not move theta, and is ignored.
           if (step > 0) {
             small_steps = step < kSmallStepSigmas ? small_steps + 1 : 0;
           }
@@ -535,7 +538,7 @@ class Calibrator {
     result_.rank = static_cast<int>(subspace_.estimated.cols());
     result_.held_constant = subspace_.unobserved;
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
-    // As the cost before: not weighted by what is known of tracks since.
+    // As for the initial cost: without the weights for correlated tracks.
     SetTrackNoise(1, &screening_);
     result_.final_cost =
         RoundCost(Round(basis), estimate_, screening_.landmarks);
@@ -553,8 +556,8 @@ class Calibrator {
     result_.observations_dropped = screening_.observations_dropped;
   }
 
-  // Each segment by itself, at the minimum. Where they disagree by more than
-  // they say, so does the covariance.
+  // Tests each segment alone, at the minimum. If they disagree by more than
+  // their information predicts, the covariance is scaled accordingly.
   void TestSegments() {
     Rig rig = rig_;
     rig.pixel_sigma_px *= result_.track_noise_factor;
@@ -581,8 +584,8 @@ class Calibrator {
     }
   }
 
-  // Sum over the two rows of a reprojection, from the redundancy of all; 0: not
-  // known.
+  // Expected sum over the two rows of a reprojection, from the redundancy of
+  // all; 0: unknown.
   double SquaresOfAReprojection() const {
     for (const NoiseFactor& factor : result_.noise_factors) {
       if (factor.kind == NoiseKind::kPixel) {
@@ -593,7 +596,7 @@ class Calibrator {
   }
 
   const Rig& stated_;
-  Rig rig_;  // with the noise that all is weighted by
+  Rig rig_;  // with the noise by which everything is weighted
   const CalibrateOptions& options_;
   const ProgressCallback& progress_;
   Partitioning partitioning_;
@@ -612,7 +615,7 @@ class Calibrator {
   Eigen::MatrixXd covariance_d_;
   bool weak_were_judged_ = false;
   double moved_sigmas_ = 0;  // by the last step
-  double left_sigmas_ = 0;   // of the step that a stalled estimate is short of
+  double left_sigmas_ = 0;   // remaining step of a stalled estimate
   double track_noise_ = 0;   // as TrackNoiseFactor
   CalibrationResult result_;
   std::vector<SegmentEvidence> evidence_;

@@ -1,5 +1,5 @@
-// One calibration from start to end, on segments as they come: what Calibrate()
-// goes through, once or more often, after it has looked at its input.
+// One complete calibration on a fixed set of segments. Calibrate() calls it
+// once or several times, after it has checked its input.
 #pragma once
 
 #include <vector>
@@ -12,13 +12,14 @@ namespace selfcal {
 
 struct CalibrationRun {
   CalibrationResult result;
-  // Of each segment; empty where no minimum was reached.
+  // One for each segment; empty if no minimum was reached.
   std::vector<SegmentEvidence> evidence;
-  DataEstimate estimate;  // what the result says; where there is evidence
+  DataEstimate
+      estimate;  // in the form that FuseEvicted needs; set if there is evidence
 };
 
 // As Calibrate(), with segments in the order of their keys, all of which are
-// used. They must outlive the call alone.
+// used. They must outlive only the call.
 CalibrationRun RunCalibration(const Rig& rig,
                               const Calibration& theta_start,
                               const std::vector<const MotionSegment*>& segments,

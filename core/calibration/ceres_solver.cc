@@ -14,7 +14,7 @@
 namespace selfcal {
 namespace {
 
-// The double arrays that Ceres moves, one of each for a keyframe.
+// The double arrays that Ceres modifies, one set for each keyframe.
 struct KeyframeBlocks {
   std::array<double, 4> q;  // x, y, z, w
   std::array<double, 3> p;
@@ -40,8 +40,8 @@ void FromBlocks(const KeyframeBlocks& blocks, KeyframeState* x) {
   x->b_g = vb.tail<3>();
 }
 
-// rho'' is given as zero, so that Ceres weights residuals as in iteratively
-// reweighted least squares, as it does for every loss that is concave.
+// rho'' is set to zero, so that Ceres weights residuals as in iteratively
+// reweighted least squares, as it does for every concave loss.
 class CeresLoss final : public ceres::LossFunction {
  public:
   CeresLoss(const RobustLoss& loss, double weight)
@@ -94,7 +94,7 @@ class Builder {
   ceres::Problem* problem() { return &problem_; }
   const Eigen::VectorXd& d() const { return d_; }
 
-  // Landmarks go first, each by itself.
+  // Landmarks are eliminated first, each separately.
   std::shared_ptr<ceres::ParameterBlockOrdering> Ordering() {
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     for (Eigen::Vector3d& place : places_) {
@@ -192,8 +192,8 @@ class Builder {
   }
 
   void AddLandmarks(const std::vector<ScreenedLandmark>& landmarks) {
-    // Two rows, as all others of a landmark have: Ceres' elimination is faster
-    // where sizes are uniform.
+    // Two rows, as for all other residuals of a landmark: Ceres' elimination is
+    // faster with uniform sizes.
     Eigen::Matrix<double, 2, 3> far = Eigen::Matrix<double, 2, 3>::Zero();
     for (std::size_t i = 0; i < landmarks.size(); ++i) {
       far(0, 2) = std::sqrt(landmarks[i].weight) / kInverseDepthSigma;
@@ -229,7 +229,7 @@ class Builder {
   std::unique_ptr<ceres::Manifold> rotation_;
   std::unique_ptr<ceres::Manifold> gauge_;
   std::unique_ptr<ceres::Manifold> subspace_;
-  // Of each observation. Ceres keeps pointers to them.
+  // One for each observation. Ceres keeps pointers to them.
   std::deque<CeresLoss> losses_;
   ceres::Problem problem_;
 };
@@ -259,19 +259,19 @@ class ProgressAdapter final : public ceres::IterationCallback {
 
 ceres::Solver::Options SolverOptions(const SolverRound& round) {
   ceres::Solver::Options options;
-  // Powell's dogleg rather than Levenberg-Marquardt. On recordings with heavy
+  // Powell's dogleg rather than Levenberg-Marquardt: on recordings with heavy
   // tails the residuals' own curvature doubles that of Gauss-Newton along the
-  // weakest directions (tilt, scale, biases). A full step then overshoots and
-  // the damping that prevents it slows every weak direction: 100 iterations and
-  // more, where dogleg, which shortens the step, takes 10.
+  // weakest directions (tilt, scale, biases). A full step then overshoots, and
+  // the damping that prevents this slows down every weak direction: 100
+  // iterations and more, where dogleg, which shortens the step, takes 10.
   options.trust_region_strategy_type = ceres::DOGLEG;
   options.dogleg_type = ceres::TRADITIONAL_DOGLEG;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
   options.num_threads = std::max(1, round.threads);
   options.max_num_iterations = round.max_iterations;
   options.function_tolerance = round.function_tolerance;
-  // Done is told by the cost and by the Gauss-Newton step of theta; a small
-  // step of all parameters together tells nothing.
+  // Convergence is decided by the cost and by the Gauss-Newton step of theta; a
+  // small step of all parameters together is not a criterion.
   options.parameter_tolerance = 1e-16;
   options.gradient_tolerance = 1e-16;
   options.jacobi_scaling = true;

@@ -1,5 +1,5 @@
-// A round of a calibration by Ceres: dogleg, landmarks eliminated first, then a
-// sparse factorisation of what is left.
+// Solves a round of a calibration with Ceres: dogleg, elimination of landmarks
+// first, then a sparse factorisation of the remaining system.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace selfcal {
 
-// As SolveRound.
+// Implements SolveRound.
 SolverOutcome SolveRoundByCeres(const SolverRound& round,
                                 const SolverCallback& callback,
                                 CalibrationEstimate* estimate,

@@ -12,15 +12,15 @@
 namespace selfcal {
 namespace {
 
-// A segment whose residuals are so many times larger than expected is not of
-// the same kind as the others.
+// A segment with residuals larger than expected by more than this factor is not
+// comparable with the others.
 constexpr double kMaxFit = 2;
-// The chance that any segment is left out wrongly.
+// Probability that any segment is excluded wrongly.
 constexpr double kChance = 1e-3;
-// A difference that is more probable than this counts as chance.
+// A difference that is more probable than this is treated as chance.
 constexpr double kLikely = 0.05;
 
-// Information about d, by the determined directions.
+// Information about d, along the determined directions.
 struct Reduced {
   Eigen::MatrixXd Lambda;  // r x r
   Eigen::VectorXd eta;     // r
@@ -74,7 +74,7 @@ class Fusion {
   }
 
  private:
-  // The segments of the chain, in its order.
+  // Collects the segments of the chain, in its order.
   void Join(const std::vector<RememberedSegment>& remembered) {
     for (const RememberedSegment& one : remembered) {
       const auto own =
@@ -95,7 +95,7 @@ class Fusion {
     });
   }
 
-  // Segments that were linearised near enough to be compared.
+  // Segments whose linearisation point is near enough for a comparison.
   std::vector<JoinedSegment> Near() const {
     std::vector<JoinedSegment> near;
     std::copy_if(joined_.begin(),
@@ -113,7 +113,7 @@ class Fusion {
            by_offset_.transpose();
   }
 
-  // The same information by the determined directions.
+  // Projects the information on the determined directions.
   Reduced ReducedOf(const ThetaInformation& information) const {
     const Eigen::MatrixXd step = by_offset_ * basis_;
     return {step.transpose() * information.Lambda * step,
@@ -128,7 +128,7 @@ class Fusion {
                          at_.excess);
   }
 
-  // Each evicted segment by itself.
+  // Tests each evicted segment separately.
   int LeaveOutContradictions() {
     const double limit = kChance / static_cast<double>(Count());
     return static_cast<int>(
@@ -157,7 +157,7 @@ class Fusion {
     }
     use.segments = evicted.segments;
     use.reach = evicted.reach;
-    // They say less where they differ by more than chance explains.
+    // Their weight is reduced if they differ by more than chance explains.
     const double weight = use.agreement.probability < kLikely
                               ? use.agreement.degrees / use.agreement.statistic
                               : 1;
@@ -174,7 +174,7 @@ class Fusion {
     result_.Lambda = weight * evicted.information.Lambda;
   }
 
-  // Accounts for the chance that the device changed.
+  // Accounts for the probability that the device changed.
   void AddDoubt(const ChangeDoubt& doubt) {
     if (result_.use.segments == 0) {
       result_.theta = theta_;

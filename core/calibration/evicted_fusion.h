@@ -1,14 +1,15 @@
-// A calibration on the segments that have their data, completed by what the
-// segments without data say.
+// Completes a calibration on the segments with data by the information of
+// segments without data.
 //
-// The estimate comes from data first, and by it is decided which directions
-// are determined, by what the noise is off, and which segments contradict the
-// rest. What the others say (evicted_information.h) is then added within the
-// determined directions alone, in one linear step: noise in states that is
-// taken for motion would be told from information by the data only, so that
-// segments without it never determine what those with data do not.
+// The estimate from data comes first. It decides which directions are
+// determined, what the noise scales are, and which segments contradict the
+// rest. The information of the other segments (evicted_information.h) is then
+// added within the determined directions only, in one linear step: only data
+// can distinguish actual information from noise in states that looks like
+// motion, so that segments without data never determine directions that those
+// with data do not.
 //
-// Pure, any thread, deterministic.
+// Pure, callable from any thread, deterministic.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,40 +24,41 @@
 
 namespace selfcal {
 
-// A calibration on data alone.
+// Result of a calibration on data alone.
 struct DataEstimate {
   // theta = reference [+] d.
   Calibration reference;
   Eigen::VectorXd d;
   ThetaSubspace subspace;
-  // Of data and prior, by d (D x D).
+  // Information of data and prior with respect to d (D x D).
   Eigen::MatrixXd Lambda;
-  // Covariances are larger by this: segments disagree by more than they say.
+  // Factor on covariances: segments disagree by more than their information
+  // predicts.
   double excess = 1;
-  // The noise of pixels and IMU is at most so many times what the rig states:
-  // what was linearised with the stated noise counts as if all were so large,
-  // and says no more than it should, whatever kind it is.
+  // Upper bound of the noise scales of pixels and IMU. Information that was
+  // linearised with the stated noise is weighted as if all noise were this much
+  // larger, so that it is not overconfident, whatever its kind.
   double noise_factor = 1;
 };
 
-// Where nothing is added to the estimate from data, nothing but `use` is set.
+// If nothing is added to the estimate from data, only `use` is set.
 struct CompletedEstimate {
   Calibration theta;
   Eigen::MatrixXd covariance;  // D x D, tangent at theta
-  // What was added (D x D, tangent at theta).
+  // Information that was added (D x D, tangent at theta).
   Eigen::MatrixXd Lambda;
   EvictedUse use;
 };
 
-// `segments` are those with data that the estimate stands on; `remembered`
-// come in the order of time, each session in one run: of these, those that
-// have no ends and are not in `segments` are passed over. `options`
-// say nothing about noise: `estimate` does. `rig` states its noise, with which
-// the ends were computed. None is used, and `use.unused` says why, where most
-// of them, or all together, contradict the estimate, or were linearised too far
-// from it. Whether the newest of all segments differ from those before
-// (memory_split.h) is told, and the result accounts for what is left open, also
-// where none is without data.
+// `segments` are those with data, on which the estimate is based. `remembered`
+// come in the order of time, with those of a session consecutive; those that
+// have no ends and are not in `segments` are ignored. The noise in `options` is
+// ignored; `estimate` has it. `rig` states the noise with which the ends were
+// computed. None is used, and `use.unused` gives the reason, if most of them,
+// or all together, contradict the estimate, or were linearised too far from it.
+// The result reports whether the newest of all segments differ from those
+// before (memory_split.h), and its covariance accounts for the remaining doubt,
+// even if no segment is without data.
 CompletedEstimate FuseEvicted(const Rig& rig,
                               const DataEstimate& estimate,
                               const std::vector<const MotionSegment*>& segments,

@@ -19,7 +19,8 @@ double Reach(const Rig& rig, const Calibration& from, const Calibration& to) {
 }
 
 // Time from one segment to the next: within a session by its own clock; between
-// sessions, which share no better one, in whole seconds of the receiver's.
+// sessions, which share no better clock, in whole seconds of the receiver's
+// clock.
 double SecondsBetween(const JoinedSegment& a, const JoinedSegment& b) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   if (a.ends->key.session == b.ends->key.session) {
@@ -55,7 +56,7 @@ class AgeingChain {
   std::optional<JoinedSegment> last_;
 };
 
-// The weights of segments in the order in which they are asked for.
+// Weights of segments, which depend on the order of the calls.
 class SegmentWeights {
  public:
   SegmentWeights(const Rig& rig,
@@ -65,7 +66,8 @@ class SegmentWeights {
         point_(point),
         noise_factor_(std::max(1.0, options.noise_factor)) {}
 
-  // Of one whose linearisation counts; nothing where that is too far away.
+  // Weight of a segment whose linearisation error counts; nullopt if its
+  // linearisation point is too far away.
   std::optional<double> Next(const JoinedSegment& segment) {
     const double reach = ReachOf(segment);
     if (!(reach <= kMaxReach)) {
@@ -76,7 +78,7 @@ class SegmentWeights {
     reach_ = std::max(reach_, reach);
     return WeightAt(segment, reach);
   }
-  // Of one whose linearisation was made at the point, as its data allows.
+  // Weight of a segment that was linearised at the point, as its data allows.
   double OfCalibrated(const JoinedSegment& segment) const {
     return WeightAt(segment, ReachOf(segment));
   }

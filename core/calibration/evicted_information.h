@@ -1,17 +1,18 @@
-// What segments without data say about theta beside those that a calibration
-// stands on.
+// The information about theta of segments without data, in addition to that of
+// the segments on which a calibration is based.
 //
-// All segments are joined at their ends (session_chain.h), and from what they
-// say together is taken what those of the calibration say among themselves:
+// All segments are joined at their ends (session_chain.h), and the joint
+// information of those of the calibration is subtracted from that of all:
 //   Lambda(evicted) = Lambda(all) - Lambda(of the calibration),
-// and eta alike. Data only adds information, so that the difference is
-// semidefinite. It holds what an evicted segment says about theta, and what it
-// says through the states of a neighbour that is calibrated on: nothing counts
-// twice, and the two together are what a calibration on all of the data would
-// linearise to. Each observation belongs to one segment; a landmark that
-// several see is a landmark of each.
+// and eta likewise. Data only adds information, so that the difference is
+// semidefinite. It contains the information of an evicted segment about theta,
+// and its information through the states of a neighbour that is part of the
+// calibration: no information is counted twice, and the sum of both is the
+// linearisation of a calibration on all of the data. Each observation belongs
+// to one segment; a landmark that several segments observe is a separate
+// landmark of each.
 //
-// Pure functions, any thread, deterministic.
+// Pure functions, callable from any thread, deterministic.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,32 +28,33 @@
 
 namespace selfcal {
 
-// One segment of all; `ends` must outlive the call.
+// One of all segments; `ends` must outlive the call.
 struct JoinedSegment {
   const SegmentEnds* ends = nullptr;
-  // The calibration has its data. Its ends should be linearised at the point,
-  // as its data allows.
+  // True if the calibration has the data of the segment. Its ends should then
+  // be linearised at the point, which the data makes possible.
   bool calibrated_on = false;
-  // Its residuals over what is expected of them (ResidualStatistics::fit): its
-  // noise counts as so many times larger. At most 1: as expected, or not
+  // Its residuals over their expectation (ResidualStatistics::fit): its noise
+  // is treated as this many times larger. At most 1: as expected, or not
   // measured.
   double fit = 1;
-  // When it was received: for the walk between sessions.
+  // Time of reception, for the walk between sessions.
   std::int64_t time_ns = 0;
 };
 
 struct EvictedOptions {
-  // theta random-walks by these densities (D) [tangent units / sqrt(s)]: what
-  // is older than the newest segment says less. Empty: theta is constant.
+  // Densities (D) of a random walk of theta [tangent units / sqrt(s)], by which
+  // information older than the newest segment decreases. Empty: theta is
+  // constant.
   Eigen::VectorXd walk = {};
-  // The noise is so many times what the rig states, as the calibration found.
+  // Noise scale that the calibration found, relative to the rig's stated noise.
   double noise_factor = 1;
-  // Groups of parameters that have changed before, and may go on to.
+  // Groups of parameters that have changed before, and may continue to.
   std::vector<std::string> changing = {};
 };
 
 // A segment that was linearised further than this from the point, rms over the
-// free components in reference sigmas, is left out.
+// free components in reference sigmas, is excluded.
 inline constexpr double kMaxReach = 2.0;
 bool IsTooFar(const Rig& rig,
               const SegmentEnds& ends,
@@ -60,28 +62,29 @@ bool IsTooFar(const Rig& rig,
 
 struct EvictedInformation {
   ThetaInformation information;  // about theta [-] point
-  int segments = 0;              // without data, that it stands on
-  int left_out = 0;              // linearised too far away
-  double reach = 0;              // the largest of those that it stands on
+  int segments = 0;              // without data, that contribute
+  int left_out = 0;              // excluded: linearised too far away
+  double reach = 0;              // the largest of those that contribute
 };
 
-// Weight of the k-th segment (from 1) that was linearised so far from the point
-// [reference sigmas, rms]. A linearisation is off by what is quadratic in the
-// reach, and by the same for all segments alike, so that their sum has an error
-// that does not average out: k segments are worth k / (1 + 0.015 k reach^4) of
-// them. (Measured: 20 simulated segments have a NEES of 1.33 of its expectation
-// at a reach of 1, and of 2.65 at 1.7.) This is the last one's part in it.
+// Weight of the k-th segment (from 1) that was linearised at this distance from
+// the point [reference sigmas, rms]. The error of a linearisation is quadratic
+// in the reach, and the same for all segments, so that it does not average out
+// in their sum: k segments are worth k / (1 + 0.015 k reach^4) segments.
+// (Measured: 20 simulated segments have a NEES of 1.33 of its expectation at a
+// reach of 1, and of 2.65 at 1.7.) The weight is the share of the last segment.
 double ReachWeight(int k, double reach);
 
-// Segments in the order of time, each session in one run. A segment that
-// contradicts the others is for the caller to leave out.
+// Segments are in the order of time, with those of a session consecutive. The
+// caller excludes segments that contradict the others.
 EvictedInformation InformationOfEvicted(const Rig& rig,
                                         const Calibration& point,
                                         std::span<const JoinedSegment> segments,
                                         const EvictedOptions& options = {});
 
-// About theta [-] point, of all segments alike, whether the calibration has
-// their data or not; those that were linearised too far away are left out.
+// Information about theta [-] point of all segments, whether or not the
+// calibration has their data; those that were linearised too far away are
+// excluded.
 ThetaInformation InformationOfAll(const Rig& rig,
                                   const Calibration& point,
                                   std::span<const JoinedSegment> segments,

@@ -12,7 +12,7 @@ namespace {
 
 // No point is further away than 1 / this [m].
 constexpr double kLeastInverseDepth = 1e-4;
-// A change of inverse depth that is small against it.
+// A step is small if it changes the inverse depth by less than this fraction.
 constexpr double kMaxRelativeStep = 0.5;
 
 struct Linearised {
@@ -60,7 +60,7 @@ Linearised Linearise(const LandmarkScene& scene,
   return sum;
 }
 
-// The least inverse depth of a landmark whose information is H.
+// Smallest allowed inverse depth of a landmark whose information is H.
 double LeastInverseDepth(const Eigen::Matrix3d& H) {
   const Eigen::LDLT<Eigen::Matrix3d> ldlt(H);
   const double variance = ldlt.solve(Eigen::Vector3d::UnitZ().eval())(2);
@@ -68,7 +68,7 @@ double LeastInverseDepth(const Eigen::Matrix3d& H) {
                       : -std::numeric_limits<double>::infinity();
 }
 
-// The step of the other two parameters where that of inverse depth is given.
+// Step of the other two parameters for a given step of inverse depth.
 Eigen::Vector3d StepWithDepth(const Eigen::Matrix3d& H,
                               const Eigen::Vector3d& g,
                               double depth_step) {
@@ -175,9 +175,9 @@ RefinedPlace RefinePlace(const LandmarkScene& scene,
   }
   bool behind = false;
   double damping = 1e-6;
-  // Beyond the loss's scale the cost curves less than Gauss-Newton has it, so
-  // that single steps crawl: while they gain more than was predicted, they are
-  // stretched.
+  // Beyond the loss's scale the cost has less curvature than Gauss-Newton
+  // assumes, so that single steps are too short: they are stretched as long as
+  // they gain more than predicted.
   double stretch = 1;
   for (int i = 0; i < limits.steps; ++i) {
     Eigen::Matrix3d H = here.H;

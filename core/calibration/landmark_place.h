@@ -1,7 +1,7 @@
-// The place of one landmark in the scene of all keyframes, and how it is
-// improved while keyframes and calibration are held.
+// The position of one landmark relative to all keyframes, and its refinement
+// while keyframes and calibration are held constant.
 //
-// Pure, any thread.
+// Pure, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,22 +18,24 @@
 namespace selfcal {
 
 // Standard deviation [1/m] of a prior on every landmark's inverse depth,
-// centred at infinity: nothing is seen from much nearer than 0.1 m. It is far
-// too weak to move what has any parallax, and keeps a landmark that loses its
-// parallax within a round, as that of a device at rest, from running away.
+// centred at infinity: nothing is observed from much nearer than 0.1 m. The
+// prior is far too weak to move a landmark with any parallax; it keeps a
+// landmark that loses its parallax within a round, as those of a device at
+// rest, from diverging.
 inline constexpr double kInverseDepthSigma = 10;
 
-// A landmark lies in front of the cameras that see it: its inverse depth is
-// held to more than so many of its own standard deviations below that of
-// infinity. Noise takes one that is far away a little below; a whole scene
-// beyond infinity is the mirror image of the true one, which fits the pixels
-// of a camera that turns about a point as well, with its lever arm reversed.
+// A landmark lies in front of the cameras that observe it: its inverse depth
+// may be at most this many of its own standard deviations beyond infinity, that
+// is below zero. Noise moves a distant landmark slightly beyond infinity; a
+// whole scene beyond infinity is the mirror image of the true one, which fits
+// the pixels of a camera that rotates about a point equally well, with its
+// lever arm reversed.
 inline constexpr double kMaxBeyondInfinity = 2;
 
-// No camera sees a point that is nearer to its centre.
+// A camera cannot observe a point that is nearer to its centre.
 inline constexpr double kMinDistance_m = 0.01;
 
-// What landmarks are measured against: every camera at every keyframe.
+// The poses of every camera at every keyframe.
 class LandmarkScene {
  public:
   // theta must outlive the scene.
@@ -46,7 +48,8 @@ class LandmarkScene {
   const CameraCalibration& camera(const TrackObservation& seen) const {
     return theta_.cameras[seen.camera];
   }
-  // Of the camera that saw it: rotation from G, and where the origin of G is.
+  // Rotation from G of the camera of an observation, and the origin of G in
+  // that camera.
   const Eigen::Matrix3d& R_CG(const TrackObservation& seen) const {
     return views_[Index(seen)].R_CG;
   }
@@ -55,9 +58,9 @@ class LandmarkScene {
   }
 
   // Predicted minus measured [px] of a homogeneous point in G; by_p_C, unless
-  // null, its derivative by p_C = R_CG X + w p_CG. False, leaving both
-  // untouched, where the point does not project, or lies nearer than
-  // kMinDistance_m: in the centre of a camera any pixel fits.
+  // null, is its derivative with respect to p_C = R_CG X + w p_CG. Returns
+  // false and changes neither if the point does not project, or is nearer than
+  // kMinDistance_m: a point in the centre of a camera fits any pixel.
   bool Residual(const TrackObservation& seen,
                 const Eigen::Vector4d& point_G,
                 Eigen::Vector2d* residual_px,
@@ -78,8 +81,8 @@ class LandmarkScene {
   std::vector<View> views_;  // keyframe by keyframe
 };
 
-// A landmark by inverse depth from the camera that saw it first, with the axis
-// of depth pointing at it.
+// A landmark by inverse depth from the camera that observed it first, with the
+// depth axis pointing at it.
 struct LandmarkPlace {
   LandmarkAnchor anchor;
   Eigen::Vector3d inverse_depth = Eigen::Vector3d::Zero();
@@ -87,52 +90,52 @@ struct LandmarkPlace {
   Eigen::Vector4d Homogeneous() const {
     return anchor.ToHomogeneous(inverse_depth);
   }
-  // In G [m]; one further away than 10 km at that depth, which is as good as
-  // infinity.
+  // Position in G [m]; a landmark further away than 10 km is placed at that
+  // depth, which is equivalent to infinity.
   Eigen::Vector3d Point() const;
 
-  // Goes a linear step in (alpha, beta, rho): as a point in space where the
-  // step is small against its depth, so that it slides along with the
-  // keyframes that see it; else by inverse depth, to which infinity is
-  // harmless.
+  // Applies a linear step in (alpha, beta, rho): as a step of the point in
+  // space if it is small relative to its depth, so that the point moves along
+  // with the keyframes that observe it; else as a step of inverse depth, which
+  // is regular at infinity.
   void Move(const Eigen::Vector3d& step);
 };
 
-// The place of a homogeneous point in G, anchored at the track's first camera.
+// Position of a homogeneous point in G, anchored at the track's first camera.
 LandmarkPlace PlaceAt(const LandmarkScene& scene,
                       const Track& track,
                       const Eigen::Vector4d& point_G);
 
-// One of a track that a place stands on.
+// An observation of a track that a position is based on.
 struct UsedObservation {
   int index = 0;      // into the track
   double weight = 1;  // in (0, 1]
 };
 
-// When to stop improving a place.
+// Criteria to stop the refinement of a position.
 struct RefineLimits {
   int steps = 30;
-  // What the next step would take off the cost [sigma^2]: far below a sigma of
-  // the place it changes nothing that is measured.
+  // Expected decrease of the cost by the next step [sigma^2]: a step far below
+  // one sigma of the position has no measurable effect.
   double decrease = 1e-8;
 };
 
 struct RefinedPlace {
   Eigen::Matrix3d information;  // of (alpha, beta, rho)
   double cost = 0;  // sum of the loss and of the prior on inverse depth
-  // The minimum lies further beyond infinity than is allowed; the place is the
-  // best one that is.
+  // The minimum lies further beyond infinity than is allowed; the position is
+  // the best one within the limit.
   bool behind = false;
 };
 
-// What an observation that does not project counts for [sigma]: as one beyond
-// any gate.
+// Residual assigned to an observation that does not project [sigma]: beyond any
+// gate.
 inline constexpr double kNotProjectedSigmas = 1e3;
 
 // Minimises the robust reprojection cost of the observations `used`, and the
-// prior on inverse depth, by damped Gauss-Newton, where the landmark is in
-// front of the camera that it is anchored to. From a place behind it, the
-// search starts at infinity.
+// prior on inverse depth, by damped Gauss-Newton, with the landmark in front of
+// its anchor camera. If the start is behind that camera, the search starts at
+// infinity.
 RefinedPlace RefinePlace(const LandmarkScene& scene,
                          const Track& track,
                          std::span<const UsedObservation> used,
@@ -140,10 +143,10 @@ RefinedPlace RefinePlace(const LandmarkScene& scene,
                          const RefineLimits& limits,
                          LandmarkPlace* place);
 
-// Every observation of the track, in full.
+// All observations of the track, with full weight.
 std::vector<UsedObservation> AllOf(const Track& track);
 
-// Norm of each residual [px]; infinite where the place does not project.
+// Norm of each residual [px]; infinite if the landmark does not project.
 std::vector<double> ResidualNorms(const LandmarkScene& scene,
                                   const Track& track,
                                   const Eigen::Vector4d& point_G);

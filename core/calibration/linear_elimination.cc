@@ -1,5 +1,5 @@
-// The elimination of a linear system, chain by chain and then the interface,
-// and the way back.
+// Elimination of a linear system, chain by chain and then the interface, and
+// back-substitution.
 #include <algorithm>
 #include <cmath>
 
@@ -10,7 +10,8 @@ namespace {
 
 double Information(double sigma) { return 1 / (sigma * sigma); }
 
-// By (alpha, beta, rho), of a step of p_G = a + R (alpha, beta, 1) / rho.
+// Converts a step of p_G = a + R (alpha, beta, 1) / rho to one of (alpha, beta,
+// rho).
 Eigen::Vector3d PlaceStep(const LandmarkPlace& place,
                           double rho,
                           const Eigen::Vector3d& step_G) {
@@ -22,7 +23,7 @@ Eigen::Vector3d PlaceStep(const LandmarkPlace& place,
 
 }  // namespace
 
-// That of landmark_place.h on inverse depth.
+// Prior on inverse depth of landmark_place.h.
 LinearSystem::LandmarkPrior LinearSystem::PriorOf(
     const std::vector<ScreenedLandmark>& landmarks, int landmark) const {
   const LandmarkPlace& place = places_[landmark];
@@ -58,7 +59,7 @@ void LinearSystem::EliminateKeyframes(Chain* chain) {
   chain->elimination.Finish(&of_chain_);
 }
 
-// Adds what a chain says about theta and the interface.
+// Adds the information of a chain about theta and the interface.
 void LinearSystem::AddChain(const Chain& chain) {
   const Eigen::Index D = information_.eta.size();
   const Eigen::MatrixXd& Lambda = of_chain_.Lambda;
@@ -90,8 +91,8 @@ void LinearSystem::SolveInterface(
     interface_eta_.segment<3>(at) -= prior.g;
   }
   interface_root_.compute(interface_);
-  // A landmark next to infinity may lose what its depth is known by to
-  // rounding: it gets the least that can be told from none.
+  // The information about the depth of a landmark near infinity may be lost to
+  // rounding: it gets the least amount that is distinguishable from none.
   for (double add = 1e-14; interface_root_.info() != Eigen::Success && add < 1;
        add *= 10) {
     interface_.diagonal() *= 1 + add;
@@ -151,7 +152,7 @@ void LinearSystem::Linearise(const Rig& rig,
   interface_.setZero(interface_size_, interface_size_);
   interface_theta_.setZero(interface_size_, size);
   interface_eta_.setZero(interface_size_);
-  Chain* finished = &chains_.back();  // by the linearisation before
+  Chain* finished = &chains_.back();  // by the previous linearisation
   for (Chain& chain : chains_) {
     chain.elimination.TakeScratch(&finished->elimination);
     finished = &chain;

@@ -1,4 +1,4 @@
-// What a linear system leaves unknown, kind by kind.
+// Posterior of a linear system by kind of factor.
 #include <cmath>
 #include <span>
 
@@ -7,7 +7,7 @@
 namespace selfcal {
 namespace {
 
-// Of the parameters at the indices `at`, after the first `head`.
+// Selects the parameters at the indices `at`, after the first `head`.
 Eigen::MatrixXd Select(const Eigen::MatrixXd& covariance,
                        Eigen::Index head,
                        std::span<const int> at) {
@@ -19,7 +19,7 @@ Eigen::MatrixXd Select(const Eigen::MatrixXd& covariance,
 
 }  // namespace
 
-// Of theta and the interface.
+// Covariance of theta and the interface.
 Eigen::MatrixXd LinearSystem::SharedCovariance(
     const Eigen::MatrixXd& theta_covariance) const {
   if (interface_size_ == 0) return theta_covariance;
@@ -58,8 +58,8 @@ void LinearSystem::AddWalk(const Chain::Walk& walk,
   }
 }
 
-// The squares of a row of weight w that unknowns absorb weigh w, and rows share
-// in what they absorb by their weight: w^2 / w on average.
+// The absorbed squares of a row of weight w have the weight w, and rows share
+// the absorbed part in proportion to their weights: sum w^2 / sum w on average.
 void LinearSystem::AddLandmarks(const std::vector<ScreenedLandmark>& landmarks,
                                 LinearPosterior* posterior) const {
   double all_squared = 0;
@@ -139,7 +139,7 @@ LinearPosterior LinearSystem::FindPosterior(
     add(chain.walk_in, false);
     add(chain.walk_out, true);
   }
-  // What is left of all squares is that of the pixels.
+  // The remaining squares are those of the pixels.
   result.pixel_squares +=
       motion_squares_ - decrease_ -
       theta_step.dot(2 * information_.eta - information_.Lambda * theta_step) -

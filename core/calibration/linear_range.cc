@@ -7,7 +7,7 @@ namespace selfcal {
 namespace {
 
 constexpr int kMaxIterations = 10;
-// The minimum is near enough when an iteration takes less off the cost.
+// The minimum is accurate enough when an iteration reduces the cost by less.
 constexpr double kEnough = 0.1 * kGrowthTolerance;
 
 }  // namespace
@@ -56,8 +56,8 @@ bool LinearRange::GrowsAsClaimed(const Eigen::VectorXd& sigma_step,
   double last = 0;
   SolverRound walk = round_;
   walk.max_iterations = kMaxIterations;
-  // Where the point on the tangent costs no more than claimed already, the way
-  // to it is as the linearisation has it.
+  // If the point on the tangent already costs no more than claimed, the
+  // linearisation holds up to that point.
   const SolverOutcome outcome = SolveRoundByStructure(
       walk,
       [&](int iteration, double cost, const Eigen::VectorXd&) {

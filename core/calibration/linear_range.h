@@ -1,16 +1,17 @@
-// Whether the cost of a calibration grows along a direction of theta as its
-// linearisation has it.
+// Tests whether the cost of a calibration grows along a direction of theta as
+// predicted by its linearisation.
 //
-// The information about a weak direction reaches as far as its sigma, and that
-// may be further than the problem is linear: an accelerometer that is off by
-// half, a lever arm of twice its length. The other directions then turn with
-// this one, and what is claimed of them holds on a tangent, not where the truth
-// is. Or it is there at one point only, where noise in states and landmarks
-// looks like motion, and gone once they follow. Both show in the cost itself,
-// with theta held a sigma away and all else at its minimum: it grows by more
-// than the half that it should, or by less.
+// The information about a weak direction applies up to about its sigma, which
+// may be further than the problem is linear: an accelerometer with a scale
+// error of a half, a lever arm of twice its length. The other directions then
+// rotate with this one, and their claimed covariance holds on a tangent that
+// does not contain the truth. Or the information exists at one point only,
+// where noise in states and landmarks looks like motion, and vanishes once they
+// adapt. Both are visible in the cost itself, with theta held one sigma away
+// and everything else at its minimum: it grows by more than the expected half,
+// or by less.
 //
-// Pure, any thread, deterministic.
+// Pure, callable from any thread, deterministic.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,26 +24,28 @@
 
 namespace selfcal {
 
-// Half squares by which the growth of the cost may differ from what is claimed,
-// a sigma from the minimum: the sigma then is what the cost shows to a fifth.
+// Tolerance of the growth of the cost [half squares], one sigma from the
+// minimum: the sigma then agrees with the cost to one fifth.
 inline constexpr double kGrowthTolerance = 0.15;
 
 class LinearRange {
  public:
-  // About an estimate near its minimum. The round's basis has no columns: theta
-  // is held. What the round refers to must outlive this.
+  // Tests about an estimate near its minimum. The round's basis has no columns:
+  // theta is held constant. The objects that the round refers to must outlive
+  // this.
   LinearRange(const SolverRound& round,
               const CalibrationEstimate& estimate,
               const std::vector<ScreenedLandmark>& landmarks);
 
-  // Keyframes and landmarks came to a minimum. If not, nothing can be told.
+  // True if keyframes and landmarks reached a minimum. If not, nothing can be
+  // tested.
   bool settled() const { return settled_; }
 
-  // Of d at that minimum, the prior on theta included.
+  // Information about d at that minimum, including the prior on theta.
   const SharedInformation& information() const { return linearised_.by_offset; }
 
-  // Whether the cost is as claimed one sigma to either side of where the
-  // direction has its minimum by the linearisation. step: of d, not 0.
+  // Returns true if the cost is as claimed one sigma to either side of the
+  // minimum of the direction according to the linearisation. step: of d, not 0.
   bool Holds(const Eigen::VectorXd& step) const;
 
  private:
@@ -55,9 +58,10 @@ class LinearRange {
   bool settled_ = false;
 };
 
-// Holds what the data says less about than the prior, and of what it says less
-// than weak_information about (in units of the prior) that for which the cost
-// does not hold what is claimed. The range must be settled.
+// Holds constant the directions with less information from the data than from
+// the prior and, among those with less than weak_information (in units of the
+// prior), the ones for which the cost does not confirm the claimed information.
+// The range must be settled.
 ThetaSubspace TrustedSubspace(const Rig& rig,
                               const LinearRange& range,
                               double weak_information);

@@ -8,16 +8,17 @@
 namespace selfcal {
 namespace {
 
-// Below it an observation counts as beyond the gate: a landmark must not stand
-// on what has all but no weight.
+// An observation with less weight is treated as beyond the gate: a landmark
+// must not depend on observations with almost no weight.
 constexpr double kLeastWeight = 1e-6;
 constexpr int kMinObservations = 2;
-// A landmark is never taken to be further away than 1 / this [m].
+// The modelled distance of a landmark is at most 1 / this [m].
 constexpr double kLeastInverseDepth = 1e-9;
 
-// The gauge is four free directions, so that holding them with any strength
-// changes nothing else: one of the size of the other terms, yet so strong that
-// the landmarks' priors, which are about fixed places, do not move them.
+// The gauge consists of four free directions, so that a prior of any strength
+// on them changes nothing else. This one is of the size of the other terms, yet
+// so strong that the landmarks' priors, which are about fixed positions, do not
+// move them.
 constexpr double kGaugeSigma_m = 1e-5;
 constexpr double kGaugeSigma_rad = 1e-5;
 
@@ -41,7 +42,7 @@ ChainStateMatrix WeakPrior() {
   return weak;
 }
 
-// Steps over which factors are about linear.
+// Steps within which factors are approximately linear.
 ChainStateMatrix SmallSteps() {
   ChainStateMatrix small = ChainStateMatrix::Zero();
   small.diagonal().segment<3>(kStateRotation).array() =
@@ -55,7 +56,7 @@ ChainStateMatrix SmallSteps() {
   return small;
 }
 
-// Position and rotation about gravity.
+// Information about position and rotation about gravity.
 ChainStateMatrix GaugePrior(const KeyframeState& x) {
   ChainStateMatrix gauge = ChainStateMatrix::Zero();
   const Eigen::Vector3d up_I = x.q_GI.conjugate() * Eigen::Vector3d::UnitZ();
@@ -72,7 +73,7 @@ double UsedInverseDepth(const LandmarkPlace& place) {
 }
 
 // Half of a walk from a to b, between the biases of one of them and those in
-// its middle: twice the information, and half of what the whole is off.
+// its middle: twice the information, and half of the residual.
 KeptBiasRows HalfWalk(const BiasLink& link,
                       const KeyframeState& a,
                       const KeyframeState& b,
@@ -90,7 +91,7 @@ KeptBiasRows HalfWalk(const BiasLink& link,
 
 std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem) {
   const int keyframes = static_cast<int>(problem.keyframes.size());
-  std::vector<bool> joined(keyframes, false);  // with the next
+  std::vector<bool> joined(keyframes, false);  // with the next one
   for (const InertialLink& link : problem.inertial_links) {
     joined[link.before] = true;
   }
@@ -158,7 +159,7 @@ void LinearSystem::PlaceLandmarks(
   }
 }
 
-// All observations that are used, by landmark, and their order by view.
+// Collects all used observations, by landmark, and sorts them by view.
 void LinearSystem::SortByView(const CalibrationProblem& problem,
                               const std::vector<ScreenedLandmark>& landmarks) {
   const int cameras = static_cast<int>(camera_sizes_.size());
@@ -226,17 +227,16 @@ void LinearSystem::Weigh(const RobustLoss* loss) {
   }
 }
 
-// The kept unknowns of a chain that stand at `place` in the interface.
+// Adds the unknowns from `place` in the interface to the kept unknowns of a
+// chain.
 int LinearSystem::KeepInChain(int place, int size, Chain* chain) {
   const int kept = static_cast<int>(chain->interface.size());
   for (int i = 0; i < size; ++i) chain->interface.push_back(place + i);
   return kept;
 }
 
-// A piece of a track, those without weight left out.
-void LinearSystem::AddPiece(int landmark,
-                            std::span<Seen> piece,
-                            Chain* chain) {
+// Adds a piece of a track, without its observations of zero weight.
+void LinearSystem::AddPiece(int landmark, std::span<Seen> piece, Chain* chain) {
   const int cameras = static_cast<int>(camera_sizes_.size());
   for (Seen& seen : piece) {
     if (seen.weight == 0) continue;
@@ -255,7 +255,7 @@ void LinearSystem::AddPiece(int landmark,
   chain->kept_landmarks.push_back(kept);
 }
 
-// The tracks of each chain, of landmarks that enough observations hold.
+// Finds the tracks of each chain, of landmarks with enough observations.
 void LinearSystem::FindTracks() {
   const int cameras = static_cast<int>(camera_sizes_.size());
   interface_of_landmark_.assign(seen_begin_.size() - 1, kNone);
@@ -263,7 +263,8 @@ void LinearSystem::FindTracks() {
     const std::span<Seen> track(seen_.data() + seen_begin_[m],
                                 seen_begin_[m + 1] - seen_begin_[m]);
     int held = 0;
-    int first = kNone, last = kNone;  // pieces that hold it
+    int first = kNone,
+        last = kNone;  // pieces with observations of nonzero weight
     for (const Seen& seen : track) {
       if (seen.weight == 0) continue;
       ++held;

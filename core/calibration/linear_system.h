@@ -1,20 +1,20 @@
 // A whole calibration problem, linearised at one estimate and eliminated down
-// to theta; and the way back from a step of theta to the steps of all else.
-// Deterministic.
+// to theta, with the back-substitution from a step of theta to the steps of all
+// other unknowns. Deterministic.
 //
-// Keyframes that IMU samples connect form a chain, eliminated by
-// ChainElimination. What connects chains is kept by them: landmarks that
-// several of them see, and for each gap over which biases walk their value in
-// the middle of the walk, so that each end is tied to it by half of the
-// variance. Together with theta these make a small dense system, the interface.
-// A landmark whose track has pieces that lie far apart in one chain is kept as
-// well, since all keyframes between two pieces would be in the front else.
+// Keyframes that are connected by IMU samples form a chain, eliminated by
+// ChainElimination. The unknowns that connect chains are kept: landmarks that
+// several of them observe and, for each gap over which biases walk, the biases
+// in the middle of the walk, to which each end is tied with half of the
+// variance. Together with theta these form a small dense system, the interface.
+// A landmark whose track has distant pieces in one chain is kept as well, since
+// otherwise all keyframes between two pieces would be in the front.
 //
-// Minimised is
+// The system minimises
 //   F(d) = sum |r + J d|^2 over all factors + the priors
 // over the steps d of the keyframes (15 each), of the landmarks and of theta's
-// tangent. Theta has no prior in here: the caller adds his to Lambda, chooses
-// its step, within a subspace or shortened, and asks for the rest.
+// tangent. It has no prior on theta: the caller adds one to Lambda, chooses the
+// step, within a subspace or shortened, and requests the other steps.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -35,7 +35,7 @@
 
 namespace selfcal {
 
-// Keyframes [begin, end) of a problem that inertial links connect.
+// Keyframes [begin, end) of a problem that are connected by inertial links.
 struct KeyframeChain {
   int begin = 0;
   int end = 0;
@@ -43,30 +43,30 @@ struct KeyframeChain {
 
 std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem);
 
-// What is left unknown of a linear system once all factors have spoken, kind by
-// kind: squares of whitened residuals at the minimum, and how much of each the
-// unknowns absorb, the trace of its hat matrix.
+// Posterior of a linear system by kind of factor: squares of whitened residuals
+// at the minimum, and how much of each the unknowns absorb, which is the trace
+// of its hat matrix.
 struct LinearPosterior {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-  // Of each inertial link: its whitened residual, and the covariance of that.
+  // For each inertial link: its whitened residual, and the covariance of that.
   std::vector<ChainStateVector> inertial;
   std::vector<ChainStateMatrix> inertial_covariance;
-  // Summed over bias links, by component. The redundancy is the number of links
-  // less what is absorbed.
+  // Sums over bias links, by component. The redundancy is the number of links
+  // minus the absorbed part.
   Vector6 walk_squares, walk_redundancy;
-  int walk_rows = 0;  // each walk is two, by an unknown in its middle
+  int walk_rows = 0;  // each walk has two, due to the unknown in its middle
   double prior_squares = 0, prior_absorbed = 0;  // weak priors and gauge
   // Reprojections, and the weak prior of each landmark.
   double pixel_squares = 0;
-  // Each observation counts with the weight w that screening gave it, not with
-  // that of the loss: sum w, and sum w^2 / sum w, by which what is absorbed
-  // counts; the latter of each landmark too, summed.
+  // Observations have the weight w from screening, not that of the loss: sum w,
+  // and sum w^2 / sum w, the weight of the absorbed part; the latter also for
+  // each landmark, summed.
   double weighted_observations = 0;
   double weight_of_absorbed = 0, landmark_weights = 0;
   int observations = 0;
   int landmarks = 0;
-  int unknowns = 0;  // all but theta
+  int unknowns = 0;  // all except theta
 };
 
 class LinearSystem {
@@ -74,17 +74,17 @@ class LinearSystem {
   explicit LinearSystem(VectorWidth width = WidestVectors())
       : reprojection_(width), inertial_(width), width_(width) {}
 
-  // Linearises all factors, whitened, and the gauge at the estimate, and
+  // Linearises and whitens all factors and the gauge at the estimate, and
   // eliminates. With a loss, residuals are weighted as in iteratively
   // reweighted least squares: for the Huber loss on normal residuals, the
-  // inverse of Lambda is then the covariance of the estimate to 1 %. Without
-  // (null), all count fully. The weak priors of the score keep states proper
-  // that nothing determines; centred at the estimate, they move nothing.
-  // Damping makes these priors stronger, to steps that are small: for a step,
-  // not for what is said about theta. 1 is next to nothing where states are
-  // determined.
-  // Landmarks that do not have two observations left to stand on are left out.
-  // What was linearised before is forgotten, its memory kept.
+  // inverse of Lambda is then the covariance of the estimate to 1 %. Without a
+  // loss (null), all have full weight. The weak priors of the score keep
+  // undetermined states proper; since they are centred at the estimate, they do
+  // not move it. Damping strengthens these priors to the size of small steps;
+  // it is for computing a step, not the information about theta. A damping of 1
+  // is negligible for states that are determined. Landmarks with fewer than two
+  // remaining observations are excluded. The previous linearisation is
+  // discarded, its memory is reused.
   void Linearise(const Rig& rig,
                  const Calibration& theta,
                  const CalibrationProblem& problem,
@@ -95,26 +95,27 @@ class LinearSystem {
                  const RobustLoss* loss,
                  double damping = 0);
 
-  // Of theta's tangent. Not finite where the factors are not.
+  // Information about theta's tangent. Not finite if the factors are not.
   const SharedInformation& information() const { return information_; }
 
   // Frees the memory that steps and posterior need: until the next
   // linearisation only the information remains.
   void ReleaseChains();
 
-  // What the best steps of keyframes and landmarks take off F while theta
-  // stays; with a step s of it, F falls by
+  // Decrease of F by the optimal steps of keyframes and landmarks with theta
+  // held constant; with a step s of theta, F decreases by
   //   decrease + 2 eta^T s - s^T Lambda s.
   double decrease() const { return decrease_; }
 
-  // The steps that minimise F for a step of theta: of the keyframes, and of the
-  // landmarks by (alpha, beta, rho), zero for those that were left out.
+  // Back-substitution: the steps that minimise F for a step of theta, of the
+  // keyframes and of the landmarks by (alpha, beta, rho); zero for excluded
+  // landmarks.
   void FindSteps(const Eigen::VectorXd& theta_step,
                  std::vector<ChainStateVector>* keyframes,
                  std::vector<Eigen::Vector3d>* landmarks) const;
 
-  // For a step of theta of the given covariance. `landmarks` as they were
-  // linearised.
+  // Posterior for a step of theta with the given covariance. `landmarks` as
+  // they were linearised.
   LinearPosterior FindPosterior(
       const Eigen::VectorXd& theta_step,
       const Eigen::MatrixXd& theta_covariance,
@@ -130,12 +131,12 @@ class LinearSystem {
     ChainElimination elimination;
     std::vector<int> landmarks;  // indices into those of the problem
     std::vector<int> tracks, track_keyframes;
-    // Of each landmark, the first of its kept unknowns, or -1; and of all kept
-    // unknowns their place in the interface.
+    // For each landmark, the first of its kept unknowns, or -1; and for all
+    // kept unknowns their index in the interface.
     std::vector<int> kept_landmarks;
     std::vector<int> interface;
-    // The walks into its first and out of its last keyframe: the bias link, or
-    // -1, and its first kept unknown.
+    // The walks into the first keyframe of the chain and out of its last: the
+    // bias link, or -1, and its first kept unknown.
     struct Walk {
       int link = kNone;
       int kept = 0;
@@ -149,10 +150,10 @@ class LinearSystem {
     int landmark;
     int piece;  // of its track
     Eigen::Vector2d z_px;
-    double share = 1;   // what screening leaves of it
-    double weight = 0;  // of its rows; 0: it says nothing
+    double share = 1;   // weight from screening
+    double weight = 0;  // of its rows; 0: no information
     double square = 0;  // of its rows
-    int factor = -1;    // index into the tracks of its chain
+    int factor = -1;    // index into the observations of its chain
   };
 
   void StartChains(const CalibrationProblem& problem,
@@ -181,7 +182,7 @@ class LinearSystem {
   void Weigh(const RobustLoss* loss);
   void FindTracks();
   void AddViews(Chain* chain);
-  // Of a landmark, by p_G: H and g of x^T H x + 2 g^T x.
+  // Prior of a landmark with respect to p_G: H and g of x^T H x + 2 g^T x.
   struct LandmarkPrior {
     Eigen::Matrix3d H;
     Eigen::Vector3d g;
@@ -191,7 +192,7 @@ class LinearSystem {
   void AddLandmarkPriors(const std::vector<ScreenedLandmark>& landmarks,
                          Chain* chain);
   void EliminateKeyframes(Chain* chain);
-  // The observations of a view that `keep` wants, as arrays.
+  // Gathers the observations of a view that `keep` selects, as arrays.
   template <typename Keep>
   ObservationRun Gather(int view, const Keep& keep);
 
@@ -203,7 +204,7 @@ class LinearSystem {
   double decrease_ = 0;
   double motion_squares_ = 0;  // of inertial factors and walks
 
-  // Of the estimate at hand.
+  // The current estimate.
   const Rig* rig_ = nullptr;
   const Calibration* theta_ = nullptr;
   const std::vector<KeyframeState>* keyframes_ = nullptr;
@@ -221,14 +222,14 @@ class LinearSystem {
   std::vector<InertialLinkStates> links_;
   std::vector<InertialTransition> transitions_;
   std::vector<int> inertial_after_;  // link to the next, or -1
-  // The interface: of each landmark its first unknown, or -1; its information
-  // with theta, and its root.
+  // The interface: for each landmark its first unknown, or -1; the information,
+  // its coupling with theta, and its root.
   std::vector<int> interface_of_landmark_;
   int interface_size_ = 0;
   Eigen::MatrixXd interface_, interface_theta_;
   Eigen::VectorXd interface_eta_;
   Eigen::LLT<Eigen::MatrixXd> interface_root_;
-  // Of one view.
+  // Buffers for one view.
   std::vector<std::int32_t> landmarks_of_view_;
   std::vector<int> seen_of_view_, factors_;
   std::vector<double> z_px_, squares_px2_, weights_, rows_;

@@ -38,23 +38,23 @@ std::vector<Piece> FindPieces(const SharingLimits& limits,
         continue;
       }
     }
-    const auto next = std::upper_bound(
-        chain_starts.begin(), chain_starts.end(), keyframe);
+    const auto next =
+        std::upper_bound(chain_starts.begin(), chain_starts.end(), keyframe);
     pieces.push_back(
         {i, i + 1, static_cast<int>(next - chain_starts.begin()) - 1});
   }
   return pieces;
 }
 
-// A landmark of more than one piece.
+// A landmark with more than one piece.
 struct Connection {
   int track = 0;
   bool with_depth = false;
   std::vector<Piece> pieces;
-  std::vector<bool> kept = {};  // of its pieces, those that it connects
+  std::vector<bool> kept = {};  // for each piece, whether it is connected
 };
 
-// Keeps connections while there is room for them: the best first.
+// Keeps connections within the limits, the best ones first.
 void KeepWithinLimits(const SharingLimits& limits,
                       int chains,
                       std::vector<Connection>* connections) {
@@ -94,7 +94,7 @@ void KeepWithinLimits(const SharingLimits& limits,
   }
 }
 
-// Of chains, the sets that what is kept connects.
+// Sets of chains that are connected by the kept connections.
 std::vector<std::vector<int>> Connected(
     const std::vector<int>& chains,
     int merge_landmarks,
@@ -108,7 +108,7 @@ std::vector<std::vector<int>> Connected(
       if (!connection.kept[i]) continue;
       std::vector<std::uint64_t>& ids =
           by_chain[connection.pieces[i].chain].landmarks;
-      // Tracks come by id.
+      // Tracks are sorted by id.
       const std::uint64_t id = tracks[connection.track].id;
       if (ids.empty() || ids.back() != id) ids.push_back(id);
     }
@@ -140,8 +140,8 @@ Track PartOf(const Track& whole, std::span<const Piece> pieces) {
   return part;
 }
 
-// The tracks that are left of one: each set of connected chains has one of the
-// pieces that are kept.
+// Splits a track: the kept pieces of each set of connected chains form one
+// track, all other pieces one track each.
 void Split(const Track& whole,
            const Connection& connection,
            const std::map<int, int>& set_of_chain,
@@ -180,10 +180,8 @@ SharedMap ShareMap(const SharingLimits& limits,
     connections.push_back(
         {static_cast<int>(t), with_depth[t], std::move(pieces)});
   }
-  KeepWithinLimits(
-      limits, static_cast<int>(chain_starts.size()), &connections);
-  SharedMap result{
-      {}, Connected(chains, merge_landmarks, tracks, connections)};
+  KeepWithinLimits(limits, static_cast<int>(chain_starts.size()), &connections);
+  SharedMap result{{}, Connected(chains, merge_landmarks, tracks, connections)};
   std::map<int, int> set_of_chain;
   for (std::size_t s = 0; s < result.connected.size(); ++s) {
     for (const int chain : result.connected[s]) {

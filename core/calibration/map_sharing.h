@@ -1,16 +1,16 @@
-// Which landmarks of a map connect what lies far apart in a partition, so that
-// a calibration costs what its segments cost, however often a SLAM system finds
-// its landmarks again.
+// Selects the landmarks of a map that may connect distant parts of a partition,
+// so that the cost of a calibration depends on its segments only, however often
+// a SLAM system recognises its landmarks again.
 //
-// A track falls into pieces: where the landmark is lost for long, where another
-// chain of inertial links begins, and where it lasts for very long. Within a
-// piece a landmark is eliminated among the few keyframes around it. One that
+// A track is split into pieces: where the landmark is lost for long, where
+// another chain of inertial links begins, and where it lasts very long. Within
+// a piece a landmark is eliminated among the few keyframes around it. One that
 // connects pieces is an unknown of the linear system's dense interface
-// (linear_system.h), which grows with each of them. So only a bounded number
-// does, those with the most pieces first. Of all others each piece is a track
-// of its own, and later a landmark of its own: that discards what the
-// connection says, and claims nothing. Chains that are then connected by too
-// little share theta alone.
+// (linear_system.h), which grows with each of them. Therefore only a bounded
+// number connects, those with the most pieces first. For all others each piece
+// is a separate track, and later a separate landmark: that discards the
+// information of the connection, and adds none. Chains that are then connected
+// by too little share only theta.
 #pragma once
 
 #include <span>
@@ -21,18 +21,19 @@
 
 namespace selfcal {
 
-// What is left of a partition. Chains are named by the index of their start.
+// The shared map of a partition. Chains are identified by the index of their
+// start.
 struct SharedMap {
   std::vector<Track> tracks;  // by id, pieces of one id by time
-  // Chains that are connected, sets sorted by their first.
+  // Sets of connected chains, sorted by their first.
   std::vector<std::vector<int>> connected;
 };
 
-// `tracks` are whole, and of the given chains: indices into `chain_starts`, the
-// first keyframes of all chains of the problem, ascending. Chains are connected
-// where they have more than merge_landmarks in common that are kept and will
-// survive screening (`with_depth`, of each track): then one gauge is enough for
-// them.
+// `tracks` are complete, and belong to the given chains: indices into
+// `chain_starts`, the first keyframes of all chains of the problem, ascending.
+// Chains are connected if they share more than merge_landmarks kept landmarks
+// that will survive screening (`with_depth`, for each track): one gauge then
+// suffices for them.
 SharedMap ShareMap(const SharingLimits& limits,
                    int merge_landmarks,
                    std::span<const int> chain_starts,

@@ -17,13 +17,14 @@ namespace {
 constexpr int kLongestPart = 4;   // segments
 constexpr int kFewest = 2;        // segments on either side of a step
 constexpr int kShortestRamp = 3;  // parts
-// Of a drift, what is near enough to what the device is now.
+// For a drift, the fraction of the change that is near enough to the present
+// state of the device.
 constexpr double kDrifted = 2.0 / 3;
-// A group is concerned where its test is less probable than this.
+// A group is concerned if its test is less probable than this.
 constexpr double kConcerned = 0.01;
 // The prior probability that a device changed while its segments were recorded.
 constexpr double kChanged = 0.5;
-// The prior probability that groups that have changed go on to.
+// The prior probability that groups that have changed continue to change.
 constexpr double kGoesOn = 0.5;
 
 // Joined segments of one session, by index.
@@ -32,15 +33,15 @@ struct Part {
   int count = 0;
 };
 
-// A course that is tried.
+// A course to be tested.
 struct Trial {
   ChangeKind kind = ChangeKind::kSudden;
   Eigen::VectorXd weights;  // by part
-  // Its part of the level of tests and of the prior of a change.
+  // Its share of the level of tests and of the prior of a change.
   double share = 1;
 };
 
-// The size of the next longer course to try.
+// The size of the next longer course to test.
 int Longer(int n) { return n + std::max(1, n / 2); }
 
 bool BeginSession(std::span<const JoinedSegment> segments, int i) {
@@ -48,7 +49,7 @@ bool BeginSession(std::span<const JoinedSegment> segments, int i) {
          segments[i].ends->key.session != segments[i - 1].ends->key.session;
 }
 
-// Each session in parts of nearly one size.
+// Cuts each session into parts of nearly equal size.
 std::vector<Part> Cut(std::span<const JoinedSegment> segments) {
   const auto count = static_cast<int>(segments.size());
   std::vector<Part> parts;
@@ -162,7 +163,8 @@ class SplitSearch {
   }
 
  private:
-  // Of the free components in units of the prior, along the directions.
+  // Information about the free components in units of the prior, along the
+  // directions.
   OffsetInformation ShownBy(std::span<const JoinedSegment> segments) const {
     const ThetaInformation information =
         InformationOfAll(rig_, theta_, segments, options_);
@@ -173,7 +175,7 @@ class SplitSearch {
   }
 
   // The information of the parts about a change of some course, and the
-  // derivative by it of theta now (in tangent units).
+  // derivative of the present theta with respect to it (in tangent units).
   struct Seen {
     OffsetInformation change;
     Eigen::MatrixXd by_change;
@@ -192,8 +194,8 @@ class SplitSearch {
                  prior);
   }
 
-  // Adds the hypotheses that groups which have changed before go on to, evenly
-  // over all of the segments. Returns the prior of other changes.
+  // Adds the hypotheses that groups which have changed before continue to
+  // change, evenly over all segments. Returns the prior of other changes.
   double AddGoingOn(ChangeMixture* mixture) const {
     const auto of = BlocksOf(options_.changing);
     if (of.empty()) return kChanged;
@@ -207,7 +209,7 @@ class SplitSearch {
     return (1 - kGoesOn) * kChanged;
   }
 
-  // Blocks whose components all belong to groups of these names.
+  // Blocks whose components all belong to these groups.
   std::vector<const ParameterBlock*> BlocksOf(
       const std::vector<std::string>& groups) const {
     std::vector<const ParameterBlock*> found;
@@ -222,7 +224,8 @@ class SplitSearch {
     return found;
   }
 
-  // Rows of the free components in units of the prior, along the directions.
+  // Maps rows of the free components in units of the prior to the tangent,
+  // projected on the directions.
   Eigen::MatrixXd OntoTangent(const Eigen::MatrixXd& rows) const {
     const Eigen::VectorXd sigmas = PriorSigmas(rig_);
     Eigen::MatrixXd tangent = Eigen::MatrixXd::Zero(sigmas.size(), rows.cols());
@@ -263,8 +266,8 @@ class SplitSearch {
   const Calibration& theta_;
   const std::vector<int> free_;
   const Eigen::MatrixXd directions_;  // of free components in prior units
-  const Eigen::MatrixXd onto_;        // these, from the units of the tangent
-  const Eigen::MatrixXd prior_;       // root of its covariance, in its units
+  const Eigen::MatrixXd onto_;        // maps from tangent units to these
+  const Eigen::MatrixXd prior_;  // root of its covariance, along the directions
   const double excess_;
   const std::span<const JoinedSegment> segments_;
   const EvictedOptions& options_;

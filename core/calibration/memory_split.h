@@ -1,24 +1,26 @@
-// Are all segments of a device, with their data or without, of one theta, or do
-// its newest show another than those before?
+// Tests whether all segments of a device, with or without their data, have the
+// same theta, or whether its newest segments have another theta than those
+// before: a device split.
 //
-// A change that is too small for single segments to show stands out where
-// neighbours are joined at their ends (session_chain.h) and few parameters are
-// tested at a time, as if all others had stayed. A set of segments from before
-// and after a change gives a calibration that is neither, and fits new segments
-// half as badly as the one before: that its own segments differ gives it away.
+// A device change that is too small to be detected in single segments becomes
+// significant when neighbours are joined at their ends (session_chain.h) and
+// few parameters are tested at a time, with all others assumed constant. A set
+// of segments from before and after a change gives a calibration that matches
+// neither, and fits new segments half as badly as the previous one; the
+// differences among its own segments reveal it.
 //
 // Each session is cut into parts of a few joined segments. Steps and ramps over
-// the parts are tried as courses of a change (core/change/course.h) about the
-// calibration, of which nothing is known but the prior. A device is handled,
-// and grows warm or cold, between sessions more than within one: a half of what
-// may be found by chance is for steps between sessions, a quarter for other
+// the parts are tested as courses of a change (core/change/course.h) about the
+// calibration, of which only the prior is known. A device is handled, and warms
+// up or cools down, between sessions more than within one: half of the
+// false-alarm probability is for steps between sessions, a quarter for other
 // steps, a quarter for ramps.
 //
-// A change that no test finds is not excluded: all courses and parameters that
-// are tried are weighed against no change at all
+// A change that no test finds is still possible: all tested courses and
+// parameters are weighed against the hypothesis of no change
 // (core/change/change_mixture.h), with these shares of one prior.
 //
-// Pure, any thread, deterministic.
+// Pure, callable from any thread, deterministic.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,22 +35,22 @@
 
 namespace selfcal {
 
-// A split is looked at closer below this probability.
+// A split is examined further below this probability.
 inline constexpr double kRareSplit = 0.05;
 
 struct SplitFindings {
-  // The least probable one. If it is not rare, `without_one` is 1 and no group
-  // is concerned.
+  // The least probable one. If its probability is not below kRareSplit,
+  // `without_one` is 1 and no group is concerned.
   DeviceSplit split;
-  // The chance of a change about theta of the newest segment, in units of the
-  // tangent (D); nothing where no course could be tried.
+  // Possible change of theta of the newest segment, in tangent units (D);
+  // nullopt if no course could be tested.
   std::optional<ChangeDoubt> doubt;
 };
 
-// Segments in the order of time, each session in one run, linearised near
-// `theta`; `estimated` are the orthonormal directions in units of the prior
-// (D x r) that data determines (subspace.h), to which tests and doubt keep.
-// Variances are larger by `excess`.
+// Segments are in the order of time, with those of a session consecutive,
+// linearised near `theta`; `estimated` are the orthonormal directions in units
+// of the prior (D x r) that the data determines (subspace.h), to which tests
+// and doubt are limited. Variances are scaled by `excess`.
 SplitFindings FindSplit(const Rig& rig,
                         const Calibration& theta,
                         const Eigen::MatrixXd& estimated,

@@ -14,9 +14,9 @@ constexpr NoiseKind kInertialKinds[] = {NoiseKind::kGyro,
 
 constexpr std::size_t kMinObservations = 2;
 
-// Each piece of a track becomes a landmark of its own: that it ties distant
-// keyframes says next to nothing about noise, and costs unknowns in every front
-// of the elimination.
+// Makes each piece of a track a separate landmark: the connection of distant
+// keyframes has almost no information about noise, and adds unknowns to every
+// front of the elimination.
 std::vector<ScreenedLandmark> SplitIntoPieces(
     const CalibrationProblem& problem,
     const std::vector<ScreenedLandmark>& landmarks) {
@@ -30,9 +30,8 @@ std::vector<ScreenedLandmark> SplitIntoPieces(
     };
     part.used.clear();
     for (const UsedObservation& used : whole.used) {
-      if (!part.used.empty() &&
-          PieceOf(track, used.index) !=
-              PieceOf(track, part.used.back().index)) {
+      if (!part.used.empty() && PieceOf(track, used.index) !=
+                                    PieceOf(track, part.used.back().index)) {
         finish();
       }
       part.used.push_back(used);
@@ -42,8 +41,8 @@ std::vector<ScreenedLandmark> SplitIntoPieces(
   return parts;
 }
 
-// What the weighted squares of a residual of two normal components of the
-// given variance [sigma^2] are on average, in parts of its squares.
+// Ratio of the expected weighted squares to the expected squares of a residual
+// with two normal components of the given variance [sigma^2].
 double Consistency(const RobustLoss& loss, double variance) {
   constexpr int kSteps = 400;
   constexpr double kEnd = 40;  // of s / 2, exponentially distributed
@@ -133,7 +132,7 @@ std::optional<NoiseBalance> NoiseProblem::Evaluate(
   return Count(factors, loss);
 }
 
-// What the errors of a track have in common is there whatever the pixel sigma.
+// The common errors of a track do not depend on the pixel sigma.
 void NoiseProblem::ScaleLandmarks(double pixel_factor) {
   const double excess = std::max(1.0, track_noise_ / pixel_factor);
   for (ScreenedLandmark& landmark : landmarks_) {
@@ -162,7 +161,7 @@ void NoiseProblem::ScaleInertial(const NoiseVector& factors) {
 
 NoiseBalance NoiseProblem::Count(const NoiseVector& factors,
                                  const RobustLoss& loss) const {
-  // The step of theta that minimises, and its covariance.
+  // The minimising step of theta, and its covariance.
   const Eigen::MatrixXd& basis = round_.basis;
   Eigen::VectorXd step = Eigen::VectorXd::Zero(basis.rows());
   Eigen::MatrixXd inverse(0, 0);
@@ -190,7 +189,7 @@ NoiseBalance NoiseProblem::Count(const NoiseVector& factors,
   return balance;
 }
 
-// Of the prior on theta, if there is one.
+// Part of the unknowns that the prior on theta absorbs, if there is one.
 double NoiseProblem::AbsorbedByPrior(const Eigen::MatrixXd& inverse) const {
   if (round_.prior_information == nullptr) return 0;
   return inverse
@@ -207,8 +206,8 @@ void NoiseProblem::AddMotion(const NoiseVector& factors,
     balance->redundancy[IndexOf(kind)] += redundancy;
   };
   for (std::size_t i = 0; i < inertial_.size(); ++i) {
-    // Squares |e|^2 and their redundancy are sums over the kinds, and gaps:
-    // their parts of the covariance add up to W^-1 W^-T.
+    // Squares |e|^2 and their redundancy are sums over the kinds and gaps,
+    // whose parts of the covariance add up to W^-1 W^-T.
     const InertialMatrix& W = whitening_[i];
     const InertialResidual by_noise = W.transpose() * posterior.inertial[i];
     const InertialMatrix left =
@@ -229,7 +228,7 @@ void NoiseProblem::AddMotion(const NoiseVector& factors,
       posterior.walk_redundancy.tail<3>().sum());
 }
 
-// What no other kind absorbs of the unknowns, reprojections do.
+// Reprojections absorb the remaining unknowns, which no other kind absorbs.
 void NoiseProblem::AddPixels(const LinearPosterior& posterior,
                              double unknowns,
                              const RobustLoss& loss,
@@ -240,7 +239,7 @@ void NoiseProblem::AddPixels(const LinearPosterior& posterior,
     absorbed -= C.trace();
   }
   absorbed += posterior.walk_redundancy.sum();
-  // Observations of less weight count less, and what is absorbed of them.
+  // Observations, and what is absorbed of them, count by their weight.
   absorbed =
       posterior.weight_of_absorbed * (absorbed - 3 * posterior.landmarks) +
       3 * posterior.landmark_weights;

@@ -1,11 +1,11 @@
 // Squares and redundancies of each kind of noise at the end of a calibration,
-// for whitening by any factors on what the rig states: what the factors are
-// found from (noise_factors.h). States, landmarks and theta stay where they
-// were linearised; that other factors move the minimum is part of the linear
-// system.
+// for whitening with any scales of the rig's stated noise; noise_factors.h
+// finds the noise scales from them. States, landmarks and theta stay at their
+// linearisation point; the shift of the minimum for other scales is part of the
+// linear system.
 //
-// Keeps the memory of one evaluation for the next. Not for use by two threads
-// at once; deterministic.
+// Reuses the memory of one evaluation for the next. Not thread-safe;
+// deterministic.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,13 +22,13 @@
 
 namespace selfcal {
 
-// By NoiseKind.
+// Indexed by NoiseKind.
 using NoiseVector = Eigen::Matrix<double, kNoiseKinds, 1>;
 
 constexpr int IndexOf(NoiseKind kind) { return static_cast<int>(kind); }
 
-// Of whitened residuals at the minimum, and how much of it the unknowns do not
-// absorb: equal, on average, where the whitening is right.
+// Squares of whitened residuals at the minimum, and the part of them that the
+// unknowns do not absorb: equal on average if the whitening is right.
 struct NoiseBalance {
   NoiseVector squares = NoiseVector::Zero();
   NoiseVector redundancy = NoiseVector::Zero();
@@ -36,23 +36,23 @@ struct NoiseBalance {
 
 class NoiseProblem {
  public:
-  // The arguments of EstimateNoiseFactors; they must outlive this.
+  // The arguments are those of EstimateNoiseFactors; they must outlive this.
   NoiseProblem(const SolverRound& round,
                const CalibrationEstimate& estimate,
                const std::vector<ScreenedLandmark>& landmarks,
                double track_noise);
 
-  // Nothing where the linear system fails.
+  // Returns nullopt if the linear system fails.
   std::optional<NoiseBalance> Evaluate(const NoiseVector& log_factors);
 
-  // Whether at the last factors what reprojections say of all else depended on
-  // the pixel sigma.
+  // Returns true if, at the last noise scales, the weight of reprojections
+  // relative to all other factors depended on the pixel sigma.
   bool PixelsCount() const { return excess_ <= 1; }
 
  private:
-  // Of the covariance of one link at unit factors, what each kind brings, of
-  // which pixels bring nothing, and what is not known of gaps between samples.
-  // A walk moves the motion as well as the biases.
+  // Parts of the covariance of one link at unit noise scales: that of each kind
+  // (zero for pixels), and that of gaps between samples. A random walk affects
+  // the motion as well as the biases.
   struct LinkNoise {
     std::array<InertialMatrix, kNoiseKinds> kinds;
     InertialMatrix gaps;
@@ -78,7 +78,7 @@ class NoiseProblem {
   const CalibrationEstimate& estimate_;
   const double track_noise_;
   const std::vector<LinkNoise> inertial_;
-  // Scaled by the factors at hand.
+  // Weights scaled by the current noise scales.
   std::vector<ScreenedLandmark> landmarks_;
   double excess_ = 1;  // of the track noise over the pixel sigma
   Rig rig_;

@@ -6,14 +6,14 @@
 namespace selfcal {
 namespace {
 
-// Noise is never taken for further off than this: then something else is wrong.
+// Noise scales are limited to this: beyond it, something else is wrong.
 constexpr double kMostOff = 30;
-// What is hardly determined is still nearer to the truth, if it is so many
-// standard deviations off.
+// A scale that is not determined is still nearer to the truth if it exceeds one
+// by more than this many standard deviations.
 constexpr double kOffSigmas = 1;
-// The variance of a logarithm counts up to this.
+// Upper limit of the variance of a logarithm.
 constexpr double kMostUncertain = 0.5;
-// The logarithm of a factor that makes a difference.
+// Smallest relevant change of the logarithm of a noise scale.
 constexpr double kLeastChange = 0.05;
 
 // A reference into a Rig or a const Rig.
@@ -72,15 +72,16 @@ std::optional<Rig> Reweight(const Rig& stated,
   Rig next = taken;
   double change = 0;
   for (const NoiseFactor& factor : factors) {
-    // Noise that is taken for larger than it is does no harm; for smaller, it
-    // makes a calibration surer than it may be.
+    // Overestimated noise does no harm; underestimated noise makes a
+    // calibration overconfident.
     if (!factor.determined() &&
         std::log(factor.factor) < kOffSigmas * factor.log_sigma) {
       continue;
     }
     const double before = NoiseOf(factor.kind, taken);
     const double most = kMostOff * NoiseOf(factor.kind, stated);
-    // Of the variance, which counts, the mean over what the factor may be.
+    // Mean of the variance, which is the relevant quantity, over the
+    // uncertainty of the scale.
     const double uncertain =
         std::exp(std::min(factor.log_sigma * factor.log_sigma, kMostUncertain));
     const double after = std::clamp(

@@ -1,4 +1,5 @@
-// What residuals say about the noise that a rig is believed to have.
+// Noise scales: the noise of a rig according to residuals, relative to the
+// noise that the rig states.
 #pragma once
 
 #include <optional>
@@ -19,21 +20,21 @@ enum class NoiseKind {
 };
 inline constexpr int kNoiseKinds = 5;
 
-// A factor counts as determined below this standard deviation of its
-// logarithm: 20 % are then two of them.
+// A noise scale is determined if the standard deviation of its logarithm is
+// below this: two of them are then 20 %.
 inline constexpr double kDeterminedLogSigma = 0.1;
 
-// The noise of one kind is this many times what the rig says.
+// Ratio of the actual noise of one kind to the noise that the rig states.
 struct NoiseFactor {
   NoiseKind kind = NoiseKind::kPixel;
   double factor = 1;
   double log_sigma = 0;  // standard deviation of the logarithm of the factor
-  // So many residuals of this kind, whitened, are left to tell by.
+  // Number of residuals of this kind, whitened, not absorbed by unknowns.
   double redundancy = 0;
-  // The calibration was weighted with noise of this many times what the rig
-  // states.
+  // Ratio of the noise by which the calibration was weighted to the noise that
+  // the rig states.
   double used = 1;
-  // The estimate of the factors converged; else the factor is where it stopped.
+  // The estimate of the scales converged; else `factor` is the last iterate.
   bool converged = true;
 
   bool determined() const { return log_sigma < kDeterminedLogSigma; }
@@ -43,22 +44,23 @@ struct NoiseFactor {
 std::string NoiseKindName(NoiseKind kind);
 std::optional<NoiseKind> FindNoiseKind(const std::string& name);
 
-// The sigma of a kind as a rig states it, in the unit of the rig.
+// Noise of a kind as a rig states it, in the unit of the rig.
 double NoiseOf(NoiseKind kind, const Rig& rig);
 void ScaleNoise(NoiseKind kind, double factor, Rig* rig);
 
-// The rig with the noise that `factors`, found with the noise of `taken`,
-// suggest: those that are determined, or larger than one by more than one of
-// their standard deviations, each with the mean of the variance that it may
-// stand for. None is taken for more than 30 times what `stated` states, either
-// way. Nothing where all that is a difference of less than 5 %.
+// Returns the rig with the noise that `factors`, which are relative to the
+// noise of `taken`, suggest. It applies those that are determined, or larger
+// than one by more than one of their standard deviations, each with the mean of
+// the variance over its uncertainty. The noise of any kind stays within a
+// factor of 30 of `stated`, in both directions. Returns nullopt if the
+// difference is less than 5 % for all kinds.
 std::optional<Rig> Reweight(const Rig& stated,
                             const Rig& taken,
                             const std::vector<NoiseFactor>& factors);
 
-// The largest NoiseFactor::used, at least 1, of all kinds but the walks, which
-// are hardly ever determined and matter least; pixels are noisier by
-// `track_noise` besides.
+// Returns the largest NoiseFactor::used, at least 1, over all kinds but the
+// walks, which are rarely determined and matter least; `track_noise`
+// additionally scales the noise of pixels.
 double LargestNoise(const std::vector<NoiseFactor>& factors,
                     double track_noise);
 

@@ -16,31 +16,34 @@ using NoiseMatrix = Eigen::Matrix<double, kNoiseKinds, kNoiseKinds>;
 constexpr double Square(double x) { return x * x; }
 
 constexpr double kMedianOfRayleigh = 1.1774100225154747;
-// Where nothing is known about a factor, its logarithm is within so much of
-// zero.
+// Prior sigma of the logarithm of a noise scale.
 const double kPriorLogSigma = std::log(10.0);
-// Statements about an IMU are wrong together, if they are: given one of its
-// factors, the logarithms of the others are within so much of it.
+// Errors in the stated noise of an IMU are correlated: given one of its noise
+// scales, the logarithms of the others have this sigma about it.
 const double kApartLogSigma = std::log(2.0);
-constexpr double kDifference = 0.1;  // of logarithms
-// A step takes a variance by no more than so much, nor below this part of it.
+constexpr double kDifference =
+    0.1;  // step of the logarithms for difference quotients
+// A step does not increase the logarithm of a noise scale by more than
+// kLongestStep, nor reduce a variance below kLeastPart of it.
 constexpr double kLongestStep = 1.5;  // of the logarithm of the factor
 constexpr double kLeastPart = 0.1;
 constexpr int kMaxSteps = 25;
 constexpr int kMaxHalvings = 3;
-// Settled when the next step is shorter, in standard deviations.
+// Converged when the next step is shorter, in standard deviations.
 constexpr double kSettledSigmas = 0.1;
 constexpr double kSettledSigmasOfGuess = 0.3;
-// Of redundancy r, the Fisher information is at most 2 r.
+// For a redundancy r, the Fisher information is at most 2 r.
 constexpr double kMayBeDetermined = 0.5 / Square(kDeterminedLogSigma);
-// A Fisher information taken further away than this is taken again, if that is
-// of a kind of which it may say more than the prior: noise that is stated far
-// too small leaves next to no redundancy where it is stated, and much where it
-// is.
+// The Fisher information is computed again if the logarithm of a noise scale is
+// further than kNear from where it was computed, and the redundancy of that
+// kind is above kMaySayMore, so that its information may exceed that of the
+// prior: noise that is stated far too small has almost no redundancy at the
+// stated value, and much at the actual one.
 constexpr double kNear = 0.3;
 constexpr double kMaySayMore = 0.5;
 
-// Of the logarithms of the factors over what the rig states.
+// Prior information about the logarithms of the noise scales relative to the
+// stated noise.
 NoiseMatrix PriorInformation() {
   NoiseMatrix covariance =
       NoiseMatrix::Constant(Square(kPriorLogSigma) - Square(kApartLogSigma));
@@ -51,12 +54,13 @@ NoiseMatrix PriorInformation() {
   return covariance.inverse();
 }
 
-// Score and Fisher information of the logarithms of the factors, with the
-// prior. The Fisher information of a restricted likelihood follows from how the
-// redundancies change with the factors.
+// Score and Fisher information of the logarithms of the noise scales, including
+// the prior. The Fisher information of a restricted likelihood follows from the
+// derivatives of the redundancies with respect to the scales.
 class Likelihood {
  public:
-  // `taken`: logarithms of the noise of the problem over what the rig states.
+  // `taken`: logarithms of the noise of the problem relative to the stated
+  // noise.
   Likelihood(NoiseProblem* problem, const NoiseVector& taken)
       : problem_(problem), taken_(taken) {}
 
@@ -75,8 +79,9 @@ class Likelihood {
     return balance_.squares - balance_.redundancy - prior_ * (taken_ + at_);
   }
 
-  // From two differences: a walk has to do with the noise of its own sensor
-  // only, so that each is moved along with that of the other one.
+  // Computed from two differences: a walk interacts with the noise of its own
+  // sensor only, so that the noise of each sensor is varied together with the
+  // walk of the other.
   std::optional<NoiseMatrix> Fisher() const {
     constexpr int kPixel = IndexOf(NoiseKind::kPixel);
     constexpr int kGyro = IndexOf(NoiseKind::kGyro);
@@ -100,7 +105,7 @@ class Likelihood {
             kAccel,
             0.5 * ((*a)[kAccel] - accel_and_walk + (*b)[kGyro] - gyro_and_walk),
             &by_factor);
-    // Nothing changes where all factors change alike.
+    // Redundancies do not change if all noise scales change by the same factor.
     if (pixels_count) {
       for (int i = 1; i < kNoiseKinds; ++i) {
         SetBoth(kPixel, i, -by_factor.row(i).sum(), &by_factor);
@@ -109,7 +114,7 @@ class Likelihood {
     }
     NoiseMatrix fisher = -by_factor;
     fisher.diagonal() += 2 * balance_.redundancy;
-    // What differences leave of nothing may be less than that.
+    // Differences may turn a zero eigenvalue into a negative one.
     const Eigen::SelfAdjointEigenSolver<NoiseMatrix> eigen(fisher);
     return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
                eigen.eigenvectors().transpose() +
@@ -121,7 +126,8 @@ class Likelihood {
     (*matrix)(i, j) = (*matrix)(j, i) = value;
   }
 
-  // Of the redundancies, by the logarithms of two factors that change alike.
+  // Difference quotient of the redundancies for a common change of the
+  // logarithms of two noise scales.
   std::optional<NoiseVector> Difference(int i, int j) const {
     const std::optional<NoiseBalance> moved = problem_->Evaluate(
         at_ + kDifference * (NoiseVector::Unit(i) + NoiseVector::Unit(j)));
@@ -136,7 +142,7 @@ class Likelihood {
   NoiseBalance balance_;
 };
 
-// Where the Fisher information was taken.
+// The Fisher information and the point at which it was computed.
 struct Informed {
   NoiseMatrix fisher;
   NoiseVector at, redundancy;
@@ -159,8 +165,8 @@ bool StillHolds(const Informed& informed, const Likelihood& likelihood) {
   return true;
 }
 
-// Closely for kinds that may be determined; others are guesses whatever is
-// done.
+// The tolerance is tight for kinds that may be determined; the others remain
+// guesses in any case.
 bool IsSettled(const NoiseVector& change, const Informed& informed) {
   const NoiseMatrix covariance = informed.fisher.inverse();
   for (int i = 0; i < kNoiseKinds; ++i) {
@@ -179,11 +185,11 @@ struct Maximum {
   bool converged = false;
 };
 
-// Fisher scoring of the variances, by which the expected squares are linear:
-// the first step comes near from anywhere. The information is then corrected by
-// what each step shows (Broyden). A step that does not bring the score nearer
-// to zero, in its own standard deviations, is halved. Nothing where the linear
-// system fails.
+// Fisher scoring of the variances, in which the expected squares are linear:
+// the first step comes near the maximum from anywhere. The information is then
+// corrected by the observed change of the score in each step (Broyden). A step
+// that does not bring the score nearer to zero, in its own standard deviations,
+// is halved. Returns nullopt if the linear system fails.
 std::optional<Maximum> Maximise(Likelihood* likelihood) {
   std::optional<Informed> informed = Inform(*likelihood);
   if (!informed) return std::nullopt;
@@ -222,7 +228,8 @@ std::optional<Maximum> Maximise(Likelihood* likelihood) {
   return Maximum{informed->fisher, false};
 }
 
-// From the median residual, as if all were alike.
+// Estimates the noise scale of pixels from the median residual, as if all
+// residuals had the same redundancy.
 double GuessPixelFactor(const SolverRound& round,
                         const CalibrationEstimate& estimate,
                         const std::vector<ScreenedLandmark>& landmarks) {
@@ -270,7 +277,7 @@ std::vector<NoiseFactor> EstimateNoiseFactors(
   std::vector<NoiseFactor> factors;
   for (int i = 0; i < kNoiseKinds; ++i) {
     const double redundancy = likelihood.balance().redundancy[i];
-    // The information may be that of a place further off.
+    // The information may have been computed at a distant point.
     const double least = 1 / (2 * redundancy + PriorInformation()(i, i));
     factors.push_back({static_cast<NoiseKind>(i),
                        std::exp(likelihood.at()[i]),

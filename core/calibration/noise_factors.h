@@ -1,18 +1,20 @@
-// By which factors the rig's noise densities and pixel sigma are off, from the
-// residuals of a calibration: variance components by kind of residual.
+// Estimates the noise scales of the rig's noise densities and pixel sigma from
+// the residuals of a calibration: variance components by kind of residual.
 //
-// Restricted maximum likelihood (REML; the same as Helmert's variance
-// components): with P what projects the measurements on what no unknown can
-// explain, the factor s_j of kind j, of covariance s_j^2 V_j, solves
+// The method is restricted maximum likelihood (REML; the same as Helmert's
+// variance components). With P the projection of the measurements on the part
+// that no unknown can explain, the scale s_j of kind j, of covariance s_j^2
+// V_j, solves
 //   s_j^2 z^T P V_j P z  =  s_j^2 tr(P V_j):
 // the weighted squares of its residuals equal its redundancy, the part of them
 // that keyframes, landmarks and calibration do not absorb. Both sides follow
-// from one elimination of the linear system and its way back; no unknown is
-// solved for again. Noise of gyroscope and accelerometer, which share the
-// residuals of the preintegrated motion, are told apart by their covariances.
+// from one elimination of the linear system and its back-substitution; no
+// unknown is solved for again. Noise of gyroscope and accelerometer, which
+// share the residuals of the preintegrated motion, is separated by their
+// covariances.
 //
-// Pixels are weighted by the robust loss; their squares are compared with what
-// the weighted squares of normal residuals would be.
+// Pixels are weighted by the robust loss; their squares are compared with the
+// expected weighted squares of normal residuals.
 // Source: Patterson and Thompson, "Recovery of inter-block information when
 // block sizes are unequal" (1971); Koch, "Parameter Estimation and Hypothesis
 // Testing in Linear Models" (1999), section 3.6.
@@ -26,15 +28,16 @@
 
 namespace selfcal {
 
-// Factors are over the noise of round.rig. Before residuals are looked at, they
-// are not far from what the rig states (`stated`), and those of the IMU not far
-// from each other: where only some are determined, the others follow.
+// The scales are relative to the noise of round.rig. A prior keeps them near
+// the noise that the rig states (`stated`), and those of the IMU near each
+// other: if only some are determined, the others follow.
 //
-// At the end of a round, with `round` as it was solved, but for landmarks
-// without the track noise. That is as TrackNoiseFactor (track_noise.h): where
-// it is larger than the pixel sigma is off, errors go together along tracks,
-// and what reprojections say of all else is weighted by it. Empty where the
-// linear system fails.
+// Call it at the end of a round, with `round` as it was solved, except that
+// `landmarks` are without the track noise. `track_noise` is the result of
+// TrackNoiseFactor (track_noise.h): if it exceeds the noise scale of pixels,
+// errors are correlated along tracks, and the reprojections are weighted by it
+// relative to all other factors. Returns an empty vector if the linear system
+// fails.
 std::vector<NoiseFactor> EstimateNoiseFactors(
     const Rig& stated,
     const SolverRound& round,

@@ -49,7 +49,7 @@ MotionSegment WithNoise(const MotionSegment& segment,
   return noisy;
 }
 
-// Of the subspace, in units of the prior.
+// Information on the subspace, in units of the prior.
 Eigen::MatrixXd Reduced(const Rig& rig,
                         const ThetaSubspace& subspace,
                         const Eigen::MatrixXd& Lambda) {

@@ -1,17 +1,20 @@
-// How much of what a calibration claims to know stems from noise in its states.
+// Determines how much of the information of a calibration stems from noise in
+// its states.
 //
 // The information about theta depends on the motion, and the motion is
-// estimated: where it shows nothing of a direction, as a rotation about the
-// IMU shows nothing of the scale of the scene, the errors of the estimated
-// states stand in for motion, and the information that they bring is spurious.
-// The cost does grow along such a direction, so that neither its curvature nor
-// its growth tells. But noise adds up: once more noise of the same size is put
-// on all measurements, and the states are solved for again, the spurious part
-// is there twice, while what the motion shows stays as it is (the idea of
-// simulation extrapolation: Cook and Stefanski, "Simulation-extrapolation
-// estimation in parametric measurement error models", 1994).
+// estimated. If the true motion has no information about a direction, as a
+// rotation about the IMU has none about the scale of the scene, the errors of
+// the estimated states act as motion, and the information that they add is
+// spurious. The cost does grow along such a direction, so that neither its
+// curvature nor its growth reveals this. But noise accumulates: if noise of the
+// same size is added to all measurements once more, and the states are
+// estimated again, the spurious part doubles, while the information of the true
+// motion stays the same (the idea of simulation extrapolation: Cook and
+// Stefanski, "Simulation-extrapolation estimation in parametric measurement
+// error models", 1994).
 //
-// Pure, any thread; deterministic, the noise follows from a fixed seed.
+// Pure, callable from any thread; deterministic, the noise follows from a fixed
+// seed.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,12 +30,12 @@
 
 namespace selfcal {
 
-// The information about d (D x D, the prior on theta included) with noise added
-// to every reading of the IMU and every pixel, as the round's rig has it, that
-// of pixels times pixel_factor. `round` and the rest are those of the
+// Returns the information about d (D x D, including the prior on theta) with
+// noise added to every IMU reading and every pixel: the noise of the round's
+// rig, that of pixels times pixel_factor. `round` and the rest are those of the
 // calibration at its minimum, with a basis of no columns; `segments` and
-// `partitioning` those that its problem was made of. Nothing where the states
-// come to no minimum.
+// `partitioning` are those of its problem. Returns nullopt if the states reach
+// no minimum.
 std::optional<Eigen::MatrixXd> InformationUnderNoise(
     const SolverRound& round,
     const std::vector<const MotionSegment*>& segments,
@@ -42,17 +45,18 @@ std::optional<Eigen::MatrixXd> InformationUnderNoise(
     double pixel_factor,
     std::uint64_t seed);
 
-// Information of which more than this part stems from noise is spurious: its
-// direction is better held. (What is true alone has been seen to grow by up to
-// 0.09 in one replica, what is not by 0.28 to 0.95.)
+// If more than this fraction of its information stems from noise, the
+// information is spurious, and its direction should be held constant. (True
+// information has been seen to grow by up to 0.09 in one replica, spurious
+// information by 0.28 to 0.95.)
 inline constexpr double kSpurious = 0.3;
-// One replica that shows less than this shows that there is nothing.
+// If one replica gives less than this, no further replicas are needed.
 inline constexpr double kMaybeSpurious = 0.15;
 
-// Of the estimated directions (D x n, orthonormal, in units of the prior) those
-// whose information, all others unknown, is spurious: `Lambda` is that of the
-// calibration, `under_noise` what InformationUnderNoise made of it, and the
-// mean of these shows by how large a part of it it grows.
+// Returns those of the estimated directions (D x n, orthonormal, in units of
+// the prior) whose information, with all others unknown, is spurious. `Lambda`
+// is that of the calibration, `under_noise` the results of
+// InformationUnderNoise; the mean growth over these is compared with the limit.
 Eigen::MatrixXd FindSpurious(const Rig& rig,
                              const ThetaSubspace& subspace,
                              const Eigen::MatrixXd& Lambda,

@@ -45,7 +45,7 @@ void MergeInto(Observers* a, Observers&& b) {
   a->landmarks = std::move(ids);
 }
 
-// Of one session.
+// Both segments belong to one session.
 bool Joinable(const MotionSegment& before, const MotionSegment& after) {
   const std::int64_t first_ns = after.keyframes.front().t_ns;
   return before.key.index + 1 == after.key.index &&
@@ -53,7 +53,7 @@ bool Joinable(const MotionSegment& before, const MotionSegment& after) {
          before.imu.back().t_ns >= first_ns;
 }
 
-// Moves the partitions of one session to the result.
+// Appends the partitions of one session to the result.
 void Finish(int merge_landmarks,
             std::vector<Observers>* parts,
             std::vector<std::vector<int>>* partitions) {
@@ -67,8 +67,8 @@ void Finish(int merge_landmarks,
 
 }  // namespace
 
-// Merges pairs until none is over the threshold. What two sets have in common
-// only grows when either grows, so the outcome is unique.
+// Merges pairs until none exceeds the threshold. The intersection of two sets
+// only grows when either grows, so that the result is unique.
 void MergeObservers(int merge_landmarks, std::vector<Observers>* sets) {
   for (std::size_t i = 0; i < sets->size();) {
     bool merged = false;
@@ -83,8 +83,8 @@ void MergeObservers(int merge_landmarks, std::vector<Observers>* sets) {
         ++j;
       }
     }
-    // The grown set may now reach those that it did not reach before, also
-    // those that stand before it in the list.
+    // The grown set may now have enough in common with sets that it did not
+    // match before, including earlier ones in the list.
     i = merged ? 0 : i + 1;
   }
 }
@@ -108,8 +108,9 @@ Partitioning PartitionSegments(
     const std::vector<const MotionSegment*>& segments, int merge_landmarks) {
   Partitioning result;
   result.merge_landmarks = merge_landmarks;
-  // Of one session: another has ids of its own, so that partitions of different
-  // sessions have nothing in common whatever their numbers.
+  // The segments of one session: other sessions have separate ids, so that
+  // partitions of different sessions have nothing in common whatever their
+  // numbers.
   std::vector<Observers> parts;
   for (int i = 0; i < static_cast<int>(segments.size()); ++i) {
     Observers part{{i}, ObservedIds(*segments[i])};

@@ -1,7 +1,7 @@
-// How a set of segments hangs together (section IV-C of the paper): direct
-// neighbours in time are joined by the IMU samples between them, what sees
-// enough common landmarks is merged (Alg. 2), and between what remains apart in
-// one session the biases still walk.
+// Partitions of a set of segments (section IV-C of the paper): direct
+// neighbours in time are joined by the IMU samples between them, segments that
+// observe enough common landmarks are merged (Alg. 2), and between unconnected
+// segments of one session the biases are linked by a random walk.
 //
 // Pure functions of their arguments, callable from any thread.
 #pragma once
@@ -13,7 +13,7 @@
 
 namespace selfcal {
 
-// Segments are named by their index into the list that was partitioned.
+// Segments are identified by their index into the partitioned list.
 struct SegmentJoint {
   int before = 0;
   int after = 0;  // follows directly, in the same session
@@ -30,35 +30,35 @@ struct SegmentGap {
 };
 
 struct Partitioning {
-  // Sets of segments that are disjoint; each sorted, and sorted by their first.
+  // Disjoint sets of segments; each sorted, and sorted by their first.
   std::vector<std::vector<int>> partitions;
   std::vector<SegmentJoint> joints;
   std::vector<SegmentGap> gaps;
-  int merge_landmarks = 0;  // as it was asked for
+  int merge_landmarks = 0;  // the threshold that was requested
 };
 
-// What observes landmarks: segments, or chains of keyframes.
+// Observers of landmarks: segments, or chains of keyframes.
 struct Observers {
   std::vector<int> members;
   std::vector<std::uint64_t> landmarks;  // ids, sorted, distinct
 };
 
-// Merges sets of one session while two of them observe more than
+// Merges sets of one session as long as two of them observe more than
 // merge_landmarks common ids.
 void MergeObservers(int merge_landmarks, std::vector<Observers>* sets);
 
-// The segments in the order of their keys, on which everything else works, so
-// that no result depends on the order in which they were handed over. The
-// pointers live as long as `segments`.
+// Sorts the segments by key. All other code uses this order, so that no result
+// depends on the order of the input. The pointers live as long as `segments`.
 std::vector<const MotionSegment*> SortByKey(
     const std::vector<MotionSegment>& segments);
 
-// Partitions segments sorted by key. Two segments are joined if they are of one
-// session, their indices follow each other, and the samples of the first reach
-// to the first keyframe of the second. Partitions of one session are merged
-// while two of them observe more than merge_landmarks common ids, counted over
-// the whole of each: unlike a single pass over the segments, that has one
-// outcome whatever the order, and leaves no two partitions over the threshold.
+// Partitions segments sorted by key. Two segments are joined if they belong to
+// one session, their indices are consecutive, and the samples of the first
+// extend to the first keyframe of the second. Partitions of one session are
+// merged as long as two of them observe more than merge_landmarks common ids,
+// counted over each whole partition: unlike a single pass over the segments,
+// that has one result whatever the order, and leaves no two partitions over the
+// threshold.
 Partitioning PartitionSegments(
     const std::vector<const MotionSegment*>& segments, int merge_landmarks);
 

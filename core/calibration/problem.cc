@@ -27,8 +27,8 @@ void AddInertialLinks(const MotionSegment& segment,
   }
 }
 
-// One track for each landmark of a partition, sorted by id, and where the map
-// of the SLAM system has it.
+// One track for each landmark of a partition, sorted by id, and the position of
+// the landmark in the map of the SLAM system.
 struct PartitionTracks {
   std::vector<Track> tracks;
   std::vector<Eigen::Vector3d> landmarks_G;
@@ -63,7 +63,7 @@ PartitionTracks CollectTracks(const std::vector<const MotionSegment*>& segments,
   return result;
 }
 
-// The chains that the segments of a partition start.
+// The chains that begin with segments of a partition.
 std::vector<int> ChainsOf(const CalibrationProblem& problem,
                           const std::vector<int>& partition,
                           const std::vector<int>& first_keyframe) {

@@ -1,5 +1,5 @@
-// Variables and factors of a calibration, flattened out of its segments: what
-// the solver, the landmarks and the covariance all work on.
+// Variables and factors of a calibration, flattened from its segments: the
+// common input of the solver, the landmarks and the covariance.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,25 +16,25 @@
 
 namespace selfcal {
 
-// Keyframes are named by their index into CalibrationProblem::keyframes.
+// Keyframes are identified by their index into CalibrationProblem::keyframes.
 struct TrackObservation {
   int keyframe = 0;
   int camera = 0;
   Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
 };
 
-// One landmark as one partition sees it. A landmark seen in several partitions
-// is a track, and later a variable, for each; and so may be parts of it that
-// lie far apart within one (map_sharing.h).
+// One landmark within one partition. A landmark observed in several partitions
+// has a track, and later a variable, in each; so may distant parts of it within
+// one partition (map_sharing.h).
 struct Track {
   std::uint64_t id = 0;
   std::vector<TrackObservation> observations = {};  // by (keyframe, camera)
-  // Where a piece begins that lies far from the one before, or in another
+  // Begins of the pieces that are distant from the previous one, or in another
   // chain: indices into the observations, ascending, above zero.
   std::vector<int> later_pieces = {};
 };
 
-// The number of pieces that begin before or at an observation, less one.
+// Index of the piece that contains an observation.
 int PieceOf(const Track& track, int observation);
 
 // The IMU samples that cover the time between two keyframes.
@@ -44,7 +44,8 @@ struct InertialLink {
   std::span<const ImuSample> samples;  // of the segment, which must outlive it
 };
 
-// Two keyframes of one session between which others were removed.
+// Two consecutive remaining keyframes of one session, with removed keyframes
+// between them.
 struct BiasLink {
   int before = 0;
   int after = 0;
@@ -53,10 +54,9 @@ struct BiasLink {
 
 struct CalibrationProblem {
   std::vector<KeyframeState> keyframes;  // as the SLAM system estimated them
-  // About each keyframe, those of its segment, which must outlive them.
+  // Samples about each keyframe: those of its segment, which must outlive them.
   std::vector<std::span<const ImuSample>> samples;
-  // First keyframe of each set of chains that share landmarks: carries the
-  // gauge.
+  // First keyframe of each set of chains that share landmarks: holds the gauge.
   std::vector<int> gauge_keyframes;
   // First keyframe of each chain of inertial links.
   std::vector<int> chain_starts;
@@ -65,13 +65,13 @@ struct CalibrationProblem {
   std::vector<Track> tracks;  // by (partition, id, time)
 };
 
-// The samples that cover the time from t0_ns to t1_ns, and of those on either
-// side what tells all about it (sampling.h).
+// The samples that cover the time from t0_ns to t1_ns, and on either side those
+// that determine the motion within it (sampling.h).
 std::span<const ImuSample> SamplesBetween(const std::vector<ImuSample>& imu,
                                           std::int64_t t0_ns,
                                           std::int64_t t1_ns);
 
-// Segments as SortByKey gives them. They must outlive the result.
+// Segments in the order of SortByKey. They must outlive the result.
 CalibrationProblem FlattenSegments(
     const Rig& rig,
     const std::vector<const MotionSegment*>& segments,

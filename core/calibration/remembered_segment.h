@@ -1,5 +1,5 @@
-// Segments of a device beside those that a calibration has the data of, and
-// what it makes of them (evicted_fusion.h). Values.
+// Segments of a device in addition to those whose data a calibration has, and
+// their use by the calibration (evicted_fusion.h). Values.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,55 +15,58 @@
 
 namespace selfcal {
 
-// A segment of a device, of which a calibration may have the data or not.
+// A segment of a device; a calibration may or may not have its data.
 struct RememberedSegment {
   SegmentKey key;
-  // What it says; nothing for one that has its data.
+  // Its information; nullopt for a segment with data.
   std::optional<SegmentEnds> ends = std::nullopt;
-  // ResidualStatistics::fit of one without data; 0: not measured.
+  // ResidualStatistics::fit of a segment without data; 0: not measured.
   double fit = 0;
-  // When it was received: for the walk between sessions.
+  // Time of reception, for the walk between sessions.
   std::int64_t time_ns = 0;
 };
 
-// The segments from `first` on show another theta than those before.
+// A device split: the segments from `first` on have another theta than those
+// before.
 struct DeviceSplit {
-  // By chance, with the number of splits and parameters that were tried
-  // accounted for; 1: none was tried.
+  // Probability of the difference by chance, corrected for the number of tested
+  // splits and parameters; 1: none was tested.
   double probability = 1;
-  // The same at this split, whichever single segment is left out: the largest.
+  // The same at this split, with one segment excluded: the largest over all
+  // choices.
   double without_one = 1;
   ChangeKind kind = ChangeKind::kSudden;
-  // Segments from `first` on; of a drift, those that are near to what the
-  // device is now.
+  // Number of segments from `first` on; for a drift, those that are near the
+  // present state of the device.
   int newer = 0;
   SegmentKey first;   // the oldest of these
   std::string block;  // parameters that differ (parameter_blocks.h)
   std::vector<std::string> concerned;  // groups, in the order of the rig
 };
 
-// What a result has from segments without data.
+// Contribution of segments without data to a result.
 struct EvictedUse {
-  int segments = 0;  // that it stands on, besides those with data
-  // Left out: contradicting what the segments with data say, or, where others
-  // are used, linearised too far from the result.
+  int segments = 0;  // that contribute, besides those with data
+  // Excluded segments: those that contradict the segments with data and, if
+  // others are used, those that were linearised too far from the result.
   int too_far = 0;
   int contradicting = 0;
-  // The largest distance from where a used one was linearised to the result,
+  // Largest distance from the linearisation point of a used one to the result,
   // rms over the free components in reference sigmas.
   double reach = 0;
-  // Of all used ones together with the segments with data. Where it is more
-  // than chance explains (5 %), what they say was taken for as much less.
+  // Agreement of all used ones together with the segments with data. If the
+  // difference is larger than chance explains (5 %), their information is
+  // reduced accordingly.
   AgreementTest agreement;
-  // Why none was used; empty where some were, or there were none.
+  // Reason why none was used; empty if some were, or there were none.
   std::string unused;
-  // Where the segments, with data and without, differ by more than chance
+  // Set if the segments, with and without data, differ by more than chance
   // explains (5 %).
   std::optional<DeviceSplit> split = std::nullopt;
   // Posterior probability that the device changed while they were recorded; 0
-  // if that was not examined. The covariance of the result accounts for it: by
-  // component (D), its variance is the square of this larger than without a
-  // change.
+  // if that was not examined. The covariance of the result accounts for it: for
+  // each component (D), the variance is larger by the square of this than
+  // without a change.
   double change_probability = 0;
   Eigen::VectorXd change_sigmas = {};
 };

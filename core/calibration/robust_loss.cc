@@ -6,7 +6,7 @@
 namespace selfcal {
 namespace {
 
-// Where the weight begins to fall, in parts of the gate.
+// Fraction of the gate at which the weight begins to decrease.
 constexpr double kTaperBegin = 0.6;
 
 double Square(double x) { return x * x; }
@@ -23,7 +23,7 @@ double PlainWeight(LossKind kind, double scale, double s) {
   return 1.0;
 }
 
-// s times the derivative of PlainWeight by s.
+// s times the derivative of PlainWeight with respect to s.
 double PlainSlope(LossKind kind, double scale, double s) {
   switch (kind) {
     case LossKind::kHuber:
@@ -48,7 +48,7 @@ double PlainValue(LossKind kind, double scale, double s) {
   return s;
 }
 
-// An antiderivative of PlainWeight(s) (end - s); for Huber, where s is over
+// An antiderivative of PlainWeight(s) (end - s); for Huber, valid if s exceeds
 // scale^2.
 double TaperedIntegral(LossKind kind, double scale, double end, double s) {
   const double b = Square(scale);

@@ -22,14 +22,14 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// Of a track, what lies within the gate of its place, and away from the border
-// of the image.
+// Observations of a track within the gate of its position, and away from the
+// border of the image.
 struct Selected {
   std::vector<UsedObservation> used;
   int candidates = 0;  // all but those at the border
 };
 
-// What an observation predicted here weighs.
+// Weight of an observation by its predicted position.
 double BorderWeight(const CameraCalibration& camera,
                     const Eigen::Vector2d& z_px,
                     double pixel_sigma_px) {
@@ -79,14 +79,14 @@ bool EnoughLeft(const Selected& selected) {
              (1 - kMaxOutlierFraction) * selected.candidates;
 }
 
-// Where a track may be.
+// Candidate positions of a track.
 struct TrackPlaces {
   std::optional<LandmarkPlace> found;
-  // Where it was before, where that is to be tried as well.
+  // Its previous position, if that is to be tried as well.
   std::optional<LandmarkPlace> other;
 };
 
-// What all landmarks are judged by.
+// Thresholds for all landmarks.
 struct Thresholds {
   RobustLoss loss;
   double max_inverse_depth_sigma;  // [1/m]
@@ -128,7 +128,7 @@ double InverseDepthSigma(const Eigen::Matrix3d& information) {
              : std::numeric_limits<double>::infinity();
 }
 
-// The place of a landmark at a minimum of its cost.
+// Position of a landmark at a minimum of its cost.
 struct SettledPlace {
   LandmarkPlace place;
   RefinedPlace refined;
@@ -144,7 +144,8 @@ SettledPlace SettlePlace(const LandmarkScene& scene,
   return settled;
 }
 
-// Whether a landmark is used, and which of its observations.
+// Decides whether a landmark is used, and which of its observations; nullopt if
+// it is dropped.
 std::optional<ScreenedLandmark> Judge(const LandmarkScene& scene,
                                       const Track& track,
                                       const Thresholds& thresholds,
@@ -198,8 +199,7 @@ Screening Screen(const LandmarkScene& scene,
   return result;
 }
 
-// No landmark gets a larger weight than before, and none that was dropped comes
-// back.
+// No weight of a landmark may increase, and no dropped landmark may return.
 void OnlyFall(const CalibrationProblem& problem,
               const Screening& before,
               Screening* now) {
@@ -221,8 +221,8 @@ void OnlyFall(const CalibrationProblem& problem,
   std::erase_if(now->landmarks, back);
 }
 
-// Where a track was, anchored anew; as the place that was found where all of it
-// lies within the gate there.
+// Previous position of a track, with a new anchor; it is the position found if
+// the whole track lies within the gate there.
 TrackPlaces PlacesBefore(const LandmarkScene& scene,
                          const Track& track,
                          const LandmarkPlace& before,

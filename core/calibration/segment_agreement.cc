@@ -12,11 +12,12 @@
 namespace selfcal {
 namespace {
 
-// Fewer have no majority.
+// Fewer segments have no majority.
 constexpr int kLeastSegments = 4;
-// By chance, over all segments of a calibration.
+// False-alarm probability, over all segments of a calibration.
 constexpr double kChance = 1e-5;
-// Residuals so many times those of the other segments are not of the same kind.
+// Residuals larger than those of the other segments by this factor are not
+// comparable.
 constexpr double kMaxRatio = 3;
 
 double Median(std::vector<double> values) {
@@ -27,7 +28,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// A segment at the estimate, with what is used of its observations.
+// A segment at the estimate, with its used observations only.
 MotionSegment AtEstimate(const MotionSegment& segment,
                          int first_keyframe,
                          const CalibrationProblem& problem,
@@ -69,8 +70,8 @@ std::string Percent(const char* what, double ratio, double usual) {
   return text;
 }
 
-// Most of an inertial residual is absorbed by the states that it connects, and
-// how much differs from rig to rig: each is compared with the others.
+// The states that an inertial residual connects absorb most of it, and how much
+// differs from rig to rig: each is compared with the others.
 void RelateInertial(std::vector<SegmentEvidence>* evidence) {
   std::vector<double> values;
   for (const SegmentEvidence& one : *evidence) {
@@ -158,7 +159,7 @@ double TestEach(std::vector<SegmentEvidence>* evidence) {
   }
   if (degrees == 0) return 1;
   const double excess = squares / degrees;
-  // By chance it is as much above 1 once in a thousand times.
+  // The probability of a larger excess by chance is one in a thousand.
   return excess > 1 + 3.1 * std::sqrt(2.0 / degrees) ? excess : 1;
 }
 

@@ -1,11 +1,11 @@
-// Whether the segments of a calibration agree: each with all others, and both
-// halves of them with each other; and which of them contradict the rest.
+// Tests whether the segments of a calibration agree: each with all others, and
+// both halves with each other; and finds those that contradict the rest.
 //
 // At the minimum of a calibration each segment is linearised alone, at the
 // states and landmarks of the joint estimate, and tested against the sum of all
 // others (agreement.h).
 //
-// Pure, any thread, deterministic.
+// Pure, callable from any thread, deterministic.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,17 +20,17 @@
 
 namespace selfcal {
 
-// What one segment says at the minimum, by the estimated directions in units of
-// the prior (r x r, r).
+// Information of one segment at the minimum, along the estimated directions in
+// units of the prior (r x r, r).
 struct SegmentEvidence {
   Eigen::MatrixXd Lambda;
   Eigen::VectorXd eta;
   SegmentFit fit;  // its key and the ratios of its residuals
 };
 
-// `rig` with the noise that the calibration was weighted with; `segments` as
-// its problem was made of them; the squares that are expected of the two rows
-// of a reprojection, 0 if that is not known.
+// `rig` has the noise by which the calibration was weighted; `segments` are
+// those of its problem; then the expected squares of the two rows of a
+// reprojection, 0 if unknown.
 std::vector<SegmentEvidence> CollectEvidence(
     const Rig& rig,
     const Calibration& theta,
@@ -41,21 +41,22 @@ std::vector<SegmentEvidence> CollectEvidence(
     const ThetaSubspace& subspace,
     double squares_of_a_reprojection);
 
-// Each against all others, in `fit.others`; returns by how much the squares of
-// all these tests exceed their expectation, 1 or more: where segments disagree
-// by more than they say, covariances are too small by that.
+// Tests each against all others, in `fit.others`. Returns the ratio of the
+// squares of all these tests to their expectation, 1 or more: if segments
+// disagree by more than their information predicts, covariances are too small
+// by this factor.
 double TestEach(std::vector<SegmentEvidence>* evidence);
 
-// The first half of the segments, in their order, against the second, with
-// variances larger by `excess`. Not tested with fewer than four.
+// Tests the first half of the segments, in their order, against the second,
+// with variances scaled by `excess`. Requires at least four segments.
 AgreementTest TestHalves(const std::vector<SegmentEvidence>& evidence,
                          double excess);
 
-// The segments that contradict the rest, as a list of index and reason: one
-// after the other, those that fit worst, while a majority agrees. Measured by
-// what is usual for the others, since stated noise may be wrong for all. Where
-// the estimate has not converged, by their theta alone: neighbours of a segment
-// that is wrong then have large residuals as well.
+// A segment that contradicts the rest, and the reason. Segments are excluded
+// one after the other, worst fit first, as long as a majority agrees. They are
+// compared with the typical values of the others, since the stated noise may be
+// wrong for all. If the estimate has not converged, only their theta is tested:
+// neighbours of a bad segment then have large residuals as well.
 struct Contradiction {
   int segment = 0;
   std::string reason;
@@ -63,7 +64,7 @@ struct Contradiction {
 std::vector<Contradiction> FindContradictions(
     const std::vector<SegmentEvidence>& evidence, bool converged);
 
-// The same before anything is solved, from how well each segment fits by itself
+// As above but before the solve, from the fit of each segment alone
 // (ResidualStatistics::fit; 0: not measured).
 std::vector<Contradiction> FindMisfits(const std::vector<double>& fits);
 

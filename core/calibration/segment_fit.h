@@ -1,5 +1,4 @@
-// How well each segment of a calibration agrees with all others, and both
-// halves of the segments with each other. Values.
+// Agreement of each segment of a calibration with all others. Values.
 #pragma once
 
 #include <string>
@@ -11,14 +10,15 @@ namespace selfcal {
 
 struct SegmentFit {
   SegmentKey key;
-  // Root mean square of its reprojection residuals over what the noise that the
-  // calibration used predicts, 1 where the model holds; and that of its whitened
-  // inertial residuals over the median of all segments. 0: not measured.
+  // Root mean square of its reprojection residuals over the prediction of the
+  // noise that the calibration used, 1 if the model holds; and that of its
+  // whitened inertial residuals over the median of all segments. 0: not
+  // measured.
   double pixel_ratio = 0;
   double inertial_ratio = 0;
-  // Its own estimate of theta against that of all others.
+  // Its own estimate of theta tested against that of all others.
   AgreementTest others;
-  // Why the result does not use the segment; empty if it does.
+  // Reason why the result does not use the segment; empty if it does.
   std::string excluded;
 };
 

@@ -17,23 +17,24 @@
 namespace selfcal {
 namespace {
 
-// What is used of the segment is decided anew so often.
+// Limit of the rounds, each with a new selection of observations.
 constexpr int kMaxRounds = 3;
 constexpr int kMaxIterations = 10;
-// A minimum is near enough when an iteration takes less off the cost [half
-// squares], and what is used when a round does.
+// A minimum is accurate enough when an iteration reduces the cost by less [half
+// squares]; the selection is final when a round does.
 constexpr double kEnough = 0.1;
 
-// States of a SLAM system are sound where their velocities are this near to
-// those of the minimum [m/s, and a part of the velocity]: those of filters,
-// also in simulation, lie within 0.04 m/s as a rule and 0.12 m/s at most; with
-// a scale that is off by a third they are 0.2 m/s off when carried by hand.
+// States of a SLAM system are good if their velocities are this near to those
+// of the minimum [m/s, and a fraction of the velocity]: those of filters, also
+// in simulation, are usually within 0.04 m/s and at most 0.12 m/s; with a scale
+// error of a third they are 0.2 m/s off for a hand-held device.
 constexpr double kSoundVelocity_mps = 0.1;
 constexpr double kSoundVelocityPart = 0.1;
-// Fixes what no segment determines: position and yaw.
+// Fixes position and yaw, which no segment determines.
 constexpr double kGaugeInformation = 1;
 
-// Iterates until little is left to gain. Nothing: states are not determined.
+// Iterates until the remaining gain is small. Returns nullopt if the states are
+// not determined.
 std::optional<SolverOutcome> Settle(const SolverRound& round,
                                     CalibrationEstimate* estimate,
                                     std::vector<ScreenedLandmark>* landmarks) {
@@ -51,7 +52,7 @@ std::optional<SolverOutcome> Settle(const SolverRound& round,
   return outcome;
 }
 
-// The segment with these states, and landmarks where they were brought to.
+// The segment with these states, and with the refined landmarks.
 MotionSegment At(const MotionSegment& segment,
                  const CalibrationProblem& problem,
                  const CalibrationEstimate& estimate,

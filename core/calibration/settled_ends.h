@@ -1,11 +1,11 @@
-// Ends of a segment, linearised where the data has its states.
+// Ends of a segment, linearised at the states that minimise its residuals.
 //
-// States of a SLAM system may lie far from their minimum: a filter that has
-// lost the scale is off by a third. Elimination takes one linear step from
-// there, which is enough for a score; but what is kept without the data can
-// never be linearised again.
+// States of a SLAM system may be far from their minimum: those of a filter that
+// has lost the scale may be wrong by a third. Elimination takes one linear step
+// from them, which is enough for a score; but information that is kept without
+// the data can never be relinearised.
 //
-// Pure, any thread, deterministic for one width of vectors.
+// Pure, callable from any thread, deterministic for one width of vectors.
 #pragma once
 
 #include "core/information/segment_ends.h"
@@ -15,19 +15,21 @@
 
 namespace selfcal {
 
-// Whether the linear minimum, with theta held, is further from the states at
-// the ends than sound ones are: by their velocities.
+// Returns true if the linear minimum, with theta held constant, is further from
+// the states at the ends than is usual for good states, measured by their
+// velocities.
 bool IsFarFromMinimum(const SegmentEnds& ends);
 
-// The segment with states and landmarks at their minimum, theta held. Landmarks
-// that are not determined stay where they are; so does all, where the states
-// are not determined.
+// Returns the segment with states and landmarks at their minimum, with theta
+// held constant. Landmarks that are not determined stay in place; everything
+// does if the states are not determined.
 MotionSegment SettleSegment(const Rig& rig,
                             const Calibration& theta,
                             const MotionSegment& segment);
 
-// SummariseEnds(), of the settled segment where that IsFarFromMinimum(): that
-// takes 30 times as long. The segment must be valid for the rig.
+// Computes SummariseEnds() of the segment, or of the settled segment if
+// IsFarFromMinimum(), which takes 30 times as long. The segment must be valid
+// for the rig.
 SegmentEnds SummariseSettledEnds(const Rig& rig,
                                  const Calibration& theta0,
                                  const MotionSegment& segment);

@@ -1,4 +1,4 @@
-// How much may connect what lies far apart in a problem (map_sharing.h).
+// Limits of the connections between distant parts of a problem (map_sharing.h).
 #pragma once
 
 #include <limits>
@@ -6,16 +6,16 @@
 namespace selfcal {
 
 struct SharingLimits {
-  // A landmark that is lost for more keyframes begins a new piece of its track.
+  // A landmark that is lost for more keyframes starts a new piece of its track.
   int max_lost = 10;
-  // Keyframes from the first to the last of a piece: two segments of the usual
-  // length. Tracks of cameras that move are shorter.
+  // Keyframes from the first to the last of a piece: two segments of typical
+  // length. Tracks of moving cameras are shorter.
   int max_length = 80;
-  // Landmarks that connect pieces: those of one chain, and all of a partition.
+  // Landmarks that connect pieces: of one chain, and of a whole partition.
   int of_chain = 32;
   int of_partition = 128;
 
-  // Everything stays connected, at any cost.
+  // Keeps all connections, at any cost.
   static constexpr SharingLimits None() {
     constexpr int kMax = std::numeric_limits<int>::max();
     return {.max_lost = kMax,

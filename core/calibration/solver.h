@@ -1,6 +1,6 @@
 // One round of a calibration: the minimum over theta, keyframes and landmarks
 // of a fixed set of landmarks and observations, with fixed whitening and fixed
-// motions about the keyframes. Two ways to the same minimum:
+// motions about the keyframes. Two solvers find the same minimum:
 // structured_solver.h, and Ceres.
 #pragma once
 
@@ -24,16 +24,16 @@ struct SolverRound {
   const Rig& rig;
   const Calibration& reference;  // theta = reference [+] d
   const CalibrationProblem& problem;
-  const KeyframeMotions& motions;  // at the estimate that the round starts from
+  const KeyframeMotions& motions;  // at the initial estimate of the round
   const std::vector<InertialMatrix>& whitening;
   // D x r: the directions in which d may move (SubspaceManifold).
   const Eigen::MatrixXd& basis;
   const RobustLoss& loss;  // on reprojection residuals
-  // Of theta about d = 0, D x D; null: no prior.
+  // Prior information about theta, centred at d = 0, D x D; null: no prior.
   const Eigen::MatrixXd* prior_information = nullptr;
   int threads = 1;  // of Ceres
   int max_iterations = 100;
-  // Done when an iteration takes less than this part off the cost.
+  // Converged when an iteration reduces the cost by less than this fraction.
   double function_tolerance = 1e-9;
 };
 
@@ -41,25 +41,25 @@ enum class SolverStatus { kConverged, kNotConverged, kCancelled, kFailed };
 
 struct SolverOutcome {
   SolverStatus status = SolverStatus::kFailed;
-  std::string message;  // why, when it failed
+  std::string message;  // the reason, if it failed
   int iterations = 0;
   double initial_cost = 0;
   double final_cost = 0;
 };
 
-// What the caller says after an iteration.
+// Reply of the caller after an iteration.
 enum class SolverSignal {
   kGoOn,
   kEnough,  // ends the round as converged
   kCancel,
 };
 
-// Called after each iteration with its number, the cost, and the present d.
+// Called after each iteration with its number, the cost, and the current d.
 using SolverCallback = std::function<SolverSignal(
     int iteration, double cost, const Eigen::VectorXd& d)>;
 
-// Improves the estimate and the places of the landmarks. When it fails or is
-// cancelled, both are as good as the last accepted step left them.
+// Improves the estimate and the positions of the landmarks. If it fails or is
+// cancelled, both are those of the last accepted step.
 SolverOutcome SolveRound(SolverKind kind,
                          const SolverRound& round,
                          const SolverCallback& callback,

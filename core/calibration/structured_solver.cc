@@ -13,23 +13,23 @@
 namespace selfcal {
 namespace {
 
-// Another length than the first is tried where the parabola through it has its
-// minimum further away than this part of it.
+// A second length is tried if the minimum of the parabola through the first
+// differs from it by more than this fraction.
 constexpr double kLengthTolerance = 0.25;
-// Weighted residuals make a robust cost curve more than it does: for the Huber
-// loss at 2 sigma and normal residuals by 8 % in theta, which would remain of
-// every step. (What lies in the motion alone is not weighted.)
+// Weighted residuals overestimate the curvature of a robust cost: for the Huber
+// loss at 2 sigma and normal residuals by 8 % in theta, by which every step
+// would be too short. (Terms of the motion alone are not weighted.)
 constexpr double kRobustStretch = 1.08;
 constexpr double kMaxStretch = 2;
 constexpr double kMinShortening = 0.1;
 constexpr int kMaxTrials = 10;
-// A step this short was turned by what states are hardly determined in, as the
-// tilt of a device that does not accelerate: then those are damped.
+// A step this short was deflected by weakly determined states, such as the tilt
+// of a device that does not accelerate; these are then damped.
 constexpr double kShort = 0.5;
 constexpr double kDampingFactor = 1e2;
 constexpr double kMaxDamping = 1e6;
-// Landmarks at a point that is tried may together lack this part of what the
-// step promises.
+// Landmarks at a trial point may together miss this fraction of the decrease
+// that the step predicts.
 constexpr double kRefineDecrease = 1e-4;
 
 void Move(const ChainStateVector& step, KeyframeState* x) {
@@ -40,12 +40,12 @@ void Move(const ChainStateVector& step, KeyframeState* x) {
   x->b_g += step.segment<3>(kStateGyroBias);
 }
 
-// The first step that is tried, of everything.
+// First trial step of all unknowns.
 struct Direction {
   Eigen::VectorXd d;
   std::vector<ChainStateVector> keyframes;
   std::vector<Eigen::Vector3d> landmarks;
-  // The cost falls by this, per unit of length, at the beginning of the way.
+  // Decrease of the cost per unit of length at the start of the line search.
   double slope = 0;
 };
 
@@ -71,8 +71,8 @@ Direction FirstStep(const SolverRound& round,
   return direction;
 }
 
-// How far the parabola through the start, with its slope, and the point at
-// `length`, where the cost is higher by `rise`, has its minimum: within bounds.
+// Length at the minimum of the parabola through the start, with its slope, and
+// the point at `length`, where the cost is higher by `rise`; limited to bounds.
 double NextLength(double length, double rise, double slope) {
   const double curvature =
       2 * (rise + length * slope) / (length * length * slope);
@@ -81,7 +81,7 @@ double NextLength(double length, double rise, double slope) {
              : std::max(1 / curvature, kMinShortening * length);
 }
 
-// A point on the way, with what it costs.
+// A trial point of the line search, with its cost.
 struct Trial {
   CalibrationEstimate estimate;
   std::vector<LandmarkPlace> places;
@@ -210,7 +210,7 @@ bool LineariseRound(const SolverRound& round,
 
 namespace {
 
-// Tries points on one way from the estimate.
+// Tries points along one direction from the estimate.
 class Way {
  public:
   Way(const SolverRound& round,
@@ -224,8 +224,8 @@ class Way {
         landmarks_(landmarks),
         places_(Places(landmarks)) {}
 
-  // The lowest point that was tried; it may be higher than the start. Further
-  // lengths are tried until one is lower.
+  // Returns the trial point of lowest cost, which may be above that of the
+  // start. Further lengths are tried until one decreases the cost.
   Trial Go() {
     Trial best = At(1);
     length_ = 1;
@@ -244,7 +244,7 @@ class Way {
   }
 
   bool Lower(const Trial& trial) const { return trial.cost < linearised_.cost; }
-  // Of the lowest point.
+  // Length of the best trial point.
   double length() const { return length_; }
 
  private:

@@ -12,7 +12,7 @@
 namespace selfcal {
 namespace {
 
-// Prior sigmas, zero for what the rig holds fixed.
+// Prior sigmas, zero for components that the rig holds fixed.
 Eigen::VectorXd FreeSigmas(const Rig& rig) {
   const Eigen::VectorXd all = PriorSigmas(rig);
   Eigen::VectorXd sigmas = Eigen::VectorXd::Zero(all.size());
@@ -40,7 +40,7 @@ Eigen::MatrixXd Reduced(const Rig& rig,
   return basis.transpose() * Lambda * basis;
 }
 
-// Eigenvalues ascend. Of nothing: nothing.
+// Eigenvalues in ascending order; empty for an empty matrix.
 struct Spectrum {
   Eigen::VectorXd values;
   Eigen::MatrixXd directions;
@@ -54,8 +54,8 @@ Spectrum Decompose(const Eigen::MatrixXd& information) {
   return {eigen.eigenvalues(), eigen.eigenvectors()};
 }
 
-// What is held, in words. One that the data says something about is named as
-// one at the threshold.
+// Describes the held directions. One with some information from the data is
+// described as one at the threshold.
 std::vector<UnobservedDirection> NameHeld(const Rig& rig,
                                           const ThetaSubspace& subspace,
                                           const Eigen::MatrixXd& Lambda) {
@@ -76,7 +76,7 @@ std::vector<UnobservedDirection> NameHeld(const Rig& rig,
       .unobserved;
 }
 
-// Orthonormal: of the span of `whole`, what is orthogonal to `part` within it.
+// Orthonormal basis of the complement of `part` within the span of `whole`.
 Eigen::MatrixXd Complement(const Eigen::MatrixXd& whole,
                            const Eigen::MatrixXd& part) {
   if (part.cols() == 0) {

@@ -1,7 +1,7 @@
-// Which directions of theta the data of a calibration determines, and what
-// follows for its covariance. Directions are told apart in units of the prior:
-// one of which the data says less than was known before counts as not observed
-// (section IV-A of the method). Pure, any thread.
+// Directions of theta that the data of a calibration determines, and the
+// resulting covariance. Directions are separated in units of the prior: one
+// with less information from the data than from the prior is treated as
+// unobserved (section IV-A of the method). Pure, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,55 +13,57 @@
 namespace selfcal {
 
 // Orthonormal directions in units of PriorSigmas(rig), zero in the components
-// that the rig holds fixed; together they span all others.
+// that the rig holds fixed; together they span all other components.
 struct ThetaSubspace {
   Eigen::MatrixXd estimated;                    // D x r
   Eigen::MatrixXd held;                         // D x h
   std::vector<UnobservedDirection> unobserved;  // h of them
 };
 
-// Everything that is free is estimated.
+// All free directions are estimated.
 ThetaSubspace WholeSubspace(const Rig& rig);
 
-// An information, in units of the prior, just below that of the prior by more
-// than rounding: where the prior is part of it, it is 1 without any data.
+// Information, in units of the prior, below that of the prior by slightly more
+// than rounding: if the prior is part of it, the information is 1 without any
+// data.
 inline constexpr double kLeastInformation = 1 - 1e-4;
 
-// Splits by what Lambda (of the data, in tangent units) says: estimated is what
-// has the least information or more. At least min_held directions are held:
-// what was once found unobserved stays so, lest rounds of a calibration
-// alternate about the threshold.
+// Splits by Lambda (of the data, in tangent units): a direction is estimated if
+// it has the least information or more. At least min_held directions are held
+// constant: a direction once found unobserved stays so, to keep rounds of a
+// calibration from alternating about the threshold.
 ThetaSubspace ObservedSubspace(const Rig& rig,
                                const Eigen::MatrixXd& Lambda,
                                int min_held,
                                double least_information = kLeastInformation);
 
-// Holds the directions `held` (orthonormal, as those of a ThetaSubspace), and
-// of the others those with less than kLeastInformation. The estimated ones come
-// in the order of their information, least first.
+// Holds the directions `held` (orthonormal, as those of a ThetaSubspace)
+// constant, and of the others those with less than kLeastInformation. The
+// estimated ones are in the order of their information, least first.
 ThetaSubspace HoldDirections(const Rig& rig,
                              const Eigen::MatrixXd& Lambda,
                              const Eigen::MatrixXd& held);
 
-// Basis in tangent units of what is estimated, D x r: for SubspaceManifold.
+// Basis of the estimated directions in tangent units, D x r: for
+// SubspaceManifold.
 Eigen::MatrixXd TangentBasis(const Rig& rig, const ThetaSubspace& subspace);
 
-// The part of a step of theta (tangent units) that lies in what is estimated;
+// Projects a step of theta (tangent units) on the estimated subspace;
 // orthogonal in units of the prior.
 Eigen::VectorXd ProjectOnSubspace(const Rig& rig,
                                   const ThetaSubspace& subspace,
                                   const Eigen::VectorXd& step);
 
 // Covariance of theta from its information Lambda (D x D, tangent units): the
-// inverse on the estimated subspace, the prior's variance on what is held, zero
-// for what the rig fixes.
+// inverse on the estimated subspace, the prior's variance on held directions,
+// zero for components that the rig holds fixed.
 Eigen::MatrixXd SubspaceCovariance(const Rig& rig,
                                    const ThetaSubspace& subspace,
                                    const Eigen::MatrixXd& Lambda);
 
-// The same for an estimate that is done. What is held is off by as much as the
-// prior says, and what is estimated leans on it where Lambda couples the two:
-// that is added (as Schmidt has it for states that a filter does not estimate).
+// The same for a final estimate. Held directions have the error of the prior,
+// which affects the estimated ones where Lambda couples the two: that effect is
+// added (as in the Schmidt-Kalman filter for states that are not estimated).
 Eigen::MatrixXd CovarianceWithHeld(const Rig& rig,
                                    const ThetaSubspace& subspace,
                                    const Eigen::MatrixXd& Lambda);
@@ -73,7 +75,7 @@ Eigen::VectorXd SubspaceStep(const Rig& rig,
                              const Eigen::VectorXd& eta);
 
 // Largest component of a step of theta in standard deviations; components
-// without variance are left out.
+// without variance are ignored.
 double LargestInSigmas(const Eigen::VectorXd& step,
                        const Eigen::MatrixXd& covariance);
 

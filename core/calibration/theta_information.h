@@ -1,6 +1,6 @@
-// What the linear system of a calibration is given and gives: the whitening of
-// its inertial factors, and its information by the offset that the solver
-// moves. Pure.
+// Interfaces of the linear system of a calibration: the whitening of its
+// inertial factors as input, and as output its information in terms of the
+// offset that the solver moves. Pure.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@
 namespace selfcal {
 
 // Square root information of every inertial link, in their order, at the given
-// estimate. It stays fixed while the estimate moves, within one round.
+// estimate. It is constant within one round while the estimate moves.
 std::vector<InertialMatrix> WhitenInertialLinks(
     const Rig& rig,
     const ImuCalibration& imu,
@@ -25,8 +25,8 @@ std::vector<InertialMatrix> WhitenInertialLinks(
 // U with U^-1 = W, a square root information of a link.
 InertialNoiseRoot NoiseRootOf(const InertialMatrix& W);
 
-// The same information by the offset d from a reference (theta = reference [+]
-// d), in which the solver works.
+// The same information about the offset d from a reference (theta = reference
+// [+] d), in which the solver works.
 SharedInformation ByOffset(const SharedInformation& at_theta,
                            const Eigen::MatrixXd& theta_by_offset);
 

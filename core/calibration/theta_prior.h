@@ -1,4 +1,4 @@
-// What is known about theta before any segment is looked at. Pure.
+// Prior on theta, before any segment is used. Pure.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,18 +9,19 @@
 
 namespace selfcal {
 
-// Normal about `centre`; of a direction without information nothing is known.
+// Normal distribution about `centre`; a direction without information is
+// unconstrained.
 struct ThetaPrior {
   Calibration centre;
   Eigen::MatrixXd information;  // D x D, tangent at centre, semidefinite
 };
 
-// PriorSigmas(rig) about the factory's calibration.
+// PriorSigmas(rig) about the factory calibration.
 ThetaPrior FactoryPrior(const Rig& rig);
 
-// What a calibration with its covariance (D x D) says about some components
-// alone, all others marginalised: of these nothing remains known. Components
-// that the rig holds fixed are left out.
+// Prior from a calibration with its covariance (D x D) for some components,
+// with all others marginalised; these are then unconstrained. Components that
+// the rig holds fixed are excluded.
 ThetaPrior MarginalPrior(const Rig& rig,
                          const Calibration& theta,
                          const Eigen::MatrixXd& covariance,

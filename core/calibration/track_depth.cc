@@ -8,16 +8,16 @@
 namespace selfcal {
 namespace {
 
-// What a track says about the inverse depth of its landmark, along its ray from
-// the middle of the cameras that see it.
+// The information of a track about the inverse depth of its landmark, along its
+// ray from the centre of the cameras that observe it.
 struct InverseDepth {
   double value = 0;        // [1/m]
   double information = 0;  // [m^2]
 };
 
-// A camera that is off the others by b across the ray sees a point of inverse
-// depth rho turned by b rho. At errors of one pixel, so that what is connected
-// does not depend on what is found about noise.
+// A camera at a distance b from the others across the ray observes a point of
+// inverse depth rho rotated by b rho. The error is assumed to be one pixel, so
+// that the connections do not depend on the estimated noise.
 InverseDepth Predict(const Rig& rig,
                      std::span<const KeyframeState> keyframes,
                      const Track& track,

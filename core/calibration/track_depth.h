@@ -1,5 +1,6 @@
-// Which tracks of a problem will show how far away their landmark is, before
-// anything is triangulated: by where the SLAM system saw it from.
+// Predicts which tracks of a problem will determine the depth of their
+// landmark, before triangulation: from the positions from which the SLAM system
+// observed it.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,10 +12,10 @@
 
 namespace selfcal {
 
-// Of each track: whether it has the observations, and its landmark the
+// Returns for each track whether it has the observations, and its landmark the
 // parallax, without which screening drops it (screening.h). `landmarks_G` are
-// the places of the landmarks in the SLAM system's map, one of each track; the
-// scene by whose median inverse depth they are judged is that of these tracks.
+// the positions of the landmarks in the SLAM system's map, one for each track;
+// the median inverse depth of the scene is that of these tracks.
 std::vector<bool> TracksWithDepth(const Rig& rig,
                                   std::span<const KeyframeState> keyframes,
                                   std::span<const Track> tracks,

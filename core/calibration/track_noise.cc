@@ -11,13 +11,13 @@
 namespace selfcal {
 namespace {
 
-// With fewer residuals to spare nothing is said.
+// With less redundancy the correlation is not measured.
 constexpr int kLeastRedundancy = 100;
 
 using PoseSteps = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-// Steps of theta of one sigma each in independent directions, and the steps of
-// every keyframe's pose that go along.
+// Steps of theta of one sigma each in independent directions, and the
+// corresponding steps of every keyframe's pose.
 struct Directions {
   Eigen::MatrixXd theta;
   std::vector<PoseSteps> poses;
@@ -51,13 +51,13 @@ Directions FindDirections(const SolverRound& round,
 struct TrackSums {
   double scatter = 0;      // |g|^2 over the directions
   double information = 0;  // trace, the landmark eliminated
-  // Of the weight and of the curvature of the loss, each times how strongly
-  // the observation depends on the directions.
+  // Sums of the weight and of the curvature of the loss, each times the
+  // sensitivity of the observation to the directions.
   double weight = 0, curvature = 0;
   int observations = 0;
 };
 
-// By (alpha, beta, rho), of the homogeneous point.
+// Derivative of the homogeneous point with respect to (alpha, beta, rho).
 Eigen::Matrix<double, 4, 3> PointByPlace(const LandmarkPlace& place) {
   Eigen::Matrix<double, 4, 3> by_place = Eigen::Matrix<double, 4, 3>::Zero();
   by_place.topLeftCorner<3, 2>() = place.anchor.R_GA.leftCols<2>();
@@ -112,8 +112,8 @@ class TrackSummer {
   }
 
  private:
-  // A residual in sigmas, with its derivatives by the homogeneous point and
-  // along the directions.
+  // A residual in sigmas, with its derivatives with respect to the homogeneous
+  // point and along the directions.
   struct Row {
     Eigen::Vector2d r;
     Eigen::Matrix<double, 2, 4> by_point;
@@ -170,7 +170,7 @@ double TrackNoiseFactor(const SolverRound& round,
     all.curvature += sums.curvature;
     all.observations += sums.observations;
   }
-  // Keyframes and theta follow the errors and leave residuals smaller.
+  // Keyframes and theta adapt to the errors and reduce the residuals.
   const double residuals = 2.0 * all.observations - 3.0 * landmarks.size();
   const double absorbed = 6.0 * estimate.keyframes.size() + round.basis.cols();
   if (!(residuals - absorbed > kLeastRedundancy) || !(all.information > 0) ||

@@ -11,14 +11,14 @@
 namespace selfcal {
 namespace {
 
-// Rays from which pairs are formed, evenly over the track.
+// Rays from which pairs are formed, evenly distributed over the track.
 constexpr int kMaxRays = 5;
-// Of the loss that finds the place among outliers, in robust sigmas.
+// Scale of the loss that finds the position among outliers, in robust sigmas.
 constexpr double kSearchLossScale = 2.0;
-// A point further away than this is given by its direction alone.
+// A point further away than this is represented by its direction alone.
 constexpr double kMinInverseDepth = 1e-4;
-// A place from which half of the observations lie so near is not improved upon
-// by further pairs, only by refinement.
+// If half of the observations are this close to a position, further pairs are
+// not tried; only refinement improves it.
 constexpr double kEnoughSigmas = 2.0;
 constexpr double kMedianOfRayleigh = 1.1774100225154747;
 
@@ -83,7 +83,7 @@ std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
       best_G = *point_G;
     }
   };
-  // From the pairs furthest apart on.
+  // Pairs furthest apart are tried first.
   const auto count = rays.size();
   for (std::size_t apart = count; apart-- > 1 && best_px > enough_px;) {
     for (std::size_t a = 0; a + apart < count && best_px > enough_px; ++a) {

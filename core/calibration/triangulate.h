@@ -1,8 +1,8 @@
-// The place of one landmark from its observations alone, with keyframes and
-// calibration held: a function of the present estimate and of nothing that went
-// before, so that two ways to one estimate see the same landmarks.
+// Triangulates one landmark from its observations alone, with keyframes and
+// calibration held constant: a function of the current estimate and not of its
+// history, so that two paths to one estimate have the same landmarks.
 //
-// Pure, any thread.
+// Pure, callable from any thread.
 #pragma once
 
 #include <optional>
@@ -12,10 +12,10 @@
 
 namespace selfcal {
 
-// A place found by least median of squares over pairs of rays, so that nearly
-// half of the observations may be wrong, then refined with a loss that gives
-// gross errors no weight. Nothing if no pair of rays gives a point in front of
-// the cameras.
+// Finds a position by least median of squares over pairs of rays, so that
+// nearly half of the observations may be outliers, and refines it with a loss
+// that gives gross errors no weight. Returns nullopt if no pair of rays gives a
+// point in front of the cameras.
 std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
                                               const Track& track);
 
