@@ -66,7 +66,7 @@ class Selection {
   }
 
   // Excludes segments; indices refer to the currently used ones.
-  void LeaveOut(const std::vector<Contradiction>& contradictions) {
+  void Exclude(const std::vector<Contradiction>& contradictions) {
     std::vector<std::size_t> used;
     for (std::size_t i = 0; i < all_.size(); ++i) {
       if (reasons_[i].empty()) used.push_back(i);
@@ -110,10 +110,10 @@ std::vector<Contradiction> FindMisfitsOf(
 
 // Completes the result, if there is one, by the information of segments without
 // data.
-void CompleteByRemembered(const Rig& rig,
-                          const std::vector<const MotionSegment*>& used,
-                          const CalibrateOptions& options,
-                          CalibrationRun* run) {
+void CompleteWithRemembered(const Rig& rig,
+                            const std::vector<const MotionSegment*>& used,
+                            const CalibrateOptions& options,
+                            CalibrationRun* run) {
   if (run->evidence.empty() || options.remembered.empty()) return;
   CompletedEstimate completed =
       FuseEvicted(rig,
@@ -137,7 +137,7 @@ CalibrationResult CalibrateOnWhatAgrees(
     const CalibrateOptions& options,
     const ProgressCallback& progress) {
   Selection selection(segments);
-  selection.LeaveOut(FindMisfitsOf(rig, theta_start, segments));
+  selection.Exclude(FindMisfitsOf(rig, theta_start, segments));
   CalibrationRun run;
   int iterations = 0;
   for (int round = 0;; ++round) {
@@ -155,9 +155,9 @@ CalibrationResult CalibrateOnWhatAgrees(
     const std::vector<Contradiction> contradictions = FindContradictions(
         run.evidence, run.result.status == CalibrateStatus::kConverged);
     if (contradictions.empty()) break;
-    selection.LeaveOut(contradictions);
+    selection.Exclude(contradictions);
   }
-  CompleteByRemembered(rig, selection.used(), options, &run);
+  CompleteWithRemembered(rig, selection.used(), options, &run);
   selection.Complete(&run.result.segment_fits);
   return std::move(run.result);
 }
@@ -182,7 +182,7 @@ CalibrationResult Calibrate(const Rig& rig,
   }
   CalibrationRun run =
       RunCalibration(rig, theta_start, sorted, options, progress);
-  CompleteByRemembered(rig, sorted, options, &run);
+  CompleteWithRemembered(rig, sorted, options, &run);
   return std::move(run.result);
 }
 

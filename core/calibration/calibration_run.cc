@@ -87,7 +87,8 @@ class Calibrator {
   }
 
   CalibrationRun Run() {
-    if (Start() && Solve() && WeighNoise() && ReleaseWeak() && HoldSpurious()) {
+    if (Start() && Solve() && ReweightNoise() && ReleaseWeak() &&
+        HoldSpurious()) {
       Finish();
     }
     return {
@@ -118,9 +119,9 @@ class Calibrator {
   // The noise scales can be estimated only now that residuals are small.
   // Weighting by them moves the minimum slightly, and thereby the noise scales,
   // so that this is repeated.
-  bool WeighNoise() {
+  bool ReweightNoise() {
     for (int i = 0; result_.status == CalibrateStatus::kConverged; ++i) {
-      if (!WeighTracks()) return false;
+      if (!WeightByTrackNoise()) return false;
       if (result_.status != CalibrateStatus::kConverged ||
           !options_.noise_factors) {
         break;
@@ -130,8 +131,8 @@ class Calibrator {
       const std::optional<Rig> next =
           Reweight(stated_, rig_, result_.noise_factors);
       if (!next) break;
-      TakeNoise(*next);
-      if (!Renew() || !Solve()) return false;
+      ApplyNoise(*next);
+      if (!RepeatSelection() || !Solve()) return false;
     }
     return true;
   }
@@ -148,7 +149,7 @@ class Calibrator {
   }
 
   // The correlation along tracks is measured again with the new noise.
-  void TakeNoise(const Rig& next) {
+  void ApplyNoise(const Rig& next) {
     for (BiasLink& link : problem_.bias_links) {
       link.sigmas.head<3>() *= next.imu_noise.accel_bias_random_walk /
                                rig_.imu_noise.accel_bias_random_walk;
@@ -161,7 +162,7 @@ class Calibrator {
   }
 
   // Weights by the correlation of errors along tracks.
-  bool WeighTracks() {
+  bool WeightByTrackNoise() {
     if (!options_.correlated_tracks) {
       return true;
     }
@@ -173,7 +174,7 @@ class Calibrator {
     }
     result_.track_noise_factor = track_noise_;
     SetTrackNoise(track_noise_, &screening_);
-    return Renew() && Solve();
+    return RepeatSelection() && Solve();
   }
 
   // Until now all weakly observed directions are held constant. Those whose
@@ -189,10 +190,10 @@ class Calibrator {
       return true;
     }
     Hold(TrustedSubspace(rig_, range, kWeakInformation));
-    weak_were_judged_ = true;
+    weak_assessed_ = true;
     Screen(&screening_);
-    return Inform(&screening_.loss) ? Solve() && WeighNoise()
-                                    : Fail(kNotDetermined);
+    return UpdateInformation(&screening_.loss) ? Solve() && ReweightNoise()
+                                               : Fail(kNotDetermined);
   }
 
   // Holds directions constant whose information stems from noise in states,
@@ -206,10 +207,10 @@ class Calibrator {
                            subspace_.held.cols() + spurious.cols());
       held << subspace_.held, spurious;
       Hold(HoldDirections(rig_, information_.Lambda, held));
-      weak_were_judged_ = true;
+      weak_assessed_ = true;
       Screen(&screening_);
-      if (!Inform(&screening_.loss)) return Fail(kNotDetermined);
-      if (!Solve() || !WeighNoise()) return false;
+      if (!UpdateInformation(&screening_.loss)) return Fail(kNotDetermined);
+      if (!Solve() || !ReweightNoise()) return false;
     }
     return true;
   }
@@ -241,14 +242,14 @@ class Calibrator {
 
   // Screens and relinearises after every step.
   bool SolveBySteps() {
-    if (!Report(0)) {
+    if (!ReportProgress(0)) {
       return Cancel();
     }
     int small_steps = 0;
     for (;;) {
       const double undamped_sigmas = StepSigmas();
       const StepOutcome step = Step();
-      if (!Report(moved_sigmas_)) {
+      if (!ReportProgress(moved_sigmas_)) {
         return Cancel();
       }
       const bool small = step.lower && moved_sigmas_ < kSmallStepSigmas &&
@@ -266,7 +267,7 @@ class Calibrator {
       if (result_.iterations >= options_.max_iterations) {
         break;
       }
-      if (!Renew()) {
+      if (!RepeatSelection()) {
         return false;
       }
     }
@@ -288,19 +289,19 @@ class Calibrator {
       return false;
     }
     const SharedInformation& at = damped.by_offset;
-    left_sigmas_ =
+    remaining_sigmas_ =
         LargestInSigmas(SubspaceStep(rig_, subspace_, at.Lambda, at.eta),
                         SubspaceCovariance(rig_, subspace_, at.Lambda));
-    return left_sigmas_ < kMaxStepSigmas;
+    return remaining_sigmas_ < kMaxStepSigmas;
   }
 
   // Repeats the selection of observations and of held directions. As holding a
   // direction moves the estimate, this is repeated until the subspace is
   // unchanged.
-  bool Renew() {
+  bool RepeatSelection() {
     do {
       Screen(&screening_);
-      if (!Inform(&screening_.loss)) {
+      if (!UpdateInformation(&screening_.loss)) {
         return Fail(kNotDetermined);
       }
     } while (!ChooseSubspace());
@@ -317,7 +318,7 @@ class Calibrator {
       if (outcome.status == SolverStatus::kFailed) {
         return Fail(outcome.message);
       }
-      if (!Inform(&screening_.loss)) {
+      if (!UpdateInformation(&screening_.loss)) {
         return Fail(kNotDetermined);
       }
       const double moved_sigmas =
@@ -336,15 +337,15 @@ class Calibrator {
     return true;
   }
 
-  bool Report(double step_sigmas) const {
-    return Tell(
+  bool ReportProgress(double step_sigmas) const {
+    return ReportProgress(
         result_.iterations, result_.final_cost, step_sigmas, estimate_.d);
   }
 
-  bool Tell(int iteration,
-            double cost,
-            double step_sigmas,
-            const Eigen::VectorXd& d) const {
+  bool ReportProgress(int iteration,
+                      double cost,
+                      double step_sigmas,
+                      const Eigen::VectorXd& d) const {
     if (!progress_) {
       return true;
     }
@@ -398,7 +399,7 @@ class Calibrator {
 
   // Updates information and covariance of the offset d at the estimate. Returns
   // false if states are not determined.
-  bool Inform(const RobustLoss* loss) {
+  bool UpdateInformation(const RobustLoss* loss) {
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
     if (!LineariseRound(Round(basis),
                         estimate_,
@@ -417,7 +418,7 @@ class Calibrator {
   // reduce information, this is unnecessary if everything is observed with
   // them.
   bool FindSubspace() {
-    if (!Inform(&screening_.loss)) {
+    if (!UpdateInformation(&screening_.loss)) {
       return false;
     }
     if (ChooseSubspace()) {
@@ -425,11 +426,11 @@ class Calibrator {
     }
     subspace_ = WholeSubspace(rig_);
     estimate_.d = start_d_;
-    if (!Inform(nullptr)) {
+    if (!UpdateInformation(nullptr)) {
       return false;
     }
     ChooseSubspace();
-    return Inform(&screening_.loss);
+    return UpdateInformation(&screening_.loss);
   }
 
   // Holds directions that the data does not observe at their start value.
@@ -437,7 +438,7 @@ class Calibrator {
   bool ChooseSubspace() {
     const auto held = static_cast<int>(subspace_.held.cols());
     ThetaSubspace observed =
-        weak_were_judged_
+        weak_assessed_
             ? HoldDirections(rig_, information_.Lambda, subspace_.held)
             : ObservedSubspace(
                   rig_, information_.Lambda, held, kWeakInformation);
@@ -494,7 +495,7 @@ class Calibrator {
           if (step > 0) {
             small_steps = step < kSmallStepSigmas ? small_steps + 1 : 0;
           }
-          if (!Tell(result_.iterations + iteration, cost, step, d)) {
+          if (!ReportProgress(result_.iterations + iteration, cost, step, d)) {
             return SolverSignal::kCancel;
           }
           return small_steps >= kSmallSteps ? SolverSignal::kEnough
@@ -522,7 +523,7 @@ class Calibrator {
       message << std::setprecision(2)
               << "no step lowers the cost, and the next one would move theta "
                  "by "
-              << left_sigmas_ << " sigma";
+              << remaining_sigmas_ << " sigma";
       result_.message = message.str();
     } else if (result_.status != CalibrateStatus::kConverged) {
       result_.status = CalibrateStatus::kNotConverged;
@@ -568,7 +569,7 @@ class Calibrator {
                                 estimate_.keyframes,
                                 screening_,
                                 subspace_,
-                                SquaresOfAReprojection());
+                                ExpectedReprojectionSquares());
     const double excess = TestEach(&evidence_);
     result_.covariance *= excess;
     data_estimate_ = {.reference = reference_,
@@ -586,7 +587,7 @@ class Calibrator {
 
   // Expected sum over the two rows of a reprojection, from the redundancy of
   // all; 0: unknown.
-  double SquaresOfAReprojection() const {
+  double ExpectedReprojectionSquares() const {
     for (const NoiseFactor& factor : result_.noise_factors) {
       if (factor.kind == NoiseKind::kPixel) {
         return factor.redundancy / std::max(1, screening_.observations);
@@ -613,10 +614,10 @@ class Calibrator {
   LinearisedRound linearised_;
   SharedInformation information_;
   Eigen::MatrixXd covariance_d_;
-  bool weak_were_judged_ = false;
-  double moved_sigmas_ = 0;  // by the last step
-  double left_sigmas_ = 0;   // remaining step of a stalled estimate
-  double track_noise_ = 0;   // as TrackNoiseFactor
+  bool weak_assessed_ = false;
+  double moved_sigmas_ = 0;      // by the last step
+  double remaining_sigmas_ = 0;  // remaining step of a stalled estimate
+  double track_noise_ = 0;       // as TrackNoiseFactor
   CalibrationResult result_;
   std::vector<SegmentEvidence> evidence_;
   DataEstimate data_estimate_;

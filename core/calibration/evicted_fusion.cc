@@ -60,7 +60,7 @@ class Fusion {
     if (basis_.cols() == 0) return std::move(result_);
     const auto evicted = Count();
     EvictedUse& use = result_.use;
-    if (evicted > 0) use.contradicting = LeaveOutContradictions();
+    if (evicted > 0) use.contradicting = ExcludeContradictions();
     if (2 * use.contradicting > evicted) {
       use.unused = "most of them contradict the segments whose data is kept";
       return std::move(result_);
@@ -129,7 +129,7 @@ class Fusion {
   }
 
   // Tests each evicted segment separately.
-  int LeaveOutContradictions() {
+  int ExcludeContradictions() {
     const double limit = kChance / static_cast<double>(Count());
     return static_cast<int>(
         std::erase_if(joined_, [&](const JoinedSegment& one) {

@@ -25,7 +25,7 @@ constexpr double kConcerned = 0.01;
 // The prior probability that a device changed while its segments were recorded.
 constexpr double kChanged = 0.5;
 // The prior probability that groups that have changed continue to change.
-constexpr double kGoesOn = 0.5;
+constexpr double kContinues = 0.5;
 
 // Joined segments of one session, by index.
 struct Part {
@@ -42,7 +42,7 @@ struct Trial {
 };
 
 // The size of the next longer course to test.
-int Longer(int n) { return n + std::max(1, n / 2); }
+int NextLonger(int n) { return n + std::max(1, n / 2); }
 
 bool BeginSession(std::span<const JoinedSegment> segments, int i) {
   return i == 0 ||
@@ -80,11 +80,11 @@ std::vector<Trial> Trials(std::span<const JoinedSegment> segments,
       between.push_back({ChangeKind::kSudden, StepCourse(count, n)});
     }
   }
-  for (int n = 1; n < count; n = Longer(n)) {
+  for (int n = 1; n < count; n = NextLonger(n)) {
     if (is_step(n))
       within.push_back({ChangeKind::kSudden, StepCourse(count, n)});
   }
-  for (int n = kShortestRamp; n <= count; n = Longer(n)) {
+  for (int n = kShortestRamp; n <= count; n = NextLonger(n)) {
     ramps.push_back({ChangeKind::kDrift, RampCourse(count, n)});
   }
   std::vector<Trial> trials;
@@ -120,7 +120,8 @@ class SplitSearch {
         blocks_(ParameterBlocks(rig)),
         parts_(Cut(segments)) {
     for (const Part& part : parts_) {
-      shown_.push_back(ShownBy(segments.subspan(part.first, part.count)));
+      shown_.push_back(
+          InformationAboutOffset(segments.subspan(part.first, part.count)));
     }
   }
 
@@ -132,9 +133,9 @@ class SplitSearch {
     const Trial* trial = nullptr;
     const ParameterBlock* block = nullptr;
     ChangeMixture mixture;
-    const double others = AddGoingOn(&mixture);
+    const double others = AddContinuing(&mixture);
     for (const Trial& tried : trials) {
-      const Seen seen = SeenOf(tried.weights);
+      const CourseInformation seen = InformationOf(tried.weights);
       for (const ParameterBlock& one : blocks_) {
         const double share = tried.share * one.share;
         AddTo(&mixture, seen, one, others * share);
@@ -165,7 +166,8 @@ class SplitSearch {
  private:
   // Information about the free components in units of the prior, along the
   // directions.
-  OffsetInformation ShownBy(std::span<const JoinedSegment> segments) const {
+  OffsetInformation InformationAboutOffset(
+      std::span<const JoinedSegment> segments) const {
     const ThetaInformation information =
         InformationOfAll(rig_, theta_, segments, options_);
     const Eigen::MatrixXd Lambda =
@@ -176,16 +178,16 @@ class SplitSearch {
 
   // The information of the parts about a change of some course, and the
   // derivative of the present theta with respect to it (in tangent units).
-  struct Seen {
+  struct CourseInformation {
     OffsetInformation change;
     Eigen::MatrixXd by_change;
   };
-  Seen SeenOf(const Eigen::VectorXd& weights) const {
+  CourseInformation InformationOf(const Eigen::VectorXd& weights) const {
     const Course course = MakeCourse(shown_, weights, prior_);
     return {course.Change(), OntoTangent(course.OffsetByChange(1))};
   }
   static void AddTo(ChangeMixture* mixture,
-                    const Seen& seen,
+                    const CourseInformation& seen,
                     const ParameterBlock& block,
                     double prior) {
     mixture->Add(block.basis.transpose() * seen.change.Lambda * block.basis,
@@ -196,17 +198,17 @@ class SplitSearch {
 
   // Adds the hypotheses that groups which have changed before continue to
   // change, evenly over all segments. Returns the prior of other changes.
-  double AddGoingOn(ChangeMixture* mixture) const {
+  double AddContinuing(ChangeMixture* mixture) const {
     const auto of = BlocksOf(options_.changing);
     if (of.empty()) return kChanged;
     double shares = 0;
     for (const ParameterBlock* one : of) shares += one->share;
     const auto parts = static_cast<int>(parts_.size());
-    const Seen seen = SeenOf(RampCourse(parts, parts));
+    const CourseInformation seen = InformationOf(RampCourse(parts, parts));
     for (const ParameterBlock* one : of) {
-      AddTo(mixture, seen, *one, kGoesOn * one->share / shares);
+      AddTo(mixture, seen, *one, kContinues * one->share / shares);
     }
-    return (1 - kGoesOn) * kChanged;
+    return (1 - kContinues) * kChanged;
   }
 
   // Blocks whose components all belong to these groups.
@@ -253,7 +255,7 @@ class SplitSearch {
         std::vector<JoinedSegment> rest(part.begin(), part.end());
         rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(k));
         std::vector<OffsetInformation> shown = shown_;
-        shown[i] = ShownBy(rest);
+        shown[i] = InformationAboutOffset(rest);
         largest = std::max(
             largest,
             TestSpan(Change(shown, trial.weights), block.basis).probability);

@@ -20,7 +20,7 @@ constexpr double kMedianOfRayleigh = 1.1774100225154747;
 const double kPriorLogSigma = std::log(10.0);
 // Errors in the stated noise of an IMU are correlated: given one of its noise
 // scales, the logarithms of the others have this sigma about it.
-const double kApartLogSigma = std::log(2.0);
+const double kConditionalLogSigma = std::log(2.0);
 constexpr double kDifference =
     0.1;  // step of the logarithms for difference quotients
 // A step does not increase the logarithm of a noise scale by more than
@@ -35,18 +35,18 @@ constexpr double kSettledSigmasOfGuess = 0.3;
 // For a redundancy r, the Fisher information is at most 2 r.
 constexpr double kMayBeDetermined = 0.5 / Square(kDeterminedLogSigma);
 // The Fisher information is computed again if the logarithm of a noise scale is
-// further than kNear from where it was computed, and the redundancy of that
-// kind is above kMaySayMore, so that its information may exceed that of the
-// prior: noise that is stated far too small has almost no redundancy at the
-// stated value, and much at the actual one.
-constexpr double kNear = 0.3;
-constexpr double kMaySayMore = 0.5;
+// further than kMaxDistance from where it was computed, and the redundancy of
+// that kind is above kRelevantRedundancy, so that its information may exceed
+// that of the prior: noise that is stated far too small has almost no
+// redundancy at the stated value, and much at the actual one.
+constexpr double kMaxDistance = 0.3;
+constexpr double kRelevantRedundancy = 0.5;
 
 // Prior information about the logarithms of the noise scales relative to the
 // stated noise.
 NoiseMatrix PriorInformation() {
-  NoiseMatrix covariance =
-      NoiseMatrix::Constant(Square(kPriorLogSigma) - Square(kApartLogSigma));
+  NoiseMatrix covariance = NoiseMatrix::Constant(Square(kPriorLogSigma) -
+                                                 Square(kConditionalLogSigma));
   constexpr int kPixel = IndexOf(NoiseKind::kPixel);
   covariance.row(kPixel).setZero();
   covariance.col(kPixel).setZero();
@@ -143,22 +143,24 @@ class Likelihood {
 };
 
 // The Fisher information and the point at which it was computed.
-struct Informed {
+struct FisherEvaluation {
   NoiseMatrix fisher;
   NoiseVector at, redundancy;
 };
 
-std::optional<Informed> Inform(const Likelihood& likelihood) {
+std::optional<FisherEvaluation> EvaluateFisher(const Likelihood& likelihood) {
   const std::optional<NoiseMatrix> fisher = likelihood.Fisher();
   if (!fisher) return std::nullopt;
-  return Informed{*fisher, likelihood.at(), likelihood.balance().redundancy};
+  return FisherEvaluation{
+      *fisher, likelihood.at(), likelihood.balance().redundancy};
 }
 
-bool StillHolds(const Informed& informed, const Likelihood& likelihood) {
+bool StillHolds(const FisherEvaluation& evaluation,
+                const Likelihood& likelihood) {
   for (int i = 0; i < kNoiseKinds; ++i) {
-    if (std::max(informed.redundancy[i], likelihood.balance().redundancy[i]) >
-            kMaySayMore &&
-        std::abs(likelihood.at()[i] - informed.at[i]) > kNear) {
+    if (std::max(evaluation.redundancy[i], likelihood.balance().redundancy[i]) >
+            kRelevantRedundancy &&
+        std::abs(likelihood.at()[i] - evaluation.at[i]) > kMaxDistance) {
       return false;
     }
   }
@@ -167,10 +169,10 @@ bool StillHolds(const Informed& informed, const Likelihood& likelihood) {
 
 // The tolerance is tight for kinds that may be determined; the others remain
 // guesses in any case.
-bool IsSettled(const NoiseVector& change, const Informed& informed) {
-  const NoiseMatrix covariance = informed.fisher.inverse();
+bool IsSettled(const NoiseVector& change, const FisherEvaluation& evaluation) {
+  const NoiseMatrix covariance = evaluation.fisher.inverse();
   for (int i = 0; i < kNoiseKinds; ++i) {
-    const double allowed = informed.redundancy[i] > kMayBeDetermined
+    const double allowed = evaluation.redundancy[i] > kMayBeDetermined
                                ? kSettledSigmas
                                : kSettledSigmasOfGuess;
     if (std::abs(change[i]) > allowed * std::sqrt(covariance(i, i))) {
@@ -191,20 +193,21 @@ struct Maximum {
 // that does not bring the score nearer to zero, in its own standard deviations,
 // is halved. Returns nullopt if the linear system fails.
 std::optional<Maximum> Maximise(Likelihood* likelihood) {
-  std::optional<Informed> informed = Inform(*likelihood);
-  if (!informed) return std::nullopt;
-  NoiseMatrix slope = informed->fisher;
+  std::optional<FisherEvaluation> evaluation = EvaluateFisher(*likelihood);
+  if (!evaluation) return std::nullopt;
+  NoiseMatrix slope = evaluation->fisher;
   const auto size_of = [&](const NoiseVector& score) {
-    return std::sqrt(score.dot(informed->fisher.ldlt().solve(score)));
+    return std::sqrt(score.dot(evaluation->fisher.ldlt().solve(score)));
   };
   for (int i = 0; i < kMaxSteps; ++i) {
     const NoiseVector score = likelihood->Score();
     NoiseVector change = slope.partialPivLu().solve(score);
     if (!change.allFinite() || change.dot(score) <= 0) {
-      slope = informed->fisher;
+      slope = evaluation->fisher;
       change = slope.ldlt().solve(score);
     }
-    if (IsSettled(change, *informed)) return Maximum{informed->fisher, true};
+    if (IsSettled(change, *evaluation))
+      return Maximum{evaluation->fisher, true};
     const NoiseVector from = likelihood->at();
     NoiseVector step = (0.5 * (1 + 2 * change.array()).max(kLeastPart).log())
                            .min(kLongestStep);
@@ -216,16 +219,16 @@ std::optional<Maximum> Maximise(Likelihood* likelihood) {
       }
       step *= 0.5;
     }
-    if (StillHolds(*informed, *likelihood)) {
+    if (StillHolds(*evaluation, *likelihood)) {
       const NoiseVector shown = score - likelihood->Score();
       slope += (shown - slope * step) * step.transpose() / step.squaredNorm();
     } else {
-      informed = Inform(*likelihood);
-      if (!informed) return std::nullopt;
-      slope = informed->fisher;
+      evaluation = EvaluateFisher(*likelihood);
+      if (!evaluation) return std::nullopt;
+      slope = evaluation->fisher;
     }
   }
-  return Maximum{informed->fisher, false};
+  return Maximum{evaluation->fisher, false};
 }
 
 // Estimates the noise scale of pixels from the median residual, as if all

@@ -146,10 +146,10 @@ SettledPlace SettlePlace(const LandmarkScene& scene,
 
 // Decides whether a landmark is used, and which of its observations; nullopt if
 // it is dropped.
-std::optional<ScreenedLandmark> Judge(const LandmarkScene& scene,
-                                      const Track& track,
-                                      const Thresholds& thresholds,
-                                      const SettledPlace& settled) {
+std::optional<ScreenedLandmark> AssessLandmark(const LandmarkScene& scene,
+                                               const Track& track,
+                                               const Thresholds& thresholds,
+                                               const SettledPlace& settled) {
   const double sigma = InverseDepthSigma(settled.refined.information);
   const double weight = 2 * (1 - sigma / thresholds.max_inverse_depth_sigma);
   Selected selected = Select(scene,
@@ -183,7 +183,7 @@ Screening Screen(const LandmarkScene& scene,
             SettlePlace(scene, track, thresholds.loss, *places[t].other);
         if (other.refined.cost < settled.refined.cost) settled = other;
       }
-      landmark = Judge(scene, track, thresholds, settled);
+      landmark = AssessLandmark(scene, track, thresholds, settled);
     }
     if (!landmark) {
       ++result.landmarks_dropped;
@@ -200,9 +200,9 @@ Screening Screen(const LandmarkScene& scene,
 }
 
 // No weight of a landmark may increase, and no dropped landmark may return.
-void OnlyFall(const CalibrationProblem& problem,
-              const Screening& before,
-              Screening* now) {
+void LimitWeights(const CalibrationProblem& problem,
+                  const Screening& before,
+                  Screening* now) {
   std::vector<double> weights(problem.tracks.size(), 0);
   for (const ScreenedLandmark& landmark : before.landmarks) {
     weights[landmark.track] = landmark.weight;
@@ -285,7 +285,7 @@ Screening ScreenLandmarks(const Rig& rig,
     SetTrackNoise(before->track_noise_factor, &result);
   }
   if (settle) {
-    OnlyFall(problem, *before, &result);
+    LimitWeights(problem, *before, &result);
   }
   return result;
 }

@@ -211,12 +211,12 @@ bool LineariseRound(const SolverRound& round,
 namespace {
 
 // Tries points along one direction from the estimate.
-class Way {
+class LineSearch {
  public:
-  Way(const SolverRound& round,
-      const LinearisedRound& linearised,
-      const CalibrationEstimate& estimate,
-      const std::vector<ScreenedLandmark>& landmarks)
+  LineSearch(const SolverRound& round,
+             const LinearisedRound& linearised,
+             const CalibrationEstimate& estimate,
+             const std::vector<ScreenedLandmark>& landmarks)
       : round_(round),
         linearised_(linearised),
         direction_(FirstStep(round, linearised)),
@@ -226,7 +226,7 @@ class Way {
 
   // Returns the trial point of lowest cost, which may be above that of the
   // start. Further lengths are tried until one decreases the cost.
-  Trial Go() {
+  Trial Run() {
     Trial best = At(1);
     length_ = 1;
     double next = Next(1, best);
@@ -288,9 +288,9 @@ StepOutcome TakeStep(const SolverRound& round,
                      const LinearisedRound& linearised,
                      CalibrationEstimate* estimate,
                      std::vector<ScreenedLandmark>* landmarks) {
-  Way way(round, linearised, *estimate, *landmarks);
-  Trial best = way.Go();
-  double length = way.length();
+  LineSearch search(round, linearised, *estimate, *landmarks);
+  Trial best = search.Run();
+  double length = search.length();
   LinearisedRound damped;
   for (double damping = 1; length < kShort && damping <= kMaxDamping;
        damping *= kDampingFactor) {
@@ -298,12 +298,12 @@ StepOutcome TakeStep(const SolverRound& round,
             round, *estimate, *landmarks, &round.loss, &damped, damping)) {
       break;
     }
-    Way shorter(round, damped, *estimate, *landmarks);
-    Trial trial = shorter.Go();
-    length = shorter.length();
+    LineSearch damped_search(round, damped, *estimate, *landmarks);
+    Trial trial = damped_search.Run();
+    length = damped_search.length();
     if (trial.cost < best.cost) best = std::move(trial);
   }
-  if (!way.Lower(best)) {
+  if (!search.Lower(best)) {
     return {false, linearised.cost};
   }
   *estimate = std::move(best.estimate);
