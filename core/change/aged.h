@@ -1,6 +1,6 @@
-// A calibration grows old: the device warms up, wears and is knocked about a
-// little, so that its parameters walk at random from where they were when they
-// were measured. Pure, any thread.
+// Ageing of a calibration: the device warms up, wears and suffers small knocks,
+// so that its parameters random-walk away from their measured values. Pure,
+// callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,8 +11,8 @@
 
 namespace selfcal {
 
-// The density of the random walk of all components that match a pattern, as
-// for ParameterGroup; 0: they never change.
+// Density of the random walk of all components that match a pattern, with
+// patterns as in ParameterGroup; 0: they never change.
 struct WalkDensity {
   std::string pattern;
   double density = 0;  // [unit/sqrt(day)]
@@ -20,23 +20,24 @@ struct WalkDensity {
   friend bool operator==(const WalkDensity&, const WalkDensity&) = default;
 };
 
-// Of every tangent component; later ones win. Without one a hundredth of
-// sigma_ref. Age alone then makes uncertain, after a month, a twentieth of what
-// one reference segment leaves so, which a good calibration feels, and a fifth
-// after a year: focal lengths 0.3 px, rotations of cameras 1 mrad, scales of
-// the gyroscope 0.1 %. That is chosen, not measured.
+// Density of every tangent component; later ones take precedence. The default
+// is a hundredth of sigma_ref. With it, age alone adds an uncertainty of a
+// twentieth of that after one reference segment in a month, which is noticeable
+// for a good calibration, and of a fifth in a year: focal lengths 0.3 px,
+// rotations of cameras 1 mrad, scales of the gyroscope 0.1 %. The default is
+// chosen, not measured.
 Eigen::VectorXd WalkDensities(const Rig& rig,
                               const std::vector<WalkDensity>& walks);
 
-// Patterns that match nothing and densities that are no number of at least 0,
-// with paths that begin with "walk_densities". At most 1024 are looked at.
+// Reports patterns that match nothing and densities that are not numbers of at
+// least 0, with paths that begin with "walk_densities". It checks at most 1024.
 std::vector<Violation> Validate(const Rig& rig,
                                 const std::vector<WalkDensity>& walks);
 
-// The covariance of an estimate (D x D) a number of days after the segments
-// that it came from: q^2 more variance a day for each component that the rig
-// estimates, q its density (D). Components walk independently. Before that time
-// (days < 0) it is what it was.
+// Covariance of an estimate (D x D) a number of days after the segments on
+// which it is based: for each component that the rig estimates, the variance
+// increases by q^2 per day, with its density q (D). Components walk
+// independently. For days < 0 the covariance is unchanged.
 Eigen::MatrixXd AgedCovariance(const Rig& rig,
                                const Eigen::VectorXd& densities,
                                const Eigen::MatrixXd& covariance,

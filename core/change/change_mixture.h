@@ -1,15 +1,16 @@
-// The theta of the newest segment of a device that may have changed among its
-// segments: a mixture of no change and of every course of one that is tried.
+// Estimates theta of the newest segment of a device that may have changed among
+// its segments: a mixture of the hypotheses of no change and of every tested
+// course of a change.
 //
-// A test that finds no change leaves it possible: too small to be noticed, or
-// too recent. An estimate that takes theta for constant is then off by a part
-// of the change, and does not say so. Here each course has a weight, its prior
-// times how probable it makes what the segments show, and from all of them
-// follow mean and covariance of theta now. Where nothing hints at a change, its
-// courses are improbable and what they add is small; where a change is nearly
-// certain, the mean follows it.
+// If a test finds no change, a change is still possible: too small to be
+// noticed, or too recent. An estimate that assumes a constant theta then has an
+// error of a fraction of the change, which its covariance does not contain.
+// Here each course has a weight, its prior times the likelihood of the data
+// under it, and the mixture gives mean and covariance of the present theta. If
+// nothing indicates a change, its courses are improbable and contribute little;
+// if a change is nearly certain, the mean follows it.
 //
-// Pure, deterministic, any thread.
+// Pure, deterministic, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,25 +18,26 @@
 
 namespace selfcal {
 
-// To be added to an estimate that takes theta for constant.
+// Correction of an estimate that assumes a constant theta.
 struct ChangeDoubt {
-  double probability = 0;      // that it changed, given what was shown
-  Eigen::VectorXd step;        // of the mean
-  Eigen::MatrixXd covariance;  // of theta about the new mean, beyond its own
+  double probability = 0;  // of a change, given the data
+  Eigen::VectorXd step;    // of the mean
+  Eigen::MatrixXd
+      covariance;  // of theta about the new mean, in addition to its own
 };
 
 class ChangeMixture {
  public:
-  // A change y, of which L and s are the information and any of kChangeSizes is
-  // the size; theta now is off by `by_change` y. `prior` is its probability
-  // before L and s are seen; of all together below 1: the rest is that of no
-  // change.
+  // Adds the hypothesis of a change y, with information L and s about it and
+  // any size of kChangeSizes; the present theta then differs by `by_change` y.
+  // `prior` is its probability before L and s are known; the sum over all
+  // hypotheses is below 1: the rest is the probability of no change.
   void Add(const Eigen::MatrixXd& L,
            const Eigen::VectorXd& s,
            Eigen::MatrixXd by_change,
            double prior);
 
-  // Something must have been added.
+  // At least one hypothesis must have been added.
   ChangeDoubt Doubt() const;
 
  private:

@@ -13,13 +13,14 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Of Sigma_a + Sigma_b in units of the prior: 2 where neither knows more.
+// Threshold on Sigma_a + Sigma_b in units of the prior: 2 if neither has more
+// information.
 constexpr double kKnown = 1.5;
-// Of the sigmas: where a solver stops.
+// In sigmas: the convergence tolerance of a solver.
 constexpr double kTolerance = 0.05;
 
-// Without directions of negative information: more is shared along them than
-// one of the two has, by the approximation of what is shared.
+// Removes directions of negative information, which occur since the shared
+// information is an approximation and may exceed that of one of the two.
 MatrixXd Positive(const MatrixXd& information) {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(information);
   const VectorXd values = eigen.eigenvalues().cwiseMax(0);

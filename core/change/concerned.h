@@ -1,5 +1,5 @@
-// Which components of theta a change concerns, by the names of its groups.
-// Pure, any thread.
+// Components of theta that a device change concerns, by the names of its
+// groups. Pure, callable from any thread.
 #pragma once
 
 #include <string>
@@ -9,13 +9,13 @@
 
 namespace selfcal {
 
-// Of the groups of these names, ascending. A component that is in one of them
-// is concerned, whatever other groups it is in.
+// Components of these groups, ascending. A component that is in one of them is
+// concerned, even if it is also in other groups.
 std::vector<int> ConcernedComponents(const Rig& rig,
                                      const std::vector<std::string>& groups);
 
-// All others that the rig estimates, ascending: what was known of them before
-// the change holds after it.
+// All other components that the rig estimates, ascending: earlier knowledge
+// about them remains valid after the change.
 std::vector<int> UnconcernedComponents(const Rig& rig,
                                        const std::vector<std::string>& groups);
 

@@ -10,14 +10,16 @@
 namespace selfcal {
 namespace {
 
-// As everywhere: a direction is observed if the data says more than the prior.
+// As everywhere: a direction is observed if the data has more information than
+// the prior.
 constexpr double kObserved = 1.0;
 
-// Of the reach of a segment: the sigma of what it takes for known there.
-// Simulated rotations in place are off by up to one and a half of it.
+// Ratio of the reach of a segment, the sigma of its spurious information, to
+// the distance from the linearisation point. Errors of simulated rotations in
+// place are up to one and a half times this distance.
 constexpr double kReachError = 2.0;
 
-// Eigenvectors of a symmetric matrix with their eigenvalues, of those observed.
+// Observed eigenvectors of a symmetric matrix, with their eigenvalues.
 struct Observed {
   explicit Observed(const Eigen::MatrixXd& information) {
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
@@ -127,11 +129,11 @@ ConsistencyTest ConsistencyTester::Test(const OffsetInformation& offset) const {
   return TestNormal(delta, covariance);
 }
 
-// With the rig's prior about the active calibration, so that what the segment
-// does not observe can be marginalised:
+// The rig's prior about the active calibration is added, so that directions
+// that the segment does not observe can be marginalised:
 //   delta = K eta, K = (Lambda + 1)^-1, eta ~ N(0, Lambda + Lambda Sigma
 //   Lambda)
-// whose distribution without a change holds exactly, the prior notwithstanding.
+// The distribution without a change is exact despite this prior.
 std::vector<GroupConsistency> ConsistencyTester::TestGroups(
     const OffsetInformation& offset) const {
   const Eigen::Index size = offset.eta.size();

@@ -1,22 +1,23 @@
-// Is what segments say consistent with a calibration that is known to a
-// covariance? From their SegmentInformation alone.
+// Tests whether segments are consistent with a calibration of known covariance,
+// using only their SegmentInformation.
 //
-// If theta is the truth of both, then
+// If theta is the true value for both, then
 //   delta = theta_segment [-] theta_active ~ N(0, Sigma_segment + Sigma_active)
-// on the directions that the segment observes (of which it says more than the
-// prior of the rig), and d = delta^T (Sigma_segment + Sigma_active)^-1 delta is
-// chi-square distributed with as many degrees of freedom. Segments that share
-// nothing are fused by adding their information.
+// on the directions that the segment observes (for which it has more
+// information than the prior of the rig), and d = delta^T (Sigma_segment +
+// Sigma_active)^-1 delta is chi-square distributed with as many degrees of
+// freedom. Segments that share nothing are fused by adding their information.
 //
-// The information of a segment is linear, and taken at the states of the SLAM
-// system. Where noise in these looks like motion, it claims to know what the
-// motion does not show: that theta is where it was linearised. That is no
-// evidence for a change. So the distance from there to the active calibration
-// makes an unknown error of the segment, of a standard deviation twice as large
-// in each component: its reach. A segment from over kMaxLinearisation reference
-// sigmas away is not tested at all.
+// The information of a segment is linearised at the states of the SLAM system.
+// If noise in these states looks like motion, the segment claims information
+// that the motion does not provide: that theta is equal to the linearisation
+// point. That is no evidence for a change. Therefore the segment is assumed to
+// have an additional unknown error, its reach: in each component, its standard
+// deviation is twice the distance from the linearisation point to the active
+// calibration. A segment that was linearised more than kMaxLinearisation
+// reference sigmas away is not tested at all.
 //
-// Pure, deterministic, any thread.
+// Pure, deterministic, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,19 +34,19 @@ namespace selfcal {
 
 inline constexpr double kMaxLinearisation = 1.0;  // reference sigmas
 
-// A calibration and how well it is known.
+// A calibration with its uncertainty.
 struct KnownCalibration {
   Calibration theta;
   Eigen::MatrixXd covariance;  // D x D, tangent at theta
-  // As its segments showed it (core/calibration/track_noise.h): the covariance
-  // is that with a pixel sigma so many times larger than the rig's.
+  // As estimated from its segments (core/calibration/track_noise.h): the
+  // covariance is that for a pixel sigma scaled by this factor.
   double track_noise_factor = 1;
 };
 
 struct ConsistencyTest {
   double statistic = 0;    // d
   int degrees = 0;         // 0: nothing is observed, and nothing was tested
-  double probability = 1;  // of a d as large or larger without a change
+  double probability = 1;  // of a d at least as large without a change
 };
 
 struct GroupConsistency {
@@ -58,20 +59,20 @@ struct GroupConsistency {
 struct OffsetInformation {
   Eigen::MatrixXd Lambda;
   Eigen::VectorXd eta;
-  // By component, of the one that reaches furthest; empty: linearised at the
+  // By component, the largest over the segments; empty: linearised at the
   // active calibration.
   Eigen::VectorXd reach = {};
 
   OffsetInformation& operator+=(const OffsetInformation& other);
-  // Keeps the reach.
+  // Does not change the reach.
   OffsetInformation& operator-=(const OffsetInformation& other);
 };
 
 // Tests against one calibration of one rig. `inflation` >= 1 is a factor on the
-// variances of segments: scores take pixel errors for independent and as small
-// as the rig says. Without it, it is the square of the calibration's track
-// noise factor. The covariance of the calibration holds that already, and is
-// taken as it is.
+// variances of segments: scores assume that pixel errors are independent and as
+// small as the rig states. The default is the square of the calibration's track
+// noise factor. The covariance of the calibration already contains this factor,
+// and is not scaled.
 class ConsistencyTester {
  public:
   ConsistencyTester(const Rig& rig,
@@ -80,16 +81,17 @@ class ConsistencyTester {
 
   double inflation() const { return inflation_; }
 
-  // Whether the segment can be tested: its information has the shape of the
-  // rig, is finite, and was linearised near the active calibration, and not
-  // too many of its observations were left out.
+  // Returns true if the segment can be tested: its information has the shape of
+  // the rig, is finite, and was linearised near the active calibration, and not
+  // too many of its observations were excluded.
   bool Accepts(const SegmentInformation& information) const;
 
-  // Of a segment that is accepted.
+  // Offset of an accepted segment.
   OffsetInformation Offset(const SegmentInformation& information) const;
 
   ConsistencyTest Test(const OffsetInformation& offset) const;
-  // In the order of rig.groups, each with all others unknown.
+  // Tests each group, in the order of rig.groups, with all other components
+  // unknown.
   std::vector<GroupConsistency> TestGroups(
       const OffsetInformation& offset) const;
 
@@ -97,11 +99,11 @@ class ConsistencyTester {
   // components in units of the prior's sigmas.
   const Eigen::MatrixXd& root() const { return root_; }
   const std::vector<ParameterBlock>& blocks() const { return blocks_; }
-  // Of rig.groups, in their order.
+  // Blocks of rig.groups, in their order.
   const std::vector<ParameterBlock>& groups() const { return groups_; }
 
  private:
-  // With the reach of segments.
+  // Covariance including the reach of segments.
   Eigen::MatrixXd Covariance(const OffsetInformation& offset) const;
 
   const Calibration theta_;

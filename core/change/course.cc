@@ -14,10 +14,11 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// As everywhere: a direction is observed if the data says more than the prior.
+// As everywhere: a direction is observed if the data has more information than
+// the prior.
 constexpr double kObserved = 1.0;
 
-// (Sigma^-1 + L0)^-1 without the inverse of either.
+// Computes (Sigma^-1 + L0)^-1 without the inverse of either.
 MatrixXd ErrorCovariance(const MatrixXd& L0, const MatrixXd& root) {
   MatrixXd A = root.transpose() * L0 * root;
   A.diagonal().array() += 1;
@@ -62,8 +63,8 @@ void Course::Remove(const OffsetInformation& segment, double weight) {
   at->h1 -= weight * segment.eta;
 }
 
-// Both errors of the reach, with (e, x) in one: what they add to the segments
-// is made of the same sums.
+// Eliminates both errors of the reach, stacked like (e, x): their contribution
+// to the segments consists of the same sums.
 void Course::EliminateReach(Sums* sums) {
   const Eigen::Index size = sums->h0.size();
   MatrixXd M(2 * size, 2 * size);

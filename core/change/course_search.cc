@@ -16,8 +16,8 @@ ConsistencyTest Noisier(ConsistencyTest test, double heterogeneity) {
 
 }  // namespace
 
-// The first that reaches the level will do: most often it is the same segment
-// that many tests hang on.
+// Stops at the first segment whose exclusion reaches the level: usually the
+// same segment is decisive for many tests.
 double CourseSearch::ProbabilityWithoutOne(const Eigen::VectorXd& weights,
                                            const Course& course,
                                            const ParameterBlock& block,

@@ -1,5 +1,5 @@
-// The search for a change over courses and blocks of parameters, that detection
-// (detect_change.h) and the test of a set (split.h) have in common.
+// Searches for a change over courses and blocks of parameters. Detection
+// (detect_change.h) and the test of a set (split.h) share it.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,24 +15,25 @@ namespace selfcal {
 struct FoundCourse {
   Eigen::VectorXd weights;  // of the segments
   const ParameterBlock* block = nullptr;
-  ConsistencyTest test;    // with the noise by which segments differ
-  double without_one = 1;  // largest probability with one segment left out
+  ConsistencyTest
+      test;  // with the noise estimated from differences of segments
+  double without_one = 1;  // largest probability with one segment excluded
   double heterogeneity = 1;
-  double evidence = 0;  // ln, for the change
+  double evidence = 0;  // ln of the likelihood ratio for the change
 };
 
-// Of one thread. Tester and segments must outlive it.
+// Not thread-safe. Tester and segments must outlive it.
 class CourseSearch {
  public:
   // A test must be less probable than the share of its block in `level`, with
-  // the noise by which the segments differ and whichever one of them is left
-  // out.
+  // the noise estimated from the differences among the segments, and with any
+  // one of them excluded.
   CourseSearch(const ConsistencyTester& tester,
                std::span<const OffsetInformation> segments,
                double level)
       : tester_(tester), segments_(segments), level_(level) {}
 
-  // `course` is that of the segments with these weights.
+  // Tests a course; `course` is that of the segments with these weights.
   void Try(const Eigen::VectorXd& weights, const Course& course);
 
   // The course and block with the most evidence so far.
@@ -47,8 +48,8 @@ class CourseSearch {
   const ConsistencyTester& tester_;
   const std::span<const OffsetInformation> segments_;
   const double level_;
-  std::optional<Heterogeneity> heterogeneity_;  // once it is needed
-  std::size_t suspect_ = 0;  // without which a test did not stand
+  std::optional<Heterogeneity> heterogeneity_;  // computed when needed
+  std::size_t suspect_ = 0;  // the segment whose exclusion last refuted a test
   std::optional<FoundCourse> best_;
 };
 

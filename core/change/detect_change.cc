@@ -13,7 +13,7 @@ namespace {
 constexpr int kShortestStep = 2;
 constexpr int kShortestRamp = 8;
 
-// The size of the next longer step to try.
+// The size of the next longer step to test.
 int Longer(int n) { return n + std::max(1, n / 4); }
 
 int CountCourses(int max_window) {
@@ -43,7 +43,7 @@ void TryAll(const ConsistencyTester& tester,
   }
 }
 
-// The evidence of every course of one kind over the newest segments.
+// Evidence for every course of one kind over the newest segments.
 struct Evidence {
   std::vector<double> step;  // [n - 1]: before the newest n
   std::vector<double> ramp;  // [n - 2]: over the newest n
@@ -70,8 +70,8 @@ std::size_t Largest(const std::vector<double>& values) {
   return std::max_element(values.begin(), values.end()) - values.begin();
 }
 
-// The most segments that all come after the change with the probability, less
-// the oldest of them: the change may lie within it.
+// Number of segments that are all after the change with the given probability,
+// at most, minus the oldest of them: the change may lie within it.
 int SegmentsSince(const std::vector<double>& evidence, double probability) {
   const double largest = evidence[Largest(evidence)];
   double total = 0;

@@ -1,21 +1,21 @@
-// Has the device changed? Sequential, over the newest segments.
+// Sequential detection of a device change over the newest segments.
 //
-// A course (course.h) is tried for each size that a change may have: a step
-// before the newest n segments, or a ramp over them, of some n up to
+// A course (course.h) is tested for each possible extent of a change: a step
+// before the newest n segments, or a ramp over them, for several n up to
 // max_window; and for each, every part of theta that may have changed alone
-// (parameter_blocks.h). Short courses find a shock, long ones a slow drift, of
-// which each segment alone shows nothing. A change is detected where the
-// evidence stands whichever one of the segments is left out: a single
-// inconsistent segment is none; and where it stands with the noise by which
-// the segments differ from each other, if that is larger than they claim.
+// (parameter_blocks.h). Short courses find a shock, long ones a slow drift that
+// no single segment reveals. A change is detected only if the evidence holds
+// with any one of the segments excluded: a single inconsistent segment is no
+// change; and if it holds with the noise estimated from the differences among
+// the segments, if that is larger than their information claims.
 //
-// Rate of false alarms: each of these tests is chi-square distributed, its
-// level the stated rate over the number of courses, times the share of its
-// part of theta. Whatever they have in common, and
-// the error of the active calibration with them, the probability of an alarm at
-// one segment is thus at most the stated rate.
+// Rate of false alarms: each of these tests is chi-square distributed; its
+// level is the stated rate divided by the number of courses, times the share of
+// its part of theta. Whatever correlation the tests have, including that due to
+// the error of the active calibration, the probability of an alarm at one
+// segment is thus at most the stated rate.
 //
-// Pure, deterministic, any thread.
+// Pure, deterministic, callable from any thread.
 #pragma once
 
 #include <cstdint>
@@ -29,16 +29,17 @@
 namespace selfcal {
 
 struct ChangeOptions {
-  // Of the variances of segments, for who makes the tester (consistency.h).
+  // Factor on the variances of segments, for the caller that makes the tester
+  // (consistency.h).
   std::optional<double> inflation = std::nullopt;
   // Upper bound of the probability of a false alarm, for each new segment; 0:
-  // nothing is ever detected.
+  // detection is disabled.
   double false_alarm_rate = 1e-5;
   int max_window = 64;  // segments
-  // A group is concerned where its test is less probable than this.
+  // A group is concerned if its test is less probable than this.
   double group_level = 0.01;
-  // The change lies before the segments that count as after it with this
-  // probability, given that there was one.
+  // Probability that the change lies before the segments that are treated as
+  // after it, given that there was one.
   double since_probability = 0.99;
 
   friend bool operator==(const ChangeOptions&, const ChangeOptions&) = default;
@@ -51,21 +52,21 @@ enum class ChangeKind {
 
 struct Change {
   ChangeKind kind = ChangeKind::kSudden;
-  // Newest segments that come wholly after the change. For a drift, those that
-  // are nearest to what the device is now.
+  // Number of newest segments that are entirely after the change. For a drift,
+  // those that are nearest to the present state of the device.
   int segments_since = 0;
   int window = 0;        // segments of the course that found it
-  std::string block;     // whose test found it
+  std::string block;     // whose test detected it
   ConsistencyTest test;  // its test
-  // In the order of rig.groups, given the course that is most likely; those
-  // concerned by name.
+  // In the order of rig.groups, given the most likely course; and the names of
+  // the concerned ones.
   std::vector<GroupConcern> groups;
   std::vector<std::string> concerned;  // never empty
 };
 
-// The newest segments in the order of their arrival, as OffsetInformation of
-// `tester`; more than max_window are not looked at. They must not have entered
-// the active calibration. Nothing: no change.
+// `newest` are the newest segments in the order of their arrival, as
+// OffsetInformation of `tester`; only the last max_window are used. They must
+// not be part of the active calibration. Returns nullopt if there is no change.
 std::optional<Change> DetectChange(const ConsistencyTester& tester,
                                    const std::vector<OffsetInformation>& newest,
                                    const ChangeOptions& options = {});

@@ -18,8 +18,8 @@ using Eigen::VectorXd;
 
 constexpr double kEvenOdds = 0.5;
 
-// What is left for others if the change is one of the components `at` as well,
-// of which nothing is known but the prior.
+// Remaining information for others if the components `at` may have changed as
+// well, with only their prior known.
 OffsetInformation Eliminate(const OffsetInformation& change,
                             const std::vector<int>& at) {
   if (at.empty()) return change;
@@ -38,7 +38,7 @@ std::vector<int> Union(std::vector<int> a, const std::vector<int>& b) {
   return a;
 }
 
-// The directions of the block outside of the components `at`.
+// Directions of the block outside of the components `at`.
 MatrixXd Without(const ParameterBlock& block, const std::vector<int>& at) {
   std::vector<Eigen::Index> rest;
   for (std::size_t k = 0; k < block.at.size(); ++k) {
@@ -49,7 +49,7 @@ MatrixXd Without(const ParameterBlock& block, const std::vector<int>& at) {
   return block.basis(Eigen::all, rest);
 }
 
-// E[y y^T] of a change B y that may have been, given L and s along B.
+// E[y y^T] of a possible change B y, given L and s along B.
 MatrixXd SecondMoment(const MatrixXd& L, const VectorXd& s) {
   ChangeMixture mixture;
   mixture.Add(L, s, MatrixXd::Identity(L.rows(), L.cols()), kEvenOdds);

@@ -7,7 +7,8 @@
 namespace selfcal {
 namespace {
 
-// As everywhere: a direction is observed if the data says more than the prior.
+// As everywhere: a direction is observed if the data has more information than
+// the prior.
 constexpr double kObserved = 1.0;
 
 double UpperMedian(std::vector<double> values) {

@@ -9,21 +9,21 @@
 namespace selfcal {
 namespace {
 
-// By chance, for two neighbours.
+// False-alarm probability, for two neighbours.
 constexpr double kChance = 1e-6;
-// A single pair is no measure of what is usual.
+// A single pair does not determine the typical difference.
 constexpr std::size_t kFewest = 4;
 
-// Of two neighbours, whether they are of one theta; nothing is known of that
-// but the prior.
+// Tests whether two neighbours have the same theta, of which only the prior is
+// known.
 ConsistencyTest TestPair(std::span<const OffsetInformation> pair) {
   const Eigen::Index size = pair.front().eta.size();
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size, size);
   return TestSpan(MakeCourse(pair, StepCourse(2, 1), one).Change(), one);
 }
 
-// A quarter of all pairs differ by less: where one segment in five is isolated,
-// two pairs in five are not usual. At least 1.
+// A quarter of all pairs differ by less: if one segment in five is isolated,
+// two pairs in five are not typical. At least 1.
 double UsualPerDegree(const std::vector<ConsistencyTest>& pairs) {
   std::vector<double> per_degree;
   for (const ConsistencyTest& pair : pairs) {

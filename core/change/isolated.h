@@ -1,12 +1,12 @@
-// Segments that show another theta than their neighbours in time do.
+// Finds segments with another theta than their neighbours in time.
 //
 // A device that has changed stays changed: the first segment after a change
-// contradicts the one before it, and agrees with the next. A segment that
-// contradicts both is corrupt, or of another device. Several of these among the
-// newest segments would make a change of any course, whichever one of them is
-// left out.
+// contradicts the previous one, and agrees with the next. A segment that
+// contradicts both is corrupt, or from another device. Several of these among
+// the newest segments would look like a change of some course, even with any
+// one of them excluded.
 //
-// Pure, deterministic, any thread.
+// Pure, deterministic, callable from any thread.
 #pragma once
 
 #include <span>
@@ -16,10 +16,10 @@
 
 namespace selfcal {
 
-// Indices of the isolated ones among segments in the order of time, ascending.
-// Contradictions are measured by how much neighbours usually differ, since
-// noise may be larger than segments claim. The first and the last have one
-// neighbour, and are isolated where they contradict that.
+// Returns the indices of the isolated ones among segments in the order of time,
+// ascending. Contradictions are measured relative to the typical difference of
+// neighbours, since noise may be larger than segments claim. The first and the
+// last have one neighbour, and are isolated if they contradict that.
 std::vector<int> FindIsolated(std::span<const OffsetInformation> segments);
 
 }  // namespace selfcal

@@ -26,7 +26,7 @@ ParameterBlock Components(std::string name,
   return block;
 }
 
-// `stems` of the free components.
+// `stems` are those of the free components.
 void SetShares(const std::vector<std::string>& stems,
                std::vector<ParameterBlock>* blocks) {
   const auto changes_by_itself = [&](const ParameterBlock& block) {

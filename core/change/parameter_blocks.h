@@ -1,8 +1,8 @@
-// Parts of theta that a device changes by: a knock turns a camera, a warm lens
-// has another focal length. A test of few parameters finds a smaller change
+// Parts of theta that change together: a knock rotates a camera, a warm lens
+// has another focal length. A test of few parameters detects a smaller change
 // than one of all of theta.
 //
-// Pure, any thread.
+// Pure, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,14 +15,14 @@ namespace selfcal {
 
 struct ParameterBlock {
   // "all", the name of a group, or that of the components without their axis:
-  // "cam0.q_CI", "imu.gyro.scale"; "cam0.zoom" is both focal lengths by the
-  // same share.
+  // "cam0.q_CI", "imu.gyro.scale"; "cam0.zoom" is a common relative change of
+  // both focal lengths.
   std::string name;
-  // Free components by k, in units of the prior's sigmas: orthonormal.
+  // Free components by k, in units of the prior's sigmas: orthonormal columns.
   Eigen::MatrixXd basis;
-  // Free components of it, ascending.
+  // Indices of its free components, ascending.
   std::vector<int> at;
-  // Its part of the level of tests and of the prior of a change; those of all
+  // Its share of the level of tests and of the prior of a change; those of all
   // ParameterBlocks sum to 1.
   double share = 0;
 };
@@ -30,10 +30,10 @@ struct ParameterBlock {
 // The groups of the rig, in their order.
 std::vector<ParameterBlock> GroupBlocks(const Rig& rig);
 
-// All of theta first, then the groups of the rig in their order, then the
-// parts of these. Of blocks with the same components, the first. Half of all
-// shares is for what changes most often by itself: the attitude of a camera,
-// which a knock turns, and its zoom, which grows with warmth.
+// All of theta first, then the groups of the rig in their order, then their
+// parts. Of blocks with the same components, only the first. Half of all shares
+// is for the most frequent isolated changes: the attitude of a camera, which a
+// knock rotates, and its zoom, which grows with temperature.
 std::vector<ParameterBlock> ParameterBlocks(const Rig& rig);
 
 }  // namespace selfcal

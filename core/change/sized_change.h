@@ -1,7 +1,7 @@
-// A hypothesis: a change of known size, normal with so many prior sigmas in
-// each of its directions, given what segments show of it.
+// A hypothesis: a change of known size, normal with this many prior sigmas in
+// each of its directions, given the information of segments about it.
 //
-// Pure, deterministic, any thread.
+// Pure, deterministic, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,14 +9,14 @@
 
 namespace selfcal {
 
-// Sizes of an uncertain change, in prior sigmas, each as likely as another: its
-// order of magnitude is not known.
+// Equally likely sizes of an uncertain change, in prior sigmas: its order of
+// magnitude is unknown.
 inline constexpr std::array<double, 5> kChangeSizes = {0.01, 0.03, 0.1, 0.3, 1};
 
 struct SizedChange {
-  // ln of how much more probable the data is than without any change.
+  // ln of the likelihood ratio relative to no change.
   double log_evidence = 0;
-  // The posterior of y, given that it changed.
+  // Posterior of y, given that there was a change.
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };

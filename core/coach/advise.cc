@@ -34,8 +34,8 @@ Eigen::MatrixXd Inverse(const Eigen::MatrixXd& matrix) {
   return 0.5 * (inverse + inverse.transpose());
 }
 
-// A covariance of the free components in units of the reference sigmas, and
-// what of it all gains are differences of.
+// A covariance of the free components in units of the reference sigmas, and the
+// log determinants whose differences are the gains.
 struct Knowledge {
   Eigen::MatrixXd covariance;
   double half_log_det = 0;
@@ -107,7 +107,7 @@ class Coach {
  private:
   const RigComponents components_;
   const std::vector<TangentComponent> tangent_;
-  const Eigen::VectorXd reference_;  // of the free components
+  const Eigen::VectorXd reference_;  // sigmas of the free components
 };
 
 }  // namespace

@@ -1,12 +1,14 @@
-// Which motion would teach the most now: what is known of theta, and what a
-// segment of each primitive motion is predicted to add to it.
+// Recommends the motion with the highest expected gain now, from the
+// information about theta and the predicted information of a segment of each
+// primitive motion.
 //
-// With Lambda the information that is known (prior included) and Lambda_i that
-// of a motion, the gain is 1/2 ln det((Lambda + Lambda_i) / Lambda) [nat] over
-// the free components; that of a group the same of its marginal covariance.
-// Linear algebra of the size of theta: fast enough after every segment.
+// With Lambda the present information (prior included) and Lambda_i that of a
+// motion, the gain is 1/2 ln det((Lambda + Lambda_i) / Lambda) [nat] over the
+// free components; that of a group is the same for its marginal covariance.
+// This is linear algebra of the size of theta: fast enough to run after every
+// segment.
 //
-// Pure, deterministic, any thread.
+// Pure, deterministic, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -44,28 +46,29 @@ struct Advice {
   std::vector<SigmaChange> sigmas;  // of the free components, in their order
 };
 
-// A direction of theta that is known worst, as a unit vector in units of the
+// One of the least known directions of theta, as a unit vector in units of the
 // reference sigmas.
 struct WeakDirection {
   std::string words;
   std::vector<UnobservedDirection::Part> parts;  // largest first
-  double sigma = 0;  // in reference sigmas: 1 after one usual segment
+  double sigma = 0;  // in reference sigmas: 1 after one typical segment
 };
 
 struct Coaching {
-  std::vector<Advice> advice;          // of every motion, by gain
-  std::vector<WeakDirection> weakest;  // the worst kWeakestDirections
+  std::vector<Advice> advice;  // for every motion, by gain
+  std::vector<WeakDirection>
+      weakest;  // the kWeakestDirections least known ones
 };
 
 // `known` is D x D, of theta's tangent at predictions.theta: positive definite
-// on the free components of the rig; what it says of others is not looked at.
+// on the free components of the rig; other components are ignored.
 Coaching Advise(const Rig& rig,
                 const Predictions& predictions,
                 const Eigen::MatrixXd& known);
 
-// What a calibration says of theta (D x D covariance at it, the prior in it),
-// and segments that it did not come from, moved to it. Not finite where the
-// covariance is not positive definite on the free components.
+// Sums the information of a calibration about theta (D x D covariance at it,
+// prior included) and of segments that are not part of it, transported to it.
+// Not finite if the covariance is not positive definite on the free components.
 Eigen::MatrixXd KnownInformation(
     const Rig& rig,
     const Calibration& theta,

@@ -6,7 +6,7 @@
 namespace selfcal {
 namespace {
 
-// From where a segment begins to what its last sample needs.
+// Additional time for the begin of a segment and its last samples.
 constexpr double kSlack_s = 0.1;
 
 double SegmentDuration(const SimulationOptions& options) {

@@ -1,10 +1,10 @@
-// What one segment of each primitive motion is predicted to say about theta:
-// the motion simulated with the calibration itself, seen by its cameras, scored
-// like a segment of the device. Takes as long as simulating so many segments;
-// what is known of theta does not enter, so that it is done once for a
-// calibration.
+// Predicts the information about theta of one segment of each primitive motion:
+// the motion is simulated with the calibration itself, observed by its cameras,
+// and scored like a segment of the device. It takes as long as simulating that
+// many segments; it does not depend on the present information about theta, so
+// that it is done once for a calibration.
 //
-// Pure, deterministic, any thread.
+// Pure, deterministic, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@
 namespace selfcal {
 
 struct PredictOptions {
-  // Of the segments, as the SLAM system sends them; the seed counts, too.
+  // Options of the simulated segments; the seed matters, too.
   SimulationOptions simulation;
 };
 
@@ -33,8 +33,8 @@ struct MotionPrediction {
 };
 
 struct Predictions {
-  Calibration theta;                      // about which they hold
-  double segment_s = 0;                   // that one segment lasts
+  Calibration theta;                      // calibration at which they hold
+  double segment_s = 0;                   // duration of one segment
   std::vector<MotionPrediction> motions;  // in the order of Primitives()
 };
 
@@ -43,8 +43,8 @@ Predictions Predict(const Rig& rig,
                     const Calibration& theta,
                     const PredictOptions& options = {});
 
-// One segment of a primitive, as a SLAM system that believes theta_slam hands
-// it over. Both calibrations must have the shape of rig.factory.
+// Simulates one segment of a primitive, as handed over by a SLAM system that
+// uses theta_slam. Both calibrations must have the shape of rig.factory.
 MotionSegment SimulatePrimitive(const Rig& rig,
                                 const Calibration& theta_true,
                                 const Calibration& theta_slam,

@@ -19,10 +19,10 @@ constexpr double kTwoPi = 2 * std::numbers::pi;
 constexpr double kQuarterTurn = std::numbers::pi / 2;
 constexpr double kPoseRate_hz = 50;
 
-// How far a person is from what was asked for.
+// Deviation of a person from the instruction.
 constexpr double kPaceError = 0.1;
 constexpr double kSizeError = 0.15;
-// Slow waver of the hand that moves, on each axis.
+// Slow movement of the moving hand, on each axis.
 constexpr double kWaver_m = 0.01;
 constexpr double kWaver_rad = 0.03;
 constexpr double kSlowestWaver_hz = 0.3;
@@ -101,14 +101,14 @@ std::vector<Primitive> MakePrimitives() {
   };
 }
 
-// From the body to forward, left, up of the first camera.
+// Rotation from the body to forward, left, up of the first camera.
 Eigen::Quaterniond DeviceFromBody(const Calibration& theta) {
   Eigen::Matrix3d R_CD;
   R_CD << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   return Eigen::Quaterniond(R_CD).conjugate() * theta.cameras.front().q_CI;
 }
 
-// What one person makes of it at one time.
+// One performance of a motion by one person.
 class Performance {
  public:
   Performance(const Primitive& primitive,
@@ -193,7 +193,7 @@ std::unique_ptr<Trajectory> Perform(const Primitive& primitive,
   for (int i = 0; i <= steps; ++i) {
     poses.push_back(performance.At(i / kPoseRate_hz));
   }
-  // None of these poses is a reason to refuse them.
+  // MakeSpline() cannot reject any of these poses.
   std::unique_ptr<Trajectory> trajectory = MakeSpline(poses);
   assert(trajectory != nullptr);
   return trajectory;

@@ -1,9 +1,9 @@
-// Motions that a person can be asked for in a sentence, with a device in hand,
-// and what they look like as trajectories.
+// Motions that can be described to a person in a sentence, for a device in the
+// hand, and the corresponding trajectories.
 //
-// They are described from the device: forward is where its first camera looks,
-// up is up in that camera's image, wherever the IMU sits. Pure, deterministic,
-// any thread.
+// They are described relative to the device: forward is the viewing direction
+// of its first camera, up is up in that camera's image, wherever the IMU is
+// mounted. Pure, deterministic, callable from any thread.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@
 
 namespace selfcal {
 
-// Moves along forward, left and up [m], turns about forward (roll), left
-// (pitch, down is positive) and up (yaw) [rad].
+// Translations along forward, left and up [m], rotations about forward (roll),
+// left (pitch, positive is down) and up (yaw) [rad].
 enum class Coordinate { kForward, kLeft, kUp, kRoll, kPitch, kYaw };
 inline constexpr int kCoordinates = 6;
 
@@ -31,24 +31,25 @@ struct PrimitiveSwing {
 };
 
 struct Primitive {
-  std::string_view name;         // [a-z_]+, stays the same over releases
+  std::string_view name;         // [a-z_]+, constant across releases
   std::string_view instruction;  // a sentence or two for the person
   std::vector<PrimitiveSwing> swings;
-  double forward_mps = 0;  // walks
-  double pivot_m = 0;      // turns about a point so far ahead
-  double unrest = 1;       // of the hand, against that of a moving person
+  double forward_mps = 0;  // walking speed
+  double pivot_m = 0;      // rotates about a point at this distance ahead
+  double unrest = 1;  // motion of the hand relative to that of a moving person
 };
 
-// All of them; the first is to hold still, which teaches least. None turns or
-// accelerates more (rms, within 10 %) than MakeHandheld does at excitation 1.
+// All primitives; the first is holding still, which has the lowest gain. None
+// rotates or accelerates more (rms, within 10 %) than MakeHandheld does at
+// excitation 1.
 std::span<const Primitive> Primitives();
 
-// Null if there is none of that name.
+// Returns null if there is no primitive of that name.
 const Primitive* FindPrimitive(std::string_view name);
 
-// As a person performs it with a device of this calibration (at least one
-// camera): pace and size are off by some 10 % and the hand wavers about all
-// axes, each time in another way. duration_s > 0.1.
+// The motion as a person performs it with a device of this calibration (at
+// least one camera): speed and size vary by about 10 %, and the hand moves
+// about all axes, differently each time. duration_s > 0.1.
 std::unique_ptr<Trajectory> Perform(const Primitive& primitive,
                                     const Calibration& theta,
                                     double duration_s,

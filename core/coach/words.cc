@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kMaxParts = 3;
 
 struct Phrase {
-  std::string_view block;  // of a name, without the sensor and the last part
+  std::string_view block;  // of a name without the sensor and the last part
   std::string_view words;
 };
 

@@ -1,5 +1,5 @@
-// Components and directions of theta in words for whoever holds the device.
-// Pure.
+// Descriptions of components and directions of theta in plain words, for the
+// user of the device. Pure.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace selfcal {
 
-// "the accelerometer's scale on z" for "imu.accel.scale.z"; a name that is not
-// known as it is.
+// "the accelerometer's scale on z" for "imu.accel.scale.z"; an unknown name is
+// returned unchanged.
 std::string ComponentInWords(std::string_view component);
 
 // "the accelerometer's scale on z", or "a mix of ... and ..." of the largest

@@ -1,6 +1,6 @@
-// Accelerations against the change of velocity between keyframes, less gravity:
-// over the unit, the 48 signed permutations of axes, and what gravity may be in
-// the readings and in G.
+// Compares accelerations with the change of velocity between keyframes, minus
+// gravity: over units, the 48 signed permutations of axes, and hypotheses about
+// gravity in the readings and in G.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,15 +16,16 @@ namespace selfcal {
 namespace {
 
 constexpr int kMinIntervals = 10;
-// Errors as parts of gravity: an explanation leaves less than the first and at
-// most a third of what is left without, which has to be more than the second;
-// more than the third is wrong even without an explanation.
+// Errors as fractions of gravity: the error of an explanation is less than
+// kExplained and at most a third of the error without it, which has to exceed
+// kNoticed; an error above kUnexplained is reported even without an
+// explanation.
 constexpr double kExplained = 0.15;
 constexpr double kNoticed = 0.1;
 constexpr double kUnexplained = 0.3;
 constexpr double kGain = 3;
-// Lengths of readings, as parts of gravity: of sensors that are read right,
-// also in vigorous motion, and where gravity is taken away.
+// Range of the norm of correct readings, as a fraction of gravity: also in
+// vigorous motion, and with gravity removed.
 constexpr double kRightLow = 0.6;
 constexpr double kRightHigh = 1.7;
 
@@ -71,20 +72,20 @@ class AccelerometerCheck {
       if (straight > kUnexplained) ReportMismatch(straight);
       return;
     }
-    // What turns the rates turns the accelerations.
+    // A permutation that fits the rates also applies to the accelerations.
     if (gyro.axes && axes == *gyro.axes) {
       return ReportAxes(axes, straight, turned);
     }
     if (tilted <= turned && IsMissing(rest)) return ReportMissing();
-    // The sensor upside down, or G: both are gravity with the wrong sign.
+    // Either the sensor or G is upside down: gravity has the wrong sign.
     if (axes == -identity || IsDown(rest)) return ReportSign(rest, straight);
     if (turned <= tilted) return ReportAxes(axes, straight, turned);
     ReportTilt(rest, straight, tilted);
   }
 
  private:
-  // What is left as a part of gravity, where readings at rest have the mean
-  // `rest` in G.
+  // Residual as a fraction of gravity, if readings at rest have the mean `rest`
+  // in G.
   double Error(const Eigen::Matrix3d& axes, const Eigen::Vector3d& rest) const {
     std::vector<double> errors;
     for (const ForceInterval& f : forces_) {
@@ -93,7 +94,7 @@ class AccelerometerCheck {
     return TrimmedRms(&errors) / gravity_;
   }
 
-  // Mean of the fed forces less the acceleration: gravity as it is in the data.
+  // Mean of the received forces minus the acceleration: gravity in the data.
   Eigen::Vector3d MeanRest() const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const ForceInterval& f : forces_) {
@@ -110,8 +111,8 @@ class AccelerometerCheck {
     return (rest + up_).norm() < kExplained * gravity_;
   }
 
-  // Those of the gyroscope if they fit about as well as any; else of those that
-  // fit about as well the one that changes fewest.
+  // The axes of the gyroscope if they fit about as well as any; otherwise, of
+  // those that fit about equally well, the ones with the fewest changes.
   Eigen::Matrix3d BestAxes(const GyroResult& gyro) const {
     constexpr double kAsGood = 0.7;
     Eigen::Matrix3d best = Eigen::Matrix3d::Identity();
@@ -128,7 +129,7 @@ class AccelerometerCheck {
     return best;
   }
 
-  // Sets the unit; false, having said so, where it is none that is known.
+  // Sets the unit. Returns false, after reporting it, if no known unit fits.
   bool FindUnit(double ratio) {
     if (ratio > kRightLow && ratio < kRightHigh) return true;
     if (IsMissing(MeanRest()) && MissingExplains()) {
@@ -158,8 +159,9 @@ class AccelerometerCheck {
     return false;
   }
 
-  // Whether readings are the acceleration alone. That zero comes near it proves
-  // nothing where they may be in units of g: those have to leave more.
+  // Returns true if readings are the acceleration without gravity. A small
+  // residual at zero gravity is no proof if the readings may be in units of g:
+  // the residual with those must be larger.
   bool MissingExplains() {
     const double removed =
         Error(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());

@@ -1,6 +1,6 @@
-// Rates against the turns between keyframes: Wahba's problem over the 48 signed
-// permutations of axes, with a scale for the unit and an offset of time, each
-// integrated exactly once it is a candidate.
+// Compares rates with the rotations between keyframes: Wahba's problem over the
+// 48 signed permutations of axes, with a scale for the unit and a time offset.
+// Each candidate is then integrated exactly.
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -14,17 +14,17 @@ namespace selfcal {
 namespace {
 
 constexpr int kMinIntervals = 10;
-// Slower motion is not told from the errors of a SLAM system.
+// Slower motion cannot be distinguished from errors of a SLAM system.
 constexpr double kMinSpeed_radps = 0.05;
-// Shares of the turns that are left: an explanation leaves less than the first,
-// what leaves more than the second needs one, and an explanation leaves at most
-// a third of what is left without.
+// Residual shares of the rotations: that of an explanation is below kExplained;
+// one above kUnexplained needs an explanation, whose residual is at most a
+// third of that without it.
 constexpr double kExplained = 0.25;
 constexpr double kUnexplained = 0.5;
 constexpr double kGain = 3;
 
-// Offsets below this do no harm that a recalibration could not mend, and are
-// what a SLAM system's own delays look like.
+// Smaller offsets do no harm that a recalibration could not correct, and look
+// like a SLAM system's own delays.
 constexpr double kMinOffset_s = 5e-3;
 constexpr double kOffsetSigmas = 6;
 
@@ -58,10 +58,10 @@ double MeanSpeed(const MotionData& data) {
   return time > 0 ? std::sqrt(turn / time) : 0;
 }
 
-// How keyframes come to have other axes than the IMU.
+// Reasons why keyframes may have other axes than the IMU.
 enum class Turned { kImu, kCameraPoses, kInvertedExtrinsics };
 
-// R_BI where keyframes are poses of a frame B.
+// R_BI if keyframes are poses of a frame B.
 Eigen::Matrix3d TurnOf(Turned turned, const Eigen::Matrix3d& R_CI) {
   if (turned == Turned::kCameraPoses) return R_CI;
   return (R_CI * R_CI).transpose();
@@ -73,7 +73,7 @@ struct Candidate {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d R_BI = Eigen::Matrix3d::Identity();
   OffsetFit offset;
-  RateFit without;  // at no offset
+  RateFit without;  // with zero offset
   RateFit with;
 };
 
@@ -149,8 +149,8 @@ class GyroCheck {
     return c;
   }
 
-  // The best of the axes if it explains what `straight` does not. Of those that
-  // explain about as much the one that changes fewest.
+  // The best axes if they explain what `straight` does not. Of those that
+  // explain about equally well, the ones with the fewest changes.
   Candidate BestAxes(const CoarseAlignment& coarse,
                      const Candidate& straight) const {
     constexpr double kAsGood = 0.7;
@@ -166,10 +166,10 @@ class GyroCheck {
     return gains ? best : straight;
   }
 
-  // Keyframes that are poses of a camera, and those that were made of them by
-  // extrinsics that are inverted, R_GC R_IC instead of R_GC R_CI. Cameras are
-  // never mounted exactly along the axes of the IMU: where one of these fits no
-  // worse than any swap of axes, it is the reason.
+  // Tries keyframes that are poses of a camera, and keyframes computed from
+  // these with inverted extrinsics, R_GC R_IC instead of R_GC R_CI. Cameras are
+  // never mounted exactly along the axes of the IMU: if one of these fits no
+  // worse than any permutation of axes, it is the reason.
   void TryExtrinsics(const CoarseAlignment& coarse, Candidate* best) const {
     for (const CameraCalibration& camera : theta_.cameras) {
       const Eigen::Matrix3d R_CI = camera.q_CI.toRotationMatrix();
@@ -228,8 +228,8 @@ class GyroCheck {
          straight / best.with.share()});
   }
 
-  // Keyframes may be those of the IMU's clock, or those of the images of a
-  // camera whose offset the calibration states.
+  // Returns true if keyframes may be at times of the IMU's clock, or at times
+  // of the images of a camera whose offset the calibration states.
   bool Stated(double offset_s, double tolerance_s) const {
     if (std::abs(offset_s) < tolerance_s) return true;
     for (const CameraCalibration& camera : theta_.cameras) {

@@ -1,6 +1,6 @@
-// Landmarks against the pixels that saw them, under the ways in which
-// extrinsics, intrinsics and landmarks may have been stated wrongly. Wherever
-// the data as it stands predicts its pixels, nothing else is looked at.
+// Compares landmarks with the pixels that observed them, under hypotheses about
+// wrong extrinsics, intrinsics and landmarks. If the data as sent predicts its
+// pixels, no hypothesis is tested.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -19,23 +19,23 @@ namespace selfcal {
 namespace {
 
 constexpr std::size_t kMinViews = 50;
-// A median error below this many pixel sigmas is no finding.
+// A median error below this many pixel sigmas is not a finding.
 constexpr double kFineSigmas = 2;
-// Parts of the focal length: an explanation leaves less than the first, and
-// what leaves more than the second needs one.
+// Fractions of the focal length: the error of an explanation is below
+// kExplained; one above kUnexplained needs an explanation.
 constexpr double kExplained = 0.03;
 constexpr double kUnexplained = 0.1;
 constexpr double kMinInFront = 0.7;
 constexpr double kGain = 3;
-// By how much a scale has to differ from one, and a shift from none [of the
-// width]; factory calibrations are known better.
+// Minimum difference of a scale from one, and of a shift from zero [of the
+// width]; factory calibrations are more accurate.
 constexpr double kMinScale = 0.1;
 constexpr double kMinShift = 0.03;
-// The same of another frame of landmarks: its scale, turn and distance.
+// The same for another frame of landmarks: its scale, rotation and distance.
 constexpr double kMinTurn_rad = 0.1;
 constexpr double kMinDistance_m = 0.2;
-// Explanations that change little are preferred to a free map of landmarks
-// that leaves no less than this part of what they leave.
+// Explanations with few parameters are preferred to a free map of landmarks,
+// unless the error of the map is below this fraction of theirs.
 constexpr double kAsGood = 0.5;
 
 struct Explanation {
@@ -49,7 +49,7 @@ Explanation Extrinsics(const std::string& cause, const std::string& remedy) {
   return {{}, {FindingKind::kExtrinsics, cause, remedy, 0}};
 }
 
-// T_CI, which takes a point from the body to the camera frame.
+// T_CI, which transforms a point from the body to the camera frame.
 Eigen::Isometry3d FromBody(const CameraCalibration& camera) {
   return Eigen::Translation3d(camera.p_CI) * camera.q_CI;
 }
@@ -62,7 +62,7 @@ bool IsFar(const LandmarkMap& map) {
 
 class ReprojectionCheck {
  public:
-  // Of camera j.
+  // Checks camera j.
   ReprojectionCheck(const std::vector<CameraCalibration>& cameras,
                     std::size_t j,
                     const std::vector<View>& views,
@@ -98,8 +98,8 @@ class ReprojectionCheck {
            kGain * error.median_px < fed_.median_px;
   }
 
-  // A free map has so many parameters that without parallax it takes up errors
-  // of the calibration: it is asked for gross errors alone.
+  // A free map has so many parameters that without parallax it absorbs errors
+  // of the calibration: it is tried for gross errors only.
   void TryLandmarkMap(std::optional<Explanation>* best) const {
     const auto map = FitLandmarkMap(views_, camera_);
     if (!map || !IsFar(*map)) return;
@@ -164,8 +164,9 @@ class ReprojectionCheck {
                    "-R_CI p of the p that is stated now"));
   }
 
-  // Keyframes that are poses of a camera, or were made from those with inverted
-  // extrinsics: one of the cameras gave them, and all see what follows.
+  // Tries keyframes that are poses of a camera, or were computed from these
+  // with inverted extrinsics: they come from one of the cameras, and all
+  // cameras observe the consequence.
   void AddPoses(std::vector<Explanation>* all) const {
     const Eigen::Isometry3d T_CI = FromBody(camera_);
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
@@ -180,7 +181,7 @@ class ReprojectionCheck {
                              "without the extrinsics",
                          "send the poses of the body: T_GI = T_GC T_CI"),
               all);
-      // The camera that gave the poses sees nothing wrong.
+      // The camera that provided the poses has no error.
       if (k == j_) continue;
       const Eigen::Isometry3d by_inverse = T_CI.inverse() * T_KI * T_KI;
       AddWith(
@@ -197,8 +198,8 @@ class ReprojectionCheck {
     }
   }
 
-  // A camera's frame in which landmarks may be, of the keyframe that saw them
-  // first: `of` takes a view to the camera.
+  // Tries landmarks in the camera frame of the keyframe that observed them
+  // first: `of` maps a view to the camera.
   template <typename Camera>
   Explanation AnchoredIn(const std::string& which, const Camera& of) const {
     return {Measure(views_,
@@ -327,7 +328,7 @@ class ReprojectionCheck {
   const ReprojectionError fed_;
 };
 
-// Says once what several cameras show alike.
+// Reports a finding once if several cameras have it.
 class FindingsByCamera {
  public:
   void Add(const std::string& camera, Finding finding) {

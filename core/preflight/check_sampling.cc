@@ -1,6 +1,7 @@
-// Dropped and repeated samples. What is dropped shows as a step between stamps
-// that is a multiple of the usual one; what is repeated as six equal numbers,
-// which no two readings of a sensor with noise have, or as equal stamps.
+// Dropped and repeated samples. A dropped sample appears as a step between
+// timestamps that is a multiple of the usual one; a repeated one as six equal
+// numbers, which do not occur twice for a sensor with noise, or as equal
+// timestamps.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -15,9 +16,9 @@ namespace selfcal {
 namespace {
 
 constexpr std::size_t kMinSamples = 100;
-// Of all samples: fewer are no finding.
+// Fraction of all samples: a smaller one is not a finding.
 constexpr double kMinShare = 5e-3;
-// A single gap of so much is one: what a hand did in it is not known.
+// A single gap of this length is a finding: the motion within it is unknown.
 constexpr double kLongGap_s = 0.05;
 
 struct Counts {
@@ -25,7 +26,7 @@ struct Counts {
   std::size_t missing = 0;
   std::size_t gaps = 0;
   std::size_t equal_readings = 0;
-  std::size_t bad_stamps = 0;  // equal to the one before, or earlier
+  std::size_t bad_stamps = 0;  // equal to the previous one, or earlier
   double longest_gap_s = 0;
 };
 

@@ -1,6 +1,6 @@
-// Saturation: more readings exactly at the extreme of an axis than just before
-// it. What a sensor cuts off piles up there; a sensor with noise reads its
-// extreme once, and one with coarse steps less often than the steps before it.
+// Saturation: more readings exactly at the extreme of an axis than just below
+// it. Clipped readings accumulate there; a sensor with noise reads its extreme
+// once, and one with coarse steps reads it less often than the steps below it.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -12,11 +12,12 @@
 namespace selfcal {
 namespace {
 
-// Readings at the very extreme, as counts and by those just before it.
+// Minimum number of readings at the extreme, absolute and relative to those
+// just below it.
 constexpr std::size_t kMinAtExtreme = 5;
 constexpr std::size_t kMinRatio = 2;
-// Just before the extreme: this part of half the range, and at least so many of
-// the sensor's steps.
+// Width of the range just below the extreme: this fraction of half the range,
+// and at least this many of the sensor's steps.
 constexpr double kMargin = 0.01;
 constexpr double kMarginSteps = 3;
 
@@ -64,7 +65,8 @@ struct Pile {
   }
 };
 
-// Readings of a sensor that repeats all its axes were not taken anew.
+// Counts readings; those that repeat all axes of the sensor are not new
+// measurements.
 Pile CountPile(std::span<const MotionSegment> segments,
                int axis,
                double extreme,

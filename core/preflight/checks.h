@@ -1,5 +1,5 @@
-// The families of checks, a file each. Each adds what it finds, and says what
-// it looked at or why it could not. Internal to core/preflight.
+// The families of checks, a file each. Each adds its findings, and reports what
+// it checked or why it could not. Internal to core/preflight.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,20 +14,20 @@
 
 namespace selfcal {
 
-// Dropped and repeated samples, by stamps and readings.
+// Dropped and repeated samples, from timestamps and readings.
 void CheckSampling(std::span<const MotionSegment> segments,
                    Diagnosis* diagnosis);
 
 void CheckSaturation(std::span<const MotionSegment> segments,
                      Diagnosis* diagnosis);
 
-// What the rates told about the samples, for the check of the accelerometer.
+// Results of the gyroscope check that the accelerometer check uses.
 struct GyroResult {
-  double offset_s = 0;  // that has to be added to stamps of keyframes
-  // The axes of the gyroscope, where they had to be turned.
+  double offset_s = 0;  // to be added to timestamps of keyframes
+  // The axes of the gyroscope, if they had to be permuted.
   std::optional<Eigen::Matrix3d> axes;
-  // R_BI, from the body to the frame that keyframes are poses of: not the
-  // identity where the extrinsics were misused.
+  // R_BI, from the body to the frame that the poses of keyframes refer to: not
+  // the identity if the extrinsics were misused.
   Eigen::Matrix3d R_BI = Eigen::Matrix3d::Identity();
 };
 

@@ -1,16 +1,17 @@
-// Pre-flight: is the data of a rig wrong in one of the usual ways, and in
-// which?
+// Pre-flight checks: finds the usual mistakes in the data of a rig.
 //
-// A SLAM system with a driver of its own may work well while what is handed on
-// is not what its documentation says: axes, units, signs, frames, stamps. Such
-// data is accepted, scored and calibrated with, and only the result is absurd.
-// Each check here is a small estimation problem: it fits the data under the
-// usual mistakes, and reports one where it explains what the data as it stands
-// does not. A check that the data cannot answer says so: a device at rest tells
-// nothing about the axes of its gyroscope.
+// A SLAM system with its own driver may work well although the data that it
+// exports is not as documented: axes, units, signs, frames, timestamps. Such
+// data is accepted, scored and used for calibration, and only the result is
+// absurd. Each check here is a small estimation problem: it fits the data under
+// the hypotheses of the usual mistakes, and reports one if it explains the data
+// and the data as sent does not fit. A check that the data does not allow is
+// reported as such: a device at rest has no information about the axes of its
+// gyroscope.
 //
-// Pure, deterministic, any thread. Segments need not be valid: what cannot be
-// used (an index out of range, a number that is not finite) is passed over.
+// Pure, deterministic, callable from any thread. Segments need not be valid:
+// unusable elements (an index out of range, a number that is not finite) are
+// ignored.
 #pragma once
 
 #include <span>
@@ -28,15 +29,15 @@ enum class FindingKind {
   kImuAxes,          // axes of the IMU swapped or flipped
   kGyroUnits,        // rates not in rad/s
   kAccelUnits,       // accelerations not in m/s^2
-  kGravity,          // with the wrong sign, removed, or G not level
-  kTimeOffset,       // between the stamps of keyframes and samples
-  kDroppedSamples,   // gaps in the stream of the IMU
-  kRepeatedSamples,  // readings or stamps twice
-  kSaturation,       // readings at the end of the sensor's range
-  kExtrinsics,       // inverted, or keyframes are those of the camera
+  kGravity,          // wrong sign, removed, or G not level
+  kTimeOffset,       // between the timestamps of keyframes and samples
+  kDroppedSamples,   // gaps in the IMU stream
+  kRepeatedSamples,  // repeated readings or timestamps
+  kSaturation,       // readings at the limit of the sensor's range
+  kExtrinsics,       // inverted, or keyframes are poses of the camera
   kFocalLength,      // intrinsics of another resolution
   kLandmarkFrame,    // landmarks not in G
-  // Wrong, but in none of the ways above.
+  // Wrong, but for none of the reasons above.
   kGyroMismatch,
   kAccelMismatch,
   kReprojectionMismatch,
@@ -47,21 +48,22 @@ std::string_view FindingName(FindingKind kind);
 
 struct Finding {
   FindingKind kind = FindingKind::kImuAxes;
-  std::string cause;   // in words, with the figure that it rests on
+  std::string cause;   // in words, with the figure that supports it
   std::string remedy;  // what to do about it
-  // What was measured: the factor of a unit or a focal length, the offset [s],
-  // the share of samples dropped, repeated or saturated; else the error as the
-  // data stands over that of the explanation.
+  // Measured value: the factor of a unit or a focal length, the offset [s], the
+  // share of samples that are dropped, repeated or saturated; otherwise the
+  // ratio of the error of the data as sent to that of the explanation.
   double value = 0;
 };
 
 struct Diagnosis {
   std::vector<Finding> findings;
-  std::vector<std::string> checked;      // and on how much data
-  std::vector<std::string> not_checked;  // and why not
+  std::vector<std::string> checked;      // with the amount of data
+  std::vector<std::string> not_checked;  // with the reason
 };
 
-// Segments of one rig; `theta` is what their SLAM system worked with.
+// `segments` are of one rig; `theta` is the calibration that their SLAM system
+// used.
 Diagnosis Diagnose(const Rig& rig,
                    const Calibration& theta,
                    std::span<const MotionSegment> segments);

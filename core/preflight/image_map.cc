@@ -14,7 +14,8 @@ struct Pair {
   Eigen::Vector2d fed;
 };
 
-// One weighted fit; a pair weighs less the more it lies off `map`.
+// One weighted fit; the weight of a pair decreases with its distance from
+// `map`.
 ImageMap Refit(const std::vector<Pair>& pairs,
                const ImageMap& map,
                double width_px) {
@@ -50,7 +51,7 @@ ImageMap FitImageMap(const std::vector<View>& views,
                      const CameraCalibration& camera) {
   constexpr int kIterations = 12;
   constexpr std::size_t kMinPairs = 20;
-  // Points at the rim of the model's range are predicted anywhere.
+  // Predictions of points at the edge of the model's range are meaningless.
   const double range_px = 4.0 * (camera.width_px + camera.height_px);
   std::vector<Pair> pairs;
   for (const View& view : views) {
@@ -60,7 +61,7 @@ ImageMap FitImageMap(const std::vector<View>& views,
   ImageMap map;
   map.error = {HUGE_VAL, 0};
   if (pairs.size() < kMinPairs) return map;
-  // From wide to narrow, so that a start far away finds its way.
+  // The width decreases, so that the fit converges from a distant start.
   double width_px = range_px;
   for (int n = 0; n < kIterations; ++n, width_px = std::max(width_px / 2, 2.)) {
     const ImageMap next = Refit(pairs, map, width_px);

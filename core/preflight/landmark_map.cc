@@ -13,15 +13,15 @@ namespace selfcal {
 namespace {
 
 struct Ray {
-  Eigen::Vector3d from;  // the camera, in G
+  Eigen::Vector3d from;  // centre of the camera, in G
   Eigen::Vector3d along;
-  Eigen::Vector3d p;  // the landmark as fed, centred and scaled
+  Eigen::Vector3d p;  // received landmark, centred and scaled
 };
 
 using Affine = Eigen::Matrix<double, 3, 4>;  // (A, t)
 
-// To coordinates of mean 0 and of mean square 1, in which the linear problem is
-// well scaled whatever the landmarks' unit is.
+// Maps to coordinates with mean 0 and mean square 1, in which the linear
+// problem is well scaled whatever the unit of the landmarks.
 struct Normalisation {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double size = 1;
@@ -52,10 +52,11 @@ std::vector<Ray> RaysOf(const std::vector<View>& views,
   return rays;
 }
 
-// Weighted linear least squares in the twelve entries of (A, t), columns first.
+// Weighted linear least squares in the twelve entries of (A, t), column-major.
 std::optional<Affine> Solve(const std::vector<Ray>& rays,
                             const std::vector<double>& weights) {
-  // Below this share of the largest the rays do not determine a direction.
+  // Below this fraction of the largest eigenvalue the rays do not determine a
+  // direction.
   constexpr double kMinRatio = 1e-9;
   Eigen::Matrix<double, 12, 12> H = Eigen::Matrix<double, 12, 12>::Zero();
   Eigen::Matrix<double, 12, 1> g = Eigen::Matrix<double, 12, 1>::Zero();
@@ -73,7 +74,8 @@ std::optional<Affine> Solve(const std::vector<Ray>& rays,
   return Affine(Eigen::Map<const Affine>(x.data()));
 }
 
-// Of the angle by which each ray is missed; width falls with the iterations.
+// Weights by the angle between each ray and its landmark; width decreases with
+// the iterations.
 std::vector<double> Weigh(const std::vector<Ray>& rays,
                           const Affine& map,
                           double width_rad) {

@@ -1,5 +1,5 @@
-// From where the landmarks were fed to where they must be in G for the camera
-// to see them as it did. Internal to core/preflight.
+// Map from the received landmark positions to those in G that match the
+// observations of the camera. Internal to core/preflight.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,11 +22,11 @@ struct LandmarkMap {
   }
 };
 
-// An affine map p_G = A p + t that brings each landmark onto the rays that see
-// it: linear in (A, t), b x (A p + t - c) = 0 for the ray from c along b;
-// weighted anew a few times. Nothing if it is no map of one frame to another
-// (A must be a scaled rotation to a twentieth), or the rays do not determine
-// it.
+// Fits an affine map p_G = A p + t that moves each landmark onto the rays that
+// observe it: linear in (A, t), b x (A p + t - c) = 0 for the ray from c along
+// b; reweighted a few times. Returns nullopt if it is not a map between frames
+// (A must be a scaled rotation within a twentieth), or the rays do not
+// determine it.
 std::optional<LandmarkMap> FitLandmarkMap(const std::vector<View>& views,
                                           const CameraCalibration& camera);
 

@@ -1,6 +1,5 @@
-// What the checks of the IMU stand on: the motion between keyframes as the SLAM
-// system states it, beside the samples that were fed. Internal to
-// core/preflight.
+// Input of the IMU checks: the motion between keyframes as the SLAM system
+// states it, and the received samples. Internal to core/preflight.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +13,7 @@
 
 namespace selfcal {
 
-// From one keyframe to another of the same segment.
+// Motion from one keyframe to another of the same segment.
 struct MotionInterval {
   std::size_t segment = 0;  // into MotionData::imu
   KeyframeState from;
@@ -24,22 +23,24 @@ struct MotionInterval {
 };
 
 struct MotionData {
-  // Of each segment the samples that are finite and later than those before.
+  // For each segment, the samples that are finite and later than the previous
+  // ones.
   std::vector<std::vector<ImuSample>> imu;
   std::vector<MotionInterval> intervals;
 };
 
-// Intervals of at least a quarter of a second, which a SLAM system knows better
-// than shorter ones in relation to how far they turn, and of at most three.
-// Of long data an even choice of about 2000.
+// Collects intervals of at least a quarter of a second, for which the relative
+// accuracy of a SLAM system's rotation is better than for shorter ones, and of
+// at most three seconds. Long data is subsampled evenly to about 2000
+// intervals.
 MotionData CollectMotion(std::span<const MotionSegment> segments);
 
-// The same intervals if the keyframes' attitudes times R_BI are those of the
+// The same intervals with the keyframes' attitudes times R_BI as those of the
 // body: R_GI = R_GB R_BI.
 MotionData InBody(const MotionData& data, const Eigen::Matrix3d& R_BI);
 
 // Root mean square of the smallest nine tenths: a few jumps of the SLAM system
-// are no finding. Sorts `norms`; 0 of none.
+// are not a finding. Sorts `norms`; 0 if empty.
 double TrimmedRms(std::vector<double>* norms);
 
 // "0.102", three digits.

@@ -1,4 +1,4 @@
-// The 48 ways in which a sensor's axes can be swapped and flipped.
+// The 48 signed permutations of a sensor's axes.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,11 +7,11 @@
 
 namespace selfcal {
 
-// Signed permutation matrices; the identity is the first, and those that change
-// fewer axes come before those that change more.
+// Signed permutation matrices; the identity is the first, and those with fewer
+// changed axes come first.
 const std::array<Eigen::Matrix3d, 48>& SignedPermutations();
 
-// "(y, -x, z)": in this order and with these signs the fed axes are x, y, z.
+// "(y, -x, z)": the received axes in terms of x, y, z, in order and with signs.
 std::string AxesText(const Eigen::Matrix3d& true_from_fed);
 
 }  // namespace selfcal

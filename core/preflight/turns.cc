@@ -17,7 +17,7 @@ namespace {
 
 std::int64_t Nanoseconds(double s) { return std::llround(s * 1e9); }
 
-// What is left of each interval; nothing where no samples cover it.
+// Residual of each interval; nullopt if no samples cover it.
 std::vector<std::optional<Eigen::Vector3d>> Residuals(
     const MotionData& data,
     const ImuCalibration& imu,
@@ -51,7 +51,7 @@ std::vector<std::optional<Eigen::Vector3d>> Residuals(
   return residuals;
 }
 
-// The integral of the fed rates from the first sample of a segment to each.
+// Integrals of the received rates from the first sample of a segment to each.
 std::vector<Eigen::Vector3d> SumRates(const std::vector<ImuSample>& samples) {
   std::vector<Eigen::Vector3d> sums(samples.size(), Eigen::Vector3d::Zero());
   for (std::size_t i = 1; i < samples.size(); ++i) {
@@ -85,14 +85,14 @@ RateSums SumRates(const MotionData& data) {
   return sums;
 }
 
-// Second moments of turns and summed rates at one offset.
+// Second moments of rotations and summed rates at one offset.
 struct Moments {
   int count = 0;
-  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();  // turn sum^T
+  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();  // rotation sum^T
   double turn = 0;
   double sum = 0;
 
-  // Mean square of turn - unit axes sum over that of the turns.
+  // Mean square of (rotation - unit axes sum) over that of the rotations.
   double Left(const Eigen::Matrix3d& axes, double unit) const {
     const double match = axes.cwiseProduct(cross).sum();
     return (turn + unit * unit * sum - 2 * unit * match) / turn;
@@ -175,7 +175,7 @@ OffsetFit RefineOffset(const MotionData& data,
 CoarseAlignment AlignRates(const MotionData& data, double unit) {
   constexpr double kMaxOffset_s = 0.5;
   constexpr double kStep_s = 0.02;
-  // Of the mean square: what the coarse sum may get wrong.
+  // Tolerance of the relative mean square, for the error of the coarse sum.
   constexpr double kCloser = 0.3;
   const RateSums sums = SumRates(data);
   const int needed = MomentsAt(data, sums, 0).count / 2;

@@ -34,7 +34,7 @@ struct Sighting {
   auto operator<=>(const Sighting&) const = default;
 };
 
-// The first of each landmark.
+// First observation of each landmark.
 std::vector<Sighting> FirstSightings(const MotionSegment& segment,
                                      int cameras) {
   std::vector<Sighting> first(segment.landmarks.size());

@@ -1,4 +1,4 @@
-// Observations of one camera with all that predicts them. Internal to
+// Observations of one camera with everything that predicts them. Internal to
 // core/preflight.
 #pragma once
 
@@ -25,28 +25,28 @@ struct BodyPose {
 };
 
 struct View {
-  BodyPose pose;  // of the keyframe that sees
-  // Of the first keyframe of its segment that saw the landmark, by any camera,
-  // and the camera that did.
+  BodyPose pose;  // of the observing keyframe
+  // Pose of the first keyframe of the segment that observed the landmark, with
+  // any camera, and the camera that did.
   BodyPose first;
   int first_camera;
-  Eigen::Vector3d p;  // the landmark as it was fed
+  Eigen::Vector3d p;  // position of the landmark as received
   Eigen::Vector2d z_px;
 };
 
-// Of the observations of `camera` an even choice of about 4000, without those
-// of numbers or indices that are none; of `cameras` in all.
+// An even subsample of about 4000 observations of `camera`, without invalid
+// numbers or indices; there are `cameras` in all.
 std::vector<View> CollectViews(std::span<const MotionSegment> segments,
                                int camera,
                                int cameras);
 
-// Pixel of a point in G; nothing where it cannot be projected.
+// Pixel of a point in G; nullopt if it cannot be projected.
 std::optional<Eigen::Vector2d> Predict(const CameraCalibration& camera,
                                        const BodyPose& pose,
                                        const Eigen::Vector3d& p_G);
 
-// How well views are predicted: what cannot be projected counts as infinitely
-// far away.
+// Error of predicted views: one that cannot be projected is treated as
+// infinitely far away.
 struct ReprojectionError {
   double median_px = 0;
   double in_front = 0;  // share that can be projected
@@ -54,7 +54,7 @@ struct ReprojectionError {
 
 ReprojectionError Summarise(std::vector<double> errors_px);
 
-// `place` takes a view to its landmark in G.
+// `place` maps a view to the position of its landmark in G.
 template <typename Place>
 ReprojectionError Measure(const std::vector<View>& views,
                           const CameraCalibration& camera,

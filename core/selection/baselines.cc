@@ -5,7 +5,7 @@
 namespace selfcal {
 namespace {
 
-// The rig with one group of all that is free.
+// The rig with one group of all free components.
 Rig WithSingleGroup(Rig rig) {
   rig.groups = {{"all", {"*"}}};
   return rig;
@@ -15,7 +15,7 @@ std::uint64_t Mixed(std::uint64_t state, std::uint64_t value) {
   return LandmarkHash(state ^ value);
 }
 
-// In [0, 1).
+// A number in [0, 1).
 double RandomScore(std::uint64_t seed, const SegmentKey& key) {
   std::uint64_t state = Mixed(0, seed);
   for (const char c : key.session) {
@@ -25,7 +25,8 @@ double RandomScore(std::uint64_t seed, const SegmentKey& key) {
   return static_cast<double>(state >> 11) * 0x1p-53;
 }
 
-// Tables with the score of each group turned to score(entropy, segment).
+// Tables in which the score of each group is replaced by score(entropy,
+// segment).
 template <typename Score>
 std::vector<Table> FillTables(const Rig& rig,
                               std::span<const ScoredSegment> segments,

@@ -1,5 +1,6 @@
-// Other choices of the same size, for comparison: each is a table with another
-// score, so that all stream, and all give the same set for the same segments.
+// Other selections of the same size, for comparison: each is a table with
+// another score, so that all can process a stream, and all give the same set
+// for the same segments.
 #pragma once
 
 #include <cstdint>
@@ -19,14 +20,14 @@ struct ScoredSegment {
   const SegmentInformation* information = nullptr;
 };
 
-// All of these offer the segments in their order, and keep the rig's minimum
+// All of these offer the segments in their order, and use the rig's minimum
 // gain.
 
 // The tables of the paper.
 std::vector<Table> MostInformativeTables(
     const Rig& rig, std::span<const ScoredSegment> segments);
 
-// The segments of highest entropy; a table shows it with its sign turned.
+// The segments of highest entropy; the table contains the negated entropy.
 std::vector<Table> LeastInformativeTables(
     const Rig& rig, std::span<const ScoredSegment> segments);
 
@@ -35,8 +36,9 @@ Table SingleGroupTable(const Rig& rig,
                        int capacity,
                        std::span<const ScoredSegment> segments);
 
-// Every subset of that size with the same probability, over the seeds: the
-// score is a hash of seed and key (a reservoir by random keys, Vitter 1985).
+// A table in which every subset of that size has the same probability, over the
+// seeds: the score is a hash of seed and key (a reservoir by random keys,
+// Vitter 1985).
 Table RandomTable(const Rig& rig,
                   int capacity,
                   std::uint64_t seed,

@@ -1,5 +1,5 @@
-// A scored segment as the joint choice sees it: all that it says about theta,
-// and which landmarks it stands on. Values; pure functions.
+// A scored segment as the joint selection uses it: its information about theta,
+// and the landmarks on which that is based. Values; pure functions.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,9 +13,9 @@ namespace selfcal {
 
 struct Candidate {
   SegmentKey key;
-  std::int64_t sequence = 0;  // order of arrival; ties go to the older
-  // Of the free components, in units of the prior's sigmas: the identity says
-  // as much as the prior.
+  std::int64_t sequence = 0;  // order of arrival; the older wins ties
+  // Information of the free components, in units of the prior's sigmas: the
+  // identity is as much as the prior.
   Eigen::MatrixXd information;
   LandmarkSketch landmarks;
 };

@@ -8,10 +8,11 @@
 namespace selfcal {
 namespace {
 
-// Of a normal distribution, over its median distance to the median.
+// Ratio of sigma to the median distance to the median, for a normal
+// distribution.
 constexpr double kSigmaOfMedianDistance = 1.4826;
 
-// The lower one of an even number; of one value or more.
+// Returns the lower median of at least one value.
 double Median(std::vector<double> values) {
   const auto middle =
       values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
@@ -19,7 +20,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// By what was measured; nothing with fewer than `min_compared` of them.
+// Ignores fits that were not measured; nullopt with fewer than `min_compared`.
 std::optional<double> LargestOf(const std::vector<double>& fits,
                                 const FitPolicy& policy) {
   std::vector<double> measured;

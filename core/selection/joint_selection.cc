@@ -11,7 +11,8 @@
 namespace selfcal {
 namespace {
 
-// Values that differ by less are equal: rounding does not choose.
+// Values that differ by less are treated as equal, so that rounding does not
+// decide.
 constexpr double kTie_nats = 1e-9;
 constexpr int kMaxExchanges = 1000;
 
@@ -36,7 +37,7 @@ std::vector<int> With(std::vector<int> members, int member) {
   return members;
 }
 
-// Values of subsets of some candidates.
+// Values of subsets of the candidates.
 class Subsets {
  public:
   Subsets(const JointSettings& settings,
@@ -57,7 +58,7 @@ class Subsets {
   double MinGainOfOne() const {
     return settings_.min_gain_nats / std::max(1, settings_.capacity);
   }
-  // Whether it may be kept at all.
+  // Returns true if the candidate alone has sufficient gain.
   bool Enough(int candidate) const {
     return HalfLogDetOf({candidate}) >= settings_.min_gain_nats;
   }
@@ -73,8 +74,7 @@ std::vector<const Candidate*> Pointers(std::span<const Candidate> candidates) {
   return pointers;
 }
 
-// The entropy of all of theta after this segment alone, normalised by
-// sigma_ref.
+// Entropy of all of theta after this segment alone, normalised by sigma_ref.
 double JointEntropy(const JointSettings& settings, const Candidate& candidate) {
   const auto size = candidate.information.rows();
   return static_cast<double>(size) / 2 *
@@ -84,13 +84,13 @@ double JointEntropy(const JointSettings& settings, const Candidate& candidate) {
                     candidate.information);
 }
 
-// What to leave out so that the rest says most.
+// The member whose removal leaves the most information.
 struct Removal {
   int member = -1;
   double value = 0;  // of the rest
 };
 
-// Among `removable`, ascending; of equal ones the last.
+// The best removal among `removable`, ascending; of equal ones the last.
 Removal CheapestRemoval(const Subsets& subsets,
                         const std::vector<int>& members,
                         const std::vector<int>& removable) {
@@ -102,7 +102,7 @@ Removal CheapestRemoval(const Subsets& subsets,
   return best;
 }
 
-// Fills up to the capacity with what adds most.
+// Fills up to the capacity, each time with the candidate that contributes most.
 std::vector<int> GrowGreedily(const Subsets& subsets,
                               const std::vector<int>& candidates,
                               int capacity) {
@@ -275,7 +275,7 @@ std::vector<int> SelectGreedily(const JointSettings& settings,
     if (subsets.Enough(i)) usable.push_back(i);
   }
   std::vector<int> kept = GrowGreedily(subsets, usable, settings.capacity);
-  // Each exchange is that of a full set in Offer(), with the newcomer that
+  // Each exchange is that of a full set in Offer(), with the new candidate that
   // helps most.
   for (int exchange = 0; exchange < kMaxExchanges; ++exchange) {
     const double value = subsets.Value(kept);

@@ -1,17 +1,17 @@
-// The joint choice: the bounded set of segments that together say most about
-// theta, with what they have in common counted once (shared_landmarks.h). A
-// table scores each segment alone and takes no notice of direction; this asks
-// what a segment adds to the others.
+// The joint selection: the bounded set of segments with the most joint
+// information about theta, with common information counted once
+// (shared_landmarks.h). A table scores each segment alone and ignores
+// directions; the joint selection scores the contribution of a segment to the
+// others.
 //
-// Every criterion is given in nats: as 1/2 ln det of the information in all D
-// directions alike that has the same
+// Every criterion is expressed in nats: as 1/2 ln det of the isotropic
+// information in all D directions that has the same
 //   D: determinant,
 //   A: mean variance, in units of sigma_ref,
 //   E: smallest eigenvalue, in units of the prior.
-// Information is that of the set with the prior, over the free components.
+// The information is that of the set with the prior, over the free components.
 //
-// Values and pure functions, deterministic; who stores the set is not known
-// here.
+// Values and pure functions, deterministic; storage is the caller's concern.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,64 +29,65 @@ enum class Criterion { kD, kA, kE };
 
 struct JointSettings {
   Criterion criterion = Criterion::kD;
-  int capacity = 0;  // segments kept at most
-  // A segment must gain this against the prior, and a capacity-th part of it on
-  // top of what is kept, so that a whole set gains it at least.
+  int capacity = 0;  // maximum number of segments kept
+  // A segment must gain this relative to the prior, and a capacity-th part of
+  // it relative to the kept set, so that the whole set gains at least this.
   double min_gain_nats = 1;
-  // False: as if no two segments had a landmark in common.
+  // If false, segments are treated as if they had no common landmarks.
   bool share_landmarks = true;
   // prior / sigma_ref of each free component.
   Eigen::VectorXd prior_in_reference;
 };
 
-// As many as the tables of the rig together, Q N, by its rules.
+// Uses the total capacity of the rig's tables, Q N, and the rig's rules.
 JointSettings MakeJointSettings(const Rig& rig, Criterion criterion);
 
 // The criterion of a rig with a joint selection.
 Criterion CriterionOf(Selection selection);
 
-// Of information in units of the prior, the prior included [nat].
+// Value of information in units of the prior, the prior included [nat].
 double JointValue(const JointSettings& settings,
                   const Eigen::MatrixXd& information);
 
-// Of a set [nat].
+// Value of a set [nat].
 double JointValue(const JointSettings& settings,
                   std::span<const Candidate> set);
 
 struct JointChange {
   bool inserted = false;
-  std::optional<int> evicted;  // index into the set as it was
-  // 1/2 ln det with the candidate minus without, on top of the whole set [nat].
+  std::optional<int> evicted;  // index into the set before the change
+  // 1/2 ln det with the candidate minus without, relative to the whole set
+  // [nat].
   double gain = 0;
 };
 
-// What is to be done with one more segment: nothing, take it in, or let it take
-// the place of the one without which the rest says most. A candidate with a key
-// of the set changes nothing; `set` is in order of arrival. While there is
-// room, a segment enters that gains enough; a full set changes only where the
-// criterion grows by min_gain_nats / capacity. Between equal ones the older
-// stay.
+// Decides about one more segment: reject it, insert it, or replace with it the
+// segment whose removal leaves the most information. A candidate with a key of
+// the set changes nothing; `set` is in order of arrival. While there is room, a
+// segment with sufficient gain enters; a full set changes only if the criterion
+// grows by min_gain_nats / capacity. Of equal segments the older ones stay.
 JointChange Offer(const JointSettings& settings,
                   const Candidate& candidate,
                   std::span<const Candidate> set);
 
-// The same as a change of the table of a rig with a joint selection, which is
-// made, and counted as Offer() of tables.h does. `set` are the candidates of
-// its entries in order of arrival. An entry has the entropy of all of theta by
-// its segment alone, and the gain on top of the set that it came to.
+// The same as an update of the table of a rig with a joint selection; it is
+// applied, and counted as Offer() of tables.h does. `set` are the candidates of
+// its entries in order of arrival. The entropy of an entry is that of all of
+// theta after its segment alone; its gain is relative to the set that it
+// entered.
 TableChange Offer(const Rig& rig,
                   const Candidate& candidate,
                   std::span<const Candidate> set,
                   Table* table);
 
-// The set that offering all candidates in order of arrival leaves: indices,
-// ascending.
+// Offers all candidates in order of arrival and returns the resulting set:
+// indices, ascending.
 std::vector<int> SelectStreaming(const JointSettings& settings,
                                  std::span<const Candidate> candidates);
 
-// The set for who knows all candidates at once: the one that adds most, again
-// and again, and then exchanges of one kept for one left out while there is one
-// that helps. Indices, ascending.
+// Selects a set with all candidates known at once: repeatedly adds the one that
+// contributes most, then exchanges a selected one for another as long as that
+// improves the criterion. Indices, ascending.
 std::vector<int> SelectGreedily(const JointSettings& settings,
                                 std::span<const Candidate> candidates);
 

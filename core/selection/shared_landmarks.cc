@@ -17,7 +17,7 @@ namespace {
 constexpr double kGap_nats = 0.005;
 constexpr int kMaxRounds = 100;
 
-// What one candidate sees of one landmark.
+// Observations of one landmark by one candidate.
 struct Entry {
   int session;  // by the order in which they appear
   std::uint64_t id;
@@ -25,7 +25,7 @@ struct Entry {
   double share;
 };
 
-// The sessions of the candidates as numbers.
+// Numbers of the sessions of the candidates.
 std::vector<int> NumberSessions(std::span<const Candidate* const> candidates) {
   std::map<std::string, int> numbers;
   std::vector<int> sessions;
@@ -37,8 +37,9 @@ std::vector<int> NumberSessions(std::span<const Candidate* const> candidates) {
   return sessions;
 }
 
-// Those of each candidate with its share of the observations, as far as the
-// sketches of all candidates of its session are whole; by landmark.
+// Entries of each candidate with its share of the observations, limited to
+// landmarks for which the sketches of all candidates of its session are
+// complete; by landmark.
 std::vector<Entry> ComparableEntries(
     std::span<const Candidate* const> candidates) {
   const std::vector<int> sessions = NumberSessions(candidates);
@@ -92,7 +93,7 @@ SharedLandmarks::SharedLandmarks(std::span<const Candidate* const> candidates)
     }
     begin = end;
   }
-  // What is left by rounding is nothing.
+  // Remaining shares of the size of rounding errors are zero.
   for (double& share : alone_) {
     if (share < 1e-12) share = 0;
   }
@@ -116,7 +117,8 @@ Eigen::MatrixXd SharedLandmarks::Information(
   std::vector<char> is_member(candidates_.size(), 0);
   for (const int i : members) is_member[i] = 1;
   std::vector<double> base = alone_;
-  // Of the landmarks that several members see: parts a_im beside the shares.
+  // Landmarks that several members observe: parts a_im in addition to the
+  // shares.
   std::vector<Sights> contested;
   std::vector<std::vector<double>> parts;
   for (const Sights& sights : shared_) {
@@ -131,9 +133,9 @@ Eigen::MatrixXd SharedLandmarks::Information(
     contested.push_back(std::move(seen));
   }
 
-  // The determinant is a polynomial in the parts with coefficients that are not
-  // negative, so that the growth transform of Baum and Eagon (1967) raises it
-  // with every round: each part times its derivative, scaled back to sum one.
+  // The determinant is a polynomial in the parts with nonnegative coefficients,
+  // so that the growth transform of Baum and Eagon (1967) increases it in every
+  // round: each part times its derivative, rescaled to a sum of one.
   std::vector<double> weights, slopes(candidates_.size());
   for (int round = 0;; ++round) {
     weights = base;
@@ -151,7 +153,7 @@ Eigen::MatrixXd SharedLandmarks::Information(
       slopes[i] =
           0.5 * covariance.cwiseProduct(candidates_[i]->information).sum();
     }
-    // 1/2 ln det is concave: no allotment exceeds this one by more than the
+    // 1/2 ln det is concave: no allocation exceeds this one by more than the
     // gap.
     double gap = 0;
     for (std::size_t m = 0; m < contested.size(); ++m) {
@@ -165,7 +167,7 @@ Eigen::MatrixXd SharedLandmarks::Information(
         now += parts[m][k];
       }
       gap += best - now;
-      // Where nobody gains by it, it does not matter whose it is.
+      // If no member gains by it, its allocation does not matter.
       for (double& part : parts[m]) {
         part =
             now > 0 ? part / now : 1.0 / static_cast<double>(parts[m].size());

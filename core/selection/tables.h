@@ -1,5 +1,5 @@
 // The tables of section IV-B: for each group the N segments of lowest entropy.
-// Values and pure functions; who stores them is not known here.
+// Values and pure functions; storage is the caller's concern.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace selfcal {
 
 struct TableEntry {
   SegmentKey key;
-  // Order of arrival in the rig; ties in entropy go to the older.
+  // Order of arrival in the rig; the older wins ties in entropy.
   std::int64_t sequence = 0;
   double entropy = 0;  // [nat]
   double gain = 0;     // [nat]
@@ -22,26 +22,26 @@ struct TableEntry {
   friend bool operator==(const TableEntry&, const TableEntry&) = default;
 };
 
-// The order of a table: richer first; the older of two that are as rich, so
-// that a replay of the same segments in the same order gives the same table.
+// The order of a table: lower entropy first, then the older, so that a replay
+// of the same segments in the same order gives the same table.
 bool Better(const TableEntry& a, const TableEntry& b);
 
 struct Table {
   std::string group;
   int capacity = 0;                 // N_q
   std::vector<TableEntry> entries;  // sorted by Better()
-  std::int64_t scored = 0;          // segments that were offered
+  std::int64_t scored = 0;          // number of segments that were offered
 
   bool full() const { return static_cast<int>(entries.size()) >= capacity; }
-  // Not full although 10 N segments were offered: no longer waited for.
+  // Not full although 10 N segments were offered; runs no longer wait for it.
   bool starved() const {
     return !full() && scored >= 10 * static_cast<std::int64_t>(capacity);
   }
 };
 
-// Empty tables of a rig: one for each of its groups; with a joint selection one
-// for all, whose entries are those that Offer() of joint_selection.h keeps, by
-// the entropy of all of theta.
+// Empty tables of a rig: one for each of its groups; with a joint selection a
+// single one, whose entries are those that Offer() of joint_selection.h keeps,
+// with the entropy of all of theta.
 std::vector<Table> MakeTables(const Rig& rig);
 
 struct TableChange {
@@ -49,31 +49,31 @@ struct TableChange {
   std::optional<TableEntry> evicted;
 };
 
-// Offers one scored segment to a table, and counts it. It enters if it gains at
-// least min_gain_nats and is among the N best. A key that the table has already
-// changes nothing and is not counted. An entropy or gain that is not finite is
-// counted and never enters. What was evicted cannot come back: the entries that
-// displaced it are better, or as good and older.
+// Offers one scored segment to a table, and counts it. It enters if its gain is
+// at least min_gain_nats and it is among the N best. A key that is already in
+// the table changes nothing and is not counted. A segment with an entropy or
+// gain that is not finite is counted and never enters. An evicted segment
+// cannot return: the entries that displaced it are better, or equal and older.
 TableChange Offer(const TableEntry& candidate,
                   double min_gain_nats,
                   Table* table);
 
-// Every key in at least one table, once, sorted by sequence.
+// All keys in at least one table, once each, sorted by sequence.
 std::vector<TableEntry> UnionOfTables(const std::vector<Table>& tables);
 
 enum class Trigger {
   kNone,
   kTablesFull,     // for the first time
-  kTablesChanged,  // enough of them since the last run
+  kTablesChanged,  // enough entries since the last run
 };
 
-// Whether a run should start. `last_run` holds the keys that the last run used,
-// nothing if there was none. Tables are ready when each is full or starved, and
-// at least one is full; that of a joint selection, which is as large as all
-// tables of the groups together, is as soon as one of those would be. Then the
-// first run starts, and a later one when, counted over all tables, at least
-// rig.retrigger_fraction of the entries (and at least one) are of segments that
-// the last run did not use.
+// Decides whether a run should start. `last_run` holds the keys that the last
+// run used, nullopt if there was none. Tables are ready when each is full or
+// starved, and at least one is full; the table of a joint selection, which is
+// as large as all tables of the groups together, is ready as soon as one of
+// those would be. Then the first run starts; a later one starts when, counted
+// over all tables, at least rig.retrigger_fraction of the entries (and at least
+// one) are of segments that the last run did not use.
 Trigger EvaluateTrigger(const Rig& rig,
                         const std::vector<Table>& tables,
                         const std::optional<std::vector<SegmentKey>>& last_run);

@@ -1,12 +1,12 @@
 // W numbers that are computed together: the scalar type with which the
-// mathematics of this project is instantiated to fill the vector units.
+// mathematics of this project is instantiated to use vector units.
 //
 // A function template over T works on one value with T = double and on W
-// independent ones with T = Lanes<W>. What would be a branch on a value is a
-// Mask, and Select() takes of both outcomes the right one for each lane; for
-// double, a Mask is a bool. Written in the vector types of the compiler; where
-// those are slow, this file, and no other, names instructions of a machine.
-// Usable as the scalar of Eigen's matrices.
+// independent ones with T = Lanes<W>. A condition on a value is a Mask instead
+// of a branch, and Select() chooses between both outcomes for each lane; for
+// double, a Mask is a bool. The implementation uses the vector types of the
+// compiler; where those are slow, this file, and no other, uses machine
+// instructions. Usable as the scalar of Eigen's matrices.
 //
 // Code that is compiled for wider units than the rest of the program must not
 // share inline functions with it: the linker keeps one copy of each, and may
@@ -19,9 +19,9 @@
 #include <cstdint>
 #include <utility>
 
-// Compiles what a function calls into it: called one by one, the parts of a
-// kernel pass their matrices through memory. With the checks of a sanitizer in
-// between, the compiler would take minutes for that.
+// Inlines everything that a function calls: called separately, the parts of a
+// kernel would pass their matrices through memory. With the checks of a
+// sanitizer, the compiler would take minutes for that.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SELFCAL_FLATTEN
 #else
@@ -38,7 +38,7 @@ struct VectorRegister {
 template <int W>
 struct LaneMask {
   using Register = typename VectorRegister<std::int64_t, W>::Type;
-  Register bits;  // of each lane, all or none
+  Register bits;  // all or none, for each lane
 
   friend LaneMask operator&&(LaneMask a, LaneMask b) {
     return {a.bits & b.bits};
@@ -56,7 +56,7 @@ struct Lanes {
   Register v;
 
   Lanes() = default;
-  // The same value in each lane; implicit, so that formulae read as written.
+  // The same value in each lane; implicit, so that formulae stay readable.
   Lanes(double x) : v(x - Register{}) {}
   explicit Lanes(Register r) : v(r) {}
 
@@ -108,7 +108,7 @@ Lanes<W> Sqrt(Lanes<W> x) {
   return root;
 }
 
-// W neighbours in memory, at any alignment.
+// Loads W consecutive numbers, at any alignment.
 template <int W>
 Lanes<W> Load(const double* from) {
   Lanes<W> x;
@@ -121,8 +121,7 @@ void Store(Lanes<W> x, double* to) {
   __builtin_memcpy(to, &x.v, sizeof(x.v));
 }
 
-// For Transpose(): blocks of step x step off the diagonal of a and b change
-// places.
+// For Transpose(): swaps the step x step off-diagonal blocks of a and b.
 template <int step, int W, int... lanes>
 void SwapBlocks(Lanes<W>* a,
                 Lanes<W>* b,
@@ -134,7 +133,7 @@ void SwapBlocks(Lanes<W>* a,
   *a = upper;
 }
 
-// W vectors as rows become W vectors as columns.
+// Transposes W vectors from rows to columns.
 template <int W, int step = 1>
 SELFCAL_FLATTEN void Transpose(Lanes<W>* block) {
   if constexpr (step < W) {
@@ -156,7 +155,7 @@ SELFCAL_FLATTEN void StoreTransposed(const Lanes<W>* rows, double* const* to) {
   for (int i = 0; i < W; ++i) Store(block[i], to[i]);
 }
 
-// The same for one value.
+// Select() for one value.
 inline double Select(bool mask, double if_true, double if_false) {
   return mask ? if_true : if_false;
 }
@@ -177,8 +176,8 @@ T Min(T a, T b) {
   return Select(b < a, b, a);
 }
 
-// One lane, and a mask from a question about each lane: for what seldom
-// happens. A double has one lane.
+// Access to one lane, and a mask from a condition on each lane: for rare cases.
+// A double has one lane.
 template <int W>
 double Lane(Lanes<W> x, int lane) {
   return x.v[lane];
@@ -209,7 +208,7 @@ typename LaneTraits<T>::Mask AskEachLane(Predicate predicate) {
   }
 }
 
-// f of each lane by itself.
+// Applies f to each lane separately.
 template <typename T, typename Function>
 T ForEachLane(T x, Function f) {
   if constexpr (LaneTraits<T>::kWidth == 1) {

@@ -1,7 +1,7 @@
-// Which vector units this machine has: the kernels of the project are compiled
-// once for each width, and one of them is picked at run time.
+// Vector units of this machine: the kernels of the project are compiled once
+// for each width, and one of them is selected at run time.
 //
-// A file that defines kernels is listed under LANES of its room and compiled
+// A file that defines kernels is listed under LANES of its module and compiled
 // for each width, with SELFCAL_LANES numbers in a vector.
 #pragma once
 
@@ -15,16 +15,16 @@ enum class VectorWidth {
   k8 = 8,  // 512 bit: AVX-512 F, DQ and VL
 };
 
-// The widest that this machine and this program have.
+// The widest that both this machine and this program support.
 VectorWidth WidestVectors();
 
-// Whether it can be used here.
+// Returns true if the width can be used on this machine.
 bool HasVectors(VectorWidth width);
 
 std::string_view VectorWidthName(VectorWidth width);
 
 // Calls f.operator()<W>() for the width; one that was not compiled for this
-// architecture runs as the portable one.
+// architecture uses the portable one.
 template <typename Function>
 decltype(auto) WithLanes([[maybe_unused]] VectorWidth width, Function&& f) {
 #if defined(__x86_64__)

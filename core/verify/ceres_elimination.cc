@@ -88,7 +88,7 @@ LinearisedSegment EliminateByCeres(const Rig& rig,
   result.inertial_rms = RootMeanSquares(inertial);
   const Eigen::VectorXd prior = PriorSigmas(rig);
   const Eigen::VectorXd unit = prior(free).cwiseInverse();
-  // Without the rig's prior, which made it definite.
+  // Subtracts the rig's prior, which made it definite.
   const Eigen::MatrixXd of_data =
       eliminated->Lambda - Eigen::MatrixXd::Identity(size, size);
   result.theta.Lambda = Eigen::MatrixXd::Zero(prior.size(), prior.size());

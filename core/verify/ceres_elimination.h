@@ -1,4 +1,5 @@
-// The factors of a segment by Ceres, eliminated down to theta by CHOLMOD.
+// Evaluates the factors of a segment with Ceres and eliminates them down to
+// theta with CHOLMOD.
 #pragma once
 
 #include "core/information/inliers.h"
@@ -9,8 +10,8 @@
 
 namespace selfcal {
 
-// What SegmentLineariser::Eliminate computes. Throws std::runtime_error where
-// that is not possible (scorer.h).
+// Computes the result of SegmentLineariser::Eliminate. Throws
+// std::runtime_error if that is not possible (scorer.h).
 LinearisedSegment EliminateByCeres(const Rig& rig,
                                    const Calibration& theta0,
                                    const MotionSegment& segment,

@@ -1,6 +1,6 @@
 #include "core/verify/cholmod_elimination.h"
 
-// Before the headers of CHOLMOD: leaves those of its GPL modules out.
+// Must precede the headers of CHOLMOD: excludes those of its GPL modules.
 #define NSUPERNODAL
 #define NMODIFY
 #define NMATRIXOPS
@@ -21,7 +21,7 @@ class Cholmod {
     common_.supernodal = CHOLMOD_SIMPLICIAL;
     common_.final_ll = 1;
     common_.print = 0;
-    // The order of the columns is the caller's.
+    // The caller determines the order of the columns.
     common_.nmethods = 1;
     common_.method[0].ordering = CHOLMOD_NATURAL;
     common_.postorder = 0;
@@ -33,7 +33,7 @@ class Cholmod {
   Cholmod(const Cholmod&) = delete;
   Cholmod& operator=(const Cholmod&) = delete;
 
-  // L with L L^T = J^T J; false where there is none.
+  // Computes L with L L^T = J^T J; false if there is none.
   bool Factor(const SparseRows& J) {
     // Rows of J are columns of J^T, as CHOLMOD stores a matrix.
     cholmod_sparse A{};
@@ -55,7 +55,7 @@ class Cholmod {
            factor_->xtype == CHOLMOD_REAL;
   }
 
-  // L^-1 b; empty where memory runs out.
+  // L^-1 b; empty if memory runs out.
   Eigen::VectorXd SolveLower(Eigen::VectorXd b) {
     cholmod_dense right{};
     right.nrow = b.size();

@@ -33,7 +33,7 @@ std::string WhyIncomparable(const CalibrationResult& a,
   return "";
 }
 
-// What is not a number exceeds all else, and is exceeded by nothing.
+// NaN exceeds everything else, and nothing exceeds NaN.
 bool Exceeds(double value, double most) {
   return std::isnan(value) || value > most;
 }

@@ -1,5 +1,5 @@
-// By what two calibrations on the same segments differ that two solvers have
-// found. Pure, any thread.
+// Compares two calibrations on the same segments by different solvers. Pure,
+// callable from any thread.
 #pragma once
 
 #include <string>
@@ -10,18 +10,18 @@
 namespace selfcal {
 
 struct ResultDifference {
-  // Why the two cannot be compared: one has not converged, or they leave out
-  // different segments or hold different directions constant (where a threshold
-  // lies between them, either is right). Empty if they can; otherwise nothing
-  // else is set.
+  // Reason why the two cannot be compared: one has not converged, or they
+  // exclude different segments or hold different directions constant (if a
+  // threshold lies between them, either is correct). Empty if they can be
+  // compared; otherwise nothing else is set.
   std::string incomparable;
-  // Of the component that differs most, in standard deviations.
+  // Difference of the component that differs most, in standard deviations.
   double theta_sigmas = 0;
   std::string theta_component;
-  // By which part the standard deviations of a component differ most.
+  // Largest relative difference of the standard deviations of a component.
   double sigma = 0;
   std::string sigma_component;
-  // The same of any direction of theta together: of the covariance as a whole.
+  // The same over all directions of theta: of the covariance as a whole.
   double covariance = 0;
 };
 
@@ -29,15 +29,15 @@ ResultDifference CompareResults(const Rig& rig,
                                 const CalibrationResult& a,
                                 const CalibrationResult& b);
 
-// A solver has converged where the step that is left is below 0.05 sigma in
-// each component: two that have lie within 0.1 of each other.
+// A solver has converged if the remaining step is below 0.05 sigma in each
+// component: two converged ones are within 0.1 of each other.
 inline constexpr double kThetaTolerance_sigmas = 0.1;
-// Of standard deviations: which observations are outliers is decided at an
-// estimate, and that differs by so much.
+// Tolerance of standard deviations: outliers are determined at an estimate, and
+// that differs by up to kThetaTolerance_sigmas.
 inline constexpr double kSigmaTolerance = 0.02;
 
-// Whether where solvers stop explains the difference. Also where the two cannot
-// be compared: that proves nothing.
+// Returns true if convergence tolerances explain the difference, and also if
+// the two cannot be compared: that proves nothing.
 bool IsConvergence(const ResultDifference& difference);
 
 }  // namespace selfcal

@@ -37,7 +37,7 @@ ScoreDifference CompareScores(const Rig& rig,
   difference.tolerance = observed ? kScoreTolerance : kUnobservedScoreTolerance;
   for (std::size_t q = 0; q < a.groups.size(); ++q) {
     const double by = std::abs(a.groups[q].entropy - b.groups[q].entropy);
-    // An entropy that is not a number is a difference.
+    // An entropy that is NaN is a difference.
     difference.entropy_nats =
         std::max(difference.entropy_nats, std::isnan(by) ? kInfinity : by);
   }

@@ -1,5 +1,4 @@
-// What stands for Ceres in a program that was built without it
-// (SELFCAL_CERES=OFF).
+// Replaces ceres_elimination.cc in a build without Ceres (SELFCAL_CERES=OFF).
 #include <stdexcept>
 
 #include "core/verify/ceres_elimination.h"

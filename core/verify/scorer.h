@@ -1,14 +1,14 @@
-// Two ways to the score of a segment that share no code for residuals,
-// Jacobians and elimination, so that each checks the other.
+// Two implementations of the score of a segment that share no code for
+// residuals, Jacobians and elimination, so that each verifies the other.
 //
-// kStructured is ScoreSegment() of core/information: kernels over vectors, and
-// an elimination along the chain of keyframes. kCeres evaluates the factors of
+// kStructured is ScoreSegment() of core/information: vectorised kernels, and an
+// elimination along the chain of keyframes. kCeres evaluates the factors of
 // core/factor/ceres_factors.h in a ceres::Problem, and factorises its Jacobian
-// with theta last by CHOLMOD, which takes far longer. Both stand on the same
-// inliers and landmarks (InlierSelector), weak priors and gauge, and score the
-// groups by the same code.
+// with theta last by CHOLMOD, which takes far longer. Both use the same inliers
+// and landmarks (InlierSelector), weak priors and gauge, and score the groups
+// by the same code.
 //
-// Pure, any thread, deterministic.
+// Pure, callable from any thread, deterministic.
 #pragma once
 
 #include "core/information/segment_information.h"
@@ -20,14 +20,14 @@ namespace selfcal {
 
 enum class ScorerKind { kStructured, kCeres };
 
-// Whether this program was built with Ceres (SELFCAL_CERES). Without it
+// Returns true if this program was built with Ceres (SELFCAL_CERES). Without it
 // ScorerKind::kCeres and SolverKind::kCeres cannot be used.
 bool HasCeres();
 
-// As ScoreSegment(). Throws std::runtime_error, with what to do about it, where
-// it cannot be computed: without Ceres, or where CHOLMOD finds the normal
-// equations not positive definite, which a segment without observations has to
-// rounding.
+// As ScoreSegment(). Throws std::runtime_error, with a remedy in its message,
+// if the score cannot be computed: without Ceres, or if CHOLMOD finds the
+// normal equations not positive definite, which those of a segment without
+// observations are, up to rounding.
 SegmentInformation ScoreSegmentBy(ScorerKind scorer,
                                   const Rig& rig,
                                   const Calibration& theta0,

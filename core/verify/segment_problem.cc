@@ -57,7 +57,7 @@ void AddPriors(const Rig& rig, int gauge, Blocks* b, ceres::Problem* problem) {
     AddPrior(
         Eigen::Vector3d::Constant(kLandmarkPriorSigma_m), l.data(), problem);
   }
-  // A quaternion moves by half of the angle.
+  // A quaternion changes by half of the angle.
   AddPrior(Eigen::Vector4d::Constant(kTiltPriorSigma_rad / 2),
            b->q[gauge].data(),
            problem);

@@ -17,11 +17,11 @@ class Problem;
 
 namespace selfcal {
 
-// With the weak priors of weak_priors.h and the rig's prior of theta, both
-// centred at the linearisation point; the gauge is held constant. What it is
-// made from must outlive it. Residual blocks come in this order: reprojections
-// of the inliers (2 rows each), inertial links (15), priors. Theta moves in its
-// free components, in units of the prior.
+// Includes the weak priors of weak_priors.h and the rig's prior of theta, both
+// centred at the linearisation point; the gauge is held constant. The arguments
+// must outlive it. Residual blocks are in this order: reprojections of the
+// inliers (2 rows each), inertial links (15), priors. Theta varies in its free
+// components, in units of the prior.
 class SegmentProblem {
  public:
   SegmentProblem(const Rig& rig,
@@ -34,7 +34,7 @@ class SegmentProblem {
   ceres::Problem* problem();
   const double* theta() const;
   Eigen::Index theta_size() const { return theta_size_; }  // of its tangent
-  // The parameter blocks that move: landmarks, keyframes in time, theta last
+  // The variable parameter blocks: landmarks, keyframes in time, theta last
   // (unless the rig holds all of it fixed).
   std::vector<double*> BlocksInOrder();
 
