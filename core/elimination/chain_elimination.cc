@@ -31,7 +31,8 @@ void ChainElimination::LayOut(const ChainShape& shape) {
          &gram_);
 
   const int slots = structure_.max_slots();
-  // The front moves on by a place with each keyframe, and back where it ends.
+  // The front advances by one place with each keyframe, and is moved back at
+  // its end.
   places_ = std::max(
       places_,
       std::min(shape.keyframes, slots + slots / 4 + kPlacesBetweenMoves));
@@ -39,7 +40,7 @@ void ChainElimination::LayOut(const ChainShape& shape) {
   GrowTo(static_cast<std::size_t>(front_stride_) *
              (fixed_ + places_ * kPose + kPanelPad),
          &front_);
-  // Only what is fixed: poses are cleared as they enter.
+  // Clears only the fixed part: poses are cleared as they enter.
   for (int j = 0; j < fixed_; ++j) Zero(&Front(0, j), fixed_ + kPanelPad);
   panel_stride_ = fixed_ + WholeVectors(slots * kPose) + kZeros;
   for (auto* panel : {&coupling_, &substituted_, &product_, &half_}) {
@@ -87,8 +88,8 @@ void ChainElimination::TakeScratch(ChainElimination* finished) {
 
 void ChainElimination::OpenSlots(int slots) {
   if (first_place_ + slots > places_) {
-    // All move to the first places; every entry moves up or left, so that
-    // ascending order never overwrites what is still to be read.
+    // All poses are moved to the first places; every entry moves up or left, so
+    // that ascending order never overwrites entries that are still to be read.
     const int from = Pose(0), to = fixed_, size = PosesSize();
     for (int j = 0; j < fixed_; ++j) {
       std::memmove(&Front(to, j), &Front(from, j), size * sizeof(double));
@@ -111,7 +112,7 @@ void ChainElimination::OpenSlots(int slots) {
   }
 }
 
-// Brings the pose in `slot` to slot 1, and that to `slot`.
+// Swaps the poses in `slot` and in slot 1.
 void ChainElimination::SwapPoses(int slot) {
   if (slot == 1) return;
   const auto entry = [&](int i, int j) -> double& {
@@ -119,7 +120,7 @@ void ChainElimination::SwapPoses(int slot) {
   };
   const int a = Pose(1), b = Pose(slot), end = Pose(slots_);
   for (int n = 0; n < kPose; ++n) {
-    // The rest of the front, but for the two blocks themselves.
+    // The rest of the front, except the two blocks themselves.
     for (int j = 0; j < end; ++j) {
       if (j >= fixed_ && j < Pose(0)) continue;
       if ((j >= a && j < a + kPose) || (j >= b && j < b + kPose)) continue;
@@ -215,7 +216,7 @@ void ChainElimination::Finish(SharedInformation* result) {
   BeginKeyframe();
   TakeState();
   EliminateByItself();
-  // What cameras alone have in common was summed aside.
+  // The products among camera parameters were summed separately.
   const int rows = landmark_shared_ + 1;
   for (int j = 0; j < landmark_shared_; ++j) {
     for (int i = j; i < rows; ++i) {

@@ -38,7 +38,7 @@ void ChainElimination::FindViews(const ChainShape& shape) {
   pose_rows_.assign(views_.size() * 3 * kPose, 0);
 }
 
-// Doubles in a row over the poses that see a landmark.
+// Number of doubles in a row over the poses that observe a landmark.
 int ChainElimination::PosesOf(int landmark) const {
   return (views_begin_[landmark + 1] - views_begin_[landmark]) * kPose;
 }
@@ -49,8 +49,8 @@ double* ChainElimination::PoseRow(int landmark, int row) {
          row * PosesOf(landmark);
 }
 
-// Adds the products of all columns of a run, which are in gram_, to those of
-// the keyframe and of the camera that they stand for.
+// Adds the products of all columns of a run, in gram_, to those of the keyframe
+// and the camera that they represent.
 void ChainElimination::ExpandGram(int keyframe,
                                   int camera,
                                   const PoseRotation* by_rotation) {
@@ -136,8 +136,8 @@ void ChainElimination::AddObservations(int keyframe,
   ExpandGram(keyframe, camera, by_rotation);
 }
 
-// Lets the products by the pose of each factor go to a panel of its own, until
-// they have been turned.
+// Redirects the products with the pose of each factor to a separate panel,
+// until they have been rotated.
 void ChainElimination::CollectPoses(int count) {
   GrowTo(static_cast<std::size_t>(count), &panels_of_poses_);
   own_poses_.assign(static_cast<std::size_t>(count) * 3 * kOwnPoseStride, 0);
@@ -170,8 +170,8 @@ void ChainElimination::AddLandmarkPrior(int landmark,
   }
 }
 
-// The panel of a landmark, `stride` from row to row, from its sums and its rows
-// over poses. Returns its information.
+// Fills the panel of a landmark, with rows `stride` apart, from its sums and
+// its rows over poses. Returns its information.
 Eigen::Matrix3d ChainElimination::PreparePanel(int landmark,
                                                double* panel,
                                                int stride) {
@@ -183,8 +183,7 @@ Eigen::Matrix3d ChainElimination::PreparePanel(int landmark,
     Zero(row, stride);
     const double* by_pose = PoseRow(landmark, j);
     for (int v = views_begin_[landmark]; v < views_begin_[landmark + 1]; ++v) {
-      std::copy_n(
-          by_pose, kPose, row + shared_places + views_[v].slot * kPose);
+      std::copy_n(by_pose, kPose, row + shared_places + views_[v].slot * kPose);
       by_pose += kPose;
     }
     for (int i = 0; i <= j; ++i) H(j, i) = prior[j * (j + 1) / 2 + i];
@@ -204,7 +203,7 @@ Eigen::Matrix3d ChainElimination::PreparePanel(int landmark,
   return H;
 }
 
-// The other way round, for the way back.
+// The inverse of PreparePanel, for the back-substitution.
 void ChainElimination::RecordPanel(int landmark,
                                    const double* panel,
                                    int stride) {
@@ -230,8 +229,8 @@ void ChainElimination::SetRoot(int landmark, Eigen::Matrix3d information) {
   }
 }
 
-// Puts a landmark that is kept into the front, instead of eliminating it; its
-// panel eliminates nothing.
+// Adds a kept landmark to the front, instead of eliminating it; its panel
+// eliminates nothing.
 void ChainElimination::KeepLandmark(int landmark,
                                     const Eigen::Matrix3d& information,
                                     double* panel,

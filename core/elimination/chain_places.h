@@ -1,5 +1,5 @@
-// Places in the front of ChainElimination, and its memory. Internal to
-// core/elimination.
+// Places of unknowns in the front of ChainElimination, and its memory. Internal
+// to core/elimination.
 #pragma once
 
 #include <cstddef>
@@ -19,17 +19,18 @@ inline constexpr int kKeptPlace = kMotionPlace + kMotion;
 static_assert(kKeptPlace % 8 == 0);
 static_assert(kTransitionConstant == kKeptPlace);
 inline constexpr int kEliminated = -1;
-// The state in whole tiles.
+// The size of a state in whole tiles.
 inline constexpr int kTileState = 16;
 inline constexpr int kLinkColumns = kTransitionNextPose + kPose;
-// Zeros that must follow what counts in a panel: the rows of the largest tile.
+// Zeros that must follow the valid entries of a panel: the rows of the largest
+// tile.
 inline constexpr int kZeros = 3 * kPanelPad;
 
 inline constexpr int kPlacesBetweenMoves = 8;
 
 inline constexpr int WholeVectors(int size) { return (size + 7) / 8 * 8; }
 
-// Of the products of one factor by its pose, on their own.
+// Separate products of one factor with its pose.
 inline constexpr int kOwnPoseStride = WholeVectors(kPose);
 
 template <typename Number>

@@ -1,10 +1,10 @@
-// The way back through a chain for covariances: from that of the shared
+// Back-substitution of covariances through a chain: from that of the shared
 // parameters to those of the states and of the noise of the links.
 //
-// Given the front z that was left when a state went, the state is C z + noise
-// of covariance root root^T, and the noise of its link -L^-T (P z + noise of
-// unit covariance). All that was in the front before is the state, or in the
-// front still.
+// Given the front z that remained when a state was eliminated, the state is C z
+// + noise of covariance root root^T, and the noise of its link is -L^-T (P z +
+// noise of unit covariance). Everything that was in the front before is either
+// the state, or still in the front.
 #include <Eigen/Core>
 #include <algorithm>
 #include <span>
@@ -28,7 +28,8 @@ using RowMajorPanel = Eigen::Map<
     0,
     Eigen::OuterStride<>>;
 
-// Where poses stand while they are in the front, the first free place first.
+// Places of poses while they are in the front; the first free place is used
+// first.
 class PosePlaces {
  public:
   explicit PosePlaces(int places) : keyframes_(places, kFree) {}
@@ -43,7 +44,7 @@ class PosePlaces {
     keyframes_[place] = keyframe;
     return place;
   }
-  // Frees all places but those of `keyframes`.
+  // Frees all places except those of `keyframes`.
   void Keep(std::span<const int> keyframes) {
     for (int& at : keyframes_) {
       if (std::find(keyframes.begin(), keyframes.end(), at) ==
@@ -66,9 +67,9 @@ class PosePlaces {
 
 }  // namespace
 
-// The covariance of the front, in places: what is fixed as in a panel, then
-// poses, each in one place as long as it is there. What stands in other places
-// is finite, and counts nowhere.
+// The covariance of the front, by places: first the fixed part as in a panel,
+// then poses, each in one place as long as it is in the front. Values in other
+// places are finite, and not used.
 class ChainElimination::CovarianceWalk {
  public:
   CovarianceWalk(const ChainElimination& chain, const Eigen::MatrixXd& shared)
@@ -88,7 +89,7 @@ class ChainElimination::CovarianceWalk {
     }
   }
 
-  // Goes back over the elimination of keyframe k.
+  // Reverses the elimination of keyframe k.
   void Step(int k) {
     const ChainElimination::Step& step = chain_.steps_[k];
     const std::span<const int> poses = chain_.structure_.Poses(k);
@@ -97,8 +98,8 @@ class ChainElimination::CovarianceWalk {
     Multiply(step, poses);
     SetState(step, poses);
   }
-  // Before keyframe k - 1: k takes its place, and what was not in the front
-  // then leaves it.
+  // Prepares for keyframe k - 1: k takes a place, and poses that were not in
+  // the front at that time leave it.
   void Enter(int k) {
     poses_.Keep(chain_.structure_.Poses(k - 1).subspan(1));
     const int pose = chain_.fixed_ + poses_.Enter(k) * kPose;
@@ -117,7 +118,7 @@ class ChainElimination::CovarianceWalk {
   }
 
   const ChainStateMatrix& state() const { return state_; }
-  // Of the noise of its link.
+  // Covariance of the noise of its link.
   ChainStateMatrix Noise(const ChainElimination::Step& step) const {
     const auto factor = RowMajorState<kTileState>(&step.factor[0][0])
                             .leftCols<kState>()
@@ -144,7 +145,7 @@ class ChainElimination::CovarianceWalk {
     return chain_.fixed_ + poses_.Find(keyframe) * kPose;
   }
 
-  // The transpose of P, in places.
+  // The transpose of P, by places.
   void SetPanel(const ChainElimination::Step& step,
                 std::span<const int> poses) {
     std::fill_n(panel_.begin(), size_ * kTileState, 0.0);
@@ -217,7 +218,7 @@ class ChainElimination::CovarianceWalk {
                panel_.data(), size_, kState, Eigen::OuterStride<>(kTileState));
   }
 
-  // with_front_ (G - root P)^T, and what the state has of its own.
+  // with_front_ (G - root P)^T, plus the state's own covariance.
   void SetState(const ChainElimination::Step& step,
                 std::span<const int> poses) {
     const auto root =
@@ -238,7 +239,7 @@ class ChainElimination::CovarianceWalk {
   const ChainElimination& chain_;
   PosePlaces poses_;
   const int stride_;
-  int size_ = 0;  // of the front, in places
+  int size_ = 0;  // of the front, by places
   std::vector<double> covariance_;
   // 15 rows over the front: P covariance, and the covariance of the state with
   // the front.

@@ -1,5 +1,5 @@
-// The elimination of one state of a chain, by its link to the next or by
-// itself.
+// Elimination of one state of a chain, by its link to the next or by its own
+// information.
 #include <algorithm>
 #include <cstring>
 
@@ -11,7 +11,8 @@ namespace selfcal {
 using namespace chain;
 
 // Moves the current state from the front to information_ and coupling_, the
-// latter in the places of what stays; its motion leaves zeros for the next.
+// latter at the places of the remaining unknowns; its motion leaves zeros for
+// the next.
 void ChainElimination::TakeState() {
   const int pose = Pose(0);
   const int rest = PosesSize() - kPose;
@@ -45,7 +46,8 @@ void ChainElimination::TakeState() {
   --slots_;
 }
 
-// Puts x0 = A e + G z into x0^T S x0 + 2 x0^T Y z, and keeps Z = Y + S G.
+// Substitutes x0 = A e + G z into x0^T S x0 + 2 x0^T Y z, and stores
+//   Z = Y + S G.
 // G^T S G + G^T Y + Y^T G = G^T H + H^T G with H = Y + S G / 2.
 void ChainElimination::Substitute(const ChainTransition& link) {
   alignas(64) double by_S[kTileState][32];
@@ -75,7 +77,7 @@ void ChainElimination::Substitute(const ChainTransition& link) {
     add(0.5, by_S[k], Row(&half_, k));
   }
 
-  // H^T G over what is fixed and the next pose, both ways round.
+  // H^T G over the fixed part and the next pose, in both directions.
   const int size_f = fixed_ + kPose;
   const int stride = size_f + kPanelPad;
   WithKernels([&](auto kernels) {
@@ -115,7 +117,7 @@ void ChainElimination::Substitute(const ChainTransition& link) {
   });
 }
 
-// root_ = A L^-T with L L^T = M, by rows; A is the transpose of `panel`.
+// root_ = A L^-T with L L^T = M, row-major; A is the transpose of `panel`.
 void ChainElimination::FindRoot(double (*M)[16], double (*panel)[16]) {
   WithKernels([&](auto kernels) {
     kernels.FactorAndSolve(kState, &M[0][0], 16, &panel[0][0], 16, kState);
@@ -152,8 +154,8 @@ void ChainElimination::FindRootOf(const ChainTransition& link) {
   FindRoot(M, panel);
 }
 
-// P = root^T Z, and takes P^T P from the front, but for the poses with what is
-// fixed.
+// Computes P = root^T Z, and subtracts P^T P from the front, except for the
+// products of poses with the fixed part.
 void ChainElimination::Eliminate(const std::vector<double>& terms) {
   const int size = fixed_ + PosesSize();
   const int pose = Pose(0);
@@ -172,8 +174,8 @@ void ChainElimination::Eliminate(const std::vector<double>& terms) {
   });
 }
 
-// What Eliminate() leaves: of the next pose, whose G is in the front already,
-// -P^T P; and of all others, whose Z is Y,
+// The products that Eliminate() omits: for the next pose, whose G is in the
+// front already, -P^T P; and for all others, whose Z is Y,
 //   Y^T G - P^T P = Y^T (G - root P).
 void ChainElimination::AddPosesWithFixed(const ChainTransition& link) {
   alignas(64) double next[kState][16] = {};
@@ -211,7 +213,7 @@ void ChainElimination::AddPosesWithFixed(const ChainTransition& link) {
   });
 }
 
-// As much as will be recorded, and no more.
+// Reserves exactly the memory for the recorded steps.
 void ChainElimination::ReserveSteps() {
   const int keyframes = structure_.keyframes();
   std::size_t size = 0;
@@ -239,7 +241,7 @@ void ChainElimination::RecordStep(const ChainTransition* link) {
   }
 }
 
-// Eliminates the state that was taken by its own information alone.
+// Eliminates the current state by its own information alone.
 void ChainElimination::EliminateByItself() {
   alignas(64) double M[kState][16] = {};
   alignas(64) double panel[kState][16] = {};

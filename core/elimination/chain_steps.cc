@@ -1,5 +1,5 @@
-// The way back through a chain: from a step of the shared parameters to the
-// steps of all that was eliminated.
+// Back-substitution through a chain: from a step of the shared parameters to
+// the steps of all eliminated unknowns.
 #include <Eigen/Core>
 
 #include "core/elimination/chain_elimination.h"
@@ -18,7 +18,7 @@ using RowMajorPanel =
 
 }  // namespace
 
-// Values in the places of a panel, without those of states.
+// Shared values at the places of a panel, with zeros for states.
 Eigen::VectorXd ChainElimination::SharedInPlaces(
     const Eigen::VectorXd& shared) const {
   Eigen::VectorXd z = Eigen::VectorXd::Zero(panel_stride_);
@@ -27,7 +27,7 @@ Eigen::VectorXd ChainElimination::SharedInPlaces(
   return z;
 }
 
-// The states that were in the front when a keyframe had been eliminated.
+// The states that were in the front after the elimination of a keyframe.
 void ChainElimination::PlaceStates(int k,
                                    const std::vector<ChainStateVector>& states,
                                    Eigen::VectorXd* z) const {

@@ -1,11 +1,12 @@
-// The order in which ChainElimination works: which poses are in the front when
-// a keyframe is eliminated, where each stands, and which landmarks go with it.
-// Found from who sees what alone, without a number.
+// The order of ChainElimination: which poses are in the front when a keyframe
+// is eliminated, the place of each, and which landmarks are eliminated with it.
+// It is determined from the observations alone, without numerical values.
 //
-// Keyframes are eliminated in their order. A landmark goes when the first of
-// the keyframes that see it is reached. A pose enters the front when a landmark
-// that sees it goes, or when its own turn comes, and takes the next free place;
-// for tracks without holes along one chain, the places are in order of time.
+// Keyframes are eliminated in their order. A landmark is eliminated when the
+// first of the keyframes that observe it is reached. A pose enters the front
+// when a landmark that it observes is eliminated, or when its own turn comes,
+// and takes the next free place; for tracks without holes along one chain, the
+// places are in order of time.
 #pragma once
 
 #include <span>
@@ -15,9 +16,9 @@ namespace selfcal {
 
 class ChainStructure {
  public:
-  // Landmark m is seen from keyframes[tracks[m]] to keyframes[tracks[m + 1]],
-  // ascending (one keyframe may come several times, once for each camera), at
-  // least one.
+  // Landmark m is observed from keyframes[tracks[m]] to keyframes[tracks[m +
+  // 1]], ascending (one keyframe may occur several times, once for each
+  // camera), at least one.
   void Find(int keyframe_count,
             std::span<const int> tracks,
             std::span<const int> keyframes);
@@ -25,13 +26,14 @@ class ChainStructure {
   int keyframes() const { return static_cast<int>(poses_begin_.size()) - 1; }
   int max_slots() const { return max_slots_; }
 
-  // The landmarks that go with keyframe k, those with most slots first.
+  // The landmarks that are eliminated with keyframe k, those with most slots
+  // first.
   std::span<const int> Landmarks(int k) const {
     return Part(landmarks_, landmarks_begin_, k);
   }
-  // Slots from the first to the last that sees landmark m.
+  // Number of slots from the first to the last that observes landmark m.
   int Slots(int m) const { return slots_of_landmark_[m]; }
-  // Slot of an observation when its landmark goes.
+  // Slot of an observation at the elimination of its landmark.
   int Slot(int observation) const { return slot_of_observation_[observation]; }
 
   // The keyframes whose poses are in the front when k is eliminated, by slot; k
@@ -39,8 +41,8 @@ class ChainStructure {
   std::span<const int> Poses(int k) const {
     return Part(poses_, poses_begin_, k);
   }
-  // Before k is eliminated, after its landmarks: the slot whose pose changes
-  // places with that in slot 1, to bring the next keyframe there.
+  // Slot whose pose is swapped with that in slot 1 before k is eliminated and
+  // after its landmarks are, to move the next keyframe there.
   int SwapWithNext(int k) const { return swaps_[k]; }
 
  private:
@@ -61,8 +63,8 @@ class ChainStructure {
   std::vector<int> slot_of_observation_;
   std::vector<int> poses_, poses_begin_;
   std::vector<int> swaps_;
-  // While it looks: the front, without what was eliminated, and the place of
-  // each keyframe counted with what was.
+  // Used by Find: the front, without eliminated poses, and the place of each
+  // keyframe, counted including eliminated ones.
   std::vector<int> front_;
   std::vector<int> place_;
   std::vector<int> entering_;

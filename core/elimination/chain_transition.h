@@ -1,5 +1,5 @@
 // A link between a keyframe and the next, solved for the state of the former:
-//   x0 = A e + G z,   e white of unit information.
+//   x0 = A e + G z,   e white with unit information.
 #pragma once
 
 namespace selfcal {
@@ -14,7 +14,7 @@ inline constexpr int kTransitionColumns = 32;
 // Columns of A, the last of which is zero.
 inline constexpr int kTransitionNoise = 16;
 
-// By rows: pose 6, velocity 3, biases 6 of x0.
+// Rows: pose 6, velocity 3, biases 6 of x0.
 struct ChainTransition {
   alignas(64) double G[15][kTransitionColumns];
   double A[15][kTransitionNoise];

@@ -10,12 +10,12 @@ namespace {
 constexpr int kLanes = SELFCAL_LANES;
 using T = Lanes<kLanes>;
 
-// Rows of a tile in vectors, and its columns: with as many sums, rows and one
-// factor a tile fills 16 registers.
+// Rows of a tile in vectors, and its columns: with these sums, rows and one
+// factor, a tile uses 16 registers.
 constexpr int kTileVectors = 3;
 constexpr int kTileColumns = 4;
 
-// What becomes of a sum: it is written (kSet), or it is added with a sign.
+// Operation on a sum: it is written (kSet), or added with a sign.
 constexpr double kSet = 0;
 
 // One tile of V vectors by N columns.
@@ -80,7 +80,7 @@ inline void AddColumns(double sign,
                     to.stride);
       i += V * kLanes;
     };
-    if (d == 0) return;  // and so it is for all rows to come
+    if (d == 0) return;  // as for all following rows
     if (vectors >= kTileVectors) {
       tile.template operator()<kTileVectors>();
     } else if (vectors == 2) {
@@ -116,8 +116,8 @@ void DenseLanes<W>::AddProduct(double sign,
   }
 }
 
-// Rows from the vector that holds the diagonal on. The columns that fill the
-// last tile are zeros as well.
+// Starts with the rows of the vector that contains the diagonal. The columns
+// that fill the last tile are zeros as well.
 template <int W>
 void DenseLanes<W>::AddSquare(
     double sign, ConstPanel a, int size, Depth depth, Target to) {

@@ -1,10 +1,11 @@
-// The dense kernels of the elimination for one vector width. Internal to
+// Dense kernels of the elimination for one vector width. Internal to
 // core/elimination.
 //
-// A panel is a matrix by rows; its rows are summed over. All sizes are those of
-// what counts: where vectors reach beyond, up to kPanelPad numbers more are
-// read and written, and whatever is written there is a sum with what was read,
-// so that a panel must hold zeros there, and a target room.
+// A panel is a row-major matrix; sums are over its rows. All sizes are those of
+// the valid entries: whole vectors are loaded and stored, so that up to
+// kPanelPad further numbers are read and written. What is written there is a
+// sum with what was read; a panel must therefore have zeros there, and a target
+// room.
 #pragma once
 
 namespace selfcal {
@@ -16,21 +17,21 @@ struct ConstPanel {
   int stride;  // from one row to the next
 };
 
-// By columns.
+// Column-major.
 struct Target {
   double* data;
   int stride;  // from one column to the next
 };
 
-// Where the products of one landmark's factor go.
+// Targets of the products of one landmark's factor.
 struct LandmarkTarget {
   double* sums;   // 3 rows of the stride of the factors
   double* poses;  // 3 rows of a panel, pose_stride apart
   int pose_stride;
 };
 
-// Rows of a panel that are summed over: for its column i all of them, or of a
-// staircase by_step[i / step], which never rises.
+// Number of rows of a panel in a sum: for its column i all of them, or those of
+// a staircase by_step[i / step], which never increases.
 struct Depth {
   Depth(int all) : all(all) {}
   Depth(const int* by_step, int step) : by_step(by_step), step(step) {}
@@ -60,24 +61,24 @@ struct DenseLanes {
                          Depth depth,
                          Target to);
 
-  // The same with a = b on and below the diagonal; what is above is
-  // overwritten by anything.
+  // The same with a = b on and below the diagonal; the entries above are
+  // overwritten with arbitrary values.
   static void AddSquare(
       double sign, ConstPanel a, int size, Depth depth, Target to);
 
   // For each pair of rows x, y (reprojection factors of landmark_rows.h):
   //   product(j, c) = x_l(j) x(c) + y_l(j) y(c),   x_l = -x[kRowsPosition ...],
-  // j < 3: added to the sums of its target, and its first six columns to the
-  // panel at its pose.
+  // j < 3: it is added to the sums of its target, and its first six columns to
+  // the panel of its pose.
   static void AddLandmarkProducts(const double* rows,
                                   int stride,
                                   int count,
                                   const LandmarkTarget* targets);
 
   // Factors a symmetric matrix of n rows (n <= 16, `stride` apart, whole
-  // vectors) as U^T U, its upper triangle becoming U, with the guard of
-  // small_cholesky.h, and overwrites the columns x of a panel of n rows by
-  // U^-T x.
+  // vectors) as U^T U, with U overwriting its upper triangle, with the
+  // safeguard of small_cholesky.h, and overwrites the columns x of a panel of n
+  // rows by U^-T x.
   static void FactorAndSolve(int n,
                              double* matrix,
                              int stride,

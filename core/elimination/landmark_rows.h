@@ -1,15 +1,15 @@
-// The form in which factors between a landmark, a keyframe and a camera come to
-// the elimination: pairs of whitened rows whose columns count more than once.
+// Input format of the elimination for factors between a landmark, a keyframe
+// and a camera: pairs of whitened rows whose columns are used several times.
 //
 //   [turn 3 | position 3 | own n - 3 | residual | zeros up to a stride]
 //
-// stand for the derivatives
-//   by the pose of the keyframe   [turn | position],
-//   by the landmark               -position,
-//   by n shared parameters        [-turn | own].
-// Where the body moves on from its keyframe before it sees, turn and position
-// are those of the pose that sees, and by the turn of the keyframe the rows are
-// [turn | position] B with some 6 x 3 matrix B.
+// represent the derivatives with respect to
+//   the pose of the keyframe   [turn | position],
+//   the landmark               -position,
+//   n shared parameters        [-turn | own].
+// If the body moves between its keyframe and the exposure, turn and position
+// are those of the pose at the exposure, and the rows with respect to the
+// rotation of the keyframe are [turn | position] B with a 6 x 3 matrix B.
 #pragma once
 
 namespace selfcal {

@@ -1,10 +1,10 @@
 // Cholesky factor of a small information matrix that is positive definite by
 // construction but may have lost that to rounding.
 //
-// A pivot is known to the rounding of its diagonal entry. Where it falls below
-// kPivotFloor of that, it is raised to it: the direction gets the least
-// information that can be told from none, rather than a NaN or a random large
-// variance. Well conditioned problems are never touched.
+// A pivot is accurate to the rounding of its diagonal entry. If it is below
+// kPivotFloor of that, it is raised to that value: the direction gets the least
+// information that is distinguishable from none, rather than a NaN or a random
+// large variance. Well conditioned problems are not affected.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,8 +15,8 @@ namespace selfcal {
 
 inline constexpr double kPivotFloor = 1e-14;
 
-// Overwrites the lower triangle of *matrix (the upper is not read) by L with
-// L L^T = matrix. A direction without any information gets a unit pivot, which
+// Overwrites the lower triangle of *matrix (the upper is not read) by L with L
+// L^T = matrix. A direction without any information gets a unit pivot, which
 // eliminates nothing.
 template <int N>
 void GuardedCholesky(Eigen::Matrix<double, N, N>* matrix) {

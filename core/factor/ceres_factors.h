@@ -1,5 +1,5 @@
-// The plain factors (inertial.h, reprojection.h) wrapped once as Ceres cost
-// functions, and the manifolds of their parameters.
+// Wraps the plain factors (inertial.h, reprojection.h) as Ceres cost functions,
+// and provides the manifolds of their parameters.
 //
 // Parameter blocks, all double arrays:
 //   theta  [D] tangent offset d from a fixed reference: theta = ref [+] d.
@@ -10,7 +10,7 @@
 //   vb     [9] (v_GI 3, b_a 3, b_g 3);
 //   l      [3] landmark, either p_G [m], or (alpha, beta, rho) anchored at a
 //              fixed place: p_G = a + R_GA (alpha, beta, 1) / rho.
-// The caller owns what is returned; the data that a factory takes by span or
+// The caller owns the returned object; data that a factory takes by span or
 // reference must outlive it. Evaluate may be called from many threads.
 #pragma once
 
@@ -27,10 +27,10 @@
 
 namespace selfcal {
 
-// Blocks (theta, q, p, l); 2 residuals, divided by sigma_px. Where the point
+// Blocks (theta, q, p, l); 2 residuals, divided by sigma_px. If the point
 // cannot be projected, the residual and its Jacobians are zero: such an
-// observation says nothing, and the caller counts it. The motion is copied;
-// null as in Reproject.
+// observation has no information, and the caller counts it. The motion is
+// copied; null as in Reproject.
 std::unique_ptr<ceres::CostFunction> MakeReprojectionCost(
     const Calibration& theta_reference,
     int camera,
@@ -40,8 +40,8 @@ std::unique_ptr<ceres::CostFunction> MakeReprojectionCost(
     const KeyframeMotion* motion = nullptr);
 
 // Blocks (theta, q0, p0, vb0, q1, p1, vb1); 15 residuals, whitened by the given
-// square root information, which stays fixed while the factor lives: the noise
-// does not chase the estimate.
+// square root information, which is constant during the lifetime of the factor:
+// the noise does not depend on the estimate.
 std::unique_ptr<ceres::CostFunction> MakeInertialCost(
     const Calibration& theta_reference,
     std::span<const ImuSample> samples,
@@ -62,13 +62,13 @@ std::unique_ptr<ceres::CostFunction> MakePriorCost(
 // q [+] d = q Exp(d), d in rad: ambient 4, tangent 3.
 std::unique_ptr<ceres::Manifold> MakeRotationManifold();
 
-// The rotation of the keyframe that carries the gauge: only roll and pitch
-// move. q [+] d = Exp((d_0, d_1, 0)) q with the axis in G, so the tangent has
-// no part about gravity at any attitude of the body. Ambient 4, tangent 2.
+// The rotation of the keyframe that holds the gauge: only roll and pitch vary.
+// q [+] d = Exp((d_0, d_1, 0)) q with the axis in G, so the tangent has no
+// component about gravity at any attitude of the body. Ambient 4, tangent 2.
 std::unique_ptr<ceres::Manifold> MakeGaugeRotationManifold();
 
-// x [+] d = x + B d for a D x r basis B of full column rank: what lies outside
-// its span is held constant. Ambient D, tangent r.
+// x [+] d = x + B d for a D x r basis B of full column rank: directions outside
+// its span are held constant. Ambient D, tangent r.
 std::unique_ptr<ceres::Manifold> MakeSubspaceManifold(
     const Eigen::MatrixXd& basis);
 

@@ -57,7 +57,7 @@ InertialMatrix ResidualCovariance(const Preintegration& imu,
                                   const ImuNoise& noise) {
   InertialMatrix covariance = InertialMatrix::Zero();
   covariance.topLeftCorner<9, 9>() = imu.covariance;
-  // All nine enter the residual negatively, the rotation through Log.
+  // All nine enter the residual with a negative sign, the rotation through Log.
   covariance.topRightCorner<9, 6>() = -imu.covariance_with_walk;
   covariance.bottomLeftCorner<6, 9>() = -imu.covariance_with_walk.transpose();
   covariance.diagonal().tail<6>() =
@@ -99,8 +99,8 @@ InertialResidual EvaluateInertial(std::span<const ImuSample> samples,
 InertialMatrix SquareRootInformation(const InertialMatrix& covariance) {
   const InertialResidual scale = covariance.diagonal().cwiseSqrt();
   const InertialResidual inverse_scale = scale.cwiseInverse();
-  // Turned around, so that the lower factor of the turned matrix is an upper
-  // one of the matrix itself: C = U U^T, W = U^-1.
+  // The matrix is reversed, so that the lower factor of the reversed matrix is
+  // an upper one of the matrix itself: C = U U^T, W = U^-1.
   const InertialMatrix correlation =
       (inverse_scale.asDiagonal() * covariance * inverse_scale.asDiagonal())
           .reverse();

@@ -34,8 +34,8 @@ void SetIntrinsics(const ImuCalibration& imu, KernelInput<W>* input) {
   Map<Matrix3d>(input->R_IA) = imu.q_AI.toRotationMatrix().transpose();
 }
 
-// Items first .. first + n of W lanes. The others read the last of them, and
-// write to one that nobody uses.
+// Items first .. first + n for W lanes. The other lanes read the last of them,
+// and write to an unused one.
 template <int W, typename Item>
 std::array<const Item*, W> Inputs(std::span<const Item> items,
                                   std::size_t first,
@@ -105,7 +105,7 @@ int InertialBatch::GatherReadings(std::span<const InertialLinkStates> links,
     counts[lane] = count;
   }
   const int rows = *std::max_element(counts, counts + W);
-  // Steps of length zero after the last of the shorter ones.
+  // Pads shorter links with steps of length zero.
   for (int lane = 0; lane < W; ++lane) {
     const double* last = reading(counts[lane] - 1) + lane;
     for (int i = counts[lane]; i < rows; ++i) {
@@ -131,7 +131,7 @@ void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
     input.gravity_mps2 = gravity_mps2;
     for (std::size_t first = 0; first < links.size(); first += W) {
       const std::size_t count = std::min<std::size_t>(W, links.size() - first);
-      // Lanes without a link repeat the last.
+      // Lanes without a link repeat the last one.
       InertialLinkStates group[W];
       for (std::size_t lane = 0; lane < W; ++lane) {
         const InertialLinkStates& link =

@@ -1,6 +1,6 @@
-// The inertial factors of many links between keyframes, several at a time in
-// the lanes of the machine's vectors, in the form that the elimination of a
-// chain of keyframes needs: solved for the earlier state.
+// Inertial factors of many links between keyframes, vectorised over several
+// links at a time, in the form that the elimination of a chain of keyframes
+// needs: solved for the earlier state.
 //
 // The factor r + J0 x0 + J1 x1 + Jt theta of inertial.h, whose covariance is
 // U U^T with U upper triangular, equals U e with e of unit covariance. J0 is
@@ -26,8 +26,8 @@ struct InertialTransition : ChainTransition {
   double whitened[15];  // U^-1 r, in the order of the residual
 };
 
-// U, in the order of the residual: U^-1 is SquareRootInformation of its
-// covariance. Where that is singular to rounding, pivots are raised to 1e-14 of
+// U, in the order of the residual: U^-1 is the SquareRootInformation of its
+// covariance. If that is singular to rounding, pivots are raised to 1e-14 of
 // their variance.
 struct InertialNoiseRoot {
   double motion[9][9];  // upper triangular
@@ -35,16 +35,15 @@ struct InertialNoiseRoot {
   double bias[6];  // diagonal
 };
 
-// The arguments of EvaluateInertial that differ from link to link.
+// Arguments of EvaluateInertial that differ between links.
 struct InertialLinkStates {
   const KeyframeState* x0;
   const KeyframeState* x1;
   std::span<const ImuSample> samples;
 };
 
-// A workspace: keeps its memory from call to call. Not for use by two threads
-// at once. Results do not depend on which links stand beside each other by more
-// than rounding, and are the same at every call.
+// A workspace that reuses its memory. Not thread-safe. Results depend on the
+// other links of a batch only by rounding, and are the same at every call.
 class InertialBatch {
  public:
   explicit InertialBatch(VectorWidth width) : width_(width) {}
@@ -57,14 +56,14 @@ class InertialBatch {
                  std::span<InertialNoiseRoot> roots,
                  std::span<InertialTransition> out);
 
-  // The same with noise as it was found elsewhere.
+  // The same with given noise.
   void LineariseWithRoots(std::span<const InertialLinkStates> links,
                           const ImuCalibration& imu,
                           double gravity_mps2,
                           std::span<const InertialNoiseRoot> roots,
                           std::span<InertialTransition> out);
 
-  // U^-1 r alone.
+  // Computes only U^-1 r.
   void Residuals(std::span<const InertialLinkStates> links,
                  const ImuCalibration& imu,
                  double gravity_mps2,
@@ -75,7 +74,7 @@ class InertialBatch {
   struct alignas(64) Chunk {
     double values[8];
   };
-  // All chunks as one row of numbers.
+  // All chunks as one array of numbers.
   static double* Numbers(std::vector<Chunk>* chunks) {
     return reinterpret_cast<double*>(chunks->data());
   }
@@ -89,15 +88,15 @@ class InertialBatch {
                     double gravity_mps2,
                     const Function& run);
 
-  // Lays the readings of W links side by side, and their noise unless null;
-  // returns the number of rows.
+  // Interleaves the readings of W links, and their noise unless null; returns
+  // the number of rows.
   template <int W>
   int GatherReadings(std::span<const InertialLinkStates> links,
                      const ImuNoise* noise);
 
   VectorWidth width_;
   std::vector<Chunk> readings_, densities_;
-  InertialTransition unused_transition_;  // of lanes without a link
+  InertialTransition unused_transition_;  // for lanes without a link
   InertialNoiseRoot unused_root_;
 };
 

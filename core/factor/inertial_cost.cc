@@ -10,7 +10,7 @@ using Eigen::Vector3d;
 template <int cols>
 using RowMajor15 = Eigen::Matrix<double, 15, cols, Eigen::RowMajor>;
 
-// The blocks of a state follow each other: q, p, vb.
+// The blocks of a state are consecutive: q, p, vb.
 enum Block { kTheta, kState0, kState1 = kState0 + 3 };
 
 KeyframeState ReadState(std::int64_t t_ns, double const* const* blocks) {
@@ -23,7 +23,7 @@ KeyframeState ReadState(std::int64_t t_ns, double const* const* blocks) {
           .b_g = Map<const Vector3d>(vb + 6)};
 }
 
-// `J` is whitened, by a state.
+// `J` is whitened, with respect to a state.
 void WriteStateJacobians(const InertialMatrix& J,
                          const Eigen::Quaterniond& q_GI,
                          double** blocks) {

@@ -31,7 +31,7 @@ State<Lanes<W>> LoadState(const double (&x)[kStateNumbers][W]) {
           .b_g = LoadVector<W>(x[13])};
 }
 
-// The links as far as the residual.
+// The links, up to the residual.
 template <int W>
 struct Link {
   using T = Lanes<W>;

@@ -1,54 +1,56 @@
-// What InertialBatch has computed for W links at once. Internal to core/factor.
+// The computations of InertialBatch for W links at once. Internal to
+// core/factor.
 //
-// Defined in inertial_kernel.cc, which is compiled once for each W. Plain
-// numbers only: an inline function of a library's container, compiled there for
-// wider vectors, could become everyone's copy.
+// Defined in inertial_kernel.cc, which is compiled once for each W. The
+// interface uses plain numbers only: an inline function of a library's
+// container, compiled there for wider vectors, could become the copy that the
+// whole program uses.
 #pragma once
 
 #include "core/factor/inertial_batch.h"
 
 namespace selfcal::inertial {
 
-// Of a row of readings: length of the step before it [s], gyro 3, accel 3. The
-// first has length zero.
+// Row of a reading: length of the step before it [s], gyro 3, accel 3. The
+// length of the first is zero.
 constexpr int kReadingSize = 7;
 // Gyroscope, accelerometer.
 constexpr int kDensities = 2;
 // q_GI (x, y, z, w), p_GI, v_GI, b_a, b_g.
 constexpr int kStateNumbers = 16;
 
-// The numbers of the W links stand side by side.
+// The numbers of the W links are interleaved.
 template <int W>
 struct KernelInput {
   int rows = 0;
   const double* readings = nullptr;  // rows x kReadingSize x W
-  // Of the noise over the step before each reading, rows x kDensities x W. Only
-  // where roots are found from noise.
+  // Noise over the step before each reading, rows x kDensities x W. Only if
+  // roots are computed from noise.
   const double* densities = nullptr;
   double x0[kStateNumbers][W];
   double x1[kStateNumbers][W];
   double dt_s[W];
-  // Of all links; by columns.
+  // Common to all links; column-major.
   double T_g_inverse[9];
   double T_a_inverse[9];
   double R_IA[9];
   double gravity_mps2 = 0;
 };
 
-// Fills out, and the roots from the noise.
+// Fills out, and computes the roots from the noise.
 template <int W>
 void LineariseLinks(const KernelInput<W>& input,
                     const ImuNoise& noise,
                     InertialNoiseRoot* const* roots,
                     InertialTransition* const* out);
 
-// Fills out with the roots as given.
+// Fills out with the given roots.
 template <int W>
 void LineariseLinksWithRoots(const KernelInput<W>& input,
                              const InertialNoiseRoot* const* roots,
                              InertialTransition* const* out);
 
-// Fills 15 numbers of each link.
+// Computes 15 numbers for each link.
 template <int W>
 void WhitenedResiduals(const KernelInput<W>& input,
                        const InertialNoiseRoot* const* roots,

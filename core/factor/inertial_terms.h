@@ -1,5 +1,5 @@
-// The inertial residual as templates over the scalar, for one link or several
-// at once. Internal to core/factor.
+// The inertial residual as templates over the scalar, for one link or for
+// several at once. Internal to core/factor.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,8 +17,8 @@ constexpr int kResidualPosition = 6;
 constexpr int kResidualAccelBias = 9;
 constexpr int kResidualGyroBias = 12;
 
-// What the two states say about the motion between them, in the body frame of
-// the first, gravity taken out.
+// The motion between two states, in the body frame of the first, without
+// gravity.
 template <typename T>
 struct StateMotion {
   Eigen::Quaternion<T> q_01;
@@ -26,7 +26,7 @@ struct StateMotion {
   Eigen::Matrix<T, 3, 1> p;
 };
 
-// State has the members of KeyframeState, with scalars T.
+// State has the members of KeyframeState, with scalars of type T.
 template <typename T, class State>
 StateMotion<T> MotionBetween(const State& x0,
                              const State& x1,

@@ -2,14 +2,14 @@
 // over the scalar, for several links at once. Internal to core/factor.
 //
 // With rows as in inertial.h and psi, v, p the derivatives of the measured
-// motion (psi a left perturbation of Delta_R), the Jacobian by the earlier
-// state has an inverse in closed form. Where the residual changes by y,
+// motion (psi a left perturbation of Delta_R), the Jacobian with respect to the
+// earlier state has an inverse in closed form. If the residual changes by y,
 //
 //   rotation  theta = -R_01 J_r(r) y_rotation
 //   velocity  R_GI (v_01 x theta - y_velocity)
 //   position  R_GI (p_01 x theta - y_position) - dt velocity
 //
-// gives the change of the state that makes up for -y, for y without a part in
+// is the change of the state that compensates -y, for y without components in
 // the biases. For the derivatives of the measured motion, y_rotation is
 // -J_l(r)^-1 Delta_R^T psi, and theta becomes -psi.
 #pragma once
@@ -28,7 +28,7 @@ namespace selfcal::inertial {
 using preintegration::Matrix3;
 using preintegration::Vector3;
 
-// The members that the residual needs.
+// The members that the residual uses.
 template <typename T>
 struct State {
   Eigen::Quaternion<T> q_GI;
@@ -43,7 +43,7 @@ struct NoiseRoot {
   Eigen::Matrix<T, 6, 1> bias;
 };
 
-// Overwrites the upper triangle of C by U with U U^T = C; never NaN. Where
+// Overwrites the upper triangle of C by U with U U^T = C; never NaN. If
 // rounding left C far from a covariance, no entry of U exceeds the standard
 // deviation of its row.
 template <typename T>
@@ -64,15 +64,15 @@ void UpperRoot(Eigen::Matrix<T, 9, 9>* C) {
   }
 }
 
-// `by_psi` is the negative derivative of the rotation residual by psi. Needs
-// root->bias, the standard deviations of the walks.
+// `by_psi` is the negative derivative of the rotation residual with respect to
+// psi. Requires root->bias, the standard deviations of the walks.
 template <typename T>
 void RootOfMotionCovariance(
     const preintegration::MotionCovariance<T>& covariance,
     const preintegration::BiasWalk<T>& walk,
     const Matrix3<T>& by_psi,
     NoiseRoot<T>* root) {
-  // Every error of the motion enters the residual negatively.
+  // Every error of the motion enters the residual with a negative sign.
   const Matrix3<T> with_gyro = -1.0 / root->bias[3] * walk.with_gyro().r;
   Eigen::Matrix<T, 9, 6>& K = root->motion_by_bias;
   K.template block<3, 3>(0, 0).setZero();
@@ -90,7 +90,7 @@ void RootOfMotionCovariance(
   C.template block<3, 3>(3, 3) = covariance.vv();
   C.template block<3, 3>(3, 6) = covariance.pv().transpose();
   C.template block<3, 3>(6, 6) = covariance.pp();
-  // Given the biases at the end.
+  // Conditioned on the biases at the end.
   for (int j = 0; j < 9; ++j) {
     for (int i = 0; i <= j; ++i) {
       for (int k = i < 3 ? 3 : 0; k < 6; ++k) C(i, j) -= K(i, k) * K(j, k);
@@ -114,7 +114,8 @@ Eigen::Matrix<T, 15, 1> Whiten(const NoiseRoot<T>& root,
   return white;
 }
 
-// The rows of the motion in InertialTransition, a row's columns side by side.
+// Rows of the motion in InertialTransition; the columns of a row are
+// contiguous.
 template <typename T>
 struct MotionRows {
   T G[9][kTransitionColumns];
@@ -210,7 +211,8 @@ class TransitionSolver {
     }
   }
 
-  // Of the residual of the motion; `turn` carries its rotation.
+  // From a change of the residual of the motion; `turn` transforms its
+  // rotation.
   Column OfNoise(const Matrix3<T>& turn, const Column& u) const {
     return Carry(turn * u.template head<3>(),
                  u.template segment<3>(kResidualVelocity),

@@ -11,17 +11,17 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Rates are smoothed over so long on either side, and over so many samples.
+// Rates are averaged over this time on either side, and at least this many
+// samples.
 constexpr double kHalfWindow_s = 0.015;
 constexpr std::ptrdiff_t kMinSamples = 4;
-// The line is followed no further than this beyond the samples.
+// The line is extrapolated no further than this beyond the samples.
 constexpr double kReach_s = 0.03;
-// A rate is shrunk by this multiple of its noise, as squares, of three axes:
+// A rate is shrunk by this multiple of its noise, in squares, over three axes:
 // noise alone is larger 3 times in 100.
 constexpr double kNoiseSquares = 3 * 3;
 
-// Readings about a keyframe, free of what the IMU does to them. Times [s] count
-// from the keyframe.
+// Corrected readings about a keyframe. Times [s] are relative to the keyframe.
 class Readings {
  public:
   Readings(std::span<const ImuSample> samples,
@@ -36,8 +36,8 @@ class Readings {
     Vector3d w_I, f_I;
   };
 
-  // Time of the sample after (dt > 0), or before, the given time; dt where that
-  // is nearer.
+  // Time of the next sample after (dt > 0) or before the given time, or dt if
+  // that is nearer.
   double Next(double t_s, double dt_s) const {
     const auto at = dt_s > 0 ? After(t_s) : Before(t_s);
     if (at < 0 || at >= std::ssize(samples_)) return dt_s;
@@ -55,13 +55,13 @@ class Readings {
                    a.accel + part * (b.accel - a.accel));
   }
 
-  // The line through the samples about the time, or those nearest to it.
+  // Evaluates the line through the samples about the time, or the nearest ones.
   Reading Smooth(double t_s) const {
     double variance_Hz;
     return Smooth(t_s, &variance_Hz);
   }
 
-  // Smooth, as far as it stands out of white noise.
+  // Like Smooth, shrunk by white noise.
   Vector3d Rate(double t_s, double noise_density) const {
     double variance_Hz;
     const Vector3d w_I = Smooth(t_s, &variance_Hz).w_I;
@@ -71,7 +71,7 @@ class Readings {
   }
 
  private:
-  // *variance_Hz is that of a result for a noise density of one.
+  // *variance_Hz is the variance of the result for a noise density of one.
   Reading Smooth(double t_s, double* variance_Hz) const {
     const double first_s = Time(0);
     const double last_s = Time(std::ssize(samples_) - 1);
@@ -101,8 +101,8 @@ class Readings {
       accel_slope += s * samples_[i].accel;
     }
     const double at_s = std::clamp(t_s, first_s - kReach_s, last_s + kReach_s);
-    // By the number of samples: where products are fused with sums, the square
-    // of a single one is that of a rounding error.
+    // The condition is on the number of samples: with fused multiply-add, the
+    // sum of squares of a single one is a rounding error.
     const double along = end - begin > 1 ? (at_s - mean_s) / square : 0;
     const double rate_Hz =
         end - begin > 1 ? (count - 1) / (Time(end - 1) - Time(begin)) : 0;

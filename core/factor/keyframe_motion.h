@@ -1,22 +1,22 @@
-// The motion of the body about a keyframe, as the IMU measured it: what takes
-// the keyframe's pose to the instant at which a camera was exposed, where the
-// camera's clock is off from that of the IMU (CameraCalibration).
+// The motion of the body about a keyframe, as measured by the IMU: it moves the
+// keyframe's pose to the instant at which a camera was exposed, if the camera's
+// clock has an offset from that of the IMU (CameraCalibration).
 //
-// The samples between the keyframe's time and the exposure are integrated under
-// the estimate at hand. The result is a constant while factors are linearised
-// about that estimate: a pose that moves by the offset alone,
+// The samples between the keyframe's time and the exposure are integrated with
+// the current estimate. The result is a constant while factors are linearised
+// at that estimate; the pose then depends on the offset alone,
 //   q_GI(t + dt) = q_GI turn Exp(w_I (dt - dt0)),
 //   p_GI(t + dt) = p_GI + R_GI (shift_I + v_I (dt - dt0)).
-// It goes with the body, so that where the keyframes of a problem are moved and
-// turned about gravity together, nothing changes. Residuals have exact
-// derivatives by the pose and by the offset, and none by biases, velocity and
-// IMU intrinsics through the motion. What is left out is small (a velocity that
-// is off by 1 cm/s moves the camera by 0.2 mm in 20 ms), and moves no estimate
-// in the mean: the motion is measured anew at each new estimate, where the
-// residuals are those of the whole model; left out are terms of the weights
-// that the residuals of the optimum get.
+// It is expressed in the body frame, so that a common translation of the
+// keyframes of a problem, or rotation about gravity, changes nothing. Residuals
+// have exact derivatives with respect to the pose and the offset, and none with
+// respect to biases, velocity and IMU intrinsics through the motion. The
+// neglected terms are small (a velocity error of 1 cm/s moves the camera by 0.2
+// mm in 20 ms), and do not bias the estimate: the motion is measured again at
+// each new estimate, where the residuals are those of the complete model; only
+// terms weighted by the residuals at the optimum are neglected.
 //
-// Pure functions, any thread.
+// Pure functions, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,7 +30,7 @@
 
 namespace selfcal {
 
-// About the time dt_s after that of the keyframe.
+// Motion about the time dt_s after that of the keyframe.
 struct KeyframeMotion {
   double dt_s = 0;
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
@@ -39,11 +39,11 @@ struct KeyframeMotion {
   Eigen::Vector3d v_I = Eigen::Vector3d::Zero();      // [m/s], in I at t
 };
 
-// From the samples about the keyframe, in order of time, at least one, with the
-// biases of the state. Beyond the first and the last sample the line through
-// those nearest is followed, but not far. The rate w_I falls to zero where it
-// does not stand out of the noise of the gyroscope: else a device at rest would
-// seem to show its offset.
+// Measures the motion from the samples about the keyframe, in order of time, at
+// least one, with the biases of the state. Beyond the first and the last sample
+// it extrapolates the line through the nearest ones, but not far. The rate w_I
+// is shrunk to zero if it is not significant relative to the noise of the
+// gyroscope: otherwise the offset would seem observable for a device at rest.
 KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
                              const KeyframeState& x,
                              const ImuCalibration& imu,
@@ -51,9 +51,10 @@ KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
                              double gravity_mps2,
                              double dt_s);
 
-// Pose of the body at the exposure, and its derivatives: of the tangent of that
-// pose (rotation 3, position 3) by the rotation of the keyframe, and by the
-// offset. By the keyframe's position it is (0, 1).
+// Pose of the body at the exposure, and its derivatives: those of the tangent
+// of that pose (rotation 3, position 3) with respect to the rotation of the
+// keyframe, and to the offset. The derivative with respect to the keyframe's
+// position is (0, 1).
 struct ExposurePose {
   Eigen::Quaterniond q_GI;
   Eigen::Vector3d p_GI;
@@ -66,21 +67,21 @@ ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
                       const KeyframeMotion& motion,
                       double time_offset_s);
 
-// Without a motion, where nothing depends on the offset.
+// The pose without a motion; nothing depends on the offset.
 ExposurePose PoseAtRest(const Eigen::Quaterniond& q_GI,
                         const Eigen::Vector3d& p_GI);
 
-// The motions of all keyframes, for those cameras that need them. Measuring
-// again keeps the memory.
+// The motions of all keyframes, for those cameras that need them. A new
+// measurement reuses the memory.
 class KeyframeMotions {
  public:
-  // Null: the camera is exposed at the keyframe's time, and that is known.
+  // Null if the camera is exposed at the keyframe's time, and this is known.
   const KeyframeMotion* At(int keyframe, int camera) const {
     if (index_.empty() || index_[camera] < 0) return nullptr;
     return &motions_[keyframe * stride_ + index_[camera]];
   }
 
-  // `estimated` says of each camera whether its offset is estimated;
+  // `estimated` is nonzero for each camera whose offset is estimated;
   // samples(k) are those about keyframe k.
   template <typename Samples>
   void Measure(const Rig& rig,
@@ -108,7 +109,7 @@ class KeyframeMotions {
  private:
   void FindCameras(const Calibration& theta, std::span<const char> estimated);
 
-  std::vector<int> index_;  // by camera; empty if none needs one
+  std::vector<int> index_;  // by camera; empty if no camera needs motions
   int stride_ = 0;
   std::vector<KeyframeMotion> motions_;
 };

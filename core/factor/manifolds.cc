@@ -78,8 +78,8 @@ class GaugeRotationManifold final : public ceres::Manifold {
     return true;
   }
 
-  // The inverse of Plus where y can be reached from x; elsewhere the turn about
-  // gravity is dropped from the rotation between them.
+  // The inverse of Plus if y can be reached from x; otherwise the rotation
+  // about gravity is removed from the rotation between them.
   bool Minus(const double* y,
              const double* x,
              double* y_minus_x) const override {

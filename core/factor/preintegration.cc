@@ -10,7 +10,7 @@ namespace selfcal {
 namespace preintegration {
 namespace {
 
-// Rotations perturbed on the right, as Preintegration has them.
+// Converts to rotations perturbed on the right, as in Preintegration.
 Preintegration Result(const Integrator<double>& integrator,
                       const PreintegrationParts& parts,
                       double dt_s) {

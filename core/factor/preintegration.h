@@ -1,25 +1,25 @@
-// The IMU samples between two keyframes, integrated into one relative motion,
-// with its derivatives by the biases and the 15 IMU intrinsics and its
-// covariance.
+// Integrates the IMU samples between two keyframes into one relative motion,
+// with its derivatives with respect to the biases and the 15 IMU intrinsics,
+// and its covariance.
 //
-// Scheme. Raw readings, less h^2/12 of their second derivative, are linear
+// Scheme. Raw readings, minus h^2/12 of their second derivative, are linear
 // between samples, hence so are the corrected
 //   w = T_g^-1 (w~ - b_g),   f = R_AI^T T_a^-1 (a~ - b_a).
 // Over a step of h from (w_0, f_0) to (w_1, f_1):
 //   rotation by Exp(h (w_0 + w_1) / 2 + h^2 (w_0 x w_1) / 12), the fourth order
 //   Magnus expansion; velocity and position by Simpson's rule, with the
 //   rotation at the middle from the same expansion over half a step.
-// That is of fourth order in h on smooth motion, with samples at least one step
-// beyond both ends; the parts of a step at ends between samples are of third,
-// and what neighbouring intervals get wrong there cancels.
+// The scheme is of fourth order in h on smooth motion, with samples at least
+// one step beyond both ends; the partial steps at ends between samples are of
+// third order, and the errors of neighbouring intervals cancel there.
 //
-// The derivatives are those of this scheme, exactly. The noise of each sensor
-// is white: over a step its mean has the variance density^2 / h on the raw
-// reading and passes through T^-1, more where samples are missing (sampling.h).
-// Biases walk from the beginning of the interval on, where they are what is
-// given (preintegration_bias_walk.h).
+// The derivatives are exactly those of this scheme. The noise of each sensor is
+// white: over a step its mean has the variance density^2 / h on the raw reading
+// and is transformed by T^-1; it is larger where samples are missing
+// (sampling.h). Biases random-walk from their given values at the beginning of
+// the interval (preintegration_bias_walk.h).
 //
-// Pure, any thread; allocates nothing.
+// Pure, callable from any thread; allocates nothing.
 // Source: Schneider et al., ICRA 2017, III-B and III-D; Forster et al., "On-
 // Manifold Preintegration for Real-Time Visual-Inertial Odometry" (2017), with
 // the 15 IMU intrinsics added.
@@ -46,26 +46,28 @@ struct Preintegration {
   Eigen::Quaterniond Delta_R = Eigen::Quaterniond::Identity();
   Eigen::Vector3d Delta_v = Eigen::Vector3d::Zero();  // [m/s]
   Eigen::Vector3d Delta_p = Eigen::Vector3d::Zero();  // [m]
-  // By (b_a 3, b_g 3), and by theta_i in the order of calibration.h.
+  // With respect to (b_a 3, b_g 3), and to theta_i in the order of
+  // calibration.h.
   Eigen::Matrix<double, 9, 6> J_bias = Eigen::Matrix<double, 9, 6>::Zero();
   Eigen::Matrix<double, 9, 15> J_theta = Eigen::Matrix<double, 9, 15>::Zero();
-  // Of the nine, from the white noise of the sensors and the walk of their
-  // biases; and of the nine with what (b_a 3, b_g 3) have walked by the end.
+  // Covariance of the nine, from the white noise of the sensors and the walk of
+  // their biases; and that of the nine with the walk of (b_a 3, b_g 3) at the
+  // end.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
   Eigen::Matrix<double, 9, 6> covariance_with_walk =
       Eigen::Matrix<double, 9, 6>::Zero();
 };
 
-// What to compute beside the motion; the rest stays zero.
+// Parts to compute in addition to the motion; the rest remains zero.
 struct PreintegrationParts {
   bool jacobians = true;
   bool covariance = true;
 };
 
-// Integrates from t0_ns to t1_ns >= t0_ns, the end points interpolated. The
+// Integrates from t0_ns to t1_ns >= t0_ns, with interpolated end points. The
 // samples (at least one) must cover the interval, which Validate(segment)
-// ensures, and should reach one sample further on either side; beyond the first
-// and the last sample their readings are held.
+// ensures, and should extend one sample further on either side; beyond the
+// first and the last sample their readings are held constant.
 Preintegration Preintegrate(std::span<const ImuSample> samples,
                             std::int64_t t0_ns,
                             std::int64_t t1_ns,

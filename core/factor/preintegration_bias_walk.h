@@ -1,16 +1,16 @@
-// What the walk of the biases within an interval adds to the covariance of its
-// preintegrated motion, and how both go together at its end. Internal to
-// core/factor.
+// The contribution of the random walk of the biases within an interval to the
+// covariance of its preintegrated motion, and the covariance of both at its
+// end. Internal to core/factor.
 //
-// The motion over an interval h answers a bias step at the part u of it by
-// J_i (1 - u)^n_i, where J are the derivatives by a constant bias and n is the
-// power of time with which they grow: rotation by b_g 1, velocity by b_a 1 and
-// by b_g 2, position by b_a 2 and by b_g 3. That is exact at constant rotation
-// and force. A walk of density q^(1/2) then has
+// The response of the motion over an interval h to a bias step at the fraction
+// u of it is J_i (1 - u)^n_i, where J are the derivatives with respect to a
+// constant bias and n is the power of time with which they grow: rotation by
+// b_g 1, velocity by b_a 1 and by b_g 2, position by b_a 2 and by b_g 3. That
+// is exact at constant rotation and force. A walk of density q^(1/2) then has
 //   cov(i, j)          = q h J_i J_j^T / (n_i + n_j + 1)
 //   cov(i, end of the walk) = q h J_i / (n_i + 1).
 // Intervals are cut into pieces that are short in this sense, and these are
-// composed: an error at the end of a piece moves on as the motion does.
+// composed: an error at the end of a piece is propagated like the motion.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +20,7 @@
 
 namespace selfcal::preintegration {
 
-// An interval up to some time of it.
+// State of the integration at some time within an interval.
 template <typename T>
 struct WalkedInterval {
   T t = T(0);  // [s] since its beginning
@@ -36,7 +36,8 @@ class BiasWalk {
   // Densities of the walks of the raw biases.
   BiasWalk(T gyro, T accel) : q_gyro_(gyro * gyro), q_accel_(accel * accel) {}
 
-  // Adds the walk since the last call; the covariance has moved on to `end`.
+  // Adds the walk since the last call; the covariance must be propagated to
+  // `end`.
   void Advance(const WalkedInterval<T>& end, MotionCovariance<T>* covariance) {
     const T h = end.t - begin_.t;
     const Vector3<T> dv = end.Delta_v - begin_.Delta_v;
@@ -58,12 +59,12 @@ class BiasWalk {
     begin_ = end;
   }
 
-  // Covariances of the motion with the biases at the end.
+  // Covariances of the motion with the biases at the end of the interval.
   const GyroResponse<T>& with_gyro() const { return gyro_; }
   const AccelResponse<T>& with_accel() const { return accel_; }
 
  private:
-  // H of the walk before the piece: what it contributes is H J^T + J H^T.
+  // H is that of the walk before the piece, which contributes H J^T + J H^T.
   void AddGyro(T h, const GyroResponse<T>& J, MotionCovariance<T>* covariance) {
     const T before = q_gyro_ * begin_.t;
     const T q = q_gyro_ * h;

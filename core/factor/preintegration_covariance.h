@@ -1,4 +1,4 @@
-// The covariance of a preintegrated motion, carried from step to step. Internal
+// Covariance of a preintegrated motion, propagated from step to step. Internal
 // to core/factor.
 #pragma once
 
@@ -8,9 +8,9 @@
 
 namespace selfcal::preintegration {
 
-// By errors of a raw reading that are constant in time: derivatives of (psi,
-// Delta_v, Delta_p), psi the left perturbation of the rotation; or covariances
-// of these with such errors.
+// Response to errors of a raw reading that are constant in time: derivatives of
+// (psi, Delta_v, Delta_p), psi the left perturbation of the rotation; or
+// covariances of these with such errors.
 template <typename T>
 struct GyroResponse {
   Matrix3<T> r = Matrix3<T>::Zero();
@@ -24,8 +24,7 @@ struct AccelResponse {
 };
 
 // Covariance of (psi, Delta_v, Delta_p), by blocks; psi is the left
-// perturbation of the rotation. Of the blocks on the diagonal, the lower
-// triangles.
+// perturbation of the rotation. Diagonal blocks are stored as lower triangles.
 template <typename T>
 class MotionCovariance {
  public:
@@ -37,7 +36,7 @@ class MotionCovariance {
     const Matrix3<T> v_r = vr_ - Cross<T, 3>(s.dv, r_r);
     const Matrix3<T> r_v = vr_.transpose();
     const Matrix3<T> r_p = pr_.transpose();
-    // Of the new with the old first, then with the new.
+    // First the covariance of the new with the old errors, then of the new.
     const Matrix3<T> p_v = pv_ + s.h * v_v - Cross<T, 3>(s.dp, r_v);
     const Matrix3<T> v_v_added =
         TimesSkew<T>(v_r, s.dv) - Cross<T, 3>(s.dv, r_v);
@@ -68,7 +67,8 @@ class MotionCovariance {
     AddLower(p, &pp_);
   }
 
-  // `correction` is the derivative of the force in the body by the raw reading.
+  // `correction` is the derivative of the force in the body with respect to the
+  // raw reading.
   void AddAccelNoise(const Stage<T>& s,
                      const ForceResponse<T>& response,
                      const Matrix3<T>& correction,
@@ -81,14 +81,15 @@ class MotionCovariance {
     vv_ += vv;
     pv_ += p.lazyProduct(v.transpose());
     AddLower(p, &pp_);
-    // White noise is not constant over the step: about its mean it moves the
-    // position by density^2 h^3 / 12 more. Without that, a single step would
-    // tie velocity and position together and leave the covariance singular.
+    // White noise is not constant over the step: its variation about the mean
+    // adds density^2 h^3 / 12 to the variance of the position. Otherwise
+    // velocity and position of a single step would be fully correlated and the
+    // covariance singular.
     pp_ += s.h * s.h * (1.0 / 12) * vv;
   }
 
-  // A piece of a bias walk (preintegration_bias_walk.h): H J^T + J H^T, and
-  // c J_i J_j^T / (n_i + n_j + 1) of blocks i and j.
+  // Adds a piece of a bias walk (preintegration_bias_walk.h): H J^T + J H^T,
+  // and c J_i J_j^T / (n_i + n_j + 1) for blocks i and j.
   void AddWalk(const GyroResponse<T>& J, const GyroResponse<T>& H, T c) {
     AddProducts(J.r, H.r, J.r, H.r, c * (1.0 / 3), &rr_);
     AddProducts(J.v, H.v, J.r, H.r, c * (1.0 / 4), &vr_);
@@ -111,7 +112,8 @@ class MotionCovariance {
   Matrix3<T> pp() const { return Symmetric(pp_); }
 
  private:
-  // Of the mean over the step. What it is multiplied with vanishes with h.
+  // Sigma of the mean over the step. What it is multiplied with vanishes with
+  // h.
   static T Sigma(const Stage<T>& s, T density) {
     return density / Sqrt(Max(s.h, T(1e-30)));
   }

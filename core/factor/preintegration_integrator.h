@@ -1,5 +1,5 @@
-// Walks over the steps of the scheme of preintegration.h and accumulates the
-// motion, its derivatives and its covariance. Internal to core/factor.
+// Integrates over the steps of the scheme of preintegration.h and accumulates
+// the motion, its derivatives and its covariance. Internal to core/factor.
 //
 // T is double, or Lanes for several intervals at once. Everything is expressed
 // in the body frame of the first keyframe, with rotations perturbed on their
@@ -25,13 +25,13 @@ struct Motion {
   Vector3<T> Delta_p = Vector3<T>::Zero();
 };
 
-// Steps of a piece in which biases walk.
+// Number of steps in a piece of the bias walk.
 inline constexpr int kWalkSteps = 24;
 
 template <typename T>
 class Integrator {
  public:
-  // Begins at a reading.
+  // Starts at a reading.
   Integrator(const Correction<T>& correction,
              const ImuNoise& noise,
              const PreintegrationParts& parts,
@@ -43,7 +43,8 @@ class Integrator {
         f_(first.f),
         walk_(noise.gyro_bias_random_walk, noise.accel_bias_random_walk) {}
 
-  // To the next reading, h [s] later, with the noise densities of the step.
+  // Advances to the next reading, h [s] later, with the noise densities of the
+  // step.
   SELFCAL_FLATTEN void Step(const Reading<T>& next,
                             T h,
                             T gyro_density = T(0),
@@ -77,7 +78,7 @@ class Integrator {
     if (parts_.covariance && ++steps_ % kWalkSteps == 0) AdvanceWalk();
   }
 
-  // After the last step, if a covariance is wanted.
+  // To be called after the last step, if a covariance is needed.
   void Finish() {
     if (steps_ % kWalkSteps != 0) AdvanceWalk();
   }
@@ -100,8 +101,7 @@ class Integrator {
                   &covariance_);
   }
 
-  // The norm stays one to rounding: where it is off by e, it is off by 3/8 e^2
-  // after that.
+  // The norm stays one to rounding: an error e of the norm becomes 3/8 e^2.
   void Turned(const Vector3<T>& phi) {
     Eigen::Quaternion<T>& q = motion_.Delta_R;
     q = q * Exp(phi);
@@ -118,7 +118,7 @@ class Integrator {
                  T accel_density) {
     const RateResponse<T> rates = RespondToRates(s, turn_m, A_m, turn_1);
     const ForceResponse<T> force = RespondToForce(s);
-    // The walk of the biases needs derivatives as well.
+    // The walk of the biases also needs derivatives.
     jacobians_.AddGyro(s, rates);
     jacobians_.AddAccel(s, force, reading_, next);
     if (parts_.covariance) {
@@ -139,7 +139,7 @@ class Integrator {
   MotionJacobians<T> jacobians_;
   MotionCovariance<T> covariance_;
   int steps_ = 0;
-  T t_ = T(0);  // since the beginning
+  T t_ = T(0);  // since the beginning of the interval
   BiasWalk<T> walk_;
 };
 

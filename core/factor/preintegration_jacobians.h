@@ -1,5 +1,5 @@
-// The derivatives of a preintegrated motion by biases and IMU intrinsics,
-// carried from step to step. Internal to core/factor.
+// Derivatives of a preintegrated motion with respect to biases and IMU
+// intrinsics, propagated from step to step. Internal to core/factor.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,8 +11,9 @@
 
 namespace selfcal::preintegration {
 
-// Of (psi, Delta_v, Delta_p), psi the left perturbation of the rotation, by
-// (b_a 3, b_g 3) and by theta_i in the order of calibration.h.
+// Derivatives of (psi, Delta_v, Delta_p), psi the left perturbation of the
+// rotation, with respect to (b_a 3, b_g 3) and to theta_i in the order of
+// calibration.h.
 template <typename T>
 struct MotionDerivatives {
   Eigen::Matrix<T, 9, 6> bias;
@@ -42,15 +43,15 @@ class MotionJacobians {
     for (int i = 0; i < 3; ++i) {
       const T a_0 = sixth * r0.h_A[i];
       const T a_1 = sixth * r1.h_A[i];
-      const T a_m = a_0 + a_1;  // half of what the middle weighs
+      const T a_m = a_0 + a_1;  // half of the weight of the middle
       Matrix3<T>& v = v_accel_[1 + i];
       p_accel_[1 + i] += s.h * v + s.h * a_0 * s.R_0 + s.h * a_m * s.R_m;
       v += a_0 * s.R_0 + 2.0 * a_m * s.R_m + a_1 * s.R_1;
     }
   }
 
-  // By constant errors of the raw readings: the derivatives by the biases with
-  // the other sign.
+  // Derivatives with respect to constant errors of the raw readings: those with
+  // respect to the biases with the opposite sign.
   GyroResponse<T> ByGyro(const Matrix3<T>& T_g_inverse) const {
     return {psi_.template leftCols<3>().lazyProduct(T_g_inverse),
             v_gyro_.template leftCols<3>().lazyProduct(T_g_inverse),
@@ -125,8 +126,8 @@ class MotionJacobians {
   RateColumns<T> v_gyro_ = RateColumns<T>::Zero();
   RateColumns<T> p_gyro_ = RateColumns<T>::Zero();
   // Integral and double integral of R h_k, for h_k in (1, h_A). A derivative of
-  // f is a fixed matrix times one of these four, so these eight matrices carry
-  // the derivatives by all accelerometer parameters.
+  // f is a constant matrix times one of these four, so these eight matrices
+  // contain the derivatives with respect to all accelerometer parameters.
   Forces v_accel_ = {Matrix3<T>::Zero(),
                      Matrix3<T>::Zero(),
                      Matrix3<T>::Zero(),

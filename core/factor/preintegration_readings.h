@@ -17,15 +17,16 @@ constexpr double kSecondsPerNanosecond = 1e-9;
 // noise: samples are missing there.
 constexpr double kMaxStepRatio = 2;
 
-// What stands for sample i where readings are taken to be linear in between.
+// Corrected sample i for an integration that assumes linear readings between
+// samples.
 //
-// A signal w, sampled every h, exceeds what is linear between its samples by
-// -h^2/12 w'' on average. Taking that off the samples beforehand makes the
-// integral one of fourth order; without, sensors that read sines of 2 Hz at
-// 200 Hz seem to have a scale that is 3e-4 off. The second derivative is that
-// of the parabola through the neighbours; at the first and the last sample, the
-// one next to it. The mean over many samples is what it was, and so is noise at
-// low frequencies.
+// A signal w, sampled every h, differs from its linear interpolation by -h^2/12
+// w'' on average. Subtracting this from the samples first makes the integral
+// one of fourth order; otherwise sensors that measure sines of 2 Hz at 200 Hz
+// seem to have a scale error of 3e-4. The second derivative is that of the
+// parabola through the neighbours; at the first and the last sample, that of
+// the adjacent one. The mean over many samples does not change, nor does noise
+// at low frequencies.
 inline ImuSample ReadingForLines(std::span<const ImuSample> samples,
                                  std::size_t i) {
   ImuSample reading = samples[i];
@@ -37,7 +38,7 @@ inline ImuSample ReadingForLines(std::span<const ImuSample> samples,
   const auto h0 = static_cast<double>(b.t_ns - a.t_ns);
   const auto h1 = static_cast<double>(c.t_ns - b.t_ns);
   if (h0 > kMaxStepRatio * h1 || h1 > kMaxStepRatio * h0) return reading;
-  // (h0^3 + h1^3) / 12 w'' of both steps, over their length h0 + h1.
+  // (h0^3 + h1^3) / 12 w'' of both steps, divided by their length h0 + h1.
   const double part = (h0 * h0 - h0 * h1 + h1 * h1) / (6 * (h0 + h1));
   const double to_c = part / h1;
   const double to_a = part / h0;
@@ -46,8 +47,8 @@ inline ImuSample ReadingForLines(std::span<const ImuSample> samples,
   return reading;
 }
 
-// The reading at t_ns, which is not after sample `next`, the first at or after
-// it. Beyond the first and the last sample their readings are held.
+// The reading at t_ns; sample `next` is the first at or after it. Beyond the
+// first and the last sample their readings are held constant.
 inline ImuSample Interpolate(std::span<const ImuSample> samples,
                              std::size_t next,
                              std::int64_t t_ns) {
@@ -85,7 +86,7 @@ void VisitReadings(std::span<const ImuSample> samples,
         sample, static_cast<double>(next_ns - t_ns) * kSecondsPerNanosecond, i);
     t_ns = next_ns;
   };
-  // Only samples strictly inside: no step has length zero.
+  // Only samples strictly inside: no step may have length zero.
   if (i < samples.size() && samples[i].t_ns == t0_ns) ++i;
   for (; i < samples.size() && samples[i].t_ns < t1_ns; ++i) {
     advance(samples[i].t_ns, ReadingForLines(samples, i));

@@ -1,9 +1,9 @@
-// One step of the scheme of preintegration.h: how readings turn and move the
-// body, and how that responds to them. Internal to core/factor.
+// One step of the scheme of preintegration.h: the rotation and motion of the
+// body due to readings, and their derivatives. Internal to core/factor.
 //
 // T is double, or Lanes for several intervals at once. A step of length zero
-// changes nothing: intervals of fewer samples than their neighbours end with
-// such.
+// changes nothing: intervals with fewer samples than others in the batch are
+// padded with such steps.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,8 +19,8 @@ using Vector3 = Eigen::Matrix<T, 3, 1>;
 template <typename T>
 using Matrix3 = Eigen::Matrix<T, 3, 3>;
 
-// One raw reading, corrected; h_A = T_a^-1 (a~ - b_a) is the specific force
-// still in A.
+// One raw reading, corrected; h_A = T_a^-1 (a~ - b_a) is the specific force in
+// A.
 template <typename T>
 struct Reading {
   Vector3<T> w;
@@ -28,7 +28,7 @@ struct Reading {
   Vector3<T> f;
 };
 
-// What corrects it, with the biases.
+// The correction of readings, including the biases.
 template <typename T>
 struct Correction {
   Vector3<T> b_a, b_g;
@@ -83,7 +83,7 @@ struct Stage {
 template <typename T>
 struct Turn {
   Vector3<T> alpha, kappa, phi;
-  // A change d of both rates moves phi by gain d + d x drift.
+  // A change d of both rates changes phi by gain d + d x drift.
   T gain;
   Vector3<T> drift;
 
@@ -98,21 +98,23 @@ struct Turn {
         gain(weight_0 + weight_1),
         drift(coning * (r1.w - r0.w)) {}
 
-  // By phi, of the left perturbation of the rotation that follows R_0:
-  // Exp(phi + d) = Exp(J_l(phi) d) Exp(phi), J_l(phi) = J_r(-phi).
+  // Derivative with respect to phi of the left perturbation of the rotation
+  // that follows R_0: Exp(phi + d) = Exp(J_l(phi) d) Exp(phi), J_l(phi) =
+  // J_r(-phi).
   Matrix3<T> LeftJacobian(const Matrix3<T>& R_0) const {
     return R_0 * RightJacobian<T>(-phi);
   }
 };
 
-// By changes of the corrected rates: an offset of each axis 3, then of axis r
-// in proportion to axis c, (r, c) = (0, 0), (1, 1), (2, 2), (0, 1), (0, 2),
-// (1, 2). Those of the raw readings follow from them, T_g being upper
-// triangular.
+// Derivatives with respect to changes of the corrected rates: an offset of each
+// axis 3, then a change of axis r in proportion to axis c, (r, c) = (0, 0), (1,
+// 1), (2, 2), (0, 1), (0, 2), (1, 2). Those with respect to the raw readings
+// follow from them, since T_g is upper triangular.
 template <typename T>
 using RateColumns = Eigen::Matrix<T, 3, 9>;
 
-// A dphi for those, for a matrix A that follows. With dw = e_r w_c,
+// A dphi for these changes, for a matrix A that is applied afterwards. With dw
+// = e_r w_c,
 //   dphi = alpha_c e_r + coning (w_0c e_r x w_1 + w_1c w_0 x e_r)
 //        = alpha_c e_r + e_r x (kappa x e_c)
 //        = alpha_c e_r - kappa_r e_c + (e_r . e_c) kappa.
@@ -130,9 +132,9 @@ RateColumns<T> ByRates(const Matrix3<T>& A, const Turn<T>& turn) {
   return J;
 }
 
-// What a step adds to the motion's derivatives by the rates: through its own
-// rotation to (psi, Delta_v, Delta_p), psi a left perturbation. A force turns
-// with its rotation, d f = psi x f.
+// Contribution of a step to the motion's derivatives with respect to the rates:
+// through its own rotation to (psi, Delta_v, Delta_p), psi a left perturbation.
+// A force rotates with its rotation, d f = psi x f.
 template <typename T>
 struct RateResponse {
   RateColumns<T> psi, v, p;
@@ -154,7 +156,8 @@ RateResponse<T> RespondToRates(const Stage<T>& s,
   return response;
 }
 
-// What a step adds to velocity and position for a constant force in the body.
+// Contribution of a step to velocity and position for a constant force in the
+// body.
 template <typename T>
 struct ForceResponse {
   Matrix3<T> v, p;

@@ -25,9 +25,10 @@ inline Eigen::Matrix<double, 4, 3> QuaternionPlusJacobian(
   return 0.5 * J;
 }
 
-// Derivative of Log(q^-1 y) by y at y = q. It is the left inverse of the above
-// that is blind to the length of q. A Jacobian by the rotation's right
-// perturbation times this is one by the four numbers, for any manifold on them.
+// Derivative of Log(q^-1 y) with respect to y at y = q. It is the left inverse
+// of the above that does not depend on the norm of q. A Jacobian with respect
+// to the rotation's right perturbation times this is one with respect to the
+// four numbers, for any manifold on them.
 inline Eigen::Matrix<double, 3, 4> QuaternionMinusJacobian(
     const Eigen::Quaterniond& q) {
   return 4 * QuaternionPlusJacobian(q).transpose();

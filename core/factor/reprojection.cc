@@ -43,7 +43,7 @@ bool Reproject(const Eigen::Quaterniond& q_GI,
 
   const Matrix23d by_p_I = projection.point * R_CI;
   const Matrix23d by_X = by_p_I * R_IG;
-  // R_GI Exp(d) turns p_I by -d, R_CI Exp(d) turns it by d.
+  // R_GI Exp(d) rotates p_I by -d, R_CI Exp(d) rotates it by d.
   const Matrix23d by_turn = by_p_I * Skew(p_I);
 
   Eigen::Matrix<double, 2, 6> by_exposure;

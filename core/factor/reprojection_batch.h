@@ -1,10 +1,10 @@
-// The reprojection factors of one keyframe and camera, several at a time.
+// Reprojection factors of one keyframe and camera, several at a time.
 //
-// What is written are the rows of core/elimination/landmark_rows.h: a whitened
-// factor has few columns that differ. A factor without weight gives zeros.
-// Where the body is moved to the exposure, they turn as PoseTurn says.
+// The output is the rows of core/elimination/landmark_rows.h: a whitened factor
+// has few distinct columns. A factor with zero weight gives zeros. If the body
+// is moved to the exposure, rows are transformed by PoseTurn.
 //
-// Pure functions of their arguments, any thread.
+// Pure functions of their arguments, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,16 +26,17 @@ struct ObservationRun {
   int count = 0;
   const std::int32_t* landmarks = nullptr;  // indices into points
   const double* z_px = nullptr;             // 2 each
-  // To the exposure of the camera; null: it is that of the keyframe, and rows
-  // are zero by the time offset.
+  // Motion to the exposure of the camera; null: the exposure is at the
+  // keyframe, and derivatives with respect to the time offset are zero.
   const KeyframeMotion* motion = nullptr;
 };
 
-// What the rows by the pose at the exposure are multiplied with to be those by
-// the turn of the keyframe; nothing where the poses are the same.
+// Matrix by which rows with respect to the pose at the exposure are multiplied
+// to get those with respect to the rotation of the keyframe; nullopt if the
+// poses are equal.
 std::optional<Eigen::Matrix<double, 6, 3>> PoseTurn(const ObservationRun& run);
 
-// Sums over the observations of a landmark that its refinement needs.
+// Sums over the observations of a landmark for its refinement.
 struct LandmarkSums {
   // Weighted J^T J (00 10 11 20 21 22) and J^T r, cost of the robust losses
   // [sigma^2], and the number of observations that project.
@@ -55,19 +56,19 @@ class ReprojectionBatch {
       : width_(width) {}
 
   // Writes 2 count rows of RowsStride(n) doubles. `points` are homogeneous, 4
-  // doubles (X, w) each with p_G = X / w; rows are by the pose, the camera, and
-  // by p_G. The factors are multiplied by `weights`, one for each observation,
-  // or where it is null by 1 / sigma_px. `rows` has room for 2 (count + 7)
-  // rows.
+  // doubles (X, w) each with p_G = X / w; rows are with respect to the pose,
+  // the camera, and p_G. The factors are multiplied by `weights`, one for each
+  // observation, or by 1 / sigma_px if that is null. `rows` must have room for
+  // 2 (count + 7) rows.
   void Linearise(const ObservationRun& run,
                  const double* points,
                  double sigma_px,
                  const double* weights,
                  double* rows) const;
 
-  // Adds to the sums of each landmark, by X, under a Huber loss of
+  // Adds to the sums of each landmark, with respect to X, with a Huber loss of
   // huber_sigmas, and writes the squared norm of each residual [px^2]; negative
-  // where the point cannot be projected.
+  // if the point cannot be projected.
   void AddLandmarkSums(const ObservationRun& run,
                        const double* points,
                        double sigma_px,
@@ -75,7 +76,7 @@ class ReprojectionBatch {
                        double* squares_px2,
                        LandmarkSums* sums) const;
 
-  // Only the squared norms.
+  // Computes only the squared norms.
   void Squares(const ObservationRun& run,
                const double* points,
                double* squares_px2) const;

@@ -32,7 +32,7 @@ Batch Gather(const ObservationRun& run, const double* points, int first) {
   return batch;
 }
 
-// M v for a matrix by rows.
+// M v for a row-major matrix.
 Vector3 Turn(const double* M, const Vector3& v) {
   return {M[0] * v[0] + M[1] * v[1] + M[2] * v[2],
           M[3] * v[0] + M[4] * v[1] + M[5] * v[2],
@@ -54,7 +54,7 @@ Vector3 ToCamera(const RunGeometry& geometry, const Vector3& p_I, T w) {
           turned[2] + w * geometry.p_CI[2]};
 }
 
-// J M for a matrix by rows.
+// J M for a row-major matrix.
 Matrix23 Times(const Matrix23& J, const double* M) {
   Matrix23 product;
   for (int r = 0; r < 2; ++r) {
@@ -65,7 +65,7 @@ Matrix23 Times(const Matrix23& J, const double* M) {
   return product;
 }
 
-// What a batch needs of its residuals, with the derivative by p_I.
+// Residuals of a batch, with the derivative with respect to p_I.
 template <class Model>
 struct Evaluated {
   LaneMask<kLanes> valid;
@@ -92,7 +92,7 @@ Evaluated<Model> Evaluate(const RunGeometry& geometry,
   return e;
 }
 
-// The part of `values` that belongs to the run.
+// Stores the part of `values` that belongs to the run.
 void StorePart(T values, int first, int count, double* to) {
   if (first + kLanes <= count) {
     Store(values, to + first);

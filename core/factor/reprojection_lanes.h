@@ -1,4 +1,4 @@
-// The kernels behind reprojection_batch.h, for one vector width. Internal to
+// The kernels of reprojection_batch.h, for one vector width. Internal to
 // core/factor.
 #pragma once
 
@@ -7,13 +7,15 @@
 
 namespace selfcal {
 
-// The pose at the exposure and the camera as plain numbers; matrices by rows.
+// The pose at the exposure and the camera as plain numbers; matrices are
+// row-major.
 struct RunGeometry {
   double R_IG[9];
   double p_GI[3];
   double R_CI[9];
   double p_CI[3];
-  double by_offset[6];  // of the pose by the time offset
+  double
+      by_offset[6];  // derivative of the pose with respect to the time offset
   Pinhole pinhole;
 };
 

@@ -10,12 +10,13 @@ namespace selfcal {
 namespace {
 
 constexpr double kSecondsPerNanosecond = 1e-9;
-// Steps that differ by less are regular: the noise of each is within as much.
+// Steps that differ by less are regular: the error of their noise is below
+// this.
 constexpr double kRegular = 1.1;
-// Of an interval with more, the first tell the usual step.
+// Of an interval with more steps, only the first ones determine the usual step.
 constexpr std::size_t kMostSteps = 256;
-// The signal is looked at no further from a gap: by then a hand has turned
-// around.
+// The signal is used only up to this distance from a gap: beyond it, a
+// hand-held motion has reversed.
 constexpr double kLongestBase_s = 0.1;
 
 double Seconds(const ImuSample& a, const ImuSample& b) {
@@ -30,9 +31,9 @@ Reading At(const ImuSample& sample) {
   return reading;
 }
 
-// How the readings change on average between a gap and a place `base_s` beyond
-// one of its ends, at sample `end`; samples follow each other by `step` from
-// there on. No change where there is no such sample.
+// Average change of the readings between a gap and a point `base_s` beyond one
+// of its ends, at sample `end`; from there `step` leads from sample to sample.
+// Zero if there is no such sample.
 struct Slope {
   Reading rate = Reading::Zero();
   double base_s = 0;
@@ -56,8 +57,8 @@ Slope SlopeBeyond(std::span<const ImuSample> samples,
   return slope;
 }
 
-// By how much a line over the gap that ends with sample `next` misses the mean
-// of the readings: of the gyroscope and of the accelerometer.
+// Error of the mean of a linear interpolation over the gap that ends with
+// sample `next`: for the gyroscope and for the accelerometer.
 StepDensities MissedByLine(std::span<const ImuSample> samples,
                            std::size_t next) {
   const double gap_s = Seconds(samples[next - 1], samples[next]);
@@ -67,7 +68,7 @@ StepDensities MissedByLine(std::span<const ImuSample> samples,
   for (const Slope& slope : {SlopeBeyond(samples, next - 1, -1, reach_s),
                              SlopeBeyond(samples, next, 1, reach_s)}) {
     if (slope.base_s == 0) continue;
-    // The slopes are those in the middle of the gap and of the base.
+    // The slopes are those at the middle of the gap and of the base.
     const Reading second =
         (across - slope.rate) / (0.5 * (gap_s + slope.base_s));
     const double by_second = gap_s * gap_s / 12;
@@ -95,7 +96,7 @@ SampleGaps FindGaps(std::span<const ImuSample> samples) {
     shortest_s = std::min(shortest_s, step_s);
     longest_s = std::max(longest_s, step_s);
   }
-  // No need to look for the usual step, which lies in between.
+  // The usual step lies in between and need not be determined.
   if (longest_s <= kGapRatio * shortest_s) return gaps;
   std::vector<double> steps;
   for (std::size_t i = 1; i < samples.size(); ++i) {

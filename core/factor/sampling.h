@@ -1,20 +1,21 @@
-// What is not known of the readings of an IMU between its samples.
+// Uncertainty of the readings of an IMU between its samples.
 //
-// Noise comes with each sample: of a sensor that takes one every `period`, a
-// sample has the variance density^2 / period, however far its neighbours are.
-// Readings are joined by straight lines, so that a sample stands for half of
-// the steps on either side; over a step of H between steps of H_0 and H_1 the
-// integral of the noise has the variance
+// Noise is that of the samples: for a sensor with one sample every `period`, a
+// sample has the variance density^2 / period, whatever the distance of its
+// neighbours. Readings are interpolated linearly, so that a sample represents
+// half of the steps on either side; over a step of H between steps of H_0 and
+// H_1 the integral of the noise has the variance
 //   density^2 H (H + (H_0 + H_1) / 2) / (2 period),
-// which is density^2 H where samples come at equal steps.
+// which is density^2 H if all steps are equal.
 //
-// Over a gap, the signal itself is not known: a line misses its mean by about
-// -H^2 / 12 of its second derivative. That is estimated by how the slope over
-// the gap differs from those before and after it, over as much time as the gap
-// itself; the larger counts, of all axes together.
+// Over a gap, the signal itself is unknown: the error of the mean of a linear
+// interpolation is about -H^2 / 12 of the second derivative. That is estimated
+// from the difference of the slope over the gap and those before and after it,
+// each over the length of the gap; the larger of the two is used, of all axes
+// together.
 //
-// Pure, any thread; allocates nothing, but for the gaps of a segment that has
-// irregular steps.
+// Pure, callable from any thread; allocates only for the gaps of a segment that
+// has irregular steps.
 #pragma once
 
 #include <cstddef>
@@ -26,12 +27,12 @@
 
 namespace selfcal {
 
-// A step over the usual one by this factor has room for another sample: a gap.
+// A step that exceeds the usual one by this factor has room for another sample:
+// a gap.
 inline constexpr double kGapRatio = 1.6;
 
-// Samples of a segment, and how far they reach beyond an interval, that tell
-// all there is to know of it: of neighbours, of the usual step, of the signal
-// about a gap.
+// Number and time range of the samples beyond an interval that affect it: as
+// neighbours, for the usual step, and for the signal about a gap.
 inline constexpr int kSamplesBeyond = 8;
 inline constexpr std::int64_t kReachBeyond_ns = 250'000'000;
 
@@ -40,17 +41,17 @@ struct SampleGaps {
   double longest_s = 0;  // 0 without a gap
 };
 
-// Against the median step.
+// Gaps relative to the median step.
 SampleGaps FindGaps(std::span<const ImuSample> samples);
 
-// Of a step: over a part h of it, the mean error of a raw reading has the
-// variance density^2 / h, on each axis.
+// Densities of a step: over a part h of it, the mean error of a raw reading has
+// the variance density^2 / h, on each axis.
 struct StepDensities {
   double gyro = 0;   // [rad/s/sqrt(Hz)]
   double accel = 0;  // [m/s^2/sqrt(Hz)]
 };
 
-// The steps of one interval, with room for kSamplesBeyond on either side.
+// Steps of one interval, with room for kSamplesBeyond on either side.
 class Sampling {
  public:
   // The samples must outlive this.
@@ -59,8 +60,8 @@ class Sampling {
            std::int64_t t1_ns,
            const ImuNoise& noise);
 
-  // Of the step that ends with sample `next`; before the first and after the
-  // last, as of regular steps.
+  // Densities of the step that ends with sample `next`; before the first and
+  // after the last sample, those of regular steps.
   StepDensities At(std::size_t next) const {
     return regular_ ? StepDensities{noise_.gyro_noise_density,
                                     noise_.accel_noise_density}

@@ -1,6 +1,6 @@
-// What the cost functions share about the block theta: the part of the
-// calibration that a factor needs, moved by an offset from the reference, and
-// Jacobians by that offset. Internal to core/factor.
+// Common parts of the cost functions for the block theta: the part of the
+// calibration that a factor needs, at an offset from the reference, and
+// Jacobians with respect to that offset. Internal to core/factor.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,22 +10,22 @@
 
 namespace selfcal {
 
-// Turns columns that are derivatives by a rotation's right perturbation at
-// R_ref Exp(d) into derivatives by d itself.
+// Converts columns that are derivatives with respect to a rotation's right
+// perturbation at R_ref Exp(d) into derivatives with respect to d.
 template <class Columns>
 void ByRotationOffset(const double* d, Columns&& columns) {
   columns =
       (columns * RightJacobian(Eigen::Map<const Eigen::Vector3d>(d))).eval();
 }
 
-// The IMU part of the reference, at the offset that the block begins with.
+// The IMU part of the reference, at the offset at the beginning of the block.
 inline ImuCalibration OffsetImu(const ImuCalibration& reference,
                                 const double* theta) {
   const Eigen::Map<const Eigen::Matrix<double, kImuTangentSize, 1>> d(theta);
   return BoxPlus(Calibration{.imu = reference, .cameras = {}}, d).imu;
 }
 
-// One camera of the reference, at its part of the block.
+// One camera of the reference, at the offset of its part of the block.
 inline CameraCalibration OffsetCamera(const CameraCalibration& reference,
                                       const double* camera_theta) {
   const int size = CameraTangentSize(reference);

@@ -3,8 +3,8 @@
 //   p(t)   = p_0 + slow_p(S(t)) + e(t) fast_p(t)
 //   phi(t) = slow_phi(S(t)) + e(t) fast_phi(t)
 //   q(t)   = Exp(yaw(S(t)) e_z) Exp(phi(t))
-// with the envelope e and its integral S: where e is zero, all stands still,
-// and a calm body also walks slower.
+// with the envelope e and its integral S: if e is zero, the body is at rest,
+// and a calm body also walks more slowly.
 #include "core/model/so3.h"
 #include "core/simulation/envelope.h"
 #include "core/simulation/random.h"
@@ -38,9 +38,9 @@ struct Waves {
   SineSum slow_yaw;            // [rad], the first axis alone
 };
 
-// Amplitudes: the walk stays within (2.2, 1.6, 0.4) m, each fast term is given
-// by its peak acceleration or rate, so that the sum is as vigorous as stated
-// whatever frequencies are drawn.
+// Amplitudes: the walk stays within (2.2, 1.6, 0.4) m, each fast term is
+// specified by its peak acceleration or rate, so that the sum is as vigorous as
+// stated whatever frequencies are drawn.
 Waves DrawWaves(std::uint64_t seed) {
   Random random(seed, kMotionStream);
   Waves waves;

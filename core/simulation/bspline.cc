@@ -8,9 +8,9 @@
 namespace selfcal {
 namespace {
 
-// Weight of the squared third differences, in values for each knot. Small
-// against the weakest response of the basis (0.066 squared, at half the
-// frequency of the knots), so that only what the data leaves open is smoothed.
+// Weight of the squared third differences, in values for each knot. It is small
+// relative to the weakest response of the basis (0.066 squared, at half the
+// frequency of the knots), so that it only affects parts without data.
 constexpr double kSmoothing = 1e-5;
 
 // The basis functions on one knot interval, u in [0, 1]: rows are control

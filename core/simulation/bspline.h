@@ -12,16 +12,16 @@ namespace selfcal {
 
 class BSpline {
  public:
-  // Value and derivatives by time.
+  // Value and derivatives with respect to time.
   struct Sample {
     Eigen::VectorXd x, d1, d2;
   };
 
-  // Fits rows of `values` (one for each time, at least one) at times in
-  // [0, duration_s], not decreasing. Knots are about spacing_s apart, so that
-  // they divide the duration. Minimises the squared distances, plus a small
+  // Fits rows of `values` (one for each time, at least one) at times in [0,
+  // duration_s], not decreasing. Knots are about spacing_s apart, so that they
+  // divide the duration. The fit minimises the squared distances, plus a small
   // multiple of the squared third differences of the control points, which
-  // determines what the data leaves open, as in a gap.
+  // determines the spline where data is missing, as in a gap.
   BSpline(const std::vector<double>& times_s,
           const Eigen::MatrixXd& values,
           double duration_s,
@@ -34,7 +34,8 @@ class BSpline {
   static constexpr int kOrder = 6;
   using Weights = Eigen::Matrix<double, kOrder, 1>;
 
-  // First control point, and weights of it and the next for x, d1 and d2.
+  // First control point, and weights of it and the following ones for x, d1 and
+  // d2.
   struct Basis {
     Eigen::Index first;
     Weights b0, b1, b2;

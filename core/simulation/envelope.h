@@ -1,5 +1,5 @@
-// How excited a motion is over time: levels that are held and joined by quintic
-// steps, so that value, first and second derivative are continuous.
+// Excitation of a motion over time: constant levels joined by quintic steps, so
+// that value, first and second derivative are continuous.
 #pragma once
 
 #include <vector>
@@ -23,7 +23,7 @@ class Envelope {
   void Hold(double duration_s) { MoveTo(level_, duration_s); }
   void MoveTo(double level, double duration_s);
 
-  // End of the last piece; the level stays as it is there.
+  // End of the last piece; the level is constant from there on.
   double end_s() const { return end_s_; }
   // t_s >= 0.
   Sample At(double t_s) const;
@@ -34,7 +34,7 @@ class Envelope {
     double duration_s;
     double from;
     double to;
-    double integral;  // up to its begin
+    double integral;  // up to its start
   };
   std::vector<Piece> pieces_;
   double level_;

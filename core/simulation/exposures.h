@@ -1,5 +1,5 @@
-// When the images of a simulated rig are exposed, and where its body is then,
-// in truth and as its SLAM system believes.
+// Exposure times of the images of a simulated rig, and the poses of its body at
+// those times: the true ones, and those according to its SLAM system.
 #pragma once
 
 #include <vector>
@@ -15,13 +15,13 @@ namespace selfcal {
 // keyframes themselves for a camera without a time offset.
 using Exposures = std::vector<std::vector<KeyframeState>>;
 
-// What a SLAM system takes for the instant of a keyframe is later by this [s]:
-// its poses follow the images, and it believes in other time offsets. The mean
-// over the cameras.
+// Delay [s] of the instants to which the states of a SLAM system refer,
+// relative to the keyframes: its poses follow the images, and it assumes other
+// time offsets. Mean over the cameras.
 double KeyframeDelay(const Calibration& theta_true,
                      const Calibration& theta_slam);
 
-// The latest any of these are before, and after, the time of their keyframe.
+// The largest time by which any of these is before, or after, its keyframe.
 struct TimeMargins {
   double before_s = 0;
   double after_s = 0;
@@ -41,8 +41,9 @@ Exposures TrueExposures(const Calibration& theta_true,
                         const Trajectory& trajectory,
                         const ImuReadings& imu);
 
-// From the states of the SLAM system, which stand for the true ones `meant`,
-// `delay_s` after those of the keyframes, moved as the body truly moves.
+// Exposures computed from the states of the SLAM system, which estimate the
+// true states `meant`, `delay_s` after those of the keyframes; between these
+// times the body moves as in truth.
 Exposures SlamExposures(const Calibration& theta_slam,
                         const std::vector<KeyframeState>& slam_states,
                         const std::vector<KeyframeState>& meant,

@@ -9,13 +9,13 @@
 namespace selfcal {
 namespace {
 
-// How many landmarks of the map are tried before a new one is made instead.
+// Number of landmarks of the map that are tried before a new one is created.
 constexpr int kRevisitAttempts = 30;
-// Keyframes after which a landmark counts as out of sight: a track that ended
-// does not resume.
+// Number of keyframes after which a landmark is out of sight: a track that
+// ended does not resume.
 constexpr int kRevisitPause = 10;
-// A tracked landmark may come nearer, or go farther, than where new ones are
-// made, by this factor.
+// A tracked landmark may come nearer, or move farther, than the depths of new
+// ones by this factor.
 constexpr double kDepthSlack = 2;
 
 bool InsideImage(const CameraCalibration& camera, const Eigen::Vector2d& z_px) {
@@ -60,8 +60,8 @@ class Tracker {
  private:
   int cameras() const { return static_cast<int>(theta_.cameras.size()); }
 
-  // Observes the landmark again in each camera that tracks it, and ends tracks
-  // at random, at the border of the image and where the depth is left.
+  // Observes the landmarks again in each camera that tracks them, and ends
+  // tracks at random, at the border of the image and beyond the depth range.
   void Continue(int camera) {
     std::vector<int> kept;
     for (const int landmark : tracked_[camera]) {
@@ -78,8 +78,8 @@ class Tracker {
   }
 
   void Refill(int camera) {
-    // A pixel without a bearing, or a noisy one beyond the border, is no track:
-    // a bound on the attempts ends the loop in any case.
+    // A pixel without a bearing, or a noisy one beyond the border, gives no
+    // track: the limit of attempts terminates the loop in any case.
     int attempts = 4 * options_.landmarks_in_view;
     while (static_cast<int>(tracked_[camera].size()) <
                options_.landmarks_in_view &&
@@ -91,7 +91,8 @@ class Tracker {
     }
   }
 
-  // A landmark that no camera tracks any more but this one sees, or -1.
+  // Returns a landmark that no camera tracks and that this camera observes, or
+  // -1.
   int Revisit(int camera) {
     if (tracks_.landmarks_G.empty()) return -1;
     for (int attempt = 0; attempt < kRevisitAttempts; ++attempt) {
@@ -107,8 +108,8 @@ class Tracker {
     return -1;
   }
 
-  // A new landmark at a random pixel, its depth uniform in the logarithm; -1
-  // where no point projects to the pixel.
+  // Creates a landmark at a random pixel, its depth uniform in the logarithm;
+  // returns -1 if no point projects to the pixel.
   int Create(int camera) {
     const CameraCalibration& c = theta_.cameras[camera];
     const Eigen::Vector2d z_px = RandomPixel(c, &random_);
@@ -129,7 +130,7 @@ class Tracker {
     return static_cast<int>(tracks_.landmarks_G.size()) - 1;
   }
 
-  // Zero for a landmark that rests.
+  // Zero for a landmark at rest.
   Eigen::Vector3d DrawVelocity() {
     if (!moving_.Chance(options_.moving_fraction)) {
       return Eigen::Vector3d::Zero();
@@ -140,8 +141,8 @@ class Tracker {
     return options_.moving_speed_mps * Eigen::Vector3d(x, y, z).normalized();
   }
 
-  // Begins a track in this camera, and in every other one that sees the
-  // landmark and has not got enough.
+  // Begins a track in this camera, and in every other one that observes the
+  // landmark and does not have enough.
   void Begin(int camera, int landmark) {
     begun_[landmark] = keyframe_;
     for (int j = 0; j < cameras(); ++j) {
@@ -154,10 +155,10 @@ class Tracker {
     }
   }
 
-  // True pixel of a landmark; false where the camera does not see it.
+  // Computes the true pixel of a landmark. Returns false if the camera does not
+  // observe it.
   bool Sees(int camera, int landmark, Eigen::Vector2d* z_px) const {
-    return SeesPoint(
-        exposures_, camera, tracks_.landmarks_G[landmark], z_px);
+    return SeesPoint(exposures_, camera, tracks_.landmarks_G[landmark], z_px);
   }
 
   bool SeesPoint(const Exposures& exposures,
@@ -174,7 +175,8 @@ class Tracker {
            Project(c, p_C, z_px, nullptr) && InsideImage(c, *z_px);
   }
 
-  // Of the next pixel of a track, in sigmas: a random walk that forgets.
+  // Error of the next pixel of a track, in sigmas: a first-order autoregressive
+  // process.
   Eigen::Vector2d NextError(int camera, int landmark) {
     std::vector<TrackError>& errors = errors_[camera];
     if (errors.size() < begun_.size()) errors.resize(begun_.size());
@@ -190,8 +192,8 @@ class Tracker {
     return error;
   }
 
-  // Of the pixel of a point that moves in the image while the shutter is open,
-  // along its way. A point that leaves the image meanwhile is not blurred.
+  // Error of the pixel of a point that moves in the image during the exposure,
+  // along its motion. A point that leaves the image meanwhile is not blurred.
   Eigen::Vector2d BlurError(int camera,
                             const Eigen::Vector3d& p_G,
                             const Eigen::Vector2d& z_px) {
@@ -218,9 +220,8 @@ class Tracker {
     if (!SeesPoint(exposures_, camera, p_G, &observation.measured_px)) {
       return false;
     }
-    observation.measured_px +=
-        pixel_sigma_px_ * NextError(camera, landmark) +
-        BlurError(camera, p_G, observation.measured_px);
+    observation.measured_px += pixel_sigma_px_ * NextError(camera, landmark) +
+                               BlurError(camera, p_G, observation.measured_px);
     if (!InsideImage(c, observation.measured_px)) return false;
     const Eigen::Vector2d elsewhere = RandomPixel(c, &outliers_);
     if (outliers_.Chance(options_.outlier_fraction)) {
@@ -244,15 +245,16 @@ class Tracker {
   int keyframe_ = 0;
   FeatureTracks tracks_;
   struct TrackError {
-    int keyframe = -2;  // that saw it last
+    int keyframe = -2;  // of the last observation
     Eigen::Vector2d error = Eigen::Vector2d::Zero();
   };
   std::vector<std::vector<int>> tracked_;        // landmarks in each camera
-  std::vector<std::vector<TrackError>> errors_;  // of them
+  std::vector<std::vector<TrackError>> errors_;  // of these landmarks
   std::vector<int> trackers_;   // for each landmark: cameras that track it
   std::vector<int> last_seen_;  // for each landmark: keyframe, or -1
   std::vector<int> begun_;      // for each landmark: keyframe
-  std::vector<int> made_;       // for each landmark: keyframe that first saw it
+  std::vector<int>
+      made_;  // for each landmark: keyframe of its first observation
   std::vector<Eigen::Vector3d> velocities_mps_;  // for each landmark
 };
 

@@ -1,5 +1,5 @@
-// What the cameras of a rig see along a session: landmarks around the motion,
-// and tracks that begin and end as those of a feature tracker.
+// Observations of the cameras of a rig during a session: landmarks around the
+// motion, and tracks that start and end like those of a feature tracker.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,9 +25,9 @@ struct FeatureTracks {
   std::vector<FeatureObservation> observations;  // in order of the keyframes
 };
 
-// Tracks over all keyframes, given their true exposures; `closed` are those
-// when the shutter has closed, needed with options.exposure_s > 0 alone. Every
-// pixel, true and measured, lies inside the image.
+// Simulates tracks over all keyframes, given their true exposures; `closed` are
+// those at the closing of the shutter, needed only with options.exposure_s > 0.
+// Every pixel, true and measured, lies inside the image.
 FeatureTracks SimulateTracks(const Calibration& theta,
                              double pixel_sigma_px,
                              const Exposures& exposures,

@@ -6,8 +6,8 @@ namespace {
 
 CameraCalibration HandheldCamera() {
   CameraCalibration camera;
-  // The camera looks along x of the body (R_CI turns forward, left, up into
-  // right, down, forward), mounted about two degrees off.
+  // The camera looks along x of the body (R_CI rotates forward, left, up into
+  // right, down, forward), with a mounting error of about two degrees.
   Eigen::Matrix3d R_CI;
   R_CI << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   camera.q_CI = Exp({0.022, -0.013, 0.031}) * Eigen::Quaterniond(R_CI);

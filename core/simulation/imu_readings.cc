@@ -9,7 +9,7 @@
 namespace selfcal {
 namespace {
 
-// Noise-free readings and what they were made of, biases still missing.
+// Noise-free readings and the true signals, without biases.
 ImuReadings PerfectReadings(const Rig& rig,
                             const ImuCalibration& imu,
                             const Trajectory& trajectory,

@@ -1,4 +1,5 @@
-// Readings of an IMU with known intrinsics, biases and noise on a trajectory.
+// Simulates readings of an IMU with known intrinsics, biases and noise on a
+// trajectory.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +23,8 @@ struct ImuReadings {
   std::vector<Eigen::Vector3d> b_g;
 };
 
-// Samples from time 0 to the end of the trajectory. Section III-B of the paper:
+// Simulates samples from time 0 to the end of the trajectory. Section III-B of
+// the paper:
 //   w~ = T_g w + b_g + n,  a~ = T_a R_AI R_IG (a_G - g) + b_a + n,
 // with n of standard deviation density * sqrt(rate), biases random walks.
 ImuReadings SimulateImu(const Rig& rig,
@@ -30,8 +32,8 @@ ImuReadings SimulateImu(const Rig& rig,
                         const Trajectory& trajectory,
                         const SimulationOptions& options);
 
-// Of the samples of a segment, those that arrive: indices from `from` to `to`,
-// both among them.
+// Selects the samples of a segment that are not lost: indices in [from, to],
+// including both ends.
 std::vector<std::size_t> SamplesThatArrive(
     const std::vector<ImuSample>& samples,
     std::size_t from,
@@ -39,12 +41,13 @@ std::vector<std::size_t> SamplesThatArrive(
     const SimulationOptions& options,
     Random* random);
 
-// Index of the last sample at or before t_ns; the samples must reach beyond it.
+// Index of the last sample at or before t_ns; the samples must extend beyond
+// it.
 std::size_t SampleBefore(const std::vector<ImuSample>& samples,
                          std::int64_t t_ns);
 
-// The true state at t_ns: pose and velocity of the trajectory, biases linear
-// between samples. t_ns must lie within the samples.
+// True state at t_ns: pose and velocity of the trajectory, biases interpolated
+// linearly between samples. t_ns must lie within the samples.
 KeyframeState TrueState(const Trajectory& trajectory,
                         const ImuReadings& imu,
                         std::int64_t t_ns);

@@ -9,7 +9,7 @@
 namespace selfcal {
 namespace {
 
-// Each entry off by the amount, up or down.
+// Perturbs each entry by the amount, up or down.
 Eigen::Vector3d Signs(Random* random) {
   const double x = random->Sign();
   const double y = random->Sign();

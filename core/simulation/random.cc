@@ -6,7 +6,7 @@
 namespace selfcal {
 namespace {
 
-// One step of splitmix64: seeds that differ in a bit give unrelated engines.
+// One step of splitmix64: seeds that differ in one bit give unrelated engines.
 std::uint64_t Mix(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;

@@ -1,9 +1,9 @@
-// Random numbers that are the same bits for the same seed on every standard
-// library: the engine is specified by the C++ standard, its distributions are
-// not, so the few that the simulation needs are here.
+// Random numbers with the same bits for the same seed on every standard
+// library: the C++ standard specifies the engine, but not its distributions, so
+// the few that the simulation needs are implemented here.
 //
-// Each purpose draws from a stream of its own: more landmarks do not change the
-// noise of the IMU.
+// Each purpose has a separate stream: more landmarks do not change the noise of
+// the IMU.
 #pragma once
 
 #include <Eigen/Core>

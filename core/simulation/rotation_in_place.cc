@@ -18,10 +18,10 @@ namespace {
 constexpr std::uint64_t kRotationStream = 3;
 constexpr std::uint64_t kPivotStream = 4;
 
-// The derivatives, by the square of the angle, of b and c in
+// Derivatives, with respect to the square of the angle, of b and c in
 //   J_r(phi) = I - b [phi]x + c [phi]x^2,
 //   b = (1 - cos t) / t^2, c = (t - sin t) / t^3, t = |phi|:
-// b' = (db/dt) / t (phi . phi'), c' alike.
+// b' = (db/dt) / t (phi . phi'), c' likewise.
 struct JacobianTerms {
   double b, c;
   double b_slope, c_slope;  // (db/dt) / t, (dc/dt) / t
@@ -49,7 +49,7 @@ struct Rates {
   Eigen::Vector3d w, dw;
 };
 
-// Of Exp(phi(t)).
+// Rates of Exp(phi(t)).
 Rates RatesOf(const Curve& phi) {
   const Eigen::Vector3d x = phi.x;
   const Eigen::Vector3d d1 = phi.d1;
@@ -72,7 +72,7 @@ struct Waves {
 Waves DrawWaves(const RotationInPlaceOptions& options, std::uint64_t seed) {
   Random random(seed, kRotationStream);
   Waves waves;
-  // Slow turns of the whole body about the vertical.
+  // Slow rotations of the whole body about the vertical.
   waves.yaw.Add(
       0.03,
       0.08,
@@ -97,7 +97,7 @@ Waves DrawWaves(const RotationInPlaceOptions& options, std::uint64_t seed) {
   constexpr std::array<std::array<double, 2>, 3> kBands_hz = {
       {{0.3, 0.6}, {0.6, 1.2}, {1.2, 2.0}}};
   for (const auto& [low_hz, high_hz] : kBands_hz) {
-    // Three sines of this amplitude have the standard deviation asked for.
+    // Three sines of this amplitude have the requested standard deviation.
     waves.pivot.Add(
         low_hz,
         high_hz,
@@ -140,9 +140,8 @@ class RotationInPlace final : public Trajectory {
         pivot.x.matrix() + Eigen::Vector3d(0, 0, 1.5);
     motion.p_GI = pivot_G - motion.q_GI * r_I_;
     motion.v_GI = pivot.d1.matrix() - motion.q_GI * around;
-    motion.a_GI =
-        pivot.d2.matrix() -
-        motion.q_GI * (motion.w_I.cross(around) + dw.cross(r_I_));
+    motion.a_GI = pivot.d2.matrix() -
+                  motion.q_GI * (motion.w_I.cross(around) + dw.cross(r_I_));
     return motion;
   }
 

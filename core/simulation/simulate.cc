@@ -14,7 +14,7 @@
 namespace selfcal {
 namespace {
 
-// Keyframes fall between IMU samples, at times that are not quite regular.
+// Keyframes fall between IMU samples, at slightly irregular times.
 constexpr double kKeyframeOffset_s = 1.7e-3;
 constexpr double kKeyframeJitter_s = 0.4e-3;
 
@@ -36,7 +36,7 @@ std::vector<KeyframeState> TrueKeyframes(const Trajectory& trajectory,
   }
 }
 
-// All that was simulated over the session, before it is cut into segments.
+// The whole simulated session, before it is cut into segments.
 struct Recording {
   ImuReadings imu;
   std::vector<KeyframeState> truth;
@@ -45,7 +45,7 @@ struct Recording {
   std::vector<std::optional<Eigen::Vector3d>> slam_landmarks_G;
 };
 
-// Cuts segment after segment; begin and end are keyframes of the session.
+// Cuts one segment after the other; begin and end are keyframes of the session.
 class Cutter {
  public:
   Cutter(const Recording& recording, const SimulationOptions& options)
@@ -54,8 +54,8 @@ class Cutter {
         lost_samples_(options.seed, kLostSampleStream),
         local_(recording.tracks.landmarks_G.size(), kUnseen) {}
 
-  // Must be called for one segment after the other; end > begin. The IMU
-  // samples reach to the keyframe `imu_end`.
+  // Must be called for consecutive segments; end > begin. The IMU samples
+  // extend to the keyframe `imu_end`.
   void Cut(int begin,
            int end,
            int imu_end,
@@ -78,8 +78,8 @@ class Cutter {
   }
 
  private:
-  // A landmark's place in the segment that is being cut: its index, or the
-  // number of observations so far as kUnseen - n.
+  // Index of a landmark in the current segment, or kUnseen - n with the number
+  // n of observations so far.
   static constexpr int kUnseen = -1;
 
   void CutStates(int begin,
@@ -138,8 +138,8 @@ class Cutter {
   std::size_t next_observation_ = 0;
 };
 
-// Where the cameras are when the shutter has closed; nothing where it is open
-// for no time.
+// Poses of the cameras at the closing of the shutter; empty if the exposure
+// time is zero.
 Exposures ShutterClosed(const Calibration& theta_true,
                         const Recording& recording,
                         const Trajectory& trajectory,
@@ -164,8 +164,7 @@ SimulatedSession Simulate(const Rig& rig,
   recording.imu = SimulateImu(rig, theta_true.imu, trajectory, options);
   TimeMargins margins = ExposureMargins(theta_true, theta_slam);
   margins.after_s += options.exposure_s;
-  recording.truth =
-      TrueKeyframes(trajectory, recording.imu, margins, options);
+  recording.truth = TrueKeyframes(trajectory, recording.imu, margins, options);
   const int N = options.keyframes_per_segment;
   const int segments = static_cast<int>(recording.truth.size()) / N;
   recording.truth.resize(static_cast<std::size_t>(segments) * N);

@@ -1,6 +1,6 @@
-// A simulated device with known truth: sensors on a trajectory, and the
-// keyframe states as a SLAM system that runs with a wrong calibration would
-// hand them over.
+// Simulates a device with known truth: sensors on a trajectory, and the
+// keyframe states as a SLAM system with a wrong calibration would hand them
+// over.
 //
 // Deterministic: the same options and seed give the same bits. Pure functions,
 // callable from any thread.
@@ -23,70 +23,75 @@ struct SimulationOptions {
   double imu_rate_hz = 200;
   double keyframe_rate_hz = 10;
   int keyframes_per_segment = 40;
-  int landmarks_in_view = 120;  // about, for each keyframe and camera
-  // Keyframes in a row in which a landmark is seen, geometrically distributed,
-  // unless it leaves the image before, or reaches the maximum.
+  int landmarks_in_view =
+      120;  // approximate number for each keyframe and camera
+  // Mean number of consecutive keyframes that observe a landmark, geometrically
+  // distributed, unless it leaves the image before, or reaches the maximum.
   double mean_track_length = 10;
   int max_track_length = 1'000'000;
-  // Of new tracks: landmarks that were seen before, as a map finds them again.
+  // Fraction of new tracks on landmarks that were observed before, as
+  // recognised by a map.
   double revisit_fraction = 0.1;
-  double min_depth_m = 0.5;  // of a landmark where it is first seen
+  double min_depth_m = 0.5;  // of a landmark at its first observation
   double max_depth_m = 8;
   double outlier_fraction = 0;  // observations replaced by a random pixel
-  // Of new landmarks: those that move through the scene on a straight line, as
-  // what a tracker locks on that is not part of it. Truth says they rest.
+  // Fraction of new landmarks that move through the scene on a straight line,
+  // like objects that a tracker follows although they are not part of it. In
+  // the truth they are at rest.
   double moving_fraction = 0;
   double moving_speed_mps = 0.3;
-  // Of the pixel error of a track with that in the keyframe before, in [0, 1):
-  // real trackers drift, errors go together along a track.
+  // Correlation of the pixel error of a track with that in the previous
+  // keyframe, in [0, 1): real trackers drift, so that errors are correlated
+  // along a track.
   double pixel_correlation = 0;
-  // How long the shutter is open. What moves in the image meanwhile is blurred,
-  // and found with a further error along the blur of blur_error times its
+  // Exposure time. Points that move in the image during it are blurred, and
+  // detected with an additional error along the blur of blur_error times its
   // length, one standard deviation.
   double exposure_s = 0;
   double blur_error = 0.15;
-  bool noise = true;  // false: perfect sensors, biases constant
-  // IMU samples that are lost, each for itself; and the length of a gap
-  // somewhere in each segment. The first and the last of a segment are never
-  // lost.
+  bool noise = true;  // false: perfect sensors, constant biases
+  // Fraction of IMU samples that are lost independently; and the length of a
+  // gap somewhere in each segment. The first and the last sample of a segment
+  // are never lost.
   double imu_lost_fraction = 0;
   double imu_gap_s = 0;
   // Errors of the SLAM system, one standard deviation. Most of each drifts
-  // slowly, a small part is new with every keyframe.
+  // slowly, a small part is independent in every keyframe.
   double slam_rotation_rad = 2e-3;  // roll and pitch; yaw drifts 3 times as far
   double slam_position_m = 5e-3;
   double slam_velocity_mps = 1e-2;
-  double slam_accel_bias_mps2 = 2e-2;  // on top of what theta_slam gets wrong
+  double slam_accel_bias_mps2 =
+      2e-2;  // in addition to the effect of theta_slam
   double slam_gyro_bias_radps = 1e-3;
   double slam_landmark_relative = 0.02;  // of the depth, before triangulation
   Eigen::Vector3d b_a0 = {0.05, -0.08, 0.1};
   Eigen::Vector3d b_g0 = {0.004, -0.003, 0.002};
 };
 
-// A landmark with fewer observations in a segment is left out of it.
+// A landmark with fewer observations in a segment is excluded from it.
 inline constexpr int kMinSegmentObservations = 3;
 
 struct SimulatedSession {
   std::vector<MotionSegment> segments;  // as the SLAM system hands them over
   // Truth of the same segments: states, biases and landmarks, noise-free pixels
-  // (also where the segment has an outlier) and noise-free readings with the
-  // true biases. Index for index the same, down to each observation.
+  // (also for outliers of the segment) and noise-free readings with the true
+  // biases. All indices are the same, including those of observations.
   std::vector<MotionSegment> truth;
 };
 
 // Simulates a session of a rig whose true calibration is theta_true, while the
-// SLAM system believes theta_slam: its landmarks are triangulated under that
-// belief, and its biases absorb what it gets wrong on average. Noise, pixel
-// sigma and gravity are those of the rig. Images are exposed later than the
-// time of their keyframe by the true time offset of their camera; where the
-// SLAM system believes in another one, its states are those of its images
-// rather than those of the IMU.
+// SLAM system uses theta_slam: its landmarks are triangulated with that
+// calibration, and its biases absorb the mean of the resulting errors. Noise,
+// pixel sigma and gravity are those of the rig. Images are exposed later than
+// the time of their keyframe by the true time offset of their camera; if the
+// SLAM system assumes another offset, its states are those at its images rather
+// than those of the IMU.
 //
-// Segments of keyframes_per_segment fill the trajectory from its start; the
-// keyframes that are left at the end and fill no segment are left out. Times
-// count from the start of the trajectory; keyframes do not coincide with IMU
-// samples, and all exposures lie within these. theta_true and theta_slam must
-// have the same shape (SameShape); rates, depths, mean_track_length and
+// Segments of keyframes_per_segment fill the trajectory from its start;
+// remaining keyframes at the end that do not fill a segment are dropped. Times
+// are relative to the start of the trajectory; keyframes do not coincide with
+// IMU samples, and all exposures lie within these. theta_true and theta_slam
+// must have the same shape (SameShape); rates, depths, mean_track_length and
 // keyframes_per_segment must be positive.
 SimulatedSession Simulate(const Rig& rig,
                           const Calibration& theta_true,
@@ -95,9 +100,9 @@ SimulatedSession Simulate(const Rig& rig,
                           const std::string& session,
                           const SimulationOptions& options);
 
-// A hand-held device like the one of the paper: one FOV camera of 640 x 480,
-// f = 255 px, w = 0.92, IMU 200 Hz, with its noise. Its calibration is the
-// truth; the caller perturbs it to get a factory's (PerturbCalibration).
+// A hand-held device like that of the paper: one FOV camera of 640 x 480, f =
+// 255 px, w = 0.92, IMU 200 Hz, with its noise. Its calibration is the truth;
+// the caller perturbs it to get a factory calibration (PerturbCalibration).
 Rig HandheldRig(const std::string& id);
 
 // Errors of a factory calibration.
@@ -112,11 +117,11 @@ struct CalibrationError {
   double accel_rotation_rad = 0.0174533;
 };
 
-// theta with every block off by exactly the given amount, in a direction drawn
-// from the seed: rotations by the angle about a random axis; p_CI and the
-// principal point by the distance in a random direction; each scale,
-// misalignment and distortion coefficient up or down by the amount, and both
-// focal lengths of a camera together.
+// Returns theta with every block perturbed by exactly the given amount, in a
+// direction drawn from the seed: rotations by the angle about a random axis;
+// p_CI and the principal point by the distance in a random direction; each
+// scale, misalignment and distortion coefficient up or down by the amount, and
+// both focal lengths of a camera together.
 Calibration PerturbCalibration(const Calibration& theta,
                                const CalibrationError& error,
                                std::uint64_t seed);

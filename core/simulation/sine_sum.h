@@ -1,4 +1,4 @@
-// Sums of sines with exact derivatives: what analytic motions are made of.
+// Sums of sines with exact derivatives, for analytic motions.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 
 namespace selfcal {
 
-// A vector in time with its first two derivatives.
+// A vector over time with its first two derivatives.
 struct Curve {
   Eigen::Array3d x = Eigen::Array3d::Zero();
   Eigen::Array3d d1 = Eigen::Array3d::Zero();
@@ -20,8 +20,8 @@ struct Curve {
 // Sum of one sine for each axis and term.
 class SineSum {
  public:
-  // A sine on each axis: frequencies drawn from a band [Hz], phases at random.
-  // amplitude(axis, omega) gives the amplitude for a frequency [rad/s].
+  // Adds a sine on each axis: frequencies drawn from a band [Hz], random
+  // phases. amplitude(axis, omega) gives the amplitude for a frequency [rad/s].
   template <typename Amplitude>
   void Add(double low_hz, double high_hz, Amplitude amplitude, Random* random) {
     constexpr double kTwoPi = 2 * std::numbers::pi;

@@ -12,15 +12,15 @@ namespace {
 
 constexpr int kMaxIterations = 10;
 constexpr double kConverged_m = 1e-7;
-// Huber's threshold. A wrong calibration bends rays by a few pixels, which is
-// no outlier.
+// Huber's threshold. A wrong calibration changes pixels by a few pixels, which
+// is not an outlier.
 constexpr double kHuber_px = 4;
-// A landmark with a larger median residual is none.
+// A landmark with a larger median residual is rejected.
 constexpr double kMaxMedian_px = 20;
-// Standard deviation of what the map knows of the logarithm of a distance.
+// Standard deviation of the map's prior on the logarithm of a distance.
 constexpr double kRangeSigma = 0.1;
 
-// A camera at a keyframe, p_C = R_CG p_G + p_CG, and what it saw.
+// A camera at a keyframe, p_C = R_CG p_G + p_CG, and its observation.
 struct View {
   const CameraCalibration* camera;
   Eigen::Matrix3d R_CG;
@@ -45,7 +45,7 @@ struct NormalEquations {
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
 };
 
-// Adds r^2 / sigma^2 of the reprojection, weighted after Huber.
+// Adds r^2 / sigma^2 of the reprojection, with Huber's weight.
 void AddView(const View& view,
              const Eigen::Vector3d& p_G,
              double sigma_px,
@@ -62,7 +62,7 @@ void AddView(const View& view,
   sum->b -= weight * J.transpose() * r;
 }
 
-// Adds the knowledge of the distance to a_G.
+// Adds the prior on the distance to a_G.
 void AddRange(const Eigen::Vector3d& a_G,
               double range_m,
               const Eigen::Vector3d& p_G,
@@ -89,7 +89,7 @@ bool IsConsistent(const std::vector<View>& views, const Eigen::Vector3d& p_G) {
   return *middle < kMaxMedian_px;
 }
 
-// Gauss-Newton from the point that the map already had.
+// Gauss-Newton from the point of the map.
 std::optional<Eigen::Vector3d> Triangulate(const std::vector<View>& views,
                                            const Eigen::Vector3d& start_G,
                                            double sigma_px) {
@@ -103,7 +103,7 @@ std::optional<Eigen::Vector3d> Triangulate(const std::vector<View>& views,
     AddRange(a_G, range_m, p_G, &sum);
     Eigen::Vector3d step = sum.H.ldlt().solve(sum.b);
     if (!step.allFinite()) return std::nullopt;
-    // No farther than half of the distance at once: the point stays in front.
+    // A step is limited to half of the distance: the point stays in front.
     const double longest_m = 0.5 * (p_G - a_G).norm();
     if (step.norm() > longest_m) step *= longest_m / step.norm();
     p_G += step;

@@ -1,5 +1,5 @@
-// Landmarks as a SLAM system would triangulate them: from its measured pixels,
-// its own poses at the exposures and its own calibration.
+// Triangulates landmarks as a SLAM system would: from its measured pixels, its
+// own poses at the exposures and its own calibration.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,13 +14,13 @@
 
 namespace selfcal {
 
-// The point in G of each landmark of `tracks`; empty where there is none to
-// hand over: too few observations, or not consistent with most of them.
+// Returns the point in G of each landmark of `tracks`; nullopt if there is
+// none: too few observations, or not consistent with most of them.
 //
-// Minimises the robust reprojection error over all observations of the session
-// together with what a map knows of the distance from the camera that saw the
-// landmark first (true up to slam_landmark_relative, trusted to 10 %): without
-// parallax, as at rest, that alone gives the depth.
+// Minimises the robust reprojection error over all observations of the session,
+// with a prior of the map on the distance from the camera that observed the
+// landmark first (true up to slam_landmark_relative, weighted with 10 %):
+// without parallax, as at rest, only the prior determines the depth.
 std::vector<std::optional<Eigen::Vector3d>> TriangulateLandmarks(
     const Calibration& theta_slam,
     const Exposures& slam_exposures,

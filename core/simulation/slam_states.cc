@@ -17,9 +17,9 @@ constexpr double kPositionTime_s = 20;
 constexpr double kVelocityTime_s = 2;
 constexpr double kBiasTime_s = 20;
 constexpr double kYawFactor = 3;
-// Part of the standard deviation that is new with every keyframe.
+// Fraction of the standard deviation that is independent in every keyframe.
 constexpr double kJitter = 0.2;
-// A bias estimate follows the mean mismatch over this long on either side.
+// A bias estimate follows the mean error over this time on either side.
 constexpr double kBiasWindow_s = 5;
 
 // A stationary first-order Gauss-Markov process in three dimensions.
@@ -28,7 +28,7 @@ class Drift {
   Drift(const Eigen::Vector3d& sigma, double time_s)
       : sigma_(sigma), time_s_(time_s) {}
 
-  // Value dt_s after the last one, with the jitter of this instant.
+  // Value dt_s after the last one, including the jitter of this instant.
   Eigen::Vector3d Next(double dt_s, Random* random) {
     const double keep = first_ ? 0 : std::exp(-dt_s / time_s_);
     first_ = false;
@@ -45,7 +45,7 @@ class Drift {
   bool first_ = true;
 };
 
-// Running sums of the true signals, for means over any window in no time.
+// Running sums of the true signals, for means over any window in constant time.
 class WindowMean {
  public:
   WindowMean(const std::vector<ImuSample>& samples,

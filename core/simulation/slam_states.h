@@ -1,6 +1,6 @@
-// Keyframe states as a SLAM system would estimate them: near the truth, with
-// errors that drift, and with biases that absorb what its calibration gets
-// wrong.
+// Simulates keyframe states as a SLAM system would estimate them: near the
+// truth, with errors that drift, and with biases that absorb the errors of its
+// calibration.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// B-splines of position and quaternion: the position as it is, the quaternion
+// B-splines of position and quaternion: the position directly, the quaternion
 // normalised, q(t) = x / |x|, from which exactly
 //   q' = (x' - q (q . x')) / |x|,   w_I = 2 vec(q^-1 q').
 #include <fmt/format.h>
@@ -12,10 +12,11 @@
 namespace selfcal {
 namespace {
 
-// Beyond it two poses do not tell which way the body turned.
+// Beyond it the direction of rotation between two poses is ambiguous.
 constexpr double kMaxTurn_rad = 150 * std::numbers::pi / 180;
 
-// Empty if a pose can follow the one before, or why not.
+// Returns the reason why a pose cannot follow the previous one; empty if it
+// can.
 std::string CheckStep(const TimedPose& last,
                       const TimedPose& pose,
                       double max_gap_s) {
@@ -28,7 +29,7 @@ std::string CheckStep(const TimedPose& last,
   return {};
 }
 
-// Empty if the poses can be fitted, or why not.
+// Returns the reason why the poses cannot be fitted; empty if they can.
 std::string CheckPoses(const std::vector<TimedPose>& poses,
                        const SplineOptions& options) {
   if (!(options.position_knots_s > 0) || !(options.rotation_knots_s > 0)) {
@@ -109,7 +110,7 @@ std::unique_ptr<Trajectory> MakeSpline(const std::vector<TimedPose>& poses,
     const TimedPose& pose = poses[static_cast<std::size_t>(i)];
     times_s.push_back(pose.t_s - poses.front().t_s);
     positions.row(i) = pose.p_GI.transpose();
-    // q and -q are one rotation: keep to the side of the one before.
+    // q and -q are the same rotation: choose the sign of the previous one.
     if (pose.q_GI.coeffs().dot(last) < 0) {
       last = -pose.q_GI.coeffs();
     } else {

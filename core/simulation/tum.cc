@@ -14,7 +14,7 @@ namespace {
 constexpr std::string_view kBlank = " \t\r";
 constexpr std::size_t kFields = 8;
 
-// Takes the first word of *rest; empty at its end.
+// Removes the first word from *rest and returns it; empty at the end.
 std::string_view TakeWord(std::string_view* rest) {
   const std::size_t begin = rest->find_first_not_of(kBlank);
   if (begin == std::string_view::npos) {
@@ -29,7 +29,7 @@ std::string_view TakeWord(std::string_view* rest) {
   return word;
 }
 
-// Empty if the line is a pose, or why it is none.
+// Returns the reason why the line is not a pose; empty if it is one.
 std::string ParseLine(std::string_view line, TimedPose* pose) {
   std::array<double, kFields> x{};
   std::size_t count = 0;
