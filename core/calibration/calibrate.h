@@ -71,10 +71,10 @@ struct CalibrateProgress {
   double cost = 0;
   double step_sigmas = 0;  // largest component of the last step of theta
   Calibration theta = {};
-  // For each tangent component: theta minus theta_start, and its standard
-  // deviation according to the last linearisation. The standard deviation is
-  // that of the prior for directions that the data does not determine so far,
-  // and 0 for components that the rig holds fixed.
+  // Difference theta minus theta_start for each tangent component, and its
+  // standard deviation according to the last linearisation. The standard
+  // deviation is that of the prior for directions that the data does not
+  // determine so far, and 0 for components that the rig holds fixed.
   Eigen::VectorXd moved = {};
   Eigen::VectorXd sigmas = {};
 };

@@ -42,9 +42,9 @@ constexpr double kMaxRoundSigmas = 0.02;
 // Correlated pixel errors that increase the sigmas of theta by less than this
 // fraction are treated as independent.
 constexpr double kLeastTrackNoise = 0.05;
-// In units of the prior. Directions with less information from the data are
-// held constant until all others are estimated: from a poor start, the estimate
-// would move along them out of the range of the linearisation.
+// Threshold in units of the prior. Directions with less information from the
+// data are held constant until all others are estimated: from a poor start, the
+// estimate would move along them out of the range of the linearisation.
 constexpr double kWeakInformation = 100;
 
 constexpr int kMaxReweightings = 4;
@@ -413,7 +413,7 @@ class Calibrator {
     return covariance_d_.allFinite();
   }
 
-  // At a start far from the optimum all residuals are large, so that
+  // All residuals are large at a start far from the optimum, so that
   // observability is assessed without their robust weights. As weights can only
   // reduce information, this is unnecessary if everything is observed with
   // them.
@@ -539,7 +539,8 @@ class Calibrator {
     result_.rank = static_cast<int>(subspace_.estimated.cols());
     result_.held_constant = subspace_.unobserved;
     const Eigen::MatrixXd basis = TangentBasis(rig_, subspace_);
-    // As for the initial cost: without the weights for correlated tracks.
+    // Same cost function as for the initial cost: without the weights for
+    // correlated tracks.
     SetTrackNoise(1, &screening_);
     result_.final_cost =
         RoundCost(Round(basis), estimate_, screening_.landmarks);

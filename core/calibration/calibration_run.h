@@ -18,8 +18,8 @@ struct CalibrationRun {
       estimate;  // in the form that FuseEvicted needs; set if there is evidence
 };
 
-// As Calibrate(), with segments in the order of their keys, all of which are
-// used. They must outlive only the call.
+// Same as Calibrate(), with segments in the order of their keys, all of which
+// are used. They must outlive only the call.
 CalibrationRun RunCalibration(const Rig& rig,
                               const Calibration& theta_start,
                               const std::vector<const MotionSegment*>& segments,

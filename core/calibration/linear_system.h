@@ -49,7 +49,7 @@ std::vector<KeyframeChain> FindChains(const CalibrationProblem& problem);
 struct LinearPosterior {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-  // For each inertial link: its whitened residual, and the covariance of that.
+  // Whitened residual of each inertial link, and its covariance.
   std::vector<ChainStateVector> inertial;
   std::vector<ChainStateMatrix> inertial_covariance;
   // Sums over bias links, by component. The redundancy is the number of links
@@ -131,8 +131,8 @@ class LinearSystem {
     ChainElimination elimination;
     std::vector<int> landmarks;  // indices into those of the problem
     std::vector<int> tracks, track_keyframes;
-    // For each landmark, the first of its kept unknowns, or -1; and for all
-    // kept unknowns their index in the interface.
+    // The first kept unknown of each landmark, or -1; and the index in the
+    // interface of all kept unknowns.
     std::vector<int> kept_landmarks;
     std::vector<int> interface;
     // The walks into the first keyframe of the chain and out of its last: the

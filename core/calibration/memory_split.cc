@@ -17,8 +17,7 @@ namespace {
 constexpr int kLongestPart = 4;   // segments
 constexpr int kFewest = 2;        // segments on either side of a step
 constexpr int kShortestRamp = 3;  // parts
-// For a drift, the fraction of the change that is near enough to the present
-// state of the device.
+// Fraction of a drift that is near enough to the present state of the device.
 constexpr double kDrifted = 2.0 / 3;
 // A group is concerned if its test is less probable than this.
 constexpr double kConcerned = 0.01;

@@ -10,7 +10,7 @@
 
 namespace selfcal {
 
-// In the order of NoiseFactors.
+// Kinds of noise, in the order of NoiseFactors.
 enum class NoiseKind {
   kPixel,
   kGyro,

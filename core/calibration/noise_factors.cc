@@ -32,7 +32,7 @@ constexpr int kMaxHalvings = 3;
 // Converged when the next step is shorter, in standard deviations.
 constexpr double kSettledSigmas = 0.1;
 constexpr double kSettledSigmasOfGuess = 0.3;
-// For a redundancy r, the Fisher information is at most 2 r.
+// Bound: for a redundancy r, the Fisher information is at most 2 r.
 constexpr double kMayBeDetermined = 0.5 / Square(kDeterminedLogSigma);
 // The Fisher information is computed again if the logarithm of a noise scale is
 // further than kMaxDistance from where it was computed, and the redundancy of

@@ -21,10 +21,10 @@
 
 namespace selfcal {
 
-// With two observations an error along the epipolar line is unobservable.
+// Two observations leave an error along the epipolar line unobservable.
 inline constexpr std::size_t kMinTrackObservations = 3;
-// In robust standard deviations, estimated from the median of all residuals; at
-// least this many times the pixel sigma of the rig.
+// Outlier gate in robust standard deviations, estimated from the median of all
+// residuals; at least this many times the pixel sigma of the rig.
 inline constexpr double kOutlierGate = 5.0;
 // The weight of an observation predicted near the border of the image is
 // reduced between these distances [pixel sigmas], and zero below the smaller:
@@ -53,7 +53,7 @@ inline constexpr int kFreeScreenings = 10;
 struct ScreenedLandmark {
   int track = 0;  // index into CalibrationProblem::tracks
   LandmarkPlace place;
-  // In (0, 1], scales all factors of the landmark.
+  // Weight in (0, 1] of all factors of the landmark.
   double weight = 1;
   std::vector<UsedObservation> used;
 };

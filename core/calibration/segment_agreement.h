@@ -64,7 +64,7 @@ struct Contradiction {
 std::vector<Contradiction> FindContradictions(
     const std::vector<SegmentEvidence>& evidence, bool converged);
 
-// As above but before the solve, from the fit of each segment alone
+// Finds contradictions before the solve, from the fit of each segment alone
 // (ResidualStatistics::fit; 0: not measured).
 std::vector<Contradiction> FindMisfits(const std::vector<double>& fits);
 

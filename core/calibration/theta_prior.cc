@@ -30,8 +30,8 @@ ThetaPrior MarginalPrior(const Rig& rig,
   ThetaPrior prior{theta,
                    Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols())};
   if (known.empty()) return prior;
-  // In units of the rig's prior: those of the components differ by orders of
-  // magnitude.
+  // Scaled to units of the rig's prior: those of the components differ by
+  // orders of magnitude.
   const Eigen::VectorXd scale = PriorSigmas(rig)(known).cwiseInverse();
   const Eigen::MatrixXd normalised =
       scale.asDiagonal() * covariance(known, known) * scale.asDiagonal();

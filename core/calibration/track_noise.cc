@@ -11,7 +11,7 @@
 namespace selfcal {
 namespace {
 
-// With less redundancy the correlation is not measured.
+// Least redundancy with which the correlation is measured.
 constexpr int kLeastRedundancy = 100;
 
 using PoseSteps = Eigen::Matrix<double, 6, Eigen::Dynamic>;

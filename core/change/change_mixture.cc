@@ -45,8 +45,8 @@ ChangeDoubt ChangeMixture::Doubt() const {
   const double total = no_change + changed;
   doubt.probability = changed / total;
   doubt.step /= total;
-  // About the mean: a sum of squares, which stays semidefinite despite
-  // rounding.
+  // Moments about the mean are a sum of squares, which stays semidefinite
+  // despite rounding.
   doubt.covariance = no_change * doubt.step * doubt.step.transpose();
   for (const Hypothesis& one : hypotheses_) {
     const VectorXd from_mean = one.by_change * one.mean - doubt.step;

@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 // Threshold on Sigma_a + Sigma_b in units of the prior: 2 if neither has more
 // information.
 constexpr double kKnown = 1.5;
-// In sigmas: the convergence tolerance of a solver.
+// Convergence tolerance of a solver, in sigmas.
 constexpr double kTolerance = 0.05;
 
 // Removes directions of negative information, which occur since the shared

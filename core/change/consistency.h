@@ -38,7 +38,7 @@ inline constexpr double kMaxLinearisation = 1.0;  // reference sigmas
 struct KnownCalibration {
   Calibration theta;
   Eigen::MatrixXd covariance;  // D x D, tangent at theta
-  // As estimated from its segments (core/calibration/track_noise.h): the
+  // Estimated from its segments (core/calibration/track_noise.h): the
   // covariance is that for a pixel sigma scaled by this factor.
   double track_noise_factor = 1;
 };
@@ -59,7 +59,7 @@ struct GroupConsistency {
 struct OffsetInformation {
   Eigen::MatrixXd Lambda;
   Eigen::VectorXd eta;
-  // By component, the largest over the segments; empty: linearised at the
+  // Largest reach over the segments, by component; empty: linearised at the
   // active calibration.
   Eigen::VectorXd reach = {};
 

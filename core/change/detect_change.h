@@ -58,8 +58,8 @@ struct Change {
   int window = 0;        // segments of the course that found it
   std::string block;     // whose test detected it
   ConsistencyTest test;  // its test
-  // In the order of rig.groups, given the most likely course; and the names of
-  // the concerned ones.
+  // Concern of each group, in the order of rig.groups, given the most likely
+  // course; and the names of the concerned ones.
   std::vector<GroupConcern> groups;
   std::vector<std::string> concerned;  // never empty
 };

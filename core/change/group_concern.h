@@ -28,9 +28,10 @@ struct GroupConcern {
   bool concerned = false;
 };
 
-// In the order of the groups (GroupBlocks). The group that explains the change
-// best is concerned if its probability is below `level`; then each of the
-// others for which that holds with these eliminated. There may be none.
+// The result is in the order of the groups (GroupBlocks). The group that
+// explains the change best is concerned if its probability is below `level`;
+// then each of the others for which that holds with these eliminated. There may
+// be none.
 std::vector<GroupConcern> FindConcerned(
     const std::vector<ParameterBlock>& groups,
     const OffsetInformation& change,

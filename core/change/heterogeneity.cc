@@ -7,7 +7,7 @@
 namespace selfcal {
 namespace {
 
-// As everywhere: a direction is observed if the data has more information than
+// A direction is observed, as everywhere, if the data has more information than
 // the prior.
 constexpr double kObserved = 1.0;
 

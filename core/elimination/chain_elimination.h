@@ -251,10 +251,11 @@ class ChainElimination {
   std::vector<double> own_poses_;
   std::vector<int> depths_;
   std::vector<double> gram_;
-  // For each keyframe, 6 rows over its pose, landmark parameters and constant.
+  // Sums of each keyframe: 6 rows over its pose, landmark parameters and
+  // constant.
   std::vector<double> keyframe_sums_;
   int keyframe_stride_ = 0;
-  // Over landmark parameters and constant, lower triangle by columns.
+  // Sums over landmark parameters and constant, lower triangle by columns.
   std::vector<double> shared_sums_;
 
   // The front, lower triangle by columns, with room for `places_` poses.

@@ -35,7 +35,7 @@ struct State {
   Vector3<T> p_GI, v_GI, b_a, b_g;
 };
 
-// As InertialNoiseRoot: U with U U^T the covariance of the residual.
+// Same as InertialNoiseRoot: U with U U^T the covariance of the residual.
 template <typename T>
 struct NoiseRoot {
   Eigen::Matrix<T, 9, 9> motion;  // upper triangle; the lower is not set
@@ -211,8 +211,8 @@ class TransitionSolver {
     }
   }
 
-  // From a change of the residual of the motion; `turn` transforms its
-  // rotation.
+  // Change of the state that compensates u in the residual of the motion;
+  // `turn` transforms its rotation.
   Column OfNoise(const Matrix3<T>& turn, const Column& u) const {
     return Carry(turn * u.template head<3>(),
                  u.template segment<3>(kResidualVelocity),

@@ -46,7 +46,7 @@ struct Preintegration {
   Eigen::Quaterniond Delta_R = Eigen::Quaterniond::Identity();
   Eigen::Vector3d Delta_v = Eigen::Vector3d::Zero();  // [m/s]
   Eigen::Vector3d Delta_p = Eigen::Vector3d::Zero();  // [m]
-  // With respect to (b_a 3, b_g 3), and to theta_i in the order of
+  // Derivatives with respect to (b_a 3, b_g 3), and to theta_i in the order of
   // calibration.h.
   Eigen::Matrix<double, 9, 6> J_bias = Eigen::Matrix<double, 9, 6>::Zero();
   Eigen::Matrix<double, 9, 15> J_theta = Eigen::Matrix<double, 9, 15>::Zero();

@@ -17,7 +17,7 @@
 
 namespace selfcal::preintegration {
 
-// As in Preintegration.
+// The motion, with the members of Preintegration.
 template <typename T>
 struct Motion {
   Eigen::Quaternion<T> Delta_R{T(1), T(0), T(0), T(0)};
@@ -78,7 +78,7 @@ class Integrator {
     if (parts_.covariance && ++steps_ % kWalkSteps == 0) AdvanceWalk();
   }
 
-  // To be called after the last step, if a covariance is needed.
+  // Must be called after the last step if a covariance is needed.
   void Finish() {
     if (steps_ % kWalkSteps != 0) AdvanceWalk();
   }

@@ -20,14 +20,14 @@
 namespace selfcal {
 
 struct ReprojectionJacobians {
-  // With respect to the keyframe's pose (q_GI 3, p_GI 3), right perturbation.
+  // Derivative with respect to the keyframe's pose (q_GI 3, p_GI 3), right
+  // perturbation.
   Eigen::Matrix<double, 2, 6> pose;
-  // With respect to the camera's tangent (q_CI 3, p_CI 3, f 2, c 2, distortion,
-  // time offset); the derivative with respect to the offset is zero without a
-  // motion.
+  // Derivative with respect to the camera's tangent (q_CI 3, p_CI 3, f 2, c 2,
+  // distortion, time offset); zero for the time offset without a motion.
   Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 7 + kMaxIntrinsics> camera;
-  // With respect to (X, w). With w = 1 the first three columns are with respect
-  // to p_G.
+  // Derivative with respect to (X, w). If w = 1 the first three columns are
+  // with respect to p_G.
   Eigen::Matrix<double, 2, 4> landmark;
 };
 

@@ -39,7 +39,7 @@ Vector3 Turn(const double* M, const Vector3& v) {
           M[6] * v[0] + M[7] * v[1] + M[8] * v[2]};
 }
 
-// In the body and in the camera frame, both times w.
+// Transforms to the body and to the camera frame, both times w.
 Vector3 ToBody(const RunGeometry& geometry, const Batch& batch) {
   const Vector3 from_body(batch.X[0] - batch.w * geometry.p_GI[0],
                           batch.X[1] - batch.w * geometry.p_GI[1],

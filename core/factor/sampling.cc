@@ -13,7 +13,8 @@ constexpr double kSecondsPerNanosecond = 1e-9;
 // Steps that differ by less are regular: the error of their noise is below
 // this.
 constexpr double kRegular = 1.1;
-// Of an interval with more steps, only the first ones determine the usual step.
+// Limit of the steps that determine the usual step of an interval: the first
+// ones.
 constexpr std::size_t kMostSteps = 256;
 // The signal is used only up to this distance from a gap: beyond it, a
 // hand-held motion has reversed.

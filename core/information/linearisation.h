@@ -50,10 +50,10 @@ class SegmentLineariser {
                                      const ObservationOrder& order,
                                      int gauge_keyframe);
 
-  // As Eliminate, but without priors on states, and down to theta and the
-  // states of the first and the last keyframe, in this order: information about
-  // D + 30 unknowns. The position of both keyframes together and their rotation
-  // about gravity are free.
+  // Eliminates without priors on states, down to theta and the states of the
+  // first and the last keyframe, in this order: information about D + 30
+  // unknowns. The position of both keyframes together and their rotation about
+  // gravity are free.
   const LinearisedSegment& EliminateToEnds(const Rig& rig,
                                            const Calibration& theta0,
                                            const MotionSegment& segment,

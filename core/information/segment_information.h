@@ -49,7 +49,7 @@ struct GroupScore {
 // model the segment well, and its information is reduced by the square of the
 // excess.
 inline constexpr double kOrdinaryFit = 2;
-// With less redundancy, a fit is not measured.
+// Least redundancy with which a fit is measured.
 inline constexpr double kLeastFitRedundancy = 50;
 
 struct ResidualStatistics {

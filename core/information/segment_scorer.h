@@ -33,7 +33,7 @@ class SegmentScorer {
   explicit SegmentScorer(Elimination elimination)
       : elimination_(std::move(elimination)) {}
 
-  // As ScoreSegment(); *result is overwritten.
+  // Same as ScoreSegment(); *result is overwritten.
   void Score(const Rig& rig,
              const Calibration& theta0,
              const MotionSegment& segment,

@@ -138,7 +138,7 @@ void SessionChain::Eliminate(int begin, int count) {
   eta_ = std::move(rest.eta);
 }
 
-// With w the walk, theta + w is the quantity of interest from now on: its
+// Let w be the walk: theta + w is the quantity of interest from now on. Its
 // information is what remains after w, with its variances as a prior, is
 // eliminated.
 void SessionChain::Age(const Eigen::VectorXd& variances) {

@@ -55,8 +55,9 @@ struct CameraCalibration {
 
 // Derivatives of the pixel coordinates, in px per unit of the argument.
 struct ProjectionJacobians {
-  Eigen::Matrix<double, 2, 3> point;  // with respect to p_C
-  // With respect to (f_x, f_y, c_x, c_y, distortion): 2 x IntrinsicsSize().
+  Eigen::Matrix<double, 2, 3> point;  // dz / dp_C
+  // Derivative with respect to (f_x, f_y, c_x, c_y, distortion): 2 x
+  // IntrinsicsSize().
   Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, kMaxIntrinsics> intrinsics;
 };
 

@@ -79,7 +79,7 @@ class DistortionEquidistant {
     const double theta_d = d.stableNorm();
     double theta;
     if (!SolveAngle(theta_d, &theta)) return false;
-    // On the axis the ratio of the two radii is 1; computed, it would be 0/0.
+    // The ratio of the two radii is 1 on the axis; computed, it would be 0/0.
     *u = theta_d > 0 ? Eigen::Vector2d(std::tan(theta) * (d / theta_d)) : d;
     return true;
   }

@@ -90,7 +90,7 @@ std::vector<int> GroupComponents(const Rig& rig, const ParameterGroup& group);
 // Components that are estimated (not fixed), sorted.
 std::vector<int> FreeComponents(const Rig& rig);
 
-// For each camera, nonzero if its time offset is estimated.
+// Nonzero for each camera whose time offset is estimated.
 std::vector<char> EstimatedTimeOffsets(const Rig& rig);
 
 // Prior standard deviation of every tangent component, in its unit.

@@ -166,8 +166,7 @@ std::vector<Violation> Validate(const Rig& rig) {
   CheckImuNoise(rig.imu_noise, &list);
   CheckPositive("pixel_sigma_px", rig.pixel_sigma_px, &list);
   CheckPositive("gravity_mps2", rig.gravity_mps2, &list);
-  // Without a valid number of cameras there are no components for patterns to
-  // match.
+  // Patterns have no components to match unless the number of cameras is valid.
   const std::size_t cameras = rig.factory.cameras.size();
   if (cameras >= 1 && cameras <= static_cast<std::size_t>(kMaxCameras)) {
     const auto components = TangentComponents(rig.factory);

@@ -15,7 +15,8 @@ namespace selfcal {
 namespace {
 
 constexpr std::size_t kMaxSessionLength = 128;
-// About 126 years in either direction: sums and differences cannot overflow.
+// Limit of about 126 years in either direction: sums and differences cannot
+// overflow.
 constexpr std::int64_t kMaxTime_ns = 4'000'000'000'000'000'000;
 
 bool TimeInRange(std::int64_t t_ns) {
@@ -205,7 +206,7 @@ void CheckImuCover(const MotionSegment& segment,
   }
 }
 
-// For each key, returns the index of the first equal key before it, or -1.
+// Returns for each key the index of the first equal key before it, or -1.
 template <class Key>
 std::vector<std::int64_t> EarlierEquals(const std::vector<Key>& keys) {
   std::vector<std::int64_t> order(keys.size());

@@ -78,7 +78,7 @@ Eigen::Quaternion<T> Exp(const Eigen::Matrix<T, 3, 1>& phi) {
   return q;
 }
 
-// For a rotation by exactly pi both signs of q are equally short; the result is
+// Both signs of q are equally short for a rotation by exactly pi; the result is
 // the one whose first nonzero component is positive.
 template <typename T>
 Eigen::Matrix<T, 3, 1> Log(const Eigen::Quaternion<T>& q) {

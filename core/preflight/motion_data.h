@@ -23,8 +23,7 @@ struct MotionInterval {
 };
 
 struct MotionData {
-  // For each segment, the samples that are finite and later than the previous
-  // ones.
+  // Samples of each segment that are finite and later than the previous ones.
   std::vector<std::vector<ImuSample>> imu;
   std::vector<MotionInterval> intervals;
 };

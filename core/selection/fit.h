@@ -26,7 +26,7 @@ struct FitPolicy {
   double max_ratio = 3;
   // Number of newest segments of a rig that determine the median.
   int newest = 16;
-  // With fewer segments, the median is not used.
+  // Least number of segments for which the median is used.
   int min_compared = 4;
 };
 

@@ -31,7 +31,7 @@ namespace selfcal {
 
 class SharedLandmarks {
  public:
-  // For these candidates, in their order. They are referenced, not copied.
+  // The candidates are referenced, in their order, not copied.
   explicit SharedLandmarks(std::span<const Candidate* const> candidates);
 
   // I + sum_i c_i L_i over the members (indices of candidates, distinct). Its

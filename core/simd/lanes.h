@@ -121,7 +121,7 @@ void Store(Lanes<W> x, double* to) {
   __builtin_memcpy(to, &x.v, sizeof(x.v));
 }
 
-// For Transpose(): swaps the step x step off-diagonal blocks of a and b.
+// Swaps the step x step off-diagonal blocks of a and b, for Transpose().
 template <int step, int W, int... lanes>
 void SwapBlocks(Lanes<W>* a,
                 Lanes<W>* b,

@@ -17,10 +17,10 @@ class Random {
  public:
   Random(std::uint64_t seed, std::uint64_t stream);
 
-  // In [0, 1), and in [low, high).
+  // Uniform numbers in [0, 1), and in [low, high).
   double Uniform();
   double Uniform(double low, double high);
-  // In [0, size); size > 0.
+  // Uniform index in [0, size); size > 0.
   std::size_t Index(std::size_t size);
   // True with the given probability.
   bool Chance(double probability);

@@ -42,7 +42,7 @@ ScoreDifference CompareScores(const Rig& rig,
         std::max(difference.entropy_nats, std::isnan(by) ? kInfinity : by);
   }
   if (free.empty()) return difference;
-  // In units of the prior, which adds 1 in each direction.
+  // Scaled to units of the prior, which adds 1 in each direction.
   const Eigen::VectorXd unit = prior(free);
   const auto posterior = [&](const SegmentInformation& s) {
     Eigen::MatrixXd P =

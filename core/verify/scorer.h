@@ -24,10 +24,10 @@ enum class ScorerKind { kStructured, kCeres };
 // ScorerKind::kCeres and SolverKind::kCeres cannot be used.
 bool HasCeres();
 
-// As ScoreSegment(). Throws std::runtime_error, with a remedy in its message,
-// if the score cannot be computed: without Ceres, or if CHOLMOD finds the
-// normal equations not positive definite, which those of a segment without
-// observations are, up to rounding.
+// Same as ScoreSegment(). Throws std::runtime_error, with a remedy in its
+// message, if the score cannot be computed: without Ceres, or if CHOLMOD finds
+// the normal equations not positive definite, as they are up to rounding for a
+// segment without observations.
 SegmentInformation ScoreSegmentBy(ScorerKind scorer,
                                   const Rig& rig,
                                   const Calibration& theta0,
