@@ -145,7 +145,7 @@ TEST(Calibrate, TwoCamerasWithOtherDistortionModels) {
   ExpectConsistent(result, s.truth);
 }
 
-TEST(Calibrate, OutliersAreLeftOut) {
+TEST(Calibrate, OutliersAreExcluded) {
   SimulationOptions options = SmallOptions(6);
   options.outlier_fraction = 0.1;
   const Scenario s = Simulated(HandheldRig("r"), options, 5);
@@ -169,7 +169,7 @@ TEST(Calibrate, FixedComponentsStay) {
   EXPECT_EQ(result.rank, 22);
 }
 
-TEST(Calibrate, DeviceAtRestKeepsWhatItCannotKnow) {
+TEST(Calibrate, DeviceAtRestKeepsUnobservableParameters) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(8), 1);
   s.segments =
       Simulate(
@@ -187,7 +187,7 @@ TEST(Calibrate, DeviceAtRestKeepsWhatItCannotKnow) {
   }
 }
 
-TEST(Calibrate, CancelsAtOnce) {
+TEST(Calibrate, CancelsImmediately) {
   const Scenario s = Simulated(HandheldRig("r"), SmallOptions(9), 3);
   int calls = 0;
   const CalibrationResult result = Calibrate(
@@ -198,7 +198,7 @@ TEST(Calibrate, CancelsAtOnce) {
   EXPECT_EQ(calls, 3);
 }
 
-TEST(Calibrate, ProgressTellsTheWayToTheResult) {
+TEST(Calibrate, ProgressReportsTheIterationsToTheResult) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(9), 3);
   s.rig.fixed = {"imu.gyro.scale.*"};
   // At the truth: what is held at a wrong value makes segments disagree.
@@ -231,7 +231,7 @@ TEST(Calibrate, ProgressTellsTheWayToTheResult) {
 }
 
 // Weighted again, it goes on from where it is.
-TEST(Calibrate, IterationsAreCountedOnWhereNoiseIsReweighted) {
+TEST(Calibrate, IterationsContinueWhenNoiseIsReweighted) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(12), 3);
   s.rig.pixel_sigma_px *= 3;
   const auto run = [&](bool reweight, std::vector<CalibrateProgress>* told) {
@@ -258,7 +258,7 @@ TEST(Calibrate, IterationsAreCountedOnWhereNoiseIsReweighted) {
 }
 
 // The noise that a calibration was weighted with is part of its result.
-TEST(Calibrate, NoiseThatIsStatedWrongIsUsedAsItIs) {
+TEST(Calibrate, WronglyStatedNoiseIsReplacedAndReported) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(12), 3);
   s.rig.pixel_sigma_px /= 3;
   const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
@@ -269,7 +269,7 @@ TEST(Calibrate, NoiseThatIsStatedWrongIsUsedAsItIs) {
   EXPECT_NEAR(pixel.used, 3, 0.05 * 3);
 }
 
-TEST(Calibrate, InputThatCannotBeUsedSaysWhy) {
+TEST(Calibrate, UnusableInputIsReportedWithTheReason) {
   const Scenario s = Simulated(HandheldRig("r"), SmallOptions(10), 1);
   EXPECT_EQ(Calibrate(s.rig, s.rig.factory, {}).status,
             CalibrateStatus::kFailed);

@@ -73,7 +73,7 @@ class EvictedFusionTest : public ::testing::Test {
 };
 
 // The reference is a calibration on the data of all segments.
-TEST_F(EvictedFusionTest, WithWhatIsRememberedAFewSegmentsSayWhatAllDo) {
+TEST_F(EvictedFusionTest, AFewSegmentsWithRememberedOnesEqualAll) {
   ASSERT_EQ(segments_.size(), 8u);
   const CalibrationResult batch = CalibrateOn(all_, {});
   const CalibrationResult alone = CalibrateOn(kept_, {});
@@ -114,7 +114,7 @@ TEST_F(EvictedFusionTest, WithoutMemoryNothingChanges) {
 }
 
 // A quarter of a degree between two sessions, of which all data is there.
-TEST_F(EvictedFusionTest, TellsThatTheDataIsOfTwoDevices) {
+TEST_F(EvictedFusionTest, ReportsThatTheDataIsOfTwoDevices) {
   Eigen::VectorXd turn = Eigen::VectorXd::Zero(TangentSize(truth_));
   const int i =
       MatchComponents(TangentComponents(truth_), {"cam0.q_CI.x"}).at(0);
@@ -141,7 +141,7 @@ TEST_F(EvictedFusionTest, TellsThatTheDataIsOfTwoDevices) {
   EXPECT_LT(mixed.evicted.change_sigmas(i), std::sqrt(mixed.covariance(i, i)));
 }
 
-TEST_F(EvictedFusionTest, LeavesOutWhatContradictsTheData) {
+TEST_F(EvictedFusionTest, ExcludesSegmentsThatContradictTheData) {
   const CalibrationResult alone = CalibrateOn(kept_, {});
   std::vector<RememberedSegment> remembered = RememberedAt(alone.theta);
   std::vector<RememberedSegment> without = remembered;
@@ -157,7 +157,7 @@ TEST_F(EvictedFusionTest, LeavesOutWhatContradictsTheData) {
   EXPECT_TRUE((healed.covariance - clean.covariance).isZero());
 }
 
-TEST_F(EvictedFusionTest, UsesNoneWhereMostContradictTheData) {
+TEST_F(EvictedFusionTest, UsesNoneIfMostContradictTheData) {
   const CalibrationResult alone = CalibrateOn(kept_, {});
   std::vector<RememberedSegment> remembered = RememberedAt(alone.theta);
   const int size = TangentSize(truth_);
@@ -172,7 +172,7 @@ TEST_F(EvictedFusionTest, UsesNoneWhereMostContradictTheData) {
   EXPECT_EQ(result.covariance, alone.covariance);
 }
 
-TEST_F(EvictedFusionTest, UsesNothingFromTooFar) {
+TEST_F(EvictedFusionTest, IgnoresSegmentsLinearisedTooFarAway) {
   const CalibrationResult alone = CalibrateOn(kept_, {});
   const CalibrationResult result = CalibrateOn(
       kept_, RememberedAt(BoxPlus(alone.theta, 2.1 * ReferenceSigmas(rig_))));
@@ -183,7 +183,7 @@ TEST_F(EvictedFusionTest, UsesNothingFromTooFar) {
 
 // Noise in states looks like information about directions that rotation in
 // place says nothing about: what is remembered must not bring it in.
-TEST_F(EvictedFusionTest, DeterminesNothingThatTheDataDoesNot) {
+TEST_F(EvictedFusionTest, DeterminesNoDirectionThatTheDataDoesNot) {
   segments_ = Session(*MakeRotationInPlace(16.5, {.pivot_jitter_m = 0}, 5));
   ASSERT_EQ(segments_.size(), 8u);
   const CalibrationResult alone = CalibrateOn(kept_, {});
@@ -210,7 +210,7 @@ TEST_F(EvictedFusionTest, DeterminesNothingThatTheDataDoesNot) {
   EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 54.1);
 }
 
-TEST_F(EvictedFusionTest, TellsWhatHasNotTheShapeOfTheRig) {
+TEST_F(EvictedFusionTest, RejectsSegmentsOfAnotherShape) {
   std::vector<RememberedSegment> remembered = RememberedAt(rig_.factory);
   remembered[0].ends->eta.resize(5);
   const CalibrationResult result = CalibrateOn(kept_, remembered);

@@ -73,7 +73,7 @@ class EvictedInformationTest : public ::testing::Test {
   std::vector<SegmentEnds> ends_;
 };
 
-TEST_F(EvictedInformationTest, IsNothingWhereAllSegmentsHaveTheirData) {
+TEST_F(EvictedInformationTest, IsZeroIfAllSegmentsHaveTheirData) {
   SummariseAt(truth_);
   const EvictedInformation evicted =
       InformationOfEvicted(rig_, truth_, Remembered({0, 1, 2, 3, 4, 5, 6, 7}));
@@ -94,7 +94,7 @@ TEST_F(EvictedInformationTest, IsSemidefiniteWhateverHasData) {
   }
 }
 
-TEST_F(EvictedInformationTest, CountsForLessFromFarAndNothingFromTooFar) {
+TEST_F(EvictedInformationTest, HasLessWeightFromFarAndNoneFromTooFar) {
   const Eigen::VectorXd reference = ReferenceSigmas(rig_);
   const Calibration near = BoxPlus(truth_, 1.0 * reference);
   const Calibration far = BoxPlus(truth_, 2.1 * reference);
@@ -112,7 +112,7 @@ TEST_F(EvictedInformationTest, CountsForLessFromFarAndNothingFromTooFar) {
   EXPECT_EQ(from_far.left_out, 5);
 }
 
-TEST_F(EvictedInformationTest, CountsForLessWithMoreNoiseAndWithAge) {
+TEST_F(EvictedInformationTest, HasLessWeightWithMoreNoiseAndWithAge) {
   SummariseAt(truth_);
   const auto most = [&](const EvictedOptions& options) {
     return InPriorUnits(
@@ -129,7 +129,7 @@ TEST_F(EvictedInformationTest, CountsForLessWithMoreNoiseAndWithAge) {
 }
 
 // Of a segment of other data under the same key.
-TEST_F(EvictedInformationTest, CountsForLessWhereASegmentFitsBadly) {
+TEST_F(EvictedInformationTest, HasLessWeightIfASegmentFitsBadly) {
   SummariseAt(truth_);
   std::vector<JoinedSegment> all = Remembered(kept_);
   const EvictedInformation plain = InformationOfEvicted(rig_, truth_, all);
@@ -147,7 +147,7 @@ TEST_F(EvictedInformationTest, CountsForLessWhereASegmentFitsBadly) {
   EXPECT_EQ(moved(0), moved(1));
 }
 
-TEST(ReachWeight, GivesSegmentsThatErrTogetherABoundedSum) {
+TEST(ReachWeight, BoundsTheSumOfSegmentsWithACommonError) {
   EXPECT_EQ(ReachWeight(1, 0), 1);
   EXPECT_EQ(ReachWeight(1000, 0), 1);
   for (const double reach : {0.3, 1.0, 1.7}) {

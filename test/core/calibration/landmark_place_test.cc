@@ -37,7 +37,7 @@ class OneView : public ::testing::Test {
 };
 
 // However small the numbers that a homogeneous point is given by.
-TEST_F(OneView, NothingIsSeenInTheCentreOfACamera) {
+TEST_F(OneView, NothingIsObservedInTheCentreOfACamera) {
   const Eigen::Vector3d ray(0.1, -0.2, 1);
   const Eigen::Vector3d unit = ray.normalized();
   for (const double scale : {1e-6, 1.0, 1e6}) {
@@ -50,7 +50,7 @@ TEST_F(OneView, NothingIsSeenInTheCentreOfACamera) {
   }
 }
 
-TEST_F(OneView, WhatIsAtInfinityIsSeen) {
+TEST_F(OneView, APointAtInfinityIsObserved) {
   EXPECT_TRUE(Projects({0.1, -0.2, 1, 0}));
   EXPECT_FALSE(Projects({0.1, -0.2, -1, 0}));
 }

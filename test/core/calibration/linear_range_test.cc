@@ -78,7 +78,7 @@ TEST(LinearRange, TheCostOfHandHeldMotionGrowsAsClaimed) {
 
 // The data of a rotation about one axis seems to tell something of directions
 // along which the cost does not grow as that has it.
-TEST(LinearRange, WeakDirectionsOfOneAxisDoNotKeepTheirPromise) {
+TEST(LinearRange, TheCostOfWeakDirectionsOfOneAxisDoesNotGrowAsClaimed) {
   int settled = 0;
   int weak = 0;
   int refused = 0;
@@ -103,7 +103,7 @@ TEST(LinearRange, WeakDirectionsOfOneAxisDoNotKeepTheirPromise) {
   EXPECT_LE(refused, weak);
 }
 
-TEST(LinearRange, WithoutWeakOnesNothingMoreIsHeld) {
+TEST(LinearRange, WithoutWeakDirectionsNoMoreAreHeld) {
   const Simulated simulated(MotionKind::kOneAxis, 1);
   const LinearRange range = simulated.Range();
   ASSERT_TRUE(range.settled());

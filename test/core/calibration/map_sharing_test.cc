@@ -54,8 +54,8 @@ TEST(MapSharing, ATrackWithoutHolesStaysWhole) {
 }
 
 TEST(MapSharing, APieceBeginsWhereALandmarkWasLostForLongerThanTheLimit) {
-  const SharedMap map = Share({TrackOf(1, {0, 1, 11, 12}),
-                               TrackOf(2, {0, 1, 12, 13, 14, 25})});
+  const SharedMap map =
+      Share({TrackOf(1, {0, 1, 11, 12}), TrackOf(2, {0, 1, 12, 13, 14, 25})});
   ASSERT_EQ(map.tracks.size(), 2u);
   EXPECT_TRUE(map.tracks[0].later_pieces.empty());
   EXPECT_EQ(map.tracks[1].later_pieces, (std::vector<int>{2, 5}));
@@ -67,7 +67,7 @@ TEST(MapSharing, APieceIsNoLongerThanTheLimit) {
   EXPECT_EQ(map.tracks[0].later_pieces, (std::vector<int>{80, 160}));
 }
 
-TEST(MapSharing, WhereAnotherChainBeginsAPieceBegins) {
+TEST(MapSharing, APieceBeginsWhereAnotherChainBegins) {
   const SharedMap map =
       Share({TrackOf(1, {8, 9, 10, 11, 30})}, {}, {0, 10, 20}, 0);
   ASSERT_EQ(map.tracks.size(), 1u);
@@ -92,7 +92,7 @@ TEST(MapSharing, ThoseWithTheMostPiecesStayConnected) {
   EXPECT_EQ(map.tracks.size(), 10u + 30u * 2u);
 }
 
-TEST(MapSharing, ChainsConnectedByTooLittleShareNothing) {
+TEST(MapSharing, ChainsWithTooFewConnectionsShareNothing) {
   // Ten landmarks connect the third chain with the others, of which 40 connect
   // the first two.
   std::vector<Track> tracks;
@@ -102,8 +102,7 @@ TEST(MapSharing, ChainsConnectedByTooLittleShareNothing) {
   for (int id = 40; id < 50; ++id) {
     tracks.push_back(TrackOf(id, Both(Range(40, 44), Range(80, 84))));
   }
-  const SharedMap map =
-      Share(std::move(tracks), {.of_chain = 30}, {0, 40, 80});
+  const SharedMap map = Share(std::move(tracks), {.of_chain = 30}, {0, 40, 80});
   EXPECT_EQ(map.connected, (std::vector<std::vector<int>>{{0, 1}, {2}}));
   int connected = 0;
   for (const Track& track : map.tracks) {

@@ -98,7 +98,7 @@ std::vector<Eigen::Index> Estimated(const Estimate& estimate) {
 // One landmark more or less survives screening where tracks are others.
 constexpr double kScreening = 0.05;
 
-TEST(MapSolution, AgreesWithTheDenseOneByWhatItLeavesOut) {
+TEST(MapSolution, DiffersFromTheDenseOneByWhatItDiscards) {
   const Rig rig = HandheldRig("r");
   double log_ratios = 0, squares = 0;
   int components = 0;

@@ -56,7 +56,7 @@ TEST_F(MemorySplitTest, OneDeviceDoesNotDiffer) {
 }
 
 // By a fifth of a degree.
-TEST_F(MemorySplitTest, ATurnedCameraDiffersAndIsNamed) {
+TEST_F(MemorySplitTest, ARotatedCameraIsDetectedAndNamed) {
   Calibration turned = rig_.factory;
   turned.cameras[0].q_CI = turned.cameras[0].q_CI *
                            Eigen::Quaterniond(Eigen::AngleAxisd(
@@ -80,7 +80,7 @@ double Largest(const Eigen::VectorXd& step, const Rig& rig) {
   return step.cwiseAbs().cwiseQuotient(PriorSigmas(rig)).maxCoeff();
 }
 
-TEST_F(MemorySplitTest, WithoutAChangeLittleIsLeftOpen) {
+TEST_F(MemorySplitTest, WithoutAChangeLittleDoubtRemains) {
   AddSession("one", rig_.factory, 1);
   AddSession("two", rig_.factory, 101);
   const auto doubt = FindAll().doubt;
@@ -90,7 +90,7 @@ TEST_F(MemorySplitTest, WithoutAChangeLittleIsLeftOpen) {
 }
 
 // The estimate of all segments lies between the two.
-TEST_F(MemorySplitTest, TheMeanFollowsATurnedCamera) {
+TEST_F(MemorySplitTest, TheMeanFollowsARotatedCamera) {
   const int q =
       MatchComponents(TangentComponents(rig_.factory), {"cam0.q_CI.y"}).at(0);
   Eigen::VectorXd turn = Eigen::VectorXd::Zero(TangentSize(rig_.factory));
@@ -105,7 +105,7 @@ TEST_F(MemorySplitTest, TheMeanFollowsATurnedCamera) {
 }
 
 // A tenth of a pixel in all shows in no test.
-TEST_F(MemorySplitTest, WhatHasChangedIsExpectedToGoOn) {
+TEST_F(MemorySplitTest, GroupsThatHaveChangedAreExpectedToContinue) {
   Calibration zoomed = rig_.factory;
   zoomed.cameras[0].f.array() += 0.1;
   AddSession("one", rig_.factory, 3);
@@ -125,7 +125,7 @@ TEST_F(MemorySplitTest, WhatHasChangedIsExpectedToGoOn) {
 }
 
 // It stands out, but not once it is left out.
-TEST_F(MemorySplitTest, OneBadSegmentIsNoSureSplit) {
+TEST_F(MemorySplitTest, OneBadSegmentIsNoCertainSplit) {
   AddSession("one", rig_.factory, 1);
   AddSession("two", rig_.factory, 101);
   const int i =
@@ -137,7 +137,7 @@ TEST_F(MemorySplitTest, OneBadSegmentIsNoSureSplit) {
   EXPECT_GT(split.without_one, 1e-3);
 }
 
-TEST_F(MemorySplitTest, OfFewSegmentsNothingIsTested) {
+TEST_F(MemorySplitTest, TooFewSegmentsAreNotTested) {
   AddSession("one", rig_.factory, 1);
   ends_.resize(3);
   EXPECT_EQ(Find().probability, 1);

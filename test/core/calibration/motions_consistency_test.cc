@@ -91,7 +91,7 @@ INSTANTIATE_TEST_SUITE_P(All,
 
 // The same device with images of twice the resolution: what is in pixels has
 // other numbers.
-TEST(MotionsInOtherUnits, WhatIsHeldDoesNotDependOnTheUnitOfPixels) {
+TEST(MotionsInOtherUnits, HeldDirectionsDoNotDependOnTheUnitOfPixels) {
   const Device device = SimulatedDevice(MotionKind::kPlanar, 2);
   Device finer = device;
   const auto scale = [](Calibration* theta) {

@@ -19,7 +19,7 @@ TEST(NoiseFactor, NamesFindTheirKinds) {
   EXPECT_FALSE(FindNoiseKind("voxel").has_value());
 }
 
-TEST(NoiseFactor, EachKindScalesANoiseOfItsOwn) {
+TEST(NoiseFactor, EachKindScalesItsOwnNoise) {
   const Rig before = HandheldRig("r");
   Rig rig = before;
   for (int i = 0; i < kNoiseKinds; ++i) {
@@ -31,7 +31,7 @@ TEST(NoiseFactor, EachKindScalesANoiseOfItsOwn) {
   }
 }
 
-TEST(Reweight, TakesWhatIsDeterminedOrFarOff) {
+TEST(Reweight, AppliesScalesThatAreDeterminedOrFarOff) {
   const Rig rig = HandheldRig("r");
   const auto next = Reweight(rig,
                              rig,
@@ -53,7 +53,7 @@ TEST(Reweight, TakesWhatIsDeterminedOrFarOff) {
             rig.imu_noise.accel_bias_random_walk);
 }
 
-TEST(Reweight, EndsWhereNothingIsFarOff) {
+TEST(Reweight, ReturnsNothingIfNoScaleIsFarOff) {
   const Rig rig = HandheldRig("r");
   EXPECT_FALSE(Reweight(rig, rig, {{NoiseKind::kGyro, 1.04, 0.01}}));
   EXPECT_FALSE(Reweight(rig, rig, {{NoiseKind::kGyro, 2, 0.8}}));
@@ -61,7 +61,7 @@ TEST(Reweight, EndsWhereNothingIsFarOff) {
   EXPECT_TRUE(Reweight(rig, rig, {{NoiseKind::kGyro, 0.7, 0.01}}));
 }
 
-TEST(Reweight, StaysWithinBoundsOfWhatIsStated) {
+TEST(Reweight, StaysWithinBoundsOfTheStatedNoise) {
   const Rig rig = HandheldRig("r");
   std::optional<Rig> taken = rig;
   for (int i = 0; i < 2; ++i) {

@@ -42,7 +42,7 @@ void ExpectFound(const std::vector<NoiseKind>& kinds, double off) {
   }
 }
 
-TEST(NoiseFactors, AreOneWhereTheRigIsRight) { ExpectFound({}, 1); }
+TEST(NoiseFactors, AreOneIfTheRigIsRight) { ExpectFound({}, 1); }
 
 TEST(NoiseFactors, AFactorOfThreeOfThePixelsIsFound) {
   ExpectFound({NoiseKind::kPixel}, 3);
@@ -66,7 +66,7 @@ TEST(NoiseFactors, AFactorOfThreeOfAllIsFound) {
   ExpectFound(all, 1.0 / 3);
 }
 
-TEST(NoiseFactors, ReweightingTakesWhatIsDetermined) {
+TEST(NoiseFactors, ReweightingAppliesDeterminedScales) {
   const Rig truth = NoisyRig();
   const std::vector<MotionSegment> segments = Walk(truth, 2, 40, 80, 5);
   Rig believed = truth;
@@ -91,7 +91,7 @@ TEST(NoiseFactors, ReweightingTakesWhatIsDetermined) {
   }
 }
 
-TEST(NoiseFactors, WhatTheDataDoesNotTellIsSaid) {
+TEST(NoiseFactors, UndeterminedScalesAreReported) {
   const Rig rig = HandheldRig("r");
   const CalibrationResult result =
       CalibrateBelieving(rig, Walk(rig, 2, 40, 100, 4));

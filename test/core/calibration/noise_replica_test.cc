@@ -75,7 +75,7 @@ TEST(FindSpurious, NamesDirectionsOfWhichInformationDoubles) {
 // The scale of the scene, and with it the lever arm of the camera, is not in a
 // rotation about the IMU: without the test it was claimed to a few centimetres
 // and off by decimetres.
-TEST(Spurious, ARotationAboutTheImuDoesNotShowTheLeverArm) {
+TEST(Spurious, ARotationAboutTheImuDoesNotObserveTheLeverArm) {
   for (int seed = 1; seed <= 2; ++seed) {
     const Device device = Simulated(MotionKind::kRotationOnly, seed, 12.5);
     const CalibrationResult result =
@@ -95,7 +95,7 @@ TEST(Spurious, ARotationAboutTheImuDoesNotShowTheLeverArm) {
   }
 }
 
-TEST(Spurious, NothingIsHeldOfWhatACarriedDeviceShows) {
+TEST(Spurious, NoDirectionOfACarriedDeviceIsHeld) {
   const Device device = Simulated(MotionKind::kHandheld, 2, 16.5);
   const CalibrationResult result =
       Calibrate(device.rig, device.rig.factory, device.segments);

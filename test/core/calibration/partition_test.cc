@@ -96,7 +96,7 @@ TEST(Partition, LandmarksWithoutAnObservationDoNotCount) {
             (Sets{{0}, {1}}));
 }
 
-TEST(Partition, CountsWhatAWholePartitionSees) {
+TEST(Partition, CountsLandmarksOfAWholePartition) {
   // The last shares 10 with each of the others, which are joined: 20 together.
   std::vector<std::uint64_t> both = IdRange(0, 10);
   const std::vector<std::uint64_t> more = IdRange(100, 110);

@@ -24,7 +24,7 @@ std::vector<MotionSegment> FourSegments() {
           HandMadeSegment("b", 0, 0, 0.4, IdRange(0, 3))};
 }
 
-TEST(Problem, GaugeIsCarriedByTheFirstKeyframeOfEachPartition) {
+TEST(Problem, GaugeIsHeldByTheFirstKeyframeOfEachPartition) {
   const std::vector<MotionSegment> segments = FourSegments();
   const CalibrationProblem problem = Flatten(segments);
   EXPECT_EQ(problem.keyframes.size(), 16u);
@@ -47,9 +47,8 @@ MotionSegment Passing(MotionSegment segment, double step_m) {
 
 // Two of one session with 20 landmarks in common.
 std::vector<MotionSegment> TwoSegments(double step_m) {
-  return {
-      Passing(HandMadeSegment("a", 0, 0, 0.4, IdRange(0, 20)), step_m),
-      Passing(HandMadeSegment("a", 7, 5.0, 5.4, IdRange(0, 20)), step_m)};
+  return {Passing(HandMadeSegment("a", 0, 0, 0.4, IdRange(0, 20)), step_m),
+          Passing(HandMadeSegment("a", 7, 5.0, 5.4, IdRange(0, 20)), step_m)};
 }
 
 TEST(Problem, MergedPartitionsHaveOneGaugeButTwoChains) {

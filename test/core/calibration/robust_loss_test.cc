@@ -42,7 +42,7 @@ TEST(RobustLoss, CurvatureIsTheDerivativeOfTheGradient) {
   }
 }
 
-TEST(RobustLoss, SmallResidualsCountFully) {
+TEST(RobustLoss, SmallResidualsHaveFullWeight) {
   for (const RobustLoss& loss : kLosses) {
     EXPECT_NEAR(loss.Weight(1e-9), 1, 1e-8);
     EXPECT_NEAR(loss.Value(1e-9), 1e-9, 1e-17);

@@ -52,7 +52,7 @@ void VisitUsed(const ScreenedSession& session, const Visitor& visit) {
 
 // Pixels beyond the border are not seen: of what is predicted near it, only
 // what noise moved inwards is there.
-TEST(Screening, WhatIsUsedAtTheBorderDoesNotLeanInwards) {
+TEST(Screening, ObservationsUsedAtTheBorderAreNotBiasedInwards) {
   constexpr double kNear = 6;
   int near = 0;
   double sum = 0;

@@ -101,7 +101,7 @@ TEST(Contradictions, OneReadingOfTheGyroscopeAtTheEndOfItsRange) {
   ExpectOnlyTheWrongOneIsLeftOut(session, "residuals");
 }
 
-TEST(Contradictions, StampsThatAreOffByTenMilliseconds) {
+TEST(Contradictions, TimestampsThatAreOffByTenMilliseconds) {
   Session session = Simulated(3);
   for (ImuSample& sample : session.segments[kWrong].imu) {
     sample.t_ns += 10'000'000;
@@ -126,7 +126,7 @@ TEST(Contradictions, ASegmentOfAnotherDevice) {
   ExpectOnlyTheWrongOneIsLeftOut(session, "contradicts");
 }
 
-TEST(Contradictions, AreFoundWhereTheyKeepItFromConverging) {
+TEST(Contradictions, AreFoundWhenTheyPreventConvergence) {
   Session session = Simulated(4);
   session.segments[kWrong] = Simulated(4, 77).segments[kWrong];
   CalibrateOptions options;
@@ -180,7 +180,7 @@ TEST(Agreement, HasTheChiSquareDistribution) {
   EXPECT_NEAR(halves, 5, 0.6);
 }
 
-TEST(Agreement, HalvesThatDifferAreSeen) {
+TEST(Agreement, HalvesThatDifferAreDetected) {
   std::mt19937 random(2);
   std::vector<SegmentEvidence> evidence;
   for (int i = 0; i < 8; ++i)
@@ -202,7 +202,7 @@ TEST(Agreement, AMinorityThatIsOffIsNamed) {
   EXPECT_EQ(found, (std::vector<int>{3, 7}));
 }
 
-TEST(Agreement, LargeResidualsCountAtAMinimumAlone) {
+TEST(Agreement, LargeResidualsCountOnlyAtAMinimum) {
   std::mt19937 random(4);
   std::vector<SegmentEvidence> evidence;
   for (int i = 0; i < 10; ++i) {
@@ -215,7 +215,7 @@ TEST(Agreement, LargeResidualsCountAtAMinimumAlone) {
   EXPECT_EQ(found[0].segment, 3);
 }
 
-TEST(Misfits, AreMeasuredByWhatIsUsual) {
+TEST(Misfits, AreMeasuredRelativeToTypicalFits) {
   // Noise that is stated too small raises all alike.
   EXPECT_TRUE(FindMisfits({10, 11, 9, 12, 10}).empty());
   const auto found = FindMisfits({1, 1.1, 4, 0.9, 1});

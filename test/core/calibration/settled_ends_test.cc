@@ -65,7 +65,7 @@ class SettledEndsTest : public ::testing::Test {
   MotionSegment segment_;
 };
 
-TEST_F(SettledEndsTest, SaysTheSameWhereverTheStatesWere) {
+TEST_F(SettledEndsTest, IsTheSameWhateverTheInitialStates) {
   for (const double factor : {0.7, 1 / 0.7}) {
     const MotionSegment scaled = Scaled(factor);
     EXPECT_GT(Distance(segment_, scaled), 0.5) << factor;
@@ -76,7 +76,7 @@ TEST_F(SettledEndsTest, SaysTheSameWhereverTheStatesWere) {
   }
 }
 
-TEST_F(SettledEndsTest, WhatIsAtItsMinimumStays) {
+TEST_F(SettledEndsTest, ASegmentAtItsMinimumDoesNotChange) {
   const MotionSegment settled = SettleSegment(rig_, truth_, segment_);
   EXPECT_LT(Distance(settled, SettleSegment(rig_, truth_, settled)), 0.02);
 }
@@ -97,7 +97,7 @@ TEST_F(SettledEndsTest, OnlyStatesThatAreFarOffAreSettled) {
   }
 }
 
-TEST_F(SettledEndsTest, TheDataIsWhatItWas) {
+TEST_F(SettledEndsTest, TheDataIsUnchanged) {
   const MotionSegment settled = SettleSegment(rig_, truth_, Scaled(0.7));
   EXPECT_EQ(settled.key, segment_.key);
   EXPECT_EQ(settled.imu.size(), segment_.imu.size());

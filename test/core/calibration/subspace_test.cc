@@ -47,7 +47,7 @@ std::vector<std::string> Words(const ThetaSubspace& subspace) {
   return words;
 }
 
-TEST(Subspace, WhatIsHeldDoesNotDependOnTheScaleOfUnits) {
+TEST(Subspace, HeldDirectionsDoNotDependOnTheScaleOfUnits) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> exponent(-30, 30);
   for (int i = 0; i < 20; ++i) {
@@ -76,7 +76,7 @@ TEST(Subspace, WhatIsHeldDoesNotDependOnTheScaleOfUnits) {
   }
 }
 
-TEST(Subspace, HoldsTheGivenDirectionsAndWhatSaysLess) {
+TEST(Subspace, HoldsTheGivenDirectionsAndThoseWithLessInformation) {
   std::mt19937 random(2);
   const Rig rig = HandheldRig("simulated");
   const Eigen::MatrixXd Lambda =

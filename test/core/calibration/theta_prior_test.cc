@@ -94,7 +94,7 @@ TEST_F(CalibrateWithPrior, AddsUpToTheCalibrationOnAllSegments) {
   EXPECT_LT((ratio.sqrt() - 1).abs().maxCoeff(), 0.05);
 }
 
-TEST_F(CalibrateWithPrior, KnowsNothingOfTheOtherComponents) {
+TEST_F(CalibrateWithPrior, HasNoInformationAboutTheOtherComponents) {
   // A camera that has turned since the prior was taken, by 60 of its sigmas.
   Calibration before = truth_;
   before.cameras[0].q_CI =
@@ -137,7 +137,7 @@ TEST_F(CalibrateWithPrior, NothingIsHeldUnderTheFactorysPrior) {
   EXPECT_EQ(result.rank, static_cast<int>(FreeComponents(rig_).size()));
 }
 
-TEST_F(CalibrateWithPrior, APriorOfAnotherShapeIsRefused) {
+TEST_F(CalibrateWithPrior, APriorOfAnotherShapeIsRejected) {
   CalibrateOptions options;
   options.prior = FactoryPrior(rig_);
   options.prior->information.conservativeResize(15, 15);

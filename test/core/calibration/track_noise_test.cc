@@ -42,7 +42,7 @@ Outcome CalibrateDevice(std::uint64_t seed,
   return outcome;
 }
 
-TEST(TrackNoise, IndependentErrorsAreLeftAlone) {
+TEST(TrackNoise, IndependentErrorsAreNotScaled) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     const CalibrationResult result = CalibrateDevice(seed, 0, 1, {}).result;
     ASSERT_EQ(result.status, CalibrateStatus::kConverged);
@@ -58,7 +58,7 @@ double SigmaRatio(const CalibrationResult& a, const CalibrationResult& b) {
   return std::exp(0.5 * ratios.log().mean());
 }
 
-TEST(TrackNoise, SigmasStayHonestWhenThePixelSigmaIsTooSmall) {
+TEST(TrackNoise, SigmasAreConsistentWhenThePixelSigmaIsTooSmall) {
   for (const LossKind loss :
        {LossKind::kNone, LossKind::kHuber, LossKind::kCauchy}) {
     CalibrateOptions options;
@@ -82,7 +82,7 @@ TEST(TrackNoise, SigmasStayHonestWhenThePixelSigmaIsTooSmall) {
   }
 }
 
-TEST(TrackNoise, SigmasStayHonestWhenTracksDrift) {
+TEST(TrackNoise, SigmasAreConsistentWhenTracksDrift) {
   constexpr int kSeeds = 6;
   double with = 0, without = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {

@@ -49,7 +49,7 @@ TEST_F(AgedTest, IsThatOfARandomWalk) {
   EXPECT_NEAR(more / (squares / kWalks), 1, 4 * std::sqrt(2.0 / kWalks));
 }
 
-TEST_F(AgedTest, WhatIsHeldFixedOrDoesNotWalkStaysAsCertain) {
+TEST_F(AgedTest, FixedAndConstantComponentsStayAsCertain) {
   const Eigen::MatrixXd aged =
       AgedCovariance(rig_, densities_, covariance_, 1000);
   const auto components = TangentComponents(rig_.factory);

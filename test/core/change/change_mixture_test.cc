@@ -67,7 +67,7 @@ TEST_F(ChangeMixtureTest, IsCalibratedOverItsPrior) {
   EXPECT_NEAR(nees / kDevices, 3, 0.1);
 }
 
-TEST_F(ChangeMixtureTest, OfTwoCoursesTheOneThatIsSeenCounts) {
+TEST_F(ChangeMixtureTest, TheMoreLikelyOfTwoCoursesDominates) {
   const MatrixXd L = MatrixXd::Constant(1, 1, 1e4);
   ChangeMixture mixture;
   // Eight sigmas of the one, half a sigma of the other.
@@ -82,7 +82,7 @@ TEST_F(ChangeMixtureTest, OfTwoCoursesTheOneThatIsSeenCounts) {
   EXPECT_LT(std::abs(doubt.step(1)), 1e-5);
 }
 
-TEST_F(ChangeMixtureTest, WithoutInformationThePriorStays) {
+TEST_F(ChangeMixtureTest, WithoutInformationThePriorRemains) {
   ChangeMixture mixture;
   mixture.Add(
       MatrixXd::Zero(1, 1), VectorXd::Zero(1), MatrixXd::Identity(1, 1), 0.25);

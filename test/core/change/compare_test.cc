@@ -51,7 +51,7 @@ class CompareTest : public ::testing::Test {
   std::vector<SegmentInformation> segments_;
 };
 
-TEST_F(CompareTest, SigmasAddWhereNothingIsShared) {
+TEST_F(CompareTest, SigmasAddIfNothingIsShared) {
   Draw();
   const KnownCalibration a = Estimate(0, 4);
   const KnownCalibration b = Estimate(4, 8);
@@ -64,7 +64,7 @@ TEST_F(CompareTest, SigmasAddWhereNothingIsShared) {
   EXPECT_EQ(compared.difference, BoxMinus(b.theta, a.theta));
 }
 
-TEST_F(CompareTest, VarianceIsTheDifferenceWhereOneHasAllOfTheOther) {
+TEST_F(CompareTest, VarianceIsTheDifferenceIfOneHasAllOfTheOther) {
   Draw();
   const KnownCalibration a = Estimate(0, 4);
   const KnownCalibration b = Estimate(0, 8);

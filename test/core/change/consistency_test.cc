@@ -118,7 +118,7 @@ TEST_F(ConsistencyTesterTest, TakesASegmentToTheActiveCalibration) {
 
 // Noise in the states of the SLAM system that looks like motion: it claims that
 // theta is where the segment was linearised, however that is.
-TEST_F(ConsistencyTesterTest, DoesNotBelieveThatThetaIsWhereItWasLinearised) {
+TEST_F(ConsistencyTesterTest, DoesNotTreatTheLinearisationPointAsEvidence) {
   const ConsistencyTester exact(rig_, FactoryKnownTo(rig_, 1e-4));
   const Eigen::VectorXd moved = 0.9 * random_.Direction(rig_);
   SegmentInformation claims =
@@ -133,7 +133,7 @@ TEST_F(ConsistencyTesterTest, DoesNotBelieveThatThetaIsWhereItWasLinearised) {
 
 // The covariance of a calibration is that with the noise it found: only what
 // segments say is taken for less sure.
-TEST_F(ConsistencyTesterTest, TakesSegmentsForAsNoisyAsTheCalibrationFound) {
+TEST_F(ConsistencyTesterTest, TreatsSegmentsAsNoisyAsTheCalibrationFound) {
   KnownCalibration noisy = FactoryKnownTo(rig_, 0);
   const ConsistencyTester exact(rig_, noisy);
   noisy.track_noise_factor = 2;
@@ -177,7 +177,7 @@ TEST_F(ConsistencyTesterTest, IsChiSquareDistributedWithSegmentsThatNoisy) {
   EXPECT_NEAR(sum, degrees, 4 * std::sqrt(2.0 * degrees));
 }
 
-TEST_F(ConsistencyTesterTest, LeavesOutWhatTheRigHoldsFixed) {
+TEST_F(ConsistencyTesterTest, IgnoresComponentsThatTheRigHoldsFixed) {
   Rig rig = rig_;
   rig.fixed = {"cam0.*"};
   const ConsistencyTester tester(rig, active_);
@@ -189,7 +189,7 @@ TEST_F(ConsistencyTesterTest, LeavesOutWhatTheRigHoldsFixed) {
   EXPECT_LT(test.statistic, 100);
 }
 
-TEST_F(ConsistencyTesterTest, RefusesWhatItCannotTest) {
+TEST_F(ConsistencyTesterTest, RejectsSegmentsThatItCannotTest) {
   const SegmentInformation good = random_.Segment(rig_, rig_.factory, zero_);
   EXPECT_TRUE(tester_.Accepts(good));
 

@@ -91,7 +91,7 @@ TEST_F(DetectChangeTest, TwoSegmentsAfterAShockAreOne) {
   ASSERT_EQ(change->groups.size(), rig_.groups.size());
 }
 
-TEST_F(DetectChangeTest, TellsWhichSegmentsCameAfterIt) {
+TEST_F(DetectChangeTest, ReportsTheSegmentsAfterIt) {
   for (int trial = 0; trial < 20; ++trial) {
     newest_.clear();
     Many(10, zero_);
@@ -104,7 +104,7 @@ TEST_F(DetectChangeTest, TellsWhichSegmentsCameAfterIt) {
   }
 }
 
-TEST_F(DetectChangeTest, FindsADriftThatNoSegmentShowsAlone) {
+TEST_F(DetectChangeTest, FindsADriftThatNoSingleSegmentReveals) {
   int found = 0;
   int drifts = 0;
   for (int trial = 0; trial < 10; ++trial) {
@@ -144,7 +144,7 @@ TEST_F(DetectChangeTest, FindsASmallChangeOfFewParameters) {
   EXPECT_GE(found, 8);
 }
 
-TEST_F(DetectChangeTest, BelievesSegmentsAsFarAsTheyAgree) {
+TEST_F(DetectChangeTest, TrustsSegmentsAsFarAsTheyAgree) {
   // Each is off by something of its own, ten times what it claims.
   for (int i = 0; i < 40; ++i) {
     Next(10 * random_.Direction(rig_));
@@ -154,7 +154,7 @@ TEST_F(DetectChangeTest, BelievesSegmentsAsFarAsTheyAgree) {
 
 // Segments of an earlier version whose information is noise taken for motion:
 // they claim that theta is what that version had it.
-TEST_F(DetectChangeTest, ClaimsFromElsewhereAreNoChange) {
+TEST_F(DetectChangeTest, SegmentsLinearisedElsewhereAreNoChange) {
   Many(8, zero_);
   const Calibration elsewhere =
       BoxPlus(rig_.factory, 0.9 * random_.Direction(rig_));
@@ -171,7 +171,8 @@ TEST_F(DetectChangeTest, ClaimsFromElsewhereAreNoChange) {
 
 // As they are, but with another motion before: what is taken for known there
 // differs from motion to motion.
-TEST_F(DetectChangeTest, NeitherAreThoseOfAnotherMotion) {
+TEST_F(DetectChangeTest,
+       SegmentsOfAnotherMotionLinearisedElsewhereAreNoChange) {
   const Eigen::VectorXd off = 0.9 * random_.Direction(rig_);
   const Calibration elsewhere = BoxPlus(rig_.factory, off);
   for (int i = 0; i < 40; ++i) {

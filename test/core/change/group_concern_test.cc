@@ -60,7 +60,7 @@ TEST_F(GroupConcernTest, FindsTheGroupAndBothOfTwo) {
 }
 
 // Nothing is shown: the expectation of the squares that stand in the header.
-TEST_F(GroupConcernTest, WithoutSegmentsDoubtIsWhatItIsBeforehand) {
+TEST_F(GroupConcernTest, WithoutSegmentsDoubtIsThatOfThePrior) {
   const Eigen::MatrixXd doubt =
       DoubtOfUnconcerned(rig_, before_, {}, {"extrinsics"});
   const double mean_square = (1e-4 + 9e-4 + 1e-2 + 9e-2 + 1) / 5;
@@ -86,7 +86,7 @@ TEST_F(GroupConcernTest, SegmentsThatShowNoChangeLeaveLittleDoubt) {
 }
 
 // A change that was missed: as far as it went, the prior is as wide.
-TEST_F(GroupConcernTest, SegmentsThatShowOneLeaveAsMuchAsItIs) {
+TEST_F(GroupConcernTest, SegmentsThatShowAChangeLeaveItsSize) {
   const auto segments =
       Segments(12, Sigmas(5, "cam0.q_CI.x") + Sigmas(4, "cam0.focal.x"));
   const Eigen::MatrixXd doubt =

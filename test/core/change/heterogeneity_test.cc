@@ -22,7 +22,7 @@ class HeterogeneityTest : public ::testing::Test {
   const ConsistencyTester tester_{rig_, FactoryKnownTo(rig_, 0.3)};
 };
 
-TEST_F(HeterogeneityTest, IsHowMuchTooSureSegmentsAre) {
+TEST_F(HeterogeneityTest, IsTheOverconfidenceOfSegments) {
   std::vector<OffsetInformation> segments;
   for (int i = 0; i < 20; ++i) segments.push_back(Segment());
   const Eigen::MatrixXd& all = tester_.blocks().front().basis;

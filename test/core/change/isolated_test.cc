@@ -50,7 +50,7 @@ TEST_F(IsolatedTest, TheNewestIsUntilTheNextAgreesWithIt) {
   EXPECT_THAT(FindIsolated(segments_), IsEmpty());
 }
 
-TEST_F(IsolatedTest, NoneIsWhereAllClaimTooMuch) {
+TEST_F(IsolatedTest, NoneIsIfAllAreOverconfident) {
   for (int i = 0; i < 20; ++i) {
     Next(0);
     segments_.back().Lambda *= 9;

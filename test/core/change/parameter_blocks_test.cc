@@ -41,7 +41,7 @@ TEST(ParameterBlocks, AreAllGroupsAndTheirParts) {
                                               "cam0.distortion"));
 }
 
-TEST(ParameterBlocks, LeaveOutWhatIsFixedAndWhatIsThereAlready) {
+TEST(ParameterBlocks, ExcludeFixedComponentsAndDuplicates) {
   Rig rig = HandheldRig("a");
   rig.fixed = {"imu.*", "cam0.p_CI.*", "cam0.focal.x"};
   std::vector<std::string> names;
@@ -68,7 +68,7 @@ std::map<std::string, double> Shares(const Rig& rig) {
   return shares;
 }
 
-TEST(ParameterBlocks, HalfIsForWhatChangesByItself) {
+TEST(ParameterBlocks, HalfIsForTheMostFrequentChanges) {
   std::map<std::string, double> shares = Shares(HandheldRig("a"));
   ASSERT_EQ(shares.size(), 15u);
   EXPECT_DOUBLE_EQ(shares["cam0.q_CI"], 0.25);

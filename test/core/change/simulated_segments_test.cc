@@ -58,7 +58,7 @@ TEST_F(SimulatedSegments, AreConsistentWithTheTruth) {
   EXPECT_LE(rare, 6);
 }
 
-TEST_F(SimulatedSegments, ShowATurnOfTheCameraByADegree) {
+TEST_F(SimulatedSegments, ShowARotationOfTheCameraByADegree) {
   Calibration turned = rig_.factory;
   CameraCalibration& camera = turned.cameras[0];
   camera.q_CI = camera.q_CI * Exp({0.0174533, 0, 0});

@@ -23,7 +23,7 @@ const Advice& AdviceOf(const Coaching& coaching, std::string_view motion) {
       [&](const Advice& advice) { return advice.motion == motion; });
 }
 
-TEST(Advise, NoMotionTakesKnowledgeAway) {
+TEST(Advise, NoMotionReducesTheInformation) {
   const Rig rig = StereoRig();
   const Predictions predictions = Predict(rig, rig.factory);
   Eigen::MatrixXd known = PriorInformation(rig);
@@ -94,7 +94,7 @@ TEST(Advise, GivesTheSameAgain) {
   }
 }
 
-TEST(Advise, AMotionTeachesLessOnceItWasDone) {
+TEST(Advise, AMotionHasLessGainOnceItWasDone) {
   const Rig rig = HandheldRig("r");
   const Predictions predictions = Predict(rig, rig.factory);
   const Eigen::MatrixXd known = PriorInformation(rig);

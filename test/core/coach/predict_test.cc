@@ -23,7 +23,7 @@ double GainOf(const Rig& rig, const Eigen::MatrixXd& Lambda) {
   return 0.5 * eigenvalues.cwiseMax(0).array().log1p().sum();
 }
 
-TEST(Predict, SaysSomethingOfEveryMotion) {
+TEST(Predict, HasInformationForEveryMotion) {
   const Rig rig = StereoRig();
   const Predictions predictions = Predict(rig, rig.factory);
   EXPECT_EQ(predictions.segment_s, 4);
@@ -40,7 +40,7 @@ TEST(Predict, SaysSomethingOfEveryMotion) {
   }
 }
 
-TEST(Predict, SaysNothingOfWhatIsFixed) {
+TEST(Predict, HasNoInformationAboutFixedComponents) {
   Rig rig = HandheldRig("r");
   rig.fixed = {"imu.gyro.*"};
   for (const MotionPrediction& motion : Predict(rig, rig.factory).motions) {
@@ -57,7 +57,7 @@ TEST(Predict, GivesTheSameBitsAgain) {
   }
 }
 
-TEST(Predict, BearsADelayOfTheImages) {
+TEST(Predict, AllowsADelayOfTheImages) {
   Rig rig = HandheldRig("r");
   rig.estimate_time_offset = true;
   for (const double delay_s : {-0.3, 0.3}) {

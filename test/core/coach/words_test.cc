@@ -29,7 +29,7 @@ TEST(Words, NameSensorAndAxis) {
             "the distance from the IMU along x of camera 1");
 }
 
-TEST(Words, KeepANameThatIsNotKnown) {
+TEST(Words, KeepAnUnknownName) {
   for (const std::string name :
        {"", ".", "imu", "imu.", "imu.magnet.x", "cam0.colour", "lidar.x"}) {
     EXPECT_EQ(ComponentInWords(name), name);

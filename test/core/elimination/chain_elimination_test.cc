@@ -212,7 +212,7 @@ TEST(ChainElimination, APriorMayCoupleAllUnknownsOfAKeyframe) {
   ExpectEqualsDense(chain, &elimination);
 }
 
-TEST(ChainElimination, LeavingRowsOutNeverAddsInformation) {
+TEST(ChainElimination, RemovingRowsNeverAddsInformation) {
   std::mt19937 random(6);
   ChainElimination elimination;
   for (int trial = 0; trial < 30; ++trial) {
@@ -261,7 +261,7 @@ TEST(ChainElimination, TightLinksLoseNoPrecision) {
   }
 }
 
-TEST(ChainElimination, AnUnknownWithoutInformationIsLeftOut) {
+TEST(ChainElimination, AnUnknownWithoutInformationGivesAFiniteResult) {
   std::mt19937 random(8);
   Chain chain = RandomChain(RandomChainShape(), &random);
   chain.landmark_prior = 0;

@@ -48,7 +48,7 @@ double ErrorPixels(const ExposurePose& pose, const KeyframeState& truth) {
                 (pose.p_GI - truth.p_GI).norm());
 }
 
-TEST(MeasureMotion, TakesThePoseToTheExposure) {
+TEST(MeasureMotion, MovesThePoseToTheExposure) {
   RandomValues random(1);
   for (int trial = 0; trial < 500; ++trial) {
     const Scene scene(random);

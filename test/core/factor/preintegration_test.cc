@@ -116,7 +116,7 @@ TEST(Preintegrate, OnASmoothMotionTheErrorIsOfThirdOrder) {
   }
 }
 
-TEST(Preintegrate, OfADeviceShakenByHandTheErrorIsBelowTheNoise) {
+TEST(Preintegrate, OnHandShakenMotionTheErrorIsBelowTheNoise) {
   RandomValues random(2);
   const std::int64_t t1_ns = 100'000'000;
   const int trials = 1000;
@@ -316,7 +316,7 @@ TEST(Preintegrate, AnEmptyIntervalIsNoMotion) {
   EXPECT_EQ(motion.J_theta.norm(), 0);
 }
 
-TEST(Preintegrate, PartsLeftOutStayZeroAndChangeNothingElse) {
+TEST(Preintegrate, OmittedPartsStayZeroAndChangeNothingElse) {
   RandomValues random(8);
   const Integral integral = RandomIntegral(random, 200, 0.1);
   const Preintegration all = integral.Whole();

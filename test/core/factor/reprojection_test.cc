@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(Models,
                            return name;
                          });
 
-TEST_P(ReprojectionOfEachModel, SeesALandmarkWhereItsPointProjects) {
+TEST_P(ReprojectionOfEachModel, ObservesALandmarkWhereItsPointProjects) {
   RandomValues random(1);
   for (int trial = 0; trial < 1000; ++trial) {
     const View view = RandomView(random, GetParam());
@@ -225,7 +225,7 @@ TEST_P(ReprojectionOfEachModel, WithAMotionIsThatOfTheMovedPose) {
   }
 }
 
-TEST_P(ReprojectionOfEachModel, ARefusedPointLeavesTheOutputsUntouched) {
+TEST_P(ReprojectionOfEachModel, ARejectedPointLeavesTheOutputsUntouched) {
   RandomValues random(5);
   for (int trial = 0; trial < 200; ++trial) {
     View view = RandomView(random, GetParam());

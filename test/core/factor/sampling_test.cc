@@ -71,7 +71,7 @@ TEST(Sampling, GapsAreCountedAgainstTheUsualStep) {
 // Motions without noise, one gap each: what is integrated is off by what the
 // covariance says, and not by much less, whether keyframes fall into the gap or
 // not.
-TEST(Sampling, TheCovarianceKnowsWhatTheMotionDidInAGap) {
+TEST(Sampling, TheCovarianceCoversTheMotionInAGap) {
   RandomValues random(1);
   for (const int gap_ms : {20, 50, 100, 200}) {
     constexpr int kTrials = 400;

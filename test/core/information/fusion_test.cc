@@ -145,7 +145,7 @@ TEST(Fuse, IsConsistentWhereAllIsLinear) {
   EXPECT_NEAR(heterogeneity, 1, 0.05);
 }
 
-TEST(Fuse, HeterogeneityIsTheFactorOfTheVariance) {
+TEST(Fuse, HeterogeneityIsTheScaleOfTheVariance) {
   std::mt19937 random(5);
   const Rig rig = AllEstimated(HandheldRig("handheld"));
   for (const double noise : {0.5, 1.0, 3.0}) {
@@ -162,7 +162,7 @@ TEST(Fuse, HeterogeneityIsTheFactorOfTheVariance) {
   }
 }
 
-TEST(Fuse, ReachIsTheWayFromTheFarthestScore) {
+TEST(Fuse, ReachIsTheDistanceFromTheFarthestScore) {
   std::mt19937 random(7);
   const Rig rig = AllEstimated(HandheldRig("handheld"));
   const Eigen::VectorXd unit = ReferenceSigmas(rig);
@@ -191,7 +191,7 @@ TEST(Fuse, WithoutSegmentsIsThePrior) {
   EXPECT_TRUE(fused.covariance.isApprox(prior, 1e-12));
 }
 
-TEST(Fuse, WhatTheRigHoldsFixedStays) {
+TEST(Fuse, FixedComponentsDoNotChange) {
   std::mt19937 random(6);
   Rig rig = HandheldRig("handheld");
   rig.fixed = {"imu.*", "cam0.p_CI.x"};

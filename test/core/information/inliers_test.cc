@@ -110,7 +110,7 @@ TEST(SelectInliers, InliersAreSortedAndOfAtLeastTwoALandmark) {
             static_cast<int>(count.size()));
 }
 
-TEST(SelectInliers, APointBehindTheCameraIsCountedAndLeftOut) {
+TEST(SelectInliers, APointBehindTheCameraIsCountedAndExcluded) {
   const Rig rig = HandheldRig("handheld");
   MotionSegment segment = MovingSegment(rig, 5);
   const CameraCalibration& camera = rig.factory.cameras[0];

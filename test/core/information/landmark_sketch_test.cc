@@ -71,7 +71,7 @@ TEST(LandmarkSketch, OfALargeSegmentHoldsAllUpToAHash) {
   }
 }
 
-TEST(LandmarkSketch, OverlapOfTwoIsFoundInWhatBothKnow) {
+TEST(LandmarkSketch, OverlapOfTwoIsFoundInTheirCommonRange) {
   const LandmarkSketch a = SketchOf(SegmentWith(0, 5000));
   const LandmarkSketch b = SketchOf(SegmentWith(3000, 5000));
   const std::uint64_t known = std::min(KnownUpTo(a), KnownUpTo(b));
@@ -90,7 +90,7 @@ TEST(LandmarkSketch, OverlapOfTwoIsFoundInWhatBothKnow) {
   EXPECT_NEAR(1.0 * common / of_a, 0.4, 0.1);
 }
 
-TEST(LandmarkSketch, OfAScoreStandsOnWhatItUsed) {
+TEST(LandmarkSketch, OfAScoreContainsTheUsedLandmarks) {
   const Rig rig = HandheldRig("handheld");
   MotionSegment segment = MovingSegment(rig, 3);
   // One landmark that no observation agrees about.

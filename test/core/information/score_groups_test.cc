@@ -110,7 +110,7 @@ TEST(ScoreGroups, GainIsTheEntropyOfThePriorMinusThatOfThePosterior) {
   }
 }
 
-TEST(ScoreGroups, ADirectionCountsAsObservedFromTheInformationOfThePriorOn) {
+TEST(ScoreGroups, ADirectionIsObservedFromTheInformationOfThePriorOn) {
   Rig rig = HandheldRig("handheld");
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(kSize, kSize);
   information(2, 2) = 1.01;

@@ -49,7 +49,7 @@ SegmentInformation Score(const Rig& rig, const MotionSegment& segment) {
   return ScoreSegment(rig, rig.factory, segment);
 }
 
-TEST(ScoreSegment, DoesNotDependOnTheKeyframeThatCarriesTheGauge) {
+TEST(ScoreSegment, DoesNotDependOnTheKeyframeThatHoldsTheGauge) {
   const Rig rig = HandheldRig("handheld");
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const MotionSegment segment = MovingSegment(rig, seed);
@@ -152,7 +152,7 @@ TEST(ScoreSegment, AMovingSegmentObservesTheCameraAndGainsForEveryGroup) {
   }
 }
 
-TEST(ScoreSegment, ADeviceAtRestSaysNothingAboutTheImuAndNamesIt) {
+TEST(ScoreSegment, ADeviceAtRestHasNoInformationAboutTheImuAndNamesIt) {
   const Rig rig = HandheldRig("handheld");
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const SegmentInformation score = Score(rig, RestingSegment(rig, seed));
@@ -320,7 +320,7 @@ TEST(ScoreSegment, ARealisticSlamSegmentKeepsItsObservations) {
 
 // What is left of all squares where states, landmarks and theta follow them is
 // what noise leaves, also from a factory's calibration.
-TEST(ScoreSegment, FitIsOneWhereNoiseIsAsStated) {
+TEST(ScoreSegment, FitIsOneIfNoiseIsAsStated) {
   const Rig device = HandheldRig("handheld");
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     Rig rig = device;
@@ -345,7 +345,7 @@ TEST(ScoreSegment, FitIsOneWhereNoiseIsAsStated) {
 
 // One reading at the end of the sensor's range makes motion look vigorous; its
 // information is worth next to nothing.
-TEST(ScoreSegment, InformationCountsForLessWhereTheSegmentDoesNotFit) {
+TEST(ScoreSegment, InformationIsReducedIfTheSegmentDoesNotFit) {
   const Rig rig = HandheldRig("handheld");
   SimulationOptions options;
   options.seed = 3;

@@ -24,7 +24,7 @@ struct Device {
   MotionSegment segment;
 };
 
-TEST(SegmentResiduals, AreThoseThatAScoreStandsOn) {
+TEST(SegmentResiduals, AreThoseThatAScoreUses) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const Device device(seed);
     const SegmentInformation scored =

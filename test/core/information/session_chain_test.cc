@@ -95,7 +95,7 @@ ThetaInformation Scored(const Rig& rig, const MotionSegment& segment) {
   return {score.Lambda, score.eta};
 }
 
-TEST(SessionChain, OfOneSegmentSaysWhatItsScoreSays) {
+TEST(SessionChain, OneSegmentGivesTheInformationOfItsScore) {
   for (const Rig& rig : {HandheldRig("one"), TwoCameraRig()}) {
     const MotionSegment segment = Session(rig, 30)[0];
     SessionChain chain(rig, rig.factory);
@@ -104,7 +104,7 @@ TEST(SessionChain, OfOneSegmentSaysWhatItsScoreSays) {
   }
 }
 
-TEST(SessionChain, OfNeighboursSaysWhatTheyWouldAsOneSegment) {
+TEST(SessionChain, NeighboursGiveTheInformationOfOneSegment) {
   const Rig rig = HandheldRig("r");
   const std::vector<MotionSegment> segments = Session(rig, 20);
   ASSERT_GE(segments.size(), 3u);

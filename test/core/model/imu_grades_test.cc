@@ -42,7 +42,7 @@ TEST(ImuGradesTest, AreOfTheSizeThatDataSheetsState) {
   EXPECT_LE(PriorSigmas(rig).head<15>().maxCoeff(), 3e-3);
 }
 
-TEST(ImuGradesTest, OfAnUnknownOneNothingIsSaid) {
+TEST(ImuGradesTest, AnUnknownGradeHasNoTolerances) {
   EXPECT_TRUE(ImuTolerances(ImuGrade::kUnknown).empty());
 }
 

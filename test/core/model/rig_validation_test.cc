@@ -140,7 +140,7 @@ TEST(ValidateRig, NeedsACamera) {
   EXPECT_THAT(Fields(Validate(rig)), ElementsAre("factory.cameras"));
 }
 
-TEST(ValidateRig, TooManyCamerasAreCountedAndNotLookedAt) {
+TEST(ValidateRig, TooManyCamerasAreCountedAndNotInspected) {
   Rig rig = ValidRig();
   rig.factory.cameras.assign(100'000, CameraCalibration());
   EXPECT_THAT(Fields(Validate(rig)), ElementsAre("factory.cameras"));

@@ -277,7 +277,7 @@ TEST(ValidateSegment, TimesAtTheEndsOfTheirTypeAreRefusedWithoutOverflow) {
                           "imu[180].t_ns"));
 }
 
-TEST(ValidateSegment, CountsAreLimitedAndLongListsNotLookedAt) {
+TEST(ValidateSegment, CountsAreLimitedAndLongListsNotInspected) {
   // Every element of the long lists is wrong.
   MotionSegment segment = ValidSegment();
   for (KeyframeState& x : segment.keyframes) x.p_GI.x() = kNan;
@@ -323,7 +323,7 @@ TEST(ValidateSegment, ThirdOfAKindNamesTheFirst) {
   }
 }
 
-TEST(ValidateSegment, LongListsOfViolationsAreCutAndSaySo) {
+TEST(ValidateSegment, LongListsOfViolationsAreTruncatedAndMarked) {
   MotionSegment segment = ValidSegment();
   for (ImuSample& sample : segment.imu) sample.gyro.x() = kNan;
   SegmentLimits limits;

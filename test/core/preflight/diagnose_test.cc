@@ -38,7 +38,7 @@ TEST(Diagnose, NamesEveryKind) {
   EXPECT_FALSE(names.contains(""));
 }
 
-TEST(Diagnose, SaysOfNoDataThatNothingWasChecked) {
+TEST(Diagnose, ReportsForNoDataThatNothingWasChecked) {
   const Rig rig = HandheldRig("rig");
   const Diagnosis diagnosis = Diagnose(rig, rig.factory, {});
   EXPECT_TRUE(diagnosis.findings.empty());
@@ -59,7 +59,7 @@ TEST(Diagnose, NamesASingleLongGap) {
               testing::HasSubstr("in 1 gap of 75 ms"));
 }
 
-TEST(Diagnose, PassesOverWhatCannotBeUsed) {
+TEST(Diagnose, IgnoresUnusableData) {
   FedData data = Clean();
   MotionSegment& segment = data.segments[0];
   segment.imu[5].gyro.x() = std::nan("");
@@ -78,7 +78,7 @@ TEST(Diagnose, PassesOverWhatCannotBeUsed) {
   EXPECT_TRUE(diagnosis.findings.empty()) << Text(diagnosis);
 }
 
-TEST(Diagnose, FindsStampsThatDoNotRise) {
+TEST(Diagnose, FindsTimestampsThatDoNotIncrease) {
   FedData data = Clean();
   for (MotionSegment& segment : data.segments) {
     for (std::size_t i = 20; i < segment.imu.size(); i += 20) {
@@ -97,7 +97,7 @@ TEST(Diagnose, FindsStampsThatDoNotRise) {
 }
 
 // Samples of another recording fit in no way that is known, and it says so.
-TEST(Diagnose, SaysThatSamplesOfAnotherRecordingDoNotFit) {
+TEST(Diagnose, ReportsThatSamplesOfAnotherRecordingDoNotFit) {
   FedData data = Clean();
   const auto other = Simulate(data.rig,
                               data.rig.factory,
@@ -113,7 +113,7 @@ TEST(Diagnose, SaysThatSamplesOfAnotherRecordingDoNotFit) {
       std::count(kinds.begin(), kinds.end(), FindingKind::kGyroMismatch));
 }
 
-TEST(Diagnose, SaysThatLandmarksOfOtherObservationsDoNotFit) {
+TEST(Diagnose, ReportsThatLandmarksOfOtherObservationsDoNotFit) {
   FedData data = Clean();
   std::mt19937 random(1);
   for (MotionSegment& segment : data.segments) {
@@ -127,7 +127,7 @@ TEST(Diagnose, SaysThatLandmarksOfOtherObservationsDoNotFit) {
       << Text(data.Diagnose());
 }
 
-TEST(Diagnose, LeavesASensorThatReadsInStepsAlone) {
+TEST(Diagnose, AcceptsASensorThatReadsInSteps) {
   FedData data = Clean();
   const auto coarse = [](double value, double step) {
     return std::round(value / step) * step;

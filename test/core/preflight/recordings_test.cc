@@ -78,7 +78,7 @@ TEST(Recordings, RoomHasAnOffsetOfTime) {
 }
 
 // Its camera, too, is turned by almost 180 degrees.
-TEST(Recordings, RoomIsCleanWithItsOffsetMendedAndEveryMistakeIsFound) {
+TEST(Recordings, RoomIsCleanWithItsOffsetCorrectedAndEveryMistakeIsFound) {
   SELFCAL_NEED_RECORDING(path, "equidistant_room");
   FedData data = Read(path, 20);
   ShiftKeyframes(&data, 0.0187);

@@ -74,7 +74,7 @@ TEST_F(BaselinesTest, SingleGroupIsOneTableForAllOfTheta) {
   }
 }
 
-TEST_F(BaselinesTest, RandomTakesEverySegmentAsOften) {
+TEST_F(BaselinesTest, RandomSelectsEverySegmentEquallyOften) {
   constexpr int kDraws = 2000, kKept = 4;
   std::map<std::int64_t, int> times;
   std::map<std::pair<std::int64_t, std::int64_t>, int> pairs;

@@ -39,14 +39,14 @@ TEST(FitTest, IsComparedWithHowMuchFitsDiffer) {
             1.36);
 }
 
-TEST(FitTest, NoiseThatIsStatedWrongRaisesAllAlike) {
+TEST(FitTest, WronglyStatedNoiseRaisesAllAlike) {
   const auto largest = LargestFit({10, 11, 9, 10.5, 9.5}, {10, 9, 11, 10});
   ASSERT_TRUE(largest.has_value());
   EXPECT_GT(*largest, 11);
   EXPECT_LT(*largest, 100);
 }
 
-TEST(FitTest, WhatLiesWithinTheStatedNoiseFits) {
+TEST(FitTest, AFitWithinTheStatedNoiseIsAccepted) {
   EXPECT_EQ(LargestFit({1e-6, 1e-6, 1e-6, 1e-6}, {}), 1.0);
 }
 
@@ -55,12 +55,12 @@ TEST(FitTest, FewSegmentsAreNoComparison) {
   EXPECT_FALSE(LargestFit({1, 1, 1}, {1, 1, 1}).has_value());
 }
 
-TEST(FitTest, WhatWasNotMeasuredDoesNotCount) {
+TEST(FitTest, UnmeasuredFitsAreIgnored) {
   EXPECT_FALSE(LargestFit({0, 0, 0, 0, 1, 1, 1}, {}).has_value());
   EXPECT_EQ(LargestFit({0, 0, 0, 2, 2, 2, 2}, {}), 3.0);
 }
 
-TEST(FitTest, ABadSessionAmongGoodOnesIsComparedWithWhatIsKept) {
+TEST(FitTest, ABadSessionAmongGoodOnesIsComparedWithKeptSegments) {
   const std::vector<double> bad(16, 40.0);
   EXPECT_EQ(LargestFit(bad, {1, 1, 1, 1}), 1.5);
 }

@@ -83,7 +83,7 @@ TEST(JointValue, IsThatOfTheEigenvalues) {
               1e-9);
 }
 
-TEST(JointSelection, TakesWhatIsMissingBeforeMoreOfWhatItHas) {
+TEST(JointSelection, PrefersMissingInformationToMoreOfTheSame) {
   const JointSettings settings = Settings(Criterion::kD, 2);
   Eigen::MatrixXd strong = Eigen::MatrixXd::Zero(kSize, kSize);
   strong.topLeftCorner<3, 3>().diagonal().setConstant(100);
@@ -126,7 +126,7 @@ TEST(JointSelection, StaysWithinTheBoundAndNeverGetsWorse) {
 }
 
 // One more and one fewer: nothing that was in reach is better.
-TEST(JointSelection, ExchangesTheOneThatIsMissedLeast) {
+TEST(JointSelection, ReplacesTheSegmentWithTheLeastContribution) {
   std::mt19937 random(3);
   int exchanged = 0;
   for (const Criterion criterion : kAll) {
@@ -222,7 +222,7 @@ TEST(JointSelection, OfEqualOnesTheOlderStay) {
   EXPECT_EQ(SelectStreaming(settings, candidates), exchanged);
 }
 
-TEST(JointSelection, WhatGainsTooLittleDoesNotEnter) {
+TEST(JointSelection, ASegmentWithInsufficientGainDoesNotEnter) {
   const JointSettings settings = Settings(Criterion::kD, 5);
   // 1/2 ln det (I + x I) = 3 ln(1 + x).
   const auto with_gain = [](int index, double nats) {
@@ -254,7 +254,7 @@ TEST(JointSelection, WhatIsNotFiniteDoesNotEnter) {
   }
 }
 
-TEST(JointSelection, ARoomForNoneKeepsNone) {
+TEST(JointSelection, ACapacityOfZeroKeepsNone) {
   std::mt19937 random(8);
   const JointSettings settings = Settings(Criterion::kD, 0);
   EXPECT_TRUE(SelectStreaming(settings, RandomCandidates(5, &random)).empty());
@@ -304,7 +304,7 @@ Rig SmallRig(Selection selection) {
   return rig;
 }
 
-TEST(JointTable, HoldsWhatTheChoiceKeeps) {
+TEST(JointTable, HoldsTheSelectedSegments) {
   std::mt19937 random(10);
   for (const auto& [selection, criterion] :
        {std::pair(Selection::kJointD, Criterion::kD),

@@ -34,7 +34,7 @@ Eigen::MatrixXd InformationOf(const std::vector<Candidate>& set) {
       .Information(FirstOf(static_cast<int>(set.size())));
 }
 
-TEST(SharedLandmarks, WhatSharesNothingAdds) {
+TEST(SharedLandmarks, SegmentsThatShareNothingAdd) {
   std::mt19937 random(1);
   std::vector<Candidate> set;
   Eigen::MatrixXd sum = Eigen::MatrixXd::Identity(5, 5);
@@ -76,7 +76,7 @@ TEST(SharedLandmarks, CopiesAddNothing) {
   }
 }
 
-TEST(SharedLandmarks, MoreInCommonSaysLess) {
+TEST(SharedLandmarks, MoreInCommonHasLessInformation) {
   std::mt19937 random(4);
   for (int trial = 0; trial < 20; ++trial) {
     const Eigen::MatrixXd a = RandomInformation(6, 4, 4, &random);
@@ -95,7 +95,7 @@ TEST(SharedLandmarks, MoreInCommonSaysLess) {
   }
 }
 
-TEST(SharedLandmarks, OneMoreSegmentNeverSaysLess) {
+TEST(SharedLandmarks, OneMoreSegmentNeverReducesInformation) {
   std::mt19937 random(5);
   std::uniform_int_distribution<std::uint64_t> first(0, 300);
   for (int trial = 0; trial < 50; ++trial) {
@@ -115,7 +115,7 @@ TEST(SharedLandmarks, OneMoreSegmentNeverSaysLess) {
 }
 
 // Two that see the same: I + w A + (1 - w) B with the best w.
-TEST(SharedLandmarks, OfTwoThatSeeTheSameItIsCovarianceIntersection) {
+TEST(SharedLandmarks, IsCovarianceIntersectionForTwoWithTheSameLandmarks) {
   std::mt19937 random(6);
   for (int trial = 0; trial < 50; ++trial) {
     const std::vector<Candidate> set = {

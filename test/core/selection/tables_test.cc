@@ -224,7 +224,7 @@ TEST_F(TriggerTest, NothingStartsWhileATableStillFills) {
   EXPECT_EQ(Evaluate(), Trigger::kTablesFull);
 }
 
-TEST_F(TriggerTest, AStarvedTableDoesNotHoldBackAFullOne) {
+TEST_F(TriggerTest, AStarvedTableDoesNotBlockAFullOne) {
   Fill(0, 0, 4);
   Starve(1);
   EXPECT_EQ(Evaluate(), Trigger::kTablesFull);
@@ -257,7 +257,7 @@ TEST_F(TriggerTest, NoChangeStartsNothingEvenWithFractionZero) {
   EXPECT_EQ(Evaluate(last), Trigger::kTablesChanged);
 }
 
-TEST_F(TriggerTest, ARunByHandDoesNotMakeUnfilledTablesReady) {
+TEST_F(TriggerTest, AManualRunDoesNotMakeUnfilledTablesReady) {
   Fill(0, 0, 2);
   const std::vector<SegmentKey> last = Keys();
   Fill(0, 2, 4);

@@ -64,7 +64,7 @@ TEST(RandomTest, UniformNumbersFillTheirInterval) {
   EXPECT_NEAR(sum, 2, 5 * 8 / std::sqrt(12.0 * kDraws));
 }
 
-TEST(RandomTest, ChancesComeTrueAsOftenAsStated) {
+TEST(RandomTest, ChancesHaveTheStatedProbability) {
   Random random(7, 0);
   double sum = 0;
   for (int i = 0; i < kDraws; ++i) sum += random.Chance(0.03);

@@ -35,7 +35,7 @@ TEST(SimulateTest, SegmentsKeepAllRules) {
   }
 }
 
-TEST(SimulateTest, EveryLandmarkOfASegmentIsSeenThereAtLeastThreeTimes) {
+TEST(SimulateTest, EveryLandmarkOfASegmentIsObservedThereAtLeastThreeTimes) {
   const SimulatedSession session = SimulateHandheld(StereoRig(), 40, {});
   for (const MotionSegment& segment : session.segments) {
     EXPECT_GT(segment.landmarks.size(), 300u);
@@ -66,7 +66,7 @@ TEST(SimulateTest, ImuReachesToTheNextSegmentAndJoinsWithoutASeam) {
   }
 }
 
-TEST(SimulateTest, LostSamplesAreMissingAndAllElseIsAsItWas) {
+TEST(SimulateTest, LostSamplesAreMissingAndAllElseIsUnchanged) {
   const Rig rig = HandheldRig("a");
   const auto simulate = [&](double lost_fraction, double gap_s) {
     SimulationOptions options;
@@ -203,7 +203,7 @@ TEST(SimulateTest, TheSameSeedGivesTheSameBitsAndAnotherSeedDoesNot) {
   EXPECT_NE(a.segments[0].imu[0].accel, c.segments[0].imu[0].accel);
 }
 
-TEST(SimulateTest, MoreOutliersLeaveAllOtherNoiseAsItWas) {
+TEST(SimulateTest, MoreOutliersLeaveAllOtherNoiseUnchanged) {
   const Rig rig = HandheldRig("a");
   SimulationOptions options;
   const SimulatedSession clean = SimulateHandheld(rig, 15, options);

@@ -90,7 +90,7 @@ TEST(SlamLandmarksTest, AFewOutliersDoNotMoveALandmarkFar) {
   }
 }
 
-TEST(SlamLandmarksTest, WhatMostObservationsContradictIsDropped) {
+TEST(SlamLandmarksTest, ALandmarkThatMostObservationsContradictIsDropped) {
   Scene scene(0.8);
   Random random(2, 0);
   for (int i = 0; i < 11; ++i) {

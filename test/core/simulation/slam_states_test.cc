@@ -78,7 +78,7 @@ TEST(SlamStatesTest, PosesDriftRatherThanJump) {
 
 // Mean over the session of what the calibration and the bias of the SLAM system
 // leave unexplained of the noise-free readings.
-TEST(SlamStatesTest, BiasesAbsorbWhatTheCalibrationGetsWrongOnAverage) {
+TEST(SlamStatesTest, BiasesAbsorbTheMeanErrorOfTheCalibration) {
   SimulationOptions options = PerfectSlam();
   options.noise = false;
   const Truth truth = MakeTruth(120, options);

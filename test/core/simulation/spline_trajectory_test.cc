@@ -91,7 +91,7 @@ TEST(SplineTrajectoryTest, BridgesAGapSmoothly) {
   }
 }
 
-TEST(SplineTrajectoryTest, RefusesPosesThatAreNoMotion) {
+TEST(SplineTrajectoryTest, RejectsPosesThatAreNoMotion) {
   const std::vector<TimedPose> good = Sampled(*MakeRest(2), 20);
   const auto refusal = [&](auto change, const SplineOptions& options = {}) {
     std::vector<TimedPose> poses = good;

@@ -56,7 +56,7 @@ TEST_F(CompareResultsTest, NamesTheComponentThatDiffersMost) {
 }
 
 // Sigmas are the same, and yet a direction is known four times worse.
-TEST_F(CompareResultsTest, SeesCorrelationsInTheCovariance) {
+TEST_F(CompareResultsTest, DetectsCorrelationsInTheCovariance) {
   const int x = Index("cam0.focal.x");
   const int y = Index("cam0.focal.y");
   const auto correlated = [&](double by) {
@@ -71,7 +71,7 @@ TEST_F(CompareResultsTest, SeesCorrelationsInTheCovariance) {
   EXPECT_NEAR(difference.covariance, 3, 1e-6);
 }
 
-TEST_F(CompareResultsTest, DoesNotCompareWhatDidNotConvergeOrHoldsMore) {
+TEST_F(CompareResultsTest, DoesNotCompareResultsThatDidNotConvergeOrHoldMore) {
   CalibrationResult other = result_;
   other.rank -= 1;
   EXPECT_NE(CompareResults(rig_, result_, other).incomparable, "");

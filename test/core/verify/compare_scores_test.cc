@@ -33,7 +33,7 @@ TEST_F(CompareScoresTest, AScoreDoesNotDifferFromItself) {
 // Where the data says all there is, a thousandth more of it is a thousandth
 // more of the posterior, and moves an entropy by at most half of that a
 // component.
-TEST_F(CompareScoresTest, TellsByWhichPartInformationDiffers) {
+TEST_F(CompareScoresTest, ReportsTheRelativeDifferenceOfInformation) {
   SegmentInformation more = score_;
   more.Lambda *= 1 + 1e-3;
   ScoreGroupsOf(&more);
@@ -48,7 +48,7 @@ TEST_F(CompareScoresTest, TellsByWhichPartInformationDiffers) {
   EXPECT_FALSE(IsRounding(difference));
 }
 
-TEST_F(CompareScoresTest, SeesAnEstimateThatIsElsewhere) {
+TEST_F(CompareScoresTest, DetectsADifferentEstimate) {
   SegmentInformation other = score_;
   const Eigen::VectorXd prior = PriorSigmas(rig_);
   // The gradient of an estimate that has moved by one in the prior's units.

@@ -95,7 +95,7 @@ TEST(Scorers, AgreeWhereNothingIsEstimated) {
 }
 
 // Inertial factors alone leave states to priors that normal equations lose.
-TEST(Scorers, CeresSaysThatItCannotScoreWhatSeesNothing) {
+TEST(Scorers, CeresReportsThatItCannotScoreWithoutObservations) {
   const Rig rig = HandheldRig("handheld");
   MotionSegment blind = MovingSegment(rig, 2);
   blind.observations.clear();
