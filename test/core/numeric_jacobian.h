@@ -1,4 +1,4 @@
-// Numeric derivatives that tests hold analytic Jacobians against.
+// Numeric derivatives with which tests compare analytic Jacobians.
 #pragma once
 
 #include <Eigen/Core>

@@ -14,8 +14,9 @@
 namespace selfcal {
 namespace {
 
-// Bounds the difference of equal calibrations [rad]: where products are fused
-// with sums (aarch64), that of a rotation to itself is not zero to the bit.
+// Tolerance of the difference of equal calibrations [rad]: with fused
+// multiply-add (aarch64), the difference of a rotation to itself is not zero to
+// the bit.
 constexpr double kOfEqualRotations = 1e-15;
 
 // A rig whose factory calibration is wrong, and segments of its motion.
@@ -51,7 +52,7 @@ Scenario Simulated(const Rig& rig,
   return s;
 }
 
-// What is held fixed has no variance.
+// Components with variance: those that the rig does not hold fixed.
 std::vector<int> Estimated(const CalibrationResult& result) {
   std::vector<int> components;
   for (int i = 0; i < result.covariance.rows(); ++i) {
@@ -180,7 +181,7 @@ TEST(Calibrate, DeviceAtRestKeepsUnobservableParameters) {
   EXPECT_TRUE(result.covariance.allFinite());
   EXPECT_FALSE(result.held_constant.empty());
   EXPECT_EQ(result.rank + static_cast<int>(result.held_constant.size()), 26);
-  // Nothing about the gyroscope's scale can be known: it keeps its prior.
+  // The gyroscope's scale is unobservable: it keeps its prior.
   const Eigen::VectorXd prior = PriorSigmas(s.rig);
   for (int i = kGyroScale; i < kGyroScale + 6; ++i) {
     EXPECT_GT(std::sqrt(result.covariance(i, i)), 0.7 * prior[i]);
@@ -201,7 +202,8 @@ TEST(Calibrate, CancelsImmediately) {
 TEST(Calibrate, ProgressReportsTheIterationsToTheResult) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(9), 3);
   s.rig.fixed = {"imu.gyro.scale.*"};
-  // At the truth: what is held at a wrong value makes segments disagree.
+  // The scale is true: a parameter held at a wrong value makes segments
+  // disagree.
   s.rig.factory.imu.s_g = s.truth.imu.s_g;
   std::vector<CalibrateProgress> told;
   const CalibrationResult result =
@@ -230,7 +232,7 @@ TEST(Calibrate, ProgressReportsTheIterationsToTheResult) {
   EXPECT_EQ(last.sigmas.segment(kGyroScale, 3).norm(), 0);
 }
 
-// Weighted again, it goes on from where it is.
+// After reweighting, the calibration continues from its estimate.
 TEST(Calibrate, IterationsContinueWhenNoiseIsReweighted) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(12), 3);
   s.rig.pixel_sigma_px *= 3;

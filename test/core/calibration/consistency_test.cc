@@ -1,4 +1,5 @@
-// Is the estimate as sure as it says? Twenty simulated devices against truth.
+// Tests that errors match the claimed covariance: twenty simulated devices
+// against truth.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>

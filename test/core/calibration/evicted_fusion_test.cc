@@ -32,7 +32,7 @@ class EvictedFusionTest : public ::testing::Test {
     return Simulate(rig_, truth_, rig_.factory, motion, name, options).segments;
   }
 
-  // All but those with data as they are linearised at theta.
+  // All segments without data, linearised at theta.
   std::vector<RememberedSegment> RememberedAt(const Calibration& theta) const {
     std::vector<RememberedSegment> remembered;
     for (const MotionSegment& segment : segments_) {
@@ -57,7 +57,7 @@ class EvictedFusionTest : public ::testing::Test {
     return Calibrate(rig_, rig_.factory, picked, options);
   }
 
-  // Of the free components.
+  // Sigmas of the free components.
   Eigen::VectorXd Sigmas(const CalibrationResult& result) const {
     return result.covariance.diagonal()(FreeComponents(rig_)).cwiseSqrt();
   }
@@ -91,10 +91,10 @@ TEST_F(EvictedFusionTest, AFewSegmentsWithRememberedOnesEqualAll) {
   EXPECT_GT(informed.evicted.agreement.probability, 1e-3);
   const Eigen::VectorXd ratio = Sigmas(informed).cwiseQuotient(Sigmas(batch));
   EXPECT_GT(Sigmas(alone).cwiseQuotient(Sigmas(batch)).minCoeff(), 1.2);
-  // Landmarks that continue are worth the rest.
+  // The rest is the information of landmarks that continue.
   EXPECT_LT(ratio.maxCoeff(), 1.15);
   EXPECT_GT(ratio.minCoeff(), 0.98);
-  // What is known less cannot move the estimate by more than a part of the
+  // Reduced information cannot move the estimate by more than a fraction of the
   // sigma, squared differences 1.15^2 - 1 of the variance: 0.57, at 3 sigma.
   EXPECT_LT(Moved(batch.theta, informed.theta)
                 .cwiseQuotient(Sigmas(batch))
@@ -113,7 +113,8 @@ TEST_F(EvictedFusionTest, WithoutMemoryNothingChanges) {
   EXPECT_EQ(same.evicted.unused, "");
 }
 
-// A quarter of a degree between two sessions, of which all data is there.
+// A rotation of a quarter of a degree between two sessions, all with their
+// data.
 TEST_F(EvictedFusionTest, ReportsThatTheDataIsOfTwoDevices) {
   Eigen::VectorXd turn = Eigen::VectorXd::Zero(TangentSize(truth_));
   const int i =
@@ -133,7 +134,7 @@ TEST_F(EvictedFusionTest, ReportsThatTheDataIsOfTwoDevices) {
   EXPECT_LT(mixed.evicted.split->without_one, 1e-4);
   EXPECT_EQ(mixed.evicted.split->first, (SegmentKey{"later", 1}));
   EXPECT_EQ(mixed.evicted.unused, "");
-  // The result is that of the newer device all the same.
+  // The result is nevertheless that of the newer device.
   EXPECT_GT(mixed.evicted.change_probability, 0.999);
   EXPECT_LT(LargestInSigmas(BoxMinus(mixed.theta, truth_), mixed.covariance),
             3.5);
@@ -181,8 +182,8 @@ TEST_F(EvictedFusionTest, IgnoresSegmentsLinearisedTooFarAway) {
   EXPECT_TRUE(Moved(alone.theta, result.theta).isZero());
 }
 
-// Noise in states looks like information about directions that rotation in
-// place says nothing about: what is remembered must not bring it in.
+// Noise in states looks like information about directions that a rotation in
+// place does not observe: remembered segments must not add it.
 TEST_F(EvictedFusionTest, DeterminesNoDirectionThatTheDataDoesNot) {
   segments_ = Session(*MakeRotationInPlace(16.5, {.pivot_jitter_m = 0}, 5));
   ASSERT_EQ(segments_.size(), 8u);

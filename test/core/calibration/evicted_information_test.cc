@@ -59,7 +59,7 @@ class EvictedInformationTest : public ::testing::Test {
     return smallest ? values.minCoeff() : values.maxCoeff();
   }
 
-  // The offset from the point that it says, with the rig's prior.
+  // The resulting offset from the point, with the rig's prior.
   Eigen::VectorXd Solve(const EvictedInformation& evicted) const {
     Eigen::MatrixXd Lambda = evicted.information.Lambda;
     Lambda.diagonal() += PriorSigmas(rig_).cwiseAbs2().cwiseInverse();
@@ -82,7 +82,7 @@ TEST_F(EvictedInformationTest, IsZeroIfAllSegmentsHaveTheirData) {
   EXPECT_TRUE(evicted.information.eta.isZero());
 }
 
-// Data never takes information away.
+// Data never reduces information.
 TEST_F(EvictedInformationTest, IsSemidefiniteWhateverHasData) {
   SummariseAt(truth_);
   for (const std::vector<int>& set :
@@ -122,13 +122,13 @@ TEST_F(EvictedInformationTest, HasLessWeightWithMoreNoiseAndWithAge) {
   };
   const double plain = most({});
   EXPECT_LT(most({.noise_factor = 2}), 0.4 * plain);
-  // In the 8 s from the middle of the session it walks a reference sigma.
+  // In the 8 s from the middle of the session theta walks one reference sigma.
   EvictedOptions ageing;
   ageing.walk = ReferenceSigmas(rig_) / std::sqrt(8.0);
   EXPECT_LT(most(ageing), 0.2 * plain);
 }
 
-// Of a segment of other data under the same key.
+// The key is used for a segment with other data.
 TEST_F(EvictedInformationTest, HasLessWeightIfASegmentFitsBadly) {
   SummariseAt(truth_);
   std::vector<JoinedSegment> all = Remembered(kept_);

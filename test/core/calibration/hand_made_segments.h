@@ -1,4 +1,4 @@
-// Small segments put together by hand, for tests that look at structure only.
+// Small hand-made segments, for tests that depend on structure only.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Sparse keyframes, whose biases walk far in between, and lost samples: is the
-// estimate as sure as it says?
+// Tests that errors match the claimed covariance for sparse keyframes, between
+// which biases walk far, and for lost samples.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>

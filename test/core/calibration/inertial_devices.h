@@ -1,6 +1,6 @@
-// Devices whose inertial factors are put to the test: sparse and dense
-// keyframes, lost samples. Their biases walk as those of a drone's or a
-// phone's IMU, so that the walk between two keyframes counts.
+// Devices for tests of inertial factors: sparse and dense keyframes, lost
+// samples. Their biases walk as those of a drone's or a phone's IMU, so that
+// the walk between two keyframes matters.
 #pragma once
 
 #include <Eigen/Core>

@@ -11,7 +11,7 @@
 namespace selfcal {
 namespace {
 
-// One keyframe at the origin of G, seen from by one camera.
+// One keyframe at the origin of G, with one camera.
 class OneView : public ::testing::Test {
  protected:
   static Rig MakeRig() {
@@ -36,7 +36,7 @@ class OneView : public ::testing::Test {
   const LandmarkScene scene_{rig_.factory, keyframes_, motions_, 1};
 };
 
-// However small the numbers that a homogeneous point is given by.
+// This holds however small the components of the homogeneous point are.
 TEST_F(OneView, NothingIsObservedInTheCentreOfACamera) {
   const Eigen::Vector3d ray(0.1, -0.2, 1);
   const Eigen::Vector3d unit = ray.normalized();
@@ -64,8 +64,7 @@ class TwoViews : public ::testing::Test {
     keyframes_[1].p_GI = {0.5, 0, 0};
   }
 
-  // The track of a point, with the baseline seen in the other direction where
-  // it is mirrored.
+  // The track of a point, with the baseline reversed if the point is mirrored.
   Track Seen(const Eigen::Vector4d& point_G) const {
     const LandmarkScene scene(rig_.factory, keyframes_, motions_, 1);
     Track track;
@@ -97,8 +96,8 @@ TEST_F(TwoViews, APointInFrontIsFound) {
       place_.Homogeneous().hnormalized().isApprox(point.hnormalized(), 1e-3));
 }
 
-// A mirrored point, as a reversed lever arm makes of all, has the same rays
-// and lies beyond infinity.
+// A mirrored point, as a reversed lever arm makes of all points, has the same
+// rays and lies beyond infinity.
 TEST_F(TwoViews, AMirroredPointIsHeldNearInfinity) {
   const Eigen::Vector4d mirrored(0.1, 0.2, 2, -1);
   const RefinedPlace refined = Refine(Seen(mirrored), {0.1, 0.2, 20, 1});
@@ -106,7 +105,7 @@ TEST_F(TwoViews, AMirroredPointIsHeldNearInfinity) {
   const double sigma = std::sqrt(refined.information.inverse()(2, 2));
   EXPECT_GT(place_.inverse_depth.z(), -2.5 * sigma);
   EXPECT_GT(refined.cost, 100);
-  // Also from where it would like to be.
+  // Also from the position to which its residuals pull it.
   EXPECT_TRUE(Refine(Seen(mirrored), mirrored).behind);
   EXPECT_GT(place_.inverse_depth.z(), -2.5 * sigma);
 }

@@ -76,8 +76,8 @@ TEST(LinearRange, TheCostOfHandHeldMotionGrowsAsClaimed) {
   }
 }
 
-// The data of a rotation about one axis seems to tell something of directions
-// along which the cost does not grow as that has it.
+// The data of a rotation about one axis seems to have information about
+// directions along which the cost does not grow accordingly.
 TEST(LinearRange, TheCostOfWeakDirectionsOfOneAxisDoesNotGrowAsClaimed) {
   int settled = 0;
   int weak = 0;

@@ -30,7 +30,8 @@ std::vector<int> Both(std::vector<int> a, const std::vector<int>& b) {
   return a;
 }
 
-// Of all chains that begin at `starts`, where all landmarks have depth.
+// Shares the map of all chains that begin at `starts`, with depth for all
+// landmarks.
 SharedMap Share(std::vector<Track> tracks,
                 const SharingLimits& limits = {},
                 const std::vector<int>& starts = {0},
@@ -130,8 +131,8 @@ TEST(MapSharing, LandmarksWithoutDepthConnectNoChains) {
   EXPECT_EQ(map.tracks.size(), 40u);
 }
 
-// Whatever is seen from where: no observation is lost or counts twice, what
-// connects stays within the limits, and tracks within what is connected.
+// For any observations: none is lost or counted twice, connections stay within
+// the limits, and tracks within connected sets.
 TEST(MapSharing, RandomMapsStayWithinTheLimits) {
   std::mt19937 random(5);
   int connected = 0, split = 0, apart = 0;

@@ -1,6 +1,6 @@
-// A map that a device sees again and again: with a bounded number of landmarks
-// that connect distant keyframes the estimate is the one in which all do, less
-// certain by what the others would have said.
+// A map that a device observes repeatedly: with a bounded number of landmarks
+// that connect distant keyframes the estimate is the one in which all connect,
+// with less certainty by the information of the others.
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -95,7 +95,7 @@ std::vector<Eigen::Index> Estimated(const Estimate& estimate) {
   return components;
 }
 
-// One landmark more or less survives screening where tracks are others.
+// One landmark more or less survives screening if tracks differ.
 constexpr double kScreening = 0.05;
 
 TEST(MapSolution, DiffersFromTheDenseOneByWhatItDiscards) {
@@ -116,8 +116,8 @@ TEST(MapSolution, DiffersFromTheDenseOneByWhatItDiscards) {
       EXPECT_GT(ratio, 1 - kScreening) << "component " << i;
       EXPECT_LT(ratio * (1 - kScreening), apart.covariance(i, i) / variance)
           << "component " << i;
-      // Of the estimate that discards information and the one that does not,
-      // the covariance of the difference is the difference of covariances.
+      // If one of two estimates discards information, the covariance of their
+      // difference is the difference of their covariances.
       const double square = std::pow(bounded.d[i] - dense.d[i], 2) / variance;
       const double expected = std::max(ratio - 1, 0.0) + kScreening;
       EXPECT_LT(square, 16 * expected) << "component " << i;

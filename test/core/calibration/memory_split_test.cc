@@ -55,7 +55,7 @@ TEST_F(MemorySplitTest, OneDeviceDoesNotDiffer) {
   }
 }
 
-// By a fifth of a degree.
+// The camera is rotated by a fifth of a degree.
 TEST_F(MemorySplitTest, ARotatedCameraIsDetectedAndNamed) {
   Calibration turned = rig_.factory;
   turned.cameras[0].q_CI = turned.cameras[0].q_CI *
@@ -75,7 +75,7 @@ TEST_F(MemorySplitTest, ARotatedCameraIsDetectedAndNamed) {
   EXPECT_LT(split.without_one, 1e-4);
 }
 
-// In sigmas of the prior, along the component.
+// Largest component in sigmas of the prior.
 double Largest(const Eigen::VectorXd& step, const Rig& rig) {
   return step.cwiseAbs().cwiseQuotient(PriorSigmas(rig)).maxCoeff();
 }
@@ -104,7 +104,7 @@ TEST_F(MemorySplitTest, TheMeanFollowsARotatedCamera) {
   EXPECT_LT(doubt->step(q), 0.75 * turn(q));
 }
 
-// A tenth of a pixel in all shows in no test.
+// A change of a tenth of a pixel in total is not detected by any test.
 TEST_F(MemorySplitTest, GroupsThatHaveChangedAreExpectedToContinue) {
   Calibration zoomed = rig_.factory;
   zoomed.cameras[0].f.array() += 0.1;
@@ -124,7 +124,7 @@ TEST_F(MemorySplitTest, GroupsThatHaveChangedAreExpectedToContinue) {
   EXPECT_LT(known->covariance(gyro, gyro), unknown->covariance(gyro, gyro));
 }
 
-// It stands out, but not once it is left out.
+// The split is significant, but not once the segment is excluded.
 TEST_F(MemorySplitTest, OneBadSegmentIsNoCertainSplit) {
   AddSession("one", rig_.factory, 1);
   AddSession("two", rig_.factory, 101);

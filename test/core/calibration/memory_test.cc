@@ -1,5 +1,5 @@
-// A calibration stays within the memory that it is given, whatever a SLAM
-// system finds again: measured as the worker limits it.
+// A calibration stays within its memory limit, whatever a SLAM system
+// recognises again: measured like the limit of the worker.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -34,9 +34,8 @@ std::vector<MotionSegment> MapSession(const Rig& rig,
   simulation.landmarks_in_view = options.landmarks_in_view;
   simulation.revisit_fraction = options.revisit_fraction;
   const int count = (options.segments - 1) * options.every + 1;
-  const double duration_s =
-      (count * simulation.keyframes_per_segment + 5) /
-      simulation.keyframe_rate_hz;
+  const double duration_s = (count * simulation.keyframes_per_segment + 5) /
+                            simulation.keyframe_rate_hz;
   std::vector<MotionSegment> all =
       SimulateHandheld(rig, duration_s, simulation).segments;
   std::vector<MotionSegment> used;
@@ -56,7 +55,7 @@ rlim_t DataBytes() {
 
 enum Outcome { kConverged, kNotConverged, kOutOfMemory };
 
-// Calibrates in a process that may take so much more memory.
+// Calibrates in a process with this limit of additional memory.
 Outcome CalibrateWithin(rlim_t bytes,
                         const Rig& rig,
                         const std::vector<MotionSegment>& segments) {

@@ -1,5 +1,5 @@
-// Motions that do not show all of theta: no sigma is claimed that the error
-// does not keep to.
+// Motions that do not observe all of theta: no claimed sigma is smaller than
+// the error.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -60,7 +60,8 @@ TEST_P(Motions, NoSigmaIsTooSmall) {
     ASSERT_EQ(result.rank + result.held_constant.size(), free.size());
     const Eigen::VectorXd error = BoxMinus(result.theta, device.truth)(free);
     const Eigen::MatrixXd covariance = result.covariance(free, free);
-    // What is held is off by far less than its prior, and adds next to nothing.
+    // Held directions have errors far below their prior, and add almost
+    // nothing.
     sum_nees += error.dot(covariance.ldlt().solve(error));
     degrees += result.rank;
     for (int i = 0; i < error.size(); ++i) {
@@ -89,8 +90,8 @@ INSTANTIATE_TEST_SUITE_P(All,
                                          MotionKind::kPlanar,
                                          MotionKind::kHover));
 
-// The same device with images of twice the resolution: what is in pixels has
-// other numbers.
+// The same device with images of twice the resolution: quantities in pixels
+// have other values.
 TEST(MotionsInOtherUnits, HeldDirectionsDoNotDependOnTheUnitOfPixels) {
   const Device device = SimulatedDevice(MotionKind::kPlanar, 2);
   Device finer = device;

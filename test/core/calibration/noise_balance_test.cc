@@ -30,7 +30,7 @@ struct Solved {
         basis(TangentBasis(rig, WholeSubspace(rig))),
         estimate{Eigen::VectorXd::Zero(TangentSize(rig.factory)),
                  problem.keyframes} {
-    // Twice, as what lies far off is only known near the minimum.
+    // Twice, since distant observations are accurate only near the minimum.
     for (int i = 0; i < 2; ++i) Solve();
   }
 
@@ -41,7 +41,7 @@ struct Solved {
         rig, theta, problem, estimate.keyframes, motions, {}, nullptr);
     loss = screening.loss;
     landmarks = screening.landmarks;
-    // Some of less weight.
+    // Some have a reduced weight.
     for (std::size_t i = 0; i < landmarks.size(); i += 5) {
       landmarks[i].weight = 0.5;
     }
@@ -79,7 +79,8 @@ struct Solved {
   std::vector<InertialMatrix> whitening;
 };
 
-// All rows of a round, whitened for given factors: an assembly of its own.
+// All rows of a round, whitened for given noise scales: an independent
+// assembly.
 // Columns are keyframes, theta and landmarks.
 class DenseRound {
  public:
@@ -108,7 +109,7 @@ class DenseRound {
     for (std::size_t m = 0; m < solved.landmarks.size(); ++m) AddLandmark(m);
   }
 
-  // Of pixels, the squares as they are weighted.
+  // The squares of pixels are weighted.
   NoiseBalance Count() const {
     Eigen::MatrixXd J(Rows(), columns_);
     Eigen::VectorXd r(Rows());
@@ -116,8 +117,7 @@ class DenseRound {
       J.row(i) = rows_[i].J;
       r(i) = rows_[i].r;
     }
-    // What is never estimated has no column, and columns are in very different
-    // units.
+    // Fixed components have no column, and columns are in very different units.
     J = J(Eigen::all, FreeColumns()).eval();
     const Eigen::RowVectorXd scale = J.colwise().norm().cwiseInverse();
     J.array().rowwise() *= scale.array();
@@ -147,8 +147,8 @@ class DenseRound {
       }
     }
     double absorbed = Q.bottomRows(Rows() - first_pixel_row_).squaredNorm();
-    // By the weight w of screening: sums of w and of w^2, and of the means of w
-    // that landmarks make of them.
+    // With the weight w of screening: sums of w and of w^2, and of the means of
+    // w over landmarks.
     double shares = 0, squared = 0, landmarks = 0;
     for (const std::vector<double>& of_landmark : shares_) {
       double of_shares = 0, of_squared = 0;
@@ -172,7 +172,7 @@ class DenseRound {
   struct Row {
     Eigen::RowVectorXd J;
     double r = 0;
-    // Unless it stands with others.
+    // Kind of the row, unless it has several.
     std::optional<NoiseKind> kind;
   };
 
@@ -265,7 +265,7 @@ class DenseRound {
     add(kStateGyroBias, kGyroBiasPriorSigma_radps);
   }
 
-  // Of any strength beyond that of the data.
+  // A gauge of any strength beyond that of the data.
   void AddGauge(int k) {
     constexpr double kStrength = 1e5;
     for (int i = 0; i < 3; ++i) {
@@ -326,15 +326,15 @@ class DenseRound {
   const double excess_;  // of the track noise over that of the pixels
   int first_pixel_row_ = 0;
   std::vector<Row> rows_;                    // inertial links first
-  std::vector<std::vector<double>> shares_;  // of what each landmark stands on
-  // Of the whitened covariance of each link, what each kind brings.
+  std::vector<std::vector<double>> shares_;  // of the landmarks
+  // Parts of the whitened covariance of each link by kind.
   std::vector<std::map<NoiseKind, InertialMatrix>> links_;
 };
 
 void ExpectEqualsDense(const Solved& solved, double track_noise) {
   const SolverRound round = solved.Round();
   NoiseProblem problem(round, solved.estimate, solved.landmarks, track_noise);
-  // What was evaluated before makes no difference.
+  // Earlier evaluations make no difference.
   for (const double pixel : {0.8, 1.7, 1.0}) {
     NoiseVector factors(pixel, 1.4, 0.7, 0.6, 2.0);
     const std::optional<NoiseBalance> balance =
@@ -347,7 +347,7 @@ void ExpectEqualsDense(const Solved& solved, double track_noise) {
                   dense.redundancy[i],
                   1e-6 * (1 + dense.redundancy[i]));
       if (i == IndexOf(NoiseKind::kPixel)) {
-        // Brought to what normal residuals without a loss would have.
+        // Normalised to the squares of normal residuals without a loss.
         EXPECT_GT(balance->squares[i], dense.squares[i]);
         EXPECT_LT(balance->squares[i], 1.3 * dense.squares[i]);
       } else {
@@ -367,7 +367,7 @@ TEST(NoiseBalance, WithTrackNoiseEqualsTheDenseOne) {
   ExpectEqualsDense({NoisyRig(), Walk(NoisyRig(), 2, 12, 50, 1)}, 1.5);
 }
 
-// Biases that walk as far as noise goes, so that they move the motion as well.
+// Biases that walk as far as the noise, so that they affect the motion as well.
 TEST(NoiseBalance, WithStrongWalksAndLostSamplesEqualsTheDenseOne) {
   Rig rig = NoisyRig();
   rig.imu_noise.gyro_bias_random_walk = 5e-2;

@@ -23,7 +23,7 @@ double FactorOf(const CalibrationResult& result, NoiseKind kind) {
   return result.noise_factors.at(At(kind)).factor;
 }
 
-// True noise is `off` times the noise that is believed.
+// The true noise is `off` times the assumed noise.
 void ExpectFound(const std::vector<NoiseKind>& kinds, double off) {
   const Rig truth = NoisyRig();
   const std::vector<MotionSegment> segments = Walk(truth, 3, 40, 100, 3);
@@ -78,7 +78,7 @@ TEST(NoiseFactors, ReweightingAppliesDeterminedScales) {
   const CalibrationResult right =
       Calibrate(truth, truth.factory, segments, {.reweight_noise = true});
   ASSERT_EQ(right.status, CalibrateStatus::kConverged);
-  // Factors are of what the rig states, and sigmas as if it were right.
+  // Scales are relative to the stated noise, and sigmas as if it were right.
   EXPECT_NEAR(FactorOf(result, NoiseKind::kPixel),
               3 * FactorOf(right, NoiseKind::kPixel),
               0.05 * 3);

@@ -1,4 +1,4 @@
-// Information that noise in the states pretends, and what follows from it.
+// Spurious information due to noise in the states, and its consequences.
 #include "core/calibration/noise_replica.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ struct Device {
   std::vector<MotionSegment> segments;
 };
 
-// Carried, or turned about the IMU.
+// Simulates a device that is carried, or rotated about the IMU.
 Device Simulated(MotionKind kind, int seed, double duration_s) {
   std::mt19937 random(seed * 100 + static_cast<int>(kind));
   Device device{HandheldRig("simulated"), {}, {}};
@@ -72,9 +72,9 @@ TEST(FindSpurious, NamesDirectionsOfWhichInformationDoubles) {
   EXPECT_NEAR(std::abs(spurious.col(0).dot(u)), 1, 1e-9);
 }
 
-// The scale of the scene, and with it the lever arm of the camera, is not in a
-// rotation about the IMU: without the test it was claimed to a few centimetres
-// and off by decimetres.
+// The scale of the scene, and with it the lever arm of the camera, is
+// unobservable in a rotation about the IMU: without the test the claimed sigma
+// was a few centimetres and the error decimetres.
 TEST(Spurious, ARotationAboutTheImuDoesNotObserveTheLeverArm) {
   for (int seed = 1; seed <= 2; ++seed) {
     const Device device = Simulated(MotionKind::kRotationOnly, seed, 12.5);

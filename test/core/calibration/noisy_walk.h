@@ -1,4 +1,4 @@
-// A device that walks, with noise that can be told.
+// A walking device whose noise can be estimated.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace selfcal {
 
-// A device whose IMU is so much noisier than that of a phone that a few
-// seconds tell its noise.
+// A device whose IMU is so much noisier than that of a phone that a few seconds
+// determine its noise.
 inline Rig NoisyRig() {
   Rig rig = HandheldRig("r");
   rig.imu_noise.gyro_noise_density = 5e-3;

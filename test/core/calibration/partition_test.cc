@@ -123,7 +123,7 @@ TEST(Partition, AMergeThatMakesAnotherPossibleIsFollowedUp) {
   EXPECT_EQ(Partition(segments).partitions, (Sets{{0, 1, 2, 3}}));
 }
 
-// Alg. 2 until nothing changes, on sets, without any care for speed.
+// Alg. 2 until nothing changes, on sets, without optimisation.
 Sets BruteForce(const std::vector<const MotionSegment*>& segments,
                 const std::vector<SegmentJoint>& joints,
                 int merge_landmarks) {

@@ -59,7 +59,7 @@ TEST(Problem, MergedPartitionsHaveOneGaugeButTwoChains) {
   EXPECT_EQ(problem.tracks.size(), 20u);
 }
 
-// Nothing of what they have in common will survive screening.
+// None of their common landmarks survives screening.
 TEST(Problem, WithoutParallaxCommonLandmarksConnectNothing) {
   const std::vector<MotionSegment> segments = TwoSegments(1e-4);
   const CalibrationProblem problem = Flatten(segments);

@@ -1,5 +1,5 @@
-// A simulated session at its truth, flattened, and its landmarks screened:
-// where tests of what follows the screening begin.
+// A simulated session at its truth, flattened, with screened landmarks: the
+// input of tests of everything after the screening.
 #pragma once
 
 #include <vector>

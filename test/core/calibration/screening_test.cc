@@ -18,9 +18,9 @@ ScreenedSession NoisySession(std::uint64_t seed) {
   return {rig, *MakeHandheld(8.5, 1.0, seed), options};
 }
 
-// Calls visit(distance, inward, weight) for all that is used: how far inside
-// the nearest border the prediction lies, and how far inwards of that the
-// observation [pixel sigmas].
+// Calls visit(distance, inward, weight) for all used observations: the distance
+// of the prediction from the nearest border, and how far inwards of it the
+// observation is [pixel sigmas].
 template <class Visitor>
 void VisitUsed(const ScreenedSession& session, const Visitor& visit) {
   const LandmarkScene scene(session.rig.factory,
@@ -50,8 +50,8 @@ void VisitUsed(const ScreenedSession& session, const Visitor& visit) {
   }
 }
 
-// Pixels beyond the border are not seen: of what is predicted near it, only
-// what noise moved inwards is there.
+// Pixels beyond the border are not observed: near the border only observations
+// that noise moved inwards exist.
 TEST(Screening, ObservationsUsedAtTheBorderAreNotBiasedInwards) {
   constexpr double kNear = 6;
   int near = 0;

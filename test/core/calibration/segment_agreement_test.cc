@@ -162,7 +162,7 @@ SegmentEvidence Drawn(double off_sigmas, std::mt19937* random) {
   return one;
 }
 
-// Drawn from what the test takes for granted, it has the stated distribution.
+// For data drawn from its assumptions, the test has the stated distribution.
 TEST(Agreement, HasTheChiSquareDistribution) {
   std::mt19937 random(1);
   constexpr int kTrials = 400;
@@ -216,7 +216,7 @@ TEST(Agreement, LargeResidualsCountOnlyAtAMinimum) {
 }
 
 TEST(Misfits, AreMeasuredRelativeToTypicalFits) {
-  // Noise that is stated too small raises all alike.
+  // Noise that is stated too small raises all fits alike.
   EXPECT_TRUE(FindMisfits({10, 11, 9, 12, 10}).empty());
   const auto found = FindMisfits({1, 1.1, 4, 0.9, 1});
   ASSERT_EQ(found.size(), 1u);

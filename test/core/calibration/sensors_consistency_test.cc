@@ -1,5 +1,5 @@
-// Rigs of several cameras, with time offsets, of which some parameters are
-// known: is the estimate right, and as sure as it says? Against truth.
+// Tests that the estimate is right and errors match the claimed covariance, for
+// rigs of several cameras with time offsets and some known parameters.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ Rig LateRig(int cameras) {
   return rig;
 }
 
-// What the rig estimates, against truth.
+// Errors of the estimated components.
 struct Errors {
   Eigen::VectorXd error;
   Eigen::MatrixXd covariance;
@@ -44,7 +44,7 @@ struct Errors {
   }
 };
 
-// `rig` has the factory's calibration; `truth` what it is in truth.
+// `rig` has the factory calibration; `truth` is the true one.
 Errors CalibrateSimulated(const Rig& rig,
                           const Calibration& truth,
                           std::uint64_t seed) {
@@ -122,7 +122,8 @@ TEST_P(Cameras, AreFoundWithTheirTimeOffsets) {
   });
 }
 
-// Others of the same rig are as well known, and found as well.
+// Other parameters of the same rig are known equally well, and estimated as
+// well.
 TEST(FreeParameters, AreThoseThatTheRigChooses) {
   Rig chosen = LateRig(2);
   chosen.fixed = {"imu.*", "cam0.p_CI.*"};
@@ -163,8 +164,8 @@ TEST(Groups, OfFourCamerasHaveAllTheirParts) {
   EXPECT_EQ(score.rank, 15 + 26 + 24 + 4);
 }
 
-// A rig that believes in another gravity than that where it moves finds the
-// difference in the scale of its accelerometer, far beyond its sigma.
+// A rig with a wrong value of gravity has the difference in the scale of its
+// accelerometer, far beyond its sigma.
 TEST(Gravity, IsTheScaleOfTheAccelerometer) {
   Rig rig = HandheldRig("r");
   const Calibration truth = rig.factory;

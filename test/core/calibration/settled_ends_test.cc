@@ -27,7 +27,7 @@ class SettledEndsTest : public ::testing::Test {
         .segments.at(0);
   }
 
-  // As a filter leaves it that takes the world for so many times larger.
+  // States of a filter whose scale is wrong by a factor.
   MotionSegment Scaled(double factor) const {
     MotionSegment scaled = segment_;
     for (KeyframeState& state : scaled.keyframes) {
@@ -38,7 +38,8 @@ class SettledEndsTest : public ::testing::Test {
     return scaled;
   }
 
-  // Of theta, with the prior; over the free components, in sigmas of `a`.
+  // Distance of estimates of theta, with the prior; over the free components,
+  // in sigmas of `a`.
   double Distance(const MotionSegment& a, const MotionSegment& b) const {
     const std::vector<int> free = FreeComponents(rig_);
     const Eigen::MatrixXd prior =
@@ -81,7 +82,7 @@ TEST_F(SettledEndsTest, ASegmentAtItsMinimumDoesNotChange) {
   EXPECT_LT(Distance(settled, SettleSegment(rig_, truth_, settled)), 0.02);
 }
 
-// The others are summarised as they are, in a part of the time.
+// The others are summarised unchanged, in a fraction of the time.
 TEST_F(SettledEndsTest, OnlyStatesThatAreFarOffAreSettled) {
   EXPECT_FALSE(IsFarFromMinimum(SummariseEnds(rig_, truth_, segment_)));
   const SegmentEnds sound = SummariseSettledEnds(rig_, truth_, segment_);

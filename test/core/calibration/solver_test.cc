@@ -1,4 +1,4 @@
-// Both ways to solve a round lead to the same minimum, and it is one.
+// Both solvers find the same minimum of a round, and it is a minimum.
 #include "core/calibration/solver.h"
 
 #include <gtest/gtest.h>
@@ -46,7 +46,7 @@ Rig WrongRig(Rig rig) {
   return rig;
 }
 
-// A round as a calibration would pose it first, from a start near the minimum.
+// A round as a calibration would state it first, from a start near the minimum.
 class Posed {
  public:
   Posed(const Rig& rig,
@@ -73,7 +73,7 @@ class Posed {
         subspace_(WholeSubspace(rig)),
         prior_(options.prior) {}
 
-  // Holds the directions in which the data says least.
+  // Holds the directions with the least information from the data.
   void Hold(int directions) {
     basis_ = TangentBasis(rig_, subspace_);
     LinearisedRound linearised;
@@ -83,7 +83,7 @@ class Posed {
     ASSERT_EQ(subspace_.held.cols(), directions);
   }
 
-  // Solves both ways, and expects the same of them.
+  // Solves with both solvers, and expects the same result.
   void ExpectSameMinimum() {
     basis_ = TangentBasis(rig_, subspace_);
     const Solved structured = Solve(SolverKind::kStructured);
@@ -172,7 +172,7 @@ class Posed {
       };
       const double curvature = (cost(h) + cost(-h) - 2 * cost(0)) / (h * h);
       ASSERT_GT(curvature, 0);
-      // With all else held.
+      // All other unknowns are held.
       const double sigma = 1 / std::sqrt(curvature);
       const double step = 0.01 * sigma;
       const double slope = (cost(step) - cost(-step)) / (2 * step);
@@ -343,7 +343,7 @@ TEST(Solvers, AgreeWithEstimatedTimeOffsets) {
   Rig rig = TwoCameraRig();
   rig.estimate_time_offset = true;
   rig.factory.cameras[0].time_offset_s = 0.02;
-  // The first is known, the second estimated from where it does not move.
+  // The first is known, the second estimated, starting without a motion.
   rig.fixed = {"cam0.time_offset"};
   Simple({}, SmallOptions(13), rig).ExpectSameMinimum();
   rig.fixed.clear();

@@ -98,8 +98,8 @@ TEST(Subspace, HoldsTheGivenDirectionsAndThoseWithLessInformation) {
   }
 }
 
-// What is estimated leans on what is held: drawn many times over, the errors of
-// both have the covariance that is claimed.
+// Estimated directions are affected by held ones: over many draws, the errors
+// of both have the claimed covariance.
 TEST(Subspace, CovarianceIsThatOfTheErrors) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
@@ -107,7 +107,7 @@ TEST(Subspace, CovarianceIsThatOfTheErrors) {
   const std::vector<int> free = FreeComponents(rig);
   const Eigen::MatrixXd Lambda =
       InTangentUnits(rig, RandomInformation(rig, &random));
-  // Directions that are not those of Lambda.
+  // Directions that are not eigenvectors of Lambda.
   const ThetaSubspace subspace = HoldDirections(
       rig,
       Lambda,
@@ -122,7 +122,7 @@ TEST(Subspace, CovarianceIsThatOfTheErrors) {
   constexpr int kRuns = 20000;
   double sum = 0;
   for (int i = 0; i < kRuns; ++i) {
-    // Errors of what is held, and of the data: eta = Lambda truth + noise.
+    // Errors of held directions, and of the data: eta = Lambda truth + noise.
     Eigen::VectorXd off(subspace.held.cols()), noise(free.size());
     for (double& value : off) value = normal(random);
     for (double& value : noise) value = normal(random);

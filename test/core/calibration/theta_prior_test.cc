@@ -95,7 +95,7 @@ TEST_F(CalibrateWithPrior, AddsUpToTheCalibrationOnAllSegments) {
 }
 
 TEST_F(CalibrateWithPrior, HasNoInformationAboutTheOtherComponents) {
-  // A camera that has turned since the prior was taken, by 60 of its sigmas.
+  // A camera that was rotated since the prior, by 60 of its sigmas.
   Calibration before = truth_;
   before.cameras[0].q_CI =
       before.cameras[0].q_CI *
@@ -122,7 +122,7 @@ TEST_F(CalibrateWithPrior, HasNoInformationAboutTheOtherComponents) {
 }
 
 TEST_F(CalibrateWithPrior, NothingIsHeldUnderTheFactorysPrior) {
-  // At rest, when the segments alone say next to nothing.
+  // At rest the segments alone have almost no information.
   SimulationOptions simulation;
   simulation.keyframes_per_segment = 10;
   const auto segments =

@@ -1,5 +1,5 @@
-// Pixel errors that go together along a track are noticed, and sigmas stay
-// honest.
+// Correlated pixel errors along a track are detected, and sigmas remain
+// consistent.
 #include "core/calibration/track_noise.h"
 
 #include <gtest/gtest.h>
@@ -19,8 +19,7 @@ struct Outcome {
   double nees = 0;
 };
 
-// A simulated device whose rig takes its pixels to be `believed` times as noisy
-// as they are.
+// A simulated device whose rig states `believed` times the actual pixel noise.
 Outcome CalibrateDevice(std::uint64_t seed,
                         double pixel_correlation,
                         double believed,
@@ -50,7 +49,7 @@ TEST(TrackNoise, IndependentErrorsAreNotScaled) {
   }
 }
 
-// Of the sigmas of one result against those of another, geometric mean.
+// Ratio of the sigmas of two results, geometric mean.
 double SigmaRatio(const CalibrationResult& a, const CalibrationResult& b) {
   const std::vector<int> free = FreeComponents(HandheldRig("simulated"));
   const Eigen::ArrayXd ratios = a.covariance.diagonal()(free).array() /
@@ -63,15 +62,15 @@ TEST(TrackNoise, SigmasAreConsistentWhenThePixelSigmaIsTooSmall) {
        {LossKind::kNone, LossKind::kHuber, LossKind::kCauchy}) {
     CalibrateOptions options;
     options.loss = loss;
-    // The noise factors would find it as well, and leave nothing to tell.
+    // The noise scales would account for it as well.
     options.reweight_noise = false;
     const CalibrationResult right = CalibrateDevice(4, 0, 1, options).result;
     const CalibrationResult small = CalibrateDevice(4, 0, 0.5, options).result;
     ASSERT_EQ(small.status, CalibrateStatus::kConverged);
     EXPECT_GT(small.track_noise_factor, 1.2);
-    // A loss at half the scale makes less of the data, by a few percent. Where
-    // weights fall as fast as Cauchy's, those of residuals, which landmarks
-    // have made smaller, claim more than those of the errors would.
+    // A loss at half the scale reduces the information by a few percent. If
+    // weights decrease as fast as Cauchy's, the weights of residuals, which
+    // landmarks have reduced, claim more than those of the errors would.
     const double ratio = SigmaRatio(small, right);
     EXPECT_GT(ratio, loss == LossKind::kCauchy ? 0.85 : 0.95)
         << "loss " << static_cast<int>(loss);

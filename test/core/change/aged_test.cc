@@ -26,8 +26,8 @@ class AgedTest : public ::testing::Test {
   Eigen::MatrixXd covariance_;
 };
 
-// The walk drawn day by day, many times: the spread of its end is what the
-// covariance has more.
+// The walk drawn day by day, many times: the scatter of its end is the increase
+// of the covariance.
 TEST_F(AgedTest, IsThatOfARandomWalk) {
   constexpr int kDays = 30;
   constexpr int kWalks = 20'000;

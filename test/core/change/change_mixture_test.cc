@@ -28,9 +28,8 @@ class ChangeMixtureTest : public ::testing::Test {
   std::uniform_real_distribution<double> uniform_{0, 1};
 };
 
-// Draws devices as the prior has them: of each the mixture says how probable a
-// change is, where theta is, and how well it knows that. All three must be
-// right on average.
+// Draws devices from the prior: for each, the mixture estimates the probability
+// of a change, theta, and its uncertainty. All three must be right on average.
 TEST_F(ChangeMixtureTest, IsCalibratedOverItsPrior) {
   constexpr int kDevices = 20'000;
   constexpr double kChanged = 0.3;
@@ -93,7 +92,7 @@ TEST_F(ChangeMixtureTest, WithoutInformationThePriorRemains) {
       doubt.covariance(0, 0), (1e-4 + 9e-4 + 1e-2 + 9e-2 + 1) / 5 / 4, 1e-12);
 }
 
-// Against the integral over y.
+// Compared with the integral over y.
 TEST(SizedChange, EvidenceMeanAndVarianceAreThoseOfTheDefinition) {
   const double L = 50;
   const double s = 12;

@@ -26,7 +26,7 @@ TEST(ChiSquareTail, HasTheDensityForASlope) {
       const double slope =
           (ChiSquareTail(x + h, degrees) - ChiSquareTail(x - h, degrees)) /
           (2 * h);
-      // Of the difference, and of the rounding of two numbers near 1.
+      // Tolerance of the difference, and of the rounding of two numbers near 1.
       EXPECT_NEAR(-slope, density, 1e-6 * density + 1e-15 / h)
           << degrees << " degrees at " << x;
     }

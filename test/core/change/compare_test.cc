@@ -11,7 +11,7 @@ namespace selfcal {
 namespace {
 
 // Estimates from segments of one device, in the linear world of
-// RandomInformation: each is what its segments and a weak prior say together.
+// RandomInformation: each is the sum of its segments and a weak prior.
 class CompareTest : public ::testing::Test {
  protected:
   static constexpr int kSegments = 8;
@@ -115,8 +115,8 @@ TEST_F(CompareTest, AVersionDoesNotDifferFromItself) {
   const KnownCalibration a = Estimate(0, 8);
   const CalibrationDifference compared =
       CompareCalibrations(rig_, a, a, Shared(0, 8));
-  // Where products are fused with sums, as on arm64, a rotation times its
-  // inverse is the identity only to rounding: 6e-25.
+  // With fused multiply-add, as on arm64, a rotation times its inverse is the
+  // identity only to rounding: 6e-25.
   EXPECT_LT(compared.test.statistic, 1e-20);
   EXPECT_EQ(compared.test.probability, 1);
   EXPECT_TRUE(compared.sigmas.allFinite());

@@ -21,7 +21,7 @@ class ConsistencyTesterTest : public ::testing::Test {
   const Eigen::VectorXd reference_ = ReferenceSigmas(rig_);
   const Eigen::VectorXd zero_ = Eigen::VectorXd::Zero(reference_.size());
   RandomInformation random_{7};
-  // As sure as two reference segments.
+  // Uncertainty of two reference segments.
   const KnownCalibration active_ = FactoryKnownTo(rig_, 0.5);
   const ConsistencyTester tester_{rig_, active_};
 };
@@ -33,7 +33,7 @@ TEST_F(ConsistencyTesterTest, IsChiSquareDistributedWithoutAChange) {
   int rare = 0;
   std::vector<int> rare_groups(rig_.groups.size());
   for (int i = 0; i < kTrials; ++i) {
-    // The truth is off from the active calibration as its covariance says.
+    // The error of the active calibration has its covariance.
     const Eigen::VectorXd error = random_.Noise(active_.covariance);
     const auto offset =
         tester_.Offset(random_.Segment(rig_, rig_.factory, error, 0.5));
@@ -79,7 +79,7 @@ TEST_F(ConsistencyTesterTest, DoesNotLookAtWhatASegmentDoesNotObserve) {
   information.eta(blind) = 0;
   const ConsistencyTest before = tester_.Test(tester_.Offset(information));
   EXPECT_EQ(before.degrees, static_cast<int>(FreeComponents(rig_).size()) - 1);
-  // A residue of rounding, worth ten prior sigmas if it were believed.
+  // A rounding error that would be worth ten prior sigmas if trusted.
   information.Lambda(blind, blind) =
       1e-6 / std::pow(PriorSigmas(rig_)(blind), 2);
   information.eta(blind) = 1e-5 / PriorSigmas(rig_)(blind);
@@ -116,8 +116,8 @@ TEST_F(ConsistencyTesterTest, TakesASegmentToTheActiveCalibration) {
   EXPECT_EQ(taken.reach.size(), offset.eta.size());
 }
 
-// Noise in the states of the SLAM system that looks like motion: it claims that
-// theta is where the segment was linearised, however that is.
+// Noise in the states of the SLAM system that looks like motion: the segment
+// claims that theta is its linearisation point, wherever that is.
 TEST_F(ConsistencyTesterTest, DoesNotTreatTheLinearisationPointAsEvidence) {
   const ConsistencyTester exact(rig_, FactoryKnownTo(rig_, 1e-4));
   const Eigen::VectorXd moved = 0.9 * random_.Direction(rig_);
@@ -125,14 +125,14 @@ TEST_F(ConsistencyTesterTest, DoesNotTreatTheLinearisationPointAsEvidence) {
       random_.Segment(rig_, BoxPlus(rig_.factory, moved), zero_, 1e4);
   ASSERT_TRUE(exact.Accepts(claims));
   EXPECT_GT(exact.Test(exact.Offset(claims)).probability, 0.01);
-  // The same of a segment that was linearised here is a change.
+  // The same information of a segment that was linearised here is a change.
   claims.theta0 = rig_.factory;
   claims.eta += claims.Lambda * moved;
   EXPECT_LT(exact.Test(exact.Offset(claims)).probability, 1e-9);
 }
 
-// The covariance of a calibration is that with the noise it found: only what
-// segments say is taken for less sure.
+// The covariance of a calibration is that with the estimated noise: only the
+// information of segments is reduced.
 TEST_F(ConsistencyTesterTest, TreatsSegmentsAsNoisyAsTheCalibrationFound) {
   KnownCalibration noisy = FactoryKnownTo(rig_, 0);
   const ConsistencyTester exact(rig_, noisy);
@@ -148,7 +148,7 @@ TEST_F(ConsistencyTesterTest, TreatsSegmentsAsNoisyAsTheCalibrationFound) {
 }
 
 TEST_F(ConsistencyTesterTest, DoesNotInflateTheCalibration) {
-  // A segment that leaves no doubt: what remains is the calibration's own.
+  // With a segment without uncertainty, only that of the calibration remains.
   const ConsistencyTester careful(rig_, active_, 4);
   const SegmentInformation information =
       random_.Segment(rig_, rig_.factory, random_.Direction(rig_), 1e6);

@@ -14,7 +14,7 @@ using ::testing::ElementsAre;
 
 class DetectChangeTest : public ::testing::Test {
  protected:
-  // Appends the next segment of a device that is off by `offset`.
+  // Appends the next segment of a device with the given offset.
   void Next(const Eigen::VectorXd& offset, double strength = 1) {
     newest_.push_back(
         tester_.Offset(random_.Segment(rig_, rig_.factory, offset, strength)));
@@ -26,7 +26,7 @@ class DetectChangeTest : public ::testing::Test {
   std::optional<Change> Detect() const {
     return DetectChange(tester_, newest_, options_);
   }
-  // So many reference sigmas of one component.
+  // This many reference sigmas of one component.
   Eigen::VectorXd Sigmas(double sigmas, const std::string& name) const {
     const int i =
         MatchComponents(TangentComponents(rig_.factory), {name}).at(0);
@@ -62,7 +62,7 @@ TEST_F(DetectChangeTest, AlarmsAtMostAtTheStatedRateWithoutAChange) {
     }
   }
   EXPECT_LE(alarms, options_.false_alarm_rate * tests);
-  EXPECT_GT(alarms, 0);  // and it is not blind
+  EXPECT_GT(alarms, 0);  // the test is sensitive
 }
 
 TEST_F(DetectChangeTest, OneInconsistentSegmentIsNoChange) {
@@ -145,15 +145,15 @@ TEST_F(DetectChangeTest, FindsASmallChangeOfFewParameters) {
 }
 
 TEST_F(DetectChangeTest, TrustsSegmentsAsFarAsTheyAgree) {
-  // Each is off by something of its own, ten times what it claims.
+  // Each has its own error, ten times what it claims.
   for (int i = 0; i < 40; ++i) {
     Next(10 * random_.Direction(rig_));
     EXPECT_FALSE(Detect()) << i;
   }
 }
 
-// Segments of an earlier version whose information is noise taken for motion:
-// they claim that theta is what that version had it.
+// Segments of an earlier version whose information is noise that looks like
+// motion: they claim that theta is that of the version.
 TEST_F(DetectChangeTest, SegmentsLinearisedElsewhereAreNoChange) {
   Many(8, zero_);
   const Calibration elsewhere =
@@ -169,14 +169,14 @@ TEST_F(DetectChangeTest, SegmentsLinearisedElsewhereAreNoChange) {
   }
 }
 
-// As they are, but with another motion before: what is taken for known there
-// differs from motion to motion.
+// As above, but with another motion before: the spurious information differs
+// from motion to motion.
 TEST_F(DetectChangeTest,
        SegmentsOfAnotherMotionLinearisedElsewhereAreNoChange) {
   const Eigen::VectorXd off = 0.9 * random_.Direction(rig_);
   const Calibration elsewhere = BoxPlus(rig_.factory, off);
   for (int i = 0; i < 40; ++i) {
-    // The first show where theta is, the others claim that it is there.
+    // The first observe theta, the others claim that it is there.
     newest_.push_back(tester_.Offset(random_.Segment(
         rig_, elsewhere, i < 15 ? Eigen::VectorXd(-off) : zero_, 100)));
     EXPECT_FALSE(Detect()) << i;

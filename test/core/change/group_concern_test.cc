@@ -59,7 +59,7 @@ TEST_F(GroupConcernTest, FindsTheGroupAndBothOfTwo) {
               ::testing::ElementsAre("camera", "extrinsics"));
 }
 
-// Nothing is shown: the expectation of the squares that stand in the header.
+// Without information: the expectation of the squares in the header.
 TEST_F(GroupConcernTest, WithoutSegmentsDoubtIsThatOfThePrior) {
   const Eigen::MatrixXd doubt =
       DoubtOfUnconcerned(rig_, before_, {}, {"extrinsics"});
@@ -79,13 +79,13 @@ TEST_F(GroupConcernTest, SegmentsThatShowNoChangeLeaveLittleDoubt) {
       DoubtOfUnconcerned(rig_, before_, segments, {"extrinsics"});
   for (const char* name : {"cam0.focal.x", "imu.gyro.scale.x"}) {
     const int i = Component(name);
-    // Below half of a reference sigma, which a segment knows; above nothing.
+    // Below half of a reference sigma, which a segment resolves; above nothing.
     EXPECT_LT(std::sqrt(doubt(i, i)), 0.5 * ReferenceSigmas(rig_)(i)) << name;
     EXPECT_GT(doubt(i, i), 0) << name;
   }
 }
 
-// A change that was missed: as far as it went, the prior is as wide.
+// A missed change: the prior is as wide as the change.
 TEST_F(GroupConcernTest, SegmentsThatShowAChangeLeaveItsSize) {
   const auto segments =
       Segments(12, Sigmas(5, "cam0.q_CI.x") + Sigmas(4, "cam0.focal.x"));

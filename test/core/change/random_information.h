@@ -12,8 +12,8 @@
 
 namespace selfcal {
 
-// The factory's calibration, as well known as `share` of the variance of a
-// reference segment; as in a result, what the rig holds fixed has none.
+// The factory calibration with `share` of the variance of a reference segment;
+// as in a result, components that the rig holds fixed have no variance.
 inline KnownCalibration FactoryKnownTo(const Rig& rig, double share) {
   const std::vector<int> free = FreeComponents(rig);
   const Eigen::VectorXd sigmas = ReferenceSigmas(rig);
@@ -32,7 +32,8 @@ class RandomInformation {
     });
   }
 
-  // A direction of what the rig estimates in reference sigmas, as a tangent.
+  // A random direction of the estimated components in reference sigmas, as a
+  // tangent.
   Eigen::VectorXd Direction(const Rig& rig) {
     const std::vector<int> free = FreeComponents(rig);
     const Eigen::VectorXd sigmas = ReferenceSigmas(rig);
@@ -45,8 +46,8 @@ class RandomInformation {
     return direction;
   }
 
-  // Symmetric, definite, about `strength` in units of `sigmas`, mixed at
-  // random.
+  // A random symmetric positive definite matrix, of about `strength` in units
+  // of `sigmas`.
   Eigen::MatrixXd Definite(const Eigen::VectorXd& sigmas, double strength) {
     const Eigen::Index size = sigmas.size();
     const Eigen::MatrixXd A = Normal(size, 2 * size);
@@ -56,8 +57,8 @@ class RandomInformation {
     return scale.asDiagonal() * unit * scale.asDiagonal();
   }
 
-  // A segment of a device whose truth is theta0 [+] offset. It says nothing of
-  // what the rig holds fixed.
+  // A segment of a device whose truth is theta0 [+] offset. It has no
+  // information about components that the rig holds fixed.
   SegmentInformation Segment(const Rig& rig,
                              const Calibration& theta0,
                              const Eigen::VectorXd& offset,

@@ -1,5 +1,5 @@
 // The theory holds for scores of simulated segments, linearised at the states
-// of a SLAM system that are off.
+// of a SLAM system with errors.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace {
 
 class SimulatedSegments : public ::testing::Test {
  protected:
-  // Of a device that has become `truth`.
+  // Segments of a device with the calibration `truth`.
   std::vector<MotionSegment> Segments(const Calibration& truth,
                                       std::uint64_t seed) const {
     SimulationOptions options;

@@ -51,7 +51,8 @@ TEST(Advise, NoMotionReducesTheInformation) {
   }
 }
 
-// The same again doubles what is known: sqrt(2) in each of k directions.
+// The same motion again doubles the information: sqrt(2) in each of k
+// directions.
 TEST(Advise, PredictsWhatTheSumOfTheInformationGives) {
   const Rig rig = HandheldRig("r");
   Predictions predictions = Predict(rig, rig.factory);
@@ -132,9 +133,9 @@ double Excitation(const Rig& rig, const Primitive& motion, int component) {
 
 class AdviseOneUnknown : public ::testing::TestWithParam<int> {};
 
-// All but one component is known a thousand times better than a segment shows
-// it: what is advised is a motion that excites that one, and its name is what
-// the coach calls weak.
+// All but one component are known a thousand times better than a segment
+// determines them: the recommended motion excites that one, and the coach names
+// it as weak.
 TEST_P(AdviseOneUnknown, ExcitesWhatIsUnknown) {
   const int unknown = GetParam();
   const Rig rig = HandheldRig("r");

@@ -12,7 +12,7 @@
 namespace selfcal {
 namespace {
 
-// Of a segment's information with the prior [nat].
+// Gain of a segment's information with the prior [nat].
 double GainOf(const Rig& rig, const Eigen::MatrixXd& Lambda) {
   const std::vector<int> free = FreeComponents(rig);
   const Eigen::VectorXd prior = PriorSigmas(rig)(free);
@@ -68,9 +68,10 @@ TEST(Predict, AllowsADelayOfTheImages) {
   }
 }
 
-// Predicted with the calibration that is known, wrong as a factory's is, a
-// motion is worth what its real segments bring: the sigmas that it leaves are
-// right within a few tens of percent, in the mean over the directions of theta.
+// A motion is predicted with a calibration as inaccurate as a factory
+// calibration. Its predicted value is that of real segments: the remaining
+// sigmas are right within a few tens of percent, on average over the directions
+// of theta.
 TEST(Predict, ComesCloseToSegmentsOfTheSameMotion) {
   for (const std::uint64_t seed : {1, 2}) {
     Rig rig = HandheldRig("r");

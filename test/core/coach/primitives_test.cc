@@ -61,8 +61,7 @@ TEST(Primitives, HaveNamesAndInstructions) {
   EXPECT_EQ(FindPrimitive("moonwalk"), nullptr);
 }
 
-// What they teach more than being carried about, they do not owe to being
-// faster.
+// Their higher gain relative to being carried about is not due to being faster.
 TEST(Primitives, AreNoMoreVigorousThanBeingCarriedAbout) {
   const Calibration theta = HandheldRig("r").factory;
   const Vigour carried = MeanVigour(

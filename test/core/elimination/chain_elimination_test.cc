@@ -43,7 +43,7 @@ std::vector<RandomChainShape> Shapes() {
   return shapes;
 }
 
-// Of the dense problem.
+// First row of the links in the dense problem.
 int FirstLinkRow(const Chain& chain) {
   std::size_t observations = 0;
   for (const auto& track : chain.landmarks) observations += track.size();
@@ -118,7 +118,8 @@ TEST(ChainElimination, FindsThePosterior) {
       Eliminate(chain, elimination, ChainElimination::Record::kSteps);
       const DenseProblem dense = MakeDense(chain);
       const int D = chain.shared_size();
-      // Shared parameters as the chain knows them, but for what it does not.
+      // The shared parameters have the information of the chain and a unit
+      // prior.
       Eigen::MatrixXd H = dense.J.transpose() * dense.J;
       H.bottomRightCorner(D, D).diagonal().array() += 1;
       const Eigen::MatrixXd covariance = H.inverse();
@@ -233,8 +234,8 @@ TEST(ChainElimination, RemovingRowsNeverAddsInformation) {
   }
 }
 
-// Neighbours tied far more tightly than double precision could tell from the
-// rest if the rows were squared: the result is still that of a QR.
+// Neighbours tied far more tightly than double precision could distinguish if
+// the rows were squared: the result is still that of a QR.
 TEST(ChainElimination, TightLinksLoseNoPrecision) {
   std::mt19937 random(7);
   for (const double tightness : {1e3, 1e6, 1e9, 1e12}) {

@@ -69,7 +69,7 @@ std::vector<ChainObservation> RandomTrack(int first,
   return track;
 }
 
-// What a factor is a derivative by.
+// Derivative of a factor with respect to the pose.
 Eigen::Matrix<double, 2, 6> ByPose(const ChainObservation& observation) {
   Eigen::Matrix<double, 2, 6> J;
   J << observation.turn, observation.position;
@@ -104,7 +104,7 @@ ChainTransition Solve(const ChainRows& rows) {
   return link;
 }
 
-// The observations of one keyframe and camera, in a form to hand over.
+// The observations of one keyframe and camera, as input of the elimination.
 void AddObservations(const Chain& chain,
                      int keyframe,
                      int camera,
@@ -142,7 +142,7 @@ void AddObservations(const Chain& chain,
       by_rotation.isIdentity(0) ? nullptr : &by_rotation);
 }
 
-// Draws what each keyframe has for the cameras of odd number.
+// Draws the pose rotation of each keyframe for the cameras of odd number.
 void TurnPoses(std::mt19937* random, Chain* chain) {
   for (int k = 0; k < chain->keyframes(); ++k) {
     const auto cameras = static_cast<int>(chain->camera_sizes.size());
@@ -279,8 +279,8 @@ DenseProblem MakeDense(const Chain& chain) {
   const double root = std::sqrt(chain.landmark_prior);
   int row = 0;
   const int kept = columns - chain.kept;
-  // First column of a landmark. One that is kept leaves its own without
-  // anything but a unit row, so that its step there is zero.
+  // First column of a landmark. A kept landmark leaves its own column empty
+  // except for a unit row, so that its step there is zero.
   const auto column = [&](int m) {
     return chain.kept_landmarks[m] < 0 ? 3 * m : kept + chain.kept_landmarks[m];
   };

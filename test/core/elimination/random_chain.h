@@ -18,7 +18,8 @@ struct ChainObservation {
   Eigen::Matrix<double, 2, 3> turn, position;
   Eigen::Matrix2Xd own;
   Eigen::Vector2d residual;
-  // By the turn of the keyframe it is [turn | position] by_rotation.
+  // The derivative with respect to the rotation of the keyframe is [turn |
+  // position] by_rotation.
   ChainElimination::PoseRotation by_rotation =
       ChainElimination::PoseRotation::Identity();
 };
@@ -56,11 +57,13 @@ struct RandomChainShape {
   int landmarks_per_keyframe = 4;
   int max_track = 5;  // keyframes from the first to the last that sees it
   double seen = 0.8;  // of the keyframes within a track
-  // Tracks that are seen once more, from any keyframe after them.
+  // Fraction of tracks that are observed once more, from any keyframe after
+  // them.
   double found_again = 0;
-  // Part of the landmarks; if any, a state and biases as well.
+  // Fraction of kept landmarks; if positive, a state and biases are kept as
+  // well.
   double kept = 0;
-  bool turned = false;  // each keyframe and every second camera on its own
+  bool turned = false;  // each keyframe with every second camera
 };
 
 Chain RandomChain(const RandomChainShape& shape, std::mt19937* random);

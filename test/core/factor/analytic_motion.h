@@ -15,7 +15,7 @@
 namespace selfcal {
 
 // Attitude Exp(alpha(t)) and position are sums of a drift and one sine for each
-// axis: a device shaken by hand, turning all the time.
+// axis: a device shaken by hand and rotating all the time.
 class AnalyticMotion {
  public:
   explicit AnalyticMotion(RandomValues& random)

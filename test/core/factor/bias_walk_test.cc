@@ -1,5 +1,6 @@
-// What the walk of the biases within an interval does to its motion, against
-// the response of the motion to a step of each bias at each sample.
+// The effect of the walk of the biases within an interval on its motion,
+// compared with the response of the motion to a step of each bias at each
+// sample.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -64,8 +65,8 @@ struct Interval {
     return covariance;
   }
 
-  // The errors that a small step of a bias from sample `first` on makes, in
-  // parts of the step.
+  // Errors due to a small step of a bias from sample `first` on, relative to
+  // the step.
   Vector9d StepResponse(std::size_t first, int axis) const {
     constexpr double kStep = 1e-4;
     const auto integrate = [&](double step) {
@@ -109,8 +110,8 @@ struct Interval {
   }
 };
 
-// Of intervals that turn by several radians within a second: the longer ones
-// are no constant rotation at all.
+// Intervals that rotate by several radians within a second: the longer ones are
+// far from a constant rotation.
 TEST(BiasWalk, MovesTheMotionAsStepsOfTheBiasesDo) {
   RandomValues random(1);
   for (const double rate_hz : {100.0, 200.0, 500.0}) {
@@ -123,8 +124,8 @@ TEST(BiasWalk, MovesTheMotionAsStepsOfTheBiasesDo) {
       Interval still = interval;
       still.noise.gyro_bias_random_walk = 0;
       still.noise.accel_bias_random_walk = 0;
-      // In standard deviations of all noise: where white noise is most of it,
-      // the walk does not matter.
+      // In standard deviations of all noise: where white noise dominates, the
+      // walk does not matter.
       const Eigen::LLT<WalkCovariance> llt(all);
       const auto whitened = [&](const WalkCovariance& of) -> WalkCovariance {
         const WalkCovariance half = llt.matrixL().solve(of);

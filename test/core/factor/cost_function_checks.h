@@ -77,7 +77,7 @@ inline void ExpectJacobiansMatch(
   }
 }
 
-// Ceres asks for some blocks only where others are constant.
+// Ceres requests only some blocks if the others are constant.
 inline void ExpectBlocksCanBeLeftOut(const ceres::CostFunction& cost,
                                      const Blocks& blocks) {
   const CostEvaluation all = EvaluateCost(cost, blocks, true);

@@ -1,4 +1,4 @@
-// The factors of many links at once against each by itself.
+// Compares the factors of many links at once with each factor alone.
 #include "core/factor/inertial_batch.h"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ struct Link {
   std::vector<ImuSample> samples;
 };
 
-// States at random, except that the rotation residual is Exp(error).
+// Random states, except that the rotation residual is Exp(error).
 Link RandomLink(RandomValues& random,
                 const ImuCalibration& imu,
                 double rate_hz,

@@ -31,7 +31,7 @@ struct Factor {
   }
 };
 
-// States at random, except that the rotation residual is Exp(error).
+// Random states, except that the rotation residual is Exp(error).
 Factor RandomFactor(RandomValues& random,
                     double rate_hz,
                     double duration_s,

@@ -41,8 +41,8 @@ struct Scene {
   std::vector<ImuSample> samples;
 };
 
-// Of a camera of f = 500 px in the body's origin: how far the farthest pixels
-// of points at a distance of 1 m are off, as a bound.
+// For a camera of f = 500 px in the body's origin: an upper bound of the pixel
+// error of points at a distance of 1 m.
 double ErrorPixels(const ExposurePose& pose, const KeyframeState& truth) {
   return 500 * (Log(pose.q_GI.conjugate() * truth.q_GI).norm() +
                 (pose.p_GI - truth.p_GI).norm());
@@ -59,7 +59,7 @@ TEST(MeasureMotion, MovesThePoseToTheExposure) {
         MovePose(scene.x.q_GI, scene.x.p_GI, motion, dt_s);
     EXPECT_LT(ErrorPixels(pose, truth), 0.02);
     EXPECT_LT((scene.x.q_GI * motion.v_I - truth.v_GI).norm(), 1e-3);
-    // A rate that is off by 1 % makes the offset's sigma that much wrong.
+    // An error of the rate of 1 % makes the offset's sigma that much wrong.
     const double h_s = 1e-4;
     const Vector3d w_I =
         Log(truth.q_GI.conjugate() * scene.Truth(dt_s + h_s).q_GI) / h_s;
@@ -122,7 +122,7 @@ TEST(MeasureMotion, HoldsASingleSample) {
   EXPECT_LT((Log(motion.turn) - 0.01 * w_I).norm(), 1e-12);
 }
 
-// A device at rest shows nothing of its offset, however often it is looked at.
+// The offset of a device at rest is unobservable, however often it is observed.
 TEST(MeasureMotion, NoiseAloneIsNoRate) {
   RandomValues random(8);
   const ImuNoise noise;

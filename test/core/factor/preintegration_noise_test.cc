@@ -1,4 +1,5 @@
-// The propagated covariance against the scatter of integrals of noisy readings.
+// Compares the propagated covariance with the scatter of integrals of noisy
+// readings.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -55,7 +56,7 @@ Experiment RandomExperiment(RandomValues& random, std::int64_t t1_ns) {
   return experiment;
 }
 
-// Noise of a sensor that takes a sample every period_ns.
+// Noise of a sensor with one sample every period_ns.
 void AddNoise(RandomValues& random,
               const ImuNoise& noise,
               std::int64_t period_ns,
@@ -122,8 +123,8 @@ TEST(PreintegrationNoise, CovarianceIsTheScatterUnderNoiseOnEachSample) {
   ExpectIdentity(moments, 0.01);
 }
 
-// Where samples are lost the noise of those about them counts for more: it
-// comes with each sample, not with the time between two.
+// If samples are lost the noise of the neighbouring ones has more weight: noise
+// belongs to samples, not to the time between two.
 TEST(PreintegrationNoise, CovarianceIsTheScatterWhereSamplesAreLost) {
   RandomValues random(2);
   const std::int64_t period_ns = 1'000'000;
@@ -156,7 +157,7 @@ TEST(PreintegrationNoise, DoesNotDependOnTheRateOfTheSamples) {
       }
       return experiment.Integrate(samples, true).covariance;
     };
-    // Whitened by the one, the other is the identity.
+    // Whitened by the one covariance, the other is the identity.
     const Eigen::LLT<Matrix9d> llt(covariance(1'000'000));
     const Matrix9d half = llt.matrixL().solve(covariance(10'000'000));
     const Matrix9d white = llt.matrixL().solve(half.transpose());

@@ -56,7 +56,7 @@ Integral RandomIntegral(RandomValues& random,
           .noise = {}};
 }
 
-// What two states say about the motion between them.
+// The motion between two states.
 Preintegration TrueMotion(const KeyframeState& x0, const KeyframeState& x1) {
   const double dt = 1e-9 * static_cast<double>(x1.t_ns - x0.t_ns);
   const Vector3d g(0, 0, -kGravity);
@@ -129,8 +129,9 @@ TEST(Preintegrate, OnHandShakenMotionTheErrorIsBelowTheNoise) {
         Difference(measured, TrueMotion(motion.State(0), motion.State(t1_ns)));
     sum += error.cwiseAbs2().cwiseQuotient(measured.covariance.diagonal());
   }
-  // In sigmas of the default noise. What is left is the interpolation between
-  // samples, largest for the rotation: the gyroscope is the better sensor.
+  // In sigmas of the default noise. The remaining error is the interpolation
+  // between samples, largest for the rotation: the gyroscope is the better
+  // sensor.
   const Vector9d rms = (sum / trials).cwiseSqrt();
   EXPECT_LT(rms.head<3>().maxCoeff(), 0.002);
   EXPECT_LT(rms.tail<6>().maxCoeff(), 0.001);
@@ -243,10 +244,9 @@ TEST(Preintegrate, SplitAtASampleTheTwoPartsComposeToTheWhole) {
     EXPECT_LT((covariance - whole.covariance).norm(),
               1e-12 * whole.covariance.norm());
 
-    // Of walks alone: the biases of the second part begin where those of the
-    // first have walked to. Readings without any smoothness are no constant
-    // rotation and force, and the pieces in which the walk is found are not the
-    // same.
+    // For walks alone: the biases of the second part begin where those of the
+    // first have walked to. Random readings are not a constant rotation and
+    // force, and the pieces in which the walk is computed differ.
     integral.noise = {.gyro_noise_density = 0, .accel_noise_density = 0};
     const Preintegration walk_a = integral.From(0, split_ns);
     const Preintegration walk_b = integral.From(split_ns, integral.t1_ns);
@@ -321,8 +321,8 @@ TEST(Preintegrate, OmittedPartsStayZeroAndChangeNothingElse) {
   const Integral integral = RandomIntegral(random, 200, 0.1);
   const Preintegration all = integral.Whole();
   const Preintegration motion = integral.MotionAlone();
-  // Two instances of one template: a compiler that fuses products with sums may
-  // do so differently in each, which is 1.1e-18 on arm64.
+  // Two instances of one template: with fused multiply-add, a compiler may fuse
+  // differently in each, which is 1.1e-18 on arm64.
   EXPECT_LT(Difference(motion, all).norm(), 1e-15);
   EXPECT_EQ(motion.J_bias.norm() + motion.J_theta.norm(), 0);
   EXPECT_EQ(motion.covariance.norm(), 0);

@@ -1,4 +1,5 @@
-// The kernels against the plain function, for every width of this machine.
+// Compares the kernels with the plain function, for every width of this
+// machine.
 #include "core/factor/reprojection_batch.h"
 
 #include <gtest/gtest.h>
@@ -13,8 +14,7 @@ namespace selfcal {
 namespace {
 
 constexpr double kSigma_px = 0.8;
-// Relative; the kernels fuse products with sums and have an arc tangent of
-// their own.
+// Relative; the kernels use fused multiply-add and a separate arc tangent.
 constexpr double kTolerance = 1e-12;
 
 std::vector<VectorWidth> Widths() {
@@ -26,7 +26,7 @@ std::vector<VectorWidth> Widths() {
   return widths;
 }
 
-// Points in front of a camera and some behind it, in an order of their own.
+// Points in front of a camera and some behind it, in random order.
 struct Scene {
   KeyframeState keyframe;
   CameraCalibration camera;
@@ -67,7 +67,7 @@ Scene RandomScene(RandomValues& random,
     const Eigen::Vector3d p_I =
         scene.camera.q_CI.conjugate() * (p_C - scene.camera.p_CI);
     const Eigen::Vector3d p_G = scene.keyframe.q_GI * p_I + scene.keyframe.p_GI;
-    // Any scale that does not turn it around; infinity is 1e6 m away.
+    // Any positive scale; infinity is 1e6 m away.
     const double w = random.LogUniform(1e-6, 10);
     const Eigen::Vector4d point = w * p_G.homogeneous();
     scene.points.insert(scene.points.end(), point.data(), point.data() + 4);

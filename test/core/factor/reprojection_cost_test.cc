@@ -53,8 +53,8 @@ View RandomView(RandomValues& random) {
   view.z_px = camera.c + Vector2d(10 * random.NormalVector(2));
   if (random.Index(2) == 0) view.motion = random.Motion();
   view.delta = 0.005 * random.NormalVector(TangentSize(view.reference));
-  // A rotation far from the reference, that a derivative by the offset differs
-  // from one by the rotation.
+  // A rotation far from the reference, for which derivatives with respect to
+  // the offset and to the rotation differ.
   if (random.Index(2) == 0) {
     const int at = CameraTangentOffset(view.reference, view.camera);
     const Vector3d turn = random.Normal3(1);

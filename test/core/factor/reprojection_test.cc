@@ -31,8 +31,8 @@ struct View {
   const KeyframeMotion* Motion() const { return motion ? &*motion : nullptr; }
 };
 
-// The homogeneous landmark that this view sees in the given direction of the
-// camera, at 1 / w metres.
+// The homogeneous landmark that this view observes in the given direction of
+// the camera, at 1 / w metres.
 Vector4d LandmarkAt(const View& view, const Vector3d& bearing_C, double w) {
   const Vector3d p_I =
       view.camera.q_CI.conjugate() * (bearing_C - w * view.camera.p_CI);
@@ -159,7 +159,7 @@ TEST_P(ReprojectionOfEachModel, JacobiansMatchDifferencesAtRandomStates) {
     if (trial % 2 == 0) view.motion = random.Motion();
     Vector3d bearing_C;
     if (!Unproject(view.camera, view.z_px, &bearing_C)) continue;
-    // From half a metre to beyond what parallax can tell, and infinity.
+    // From half a metre to beyond the range of parallax, and infinity.
     const double w = trial % 10 == 0 ? 0 : random.LogUniform(1e-6, 2);
     view.landmark_G = LandmarkAt(view, bearing_C, w);
     view.z_px += Vector2d(random.NormalVector(2));

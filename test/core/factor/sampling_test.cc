@@ -34,10 +34,10 @@ TEST(Sampling, RegularStepsHaveTheDensitiesOfTheRig) {
   }
 }
 
-// One lost sample: of the two beside it each stands for one and a half steps.
+// One lost sample: each of the two neighbours represents one and a half steps.
 // In squares of a sample's noise, over the three steps there are
-//   1/4 + (3/2)^2 + (3/2)^2 + 1/4 of the outer halves, and what the step
-// densities say is their sum.
+//   1/4 + (3/2)^2 + (3/2)^2 + 1/4 of the outer halves, and the step
+// densities give their sum.
 TEST(Sampling, NoiseComesWithEachSample) {
   const std::vector<ImuSample> samples =
       SamplesAt({0, 5, 10, 15, 20, 30, 35, 40, 45, 50});
@@ -60,7 +60,7 @@ TEST(Sampling, GapsAreCountedAgainstTheUsualStep) {
   EXPECT_EQ(FindGaps({}).count, 0);
   EXPECT_EQ(FindGaps(SamplesAt({0})).count, 0);
   EXPECT_EQ(FindGaps(SamplesAt({0, 5, 10, 15})).count, 0);
-  // Stamps that jitter are no gap.
+  // Timestamp jitter is not a gap.
   EXPECT_EQ(FindGaps(SamplesAt({0, 5, 11, 14, 20, 25})).count, 0);
   const SampleGaps gaps =
       FindGaps(SamplesAt({0, 5, 10, 20, 25, 30, 130, 135, 140}));
@@ -68,8 +68,8 @@ TEST(Sampling, GapsAreCountedAgainstTheUsualStep) {
   EXPECT_DOUBLE_EQ(gaps.longest_s, 0.1);
 }
 
-// Motions without noise, one gap each: what is integrated is off by what the
-// covariance says, and not by much less, whether keyframes fall into the gap or
+// Motions without noise, one gap each: the error of the integral matches the
+// covariance, and is not much smaller, whether keyframes fall into the gap or
 // not.
 TEST(Sampling, TheCovarianceCoversTheMotionInAGap) {
   RandomValues random(1);
@@ -112,7 +112,7 @@ TEST(Sampling, TheCovarianceCoversTheMotionInAGap) {
                 sum / kTrials,
                 squares[kTrials * 99 / 100],
                 squares.back());
-    // There is no noise, nor is the walk of biases: one is the bound.
+    // There is neither noise nor a walk of biases: one is the bound.
     EXPECT_LT(sum / kTrials, 1);
     EXPECT_GT(sum / kTrials, 0.02);
     EXPECT_LT(squares[kTrials * 99 / 100], 4);

@@ -1,5 +1,5 @@
 // The scoring loop allocates nothing in steady state: counted by a malloc of
-// this program's own, so that it is a program by itself.
+// this program, which is therefore a separate program.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -17,7 +17,7 @@ std::atomic<int> allocations = 0;
 
 extern "C" {
 
-// The C library's own.
+// The allocator of the C library.
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
 void* __libc_realloc(void* memory, std::size_t size);

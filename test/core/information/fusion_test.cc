@@ -20,13 +20,13 @@ Eigen::VectorXd Normal(int size, std::mt19937* random) {
   return values;
 }
 
-// With the time offsets: nothing is held.
+// The rig with estimated time offsets: nothing is held.
 Rig AllEstimated(Rig rig) {
   rig.estimate_time_offset = true;
   return rig;
 }
 
-// What a linear segment says that was scored at theta0 where theta is the
+// Information of a linear segment that was scored at theta0, with theta at the
 // truth: information of a given rank, in units of the prior, with its noise.
 SegmentInformation LinearSegment(const Rig& rig,
                                  const Calibration& theta0,
@@ -120,8 +120,8 @@ TEST(Fuse, FindsTheTruthOfLinearSegmentsScoredAtDifferentCalibrations) {
   }
 }
 
-// Truth drawn from the prior, noise as modelled: the estimate errs as its
-// covariance says, and the segments differ as their information says.
+// Truth drawn from the prior, noise as modelled: the error of the estimate has
+// its covariance, and the segments differ as their information predicts.
 TEST(Fuse, IsConsistentWhereAllIsLinear) {
   std::mt19937 random(4);
   const Rig rig = AllEstimated(HandheldRig("handheld"));
@@ -184,8 +184,8 @@ TEST(Fuse, WithoutSegmentsIsThePrior) {
   EXPECT_EQ(fused.reach, 0);
   EXPECT_EQ(static_cast<int>(fused.unobserved.size()),
             TangentSize(rig.factory));
-  // Where products are fused with sums, as on arm64, a rotation times its
-  // inverse is the identity only to rounding: 2e-17.
+  // With fused multiply-add, as on arm64, a rotation times its inverse is the
+  // identity only to rounding: 2e-17.
   EXPECT_LT(BoxMinus(fused.theta, rig.factory).norm(), 1e-15);
   const Eigen::MatrixXd prior = PriorSigmas(rig).cwiseAbs2().asDiagonal();
   EXPECT_TRUE(fused.covariance.isApprox(prior, 1e-12));

@@ -34,7 +34,8 @@ TEST(SelectInliers, KeepsEverythingOfAPerfectSegmentAndMovesNothing) {
   EXPECT_FALSE(statistics.many_outliers);
 }
 
-// The calibration is a factory's, states and landmarks are a SLAM system's.
+// The calibration is a factory calibration, states and landmarks are a SLAM
+// system's.
 TEST(SelectInliers, FindsGrossOutliersUnderAWrongCalibration) {
   const Rig rig = HandheldRig("handheld");
   int gross = 0, missed = 0, good = 0, lost = 0;
@@ -139,8 +140,8 @@ TEST(SelectInliers, NothingToSelectFromIsNoError) {
   EXPECT_FALSE(selection.statistics.many_outliers);
 }
 
-// Root mean square distance [px] of where two points appear in a track, but for
-// its observation `except`.
+// Root mean square distance [px] of the projections of two points in a track,
+// excluding its observation `except`.
 double AppearanceError(const Rig& rig,
                        const MotionSegment& segment,
                        const std::vector<int>& track,

@@ -15,7 +15,7 @@
 namespace selfcal {
 namespace {
 
-// Every landmark is seen as often as its id modulo 7, and once more.
+// Every landmark is observed as often as its id modulo 7, plus once.
 MotionSegment SegmentWith(std::uint64_t first_id, int landmarks) {
   MotionSegment segment;
   for (int m = 0; m < landmarks; ++m) {
@@ -93,7 +93,7 @@ TEST(LandmarkSketch, OverlapOfTwoIsFoundInTheirCommonRange) {
 TEST(LandmarkSketch, OfAScoreContainsTheUsedLandmarks) {
   const Rig rig = HandheldRig("handheld");
   MotionSegment segment = MovingSegment(rig, 3);
-  // One landmark that no observation agrees about.
+  // One landmark whose observations contradict each other.
   const std::uint64_t wrong = segment.landmarks[0].id;
   std::mt19937 random(1);
   std::uniform_real_distribution<double> pixel(20, 460);

@@ -1,5 +1,6 @@
-// What the score calls observed, against the sparse QR of the whole Jacobian,
-// on many small segments, most of them of motions that leave much unobserved.
+// Compares the observable directions of the score with the sparse QR of the
+// whole Jacobian, on many small segments, most of them of motions that leave
+// much unobserved.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -54,7 +55,7 @@ RandomSegment MakeRandomSegment(int index) {
       result.kind,
       (options.keyframes_per_segment + 1) / options.keyframe_rate_hz,
       &random);
-  // Truth; or a SLAM system that runs with a factory's calibration.
+  // Truth; or a SLAM system that runs with a factory calibration.
   const bool truth = between(0, 1) == 0;
   result.theta0 =
       truth ? result.rig.factory
@@ -90,17 +91,18 @@ ReferenceInformation Reference(const RandomSegment& s,
   return ReferenceDirections(s.rig, qr.Root().R);
 }
 
-// Directions in which the data says at least as much as the prior.
+// Number of directions with at least as much information from the data as from
+// the prior.
 int Rank(const Eigen::VectorXd& information) {
   return static_cast<int>((information.array() >= 1).count());
 }
 
-// How near to the threshold the information of a direction comes.
+// Distance of the information of a direction from the threshold.
 double Distance(const Eigen::VectorXd& information) {
   return (information.array() - 1).abs().minCoeff();
 }
 
-// Rounding moves what is near the threshold by less than this.
+// Rounding changes information near the threshold by less than this.
 constexpr double kRounding = 1e-5;
 
 TEST(RankAgainstReference, IsTheSameOnRandomSegments) {

@@ -1,4 +1,4 @@
-// The structured score against two slow ways to the same numbers.
+// Compares the structured score with two slow implementations.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -149,9 +149,9 @@ TEST(ScoreAgainstReference, EqualsCeresCovariance) {
   }
 }
 
-// eta is what moves theta towards the truth: linearised off the truth, with
-// states that are true, its step differs by just that from the step at the
-// truth (which is not zero: the IMU is sampled, its integral is not exact).
+// eta moves theta towards the truth: linearised off the truth, with true
+// states, its step differs by exactly this offset from the step at the truth
+// (which is not zero: the IMU is sampled, its integral is not exact).
 TEST(ScoreAgainstReference, TheStepFromEtaTakesBackAnErrorOfTheta) {
   Rig rig = HandheldRig("handheld");
   rig.estimate_time_offset = true;

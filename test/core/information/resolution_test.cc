@@ -7,7 +7,7 @@
 namespace selfcal {
 namespace {
 
-// What is in pixels has other numbers; angles are what they were.
+// Quantities in pixels have other values; angles are unchanged.
 void ScalePixels(double factor, Calibration* theta) {
   for (CameraCalibration& camera : theta->cameras) {
     camera.f *= factor;

@@ -1,4 +1,4 @@
-// What follows from Lambda alone.
+// Scores that follow from Lambda alone.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -22,7 +22,7 @@ Eigen::MatrixXd RandomInformation(int size, int rank, std::mt19937* random) {
 // The size of the tangent with one FOV camera.
 constexpr int kSize = 27;
 
-// With the time offset, that nothing is held fixed.
+// The rig with estimated time offset, so that nothing is held fixed.
 Rig EstimatingAll() {
   Rig rig = HandheldRig("handheld");
   rig.estimate_time_offset = true;

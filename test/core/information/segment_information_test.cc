@@ -193,7 +193,7 @@ TEST(ScoreSegment, WithoutObservationsOnlyTheWeakPriorsRemain) {
   }
 }
 
-// Body in free fall: nothing shows which way is down.
+// A body in free fall: gravity is unobservable.
 TEST(ScoreSegment, FreeFallStaysFinite) {
   Rig rig = HandheldRig("handheld");
   rig.factory.imu = {};
@@ -247,7 +247,7 @@ TEST(ScoreSegment, FixedComponentsHaveZeroRowsAndLeaveTheirGroup) {
   EXPECT_TRUE(held.eta(fixed).isZero(0));
   EXPECT_EQ(held.groups[0].size, 9);
   EXPECT_EQ(held.groups[2].size, 5);
-  // What is known helps the rest.
+  // Known components improve the others.
   EXPECT_LE(held.groups[1].entropy, free.groups[1].entropy + 1e-9);
   // A group of which nothing is left.
   rig.fixed = {"imu.*"};
@@ -318,8 +318,8 @@ TEST(ScoreSegment, ARealisticSlamSegmentKeepsItsObservations) {
   }
 }
 
-// What is left of all squares where states, landmarks and theta follow them is
-// what noise leaves, also from a factory's calibration.
+// The remaining squares at the minimum over states, landmarks and theta are
+// those of the noise, also from a factory calibration.
 TEST(ScoreSegment, FitIsOneIfNoiseIsAsStated) {
   const Rig device = HandheldRig("handheld");
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -343,8 +343,8 @@ TEST(ScoreSegment, FitIsOneIfNoiseIsAsStated) {
   }
 }
 
-// One reading at the end of the sensor's range makes motion look vigorous; its
-// information is worth next to nothing.
+// One reading at the limit of the sensor's range makes motion look vigorous;
+// its information has almost no weight.
 TEST(ScoreSegment, InformationIsReducedIfTheSegmentDoesNotFit) {
   const Rig rig = HandheldRig("handheld");
   SimulationOptions options;

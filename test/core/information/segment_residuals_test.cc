@@ -88,7 +88,7 @@ TEST(SegmentResiduals, IntervalsAreWhitenedAsTheScoreWhitensThem) {
   }
 }
 
-// One that was moved by hand: its residual is what it was moved by.
+// One that was moved manually: its residual is the displacement.
 TEST(SegmentResiduals, AMovedMeasurementHasItsResidualAndIsNoInlier) {
   const Rig rig = TwoCameraRig();
   MotionSegment segment = MovingSegment(rig, 1);

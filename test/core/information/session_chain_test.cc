@@ -68,7 +68,7 @@ std::vector<MotionSegment> Session(const Rig& rig, int keyframes) {
       .segments;
 }
 
-// One segment of both; landmarks that both see are different ones.
+// Concatenates two segments; common landmarks become different ones.
 MotionSegment Concatenated(const MotionSegment& a, const MotionSegment& b) {
   MotionSegment both = a;
   const auto keyframes = static_cast<std::int32_t>(a.keyframes.size());
@@ -117,7 +117,7 @@ TEST(SessionChain, NeighboursGiveTheInformationOfOneSegment) {
     apart.Lambda += Scored(rig, segments[i]).Lambda;
   }
   ExpectSame(rig, chain.Theta(), Scored(rig, whole));
-  // Which is more than what they say one by one.
+  // The joint information exceeds that of the single segments.
   const Eigen::VectorXd gained =
       Sigmas(rig, apart.Lambda)
           .cwiseQuotient(Sigmas(rig, chain.Theta().Lambda));
@@ -125,8 +125,8 @@ TEST(SessionChain, NeighboursGiveTheInformationOfOneSegment) {
   EXPECT_GT(gained.maxCoeff(), 1.2);
 }
 
-// Where the point is another one than that of the linearisation, the chain is
-// about it, and its estimate is the same calibration.
+// If the point differs from the linearisation point, the chain is about the
+// point, and its estimate is the same calibration.
 TEST(SessionChain, IsAboutItsPoint) {
   const Rig rig = HandheldRig("r");
   const MotionSegment segment = Session(rig, 30)[0];
@@ -138,8 +138,8 @@ TEST(SessionChain, IsAboutItsPoint) {
   ExpectSame(rig, chain.Theta(), Transport(score, point));
 }
 
-// Segments between which one is missing know that biases walk slowly, and of
-// another session nothing.
+// Segments with a missing one in between share the information that biases walk
+// slowly; those of another session do not.
 TEST(SessionChain, OverAGapTiesTheBiases) {
   const Rig rig = HandheldRig("r");
   const std::vector<MotionSegment> segments = Session(rig, 20);
@@ -173,7 +173,7 @@ TEST(SessionChain, AWeightIsOneOverAFactorOnTheCovariance) {
 }
 
 // The covariance of the estimate grows by the variances of the walk, and the
-// estimate stays.
+// estimate does not change.
 TEST(SessionChain, AgesByTheWalk) {
   Rig rig = HandheldRig("r");
   SessionChain chain(rig, rig.factory);

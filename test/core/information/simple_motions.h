@@ -17,7 +17,7 @@ enum class MotionKind {
   kConstantVelocity,  // without turning
   kOneAxis,           // turns about one axis, in place
   kRotationOnly,
-  kPlanar,  // drives on level ground, turning
+  kPlanar,  // drives on level ground, rotating
   kHover,   // centimetres and a degree about one place
   kHandheld,
 };
@@ -68,7 +68,7 @@ inline std::unique_ptr<Trajectory> RandomMotion(MotionKind kind,
                               ? uniform(-std::numbers::pi, std::numbers::pi)
                               : uniform(-0.3, 0.3);
   }
-  // On level ground the device does not lean.
+  // On level ground the device does not tilt.
   if (kind == MotionKind::kPlanar) angles[0].offset = angles[1].offset = 0;
   return std::make_unique<SwingTrajectory>(duration_s, p, angles);
 }

@@ -1,5 +1,5 @@
-// Segments for the tests of the score: truth or as a SLAM system gives them,
-// and changes of them that the score must bear.
+// Segments for the tests of the score: truth or as estimated by a SLAM system,
+// and changes of them that must not affect the score.
 #pragma once
 
 #include <algorithm>
@@ -69,7 +69,7 @@ inline MotionSegment RestingSegment(const Rig& rig, std::uint64_t seed) {
   return TrueSegment(rig, *MakeRest(4.1), options);
 }
 
-// The same segment in a world frame turned by yaw and moved.
+// The same segment in a world frame that is rotated by yaw and translated.
 inline MotionSegment Moved(MotionSegment segment,
                            double yaw_rad,
                            const Eigen::Vector3d& offset_m) {

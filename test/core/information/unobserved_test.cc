@@ -64,7 +64,7 @@ TEST(AnalyseObservability, DirectionsLieInTheUnobservedSpan) {
       }
       EXPECT_GT(d.parts[0].weight, 0);
       EXPECT_GE(v.squaredNorm(), 0.9 - 1e-12);
-      // Only what was left out of the parts is missing.
+      // Only the excluded parts are missing.
       const Eigen::VectorXd in_span =
           Q.leftCols(2) * (Q.leftCols(2).transpose() * v);
       EXPECT_GE(in_span.squaredNorm(),
@@ -73,8 +73,8 @@ TEST(AnalyseObservability, DirectionsLieInTheUnobservedSpan) {
   }
 }
 
-// Where several components are equally unknown, each is named by itself, not
-// in a mixture that rounding chose.
+// If several components are equally unknown, each is named individually, not in
+// a mixture determined by rounding.
 TEST(AnalyseObservability, EquallyUnknownComponentsAreNamedOneByOne) {
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(5, 5);
   information(1, 1) = 50;

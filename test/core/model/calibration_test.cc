@@ -177,8 +177,8 @@ TEST(TangentComponents, ReferenceSigmasAreEqualOnTheAxesOfABlock) {
     const std::string block =
         component.name.substr(0, component.name.rfind('.'));
     for (const TangentComponent& other : components) {
-      // The coefficients of a distortion are no axes, and what a camera has
-      // but one of is no block.
+      // The coefficients of a distortion are not axes, and a single parameter
+      // of a camera is not a block.
       if (block.ends_with("distortion")) continue;
       if (component.name.ends_with("time_offset")) continue;
       if (!other.name.starts_with(block + ".")) continue;

@@ -13,8 +13,8 @@ namespace {
 constexpr int kTrials = 5000;
 using Real = long double;
 
-// Sums term(0) + term(1) + ... until terms no longer count: a reference that
-// has no switch between two formulas.
+// Sums term(0) + term(1) + ... until terms are negligible: a reference without
+// a switch between two formulas.
 Real Sum(const std::function<Real(int)>& term) {
   Real sum = 0;
   for (int n = 0; n < 400; ++n) sum += term(n);

@@ -31,7 +31,7 @@ TEST(ImuGradesTest, SetEveryComponentOfTheImuAndNoOther) {
   }
 }
 
-// Data sheets: at most 3 % and one degree, and some tenths of a percent.
+// Data sheets state at most 3 % and one degree, and some tenths of a percent.
 TEST(ImuGradesTest, AreOfTheSizeThatDataSheetsState) {
   Rig rig = TestRig();
   rig.prior_sigmas = ImuTolerances(ImuGrade::kConsumer);

@@ -35,7 +35,7 @@ TEST(ProfileRises, AgreesWithTheSmallestSlope) {
     for (double& value : k) value = random.Uniform(-1, 1);
     const double q = random.Uniform(0, 2.5);
     const double smallest = SmallestSlope(k, q);
-    if (std::abs(smallest) < 1e-3) continue;  // brute force cannot tell
+    if (std::abs(smallest) < 1e-3) continue;  // undecidable by brute force
     const bool rises = ProfileRises(k, q);
     EXPECT_EQ(rises, smallest > 0) << smallest;
     ++(rises ? rising : falling);

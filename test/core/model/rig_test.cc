@@ -115,7 +115,7 @@ TEST(TimeOffsets, AreKnownUnlessTheRigEstimatesThem) {
   EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(0, 0, 0));
   rig.estimate_time_offset = true;
   EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(1, 1, 1));
-  // Of one camera against which the others are found.
+  // Time offset of the camera relative to which the others are estimated.
   rig.fixed = {"cam0.time_offset"};
   EXPECT_FALSE(free(0));
   EXPECT_TRUE(free(1));

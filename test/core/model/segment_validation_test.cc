@@ -179,7 +179,7 @@ TEST(ValidateSegment, AllCorruptionsTogetherGiveAllFieldsInOrder) {
     corruption.apply(&segment);
     expected.push_back(corruption.field);
   }
-  // What the cover needs is judged after the samples themselves.
+  // Coverage is validated after the samples themselves.
   const auto first = std::find(expected.begin(), expected.end(), "imu[0].t_ns");
   const auto last =
       std::find(expected.begin(), expected.end(), "imu[180].t_ns");
@@ -334,7 +334,7 @@ TEST(ValidateSegment, LongListsOfViolationsAreTruncatedAndMarked) {
     EXPECT_EQ(violations[i].field, "imu[" + std::to_string(i) + "].gyro");
   }
   EXPECT_THAT(violations.back().message, HasSubstr("only the first 20"));
-  // Exactly as many as fit: nothing is cut.
+  // Exactly as many as allowed: nothing is truncated.
   limits.max_violations = 181;
   EXPECT_THAT(Validate(segment, Theta(), limits), SizeIs(181));
 }

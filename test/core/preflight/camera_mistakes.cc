@@ -19,7 +19,7 @@ void InvertExtrinsics(FedData* data) {
   }
 }
 
-// States of the camera handed on as those of the body.
+// Sends the states of the camera as those of the body.
 void SendCameraPoses(FedData* data) {
   const CameraCalibration& camera = data->rig.factory.cameras[0];
   const Eigen::Quaterniond q_IC = camera.q_CI.conjugate();
@@ -31,8 +31,8 @@ void SendCameraPoses(FedData* data) {
   }
 }
 
-// The bridge has the extrinsics inverted and makes the poses of the body from
-// those of the camera with them: landmarks project as they should.
+// The bridge has inverted extrinsics and computes the poses of the body from
+// those of the camera with them: landmarks project correctly.
 void MakePosesByInverse(FedData* data) {
   SendCameraPoses(data);
   InvertExtrinsics(data);
@@ -55,7 +55,7 @@ void ScaleCamera(FedData* data, double by) {
   }
 }
 
-// Landmarks as the front end has them: in the camera that saw them first.
+// Landmarks as stored by the front end: in the camera that observed them first.
 void AnchorLandmarks(FedData* data) {
   for (MotionSegment& segment : data->segments) {
     std::map<int, std::pair<int, int>> first;  // keyframe and camera
@@ -74,8 +74,8 @@ void AnchorLandmarks(FedData* data) {
   }
 }
 
-// Landmarks in the frame of the session's first camera, as ORB-SLAM's map has
-// them, beside poses in G.
+// Landmarks in the frame of the session's first camera, as in ORB-SLAM's map,
+// with poses in G.
 void LandmarksOfFirstCamera(FedData* data) {
   const CameraCalibration& camera = data->rig.factory.cameras[0];
   const KeyframeState state = data->segments.front().keyframes.front();

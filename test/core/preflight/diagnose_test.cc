@@ -46,7 +46,7 @@ TEST(Diagnose, ReportsForNoDataThatNothingWasChecked) {
   EXPECT_EQ(diagnosis.not_checked.size(), 5);
 }
 
-// Of 4000 samples a gap of 75 ms is no more than a few in a thousand.
+// A gap of 75 ms is only a few in a thousand of 4000 samples.
 TEST(Diagnose, NamesASingleLongGap) {
   FedData data = Clean();
   std::vector<ImuSample>& imu = data.segments[2].imu;
@@ -96,7 +96,7 @@ TEST(Diagnose, FindsTimestampsThatDoNotIncrease) {
       << Text(diagnosis);
 }
 
-// Samples of another recording fit in no way that is known, and it says so.
+// Samples of another recording do not fit any hypothesis, and that is reported.
 TEST(Diagnose, ReportsThatSamplesOfAnotherRecordingDoNotFit) {
   FedData data = Clean();
   const auto other = Simulate(data.rig,

@@ -1,4 +1,4 @@
-// What a planted mistake must lead to.
+// Expected findings for a planted mistake.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Clean data gives no finding: over seeds, motions, rigs, and calibrations that
-// are as far off as a factory's. As many seeds as SELFCAL_TRIALS says.
+// Clean data gives no finding: over seeds, motions, rigs, and calibrations as
+// inaccurate as a factory calibration. SELFCAL_TRIALS sets the number of seeds.
 #include <gtest/gtest.h>
 
 #include <iostream>

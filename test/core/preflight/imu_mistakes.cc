@@ -1,4 +1,4 @@
-// Mistakes about the IMU and the frame that gravity is in.
+// Mistakes about the IMU and the frame of gravity.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -35,14 +35,15 @@ void TurnImu(FedData* data, const Eigen::Matrix3d& m) {
   });
 }
 
-// The clock of the images runs apart from that of the IMU.
+// The clock of the images has an offset from that of the IMU.
 void ShiftKeyframes(FedData* data, std::int64_t by_ns) {
   for (MotionSegment& segment : data->segments) {
     for (KeyframeState& state : segment.keyframes) state.t_ns += by_ns;
   }
 }
 
-// A frame whose axes are m times those of G, for all that the SLAM system says.
+// A frame whose axes are m times those of G, for everything that the SLAM
+// system exports.
 void TurnWorld(FedData* data, const Eigen::Matrix3d& m) {
   const Eigen::Quaterniond q(m);
   for (MotionSegment& segment : data->segments) {
@@ -83,7 +84,7 @@ void RepeatReadings(FedData* data, double share) {
   }
 }
 
-// A range of the sensor at `part` of what it reads at most about x.
+// Limits the range of the sensor to `part` of its largest reading about x.
 void Saturate(FedData* data, bool gyro, double part) {
   const auto axis = [&](ImuSample* s) -> double& {
     return gyro ? s->gyro.x() : s->accel.x();
@@ -96,7 +97,7 @@ void Saturate(FedData* data, bool gyro, double part) {
   });
 }
 
-// A driver that takes gravity away, by the attitude of the SLAM system.
+// A driver that removes gravity, with the attitude of the SLAM system.
 void RemoveGravity(FedData* data) {
   for (MotionSegment& segment : data->segments) {
     std::size_t k = 0;

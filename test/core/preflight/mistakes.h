@@ -1,6 +1,6 @@
-// The usual mistakes, planted in data that has none. Each is what a user's own
-// bridge to selfcal does: the SLAM system ran with a driver and a calibration
-// of its own, and its states are right; what is handed on is not. The same
+// The usual mistakes, planted in data that has none. Each is a mistake of a
+// user's own bridge to selfcal: the SLAM system ran with its own driver and
+// calibration, and its states are right, but the exported data is not. The same
 // mistakes are planted in simulated and in recorded data.
 #pragma once
 
@@ -32,7 +32,7 @@ struct Mistake {
   double value = 0;  // of the first finding, where it is known beforehand
 };
 
-// All of both kinds.
+// The mistakes of both kinds.
 std::vector<Mistake> Mistakes();
 std::vector<Mistake> ImuMistakes();
 std::vector<Mistake> CameraMistakes();

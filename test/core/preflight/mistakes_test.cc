@@ -27,7 +27,7 @@ FedData Simulated(const Rig& rig, const Trajectory& trajectory, int seed) {
   return data;
 }
 
-// Over seeds: as many as SELFCAL_TRIALS says.
+// Tests over seeds; SELFCAL_TRIALS sets their number.
 void ExpectAllFound(
     const std::function<std::unique_ptr<Trajectory>(int)>& motion,
     const Rig& rig = HandheldRig("rig")) {
@@ -57,7 +57,7 @@ TEST(Mistakes, AreFoundInMixedMotion) {
   ExpectAllFound([](int seed) { return MakeMixed(60, seed); });
 }
 
-// Of all four, which look in three directions.
+// The four cameras look in three directions.
 TEST(Mistakes, AreFoundWithFourCameras) {
   ExpectAllFound([](int seed) { return MakeMixed(60, seed); }, RigOfCameras(4));
 }
@@ -91,7 +91,7 @@ TEST(Mistakes, LandmarksInTheFirstOfFourCamerasAreFound) {
                           clean));
 }
 
-// At rest nothing can be said about rates, and it is not.
+// Rates cannot be checked at rest, and the diagnosis reports that.
 TEST(Mistakes, OfTheGyroscopeAreNotCheckedAtRest) {
   FedData data = Simulated(HandheldRig("rig"), *MakeRest(40), 4);
   for (MotionSegment& segment : data.segments) {

@@ -31,8 +31,8 @@ void ShiftKeyframes(FedData* data, double by_s) {
   }
 }
 
-// `harmless`: what changes too little in this recording to be seen, or to
-// matter; nothing may be said about these.
+// `harmless`: mistakes that change too little in this recording to be detected,
+// or to matter; they need not be reported.
 void ExpectAllFound(const FedData& clean,
                     const std::set<std::string>& harmless) {
   const Diagnosis diagnosis = clean.Diagnose();
@@ -49,8 +49,8 @@ void ExpectAllFound(const FedData& clean,
   }
 }
 
-// Its camera is turned by almost 180 degrees to the body, which is nearly its
-// own inverse: R_CI^2 is a turn of 7 degrees.
+// Its camera is rotated by almost 180 degrees relative to the body, which is
+// nearly its own inverse: R_CI^2 is a rotation of 7 degrees.
 TEST(Recordings, TangoIsCleanAndEveryMistakeIsFound) {
   SELFCAL_NEED_RECORDING(path, "tango_handheld");
   ExpectAllFound(Read(path, 40), {"poses_by_inverted_extrinsics"});
@@ -61,7 +61,7 @@ TEST(Recordings, EurocIsCleanAndEveryMistakeIsFound) {
   ExpectAllFound(Read(path, 20), {});
 }
 
-// This one has a mistake of its own, which each half of it shows alike.
+// This recording has an actual mistake, which both halves of it reveal.
 TEST(Recordings, RoomHasAnOffsetOfTime) {
   SELFCAL_NEED_RECORDING(path, "equidistant_room");
   const FedData whole = Read(path, 20);
@@ -77,7 +77,7 @@ TEST(Recordings, RoomHasAnOffsetOfTime) {
   }
 }
 
-// Its camera, too, is turned by almost 180 degrees.
+// Its camera, too, is rotated by almost 180 degrees.
 TEST(Recordings, RoomIsCleanWithItsOffsetCorrectedAndEveryMistakeIsFound) {
   SELFCAL_NEED_RECORDING(path, "equidistant_room");
   FedData data = Read(path, 20);

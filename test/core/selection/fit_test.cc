@@ -12,11 +12,11 @@ TEST(FitTest, IsComparedWithTheMedianOfTheNewest) {
 }
 
 TEST(FitTest, IsComparedWithHowMuchFitsDiffer) {
-  // All alike, and more different: a tenth of the median as the median
+  // All equal, and then with more spread: a tenth of the median as the median
   // distance, 1.4826 times that as the standard deviation.
   EXPECT_DOUBLE_EQ(*LargestFit({1.99, 2, 2, 2.01, 2}, {}), 1.5 * 2);
   EXPECT_DOUBLE_EQ(*LargestFit({1.6, 1.8, 2, 2.2, 2.4}, {}), 2 + 10 * 0.29652);
-  // One in five segments has stamps that are off: simulated.
+  // One in five segments has timestamps with an error: simulated.
   EXPECT_LT(*LargestFit({1.01, 1.01, 1.91, 1.01, 0.99, 1.01, 1.0, 1.86}, {}),
             1.86);
   // One landmark in ten moves, and nothing is wrong: simulated.

@@ -125,7 +125,7 @@ TEST(JointSelection, StaysWithinTheBoundAndNeverGetsWorse) {
   }
 }
 
-// One more and one fewer: nothing that was in reach is better.
+// One more and one fewer: no reachable set is better.
 TEST(JointSelection, ReplacesTheSegmentWithTheLeastContribution) {
   std::mt19937 random(3);
   int exchanged = 0;

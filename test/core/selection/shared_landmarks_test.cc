@@ -10,7 +10,7 @@
 namespace selfcal {
 namespace {
 
-// What an allotment is sought to.
+// Tolerance of an allocation.
 constexpr double kGap_nats = 0.005;
 
 double HalfLogDet(const Eigen::MatrixXd& matrix) {
@@ -114,7 +114,7 @@ TEST(SharedLandmarks, OneMoreSegmentNeverReducesInformation) {
   }
 }
 
-// Two that see the same: I + w A + (1 - w) B with the best w.
+// Two with the same landmarks: I + w A + (1 - w) B with the best w.
 TEST(SharedLandmarks, IsCovarianceIntersectionForTwoWithTheSameLandmarks) {
   std::mt19937 random(6);
   for (int trial = 0; trial < 50; ++trial) {

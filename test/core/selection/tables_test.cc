@@ -26,8 +26,8 @@ Table MakeTable(int capacity) {
   return table;
 }
 
-// What a table must hold after these offers, said without a table: the first
-// offer of every key that gains enough, sorted, cut.
+// Expected contents of a table after these offers, computed without a table:
+// the first offer of every key with sufficient gain, sorted, truncated.
 std::vector<TableEntry> BruteForce(const std::vector<TableEntry>& offers,
                                    double min_gain,
                                    int capacity) {

@@ -1,5 +1,5 @@
-// What a program does with a calibration: readings to rates, points to pixels
-// and pixels to rays, against the truth of the simulation.
+// Applies a calibration: readings to rates, points to pixels and pixels to
+// rays, compared with the truth of the simulation.
 #include <gtest/gtest.h>
 
 #include "core/model/camera.h"

@@ -26,8 +26,8 @@ std::vector<KeyframeState> Keyframes(const Trajectory& trajectory,
   return keyframes;
 }
 
-// Lengths of the stretches of neighbouring keyframes in which a camera sees a
-// landmark, and how many stretches each landmark has in camera 0.
+// Lengths of the runs of consecutive keyframes in which a camera observes a
+// landmark, and the number of runs of each landmark in camera 0.
 struct Lengths {
   std::vector<int> lengths;
   std::map<int, int> stretches;
@@ -59,7 +59,7 @@ double Mean(const std::vector<int>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-// Of cameras without a time offset.
+// Tracks of cameras without a time offset.
 FeatureTracks Tracks(const Rig& rig,
                      double pixel_sigma_px,
                      const std::vector<KeyframeState>& keyframes,
@@ -208,8 +208,8 @@ TEST(FeatureTracksTest, TheWantedFractionOfLandmarksMoves) {
   EXPECT_NEAR(moved / n, 0.2, 5 * std::sqrt(0.2 * 0.8 / n));
 }
 
-// The errors lie along the blur and are as large a part of it as stated, by
-// projections of the landmarks at both ends of the exposure.
+// The errors lie along the blur and have the stated size relative to it,
+// according to projections of the landmarks at both ends of the exposure.
 TEST(FeatureTracksTest, BlurMakesErrorsAlongTheWayOfALandmarkInTheImage) {
   constexpr double kExposure_s = 0.01;
   const Rig rig = HandheldRig("a");

@@ -11,8 +11,8 @@ namespace {
 constexpr int kDraws = 200000;
 
 TEST(RandomTest, TheEngineIsTheOneOfTheStandard) {
-  // The standard demands this value: if it holds, so do all bits that are made
-  // from the engine without its library's distributions.
+  // The standard requires this value: if it holds, so do all bits derived from
+  // the engine without its library's distributions.
   std::mt19937_64 engine;
   engine.discard(9999);
   EXPECT_EQ(engine(), 9981545732273789042ULL);

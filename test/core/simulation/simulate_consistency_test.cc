@@ -1,4 +1,4 @@
-// Simulated readings and pixels against the factors that an estimator uses.
+// Compares simulated readings and pixels with the factors of an estimator.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -78,8 +78,8 @@ Rig LateRig() {
   return rig;
 }
 
-// What the factor makes of the IMU's samples is the model's error: for offsets
-// of 30 ms it is far below the noise of a pixel, but for the first keyframe of
+// The error is that of the factor's integration of IMU samples: for offsets of
+// 30 ms it is far below the noise of a pixel, except for the first keyframe of
 // a segment, before which there are no samples.
 TEST(SimulateConsistencyTest, WithATimeOffsetPixelsAreThoseOfTheMovedPose) {
   const Rig rig = LateRig();
@@ -112,8 +112,8 @@ TEST(SimulateConsistencyTest, WithoutNoiseReadingsAreThoseOfTheFactor) {
   options.noise = false;
   const SimulatedSession coarse = SimulateHandheld(rig, 30, options);
   const Eigen::Vector3d at_200 = InertialRms(coarse.truth, rig);
-  // What is left is the error of the linear interpolation between samples: less
-  // than a fifth of what the noise of the readings makes of 0.1 s.
+  // The remaining error is that of the linear interpolation between samples:
+  // less than a fifth of the effect of the noise of the readings in 0.1 s.
   const double dt_s = 0.1;
   const ImuNoise& noise = rig.imu_noise;
   const double gyro = noise.gyro_noise_density * std::sqrt(3 * dt_s);
@@ -121,7 +121,7 @@ TEST(SimulateConsistencyTest, WithoutNoiseReadingsAreThoseOfTheFactor) {
   EXPECT_LT(at_200[0], gyro / 5);
   EXPECT_LT(at_200[1], accel / 5);
   EXPECT_LT(at_200[2], accel * dt_s / std::sqrt(3) / 5);
-  // It falls with the square of the step: nothing else is hidden beneath.
+  // It decreases with the square of the step: there is no other error.
   options.imu_rate_hz = 800;
   const Eigen::Vector3d at_800 =
       InertialRms(SimulateHandheld(rig, 30, options).truth, rig);
@@ -194,7 +194,7 @@ TEST(SimulateConsistencyTest, StartsNearEnoughForAnEstimator) {
       ++count;
     }
   }
-  // More than the noise, for the SLAM system is wrong; but of its order.
+  // Larger than the noise, since the SLAM system is wrong; but of its order.
   EXPECT_GT(std::sqrt(sum / count), rig.pixel_sigma_px);
   EXPECT_LT(std::sqrt(sum / count), 5 * rig.pixel_sigma_px);
 }

@@ -10,7 +10,7 @@
 namespace selfcal {
 namespace {
 
-// A camera that moves sideways by 1 m and sees points 2 to 4 m ahead.
+// A camera that translates sideways by 1 m and observes points 2 to 4 m ahead.
 struct Scene {
   Rig rig = HandheldRig("a");
   std::vector<KeyframeState> states;

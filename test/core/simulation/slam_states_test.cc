@@ -76,8 +76,8 @@ TEST(SlamStatesTest, PosesDriftRatherThanJump) {
             0.4 * truth.options.slam_position_m);
 }
 
-// Mean over the session of what the calibration and the bias of the SLAM system
-// leave unexplained of the noise-free readings.
+// Mean over the session of the part of the noise-free readings that the
+// calibration and the bias of the SLAM system do not explain.
 TEST(SlamStatesTest, BiasesAbsorbTheMeanErrorOfTheCalibration) {
   SimulationOptions options = PerfectSlam();
   options.noise = false;

@@ -23,7 +23,7 @@ std::vector<TimedPose> Sampled(const Trajectory& trajectory, double rate_hz) {
   std::vector<TimedPose> poses;
   for (double t = 0; t <= trajectory.duration_s(); t += 1 / rate_hz) {
     const BodyMotion motion = trajectory.At(t);
-    // Sensors and files do not care about the sign of a quaternion.
+    // The sign of a quaternion is irrelevant to sensors and files.
     Eigen::Quaterniond q = motion.q_GI;
     if (poses.size() % 3 == 1) q.coeffs() = -q.coeffs();
     poses.push_back({100 + t, q, motion.p_GI});
@@ -75,7 +75,8 @@ TEST(SplineTrajectoryTest, SmoothsTheNoiseOfPoses) {
   for (double t = 0.5; t < 19.5; t += 0.013, ++count) {
     sum += (spline->At(t).a_GI - motion->At(t).a_GI).squaredNorm() / 3;
   }
-  // Through every pose it would be 1e-3 m * sqrt(6) / (0.01 s)^2 = 24 m/s^2.
+  // An interpolating spline would have 1e-3 m * sqrt(6) / (0.01 s)^2 = 24
+  // m/s^2.
   EXPECT_LT(std::sqrt(sum / count), 0.5);
 }
 

@@ -11,7 +11,7 @@
 namespace selfcal {
 namespace {
 
-// Root mean square over a stretch of time.
+// Root mean square over an interval of time.
 double Rms(const Trajectory& trajectory,
            double begin_s,
            double end_s,

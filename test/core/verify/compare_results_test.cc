@@ -55,7 +55,7 @@ TEST_F(CompareResultsTest, NamesTheComponentThatDiffersMost) {
   EXPECT_FALSE(IsConvergence(difference));
 }
 
-// Sigmas are the same, and yet a direction is known four times worse.
+// Sigmas are the same, but a direction is known four times worse.
 TEST_F(CompareResultsTest, DetectsCorrelationsInTheCovariance) {
   const int x = Index("cam0.focal.x");
   const int y = Index("cam0.focal.y");

@@ -30,9 +30,9 @@ TEST_F(CompareScoresTest, AScoreDoesNotDifferFromItself) {
   EXPECT_TRUE(IsRounding(difference));
 }
 
-// Where the data says all there is, a thousandth more of it is a thousandth
-// more of the posterior, and moves an entropy by at most half of that a
-// component.
+// If the data dominates the prior, an increase of its information by a
+// thousandth is one of the posterior, and changes an entropy by at most half of
+// that for each component.
 TEST_F(CompareScoresTest, ReportsTheRelativeDifferenceOfInformation) {
   SegmentInformation more = score_;
   more.Lambda *= 1 + 1e-3;

@@ -1,4 +1,4 @@
-// The two scorers against each other, on all kinds of motion.
+// Compares the two scorers on all kinds of motion.
 #include "core/verify/scorer.h"
 
 #include <gtest/gtest.h>
@@ -94,7 +94,8 @@ TEST(Scorers, AgreeWhereNothingIsEstimated) {
   ExpectSame(rig, rig.factory, MovingSegment(rig, 2));
 }
 
-// Inertial factors alone leave states to priors that normal equations lose.
+// With inertial factors alone, states depend on priors that normal equations
+// lose.
 TEST(Scorers, CeresReportsThatItCannotScoreWithoutObservations) {
   const Rig rig = HandheldRig("handheld");
   MotionSegment blind = MovingSegment(rig, 2);
