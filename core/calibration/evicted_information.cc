@@ -79,7 +79,7 @@ class SegmentWeights {
     return WeightAt(segment, reach);
   }
   // Weight of a segment that was linearised at the point, as its data allows.
-  double OfCalibrated(const JoinedSegment& segment) const {
+  double WeightOfCalibrated(const JoinedSegment& segment) const {
     return WeightAt(segment, ReachOf(segment));
   }
 
@@ -125,9 +125,9 @@ EvictedInformation InformationOfEvicted(const Rig& rig,
   AgeingChain all(rig, point, options.walk);
   AgeingChain with_data(rig, point, options.walk);
   for (const JoinedSegment& segment : segments) {
-    const std::optional<double> weight = segment.calibrated_on
-                                             ? weights.OfCalibrated(segment)
-                                             : weights.Next(segment);
+    const std::optional<double> weight =
+        segment.calibrated_on ? weights.WeightOfCalibrated(segment)
+                              : weights.Next(segment);
     if (!weight) continue;
     all.AgeTo(segment);
     with_data.AgeTo(segment);

@@ -14,11 +14,11 @@ constexpr int kShortestStep = 2;
 constexpr int kShortestRamp = 8;
 
 // The size of the next longer step to test.
-int Longer(int n) { return n + std::max(1, n / 4); }
+int NextLonger(int n) { return n + std::max(1, n / 4); }
 
 int CountCourses(int max_window) {
   int count = 0;
-  for (int n = kShortestStep; n <= max_window; n = Longer(n)) ++count;
+  for (int n = kShortestStep; n <= max_window; n = NextLonger(n)) ++count;
   for (int n = kShortestRamp; n <= max_window; n *= 2) ++count;
   return count;
 }
@@ -29,7 +29,7 @@ void TryAll(const ConsistencyTester& tester,
   const int count = static_cast<int>(segments.size());
   Course step = MakeCourse(segments, StepCourse(count, 0), tester.root());
   int after = 0;
-  for (int n = kShortestStep; n <= count; n = Longer(n)) {
+  for (int n = kShortestStep; n <= count; n = NextLonger(n)) {
     for (; after < n; ++after) {
       const OffsetInformation& segment = segments[count - 1 - after];
       step.Remove(segment, 0);

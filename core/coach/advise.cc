@@ -55,7 +55,7 @@ class Coach {
            reference_.asDiagonal();
   }
 
-  Knowledge Know(const Eigen::MatrixXd& information) const {
+  Knowledge Summarise(const Eigen::MatrixXd& information) const {
     Knowledge result;
     result.covariance = Inverse(information);
     result.half_log_det = HalfLogDet(result.covariance);
@@ -117,11 +117,11 @@ Coaching Advise(const Rig& rig,
                 const Eigen::MatrixXd& known) {
   const Coach coach(rig);
   const Eigen::MatrixXd information = coach.Normalised(known);
-  const Knowledge now = coach.Know(information);
+  const Knowledge now = coach.Summarise(information);
   Coaching coaching;
   for (const MotionPrediction& motion : predictions.motions) {
     const Knowledge after =
-        coach.Know(information + coach.Normalised(motion.Lambda));
+        coach.Summarise(information + coach.Normalised(motion.Lambda));
     coaching.advice.push_back(coach.Compare(motion, now, after));
   }
   std::stable_sort(coaching.advice.begin(),

@@ -60,7 +60,7 @@ class Integrator {
     const Matrix3<T> A_m = turn_m.LeftJacobian(R_);
     // Exp(phi) = I + J_l(phi) [phi]x.
     s.R_m = R_ + TimesSkew<T>(A_m, turn_m.phi);
-    Turned(turn_1.phi);
+    Rotate(turn_1.phi);
     s.R_1 = R_;
     s.f_m = s.R_m * (0.5 * (reading_.f + next.f));
     s.f_1 = s.R_1 * next.f;
@@ -102,7 +102,7 @@ class Integrator {
   }
 
   // The norm stays one to rounding: an error e of the norm becomes 3/8 e^2.
-  void Turned(const Vector3<T>& phi) {
+  void Rotate(const Vector3<T>& phi) {
     Eigen::Quaternion<T>& q = motion_.Delta_R;
     q = q * Exp(phi);
     q.coeffs() *= 1.5 - 0.5 * q.coeffs().squaredNorm();

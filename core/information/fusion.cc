@@ -31,7 +31,7 @@ class FusionProblem {
       Linearise(result.theta);
       const Eigen::VectorXd step = posterior_.solve(posterior_eta_);
       Eigen::VectorXd delta = Eigen::VectorXd::Zero(components_.size());
-      delta(components_.free()) = InTheirUnits(step);
+      delta(components_.free()) = ToTangentUnits(step);
       result.theta = BoxPlus(result.theta, delta);
       if (step.lpNorm<Eigen::Infinity>() < kSmallStep) break;
     }
@@ -52,7 +52,7 @@ class FusionProblem {
             scale.cwiseProduct(there.eta(components_.free()))};
   }
 
-  Eigen::VectorXd InTheirUnits(const Eigen::VectorXd& normalised) const {
+  Eigen::VectorXd ToTangentUnits(const Eigen::VectorXd& normalised) const {
     return normalised.cwiseProduct(components_.prior()(components_.free()));
   }
 
@@ -75,7 +75,7 @@ class FusionProblem {
     const Eigen::MatrixXd covariance =
         posterior_.solve(Eigen::MatrixXd::Identity(size, size));
     result->covariance.setZero(components_.size(), components_.size());
-    const Eigen::VectorXd scale = InTheirUnits(Eigen::VectorXd::Ones(size));
+    const Eigen::VectorXd scale = ToTangentUnits(Eigen::VectorXd::Ones(size));
     result->covariance(components_.free(), components_.free()) =
         scale.asDiagonal() * (0.5 * (covariance + covariance.transpose())) *
         scale.asDiagonal();

@@ -16,8 +16,8 @@ Eigen::Matrix3d ScaleAndMisalignment(const Eigen::Vector3d& s,
   return T;
 }
 
-Eigen::Quaterniond Turned(const Eigen::Quaterniond& q,
-                          const Eigen::Vector3d& delta) {
+Eigen::Quaterniond Rotated(const Eigen::Quaterniond& q,
+                           const Eigen::Vector3d& delta) {
   return (q * Exp(delta)).normalized();
 }
 
@@ -59,11 +59,11 @@ Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta) {
   imu.m_g += delta.segment<3>(kGyroMisalignment);
   imu.s_a += delta.segment<3>(kAccelScale);
   imu.m_a += delta.segment<3>(kAccelMisalignment);
-  imu.q_AI = Turned(imu.q_AI, delta.segment<3>(kAccelRotation));
+  imu.q_AI = Rotated(imu.q_AI, delta.segment<3>(kAccelRotation));
   int offset = kImuTangentSize;
   for (CameraCalibration& camera : moved.cameras) {
     const auto part = delta.segment(offset, CameraTangentSize(camera));
-    camera.q_CI = Turned(camera.q_CI, part.segment<3>(kCameraRotation));
+    camera.q_CI = Rotated(camera.q_CI, part.segment<3>(kCameraRotation));
     camera.p_CI += part.segment<3>(kCameraPosition);
     camera.f += part.segment<2>(kCameraIntrinsics);
     camera.c += part.segment<2>(kCameraIntrinsics + 2);

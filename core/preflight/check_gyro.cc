@@ -62,7 +62,7 @@ double MeanSpeed(const MotionData& data) {
 enum class Turned { kImu, kCameraPoses, kInvertedExtrinsics };
 
 // R_BI if keyframes are poses of a frame B.
-Eigen::Matrix3d TurnOf(Turned turned, const Eigen::Matrix3d& R_CI) {
+Eigen::Matrix3d BodyToPoseRotation(Turned turned, const Eigen::Matrix3d& R_CI) {
   if (turned == Turned::kCameraPoses) return R_CI;
   return (R_CI * R_CI).transpose();
 }
@@ -103,7 +103,7 @@ class GyroCheck {
       if (best.with.share() > kUnexplained)
         ReportMismatch(best);
       else
-        NotTold(best);
+        ReportUndetermined(best);
       return {};
     }
     ReportUnit(ratio);
@@ -175,7 +175,7 @@ class GyroCheck {
       const Eigen::Matrix3d R_CI = camera.q_CI.toRotationMatrix();
       for (const Turned turned :
            {Turned::kCameraPoses, Turned::kInvertedExtrinsics}) {
-        const Eigen::Matrix3d R_BI = TurnOf(turned, R_CI);
+        const Eigen::Matrix3d R_BI = BodyToPoseRotation(turned, R_CI);
         Candidate candidate = Fit(
             InBody(data_, R_BI), Eigen::Matrix3d::Identity(), coarse.turned_s);
         candidate.R_BI = R_BI;
@@ -274,7 +274,7 @@ class GyroCheck {
          best.with.share()});
   }
 
-  void NotTold(const Candidate& best) {
+  void ReportUndetermined(const Candidate& best) {
     diagnosis_->not_checked.push_back(
         "gyroscope axes, units and time offset: rates and keyframes agree "
         "too loosely to tell (" +

@@ -43,7 +43,7 @@ struct Explanation {
   Finding finding;  // its cause without the figures
 };
 
-Eigen::Vector3d AsFed(const View& view) { return view.p; }
+Eigen::Vector3d AsReceived(const View& view) { return view.p; }
 
 Explanation Extrinsics(const std::string& cause, const std::string& remedy) {
   return {{}, {FindingKind::kExtrinsics, cause, remedy, 0}};
@@ -73,7 +73,7 @@ class ReprojectionCheck {
         views_(views),
         f_px_(camera_.f.mean()),
         fine_px_(kFineSigmas * pixel_sigma_px),
-        fed_(Measure(views, camera_, AsFed)) {}
+        fed_(Measure(views, camera_, AsReceived)) {}
 
   const ReprojectionError& fed() const { return fed_; }
 
@@ -130,7 +130,7 @@ class ReprojectionCheck {
     CameraCalibration other = camera_;
     other.q_CI = q_CI;
     other.p_CI = p_CI;
-    explanation.error = Measure(views_, other, AsFed);
+    explanation.error = Measure(views_, other, AsReceived);
     all->push_back(std::move(explanation));
   }
 

@@ -60,7 +60,7 @@ struct Pile {
   std::size_t at_extreme = 0;
   std::size_t before = 0;
 
-  bool Stands() const {
+  bool IsSignificant() const {
     return at_extreme >= kMinAtExtreme && at_extreme > kMinRatio * before;
   }
 };
@@ -125,7 +125,7 @@ void CheckSaturation(std::span<const MotionSegment> segments,
     if (!(half > margin)) continue;
     for (const double extreme : {extent.low[axis], extent.high[axis]}) {
       const Pile pile = CountPile(segments, axis, extreme, margin);
-      if (pile.Stands()) Report(axis, extreme, pile, samples, diagnosis);
+      if (pile.IsSignificant()) Report(axis, extreme, pile, samples, diagnosis);
     }
   }
   diagnosis->checked.push_back("saturation: " + std::to_string(samples) +

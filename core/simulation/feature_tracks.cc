@@ -65,10 +65,10 @@ class Tracker {
   void Continue(int camera) {
     std::vector<int> kept;
     for (const int landmark : tracked_[camera]) {
-      const bool goes_on =
+      const bool continues =
           !random_.Chance(1 / options_.mean_track_length) &&
           keyframe_ - begun_[landmark] < options_.max_track_length;
-      if (goes_on && Observe(camera, landmark)) {
+      if (continues && Observe(camera, landmark)) {
         kept.push_back(landmark);
       } else {
         --trackers_[landmark];
