@@ -4,9 +4,10 @@
 // If theta is the true value for both, then
 //   delta = theta_segment [-] theta_active ~ N(0, Sigma_segment + Sigma_active)
 // on the directions that the segment observes (for which it has more
-// information than the prior of the rig), and d = delta^T (Sigma_segment +
-// Sigma_active)^-1 delta is chi-square distributed with as many degrees of
-// freedom. Segments that share nothing are fused by adding their information.
+// information than the prior of the rig), and
+//   d = delta^T (Sigma_segment + Sigma_active)^-1 delta
+// is chi-square distributed with as many degrees of freedom. Segments that
+// share nothing are fused by adding their information.
 //
 // The information of a segment is linearised at the states of the SLAM system.
 // If noise in these states looks like motion, the segment claims information

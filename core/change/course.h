@@ -3,8 +3,8 @@
 //
 // A segment of weight w comes from a device whose theta differs by w x, where x
 // is the full change: the weight is 0 before the change, 1 after it, and in
-// between while it grows. With the error e of the active calibration, e ~ N(0,
-// Sigma),
+// between while it grows. With the error e ~ N(0, Sigma) of the active
+// calibration,
 //
 //   eta_i = Lambda_i (e + w_i x) + noise,   noise ~ N(0, Lambda_i).
 //
@@ -18,8 +18,8 @@
 // size: a is common to segments of one motion, but later segments may have
 // another motion, in which other noise looks like information. Both are
 // eliminated first. Segments from before the change reduce e: an offset that
-// all segments have in common is not a change. A change within the span of B, x
-// = B y, is tested by
+// all segments have in common is not a change. A change x = B y within the span
+// of B is tested by
 //
 //   d = (B^T s)^T (B^T L B)^-1 (B^T s),
 //

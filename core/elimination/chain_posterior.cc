@@ -1,10 +1,12 @@
 // Back-substitution of covariances through a chain: from that of the shared
 // parameters to those of the states and of the noise of the links.
 //
-// Given the front z that remained when a state was eliminated, the state is C z
-// + noise of covariance root root^T, and the noise of its link is -L^-T (P z +
-// noise of unit covariance). Everything that was in the front before is either
-// the state, or still in the front.
+// Given the front z that remained when a state was eliminated, the state is
+//   C z + noise of covariance root root^T,
+// and the noise of its link is
+//   -L^-T (P z + noise of unit covariance).
+// Everything that was in the front before is either the state, or still in the
+// front.
 #include <Eigen/Core>
 #include <algorithm>
 #include <span>

@@ -16,9 +16,9 @@ namespace selfcal {
 
 class ChainStructure {
  public:
-  // Landmark m is observed from keyframes[tracks[m]] to keyframes[tracks[m +
-  // 1]], ascending (one keyframe may occur several times, once for each
-  // camera), at least one.
+  // Landmark m is observed from keyframes[tracks[m]] to
+  // keyframes[tracks[m + 1]], ascending (one keyframe may occur several times,
+  // once for each camera), at least one.
   void Find(int keyframe_count,
             std::span<const int> tracks,
             std::span<const int> keyframes);

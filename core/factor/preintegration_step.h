@@ -99,8 +99,8 @@ struct Turn {
         drift(coning * (r1.w - r0.w)) {}
 
   // Derivative with respect to phi of the left perturbation of the rotation
-  // that follows R_0: Exp(phi + d) = Exp(J_l(phi) d) Exp(phi), J_l(phi) =
-  // J_r(-phi).
+  // that follows R_0:
+  //   Exp(phi + d) = Exp(J_l(phi) d) Exp(phi),   J_l(phi) = J_r(-phi).
   Matrix3<T> LeftJacobian(const Matrix3<T>& R_0) const {
     return R_0 * RightJacobian<T>(-phi);
   }

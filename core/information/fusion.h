@@ -27,10 +27,11 @@ struct ThetaInformation {
   Eigen::VectorXd eta;     // D
 };
 
-// Transports the same information to the offset from another point: with b =
-// point [-] theta0, theta [-] theta0 = b + J_r(b)^-1 (theta [-] point) to first
-// order, where J_r acts on the rotations only. `point` must have the shape of
-// information.theta0.
+// Transports the same information to the offset from another point: with
+// b = point [-] theta0,
+//   theta [-] theta0 = b + J_r(b)^-1 (theta [-] point)
+// to first order, where J_r acts on the rotations only. `point` must have the
+// shape of information.theta0.
 ThetaInformation Transport(const SegmentInformation& information,
                            const Calibration& point);
 

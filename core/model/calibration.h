@@ -34,8 +34,8 @@ inline constexpr int kCameraPosition = 3;
 inline constexpr int kCameraIntrinsics = 6;
 inline constexpr int kCameraDistortion = kCameraIntrinsics + 4;
 
-// theta_i: the gyroscope reads T_g w + b_g, the accelerometer T_a R_AI f_I +
-// b_a.
+// theta_i: the gyroscope reads T_g w + b_g, the accelerometer
+// T_a R_AI f_I + b_a.
 struct ImuCalibration {
   Eigen::Vector3d s_g = Eigen::Vector3d::Ones();  // [-]
   Eigen::Vector3d m_g = Eigen::Vector3d::Zero();  // [-]
@@ -84,10 +84,10 @@ Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta);
 // distortion models (SameShape). Rotations give Log(R_b^T R_a).
 Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b);
 
-// Derivative of (reference [+] d) [-] theta with respect to d, at theta =
-// reference [+] d. It is the identity except for the right Jacobians of
-// rotations. Its inverse maps an offset from one point to the offset from
-// another.
+// Derivative of (reference [+] d) [-] theta with respect to d, at
+// theta = reference [+] d. It is the identity except for the right Jacobians of
+// rotations. Its inverse transports knowledge about the offset from one point
+// to the offset from another.
 Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
                               const Eigen::VectorXd& d);
 

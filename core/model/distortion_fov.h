@@ -8,8 +8,8 @@
 //   d = s u,   s = A(w) g(q),   g(q) = atan(sqrt(q)) / sqrt(q),
 //
 // with regular limits: A -> 1 as w -> 0 (no distortion), and g -> 1 as q -> 0
-// (the axis). The model is even in w. Derivatives, with t = tan(w/2), dt/dw =
-// (1 + t^2) / 2 and A = h(w/2), h = tan(x)/x:
+// (the axis). The model is even in w. Derivatives, with t = tan(w/2),
+// dt/dw = (1 + t^2) / 2 and A = h(w/2), h = tan(x)/x:
 //
 //   ds/d(r_u^2) = A g'(q) 4 t^2
 //   ds/dw       = h'(w/2) / 2 g(q) + A g'(q) 4 t (1 + t^2) r_u^2

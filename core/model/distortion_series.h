@@ -7,9 +7,9 @@
 //   h'(x) = (1 + tan^2(x) - h) / x
 //
 // As a function of q = r^2, g is smooth at zero, so that no model divides by a
-// radius. The vectorised form halves the angle twice, atan(x) = 2 atan(x / (1 +
-// s)) with s = sqrt(1 + x^2), after which the series is short for every q; in
-// terms of squares,
+// radius. The vectorised form halves the angle twice,
+// atan(x) = 2 atan(x / (1 + s)) with s = sqrt(1 + x^2), after which the series
+// is short for every q; in terms of squares,
 //
 //   q -> (s - 1) / (s + 1),   g(q) = 2 / (1 + s) g((s - 1) / (s + 1)).
 //
