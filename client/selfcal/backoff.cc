@@ -5,7 +5,7 @@
 namespace selfcal::client {
 namespace {
 
-// Keeps every point in time that follows from a wait representable.
+// Limits waits so that the time at which a wait ends is always representable.
 constexpr std::chrono::hours kLongest{24};
 
 }  // namespace

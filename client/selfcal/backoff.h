@@ -1,5 +1,5 @@
-// Waiting times between attempts to connect: doubled each time up to a limit,
-// with jitter, so that a fleet does not come back in step after an outage.
+// Exponential backoff between attempts to connect, with a limit, and with
+// jitter, so that a fleet does not reconnect in step after an outage.
 #pragma once
 
 #include <chrono>
@@ -15,11 +15,12 @@ class Backoff {
           std::chrono::milliseconds max,
           std::uint64_t seed);
 
-  // Time to wait before the next attempt: between half of the current step and
-  // all of it. The step begins at `min` and doubles up to `max`.
+  // Returns the time to wait before the next attempt: between half of the
+  // current step and all of it. The step starts at `min` and doubles up to
+  // `max`.
   std::chrono::milliseconds Next();
 
-  // After a success.
+  // Sets the step back to `min`, after a success.
   void Reset() { step_ = min_; }
 
  private:

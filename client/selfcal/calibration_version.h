@@ -1,5 +1,5 @@
-// From the message that publishes a calibration to the value a SLAM process
-// uses.
+// Conversion of the message that publishes a calibration into the value that a
+// SLAM process uses.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -9,8 +9,8 @@
 
 namespace selfcal::client {
 
-// DATA_LOSS, with the path of the field, for a message that is no calibration
-// or whose covariance has the wrong size.
+// Returns DATA_LOSS, with the path of the field, if the message is not a valid
+// calibration or its covariance has the wrong size.
 absl::StatusOr<CalibrationVersion> ToCalibrationVersion(
     const v1::Calibration& message);
 

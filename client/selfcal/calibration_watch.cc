@@ -66,12 +66,12 @@ class CalibrationWatch::Impl {
   absl::Status TryWatch(bool* answered) {
     try {
       return Watch(answered);
-    } catch (const std::exception& error) {  // no memory
+    } catch (const std::exception& error) {  // out of memory
       return absl::InternalError(error.what());
     }
   }
 
-  // One connection, from its beginning to its end, which is never a success.
+  // Handles one connection until it ends; never returns OK.
   absl::Status Watch(bool* answered) {
     const auto channel = MakeChannel(options_);
     if (!channel.ok()) return channel.status();
@@ -88,21 +88,21 @@ class CalibrationWatch::Impl {
     v1::Calibration message;
     while (stream->Read(&message)) {
       *answered = true;
-      Tell(message);
+      Publish(message);
     }
     const absl::Status status = ToAbsl(stream->Finish());
     if (!status.ok()) return status;
     return absl::UnavailableError("the daemon ended the stream");
   }
 
-  void Tell(const v1::Calibration& message) {
+  void Publish(const v1::Calibration& message) {
     const auto version = ToCalibrationVersion(message);
     {
       std::lock_guard lock(mutex_);
       connection_ = version.status();
     }
-    if (!version.ok() || last_told_ == version->version) return;
-    last_told_ = version->version;
+    if (!version.ok() || last_published_ == version->version) return;
+    last_published_ = version->version;
     if (!callback_) return;
     try {
       callback_(*version);
@@ -114,7 +114,7 @@ class CalibrationWatch::Impl {
 
   const ClientOptions options_;
   const Callback callback_;
-  std::optional<std::int64_t> last_told_;  // by thread_ alone
+  std::optional<std::int64_t> last_published_;  // used by thread_ only
 
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable stopped_;
@@ -131,13 +131,13 @@ CalibrationWatch::CalibrationWatch(const ClientOptions& options,
   try {
     impl_ = std::make_unique<Impl>(options, std::move(callback));
   } catch (...) {
-    impl_ = nullptr;  // as documented: tells nothing
+    impl_ = nullptr;  // as documented: does nothing
   }
 }
 CalibrationWatch::~CalibrationWatch() = default;
 
 absl::Status CalibrationWatch::connection_status() const noexcept {
-  // Without a message, which would take memory.
+  // Has no message, because a message needs memory.
   return impl_ == nullptr
              ? absl::Status(absl::StatusCode::kResourceExhausted, "")
              : impl_->connection_status();

@@ -1,18 +1,24 @@
-// What a SLAM process links: stream segments to selfcald and receive
-// calibrations, never blocking the caller.
+// The client library for a SLAM process: it streams segments to selfcald and
+// receives calibrations, and never blocks the caller.
 //
-// Every method but Drain returns at once, whatever the daemon and the disk do,
-// and may be called from any thread; threads of the client's own encode, write,
-// talk to the daemon, reconnect with exponential backoff and jitter, and send
-// again what was not acknowledged. Callbacks run one at a time on a thread of
-// the client's: they should be short, and must not destroy the object that
-// calls them. A destructor waits for a callback that is running, and that of a
-// stream with a spool for the disk; and where a daemon stands still in the
-// middle of a message, as a process under SIGSTOP, that of a stream waits until
-// it goes on or gRPC gives the connection up. No function throws, and what a
-// callback throws is caught and counted. An object for which there was no
-// memory, or no thread, does nothing and says RESOURCE_EXHAUSTED. (gRPC itself
-// ends the process when it finds no memory.)
+// Threads: Every method except Drain returns at once, whatever the daemon and
+// the disk do, and may be called from any thread. The client has its own
+// threads, which encode, write to the spool, communicate with the daemon,
+// reconnect with exponential backoff and jitter, and resend what was not
+// acknowledged.
+//
+// Callbacks: They run one at a time on a thread of the client. They should be
+// short, and must not destroy the object that calls them. Exceptions that a
+// callback throws are caught and counted.
+//
+// Destructors: A destructor waits for a callback that is running. That of a
+// stream with a spool also waits for the disk. If the daemon hangs in the
+// middle of a message, e.g. under SIGSTOP, the destructor of a stream waits
+// until the daemon continues or gRPC gives up the connection.
+//
+// Errors: No function throws. An object whose construction ran out of memory or
+// threads does nothing and reports RESOURCE_EXHAUSTED. (gRPC itself aborts the
+// process when it runs out of memory.)
 #pragma once
 
 #include <absl/status/status.h>
@@ -31,22 +37,26 @@
 namespace selfcal::client {
 
 struct ClientOptions {
-  std::string target = "unix:/run/selfcal/selfcald.sock";  // as gRPC names it
-  std::string rig;             // {rig}, without "rigs/"
-  int max_queue = 16;          // segments in memory, waiting or unacknowledged
-  int max_unacknowledged = 4;  // sent before the first of them is acknowledged
+  // Address of the daemon, in the syntax of gRPC.
+  std::string target = "unix:/run/selfcal/selfcald.sock";
+  std::string rig;     // {rig}, without "rigs/"
+  int max_queue = 16;  // segments in memory, waiting or unacknowledged
+  // Segments that are sent before the first of them is acknowledged.
+  int max_unacknowledged = 4;
   std::chrono::milliseconds min_backoff{100};
   std::chrono::milliseconds max_backoff{5000};
 
-  // For a TCP target with mutual TLS: PEM files, read at every connection. All
-  // empty: no TLS. The authority alone: the daemon is known by its certificate,
-  // this side by none.
-  std::string ca_file = {};           // authorities that the daemon's may be of
-  std::string certificate_file = {};  // this client's, with its chain
+  // PEM files for a TCP target with mutual TLS, read at every connection. If
+  // all are empty, TLS is not used. If only ca_file is given, the daemon is
+  // authenticated by its certificate, and the client is not authenticated.
+  std::string ca_file =
+      {};  // authorities that may sign the daemon's certificate
+  std::string certificate_file = {};  // the client's, with its chain
   std::string key_file = {};
 
-  // Where segments go that memory has no room for, in a folder named after the
-  // rig; empty: nowhere, they are dropped. One stream at a time may use it.
+  // Folder for segments that do not fit into memory; they go into a subfolder
+  // named after the rig, which one stream at a time may use. If empty, such
+  // segments are dropped.
   std::string spool_dir = {};
   std::uint64_t max_spool_bytes = 256u << 20;
 };
@@ -56,58 +66,59 @@ struct Acknowledgement {
   enum class Verdict { kStored, kDuplicate, kRejected };
   SegmentKey key;
   Verdict verdict = Verdict::kStored;
-  std::vector<Violation> violations;  // of a rejected one
+  std::vector<Violation> violations;  // the reasons for a rejection
 };
 
+// Counts of segments unless stated otherwise.
 struct StreamStatistics {
   std::uint64_t queued = 0;  // accepted by Send
   std::uint64_t stored = 0;
   std::uint64_t duplicates = 0;
   std::uint64_t rejected = 0;
-  std::uint64_t dropped = 0;            // refused by Send, or no memory later
-  std::uint64_t resent = 0;             // sent once more after a reconnection
-  std::uint64_t connections = 0;        // on which the daemon answered
+  std::uint64_t dropped = 0;            // refused by Send, or out of memory
+  std::uint64_t resent = 0;             // sent again after a reconnection
+  std::uint64_t connections = 0;        // connections that the daemon answered
   std::uint64_t callback_failures = 0;  // callbacks that threw
-  // Of the spool: segments written to it, found in it at the start, set aside
-  // because the file was not what was written, errors of the disk.
-  std::uint64_t spooled = 0;
-  std::uint64_t spool_recovered = 0;
+  std::uint64_t spooled = 0;            // written to the spool
+  std::uint64_t spool_recovered = 0;    // found in the spool at the start
+  // Quarantined in the spool, because the file differs from what was written.
   std::uint64_t spool_damaged = 0;
-  std::uint64_t spool_failures = 0;
-  // What is in it now.
+  std::uint64_t spool_failures = 0;  // disk errors
+  // Present content of the spool.
   std::uint64_t spool_segments = 0;
   std::uint64_t spool_bytes = 0;
 };
 
+// Sends segments to the daemon, in order and at least once.
 class SegmentStream {
  public:
   using AckCallback = std::function<void(const Acknowledgement&)>;
-  // `on_ack` may be null. The connection is made when there is something to
-  // send: also what an earlier process left in the spool.
+  // `on_ack` may be null. The stream connects when there is something to send,
+  // which includes segments that an earlier process left in the spool.
   SegmentStream(const ClientOptions& options, AckCallback on_ack) noexcept;
-  // What is unacknowledged then goes to the spool. Without one, or where it has
-  // no room, it is given up: Drain first.
+  // Writes unacknowledged segments to the spool. Without a spool, or if it is
+  // full, they are lost: call Drain first.
   ~SegmentStream();
   SegmentStream(const SegmentStream&) = delete;
   SegmentStream& operator=(const SegmentStream&) = delete;
 
-  // Queues a segment; segments are sent in this order. False, and the segment
-  // is counted as dropped, if memory and spool are full or the stream has
-  // ended: what is older stays.
+  // Queues a segment; segments are sent in the order of these calls. Returns
+  // false and counts the segment as dropped if memory and spool are full or the
+  // stream has ended; older segments stay in the queue.
   bool Send(MotionSegment segment) noexcept;
   bool Send(ClosedSegment segment) noexcept;
 
-  // Waits until everything queued, and what is in the spool, is acknowledged
-  // and its callbacks have returned. DEADLINE_EXCEEDED, or the error that ended
-  // the stream for good (NOT_FOUND: the rig does not exist; INVALID_ARGUMENT,
-  // PERMISSION_DENIED, UNAUTHENTICATED). Any other error is of the connection,
-  // which is made again. Not to be called from a callback.
+  // Waits until all segments in the queue and in the spool are acknowledged and
+  // their callbacks have returned. Returns DEADLINE_EXCEEDED after `timeout`,
+  // or the error that ended the stream permanently (NOT_FOUND: the rig does not
+  // exist; INVALID_ARGUMENT, PERMISSION_DENIED, UNAUTHENTICATED). After any
+  // other error the stream reconnects. Must not be called from a callback.
   absl::Status Drain(std::chrono::milliseconds timeout) noexcept;
 
   StreamStatistics statistics() const noexcept;
-  // OK, or the last error of the connection while it is down.
+  // OK, or the last error while the connection is down.
   absl::Status connection_status() const noexcept;
-  // OK, or why the last attempt to use the spool failed.
+  // OK, or the error of the last attempt to use the spool.
   absl::Status spool_status() const noexcept;
 
  private:
@@ -119,13 +130,14 @@ class SegmentStream {
 struct CalibrationVersion {
   std::int64_t version = 0;
   Calibration theta;
-  Eigen::MatrixXd covariance;  // of the tangent, D x D; 0 x 0 if not given
+  // Covariance of the tangent components, D x D; 0 x 0 if it is not known.
+  Eigen::MatrixXd covariance;
 };
 
-// Calls back with the active calibration at once and with each one that becomes
-// active after it; survives restarts of the daemon, and tells no version twice
-// in a row. A slow callback is told the newest. A rig that does not exist yet
-// is waited for.
+// Watches the active calibration of a rig. Calls back with the active version
+// at once, and with each version that becomes active later. Reconnects when the
+// daemon restarts, and waits for a rig that does not exist yet. A slow callback
+// gets the newest version; no version is delivered twice in a row.
 class CalibrationWatch {
  public:
   using Callback = std::function<void(const CalibrationVersion&)>;

@@ -23,7 +23,8 @@ struct SightingHash {
   }
 };
 
-// For each keyframe the first observation of each landmark by each camera.
+// Returns, for each keyframe, the first observation of each landmark by each
+// camera.
 std::vector<std::vector<const KeyframeObservation*>> WithoutDuplicates(
     const std::vector<ObservedKeyframe>& keyframes) {
   std::vector<std::vector<const KeyframeObservation*>> all;
@@ -42,8 +43,8 @@ std::vector<std::vector<const KeyframeObservation*>> WithoutDuplicates(
   return all;
 }
 
-// Landmarks seen often enough, in the order of their first observation, and
-// the observations of them.
+// Adds the landmarks that are seen often enough, in the order of their first
+// observation, and their observations.
 void AddLandmarks(const ClosedSegment& closed, MotionSegment* segment) {
   const auto keyframes = WithoutDuplicates(closed.keyframes);
   std::unordered_map<std::uint64_t, int> count;
@@ -69,8 +70,8 @@ void AddLandmarks(const ClosedSegment& closed, MotionSegment* segment) {
   }
 }
 
-// Samples from the last one at or before `begin` to the first one at or after
-// `end`.
+// Returns the samples from the last at or before `begin_ns` to the first at or
+// after `end_ns`.
 std::vector<ImuSample> ImuBetween(const std::vector<ImuSample>& imu,
                                   std::int64_t begin_ns,
                                   std::int64_t end_ns) {

@@ -1,8 +1,8 @@
-// The material of one motion segment as it was collected, closed but not yet
-// put together. Closing moves a few pointers; what takes time (which landmarks
-// are seen often enough, their indices) is left to Assemble, which need not run
-// on the thread of the SLAM system: SegmentStream::Send takes a ClosedSegment
-// as it is.
+// The raw content of one motion segment, complete but not yet assembled.
+// Closing a segment only moves a few pointers. Assemble does what takes time
+// (it selects the landmarks that are seen often enough and assigns indices) and
+// need not run on the thread of the SLAM system: SegmentStream::Send accepts a
+// ClosedSegment.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,16 @@
 
 namespace selfcal::client {
 
-// What the SLAM system says when it makes a keyframe.
+// One observation of a landmark in a keyframe, as the SLAM system reports it.
 struct KeyframeObservation {
   std::int32_t camera = 0;
   std::uint64_t landmark_id = 0;
   Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
-  Eigen::Vector3d p_G = Eigen::Vector3d::Zero();  // landmark's estimate [m]
+  // Estimated position of the landmark [m].
+  Eigen::Vector3d p_G = Eigen::Vector3d::Zero();
 };
 
-// A keyframe with what it sees.
+// A keyframe with its observations.
 struct ObservedKeyframe {
   KeyframeState state;
   std::vector<KeyframeObservation> observations;
@@ -30,18 +31,18 @@ struct ObservedKeyframe {
 struct ClosedSegment {
   SegmentKey key;
   std::int64_t calibration_version = 1;
-  // Landmarks seen fewer times in the segment are left out.
+  // Landmarks with fewer observations in the segment are excluded.
   int min_observations = 3;
   std::vector<ObservedKeyframe> keyframes;  // at least one, in order of time
-  // Strictly increasing in time; those far outside are left out.
+  // Strictly increasing in time; samples far outside the segment are excluded.
   std::vector<ImuSample> imu;
-  std::int64_t end_ns = 0;  // where the samples of the segment end
+  std::int64_t end_ns = 0;  // time to which the segment's samples reach
   std::optional<double> temperature_c = std::nullopt;  // of the device
 };
 
-// The segment. Of several observations of one landmark by one camera in one
-// keyframe the first counts, of the places of a landmark the last. Throws
-// std::bad_alloc.
+// Assembles the segment. If a camera observes a landmark several times in one
+// keyframe, the first observation is used; if a landmark has several positions,
+// the last is used. Throws std::bad_alloc.
 MotionSegment Assemble(const ClosedSegment& closed);
 
 }  // namespace selfcal::client

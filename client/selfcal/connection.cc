@@ -17,8 +17,8 @@ namespace selfcal::client {
 
 namespace {
 
-// gRPC is kept until the process ends: to shut it down with the last channel
-// can wait 10 s for a poll of that channel.
+// Keeps gRPC initialised until the process ends: shutting it down with the last
+// channel can wait 10 s for a poll of that channel.
 void KeepLibrary() {
   static std::once_flag once;
   std::call_once(once, [] { grpc_init(); });
@@ -29,17 +29,17 @@ std::shared_ptr<grpc::Channel> MakeChannel(
     const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   KeepLibrary();
   grpc::ChannelArguments arguments;
-  // A failed connection that is shared would impose its own waiting time.
+  // A shared connection that failed would impose its own backoff.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // Finds out that the other end is gone without a word; servers allow a ping
-  // every five minutes by default.
+  // Detects that the peer is gone without having closed the connection. By
+  // default, servers allow a ping every five minutes.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 6 * 60 * 1000);
-  // The data of a segment may be larger than the 4 MiB of the default.
+  // The data of a segment may be larger than the default of 4 MiB.
   arguments.SetMaxReceiveMessageSize(-1);
   return grpc::CreateCustomChannel(target, credentials, arguments);
 }
 
-// Nothing for no path.
+// Returns the content of the file, or an empty string for an empty path.
 absl::StatusOr<std::string> ReadPem(const std::string& path) {
   if (path.empty()) return std::string();
   std::ifstream file(path, std::ios::binary);
@@ -47,7 +47,7 @@ absl::StatusOr<std::string> ReadPem(const std::string& path) {
   text << file.rdbuf();
   if (!file || text.str().empty()) {
     return absl::FailedPreconditionError(
-        fmt::format("cannot read {}: it should be a PEM file", path));
+        fmt::format("cannot read {} as a PEM file", path));
   }
   return text.str();
 }
@@ -61,7 +61,7 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(
   if (options.ca_file.empty() && !has_own) return MakeChannel(options.target);
   if (options.certificate_file.empty() != options.key_file.empty()) {
     return absl::FailedPreconditionError(
-        "certificate_file and key_file belong together: give both");
+        "certificate_file and key_file must be given together");
   }
   grpc::SslCredentialsOptions tls;
   for (const auto& [path, pem] :

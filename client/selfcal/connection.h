@@ -1,4 +1,4 @@
-// What both streams of the client need from gRPC.
+// gRPC channels and statuses for both streams of the client.
 #pragma once
 
 #include <absl/status/status.h>
@@ -15,18 +15,17 @@
 
 namespace selfcal::client {
 
-// A channel of its own, which shares neither connection nor backoff with any
-// other: an attempt to connect begins at the first call. With the certificates
-// of the options as they are on disk now; FAILED_PRECONDITION if one cannot be
-// read.
+// Returns a channel that shares neither its connection nor its backoff with
+// other channels; it connects at the first call. Reads the certificates of the
+// options from disk; FAILED_PRECONDITION if one cannot be read.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(
     const ClientOptions& options);
-// Without TLS.
+// Returns a channel without TLS.
 std::shared_ptr<grpc::Channel> MakeChannel(const std::string& target);
 
 absl::Status ToAbsl(const grpc::Status& status);
 
-// A seed that differs between devices and between objects of a process.
+// Returns a seed that differs between devices and between objects of a process.
 std::uint64_t JitterSeed(const void* object);
 
 }  // namespace selfcal::client

@@ -12,7 +12,7 @@
 namespace selfcal::client {
 namespace {
 
-// Otherwise a vector that grows would copy every observation.
+// Without these, a vector that grows would copy every observation.
 static_assert(std::is_nothrow_move_constructible_v<ObservedKeyframe>);
 static_assert(std::is_nothrow_move_constructible_v<ClosedSegment>);
 
@@ -21,7 +21,7 @@ std::int64_t Nanoseconds(double seconds) {
   return std::llround(std::clamp(seconds, 0.0, kMaxSeconds) * 1e9);
 }
 
-// later - earlier, for any two times, without overflow.
+// Returns later - earlier without overflow, for any two times.
 std::uint64_t Elapsed(std::int64_t later_ns, std::int64_t earlier_ns) {
   return static_cast<std::uint64_t>(later_ns) -
          static_cast<std::uint64_t>(earlier_ns);
@@ -38,9 +38,10 @@ struct SegmentBuilder::State {
   std::uint64_t max_gap_ns;
   std::uint64_t seconds_ns;
   std::int64_t next_index;
-  // Of the segment at hand and, while IMU samples lag behind, of later ones.
+  // Keyframes of the current segment and, while IMU samples lag behind, of
+  // later ones.
   std::vector<ObservedKeyframe> keyframes;
-  // From the last sample at or before the first keyframe.
+  // Samples from the last one at or before the first keyframe.
   std::vector<ImuSample> imu;
   std::optional<std::int64_t> last_keyframe_ns;
   std::optional<double> temperature_c;
@@ -53,8 +54,8 @@ struct SegmentBuilder::State {
         seconds_ns(static_cast<std::uint64_t>(Nanoseconds(given.seconds))),
         next_index(given.first_index) {}
 
-  // Number of keyframes of the segment that begins with the first one, if the
-  // keyframe after it has come.
+  // Number of keyframes of the segment that starts with the first keyframe, if
+  // the keyframe after the segment has arrived.
   std::optional<std::size_t> ClosedSize() const {
     if (options.seconds > 0) {
       for (std::size_t n = 2; n < keyframes.size(); ++n) {
@@ -74,16 +75,17 @@ struct SegmentBuilder::State {
     return !imu.empty() && imu.back().t_ns >= t_ns;
   }
 
-  // The last sample at or before the time, or the first there is.
+  // Returns the last sample at or before the time, or else the first sample.
   std::vector<ImuSample>::iterator SampleBefore(std::int64_t t_ns) {
     const auto first = std::lower_bound(imu.begin(), imu.end(), t_ns, Before);
     const bool at = first != imu.end() && first->t_ns == t_ns;
     return first == imu.begin() || at ? first : first - 1;
   }
 
-  // The first `size` keyframes leave as a segment whose samples reach `end_ns`.
+  // Closes a segment of the first `size` keyframes, with samples up to
+  // `end_ns`.
   void Close(std::size_t size, std::int64_t end_ns) {
-    // What may find no memory comes first, and changes nothing.
+    // Allocations come first: if one fails, nothing has changed.
     ClosedSegment segment;
     segment.key = {options.session, next_index};
     segment.calibration_version = options.calibration_version;
@@ -109,7 +111,7 @@ struct SegmentBuilder::State {
     ++statistics.segments;
   }
 
-  // Keyframes before the first sample: no later sample can cover them.
+  // Drops keyframes before the first sample, which no later sample can cover.
   void DropUncovered() {
     if (imu.empty()) return;
     const auto first =
@@ -146,7 +148,7 @@ struct SegmentBuilder::State {
   bool AddImu(const ImuSample& sample);
   bool AddKeyframe(const KeyframeState& state,
                    std::span<const KeyframeObservation> observations);
-  // True if samples that have not come by this time will not.
+  // True if samples that have not arrived by this time will not arrive.
   bool IsStarved(std::int64_t t_ns) const;
   void GiveUp();
 };
@@ -158,8 +160,8 @@ bool SegmentBuilder::State::AddImu(const ImuSample& sample) {
   }
   imu.push_back(sample);
   CloseWhatIs();
-  // A keyframe may lag by max_gap; one that comes later than that cannot
-  // continue the segment at hand, and samples older than that are not needed.
+  // A keyframe may lag by max_gap. A keyframe that lags more cannot continue
+  // the current segment, so that older samples are not needed.
   if (!keyframes.empty() && sample.t_ns > keyframes.back().state.t_ns &&
       Elapsed(sample.t_ns, keyframes.back().state.t_ns) > 2 * max_gap_ns) {
     Flush(options.min_keyframes);
@@ -197,7 +199,7 @@ bool SegmentBuilder::State::AddKeyframe(
   return true;
 }
 
-// There was no memory: what is held is freed.
+// Frees everything that is held, after memory ran out.
 void SegmentBuilder::State::GiveUp() {
   ++statistics.out_of_memory;
   statistics.keyframes_dropped += keyframes.size();

@@ -1,21 +1,21 @@
 // Builds motion segments from the keyframes of a SLAM system.
 //
-// Feed, each in order of time, every IMU sample and every keyframe with the
-// landmarks it sees; the two streams may run ahead of each other by up to
-// max_gap_s. A segment is complete when it has its number of keyframes (or
-// seconds), the keyframe after it has come, and the IMU samples have reached
-// that one: they belong to the segment, so that neighbours can be joined. Take
-// complete segments after each call:
+// Feed every IMU sample, and every keyframe with its observations, each in
+// order of time; either stream may run ahead of the other by up to max_gap_s. A
+// segment is complete when it has its number of keyframes (or seconds), the
+// keyframe after it has arrived, and the IMU samples have reached that
+// keyframe: these samples belong to the segment, so that neighbours can be
+// joined. Take complete segments after each call:
 //
 //   builder.AddImu(sample);
 //   builder.AddKeyframe(state, observations);
 //   while (auto closed = builder.TakeClosed()) stream.Send(*std::move(closed));
 //
-// Each call takes microseconds: what is handed in is copied once, and a segment
-// leaves by move. Memory is bounded: by what one segment holds, and by what the
-// caller leaves untaken. Not thread-safe. Bad input is refused and counted,
-// never fatal; no function throws. When there is no memory, the segment at hand
-// is dropped and counted.
+// Each call takes microseconds: input is copied once, and a segment is moved
+// out. Memory is bounded by one segment plus the segments that the caller has
+// not taken. Not thread-safe. Bad input is refused and counted, never fatal; no
+// function throws. When memory runs out, the current segment is dropped and
+// counted.
 #pragma once
 
 #include <cstdint>
@@ -33,27 +33,27 @@ struct SegmentBuilderOptions {
   std::string session;
   std::int64_t first_index = 0;
   std::int64_t calibration_version = 1;
-  int keyframes = 40;  // close after this many (at least 2) ...
-  double seconds = 0;  // ... or, if > 0, after this long instead
-  // Landmarks seen fewer times in the segment are left out.
+  int keyframes = 40;  // keyframes in a segment, at least 2 ...
+  double seconds = 0;  // ... or, if > 0, duration of a segment instead
+  // Landmarks with fewer observations in the segment are excluded.
   int min_observations = 3;
-  // Keyframes further apart than this are not of one segment: the builder
-  // flushes between them. The default is what the daemon accepts.
+  // Largest time between keyframes of one segment: the builder flushes between
+  // keyframes that are further apart. The default is the limit of the daemon.
   double max_gap_s = 10;
-  // Segments shorter than this after such a gap are dropped.
+  // Segments with fewer keyframes are dropped when they end at such a gap.
   int min_keyframes = 10;
 };
 
 struct SegmentBuilderStatistics {
   std::uint64_t segments = 0;  // completed
-  // Keyframes at or before the last one.
+  // Keyframes that were not later than the keyframe before them.
   std::uint64_t keyframes_refused = 0;
-  // Accepted, but in no segment: no IMU sample covers them, the rest they
-  // belong to was too short, or there was no memory.
+  // Keyframes that were accepted but are in no segment: no IMU sample covers
+  // them, their segment was too short when it was flushed, or memory ran out.
   std::uint64_t keyframes_dropped = 0;
-  // IMU samples at or before the last one.
+  // IMU samples that were not later than the sample before them.
   std::uint64_t imu_ignored = 0;
-  // Calls that found no memory; each gave up the segment at hand.
+  // Calls that ran out of memory; each dropped the current segment.
   std::uint64_t out_of_memory = 0;
 };
 
@@ -61,42 +61,47 @@ class SegmentBuilder {
  public:
   explicit SegmentBuilder(const SegmentBuilderOptions& options) noexcept;
   ~SegmentBuilder();
-  // What was moved from refuses everything.
+  // A builder that was moved from refuses everything.
   SegmentBuilder(SegmentBuilder&&) noexcept;
   SegmentBuilder& operator=(SegmentBuilder&&) noexcept;
 
-  // False, and ignored, if it is not later than the sample before it.
+  // Adds a sample. Returns false and ignores the sample if it is not later than
+  // the sample before it.
   bool AddImu(const ImuSample& sample) noexcept;
 
-  // False, and refused, if it is not later than the keyframe before it. Of
-  // several observations of one landmark by one camera the first counts; the
-  // last p_G given for a landmark within the segment is the one that is sent.
+  // Adds a keyframe. Returns false and refuses the keyframe if it is not later
+  // than the keyframe before it. If a camera observes a landmark several times,
+  // the first observation is used. The last p_G of a landmark within the
+  // segment is the one that is sent.
   bool AddKeyframe(const KeyframeState& state,
                    std::span<const KeyframeObservation> observations) noexcept;
 
-  // The device's temperature from now on [degrees Celsius]; nothing: it is not
-  // known. A segment carries what was given last when it is completed.
-  // False, and ignored, for what the daemon would not accept (-100 to 200).
+  // Sets the temperature of the device [degrees Celsius] from now on; nullopt
+  // if it is unknown. A segment carries the temperature that was set last when
+  // it was completed. Returns false and ignores values that the daemon does not
+  // accept (outside -100 to 200).
   bool SetTemperature(std::optional<double> temperature_c) noexcept;
 
-  // The oldest complete segment, if there is one: as it was collected, for
-  // SegmentStream::Send, or put together here, which takes some milliseconds.
+  // Returns the oldest complete segment, if there is one. TakeClosed returns it
+  // unassembled, for SegmentStream::Send. Take assembles it, which takes some
+  // milliseconds.
   std::optional<ClosedSegment> TakeClosed() noexcept;
   std::optional<MotionSegment> Take() noexcept;
 
-  // Ends the segment at hand, at the end of a session or where tracking was
-  // lost: with at least max(2, min_keyframes) keyframes that the IMU samples
-  // cover it is complete, otherwise it is dropped. The builder then starts
-  // anew, with the next index of the same session.
+  // Ends the current segment, at the end of a session or where tracking was
+  // lost. It is complete if the IMU samples cover at least
+  // max(2, min_keyframes) of its keyframes, otherwise it is dropped. The
+  // builder continues with a new segment of the same session, with the next
+  // index.
   void Flush(int min_keyframes) noexcept;
 
-  // Index that the next segment gets.
+  // Index of the next segment.
   std::int64_t next_index() const noexcept;
   SegmentBuilderStatistics statistics() const noexcept;
 
  private:
   struct State;
-  std::unique_ptr<State> state_;  // null if there was no memory for it
+  std::unique_ptr<State> state_;  // null if memory ran out
 };
 
 }  // namespace selfcal::client

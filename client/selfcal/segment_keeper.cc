@@ -1,5 +1,5 @@
-// The keeper's side of the queue: the thread that encodes, spools and reads
-// back, so that neither the SLAM system nor the sender waits for it.
+// The keeper of the queue: the thread that encodes, spools and reads back, so
+// that neither the SLAM system nor the sender has to wait for this work.
 #include <sched.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -14,12 +14,12 @@
 namespace selfcal::client {
 namespace {
 
-// Until the disk is tried again after it was full or failed.
+// Time between retries after the disk was full or failed.
 constexpr std::chrono::milliseconds kSpoolRetry{1000};
 
-// This thread does not push aside the one that wakes it, which is that of the
-// SLAM system. If it may not be so, it goes on as it is.
-void YieldToOthers() {
+// Prevents this thread from preempting the thread that wakes it, which is the
+// SLAM system's. Without the permission to do so, it continues as it is.
+void LowerPriority() {
   constexpr int kNice = 10;
   const sched_param parameters{};
   sched_setscheduler(0, SCHED_BATCH, &parameters);
@@ -29,31 +29,31 @@ void YieldToOthers() {
 }  // namespace
 
 void SegmentQueue::Keep() {
-  YieldToOthers();
+  LowerPriority();
   OpenSpool();
   Lock lock(mutex_);
   while (!finish_) {
-    const auto due = [this] { return finish_ || HasChore(); };
+    const auto due = [this] { return finish_ || HasPending(); };
     if (!spool_blocked_) {
-      chores_.wait(lock, due);
-    } else if (!chores_.wait_for(lock, kSpoolRetry, due)) {
+      work_.wait(lock, due);
+    } else if (!work_.wait_for(lock, kSpoolRetry, due)) {
       spool_blocked_ = false;
     }
-    if (finish_ || !HasChore()) continue;
+    if (finish_ || !HasPending()) continue;
     try {
-      DoChore(lock);
-    } catch (const std::exception&) {  // no memory
+      ProcessPending(lock);
+    } catch (const std::exception&) {  // out of memory
       if (!lock.owns_lock()) lock.lock();
-      if (taking_in_ && !pending_.has_value()) {
+      if (admitting_ && !pending_.has_value()) {
         ++statistics_.dropped;
-        taking_in_ = false;
+        admitting_ = false;
       }
       spool_blocked_ = true;
     }
   }
   try {
     SpoolRest(lock);
-  } catch (const std::exception&) {  // no memory: the rest is lost
+  } catch (const std::exception&) {  // out of memory: the rest is lost
   }
 }
 
@@ -88,8 +88,8 @@ void SegmentQueue::OpenSpool() {
   changed_.notify_all();
 }
 
-bool SegmentQueue::HasChore() const {
-  return !finished_files_.empty() || CanLoad() || CanTakeIn();
+bool SegmentQueue::HasPending() const {
+  return !finished_files_.empty() || CanLoad() || CanAdmit();
 }
 
 bool SegmentQueue::CanLoad() const {
@@ -97,24 +97,25 @@ bool SegmentQueue::CanLoad() const {
          spool_->FirstFrom(loaded_ + 1).has_value();
 }
 
-// Nothing on disk comes before what is taken in now.
+// True if no segment on disk comes before the one that is admitted now, and the
+// head has room.
 bool SegmentQueue::HeadIsNext() const {
   const bool none =
       spool_ == nullptr || !spool_->FirstFrom(loaded_ + 1).has_value();
   return none && head_.size() < max_head_;
 }
 
-bool SegmentQueue::CanTakeIn() const {
+bool SegmentQueue::CanAdmit() const {
   if (incoming_.empty() && !pending_.has_value()) return false;
   return HeadIsNext() || (spool_ != nullptr && !spool_blocked_) ||
          (spool_ == nullptr && head_.size() < max_held_);
 }
 
-void SegmentQueue::DoChore(Lock& lock) {
+void SegmentQueue::ProcessPending(Lock& lock) {
   if (!finished_files_.empty()) {
     RemoveFiles(lock);
-  } else if (CanTakeIn() && (!head_.empty() || !CanLoad())) {
-    TakeIn(lock);  // first, for the SLAM system does not wait
+  } else if (CanAdmit() && (!head_.empty() || !CanLoad())) {
+    Admit(lock);  // first, because the SLAM system does not wait
   } else {
     Load(lock);
   }
@@ -125,7 +126,7 @@ void SegmentQueue::RemoveFiles(Lock& lock) {
   lock.unlock();
   for (const std::uint64_t number : files) spool_->Remove(number);
   lock.lock();
-  spool_blocked_ = false;  // there is room now
+  spool_blocked_ = false;  // there is room again
   NoteSpool();
   changed_.notify_all();
 }
@@ -140,7 +141,7 @@ void SegmentQueue::Load(Lock& lock) {
                       request->parent() != RigName(options_.rig))) {
     status = absl::DataLossError("a file of the spool is of another rig");
   }
-  if (absl::IsDataLoss(status)) spool_->SetAside(number);
+  if (absl::IsDataLoss(status)) spool_->Quarantine(number);
   lock.lock();
   if (status.ok()) {
     const SegmentKey key{request->segment().session(),
@@ -160,9 +161,9 @@ void SegmentQueue::Load(Lock& lock) {
   changed_.notify_all();
 }
 
-void SegmentQueue::TakeIn(Lock& lock) {
+void SegmentQueue::Admit(Lock& lock) {
   if (!pending_.has_value()) {
-    taking_in_ = true;
+    admitting_ = true;
     Material material = std::move(incoming_.front());
     incoming_.pop_front();
     pending_ = Prepare(std::move(material), lock);
@@ -173,11 +174,12 @@ void SegmentQueue::TakeIn(Lock& lock) {
     head_.push_back(*std::move(pending_));
     pending_.reset();
   }
-  taking_in_ = pending_.has_value();
+  admitting_ = pending_.has_value();
   changed_.notify_all();
 }
 
-// Returns with the lock held. Nothing for a segment that no message can carry.
+// Assembles and encodes a segment. Returns with the lock held; nullopt if the
+// segment does not fit into a message.
 std::optional<SegmentQueue::Entry> SegmentQueue::Prepare(Material material,
                                                          Lock& lock) {
   lock.unlock();
@@ -188,7 +190,7 @@ std::optional<SegmentQueue::Entry> SegmentQueue::Prepare(Material material,
   auto request = std::make_shared<Request>();
   auto violations = MakeRequest(options_.rig, segment, request.get());
   const SegmentKey key = segment.key;
-  segment = MotionSegment();  // freed before anybody can wait for the lock
+  segment = MotionSegment();  // freed before another thread waits for the lock
   if (violations.empty()) {
     lock.lock();
     return Entry{next_number_++, key, std::move(request)};
@@ -203,7 +205,7 @@ std::optional<SegmentQueue::Entry> SegmentQueue::Prepare(Material material,
   return std::nullopt;
 }
 
-// The pending one to disk; it stays pending if that fails.
+// Writes the pending segment to disk; it stays pending if that fails.
 void SegmentQueue::Write(Lock& lock) {
   lock.unlock();
   const absl::Status status =
@@ -225,7 +227,7 @@ void SegmentQueue::NoteSpool() {
   statistics_.spool_bytes = spool_ == nullptr ? 0 : spool_->bytes();
 }
 
-// What is in memory at the end goes to disk, oldest first.
+// Writes the segments that are in memory at the end to disk, oldest first.
 void SegmentQueue::SpoolRest(Lock& lock) {
   if (spool_ == nullptr) return;
   RemoveFiles(lock);

@@ -52,7 +52,7 @@ Acknowledgement ToAcknowledgement(const v1::StreamSegmentsResponse& response) {
       ack.verdict = Acknowledgement::Verdict::kRejected;
       break;
     default:
-      // Not to be taken for stored, and asking again would not help.
+      // Must not be treated as stored, and sending again would not help.
       ack.verdict = Acknowledgement::Verdict::kRejected;
       ack.violations.push_back(
           {"verdict", "is not known to this client; update it"});

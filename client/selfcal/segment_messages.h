@@ -1,7 +1,7 @@
-// The messages of the stream of segments.
+// Conversion between segments and the messages of StreamSegments.
 //
-// A few segments no message can carry. Sending one would break the stream again
-// and again, so they are refused on this side.
+// Some segments do not fit into a message. Sending one would break the stream
+// again and again, so the client refuses them.
 #pragma once
 
 #include <cstddef>
@@ -14,17 +14,18 @@
 
 namespace selfcal::client {
 
-// What the daemon takes in one message.
+// Size of the largest message that the daemon accepts.
 inline constexpr std::size_t kMaxRequestBytes = 64u << 20;
-// The longest name of a session that its acknowledgements repeat in full.
+// Length of the longest session name that acknowledgements repeat in full.
 inline constexpr std::size_t kMaxSessionBytes = 256;
 
-// Fills *request, or says why the segment cannot be sent.
+// Fills *request, or returns the reasons why the segment cannot be sent.
 std::vector<Violation> MakeRequest(const std::string& rig,
                                    const MotionSegment& segment,
                                    v1::StreamSegmentsRequest* request);
 
-// A verdict that this client does not know counts as a rejection.
+// Converts a response. A verdict that this client does not know is treated as a
+// rejection.
 Acknowledgement ToAcknowledgement(const v1::StreamSegmentsResponse& response);
 
 }  // namespace selfcal::client

@@ -10,7 +10,7 @@ std::size_t AtLeastOne(int count) {
   return static_cast<std::size_t>(std::max(count, 1));
 }
 
-// With a spool, half of the room is for what waits for the disk.
+// With a spool, half of the queue is for segments that wait for the disk.
 std::size_t HeadRoom(const ClientOptions& options) {
   const std::size_t all = AtLeastOne(options.max_queue);
   if (options.spool_dir.empty()) return all;
@@ -33,7 +33,7 @@ SegmentQueue::~SegmentQueue() {
     stop_ = true;
     finish_ = true;
   }
-  chores_.notify_one();
+  work_.notify_one();
   keeper_.join();
 }
 
@@ -51,7 +51,7 @@ bool SegmentQueue::Push(Material segment) noexcept {
     ++(taken ? statistics_.queued : statistics_.dropped);
     if (!taken) return false;
   }
-  chores_.notify_one();
+  work_.notify_one();
   return true;
 }
 
@@ -102,7 +102,7 @@ std::shared_ptr<const SegmentQueue::Request> SegmentQueue::Next() {
   });
   if (stop_ || !open_) return nullptr;
   Entry& entry = head_[in_flight_];
-  ++in_flight_;  // before it is sent, for its acknowledgement may be quick
+  ++in_flight_;  // before it is sent, because the acknowledgement may be quick
   if (entry.was_sent) ++statistics_.resent;
   entry.was_sent = true;
   return entry.request;
@@ -122,7 +122,7 @@ bool SegmentQueue::Pause(std::chrono::milliseconds time) {
   return !stop_;
 }
 
-bool SegmentQueue::Take(const Acknowledgement& ack) {
+bool SegmentQueue::Acknowledge(const Acknowledgement& ack) {
   {
     std::lock_guard lock(mutex_);
     const auto end = head_.begin() + static_cast<std::ptrdiff_t>(in_flight_);
@@ -137,7 +137,7 @@ bool SegmentQueue::Take(const Acknowledgement& ack) {
     Count(ack.verdict);
     ++callbacks_due_;
   }
-  chores_.notify_one();
+  work_.notify_one();
   changed_.notify_all();
   return true;
 }
@@ -182,9 +182,9 @@ bool SegmentQueue::stopped() const {
   return stop_;
 }
 
-// Segments in memory.
+// Number of segments in memory.
 std::size_t SegmentQueue::Held() const {
-  return incoming_.size() + (taking_in_ ? 1 : 0) + head_.size();
+  return incoming_.size() + (admitting_ ? 1 : 0) + head_.size();
 }
 
 void SegmentQueue::Count(Acknowledgement::Verdict verdict) {

@@ -1,15 +1,17 @@
-// The segments of a stream on their way: taken from the SLAM system, turned
-// into messages, kept on disk while the daemon is away, sent, acknowledged.
+// The queue of a stream: it accepts segments from the SLAM system, encodes them
+// as messages, spools them to disk while the daemon is unreachable, hands them
+// to the sender, and removes them when they are acknowledged.
 //
-//   Push -> incoming -> [spool on disk] -> head -> Next ... Take
+//   Push -> incoming -> [spool on disk] -> head -> Next ... Acknowledge
 //
-// `head` is what the sender works on, oldest first: in_flight of them have been
-// sent on this connection. A thread of the queue's own, the keeper, does all
-// that takes time: it assembles and encodes segments, writes what the head has
-// no room for to the spool, and reads it back when it has.
+// `head` has the segments that the sender works on, oldest first; the first
+// in_flight of them have been sent on this connection. A thread of the queue,
+// the keeper, does everything that takes time: it assembles and encodes
+// segments, writes those that do not fit into the head to the spool, and reads
+// them back when there is room.
 //
 // Push, the sender's functions and the statistics may be called from any
-// thread; they only ever wait for each other.
+// thread; they wait only for each other.
 #pragma once
 
 #include <absl/status/status.h>
@@ -37,38 +39,41 @@ class SegmentQueue {
  public:
   using Request = v1::StreamSegmentsRequest;
   using Material = std::variant<MotionSegment, ClosedSegment>;
-  // Called by the keeper for segments that no message can carry.
+  // The keeper calls it for segments that do not fit into a message.
   using Refuse = std::function<void(const Acknowledgement&)>;
 
-  // Throws std::system_error if there can be no thread, std::bad_alloc.
+  // Throws std::system_error if no thread can be started, and std::bad_alloc.
   SegmentQueue(const ClientOptions& options, Refuse refuse);
-  // Call Stop first, and let the sender end. Writes to the spool, if there is
-  // one and while there is room, what was not acknowledged.
+  // Writes unacknowledged segments to the spool, if there is one, as far as
+  // they fit. Before, call Stop and wait until the sender has ended.
   ~SegmentQueue();
   SegmentQueue(const SegmentQueue&) = delete;
   SegmentQueue& operator=(const SegmentQueue&) = delete;
 
-  // False, and counted as dropped, if there is no room, no memory, or no
-  // further sending.
+  // Returns false and counts the segment as dropped if the queue is full,
+  // memory runs out, or sending has ended.
   bool Push(Material segment) noexcept;
-  // Until everything is acknowledged, or sending has ended: true.
+  // Waits until everything is acknowledged or sending has ended; false after
+  // the timeout.
   bool WaitUntilDone(std::chrono::milliseconds timeout);
   std::size_t unacknowledged() const;
   StreamStatistics statistics() const;
   absl::Status spool_status() const;
 
-  // For the sender: until there is something to send. False: stopped.
+  // The functions from here on are for the sender.
+  // Waits until there is something to send; false if stopped.
   bool WaitForWork();
-  // A connection begins: everything is to be sent (again).
+  // Starts a connection, on which everything is sent (again).
   void Open();
-  // Waits until there is one and the window has room; null once closed.
+  // Returns the next request. Waits until there is one and the number of
+  // unacknowledged segments allows it; null after Close.
   std::shared_ptr<const Request> Next();
   void Close();
-  // Waits; false if stopped meanwhile.
+  // Waits for this time; false if stopped meanwhile.
   bool Pause(std::chrono::milliseconds time);
-  // A segment that was sent is acknowledged; false if it is none. Counts its
-  // verdict, and one callback as due.
-  bool Take(const Acknowledgement& ack);
+  // Removes the acknowledged segment, counts its verdict, and counts one
+  // callback as due. Returns false if no such segment was sent.
+  bool Acknowledge(const Acknowledgement& ack);
   void CallbackReturned(bool failed);
   void NoteConnection();
   void End(const absl::Status& why);
@@ -78,26 +83,25 @@ class SegmentQueue {
 
  private:
   struct Entry {
-    std::uint64_t number = 0;  // order, and name in the spool
+    std::uint64_t number = 0;  // defines the order and the name in the spool
     SegmentKey key;
     std::shared_ptr<const Request> request;
     bool on_disk = false;
     bool was_sent = false;
   };
 
-  // Of the keeper's thread (segment_keeper.cc).
+  // Functions of the keeper's thread (segment_keeper.cc).
   using Lock = std::unique_lock<std::mutex>;
   void Keep();
   void OpenSpool();
-  bool HasChore() const;
+  bool HasPending() const;
   bool CanLoad() const;
-  bool CanTakeIn() const;
+  bool CanAdmit() const;
   bool HeadIsNext() const;
-  void DoChore(Lock& lock);
+  void ProcessPending(Lock& lock);
   void RemoveFiles(Lock& lock);
   void Load(Lock& lock);
-  void SetAside(std::uint64_t number, const absl::Status& why);
-  void TakeIn(Lock& lock);
+  void Admit(Lock& lock);
   std::optional<Entry> Prepare(Material material, Lock& lock);
   void Write(Lock& lock);
   void NoteSpool();
@@ -111,26 +115,26 @@ class SegmentQueue {
   const std::size_t max_held_;
   const std::size_t max_head_;
 
-  // The keeper's alone.
+  // Used by the keeper only.
   std::unique_ptr<Spool> spool_;
   std::uint64_t next_number_ = 1;
   std::uint64_t loaded_ = 0;      // files up to this number are in the head
-  std::optional<Entry> pending_;  // taken in, waits for a place
+  std::optional<Entry> pending_;  // admitted, waits for room
 
   mutable std::mutex mutex_;         // guards all below
-  std::condition_variable chores_;   // the keeper waits for it alone, so
-  std::condition_variable changed_;  // that Push wakes nobody else
+  std::condition_variable work_;     // only the keeper waits for it, so that
+  std::condition_variable changed_;  // Push wakes no other thread
   std::deque<Material> incoming_;
-  bool taking_in_ = false;  // the keeper holds one that is nowhere else
+  bool admitting_ = false;  // the keeper holds a segment that is nowhere else
   std::deque<Entry> head_;
   std::size_t in_flight_ = 0;
   std::vector<std::uint64_t> finished_files_;
   bool spool_ready_ = false;    // opened, or there is none
-  bool spool_blocked_ = false;  // full or failing: tried again in a while
+  bool spool_blocked_ = false;  // full or failing; retried after kSpoolRetry
   absl::Status spool_status_;
   int callbacks_due_ = 0;
   StreamStatistics statistics_;
-  absl::Status end_;  // not OK: nothing is sent any more
+  absl::Status end_;  // if not OK, nothing is sent any more
   bool open_ = false;
   bool stop_ = false;
   bool finish_ = false;

@@ -1,5 +1,6 @@
-// Two threads beside the queue's: `sender_` connects, sends and waits out the
-// backoff; while a connection lasts, a reader takes the acknowledgements.
+// A stream has two threads besides that of the queue: `sender_` connects, sends
+// and waits for the backoff; while a connection lasts, a reader receives the
+// acknowledgements.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -23,13 +24,13 @@ using Request = v1::StreamSegmentsRequest;
 using Response = v1::StreamSegmentsResponse;
 using ClientStream = grpc::ClientReaderWriter<Request, Response>;
 
-// Errors that the next connection would give again.
+// True for errors that the next connection would return again.
 bool EndsStream(const absl::Status& status) {
   return absl::IsNotFound(status) || absl::IsInvalidArgument(status) ||
          absl::IsPermissionDenied(status) || absl::IsUnauthenticated(status);
 }
 
-// Without a message, which would take memory.
+// Has no message, because a message needs memory.
 absl::Status NoMemory() {
   return absl::Status(absl::StatusCode::kResourceExhausted, "");
 }
@@ -38,7 +39,7 @@ absl::Status NoMemory() {
 
 class SegmentStream::Impl {
  public:
-  // Throws std::bad_alloc, and std::system_error if there can be no thread.
+  // Throws std::bad_alloc, and std::system_error if no thread can be started.
   Impl(const ClientOptions& options, AckCallback on_ack)
       : options_(options),
         on_ack_(std::move(on_ack)),
@@ -57,7 +58,7 @@ class SegmentStream::Impl {
   SegmentQueue& queue() { return queue_; }
 
   absl::Status Drain(std::chrono::milliseconds timeout) {
-    // Longer ones may not be representable as a point in time.
+    // The end of a longer timeout may not be representable as a point in time.
     const auto wait = std::min<std::chrono::milliseconds>(
         timeout, std::chrono::hours(24 * 365));
     const bool done = queue_.WaitUntilDone(wait);
@@ -81,15 +82,15 @@ class SegmentStream::Impl {
     Backoff backoff(
         options_.min_backoff, options_.max_backoff, JitterSeed(this));
     while (queue_.WaitForWork()) {
-      const absl::Status status = TryConverse();
+      const absl::Status status = TryConnection();
       if (answered_) backoff.Reset();
-      if (!AfterConversation(status, backoff.Next())) return;
+      if (!PrepareReconnection(status, backoff.Next())) return;
     }
   }
 
-  // False if there is to be no other conversation.
-  bool AfterConversation(const absl::Status& status,
-                         std::chrono::milliseconds wait) {
+  // Returns false if the stream must not connect again.
+  bool PrepareReconnection(const absl::Status& status,
+                           std::chrono::milliseconds wait) {
     if (queue_.stopped()) return false;
     {
       std::lock_guard lock(mutex_);
@@ -102,11 +103,11 @@ class SegmentStream::Impl {
     return queue_.Pause(wait);
   }
 
-  absl::Status TryConverse() {
+  absl::Status TryConnection() {
     absl::Status status;
     try {
-      status = Converse();
-    } catch (const std::exception& error) {  // no memory, no thread
+      status = RunConnection();
+    } catch (const std::exception& error) {  // out of memory or threads
       status = absl::InternalError(error.what());
     }
     std::lock_guard lock(mutex_);
@@ -114,8 +115,8 @@ class SegmentStream::Impl {
     return status;
   }
 
-  // One connection, from its beginning to its end, which is never a success.
-  absl::Status Converse() {
+  // Handles one connection until it ends; never returns OK.
+  absl::Status RunConnection() {
     answered_ = false;
     const auto channel = MakeChannel(options_);
     if (!channel.ok()) return channel.status();
@@ -126,7 +127,8 @@ class SegmentStream::Impl {
       context_ = context;
       broken_ = absl::OkStatus();
     }
-    // Who stops looks for a context after saying so, and so does this.
+    // Stopping sets the flag and then looks for a context; this sets the
+    // context and then looks at the flag, so that one of them sees the other.
     if (queue_.stopped()) return absl::CancelledError();
     queue_.Open();
     const auto stream = stub->StreamSegments(context.get());
@@ -142,18 +144,18 @@ class SegmentStream::Impl {
   // Sends until the connection ends.
   void WriteAll(ClientStream* stream) {
     while (const auto request = queue_.Next()) {
-      if (!stream->Write(*request)) return;  // the reader learns of it, too
+      if (!stream->Write(*request)) return;  // the reader notices it, too
     }
   }
 
-  // Takes acknowledgements until the connection ends.
+  // Receives acknowledgements until the connection ends.
   void ReadAll(ClientStream* stream) {
     try {
       Response response;
       while (stream->Read(&response)) {
         NoteAnswer();
         const Acknowledgement ack = ToAcknowledgement(response);
-        if (queue_.Take(ack)) {
+        if (queue_.Acknowledge(ack)) {
           CallBack(ack);
         } else {
           Break(absl::InternalError(
@@ -199,11 +201,11 @@ class SegmentStream::Impl {
 
   mutable std::mutex mutex_;  // guards the three below
   absl::Status connection_;
-  absl::Status broken_;  // not OK: why this side ended the connection
+  absl::Status broken_;  // if not OK, why the client ended the connection
   std::shared_ptr<grpc::ClientContext> context_;  // while there is one
 
-  // The daemon has said something on the connection. The reader writes it, the
-  // sender reads it when the reader has ended.
+  // True if the daemon has answered on the connection. The reader writes it;
+  // the sender reads it when the reader has ended.
   bool answered_ = false;
 
   SegmentQueue queue_;  // its thread uses all of the above

@@ -65,7 +65,7 @@ absl::StatusOr<std::unique_ptr<Spool>> Spool::Open(
   const auto lock = Lock(folder);
   if (!lock.ok()) return lock.status();
   std::unique_ptr<Spool> spool(new Spool(folder, max_bytes, *lock));
-  const absl::Status status = spool->TakeUp();
+  const absl::Status status = spool->Recover();
   if (!status.ok()) return status;
   return spool;
 }
@@ -75,7 +75,7 @@ Spool::Spool(std::filesystem::path folder, std::uint64_t max_bytes, int lock)
 
 Spool::~Spool() { ::close(lock_); }
 
-absl::Status Spool::TakeUp() {
+absl::Status Spool::Recover() {
   std::vector<std::filesystem::path> unfinished;
   std::error_code error;
   for (std::filesystem::directory_iterator file(folder_, error), end;
@@ -150,7 +150,7 @@ void Spool::Remove(std::uint64_t number) {
   files_.erase(file);
 }
 
-void Spool::SetAside(std::uint64_t number) {
+void Spool::Quarantine(std::uint64_t number) {
   const auto file = files_.find(number);
   if (file == files_.end()) return;
   if (::rename(Path(number, kSegment).c_str(),

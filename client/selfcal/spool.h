@@ -1,10 +1,10 @@
-// Payloads on disk while they cannot be sent: a folder with one file for each,
-// in the order of their numbers, bounded in bytes, and taken up by the next
-// process that opens it.
+// A folder that keeps payloads while they cannot be sent: one file for each, in
+// the order of their numbers, with a limit on the bytes. The next process that
+// opens the folder continues with them.
 //
 //   00000000000000000042.segment   one payload (spool_file.h)
-//   00000000000000000042.damaged   set aside: not what was written
-//   lock                           held while a process has it open
+//   00000000000000000042.damaged   quarantined: differs from what was written
+//   lock                           held while a process has the folder open
 //
 // Not thread-safe.
 #pragma once
@@ -24,39 +24,41 @@ namespace selfcal::client {
 
 class Spool {
  public:
-  // Makes the folder if it is missing. ALREADY_EXISTS if another process or
-  // object has it open, UNAVAILABLE for errors of the disk.
+  // Creates the folder if it is missing. ALREADY_EXISTS if another process or
+  // object has it open, UNAVAILABLE for disk errors.
   static absl::StatusOr<std::unique_ptr<Spool>> Open(
       const std::filesystem::path& folder, std::uint64_t max_bytes);
   ~Spool();
   Spool(const Spool&) = delete;
   Spool& operator=(const Spool&) = delete;
 
-  // Larger than that of every payload that is there.
+  // Larger than the number of every payload in the folder.
   std::uint64_t next_number() const;
 
-  // On success the payload is on disk. RESOURCE_EXHAUSTED if it would take more
-  // than max_bytes, for which files that are set aside make room, or if the
-  // disk is full; UNAVAILABLE for its other errors.
+  // Writes a payload; when it returns OK, the payload is on disk. Quarantined
+  // files are deleted to make room. RESOURCE_EXHAUSTED if the folder would
+  // still exceed max_bytes or the disk is full; UNAVAILABLE for other disk
+  // errors.
   absl::Status Write(std::uint64_t number, std::string_view payload);
 
-  // Number of the oldest payload from `number` on.
+  // Returns the number of the oldest payload from `number` on.
   std::optional<std::uint64_t> FirstFrom(std::uint64_t number) const;
 
-  // DATA_LOSS if it is damaged; UNAVAILABLE if it cannot be read.
+  // Reads a payload. DATA_LOSS if it is damaged; UNAVAILABLE if it cannot be
+  // read.
   absl::StatusOr<std::string> Read(std::uint64_t number) const;
 
-  // The payload has done its duty.
+  // Deletes a payload that is no longer needed.
   void Remove(std::uint64_t number);
-  // It is of no use, but kept for who wants to know why.
-  void SetAside(std::uint64_t number);
+  // Takes a damaged payload out of use, but keeps its file for a diagnosis.
+  void Quarantine(std::uint64_t number);
 
   std::size_t size() const { return files_.size(); }  // payloads
-  std::uint64_t bytes() const { return bytes_; }      // with those set aside
+  std::uint64_t bytes() const { return bytes_; }      // with quarantined files
 
  private:
   Spool(std::filesystem::path folder, std::uint64_t max_bytes, int lock);
-  absl::Status TakeUp();
+  absl::Status Recover();
   void MakeRoom(std::uint64_t bytes);
   std::filesystem::path Path(std::uint64_t number, const char* suffix) const;
 

@@ -41,7 +41,7 @@ absl::Status DiskError(const char* what, const std::filesystem::path& path) {
   return absl::UnavailableError(message);
 }
 
-// Little-endian, as all numbers of the header.
+// Writes a number little-endian, as all numbers of the header are.
 template <typename T>
 void Put(T value, char* bytes) {
   for (std::size_t i = 0; i < sizeof(T); ++i) {
@@ -137,7 +137,7 @@ absl::StatusOr<std::string> ReadSpoolFile(const std::filesystem::path& path) {
     }
   }
   return absl::DataLossError(
-      fmt::format("{} is not what was written", path.string()));
+      fmt::format("{} is damaged: its checksum does not match", path.string()));
 }
 
 }  // namespace selfcal::client

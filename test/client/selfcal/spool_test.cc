@@ -98,7 +98,7 @@ TEST_F(SpoolTest, KeepsToItsBytes) {
   EXPECT_FALSE(std::filesystem::exists(File(1)));
   EXPECT_TRUE(spool->Write(4, payload).ok());
   // What is set aside makes room.
-  spool->SetAside(2);
+  spool->Quarantine(2);
   EXPECT_EQ(spool->bytes(), 3 * one);
   EXPECT_EQ(spool->size(), 2u);
   EXPECT_TRUE(spool->Write(5, payload).ok());
