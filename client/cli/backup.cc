@@ -1,4 +1,4 @@
-// backup: a copy of the daemon's database, whole or not there.
+// backup: copies the daemon's database to a file, atomically.
 #include <fmt/format.h>
 
 #include <memory>
@@ -16,15 +16,15 @@ namespace {
 
 using Summary = v1::BackupStoreResponse::Summary;
 
-// Receives every piece; *arrived says what did, in the form in which the daemon
-// says what it sent.
+// Receives all pieces. *arrived summarises what was received, so that it can be
+// compared with the daemon's summary of what it sent.
 grpc::Status Receive(v1::StoreService::StubInterface* stub,
                      NewFile* file,
                      absl::Status* written,
                      Summary* sent,
                      Summary* arrived) {
   Progress progress("backup");
-  progress.Say("the daemon makes a copy");
+  progress.Say("the daemon copies its database");
   grpc::ClientContext call;
   const auto reader = stub->BackupStore(&call, v1::BackupStoreRequest());
   Sha256 digest;
@@ -55,7 +55,7 @@ int Backup(Context* context, const std::string& path, bool force) {
     if (!status.ok()) return Fail(*context, status);
     if (arrived.bytes() != sent.bytes() || arrived.sha256() != sent.sha256()) {
       PrintError(fmt::format(
-          "the backup did not arrive whole: try again; there is no {}", path));
+          "the backup is incomplete: try again; {} was not written", path));
       return kFailed;
     }
     written = file.Commit();
@@ -81,12 +81,12 @@ int Backup(Context* context, const std::string& path, bool force) {
 void AddBackupCommand(CLI::App* app, Context* context) {
   CLI::App* backup = app->add_subcommand(
       "backup",
-      "Copy the daemon's database, as it is at one instant, to a file; the "
-      "daemon goes on meanwhile");
+      "Copy the daemon's database to a file; the copy is consistent, and the "
+      "daemon continues to serve");
   const auto path = std::make_shared<std::string>();
   const auto force = std::make_shared<bool>(false);
   backup->add_option("FILE", *path)->required();
-  backup->add_flag("--force", *force, "Overwrite the file if there is one");
+  backup->add_flag("--force", *force, "Overwrite the file if it exists");
   backup->callback([context, path, force] {
     context->command = [context, path, force] {
       return Backup(context, *path, *force);

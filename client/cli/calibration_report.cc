@@ -36,7 +36,7 @@ Facts DescribeDifferences(const v1::CompareCalibrationsResponse& differences) {
             fmt::format(
                 "{} and {}", differences.version_a(), differences.version_b()));
   facts.Add("shared segments",
-            fmt::format("{} ({} taken into account)",
+            fmt::format("{} ({} accounted for)",
                         differences.shared_segments(),
                         differences.shared_segments_used()));
   facts.Add(

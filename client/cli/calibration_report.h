@@ -1,4 +1,4 @@
-// A calibration for people: what it is, where it came from, and its values.
+// A calibration in words and tables for people: description, origin, values.
 #pragma once
 
 #include <string>
@@ -8,20 +8,22 @@
 
 namespace selfcal::client {
 
-// State, provenance and the solver's report, what was held constant in words.
+// State, provenance and the solver's report, with the directions that were held
+// constant in words.
 Facts DescribeCalibration(const v1::Calibration& calibration);
 
-// Component, value, unit, sigma.
+// A table of component, value, unit and sigma.
 Table CalibrationValues(const v1::Calibration& calibration);
 
-// Verdict on two versions; component, both values, difference with its sigma.
+// The comparison of two versions: its result, and a table of component, both
+// values and the difference with its sigma.
 Facts DescribeDifferences(const v1::CompareCalibrationsResponse& differences);
 Table DifferenceValues(const v1::CompareCalibrationsResponse& differences);
 
-// A line: version, state, time, what the solver did.
+// One line: version, state, time, summary of the solver.
 std::string CalibrationLine(const v1::Calibration& calibration);
 
-// What the solver did, in a few words; "factory" for the first version.
+// A summary of the solver in a few words; "factory" for the first version.
 std::string OriginText(const v1::Calibration& calibration);
 
 }  // namespace selfcal::client

@@ -106,7 +106,8 @@ int Diff(Context* context,
   return kDone;
 }
 
-// Until `count` have come, or, if it is 0, until the daemon ends it.
+// Prints `count` versions or, if `count` is 0, continues until the daemon ends
+// the stream.
 int Watch(Context* context, const std::string& rig, std::int64_t count) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   grpc::ClientContext call;
@@ -127,7 +128,7 @@ int Watch(Context* context, const std::string& rig, std::int64_t count) {
   }
   grpc::Status status = stream->Finish();
   if (status.ok()) {
-    status = {grpc::StatusCode::UNAVAILABLE, "it ended the stream"};
+    status = {grpc::StatusCode::UNAVAILABLE, "the daemon ended the stream"};
   }
   return Fail(*context, status);
 }
@@ -161,11 +162,14 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   const auto reason = std::make_shared<std::string>();
   CLI::App* activate = calibrations->add_subcommand(
       "activate",
-      "Make a version the active one; an older one rolls the active one back");
+      "Make a version active; if it is older than the active version, that one "
+      "is rolled back");
   activate->add_option("RIG", *rig)->required();
   activate->add_option("VERSION", *version, "A number")->required();
   activate
-      ->add_option("--reason", *reason, "Why; the event log keeps it with who")
+      ->add_option("--reason",
+                   *reason,
+                   "The reason; the event log records it with your name")
       ->required();
   activate->callback([context, rig, version, reason] {
     context->command = [context, rig, version, reason] {
@@ -175,7 +179,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
 
   const auto other = std::make_shared<std::string>("active");
   CLI::App* diff = calibrations->add_subcommand(
-      "diff", "Compare two versions, by their uncertainty");
+      "diff", "Compare two versions, given their uncertainty");
   diff->add_option("RIG", *rig)->required();
   diff->add_option("A", *version, "A number, or active")->required();
   diff->add_option("B", *other, "A number, or active")->capture_default_str();
@@ -191,7 +195,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   CLI::App* watch = calibrations->add_subcommand(
       "watch", "Print the active version at once, then each new one");
   watch->add_option("RIG", *rig)->required();
-  watch->add_option("--count", *count, "End after this many")
+  watch->add_option("--count", *count, "Exit after this many versions")
       ->check(CLI::PositiveNumber);
   watch->callback([context, rig, count] {
     context->command = [context, rig, count] {

@@ -20,14 +20,14 @@ namespace {
 using Service = v1::CalibrationService::StubInterface;
 using Response = v1::AdviseMotionResponse;
 
-// Scores come a few seconds apart.
+// A segment is scored every few seconds.
 constexpr std::chrono::milliseconds kPoll(1000);
 
 std::string GainText(double gain_nats) {
   return fmt::format("{:.2f}", gain_nats);
 }
 
-// "imu 3.10, camera 0.42".
+// Returns e.g. "imu 3.10, camera 0.42".
 std::string GroupsText(const Response::Advice& advice) {
   std::vector<std::string> parts;
   for (const auto& gain : advice.group_gains()) {
@@ -37,8 +37,8 @@ std::string GroupsText(const Response::Advice& advice) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// Of the component that the motion sharpens most: "cam0.p_CI.z 0.013 -> 0.0041
-// m".
+// Returns the component whose sigma the motion reduces most, e.g.
+// "cam0.p_CI.z 0.013 -> 0.0041 m".
 std::string SharpestText(const Response::Advice& advice) {
   const auto& changes = advice.sigma_changes();
   const auto sharpest = std::min_element(
@@ -67,7 +67,7 @@ Table AdviceTable(const Response& response) {
                {"motion"},
                {"gain [nat]", true},
                {"by group"},
-               {"sharpens most"},
+               {"largest improvement"},
                {"what to do"}});
   int rank = 0;
   for (const auto& advice : response.advice()) {
@@ -87,19 +87,19 @@ void Print(const Context& context, const Response& response) {
     return;
   }
   if (context.terminal) {
-    PrintText(fmt::format("known: {}; known worst, in reference sigmas:\n",
+    PrintText(fmt::format("known: {}; least known, in reference sigmas:\n",
                           KnownText(response)));
     for (const auto& weak : response.weakest()) {
       PrintText(fmt::format(
           "  {:8.3g}  {}\n", weak.sigma_by_reference(), weak.words()));
     }
-    PrintText(fmt::format("a segment of {:g} s would bring:\n",
+    PrintText(fmt::format("predicted for a segment of {:g} s:\n",
                           response.segment_seconds()));
   }
   context.Print(AdviceTable(response));
 }
 
-// One line: what to do now, and what that is worth.
+// Prints one line: the best motion now, and its gain.
 void PrintLine(const Context& context, const Response& response) {
   if (context.json) {
     context.PrintJson(response, true);
@@ -133,26 +133,27 @@ int Coach(Context* context, const std::string& rig, int top) {
   return kDone;
 }
 
-// What a line is told for: the motion, or what it follows from, is another one.
-using Told = std::tuple<std::string, std::int64_t, int>;
-Told Subject(const Response& response) {
+// A new line is printed when the motion changes, or the information that it
+// follows from.
+using Subject = std::tuple<std::string, std::int64_t, int>;
+Subject SubjectOf(const Response& response) {
   return {response.advice().empty() ? "" : response.advice(0).motion(),
           response.calibration_version(),
           response.segments_since()};
 }
 
-// Until `count` lines are printed, or, if it is 0, until the daemon ends.
+// Prints `count` lines or, if `count` is 0, continues until the daemon ends.
 int Watch(Context* context,
           const std::string& rig,
           int top,
           std::int64_t count) {
-  Told told;
+  Subject printed;
   for (std::int64_t lines = 0;;) {
     Response response;
     const auto status = Ask(context, rig, top, &response);
     if (!status.ok()) return Fail(*context, status);
-    if (Subject(response) != told) {
-      told = Subject(response);
+    if (SubjectOf(response) != printed) {
+      printed = SubjectOf(response);
       PrintLine(*context, response);
       if (++lines == count) return kDone;
     }
@@ -164,18 +165,18 @@ int Watch(Context* context,
 
 void AddCoachCommand(CLI::App* app, Context* context) {
   CLI::App* coach = app->add_subcommand(
-      "coach", "Say which motion would teach a rig the most now");
+      "coach", "Recommend the motions with the largest predicted gain");
   const auto rig = std::make_shared<std::string>();
   const auto top = std::make_shared<int>(3);
   const auto watch = std::make_shared<bool>(false);
   const auto count = std::make_shared<std::int64_t>(0);
   coach->add_option("RIG", *rig)->required();
-  coach->add_option("--top", *top, "Print this many motions")
+  coach->add_option("--top", *top, "Number of motions to print")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   CLI::Option* watching = coach->add_flag(
-      "--watch", *watch, "Print a line now, and each time the advice changes");
-  coach->add_option("--count", *count, "With --watch: end after this many")
+      "--watch", *watch, "Print a line now, and whenever the advice changes");
+  coach->add_option("--count", *count, "With --watch: exit after this many")
       ->needs(watching)
       ->check(CLI::PositiveNumber);
   coach->callback([context, rig, top, watch, count] {

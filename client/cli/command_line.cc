@@ -9,12 +9,12 @@ namespace selfcal::client {
 namespace {
 
 constexpr char kFooter[] =
-    "On a terminal the output is a table. Into a pipe it is one record a line, "
+    "On a terminal the output is a table. In a pipe it is one record per line, "
     "its fields\nseparated by tabs, without a header. With --json it is the "
     "contract's message in\nproto3 JSON: one document, or one line each for "
     "import,\ncalibrations watch, runs watch, coach --watch, verify and "
     "doctor.\n\n"
-    "Exit codes: 0 done; 1 the daemon refused, what was asked for failed, or "
+    "Exit codes: 0 success; 1 the daemon refused, the operation failed, or "
     "preflight\nor verify found something; 2 wrong usage or unusable input; 3 "
     "the daemon\ncannot be reached; 4 doctor found damage.";
 
@@ -40,7 +40,7 @@ void AddGlobalOptions(CLI::App* app, Context* context) {
       ->envname("SELFCAL_KEY");
   app->add_flag("--json", context->json, "Print JSON");
   app->require_subcommand(1);
-  app->fallthrough();  // global options may come after the command, too
+  app->fallthrough();  // global options may also follow the command
   app->footer(kFooter);
 }
 

@@ -1,5 +1,5 @@
-// The commands by noun; each adds itself to the command line. `context` must
-// outlive the command line.
+// The commands, sorted by noun; each function adds its commands to the command
+// line. `context` must outlive the command line.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -12,7 +12,7 @@ void AddRigCommands(CLI::App* app, Context* context);
 void AddImportCommand(CLI::App* app, Context* context);
 void AddPreflightCommand(CLI::App* app, Context* context);
 void AddSegmentCommands(CLI::App* app, Context* context);
-// Below `segments`.
+// Adds a command below `segments`.
 void AddSegmentExport(CLI::App* segments, Context* context);
 void AddTablesCommand(CLI::App* app, Context* context);
 void AddRecalibrateCommand(CLI::App* app, Context* context);
@@ -20,7 +20,7 @@ void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
 void AddReportCommand(CLI::App* app, Context* context);
 void AddCoachCommand(CLI::App* app, Context* context);
-// To `calibrations`.
+// Adds a command below `calibrations`.
 void AddCalibrationExport(CLI::App* calibrations, Context* context);
 void AddVerifyCommand(CLI::App* app, Context* context);
 void AddTopCommand(CLI::App* app, Context* context);
@@ -30,7 +30,7 @@ void AddBackupCommand(CLI::App* app, Context* context);
 void AddRestoreCommand(CLI::App* app, Context* context);
 void AddCompletionCommand(CLI::App* app, Context* context);
 
-// The whole command line; returns the exit code.
+// Parses and runs the command line; returns the exit code.
 int RunCommandLine(int argc, const char* const* argv);
 
 }  // namespace selfcal::client

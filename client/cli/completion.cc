@@ -16,7 +16,8 @@ std::vector<const CLI::App*> CommandsOf(const CLI::App& app) {
   return app.get_subcommands([](const CLI::App*) { return true; });
 }
 
-// "--json --target ...": the flags of a command, without the program's own.
+// Returns the flags of a command, without those of the program, e.g.
+// "--json --target ...".
 std::vector<std::string> FlagsOf(const CLI::App& app) {
   std::vector<std::string> flags;
   for (const CLI::Option* option :
@@ -28,7 +29,7 @@ std::vector<std::string> FlagsOf(const CLI::App& app) {
   return flags;
 }
 
-// Calls back with each command and the words that lead to it.
+// Callback for each command, with the words that lead to it.
 using Visit =
     std::function<void(const std::string& path, const CLI::App& command)>;
 void ForEachCommand(const CLI::App& app,
@@ -43,7 +44,7 @@ void ForEachCommand(const CLI::App& app,
   }
 }
 
-// In single quotes of a shell.
+// Puts the text into single quotes for a shell.
 std::string Quoted(const std::string& text) {
   std::string quoted = "'";
   for (const char c : text) quoted += c == '\'' ? "'\\''" : std::string(1, c);
@@ -97,7 +98,7 @@ std::string ZshCompletion(const CLI::App& app) {
 std::string FishCompletion(const CLI::App& app) {
   std::string script;
   ForEachCommand(app, "", [&](const std::string& path, const CLI::App& at) {
-    // A command is open to those below it until one of them is there.
+    // The subcommands of a command are completed until one of them is given.
     std::string condition = "__fish_use_subcommand";
     if (!path.empty()) {
       condition.clear();

@@ -1,5 +1,5 @@
-// Scripts that complete the command line in a shell, made from the commands
-// that it has.
+// Completion scripts for shells, generated from the commands of the command
+// line.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::chrono::seconds kDeadline{30};
 
-// The violated fields of the error's details, a line each.
+// Returns the violated fields from the error's details, a line each.
 std::string Violations(const grpc::Status& status) {
   google::rpc::Status details;
   if (!details.ParseFromString(status.error_details())) return "";
@@ -90,8 +90,8 @@ int Fail(const Context& context, const grpc::Status& status) {
   if (IsUnreachable(status)) {
     PrintError(
         fmt::format("the daemon at {} does not answer: {}\n"
-                    "  Is selfcald running? Another address: --target, or "
-                    "SELFCAL_TARGET in the environment.",
+                    "  Is selfcald running? Set another address with --target "
+                    "or the environment variable SELFCAL_TARGET.",
                     context.target.address,
                     status.error_message()));
     return kUnreachable;

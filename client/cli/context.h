@@ -1,9 +1,9 @@
-// What every command shares: where the daemon is, how to print, and how errors
-// become exit codes.
+// The context that all commands share: the connection to the daemon, output,
+// and the conversion of errors into exit codes.
 //
-// Exit codes: 0 done; 1 the daemon refused, or what was asked for failed; 2
-// wrong usage or unusable input; 3 the daemon cannot be reached; 4 its database
-// is damaged.
+// Exit codes: 0 success; 1 the daemon refused the request, or the operation
+// failed; 2 wrong usage or unusable input; 3 the daemon cannot be reached; 4
+// its database is damaged.
 #pragma once
 
 #include <absl/status/status.h>
@@ -31,21 +31,22 @@ inline constexpr int kDamaged = 4;
 struct Context {
   Target target;
   bool json = false;
-  bool terminal = false;  // stdout is one
-  // Set by the command that was named, run once the line is parsed.
+  bool terminal = false;  // true if stdout is a terminal
+  // The command to run; set while the command line is parsed.
   std::function<int()> command;
 
-  // Before the first call, and to forget how the daemon was. Says what is wrong
-  // with the target or its files; the daemon need not be there.
+  // Creates the channel; needed before the first call. A later call replaces
+  // the channel and its connection state. Returns an error if the target or its
+  // files are invalid; the daemon need not be running.
   absl::Status Connect();
-  // One for all calls from then on.
+  // The channel for all calls since Connect.
   std::shared_ptr<grpc::Channel> Channel() const { return channel_; }
-  // For what the library connects.
+  // The options for connections of the client library.
   const ClientOptions& Connection() const { return connection_; }
 
   void Print(const Table& table) const;
   void Print(const Facts& facts) const;
-  // One document, or with `line` one line.
+  // Prints one document or, with `line`, one line.
   void PrintJson(const google::protobuf::Message& message,
                  bool line = false) const;
 
@@ -54,24 +55,24 @@ struct Context {
   std::shared_ptr<grpc::Channel> channel_;
 };
 
-// As proto3 JSON with the names of the fields as in the contract, default
-// values included.
+// Converts to proto3 JSON, with the field names of the contract and with
+// default values.
 std::string ToJson(const google::protobuf::Message& message, bool line);
 
 void PrintText(std::string_view text);
-void PrintError(std::string_view text);  // "selfcal: text"
+void PrintError(std::string_view text);  // prints "selfcal: text"
 
-// Says on stderr what is wrong, a line for each violated field; returns the
+// Prints the error to stderr, with a line for each violated field; returns the
 // exit code.
 int Fail(const Context& context, const grpc::Status& status);
-// For what this side could not read.
+// Does the same for input that could not be read.
 int FailInput(const absl::Status& status);
 
-// True for what may pass when the daemon comes back. One that is about to end
-// cancels the calls it has.
+// True for errors that may end when the daemon is back. CANCELLED is one of
+// them, because a daemon that shuts down cancels its calls.
 bool IsUnreachable(const grpc::Status& status);
 
-// A deadline for calls that answer at once.
+// Sets the deadline for calls that answer at once.
 void SetDeadline(grpc::ClientContext* call);
 
 // Calls `method` of `stub` once.

@@ -16,7 +16,7 @@ namespace {
 
 using SegmentStub = v1::SegmentService::StubInterface;
 
-// One page, newest first.
+// Lists one page of segments, newest first.
 grpc::Status ListNewest(SegmentStub* stub,
                         const std::string& rig,
                         const std::string& filter,
@@ -30,7 +30,7 @@ grpc::Status ListNewest(SegmentStub* stub,
   return Call<SegmentStub>(stub, &SegmentStub::ListSegments, request, listed);
 }
 
-// Nothing is added if its data was dropped since it was listed.
+// Adds the segment, unless its data was dropped since it was listed.
 grpc::Status AddSegment(SegmentStub* stub,
                         const std::string& name,
                         std::vector<MotionSegment>* segments) {

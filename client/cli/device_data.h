@@ -1,5 +1,5 @@
-// What the daemon holds of a device, as values of core/model: for checks that
-// run on this side.
+// Reads the data of a device from the daemon as values of core/model, for
+// checks that run in the client.
 #pragma once
 
 #include <grpcpp/support/status.h>
@@ -21,14 +21,14 @@ grpc::Status ReadDevice(Context* context,
                         const std::string& rig,
                         v1::Rig* found);
 
-// The parameters of a version; nothing where the daemon has none.
+// Returns the parameters of a version; nullopt if the daemon does not have it.
 std::optional<Calibration> ReadVersion(Context* context,
                                        const Rig& rig,
                                        std::int64_t version);
 
-// The newest `count` segments whose data is kept and that were recorded with
-// the same version as the newest of all, in the order of their arrival. What is
-// dropped meanwhile is left out.
+// Reads the newest `count` segments whose data is kept and that were recorded
+// with the same version as the newest segment, in the order of their arrival.
+// Segments whose data is dropped in the meantime are excluded.
 grpc::Status ReadNewestSegments(Context* context,
                                 const std::string& rig,
                                 int count,

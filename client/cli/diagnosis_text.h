@@ -1,4 +1,4 @@
-// What a pre-flight found, for people and for programs.
+// The findings of a pre-flight check, for people and for programs.
 #pragma once
 
 #include <google/protobuf/struct.pb.h>
@@ -9,19 +9,20 @@
 
 namespace selfcal::client {
 
-// For a terminal: each finding with its remedy; without one what was checked;
-// always what was not.
+// Text for a terminal: each finding with its remedy or, if there are no
+// findings, what was checked; then what was not checked.
 std::string DiagnosisText(const Diagnosis& diagnosis);
 
-// For a pipe: kind, cause and remedy, separated by tabs; then "checked" and
-// "not-checked" with a line of what.
+// Records for a pipe: kind, cause and remedy of each finding, separated by
+// tabs; then a record for each check that was done ("checked") or not done
+// ("not-checked").
 std::string DiagnosisRecords(const Diagnosis& diagnosis);
 
 // {"findings": [{"kind", "cause", "remedy", "value"}], "checked": [],
 // "not_checked": []}
 google::protobuf::Struct DiagnosisJson(const Diagnosis& diagnosis);
 
-// Each finding on standard error, a line each.
+// Prints the findings to standard error, a line each.
 void WarnOf(const Diagnosis& diagnosis);
 
 }  // namespace selfcal::client

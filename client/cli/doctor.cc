@@ -1,4 +1,4 @@
-// doctor: whether what the daemon keeps is sound.
+// doctor: checks the integrity of the daemon's database.
 #include <fmt/format.h>
 
 #include <string>
@@ -65,9 +65,10 @@ int Doctor(Context* context) {
 void AddDoctorCommand(CLI::App* app, Context* context) {
   CLI::App* doctor = app->add_subcommand(
       "doctor",
-      "Check the daemon's database while it runs: structure, references, every "
-      "checksum, the data of every segment. Exits with 0 if it is sound, with "
-      "4 if it is damaged, with another code if that could not be found out");
+      "Check the daemon's database while the daemon runs: structure, "
+      "references, every checksum, the data of every segment. Exits with 0 if "
+      "it is intact, with 4 if it is damaged, with another code if the check "
+      "failed");
   doctor->callback(
       [context] { context->command = [context] { return Doctor(context); }; });
 }

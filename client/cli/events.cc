@@ -1,4 +1,4 @@
-// events: what has happened.
+// events: lists the event log.
 #include <fmt/format.h>
 #include <google/protobuf/util/time_util.h>
 
@@ -25,13 +25,13 @@ using Service = v1::StoreService::StubInterface;
 constexpr int kPageSize = 500;
 
 struct Options {
-  std::string rig;                 // empty: all
-  std::vector<std::string> kinds;  // as KindName; empty: all
+  std::string rig;                 // empty: all rigs
+  std::vector<std::string> kinds;  // as KindName returns them; empty: all
   std::string since;
-  std::size_t limit = 0;  // none
+  std::size_t limit = 0;  // 0: no limit
 };
 
-// "data-evicted".
+// Returns e.g. "data-evicted".
 std::string KindName(v1::Event::Kind kind) {
   std::string name = KindText(kind);
   std::replace(name.begin(), name.end(), ' ', '-');
@@ -58,8 +58,8 @@ bool IsWanted(const v1::Event& event,
                    KindName(event.kind())) != options.kinds.end();
 }
 
-// Page by page, so that a long history needs no more memory than what is
-// wanted of it.
+// Reads page by page, so that a long history needs no more memory than the
+// events that are wanted.
 grpc::Status Read(Context* context,
                   const Options& options,
                   const std::optional<Timestamp>& since,
@@ -120,16 +120,16 @@ int List(Context* context, const Options& options) {
 
 void AddEventsCommand(CLI::App* app, Context* context) {
   CLI::App* events = app->add_subcommand(
-      "events", "List what has happened, oldest first, of one rig or of all");
+      "events", "List the events of one rig or of all, oldest first");
   const auto options = std::make_shared<Options>();
   events->add_option("RIG", options->rig);
-  events->add_option("--kind", options->kinds, "Of this kind only; repeatable")
+  events->add_option("--kind", options->kinds, "Only this kind; repeatable")
       ->check(CLI::IsMember(KindNames()));
   events->add_option("--since",
                      options->since,
-                     "Not before 2026-11-21, '2026-11-21 04:10:03' (UTC), or "
+                     "Only since 2026-11-21, '2026-11-21 04:10:03' (UTC), or "
                      "30s, 15m, 2h, 7d ago");
-  events->add_option("--limit", options->limit, "The newest of them, so many")
+  events->add_option("--limit", options->limit, "Only this many, the newest")
       ->check(CLI::PositiveNumber);
   events->callback([context, options] {
     context->command = [context, options] { return List(context, *options); };

@@ -30,7 +30,7 @@ struct Source {
   Calibration theta;
 };
 
-// The rig and the version as values. Returns kDone, or says what is wrong.
+// Reads the rig and the version. Returns kDone, or prints an error.
 int Fetch(const Context& context, const ExportInput& input, Source* source) {
   const auto rigs = v1::RigService::NewStub(context.Channel());
   v1::GetRigRequest rig_request;
@@ -94,7 +94,8 @@ int Export(Context* context, const ExportInput& input) {
   }
   PrintLosses(exported->losses);
   if (input.strict && ChangesPrediction(exported->losses)) {
-    PrintError("nothing is written: --strict, and something is lost");
+    PrintError(
+        "nothing was written: --strict is set, and the export has losses");
     return kFailed;
   }
   const std::vector<std::string> paths =
@@ -130,17 +131,17 @@ void AddCalibrationExport(CLI::App* calibrations, Context* context) {
   command
       ->add_option("--output",
                    input->output,
-                   "A folder for the files; where there is but one, that file "
-                   "or its folder")
+                   "The folder for the files; for a single file, its path or "
+                   "its folder")
       ->required();
   command->add_option("--imu-rate",
                       input->imu_rate_hz,
-                      "Of the IMU, for tools that want to know [Hz]");
+                      "Rate of the IMU, for tools that need it [Hz]");
   command->add_flag("--strict",
                     input->strict,
-                    "Write nothing if the tool would predict otherwise than "
-                    "selfcal does");
-  command->add_flag("--force", input->force, "Overwrite files");
+                    "Write nothing if the predictions of the tool would differ "
+                    "from those of selfcal");
+  command->add_flag("--force", input->force, "Overwrite existing files");
   command->callback([context, input] {
     context->command = [context, input] { return Export(context, *input); };
   });

@@ -1,4 +1,4 @@
-// segments export: the data of segments as files that other tools read.
+// segments export: writes the data of segments to files for other tools.
 #include <fmt/format.h>
 
 #include <array>
@@ -22,14 +22,14 @@ using Service = v1::SegmentService::StubInterface;
 
 struct ExportOptions {
   std::string rig;
-  std::vector<std::string> segments;  // all with data where there is none
+  std::vector<std::string> segments;  // empty: all segments with data
   std::string filter;
   std::string format = "csv";
   std::string output;
   bool force = false;
 };
 
-// Where segments go, one after the other.
+// The destination of the segments, which are written one after the other.
 class Sink {
  public:
   virtual ~Sink() = default;
@@ -92,8 +92,8 @@ absl::StatusOr<std::unique_ptr<Sink>> OpenSink(const ExportOptions& options) {
   return sink;
 }
 
-// The names of the segments to export; all that have data, oldest first, where
-// none is given.
+// Returns the names of the segments to export; if none is given, those of all
+// segments with data, oldest first.
 grpc::Status FindNames(Service* stub,
                        const ExportOptions& options,
                        std::vector<std::string>* names) {
@@ -133,7 +133,7 @@ int Export(Context* context, const ExportOptions& options) {
     v1::MotionSegment segment;
     const auto status =
         Call<Service>(stub.get(), &Service::GetSegmentData, request, &segment);
-    // Dropped since it was listed.
+    // The data was dropped since the segment was listed.
     if (options.segments.empty() &&
         status.error_code() == grpc::StatusCode::FAILED_PRECONDITION) {
       continue;
@@ -159,23 +159,23 @@ int Export(Context* context, const ExportOptions& options) {
 void AddSegmentExport(CLI::App* segments, Context* context) {
   CLI::App* command = segments->add_subcommand(
       "export",
-      "Write the data of segments to files; nothing is there until all are");
+      "Write the data of segments to files; they appear when all are complete");
   const auto options = std::make_shared<ExportOptions>();
   command->add_option("RIG", options->rig)->required();
   command->add_option("SEGMENT",
                       options->segments,
-                      "As in the list: session~index [all that have data]");
+                      "session~index, as in the list [all with data]");
   command->add_option(
-      "--filter", options->filter, "Of all that have data, as for the list");
+      "--filter", options->filter, "Conditions, as for the list");
   command
       ->add_option("--format",
                    options->format,
-                   "csv: four tables in a folder; jsonl: a message a line")
+                   "csv: four tables in a folder; jsonl: one message per line")
       ->check(CLI::IsMember({"csv", "jsonl"}))
       ->capture_default_str();
   command->add_option("--output", options->output, "A folder or a file")
       ->required();
-  command->add_flag("--force", options->force, "Overwrite what is there");
+  command->add_flag("--force", options->force, "Overwrite existing files");
   command->callback([context, options] {
     context->command = [context, options] { return Export(context, *options); };
   });

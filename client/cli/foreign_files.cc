@@ -78,7 +78,7 @@ absl::Status WriteTextFiles(const std::vector<TextFile>& files,
     if (!folder.empty()) fs::create_directories(folder, error);
     if (error) {
       return absl::FailedPreconditionError(fmt::format(
-          "cannot make the folder {}: {}", folder.string(), error.message()));
+          "cannot create the folder {}: {}", folder.string(), error.message()));
     }
     absl::Status status = unfinished[i].Open(paths[i], overwrite);
     if (status.ok()) status = unfinished[i].Append(files[i].text);

@@ -1,4 +1,5 @@
-// Files of other tools on the disk, and what they cannot say on standard error.
+// Reads and writes the files of other tools, and prints what is lost in the
+// conversion to standard error.
 #pragma once
 
 #include <absl/status/status.h>
@@ -12,26 +13,28 @@
 
 namespace selfcal::client {
 
-// For an option that takes the name of a format.
+// Validator of an option whose value is the name of a format.
 CLI::IsMember FormatNames();
 
-// NOT_FOUND for one that cannot be read.
+// Reads files. NOT_FOUND if one cannot be read.
 absl::StatusOr<std::vector<TextFile>> ReadTextFiles(
     const std::vector<std::string>& paths);
 
-// A line each: "lost: NAME: what" where predictions change, otherwise "note:".
+// Prints a line for each loss: "lost: NAME: text" if predictions change,
+// otherwise "note: NAME: text".
 void PrintLosses(const std::vector<Loss>& losses);
 
-// True if a prediction changes.
+// True if a loss changes predictions.
 bool ChangesPrediction(const std::vector<Loss>& losses);
 
-// Where the files of an export go. A single one is `output` itself, unless that
-// is a folder or ends with a '/'; several go into it.
+// Returns the paths for the files of an export. A single file gets the path
+// `output`, unless that is a folder or ends with a '/'; several files go into
+// the folder `output`.
 std::vector<std::string> OutputPaths(const std::vector<TextFile>& files,
                                      const std::string& output);
 
-// All of them or, after an error, none that was not there before. Makes their
-// folder. ALREADY_EXISTS for a file that is there, unless `overwrite`.
+// Writes all files or, after an error, none that did not exist before. Creates
+// the folder. ALREADY_EXISTS if a file exists, unless `overwrite` is set.
 absl::Status WriteTextFiles(const std::vector<TextFile>& files,
                             const std::vector<std::string>& paths,
                             bool overwrite);

@@ -53,7 +53,7 @@ v1::StreamSegmentsResponse ToMessage(const Acknowledgement& ack) {
   return message;
 }
 
-// Prints acknowledgements as they come, on the thread of the stream.
+// Prints acknowledgements as they arrive, on the thread of the stream.
 class Reporter {
  public:
   Reporter(const Context& context, std::size_t total)
@@ -106,7 +106,8 @@ class Reporter {
   Progress progress_;
 };
 
-// Says what looks wrong, and sends all the same: a person may know better.
+// Warns about likely mistakes, but does not prevent sending: the user may know
+// better.
 void WarnBeforeSending(Context* context,
                        const v1::Rig& message,
                        const ImportOptions& options,
@@ -118,7 +119,7 @@ void WarnBeforeSending(Context* context,
   if (theta) WarnOf(Diagnose(rig, *theta, segments));
 }
 
-// Waits as long as acknowledgements keep coming.
+// Waits as long as acknowledgements keep arriving.
 absl::Status DrainPatiently(SegmentStream* stream,
                             const Reporter& reporter,
                             std::chrono::milliseconds patience) {
@@ -158,12 +159,11 @@ int Send(Context* context,
   }
   const StreamStatistics statistics = stream.statistics();
   if (context->terminal && !context->json) {
-    PrintText(
-        fmt::format("{} segments: {} stored, {} already there, {} rejected\n",
-                    statistics.queued,
-                    statistics.stored,
-                    statistics.duplicates,
-                    statistics.rejected));
+    PrintText(fmt::format("{} segments: {} stored, {} duplicate, {} rejected\n",
+                          statistics.queued,
+                          statistics.stored,
+                          statistics.duplicates,
+                          statistics.rejected));
   }
   return statistics.rejected == 0 ? kDone : kFailed;
 }
@@ -174,7 +174,8 @@ int Import(Context* context, const ImportOptions& options) {
   for (MotionSegment& segment : recording->segments) {
     segment.temperature_c = options.temperature_c;
   }
-  // Says at once what the stream would wait for.
+  // Fails at once if the rig does not exist; the stream would only report it
+  // later.
   v1::Rig rig;
   const grpc::Status found = ReadDevice(context, options.rig, &rig);
   if (!found.ok()) return Fail(*context, found);
@@ -198,12 +199,13 @@ void AddImportCommand(CLI::App* app, Context* context) {
   import
       ->add_option("--calibration-version",
                    builder.calibration_version,
-                   "The version that the map was estimated with")
+                   "The version with which the map was estimated")
       ->capture_default_str();
   import
       ->add_option("--temperature",
                    options->temperature_c,
-                   "The device's temperature at the time [degrees Celsius]")
+                   "Temperature of the device during the recording [degrees "
+                   "Celsius]")
       ->check(CLI::Range(SegmentLimits{}.min_temperature_c,
                          SegmentLimits{}.max_temperature_c));
   import

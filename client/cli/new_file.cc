@@ -25,7 +25,7 @@ bool SyncFolderOf(const std::string& path) {
   const int handle = open(folder.empty() ? "." : folder.c_str(),
                           O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (handle < 0) return false;
-  // EINVAL: a file system whose folders cannot be synced.
+  // EINVAL: the file system cannot sync folders.
   const bool synced = fsync(handle) == 0 || errno == EINVAL;
   close(handle);
   return synced;
@@ -54,7 +54,7 @@ absl::Status NewFile::Open(const std::string& path, bool overwrite) {
   if (fs::exists(there)) {
     if (!fs::is_regular_file(there)) {
       return absl::FailedPreconditionError(
-          fmt::format("{} is not a file: name one", path));
+          fmt::format("{} is not a regular file: name another", path));
     }
     if (!overwrite) return Exists(path);
   }
@@ -84,7 +84,7 @@ absl::Status NewFile::Rename() const {
                                RENAME_NOREPLACE);
     if (code == 0) return absl::OkStatus();
     if (errno == EEXIST) return Exists(path_);
-    // EINVAL: a file system that knows no such rename, as NFS.
+    // EINVAL: the file system, e.g. NFS, does not support this rename.
     if (errno != EINVAL) return Failed("write");
     if (access(path_.c_str(), F_OK) == 0) return Exists(path_);
   }

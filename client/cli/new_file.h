@@ -1,4 +1,5 @@
-// A file that gets its name when it is whole and on the disk, not before.
+// A file that appears under its name atomically, once it is complete and synced
+// to disk.
 #pragma once
 
 #include <absl/status/status.h>
@@ -8,8 +9,8 @@
 
 namespace selfcal::client {
 
-// Until Commit it lies beside its place as PATH.XXXXXX, for its owner alone,
-// and goes with this object. Not thread-safe.
+// Before Commit the file has the name PATH.XXXXXX and is readable by its owner
+// only; the destructor deletes it. Not thread-safe.
 class NewFile {
  public:
   NewFile() = default;
@@ -17,15 +18,15 @@ class NewFile {
   NewFile(const NewFile&) = delete;
   NewFile& operator=(const NewFile&) = delete;
 
-  // ALREADY_EXISTS if there is one and `overwrite` is false;
-  // FAILED_PRECONDITION for what no file can be put in place of, and for a
-  // folder that cannot be written to. Once.
+  // Opens the file; may be called once. ALREADY_EXISTS if a file exists and
+  // `overwrite` is false; FAILED_PRECONDITION if the path is something that a
+  // file cannot replace, or its folder is not writable.
   absl::Status Open(const std::string& path, bool overwrite);
 
   absl::Status Append(std::string_view bytes);
 
-  // Syncs it, gives it its name, and syncs that. ALREADY_EXISTS if another file
-  // took the name in the meantime.
+  // Syncs the file, renames it to its path, and syncs the folder.
+  // ALREADY_EXISTS if another file with this name appeared in the meantime.
   absl::Status Commit();
 
  private:
@@ -33,7 +34,7 @@ class NewFile {
   absl::Status Rename() const;
 
   std::string path_;
-  std::string unfinished_;  // empty once it has its name
+  std::string unfinished_;  // temporary path; empty after the rename
   bool overwrite_ = false;
   int file_ = -1;
 };

@@ -1,5 +1,5 @@
-// preflight: whether a recording, or what a device has sent, is wrong in one of
-// the usual ways.
+// preflight: checks a recording, or the segments that a device has sent, for
+// the usual mistakes.
 #include <fmt/format.h>
 
 #include <cstdint>
@@ -21,12 +21,12 @@ namespace {
 
 struct PreflightOptions {
   RecordingInput recording;
-  std::string rig_file;  // empty: the sensors of the map
-  std::string device;    // of the daemon, instead of a recording
-  int newest = 20;       // of its segments
+  std::string rig_file;  // empty: use the sensors of the map
+  std::string device;    // rig of the daemon, instead of a recording
+  int newest = 20;       // number of its segments to check
 };
 
-// What is looked at.
+// The rig and the segments that are checked.
 struct Subject {
   Rig rig;
   Calibration theta;
@@ -45,7 +45,7 @@ absl::Status Invalid(const std::string& source,
 absl::StatusOr<Rig> ReadRigFile(const std::string& file) {
   RigInput input;
   input.files = {file};
-  std::vector<Loss> losses;  // of other tools' files: this is our own
+  std::vector<Loss> losses;  // stays empty: the file is not of another tool
   const auto message = ReadRig(input, &losses);
   if (!message.ok()) return message.status();
   Rig rig;
@@ -88,8 +88,8 @@ grpc::Status FromDevice(Context* context,
   if (!status.ok()) return status;
   if (subject->segments.empty()) {
     return {grpc::StatusCode::FAILED_PRECONDITION,
-            "the daemon keeps the data of no segment of " + options.device +
-                ": let the device send some, and ask again"};
+            "the daemon has no segment data of " + options.device +
+                ": send segments from the device, then try again"};
   }
   const std::int64_t version = subject->segments[0].calibration_version;
   const auto theta = ReadVersion(context, subject->rig, version);
@@ -128,27 +128,31 @@ int Preflight(Context* context, const PreflightOptions& options) {
 void AddPreflightCommand(CLI::App* app, Context* context) {
   CLI::App* preflight = app->add_subcommand(
       "preflight",
-      "Check VI-maps, or what a device has sent, for the usual mistakes: axes, "
-      "units, gravity, time offset, lost samples, saturation, extrinsics, "
-      "focal length, landmarks. Exits with 0 if nothing is found, with 1 if "
-      "something is");
+      "Check VI-maps, or the segments that a device has sent, for the usual "
+      "mistakes: axes, units, gravity, time offset, lost samples, saturation, "
+      "extrinsics, focal length, landmarks. Exits with 0 if nothing is found, "
+      "otherwise with 1");
   const auto options = std::make_shared<PreflightOptions>();
   AddRecordingOptions(preflight, &options->recording);
   CLI::Option* const folders = preflight->get_option("DIR")->required(false);
   CLI::Option* const rig = preflight->add_option(
       "--rig",
       options->rig_file,
-      "What is stated about the rig: proto3 JSON of selfcal.v1.Rig, \"-\" is "
-      "standard input [the map's own sensors]");
+      "The rig to check against: proto3 JSON of selfcal.v1.Rig, \"-\" is "
+      "standard input [the sensors of the map]");
   CLI::Option* const device =
       preflight
           ->add_option("--device",
                        options->device,
-                       "A rig of the daemon instead of VI-maps: its newest "
-                       "segments, against the version they were recorded with")
+                       "Check a rig of the daemon instead of VI-maps: its "
+                       "newest segments, against the version they were "
+                       "recorded with")
           ->excludes(folders)
           ->excludes(rig);
-  preflight->add_option("--newest", options->newest, "How many segments of it")
+  preflight
+      ->add_option("--newest",
+                   options->newest,
+                   "With --device: number of segments to check")
       ->check(CLI::Range(1, 500))
       ->capture_default_str()
       ->needs(device);

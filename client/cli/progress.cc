@@ -38,7 +38,7 @@ std::string ProgressLine(std::string_view label,
                                  done,
                                  total);
   if (!note.empty()) line += fmt::format(" {}", note);
-  // A line that wraps could not be taken away again.
+  // A line that wraps could not be removed again.
   if (line.size() >= width) line.resize(width == 0 ? 0 : width - 1);
   return line;
 }

@@ -1,5 +1,4 @@
-// A bar on stderr for what takes time; nothing at all unless stderr is a
-// terminal.
+// A progress bar on stderr; shown only if stderr is a terminal.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +7,7 @@
 
 namespace selfcal::client {
 
-// "label [#####-----] 12/40 note", for a line of `width` characters.
+// Returns "label [#####-----] 12/40 note", for a line of `width` characters.
 std::string ProgressLine(std::string_view label,
                          std::size_t done,
                          std::size_t total,
@@ -19,13 +18,13 @@ std::string ProgressLine(std::string_view label,
 class Progress {
  public:
   explicit Progress(std::string label);
-  ~Progress();  // takes the bar away
+  ~Progress();  // removes the bar
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   void Show(std::size_t done, std::size_t total, std::string_view note);
-  void Say(std::string_view note);  // where the total is not known
-  void Clear();                     // before other output to the terminal
+  void Say(std::string_view note);  // shows a note if the total is unknown
+  void Clear();  // removes the bar before other output to the terminal
 
  private:
   void Put(const std::string& line);

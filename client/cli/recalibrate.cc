@@ -43,8 +43,8 @@ void AddRecalibrateCommand(CLI::App* app, Context* context) {
   recalibrate->add_option("RIG", options->rig)->required();
   recalibrate->add_flag("--force",
                         options->force,
-                        "Also if the tables have not changed since a version "
-                        "was computed on them");
+                        "Run even if the tables have not changed since a "
+                        "version was computed from them");
   recalibrate->add_flag("--no-wait", options->no_wait, "Start it and return");
   recalibrate->callback([context, options] {
     context->command = [context, options] {

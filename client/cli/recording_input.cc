@@ -10,9 +10,9 @@ void AddRecordingOptions(CLI::App* command, RecordingInput* input) {
       ->add_option("DIR",
                    input->folders,
                    "A VI-map, or a folder of submap_0, submap_1, ...; several "
-                   "must continue each other and are one session")
+                   "must be consecutive, and become one session")
       ->required();
-  command->add_option("--keyframes", builder.keyframes, "Keyframes a segment")
+  command->add_option("--keyframes", builder.keyframes, "Keyframes per segment")
       ->check(CLI::Range(2, 2000))
       ->capture_default_str();
   command
@@ -22,11 +22,11 @@ void AddRecordingOptions(CLI::App* command, RecordingInput* input) {
   command
       ->add_option("--min-observations",
                    builder.min_observations,
-                   "Leave out landmarks that a segment sees less often")
+                   "Exclude landmarks with fewer observations in a segment")
       ->capture_default_str();
   command->add_flag("--all-landmarks",
                     input->all_landmarks,
-                    "Also those that the map does not call good");
+                    "Also use landmarks that the map does not mark as good");
 }
 
 absl::StatusOr<RecordedSegments> ReadRecording(const RecordingInput& input) {

@@ -1,4 +1,4 @@
-// The recording that a command reads, and the flags that say how.
+// The recording that a command reads, and the options for reading it.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -21,16 +21,16 @@ struct RecordingInput {
 };
 
 struct RecordedSegments {
-  Rig rig;  // of the map's own sensors, id empty
+  Rig rig;  // from the sensors of the map, id empty
   std::vector<MotionSegment> segments;
 };
 
-// DIR..., --keyframes, --seconds, --min-observations, --all-landmarks. `input`
-// must outlive the command.
+// Adds DIR..., --keyframes, --seconds, --min-observations and --all-landmarks.
+// `input` must outlive the command.
 void AddRecordingOptions(CLI::App* command, RecordingInput* input);
 
-// Errors name the file; INVALID_ARGUMENT as well for a recording too short for
-// one segment.
+// Reads the recording. Errors name the file; INVALID_ARGUMENT also if the
+// recording is too short for one segment.
 absl::StatusOr<RecordedSegments> ReadRecording(const RecordingInput& input);
 
 }  // namespace selfcal::client

@@ -1,4 +1,4 @@
-// report: a calibration as one HTML file.
+// report: writes a calibration as one HTML file.
 #include "client/report/report.h"
 
 #include <memory>
@@ -86,13 +86,14 @@ int Report(Context* context, const ReportOptions& options) {
 
 void AddReportCommand(CLI::App* app, Context* context) {
   CLI::App* report = app->add_subcommand(
-      "report", "Write a calibration as one HTML file, its verdict first");
+      "report", "Write a report on a calibration as one HTML file");
   const auto options = std::make_shared<ReportOptions>();
   report->add_option("RIG", options->rig)->required();
   report->add_option("VERSION", options->version, "A number, or active")
       ->capture_default_str();
   report->add_option("--output", options->output, "The file")->required();
-  report->add_flag("--force", options->force, "Overwrite what is there");
+  report->add_flag(
+      "--force", options->force, "Overwrite the file if it exists");
   report->callback([context, options] {
     context->command = [context, options] { return Report(context, *options); };
   });

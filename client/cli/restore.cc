@@ -1,4 +1,4 @@
-// restore: a backup in the place of the daemon's database.
+// restore: replaces the daemon's database by a backup.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -32,8 +32,8 @@ struct Options {
   double timeout_s = kDefaultTimeoutS;
 };
 
-// A database of SQLite that the daemon marked as its own: what begins otherwise
-// need not be sent. The daemon looks at all of it.
+// True if the file starts like an SQLite database of the daemon; other files
+// need not be sent. The daemon then checks the whole file.
 bool IsBackup(std::istream* file) {
   constexpr std::string_view kMagic("SQLite format 3\0", 16);
   constexpr std::string_view kApplication = "SCAL";
@@ -51,7 +51,7 @@ absl::Status OpenBackup(const std::string& path, std::ifstream* file) {
   }
   if (!IsBackup(file)) {
     return absl::InvalidArgumentError(fmt::format(
-        "{} is not a backup of selfcald: name a file that selfcal backup wrote",
+        "{} is not a backup of selfcald: name a file written by selfcal backup",
         path));
   }
   file->seekg(0);
@@ -60,9 +60,9 @@ absl::Status OpenBackup(const std::string& path, std::ifstream* file) {
 
 bool Confirmed(const Context& context, const std::string& path) {
   std::cerr << fmt::format(
-                   "Put {} in the place of the database of the daemon at {}?\n"
-                   "What was stored since is in the present database alone, "
-                   "which is kept apart. [y/N] ",
+                   "Replace the database of the daemon at {1} by {0}?\n"
+                   "What was stored since the backup is only in the present "
+                   "database, which is kept under another name. [y/N] ",
                    path,
                    context.target.address)
             << std::flush;
@@ -71,7 +71,7 @@ bool Confirmed(const Context& context, const std::string& path) {
   return answer == "y" || answer == "Y" || answer == "yes";
 }
 
-// False if the file could not be read to its end.
+// Sends the file. Returns false if it could not be read to its end.
 bool Send(std::ifstream* file,
           std::size_t size,
           grpc::ClientWriterInterface<v1::RestoreStoreRequest>* writer) {
@@ -83,7 +83,7 @@ bool Send(std::ifstream* file,
   while (file->read(piece.data(), kPiece), file->gcount() > 0) {
     request.set_data(piece.data(), static_cast<std::size_t>(file->gcount()));
     digest.Add(request.data());
-    // What stopped it is the status of the call.
+    // The status of the call has the error.
     if (!writer->Write(request)) return true;
     sent += request.data().size();
     progress.Show(sent / kPiece, size / kPiece, "MiB");
@@ -95,7 +95,7 @@ bool Send(std::ifstream* file,
   return true;
 }
 
-// On a connection of its own.
+// True if a daemon answers on a new connection.
 bool Answers(Context* context) {
   if (!context->Connect().ok()) return false;
   const auto stub = v1::StoreService::NewStub(context->Channel());
@@ -106,11 +106,11 @@ bool Answers(Context* context) {
       Call<Service>(stub.get(), &Service::ListEvents, request, &response));
 }
 
-// The daemon that answered stops, which its connection shows, and one answers
-// that was not connected to before.
+// Waits until the present connection breaks, because the daemon stops, and the
+// daemon answers on a new connection.
 bool WaitForNewStart(Context* context, double timeout_s) {
   Progress progress("restore");
-  progress.Say("verified; the daemon starts anew");
+  progress.Say("verified; the daemon restarts");
   const auto until =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(
                          std::chrono::duration<double>(timeout_s));
@@ -138,8 +138,8 @@ int Report(Context* context,
   }
   if (WaitForNewStart(context, options.timeout_s)) return kDone;
   PrintError(fmt::format(
-      "the daemon at {} did not start anew within {:g} s: look at its log. The "
-      "backup is verified, and its next start puts it in place",
+      "the daemon at {} did not restart within {:g} s: see its log. The backup "
+      "is verified, and is put in place when the daemon next starts",
       context->target.address,
       options.timeout_s));
   return kUnreachable;
@@ -150,7 +150,7 @@ int Restore(Context* context, const Options& options) {
   const absl::Status opened = OpenBackup(options.path, &file);
   if (!opened.ok()) return FailInput(opened);
   if (!options.yes && !Confirmed(*context, options.path)) {
-    PrintError("nothing was changed; without a question: --yes");
+    PrintError("nothing was changed; use --yes to restore without a prompt");
     return kUsage;
   }
   const auto stub = v1::StoreService::NewStub(context->Channel());
@@ -175,16 +175,16 @@ int Restore(Context* context, const Options& options) {
 void AddRestoreCommand(CLI::App* app, Context* context) {
   CLI::App* restore = app->add_subcommand(
       "restore",
-      "Put a backup in the place of the daemon's database: the daemon verifies "
-      "it, keeps the present one under another name and starts anew");
+      "Replace the daemon's database by a backup: the daemon verifies the "
+      "backup, keeps the present database under another name and restarts");
   const auto options = std::make_shared<Options>();
-  restore->add_option("FILE", options->path, "What selfcal backup wrote")
+  restore->add_option("FILE", options->path, "A file written by selfcal backup")
       ->required();
-  restore->add_flag("--yes", options->yes, "Do not ask");
+  restore->add_flag("--yes", options->yes, "Do not ask for confirmation");
   restore
       ->add_option("--timeout",
                    options->timeout_s,
-                   "Give up after waiting this long for the new start [s]")
+                   "Give up after waiting this long for the restart [s]")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
   restore->callback([context, options] {

@@ -95,7 +95,7 @@ Facts Describe(const v1::Rig& rig) {
   return facts;
 }
 
-// Empty if the message cannot be read.
+// Returns an empty table if the message is invalid.
 Table FactoryValues(const v1::Rig& rig) {
   Table table({{"factory"}, {"value", true}, {"unit"}});
   Calibration theta;
@@ -167,7 +167,8 @@ int Show(Context* context, const std::string& id) {
 }
 
 void AddOverrides(CLI::App* create, RigInput* input) {
-  create->add_option("--id", input->id, "The rig's id, instead of the file's");
+  create->add_option(
+      "--id", input->id, "Id of the rig, instead of that in the file");
   create->add_option("--pixel-sigma", input->pixel_sigma_px, "[px]");
   create->add_option("--gyro-noise", input->gyro_noise, "[rad/s/sqrt(Hz)]");
   create->add_option("--accel-noise", input->accel_noise, "[m/s^2/sqrt(Hz)]");
@@ -177,45 +178,47 @@ void AddOverrides(CLI::App* create, RigInput* input) {
       "--accel-bias-walk", input->accel_bias_walk, "[m/s^3/sqrt(Hz)]");
   create->add_option("--imu",
                      input->imu,
-                     "How well the factory knows the IMU: consumer (scales to "
-                     "2 %, angles to 1 degree), factory-calibrated (0.3 %, 0.1 "
-                     "degrees) or unknown; prior sigmas of the file go before");
+                     "Tolerances of the IMU: consumer (scales to 2 %, angles "
+                     "to 1 degree), factory-calibrated (0.3 %, 0.1 degrees) or "
+                     "unknown; prior sigmas in the file take precedence");
   create->add_option("--gravity", input->gravity_mps2, "[m/s^2]");
   create->add_option("--selection",
                      input->selection,
-                     "Which segments are kept: tables, joint-d, joint-a or "
-                     "joint-e");
+                     "Criterion by which segments are kept: tables, joint-d, "
+                     "joint-a or joint-e");
   create->add_option(
-      "--table-size", input->table_size, "Segments that a table keeps");
+      "--table-size", input->table_size, "Capacity of a table, in segments");
   create->add_option("--min-gain",
                      input->min_gain_nats,
-                     "What a segment must gain to enter a table [nat]");
-  create->add_option("--retrigger-fraction",
-                     input->retrigger_fraction,
-                     "Part of the tables that must be new for another run");
+                     "Minimum gain of a segment to enter a table [nat]");
+  create->add_option(
+      "--retrigger-fraction",
+      input->retrigger_fraction,
+      "Fraction of the table entries that must be new to trigger "
+      "another run");
   create->add_option("--table-max-age",
                      input->table_max_age_s,
-                     "Segments that arrived longer ago leave the tables [s]");
+                     "Age at which segments leave the tables, since their "
+                     "arrival [s]");
   create->add_option("--min-interval",
                      input->min_interval_s,
-                     "From the end of a run to the next that nobody asks for "
-                     "[s]");
+                     "Minimum time between the end of a run and the next, "
+                     "except for manual runs [s]");
   create->add_option("--calibration-max-age",
                      input->calibration_max_age_s,
-                     "A calibration that is active for longer is computed anew "
-                     "[s]");
+                     "Age of the active version that triggers a run [s]");
   create->add_flag("--reweight-noise",
                    input->reweight_noise,
-                   "No matter: recalibrations always weight by the noise "
-                   "that their residuals show");
+                   "Has no effect: runs always weight by the noise that their "
+                   "residuals show");
   create->add_option("--fixed",
                      input->fixed,
-                     "Never estimate the components of this name, '*' at "
-                     "either end stands for anything; repeatable");
+                     "Never estimate components with this name; a '*' at "
+                     "either end matches anything; repeatable");
   create->add_flag("--estimate-time-offset",
                    input->estimate_time_offset,
                    "Estimate the time offset of each camera, instead of "
-                   "holding it as the factory has it");
+                   "holding it at its factory value");
 }
 
 }  // namespace
@@ -230,8 +233,8 @@ void AddRigCommands(CLI::App* app, Context* context) {
   CLI::Option_group* source = create->add_option_group("source");
   source->add_option("FILE",
                      input->files,
-                     "selfcal.v1.Rig in proto3 JSON, - is standard input; or "
-                     "with --from the files of that tool");
+                     "selfcal.v1.Rig in proto3 JSON, - is standard input; with "
+                     "--from, the files of that tool");
   source->add_option(
       "--vi-map", input->vi_map, "Take the rig from this maplab VI-map");
   source->require_option(1);
@@ -241,11 +244,12 @@ void AddRigCommands(CLI::App* app, Context* context) {
       ->check(FormatNames());
   create->add_option("--imu-rate",
                      input->imu_rate_hz,
-                     "With --from, for a tool whose noise is by sample [Hz]");
+                     "With --from: rate of the IMU, for tools that state noise "
+                     "per sample [Hz]");
   create->add_flag("--strict",
                    input->strict,
-                   "With --from: no rig if the tool predicts otherwise than "
-                   "selfcal would");
+                   "With --from: create no rig if the predictions of the tool "
+                   "differ from those of selfcal");
   AddOverrides(create, input.get());
   create->callback([context, input] {
     context->command = [context, input] { return Create(context, *input); };

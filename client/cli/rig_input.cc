@@ -42,10 +42,10 @@ absl::StatusOr<v1::Rig> ReadForeign(const RigInput& input,
   *losses = imported->losses;
   if (input.strict && ChangesPrediction(*losses)) {
     return absl::InvalidArgumentError(
-        "no rig is created: --strict, and something is lost");
+        "no rig was created: --strict is set, and the conversion has losses");
   }
   v1::Rig rig = ToProto(imported->rig);
-  rig.clear_groups();  // files have none: the daemon knows the default
+  rig.clear_groups();  // files have no groups: the daemon sets the default
   return rig;
 }
 
@@ -56,12 +56,13 @@ absl::StatusOr<v1::Rig> ReadBase(const RigInput& input,
     absl::StatusOr<ViMapRecording> recording = ReadViMap(input.vi_map, {});
     if (!recording.ok()) return recording.status();
     v1::Rig rig = ToProto(recording->rig);
-    rig.clear_groups();  // a VI-map has none: the daemon knows the default
+    rig.clear_groups();  // a VI-map has no groups: the daemon sets the default
     return rig;
   }
   if (input.files.size() != 1) {
     return absl::InvalidArgumentError(
-        "name one file, or the tool that several are of with --from");
+        "name one file; for the files of another tool, name the tool with "
+        "--from");
   }
   const std::string& file = input.files[0];
   const auto json = ReadFile(file);
@@ -90,15 +91,16 @@ absl::Status SetSelection(const std::string& text, v1::Rig* rig) {
     known.push_back(SelectionText(selection));
   }
   return absl::InvalidArgumentError(fmt::format(
-      "--selection {} is none of {}", text, fmt::join(known, ", ")));
+      "--selection {} must be one of {}", text, fmt::join(known, ", ")));
 }
 
-// Before what the file has: that is said of single components.
+// Puts the tolerances before those of the file, which are of single components
+// and take precedence.
 absl::Status SetImuTolerances(const std::string& text, v1::Rig* rig) {
   const auto grade = ParseImuGrade(text);
   if (!grade) {
     return absl::InvalidArgumentError(fmt::format(
-        "--imu {} is none of consumer, factory-calibrated, unknown", text));
+        "--imu {} must be one of consumer, factory-calibrated, unknown", text));
   }
   google::protobuf::RepeatedPtrField<v1::ComponentSetting> settings;
   for (const ComponentSetting& tolerance : ImuTolerances(*grade)) {
@@ -112,7 +114,7 @@ absl::Status SetImuTolerances(const std::string& text, v1::Rig* rig) {
 }
 
 google::protobuf::Duration Seconds(double seconds) {
-  constexpr double kMost = 1e12;  // more is refused by the daemon anyway
+  constexpr double kMost = 1e12;  // the daemon refuses larger values anyway
   const double bounded = std::clamp(seconds, -kMost, kMost);
   google::protobuf::Duration duration;
   duration.set_seconds(static_cast<std::int64_t>(bounded));

@@ -1,5 +1,5 @@
-// The rig that `rig create` sends: from a file, a VI-map or the files of
-// another tool, with what the command line overrides.
+// The rig that `rig create` sends: read from a file, a VI-map or the files of
+// another tool, with the overrides of the command line.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -14,12 +14,13 @@
 namespace selfcal::client {
 
 struct RigInput {
-  // One with proto3 JSON of selfcal.v1.Rig, "-" is stdin; or those of `from`.
+  // One file with proto3 JSON of selfcal.v1.Rig, "-" for stdin; or the files of
+  // the tool that `from` names.
   std::vector<std::string> files;
   std::string from;    // a format of client/formats
-  std::string vi_map;  // or a VI-map
+  std::string vi_map;  // folder of a VI-map, instead of files
   std::optional<double> imu_rate_hz;
-  bool strict = false;  // nothing of `from` may be lost
+  bool strict = false;  // fail if reading `from` has losses
   std::optional<std::string> id;
   std::optional<double> pixel_sigma_px;
   std::optional<double> gyro_noise;
@@ -27,7 +28,7 @@ struct RigInput {
   std::optional<double> gyro_bias_walk;
   std::optional<double> accel_bias_walk;
   std::optional<double> gravity_mps2;
-  std::optional<std::string> imu;  // a grade, as ParseImuGrade() reads it
+  std::optional<std::string> imu;        // a grade, as ParseImuGrade() reads it
   std::optional<std::string> selection;  // as SelectionText()
   std::optional<int> table_size;
   std::optional<double> min_gain_nats;
@@ -40,16 +41,16 @@ struct RigInput {
   bool estimate_time_offset = false;
 };
 
-// INVALID_ARGUMENT and NOT_FOUND for what cannot be read, with the file's name.
-// The values are judged by the daemon. Adds what files of another tool have and
-// selfcal has not.
+// Reads the rig. INVALID_ARGUMENT or NOT_FOUND, with the name of the file, if
+// it cannot be read. The daemon validates the values. Appends to *losses what
+// the files of another tool have and selfcal cannot express.
 absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
                                 std::vector<Loss>* losses);
 
-// "tables", "joint-d", "joint-a", "joint-e".
+// Returns "tables", "joint-d", "joint-a" or "joint-e".
 std::string SelectionText(v1::Rig::Selection selection);
 
-// proto3 JSON of a rig; unknown fields are errors.
+// Parses a rig from proto3 JSON; unknown fields are errors.
 absl::StatusOr<v1::Rig> ParseRig(const std::string& json);
 
 }  // namespace selfcal::client

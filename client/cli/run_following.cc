@@ -19,7 +19,7 @@ namespace {
 
 using Service = v1::RecalibrationService::StubInterface;
 
-// A run outlives its daemon: it starts again with the next one.
+// How long to wait for a daemon that restarts; the run starts again then.
 constexpr std::chrono::seconds kPatience{60};
 constexpr std::chrono::milliseconds kRetryEvery{500};
 
@@ -43,11 +43,11 @@ void ShowProgress(const v1::Recalibration& run, Progress* progress) {
 
 using OnUpdate = std::function<void(const v1::Recalibration&)>;
 
-// One connection; *run is the last state that was told, if any was.
+// Watches over one connection; *run is the last update, if there was any.
 grpc::Status WatchOnce(Service* stub,
                        const OnUpdate& on_update,
                        v1::Recalibration* run,
-                       bool* told) {
+                       bool* updated) {
   grpc::ClientContext call;
   v1::WatchRecalibrationRequest request;
   request.set_name(run->name());
@@ -55,7 +55,7 @@ grpc::Status WatchOnce(Service* stub,
   v1::Recalibration update;
   while (stream->Read(&update)) {
     *run = update;
-    *told = true;
+    *updated = true;
     on_update(*run);
   }
   return stream->Finish();
@@ -67,17 +67,17 @@ grpc::Status WatchToEnd(Service* stub,
   using Clock = std::chrono::steady_clock;
   auto give_up = Clock::now() + kPatience;
   while (!HasEnded(*run)) {
-    bool told = false;
-    const grpc::Status status = WatchOnce(stub, on_update, run, &told);
+    bool updated = false;
+    const grpc::Status status = WatchOnce(stub, on_update, run, &updated);
     if (!status.ok() && !IsUnreachable(status)) return status;
-    if (told) give_up = Clock::now() + kPatience;
+    if (updated) give_up = Clock::now() + kPatience;
     if (!status.ok() && Clock::now() > give_up) return status;
     if (!HasEnded(*run)) std::this_thread::sleep_for(kRetryEvery);
   }
   return grpc::Status::OK;
 }
 
-// What the run has produced; 1 if it may not be used.
+// Shows the version that the run has computed; kFailed if it is not usable.
 int ShowResult(Context* context, const v1::Recalibration& run) {
   if (run.state() != v1::Recalibration::SUCCEEDED) {
     PrintError(fmt::format(

@@ -1,4 +1,4 @@
-// A run of the solver as the command line shows it, and follows it to its end.
+// Shows a run on the command line and follows it to its end.
 #pragma once
 
 #include "client/cli/context.h"
@@ -9,12 +9,12 @@ namespace selfcal::client {
 void PrintRun(const Context& context, const v1::Recalibration& run);
 
 enum class ShownAsJson {
-  kEnd,         // one document
-  kEachUpdate,  // a line each, the end included
+  kEnd,         // one document at the end
+  kEachUpdate,  // a line for each update, also for the end
 };
 
-// Waits for the end of the run, through restarts of the daemon, and shows the
-// result. The exit code: kFailed if there is none that may be used.
+// Waits for the end of the run, also through restarts of the daemon, and shows
+// the result. Returns the exit code: kFailed if there is no usable result.
 int FollowRun(Context* context,
               v1::RecalibrationService::StubInterface* stub,
               v1::Recalibration run,

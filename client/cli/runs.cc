@@ -53,7 +53,7 @@ int List(Context* context, const RunOptions& options) {
   return kDone;
 }
 
-// One call about a run: the request names it, the response is the run.
+// Makes a call about a run: the request names it, the response is the run.
 template <typename Request>
 grpc::Status Ask(Service* stub,
                  grpc::Status (Service::*method)(grpc::ClientContext*,
@@ -123,11 +123,11 @@ void AddRunCommands(CLI::App* app, Context* context) {
   };
   add("show", "Show a run", Show);
   add("watch",
-      "Wait for the end of a run and show the result; exits with 1 if that "
-      "was rejected. With --json a line for each iteration",
+      "Wait for the end of a run and show the result; exits with 1 if the "
+      "result was rejected. With --json, prints a line for each iteration",
       Watch);
   add("cancel",
-      "End a run that is under way; what it found is given up",
+      "Cancel a run that has not ended; its result is discarded",
       Cancel);
 }
 

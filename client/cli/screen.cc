@@ -12,19 +12,20 @@
 namespace selfcal::client {
 namespace {
 
-constexpr char kEnter[] = "\033[?1049h\033[?25l";  // a screen of its own
+constexpr char kEnter[] = "\033[?1049h\033[?25l";  // the alternate screen
 constexpr char kLeave[] = "\033[?25h\033[?1049l";
 constexpr char kHome[] = "\033[H";
 constexpr char kEraseLine[] = "\033[K";
 constexpr char kEraseBelow[] = "\033[J";
 
-// A signal may reach any thread: its handler writes here, Wait reads.
+// The signal handler, which may run on any thread, writes to this pipe; Wait
+// reads from it.
 int signal_pipe[2] = {-1, -1};
 
 void OnSignal(int signal) {
   const int error = errno;
   const char byte = signal == SIGWINCH ? 'w' : 'q';
-  // What does not fit is no loss: the reader wakes up anyway.
+  // If the pipe is full, nothing is lost: the reader wakes up anyway.
   [[maybe_unused]] const auto written = write(signal_pipe[1], &byte, 1);
   errno = error;
 }
@@ -33,7 +34,7 @@ void OnSignal(int signal) {
 
 Screen::Screen() {
   if (pipe2(signal_pipe, O_CLOEXEC | O_NONBLOCK) != 0) {
-    throw std::runtime_error("no pipe for signals");
+    throw std::runtime_error("cannot create a pipe for signals");
   }
   struct sigaction action {};
   action.sa_handler = OnSignal;

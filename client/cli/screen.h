@@ -1,4 +1,4 @@
-// The whole terminal for a command that draws again and again, until Ctrl-C.
+// The terminal as a full screen, for a command that redraws it until Ctrl-C.
 #pragma once
 
 #include <array>
@@ -8,28 +8,28 @@
 
 namespace selfcal::client {
 
-// One at a time. Not thread-safe.
+// Only one may exist at a time. Not thread-safe.
 class Screen {
  public:
   // Shows an empty screen without a cursor.
   Screen();
-  // The terminal is as it was, and signals do what they did.
+  // Restores the terminal and the signal handlers.
   ~Screen();
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  // Of the terminal now; 80 x 24 where it does not say.
+  // Present size of the terminal; 80 x 24 if it is unknown.
   struct Size {
     int columns = 80;
     int rows = 24;
   };
   Size size() const;
 
-  // In place of what it showed. False if it cannot be written.
+  // Replaces the content of the screen. Returns false if writing fails.
   bool Show(const std::string& lines);
 
-  // Returns early when the terminal gets another size; false once SIGINT,
-  // SIGTERM or SIGHUP has come.
+  // Waits for this time, or until the size of the terminal changes. Returns
+  // false once SIGINT, SIGTERM or SIGHUP has arrived.
   bool Wait(std::chrono::milliseconds time);
 
  private:

@@ -5,7 +5,7 @@
 namespace selfcal::client {
 namespace {
 
-// In quotes, if a reader of CSV would need them.
+// Adds quotes if CSV requires them.
 std::string Field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -13,7 +13,7 @@ std::string Field(const std::string& text) {
   return quoted + "\"";
 }
 
-// Entry k of a column with `width` numbers an entry.
+// Appends element k of a column that has `width` numbers for each element.
 template <typename Column>
 void Append(const Column& column, int k, int width, std::string* row) {
   for (int i = width * k; i < width * (k + 1); ++i) {

@@ -1,5 +1,5 @@
-// Motion segments as tables of numbers: four CSV files, which several segments
-// share. Every row begins with session and index.
+// Motion segments as four CSV files, which several segments share. Every row
+// starts with session and index.
 #pragma once
 
 #include <array>
@@ -11,13 +11,14 @@ namespace selfcal::client {
 
 struct CsvFile {
   std::string name;
-  std::string header;  // with units, ends with a newline
+  std::string header;  // column names with units, and a newline
 };
 
-// keyframes, imu, landmarks, observations.
+// The files keyframes, imu, landmarks and observations.
 const std::array<CsvFile, 4>& SegmentCsvFiles();
 
-// The rows of each file. Numbers have as many digits as bring them back.
+// Returns the rows for each file. Numbers have enough digits to be read back
+// exactly.
 std::array<std::string, 4> SegmentCsvRows(const v1::MotionSegment& segment);
 
 }  // namespace selfcal::client

@@ -20,14 +20,14 @@ std::string SecondsText(const v1::Segment& segment) {
       static_cast<double>(segment.end_ns() - segment.start_ns()) * 1e-9);
 }
 
-// In degrees Celsius.
+// The temperature in degrees Celsius.
 std::string TemperatureText(const v1::Segment& segment) {
   return segment.has_temperature_c()
              ? fmt::format("{:.1f}", segment.temperature_c())
              : "-";
 }
 
-// Groups of the rig, in its order, as any scored segment names them.
+// Returns the groups of the rig, in its order, from any scored segment.
 std::vector<std::string> Groups(const v1::ListSegmentsResponse& segments) {
   std::vector<std::string> groups;
   for (const v1::Segment& segment : segments.segments()) {
@@ -171,7 +171,7 @@ struct ListOptions {
   bool quarantined = false;
 };
 
-// The conditions of the list, those of the flag among them.
+// Returns the conditions of the list, with that of the flag --unusable.
 std::string FilterOf(const ListOptions& options) {
   constexpr char kUnusable[] = "state = UNUSABLE";
   if (!options.quarantined) return options.filter;
@@ -223,17 +223,18 @@ int Show(Context* context, const std::string& rig, const std::string& id) {
 
 struct QuarantineOptions {
   std::string rig;
-  std::string segments;  // a session, or one segment as in the list
+  std::string segments;  // a session, or session~index
   std::string reason;
 };
 
-// False for a text that names neither a session nor a segment.
+// Returns false if the text names neither a session nor a segment.
 bool NameSegments(const QuarantineOptions& options,
                   v1::QuarantineSegmentsRequest* request) {
   request->set_parent(RigName(options.rig));
   const std::string id = LastPart(options.segments);
   const bool one = id.find('~') != id.npos;
-  // As a segment of the session, whose characters are encoded alike.
+  // A session is parsed as a segment of it, because its characters are encoded
+  // in the same way.
   const auto parts = ParseSegmentName(RigName(options.rig) + "/segments/" + id +
                                       (one ? "" : "~0"));
   if (!parts) return false;
@@ -246,8 +247,8 @@ int Quarantine(Context* context, const QuarantineOptions& options) {
   v1::QuarantineSegmentsRequest request;
   if (!NameSegments(options, &request)) {
     return FailInput(absl::InvalidArgumentError(fmt::format(
-        "'{}' is neither a session nor a segment; selfcal segments list {} "
-        "shows them as session~index",
+        "'{}' is neither a session nor a segment; `selfcal segments list {}` "
+        "lists segments as session~index",
         options.segments,
         options.rig)));
   }
@@ -272,16 +273,18 @@ void AddQuarantine(CLI::App* segments, Context* context) {
   const auto options = std::make_shared<QuarantineOptions>();
   CLI::App* quarantine = segments->add_subcommand(
       "quarantine",
-      "Take a segment, or all of a session, out of everything for good");
+      "Quarantine a segment, or all segments of a session: they are never used "
+      "again. This cannot be undone");
   quarantine->add_option("RIG", options->rig)->required();
   quarantine
       ->add_option("SEGMENT",
                    options->segments,
-                   "As in the list, session~index; or a session")
+                   "session~index, as in the list; or a session")
       ->required();
   quarantine
-      ->add_option(
-          "--reason", options->reason, "Why; the event log keeps it with who")
+      ->add_option("--reason",
+                   options->reason,
+                   "The reason; the event log records it with your name")
       ->required();
   quarantine->callback([context, options] {
     context->command = [context, options] {
@@ -300,18 +303,19 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   CLI::App* list = segments->add_subcommand(
       "list",
       "List the segments of a rig, newest first, with the entropy of each "
-      "group [nat] (lower is richer) and the tables that hold it");
+      "group [nat] (lower is more informative) and the tables that hold it");
   list->add_option("RIG", options->rig)->required();
   list->add_option("--filter",
                    options->filter,
-                   "Conditions joined by AND, as 'state = SCORED AND "
+                   "Conditions joined by AND, e.g. 'state = SCORED AND "
                    "gain.camera >= 2'");
   list->add_option("--order-by",
                    options->order_by,
-                   "A field, then asc or desc, as 'entropy.camera asc'");
+                   "A field, then asc or desc, e.g. 'entropy.camera asc'");
   list->add_flag("--quarantined",
                  options->quarantined,
-                 "Those that are unusable or quarantined alone, with why");
+                 "List only unusable and quarantined segments, with the "
+                 "reasons");
   list->callback([context, options] {
     context->command = [context, options] { return List(context, *options); };
   });
@@ -320,7 +324,7 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   const auto id = std::make_shared<std::string>();
   CLI::App* show = segments->add_subcommand("show", "Show a segment");
   show->add_option("RIG", *rig)->required();
-  show->add_option("SEGMENT", *id, "As in the list: session~index")->required();
+  show->add_option("SEGMENT", *id, "session~index, as in the list")->required();
   show->callback([context, rig, id] {
     context->command = [context, rig, id] { return Show(context, *rig, *id); };
   });

@@ -1,4 +1,4 @@
-// SHA-256 of what comes in pieces.
+// SHA-256 of data that arrives in pieces.
 #pragma once
 
 #include <openssl/evp.h>
@@ -13,7 +13,7 @@ class Sha256 {
  public:
   Sha256();
   void Add(std::string_view bytes);
-  std::string Finish();  // 32 bytes; once
+  std::string Finish();  // returns 32 bytes; may be called once
 
  private:
   struct Free {
@@ -22,7 +22,7 @@ class Sha256 {
   std::unique_ptr<EVP_MD_CTX, Free> context_;
 };
 
-// As sha256sum prints it.
+// Hexadecimal digits, as sha256sum prints them.
 std::string HexText(std::string_view bytes);
 
 }  // namespace selfcal::client

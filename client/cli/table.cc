@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::string_view kGap = "  ";
 
-// Characters, not bytes, of UTF-8.
+// Number of UTF-8 characters, not of bytes.
 std::size_t Width(std::string_view text) {
   return static_cast<std::size_t>(
       std::count_if(text.begin(), text.end(), [](char c) {

@@ -1,4 +1,4 @@
-// Rows of text for a person at a terminal or for a program behind a pipe.
+// Rows of text, for a person at a terminal or for a program that reads a pipe.
 #pragma once
 
 #include <string>
@@ -9,21 +9,21 @@ namespace selfcal::client {
 
 struct Column {
   std::string header;
-  bool right = false;  // numbers
+  bool right = false;  // align right, for numbers
 };
 
 class Table {
  public:
   explicit Table(std::vector<Column> columns);
 
-  // Cells that are missing are empty, those in excess are left out.
+  // Adds a row. Missing cells are empty, excess cells are dropped.
   void Add(std::vector<std::string> cells);
 
   // Aligned columns under their headers, for a terminal.
   std::string Aligned() const;
 
-  // One record a line, cells separated by a tab, no header. Tabs and line
-  // breaks within a cell become spaces.
+  // One record per line, cells separated by tabs, without a header. Tabs and
+  // line breaks within a cell become spaces.
   std::string Tabbed() const;
 
  private:
@@ -31,7 +31,7 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-// "key:  value" lines, the values aligned; a pipe gets "key<tab>value".
+// Lines "key:  value" with aligned values; in a pipe, "key<tab>value".
 class Facts {
  public:
   void Add(std::string_view key, std::string value);

@@ -14,7 +14,7 @@ namespace {
 using Service = v1::SegmentService::StubInterface;
 
 void PrintTable(const v1::Table& table) {
-  PrintText(fmt::format("{}: {} of {} places taken, {} segments offered{}\n",
+  PrintText(fmt::format("{}: {} of {} entries, {} segments offered{}\n",
                         LastPart(table.name()),
                         table.entries_size(),
                         table.capacity(),
@@ -31,7 +31,7 @@ void PrintTable(const v1::Table& table) {
   PrintText(rows.Aligned() + "\n");
 }
 
-// One line an entry: group, rank, segment, entropy, gain.
+// One line per entry: group, rank, segment, entropy, gain.
 Table Records(const v1::ListTablesResponse& tables) {
   Table rows({{"group"}, {"#"}, {"segment"}, {"entropy"}, {"gain"}});
   for (const v1::Table& table : tables.tables()) {

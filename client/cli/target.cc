@@ -21,8 +21,8 @@ absl::StatusOr<ClientOptions> Resolve(const Target& target) {
   if (target.ca_file.empty() || target.certificate_file.empty() ||
       target.key_file.empty()) {
     return absl::InvalidArgumentError(fmt::format(
-        "{} needs --ca, --cert and --key, for mutual TLS; to connect without "
-        "encryption say insecure:{}",
+        "{} needs --ca, --cert and --key for mutual TLS; to connect without "
+        "encryption, use insecure:{}",
         target.address,
         target.address));
   }

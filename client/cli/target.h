@@ -1,4 +1,4 @@
-// Where the daemon is, and how its connection is secured.
+// The address of the daemon, and how the connection is secured.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -12,15 +12,15 @@ namespace selfcal::client {
 struct Target {
   // "unix:/path"; "host:port", with mutual TLS; "insecure:host:port", without.
   std::string address = "unix:/run/selfcal/selfcald.sock";
-  // PEM files, for host:port alone.
+  // PEM files, for host:port only.
   std::string ca_file = {};
   std::string certificate_file = {};
   std::string key_file = {};
 };
 
-// What the library connects with; it reads the files. INVALID_ARGUMENT for
-// host:port without all three of them: nothing goes over a network in plain
-// text unless it is asked for by name.
+// Converts to the options of the client library, which reads the files.
+// INVALID_ARGUMENT for host:port unless all three files are given: connections
+// over a network are unencrypted only if the address says so explicitly.
 absl::StatusOr<ClientOptions> Resolve(const Target& target);
 
 }  // namespace selfcal::client

@@ -28,7 +28,7 @@ std::optional<std::int64_t> SecondsOf(char unit) {
   }
 }
 
-// Of "7d"; at most a hundred years.
+// Parses a duration such as "7d"; at most a hundred years.
 std::optional<std::int64_t> ParseAge(std::string_view text) {
   if (text.size() < 2) return std::nullopt;
   const auto unit = SecondsOf(text.back());
@@ -59,10 +59,11 @@ absl::StatusOr<Timestamp> ParseTime(const std::string& text,
   if (rfc3339.size() > kDate && rfc3339[kDate] == ' ') rfc3339[kDate] = 'T';
   if (!rfc3339.empty() && rfc3339.back() != 'Z') rfc3339 += 'Z';
   if (TimeUtil::FromString(rfc3339, &time)) return time;
-  return absl::InvalidArgumentError(fmt::format(
-      "'{}' is no time: give 2026-11-21, '2026-11-21 04:10:03' (UTC), or 30s, "
-      "15m, 2h, 7d ago",
-      text));
+  return absl::InvalidArgumentError(
+      fmt::format("'{}' is not a time: use 2026-11-21, '2026-11-21 04:10:03' "
+                  "(UTC), or 30s, "
+                  "15m, 2h, 7d ago",
+                  text));
 }
 
 }  // namespace selfcal::client

@@ -1,4 +1,4 @@
-// Points in time as people give them on the command line.
+// Points in time on the command line.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -8,8 +8,9 @@
 
 namespace selfcal::client {
 
-// "2026-11-21", "2026-11-21 04:10:03" (or with a T; in UTC), or a time before
-// `now`: "30s", "15m", "2h", "7d". INVALID_ARGUMENT for anything else.
+// Parses "2026-11-21" or "2026-11-21 04:10:03" (or with a T), both in UTC, or a
+// duration before `now`: "30s", "15m", "2h", "7d". INVALID_ARGUMENT for
+// anything else.
 absl::StatusOr<google::protobuf::Timestamp> ParseTime(
     const std::string& text, const google::protobuf::Timestamp& now);
 

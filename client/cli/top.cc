@@ -1,4 +1,4 @@
-// top: what the daemon does right now, by rig.
+// top: shows the current activity of the daemon, by rig.
 #include <algorithm>
 #include <chrono>
 #include <memory>
@@ -14,7 +14,7 @@ namespace {
 
 using Service = v1::ActivityService::StubInterface;
 
-constexpr int kMostRigs = 1000;  // of a page
+constexpr int kMostRigs = 1000;  // limit of a page
 
 struct Options {
   double interval_s = 2;
@@ -22,7 +22,7 @@ struct Options {
   int rigs = 50;
 };
 
-// The rigs that sent last: the daemon reads no more than these.
+// Requests the rigs that sent last; the daemon reads only these.
 grpc::Status Ask(Context* context,
                  int rigs,
                  v1::ListActivityResponse* activity) {
@@ -44,7 +44,7 @@ int Snapshot(Context* context, const Options& options) {
   return kDone;
 }
 
-// Draws until it is told to end, or the daemon does not answer.
+// Redraws until the user quits or the daemon does not answer.
 grpc::Status Draw(Context* context, const Options& options, Screen* screen) {
   const std::chrono::milliseconds interval(
       static_cast<std::int64_t>(1000 * options.interval_s));
@@ -78,17 +78,17 @@ int Top(Context* context, const Options& options) {
 void AddTopCommand(CLI::App* app, Context* context) {
   CLI::App* top = app->add_subcommand(
       "top",
-      "Show what goes on right now: rigs that sent last, streams, tables and "
-      "runs. On a terminal until Ctrl-C, into a pipe once");
+      "Show the current activity: the rigs that sent last, streams, tables and "
+      "runs. Updates until Ctrl-C on a terminal, prints once into a pipe");
   const auto options = std::make_shared<Options>();
-  top->add_option("--interval", options->interval_s, "Seconds between drawings")
+  top->add_option("--interval", options->interval_s, "Seconds between updates")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
-  top->add_flag(
-      "--once", options->once, "On a terminal, too, once and no more");
+  top->add_flag("--once", options->once, "Print once, also on a terminal");
   top->add_option("--rigs",
                   options->rigs,
-                  "Once: so many rigs at most, those that sent last")
+                  "If printing once: show at most this many rigs, those that "
+                  "sent last")
       ->check(CLI::Range(1, kMostRigs))
       ->capture_default_str();
   top->callback([context, options] {

@@ -10,13 +10,13 @@
 namespace selfcal::client {
 namespace {
 
-constexpr int kLinesAbove = 3;  // in all, an empty one, the headers
+constexpr int kLinesAbove = 3;  // totals, an empty line, the headers
 
 std::string RateText(const v1::SegmentTraffic& traffic) {
   return fmt::format("{:.1f}", traffic.stored_per_minute());
 }
 
-// "3 running 4/100", "3 pending", "-".
+// Returns "3 running 4/100", "3 pending" or "-".
 std::string RunText(const v1::RigActivity& rig) {
   if (!rig.has_run()) return "-";
   const v1::Recalibration& run = rig.run();
@@ -28,7 +28,7 @@ std::string RunText(const v1::RigActivity& rig) {
   return text;
 }
 
-// The first line of *text, which is taken from it.
+// Removes the first line from *text and returns it.
 std::string_view TakeLine(std::string_view* text) {
   const std::size_t end = std::min(text->find('\n'), text->size());
   const std::string_view line = text->substr(0, end);

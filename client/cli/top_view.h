@@ -1,4 +1,5 @@
-// What `selfcal top` shows of an answer of ActivityService; pure.
+// The output of `selfcal top` for a response of ActivityService. Pure
+// functions.
 #pragma once
 
 #include <cstdint>
@@ -9,20 +10,20 @@
 
 namespace selfcal::client {
 
-// "42 s", "12 min", "3 h", "9 d"; "0 s" for what is negative.
+// Returns "42 s", "12 min", "3 h" or "9 d"; "0 s" for negative values.
 std::string AgeText(std::int64_t seconds);
 
-// A rig a row. Times are stamps, or with `ages` how long ago they are by the
-// daemon's clock.
+// A table with one rig per row. Times are timestamps or, with `ages`, ages by
+// the daemon's clock.
 Table ActivityTable(const v1::ListActivityResponse& activity, bool ages);
 
-// Lines for a terminal of this size, none of them wider, no more of them: what
-// is going on in all, and below it the rigs that there is room for.
+// Lines that fit into a terminal of this size: totals, and below them as many
+// rigs as there is room for.
 std::string ActivityScreen(const v1::ListActivityResponse& activity,
                            int columns,
                            int rows);
 
-// Rigs that ActivityScreen has room for.
+// Number of rigs that ActivityScreen has room for.
 int RigsOnScreen(int rows);
 
 }  // namespace selfcal::client

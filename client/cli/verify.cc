@@ -1,4 +1,5 @@
-// verify: whether both estimation cores come to what the daemon has computed.
+// verify: checks that both estimation cores agree with what the daemon has
+// computed.
 #include <fmt/format.h>
 
 #include <memory>
@@ -46,7 +47,7 @@ std::string DifferenceText(const Response::CalibrationCheck& check) {
       100 * check.covariance_difference());
 }
 
-// Prints each check as it is done.
+// Prints each check when it is done.
 void Print(const Context& context, const Response& response) {
   Table line({{""}, {""}, {""}});
   if (response.has_score()) {
@@ -82,11 +83,11 @@ void Print(const Context& context, const Response::Summary& summary) {
     facts.Add("calibration", OutcomeText(check.outcome(), check.message()));
     facts.Add("difference", DifferenceText(check));
     facts.Add("segments",
-              fmt::format("{}, {} of the version are not kept any more",
+              fmt::format("{}, {} of the version are no longer kept",
                           check.segments(),
                           check.segments_gone()));
   } else {
-    facts.Add("calibration", "the factory's: nothing computed it");
+    facts.Add("calibration", "factory calibration: it was not computed");
   }
   if (!summary.finding().empty()) {
     facts.Add("not trustworthy", summary.finding());
@@ -94,7 +95,7 @@ void Print(const Context& context, const Response::Summary& summary) {
   context.Print(facts);
 }
 
-// 1 where the cores disagree, or where it could not be found out.
+// Returns 1 if the cores disagree or not everything could be compared.
 int ExitCode(const Response::Summary& summary) {
   if (!summary.finding().empty()) {
     PrintError(fmt::format("version {} is not trustworthy: {}",
@@ -107,7 +108,7 @@ int ExitCode(const Response::Summary& summary) {
       (!summary.has_calibration() ||
        summary.calibration().outcome() != Response::NOT_COMPARED);
   if (compared) return kDone;
-  PrintError("not everything could be compared; nothing that was differs");
+  PrintError("not everything could be compared; what was compared agrees");
   return kFailed;
 }
 
@@ -152,7 +153,7 @@ void AddVerifyCommand(CLI::App* app, Context* context) {
   CLI::App* verify = app->add_subcommand(
       "verify",
       "Compute the scores of all segments whose data is kept, and the active "
-      "version, by both estimation cores, and compare them; takes minutes. "
+      "version, with both estimation cores, and compare them; takes minutes. "
       "Exits with 1 if they differ by more than rounding or convergence "
       "explains, or if something could not be compared");
   const auto rig = std::make_shared<std::string>();

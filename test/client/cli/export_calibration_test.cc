@@ -86,7 +86,7 @@ TEST_F(CalibrationExport, StrictWritesNothingThatPredictsOtherwise) {
   const Outcome outcome = Selfcal(line);
   EXPECT_EQ(outcome.code, 1);
   EXPECT_EQ(outcome.out, "");
-  EXPECT_THAT(outcome.err, HasSubstr("nothing is written"));
+  EXPECT_THAT(outcome.err, HasSubstr("nothing was written"));
   EXPECT_FALSE(fs::exists(folder_));
   // Kalibr loses the sigmas alone, of which no prediction is made.
   line = Line("kalibr");
@@ -193,7 +193,7 @@ TEST_F(CalibrationExport, WhatARigCannotTakeIsNamedAndStrictRefusesIt) {
   line.push_back("--strict");
   const Outcome refused = Selfcal(line);
   EXPECT_EQ(refused.code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("no rig is created"));
+  EXPECT_THAT(refused.err, HasSubstr("no rig was created"));
   EXPECT_EQ(daemon_.rigs.size(), 2u);
 }
 

@@ -100,7 +100,7 @@ TEST_F(PreflightCommand, LooksAtWhatADeviceHasSent) {
   daemon_.rigs.push_back(ToProto(rig));
   const Outcome nothing = Selfcal({"preflight", "--device", "device"});
   EXPECT_EQ(nothing.code, 1);
-  EXPECT_THAT(nothing.err, HasSubstr("let the device send some"));
+  EXPECT_THAT(nothing.err, HasSubstr("send segments from the device"));
   for (MotionSegment segment : recording->segments) {
     segment.calibration_version = 2;
     v1::Segment listed;

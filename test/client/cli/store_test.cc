@@ -133,7 +133,7 @@ TEST_F(StoreCommands, BackupOverwritesOnlyWithForce) {
 TEST_F(StoreCommands, BackupLeavesNothingThatIsNotWhole) {
   daemon_.backup_checksum = std::string(32, 'x');
   EXPECT_EQ(Selfcal({"backup", file_}), 1);
-  EXPECT_THAT(err_, HasSubstr("did not arrive whole"));
+  EXPECT_THAT(err_, HasSubstr("the backup is incomplete"));
   EXPECT_EQ(Files(), 0);
   daemon_.backup_status = {grpc::StatusCode::RESOURCE_EXHAUSTED, "disk full"};
   EXPECT_EQ(Selfcal({"backup", file_}), 1);
@@ -158,7 +158,7 @@ TEST_F(StoreCommands, RestoreSaysIfTheDaemonDoesNotStartAnew) {
   WriteBackup();
   daemon_.restarts = false;
   EXPECT_EQ(Selfcal({"restore", file_, "--yes", "--timeout", "0.2"}), 3);
-  EXPECT_THAT(err_, HasSubstr("did not start anew within 0.2 s"));
+  EXPECT_THAT(err_, HasSubstr("did not restart within 0.2 s"));
   EXPECT_THAT(out_, HasSubstr("/var/before"));
 }
 

@@ -43,7 +43,7 @@ TEST(ParseTime, SaysWhatToGiveInsteadOfAnythingElse) {
                                  "2026-11-21 25:00:00",
                                  "21.11.2026",
                                  "yesterday"}) {
-    EXPECT_NE(Parsed(text).find("'" + text + "' is no time: give"),
+    EXPECT_NE(Parsed(text).find("'" + text + "' is not a time: use"),
               std::string::npos)
         << Parsed(text);
   }

@@ -59,7 +59,7 @@ TEST_F(Commands, VerifyPrintsEachCheckAndASummary) {
                         "sigma of imu.gyro.scale.x 0.1 %, covariance 0.2 %\n"));
   EXPECT_THAT(
       outcome.out,
-      HasSubstr("segments\t11, 1 of the version are not kept any more\n"));
+      HasSubstr("segments\t11, 1 of the version are no longer kept\n"));
 }
 
 TEST_F(Commands, VerifyFailsWhereTheCoresDiffer) {
