@@ -33,8 +33,8 @@ Eigen::Vector3d ToVector(const Column& column, int offset = 0) {
   return {column[offset], column[offset + 1], column[offset + 2]};
 }
 
-// Reads one folder into a recording. `landmark_ids` gives each landmark of
-// this map the next free number.
+// Reads one folder into a recording. `landmark_ids` assigns the next free
+// number to each landmark of this map.
 class MapReader {
  public:
   MapReader(const std::string& folder,
@@ -79,7 +79,7 @@ class MapReader {
   absl::Status IndexVertices() {
     if (map_.missions_size() != 1 || map_.mission_ids_size() != 1) {
       return Bad(folder_,
-                 fmt::format("holds {} missions; give a map with one",
+                 fmt::format("contains {} missions; a map must have one",
                              map_.missions_size()));
     }
     if (map_.vertex_ids_size() != map_.vertices_size()) {
@@ -210,7 +210,7 @@ class MapReader {
         camera >= static_cast<int>(recording_.rig.factory.cameras.size())) {
       return Bad(folder_,
                  fmt::format("vertices[{}].frames[{}]: keypoints, landmark ids "
-                             "and cameras do not fit together",
+                             "and cameras are inconsistent",
                              vertex,
                              camera));
     }
@@ -220,7 +220,8 @@ class MapReader {
       if (landmark == landmarks_.end()) continue;
       const Eigen::Vector2d z_px(frame.keypoint_measurements(2 * k),
                                  frame.keypoint_measurements(2 * k + 1));
-      // A tracker may follow a point past the border: no measurement there.
+      // A tracker may follow a point beyond the border of the image; such
+      // observations are dropped.
       if (!(z_px.minCoeff() >= 0 && z_px.x() <= model.width_px &&
             z_px.y() <= model.height_px)) {
         continue;
@@ -251,7 +252,7 @@ class MapReader {
     }
     std::vector<ImuSample>& imu = recording_.imu;
     for (int k = 0; k < edge.imu_timestamps_size(); ++k) {
-      // The last sample of an edge is the first of the next.
+      // The last sample of an edge is repeated as the first of the next.
       if (!imu.empty() && edge.imu_timestamps(k) <= imu.back().t_ns) continue;
       imu.push_back({edge.imu_timestamps(k),
                      ToVector(edge.imu_data(), 6 * k + 3),
@@ -265,22 +266,23 @@ class MapReader {
   std::uint64_t next_landmark_id_;
   vi_map::ViMap map_;
   ViMapRecording recording_;
-  std::vector<double> sigmas_px_;  // of the observations that are used
+  std::vector<double> sigmas_px_;  // of the used observations
   std::map<IdKey, int> vertex_index_;
   std::map<IdKey, const vi_map::ViwlsEdge*> edge_from_;
   std::map<IdKey, MapLandmark> landmarks_;
 };
 
-// Adds what follows `first`: it must begin with the keyframe that `first` ends
-// with. That keyframe is one, with the observations of both.
+// Appends a recording, which must start with the keyframe at which the one
+// before ends. The two are merged into one keyframe with the observations of
+// both.
 absl::Status Join(const std::string& folder,
                   ViMapRecording next,
                   ViMapRecording* first) {
   ViMapKeyframe& last = first->keyframes.back();
   if (next.keyframes.front().state.t_ns != last.state.t_ns) {
     return Bad(folder,
-               fmt::format("does not continue the map before it: begins at {} "
-                           "ns, that one ends at {} ns",
+               fmt::format("does not continue the previous map: starts at {} "
+                           "ns, but the previous map ends at {} ns",
                            next.keyframes.front().state.t_ns,
                            last.state.t_ns));
   }
@@ -310,7 +312,7 @@ absl::StatusOr<ViMapRecording> ReadViMaps(
     absl::StatusOr<ViMapRecording> recording = reader.Read();
     if (!recording.ok()) return recording.status();
     if (recording->keyframes.empty() || recording->imu.empty()) {
-      return Bad(folders[i], "holds no keyframes with IMU data");
+      return Bad(folders[i], "has no keyframes with IMU data");
     }
     next_landmark_id = reader.next_landmark_id();
     if (i == 0) {

@@ -1,8 +1,8 @@
-// Reads maplab VI-maps (a folder each) into keyframes, IMU samples and a rig.
+// Reads maplab VI-maps (each is a folder) into keyframes, IMU samples and a
+// rig.
 //
-// Reads files, so it belongs to the client's side. Every malformed or truncated
-// file gives INVALID_ARGUMENT or DATA_LOSS that names the file and the field;
-// nothing aborts.
+// Malformed and truncated files result in INVALID_ARGUMENT or DATA_LOSS, with
+// the name of the file and the field; nothing aborts.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -24,13 +24,13 @@ struct ViMapKeyframe {
 // One recording: a single unbroken chain of keyframes.
 struct ViMapRecording {
   Rig rig;              // id empty; factory = the stored calibration
-  std::string session;  // from the mission's id
+  std::string session;  // the id of the mission
   std::vector<ViMapKeyframe> keyframes;  // in time order
   std::vector<ImuSample> imu;            // one stream, duplicates dropped
 };
 
 struct ViMapOptions {
-  bool good_landmarks_only = true;  // quality 2
+  bool good_landmarks_only = true;  // only landmarks of quality 2
 };
 
 // Reads the map in `folder`, or, if it holds submap_0, submap_1, ..., all of
@@ -38,12 +38,12 @@ struct ViMapOptions {
 absl::StatusOr<ViMapRecording> ReadViMap(const std::string& folder,
                                          const ViMapOptions& options);
 
-// Several folders that continue each other.
+// Reads several consecutive maps into one recording.
 absl::StatusOr<ViMapRecording> ReadViMaps(
     const std::vector<std::string>& folders, const ViMapOptions& options);
 
-// Segments of the recording through SegmentBuilder. The rest at its end that
-// does not fill a segment is left out.
+// Builds the segments of the recording with SegmentBuilder. The remainder at
+// the end that does not fill a segment is dropped.
 std::vector<MotionSegment> BuildSegments(const ViMapRecording& recording,
                                          const SegmentBuilderOptions& options);
 

@@ -13,7 +13,8 @@
 namespace selfcal::client {
 namespace {
 
-// Far above any real part file; bounds what a hostile one can claim.
+// Limit on the size of a part file, far above any real one, as a defence
+// against malicious files.
 constexpr std::size_t kMaxUncompressedBytes = std::size_t{1} << 30;
 
 absl::StatusOr<std::string> Gunzip(const std::string& path) {
@@ -21,7 +22,7 @@ absl::StatusOr<std::string> Gunzip(const std::string& path) {
                                                   &gzclose);
   if (!file) {
     return absl::NotFoundError(
-        fmt::format("{}: cannot be opened; the map's metadata names it", path));
+        fmt::format("{}: cannot be opened; the map's metadata lists it", path));
   }
   std::string data;
   std::array<char, 1 << 16> buffer;
@@ -39,7 +40,7 @@ absl::StatusOr<std::string> Gunzip(const std::string& path) {
           "{}: more than 1 GiB uncompressed; not a map part", path));
     }
   }
-  // A truncated stream ends without an error from gzread, but is not complete.
+  // gzread reports no error at the end of a truncated stream.
   int code = Z_OK;
   gzerror(file.get(), &code);
   if (code != Z_OK || gzdirect(file.get()) != 0) {
@@ -49,7 +50,8 @@ absl::StatusOr<std::string> Gunzip(const std::string& path) {
   return data;
 }
 
-// The metadata comes from outside: a part is a plain name inside the folder.
+// True if the name of a part is a plain file name inside the folder. The
+// metadata is not trusted.
 bool IsPlainName(const std::string& name) {
   return !name.empty() && name.find('/') == std::string::npos && name != ".." &&
          name != ".";
@@ -71,7 +73,7 @@ absl::StatusOr<vi_map::ViMap> ReadViMapFiles(const std::string& folder) {
   absl::StatusOr<std::string> text = ReadFile(metadata_path);
   if (!text.ok()) {
     return absl::NotFoundError(fmt::format(
-        "{}: cannot be opened; give a VI-map folder, one that holds vi_map/",
+        "{}: cannot be opened; name a VI-map folder, which contains vi_map/",
         metadata_path));
   }
   vi_map::MapFiles files;
@@ -94,7 +96,7 @@ absl::StatusOr<vi_map::ViMap> ReadViMapFiles(const std::string& folder) {
     vi_map::ViMap part;
     if (!part.ParseFromString(*data)) {
       return absl::DataLossError(fmt::format(
-          "{}: not a VI-map message, or cut off", base + file.path()));
+          "{}: not a VI-map message, or truncated", base + file.path()));
     }
     map.MergeFrom(part);
   }

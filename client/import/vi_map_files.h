@@ -1,5 +1,5 @@
-// The files of one VI-map folder as messages: which parts there are, gzip, and
-// the protobuf inside. What they mean is the business of vi_map.cc.
+// Reads the files of one VI-map folder as messages: finds the part files,
+// decompresses them and parses the protobuf. vi_map.cc interprets the messages.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -10,11 +10,11 @@
 
 namespace selfcal::client {
 
-// Content of a file. NOT_FOUND if it cannot be opened.
+// Returns the content of a file. NOT_FOUND if it cannot be opened.
 absl::StatusOr<std::string> ReadFile(const std::string& path);
 
-// Merges all part files that `folder`/vi_map/vi_map_metadata names. DATA_LOSS
-// for a truncated or damaged file, NOT_FOUND for a missing one, each naming it.
+// Merges all part files that `folder`/vi_map/vi_map_metadata lists. DATA_LOSS
+// for a truncated or damaged file, NOT_FOUND for a missing one, with its name.
 absl::StatusOr<vi_map::ViMap> ReadViMapFiles(const std::string& folder);
 
 }  // namespace selfcal::client

@@ -14,7 +14,7 @@ struct Box {
   double left, top, width, height;
 };
 
-// From values to places in a box; a single value stands in the middle.
+// Maps values to coordinates in a box; a single value is put in the middle.
 class Scale {
  public:
   Scale(const std::vector<ChartPoint>& points, const Box& box) : box_(box) {

@@ -1,4 +1,4 @@
-// HTML as text. Whatever comes from the daemon goes through Escaped.
+// Builders of HTML text. All text from the daemon must go through Escaped.
 #pragma once
 
 #include <string>
@@ -7,16 +7,16 @@
 
 namespace selfcal::client {
 
-// As text or in a quoted attribute. Bytes that are no character of HTML become
-// '?'.
+// Escapes text for element content or a quoted attribute. Bytes that are not
+// valid in HTML become '?'.
 std::string Escaped(std::string_view text);
 
 struct HtmlColumn {
   std::string title;
-  bool number = false;  // to the right
+  bool number = false;  // align right
 };
 
-// Cells are HTML already.
+// A table; its cells are HTML, so text has to be escaped before.
 class HtmlTable {
  public:
   explicit HtmlTable(std::vector<HtmlColumn> columns);
@@ -28,12 +28,13 @@ class HtmlTable {
   std::string rows_;
 };
 
-// A section with its heading, which the page's list of contents can name.
+// A section with its heading; `id` is the anchor for links.
 std::string Section(std::string_view id,
                     std::string_view title,
                     std::string_view body);
 
-// The page: everything in one file, no scripts, dark where the reader is.
+// The page: everything in one file, without scripts, with a dark mode if the
+// reader prefers it.
 std::string Page(std::string_view title, std::string_view body);
 
 }  // namespace selfcal::client

@@ -1,5 +1,5 @@
-// A calibration as one HTML file that needs nothing beside it: what people
-// attach to a question or a release.
+// A report on a calibration as one self-contained HTML file, e.g. to attach to
+// a question or a release.
 #pragma once
 
 #include <string>
@@ -11,16 +11,16 @@
 
 namespace selfcal::client {
 
-// As the daemon gives them.
+// The input of a report, as the daemon returns it.
 struct ReportData {
   v1::Rig rig;
-  v1::Calibration calibration;            // that the report is about
-  std::vector<v1::Calibration> versions;  // all of the rig, the factory's too
+  v1::Calibration calibration;            // the subject of the report
+  std::vector<v1::Calibration> versions;  // all of the rig, with the factory's
   std::vector<v1::Table> tables;
   std::vector<v1::Segment> segments;  // scored, in any order
 };
 
-// The verdict first, then what it rests on.
+// Writes the report: the verdict first, then the data behind it.
 std::string WriteReport(const ReportData& data);
 
 }  // namespace selfcal::client

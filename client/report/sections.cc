@@ -27,7 +27,8 @@ std::string ClassOf(v1::Verdict::Kind kind) {
   return kind == v1::Verdict::NOT_TRUSTWORTHY ? "bad" : "weak";
 }
 
-// As it is shown; 0 if it was not estimated.
+// Sigma of the factory calibration, in the unit that is shown; 0 if the
+// component is not estimated.
 double SigmaBefore(const v1::Calibration& factory,
                    const std::string& component) {
   for (const auto& estimate : factory.estimates()) {
@@ -36,7 +37,7 @@ double SigmaBefore(const v1::Calibration& factory,
   return 0;
 }
 
-// In the order of their arrival.
+// Returns the segments in the order of their arrival.
 std::vector<const v1::Segment*> InOrder(const ReportData& data) {
   std::vector<const v1::Segment*> segments;
   for (const v1::Segment& segment : data.segments) segments.push_back(&segment);
@@ -57,7 +58,7 @@ std::string Course(const ReportData& data, const std::string& component) {
     if (version.state() == v1::Calibration::REJECTED) continue;
     for (const auto& estimate : version.estimates()) {
       if (estimate.component() != component) continue;
-      // The band of the factory would hide all others.
+      // The band of the factory calibration would dwarf all others.
       const ShownEstimate shown = Shown(estimate);
       points.push_back({static_cast<double>(version.version()),
                         shown.value,
@@ -82,7 +83,7 @@ std::string VerdictSection(const ReportData& data) {
   }
   return fmt::format(
       "<div class=\"verdict {}\"><p><strong>Verdict: {}.</strong> State: {}, "
-      "made {} UTC.</p>\n<ul>{}</ul></div>\n",
+      "created {} UTC.</p>\n<ul>{}</ul></div>\n",
       ClassOf(verdict.kind()),
       Escaped(VerdictText(data.calibration)),
       Escaped(StateText(data.calibration.state())),
@@ -104,7 +105,7 @@ std::string ParameterSection(const ReportData& data) {
     const double before = SigmaBefore(Factory(data), estimate.component());
     const double nats = std::log(before / shown.sigma);
     const bool known = before > 0 && shown.sigma > 0;
-    // A full bar: a sigma e^5 = 148 times smaller than before.
+    // A full bar means that sigma is e^5 = 148 times smaller than before.
     table.Add({Escaped(estimate.component()),
                ValueText(shown.value, shown.sigma),
                SigmaText(shown.sigma),
@@ -116,8 +117,9 @@ std::string ParameterSection(const ReportData& data) {
   }
   return Section("parameters",
                  "Parameters",
-                 "<p class=\"faint\">Learned is the logarithm of sigma before "
-                 "by sigma now. A held component is not estimated.</p>\n" +
+                 "<p class=\"faint\">Learned is the logarithm of the ratio of "
+                 "sigma before to sigma now. A held component is not "
+                 "estimated.</p>\n" +
                      table.Html());
 }
 
@@ -149,8 +151,8 @@ std::string ResidualSection(const ReportData& data) {
     }
   }
   std::string body =
-      "<p class=\"faint\">Of each segment when it was scored, against the "
-      "calibration of that time; filled: this version was calibrated on it."
+      "<p class=\"faint\">Residuals of each segment when it was scored, with "
+      "the calibration of that time; filled: this version was computed from it."
       "</p>\n" +
       PointChart(pixels,
                  "Reprojection error of each segment",
@@ -169,7 +171,8 @@ std::string ResidualSection(const ReportData& data) {
 std::string EntropySection(const ReportData& data) {
   std::string body =
       "<p class=\"faint\">Differential entropy of each group after one "
-      "segment alone; lower is richer. Filled: a table keeps it.</p>\n";
+      "segment alone; lower is more informative. Filled: a table keeps it."
+      "</p>\n";
   for (const v1::Table& table : data.tables) {
     const std::string group = LastPart(table.name());
     std::vector<ChartPoint> points;
@@ -217,9 +220,9 @@ std::string SegmentSection(const ReportData& data) {
          fmt::format("{}", segment->observations()),
          fmt::format("{:.3f}", segment->residuals().reprojection_rms_px()),
          fmt::format("{} of {}", segment->rank(), segment->components()),
-         kept.empty() ? "no table any more" : Escaped(kept)});
+         kept.empty() ? "no table" : Escaped(kept)});
   }
-  return Section("segments", "Segments it was calibrated on", table.Html());
+  return Section("segments", "Segments it was computed from", table.Html());
 }
 
 std::string OriginSection(const ReportData& data) {
@@ -229,7 +232,7 @@ std::string OriginSection(const ReportData& data) {
   for (const Fact& fact : CalibrationFacts(calibration)) {
     table.Add({Escaped(fact.name), Escaped(fact.text)});
   }
-  return Section("origin", "Where it came from", table.Html());
+  return Section("origin", "Origin", table.Html());
 }
 
 std::string HistorySection(const ReportData& data) {

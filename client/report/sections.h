@@ -1,4 +1,4 @@
-// The parts of a report, each the HTML of a section.
+// The sections of a report, as HTML.
 #pragma once
 
 #include <string>
@@ -8,13 +8,14 @@
 namespace selfcal::client {
 
 std::string VerdictSection(const ReportData& data);
-// Value, sigma, sigma before, what was learned, the course over versions.
+// Components: value, sigma, sigma before, what was learned, the history over
+// versions.
 std::string ParameterSection(const ReportData& data);
-// Of pixels and of the IMU, segment by segment.
+// Residuals of pixels and of the IMU, segment by segment.
 std::string ResidualSection(const ReportData& data);
-// Of each group over the segments, with those that a table keeps.
+// Entropy of each group over the segments, with those that a table keeps.
 std::string EntropySection(const ReportData& data);
-// Those that it was calibrated on.
+// The segments that the version was computed from.
 std::string SegmentSection(const ReportData& data);
 std::string OriginSection(const ReportData& data);
 std::string HistorySection(const ReportData& data);

@@ -12,8 +12,8 @@ namespace {
 
 using FactList = std::vector<Fact>;
 
-// A change that is less probable is not worth a line.
-constexpr double kWorthTelling = 0.1;
+// Probability below which a device change is not shown.
+constexpr double kMinShownProbability = 0.1;
 
 void Add(FactList* facts, std::string name, std::string text) {
   facts->push_back({std::move(name), std::move(text)});
@@ -52,7 +52,7 @@ void AddProvenance(const v1::Calibration::Provenance& provenance,
 
 void AddVerdict(const v1::Calibration& calibration, FactList* facts) {
   Add(facts, "verdict", VerdictText(calibration));
-  // Those of one that is not trustworthy are the reasons.
+  // If it is not trustworthy, the sentences are the reasons of the rejection.
   if (calibration.verdict().kind() == v1::Verdict::NOT_TRUSTWORTHY) return;
   const bool weak = calibration.verdict().kind() == v1::Verdict::WEAK;
   for (const std::string& sentence : calibration.verdict().sentences()) {
@@ -85,7 +85,7 @@ void AddValidation(const v1::Validation& validation, FactList* facts) {
   }
   Add(facts,
       "held-out segments",
-      fmt::format("{} ({} scored anew, {} left out), {} degrees: chi-square "
+      fmt::format("{} ({} rescored, {} not testable), {} degrees: chi-square "
                   "{:.1f}, of version {} {:.1f}",
                   held_out.segments(),
                   held_out.rescored(),
@@ -114,7 +114,7 @@ std::string NoiseText(const v1::NoiseFactor& factor) {
                     factor.factor(),
                     100 * factor.log_sigma())
               : "residuals do not determine it";
-  if (factor.used() == 0) return text;  // from before it was recorded
+  if (factor.used() == 0) return text;  // it was not recorded
   if (!factor.converged()) text += ", the estimate did not converge";
   return text + fmt::format("; {:.2f} times was used", factor.used());
 }
@@ -138,7 +138,7 @@ void AddAgreement(const v1::SolverReport& solver, FactList* facts) {
 }
 
 void AddChange(const v1::EvictedUse& use, FactList* facts) {
-  if (use.change_probability() < kWorthTelling) return;
+  if (use.change_probability() < kMinShownProbability) return;
   Add(facts,
       "device changed",
       fmt::format("among its segments with probability {:.2g}; sigmas account "
@@ -154,11 +154,11 @@ void AddEvicted(const v1::EvictedUse& use, FactList* facts) {
   if (use.segments() == 0) return;
   std::string text = fmt::format(
       "{} used, linearised up to {:.2g} sigma_ref "
-      "from here",
+      "from the result",
       use.segments(),
       use.reach());
   if (use.too_far() > 0) {
-    text += fmt::format("; {} too far away", use.too_far());
+    text += fmt::format("; {} linearised too far away", use.too_far());
   }
   if (use.contradicting() > 0) {
     text += fmt::format("; {} contradict the others", use.contradicting());
@@ -199,7 +199,7 @@ void AddSolver(const v1::SolverReport& solver, FactList* facts) {
   if (solver.track_noise_factor() > 1) {
     Add(facts,
         "pixel errors along tracks",
-        fmt::format("count as {:.2f} times the rig's sigma",
+        fmt::format("weighted with {:.2f} times the rig's sigma",
                     solver.track_noise_factor()));
   }
   Add(facts,

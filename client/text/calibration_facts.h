@@ -1,4 +1,4 @@
-// What a calibration is, where it came from and what was checked, in words.
+// A calibration in words: its state, origin and checks.
 #pragma once
 
 #include <string>
@@ -13,8 +13,8 @@ struct Fact {
   std::string text;
 };
 
-// State, verdict, provenance, validation and the solver's report, what was held
-// constant in words. A name may come more than once.
+// State, verdict, provenance, validation and the solver's report, with the
+// directions that were held constant in words. Names may repeat.
 std::vector<Fact> CalibrationFacts(const v1::Calibration& calibration);
 
 }  // namespace selfcal::client

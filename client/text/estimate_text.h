@@ -1,6 +1,6 @@
-// Estimates as people read and compare them: a rotation as what it differs by
-// from the factory's value, in degrees. Its rotation vector, near pi, changes
-// the sign from one version to the next though nothing has moved.
+// Estimates in a form that people can read and compare. A rotation is shown as
+// its difference from the factory value, in degrees: a rotation vector near pi
+// can change its sign from one version to the next although nothing has moved.
 #pragma once
 
 #include <string>
@@ -12,10 +12,11 @@ namespace selfcal::client {
 struct ShownEstimate {
   double value = 0;
   double sigma = 0;
-  std::string unit;  // of both; "deg from factory" of a rotation
+  std::string unit;  // of both; "deg from factory" for a rotation
 };
 
-// A daemon from before the difference was told leaves a rotation as its vector.
+// If the daemon is too old to send the difference, a rotation is shown as its
+// rotation vector.
 ShownEstimate Shown(const v1::ComponentEstimate& estimate);
 
 struct ShownDifference {
@@ -23,12 +24,12 @@ struct ShownDifference {
   double b = 0;
   double difference = 0;
   double sigma = 0;
-  std::string unit;  // of all
+  std::string unit;  // of all values
 };
 ShownDifference Shown(
     const v1::CompareCalibrationsResponse::Difference& difference);
 
-// "good", "weak", ...; what the daemon has stored with the version.
+// The verdict that the daemon stored with the version: "good", "weak", ...
 std::string VerdictText(const v1::Calibration& calibration);
 
 }  // namespace selfcal::client

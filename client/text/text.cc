@@ -10,12 +10,13 @@
 namespace selfcal::client {
 namespace {
 
-// A unit vector with a part this large has no other worth a word.
+// If a part of a unit vector is this large, no other is shown.
 constexpr double kAlone = 0.98;
-constexpr double kWorthAWord = 0.1;
+constexpr double kMinShownPart = 0.1;
 constexpr int kMaxParts = 4;
 
-// "NOT_FULL" as "not full"; the prefix of the zero value is dropped.
+// Converts "NOT_FULL" to "not full"; a name that ends with UNSPECIFIED becomes
+// "unknown".
 std::string Words(std::string name) {
   constexpr std::string_view kUnspecified = "UNSPECIFIED";
   if (name.size() >= kUnspecified.size() &&
@@ -93,7 +94,7 @@ std::string DirectionText(const v1::UnobservedDirection& direction) {
       text = part.component();
       break;
     }
-    if (parts > 0 && (std::abs(weight) < kWorthAWord || parts == kMaxParts)) {
+    if (parts > 0 && (std::abs(weight) < kMinShownPart || parts == kMaxParts)) {
       break;
     }
     if (parts == 0) {
@@ -104,7 +105,7 @@ std::string DirectionText(const v1::UnobservedDirection& direction) {
     text += fmt::format("{:.2f} {}", std::abs(weight), part.component());
     ++parts;
   }
-  return fmt::format("{} (the data says {:.2g} of what was known before)",
+  return fmt::format("{} (information of the data: {:.2g} of the prior's)",
                      text.empty() ? "unnamed" : text,
                      direction.information_ratio());
 }

@@ -1,4 +1,4 @@
-// Values of the contract in words and numbers for people.
+// Values of the contract as text for people.
 #pragma once
 
 #include <google/protobuf/timestamp.pb.h>
@@ -21,12 +21,12 @@ std::string TimeText(const google::protobuf::Timestamp& time);
 // "1.4 MB".
 std::string BytesText(std::int64_t bytes);
 
-// A value with as many decimals as a sigma of two digits has; six significant
-// digits without a sigma.
+// A value with as many decimals as its sigma has at two significant digits;
+// without a sigma, with six significant digits.
 std::string ValueText(double value, double sigma);
 std::string SigmaText(double sigma);
 
-// What follows the last '/': "walk~3" of "rigs/a/segments/walk~3".
+// The part after the last '/': "walk~3" of "rigs/a/segments/walk~3".
 std::string LastPart(std::string_view name);
 
 std::string StateText(v1::Calibration::State state);
@@ -35,8 +35,9 @@ std::string StateText(v1::Recalibration::State state);
 std::string TriggerText(v1::Recalibration::Trigger trigger);
 std::string KindText(v1::Event::Kind kind);
 
-// "imu.gyro.scale.x", or for a combination "0.71 imu.accel.scale.x - 0.70
-// cam0.p_CI.z"; in brackets what the data says against what was known before.
+// "imu.gyro.scale.x" or, for a combination, "0.71 imu.accel.scale.x - 0.70
+// cam0.p_CI.z"; in brackets, the ratio of the information of the data to that
+// of the prior.
 std::string DirectionText(const v1::UnobservedDirection& direction);
 
 }  // namespace selfcal::client

@@ -95,10 +95,11 @@ TEST(Report, ShowsEachParameterWithBothSigmasAndWhatWasLearned) {
 TEST(Report, SaysWhereItCameFromAndWhatWasChecked) {
   const std::string html = WriteReport(ADevice());
   EXPECT_THAT(html, HasSubstr("<td>started from</td><td>version 0</td>"));
-  EXPECT_THAT(html,
-              HasSubstr("<td>held-out segments</td><td>3 (0 scored anew, "
-                        "0 left out), 60 degrees: chi-square 58.0, of version "
-                        "0 0.0</td>"));
+  EXPECT_THAT(
+      html,
+      HasSubstr("<td>held-out segments</td><td>3 (0 rescored, "
+                "0 not testable), 60 degrees: chi-square 58.0, of version "
+                "0 0.0</td>"));
 }
 
 TEST(Report, MarksSegmentsThatItUsesAndThatTablesKeep) {

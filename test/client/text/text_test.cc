@@ -63,19 +63,19 @@ v1::UnobservedDirection Direction(
 TEST(DirectionText, NamesASingleComponentAlone) {
   EXPECT_EQ(DirectionText(Direction(
                 {{"imu.gyro.scale.x", -0.999}, {"imu.gyro.scale.y", 0.04}})),
-            "imu.gyro.scale.x (the data says 0.12 of what was known before)");
+            "imu.gyro.scale.x (information of the data: 0.12 of the prior's)");
 }
 
 TEST(DirectionText, WritesACombinationAsASum) {
   EXPECT_EQ(DirectionText(Direction(
                 {{"a", -0.8}, {"b", -0.5}, {"c", 0.33}, {"d", 0.05}})),
-            "-0.80 a - 0.50 b + 0.33 c (the data says 0.12 of what was known "
-            "before)");
+            "-0.80 a - 0.50 b + 0.33 c (information of the data: 0.12 of the "
+            "prior's)");
 }
 
 TEST(DirectionText, SaysSomethingAboutNothing) {
   EXPECT_EQ(DirectionText(Direction({})),
-            "unnamed (the data says 0.12 of what was known before)");
+            "unnamed (information of the data: 0.12 of the prior's)");
 }
 
 TEST(LastPart, IsTheIdOfAName) {
