@@ -47,7 +47,8 @@ Json PoseJson(const Eigen::Matrix4d& T) {
           {"qw", q.w()}};
 }
 
-// Constant biases go with the readings, not with selfcal's calibration.
+// Records the loss of constant biases, which selfcal's calibration does not
+// have.
 void AddBiasLoss(const std::string& field,
                  const Eigen::Vector3d& bias,
                  const Eigen::Matrix3d& inverse,
@@ -56,7 +57,7 @@ void AddBiasLoss(const std::string& field,
   const Eigen::Vector3d raw = inverse.inverse() * bias;
   losses->push_back(
       {field,
-       fmt::format("selfcal has biases with the states, not in the "
+       fmt::format("selfcal estimates biases as states, not in the "
                    "calibration; in terms of the readings they are {} {} {}",
                    raw.x(),
                    raw.y(),
@@ -91,7 +92,7 @@ double ReadNoise(const Json& root,
   if (axes[0] == axes[1] && axes[0] == axes[2]) return axes[0];
   losses->push_back(
       {key,
-       "selfcal has one for all axes: the root of the mean square",
+       "selfcal has one value for all axes: the root mean square is used",
        false});
   return std::sqrt((axes[0] * axes[0] + axes[1] * axes[1] + axes[2] * axes[2]) /
                    3);
@@ -118,8 +119,7 @@ void ReadCameras(const Json& root,
   const Json& intrinsics = JsonList(root, "intrinsics");
   const Json& sizes = JsonList(root, "resolution");
   if (poses.size() != intrinsics.size() || poses.size() != sizes.size()) {
-    throw FormatError(
-        "T_imu_cam, intrinsics and resolution are not of one length");
+    throw FormatError("T_imu_cam, intrinsics and resolution differ in length");
   }
   for (std::size_t j = 0; j < poses.size(); ++j) {
     CameraCalibration camera = ReadBasaltCamera(intrinsics[j], &result->losses);
@@ -148,7 +148,7 @@ ImportedRig ImportBasalt(const std::vector<TextFile>& files,
   result.rig.factory.imu = body.imu;
   ReadCameras(root, body.R_IB.transpose(), &result);
   if (root.contains("vignette") && !root["vignette"].empty()) {
-    losses->push_back({"vignette", "selfcal has none: left out", false});
+    losses->push_back({"vignette", "selfcal has none: ignored", false});
   }
   return result;
 }

@@ -1,14 +1,15 @@
 // Basalt: calibration.json.
 //
 // T_imu_cam takes a point from the camera's frame to the IMU's, quaternions are
-// x y z w, and image time + cam_time_offset_ns = IMU time, one for all cameras.
-// Of the readings Basalt has the inverse of selfcal's matrices,
+// x y z w, and image time + cam_time_offset_ns = IMU time, with one offset for
+// all cameras. Basalt's matrices are the inverses of selfcal's,
 //   f = (1 + M_a) accel - b,   w = (1 + M_g) gyro - b,
-// with M_a lower triangular and M_g full: b_0 b_1 b_2 M_00 M_10 M_20 M_11 M_21
-// M_22, and b_0 b_1 b_2 with the columns of M_g. So the IMU's frame is that in
-// which the accelerometer's matrix is lower triangular. Whatever selfcal has
-// can be said, but for time offsets that differ; constant biases are written as
-// 0. Cameras: fov, kb4, pinhole-radtan8 with k3 .. k6 zero; pinhole.
+// with M_a lower triangular and M_g full. They are stored as b_0 b_1 b_2 M_00
+// M_10 M_20 M_11 M_21 M_22, and as b_0 b_1 b_2 with the columns of M_g. The
+// IMU's frame is therefore the one in which the accelerometer's matrix is lower
+// triangular. The format can express everything that selfcal has, except time
+// offsets that differ between cameras; constant biases are written as 0.
+// Cameras: fov, kb4, pinhole-radtan8 with k3 .. k6 zero; pinhole.
 #pragma once
 
 #include <vector>

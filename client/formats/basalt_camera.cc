@@ -19,7 +19,7 @@ struct Model {
   std::vector<const char*> coefficients;
 };
 
-// The first of a distortion model is the one that is written.
+// For each distortion model, the first entry is the one that is written.
 const std::vector<Model>& Models() {
   static const std::vector<Model> models = {
       {"fov", DistortionModel::kFov, {"w"}},
@@ -31,7 +31,7 @@ const std::vector<Model>& Models() {
   return models;
 }
 
-// What a radtan8 has beyond selfcal's coefficients.
+// Checks the coefficients of a radtan8 that selfcal does not have.
 void CheckRest(const Json& values, std::vector<Loss>* losses) {
   for (const char* key : {"k3", "k4", "k5", "k6"}) {
     if (JsonNumber(values, key, 0) == 0) continue;
@@ -42,7 +42,7 @@ void CheckRest(const Json& values, std::vector<Loss>* losses) {
   }
   if (JsonNumber(values, "rpmax", 0) == 0) return;
   losses->push_back(
-      {"rpmax", "selfcal finds the radius that a model is good for", false});
+      {"rpmax", "selfcal computes the valid radius of a model", false});
 }
 
 }  // namespace
@@ -50,7 +50,9 @@ void CheckRest(const Json& values, std::vector<Loss>* losses) {
 CameraCalibration ReadBasaltCamera(const Json& node,
                                    std::vector<Loss>* losses) {
   const Json& type = JsonMember(node, "camera_type");
-  if (!type.is_string()) throw FormatError("field 'camera_type' is no text");
+  if (!type.is_string()) {
+    throw FormatError("field 'camera_type' is not a string");
+  }
   const Json& values = JsonMember(node, "intrinsics");
   for (const Model& model : Models()) {
     if (type != model.type) continue;
@@ -73,7 +75,8 @@ CameraCalibration ReadBasaltCamera(const Json& node,
 
 void SetBasaltResolution(const Json& size, CameraCalibration* camera) {
   const auto pixels = [](const Json& value) {
-    constexpr std::int64_t kMost = 1'000'000;  // refused as a size anyway
+    constexpr std::int64_t kMost =
+        1'000'000;  // larger sizes are refused anyway
     if (!value.is_number_integer() || value.get<std::int64_t>() > kMost ||
         value.get<std::int64_t>() < 0) {
       throw FormatError("field 'resolution' needs a width and a height each");
@@ -90,10 +93,10 @@ void SetBasaltResolution(const Json& size, CameraCalibration* camera) {
 Json BasaltCameraJson(const CameraCalibration& camera) {
   for (const Model& model : Models()) {
     if (model.model != camera.model) continue;
-    constexpr double kLeastFov = 1e-4;  // Basalt's equations end there
+    constexpr double kLeastFov = 1e-4;  // below it Basalt's equations fail
     if (camera.model == DistortionModel::kFov &&
         !(camera.distortion[0] > kLeastFov)) {
-      throw FormatError("basalt's fov wants a w above 0");
+      throw FormatError("basalt's fov needs a w above 0");
     }
     Json values = {{"fx", camera.f.x()},
                    {"fy", camera.f.y()},
@@ -104,7 +107,7 @@ Json BasaltCameraJson(const CameraCalibration& camera) {
           camera.distortion[static_cast<Eigen::Index>(i)];
     }
     if (model.model == DistortionModel::kRadialTangential) {
-      // No radius beyond which Basalt would refuse points.
+      // 0: no radius beyond which Basalt rejects points.
       for (const char* key : {"k3", "k4", "k5", "k6", "rpmax"}) {
         values[key] = 0.0;
       }

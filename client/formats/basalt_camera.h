@@ -1,4 +1,4 @@
-// Cameras of Basalt: fov, kb4, pinhole-radtan8 and pinhole.
+// Basalt's camera models fov, kb4, pinhole-radtan8 and pinhole.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,7 +9,8 @@
 
 namespace selfcal::client {
 
-// FormatError for another model, and for coefficients that selfcal lacks.
+// Reads a camera. FormatError for other models, and for coefficients that
+// selfcal does not have.
 CameraCalibration ReadBasaltCamera(const nlohmann::ordered_json& node,
                                    std::vector<Loss>* losses);
 void SetBasaltResolution(const nlohmann::ordered_json& size,

@@ -1,4 +1,5 @@
-// What the camera chains of Kalibr and OpenVINS share, and their IMU's noise.
+// The common part of the camera chains of Kalibr and OpenVINS, and of the noise
+// of their IMU.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -11,19 +12,20 @@
 
 namespace selfcal::client {
 
-// The file that has cameras, and the one that has the IMU, whatever their
-// names. FormatError unless both are there.
+// The file with the cameras and the file with the IMU, found by their content.
+// FormatError unless both are given.
 struct ChainFiles {
   YAML::Node cameras;
-  YAML::Node imu;  // what is under imu0, or the file itself
+  YAML::Node imu;  // the node imu0, or the whole file
 };
 ChainFiles ReadChainFiles(const std::vector<TextFile>& files);
 
-// Of cam0, cam1, ...: f, c, distortion, size and time offset; no extrinsics.
+// Reads and writes f, c, distortion, size and time offset of cam0, cam1, ...;
+// no extrinsics.
 CameraCalibration ReadChainCamera(const YAML::Node& node);
 std::string ChainCameraText(const CameraCalibration& camera);
 
-// Densities by continuous time, as selfcal has them.
+// Reads and writes continuous-time noise densities, as selfcal has them.
 ImuNoise ReadChainNoise(const YAML::Node& imu);
 std::string ChainNoiseText(const ImuNoise& noise, double rate_hz);
 

@@ -43,8 +43,8 @@ absl::StatusOr<const Format*> FindFormat(const std::string& name) {
     if (format.name == name) return &format;
     known.emplace_back(format.name);
   }
-  return absl::InvalidArgumentError(
-      fmt::format("format '{}' is none of {}", name, fmt::join(known, ", ")));
+  return absl::InvalidArgumentError(fmt::format(
+      "format '{}' must be one of {}", name, fmt::join(known, ", ")));
 }
 
 std::string Names(const std::vector<TextFile>& files) {
@@ -59,7 +59,7 @@ absl::Status CheckOptions(const FormatOptions& options) {
       (*options.imu_rate_hz > 0 && *options.imu_rate_hz <= kMost_hz)) {
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError("the IMU's rate is not above 0 Hz");
+  return absl::InvalidArgumentError("the IMU's rate must be above 0 Hz");
 }
 
 absl::Status Check(const Rig& rig, const std::string& files) {
@@ -69,7 +69,7 @@ absl::Status Check(const Rig& rig, const std::string& files) {
       fmt::format("{}: {} {}", files, faults[0].field, faults[0].message));
 }
 
-// The FOV model is even in w; tools want it positive.
+// Makes w of FOV models positive, as tools require; the model is even in w.
 Calibration WithPositiveFov(Calibration theta) {
   for (CameraCalibration& camera : theta.cameras) {
     if (camera.model != DistortionModel::kFov) continue;
@@ -123,8 +123,9 @@ absl::StatusOr<ExportedFiles> ExportRig(const std::string& format,
         (*found)->write(rig, WithPositiveFov(theta), options);
     result.losses.push_back(
         {"sigmas",
-         fmt::format("{} keeps no uncertainty: calibrations show has it",
-                     format),
+         fmt::format(
+             "{} has no uncertainty: `selfcal calibrations show` has it",
+             format),
          false});
     return result;
   } catch (const std::exception& error) {

@@ -1,10 +1,10 @@
 // Calibrations in the files of other tools: read as a rig, written from one.
 //
-// Each tool has its own frames, its own order of a quaternion, and its own
-// matrices of the IMU; docs/formats.md states them with their sources. What a
-// format cannot express is an error where nothing useful would be left, and
-// otherwise a loss with a name. Pure functions of texts, callable from any
-// thread; nothing is read or written here.
+// Each tool has its own frames, quaternion order and IMU matrices;
+// docs/formats.md states them with their sources. If a format cannot express
+// something, that is an error if nothing useful would be left, and otherwise a
+// named loss. These are pure functions of texts, callable from any thread; they
+// do not access files.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -18,26 +18,27 @@
 namespace selfcal::client {
 
 struct TextFile {
-  std::string name;  // as errors name it; where it is written: without a folder
+  std::string name;  // for error messages; without a folder if it is written
   std::string text;
 };
 
-// What one side has and the other cannot say.
+// Something that the source of a conversion has and the target cannot express.
 struct Loss {
   std::string name;  // "imu", "cam1.time_offset", "sigmas"
-  std::string text;  // what that means, and what to do
-  // Pixels, readings or times predicted from the result differ from those of
-  // the source, unless that is done.
+  std::string text;  // what the loss means, and what to do
+  // True if pixels, readings or times that are predicted from the result differ
+  // from those of the source, unless the user does what the text says.
   bool changes_prediction = false;
 };
 
 struct FormatOptions {
-  // Of the IMU [Hz]; selfcal keeps none, some tools' noise is by sample.
+  // Rate of the IMU [Hz], for tools whose noise is per sample; selfcal does not
+  // store it.
   std::optional<double> imu_rate_hz;
 };
 
 struct ImportedRig {
-  Rig rig;  // id empty, groups the default; factory is the calibration
+  Rig rig;  // id empty, default groups; `factory` is the calibration
   std::vector<Loss> losses;
 };
 
@@ -52,16 +53,16 @@ struct FormatInfo {
 };
 std::vector<FormatInfo> Formats();
 
-// The rig that the files of a tool describe, in any order and with any names.
-// INVALID_ARGUMENT for an unknown format, and for what cannot be read or is no
-// valid calibration, with the file and the field.
+// Reads the rig that the files of a tool describe; the files may have any order
+// and any names. INVALID_ARGUMENT for an unknown format and, with the file and
+// the field, for files that cannot be parsed or are not a valid calibration.
 absl::StatusOr<ImportedRig> ImportRig(const std::string& format,
                                       const std::vector<TextFile>& files,
                                       const FormatOptions& options);
 
-// theta in the files of a tool, with the noise and gravity of the rig.
+// Writes theta in the files of a tool, with the noise and gravity of the rig.
 // INVALID_ARGUMENT for an unknown format, FAILED_PRECONDITION for a calibration
-// that it has no words for.
+// that the format cannot express.
 absl::StatusOr<ExportedFiles> ExportRig(const std::string& format,
                                         const Rig& rig,
                                         const Calibration& theta,

@@ -1,4 +1,5 @@
-// Thrown inside this room only; ImportRig and ExportRig turn it into a status.
+// The exception of this module, which does not leave it: ImportRig and
+// ExportRig convert it to a status.
 #pragma once
 
 #include <stdexcept>

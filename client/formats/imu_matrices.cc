@@ -23,7 +23,7 @@ Factors SignedLowerFactors(const Eigen::Matrix3d& M) {
 }
 
 void CheckOrientation(const Eigen::Matrix3d& M) {
-  constexpr double kLeast = 1e-6;  // far below any scale
+  constexpr double kLeast = 1e-6;  // far below any real scale
   if (M.allFinite() && M.determinant() > kLeast) return;
   throw FormatError(
       "a matrix of the IMU is singular or mirrors its axes (its determinant is "
@@ -39,7 +39,7 @@ Factors LowerFactors(const Eigen::Matrix3d& M) {
 
 Factors UpperFactors(const Eigen::Matrix3d& M) {
   CheckOrientation(M);
-  // Rows and columns in reverse order make a lower triangle an upper one.
+  // Reversing rows and columns turns a lower triangle into an upper one.
   const Factors reversed = SignedLowerFactors(M.colwise().reverse());
   return {reversed.triangular.reverse(), reversed.R.colwise().reverse()};
 }

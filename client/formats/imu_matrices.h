@@ -1,11 +1,11 @@
 // The IMU's matrices in the frames and triangular forms that tools use.
 //
 // Any pair of readings gyro = G w_B, accel = A f_B in a body frame B can be
-// written with triangular matrices, since a matrix is the product of a
-// triangular one with positive diagonal and a rotation in exactly one way.
-// Which body frame a tool ends up with depends on which of its matrices has no
-// rotation of its own: selfcal turns B until G is upper triangular (B = I);
-// Kalibr and Basalt until A is lower triangular.
+// written with triangular matrices, because a matrix is the product of a
+// triangular matrix with positive diagonal and a rotation in exactly one way.
+// The body frame of a tool depends on which of its matrices has no rotation of
+// its own: selfcal rotates B so that G is upper triangular (B = I); Kalibr and
+// Basalt rotate it so that A is lower triangular.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@
 namespace selfcal::client {
 
 // M = triangular * R with a positive diagonal and det R = 1. FormatError unless
-// det M is positive: an IMU of which axes are missing or mirrored.
+// det M is positive; otherwise axes of the IMU are missing or mirrored.
 struct Factors {
   Eigen::Matrix3d triangular;
   Eigen::Matrix3d R;
@@ -29,14 +29,15 @@ struct ImuMatrices {
   Eigen::Matrix3d A;
 };
 
-// The same IMU as selfcal has it, and where its frame I is.
+// The same IMU in selfcal's form, with the orientation of its frame I.
 struct ImuInBody {
   ImuCalibration imu;
   Eigen::Matrix3d R_IB;
 };
 ImuInBody FromMatrices(const ImuMatrices& matrices);
 
-// In the frame B in which the accelerometer's matrix is lower triangular.
+// The IMU in the frame B in which the accelerometer's matrix is lower
+// triangular.
 struct AccelFrame {
   ImuMatrices matrices;
   Eigen::Matrix3d R_BI;
@@ -50,7 +51,7 @@ void SetTransformFromBody(const Eigen::Matrix4d& T_CB,
                           const Eigen::Matrix3d& R_BI,
                           CameraCalibration* camera);
 
-// Of a rigid transform.
+// The inverse of a rigid transform.
 Eigen::Matrix4d RigidInverse(const Eigen::Matrix4d& T);
 
 }  // namespace selfcal::client

@@ -14,14 +14,14 @@ namespace {
 void CheckReference(const YAML::Node& imu) {
   if (Has(imu, "T_i_b") && !GetMatrix(imu, "T_i_b", 4, 4).isIdentity(1e-9)) {
     throw FormatError(
-        "T_i_b is not the identity: give the file with imu0, the reference");
+        "T_i_b is not the identity: use the file with imu0, the reference");
   }
   if (GetDouble(imu, "time_offset", 0) != 0) {
     throw FormatError("time_offset of imu0 is not 0");
   }
 }
 
-// Without matrices the readings are taken as they are.
+// Reads the IMU's matrices; without them, readings are used as they are.
 ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
   ImuMatrices result{Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};
   if (!Has(imu, "gyroscopes")) return result;
@@ -32,13 +32,13 @@ ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
   if (Has(gyro, "A") && !GetMatrix(gyro, "A", 3, 3).isZero(0)) {
     losses->push_back({"gyroscopes.A",
                        "selfcal has no sensitivity of the gyroscope to "
-                       "acceleration: left out",
+                       "acceleration: ignored",
                        true});
   }
   for (const char* arm : {"rx_i", "ry_i", "rz_i"}) {
     if (!Has(accel, arm) || GetMatrix(accel, arm, 3, 1).isZero(0)) continue;
     losses->push_back({fmt::format("accelerometers.{}", arm),
-                       "selfcal has one place for all axes: left out",
+                       "selfcal has one position for all axes: ignored",
                        true});
   }
   return result;
@@ -54,7 +54,7 @@ ImportedRig ImportKalibr(const std::vector<TextFile>& files,
   result.rig.imu_noise = ReadChainNoise(chain.imu);
   const ImuInBody body = FromMatrices(ReadMatrices(chain.imu, &result.losses));
   result.rig.factory.imu = body.imu;
-  Eigen::Matrix4d T_CB;  // of the camera before
+  Eigen::Matrix4d T_CB;  // of the previous camera
   for (int j = 0; Has(chain.cameras, fmt::format("cam{}", j)); ++j) {
     const YAML::Node node = chain.cameras[fmt::format("cam{}", j)];
     CameraCalibration camera = ReadChainCamera(node);
@@ -64,7 +64,7 @@ ImportedRig ImportKalibr(const std::vector<TextFile>& files,
       T_CB = Rigid(GetMatrix(node, "T_cn_cnm1", 4, 4), "T_cn_cnm1") * T_CB;
     } else {
       throw FormatError(
-          "T_cam_imu is missing: give the chain of the calibration with the "
+          "T_cam_imu is missing: use the chain of the calibration with the "
           "IMU (camchain-imucam)");
     }
     SetTransformFromBody(T_CB, body.R_IB.transpose(), &camera);

@@ -4,9 +4,9 @@
 // t_imu = t_cam + timeshift_cam_imu. The IMU's frame is that in which the
 // accelerometer's matrix is lower triangular:
 //   accel = M_a f + b_a,   gyro = M_g C_gyro_i w + A_g C_gyro_i f + b_g,
-// with M_g lower triangular, too. Whatever selfcal has can be said; A_g, the
-// gyroscope's sensitivity to acceleration, and lever arms of the
-// accelerometer's axes, cannot be read.
+// with M_g lower triangular, too. The format can express everything that
+// selfcal has. Reading ignores A_g, the gyroscope's sensitivity to
+// acceleration, and the lever arms of the accelerometer's axes.
 #pragma once
 
 #include <vector>

@@ -13,8 +13,8 @@ void AddImuLoss(const std::string& tool,
   if (imu.T_g() == one && imu.T_a() == one && imu.q_AI.vec().isZero(0)) return;
   losses->push_back(
       {"imu",
-       fmt::format("{} takes the readings as they are: give it those that "
-                   "CorrectImu makes with this calibration (scales, "
+       fmt::format("{} uses the readings as they are: give it those that "
+                   "CorrectImu computes with this calibration (scales, "
                    "misalignments and q_AI removed, both in frame I)",
                    tool),
        true});
@@ -28,7 +28,7 @@ void AddTimeOffsetLosses(const std::string& tool,
     if (offset_s == 0) continue;
     losses->push_back(
         {fmt::format("cam{}.time_offset", j),
-         fmt::format("{} has no time offset: add {} s to the stamps of its "
+         fmt::format("{} has no time offset: add {} s to the timestamps of its "
                      "images",
                      tool,
                      offset_s),
@@ -46,7 +46,7 @@ void AddSharedOffsetLosses(const std::string& tool,
     losses->push_back(
         {fmt::format("cam{}.time_offset", j),
          fmt::format("{} has one time offset, that of cam0: add {} s to the "
-                     "stamps of cam{}",
+                     "timestamps of cam{}",
                      tool,
                      more_s,
                      j),
@@ -59,8 +59,8 @@ void AddGravityLoss(const std::string& tool,
                     std::vector<Loss>* losses) {
   if (rig.gravity_mps2 == Rig().gravity_mps2) return;
   losses->push_back({"gravity",
-                     fmt::format("{} does not take it from these files; the "
-                                 "rig's is {} m/s^2",
+                     fmt::format("{} does not read it from these files; that "
+                                 "of the rig is {} m/s^2",
                                  tool,
                                  rig.gravity_mps2),
                      false});
@@ -73,7 +73,7 @@ void KeepCameras(const std::string& tool,
   for (std::size_t j = count; j < theta->cameras.size(); ++j) {
     losses->push_back(
         {fmt::format("cam{}", j),
-         fmt::format("{} has at most {} cameras: left out", tool, count),
+         fmt::format("{} has at most {} cameras: omitted", tool, count),
          true});
   }
   if (theta->cameras.size() > count) theta->cameras.resize(count);
@@ -85,8 +85,8 @@ double ImuRate(const FormatOptions& options,
   if (options.imu_rate_hz) return *options.imu_rate_hz;
   constexpr double kUsual_hz = 200;
   losses->push_back({"imu_rate",
-                     fmt::format("{} is taken for {} Hz, which selfcal does "
-                                 "not know: give --imu-rate",
+                     fmt::format("{} is assumed to be {} Hz, because selfcal "
+                                 "does not know it: set --imu-rate",
                                  field,
                                  kUsual_hz),
                      false});
@@ -98,8 +98,8 @@ void NoSuchModel(const std::string& tool,
                  DistortionModel model,
                  const std::string& models) {
   throw FormatError(
-      fmt::format("cam{} has the distortion model {}, {} only {}; kalibr, "
-                  "basalt and maplab have all of selfcal's",
+      fmt::format("cam{} has the distortion model {}, but {} has only {}; "
+                  "kalibr, basalt and maplab have all models of selfcal",
                   camera,
                   DistortionName(model),
                   tool,

@@ -1,4 +1,5 @@
-// Losses that several formats have in common.
+// Losses that several formats have in common. Each function appends to the
+// losses what a tool of the stated kind cannot express.
 #pragma once
 
 #include <string>
@@ -8,37 +9,37 @@
 
 namespace selfcal::client {
 
-// Of a tool that takes readings as they are: unless the IMU is nominal.
+// For tools that use readings as they are: a loss unless the IMU is nominal.
 void AddImuLoss(const std::string& tool,
                 const ImuCalibration& imu,
                 std::vector<Loss>* losses);
 
-// Of a tool without time offsets.
+// For tools without time offsets.
 void AddTimeOffsetLosses(const std::string& tool,
                          const Calibration& theta,
                          std::vector<Loss>* losses);
-// Of a tool with one for all cameras, that of the first.
+// For tools with one time offset for all cameras, that of the first.
 void AddSharedOffsetLosses(const std::string& tool,
                            const Calibration& theta,
                            std::vector<Loss>* losses);
 
-// Of a tool whose gravity is elsewhere, or fixed.
+// For tools whose gravity is set elsewhere, or fixed.
 void AddGravityLoss(const std::string& tool,
                     const Rig& rig,
                     std::vector<Loss>* losses);
 
-// Cameras of a tool that has at most `count`: those are left.
+// For tools with at most `count` cameras: removes the others.
 void KeepCameras(const std::string& tool,
                  std::size_t count,
                  Calibration* theta,
                  std::vector<Loss>* losses);
 
-// The rate that was given, or a usual one with its name in the losses.
+// Returns the given rate, or a usual one, which is then stated in the losses.
 double ImuRate(const FormatOptions& options,
                const std::string& field,
                std::vector<Loss>* losses);
 
-// FormatError: a distortion model that the tool does not have.
+// Throws a FormatError about a distortion model that the tool does not have.
 [[noreturn]] void NoSuchModel(const std::string& tool,
                               std::size_t camera,
                               DistortionModel model,

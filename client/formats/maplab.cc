@@ -65,14 +65,14 @@ CameraCalibration ReadCamera(const YAML::Node& entry,
       RigidInverse(T_BC), Eigen::Matrix3d::Identity(), &result);
   if (GetDouble(camera, "line-delay-nanoseconds", 0) != 0) {
     losses->push_back({"line-delay-nanoseconds",
-                       "selfcal takes an image for exposed at one time",
+                       "selfcal treats an image as exposed at one time",
                        true});
   }
   return result;
 }
 
-// maplab projects into the cameras of a map by T_B_C alone, whatever the
-// extrinsics say of their system.
+// maplab projects into the cameras of a map with T_B_C only, and ignores the
+// extrinsics of the camera system.
 void AddExtrinsicsLoss(const YAML::Node& root,
                        const YAML::Node& system,
                        std::vector<Loss>* losses) {
@@ -84,12 +84,12 @@ void AddExtrinsicsLoss(const YAML::Node& root,
     }
     losses->push_back({"extrinsics",
                        "T_B_S of the camera system is not used: maplab "
-                       "projects by T_B_C alone",
+                       "projects with T_B_C only",
                        false});
   }
 }
 
-// An id of 32 hexadecimal digits, the same for the same text (FNV-1a).
+// An id of 32 hexadecimal digits: a hash of the text (FNV-1a).
 std::string SensorId(const std::string& text) {
   std::uint64_t halves[2] = {14695981039346656037ull, 1099511628211ull};
   for (std::uint64_t& hash : halves) {
@@ -219,7 +219,7 @@ ExportedFiles ExportMaplab(const Rig& rig,
   AddImuLoss("maplab", theta.imu, &result.losses);
   AddTimeOffsetLosses("maplab", theta, &result.losses);
   result.losses.push_back({"saturation",
-                           "maplab wants the IMU's range, which selfcal does "
+                           "maplab needs the IMU's range, which selfcal does "
                            "not know: its defaults are written, 150 m/s^2 and "
                            "7.5 rad/s",
                            false});

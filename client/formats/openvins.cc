@@ -11,7 +11,8 @@
 namespace selfcal::client {
 namespace {
 
-// OpenVINS would silently take a triangle of what is none.
+// Reads a triangular matrix, and fails for others: OpenVINS would silently use
+// their triangle.
 Eigen::Matrix3d ReadTriangle(const YAML::Node& imu,
                              const std::string& key,
                              bool upper) {
@@ -22,7 +23,7 @@ Eigen::Matrix3d ReadTriangle(const YAML::Node& imu,
             : T.triangularView<Eigen::StrictlyUpper>().toDenseMatrix();
   if (other.isZero(1e-9)) return T;
   throw FormatError(
-      fmt::format("field '{}' is not {} triangular, as its model has it",
+      fmt::format("field '{}' is not {} triangular, as the model requires",
                   key,
                   upper ? "upper" : "lower"));
 }
@@ -45,7 +46,7 @@ ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
   if (Has(imu, "Tg") && !GetMatrix(imu, "Tg", 3, 3).isZero(0)) {
     losses->push_back({"Tg",
                        "selfcal has no sensitivity of the gyroscope to "
-                       "acceleration: left out",
+                       "acceleration: ignored",
                        true});
   }
   return {
@@ -73,7 +74,7 @@ ImportedRig ImportOpenVins(const std::vector<TextFile>& files,
     const YAML::Node node = chain.cameras[fmt::format("cam{}", j)];
     CameraCalibration camera = ReadChainCamera(node);
     if (camera.model == DistortionModel::kFov) {
-      throw FormatError("distortion_model 'fov' is none of OpenVINS");
+      throw FormatError("distortion_model 'fov' is not supported by OpenVINS");
     }
     SetTransformFromBody(ReadExtrinsics(node), body.R_IB.transpose(), &camera);
     auto& cameras = result.rig.factory.cameras;
@@ -82,7 +83,7 @@ ImportedRig ImportOpenVins(const std::vector<TextFile>& files,
     cameras.back().time_offset_s = cameras[0].time_offset_s;
     result.losses.push_back(
         {fmt::format("cam{}.timeshift_cam_imu", j),
-         "OpenVINS uses that of cam0 for all cameras, and so it is read",
+         "OpenVINS uses that of cam0 for all cameras; it is read in this way",
          false});
   }
   return result;
@@ -92,7 +93,7 @@ ExportedFiles ExportOpenVins(const Rig& rig,
                              const Calibration& theta,
                              const FormatOptions& options) {
   ExportedFiles result;
-  // A line that cv::FileStorage wants first.
+  // cv::FileStorage requires this first line.
   std::string chain = "%YAML:1.0\n---\n";
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
     CameraCalibration camera = theta.cameras[j];

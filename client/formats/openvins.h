@@ -1,13 +1,14 @@
 // OpenVINS: kalibr_imucam_chain.yaml and kalibr_imu_chain.yaml.
 //
-// T_imu_cam takes a point from the camera's frame to the IMU's (T_cam_imu, of
-// older files, the other way), and t_imu = t_cam + timeshift_cam_imu, that of
-// cam0 for all. The matrices are those of the readings,
+// T_imu_cam takes a point from the camera's frame to the IMU's (in older files,
+// T_cam_imu is its inverse), and t_imu = t_cam + timeshift_cam_imu, where the
+// offset of cam0 applies to all cameras. The matrices are those of the
+// readings,
 //   accel = Ta R_IMUtoACC f + b_a,
 //   gyro  = Tw R_IMUtoGYRO w + Tg f + b_g;
-// of their inverses OpenVINS keeps the upper triangle with the model "rpng" and
-// the lower one with "kalibr". It is written as "rpng" with R_IMUtoGYRO = 1,
-// which is selfcal's own form.
+// of their inverses, OpenVINS uses the upper triangle with the model "rpng" and
+// the lower triangle with "kalibr". The model is written as "rpng" with
+// R_IMUtoGYRO = 1, which is selfcal's own form.
 #pragma once
 
 #include <vector>

@@ -81,8 +81,8 @@ void CheckCameras(const std::vector<CameraCalibration>& cameras) {
         camera.width_px != cameras[0].width_px ||
         camera.height_px != cameras[0].height_px) {
       throw FormatError(
-          "orb_slam3 has one distortion model and one size of the image for "
-          "both cameras");
+          "orb_slam3 has one distortion model and one image size for both "
+          "cameras");
     }
   }
 }
@@ -105,11 +105,11 @@ std::string NoiseText(const ImuNoise& noise, double rate_hz) {
 
 ImportedRig ImportOrbSlam3(const std::vector<TextFile>& files,
                            const FormatOptions&) {
-  if (files.size() != 1) throw FormatError("give one file of settings");
+  if (files.size() != 1) throw FormatError("give one settings file");
   const YAML::Node root = ParseYaml(files[0]);
   if (!Has(root, "File.version")) {
     throw FormatError(
-        "File.version is missing: settings of before ORB-SLAM3 1.0 are not "
+        "File.version is missing: settings from before ORB-SLAM3 1.0 are not "
         "read");
   }
   ImportedRig result;
@@ -172,8 +172,8 @@ ExportedFiles ExportOrbSlam3(const Rig& rig,
   result.losses.push_back(
       {"settings",
        "those of its extractor, viewer and images (Camera.fps, Camera.RGB, "
-       "ORBextractor.*, Stereo.ThDepth) are no calibration: put these lines "
-       "into your file",
+       "ORBextractor.*, Stereo.ThDepth) are not part of a calibration: insert "
+       "these lines into your file",
        false});
   result.files = {{"orb_slam3.yaml", text}};
   return result;

@@ -3,8 +3,8 @@
 // IMU.T_b_c1 takes a point from the left camera's frame to the body's, and
 // Stereo.T_c1_c2 from the right one's to the left one's. PinHole has k1 k2 p1
 // p2 (and k3), KannalaBrandt8 has k1 .. k4. The body's frame is that of the
-// IMU, of which readings are taken as they are; noise is by continuous time.
-// One or two cameras with the same model and size of the image.
+// IMU, whose readings are used as they are; noise densities are for continuous
+// time. There are one or two cameras, with the same model and image size.
 #pragma once
 
 #include <vector>

@@ -22,7 +22,7 @@ const TextFile& FindFile(const std::vector<TextFile>& files,
     if (FileName(file.name) == FileName(name)) return file;
   }
   throw FormatError(
-      fmt::format("its camera file {} is missing: give it, too", name));
+      fmt::format("its camera file {} is missing: give it as well", name));
 }
 
 YAML::Node FindConfiguration(const std::vector<TextFile>& files) {
@@ -30,7 +30,7 @@ YAML::Node FindConfiguration(const std::vector<TextFile>& files) {
     const YAML::Node root = ParseYaml(file);
     if (Has(root, "num_of_cam")) return root;
   }
-  throw FormatError("no file has num_of_cam: give the configuration, too");
+  throw FormatError("no file has num_of_cam: give the configuration as well");
 }
 
 CameraCalibration ReadCamera(const TextFile& file) {
@@ -115,8 +115,7 @@ void CheckCameras(const std::vector<CameraCalibration>& cameras) {
     }
     if (cameras[j].width_px != cameras[0].width_px ||
         cameras[j].height_px != cameras[0].height_px) {
-      throw FormatError(
-          "vins_fusion has one size of the image for both cameras");
+      throw FormatError("vins_fusion has one image size for both cameras");
     }
   }
 }
@@ -127,7 +126,9 @@ ImportedRig ImportVinsFusion(const std::vector<TextFile>& files,
                              const FormatOptions& options) {
   const YAML::Node root = FindConfiguration(files);
   ImportedRig result;
-  if (GetInt(root, "imu") != 1) throw FormatError("imu is not 1: it has none");
+  if (GetInt(root, "imu") != 1) {
+    throw FormatError("imu is not 1: the configuration has no IMU");
+  }
   const double by_sample =
       1 / std::sqrt(ImuRate(options, "the rate of its noise", &result.losses));
   result.rig.imu_noise = {
@@ -196,8 +197,8 @@ ExportedFiles ExportVinsFusion(const Rig& rig,
   AddSharedOffsetLosses("vins_fusion", kept, &result.losses);
   result.losses.push_back(
       {"settings",
-       "those of its tracker, solver and topics are no calibration: put these "
-       "lines into your file",
+       "those of its tracker, solver and topics are not part of a calibration: "
+       "insert these lines into your file",
        false});
   result.files = {{"vins_fusion.yaml", text}};
   result.files.insert(result.files.end(), cameras.begin(), cameras.end());

@@ -1,4 +1,4 @@
-// Reading and writing the values of YAML files, OpenCV's among them.
+// Reading and writing the values of YAML files, including those of OpenCV.
 //
 // Every function that reads throws FormatError, which names the field.
 #pragma once
@@ -14,7 +14,8 @@
 
 namespace selfcal::client {
 
-// OpenCV begins its files with a line that is no directive of YAML 1.2.
+// Parses a file. Accepts the first line of OpenCV's files, which is not a valid
+// directive of YAML 1.2.
 YAML::Node ParseYaml(const TextFile& file);
 
 bool Has(const YAML::Node& node, const std::string& key);
@@ -27,28 +28,29 @@ std::vector<int> GetInts(const YAML::Node& node,
                          const std::string& key,
                          std::size_t count);
 
-// A list of lists, or one list of all numbers by rows.
+// Reads a list of lists, or one list of all numbers, row by row.
 Eigen::MatrixXd GetMatrix(const YAML::Node& node,
                           const std::string& key,
                           int rows,
                           int cols);
-// The same under "data", as OpenCV and maplab have it.
+// Reads the same from the field "data", as OpenCV and maplab write it.
 Eigen::MatrixXd GetMatrixData(const YAML::Node& node,
                               const std::string& key,
                               int rows,
                               int cols);
-// With a rotation that is one within 1e-3, made one exactly.
+// Returns T with its rotation made orthonormal; it must be a rotation to within
+// 1e-3.
 Eigen::Matrix4d Rigid(const Eigen::MatrixXd& T, const std::string& name);
 
-// The shortest text that reads as the same number, always with a decimal
-// point: OpenCV and YAML 1.1 take "1" for an integer and "1e-05" for a word.
+// The shortest text that reads as the same number, always with a decimal point:
+// OpenCV and YAML 1.1 read "1" as an integer and "1e-05" as a string.
 std::string NumberText(double value);
-// "[1.0, 2.0]"
+// Returns e.g. "[1.0, 2.0]".
 std::string ListText(std::span<const double> values);
-// A line for each row, "    - [1.0, 2.0]".
+// Returns a line for each row, e.g. "    - [1.0, 2.0]".
 std::string RowsText(const Eigen::MatrixXd& M, const std::string& indent);
-// "!!opencv-matrix" with its rows, columns and data; `type` is 'd', or 'f' for
-// a reader that takes the elements for floats whatever they are.
+// Returns an "!!opencv-matrix" with its rows, columns and data; `type` is 'd',
+// or 'f' for a reader that reads elements as floats in any case.
 std::string OpenCvMatrixText(const Eigen::MatrixXd& M, char type);
 
 }  // namespace selfcal::client
