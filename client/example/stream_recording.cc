@@ -1,20 +1,20 @@
 // Streams a recording to selfcald as a SLAM process would, then waits until all
-// of it is acknowledged.
+// segments are acknowledged.
 //
 //   stream_recording TARGET RIG DIR [SPOOL_DIR]
 //
-// DIR has three files of numbers separated by commas, a line for each, in the
+// DIR has three files with comma-separated numbers, one record per line, in the
 // order of time:
 //
-//   imu.csv           t_ns, gyroscope x y z [rad/s], accelerometer x y z
-//   [m/s^2] keyframes.csv     t_ns, q_GI w x y z, p_GI x y z [m], v_GI x y z
-//   [m/s],
+//   imu.csv           t_ns, gyroscope x y z [rad/s],
+//                     accelerometer x y z [m/s^2]
+//   keyframes.csv     t_ns, q_GI w x y z, p_GI x y z [m], v_GI x y z [m/s],
 //                     b_a x y z [m/s^2], b_g x y z [rad/s]
 //   observations.csv  t_ns of the keyframe, camera, landmark, u v [px],
 //                     p_G x y z [m] of the landmark
 //
-// Exit code: 0 if every segment was stored (or had been before), 1 if not, 2
-// for a recording that cannot be read.
+// Exit code: 0 if every segment is stored (by this or an earlier call), 1 if
+// not, 2 if the recording cannot be read.
 #include <selfcal/client.h>
 #include <selfcal/segment_builder.h>
 
@@ -31,8 +31,8 @@ namespace sc = selfcal::client;
 
 using Row = std::vector<double>;
 
-// False for a line that has other than `count` numbers. The time is apart, for
-// a double cannot hold its nanoseconds.
+// Parses a time and `count` numbers; false for any other line. The time is an
+// integer, because a double cannot represent its nanoseconds.
 bool Parse(const std::string& line,
            std::size_t count,
            std::int64_t* t_ns,
@@ -50,7 +50,8 @@ bool Parse(const std::string& line,
   return parsed.ec == std::errc() && row->size() == count;
 }
 
-// Calls back for each line of DIR/name; says what is wrong and returns false.
+// Calls back for each line of the file. On an error, prints it and returns
+// false.
 template <typename Callback>
 bool ForEachRow(const std::string& path,
                 std::size_t count,
@@ -127,7 +128,8 @@ void OnCalibration(const sc::CalibrationVersion& active) {
               active.theta.cameras.front().f.x());
 }
 
-// A recording does not mind to wait; a SLAM system would go on.
+// Waits when many segments are queued, because a recording can wait; a SLAM
+// system would continue.
 void Send(sc::SegmentStream* stream, sc::SegmentBuilder* builder) {
   while (auto closed = builder->TakeClosed()) {
     if (stream->statistics().queued >= 8) {

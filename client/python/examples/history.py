@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Lists the segments of a rig as a data frame and plots how its calibration
-went on from version to version.
+"""Lists the segments of a rig as a data frame and plots its calibration over
+the versions.
 
     PYTHONPATH=DIR history.py TARGET RIG PLOT.png
 
-DIR is made by client/python/generate; needs pandas and matplotlib.
+client/python/generate creates DIR. Needs pandas and matplotlib.
 """
 
 import sys
@@ -20,7 +20,7 @@ from matplotlib import pyplot  # noqa: E402
 
 
 def segment_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:
-    """One row for each segment, oldest first; gains by group [nats]."""
+    """Returns one row per segment, oldest first; gains by group [nats]."""
     rows = []
     for segment in daemon.segments(rig):
         row = {
@@ -43,7 +43,7 @@ def segment_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:
 
 
 def calibration_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:
-    """One row for each component of each version."""
+    """Returns one row for each component of each version."""
     states = calibration_service_pb2.Calibration.State
     return pandas.DataFrame(
         [
@@ -54,7 +54,7 @@ def calibration_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:
                 "component": estimate.component,
                 "unit": estimate.unit,
                 "value": estimate.value,
-                # Of a rotation, whose vector may change its sign.
+                # For rotations, whose rotation vector may change its sign.
                 "from_factory": estimate.from_factory,
                 "sigma": estimate.sigma,
             }
@@ -65,8 +65,8 @@ def calibration_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:
 
 
 def plot_history(frame: pandas.DataFrame, path: str) -> None:
-    """What changed against the first version, with sigmas, a plot each for
-    focal length and principal point; rejected versions are hollow."""
+    """Plots the differences from the first version, with sigmas, in one plot
+    each for focal length and principal point; rejected versions are hollow."""
     figure, axes = pyplot.subplots(2, 1, sharex=True, figsize=(8, 6))
     for axis, kind in zip(axes, ["focal", "principal"]):
         chosen = frame[frame.component.str.contains(kind)]

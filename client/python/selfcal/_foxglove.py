@@ -1,4 +1,4 @@
-"""Parts of a segment as messages of Foxglove's schemas; see selfcal.mcap."""
+"""Converts parts of a segment to Foxglove's schemas; see selfcal.mcap."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Timed = Tuple[int, str, object]  # t_ns, topic, message
 _DISTORTION = {
     v1.DISTORTION_MODEL_RADIAL_TANGENTIAL: "plumb_bob",
     v1.DISTORTION_MODEL_EQUIDISTANT: "kannala_brandt",
-    v1.DISTORTION_MODEL_FOV: "fov",  # not one that Foxglove knows
+    v1.DISTORTION_MODEL_FOV: "fov",  # Foxglove does not know it
 }
 
 
@@ -50,7 +50,7 @@ def _contract_vector(xyz: Tuple[float, float, float]) -> v1.Vector3:
 def _inverse(
     q: v1.Quaternion, p: v1.Vector3
 ) -> Tuple[Quaternion_pb2.Quaternion, Vector3_pb2.Vector3]:
-    """T_BA of T_AB = (q, p)."""
+    """Returns T_BA for T_AB = (q, p)."""
     w, x, y, z = q.w, -q.x, -q.y, -q.z
     # -q^-1 p: twice the cross products of Rodrigues' formula.
     cross = (y * p.z - z * p.y, z * p.x - x * p.z, x * p.y - y * p.x)
@@ -59,20 +59,20 @@ def _inverse(
         z * cross[0] - x * cross[2],
         x * cross[1] - y * cross[0],
     )
-    turned = [
+    rotated = [
         a + 2 * (w * b + c)
         for a, b, c in zip((p.x, p.y, p.z), cross, again)
     ]
     return (
         Quaternion_pb2.Quaternion(w=w, x=x, y=y, z=z),
-        Vector3_pb2.Vector3(x=-turned[0], y=-turned[1], z=-turned[2]),
+        Vector3_pb2.Vector3(x=-rotated[0], y=-rotated[1], z=-rotated[2]),
     )
 
 
 def sensors(
     calibration: v1.CalibrationParameters, t_ns: int
 ) -> Iterator[Timed]:
-    """Where the sensors are, and what the cameras are."""
+    """Yields the poses of the sensors and the intrinsics of the cameras."""
     parts = [("A", calibration.imu.q_ai, v1.Vector3())]
     for number, camera in enumerate(calibration.cameras):
         parts.append((f"cam{number}", camera.q_ci, camera.p_ci))
@@ -154,7 +154,7 @@ def landmarks(segment: segment_pb2.MotionSegment) -> Iterator[Timed]:
     if not segment.landmarks.id:
         return
     number = PackedElementField_pb2.PackedElementField
-    record = struct.Struct("<dddII")  # an id has 64 bits: in two parts
+    record = struct.Struct("<dddII")  # the 64 bits of an id in two parts
     t_ns = segment.keyframes.t_ns[0]
     fields = [
         number(name=name, offset=8 * i, type=number.FLOAT64)
@@ -225,7 +225,7 @@ def losses(calibration: v1.CalibrationParameters) -> List[str]:
         if camera.time_offset_s != 0:
             lost.append(
                 f"cam{number}: the time offset of {camera.time_offset_s:g} s "
-                "has no place; images keep their own stamps"
+                "is not included; images keep their own timestamps"
             )
     scales = calibration.imu
     if any(
@@ -236,6 +236,6 @@ def losses(calibration: v1.CalibrationParameters) -> List[str]:
         for value in (vector.x, vector.y, vector.z)
     ):  # fmt: skip
         lost.append(
-            "imu: scales and misalignments have no place; readings are raw"
+            "imu: scales and misalignments are not included; readings are raw"
         )
     return lost

@@ -1,11 +1,11 @@
-"""What a program does with a calibration: readings to rates, points to pixels
-and pixels to rays, as in C++ (core/model/imu.h, core/model/camera.h).
+"""Applies a calibration: corrects IMU readings, projects points to pixels, and
+converts pixels to rays, as in C++ (core/model/imu.h, core/model/camera.h).
 
-Arrays have the vectors in their last axis, any number of them before it; the
-messages are those of the contract. Needs numpy. Where a camera's model has no
-answer, a row is NaN: a point behind the camera, or where the distortion is not
-one-to-one; a pixel that no point projects to. Borders of the image do not
-count.
+The last axis of an array has the components of a vector; there may be any
+number of axes before it. Messages are those of the contract. Needs numpy. If
+the camera model has no result, the row is NaN: for a point behind the camera or
+where the distortion is not one-to-one, and for a pixel that no point projects
+to. The borders of the image are ignored.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _vector(v) -> np.ndarray:
 
 
 def _rotation(q: v1.Quaternion) -> np.ndarray:
-    """The matrix R_AB of q_AB."""
+    """Returns the matrix R_AB of q_AB."""
     w, x, y, z = np.array([q.w, q.x, q.y, q.z]) / np.linalg.norm(
         [q.w, q.x, q.y, q.z]
     )
@@ -50,7 +50,7 @@ def correct_imu(
     b_g: np.ndarray,
     b_a: np.ndarray,
 ) -> Tuple[np.ndarray, np.ndarray]:
-    """Angular rate [rad/s] and specific force [m/s^2] in the body frame I."""
+    """Returns angular rate [rad/s] and specific force [m/s^2] in frame I."""
     T_g = _upper(imu.s_g, imu.m_g)
     T_a_R_AI = _upper(imu.s_a, imu.m_a) @ _rotation(imu.q_ai)
     return (
@@ -60,19 +60,20 @@ def correct_imu(
 
 
 def to_camera(camera: v1.CameraCalibration, p_I: np.ndarray) -> np.ndarray:
-    """Points from the body frame I to the camera's."""
+    """Transforms points from the body frame I to the camera's frame."""
     return np.asarray(p_I) @ _rotation(camera.q_ci).T + _vector(camera.p_ci)
 
 
 def _first_root(coefficients: list[float], limit: float) -> float:
-    """The first zero of 1 + c1 x + c2 x^2 + ... in (0, limit), or limit."""
+    """Returns the first zero of 1 + c1 x + c2 x^2 + ... in (0, limit), or
+    limit."""
     roots = np.roots([*coefficients[::-1], 1.0])
     real = roots[np.abs(roots.imag) < 1e-12 * np.abs(roots)].real
     return float(min([r for r in real if 0 < r < limit], default=limit))
 
 
 def _scaled(u: np.ndarray, r: np.ndarray, r_new: np.ndarray) -> np.ndarray:
-    """u with its length r made r_new; r = 0 stays."""
+    """Scales u from its length r to the length r_new; r = 0 stays."""
     return u * np.where(r > 0, r_new / np.where(r > 0, r, 1), 0)[..., None]
 
 
@@ -117,7 +118,7 @@ class _Equidistant:
     def undistort(self, d: np.ndarray) -> np.ndarray:
         r_d = np.linalg.norm(d, axis=-1)
         low, high = np.zeros_like(r_d), np.full_like(r_d, self._max)
-        for _ in range(60):  # the radius rises with theta
+        for _ in range(60):  # the radius increases with theta
             middle = (low + high) / 2
             below = self._radius(middle) < r_d
             low = np.where(below, middle, low)
@@ -146,7 +147,7 @@ class _RadialTangential:
         )
 
     def _derivative(self, u: np.ndarray) -> np.ndarray:
-        """By u, symmetric: (xx, xy, yy)."""
+        """Returns the derivative by u, which is symmetric: (xx, xy, yy)."""
         k1, k2, p1, p2 = self._k
         x, y = u[..., 0], u[..., 1]
         r2 = x * x + y * y
@@ -169,7 +170,7 @@ class _RadialTangential:
         return np.where(self._valid(u)[..., None], self._value(u), np.nan)
 
     def undistort(self, d: np.ndarray) -> np.ndarray:
-        """Newton's method from the axis; a step that does not help is halved."""
+        """Runs Newton's method from the axis; halves steps that do not help."""
         u = np.zeros_like(d)
         for _ in range(60):
             error = d - self._value(u)
@@ -212,7 +213,7 @@ def _model(camera: v1.CameraCalibration):
 
 
 def project(camera: v1.CameraCalibration, p_C: np.ndarray) -> np.ndarray:
-    """Pixels of points in the camera's frame (z forward)."""
+    """Returns the pixels of points in the camera's frame (z forward)."""
     p = np.asarray(p_C, dtype=float)
     with np.errstate(all="ignore"):
         u = p[..., :2] / p[..., 2:]
@@ -225,7 +226,7 @@ def project(camera: v1.CameraCalibration, p_C: np.ndarray) -> np.ndarray:
 
 
 def unproject(camera: v1.CameraCalibration, z_px: np.ndarray) -> np.ndarray:
-    """Unit bearings in the camera's frame of pixels."""
+    """Returns the unit bearings of pixels, in the camera's frame."""
     d = (np.asarray(z_px, dtype=float) - [camera.c.x, camera.c.y]) / [
         camera.f.x,
         camera.f.y,

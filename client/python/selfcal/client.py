@@ -22,7 +22,7 @@ from selfcal.v1 import (
 )
 
 _PAGE_SIZE = 500
-_MAX_MESSAGE_BYTES = 64 << 20  # what the daemon takes and sends
+_MAX_MESSAGE_BYTES = 64 << 20  # limit of the daemon
 
 _Request = TypeVar("_Request")
 _Response = TypeVar("_Response")
@@ -45,9 +45,10 @@ class Tls:
 
 
 class Daemon:
-    """Lists are read page by page while they are iterated over.
+    """A connection to the daemon. Lists are read page by page while they are
+    iterated over.
 
-    `timeout_s` is that of each call but the watches, which last.
+    `timeout_s` applies to each call, except streams and watches.
     """
 
     def __init__(self, channel: grpc.Channel, timeout_s: float = 30) -> None:
@@ -88,7 +89,7 @@ class Daemon:
     def segment_data(
         self, rig_id: str, segment_id: str
     ) -> segment.MotionSegment:
-        """What was sent, of `session~index` as in its name, while it is kept."""
+        """Returns the data of the segment `session~index`, while it is kept."""
         return self.segment_service.GetSegmentData(
             segment.GetSegmentDataRequest(
                 name=f"rigs/{rig_id}/segments/{segment_id}"
@@ -105,7 +106,7 @@ class Daemon:
     def stream(
         self, requests: Iterable[segment.StreamSegmentsRequest]
     ) -> Iterator[segment.StreamSegmentsResponse]:
-        """Sends segments; one verdict for each, in their order."""
+        """Sends segments; yields one verdict for each, in their order."""
         return self.segment_service.StreamSegments(iter(requests))
 
     def calibration(
@@ -119,7 +120,7 @@ class Daemon:
         )
 
     def calibrations(self, rig_id: str) -> Iterator[calibration.Calibration]:
-        """Every version, rejected ones too; newest first."""
+        """All versions, including rejected ones; newest first."""
         request = calibration.ListCalibrationsRequest(parent=f"rigs/{rig_id}")
         for page in self._pages(
             self.calibration_service.ListCalibrations, request
@@ -129,7 +130,7 @@ class Daemon:
     def watch_calibration(
         self, rig_id: str
     ) -> Iterator[calibration.Calibration]:
-        """The active version at once, then each new one."""
+        """Yields the active version at once, then each new one."""
         return self.calibration_service.WatchCalibration(
             calibration.WatchCalibrationRequest(parent=f"rigs/{rig_id}")
         )
@@ -147,7 +148,7 @@ class Daemon:
             yield from page.recalibrations
 
     def activity(self, rigs: int = 50) -> activity.ListActivityResponse:
-        """What goes on right now, of the rigs that sent last."""
+        """Returns the current activity, for the rigs that sent last."""
         return self.activity_service.ListActivity(
             activity.ListActivityRequest(page_size=rigs),
             timeout=self._timeout_s,
@@ -166,9 +167,9 @@ class Daemon:
 
 
 def connect(target: str, tls: Optional[Tls] = None) -> Daemon:
-    """`target` as gRPC names it: unix:/path or host:port.
+    """Returns a client for `target`, as in gRPC: unix:/path or host:port.
 
-    Returns at once; the connection is made by the first call.
+    Returns at once; the first call makes the connection.
     """
     options = [("grpc.max_receive_message_length", _MAX_MESSAGE_BYTES)]
     if tls is None:

@@ -1,10 +1,10 @@
-"""Segments as MCAP, with Foxglove's schemas, for Foxglove, Rerun and others::
+"""Writes segments as MCAP, with Foxglove's schemas, for Foxglove, Rerun etc.::
 
     python -m selfcal.mcap TARGET RIG FOLDER [SEGMENT...] [--version VERSION]
 
-writes a file for each session, FOLDER/SESSION.mcap, of the segments that are
-named (``session~index``) or of all whose data is kept. Needs the extra ``mcap``:
-``pip install 'selfcal[mcap]'``.
+writes a file for each session, FOLDER/SESSION.mcap, with the named segments
+(``session~index``) or all segments whose data is kept. Needs the extra
+``mcap``: ``pip install 'selfcal[mcap]'``.
 
 Frames are G (the session's), I (the body), A (the accelerometer) and cam0,
 cam1, ...; times are those of the session's clock.
@@ -55,11 +55,11 @@ def write(
     segments: Iterable[segment_pb2.MotionSegment],
     calibration: v1.CalibrationParameters,
 ) -> List[str]:
-    """Writes segments of one session with the calibration that holds for them.
+    """Writes segments of one session with the calibration that applies to them.
 
-    Returns what the file cannot say, a sentence each. Raises ValueError for
-    segments of several sessions, which have clocks and frames of their own, and
-    for times before zero, which MCAP has not.
+    Returns what the file cannot express, one sentence each. Raises ValueError
+    for segments of several sessions, because each session has its own clock and
+    frame, and for times before zero, which MCAP does not support.
     """
     timed: List[_foxglove.Timed] = []
     sessions = set()
@@ -76,8 +76,8 @@ def write(
         timed += _foxglove.observations(segment)
     if len(sessions) != 1:
         raise ValueError(
-            f"one session for each file, not {len(sessions)}: each has a clock "
-            "and a frame of its own"
+            f"a file takes one session, not {len(sessions)}: each session has "
+            "its own clock and frame"
         )
     timed.sort(key=lambda entry: entry[0])
     if timed[0][0] < 0:
@@ -96,16 +96,22 @@ def write(
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m selfcal.mcap",
-        description="Writes segments of a rig as MCAP, a file for each session.",
+        description="Write segments of a rig as MCAP, one file per session.",
     )
-    parser.add_argument("target", help="unix:/path or host:port, as gRPC has it")
+    parser.add_argument("target", help="unix:/path or host:port, as in gRPC")
     parser.add_argument("rig")
-    parser.add_argument("folder", help="gets SESSION.mcap; is made if need be")
-    parser.add_argument("segment", nargs="*", help="session~index; else all")
-    parser.add_argument("--version", default="active", help="of the calibration")
+    parser.add_argument(
+        "folder", help="for the files SESSION.mcap; created if missing"
+    )
+    parser.add_argument("segment", nargs="*", help="session~index; default: all")
+    parser.add_argument(
+        "--version", default="active", help="version of the calibration"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite files")
     for flag in ("ca", "cert", "key"):
-        parser.add_argument(f"--{flag}", help="for host:port: PEM, as selfcal's")
+        parser.add_argument(
+            f"--{flag}", help="PEM file for host:port, as for selfcal"
+        )
     return parser
 
 
@@ -142,7 +148,7 @@ def main() -> int:
         name = urllib.parse.quote(session, safe="") + ".mcap"
         path = os.path.join(flags.folder, name)
         if os.path.exists(path) and not flags.force:
-            print(f"{path} is there already; --force", file=sys.stderr)
+            print(f"{path} exists: use --force to overwrite", file=sys.stderr)
             return 2
         segments.sort(key=lambda segment: segment.index)
         try:
@@ -150,7 +156,7 @@ def main() -> int:
             os.replace(f"{path}.new", path)
         except (OSError, ValueError) as error:
             pathlib.Path(f"{path}.new").unlink(missing_ok=True)
-            print(f"{path} is not written: {error}", file=sys.stderr)
+            print(f"{path} was not written: {error}", file=sys.stderr)
             return 2
         for line in lost:
             print(f"lost: {line}", file=sys.stderr)

@@ -266,7 +266,7 @@ class McapTest(unittest.TestCase):
         other = segment_pb2.MotionSegment()
         other.CopyFrom(self.segments[0])
         other.session = "other"
-        with self.assertRaisesRegex(ValueError, "one session for each file"):
+        with self.assertRaisesRegex(ValueError, "a file takes one session"):
             mcap.write(
                 io.BytesIO(), [self.segments[0], other], self.calibration
             )
@@ -278,7 +278,7 @@ class McapTest(unittest.TestCase):
         arguments = [self.target, "simulated", f"{self.folder}/out"]
         done = run(arguments)
         self.assertEqual(done.returncode, 2)
-        self.assertIn("there already", done.stderr)
+        self.assertIn("exists", done.stderr)
         self.assertEqual(run([*arguments, "--force"]).returncode, 0)
 
     def test_leaves_the_old_file_when_the_disk_is_full(self) -> None:
