@@ -48,11 +48,11 @@ const tests = {
   },
 
   async 'a filter that nothing passes says what to do'(r) {
-    await r.shows('/?filter=nothing', 'Rigs', ['Take the filter away'], 'rigs-none');
+    await r.shows('/?filter=nothing', 'Rigs', ['Clear the filter'], 'rigs-none');
   },
 
   async 'a rig tells how well it is known'(r) {
-    await r.shows('/rigs/tablet', 'tablet', ['What is weak', 'focal length of camera 0, x']);
+    await r.shows('/rigs/tablet', 'tablet', ['Weak parameters', 'focal length of camera 0, x']);
     await r.page.locator('.uplot canvas').first().waitFor();
     await r.picture('rig');
     await r.detail('rig');
@@ -62,7 +62,7 @@ const tests = {
     const rig = '/rigs/phone-001';
     await r.shows(rig, 'phone-001', ['No segment is scored yet']);
     await r.shows(rig + '/segments', 'Segments of phone-001', ['No segment has arrived yet']);
-    await r.shows(rig + '/recalibrations', 'Runs of phone-001', ['No run yet'], 'runs-none');
+    await r.shows(rig + '/recalibrations', 'Runs of phone-001', ['There are no runs yet'], 'runs-none');
   },
 
   async 'segments are filtered and sorted by their address'(r) {
@@ -87,14 +87,14 @@ const tests = {
     await r.rows((names) => names.join() === sorted);
     assert.equal(await r.page.getByLabel('Filter').inputValue(), filter);
     await r.page.locator('th[aria-sort=descending]', { hasText: 'Gain' }).waitFor();
-    // What is sorted by the score of one group goes on to be by another's.
+    // A list sorted by the score of a group is then sorted by that of the other.
     await r.page.getByLabel('Scores of').selectOption('imu');
     const other = await expected(filter, 'gain.imu desc');
     await r.rows((names) => names.join() === other);
-    await r.page.getByText('What can be asked for').click();
+    await r.page.getByText('Filter syntax').click();
     await r.picture('segments-filtered');
     await r.page.getByRole('link', { name: 'state = UNUSABLE' }).click();
-    await r.sees('No segment is as asked for');
+    await r.sees('No segment matches');
     await r.page.getByLabel('Filter').fill('');
     await r.rows((names) => names.length > kept.split(',').length);
   },
@@ -119,7 +119,7 @@ const tests = {
     const { tables } = await r.api('rigs/tablet/tables');
     const { segment } = tables[0].entries[0];
     await r.page.goto(`${r.base}/${segment}`);
-    await r.sees('kept: place 1 of');
+    await r.sees('kept: rank 1 of');
     await r.page.locator('.uplot canvas').nth(1).waitFor();
     const scrubber = r.page.getByLabel(/^Time:/);
     const before = await r.page.locator('circle.now').getAttribute('cx');
@@ -127,9 +127,9 @@ const tests = {
     await r.page.keyboard.press('End');
     await r.sees('keyframe 20 of 20');
     assert.notEqual(await r.page.locator('circle.now').getAttribute('cx'), before);
-    await r.page.getByText('What it says alone about each parameter').click();
+    await r.page.getByText('Information of this segment alone about each parameter').click();
     await r.page.getByRole('row', { name: /focal length of camera 0, x \[px\]/ }).waitFor();
-    // Residuals go with the time, and with the version.
+    // Residuals depend on the time and on the version.
     await r.sees(/Camera 0: .* px rms over the/);
     await r.sees('At version 1,');
     assert.ok((await r.page.locator('g.observation line').count()) > 0);
@@ -156,7 +156,7 @@ const tests = {
     await r.shows('/rigs/tablet/sessions', 'Sessions of tablet', ['walk'], 'sessions');
     await r.page.getByRole('link', { name: 'walk', exact: true }).click();
     await r.heading('Session walk');
-    await r.sees('richest first');
+    await r.sees('most informative first');
     const { segments } = await r.api('rigs/tablet/sessions/walk/trajectory?page_size=100');
     const kept = segments.filter((s) => s.tables.length > 0);
     assert.ok(kept.length > 0 && kept.length < segments.length, 'all or none are kept');
@@ -177,7 +177,7 @@ const tests = {
     await r.page.getByRole('combobox').selectOption({ index: 1 });
     assert.notEqual(await r.page.locator('thead').textContent(), before);
     assert.ok((await own()) > 0);
-    // A place on the way leads to its segment.
+    // A point on the path links to its segment.
     const picture = r.page.locator('.wide svg');
     await picture.hover();
     await r.sees('click to open it');
@@ -193,7 +193,7 @@ const tests = {
     await r.sees('Its data was dropped');
     await r.sees(/not kept|kept until/);
     await r.picture('segment-dropped');
-    // One that a later one pushed out of a table names it.
+    // An entry that a later segment replaced names that segment.
     for (const { name } of segments) {
       const { absences } = await r.api(name + '/absences');
       const pushed = absences.find((absence) => absence.cause === 'PUSHED_OUT');
@@ -223,7 +223,7 @@ const tests = {
   async 'runs are listed and explained'(r) {
     await r.shows('/rigs/tablet/recalibrations', 'Runs of tablet', ['tables full'], 'runs');
     await r.shows('/rigs/tablet/recalibrations/1', 'Run 1 of tablet',
-      ['What the solver says'], 'run');
+      ['Solver report'], 'run');
   },
 
   async 'mistakes in an address are explained'(r) {
@@ -261,7 +261,7 @@ const tests = {
     await r.open('/rigs/headset', 'headset');
     await r.page.getByRole('link', { name: 'The coach' }).click();
     await r.heading('Coach of headset');
-    await r.sees('and 0 segments that a table');
+    await r.sees('and 0 segments in the tables');
     const expected = () => r.page.locator('.advice').textContent();
     const before = await expected();
     assert.match(before, /\d % smaller/);
@@ -270,9 +270,9 @@ const tests = {
     await r.picture('coach');
     await r.detail('coach');
     await start(sendSegments, [daemon.address, 'headset', 'carried', '6']);
-    await r.sees(/and [1-9] segments? that a table/);
+    await r.sees(/and [1-9] segments? in the tables/);
     assert.notEqual(await expected(), before);
-    await r.shows('/rigs/tablet/coach', 'Coach of tablet', ['What is known worst']);
+    await r.shows('/rigs/tablet/coach', 'Coach of tablet', ['Least known']);
   },
 
   async 'a run is drawn while it computes'(r, other, daemon) {
@@ -285,7 +285,7 @@ const tests = {
       const number = name.slice(name.lastIndexOf('/') + 1);
       const heading = `Run ${number} of tablet`;
       await r.open('/' + name, heading);
-      // Lets it go on a little at a time, until the page has told of two.
+      // Continues it in small steps, until the page shows two iterations.
       await until('the second iteration', async () => {
         process.kill(worker, 'SIGCONT');
         await sleep(10);
@@ -293,7 +293,7 @@ const tests = {
         await sleep(50);
         return r.page.getByText(/^Iteration ([2-9]|\d\d)/).count();
       });
-      // Who opens it now sees it from the beginning.
+      // A page that is opened now shows it from the beginning.
       await other.shows('/' + name, heading, ['Iteration ', 'focal length of camera 0, x']);
       const way = await other.page.locator('.way .path').first().getAttribute('points');
       assert.ok(way.split(' ').length >= 3, way);
@@ -302,8 +302,8 @@ const tests = {
     } finally {
       process.kill(worker, 'SIGCONT');
     }
-    // What was drawn stays when it has ended.
-    await r.sees('What the solver says');
+    // The drawing stays when the run has ended.
+    await r.sees('Solver report');
     await r.sees('Over the iterations');
     await r.picture('run-ended');
   },
@@ -335,7 +335,7 @@ try {
   }
   console.log('a daemon that has stopped');
   reader.expectProblems = other.expectProblems = true;
-  await reader.shows('/rigs/tablet', 'tablet', ['What is weak']);
+  await reader.shows('/rigs/tablet', 'tablet', ['Weak parameters']);
   await daemon.stop();
   await reader.page.getByText('not live').waitFor();
   await reader.page.getByRole('link', { name: 'Segments', exact: true }).click();

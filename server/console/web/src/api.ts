@@ -1,5 +1,5 @@
-// What /api/v1 answers; names and values are those of the contract, 64-bit
-// integers as texts.
+// The types of /api/v1; names and values are those of the contract, with 64-bit
+// integers as strings.
 
 export interface ApiError {
   code: string;
@@ -211,11 +211,11 @@ export interface Absence {
   time: string;
   rival: string; // a segment
   rivalEntropyNats?: number;
-  fit?: number; // of its residuals against what is expected
+  fit?: number; // its residuals, relative to what is expected
   fitLimit?: number;
 }
 
-// What a segment alone leaves to be known.
+// The information of one segment about a component.
 export interface ComponentInformation {
   component: string;
   unit: string;
@@ -269,7 +269,7 @@ export interface ComponentProgress {
   component: string;
   unit: string;
   value: number;
-  moved: number; // from where the run began
+  moved: number; // difference to the start value
   sigma: number;
 }
 
@@ -288,7 +288,7 @@ export interface Run {
   message: string;
   attempts: number;
   solver?: Solver;
-  parameters: ComponentProgress[]; // in the stream alone
+  parameters: ComponentProgress[]; // only in the stream
 }
 
 export interface Advice {
@@ -305,7 +305,7 @@ export interface Advice {
 }
 
 export interface Coaching {
-  advice: Advice[]; // the most informative first
+  advice: Advice[]; // most informative first
   weakest: {
     words: string;
     sigmaByReference: number;
@@ -339,8 +339,8 @@ async function answer<T>(response: Response): Promise<T> {
       ? error
       : {
           code: String(response.status),
-          message: 'The answer of the daemon cannot be read.',
-          whatToDo: 'Load the page again; look into the log of selfcald.',
+          message: 'The response of the daemon cannot be read.',
+          whatToDo: 'Reload the page; see the log of selfcald.',
         },
   );
 }
@@ -352,7 +352,7 @@ async function reach(path: string, init?: RequestInit): Promise<Response> {
     throw new Failure({
       code: 'UNAVAILABLE',
       message: 'The daemon does not answer.',
-      whatToDo: 'See whether selfcald runs; this page goes on by itself.',
+      whatToDo: 'Check that selfcald is running; this page reconnects by itself.',
     });
   }
 }
@@ -371,7 +371,7 @@ export async function post<T>(path: string, body: unknown): Promise<T> {
   );
 }
 
-// The last part of a resource name, as it stands in an address.
+// The last part of a resource name, encoded as in an address.
 export function idOf(name: string): string {
   return name.slice(name.lastIndexOf('/') + 1);
 }

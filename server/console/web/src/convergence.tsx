@@ -1,5 +1,5 @@
-// How a run comes to its result: the cost, and each parameter with its sigma
-// against where the run began, over the iterations.
+// The convergence of a run over its iterations: the cost, and each parameter with
+// its sigma, relative to its start value.
 import { useMemo } from 'preact/hooks';
 import type uPlot from 'uplot';
 import type { ComponentProgress } from './api';
@@ -10,17 +10,18 @@ import { kColours, Plot } from './plot';
 export interface Step {
   iteration: number;
   cost: number;
-  step: number; // largest of a parameter, in sigmas
+  step: number; // largest step of a parameter, in sigmas
   parameters: ComponentProgress[];
 }
 
 const kWidth = 200;
 const kHeight = 34;
 const kEdge = 3;
-// A parameter that moves less does not show it in any digit that counts.
+// A smaller step, in sigmas, changes no significant digit of a parameter.
 const kStill = 0.01;
 
-// The way of one parameter, its sigma around it, and a line where it began.
+// The course of one parameter, with a band of one sigma and a line at its start
+// value.
 function Way(props: { of: ComponentProgress[]; label: string }) {
   const ends = props.of.flatMap((p) => [p.moved - p.sigma, p.moved + p.sigma, 0]);
   const [least, most] = [Math.min(...ends), Math.max(...ends)];
@@ -74,8 +75,8 @@ function Parameters(props: { steps: Step[] }) {
     <>
       <h2>Parameters</h2>
       <p class="quiet">
-        Each against where the run began (dashed), with one sigma either way as
-        the iteration knows it.
+        Each relative to its start value (dashed), with a band of one sigma at
+        that iteration.
       </p>
       <DataTable
         caption="Parameters by iteration"

@@ -1,4 +1,4 @@
-// Times, numbers and names as people read them.
+// Times, numbers and names in a form for people.
 
 export function number(value: number | string, digits = 3): string {
   const x = Number(value);
@@ -77,12 +77,12 @@ export function component(name: string): string {
   return name;
 }
 
-// With its unit, where it has one.
+// A number with its unit, if it has one.
 export function quantity(value: number, unit: string, digits = 6): string {
   return number(value, digits) + (unit === '-' ? '' : ' ' + unit);
 }
 
-// A pattern with a '*' at either end.
+// Matches a pattern, which may have a '*' at either end.
 export function matches(pattern: string, name: string): boolean {
   const text = pattern.replace(/^\*|\*$/g, '');
   const open = pattern.startsWith('*');
@@ -95,8 +95,8 @@ export function matches(pattern: string, name: string): boolean {
 
 const kDegrees = 180 / Math.PI;
 
-// A rotation as what it differs by from the factory's value, in degrees: near
-// pi, rotation vectors change their sign though nothing has moved.
+// Shows a rotation as its difference from the factory value, in degrees: a
+// rotation vector near pi can change its sign although nothing has moved.
 export function shown(estimate: {
   unit: string;
   value: number;

@@ -1,53 +1,60 @@
-// A list that the daemon hands out in pages. Where one is in it, and what is
-// asked for, stands in the address.
+// A list that the daemon returns in pages. The address has the position in the
+// list and the query.
 import type { ComponentChildren } from 'preact';
 import type { ApiError } from './api';
 import { DataTable, Empty, Link, Loaded, Title } from './parts';
 import { useAddress, useRead, withQuery } from './state';
 
-type Way = 'asc' | 'desc';
+type SortDirection = 'asc' | 'desc';
 
 export interface Column<T> {
   head: string;
   cell: (item: T) => ComponentChildren;
-  order?: string; // what order_by calls it, where it can be sorted by
+  order?: string; // its name in order_by, if the list can be sorted by it
 }
 
 interface Listing<T> {
   path: string; // under /api/v1
-  items: string; // what the answer calls them
-  query?: string[]; // of the address, that the daemon works out
-  order?: [string, Way]; // without order_by in the address
+  items: string; // the field of the response that has them
+  query?: string[]; // query parameters of the address that go to the daemon
+  order?: [string, SortDirection]; // default, without order_by in the address
   version: number;
   columns: Column<T>[]; // the first names the item
-  next: string; // what the link to the next page says
+  next: string; // text of the link to the next page
   empty: ComponentChildren;
-  // Stands above the table; told what the daemon says of a request that it
-  // cannot read.
+  // Content above the table. Gets the daemon's error if the request is invalid.
   above?: (mistake: ApiError | null) => ComponentChildren;
 }
 
-// By what a list is sorted, as the address has it.
-export function orderOf(address: URLSearchParams, without: [string, Way]): [string, Way] {
-  const [field, way] = (address.get('order_by') ?? '').split(' ');
+// The order of a list, from the address.
+export function orderOf(
+  address: URLSearchParams,
+  without: [string, SortDirection],
+): [string, SortDirection] {
+  const [field, direction] = (address.get('order_by') ?? '').split(' ');
   if (!field) return without;
-  return [field, way === 'asc' || way === 'desc' ? way : without[1]];
+  return [field, direction === 'asc' || direction === 'desc' ? direction : without[1]];
 }
 
-// Sorts by the column; where that is done already, the other way.
-function SortBy(props: { column: string; head: string; now: [string, Way]; first: Way }) {
-  const [field, way] = props.now;
+// A link that sorts by the column; reverses the order if it is the present one.
+function SortBy(props: {
+  column: string;
+  head: string;
+  now: [string, SortDirection];
+  first: SortDirection;
+}) {
+  const [field, direction] = props.now;
   const current = field === props.column;
-  const next = !current ? props.first : way === 'asc' ? 'desc' : 'asc';
+  const next = !current ? props.first : direction === 'asc' ? 'desc' : 'asc';
   return (
     <Link to={withQuery({ order_by: `${props.column} ${next}`, page_token: '' })}>
       {props.head}
-      <span aria-hidden="true">{current ? (way === 'asc' ? ' ▲' : ' ▼') : ''}</span>
+      <span aria-hidden="true">{current ? (direction === 'asc' ? ' ▲' : ' ▼') : ''}</span>
     </Link>
   );
 }
 
-// To the next page and to the first one.
+// Links to the next page and to the first page.
 function Pager(props: { next: string; token: string; more: string }) {
   if (!props.token && !props.more) return null;
   return (

@@ -1,5 +1,5 @@
-// Which page an address shows. Addresses are those of the resources: what is
-// rigs/a/segments/s~0 over gRPC is /rigs/a/segments/s~0 here.
+// Routes an address to its page. The address of a page is the name of its
+// resource: rigs/a/segments/s~0 in gRPC is /rigs/a/segments/s~0 here.
 import './style.css';
 import { render } from 'preact';
 import { useEffect } from 'preact/hooks';
@@ -97,7 +97,7 @@ function Page(props: {
     <>
       <Title text="Not found">There is no such page</Title>
       <Empty>
-        The address names nothing that the console shows. Begin at the{' '}
+        The console has no page at this address. Start at the{' '}
         <Link to="/">list of rigs</Link>.
       </Empty>
     </>
@@ -106,7 +106,7 @@ function Page(props: {
 
 function App() {
   const url = useAddress();
-  // A calibration has its place in the history.
+  // A calibration is shown on the page of the rig's calibrations.
   const calibration = /^(\/rigs\/[^/]+\/calibrations)\/(\d+)$/.exec(url.pathname);
   const parts = (calibration ? calibration[1] : url.pathname)
     .split('/')
@@ -119,7 +119,7 @@ function App() {
   return (
     <>
       <a class="skip" href="#content">
-        To the content
+        Skip to the content
       </a>
       <header>
         <Link to="/" class="brand">

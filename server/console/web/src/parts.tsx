@@ -1,4 +1,4 @@
-// What several pages are made of.
+// Components that several pages share.
 import type { ComponentChildren, JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import { idOf, pageOf, type ApiError, type Solver } from './api';
@@ -28,7 +28,7 @@ export function Link(props: {
   );
 }
 
-// The heading of a page, which a change of the page moves the focus to.
+// The heading of a page; it gets the focus when the page changes.
 export function Title(props: { children: ComponentChildren; text: string }) {
   const heading = useRef<HTMLHeadingElement>(null);
   useEffect(() => {
@@ -58,7 +58,7 @@ export function Empty(props: { children: ComponentChildren }) {
   return <div class="box empty">{props.children}</div>;
 }
 
-// An error, a wait, or what was read.
+// Shows an error, a loading note, or the value that was read.
 export function Loaded<T>(props: {
   read: { value: T | null; error: ApiError | null };
   children: (value: T) => ComponentChildren;
@@ -105,7 +105,7 @@ export function Badge(props: { state: string }) {
   );
 }
 
-// A part of a whole, with both in words.
+// A meter that also shows the value and the total as numbers.
 export function Meter(props: { value: number; of: number; label: string }) {
   return (
     <span class="meter">
@@ -115,11 +115,11 @@ export function Meter(props: { value: number; of: number; label: string }) {
   );
 }
 
-// Of what the factory says, that is still not known.
+// Limits of sigma as a fraction of the factory tolerance.
 export const kWell = 0.1;
 export const kWeak = 0.5;
 
-// The part of a tolerance that a sigma is.
+// Shows a sigma as a fraction of the factory tolerance.
 export function Unknown(props: { ratio: number; of: string }) {
   return (
     <span class="meter">
@@ -130,7 +130,7 @@ export function Unknown(props: { ratio: number; of: string }) {
         high={kWeak}
         optimum={0}
         value={Math.min(props.ratio, 1)}
-        aria-label={'part of the tolerance of ' + props.of}
+        aria-label={'fraction of the tolerance of ' + props.of}
       />
       {number(100 * props.ratio, 2)} %
     </span>
@@ -139,7 +139,7 @@ export function Unknown(props: { ratio: number; of: string }) {
 
 export type Figure = [string, ComponentChildren];
 
-// What is null is not shown.
+// A list of names and values; null entries are not shown.
 export function Figures(props: { of: (Figure | null)[] }) {
   return (
     <dl class="figures">
@@ -153,7 +153,7 @@ export function Figures(props: { of: (Figure | null)[] }) {
   );
 }
 
-// What several pages say of how a calibration went.
+// Figures about a solver run, for several pages.
 export function solverFigures(solver: Solver): Record<'iterations' | 'reprojection' | 'rank', Figure> {
   return {
     iterations: ['Iterations', solver.iterations],
@@ -181,7 +181,7 @@ export function SegmentLinks(props: { names: string[] }) {
   );
 }
 
-// One of several, each with what it is called.
+// A menu to choose one of several values; each has a label.
 export function Choice(props: {
   label: string;
   value: string;

@@ -1,4 +1,4 @@
-// A plot by uPlot that follows the width and the colours of the page.
+// A plot, drawn by uPlot, that adapts to the width and the colours of the page.
 import { useEffect, useRef } from 'preact/hooks';
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
@@ -12,19 +12,19 @@ function ink(name: string): string {
 }
 
 export interface PlotProps {
-  label: string; // what it shows, in a sentence
+  label: string; // a description of the plot
   data: uPlot.AlignedData;
   series: uPlot.Series[];
   x?: { label?: string; integers?: boolean; range?: [number, number] };
   y?: string;
-  log?: boolean; // of values above 0
+  log?: boolean; // logarithmic y axis; needs values above 0
   bands?: uPlot.Band[];
   height?: number;
-  cursor?: number; // index of the value that is pointed at
+  cursor?: number; // index of the value under the cursor
   onCursor?: (index: number) => void;
 }
 
-// Of a logarithmic axis over decades, the powers of ten alone.
+// Labels only the powers of ten on a logarithmic axis over several decades.
 function powers(_: uPlot, values: number[]): (number | null)[] {
   const isPower = (value: number) => {
     const power = Math.log10(value);
@@ -61,7 +61,7 @@ export function Plot(props: PlotProps) {
   const plot = useRef<uPlot | null>(null);
   const onCursor = useRef(props.onCursor);
   onCursor.current = props.onCursor;
-  // Whoever reads numbers moves it, or the pointer does.
+  // The cursor is moved by the page or by the pointer.
   const moving = useRef(false);
 
   useEffect(() => {
@@ -88,7 +88,7 @@ export function Plot(props: PlotProps) {
         hooks: {
           setCursor: [
             (u) => {
-              // A change of its size tells of the cursor as well.
+              // uPlot also calls this when the size of the plot changes.
               const pointed = !moving.current && u.over.matches(':hover');
               if (pointed && u.cursor.idx != null) {
                 onCursor.current?.(u.cursor.idx);

@@ -1,5 +1,4 @@
-// What a segment leaves unexplained: residuals of its observations and between
-// its keyframes, at one time of it.
+// The residuals of a segment: of its observations and between its keyframes.
 import { useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
 import type { SegmentData, SegmentResiduals } from './api';
@@ -14,7 +13,7 @@ interface Shown {
   data: SegmentData;
   residuals: SegmentResiduals;
   keyframe: number;
-  end: number; // of the time axis, which the IMU's plots have too [s]
+  end: number; // of the time axis, as in the plots of the IMU [s]
   onKeyframe: (keyframe: number) => void;
 }
 
@@ -30,9 +29,9 @@ const points = (label: string, stroke: string): uPlot.Series => ({
   points: { show: true, size: 4, stroke, fill: stroke },
 });
 
-const kObservations = [points('used', kColours[0]), points('left out', kColours[1])];
+const kObservations = [points('used', kColours[0]), points('excluded', kColours[1])];
 
-// Of one camera, each observation at the time of its keyframe.
+// The residuals of one camera, at the times of the keyframes.
 function Reprojections(props: Shown & { camera: number }) {
   const { data, keyframes } = useMemo(() => {
     const { observations } = props.data;
@@ -69,18 +68,18 @@ function Reprojections(props: Shown & { camera: number }) {
   );
 }
 
-// Parts of the residual of an interval, as they come.
+// The parts of the residual of an interval, in their order.
 const kParts = [
   { name: 'rotation', unit: 'rad' },
   { name: 'velocity', unit: 'm/s' },
   { name: 'position', unit: 'm' },
-  { name: 'step of the accelerometer bias', unit: 'm/s²' },
-  { name: 'step of the gyroscope bias', unit: 'rad/s' },
+  { name: 'change of the accelerometer bias', unit: 'm/s²' },
+  { name: 'change of the gyroscope bias', unit: 'rad/s' },
 ];
 const kSize = 15;
 const kWhitened = 'whitened';
 
-// Lines of biases are broken.
+// The lines of biases are dashed.
 const kGrey = '#8a929c';
 const kKinds: uPlot.Series[] = kParts.map((part, i) => ({
   label: part.name,
@@ -154,7 +153,7 @@ function InWords(props: { of: SegmentResiduals }) {
           <li key={c.camera}>
             Camera {c.camera}: {number(c.inlierRmsPx)} px rms over the {c.inliers} of{' '}
             {c.observations} observations that a score uses
-            {c.observations > c.inliers && `; ${c.observations - c.inliers} are left out`}.
+            {c.observations > c.inliers && `; ${c.observations - c.inliers} are excluded`}.
           </li>
         ))}
         {notProjectable.length > 0 && (
@@ -163,9 +162,9 @@ function InWords(props: { of: SegmentResiduals }) {
         {inertialRms.length > 0 && <li>IMU, rms in standard deviations: {kinds}.</li>}
       </ul>
       <p class="quiet">
-        At version {calibrationVersion}, about the states that the client's SLAM
-        system sent; landmarks are moved as for a score, nothing else is. These
-        are not the residuals after a calibration: the page of its run has those.
+        At version {calibrationVersion}, with the states that the client's SLAM
+        system sent; landmarks are refined as for a score, everything else is held
+        constant. For the residuals after a calibration, see the page of its run.
       </p>
     </>
   );

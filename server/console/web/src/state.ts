@@ -1,4 +1,4 @@
-// Where the reader is, what was read, and when to read it again.
+// State that pages share: the address, data from the daemon, and its updates.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { Failure, get, type ApiError } from './api';
 
@@ -26,7 +26,8 @@ export function useAddress(): URL {
   return url;
 }
 
-// The address of this page with other values in its query; empty ones go.
+// The address of this page with other values in its query; empty values are
+// removed.
 export function withQuery(values: Record<string, string>): string {
   const url = new URL(location.href);
   for (const [key, value] of Object.entries(values)) {
@@ -41,11 +42,11 @@ export function withQuery(values: Record<string, string>): string {
 export interface Read<T> {
   value: T | null;
   error: ApiError | null;
-  busy: boolean; // a new answer is under way
+  busy: boolean; // a request is in progress
 }
 
-// Reads a path, and again whenever `version` changes; what was read stays until
-// the new answer is there. A null path reads nothing.
+// Reads a path, and reads it again when `version` changes; the old value is kept
+// until the new one arrives. A null path reads nothing.
 export function useRead<T>(path: string | null, version = 0): Read<T> {
   const [read, setRead] = useState<{
     value: T | null;
@@ -69,7 +70,7 @@ export function useRead<T>(path: string | null, version = 0): Read<T> {
   return { ...read, busy: read.version !== version };
 }
 
-// The version, no more often than so: where an answer costs the daemon more.
+// Limits how often the version changes, for requests that cost the daemon more.
 export function useCalm(version: number, leastMs: number): number {
   const [calm, setCalm] = useState(version);
   const last = useRef(0);
@@ -91,8 +92,8 @@ export function useCalm(version: number, leastMs: number): number {
 
 const kSettleMs = 400;
 
-// Counts up when something has changed; of one rig, or of all with ''. Bursts
-// count once.
+// A version that is incremented when something has changed, in one rig or, with
+// '', in any; once for a burst of changes.
 export function useLive(rig: string): { version: number; live: boolean } {
   const [version, setVersion] = useState(0);
   const [live, setLive] = useState(false);
@@ -107,7 +108,7 @@ export function useLive(rig: string): { version: number; live: boolean } {
     source.addEventListener('change', () => {
       setLive(true);
       if (first) {
-        // Says that the stream stands: what was read before is as new.
+        // The stream is connected: the data that was read before is up to date.
         first = false;
         return;
       }

@@ -1,4 +1,4 @@
-// Ways through space, seen from a side that the reader chooses.
+// Paths in space, seen from a direction that the user chooses.
 import type { ComponentChildren } from 'preact';
 import { useMemo, useState } from 'preact/hooks';
 
@@ -6,13 +6,13 @@ const kSize = 320;
 const kMargin = 24;
 const kDegree = Math.PI / 180;
 
-// Pieces of a way that look alike: x, y, z in turn.
+// Pieces of a path with the same style; x, y, z in turn.
 export interface Strand {
   ways: number[][];
   class: string;
 }
 
-// A single place of a strand.
+// A marked point.
 export interface Mark {
   at: number[]; // x, y, z
   class: string;
@@ -25,7 +25,7 @@ interface View {
   tilt: number;
 }
 
-// To the right and down, in metres.
+// Coordinates in the picture, to the right and down, in metres.
 function project(x: number, y: number, z: number, view: View): [number, number] {
   const [c, s] = [Math.cos(view.turn * kDegree), Math.sin(view.turn * kDegree)];
   const [ct, st] = [Math.cos(view.tilt * kDegree), Math.sin(view.tilt * kDegree)];
@@ -33,11 +33,11 @@ function project(x: number, y: number, z: number, view: View): [number, number] 
 }
 
 interface Fit {
-  scale: number; // pixels for a metre
+  scale: number; // pixels per metre
   place: (at: number[], i?: number) => [number, number];
 }
 
-// So that all of it is in the picture.
+// Chooses the scale so that everything is in the picture.
 function fit(strands: Strand[], view: View, width: number, height: number): Fit {
   let [left, right, top, bottom] = [Infinity, -Infinity, Infinity, -Infinity];
   for (const { ways } of strands) {
@@ -78,7 +78,8 @@ function drawn(ways: number[][], place: Fit['place']): string {
   return path;
 }
 
-// A round length that is a good part of the picture.
+// The length of the scale bar: a round number of metres that is a good part of
+// the picture.
 function rod(scale: number, width: number): number {
   const most = (width - 2 * kMargin) / 2 / scale;
   const power = 10 ** Math.floor(Math.log10(most));
@@ -90,7 +91,7 @@ function length(metres: number): string {
   return `${Number((metres * 1000).toPrecision(1))} mm`;
 }
 
-// `onPoint` gets the number of the target that is nearest to the pointer.
+// `onPoint` gets the index of the target nearest to the pointer.
 export function Scene(props: {
   label: string;
   strands: Strand[];

@@ -1,5 +1,5 @@
-// The way of a device through a session: how it is read, and how it is drawn in
-// colours of what each piece says.
+// The path of a device through a session: reads it, and draws it coloured by the
+// entropy of each segment.
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import {
   Failure,
@@ -16,10 +16,10 @@ import { Choice, Empty } from './parts';
 import { go } from './state';
 import { Scene, type Mark, type Strand } from './trajectory';
 
-// What the page draws at most; the daemon thins long sessions.
+// Limits of what the page draws; the daemon thins out long sessions.
 const kPages = 20;
 const kPageSize = 1000;
-const kSteps = 6; // of colour
+const kSteps = 6; // number of colours
 
 export interface Way {
   session: SessionOverview;
@@ -41,9 +41,9 @@ async function readWay(path: string): Promise<Way> {
   }
 }
 
-// Of one path as long as the component is there. Reads again when something has
-// changed, but never twice at a time: a long session takes longer than its next
-// segment.
+// Reads the path of one session while the component is mounted. Reads again when
+// something has changed, but never concurrently: reading a long session can take
+// longer than recording its next segment.
 export function useWay(path: string, version: number) {
   const [way, setWay] = useState<Way | null>(null);
   const [error, setError] = useState<ApiError | null>(null);
@@ -81,11 +81,11 @@ export function useWay(path: string, version: number) {
 
 interface Scale {
   bounds: number[]; // between the steps, ascending
-  stepOf: (entropy: number) => number; // 0: says least
+  stepOf: (entropy: number) => number; // 0: least informative
 }
 
-// Steps with as many segments each: entropies of rest and of motion lie far
-// apart, and those of motion would look alike in steps of equal width.
+// Steps with equal numbers of segments. Entropies of rest and of motion are far
+// apart, so that with steps of equal width all motion would look alike.
 function scaleOf(entropies: number[]): Scale {
   const sorted = [...entropies].sort((a, b) => a - b);
   const bounds = Array.from(
@@ -120,7 +120,7 @@ function Legend(props: { scale: Scale; counts: number[]; unknown: number }) {
       {Array.from({ length: kSteps }, (_, i) => kSteps - 1 - i).map((step) => (
         <li key={step}>
           {sample('info-' + step)} {range(step)} nats: {props.counts[step]}
-          {step === kSteps - 1 ? ', says most' : step === 0 ? ', says least' : ''}
+          {step === kSteps - 1 ? ', most informative' : step === 0 ? ', least informative' : ''}
         </li>
       ))}
       {props.unknown > 0 && (
@@ -155,7 +155,7 @@ function say(piece: SessionPiece, group: string): string {
   );
 }
 
-// Consecutive pieces join where the gap between them is small.
+// Consecutive pieces are joined if the gap between them is small.
 function wayOf(piece: SessionPiece, next: SessionPiece | undefined): number[] {
   const close = next && next.positionsM.length > 0 && joins(piece, next);
   return close ? [...piece.positionsM, ...next.positionsM.slice(0, 3)] : piece.positionsM;
@@ -180,7 +180,7 @@ function strandsOf(drawn: SessionPiece[], group: string, scale: Scale): Strand[]
       ways: ways((piece) => stepOf(piece) === step && !isKept(piece)),
       class: 'info-' + step,
     })),
-    // Kept ones lie above, on an edge of their own.
+    // Kept pieces are drawn on top, with an edge.
     { ways: ways(isKept), class: 'edge' },
     ...steps.map((step) => ({
       ways: ways((piece) => stepOf(piece) === step && isKept(piece)),
@@ -212,8 +212,8 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
   if (drawn.length === 0) {
     return (
       <Empty>
-        No positions are kept of this session: it was received before the daemon
-        kept them. Its segments are listed with the others of the rig.
+        No positions of this session are stored: it was received before the daemon
+        stored them. Its segments are listed with the others of the rig.
       </Empty>
     );
   }
@@ -223,7 +223,7 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
     <>
       <div class="wide">
         <Scene
-          label={`Way of the device through session ${way.session.session}, coloured by the entropy of group ${group}; the tables below say the same in numbers`}
+          label={`Path of the device through session ${way.session.session}, coloured by the entropy of group ${group}; the tables below have the numbers`}
           strands={strands}
           marks={marks}
           width={720}
@@ -232,25 +232,25 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
           onPoint={setPointed}
           onPick={() => now && go(pageOf(now.segment))}
         >
-          Way of the IMU
+          Path of the IMU
         </Scene>
       </div>
       <p class="quiet">
         {now
           ? say(now, group) + '; click to open it'
-          : 'Point at the way to see which segment it is. Thick pieces with a mark are kept; a full mark is kept for this group.'}
+          : 'Point at the path to see the segment. Thick pieces with a mark are kept; a filled mark means kept for this group.'}
       </p>
       {drawn.length < way.pieces.length && (
         <p class="quiet">
           {way.pieces.length - drawn.length} segments are not drawn: they were
-          received before positions were kept.
+          received before positions were stored.
         </p>
       )}
     </>
   );
 }
 
-// In the colours of a group, with what chooses the group.
+// The path coloured by a group, with the menu that selects the group.
 export function ColouredWay(props: {
   way: Way;
   groups: string[];

@@ -31,9 +31,9 @@ import {
 import { kColours, Plot } from '../plot';
 import { go, useAddress, useRead, withQuery } from '../state';
 
-const kBand = 2; // sigmas either way
+const kBand = 2; // half width of the band, in sigmas
 
-// As it is shown.
+// The estimate in the unit in which it is shown.
 function estimateOf(version: Calibration, name: string) {
   const estimate = version.estimates.find((e) => e.component === name);
   return estimate && shown(estimate);
@@ -42,7 +42,7 @@ function estimateOf(version: Calibration, name: string) {
 function History(props: { of: Calibration[] }) {
   const query = useAddress().searchParams;
   const [factory, setFactory] = useState(props.of.length === 1);
-  // The factory's sigmas would flatten all that came after.
+  // The factory's sigmas are so large that later versions would look flat.
   const versions = [...props.of].reverse().filter((v) => factory || v.version !== '1');
   const names = versions[0].estimates
     .filter((e) => e.sigma > 0)
@@ -75,19 +75,19 @@ function History(props: { of: Calibration[] }) {
               checked={factory}
               onChange={(event) => setFactory(event.currentTarget.checked)}
             />
-            with the factory's
+            with the factory calibration
           </label>
         )}
       </div>
       <Plot
-        label={`${component(chosen)} over the versions, with two sigmas either way`}
+        label={`${component(chosen)} over the versions, with a band of two sigmas`}
         data={data}
         x={{ label: 'version', integers: true }}
         y={unit === '-' ? 'value' : unit}
         series={[
           { label: component(chosen), stroke: kColours[0], width: 2, points: { show: true, size: 7 } },
-          { label: 'and two sigmas', ...bound },
-          { label: 'less two sigmas', ...bound },
+          { label: 'plus two sigmas', ...bound },
+          { label: 'minus two sigmas', ...bound },
         ]}
         bands={[{ series: [2, 3], fill: kColours[0] + '22' }]}
       />
@@ -123,11 +123,11 @@ function Difference(props: { rig: string; of: Calibration[] }) {
           <>
             <p>
               {compared.degrees === 0
-                ? 'Neither version knows a direction clearly better than the factory: nothing can be compared.'
-                : `Together they differ ${compared.significant ? 'by more than' : 'no more than'} their uncertainty explains: chi-square ${number(compared.chiSquare)} with ${compared.degrees} degrees, probability ${number(compared.probability)}.`}
+                ? 'Neither version determines a direction clearly better than the factory: nothing can be compared.'
+                : `Together they differ by ${compared.significant ? 'more' : 'no more'} than their uncertainty explains: chi-square ${number(compared.chiSquare)} with ${compared.degrees} degrees of freedom, probability ${number(compared.probability)}.`}
             </p>
             <DataTable
-              caption={`Version ${compared.versionB} less version ${compared.versionA}`}
+              caption={`Version ${compared.versionB} minus version ${compared.versionA}`}
               head={['Parameter', `Version ${compared.versionA}`, `Version ${compared.versionB}`, 'Difference', 'Sigma', 'In sigmas']}
               rows={compared.differences.map((d) => {
                 const sigmas = Math.abs(d.difference) / d.sigma;
@@ -178,8 +178,8 @@ function Activate(props: { calibration: Calibration; active: string; onEnd: () =
           {back ? 'Roll back to' : 'Activate'} version {props.calibration.version}?
         </h2>
         <p>
-          Every device that watches this rig takes it up at once, in place of
-          version {props.active}. The reason goes into the log of events.
+          Every device that watches this rig receives it at once, and uses it in
+          place of version {props.active}. The event log records the reason.
         </p>
         <label>
           Reason
@@ -253,9 +253,8 @@ function Validation(props: { of: Calibration }) {
       />
       {held && held.degrees > 0 && (
         <p>
-          On {held.segments} segments that it was not calibrated on ({held.rescored} scored
-          anew): chi-square{' '}
-          {number(held.chiSquare)} with {held.degrees} degrees (probability{' '}
+          On {held.segments} held-out segments ({held.rescored} rescored): chi-square{' '}
+          {number(held.chiSquare)} with {held.degrees} degrees of freedom (probability{' '}
           {number(held.probability)}); the version before: {number(held.activeChiSquare)}.
         </p>
       )}
@@ -269,8 +268,8 @@ function Origin(props: { of: Calibration }) {
   return (
     <>
       <p>
-        Made by <Link to={pageOf(from.recalibration)}>run {idOf(from.recalibration)}</Link>{' '}
-        of selfcald {from.programVersion}, starting at version {from.baseVersion}, out of{' '}
+        Computed by <Link to={pageOf(from.recalibration)}>run {idOf(from.recalibration)}</Link>{' '}
+        of selfcald {from.programVersion}, starting from version {from.baseVersion}, from{' '}
         {from.segments.length} segments:
       </p>
       <SegmentLinks names={from.segments} />
@@ -282,7 +281,7 @@ function Noise(props: { of: Solver }) {
   if (props.of.noiseFactors.length === 0) return null;
   return (
     <DataTable
-      caption="Noise, as factors of what the rig states"
+      caption="Noise scales, relative to what the rig states"
       head={['Kind', 'Residuals suggest', 'Used']}
       rows={props.of.noiseFactors.map((factor) => [
         words(factor.kind),
@@ -297,12 +296,12 @@ function Noise(props: { of: Solver }) {
   );
 }
 
-// By their fit, where it was measured.
+// The fit of each segment, where it was measured.
 function Fits(props: { of: Solver }) {
   if (props.of.segmentFits.length === 0) return null;
   return (
     <DataTable
-      caption="Residuals of each segment, over what its noise predicts"
+      caption="Residuals of each segment, relative to what the noise predicts"
       head={['Segment', 'Pixels', 'IMU', 'Excluded']}
       rows={props.of.segmentFits.map((fit) => [
         <SegmentLink name={fit.segment} />,
@@ -408,7 +407,7 @@ export function Calibrations(props: { rig: string; session: Session | null; vers
                 <Problem
                   error={{
                     code: 'NOT_FOUND',
-                    message: `Version ${shown} is not among those listed.`,
+                    message: `Version ${shown} is not in this list.`,
                     whatToDo: 'Choose one from the table.',
                   }}
                 />

@@ -1,16 +1,17 @@
-// Which motion would teach a rig the most now; for whoever holds the device.
+// The motion with the largest predicted gain, for the person who holds the
+// device.
 import { pageOf, rigPath, type Advice, type Coaching } from '../api';
 import { component, number, quantity, words } from '../format';
 import { DataTable, Link, Problem, Title } from '../parts';
 import { useCalm, useRead } from '../state';
 
 const kAll = 100; // more than there are motions
-// Between two answers: a segment takes longer to record.
+// Minimum time between updates; recording a segment takes longer.
 const kLeastMs = 2000;
-// A motion that makes sigmas less than this part smaller teaches nothing much.
+// A motion that reduces sigmas by less than this fraction is not worth it.
 const kHardly = 0.02;
 
-// Of all directions of what is estimated, in the geometric mean.
+// The reduction of sigma, in the geometric mean over all estimated directions.
 function shrink(advice: Advice): number {
   return 1 - Math.exp(-advice.gainNats / Math.max(1, advice.sigmaChanges.length));
 }
@@ -35,16 +36,16 @@ function Best(props: { of: Advice; seconds: number }) {
       <p class="instruction">{props.of.instruction}</p>
       {part < kHardly ? (
         <p>
-          Nothing teaches much now: {number(props.seconds)} s of it make the
-          uncertainty {number(100 * part, 2)} % smaller. A new calibration, or
-          other surroundings, may bring more.
+          No motion helps much now: {number(props.seconds)} s of it reduce the
+          uncertainty by {number(100 * part, 2)} %. A new calibration, or other
+          surroundings, may help more.
         </p>
       ) : (
         <p>
-          Expected of {number(props.seconds)} s: the uncertainty becomes{' '}
+          Expected from {number(props.seconds)} s: the uncertainty becomes{' '}
           <strong>{number(100 * part, 2)} % smaller</strong> in the mean over all
-          directions (gain {number(props.of.gainNats)} nats). Most of all,{' '}
-          <Sharpens of={props.of} />.
+          directions (gain {number(props.of.gainNats)} nats). Largest
+          improvement: <Sharpens of={props.of} />.
         </p>
       )}
     </div>
@@ -56,8 +57,8 @@ function Motions(props: { of: Coaching }) {
     <>
       <h2>All motions</h2>
       <DataTable
-        caption={`What a segment of ${number(props.of.segmentSeconds)} s would bring`}
-        head={['Motion', 'What to do', 'Smaller by', 'Gain [nats]', 'By group [nats]', 'Sharpens most']}
+        caption={`Predicted gain of a segment of ${number(props.of.segmentSeconds)} s`}
+        head={['Motion', 'What to do', 'Smaller by', 'Gain [nats]', 'By group [nats]', 'Largest improvement']}
         rows={props.of.advice.map((advice) => [
           words(advice.motion),
           advice.instruction,
@@ -74,9 +75,10 @@ function Motions(props: { of: Coaching }) {
 function Weakest(props: { of: Coaching['weakest'] }) {
   return (
     <>
-      <h2>What is known worst</h2>
+      <h2>Least known</h2>
       <p class="quiet">
-        In sigmas of what one usual segment gives: a new device begins at about 10.
+        In reference sigmas: one usual segment reaches about 1, a new device starts
+        at about 10.
       </p>
       <ol>
         {props.of.map((weak) => (
@@ -106,22 +108,22 @@ export function CoachPage(props: { rig: string; version: number }) {
       {read.error && <Problem error={read.error} />}
       {!read.error && !coaching && (
         <p role="status">
-          Each motion is simulated with this device's own calibration. The first
-          answer about a version takes a few seconds ...
+          Simulating each motion with the calibration of this device. The first
+          time for a version, this takes a few seconds ...
         </p>
       )}
       {coaching && (
         <>
           <Best of={coaching.advice[0]} seconds={coaching.segmentSeconds} />
           <p class="quiet" aria-busy={read.busy}>
-            From{' '}
+            Based on{' '}
             <Link to={`${pageOf('rigs/' + props.rig)}/calibrations/${coaching.calibrationVersion}`}>
               version {coaching.calibrationVersion}
             </Link>{' '}
             and {coaching.segmentsSince}{' '}
-            {coaching.segmentsSince === 1 ? 'segment' : 'segments'} that a table
-            holds beyond it; follows the segments as they come.
-            {read.busy && ' Working it out anew ...'}
+            {coaching.segmentsSince === 1 ? 'segment' : 'segments'} in the tables
+            that it does not use; updates when segments arrive.
+            {read.busy && ' Updating ...'}
           </p>
           <Weakest of={coaching.weakest} />
           <Motions of={coaching} />

@@ -14,7 +14,7 @@ const kColumns: Column<Event>[] = [
   { head: 'Detail', cell: (event) => event.detail },
 ];
 
-// Of one rig, or of all with ''.
+// The events of one rig, or of all rigs if `rig` is ''.
 export function Events(props: { rig: string; version: number }) {
   return (
     <ListPage
@@ -24,7 +24,7 @@ export function Events(props: { rig: string; version: number }) {
       version={props.version}
       columns={kColumns}
       next="Older events"
-      empty="Nothing has happened yet. Rigs that are created, runs and new versions are listed here."
+      empty="There are no events yet. New rigs, runs and new versions are listed here."
     />
   );
 }

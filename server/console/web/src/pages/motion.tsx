@@ -1,5 +1,5 @@
-// A segment at one time of it: where the device was, what its cameras saw, what
-// its IMU measured, and what of all that is left unexplained.
+// A segment at one point in time: the position of the device, the observations of
+// its cameras, the readings of its IMU, and the residuals.
 import { useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
 import {
@@ -47,7 +47,7 @@ interface Point {
   y: number;
 }
 
-// By landmark.
+// The observations of a camera, by landmark.
 function tracksOf(of: SegmentData['observations'], camera: number): Map<number, Point[]> {
   const tracks = new Map<number, Point[]>();
   of.camera.forEach((c, i) => {
@@ -65,20 +65,21 @@ function tracksOf(of: SegmentData['observations'], camera: number): Map<number, 
   return tracks;
 }
 
-// 1, 2 or 5 times a power of ten, at most x.
+// Rounds x down to 1, 2 or 5 times a power of ten.
 function round(x: number): number {
   const power = 10 ** Math.floor(Math.log10(x));
   return [5, 2, 1].map((k) => k * power).find((k) => k <= x) ?? power;
 }
 
-// By how much residuals are drawn longer: a typical one is a fortieth of the
-// image.
+// The factor by which residuals are enlarged; a typical one is then a fortieth of
+// the image wide.
 function enlargement(residuals: SegmentResiduals, width: number): number {
   return Math.max(1, round(width / 40 / Math.max(0.01, residuals.reprojectionMedianPx)));
 }
 
-// Of one camera: each landmark's way over the image, and at this keyframe the
-// residual of each observation, from where it was seen to where it is predicted.
+// The tracks of one camera: the path of each landmark over the image and, at this
+// keyframe, the residual of each observation, drawn from the observed to the
+// predicted position.
 function Tracks(props: {
   of: SegmentData['observations'];
   at: number;
@@ -92,7 +93,7 @@ function Tracks(props: {
   const unused = useMemo(() => new Set(residuals?.unused), [residuals]);
   const scale = residuals ? enlargement(residuals, width) : 1;
   const thin = width / 500;
-  const rodPx = round(width / 8 / scale); // of residual
+  const rodPx = round(width / 8 / scale); // length of the scale bar, as a residual
   const vector = (p: Point, colour: string) => {
     const [dx, dy] = residuals!.residualPx.slice(2 * p.observation, 2 * p.observation + 2);
     const out = unused.has(p.observation);
@@ -164,15 +165,15 @@ function Tracks(props: {
         )}
       </svg>
       <figcaption>
-        Tracks over the image; points are those of this keyframe
+        Tracks over the image; points are the observations of this keyframe
         {residuals &&
-          `, with residuals ${scale} times as long as they are; crosses and broken lines are left out of a score`}
+          `, with residuals enlarged ${scale} times; crosses and dashed lines are not used in a score`}
       </figcaption>
     </figure>
   );
 }
 
-// Values of one kind, three of each sample, against seconds.
+// Vectors of one kind, one per sample, over time in seconds.
 function triple(t: string[], values: number[]): uPlot.AlignedData {
   const start = BigInt(t[0]);
   const at = (offset: number) => t.map((_, i) => values[3 * i + offset]);
@@ -204,7 +205,7 @@ function nearest(times: string[], wanted: bigint): number {
   return best;
 }
 
-// At which version, and by which camera.
+// Menus for the version and the camera.
 function Choices(props: {
   segment: Segment;
   active: string | undefined;
@@ -221,9 +222,9 @@ function Choices(props: {
         label="Residuals at"
         value={props.version}
         of={[
-          [scored, `version ${scored}, which it was scored with`],
+          [scored, `version ${scored}, used for its score`],
           ...(props.active && props.active !== scored
-            ? [['active', `version ${props.active}, which is active`] as [string, string]]
+            ? [['active', `version ${props.active}, active`] as [string, string]]
             : []),
         ]}
         onChoice={props.onVersion}
@@ -314,9 +315,11 @@ export function Data(props: { rig: string; path: string; segment: Segment }) {
     return (
       <Empty>
         Its data was dropped
-        {props.segment.problem ? `: ${props.segment.problem}` : ', for no table and no run needs it'}
-        . What it says about the calibration is kept, and its way with that of its
-        session.
+        {props.segment.problem
+          ? `: ${props.segment.problem}`
+          : ', because no table and no run needs it'}
+        . Its information about the calibration is kept, and its path is shown with
+        that of its session.
       </Empty>
     );
   }
@@ -324,7 +327,7 @@ export function Data(props: { rig: string; path: string; segment: Segment }) {
     <Loaded read={read}>
       {(data) =>
         data.imu.tNs.length === 0 ? (
-          <Empty>It has no IMU samples.</Empty>
+          <Empty>The segment has no IMU samples.</Empty>
         ) : (
           <Motion rig={props.rig} path={props.path} data={data} segment={props.segment} />
         )

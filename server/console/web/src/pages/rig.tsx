@@ -34,7 +34,7 @@ import { useRead } from '../state';
 
 interface Known extends Estimate {
   tolerance: number;
-  ratio: number; // sigma against the factory's tolerance
+  ratio: number; // sigma as a fraction of the factory tolerance
 }
 
 function known(active: Calibration, factory: Calibration): Known[] {
@@ -62,7 +62,7 @@ function Group(props: { name: string; of: Known[] }) {
         {props.name}: {verdict(mean)}
       </h3>
       <DataTable
-        caption={'How well the group ' + props.name + ' is known'}
+        caption={'Uncertainty of the group ' + props.name}
         head={['Parameter', 'Value', 'Sigma', 'Factory tolerance', 'Still unknown']}
         rows={props.of.map((e) => [
           component(e.component),
@@ -85,7 +85,7 @@ function Weak(props: { of: Known[] }) {
     <>
       <p>
         {weak.length} of {props.of.length} parameters are hardly better known than
-        from the factory. What was recorded so far did not show:
+        from the factory. The recordings so far do not determine:
       </p>
       <ul>
         {weak.slice(0, 8).map((e) => (
@@ -102,13 +102,13 @@ function Weak(props: { of: Known[] }) {
 function Knowledge(props: { rig: Rig; of: Known[] }) {
   return (
     <>
-      <h2>What is weak</h2>
+      <h2>Weak parameters</h2>
       <Weak of={props.of} />
       <p>
-        <Link to={pageOf(props.rig.name) + '/coach'}>The coach</Link> says which
-        motion would teach the most now.
+        <Link to={pageOf(props.rig.name) + '/coach'}>The coach</Link> recommends
+        the motion with the largest gain.
       </p>
-      <h2>How well it is known</h2>
+      <h2>Uncertainty by group</h2>
       {props.rig.groups.map((group) => {
         const members = props.of.filter((e) =>
           group.patterns.some((pattern) => matches(pattern, e.component)),
@@ -137,13 +137,13 @@ function Tables(props: { of: Table[] }) {
           </h3>
           {table.starved && (
             <p class="warning">
-              It does not fill: {table.scored} segments were offered. Move the
-              device in more directions, and nearer to what it sees.
+              The table does not fill: {table.scored} segments were offered. Move
+              the device in more directions, and closer to what it sees.
             </p>
           )}
           {table.entries.length === 0 ? (
             <p class="quiet">
-              Empty: no segment has told enough about this group so far.
+              Empty: no segment has enough information about this group yet.
             </p>
           ) : (
             <DataTable
@@ -190,9 +190,9 @@ function Histogram(props: { segments: Segment[]; group: string }) {
   const bars = uPlot.paths.bars!({ size: [0.9, 60] });
   return (
     <Plot
-      label={`How many segments have which entropy for the group ${props.group}`}
+      label={`Histogram of the entropy of segments for the group ${props.group}`}
       data={data}
-      x={{ label: 'entropy [nats], lower is richer', range: [low, high] }}
+      x={{ label: 'entropy [nats], lower is more informative', range: [low, high] }}
       y="segments"
       series={[
         { label: 'all', fill: kColours[0] + '66', stroke: kColours[0], paths: bars, points: { show: false } },
@@ -233,7 +233,7 @@ function Entropies(props: { rig: string; groups: string[]; version: number }) {
                 />
               </div>
               <Histogram segments={scored} group={group} />
-              <p class="quiet">Of the newest {scored.length} scored segments.</p>
+              <p class="quiet">For the newest {scored.length} scored segments.</p>
             </>
           );
         }}
@@ -253,7 +253,7 @@ export function RigPage(props: { rig: string; version: number }) {
       active.value && factory.value ? known(active.value, factory.value) : null,
     [active.value, factory.value],
   );
-  // Said once, not for each part of the page.
+  // An error is shown once, not for each part of the page.
   const problem = rig.error ?? active.error ?? factory.error ?? tables.error;
   if (problem) {
     return (

@@ -47,12 +47,12 @@ const kColumns: Column<RigOverview>[] = [
 function Nothing(props: { filter: string }) {
   return props.filter ? (
     <p>
-      No rig has '{props.filter}' in its name. Take the filter away to see all.
+      No rig has '{props.filter}' in its name. Clear the filter to see all.
     </p>
   ) : (
     <p>
-      There is no rig yet. Create one: <code>selfcal rig create</code>, then send
-      segments with the client library or <code>selfcal import</code>.
+      There is no rig yet. Create one with <code>selfcal rig create</code>, then
+      send segments with the client library or <code>selfcal import</code>.
     </p>
   );
 }

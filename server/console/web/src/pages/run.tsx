@@ -1,4 +1,4 @@
-// One run: how it goes while it computes, what came of it.
+// One run: its progress while it computes, and its result.
 import { useEffect, useState } from 'preact/hooks';
 import { rigPath, type Run } from '../api';
 import { Convergence, type Step } from '../convergence';
@@ -11,7 +11,8 @@ function isRunning(run: Run): boolean {
   return run.state === 'PENDING' || run.state === 'RUNNING';
 }
 
-// With the step, in order; what an iteration says first counts.
+// Adds the step, in order; of several updates about an iteration, the first is
+// used.
 function withStep(steps: Step[], run: Run): Step[] {
   if (run.iteration === 0 && run.parameters.length === 0) return steps;
   if (steps.some((s) => s.iteration === run.iteration)) return steps;
@@ -24,7 +25,7 @@ function withStep(steps: Step[], run: Run): Step[] {
   return [...steps, step].sort((a, b) => a.iteration - b.iteration);
 }
 
-// Each iteration from the first; they stay when the run has ended.
+// All iterations from the first; they are kept when the run has ended.
 function useSteps(name: string, running: boolean): { steps: Step[]; now: Run | null } {
   const [steps, setSteps] = useState<Step[]>([]);
   const [now, setNow] = useState<Run | null>(null);
@@ -32,12 +33,12 @@ function useSteps(name: string, running: boolean): { steps: Step[]; now: Run | n
     if (!running) return;
     const source = new EventSource('/api/v1/stream?run=' + encodeURIComponent(name));
     source.addEventListener('run', (event) => {
-      const told = JSON.parse((event as MessageEvent<string>).data) as Run;
-      // Without a name: the daemon has left some out.
-      if (!told.name) return;
-      setNow(told);
-      setSteps((before) => withStep(before, told));
-      if (!isRunning(told)) source.close();
+      const update = JSON.parse((event as MessageEvent<string>).data) as Run;
+      // An update without a name means that the daemon has skipped some.
+      if (!update.name) return;
+      setNow(update);
+      setSteps((before) => withStep(before, update));
+      if (!isRunning(update)) source.close();
     });
     return () => source.close();
   }, [name, running]);
@@ -47,17 +48,17 @@ function useSteps(name: string, running: boolean): { steps: Step[]; now: Run | n
 function Report(props: { run: Run }) {
   const solver = props.run.solver;
   if (!solver) return null;
-  const said = solverFigures(solver);
+  const figures = solverFigures(solver);
   return (
     <>
-      <h2>What the solver says</h2>
+      <h2>Solver report</h2>
       <Figures
         of={[
           ['Status', solver.status],
-          said.iterations,
+          figures.iterations,
           ['Cost', costs(solver)],
-          said.reprojection,
-          said.rank,
+          figures.reprojection,
+          figures.rank,
           ['Keyframes', solver.keyframes],
           ['Landmarks', solver.landmarks],
           ['Time', number(solver.seconds) + ' s'],
@@ -72,9 +73,9 @@ function Going(props: { run: Run }) {
   return (
     <p role="status">
       {state === 'PENDING'
-        ? 'It waits.'
+        ? 'The run is waiting.'
         : iteration === 0
-          ? 'It has begun.'
+          ? 'The run has started.'
           : `Iteration ${iteration} of at most ${maxIterations}, cost ${number(cost, 4)}.`}
     </p>
   );
@@ -99,8 +100,8 @@ export function RunPage(props: { rig: string; run: string; version: number }) {
               <Figures
                 of={[
                   ['State', <Badge state={shown.state} />],
-                  ['Why', words(shown.trigger)],
-                  ['Begun', <When time={shown.createTime} />],
+                  ['Trigger', words(shown.trigger)],
+                  ['Created', <When time={shown.createTime} />],
                   ['Segments', shown.segments.length],
                   ['Attempts', shown.attempts],
                   shown.calibration ? ['Result', <Result of={shown} />] : null,
@@ -111,7 +112,7 @@ export function RunPage(props: { rig: string; run: string; version: number }) {
               <Report run={run} />
               {steps.length > 0 && <Convergence steps={steps} />}
               {isRunning(shown) && steps.length === 0 && (
-                <Empty>Iterations are drawn here as they come.</Empty>
+                <Empty>Iterations are shown here as they are computed.</Empty>
               )}
               <h2>Segments</h2>
               <SegmentLinks names={shown.segments} />

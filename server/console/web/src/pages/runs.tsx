@@ -15,8 +15,8 @@ export function Result(props: { of: Run }) {
 const kColumns: Column<Run>[] = [
   { head: 'Run', cell: (run) => <Link to={pageOf(run.name)}>{idOf(run.name)}</Link> },
   { head: 'State', cell: (run) => <Badge state={run.state} /> },
-  { head: 'Why', cell: (run) => words(run.trigger) },
-  { head: 'Begun', cell: (run) => <When time={run.createTime} /> },
+  { head: 'Trigger', cell: (run) => words(run.trigger) },
+  { head: 'Created', cell: (run) => <When time={run.createTime} /> },
   { head: 'Segments', cell: (run) => run.segments.length },
   { head: 'Cost', cell: (run) => run.solver && costs(run.solver) },
   { head: 'Result', cell: (run) => run.calibration && <Result of={run} /> },
@@ -34,8 +34,8 @@ export function Runs(props: { rig: string; version: number }) {
       next="Older runs"
       empty={
         <>
-          No run yet. One begins when the tables are full;{' '}
-          <code>selfcal recalibrate {props.rig}</code> starts one by hand.
+          There are no runs yet. A run starts when the tables are full;{' '}
+          <code>selfcal recalibrate {props.rig}</code> starts one manually.
         </>
       }
     />

@@ -25,41 +25,41 @@ import { useRead } from '../state';
 import { Data } from './motion';
 import { sessionOf } from './session';
 
-// The one table of a rig that chooses for all groups together.
+// The name of the table that is for all groups together.
 const kJoint = 'joint';
 
 type Score = Segment['scores'][number];
 type Entry = Table['entries'][number];
 
-// What the last entry of the table has, or why there is none to compare with.
+// Describes the last entry of the table, or states that there is none.
 function worstOf(table: Table): string {
   const last = table.entries[table.entries.length - 1] as Entry | undefined;
   if (!last) return 'the table is empty now';
-  return `the worst that it holds now has ${number(last.entropyNats, 4)}`;
+  return `its worst entry now has ${number(last.entropyNats, 4)}`;
 }
 
 function Rival(props: { of: Absence; none: string }) {
   return props.of.rival ? <SegmentLink name={props.of.rival} /> : <>{props.none}</>;
 }
 
-// Entropies stand only where the table goes by them.
+// Explains an exclusion. Entropies are shown only if the table ranks by them.
 function Gone(props: { of: Absence; table: Table; entropy: number | undefined }) {
   const { of, table, entropy } = props;
   const values =
     entropy !== undefined && of.rivalEntropyNats !== undefined
-      ? ` (entropy ${number(of.rivalEntropyNats, 4)}, this one ${number(entropy, 4)}; lower says more)`
+      ? ` (entropy ${number(of.rivalEntropyNats, 4)}, this one ${number(entropy, 4)}; lower is more informative)`
       : '';
   const last = table.entries[table.entries.length - 1] as Entry | undefined;
   const changed = last?.segment !== of.rival;
   const now = entropy === undefined || !changed ? '' : '; ' + worstOf(table);
   switch (of.cause) {
     case 'SAYS_TOO_LITTLE':
-      return <>not kept: it adds too little to what is known without it</>;
+      return <>not kept: insufficient gain</>;
     case 'OTHERS_SAY_MORE':
       return (
         <>
-          not kept: the table was full, and its worst, <Rival of={of} none="since dropped" />, said
-          more{values}
+          not kept: the table was full, and its worst entry,{' '}
+          <Rival of={of} none="since dropped" />, is more informative{values}
           {now}
         </>
       );
@@ -67,22 +67,22 @@ function Gone(props: { of: Absence; table: Table; entropy: number | undefined })
       return (
         <>
           kept until <time dateTime={of.time}>{clock(of.time)}</time>, when{' '}
-          <Rival of={of} none="a segment that is since dropped" /> took its place{values}
+          <Rival of={of} none="a segment that was dropped since" /> replaced it{values}
           {now}
         </>
       );
     case 'TOO_OLD':
       return (
         <>
-          kept until <time dateTime={of.time}>{clock(of.time)}</time>, when it was older than the
-          rig's tables may hold
+          kept until <time dateTime={of.time}>{clock(of.time)}</time>, when it exceeded the age
+          limit of the rig's tables
         </>
       );
     case 'DEVICE_CHANGED':
       return (
         <>
-          kept until <time dateTime={of.time}>{clock(of.time)}</time>, when the device was found to
-          have changed: it speaks of the device before
+          kept until <time dateTime={of.time}>{clock(of.time)}</time>, when a device change was
+          detected: the segment is from before it
         </>
       );
     case 'DATA_EVICTED':
@@ -97,8 +97,8 @@ function Gone(props: { of: Absence; table: Table; entropy: number | undefined })
     case 'DOES_NOT_FIT':
       return (
         <>
-          excluded: it does not fit; its residuals are {number(of.fit ?? 0)} times what is expected, and
-          up to {number(of.fitLimit ?? 0)} is usual for this rig
+          excluded: it does not fit; its residuals are {number(of.fit ?? 0)} times what is expected,
+          and up to {number(of.fitLimit ?? 0)} times is usual for this rig
         </>
       );
     case 'MANY_OUTLIERS':
@@ -108,21 +108,22 @@ function Gone(props: { of: Absence; table: Table; entropy: number | undefined })
   }
 }
 
-// Why a table holds a segment, or does not: as it was written down, or for
-// segments from before that, as far as the table tells.
+// Explains why a table holds a segment or not: as it was recorded or, for
+// segments from before this was recorded, as far as the table shows it.
 function Why(props: {
   segment: Segment;
   table: Table | undefined;
   absence: Absence | undefined;
-  entropy?: number; // where the table goes by it
+  entropy?: number; // if the table ranks by it
 }) {
   const { table, entropy } = props;
-  if (!table) return <>the rig chooses for all groups together</>;
+  if (!table) return <>the rig has one table for all groups</>;
   const place = table.entries.findIndex((e) => e.segment === props.segment.name);
   if (place >= 0) {
     return (
       <>
-        kept: place {place + 1} of {table.entries.length}, richest first; {worstOf(table)}
+        kept: rank {place + 1} of {table.entries.length}, most informative first;{' '}
+        {worstOf(table)}
       </>
     );
   }
@@ -132,12 +133,12 @@ function Why(props: {
   if (full && last && entropy !== undefined && entropy >= last.entropyNats) {
     return (
       <>
-        not kept: its entropy of {number(entropy, 4)} is above that of all in the table;{' '}
+        not kept: its entropy of {number(entropy, 4)} is above that of all entries;{' '}
         {worstOf(table)}
       </>
     );
   }
-  return <>not kept; why was not written down when it was scored</>;
+  return <>not kept; the reason was not recorded when it was scored</>;
 }
 
 function directions(of: Direction[]): string {
@@ -151,8 +152,8 @@ function Information(props: { of: Segment; tables: Table[]; absences: Absence[] 
     return (
       <Empty>
         {props.of.state === 'STORED'
-          ? 'It waits for its score; this page shows it when it is there.'
-          : 'It has no score.'}
+          ? 'The segment is waiting to be scored; this page updates when it is.'
+          : 'The segment has no score.'}
       </Empty>
     );
   }
@@ -172,30 +173,30 @@ function Information(props: { of: Segment; tables: Table[]; absences: Absence[] 
     number(score.entropyNats, 4),
     `${score.rank} of ${score.size}`,
     reason(score.group, score.entropyNats),
-    directions(score.unobserved) || 'nothing is missing',
+    directions(score.unobserved) || 'none',
   ];
   return (
     <>
       <DataTable
-        caption="What it says about each group"
-        head={['Group', 'Gain [nats]', 'Entropy [nats]', 'Rank', 'Kept?', 'Does not show']}
+        caption="Information about each group"
+        head={['Group', 'Gain [nats]', 'Entropy [nats]', 'Rank', 'Kept?', 'Unobservable']}
         rows={props.of.scores.map(row)}
       />
-      {tables.has(kJoint) && <p>Of all groups together: {reason(kJoint)}.</p>}
+      {tables.has(kJoint) && <p>For all groups together: {reason(kJoint)}.</p>}
     </>
   );
 }
 
-// By parameter, the ones that it says most about first.
+// Information by parameter, the best determined first.
 function Parameters(props: { of: ComponentInformation[] }) {
   if (props.of.length === 0) return null;
   const ratio = (c: ComponentInformation) => c.sigma / c.priorSigma;
   const unit = (c: ComponentInformation) => (c.unit === '-' ? '' : ` [${c.unit}]`);
   return (
     <details>
-      <summary>What it says alone about each parameter</summary>
+      <summary>Information of this segment alone about each parameter</summary>
       <DataTable
-        caption="What this segment alone says about each parameter"
+        caption="Parameters, by the information of this segment alone"
         head={['Parameter', 'Factory tolerance', 'Sigma with it', 'Still unknown']}
         rows={[...props.of]
           .sort((a, b) => ratio(a) - ratio(b))
@@ -242,7 +243,7 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
               ]}
             />
             {segment.problem && <p class="warning">{segment.problem}</p>}
-            <h2>What it says</h2>
+            <h2>Information</h2>
             <Information
               of={segment}
               tables={tables.value?.tables ?? []}
@@ -261,10 +262,10 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
             )}
             <h2>Motion</h2>
             <Data rig={props.rig} path={path} segment={segment} />
-            <h2>Where it comes from</h2>
+            <h2>Origin</h2>
             <p>
-              Number {segment.sequence} of <Link to={'/rigs/' + props.rig}>{props.rig}</Link>,
-              of the session{' '}
+              Segment number {segment.sequence} of{' '}
+              <Link to={'/rigs/' + props.rig}>{props.rig}</Link>, from the session{' '}
               <Link to={pageOf(`rigs/${props.rig}/sessions/${sessionOf(segment.name)}`)}>
                 {decodeURIComponent(sessionOf(segment.name))}
               </Link>

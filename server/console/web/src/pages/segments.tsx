@@ -1,4 +1,4 @@
-// Which segments of a rig have come, of those that are asked for.
+// The segments of a rig, filtered and sorted.
 import type { JSX } from 'preact';
 import { useEffect, useState } from 'preact/hooks';
 import { rigPath, type ApiError, type Rig, type Segment } from '../api';
@@ -12,7 +12,7 @@ function kept(segment: Segment): string {
   return tables.length > 0 ? tables.join(', ') : 'none';
 }
 
-// With what it says about one group.
+// The columns, with the score for one group.
 function columns(group: string): Column<Segment>[] {
   const of = (segment: Segment, show: (score: Segment['scores'][number]) => string) => {
     const score = segment.scores.find((s) => s.group === group);
@@ -74,8 +74,8 @@ function Help(props: { group: string }) {
   ];
   return (
     <details>
-      <summary>What can be asked for</summary>
-      <p>Conditions, with AND between them; all of them hold.</p>
+      <summary>Filter syntax</summary>
+      <p>Conditions joined by AND; a segment has to meet all of them.</p>
       <ul>
         <li>
           With <code>=</code>: <code>state</code> (STORED, SCORED or UNUSABLE),{' '}
@@ -86,12 +86,12 @@ function Help(props: { group: string }) {
           With <code>=</code> <code>&lt;</code> <code>&lt;=</code> <code>&gt;</code>{' '}
           <code>&gt;=</code>: <code>receive_time</code>, <code>calibration_version</code>,{' '}
           <code>landmarks</code>, <code>observations</code>, <code>temperature_c</code>,{' '}
-          <code>gain.GROUP</code> and <code>entropy.GROUP</code>, these of one group.
+          <code>gain.GROUP</code> and <code>entropy.GROUP</code>, where GROUP is a group.
         </li>
-        <li>A value with a space or other signs stands in double quotes.</li>
+        <li>Enclose a value with spaces or other special characters in double quotes.</li>
       </ul>
       <p>
-        For instance{' '}
+        Examples:{' '}
         {examples.map((example, i) => (
           <>
             {i > 0 && ', '}
@@ -120,7 +120,7 @@ function Filter(props: { mistake: ApiError | null; group: string; groups: string
     event.preventDefault();
     show(draft);
   };
-  // What is sorted by the score of a group goes on to be.
+  // A list sorted by the score of a group is then sorted by that of the new group.
   const choose = (group: string) =>
     go(
       withQuery({
@@ -164,14 +164,14 @@ function Filter(props: { mistake: ApiError | null; group: string; groups: string
 
 const kNewestFirst: ['receive_time', 'desc'] = ['receive_time', 'desc'];
 
-// Not known of every segment.
+// Fields that not every segment has.
 const kNotOfAll = /^(gain|entropy|temperature_c)\b/;
 
 function Nothing(props: { rig: string; filter: string; order: string }) {
   if (props.filter || props.order !== kNewestFirst[0]) {
     return (
       <p>
-        No segment is as asked for.{' '}
+        No segment matches.{' '}
         <Link to={withQuery({ filter: '', order_by: '', page_token: '' })}>
           Show all, newest first
         </Link>
@@ -209,7 +209,7 @@ export function Segments(props: { rig: string; version: number }) {
         <>
           <Filter mistake={mistake} group={group} groups={groups} />
           {kNotOfAll.test(order) && !mistake && (
-            <p class="quiet">Segments of which what they are sorted by is not known are left out.</p>
+            <p class="quiet">Segments without a value in the sorted column are not listed.</p>
           )}
         </>
       )}

@@ -1,4 +1,4 @@
-// Sessions, and where the device went in one.
+// The list of sessions, and the page of one session with the device's path.
 import { useState } from 'preact/hooks';
 import { idOf, pageOf, rigPath, type Rig, type Segment, type SessionOverview } from '../api';
 import { number } from '../format';
@@ -18,8 +18,8 @@ function Kept(props: { way: Way; group: string }) {
   const start = BigInt(pieces[0].startNs);
   return (
     <DataTable
-      caption="Segments of this session that are kept, richest first"
-      head={['Segment', `Entropy of ${props.group} [nats]`, 'Kept for', 'Begins at [s]']}
+      caption="Segments of this session that are kept, most informative first"
+      head={['Segment', `Entropy of ${props.group} [nats]`, 'Kept for', 'Starts at [s]']}
       rows={kept.map((piece) => [
         <SegmentLink name={piece.segment} />,
         number(entropyOf(piece, props.group), 4),
@@ -41,7 +41,7 @@ function WayAndKept(props: { way: Way; groups: string[] }) {
   );
 }
 
-// The way of a session, and the groups of its rig.
+// Reads the path of a session and the groups of its rig.
 function useWayAndGroups(rig: string, session: string, version: number) {
   const way = useWay(`${rigPath(rig)}/sessions/${encodeURIComponent(session)}`, version);
   const described = useRead<Rig>(rigPath(rig));
@@ -52,7 +52,7 @@ function useWayAndGroups(rig: string, session: string, version: number) {
   };
 }
 
-// `session` is as in the names of its segments.
+// `session` is encoded as in the names of its segments.
 export function SessionPage(props: { rig: string; session: string; version: number }) {
   const read = useWayAndGroups(props.rig, props.session, props.version);
   const title = 'Session ' + decodeURIComponent(props.session);
@@ -66,7 +66,7 @@ export function SessionPage(props: { rig: string; session: string; version: numb
               of={[
                 ['Segments', way.session.segments],
                 ['Kept', way.pieces.filter(isKept).length],
-                ['Began', <When time={way.session.firstReceived} />],
+                ['Started', <When time={way.session.firstReceived} />],
                 ['Newest', <When time={way.session.lastReceived} />],
               ]}
             />
@@ -78,7 +78,7 @@ export function SessionPage(props: { rig: string; session: string; version: numb
   );
 }
 
-// Of the session that the newest segment belongs to, for the page of a rig.
+// The session of the newest segment, for the page of a rig.
 function Newest(props: { rig: string; session: string; version: number }) {
   const [group, setGroup] = useState<string | null>(null);
   const read = useWayAndGroups(props.rig, props.session, props.version);
@@ -133,7 +133,7 @@ export function NewestSession(props: { rig: string; version: number }) {
 const kColumns: Column<SessionOverview>[] = [
   { head: 'Session', cell: (s) => <Link to={pageOf(s.name)}>{s.session}</Link> },
   { head: 'Segments', cell: (s) => s.segments },
-  { head: 'Began', cell: (s) => <When time={s.firstReceived} /> },
+  { head: 'Started', cell: (s) => <When time={s.firstReceived} /> },
   { head: 'Newest segment', cell: (s) => <When time={s.lastReceived} /> },
 ];
 
