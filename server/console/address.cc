@@ -14,7 +14,7 @@ constexpr std::uint8_t kLoopbackNet = 127;
 absl::Status Bad(const std::string& text) {
   return absl::InvalidArgumentError(
       "console: '" + text +
-      "' is no address such as 127.0.0.1:7448 or [::1]:7448; or say off");
+      "' is not an address such as 127.0.0.1:7448 or [::1]:7448, or off");
 }
 
 }  // namespace

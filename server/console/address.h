@@ -1,4 +1,4 @@
-// host:port in numbers, as sockets take it.
+// A numeric host:port, for sockets.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -20,7 +20,8 @@ struct SocketAddress {
   }
 };
 
-// Of "127.0.0.1:7448" or "[::1]:7448". INVALID_ARGUMENT for anything else.
+// Parses e.g. "127.0.0.1:7448" or "[::1]:7448". INVALID_ARGUMENT for anything
+// else.
 absl::StatusOr<SocketAddress> ParseSocketAddress(const std::string& text);
 
 }  // namespace selfcal::server

@@ -15,7 +15,7 @@ namespace {
 
 struct Route {
   std::string_view method;
-  std::string_view pattern;  // '*' stands for one part
+  std::string_view pattern;  // '*' matches one part of the path
   Answer (*handler)(const Call&);
 };
 
@@ -51,7 +51,7 @@ std::string_view NextPart(std::string_view* path) {
   return part;
 }
 
-// What stands at the '*'; nothing if the path is not of this pattern.
+// Returns the parts of the path at each '*'; nullopt if it does not match.
 std::optional<std::vector<std::string>> Match(std::string_view pattern,
                                               std::string_view path) {
   std::vector<std::string> parts;
@@ -87,10 +87,10 @@ HttpResponse Dispatch(const ApiContext& context, const HttpRequest& request) {
   }
   if (known) {
     return ErrorResponse(absl::UnimplementedError(
-        "this address cannot be called with " + request.method));
+        "this address does not support the method " + request.method));
   }
   return ErrorResponse(absl::NotFoundError(
-      "there is nothing under this address; docs/console.md lists what is"));
+      "no such address; docs/console.md lists the addresses"));
 }
 
 }  // namespace
@@ -102,7 +102,8 @@ HttpResponse AnswerApi(const ApiContext& context, const HttpRequest& request) {
     return ErrorResponse(absl::ResourceExhaustedError("out of memory"));
   } catch (const std::exception& error) {
     spdlog::error("console: {}", error.what());
-    return ErrorResponse(absl::InternalError("the log says more"));
+    return ErrorResponse(
+        absl::InternalError("internal error; see the daemon's log"));
   }
 }
 

@@ -1,5 +1,5 @@
-// What is under /api/v1: the contract read over HTTP, in its own messages and
-// under the same rules of access. Any thread may call.
+// The HTTP API under /api/v1: the contract with its own messages and the same
+// access rules. Any thread may call.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ struct ApiContext {
   std::string program_version;
 };
 
-// Never throws; every mistake is an answer.
+// Handles a request. Never throws; errors are responses.
 HttpResponse AnswerApi(const ApiContext& context, const HttpRequest& request);
 
 }  // namespace selfcal::server

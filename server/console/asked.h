@@ -1,5 +1,5 @@
-// What the calls under /api/v1 have in common: whose it is that is asked for,
-// and a page as an answer. Internal to server/console.
+// Helpers that the calls under /api/v1 share: the resource of a request, and a
+// page as a response. Internal to server/console.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace selfcal::server {
 
-// The rig of the address, for a caller who may make this request of it.
+// Returns the rig of the address, if the caller may make this request about it.
 template <typename Request>
 absl::StatusOr<std::string> ParentOf(const Call& call) {
   Request request;
@@ -20,7 +20,8 @@ absl::StatusOr<std::string> ParentOf(const Call& call) {
   return RigOf(call);
 }
 
-// The segment of the address, for a caller who may make this request about it.
+// Returns the segment of the address, if the caller may make this request about
+// it.
 template <typename Request>
 absl::StatusOr<SegmentNameParts> SegmentOf(const Call& call) {
   Request request;
@@ -30,10 +31,11 @@ absl::StatusOr<SegmentNameParts> SegmentOf(const Call& call) {
   if (parts) return *parts;
   return absl::InvalidArgumentError(
       "a segment's name is rigs/{rig}/segments/{session}~{index}; in an "
-      "address a '%' of the session stands as %25");
+      "address, a '%' of the session is written as %25");
 }
 
-// `add` takes an item and the response; it returns an absl::Status.
+// Responds with a page. `add` takes an item and the response; it returns an
+// absl::Status.
 template <typename Response, typename Item, typename Add>
 Answer PageAnswer(const absl::StatusOr<Listed<Item>>& listed, const Add& add) {
   if (!listed.ok()) return listed.status();

@@ -1,4 +1,5 @@
-// The files of the pages, built from server/console/web into the program.
+// The files of the pages, which are built from server/console/web and embedded
+// into the program.
 #pragma once
 
 #include <span>
@@ -7,12 +8,13 @@
 namespace selfcal::server {
 
 struct Asset {
-  std::string_view path;  // from "/" on
+  std::string_view path;  // starts with "/"
   std::string_view type;
   std::string_view bytes;
 };
 
-// The first is the page that all addresses of pages show.
+// The first asset is the HTML page, which is served at the address of every
+// page.
 std::span<const Asset> Assets();
 
 }  // namespace selfcal::server

@@ -24,7 +24,7 @@ absl::StatusOr<StoredCalibration> ReadVersion(const Call& call,
   const auto version = ParseCount(id);
   if (version) return call.context.store->GetCalibration(rig, *version);
   return absl::InvalidArgumentError(
-      "a version is a number from 1 on, or 'active'");
+      "a version must be a number >= 1, or 'active'");
 }
 
 Answer ListCalibrations(const Call& call) {
@@ -53,7 +53,7 @@ Answer GetCalibration(const Call& call) {
   return JsonResponse(message);
 }
 
-// The body is an ActivateCalibrationRequest; the address says which version.
+// The body is an ActivateCalibrationRequest; the address has the version.
 Answer ActivateCalibration(const Call& call) {
   std::string id = call.parts.at(1);
   if (!id.ends_with(kActivate)) {
@@ -74,7 +74,7 @@ Answer ActivateCalibration(const Call& call) {
   SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
   const auto version = ParseCount(id);
   if (!version) {
-    return absl::InvalidArgumentError("a version is a number from 1 on");
+    return absl::InvalidArgumentError("a version must be a number >= 1");
   }
   if (!IsReason(request.reason())) {
     return absl::InvalidArgumentError("reason: " + std::string(kReasonRule));
@@ -88,7 +88,7 @@ Answer ActivateCalibration(const Call& call) {
   return JsonResponse(message);
 }
 
-// May take seconds at the first question about a version.
+// May take seconds at the first request about a version.
 Answer AdviseMotion(const Call& call) {
   constexpr int kDefaultAdvice = 3;
   v1::AdviseMotionRequest request;
@@ -100,7 +100,7 @@ Answer AdviseMotion(const Call& call) {
       CountOf(call,
               "max_advice",
               kDefaultAdvice,
-              "max_advice is a number from 1 on; without it 3 motions are "
+              "max_advice must be a number >= 1; without it 3 motions are "
               "told"));
   SELFCAL_ASSIGN_OR_RETURN(const RigCoaching coaching,
                            call.context.pipeline->AdviseMotion(rig));

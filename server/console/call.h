@@ -1,4 +1,4 @@
-// Parts of the handlers under /api/v1; internal to server/console.
+// The handlers under /api/v1, and their helpers; internal to server/console.
 #pragma once
 
 #include <absl/status/status.h>
@@ -13,13 +13,13 @@
 
 namespace selfcal::server {
 
-// One request on its way; `parts` are what stands at the '*' of its pattern.
+// One request; `parts` are the parts of the path at each '*' of its pattern.
 struct Call {
   const ApiContext& context;
   const HttpRequest& request;
   std::vector<std::string> parts;
 
-  // Of the query; empty if it is not there.
+  // Returns a query parameter; empty if it is missing.
   std::string Query(const std::string& name) const {
     const auto found = request.query.find(name);
     return found == request.query.end() ? "" : found->second;
@@ -28,21 +28,22 @@ struct Call {
 
 using Answer = absl::StatusOr<HttpResponse>;
 
-// A number from 1 on in the query; `without` if it is not there.
+// Returns a query parameter that is a number >= 1; `without` if it is missing.
 // INVALID_ARGUMENT, with the rule, for anything else.
 absl::StatusOr<int> CountOf(const Call& call,
                             const std::string& name,
                             int without,
                             std::string_view rule);
 
-// Size and token; INVALID_ARGUMENT for a size that is no number.
+// Returns size and token of a page; INVALID_ARGUMENT if the size is not a
+// number.
 absl::StatusOr<Page> PageOf(const Call& call);
 
-// INVALID_ARGUMENT for what can be no id of a rig.
+// Returns the rig of the address. INVALID_ARGUMENT if it is not a valid id.
 absl::StatusOr<std::string> RigOf(const Call& call);
 
-// A version of the rig by number or "active"; INVALID_ARGUMENT for what is
-// neither.
+// Returns a version of the rig, by its number or "active"; INVALID_ARGUMENT for
+// anything else.
 absl::StatusOr<StoredCalibration> ReadVersion(const Call& call,
                                               const std::string& id);
 

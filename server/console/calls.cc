@@ -22,7 +22,8 @@ absl::StatusOr<RigQuery> QueryOf(const Call& call) {
     query.order = RigQuery::Order::kLastSeen;
   } else if (!field.empty() && field != "name") {
     return absl::InvalidArgumentError(
-        "order_by is name or last_seen, with ' desc' for the other way");
+        "order_by must be name or last_seen, with ' desc' for descending "
+        "order");
   }
   return query;
 }
@@ -55,11 +56,12 @@ absl::StatusOr<Page> PageOf(const Call& call) {
   constexpr int kDefault = 50;
   SELFCAL_ASSIGN_OR_RETURN(
       const int size,
-      CountOf(call,
-              "page_size",
-              kDefault,
-              "page_size is a number from 1 to 1000; without it a page has "
-              "50"));
+      CountOf(
+          call,
+          "page_size",
+          kDefault,
+          "page_size must be a number from 1 to 1000; without it a page has "
+          "50"));
   return Page{size, call.Query("page_token")};
 }
 
@@ -67,10 +69,10 @@ absl::StatusOr<std::string> RigOf(const Call& call) {
   const auto rig = ParseRigName(RigName(call.parts.at(0)));
   if (rig) return *rig;
   return absl::InvalidArgumentError(
-      "a rig's name has 1 to 63 characters out of a-z, 0-9, '-' and '_'");
+      "a rig's name must have 1 to 63 characters from a-z, 0-9, '-' and '_'");
 }
 
-// What the caller may do, and where: the pages hide what it may not.
+// Returns the rights of the caller; the pages hide what it may not do.
 Answer GetSession(const Call& call) {
   const nlohmann::json body = {
       {"caller", call.request.caller.name},
@@ -104,7 +106,7 @@ Answer GetRig(const Call& call) {
   return JsonResponse(Encode(stored));
 }
 
-// Newest first, unlike over gRPC.
+// Lists events newest first, unlike over gRPC.
 Answer ListEvents(const Call& call) {
   v1::ListEventsRequest request;
   std::string rig;

@@ -37,7 +37,7 @@ bool IsTrusted(gnutls_session_t session) {
          problems == 0;
 }
 
-// That of the peer; null if there is none that can be read.
+// Returns the certificate of the peer; null if there is none or it is invalid.
 Certificate PeerCertificate(gnutls_session_t session) {
   unsigned count = 0;
   const gnutls_datum_t* chain = gnutls_certificate_get_peers(session, &count);
@@ -68,7 +68,7 @@ std::vector<Grant> GrantsOf(gnutls_x509_crt_t certificate) {
     std::size_t size = name.size();
     const int type = gnutls_x509_crt_get_subject_alt_name(
         certificate, i, name.data(), &size, nullptr);
-    if (type == GNUTLS_E_SHORT_MEMORY_BUFFER) continue;  // not one of ours
+    if (type == GNUTLS_E_SHORT_MEMORY_BUFFER) continue;  // too long for a grant
     if (type < 0) return grants;
     if (type != GNUTLS_SAN_URI) continue;
     const auto grant = ParseGrant(std::string_view(name.data(), size));

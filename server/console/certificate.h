@@ -1,4 +1,4 @@
-// Who is at the other end of a TLS connection.
+// The caller of a TLS connection.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -8,8 +8,9 @@
 
 namespace selfcal::server {
 
-// With the rights that its certificate states. UNAUTHENTICATED without a
-// certificate, or for one that the client authority did not sign for clients.
+// Returns the caller, with the rights that its certificate states.
+// UNAUTHENTICATED without a certificate, or if the client authority did not
+// sign it for clients.
 absl::StatusOr<Caller> CallerOf(gnutls_session_t session);
 
 }  // namespace selfcal::server

@@ -9,9 +9,9 @@ namespace selfcal::server {
 namespace {
 
 constexpr std::chrono::milliseconds kLookAfter{500};
-constexpr std::size_t kEvents = 50;  // looked at for each time
+constexpr std::size_t kEvents = 50;  // number of events that a poll reads
 
-// What is told has no character that JSON would escape.
+// The arguments have no characters that JSON would escape.
 std::string Line(const std::string& what, const std::string& rig) {
   return "event: change\ndata: {\"what\":\"" + what + "\",\"rig\":\"" +
          (rig.empty() ? "" : RigName(rig)) + "\"}\n\n";
@@ -53,7 +53,7 @@ void ChangeFeed::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
 
 std::shared_ptr<Outbox> ChangeFeed::Subscribe(const std::string& rig) {
   auto outbox = std::make_shared<Outbox>(Line("everything", ""));
-  // At once: a page that waits for its stream sees that it stands.
+  // Sent at once, so that the page knows that its stream is connected.
   outbox->Put(Line("everything", ""));
   const auto events = store_->ListNewestEvents({1, ""});
   const bool known = events.ok() && !events->items.empty();
@@ -88,7 +88,7 @@ void ChangeFeed::WatchEvents() {
   while (!stop_.wait_for(lock, kLookAfter, [this] { return stopping_; })) {
     lock.unlock();
     if (HasReaders()) {
-      // A store that fails now is asked again the next time.
+      // If the store fails, the next poll tries again.
       const auto events =
           store_->ListNewestEvents({static_cast<int>(kEvents), ""});
       if (events.ok() && !events->items.empty()) TellEvents(events->items);

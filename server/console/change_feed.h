@@ -1,7 +1,7 @@
-// Tells open pages that something has changed, so that they read it anew. What
-// the pipeline does comes from its observer; what is committed by hand, from
-// the log of events, which is looked at while a page is open. Any thread may
-// call.
+// The event feed for open pages: notifies them of changes, so that they read
+// again. Changes by the pipeline are reported by its observer; manual changes
+// are found in the event log, which is polled while a page is open. Any thread
+// may call.
 #pragma once
 
 #include <condition_variable>
@@ -21,7 +21,7 @@ namespace selfcal::server {
 
 class ChangeFeed final : public PipelineObserver {
  public:
-  // Hands on to `next`, which may be null. Both outlive it.
+  // Forwards to `next`, which may be null. Both must outlive the feed.
   ChangeFeed(Store* store, PipelineObserver* next);
   ~ChangeFeed() override;
 
@@ -30,14 +30,15 @@ class ChangeFeed final : public PipelineObserver {
   void OnRun(const StoredRun& run) override;
   void OnCheck(CheckSubject subject, VerificationOutcome outcome) override;
 
-  // Server-sent events, from now on; of one rig, or all with an empty name.
-  // The feed forgets it when nobody holds it.
+  // Returns a stream of server-sent events from now on, about one rig or, with
+  // an empty name, all rigs. The subscription ends when its last owner releases
+  // it.
   std::shared_ptr<Outbox> Subscribe(const std::string& rig);
 
  private:
   struct Reader {
     std::string rig;
-    std::int64_t newest_event = 0;  // that it needs not be told
+    std::int64_t newest_event = 0;  // events up to this one are not sent
     std::weak_ptr<Outbox> outbox;
   };
 

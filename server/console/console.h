@@ -1,6 +1,6 @@
 // The web console: pages for a browser, and the contract over HTTP under
-// /api/v1 (api.h). Off unless a port is given; a build may be without it
-// (SELFCAL_CONSOLE).
+// /api/v1 (api.h). It is off unless a port is given, and can be excluded from
+// the build (SELFCAL_CONSOLE).
 #pragma once
 
 #include <absl/status/status.h>
@@ -18,28 +18,29 @@
 namespace selfcal::server {
 
 struct ConsoleOptions {
-  std::string address;  // host:port; port 0 takes a free one
-  // Of whoever opens it on the loopback. Elsewhere certificates say.
+  std::string address;  // host:port; port 0 selects a free one
+  // Role of callers on the loopback interface. On other interfaces,
+  // certificates state the rights.
   Role local_role = Role::kRead;
-  TlsOptions tls;  // for an address off the loopback
+  TlsOptions tls;  // for an address that is not on the loopback interface
   std::string program_version;
 };
 
 class Console {
  public:
-  virtual ~Console() = default;  // nothing of it runs after that
+  virtual ~Console() = default;  // no thread of it runs after that
 
-  // With the port that was taken.
+  // The URL, with the actual port.
   virtual const std::string& url() const = 0;
 };
 
-// INVALID_ARGUMENT for what is no address, or off the loopback without TLS;
-// FAILED_PRECONDITION for files of TLS that cannot be used, and in a build that
-// has no console.
+// Checks the options. INVALID_ARGUMENT for an invalid address, and for one that
+// is not on the loopback interface if TLS is not set up; FAILED_PRECONDITION
+// for unusable TLS files, and in a build without the console.
 absl::Status CheckConsole(const ConsoleOptions& options);
 
-// All three outlive it. Errors of CheckConsole; UNAVAILABLE if the port cannot
-// be opened.
+// Starts the console; all three pointers must outlive it. Errors are those of
+// CheckConsole; UNAVAILABLE if the port cannot be opened.
 absl::StatusOr<std::unique_ptr<Console>> MakeConsole(
     Store* store,
     Pipeline* pipeline,

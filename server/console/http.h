@@ -1,4 +1,4 @@
-// A request and its answer, as the console sees them.
+// A request to the console and its response.
 #pragma once
 
 #include <functional>
@@ -17,7 +17,7 @@ struct HttpRequest {
   std::string method;
   std::string path;  // decoded once
   std::map<std::string, std::string> query;
-  std::map<std::string, std::string> headers;  // names in small letters
+  std::map<std::string, std::string> headers;  // names in lower case
   std::string body;
   Caller caller;
 };
@@ -27,9 +27,10 @@ struct HttpResponse {
   std::string type = "application/json";
   std::string body;
   std::vector<std::pair<std::string, std::string>> headers = {};
-  // Goes on after the body until it is closed or its reader has gone.
+  // If set, its lines are sent after the body, until it is closed or the client
+  // has disconnected.
   std::shared_ptr<Outbox> stream = nullptr;
-  // Lives as long as the answer is sent.
+  // An object that must live until the response is sent.
   std::shared_ptr<void> keep = nullptr;
 };
 

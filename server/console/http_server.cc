@@ -34,24 +34,25 @@ namespace {
 constexpr unsigned kMaxConnections = 64;
 constexpr std::size_t kMaxStreams = 16;
 constexpr std::size_t kMaxBodyBytes = 64 << 10;
-constexpr std::size_t kConnectionBytes = 32 << 10;  // of headers
+constexpr std::size_t kConnectionBytes = 32 << 10;  // limit of the headers
 constexpr unsigned kIdleSeconds = 15;
 constexpr std::size_t kMaxLogBytes = 500;
 constexpr std::size_t kStreamBlock = 16 << 10;
-// Keeps what stands between from ending a stream that has nothing to say.
+// Interval of heartbeats, which keep proxies from closing an idle stream.
 constexpr std::chrono::milliseconds kHeartbeat{5000};
-// A reader that has gone is noticed so soon, and makes room for the next.
+// Interval of checks whether a client has disconnected, to make room for
+// others.
 constexpr std::chrono::milliseconds kLookForReader{100};
-// A stop waits so long for requests that are being answered.
+// How long a stop waits for requests in progress.
 constexpr std::chrono::seconds kDrain{5};
 
-// libmicrohttpd keeps a pointer to it while a request is received and answered.
+// A request in progress; libmicrohttpd keeps the pointer to it.
 struct Exchange {
   HttpRequest request;
   bool too_large = false;
 };
 
-// What is sent after the body of an answer.
+// The stream that is sent after the body of a response.
 struct Sending {
   std::string waiting;
   std::shared_ptr<Outbox> stream;
@@ -94,13 +95,15 @@ MHD_socket SocketOf(MHD_Connection* connection) {
   return info == nullptr ? MHD_INVALID_SOCKET : info->connect_fd;
 }
 
-// Writing would not tell: the first write after a reader has gone succeeds.
+// True if the client has disconnected. Writing would not show it: the first
+// write after a disconnection succeeds.
 bool HasGone(MHD_socket reader) {
   pollfd state{reader, POLLRDHUP, 0};
   return poll(&state, 1, 0) > 0;
 }
 
-// Until there is something to send, which may be a heartbeat; false at the end.
+// Waits until there is something to send, which may be a heartbeat; false at
+// the end.
 bool AwaitMore(Sending* sending) {
   while (sending->waiting.empty()) {
     auto more = sending->stream->Take(kLookForReader);
@@ -217,8 +220,9 @@ class MicroServer final : public HttpServer {
                                MHD_OPTION_END);
     if (daemon_ == nullptr) {
       return absl::UnavailableError(
-          "cannot open the port of the console; is it free, and are the files "
-          "of TLS a certificate with its key?");
+          "cannot open the port of the console; check that it is free, and "
+          "that "
+          "the TLS files are a certificate with its key");
     }
     const MHD_DaemonInfo* info =
         MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT);
@@ -286,8 +290,7 @@ class MicroServer final : public HttpServer {
   HttpResponse Answer(MHD_Connection* connection, Exchange* exchange) {
     HttpRequest& request = exchange->request;
     if (exchange->too_large) {
-      return ErrorResponse(
-          absl::OutOfRangeError("the request has more than 64 KiB; send less"));
+      return ErrorResponse(absl::OutOfRangeError("the request exceeds 64 KiB"));
     }
     MHD_get_connection_values(
         connection, MHD_GET_ARGUMENT_KIND, &AddQuery, &request.query);
@@ -307,7 +310,7 @@ class MicroServer final : public HttpServer {
                ? std::move(answer)
                : ErrorResponse(absl::UnavailableError(
                      "too many pages are open, or the daemon is stopping; "
-                     "close some and load this one again"));
+                     "close some pages and reload this one"));
   }
 
   static absl::StatusOr<Caller> Peer(MHD_Connection* connection) {
@@ -319,7 +322,7 @@ class MicroServer final : public HttpServer {
     return CallerOf(static_cast<gnutls_session_t>(info->tls_session));
   }
 
-  // Whether one more connection may come; Count() says when it is there.
+  // True if one more connection is allowed; Count() then registers it.
   bool Announce() {
     const std::lock_guard lock(mutex_);
     announced_ = !stopping_;
@@ -337,9 +340,9 @@ class MicroServer final : public HttpServer {
     }
   }
 
-  // libmicrohttpd 0.9.75 takes no answer any more once it has been told to
-  // stop, not even its own to a malformed request, which it then follows
-  // through a null pointer. So it is told when no connection is left.
+  // Once libmicrohttpd 0.9.75 has been told to stop, it accepts no response,
+  // not even its own to a malformed request, which then makes it dereference a
+  // null pointer. Therefore it is only stopped when no connection is left.
   void EndConnections() {
     std::unique_lock lock(mutex_);
     stopping_ = true;
@@ -354,7 +357,7 @@ class MicroServer final : public HttpServer {
     }
   }
 
-  // Whether one more stream may run.
+  // True if one more stream is allowed.
   bool Admit(const std::shared_ptr<Outbox>& stream) {
     const std::lock_guard lock(mutex_);
     streams_.remove_if([](const auto& weak) { return weak.expired(); });
@@ -371,7 +374,7 @@ class MicroServer final : public HttpServer {
   std::list<std::weak_ptr<Outbox>> streams_;
   std::set<MHD_socket> connections_;
   std::condition_variable disconnected_;
-  bool announced_ = false;  // a connection that is not among them yet
+  bool announced_ = false;  // a connection is about to be counted
   bool stopping_ = false;
   MHD_Daemon* daemon_ = nullptr;
 };

@@ -1,11 +1,12 @@
-// HTTP/1.1 on one port, by libmicrohttpd: a thread for each connection, of
-// which there are so many at most. What comes from the network is bounded in
-// size and time, and ends no more than its own connection. Off the loopback,
-// TLS with certificates of the client authority, whose names say what a caller
-// may do, as over gRPC.
+// An HTTP/1.1 server on one port, based on libmicrohttpd: a thread for each
+// connection, with a limit on their number. Requests are limited in size and
+// time; an invalid request ends at most its own connection. On interfaces other
+// than the loopback, TLS is required, with certificates of the client
+// authority, whose names state the rights of a caller, as over gRPC.
 //
-// Not civetweb, which comes with prometheus-cpp: that of Debian 12 asks OpenSSL
-// for a function that OpenSSL 3 does not have, and has no TLS therefore.
+// The server is not based on civetweb, which comes with prometheus-cpp: the
+// version of Debian 12 needs a function that OpenSSL 3 does not have, and
+// therefore has no TLS.
 #pragma once
 
 #include <absl/status/status.h>
@@ -20,25 +21,26 @@
 namespace selfcal::server {
 
 struct HttpOptions {
-  std::string address;            // host:port; port 0 takes a free one
-  TlsOptions tls;                 // for addresses off the loopback
-  Role local_role = Role::kRead;  // of callers on the loopback
+  std::string address;            // host:port; port 0 selects a free one
+  TlsOptions tls;                 // for interfaces other than the loopback
+  Role local_role = Role::kRead;  // of callers on the loopback interface
 };
 
 class HttpServer {
  public:
   virtual ~HttpServer() = default;  // no handler runs after it
 
-  // With the port that was taken, without a path.
+  // The URL, with the actual port and without a path.
   virtual const std::string& url() const = 0;
 };
 
-// INVALID_ARGUMENT for what is no address, or without TLS off the loopback;
-// FAILED_PRECONDITION for files of TLS that cannot be read.
+// Checks the options. INVALID_ARGUMENT for an invalid address, and for one that
+// is not on the loopback interface if TLS is not set up; FAILED_PRECONDITION
+// for TLS files that cannot be read.
 absl::Status CheckHttpOptions(const HttpOptions& options);
 
-// `handler` is called from many threads. Errors of CheckHttpOptions;
-// UNAVAILABLE if the port cannot be opened.
+// Starts a server; `handler` is called on many threads. Errors are those of
+// CheckHttpOptions; UNAVAILABLE if the port cannot be opened.
 absl::StatusOr<std::unique_ptr<HttpServer>> MakeHttpServer(
     const HttpOptions& options, HttpHandler handler);
 

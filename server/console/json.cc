@@ -16,28 +16,28 @@ struct Kind {
 Kind KindOf(absl::StatusCode code) {
   switch (code) {
     case absl::StatusCode::kInvalidArgument:
-      return {400, "Correct the address or the request, and send it again."};
+      return {400, "Correct the address or the request."};
     case absl::StatusCode::kOutOfRange:
-      return {413, "Send less at once."};
+      return {413, "Send a smaller request."};
     case absl::StatusCode::kUnauthenticated:
       return {401, "Import a client certificate into the browser."};
     case absl::StatusCode::kPermissionDenied:
-      return {403, "Ask the operator for the role that this needs."};
+      return {403, "Ask the operator for the required role."};
     case absl::StatusCode::kNotFound:
-      return {404, "Look in the list for what there is."};
+      return {404, "Check the name against the list."};
     case absl::StatusCode::kFailedPrecondition:
     case absl::StatusCode::kAlreadyExists:
     case absl::StatusCode::kAborted:
-      return {409, "Load the page again to see how things are now."};
+      return {409, "Reload the page to see the current state."};
     case absl::StatusCode::kResourceExhausted:
     case absl::StatusCode::kUnavailable:
       return {503, "Try again in a moment."};
     case absl::StatusCode::kUnimplemented:
-      return {405, "Use a method that this address has."};
+      return {405, "Use a method that this address supports."};
     case absl::StatusCode::kDataLoss:
       return {500, "Run 'selfcal doctor', and restore a backup."};
     default:
-      return {500, "Look into the log of selfcald, and report this."};
+      return {500, "See the log of selfcald, and report this."};
   }
 }
 
@@ -63,7 +63,7 @@ HttpResponse ErrorResponse(const absl::Status& status) {
       {"whatToDo", kind.what_to_do}};
   HttpResponse response;
   response.status = kind.status;
-  // Messages may quote bytes of the request that are no UTF-8.
+  // Messages may quote bytes of the request that are not valid UTF-8.
   response.body =
       body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return response;

@@ -1,4 +1,4 @@
-// Answers in JSON: messages of the contract as gRPC has them, and errors.
+// Responses in JSON: messages of the contract, and errors.
 #pragma once
 
 #include <absl/status/status.h>
@@ -8,10 +8,11 @@
 
 namespace selfcal::server {
 
-// Every field, names in camel case, 64-bit integers as strings.
+// A response with all fields of a message; names are in camel case, 64-bit
+// integers are strings.
 HttpResponse JsonResponse(const google::protobuf::Message& message);
 
-// {"code": "NOT_FOUND", "message": ..., "whatToDo": ...}
+// A response {"code": "NOT_FOUND", "message": ..., "whatToDo": ...}.
 HttpResponse ErrorResponse(const absl::Status& status);
 
 }  // namespace selfcal::server

@@ -51,7 +51,7 @@ console::SessionPiece Encode(const std::string& rig,
 console::Absence Encode(const std::string& rig, const TableAbsence& absence) {
   console::Absence message;
   message.set_group(absence.group);
-  // Those of a newer program are not known here.
+  // Causes that a newer program has written are unknown here.
   const int cause = static_cast<int>(absence.cause);
   message.set_cause(console::Absence::Cause_IsValid(cause)
                         ? static_cast<console::Absence::Cause>(cause)
@@ -96,7 +96,7 @@ console::SegmentResiduals Encode(const SegmentResiduals& residuals,
     camera.set_observations(camera.observations() + 1);
     if (o.inlier) {
       camera.set_inliers(camera.inliers() + 1);
-      // The sum of squares, until all are in it.
+      // Accumulates the sum of squares first.
       camera.set_inlier_rms_px(camera.inlier_rms_px() +
                                o.residual_px.squaredNorm());
       continue;

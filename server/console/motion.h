@@ -1,4 +1,4 @@
-// Sessions, absences and residuals as messages of the console.
+// Encodes sessions, exclusions and residuals as messages of the console.
 #pragma once
 
 #include <string>
@@ -16,14 +16,16 @@ namespace selfcal::server {
 console::SessionOverview Encode(const std::string& rig,
                                 const SessionSummary& session);
 
-// With at most this many positions, the first and the last among them.
+// Encodes a segment with at most this many positions, including the first and
+// the last.
 console::SessionPiece Encode(const std::string& rig,
                              const SessionSegment& segment,
                              int max_points);
 
 console::Absence Encode(const std::string& rig, const TableAbsence& absence);
 
-// Of one segment with the prior of the rig (core/information/fusion.h).
+// Encodes the information of one segment together with the prior of the rig
+// (core/information/fusion.h).
 console::SegmentInformation Encode(const Rig& rig,
                                    const SegmentInformation& information);
 

@@ -10,8 +10,8 @@
 namespace selfcal::server {
 namespace {
 
-// Positions of one session that a page has to draw, however long it was; each
-// segment keeps its ends.
+// Limit on the positions of one session that a page draws, however long it is;
+// each segment keeps its first and last position.
 constexpr std::int64_t kPointsOfSession = 16'000;
 
 absl::StatusOr<StoredCalibration> VersionOf(const Call& call,
@@ -43,8 +43,8 @@ Answer GetTrajectory(const Call& call) {
       RigName(call.parts.at(0)) + "/sessions/" + call.parts.at(1), "sessions");
   if (!name) {
     return absl::InvalidArgumentError(
-        "a session stands in an address as in the name of its segments, with "
-        "%25 for a '%'");
+        "in an address, a session is written as in the name of its segments, "
+        "with %25 for a '%'");
   }
   const std::string& session = name->id;
   SELFCAL_ASSIGN_OR_RETURN(const Page page, PageOf(call));

@@ -1,4 +1,4 @@
-// Of a build that has no console.
+// The implementation for a build without the console.
 #include "server/console/console.h"
 
 namespace selfcal::server {

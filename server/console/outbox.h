@@ -1,5 +1,6 @@
-// Between who tells and one reader of a stream that may be slow: lines that
-// wait, each once, and no more than so many. Any thread may call.
+// A bounded queue of lines between the publishers of a stream and its reader,
+// which may be slow. A line that is queued is not queued twice. Any thread may
+// call.
 #pragma once
 
 #include <chrono>
@@ -13,13 +14,13 @@ namespace selfcal::server {
 
 class Outbox {
  public:
-  // `overflow` takes the place of all lines when there are too many.
+  // When there are too many lines, `overflow` replaces all of them.
   explicit Outbox(std::string overflow) : overflow_(std::move(overflow)) {}
 
   void Put(std::string line);
-  // What waits is still taken; after that the stream has ended.
+  // Ends the stream once the queued lines are taken.
   void Close();
-  // What waits, together; empty after the timeout, nothing at the end.
+  // Takes all queued lines; empty after the timeout, nullopt at the end.
   std::optional<std::string> Take(std::chrono::milliseconds timeout);
 
  private:

@@ -12,11 +12,11 @@ namespace {
 void AddAlarms(const RigSummary& rig, console::RigOverview* message) {
   if (rig.newest_state == CalibrationState::kRejected) {
     message->add_alarms("version " + std::to_string(rig.newest_version) +
-                        " was rejected; its reasons are in the history");
+                        " was rejected; see the reasons on its page");
   }
   if (rig.run_state == RunState::kFailed) {
     message->add_alarms("run " + std::to_string(rig.newest_run) +
-                        " failed; its message is among the runs");
+                        " failed; see its message in the list of runs");
   }
   if (rig.newest_change_ns > rig.active_since_ns) {
     message->add_alarms("the device has changed since version " +
@@ -26,7 +26,7 @@ void AddAlarms(const RigSummary& rig, console::RigOverview* message) {
   for (const Table& table : rig.tables) {
     if (!table.starved()) continue;
     message->add_alarms("the table '" + table.group +
-                        "' does not fill: the motion says too little about it");
+                        "' does not fill: the gain of the motion is too small");
   }
 }
 

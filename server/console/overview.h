@@ -1,4 +1,4 @@
-// A rig in the list of rigs, with what somebody should look at.
+// A rig in the list of rigs, with alarms for the operator.
 #pragma once
 
 #include "server/console/overview.pb.h"

@@ -12,7 +12,7 @@ std::string HeaderOf(const HttpRequest& request, const char* name) {
   return found == request.headers.end() ? "" : found->second;
 }
 
-// Without the port.
+// Returns the host without the port.
 std::string_view HostOf(std::string_view host) {
   if (host.starts_with('[')) return host.substr(0, host.find(']') + 1);
   return host.substr(0, host.find(':'));
@@ -43,19 +43,20 @@ const std::array<Header, 6>& SecurityHeaders() {
 absl::Status CheckOrigin(const HttpRequest& request, bool loopback) {
   if (loopback && !IsLoopbackName(HeaderOf(request, "host"))) {
     return absl::PermissionDeniedError(
-        "the console answers on the loopback to 127.0.0.1, localhost and [::1] "
-        "alone; open it by one of these names");
+        "on the loopback interface the console can only be opened as "
+        "127.0.0.1, "
+        "localhost or [::1]");
   }
   if (request.method == "GET" || request.method == "HEAD") {
     return absl::OkStatus();
   }
   if (request.method != "POST") {
     return absl::UnimplementedError(
-        "the console answers to GET, HEAD and POST");
+        "the console supports only GET, HEAD and POST");
   }
   if (HeaderOf(request, "x-selfcal-console").empty()) {
     return absl::PermissionDeniedError(
-        "a change needs the header X-Selfcal-Console: 1, which the pages of "
+        "a change requires the header X-Selfcal-Console: 1, which the pages of "
         "the console send");
   }
   return absl::OkStatus();

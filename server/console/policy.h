@@ -1,5 +1,5 @@
-// What keeps pages of other sites, and names that point here, from using the
-// console through somebody's browser.
+// Protection against pages of other sites, and host names that resolve to this
+// machine, that try to use the console through a user's browser.
 #pragma once
 
 #include <absl/status/status.h>
@@ -11,13 +11,14 @@
 
 namespace selfcal::server {
 
-// Of every answer: nothing from elsewhere is loaded, nobody frames the pages.
+// Headers of every response: the pages load nothing from other sites and cannot
+// be framed.
 using Header = std::pair<const char*, const char*>;
 const std::array<Header, 6>& SecurityHeaders();
 
-// PERMISSION_DENIED on the loopback for a Host that is none of its names (a
-// name of somebody else that was made to point here), and for a change without
-// the header X-Selfcal-Console, which no page of another site can send.
+// Checks the origin of a request. PERMISSION_DENIED on the loopback interface
+// if the header Host is none of its names (DNS rebinding), and for a change
+// without the header X-Selfcal-Console, which pages of other sites cannot send.
 // UNIMPLEMENTED for methods other than GET, HEAD and POST.
 absl::Status CheckOrigin(const HttpRequest& request, bool loopback);
 

@@ -19,7 +19,7 @@ absl::StatusOr<RunId> RunOf(const Call& call, const std::string& text) {
   SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOf(call));
   const auto run = ParseCount(text);
   if (run) return RunId{rig, *run};
-  return absl::InvalidArgumentError("a run is a number from 1 on");
+  return absl::InvalidArgumentError("a run must be a number >= 1");
 }
 
 HttpResponse StreamResponse(std::shared_ptr<Outbox> outbox) {
@@ -38,7 +38,7 @@ std::string RunLine(const StoredRun& run, const CalibrateProgress& progress) {
          JsonResponse(Encode(run, progress, nullptr)).body + "\n\n";
 }
 
-// Each iteration of a run from its first, until it has ended.
+// Streams each iteration of a run from the first, until it has ended.
 Answer OpenRunStream(const Call& call, const std::string& name) {
   v1::WatchRecalibrationRequest request;
   request.set_name(name);
@@ -47,7 +47,7 @@ Answer OpenRunStream(const Call& call, const std::string& name) {
   const auto run = parts ? ParseCount(parts->id) : std::nullopt;
   if (!run) {
     return absl::InvalidArgumentError(
-        "run is a name of the form rigs/{rig}/recalibrations/{run}");
+        "run must be a name of the form rigs/{rig}/recalibrations/{run}");
   }
   auto outbox = std::make_shared<Outbox>("event: run\ndata: {}\n\n");
   SELFCAL_ASSIGN_OR_RETURN(
@@ -93,7 +93,7 @@ Answer GetRun(const Call& call) {
   return JsonResponse(encoded);
 }
 
-// Of a run, of a rig (its id), or of everything.
+// Opens a stream about a run, a rig (by its id) or everything.
 Answer OpenStream(const Call& call) {
   const std::string run = call.Query("run");
   if (!run.empty()) return OpenRunStream(call, run);

@@ -9,7 +9,8 @@
 namespace selfcal::server {
 namespace {
 
-// For a list, which shows no directions: they are nine tenths of the bytes.
+// Encodes a segment for a list, without its unobserved directions, which are
+// nine tenths of the bytes and are not shown.
 v1::Segment EncodeBriefly(const StoredSegment& segment) {
   v1::Segment message = Encode(segment);
   message.clear_unobserved();

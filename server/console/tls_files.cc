@@ -21,7 +21,7 @@ std::string Read(const std::string& path) {
 absl::Status Check(TlsFiles* files, const TlsOptions& options) {
   gnutls_certificate_credentials_t credentials = nullptr;
   if (gnutls_certificate_allocate_credentials(&credentials) != 0) {
-    return absl::ResourceExhaustedError("GnuTLS does not start");
+    return absl::ResourceExhaustedError("GnuTLS cannot be initialised");
   }
   gnutls_datum_t certificate = Datum(&files->certificate);
   gnutls_datum_t key = Datum(&files->key);
@@ -38,7 +38,7 @@ absl::Status Check(TlsFiles* files, const TlsOptions& options) {
   }
   if (trusted <= 0) {
     return absl::FailedPreconditionError(
-        "the console finds no certificate of an authority in " +
+        "the console found no certificate of an authority in " +
         options.client_ca);
   }
   return absl::OkStatus();
@@ -50,8 +50,9 @@ absl::StatusOr<TlsFiles> ReadTlsFiles(const TlsOptions& options) {
   if (options.certificate.empty() || options.key.empty() ||
       options.client_ca.empty()) {
     return absl::InvalidArgumentError(
-        "off the loopback the console needs tls-certificate, tls-key and "
-        "tls-client-ca; or take a port of the loopback such as "
+        "on an address that is not loopback, the console needs "
+        "tls-certificate, "
+        "tls-key and tls-client-ca; or use a loopback address such as "
         "127.0.0.1:7448");
   }
   TlsFiles files{

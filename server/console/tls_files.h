@@ -1,4 +1,4 @@
-// The files of TLS, as libmicrohttpd takes them. They are read at the start.
+// The TLS files for libmicrohttpd. They are read once, at the start.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -15,8 +15,8 @@ struct TlsFiles {
   std::string client_ca;
 };
 
-// INVALID_ARGUMENT where one is not given, FAILED_PRECONDITION where it cannot
-// be read or the key is not that of the certificate.
+// Reads the files. INVALID_ARGUMENT if one is not given, FAILED_PRECONDITION if
+// one cannot be read or the key does not match the certificate.
 absl::StatusOr<TlsFiles> ReadTlsFiles(const TlsOptions& options);
 
 }  // namespace selfcal::server

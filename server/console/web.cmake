@@ -1,8 +1,8 @@
 # Builds the pages in web/ with npm, and embeds them. Sets SELFCAL_HAS_CONSOLE,
 # and SELFCAL_CONSOLE_ASSETS: the source file with them.
 #
-# The packages that package-lock.json names are fetched when the build is
-# configured, into the build directory, and again when the lock file changes.
+# The packages of package-lock.json are fetched into the build directory when the
+# build is configured, and again when the lock file changes.
 
 set(web_source ${CMAKE_CURRENT_SOURCE_DIR}/web)
 set(web ${CMAKE_CURRENT_BINARY_DIR}/web)
@@ -10,13 +10,14 @@ set(SELFCAL_HAS_CONSOLE FALSE)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS
   ${web_source}/package-lock.json)
 
-# selfcal_no_console(REASON): goes on without, or ends where it was asked for.
+# selfcal_no_console(REASON): continues without the console, or fails if it was
+# requested.
 macro(selfcal_no_console reason)
   if(SELFCAL_CONSOLE STREQUAL "AUTO")
     message(WARNING "no web console in this build: ${reason} "
-                    "(-DSELFCAL_CONSOLE=OFF says that none is wanted)")
+                    "(-DSELFCAL_CONSOLE=OFF disables this warning)")
   else()
-    message(FATAL_ERROR "the web console was asked for, but ${reason}")
+    message(FATAL_ERROR "the web console was requested, but ${reason}")
   endif()
 endmacro()
 
@@ -61,7 +62,7 @@ if(SELFCAL_HAS_CONSOLE)
     ${web_source}/build.mjs)
   set(built ${web}/dist/index.html ${web}/dist/assets/app.js
     ${web}/dist/assets/app.css)
-  # In a copy, beside the packages.
+  # The pages are built in a copy, beside the packages.
   add_custom_command(
     OUTPUT ${built}
     COMMAND ${CMAKE_COMMAND} -E rm -rf ${web}/src ${web}/dist
@@ -78,6 +79,6 @@ if(SELFCAL_HAS_CONSOLE)
   set_source_files_properties(${SELFCAL_CONSOLE_ASSETS} PROPERTIES
     OBJECT_DEPENDS "${built}")
 endif()
-# For the tests.
+# Variables for the tests.
 set(SELFCAL_HAS_CONSOLE ${SELFCAL_HAS_CONSOLE} CACHE INTERNAL "")
 set(SELFCAL_CONSOLE_WEB ${web} CACHE INTERNAL "")

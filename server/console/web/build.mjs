@@ -1,4 +1,4 @@
-// dist/index.html, dist/assets/app.js and app.css: web.cmake embeds them.
+// Writes dist/index.html, dist/assets/app.js and app.css, which web.cmake embeds.
 import { build } from 'esbuild';
 import { copyFile, mkdir } from 'node:fs/promises';
 
