@@ -17,7 +17,8 @@ constexpr std::string_view kRigs = "/rigs/";
 constexpr std::size_t kMaxRigId = 63;
 constexpr std::size_t kMaxName = 100;
 
-// A name that no rig can have would grant nothing, or, if empty, everything.
+// True for a valid id of a rig. An invalid one would grant nothing or, if
+// empty, everything.
 bool IsRigId(std::string_view id) {
   return !id.empty() && id.size() <= kMaxRigId &&
          id.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") ==

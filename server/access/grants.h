@@ -1,11 +1,11 @@
-// Who calls, and what it may do.
+// Callers and their rights.
 //
-// A certificate states rights as URIs among its alternative names:
+// A certificate states rights as URIs in its alternative names:
 //
 //   selfcal://role/{role}               on every rig
-//   selfcal://role/{role}/rigs/{rig}    on this rig alone
+//   selfcal://role/{role}/rigs/{rig}    on this rig only
 //
-// A role includes those before it: who may produce may read.
+// A role includes those before it: a caller that may produce may also read.
 #pragma once
 
 #include <optional>
@@ -28,14 +28,15 @@ struct Grant {
 };
 
 struct Caller {
-  std::string name;  // for the log of events; ASCII, not empty
+  std::string name;  // for the event log; ASCII, not empty
   std::vector<Grant> grants;
 };
 
-// A name out of a certificate for the log of events: ASCII, and not too long.
+// Converts a name from a certificate for the event log: ASCII, limited in
+// length.
 std::string PrintableName(std::string name);
 
-// What the name of a certificate grants; nothing for any other name.
+// Parses a grant from a name of a certificate; nullopt if it is not a grant.
 std::optional<Grant> ParseGrant(std::string_view uri);
 
 }  // namespace selfcal::server

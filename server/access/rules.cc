@@ -52,7 +52,8 @@ constexpr AccessRule kRules[] = {
     {"selfcal.v1.StoreService.ListEvents", Role::kRead, "parent", true},
 };
 
-// Every method has a request type of its own, in the file of its service.
+// Finds the rule of a request: every method has its own request type, in the
+// file of its service.
 const AccessRule* RuleOf(const Descriptor& request) {
   const FileDescriptor& file = *request.file();
   for (int s = 0; s < file.service_count(); ++s) {
@@ -69,7 +70,8 @@ const AccessRule* RuleOf(const Descriptor& request) {
   return nullptr;
 }
 
-// The text at a path like "rig.name"; empty if a message on the way is missing.
+// Returns the string at a path such as "rig.name"; empty if a message on the
+// path is missing.
 std::string TextAt(const Message& message, std::string_view path) {
   const std::size_t dot = path.find('.');
   const auto* field = message.GetDescriptor()->FindFieldByName(
@@ -80,7 +82,8 @@ std::string TextAt(const Message& message, std::string_view path) {
   return TextAt(reflection.GetMessage(message, field), path.substr(dot + 1));
 }
 
-// The {rig} of "rigs/{rig}" and "rigs/{rig}/..."; empty for other forms.
+// Returns the {rig} of "rigs/{rig}" and "rigs/{rig}/..."; empty for other
+// forms.
 std::string RigOf(std::string_view name) {
   constexpr std::string_view kRigs = "rigs/";
   if (!name.starts_with(kRigs)) return "";
@@ -88,8 +91,8 @@ std::string RigOf(std::string_view name) {
   return std::string(name.substr(0, name.find('/')));
 }
 
-// Whether a grant gives the role on the rig of this name; on any rig, if the
-// name is empty.
+// True if a grant gives the role on the rig of this name or, if the name is
+// empty, on any rig.
 bool Holds(const Caller& caller, Role role, const std::string& name) {
   const std::string rig = RigOf(name);
   return std::any_of(
@@ -133,7 +136,7 @@ absl::Status Authorise(const Caller& caller, const Message& request) {
   const AccessRule* rule = RuleOf(*request.GetDescriptor());
   if (rule == nullptr) {
     return absl::PermissionDeniedError(
-        "nobody may call this method: it has no rule of access");
+        "nobody may call this method: it has no access rule");
   }
   if (Passes(caller, *rule, request)) return absl::OkStatus();
   std::string message = "this needs the role '";

@@ -1,17 +1,17 @@
-// What a port needs to know its callers by their certificates.
+// The TLS files of a port that authenticates its callers by certificates.
 #pragma once
 
 #include <string>
 
 namespace selfcal::server {
 
-// PEM files, for addresses of TCP. They are read anew when they change; a
-// change that cannot be used leaves the ones before in place.
+// PEM files for TCP addresses. They are reloaded when they change; if the new
+// files are unusable, the old ones stay in use.
 struct TlsOptions {
-  std::string certificate;  // of the daemon, with those between it and its root
+  std::string certificate;  // of the daemon, with intermediate certificates
   std::string key;          // of the certificate
-  std::string client_ca;    // whose certificates clients must have
-  int refresh_s = 60;       // how often the files are looked at
+  std::string client_ca;    // authority that signs the clients' certificates
+  int refresh_s = 60;       // interval of checks for changed files
 
   friend bool operator==(const TlsOptions&, const TlsOptions&) = default;
 };

@@ -9,7 +9,7 @@
 namespace selfcal::server {
 namespace {
 
-// A difference as large comes by chance once in a hundred comparisons.
+// Significance level: by chance, one comparison in a hundred is significant.
 constexpr double kSignificant = 0.01;
 
 KnownCalibration Known(const StoredCalibration& calibration) {
@@ -31,7 +31,7 @@ std::vector<SegmentKey> SharedKeys(const StoredCalibration& a,
   return shared;
 }
 
-// Of those that can be read.
+// Reads the information of those segments for which it is readable.
 absl::StatusOr<std::vector<SegmentInformation>> ReadInformation(
     Store* store,
     const std::string& rig,

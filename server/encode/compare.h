@@ -1,4 +1,4 @@
-// The answer to CompareCalibrations.
+// The response to CompareCalibrations.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -8,8 +8,8 @@
 
 namespace selfcal::server {
 
-// Two versions of one rig, with what the segments say that both came from
-// (core/change/compare.h). Errors of the store.
+// Compares two versions of one rig, given the information of the segments that
+// both were computed from (core/change/compare.h). Returns errors of the store.
 absl::StatusOr<v1::CompareCalibrationsResponse> Compare(
     Store* store, const StoredCalibration& a, const StoredCalibration& b);
 

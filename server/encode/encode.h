@@ -1,4 +1,4 @@
-// What the store keeps, as the messages of the contract.
+// Conversion of the store's records to messages of the contract.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -19,21 +19,21 @@ v1::TableExclusion Encode(const TableAbsence& absence);
 v1::Event Encode(const StoredEvent& event);
 v1::Table Encode(const std::string& rig, const Table& table);
 
-// With an estimate for each tangent component, also as its difference from the
-// factory's value of its rig, sigmas from the covariance, and the walk that the
-// rig states.
+// Encodes a calibration with an estimate for each tangent component: its value,
+// its difference from the factory value, its sigma from the covariance, and the
+// random walk density that the rig states.
 v1::Calibration Encode(const StoredCalibration& calibration,
                        const StoredRig& rig);
-// The same with its rig.
+// Does the same, and reads the rig from the store.
 absl::StatusOr<v1::Calibration> Encode(Store* store,
                                        const StoredCalibration& calibration);
 
-// `calibration` is the one that the run produced, null if there is none yet.
+// Encodes a run. `calibration` is its result; null if there is none yet.
 v1::Recalibration Encode(const StoredRun& run,
                          const CalibrateProgress& progress,
                          const StoredCalibration* calibration);
 
-// The same with what the store keeps of the calibration: the solver's report.
+// Does the same, with the solver's report, which it reads from the store.
 absl::StatusOr<v1::Recalibration> EncodeWithReport(
     Store* store, const StoredRun& run, const CalibrateProgress& progress);
 

@@ -1,4 +1,4 @@
-// What the coach says, as the message of the contract.
+// Conversion of the coach's advice to a message of the contract.
 #pragma once
 
 #include "selfcal/v1/calibration_service.pb.h"
@@ -6,7 +6,7 @@
 
 namespace selfcal::server {
 
-// The best `max_advice` motions.
+// Encodes the best `max_advice` motions.
 v1::AdviseMotionResponse Encode(const RigCoaching& coaching, int max_advice);
 
 }  // namespace selfcal::server

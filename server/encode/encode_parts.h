@@ -1,4 +1,4 @@
-// Parts that several messages contain; internal to server/encode.
+// Encoders of parts that several messages share; internal to server/encode.
 #pragma once
 
 #include <google/protobuf/timestamp.pb.h>

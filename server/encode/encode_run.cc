@@ -40,7 +40,7 @@ v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
   return v1::Recalibration::TRIGGER_UNSPECIFIED;
 }
 
-// What is fixed has no sigma.
+// Components that the rig holds fixed have no sigma and are skipped.
 void FillProgress(const CalibrateProgress& progress,
                   v1::Recalibration* message) {
   message->set_iteration(progress.iteration);

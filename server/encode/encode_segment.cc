@@ -58,22 +58,24 @@ std::string ReasonText(const TableAbsence& absence) {
   const std::string rival =
       absence.rival
           ? fmt::format("{}~{}", absence.rival->session, absence.rival->index)
-          : "a segment that is since dropped";
+          : "a segment that was dropped since";
   switch (absence.cause) {
     case AbsenceCause::kSaysTooLittle:
       return "insufficient gain";
     case AbsenceCause::kOthersSayMore:
-      return "outranked by all in the full table, the last of them " + rival;
+      return "outranked by all entries of the full table, the last of which "
+             "is " +
+             rival;
     case AbsenceCause::kPushedOut:
-      return "displaced by " + rival;
+      return "replaced by " + rival;
     case AbsenceCause::kTooOld:
       return "older than the rig's table_max_age";
     case AbsenceCause::kDeviceChanged:
-      return "from before a change of the device";
+      return "from before a device change";
     case AbsenceCause::kDataEvicted:
       return "its data was evicted by a quota";
     case AbsenceCause::kUnusable:
-      return "unusable; see problem";
+      return "unusable; see the segment's problem";
     case AbsenceCause::kDoesNotFit:
       return fmt::format(
           "does not fit: its residuals are {:.3g} times what is expected, and "

@@ -1,4 +1,4 @@
-// Verifications as messages of the contract.
+// Conversion of verifications to messages of the contract.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace selfcal::server {
 
 v1::VerifyRigResponse Encode(const std::string& rig,
                              const VerificationStep& step);
-// With the summary.
+// Encodes the response with the summary.
 v1::VerifyRigResponse Encode(const Verification& verification);
 
 }  // namespace selfcal::server

@@ -1,4 +1,4 @@
-// What is written into the log of events for whoever reads it later.
+// The reason that a caller gives for the event log.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 namespace selfcal::server {
 
 inline constexpr std::string_view kReasonRule =
-    "must have 1 to 500 bytes; say why, for whoever reads the log";
+    "must have 1 to 500 bytes; the event log records the reason";
 
 inline bool IsReason(const std::string& text) {
   constexpr std::size_t kMaxBytes = 500;

@@ -31,7 +31,7 @@ bool IsOfWord(char c) {
          std::string_view("_-+.:~").find(c) != std::string_view::npos;
 }
 
-// Words, quoted texts and comparisons, one after the other.
+// A tokeniser: words, quoted texts and comparisons.
 class Words {
  public:
   explicit Words(std::string_view text) : rest_(text) { SkipSpace(); }
@@ -85,7 +85,7 @@ class Words {
 
 struct Term {
   std::string field;
-  std::string group;  // behind the dot of the field, if there is one
+  std::string group;  // after the dot of the field, if there is one
   std::string sign;
   std::string value;
 };
@@ -112,7 +112,7 @@ double Before(double value) {
   return std::nextafter(value, -std::numeric_limits<double>::infinity());
 }
 
-// Narrows the range: conditions on one field add up.
+// Narrows the range by a condition; several conditions on a field all apply.
 template <typename T>
 void Narrow(const std::string& sign, T value, Range<T>* range) {
   if (sign != "<" && sign != "<=") {
@@ -144,7 +144,7 @@ absl::Status NarrowByTime(const Term& term, Range<std::int64_t>* range) {
   if (!google::protobuf::util::TimeUtil::FromString(term.value, &time)) {
     return Wrong(term.value, "a time as 2026-11-21T04:10:03Z");
   }
-  // Other years do not fit into 64 bits.
+  // Times in other years do not fit into 64 bits.
   if (time.seconds() < 0 || time.seconds() > INT64_MAX / 1'000'000'000 - 1) {
     return Wrong(term.value, "a time from 1970 to 2262");
   }
@@ -193,7 +193,7 @@ absl::Status ReadBool(const Term& term, std::optional<bool>* value) {
   return absl::OkStatus();
 }
 
-// Fields that are one thing or another.
+// Applies a condition on a field that supports only '='.
 absl::Status ApplyEquality(const Term& term, SegmentQuery* query) {
   if (term.sign != "=") {
     return Wrong(term.sign, fmt::format("= : {} has no order", term.field));
@@ -252,7 +252,7 @@ absl::Status ParseSegmentFilter(std::string_view filter, SegmentQuery* query) {
     SELFCAL_RETURN_IF_ERROR(Apply(term, query));
     if (words.at_end()) break;
     SELFCAL_ASSIGN_OR_RETURN(const std::string joint, words.Word("AND"));
-    if (joint != "AND") return Wrong(joint, "AND, the one word between two");
+    if (joint != "AND") return Wrong(joint, "AND between two conditions");
     if (words.at_end()) return Wrong("the end", "a condition");
   }
   return absl::OkStatus();

@@ -1,5 +1,5 @@
-// What a list of segments is asked for, as text (ListSegmentsRequest in
-// selfcal/v1/segment.proto has the grammar).
+// Parsers of the filter and the order of a list of segments
+// (ListSegmentsRequest in selfcal/v1/segment.proto has the grammar).
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -10,7 +10,7 @@
 
 namespace selfcal::server {
 
-// INVALID_ARGUMENT says where and what was expected.
+// INVALID_ARGUMENT names the position and what was expected.
 absl::Status ParseSegmentFilter(std::string_view filter, SegmentQuery* query);
 absl::Status ParseSegmentOrder(std::string_view order_by, SegmentQuery* query);
 

@@ -5,8 +5,8 @@
 namespace selfcal::server {
 namespace {
 
-// Bytes of the UTF-8 character that the text begins with; 0 if it begins with
-// none, or with a control character.
+// Returns the number of bytes of the UTF-8 character at the start of the text;
+// 0 if there is none or it is a control character.
 std::size_t CharacterSize(std::string_view text) {
   const auto byte = [&](std::size_t i) {
     return static_cast<unsigned char>(text[i]);
@@ -21,7 +21,7 @@ std::size_t CharacterSize(std::string_view text) {
   for (std::size_t i = 1; i < size; ++i) {
     if ((byte(i) & 0xc0) != 0x80) return 0;
   }
-  // Longer than needed, a surrogate, or beyond the last code point.
+  // Overlong encodings, surrogates, and values beyond the last code point.
   if (first == 0xe0 && byte(1) < 0xa0) return 0;
   if (first == 0xed && byte(1) > 0x9f) return 0;
   if (first == 0xf0 && byte(1) < 0x90) return 0;
@@ -35,7 +35,7 @@ std::string Shortened(std::string_view text, std::size_t max_bytes) {
   constexpr std::string_view kEllipsis = "...";
   std::string result;
   std::size_t i = 0;
-  // Where the result ends if the rest does not fit.
+  // The length of the result if the rest does not fit.
   std::size_t cut = 0;
   while (i < text.size() && result.size() <= max_bytes) {
     const std::size_t size = CharacterSize(text.substr(i));

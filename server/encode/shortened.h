@@ -1,4 +1,4 @@
-// Text that came from elsewhere, for a message or a log.
+// Sanitises text from outside for a message or a log.
 #pragma once
 
 #include <cstddef>
@@ -7,9 +7,9 @@
 
 namespace selfcal::server {
 
-// A text of any bytes as valid UTF-8 of at most max_bytes: cut between
-// characters, with an ellipsis; '?' for control characters and for bytes that
-// are no UTF-8.
+// Converts any bytes to valid UTF-8 of at most max_bytes: truncated between
+// characters, with an ellipsis, and with '?' for control characters and for
+// bytes that are not UTF-8.
 std::string Shortened(std::string_view text, std::size_t max_bytes);
 
 }  // namespace selfcal::server

@@ -1,4 +1,4 @@
-// How full the tables of a rig are, all together.
+// The fill of all tables of a rig together.
 #pragma once
 
 #include <vector>

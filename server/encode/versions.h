@@ -1,4 +1,4 @@
-// Ids that count: versions of calibrations, runs.
+// Numeric ids, of versions and runs.
 #pragma once
 
 #include <charconv>
@@ -9,7 +9,7 @@
 
 namespace selfcal::server {
 
-// A number from 1 on, written without anything else; nothing if it is not.
+// Parses a number >= 1; nullopt for any other text.
 inline std::optional<std::int64_t> ParseCount(const std::string& text) {
   std::int64_t number = 0;
   const char* end = text.data() + text.size();

@@ -76,7 +76,8 @@ class ActivityService final : public v1::ActivityService::Service {
     }
   }
 
-  // A watch begins with how things are; nothing if the run has ended since.
+  // Returns the first update of a watch, which is the present state; nullopt if
+  // the run has ended in the meantime.
   std::optional<RunUpdate> Now(const std::string& rig, std::int64_t run) {
     std::optional<RunUpdate> now;
     const auto watch =

@@ -148,7 +148,7 @@ class CalibrationService final : public v1::CalibrationService::Service {
     return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
-      // Before the subscription, so that it ends after it.
+      // Declared before the subscription, so that it outlives it.
       Mailbox<StoredCalibration> mailbox;
       const auto subscription = context_.pipeline->WatchCalibration(
           *rig, [&](const StoredCalibration& active) { mailbox.Put(active); });
@@ -156,15 +156,15 @@ class CalibrationService final : public v1::CalibrationService::Service {
         return ToGrpc(subscription.status(),
                       {"selfcal.v1.Rig", request->parent(), "parent"});
       }
-      // One that was rolled back and made active again while the reader was
-      // slow is what the reader has.
-      std::int64_t told = 0;
+      // The version that the client has. If it was rolled back and activated
+      // again while the client was slow, it is not sent again.
+      std::int64_t sent = 0;
       return Watch(context_,
                    call,
                    &mailbox,
                    [&](const StoredCalibration& active, bool*) {
-                     if (active.version == told) return true;
-                     told = active.version;
+                     if (active.version == sent) return true;
+                     sent = active.version;
                      v1::Calibration message;
                      return Fill(active, request->parent(), &message).ok() &&
                             writer->Write(message);
@@ -182,7 +182,7 @@ class CalibrationService final : public v1::CalibrationService::Service {
     return grpc::Status::OK;
   }
 
-  // The version of that name.
+  // Reads the version of that name.
   grpc::Status Read(std::string_view field,
                     const std::string& name,
                     StoredCalibration* calibration) {

@@ -1,4 +1,4 @@
-// Who makes a call, and whether it may.
+// The caller of an RPC, and its authorisation.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -13,12 +13,13 @@
 
 namespace selfcal::server {
 
-// The name for the log of events: the common name of the client's certificate,
-// or how it came in without one, e.g. "local". Printable ASCII, not empty.
+// The name of the caller for the event log: the common name of the client's
+// certificate or, without one, the kind of connection, e.g. "local". Printable
+// ASCII, not empty.
 std::string CallerName(const grpc::ServerContextBase& call);
 
-// With the rights that its certificate states; without a certificate `local`
-// on every rig.
+// Returns the caller with the rights that its certificate states; without a
+// certificate, with the role `local` on every rig.
 Caller CallerOf(const grpc::ServerContextBase& call, Role local);
 
 // OK, or PERMISSION_DENIED (server/access/rules.h).
@@ -26,7 +27,7 @@ grpc::Status Authorise(const grpc::ServerContextBase& call,
                        Role local,
                        const google::protobuf::Message& request);
 
-// Runs a handler for a caller who may make the call; no exception leaves it.
+// Runs the handler if the caller is authorised; no exception leaves it.
 template <typename Handler>
 grpc::Status Authorised(const ServiceContext& context,
                         const grpc::ServerContextBase& call,

@@ -21,19 +21,20 @@ constexpr std::string_view kInsecure = "insecure:";
 constexpr std::string_view kUnix = "unix:";
 constexpr std::size_t kMaxGroupBuffer = 1 << 16;
 
-// OpenSSL's own sentence for the last failure; it never quotes the file.
+// An error with OpenSSL's message for the last failure, which never quotes the
+// file.
 absl::Status Unusable(const std::string& what, const std::string& path) {
   const char* reason = ERR_reason_error_string(ERR_get_error());
   ERR_clear_error();
   return absl::FailedPreconditionError(
       "cannot use the " + what + " " + path + ": " +
-      (reason == nullptr ? "it is no PEM file" : reason));
+      (reason == nullptr ? "it is not a PEM file" : reason));
 }
 
-// An encrypted key would make OpenSSL ask at the terminal.
+// Prevents OpenSSL from prompting at the terminal for an encrypted key.
 int NoPassphrase(char*, int, int, void*) { return 0; }
 
-// The number of a group; nothing if there is none of this name.
+// Returns the number of a group; nullopt if no group has this name.
 std::optional<gid_t> FindGroup(const std::string& name) {
   group entry{};
   group* found = nullptr;
@@ -42,18 +43,20 @@ std::optional<gid_t> FindGroup(const std::string& name) {
   return found == nullptr ? std::nullopt : std::optional(found->gr_gid);
 }
 
-// The messages do not tell what is in a file.
+// Checks the TLS files. The messages do not reveal their content.
 absl::Status CheckTls(const TlsOptions& options) {
   if (options.certificate.empty() || options.key.empty() ||
       options.client_ca.empty()) {
     return absl::InvalidArgumentError(
-        "an address of TCP needs tls-certificate, tls-key and tls-client-ca; "
-        "without encryption and authentication it must be asked for by name: "
+        "a TCP address needs tls-certificate, tls-key and tls-client-ca; "
+        "without encryption and authentication it must be explicit: "
         "insecure:host:port");
   }
   const std::unique_ptr<SSL_CTX, void (*)(SSL_CTX*)> context(
       SSL_CTX_new(TLS_server_method()), SSL_CTX_free);
-  if (context == nullptr) return absl::InternalError("OpenSSL does not start");
+  if (context == nullptr) {
+    return absl::InternalError("OpenSSL cannot be initialised");
+  }
   SSL_CTX_set_default_passwd_cb(context.get(), NoPassphrase);
   ERR_clear_error();
   if (SSL_CTX_use_certificate_chain_file(context.get(),
@@ -104,8 +107,8 @@ absl::Status SetPermissions(const std::string& path,
     const auto group = FindGroup(options.group);
     if (!group || chown(path.c_str(), static_cast<uid_t>(-1), *group) != 0) {
       return absl::FailedPreconditionError(
-          "cannot give " + path + " to the group '" + options.group +
-          "'; the daemon must be a member of it");
+          "cannot set the group of " + path + " to '" + options.group +
+          "'; the daemon must be a member of the group");
     }
   }
   if (chmod(path.c_str(), options.mode) != 0) {

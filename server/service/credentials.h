@@ -1,8 +1,8 @@
-// How each address is opened: unix sockets with permissions, TCP with mutual
-// TLS, and plain TCP only where it is asked for by name.
+// Security of the addresses: unix sockets with permissions, TCP with mutual
+// TLS, and plain TCP only if it is requested explicitly. Access is granted to
 //
-//   unix:/path          who may open the file
-//   host:port           who has a certificate of the client authority
+//   unix:/path          users who may open the file
+//   host:port           clients with a certificate of the client authority
 //   insecure:host:port  anybody who reaches the port
 #pragma once
 
@@ -16,7 +16,7 @@
 
 namespace selfcal::server {
 
-// What gRPC is told, and what its file is for a unix socket.
+// An address for gRPC and, for a unix socket, the path of its file.
 struct Endpoint {
   std::string address;
   bool tls = false;
@@ -25,11 +25,12 @@ struct Endpoint {
 
 Endpoint ParseEndpoint(const std::string& address);
 
-// Reads the files anew when they change; CheckServerOptions has passed.
+// Returns credentials that reload the files when they change.
+// CheckServerOptions must have succeeded.
 std::shared_ptr<grpc::ServerCredentials> TlsCredentials(
     const TlsOptions& options);
 
-// Gives a socket that is open its group and mode.
+// Sets group and mode of an open socket.
 absl::Status SetPermissions(const std::string& path,
                             const SocketOptions& options);
 

@@ -13,11 +13,12 @@ namespace {
 
 constexpr std::size_t kMaxMessageBytes = 1000;
 constexpr std::size_t kMaxTextBytes = 300;
-// Of the violations; base64 makes 4/3 of it in the trailer.
+// Limit on the size of the violations; base64 enlarges it by 4/3 in the
+// trailer.
 constexpr std::size_t kMaxViolationBytes = 3500;
 constexpr int kRetryDelay_s = 1;
 
-// absl and gRPC number the canonical codes alike.
+// absl and gRPC use the same numbers for the canonical codes.
 grpc::StatusCode Code(absl::StatusCode code) {
   return static_cast<grpc::StatusCode>(static_cast<int>(code));
 }

@@ -12,7 +12,8 @@
 namespace selfcal::server {
 namespace {
 
-// Never destroyed: threads of gRPC may outlive the end of main.
+// Returns a logger that is never destroyed, because threads of gRPC may outlive
+// main.
 const std::shared_ptr<spdlog::logger>& Logger() {
   static const auto* const logger =
       new std::shared_ptr<spdlog::logger>(spdlog::default_logger());
@@ -25,14 +26,15 @@ void Log(gpr_log_func_args* line) {
   if (std::string_view(line->message).starts_with("Failed accept4")) {
     stopped_accepting = true;
   }
-  // Its errors are failures of one connection, as a rule.
+  // Most errors of gRPC are failures of one connection.
   const bool is_error = line->severity == GPR_LOG_SEVERITY_ERROR;
   Logger()->log(is_error ? spdlog::level::warn : spdlog::level::debug,
                 "grpc: {}",
                 line->message);
 }
 
-// What it says of is what callers send, as often as they like.
+// Drops messages of protobuf: they are about the data of callers, who could
+// flood the log.
 void LogProtobuf(google::protobuf::LogLevel,
                  const char*,
                  int,

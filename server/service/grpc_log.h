@@ -1,15 +1,15 @@
-// What gRPC and protobuf themselves have to say goes into the daemon's log.
+// Routes the log messages of gRPC and protobuf to the daemon's log.
 #pragma once
 
 namespace selfcal::server {
 
-// For the whole process, into the logger that is the default one now. A second
+// Applies to the whole process and uses the present default logger. A second
 // call does nothing.
 void RouteGrpcLog();
 
-// Whether an address has gone deaf. gRPC 1.51 gives up accepting on it for good
-// when the process has no file left for a connection, and says so in its log
-// alone.
+// True if an address has stopped accepting connections. gRPC 1.51 stops
+// accepting permanently when the process has no file descriptor left for a
+// connection, and only reports this in its log.
 bool HasStoppedAccepting();
 
 }  // namespace selfcal::server

@@ -1,5 +1,5 @@
-// Between a publisher that must not wait and a watcher that may be slow: holds
-// one value, the newest. Any thread may call.
+// A mailbox between a publisher that must not wait and a watcher that may be
+// slow. It holds one value, the newest. Any thread may call.
 #pragma once
 
 #include <chrono>
@@ -13,7 +13,7 @@ namespace selfcal::server {
 template <typename T>
 class Mailbox {
  public:
-  // Replaces what was not taken.
+  // Replaces a value that was not taken.
   void Put(T value) {
     {
       const std::lock_guard lock(mutex_);
@@ -22,7 +22,7 @@ class Mailbox {
     arrived_.notify_one();
   }
 
-  // The newest value not yet taken, or nothing after the timeout.
+  // Takes the newest value; nullopt if there is none within the timeout.
   std::optional<T> Take(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
     arrived_.wait_for(lock, timeout, [this] { return value_.has_value(); });

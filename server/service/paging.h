@@ -1,4 +1,4 @@
-// Pages of lists: what a request may ask for, and how a response is filled.
+// Pages of lists: limits on requests, and the filling of responses.
 #pragma once
 
 #include <grpcpp/support/status.h>
@@ -14,8 +14,8 @@ namespace selfcal::server {
 
 inline constexpr int kDefaultPageSize = 50;
 inline constexpr int kMaxPageSize = 1000;
-// A client receives at most 4 MiB unless it says otherwise: larger pages are
-// cut, which a paging client does not notice.
+// Pages are truncated to this size, because a client receives at most 4 MiB by
+// default. A client that reads page by page does not notice it.
 inline constexpr std::size_t kMaxPageBytes = 3u << 20;
 
 // Fills *response with a page. `fetch` takes a Page and returns a

@@ -93,7 +93,7 @@ class RecalibrationService final : public v1::RecalibrationService::Service {
     return Authorised(context_, *call, *request, [&]() -> grpc::Status {
       RunId id;
       if (auto bad = ParseRun(request->name(), &id); !bad.ok()) return bad;
-      // Before the subscription, so that it ends after it.
+      // Declared before the subscription, so that it outlives it.
       Mailbox<RunUpdate> mailbox;
       const auto subscription = context_.pipeline->WatchRun(
           id.rig, id.run, [&](const RunUpdate& update) {

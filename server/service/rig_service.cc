@@ -84,8 +84,8 @@ class RigService final : public v1::RigService::Service {
     const bool exists = context_.store->GetRig(rig.id).ok();
     if (*rigs >= context_.max_rigs && !exists) {
       return ToGrpc(absl::ResourceExhaustedError(
-                        "there are as many rigs as the setting max-rigs "
-                        "allows; ask the operator to raise it"),
+                        "the limit of rigs, the setting max-rigs, is reached; "
+                        "ask the operator to raise it"),
                     {});
     }
     const auto created = context_.domain->CreateRig(rig, policy);
@@ -97,7 +97,8 @@ class RigService final : public v1::RigService::Service {
     return grpc::Status::OK;
   }
 
-  // Rigs of the store; they are counted once and never become fewer.
+  // Returns the number of rigs. It is read once and then kept up to date,
+  // because rigs are never removed.
   absl::StatusOr<std::int64_t> Count() {
     if (rigs_) return *rigs_;
     std::int64_t rigs = 0;
@@ -113,7 +114,7 @@ class RigService final : public v1::RigService::Service {
   }
 
   ServiceContext context_;
-  std::mutex mutex_;  // guards rigs_, and that no rig is created meanwhile
+  std::mutex mutex_;  // guards rigs_, and serialises the creation of rigs
   std::optional<std::int64_t> rigs_;
 };
 

@@ -15,11 +15,11 @@
 namespace selfcal::server {
 namespace {
 
-// Its own thread reads, hands segments to the stream, and ends the call. The
-// answers come on any thread, which starts to write the first of them. An
-// operation of gRPC is started with the lock released, since it may run another
-// callback of this class before it returns; what the lock guards says which one
-// is under way.
+// The call's own thread reads, hands segments to the stream, and ends the call.
+// Answers arrive on any thread, which starts to write the first of them. gRPC
+// operations are started with the lock released, because they may run another
+// callback of this class before they return; the guarded members state which
+// operation is in progress.
 class SegmentCall final : public SegmentReactor {
  public:
   SegmentCall(const ServiceContext& context,
@@ -95,8 +95,8 @@ class SegmentCall final : public SegmentReactor {
     Finish(status);  // may delete this
   }
 
-  // Every segment that is under way has an answer, and there is no more to do.
-  // With the lock held, as what follows but Take.
+  // True if every segment has an answer and nothing remains to be done. This
+  // and the functions below, except Take, need the lock.
   bool Over() const {
     if (writing_ || (arrived_ && !Ending())) return false;
     for (const auto& slot : answers_) {
@@ -119,8 +119,8 @@ class SegmentCall final : public SegmentReactor {
     if (!refused.ok()) Fill(slot, {refused, {}});
   }
 
-  // Once the lock is released the call may be over and gone, unless a write
-  // was begun.
+  // Once the lock is released, the call may have ended and this may be deleted,
+  // unless a write is in progress.
   void Fill(Slot* slot, SegmentStream::Answer answer) {
     const v1::StreamSegmentsResponse* next = nullptr;
     {
@@ -146,21 +146,21 @@ class SegmentCall final : public SegmentReactor {
     return &first.answer.response;
   }
 
-  SegmentStream stream_;                     // of the thread
+  SegmentStream stream_;                     // used by the thread
   const grpc::CallbackServerContext& call_;  // outlives it
   const Role local_role_;
   v1::StreamSegmentsRequest request_;
   std::atomic<int>* const open_calls_;
-  std::atomic<bool> gone_ = false;  // the caller
+  std::atomic<bool> gone_ = false;  // the caller has disconnected
 
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
   std::deque<std::unique_ptr<Slot>> answers_;  // in the order of the segments
   bool reading_ = false;
-  bool arrived_ = false;  // a request was read and not yet taken
-  bool closed_ = false;   // the caller sends no more
+  bool arrived_ = false;  // a request was read and is not processed yet
+  bool closed_ = false;   // the caller sends no more requests
   bool writing_ = false;
-  bool failed_ = false;  // ends with `failure_`
+  bool failed_ = false;  // the call ends with `failure_`
   grpc::Status failure_;
 };
 
@@ -179,7 +179,7 @@ SegmentReactor* StartSegmentCall(const ServiceContext& context,
     try {
       return new SegmentCall(context, *call, open_calls);
     } catch (const std::system_error&) {
-      // No thread: refused as one too many.
+      // No thread could be started: refuse the call, as beyond the limit.
     }
   }
   --*open_calls;

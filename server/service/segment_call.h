@@ -1,5 +1,4 @@
-// One StreamSegments call: reads ahead while there is room, and answers in
-// order.
+// One StreamSegments call: reads ahead within a limit, and responds in order.
 #pragma once
 
 #include <grpcpp/server_context.h>
@@ -12,15 +11,16 @@
 
 namespace selfcal::server {
 
-// Segments of one stream that are read and not yet answered: enough to fill a
-// commit while another is on its way to the disk.
+// Limit on the segments of one stream that are read and not yet answered:
+// enough to fill a commit while another is being written to disk.
 inline constexpr int kReadAhead = 4;
 
 using SegmentReactor = grpc::ServerBidiReactor<v1::StreamSegmentsRequest,
                                                v1::StreamSegmentsResponse>;
 
-// Takes the call; the reactor lives until it has ended, on a thread of its own.
-// RESOURCE_EXHAUSTED if `open_calls` is at the limit of the context already.
+// Starts to handle the call, on a thread of its own; the reactor lives until
+// the call has ended. RESOURCE_EXHAUSTED if `open_calls` is at the limit of the
+// context.
 SegmentReactor* StartSegmentCall(const ServiceContext& context,
                                  const grpc::CallbackServerContext* call,
                                  std::atomic<int>* open_calls);

@@ -22,7 +22,8 @@ constexpr char kRigType[] = "selfcal.v1.Rig";
 constexpr char kSegmentType[] = "selfcal.v1.Segment";
 constexpr char kTableType[] = "selfcal.v1.Table";
 
-// Streams are answered as segments become durable, all else at once.
+// StreamSegments is asynchronous, because it responds when segments become
+// durable; the other methods are synchronous.
 using Service = v1::SegmentService::WithCallbackMethod_StreamSegments<
     v1::SegmentService::Service>;
 
@@ -154,7 +155,7 @@ class SegmentService final : public Service {
       const auto rig = ParseRigName(request->parent());
       if (!rig) return BadName("parent", "rigs/{rig}");
       if (request->session().empty()) {
-        return InvalidFields({{"session", "is empty; name the session"}});
+        return InvalidFields({{"session", "must not be empty"}});
       }
       if (!IsReason(request->reason())) {
         return InvalidFields({{"reason", std::string(kReasonRule)}});

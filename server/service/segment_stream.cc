@@ -13,7 +13,7 @@
 namespace selfcal::server {
 namespace {
 
-// Longer sessions are refused; their echo need not be complete.
+// Longer names of sessions are refused, so that responses may truncate them.
 constexpr std::size_t kMaxSessionEcho = 256;
 constexpr std::size_t kMaxDescription = 1000;
 
@@ -92,8 +92,8 @@ void SegmentStream::Take(const v1::StreamSegmentsRequest& request,
   response.set_index(request.segment().index());
   if (!request.parent().empty() && request.parent() != parent_) {
     Reject({{"parent",
-             "is another rig than that of the first message; open a stream "
-             "for each rig"}},
+             "is not the rig of the first message; open a stream for each "
+             "rig"}},
            &response);
     return Answered(std::move(response), done);
   }

@@ -28,9 +28,9 @@ constexpr const char* kServiceNames[] = {
     "selfcal.v1.ActivityService",
 };
 
-// Plugins of gRPC's builder are global and meant to be set once. The library
-// is kept until the process ends: to shut it down with the last server waits up
-// to 10 s for a poll of a connection that a client has left open.
+// Sets up gRPC once: plugins of its builder are global. Keeps the library
+// initialised until the process ends: shutting it down with the last server can
+// wait 10 s for a poll of a connection that a client has left open.
 void SetUpLibrary() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -49,11 +49,12 @@ void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
   builder->SetResourceQuota(quota);
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                               options.max_streams);
-  // A stream reads ahead of what it takes by this much (64 KiB) and no more.
+  // Without the probe, a stream reads ahead by 64 KiB and no more.
   builder->AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  // Two daemons on one port would share its calls without a word.
+  // Prevents two daemons from silently sharing the calls of one port.
   builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  // Readers that vanished without closing are noticed, and may ask likewise.
+  // Detects clients that have vanished without closing, and allows clients to
+  // do the same.
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 60'000);
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 20'000);
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
@@ -61,7 +62,7 @@ void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
       GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
 }
 
-// The address with the port that was taken in place of 0.
+// The address with the actual port in place of 0.
 std::string BoundAddress(const std::string& address, int port) {
   if (address.starts_with("unix:")) return address;
   return address.substr(0, address.rfind(':') + 1) + std::to_string(port);
@@ -122,7 +123,8 @@ class GrpcServer final : public Server {
     if (server_ == nullptr || !failed.empty()) {
       return absl::UnavailableError(
           "cannot listen on" + failed +
-          "; is the address free, the path writable and short enough?");
+          "; check that the address is free, and that the path is writable and "
+          "short enough");
     }
     for (const std::string& address : options.listen) {
       const std::string socket = ParseEndpoint(address).socket;

@@ -1,9 +1,10 @@
-// The six services of the contract, each in a file of its own: decode the
-// request, authorise it, ask the store or the pipeline, encode the answer.
-// Nothing that comes from the network aborts or throws out of a handler.
+// The six services of the contract, each in its own file. A handler decodes the
+// request, authorises it, calls the store or the pipeline, and encodes the
+// response. Input from the network never aborts the process, and no exception
+// leaves a handler.
 //
-// Every call runs on a thread of the gRPC server; a watch holds one as long as
-// it lives, a stream of segments has one of its own.
+// Every call runs on a thread of the gRPC server; a watch occupies it as long
+// as it lives, a stream of segments has its own thread.
 #pragma once
 
 #include <grpcpp/impl/codegen/service_type.h>
@@ -21,20 +22,20 @@ namespace selfcal::server {
 
 class Traffic;  // traffic.h
 
-// All of it outlives the services.
+// The pointers must outlive the services.
 struct ServiceContext {
   Domain* domain = nullptr;
   Store* store = nullptr;  // of `domain`
   Pipeline* pipeline = nullptr;
   // Once true, watches and streams end with UNAVAILABLE.
   const std::atomic<bool>* stopping = nullptr;
-  // Of callers without a certificate.
+  // Role of callers without a certificate.
   Role local_role = Role::kAdminister;
   std::int64_t max_rigs = 0;
-  int max_segment_streams = 256;  // at once
-  // Called when a restored database waits for the next start; or nothing.
+  int max_segment_streams = 256;  // concurrent streams
+  // Called when a restored database is ready for the next start; may be empty.
   std::function<void()> restored;
-  Traffic* traffic = nullptr;  // of segments, counted for ActivityService
+  Traffic* traffic = nullptr;  // counts segments for ActivityService
 };
 
 std::unique_ptr<grpc::Service> MakeRigService(const ServiceContext& context);

@@ -126,7 +126,7 @@ class StoreService final : public v1::StoreService::Service {
       StoreMaintenance* maintenance = context_.store->maintenance();
       if (maintenance == nullptr) {
         return {grpc::StatusCode::UNIMPLEMENTED,
-                "this store is cared for by the tools of its own engine"};
+                "this store is administered with the tools of its database"};
       }
       return handler(maintenance);
     });

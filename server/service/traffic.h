@@ -1,5 +1,5 @@
-// Segments that come in, counted by rig since the daemon started. Any thread
-// may call. Rigs that a stream was never opened for take no memory.
+// Counts of segments that arrive, by rig, since the daemon started. Any thread
+// may call. Only rigs for which a stream was opened take memory.
 #pragma once
 
 #include <chrono>
@@ -11,8 +11,8 @@
 
 namespace selfcal::server {
 
-// Events in a minute: each counts 1 when it happens and is forgotten with a
-// time constant of a minute, so that the mean over time is the true rate.
+// Events per minute: each event counts 1 when it happens and decays with a time
+// constant of one minute, so that the mean over time is the true rate.
 class MinuteRate {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -36,7 +36,7 @@ class Traffic {
   using Clock = std::function<MinuteRate::Time()>;
   explicit Traffic(Clock clock = std::chrono::steady_clock::now);
 
-  void Opened(const std::string& rig);  // a stream, which is closed later
+  void Opened(const std::string& rig);  // a stream was opened
   void Closed(const std::string& rig);
   void Stored(const std::string& rig);
   void Rejected(const std::string& rig);
@@ -47,7 +47,7 @@ class Traffic {
 
  private:
   struct Counters {
-    TrafficCounts counts;  // but for the rate
+    TrafficCounts counts;  // without the rate
     MinuteRate rate;
   };
   template <typename Change>
@@ -56,7 +56,7 @@ class Traffic {
 
   const Clock clock_;
   const std::int64_t start_time_ns_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   Counters all_;
   std::map<std::string, Counters> rigs_;
 };

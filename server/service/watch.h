@@ -1,4 +1,5 @@
-// The loop of a watch: from a mailbox to the stream of its reader.
+// The loop of a watch, which forwards values from a mailbox to a client's
+// stream.
 #pragma once
 
 #include <grpcpp/server_context.h>
@@ -11,12 +12,13 @@
 
 namespace selfcal::server {
 
-// How late a watch notices that its reader has gone or the daemon stops.
+// Delay after which a watch notices that its client has disconnected or the
+// daemon is stopping.
 inline constexpr std::chrono::milliseconds kWatchPoll{100};
 
-// Takes what arrives in the mailbox and hands it to `write`, which returns
-// whether the reader is still there and sets *done after the last value.
-// Returns when the reader has gone, the daemon stops, or *done.
+// Takes values from the mailbox and passes them to `write`, which returns false
+// if the client has disconnected, and sets *done after the last value. Returns
+// when the client has disconnected, the daemon is stopping, or *done is true.
 template <typename T, typename Write>
 grpc::Status Watch(const ServiceContext& context,
                    grpc::ServerContext* call,

@@ -54,7 +54,7 @@ inline const AccessRule& RuleOf(const MethodDescriptor& method) {
   for (const AccessRule& rule : AccessRules()) {
     if (rule.method == method.full_name()) return rule;
   }
-  throw std::runtime_error(method.full_name() + " has no rule of access");
+  throw std::runtime_error(method.full_name() + " has no access rule");
 }
 
 // Writes the name to the field at a path like "rig.name".
