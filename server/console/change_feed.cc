@@ -33,18 +33,18 @@ ChangeFeed::~ChangeFeed() {
 
 void ChangeFeed::OnVerdict(const std::string& rig, Verdict verdict) {
   if (next_ != nullptr) next_->OnVerdict(rig, verdict);
-  if (verdict == Verdict::kStored) Tell("segments", rig);
+  if (verdict == Verdict::kStored) Notify("segments", rig);
 }
 
 void ChangeFeed::OnScore(const SegmentInformation& information,
                          double seconds) {
   if (next_ != nullptr) next_->OnScore(information, seconds);
-  Tell("scores", "");
+  Notify("scores", "");
 }
 
 void ChangeFeed::OnRun(const StoredRun& run) {
   if (next_ != nullptr) next_->OnRun(run);
-  Tell("runs", run.rig);
+  Notify("runs", run.rig);
 }
 
 void ChangeFeed::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
@@ -62,7 +62,7 @@ std::shared_ptr<Outbox> ChangeFeed::Subscribe(const std::string& rig) {
   return outbox;
 }
 
-void ChangeFeed::Tell(const std::string& what, const std::string& rig) {
+void ChangeFeed::Notify(const std::string& what, const std::string& rig) {
   const std::lock_guard lock(mutex_);
   for (auto reader = readers_.begin(); reader != readers_.end();) {
     const auto outbox = reader->outbox.lock();

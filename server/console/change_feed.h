@@ -42,7 +42,7 @@ class ChangeFeed final : public PipelineObserver {
     std::weak_ptr<Outbox> outbox;
   };
 
-  void Tell(const std::string& what, const std::string& rig);
+  void Notify(const std::string& what, const std::string& rig);
   bool HasReaders();
   void WatchEvents();
   void TellEvents(const std::vector<StoredEvent>& newest);

@@ -19,7 +19,8 @@ absl::Status Mistake(const std::string& path,
       "{}:{}:{}: {}", path, where.begin.line, where.begin.column, what));
 }
 
-// As it would stand behind the flag; nothing for a kind that no setting has.
+// Converts a value to the text of a command line argument; nullopt for types
+// that no setting has.
 std::optional<std::string> Text(const toml::node& node) {
   if (const auto* text = node.as_string()) return text->get();
   if (const auto* number = node.as_integer()) {
@@ -49,16 +50,16 @@ std::optional<std::vector<std::string>> Texts(const toml::node& node) {
 }
 
 std::string WrongKind(const std::string& name) {
-  return "'" + name + "' must be a text, a number or a list of texts";
+  return "'" + name + "' must be a string, a number or a list of strings";
 }
 
-// The explanation of what is wrong with the value, or nothing.
+// Applies a value; returns an error message, or nullopt if it is valid.
 std::optional<std::string> Set(const std::string& name,
                                bool is_flag,
                                const std::vector<std::string>& values,
                                DaemonOptions* options) {
   CLI::App app;
-  app.set_help_flag();  // no setting
+  app.set_help_flag();  // the help flag is not a setting
   DefineSettings(&app, Environment::kIgnore, options);
   if (app.get_option_no_throw("--" + name) == nullptr) {
     return "there is no setting '" + name + "'; selfcald --help lists them";
@@ -72,7 +73,7 @@ std::optional<std::string> Set(const std::string& name,
     arguments.push_back("--" + name + "=" + value);
   }
   try {
-    // CLI11 takes them in reverse.
+    // CLI11 expects arguments in reverse order.
     std::reverse(arguments.begin(), arguments.end());
     app.parse(arguments);
   } catch (const CLI::ParseError& error) {

@@ -1,4 +1,4 @@
-// The TOML file of settings: flat, with the names of the flags.
+// The TOML file of settings: flat, with the names of the flags as keys.
 #pragma once
 
 #include <absl/status/status.h>
@@ -9,9 +9,10 @@
 
 namespace selfcal::server {
 
-// Writes what the file sets to *options. INVALID_ARGUMENT with file, line and
-// column for the first mistake: no TOML, a name that is no setting, a value
-// that the setting does not take. An empty text or list leaves the default.
+// Applies the settings of the file to *options. INVALID_ARGUMENT with file,
+// line and column of the first error: invalid TOML, an unknown setting, or a
+// value that the setting does not accept. An empty string or list keeps the
+// default.
 absl::Status ApplyConfigFile(const std::string& path, DaemonOptions* options);
 
 }  // namespace selfcal::server

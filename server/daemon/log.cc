@@ -28,7 +28,7 @@ class JsonFormatter final : public spdlog::formatter {
     line["level"] = std::string_view(level.data(), level.size());
     line["message"] =
         std::string_view(message.payload.data(), message.payload.size());
-    // Names of files may be any bytes.
+    // File names may contain any bytes.
     const std::string text = line.dump(
         -1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
     to.append(text.data(), text.data() + text.size());

@@ -1,14 +1,15 @@
-// The log on stderr: text, or one JSON object on each line.
+// The log on stderr: text, or one JSON object per line.
 #pragma once
 
 #include <string>
 
 namespace selfcal::server {
 
-// Once, before anything is logged. `format` is "text" or "json".
+// Sets up the log. Call it once, before anything is logged. `format` is "text"
+// or "json".
 void SetUpLog(const std::string& level, const std::string& format);
 
-// Any thread, at any time.
+// Any thread may call at any time.
 void SetLogLevel(const std::string& level);
 
 }  // namespace selfcal::server

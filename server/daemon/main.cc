@@ -1,4 +1,4 @@
-// selfcald: keeps the calibration of a camera-IMU device true.
+// selfcald: keeps the calibrations of camera-IMU devices up to date.
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
@@ -27,9 +27,9 @@ int main(int argc, char** argv) {
   if (const auto exit_code = ParseOptions(argc, argv, &options)) {
     return *exit_code;
   }
-  // Nobody but the owner reads what it writes.
+  // Files are readable by their owner only.
   umask(S_IRWXG | S_IRWXO);
-  // A reader of the log that goes away must not end the daemon.
+  // The daemon must not end when the reader of its log does.
   signal(SIGPIPE, SIG_IGN);
   BlockSignals();
   try {

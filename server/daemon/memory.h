@@ -1,15 +1,16 @@
-// The heap of a daemon that runs for years.
+// Settings of the heap for a daemon that runs for years.
 #pragma once
 
 namespace selfcal::server {
 
-// Before the first thread. Segments and what a run computes with go from thread
-// to thread: with an arena for each thread the heap grows to several times of
-// what is in use, and what is large stays in it.
+// Limits the growth of the heap. Call it before the first thread is started.
+// Segments and the data of runs move between threads: with an arena for each
+// thread, the heap would grow to several times the memory in use, and would
+// keep large blocks.
 void KeepHeapSmall();
 
-// Gives back what is free in the midst of the heap, now and then: at most once
-// in 5 s, for it holds up whoever allocates for some ms.
+// Returns free memory within the heap to the system, at most once in 5 s,
+// because it blocks allocations for some ms.
 void TrimHeap();
 
 }  // namespace selfcal::server

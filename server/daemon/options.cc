@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kUsageError = 2;
 
-// The command line with the environment under it.
+// The command line, with the environment as its default.
 class CommandLine {
  public:
   explicit CommandLine(DaemonOptions* options) {
@@ -22,7 +22,7 @@ class CommandLine {
         ->envname("SELFCAL_CONFIG");
     app_.add_flag("--check",
                   options->check,
-                  "Look at the settings and the files they name, and end");
+                  "Check the settings and the files they name, and exit");
     DefineSettings(&app_, Environment::kUse, options);
   }
 
@@ -40,7 +40,7 @@ class CommandLine {
  private:
   CLI::App app_{
       "selfcald scores motion segments, keeps the most informative ones and "
-      "calibrates cameras and IMU on them."};
+      "calibrates cameras and IMU with them."};
   std::string file_;
 };
 
@@ -57,7 +57,8 @@ std::string FolderOfTheServiceManager(const char* variable) {
 }  // namespace
 
 std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
-  // Once for its mistakes and for the file, then again on top of the file.
+  // Parses the command line once, for its errors and the name of the file, and
+  // again after the file, so that it takes precedence.
   DaemonOptions without_file;
   CommandLine first(&without_file);
   if (const auto exit_code = first.Parse(argc, argv)) return exit_code;
@@ -72,7 +73,7 @@ std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
     options->state_dir = FolderOfTheServiceManager("STATE_DIRECTORY");
   }
   if (options->state_dir.empty()) {
-    return Mistake("state-dir is not set: give --state-dir FOLDER");
+    return Mistake("state-dir is not set: use --state-dir FOLDER");
   }
   if (options->server.listen.empty()) {
     const std::string runtime = FolderOfTheServiceManager("RUNTIME_DIRECTORY");

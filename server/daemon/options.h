@@ -1,7 +1,7 @@
-// What selfcald is told at its start. Each setting has one name: the flag
-// --name, the variable SELFCAL_NAME (capitals, '_' for '-') and the key in the
-// TOML file. A flag goes before the environment, the environment before the
-// file, the file before the default.
+// The settings of selfcald. Each setting has one name: the flag --name, the
+// environment variable SELFCAL_NAME (in capitals, '_' for '-') and the key in
+// the TOML file. A flag takes precedence over the environment, the environment
+// over the file, the file over the default.
 #pragma once
 
 #include <filesystem>
@@ -17,37 +17,38 @@
 namespace selfcal::server {
 
 struct DaemonOptions {
-  // Not given: the service manager's STATE_DIRECTORY.
+  // Default: the service manager's STATE_DIRECTORY.
   std::filesystem::path state_dir;
-  // Without an address to listen on: selfcald.sock in the service manager's
-  // RUNTIME_DIRECTORY, or else in the state folder.
+  // The default address is the socket selfcald.sock in the service manager's
+  // RUNTIME_DIRECTORY or, without one, in the state folder.
   ServerOptions server;
   int scoring_threads = 1;
-  int max_backlog = 64;  // stored and unscored segments; then streams wait
+  // Number of stored but unscored segments above which streams wait.
+  int max_backlog = 64;
   SolverKind solver = SolverKind::kStructured;
   ScorerKind scorer = ScorerKind::kStructured;
-  // Of scores and calibrations: computed by the other core as well.
+  // Share of scores and calibrations that the other core computes as well.
   double verify_share = 0;
   DomainOptions domain;
-  HostLimits host;  // for runs that nobody asks for
+  HostLimits host;  // for automatic runs
   bool idle_runs = true;
-  double max_run_minutes = 30;      // of a run; it fails then
-  int max_run_memory_mib = 512;     // of a run; 0: no limit
-  double session_idle_s = 60;       // then a session has ended; 0: never
-  std::string metrics = "off";      // or host:port of the loopback
-  int metrics_rigs = 16;            // with series of their own
-  std::string console = "off";      // or host:port
-  Role console_role = Role::kRead;  // of whoever opens it on the loopback
+  double max_run_minutes = 30;   // a run that takes longer fails
+  int max_run_memory_mib = 512;  // limit for a run; 0: no limit
+  double session_idle_s = 60;    // idle time that ends a session; 0: no limit
+  std::string metrics = "off";   // or host:port of the loopback interface
+  int metrics_rigs = 16;         // number of rigs with their own series
+  std::string console = "off";   // or host:port
+  Role console_role = Role::kRead;  // of users on the loopback interface
   std::string log_level = "info";
   std::string log_format = "text";
-  bool check = false;  // no setting: look at the settings and end
+  bool check = false;  // not a setting: check the settings and exit
 
   friend bool operator==(const DaemonOptions&, const DaemonOptions&) = default;
 };
 
-// Fills *options. Returns the exit code if the program ends here: 0 after
-// --help and --version, 2 after a mistake, which is explained on stderr; one in
-// the file with its line.
+// Fills *options. Returns the exit code if the program should exit: 0 after
+// --help and --version, 2 after an error, which is explained on stderr, with
+// its line if it is in the file.
 std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options);
 
 }  // namespace selfcal::server

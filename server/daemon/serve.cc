@@ -30,10 +30,10 @@
 namespace selfcal::server {
 namespace {
 
-// A stop is over within 10 s, of which calls get a part to end by themselves.
+// A stop takes less than 10 s; calls get a part of it to end by themselves.
 constexpr std::chrono::milliseconds kStopLimit{9500};
 constexpr std::chrono::milliseconds kCallLimit{2000};
-// How often it looks whether its addresses still accept.
+// Interval of checks that the addresses still accept connections.
 constexpr std::chrono::milliseconds kLookAfter{1000};
 
 int Failed(const std::string& what, const absl::Status& status) {
@@ -41,7 +41,8 @@ int Failed(const std::string& what, const absl::Status& status) {
   return EXIT_FAILURE;
 }
 
-// Each connection holds a file: as many as the system lets this process have.
+// Raises the limit of open files as far as the system permits, because each
+// connection takes a file descriptor.
 void RaiseFileLimit() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
@@ -68,7 +69,7 @@ PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
   return pipeline;
 }
 
-// Calibrates, and scores for a check, in a worker: this program again.
+// Estimators that calibrate, and score for verifications, in a worker process.
 Estimators EstimatorsOfPipeline(const DaemonOptions& options) {
   WorkerLimits limits;
   limits.idle = options.idle_runs;
@@ -109,18 +110,19 @@ ConsoleOptions OptionsOfConsole(const DaemonOptions& options) {
           SELFCAL_VERSION};
 }
 
-// Whether the scores that are asked of Ceres can be computed.
+// Returns an error if the settings require Ceres and this build does not have
+// it.
 absl::Status CheckCeres(const DaemonOptions& options) {
   if (HasCeres()) return absl::OkStatus();
   const bool scores = options.scorer == ScorerKind::kCeres;
   if (!scores && options.verify_share == 0) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      fmt::format("{}: this program was built without Ceres; take the setting "
-                  "out, or use a build with SELFCAL_CERES=ON",
+      fmt::format("{}: this program was built without Ceres; remove the "
+                  "setting, or use a build with SELFCAL_CERES=ON",
                   scores ? "scorer" : "verify-share"));
 }
 
-// Null where it is off.
+// Opens the console; null if it is off.
 absl::StatusOr<std::unique_ptr<Console>> OpenConsole(
     const DaemonOptions& options,
     Store* store,
@@ -132,8 +134,9 @@ absl::StatusOr<std::unique_ptr<Console>> OpenConsole(
   return opened;
 }
 
-// The signal to stop, or nothing if an address has gone deaf. A store that does
-// not answer any more keeps the watchdog from being told.
+// Runs until a signal to stop, which it returns; nullopt if an address has
+// stopped accepting connections. If the store does not respond any more, the
+// watchdog is not notified.
 std::optional<int> RunUntilStopped(
     Store* store,
     const std::function<std::optional<std::string>()>& read_log_level) {
@@ -148,7 +151,7 @@ std::optional<int> RunUntilStopped(
     } else if (signal == SIGHUP) {
       const auto level = read_log_level();
       if (level) SetLogLevel(*level);
-      spdlog::info("log level: {}", level.value_or("as it was"));
+      spdlog::info("log level: {}", level.value_or("unchanged"));
     } else if (signal) {
       return signal;
     }
@@ -156,12 +159,12 @@ std::optional<int> RunUntilStopped(
   return std::nullopt;
 }
 
-// From a start to a stop. Returns the exit code, or nothing where a restored
-// database waits for the next start.
+// Serves from a start to a stop. Returns the exit code, or nullopt if a
+// restored database is ready for the next start.
 std::optional<int> ServeOnce(
     const DaemonOptions& options,
     const std::function<std::optional<std::string>()>& read_log_level) {
-  // First, so that it watches over the end of all that follows.
+  // Declared first, so that it limits the time in which everything below ends.
   std::optional<StopDeadline> deadline;
   RaiseFileLimit();
   if (absl::Status status = CheckCeres(options); !status.ok()) {
@@ -199,7 +202,7 @@ std::optional<int> ServeOnce(
     return Failed("cannot open the console", console.status());
   }
   const auto server =
-      MakeServer(&domain, pipeline.get(), options.server, AskToStartAnew);
+      MakeServer(&domain, pipeline.get(), options.server, RequestRestart);
   if (!server.ok()) {
     pipeline->Stop();
     return Failed("cannot serve", server.status());
@@ -211,20 +214,20 @@ std::optional<int> ServeOnce(
   const auto signal = RunUntilStopped(store->get(), read_log_level);
   deadline.emplace(kStopLimit);
   NotifyStopping();
-  if (signal == kStartAnew) {
-    spdlog::info("stopping, to start anew with the restored database");
+  if (signal == kRestart) {
+    spdlog::info("stopping, to restart with the restored database");
   } else if (signal) {
     spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
   } else {
     spdlog::error(
-        "stopping to be started anew: with more connections than files it may "
-        "open, it does not accept any more");
+        "stopping, to be restarted: the limit of open files was reached, and "
+        "no new connections are accepted");
   }
   console->reset();
   (*server)->Shutdown(kCallLimit);
   pipeline->Stop();
   spdlog::info("stopped");
-  if (signal == kStartAnew) return std::nullopt;
+  if (signal == kRestart) return std::nullopt;
   return signal ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
@@ -239,8 +242,8 @@ int Check(const DaemonOptions& options) {
   if (status.ok() && options.console != "off") {
     status = CheckConsole(OptionsOfConsole(options));
   }
-  if (!status.ok()) return Failed("the settings have a mistake", status);
-  spdlog::info("the settings are good; state-dir {}, listening on {}",
+  if (!status.ok()) return Failed("the settings are invalid", status);
+  spdlog::info("the settings are valid; state-dir {}, listening on {}",
                options.state_dir.string(),
                fmt::join(options.server.listen, ", "));
   return EXIT_SUCCESS;

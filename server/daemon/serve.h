@@ -1,5 +1,5 @@
-// Wires the store, the pipeline, the metrics and the gRPC server, and runs them
-// until a signal tells to stop.
+// Connects the store, the pipeline, the metrics and the gRPC server, and runs
+// them until a signal to stop.
 #pragma once
 
 #include <functional>
@@ -10,11 +10,13 @@
 
 namespace selfcal::server {
 
-// Looks at what the settings name: 0, or 1 with an explanation in the log.
+// Checks the settings and the files that they name. Returns 0, or 1 with an
+// explanation in the log.
 int Check(const DaemonOptions& options);
 
-// Returns the exit code. SIGHUP takes up the log level that `read_log_level`
-// returns; nothing if the settings have a mistake, which it explains.
+// Runs the daemon; returns the exit code. At SIGHUP it sets the log level that
+// `read_log_level` returns; that is nullopt if the settings have an error,
+// which it explains.
 int Serve(const DaemonOptions& options,
           const std::function<std::optional<std::string>()>& read_log_level);
 

@@ -20,7 +20,7 @@ void NotifyAlive() { sd_notify(0, "WATCHDOG=1"); }
 std::optional<std::chrono::milliseconds> WatchdogInterval() {
   std::uint64_t limit_us = 0;
   if (sd_watchdog_enabled(0, &limit_us) <= 0) return std::nullopt;
-  // Twice within the limit.
+  // Notify twice within the limit.
   const auto half = static_cast<std::int64_t>(limit_us / 2000);
   return std::chrono::milliseconds(std::max<std::int64_t>(half, 1));
 }

@@ -1,5 +1,5 @@
-// What systemd is told about the daemon, where it runs under it (sd_notify(3));
-// otherwise nothing happens.
+// Notifications to systemd (sd_notify(3)). They do nothing if the daemon does
+// not run under systemd.
 #pragma once
 
 #include <chrono>
@@ -13,7 +13,7 @@ void NotifyReady();
 void NotifyStopping();
 void NotifyAlive();
 
-// How often NotifyAlive is due; nothing without a watchdog.
+// Interval at which NotifyAlive must be called; nullopt without a watchdog.
 std::optional<std::chrono::milliseconds> WatchdogInterval();
 
 }  // namespace selfcal::server

@@ -64,7 +64,7 @@ std::map<std::string, Role> Roles() {
 std::string OctalMode(const std::string& text) {
   const bool octal = !text.empty() && text.size() <= 4 &&
                      text.find_first_not_of("01234567") == text.npos;
-  return octal ? "" : "'" + text + "' is no mode such as 0660";
+  return octal ? "" : "'" + text + "' is not an octal mode such as 0660";
 }
 
 void DefineAccess(Definer* define, ServerOptions* options) {
@@ -72,12 +72,12 @@ void DefineAccess(Definer* define, ServerOptions* options) {
       ->Add("listen",
             &options->listen,
             "Address, repeatable: unix:/path, host:port (needs tls-*), or "
-            "insecure:host:port, where whoever reaches the port may do what "
-            "local-role says [unix:<runtime or state folder>/selfcald.sock]")
+            "insecure:host:port, where everybody who reaches the port has "
+            "local-role [unix:<runtime or state folder>/selfcald.sock]")
       ->delimiter(',');
   define->Add("socket-group",
               &options->socket.group,
-              "Group of unix sockets [that of the process]");
+              "Group of unix sockets [the group of the process]");
   define
       ->Named("socket-mode",
               define->app()->add_option_function<std::string>(
@@ -92,7 +92,7 @@ void DefineAccess(Definer* define, ServerOptions* options) {
   define
       ->Add("local-role",
             &options->local_role,
-            "What callers without a certificate may do: read, produce or "
+            "Role of callers without a certificate: read, produce or "
             "administer")
       ->transform(CLI::CheckedTransformer(Roles()))
       ->default_str("administer");
@@ -107,7 +107,7 @@ void DefineAccess(Definer* define, ServerOptions* options) {
   define
       ->Add("tls-refresh",
             &options->tls.refresh_s,
-            "Seconds after which changed files of TLS are noticed")
+            "Seconds between checks for changed TLS files")
       ->check(CLI::Range(1, kMaxSeconds))
       ->capture_default_str();
 }
@@ -117,44 +117,45 @@ void DefineLimits(Definer* define, DaemonOptions* options) {
   define
       ->Add("max-message-bytes",
             &server.max_receive_bytes,
-            "Bytes of one message")
+            "Limit on the bytes of one message")
       ->check(CLI::Range(kMinMessageBytes, std::numeric_limits<int>::max()))
       ->capture_default_str();
   define
       ->Add("max-memory-bytes",
             &server.max_memory_bytes,
-            "Bytes of all messages on their way")
+            "Limit on the bytes of all messages in flight")
       ->check(CLI::Range(kMinMemoryBytes, kMaxMemoryBytes))
       ->capture_default_str();
   define
       ->Add("max-threads",
             &server.max_threads,
-            "Threads of calls; each watch holds one")
+            "Limit on the threads for calls; each watch occupies one")
       ->check(CLI::Range(8, kMaxThreads))
       ->capture_default_str();
   define
-      ->Add(
-          "max-streams", &server.max_streams, "Calls at once on one connection")
+      ->Add("max-streams",
+            &server.max_streams,
+            "Limit on concurrent calls on one connection")
       ->check(CLI::Range(1, kMaxThreads))
       ->capture_default_str();
   define
       ->Add("max-segment-streams",
             &server.max_segment_streams,
-            "Streams of segments at once, each with a thread of its own")
+            "Limit on concurrent streams of segments; each has a thread")
       ->check(CLI::Range(1, kMaxThreads))
       ->capture_default_str();
-  define->Add("max-rigs", &server.max_rigs, "Rigs in the database")
+  define->Add("max-rigs", &server.max_rigs, "Limit on the number of rigs")
       ->check(CLI::Range(1, kMaxRigs))
       ->capture_default_str();
   define
       ->Add("max-backlog",
             &options->max_backlog,
-            "Segments that wait for their score; then streams wait")
+            "Limit on segments that wait to be scored; then streams wait")
       ->check(CLI::Range(1, kMaxBacklog))
       ->capture_default_str();
 }
 
-// Each is off at 0.
+// Quotas; 0 disables a quota.
 void DefineQuotas(Definer* define, Quotas* quotas) {
   const auto add = [&](const char* name,
                        std::int64_t* value,
@@ -166,11 +167,11 @@ void DefineQuotas(Definer* define, Quotas* quotas) {
   };
   add("max-payload-bytes-per-rig",
       &quotas->max_payload_bytes_per_rig,
-      "Bytes of stored data of one rig's segments; 0: no limit",
+      "Quota of bytes for the stored data of one rig's segments; 0: no limit",
       kMaxBytes);
   add("max-segments-per-rig",
       &quotas->max_segments_per_rig,
-      "Segments of one rig whose metadata is kept; 0: no limit",
+      "Quota of segments of one rig whose metadata is kept; 0: no limit",
       kMaxSegments);
   add("max-segment-age",
       &quotas->max_segment_age_s,
@@ -178,7 +179,8 @@ void DefineQuotas(Definer* define, Quotas* quotas) {
       kMaxAgeSeconds);
   add("max-database-bytes",
       &quotas->max_database_bytes,
-      "Bytes of the database; near it segments are refused; 0: no limit",
+      "Quota of bytes for the database; near it, segments are refused; 0: no "
+      "limit",
       kMaxBytes);
 }
 
@@ -192,7 +194,7 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
   define
       ->Add("solver",
             &options->solver,
-            "What solves recalibrations; both lead to the same minimum")
+            "Solver of runs; both converge to the same minimum")
       ->transform(CLI::CheckedTransformer(std::map<std::string, SolverKind>{
           {"structured", SolverKind::kStructured},
           {"ceres", SolverKind::kCeres}}))
@@ -200,7 +202,7 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
   define
       ->Add("scorer",
             &options->scorer,
-            "What scores segments; both come to the same to rounding")
+            "Scorer of segments; both agree up to rounding")
       ->transform(CLI::CheckedTransformer(std::map<std::string, ScorerKind>{
           {"structured", ScorerKind::kStructured},
           {"ceres", ScorerKind::kCeres}}))
@@ -208,22 +210,22 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
   define
       ->Add("verify-share",
             &options->verify_share,
-            "Share of new scores and calibrations that is computed by the "
-            "other core as well, while the device is idle, and compared")
+            "Share of new scores and calibrations that the other core computes "
+            "as well, while the device is idle, for comparison")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   define
       ->Add("change-inflation",
             &options->domain.change.inflation,
-            "Factor on the variances of segments in the test for a change of "
-            "the device [what the active calibration found: the square of its "
-            "track noise factor]")
+            "Factor on the variances of segments in the test for a device "
+            "change [from the active calibration: the square of its track "
+            "noise factor]")
       ->check(CLI::Range(1.0, kMaxInflation));
   define
       ->Add("change-false-alarms",
             &options->domain.change.false_alarm_rate,
-            "Bound on false alarms of that test, for each segment; 0 turns it "
-            "off")
+            "Bound on false alarms of that test, for each segment; 0 disables "
+            "the test")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
 }
@@ -233,20 +235,20 @@ void DefineRuns(Definer* define, DaemonOptions* options) {
       "only-on-external-power",
       define->app()->add_flag("--only-on-external-power",
                               options->host.only_on_external_power,
-                              "Runs that nobody asked for wait while the "
-                              "machine runs on its battery"));
+                              "Defer automatic runs while the machine runs on "
+                              "its battery"));
   define
       ->Add("max-load",
             &options->host.max_load,
-            "They wait while the load of the last minute, for each processor, "
-            "is this or more; 0: no matter")
+            "Defer automatic runs while the load average of the last minute, "
+            "per processor, is this or more; 0: no limit")
       ->check(CLI::Range(0.0, kMaxLoad))
       ->capture_default_str();
   define
       ->Add("run-priority",
             &options->idle_runs,
-            "idle: a run takes only what nobody else wants, and does not get "
-            "on while the machine is busy; low: it stands behind everything "
+            "idle: a run uses only idle resources, and makes no progress while "
+            "the machine is busy; low: it has a lower priority than everything "
             "else")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, bool>{{"idle", true}, {"low", false}}))
@@ -254,21 +256,22 @@ void DefineRuns(Definer* define, DaemonOptions* options) {
   define
       ->Add("max-run-minutes",
             &options->max_run_minutes,
-            "A run that takes longer fails")
+            "Limit on the duration of a run; a run that takes longer fails")
       ->check(CLI::Range(kMinRunMinutes, kMaxRunMinutes))
       ->capture_default_str();
   define
       ->Add("max-run-memory",
             &options->max_run_memory_mib,
-            "MiB; a run that needs more fails; 0: no limit")
+            "Limit on the memory of a run in MiB; a run that needs more fails; "
+            "0: no limit")
       ->check(CLI::Range(0, kMaxRunMemoryMib))
       ->capture_default_str();
   define
       ->Add("session-idle",
             &options->session_idle_s,
-            "Seconds without a segment after which the session of a rig has "
-            "ended: changed tables then start a run; 0: only the end of a "
-            "stream ends it")
+            "Seconds without a segment after which the session of a rig ends; "
+            "a run then starts if the tables have changed; 0: only the end of "
+            "a stream ends a session")
       ->check(CLI::Range(0.0, static_cast<double>(kMaxSeconds)))
       ->capture_default_str();
 }
@@ -277,36 +280,36 @@ void DefineReports(Definer* define, DaemonOptions* options) {
   define
       ->Add("metrics",
             &options->metrics,
-            "Where Prometheus reads /metrics: a port of the loopback such as "
-            "127.0.0.1:9464, or off")
+            "Address at which Prometheus reads /metrics: a loopback address "
+            "such as 127.0.0.1:9464, or off")
       ->capture_default_str();
   define
       ->Add("metrics-rigs",
             &options->metrics_rigs,
-            "Rigs with series of their own: those that sent last")
+            "Number of rigs with their own series: those that sent last")
       ->check(CLI::Range(0, kMaxMetricsRigs))
       ->capture_default_str();
   define
       ->Add("console",
             &options->console,
-            "Where browsers open the web console: a port of the loopback such "
-            "as 127.0.0.1:7448, another host:port (needs tls-*), or off")
+            "Address of the web console: a loopback address such as "
+            "127.0.0.1:7448, another host:port (needs tls-*), or off")
       ->capture_default_str();
   define
       ->Add("console-role",
             &options->console_role,
-            "What whoever opens it on the loopback may do: read, produce or "
-            "administer")
+            "Role of users who open the console on the loopback interface: "
+            "read, produce or administer")
       ->transform(CLI::CheckedTransformer(Roles()))
       ->default_str("read");
-  define->Add("log-level", &options->log_level, "What goes to stderr")
+  define->Add("log-level", &options->log_level, "Level of the log on stderr")
       ->check(CLI::IsMember(
           {"trace", "debug", "info", "warning", "error", "critical", "off"}))
       ->capture_default_str();
   define
       ->Add("log-format",
             &options->log_format,
-            "text, or json: an object on each line")
+            "text, or json: one object per line")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
 }

@@ -1,4 +1,4 @@
-// The settings, each defined once: name, variable, limits and explanation.
+// Defines each setting: name, variable, limits and help text.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,11 +7,10 @@
 
 namespace selfcal::server {
 
-// Which source the settings are taken from besides the arguments.
+// Selects whether settings are also read from the environment.
 enum class Environment { kUse, kIgnore };
 
-// Defines an option for each setting, which writes to *options when it is
-// given.
+// Defines an option for each setting; it writes to *options if it is given.
 void DefineSettings(CLI::App* app,
                     Environment environment,
                     DaemonOptions* options);

@@ -33,7 +33,7 @@ absl::Status CreateFolder(const std::filesystem::path& folder) {
   return SystemError("cannot create the folder " + folder.string(), errno);
 }
 
-// The process that the file names, as it wrote it itself.
+// Returns the process id in the file, which the owner of the lock has written.
 std::string ReadOwner(int file) {
   std::array<char, 32> text;
   const ssize_t size = pread(file, text.data(), text.size(), 0);

@@ -1,6 +1,6 @@
-// One daemon for one state folder. The lock is taken before the database is
-// opened and before the socket of another daemon could be replaced; the kernel
-// releases it when the process ends, however it ends.
+// The lock that allows only one daemon per state folder. It is taken before the
+// database is opened and before the socket of another daemon could be replaced;
+// the kernel releases it when the process ends, however it ends.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -11,10 +11,10 @@ namespace selfcal::server {
 
 class StateLock {
  public:
-  // Creates the folder, if need be, for its owner alone, locks <folder>/lock
-  // and writes the process id into it. FAILED_PRECONDITION if another process
-  // holds it (the message tells which); UNAVAILABLE if the folder or the file
-  // cannot be created.
+  // Creates the folder if it does not exist, accessible by its owner only,
+  // locks <folder>/lock and writes the process id into it. FAILED_PRECONDITION,
+  // with the process id, if another process holds the lock; UNAVAILABLE if the
+  // folder or the file cannot be created.
   static absl::StatusOr<StateLock> Take(const std::filesystem::path& folder);
 
   StateLock(StateLock&& other) noexcept;
@@ -24,7 +24,7 @@ class StateLock {
  private:
   explicit StateLock(int file) : file_(file) {}
 
-  int file_;  // -1 once moved from
+  int file_;  // -1 after a move
 };
 
 }  // namespace selfcal::server

@@ -16,7 +16,7 @@ sigset_t Signals() {
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGHUP);
-  sigaddset(&signals, kStartAnew);
+  sigaddset(&signals, kRestart);
   return signals;
 }
 
@@ -36,13 +36,13 @@ std::optional<int> WaitForSignal(std::chrono::milliseconds limit) {
   return signal < 0 ? std::nullopt : std::optional(signal);
 }
 
-void AskToStartAnew() { kill(getpid(), kStartAnew); }
+void RequestRestart() { kill(getpid(), kRestart); }
 
 StopDeadline::StopDeadline(std::chrono::milliseconds limit)
     : thread_([this, limit] {
         std::unique_lock lock(mutex_);
         if (stopped_.wait_for(lock, limit, [this] { return in_time_; })) return;
-        spdlog::error("did not stop within {} ms; ending at once",
+        spdlog::error("the daemon did not stop within {} ms and is terminated",
                       limit.count());
         std::_Exit(EXIT_FAILURE);
       }) {}

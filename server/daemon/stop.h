@@ -1,5 +1,5 @@
-// What the daemon is told by signals: to stop, to look at its settings again;
-// and what happens if a stop takes too long.
+// Signals to the daemon: stop, restart, and reread the settings; and the
+// deadline of a stop.
 #pragma once
 
 #include <signal.h>
@@ -12,20 +12,20 @@
 
 namespace selfcal::server {
 
-// What the daemon sends to itself when it is to stop and start again: apart
-// from SIGTERM, so that a stop that comes at the same time is not lost.
-inline constexpr int kStartAnew = SIGUSR1;
-void AskToStartAnew();
+// The signal that the daemon sends to itself in order to restart: different
+// from SIGTERM, so that a stop at the same time is not lost.
+inline constexpr int kRestart = SIGUSR1;
+void RequestRestart();
 
 // Blocks these signals in this thread and in those it starts, so that
 // WaitForSignal receives them. Call before any thread is started.
 void BlockSignals();
 
-// The signal that arrived; nothing if none does within the limit.
+// Waits for a signal and returns it; nullopt if none arrives within the limit.
 std::optional<int> WaitForSignal(std::chrono::milliseconds limit);
 
-// Ends the process with exit code 1 if it lives longer than the limit. That
-// loses nothing: what was acknowledged is on disk.
+// Ends the process with exit code 1 if this object lives longer than the limit.
+// Nothing is lost then: everything that was acknowledged is on disk.
 class StopDeadline {
  public:
   explicit StopDeadline(std::chrono::milliseconds limit);

@@ -20,13 +20,14 @@ std::string FirstWord(const fs::path& file) {
   return word;
 }
 
-// A machine without a battery has no other power than external.
+// True if the machine runs on its battery. A machine without a battery is
+// always on external power.
 bool OnBattery(const fs::path& supplies) {
   bool has_battery = false;
   std::error_code error;
   for (const auto& supply : fs::directory_iterator(supplies, error)) {
     if (FirstWord(supply.path() / "type") == "Battery") {
-      // That of a mouse is no matter.
+      // The battery of a peripheral, e.g. a mouse, is ignored.
       has_battery |= FirstWord(supply.path() / "scope") != "Device";
     } else if (FirstWord(supply.path() / "online") == "1") {
       return false;
@@ -59,7 +60,7 @@ class HostConditions : public Conditions {
     if (load / processors < limits_.max_load) {
       return "";
     }
-    return fmt::format("the load is {:g} for each processor or more",
+    return fmt::format("the load is {:g} per processor or more",
                        limits_.max_load);
   }
 

@@ -1,5 +1,4 @@
-// Whether the machine has power and time to spare for a run that nobody asked
-// for by hand.
+// Conditions of the machine, power and load, that defer automatic runs.
 #pragma once
 
 #include <filesystem>
@@ -10,23 +9,23 @@
 namespace selfcal::server {
 
 struct HostLimits {
-  // Only while no battery is what the machine runs on.
+  // Defers runs while the machine runs on its battery.
   bool only_on_external_power = false;
-  // Only while the load of the last minute is below this, for each processor;
-  // 0: no matter.
+  // Defers runs while the load average of the last minute, per processor, is
+  // this or more; 0: no limit.
   double max_load = 0;
 
   friend bool operator==(const HostLimits&, const HostLimits&) = default;
 };
 
-// Where the kernel tells.
+// The files in which the kernel reports power and load.
 struct HostFiles {
   std::filesystem::path power_supplies = "/sys/class/power_supply";
   std::filesystem::path load = "/proc/loadavg";
 };
 
-// Any thread may ask. What cannot be read holds runs back, and says so: a limit
-// that was asked for is kept.
+// Any thread may call. If a file cannot be read, runs are deferred with a
+// message that says so: a limit that is set is never ignored.
 std::unique_ptr<Conditions> MakeHostConditions(const HostLimits& limits,
                                                const HostFiles& files = {});
 

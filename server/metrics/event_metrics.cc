@@ -54,8 +54,8 @@ EventMetrics::EventMetrics(Store* store,
       rigs_(rigs),
       segments_(prometheus::BuildCounter()
                     .Name("selfcal_segments_total")
-                    .Help("Segments received, by verdict; failed: the store "
-                          "or a stop kept it from one.")
+                    .Help("Segments received, by verdict; failed: no verdict, "
+                          "because the store failed or the daemon stopped.")
                     .Register(*registry)),
       scoring_(prometheus::BuildHistogram()
                    .Name("selfcal_scoring_seconds")
@@ -65,11 +65,11 @@ EventMetrics::EventMetrics(Store* store,
       entropy_(prometheus::BuildHistogram()
                    .Name("selfcal_segment_entropy_nats")
                    .Help("Entropy of scored segments by group of parameters; "
-                         "lower is richer.")
+                         "lower is more informative.")
                    .Register(*registry)),
       runs_(prometheus::BuildCounter()
                 .Name("selfcal_runs_total")
-                .Help("Recalibrations that ended, by outcome.")
+                .Help("Runs that ended, by outcome.")
                 .Register(*registry)),
       run_seconds_(prometheus::BuildHistogram()
                        .Name("selfcal_run_seconds")
@@ -82,7 +82,7 @@ EventMetrics::EventMetrics(Store* store,
                         "outcome; differs: by more than rounding or "
                         "convergence explains.")
                   .Register(*registry)) {
-  // A series that is there from the start makes the first event a step.
+  // Series that exist from the start show their first event as a step.
   for (const Verdict verdict : {Verdict::kStored,
                                 Verdict::kDuplicate,
                                 Verdict::kRejected,

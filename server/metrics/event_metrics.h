@@ -1,4 +1,4 @@
-// Counts what the pipeline tells.
+// Metrics that count the events which the pipeline reports to its observer.
 #pragma once
 
 #include <prometheus/counter.h>
@@ -31,7 +31,7 @@ class EventMetrics final : public PipelineObserver {
  private:
   using RunId = std::pair<std::string, std::int64_t>;
 
-  // What became of a run that has ended.
+  // The outcome of a run that has ended.
   std::string Outcome(const StoredRun& run) const;
 
   Store* const store_;
@@ -42,8 +42,8 @@ class EventMetrics final : public PipelineObserver {
   prometheus::Family<prometheus::Counter>& runs_;
   prometheus::Histogram& run_seconds_;
   prometheus::Family<prometheus::Counter>& checks_;
-  std::mutex mutex_;  // guards what follows
-  // Runs at work; one, as a rule.
+  std::mutex mutex_;  // guards the members below
+  // Start times of active runs; usually there is one.
   std::map<RunId, std::chrono::steady_clock::time_point> started_;
 };
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kMaxPort = 65535;
 
-// The host of host:port; empty if there is no port.
+// Returns the host of host:port; empty if there is no port.
 std::string_view HostOf(std::string_view address) {
   const std::size_t colon = address.rfind(':');
   if (colon == address.npos) return {};
@@ -41,7 +41,7 @@ class PrometheusMetrics final : public Metrics {
         exposer_(options.address) {
     prometheus::BuildGauge()
         .Name("selfcal_build_info")
-        .Help("1, with the version of the program as label.")
+        .Help("Constant 1, with the version of the program as label.")
         .Register(*registry_)
         .Add({{"version", options.program_version}})
         .Set(1);
@@ -72,8 +72,8 @@ absl::Status CheckMetricsAddress(const std::string& address) {
   }
   return absl::InvalidArgumentError(
       "metrics: '" + address +
-      "' is no port of the loopback such as 127.0.0.1:9464; there is no "
-      "authentication, so put a proxy in front for other machines");
+      "' is not a loopback address such as 127.0.0.1:9464; there is no "
+      "authentication, so use a proxy for access from other machines");
 }
 
 absl::StatusOr<std::unique_ptr<Metrics>> MakeMetrics(
@@ -83,8 +83,8 @@ absl::StatusOr<std::unique_ptr<Metrics>> MakeMetrics(
     return std::make_unique<PrometheusMetrics>(store, options);
   } catch (const std::exception& error) {
     return absl::UnavailableError("cannot open " + options.address +
-                                  " for metrics; is it free? (" + error.what() +
-                                  ")");
+                                  " for metrics; check that it is free (" +
+                                  error.what() + ")");
   }
 }
 

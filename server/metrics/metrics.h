@@ -1,8 +1,9 @@
-// What Prometheus reads: GET /metrics on an HTTP port of the loopback.
+// Metrics for Prometheus: GET /metrics on an HTTP port of the loopback
+// interface.
 //
-// The number of series is bounded: labels that come from clients are the rig,
-// for `rigs` rigs at most (those that sent last), and the group of parameters,
-// where others than the usual ones are "other".
+// The number of series is bounded. Two labels come from clients: the rig,
+// limited to the `rigs` rigs that sent last, and the group of parameters, where
+// unusual names are replaced by "other".
 #pragma once
 
 #include <absl/status/status.h>
@@ -18,28 +19,28 @@
 namespace selfcal::server {
 
 struct MetricsOptions {
-  std::string address;  // host:port; port 0 takes a free one
-  int rigs = 16;        // with series of their own
+  std::string address;  // host:port; port 0 selects a free one
+  int rigs = 16;        // number of rigs with their own series
   std::string program_version;
-  std::filesystem::path database;  // whose bytes and free space are told
+  std::filesystem::path database;  // its size and free space are reported
 };
 
 class Metrics {
  public:
   virtual ~Metrics() = default;
 
-  // For the pipeline; lives as long as the metrics.
+  // The observer for the pipeline; lives as long as the metrics.
   virtual PipelineObserver* observer() = 0;
-  // The URL with the port that was taken.
+  // The URL, with the actual port.
   virtual const std::string& url() const = 0;
 };
 
-// INVALID_ARGUMENT for what is no port of the loopback: there is no
-// authentication.
+// INVALID_ARGUMENT unless the address is a port of the loopback interface,
+// because there is no authentication.
 absl::Status CheckMetricsAddress(const std::string& address);
 
-// Starts to answer; `store` must outlive it. Errors of CheckMetricsAddress;
-// UNAVAILABLE if the port cannot be opened.
+// Starts to serve metrics; `store` must outlive it. Errors are those of
+// CheckMetricsAddress; UNAVAILABLE if the port cannot be opened.
 absl::StatusOr<std::unique_ptr<Metrics>> MakeMetrics(
     Store* store, const MetricsOptions& options);
 

@@ -1,4 +1,4 @@
-// The rigs that sent last: the ones that have series of their own.
+// The rigs that sent last, which have their own series.
 #pragma once
 
 #include <list>
@@ -15,7 +15,7 @@ class RecentRigs {
   explicit RecentRigs(int limit) : limit_(limit) {}
 
   void Heard(const std::string& rig);
-  // At most `limit`, in the order of their names.
+  // Returns at most `limit` rigs, sorted by name.
   std::vector<std::string> List() const;
 
  private:
@@ -24,8 +24,8 @@ class RecentRigs {
   std::list<std::string> rigs_;  // newest first
 };
 
-// The label for a group of parameters: its name, or "other" for names that a
-// client made up.
+// The label of a group of parameters: its name, or "other" for names that a
+// client has defined.
 std::string GroupLabel(std::string_view group);
 
 }  // namespace selfcal::server

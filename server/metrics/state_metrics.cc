@@ -47,9 +47,10 @@ void AddTables(Store* store,
                  "Segments that the tables of a group can hold.");
   Gauge version("selfcal_active_version", "Number of the active calibration.");
   Gauge verdict("selfcal_active_verdict",
-                "1, with the verdict on the active calibration as label.");
+                "Constant 1, with the verdict on the active calibration as "
+                "label.");
   for (const std::string& rig : rigs) {
-    // Several groups may share the label "other".
+    // Several groups can have the label "other".
     std::map<std::string, std::pair<double, double>> groups;
     const auto tables = store->GetTables(rig);
     if (!tables.ok()) continue;
@@ -75,11 +76,11 @@ void AddTables(Store* store,
 }
 
 void AddQueue(Store* store, std::vector<MetricFamily>* families) {
-  Gauge queue("selfcal_queue_length", "Segments that wait for their score.");
+  Gauge queue("selfcal_queue_length", "Segments that wait to be scored.");
   const auto unscored = store->ListUnscored(std::numeric_limits<int>::max());
   if (unscored.ok()) queue.Add({}, static_cast<double>(unscored->size()));
   families->push_back(queue.Take());
-  Gauge runs("selfcal_unfinished_runs", "Recalibrations that wait or run.");
+  Gauge runs("selfcal_unfinished_runs", "Runs that are pending or running.");
   const auto unfinished = store->ListUnfinishedRuns();
   if (unfinished.ok()) runs.Add({}, static_cast<double>(unfinished->size()));
   families->push_back(runs.Take());
@@ -87,7 +88,7 @@ void AddQueue(Store* store, std::vector<MetricFamily>* families) {
 
 void AddDisk(const std::filesystem::path& database,
              std::vector<MetricFamily>* families) {
-  Gauge bytes("selfcal_database_bytes", "Size of the files of the database.");
+  Gauge bytes("selfcal_database_bytes", "Size of the database files.");
   for (const auto& [label, suffix] :
        {std::pair<const char*, const char*>{"database", ""}, {"log", "-wal"}}) {
     std::error_code error;
@@ -97,7 +98,7 @@ void AddDisk(const std::filesystem::path& database,
   }
   families->push_back(bytes.Take());
   Gauge free("selfcal_disk_free_bytes",
-             "Free space where the database is, for the daemon's user.");
+             "Free space on the disk of the database, for the daemon's user.");
   std::error_code error;
   const auto space = std::filesystem::space(database.parent_path(), error);
   if (!error) free.Add({}, static_cast<double>(space.available));
@@ -122,8 +123,8 @@ StateMetrics::StateMetrics(Store* store,
     : store_(store), rigs_(rigs), database_(std::move(database)) {}
 
 std::vector<MetricFamily> StateMetrics::Collect() const {
-  // The threads of the HTTP server have a stack of 100 KiB, most of which it
-  // uses itself.
+  // Reads on another thread, because the threads of the HTTP server have a
+  // stack of 100 KiB, most of which the server itself uses.
   return std::async(std::launch::async,
                     [this] {
                       std::vector<MetricFamily> families;

@@ -1,5 +1,5 @@
-// How things are at the moment that Prometheus asks: tables and versions of the
-// rigs that sent last, the queue, disk and memory.
+// Metrics of the present state, when Prometheus reads them: tables and versions
+// of the rigs that sent last, the queue, disk and memory.
 #pragma once
 
 #include <prometheus/collectable.h>
@@ -20,7 +20,7 @@ class StateMetrics final : public prometheus::Collectable {
                const RecentRigs* rigs,
                std::filesystem::path database);
 
-  // What cannot be read is left out.
+  // Returns all metrics, except those that cannot be read.
   std::vector<prometheus::MetricFamily> Collect() const override;
 
  private:

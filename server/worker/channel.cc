@@ -21,7 +21,7 @@ void WriteWhole(int file, std::string_view bytes) {
     const ssize_t written = pwrite(file, bytes.data(), bytes.size(), at);
     if (written < 0) {
       if (errno == EINTR) continue;
-      Fail("cannot hand over a calibration");
+      Fail("cannot write a job or result");
     }
     bytes.remove_prefix(written);
     at += written;
@@ -30,7 +30,7 @@ void WriteWhole(int file, std::string_view bytes) {
 
 std::string ReadWhole(int file) {
   struct stat state {};
-  if (fstat(file, &state) != 0) Fail("cannot take over a calibration");
+  if (fstat(file, &state) != 0) Fail("cannot read a job or result");
   std::string bytes(state.st_size, '\0');
   std::size_t done = 0;
   while (done < bytes.size()) {
@@ -39,7 +39,7 @@ std::string ReadWhole(int file) {
                                bytes.size() - done,
                                static_cast<off_t>(done));
     if (read < 0 && errno == EINTR) continue;
-    if (read <= 0) Fail("cannot take over a calibration");
+    if (read <= 0) Fail("cannot read a job or result");
     done += read;
   }
   return bytes;

@@ -1,4 +1,4 @@
-// What lies between the daemon and its worker.
+// The files and the socket between the daemon and its worker.
 #pragma once
 
 #include <cstddef>
@@ -7,16 +7,18 @@
 
 namespace selfcal::server {
 
-// The worker's files, besides standard error.
+// The worker's file descriptors, besides standard error.
 inline constexpr int kJobFile = 0;
-inline constexpr int kProgressFile = 3;  // a socket of packets
+inline constexpr int kProgressFile = 3;  // a packet socket
 inline constexpr int kResultFile = 4;
 inline constexpr int kFirstFreeFile = 5;
 
-// Of one packet: kMaxCameras cameras take a fifth of it.
+// Limit on the size of a packet; progress with kMaxCameras cameras takes a
+// fifth of it.
 inline constexpr std::size_t kMaxProgressBytes = 64 << 10;
 
-// From its start, wherever the file stands. Throw std::system_error.
+// Write or read the whole file, from its start, whatever its position is. Throw
+// std::system_error.
 void WriteWhole(int file, std::string_view bytes);
 std::string ReadWhole(int file);
 

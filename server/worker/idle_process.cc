@@ -12,7 +12,7 @@
 namespace selfcal::server {
 namespace {
 
-// linux/ioprio.h is not for programs.
+// Constants of linux/ioprio.h, which programs should not include.
 constexpr int kWhoProcess = 1;
 constexpr int kClassIdle = 3;
 constexpr int kClassShift = 13;
@@ -22,20 +22,19 @@ constexpr int kClassShift = 13;
 void BecomeIdle() {
   const sched_param parameters{};
   if (sched_setscheduler(0, SCHED_IDLE, &parameters) != 0) {
-    spdlog::warn("recalibration does not run at idle priority: {}",
+    spdlog::warn("the run does not have idle CPU priority: {}",
                  std::strerror(errno));
   }
   if (syscall(SYS_ioprio_set, kWhoProcess, 0, kClassIdle << kClassShift) != 0) {
-    spdlog::warn("recalibration does not read at idle priority: {}",
+    spdlog::warn("the run does not have idle I/O priority: {}",
                  std::strerror(errno));
   }
 }
 
-void StandBack() {
+void LowerPriority() {
   constexpr int kNiceness = 10;
   if (setpriority(PRIO_PROCESS, 0, kNiceness) != 0) {
-    spdlog::warn("recalibration runs at normal priority: {}",
-                 std::strerror(errno));
+    spdlog::warn("the run has normal priority: {}", std::strerror(errno));
   }
 }
 

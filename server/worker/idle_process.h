@@ -1,16 +1,17 @@
-// A process that takes what others leave.
+// Priorities of a process below that of others.
 #pragma once
 
 namespace selfcal::server {
 
-// Call before any thread is started; what the system refuses is logged.
+// Call these before any thread is started. A refusal by the system is logged.
 
-// The process runs only where a CPU, and reads and writes only where the disk,
-// would be idle (SCHED_IDLE, I/O class idle). Without privileges there is no
-// way back.
+// The process uses only CPU time and disk bandwidth that would otherwise be
+// idle (SCHED_IDLE, I/O class idle). Without privileges this cannot be
+// reverted.
 void BecomeIdle();
 
-// The process stands behind all others (nice level 10), but gets on.
-void StandBack();
+// The process has a lower priority than others (nice level 10), but continues
+// to make progress.
+void LowerPriority();
 
 }  // namespace selfcal::server

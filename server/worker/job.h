@@ -1,6 +1,5 @@
-// Between the input and result of a calibration or a score and the bytes
-// (job.proto) that go to a worker and come back. Doubles come back as they
-// were, to the bit.
+// Serialisation of the input and result of a calibration or a score
+// (job.proto), for a worker. Doubles are exact, bit for bit.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -25,11 +24,12 @@ struct Job {
   std::vector<MotionSegment> segments;
   CalibrateOptions options;
   WorkerLimits limits;
-  // Score the one segment at theta_start; nothing: calibrate.
+  // If set, the job is to score the only segment at theta_start; otherwise it
+  // is a calibration.
   std::optional<ScorerKind> scorer = std::nullopt;
 };
 
-// Empty where it is more than a message can hold (2 GiB).
+// Returns an empty string if the job exceeds the size of a message (2 GiB).
 std::string EncodeJob(const Rig& rig,
                       const Calibration& theta_start,
                       const std::vector<MotionSegment>& segments,
@@ -44,13 +44,13 @@ std::string EncodeProgress(const CalibrateProgress& progress);
 std::string EncodeResult(const CalibrationResult& result);
 std::string EncodeScore(const SegmentInformation& information);
 
-// Nothing where the bytes are not what the functions above made.
+// Return nullopt if the bytes are not from the functions above.
 std::optional<Job> DecodeJob(std::string_view bytes);
 std::optional<CalibrateProgress> DecodeProgress(std::string_view bytes);
 std::optional<CalibrationResult> DecodeResult(std::string_view bytes);
 
-// INTERNAL with the failure that EncodeResult() was given, or where the bytes
-// are not what EncodeScore() made.
+// INTERNAL with the failure that was passed to EncodeResult(), or if the bytes
+// are not from EncodeScore().
 absl::StatusOr<SegmentInformation> DecodeScore(std::string_view bytes);
 
 }  // namespace selfcal::server

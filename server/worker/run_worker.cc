@@ -1,4 +1,4 @@
-// The worker's side.
+// The worker process.
 #include <fmt/format.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -19,19 +19,19 @@
 namespace selfcal::server {
 namespace {
 
-// The daemon decides when it ends; a signal to the whole group or service is
-// not for it.
-void LeaveTheEndToTheDaemon() {
+// The daemon decides when the worker ends; signals to the whole process group
+// or service are ignored.
+void IgnoreStopSignals() {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   for (const int stop : {SIGTERM, SIGINT, SIGHUP}) {
     signal(stop, SIG_IGN);
   }
 }
 
-// Where memory runs out, the system takes this process and not the daemon.
-void BeTakenFirst() { std::ofstream("/proc/self/oom_score_adj") << 1000; }
+// When memory runs out, the system kills this process rather than the daemon.
+void PreferOomKill() { std::ofstream("/proc/self/oom_score_adj") << 1000; }
 
-// Bytes of data that the process has mapped.
+// Returns the size of the data that the process has mapped.
 std::int64_t DataBytes() {
   std::ifstream file("/proc/self/statm");
   std::int64_t pages = 0;
@@ -46,8 +46,8 @@ void LimitMemory(std::int64_t bytes) {
   setrlimit(RLIMIT_DATA, &limit);
 }
 
-// False if nobody listens any more.
-bool Tell(const CalibrateProgress& progress) {
+// Sends the progress; returns false if the daemon no longer reads it.
+bool ReportProgress(const CalibrateProgress& progress) {
   const std::string bytes = EncodeProgress(progress);
   return send(kProgressFile, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
          static_cast<ssize_t>(bytes.size());
@@ -64,19 +64,19 @@ std::string Compute(const Job& job) {
     return EncodeScore(ScoreSegmentBy(
         *job.scorer, job.rig, job.theta_start, job.segments.front()));
   }
-  return EncodeResult(
-      Calibrate(job.rig, job.theta_start, job.segments, job.options, Tell));
+  return EncodeResult(Calibrate(
+      job.rig, job.theta_start, job.segments, job.options, ReportProgress));
 }
 
-// The bytes of the result.
+// Computes the job and returns the bytes of the result.
 std::string Solve(const Job& job) {
   LimitMemory(job.limits.max_memory_bytes);
   try {
     return Compute(job);
   } catch (const std::bad_alloc&) {
     return EncodeResult(Failure(fmt::format(
-        "it needs more than the {} MiB of memory that a run may take; smaller "
-        "tables need less",
+        "it exceeds the memory limit of a run of {} MiB; smaller tables need "
+        "less",
         job.limits.max_memory_bytes >> 20)));
   } catch (const std::exception& error) {
     return EncodeResult(Failure(error.what()));
@@ -86,13 +86,13 @@ std::string Solve(const Job& job) {
 }  // namespace
 
 int RunWorker() {
-  LeaveTheEndToTheDaemon();
-  BeTakenFirst();
+  IgnoreStopSignals();
+  PreferOomKill();
   const auto job = DecodeJob(ReadWhole(kJobFile));
   if (!job) {
     return EXIT_FAILURE;
   }
-  job->limits.idle ? BecomeIdle() : StandBack();
+  job->limits.idle ? BecomeIdle() : LowerPriority();
   WriteWhole(kResultFile, Solve(*job));
   return EXIT_SUCCESS;
 }

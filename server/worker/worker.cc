@@ -31,7 +31,7 @@ extern char** environ;
 namespace selfcal::server {
 namespace {
 
-// How often `interrupted` is asked.
+// Interval at which `interrupted` is called.
 constexpr int kPollMs = 20;
 
 std::system_error SystemError(const char* what) {
@@ -40,8 +40,8 @@ std::system_error SystemError(const char* what) {
 
 class Descriptor {
  public:
-  // Takes a number above those that the worker's get, so that none is taken for
-  // another when they are handed over.
+  // Moves the descriptor above the numbers that the worker uses, so that none
+  // is overwritten when they are assigned.
   Descriptor(int file, const char* what) {
     if (file < 0) throw SystemError(what);
     file_ = fcntl(file, F_DUPFD_CLOEXEC, kFirstFreeFile);
@@ -62,7 +62,7 @@ class Descriptor {
   int file_ = -1;
 };
 
-// A file without a name.
+// Creates an anonymous file.
 Descriptor MakeFile(const char* name) {
   return {memfd_create(name, MFD_CLOEXEC), "memfd_create"};
 }
@@ -109,19 +109,20 @@ class Process {
       throw SystemError("cannot start the solver");
     }
   }
-  // Does not wait for it where others keep the machine busy: it has to be
-  // scheduled to die, and at idle priority that may take many seconds.
+  // Kills the process, but does not block until it has ended: it has to be
+  // scheduled to die, and at idle priority on a busy machine that may take many
+  // seconds.
   ~Process() {
     if (pid_ <= 0) return;
     kill(pid_, SIGKILL);
     const sched_param parameters{};
-    sched_setscheduler(pid_, SCHED_OTHER, &parameters);  // who may, hastens it
+    sched_setscheduler(pid_, SCHED_OTHER, &parameters);  // faster, if permitted
     if (!EndsWithin(kPatience)) WaitAside(pid_);
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // As waitpid().
+  // Waits like waitpid().
   int Wait() {
     const int status = WaitFor(pid_);
     pid_ = 0;
@@ -138,13 +139,13 @@ class Process {
     return status;
   }
 
-  // It holds nothing that anyone waits for; without a thread it remains a
-  // zombie until the daemon ends.
+  // Waits on another thread: the process holds nothing that is needed. If no
+  // thread can be started, it remains a zombie until the daemon ends.
   static void WaitAside(pid_t pid) {
     try {
       std::thread([pid] { WaitFor(pid); }).detach();
     } catch (const std::system_error& error) {
-      spdlog::warn("a solver that was ended is not waited for: {}",
+      spdlog::warn("cannot wait for a solver process that was killed: {}",
                    error.what());
     }
   }
@@ -161,7 +162,7 @@ class Process {
   pid_t pid_ = 0;
 };
 
-// What became of a worker: the bytes of its result, or why there are none.
+// The outcome of a worker: the bytes of its result, or why there are none.
 struct Finished {
   CalibrateStatus status = CalibrateStatus::kFailed;
   std::string message;
@@ -177,7 +178,8 @@ std::string WhyItEnded(int status) {
                            WEXITSTATUS(status));
 }
 
-// Until the worker closes its end. False if it is not wanted any longer.
+// Forwards progress until the worker closes its end. Returns false if the
+// worker is no longer needed.
 bool Follow(int socket,
             const ProgressCallback& progress,
             const std::function<bool()>& interrupted) {
@@ -208,7 +210,7 @@ Finished RunJob(const std::vector<std::string>& command,
                 const std::function<bool()>& interrupted) {
   if (bytes.empty()) {
     return {CalibrateStatus::kFailed,
-            "its segments are more than 2 GiB; make the tables smaller",
+            "its segments exceed 2 GiB; make the tables smaller",
             ""};
   }
   const Descriptor job = MakeFile("selfcal-job");

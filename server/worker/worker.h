@@ -1,10 +1,11 @@
-// Calibrates, or scores for a check, in a process of its own: the daemon lives
-// on whatever becomes of the solver, what it took is given back whole, it can
-// be limited in memory, be idle in CPU and I/O, and be ended at any instant.
+// Calibrates, or scores for a verification, in a separate process: the daemon
+// survives any failure of the solver, all of the solver's memory is released,
+// and the process can be limited in memory, run at idle priority of CPU and
+// I/O, and be killed at any time.
 //
-// The worker is the same program with kWorkerArgument. It gets the job in a
-// file without a name, tells its progress through a socket, and leaves the
-// result in another such file. It dies with the thread that started it.
+// The worker is the same program with kWorkerArgument. It reads the job from an
+// anonymous file, reports its progress through a socket, and writes the result
+// to another anonymous file. It dies with the thread that started it.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -25,16 +26,18 @@ namespace selfcal::server {
 inline constexpr char kWorkerArgument[] = "--worker";
 
 struct WorkerLimits {
-  // It takes only what nobody else wants: on a machine that is never idle it
-  // does not get on. Otherwise it stands behind everything else.
+  // If true, the worker uses only idle resources and makes no progress on a
+  // machine that is never idle; otherwise it has a lower priority than others.
   bool idle = true;
-  std::int64_t max_memory_bytes = 0;  // besides what it starts with; 0: none
+  // Limit on the memory beyond that at the start; 0: no limit.
+  std::int64_t max_memory_bytes = 0;
 };
 
-// As Calibrate() of core. `interrupted` is asked every few milliseconds; where
-// it returns true the worker is killed, and the result is kCancelled. kFailed,
-// with a message, where the worker ended without a result. Blocks; calls
-// `progress` and `interrupted` on this thread. `command` starts the worker.
+// Like Calibrate() of core. `interrupted` is called every few milliseconds; if
+// it returns true, the worker is killed and the result is kCancelled. The
+// result is kFailed, with a message, if the worker ended without a result.
+// Blocks, and calls `progress` and `interrupted` on this thread. `command`
+// starts the worker.
 CalibrationResult CalibrateInWorker(const std::vector<std::string>& command,
                                     const WorkerLimits& limits,
                                     const Rig& rig,
@@ -44,8 +47,8 @@ CalibrationResult CalibrateInWorker(const std::vector<std::string>& command,
                                     const ProgressCallback& progress,
                                     const std::function<bool()>& interrupted);
 
-// As ScoreSegmentBy() of core, with `interrupted` as above: CANCELLED then.
-// INTERNAL with a message where there is no score.
+// Like ScoreSegmentBy() of core. CANCELLED if `interrupted`, as above, returns
+// true; INTERNAL with a message if there is no score.
 absl::StatusOr<SegmentInformation> ScoreInWorker(
     const std::vector<std::string>& command,
     const WorkerLimits& limits,
@@ -55,8 +58,8 @@ absl::StatusOr<SegmentInformation> ScoreInWorker(
     const MotionSegment& segment,
     const std::function<bool()>& interrupted);
 
-// The worker: what main() returns for kWorkerArgument. Call before any thread
-// is started.
+// Runs the worker, if main() is called with kWorkerArgument; returns the exit
+// code. Call it before any thread is started.
 int RunWorker();
 
 }  // namespace selfcal::server

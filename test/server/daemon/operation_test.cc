@@ -162,7 +162,7 @@ TEST_F(OperationTest, MoreConnectionsThanFilesEndItWithAnError) {
             sizeof(address));
   }
   EXPECT_EQ(daemon.Wait(), 1);
-  EXPECT_THAT(daemon.Log(), HasSubstr("to be started anew"));
+  EXPECT_THAT(daemon.Log(), HasSubstr("to be restarted"));
   for (const int connection : connections) close(connection);
 }
 

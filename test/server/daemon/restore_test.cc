@@ -49,7 +49,7 @@ TEST_F(RestoreTest, TheDaemonStartsAnewWithTheBackup) {
     ASSERT_TRUE(status.ok()) << status.error_message();
   }
   ASSERT_TRUE(
-      daemon->Says("selfcald ready", "start anew with the restored database"))
+      daemon->Says("selfcald ready", "restart with the restored database"))
       << daemon->Log();
   Connect();
   EXPECT_EQ(Segments().segments_size(), 0);

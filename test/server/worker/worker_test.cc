@@ -277,7 +277,7 @@ TEST_F(WorkerTest, OneThatNeedsTooMuchMemoryFailsAndSaysSo) {
   limits_.max_memory_bytes = 1 << 20;
   const CalibrationResult result = InWorker();
   EXPECT_EQ(result.status, CalibrateStatus::kFailed);
-  EXPECT_THAT(result.message, HasSubstr("more than the 1 MiB of memory"));
+  EXPECT_THAT(result.message, HasSubstr("memory limit of a run of 1 MiB"));
 }
 
 TEST_F(WorkerTest, AnIdleOneTakesOnlyWhatOthersLeave) {
