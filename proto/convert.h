@@ -1,7 +1,7 @@
-// Between messages of selfcal.v1 and core/model values, written once, for both
-// ends. Nothing that comes from the network may abort: a message of the wrong
-// shape gives violations with the path of the field, and Validate of core/model
-// judges the values afterwards.
+// Conversion between messages of selfcal.v1 and values of core/model, for
+// client and server. Input from the network must not abort: a message of the
+// wrong shape results in violations with the path of the field; Validate of
+// core/model then checks the values.
 #pragma once
 
 #include <string>

@@ -47,7 +47,8 @@ v1::Rig::Selection ToProto(Selection selection) {
   return v1::Rig::SELECTION_UNSPECIFIED;
 }
 
-// Leaves it as it is where the message says nothing; false if it is unknown.
+// Reads the selection; leaves it unchanged if the message does not specify it.
+// Returns false if it is unknown.
 bool ReadSelection(const v1::Rig& message, Selection* selection) {
   switch (message.selection()) {
     case v1::Rig::SELECTION_UNSPECIFIED:
@@ -69,7 +70,8 @@ bool ReadSelection(const v1::Rig& message, Selection* selection) {
   }
 }
 
-// Zero, or absence where zero has a meaning, stands for the default.
+// Reads the settings. The default is stated by 0 or, if 0 has a meaning, by an
+// absent field.
 void ReadSettings(const v1::Rig& message, Rig* rig) {
   rig->pixel_sigma_px = message.pixel_sigma_px();
   if (message.gravity_mps2() != 0) rig->gravity_mps2 = message.gravity_mps2();

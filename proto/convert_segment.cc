@@ -192,7 +192,7 @@ std::vector<Violation> FromProto(const v1::MotionSegment& message,
   if (message.has_temperature_c()) {
     read.temperature_c = message.temperature_c();
   }
-  // A segment may have seen nothing, but not without moments and samples.
+  // A segment may have no observations, but must have keyframes and samples.
   if (!message.has_keyframes()) {
     violations.push_back({prefix + "keyframes", "is missing"});
   }

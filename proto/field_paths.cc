@@ -5,7 +5,8 @@
 namespace selfcal {
 namespace {
 
-// Frames are capitals in the names of values, and no message has capitals.
+// Converts to lower case: names of values have frames in capitals, names of
+// message fields have no capitals.
 std::string Lowered(std::string_view field) {
   std::string path(field);
   std::transform(path.begin(), path.end(), path.begin(), [](char c) {

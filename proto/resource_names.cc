@@ -38,7 +38,7 @@ std::string Encode(std::string_view text) {
   return encoded;
 }
 
-// Accepts what Encode writes and nothing else, so that a resource has one name.
+// Accepts only what Encode writes, so that a resource has exactly one name.
 std::optional<std::string> Decode(std::string_view encoded) {
   std::string text;
   for (std::size_t i = 0; i < encoded.size(); ++i) {
@@ -66,7 +66,7 @@ std::optional<std::int64_t> ParseIndex(std::string_view digits) {
   return index;
 }
 
-// Splits "rigs/{rig}{middle}{rest}"; the rest is not looked at.
+// Splits "rigs/{rig}{middle}{rest}"; the rest is not checked.
 struct Split {
   std::string rig;
   std::string_view rest;

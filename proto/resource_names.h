@@ -1,4 +1,4 @@
-// Resource names (AIP-122): building and parsing, written once.
+// Builds and parses resource names (AIP-122).
 #pragma once
 
 #include <cstdint>

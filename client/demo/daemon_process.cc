@@ -49,7 +49,7 @@ pid_t Spawn(const std::string& binary,
         binary.c_str(),
         "--state-dir",
         state_dir.c_str(),
-        // Someone waits for the result, on a machine that may be busy.
+        // The user waits for the result, and the machine may be busy.
         "--run-priority",
         "low",
         static_cast<char*>(nullptr));

@@ -15,14 +15,15 @@ class DaemonProcess {
   // waits until it serves. UNAVAILABLE with the end of the log if it does not.
   static absl::StatusOr<std::unique_ptr<DaemonProcess>> Start(
       const std::string& binary, const std::string& state_dir);
-  ~DaemonProcess();  // SIGTERM, and waits
+  ~DaemonProcess();  // sends SIGTERM and waits for the end
   DaemonProcess(const DaemonProcess&) = delete;
   DaemonProcess& operator=(const DaemonProcess&) = delete;
 
-  // SIGKILL, and waits for the end.
+  // Sends SIGKILL and waits for the end.
   void Kill();
 
-  const std::string& target() const { return target_; }  // as gRPC names it
+  // The address, in the syntax of gRPC.
+  const std::string& target() const { return target_; }
   pid_t pid() const { return pid_; }
 
  private:

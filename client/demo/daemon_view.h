@@ -1,5 +1,5 @@
-// What the demo asks the daemon, one call each. Every method returns the error
-// of the call; nothing is kept between calls.
+// The demo's calls to the daemon, one method each. Every method returns the
+// error of the call; no state is kept between calls.
 #pragma once
 
 #include <absl/status/status.h>
@@ -17,7 +17,7 @@
 
 namespace selfcal::client {
 
-// What a restart must not change.
+// The state that a restart must not change.
 struct DaemonState {
   std::vector<v1::Segment> segments;  // oldest first
   std::vector<v1::Table> tables;
@@ -32,7 +32,7 @@ class DaemonView {
   absl::Status CreateRig(const Rig& rig);
   absl::StatusOr<DaemonState> GetState();
   absl::StatusOr<std::vector<v1::Table>> GetTables();
-  // Newest first.
+  // Lists runs, newest first.
   absl::StatusOr<std::vector<v1::Recalibration>> GetRuns();
   absl::StatusOr<v1::Recalibration> StartRun();
   // Calls back with each change of a run until it has ended.

@@ -21,7 +21,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-// Streams the segments while showing what the daemon makes of them.
+// Streams the segments and shows how the daemon processes them.
 class Streaming {
  public:
   Streaming(const DaemonProcess& daemon, const Device& device, Report* report)
@@ -31,7 +31,7 @@ class Streaming {
         stream_({.target = daemon.target(), .rig = device.rig.id},
                 [this](const Acknowledgement& ack) { OnAck(ack); }) {}
 
-  // Until all is scored and no run is left.
+  // Waits until all segments are scored and all runs have ended.
   absl::Status Run(double timeout_s) {
     const auto deadline =
         Clock::now() + std::chrono::duration<double>(timeout_s);
@@ -67,7 +67,7 @@ class Streaming {
     }
   }
 
-  // One look at the daemon; true when there is nothing left to wait for.
+  // Polls the daemon; true when there is nothing left to wait for.
   absl::StatusOr<bool> Look() {
     {
       std::lock_guard lock(mutex_);
@@ -93,7 +93,7 @@ class Streaming {
     return *idle && next_ == total && static_cast<std::size_t>(scored) == total;
   }
 
-  // Follows every run that is new; true if none is unfinished.
+  // Follows every new run to its end; true if there was none.
   absl::StatusOr<bool> WatchRuns() {
     absl::StatusOr<std::vector<v1::Recalibration>> runs = view_.GetRuns();
     if (!runs.ok()) return runs.status();
@@ -190,7 +190,7 @@ void ShowResult(const DaemonState& state,
   report->Result(state.calibrations.front(), active, device.truth);
 }
 
-// Where the recording was too short to fill the tables, a person would ask.
+// Starts a run manually, for a recording that is too short to fill the tables.
 absl::Status RecalibrateByHand(DaemonView& view, Report* report) {
   report->Step("by hand",
                "the tables did not fill: a recalibration on what they hold");

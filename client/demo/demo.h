@@ -1,4 +1,4 @@
-// The main job, step by step, as someone watches it.
+// The steps of the demo, from a device to a calibration that survives a kill.
 #pragma once
 
 #include <absl/status/status.h>
@@ -12,13 +12,13 @@ namespace selfcal::client {
 
 struct DemoOptions {
   std::string daemon;      // path of selfcald
-  std::string state_dir;   // fresh
+  std::string state_dir;   // a new folder
   double timeout_s = 900;  // for all scores and runs
 };
 
-// Starts the daemon, streams the device, waits for the recalibration, shows
-// the result, kills the daemon, starts it again and compares. An error ends it;
-// what did not hold is in report.failed().
+// Starts the daemon, streams the device, waits for the run, shows the result,
+// kills the daemon, restarts it and compares its state. An error ends the demo;
+// a promise that did not hold sets report.failed().
 absl::Status RunDemo(const DemoOptions& options,
                      const Device& device,
                      Report* report);

@@ -1,4 +1,4 @@
-// What the demo streams: a simulated device with known truth, or a recording.
+// The device of the demo: a simulation with known truth, or a recording.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -17,7 +17,7 @@ namespace selfcal::client {
 struct Device {
   Rig rig;
   std::vector<MotionSegment> segments;
-  std::optional<Calibration> truth;  // only simulation knows it
+  std::optional<Calibration> truth;  // known for a simulation only
   std::string description;
 };
 
@@ -27,7 +27,7 @@ Device SimulateDevice(std::uint64_t seed, double seconds);
 
 struct RecordingOptions {
   int keyframes_per_segment = 40;
-  // Instead of those of the file, where given.
+  // These override the values of the file.
   std::optional<double> gyro_bias_walk;
   std::optional<double> accel_bias_walk;
 };

@@ -1,5 +1,5 @@
-// selfcal-demo: shows the whole way of the data, from a device to a versioned
-// calibration that survives a kill.
+// selfcal-demo: shows how data of a device becomes a versioned calibration that
+// survives a kill.
 #include <fmt/format.h>
 #include <stdlib.h>
 
@@ -26,7 +26,7 @@ struct Flags {
   selfcal::client::RecordingOptions recording;
 };
 
-// A new folder: `keep`, or one for the time of the demo. Says what is wrong.
+// Creates the folder `keep`, or a temporary one. Prints errors.
 std::optional<std::string> MakeFolder(const std::string& keep) {
   std::error_code error;
   if (!keep.empty()) {

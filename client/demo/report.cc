@@ -31,14 +31,14 @@ std::string LastPart(const std::string& name) {
   return name.substr(name.rfind('/') + 1);
 }
 
-// Long session names shortened to their end: "...e08f~3".
+// Shortens long session names to their end: "...e08f~3".
 std::string Short(const std::string& segment_name) {
   const std::string id = LastPart(segment_name);
   return id.size() <= 16 ? id : "..." + id.substr(id.size() - 13);
 }
 
-// The components that the estimate knows least, against what was known before
-// it: "cam0.p_CI.y 0.33" has a third of the factory's sigma left.
+// The components with the largest sigma relative to the factory's, e.g.
+// "cam0.p_CI.y 0.33" for a third of it.
 std::string LeastKnown(const v1::Calibration& factory,
                        const v1::Calibration& estimate) {
   std::vector<std::pair<double, std::string>> ratios;
@@ -200,7 +200,8 @@ void Report::Result(const v1::Calibration& factory,
                     const v1::Calibration& estimate,
                     const std::optional<Calibration>& truth) {
   EndProgress();
-  // Differences are taken in the tangent: a rotation near pi has two vectors.
+  // Differences are taken in the tangent space, because a rotation near pi has
+  // two rotation vectors.
   Calibration before_theta, after_theta;
   if (!FromProto(factory.parameters(), "", &before_theta).empty() ||
       !FromProto(estimate.parameters(), "", &after_theta).empty()) {
@@ -223,13 +224,13 @@ void Report::Result(const v1::Calibration& factory,
   double largest = 0;
   for (int i = 0; i < estimate.estimates_size(); ++i) {
     const v1::ComponentEstimate& after = estimate.estimates(i);
-    if (after.sigma() == 0) continue;  // fixed in the rig
+    if (after.sigma() == 0) continue;  // held fixed by the rig
     ++estimated;
     const double before = factory.estimates(i).value();
     const double sigmas = difference[i] / after.sigma();
     within_3 += std::abs(sigmas) <= 3;
     largest = std::max(largest, std::abs(sigmas));
-    // Rotations in degrees from the factory's.
+    // Rotations are shown in degrees from the factory value.
     const bool turned = after.unit() == "rad";
     const double unit = turned ? 180 / std::numbers::pi : 1;
     const double off = turned ? 0 : before;

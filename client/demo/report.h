@@ -1,4 +1,4 @@
-// What the demo shows: lines on the terminal, and the same as JSON.
+// The output of the demo: lines on the terminal, and the same as JSON.
 #pragma once
 
 #include <absl/status/status.h>
@@ -21,20 +21,21 @@ class Report {
  public:
   Report();
 
-  // Begins a step: "1. device  text".
+  // Starts a step: "1. device  text".
   void Step(const std::string& name, const std::string& text);
-  // One line of detail.
+  // Prints one line of detail.
   void Line(const std::string& text);
   // A line that replaces the last one on a terminal; elsewhere it is printed
   // only when `milestone`.
   void Progress(const std::string& text, bool milestone);
-  // Something that the demo promised did not hold: shown, and it fails.
+  // Reports that a promise of the demo did not hold; the demo then fails.
   void Fail(const std::string& what);
 
   void Segments(const std::vector<v1::Segment>& segments);
   void Tables(const std::vector<v1::Table>& tables);
   void Run(const v1::Recalibration& run);
-  // Parameter, unit, truth, factory (before), estimate, sigma, error in sigmas.
+  // Prints a table of parameter, unit, truth, factory value (before), estimate,
+  // sigma and error in sigmas.
   void Result(const v1::Calibration& factory,
               const v1::Calibration& estimate,
               const std::optional<Calibration>& truth);
@@ -52,7 +53,7 @@ class Report {
   nlohmann::json json_;
 };
 
-// "imu 8/8  camera 5/8": how full the tables are.
+// The fill of the tables, e.g. "imu 8/8  camera 5/8".
 std::string Fill(const std::vector<v1::Table>& tables);
 
 }  // namespace selfcal::client

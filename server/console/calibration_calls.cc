@@ -101,7 +101,7 @@ Answer AdviseMotion(const Call& call) {
               "max_advice",
               kDefaultAdvice,
               "max_advice must be a number >= 1; without it 3 motions are "
-              "told"));
+              "returned"));
   SELFCAL_ASSIGN_OR_RETURN(const RigCoaching coaching,
                            call.context.pipeline->AdviseMotion(rig));
   return JsonResponse(Encode(coaching, max_advice));
