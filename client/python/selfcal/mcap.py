@@ -103,7 +103,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "folder", help="for the files SESSION.mcap; created if missing"
     )
-    parser.add_argument("segment", nargs="*", help="session~index; default: all")
+    parser.add_argument(
+        "segment", nargs="*", help="session~index; default: all"
+    )
     parser.add_argument(
         "--version", default="active", help="version of the calibration"
     )

@@ -57,9 +57,8 @@ TEST_F(Commands, VerifyPrintsEachCheckAndASummary) {
   EXPECT_THAT(outcome.out,
               HasSubstr("calibration 4\tagrees\tcam0.focal.x 0.012 sigma, "
                         "sigma of imu.gyro.scale.x 0.1 %, covariance 0.2 %\n"));
-  EXPECT_THAT(
-      outcome.out,
-      HasSubstr("segments\t11, 1 of the version are no longer kept\n"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("segments\t11, 1 of the version are no longer kept\n"));
 }
 
 TEST_F(Commands, VerifyFailsWhereTheCoresDiffer) {
