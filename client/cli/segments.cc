@@ -171,7 +171,7 @@ struct ListOptions {
   bool quarantined = false;
 };
 
-// Returns the conditions of the list, with that of the flag --unusable.
+// Returns the conditions of the list, with that of the flag --quarantined.
 std::string FilterOf(const ListOptions& options) {
   constexpr char kUnusable[] = "state = UNUSABLE";
   if (!options.quarantined) return options.filter;
