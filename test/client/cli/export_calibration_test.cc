@@ -58,7 +58,7 @@ TEST_F(CalibrationExport, WritesTheVersionAndNamesWhatIsLost) {
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/2");
   EXPECT_EQ(outcome.out, (folder_ / "sensors.yaml").string() + "\n");
   EXPECT_THAT(ReadAll(folder_ / "sensors.yaml"), HasSubstr("[257.5, 258.5,"));
-  EXPECT_THAT(outcome.err, HasSubstr("lost: imu: maplab takes the readings"));
+  EXPECT_THAT(outcome.err, HasSubstr("lost: imu: maplab uses the readings"));
   EXPECT_THAT(outcome.err, HasSubstr("note: sigmas: "));
 }
 

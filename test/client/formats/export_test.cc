@@ -241,7 +241,7 @@ TEST(Formats, AnUnknownOneIsNamedWithThoseThatAre) {
   const auto rig = ImportRig("okvis", {}, {});
   EXPECT_EQ(rig.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(rig.status().message()),
-              HasSubstr("none of kalibr, openvins, orb_slam3"));
+              HasSubstr("one of kalibr, openvins, orb_slam3"));
   EXPECT_FALSE(ExportRig("kalibr", Rig(), Calibration(), {}).ok());
 }
 
