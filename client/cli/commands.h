@@ -12,8 +12,10 @@ void AddRigCommands(CLI::App* app, Context* context);
 void AddImportCommand(CLI::App* app, Context* context);
 void AddPreflightCommand(CLI::App* app, Context* context);
 void AddSegmentCommands(CLI::App* app, Context* context);
-// Adds a command below `segments`.
+// Each adds commands below `segments`.
+void AddSegmentDetails(CLI::App* segments, Context* context);
 void AddSegmentExport(CLI::App* segments, Context* context);
+void AddSessionCommands(CLI::App* app, Context* context);
 void AddTablesCommand(CLI::App* app, Context* context);
 void AddRecalibrateCommand(CLI::App* app, Context* context);
 void AddRunCommands(CLI::App* app, Context* context);

@@ -329,6 +329,7 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
     context->command = [context, rig, id] { return Show(context, *rig, *id); };
   });
 
+  AddSegmentDetails(segments, context);
   AddQuarantine(segments, context);
   AddSegmentExport(segments, context);
 }

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/console/api.h"
 #include "server/console/assets.h"
 #include "server/console/http_server.h"
 #include "server/console/json.h"
+#include "server/console/transcoding.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
@@ -38,11 +38,14 @@ HttpResponse AnswerPage(const HttpRequest& request) {
 
 class HttpConsole final : public Console {
  public:
-  absl::Status Start(const ApiContext& context, const HttpOptions& options) {
+  explicit HttpConsole(const Api* api) : transcoding_(api) {}
+
+  absl::Status Start(const HttpOptions& options) {
     SELFCAL_ASSIGN_OR_RETURN(
-        server_, MakeHttpServer(options, [context](const HttpRequest& request) {
-          return request.path.starts_with("/api/") ? AnswerApi(context, request)
-                                                   : AnswerPage(request);
+        server_, MakeHttpServer(options, [this](const HttpRequest& request) {
+          return request.path.starts_with("/api/")
+                     ? transcoding_.Answer(request)
+                     : AnswerPage(request);
         }));
     return absl::OkStatus();
   }
@@ -50,6 +53,7 @@ class HttpConsole final : public Console {
   const std::string& url() const override { return server_->url(); }
 
  private:
+  const Transcoding transcoding_;
   std::unique_ptr<HttpServer> server_;
 };
 
@@ -60,13 +64,9 @@ absl::Status CheckConsole(const ConsoleOptions& options) {
 }
 
 absl::StatusOr<std::unique_ptr<Console>> MakeConsole(
-    Store* store,
-    Pipeline* pipeline,
-    ChangeFeed* feed,
-    const ConsoleOptions& options) {
-  auto console = std::make_unique<HttpConsole>();
-  SELFCAL_RETURN_IF_ERROR(console->Start(
-      {store, pipeline, feed, options.program_version}, HttpOf(options)));
+    const Api* api, const ConsoleOptions& options) {
+  auto console = std::make_unique<HttpConsole>(api);
+  SELFCAL_RETURN_IF_ERROR(console->Start(HttpOf(options)));
   return console;
 }
 

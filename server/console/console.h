@@ -11,9 +11,7 @@
 
 #include "server/access/grants.h"
 #include "server/access/tls_options.h"
-#include "server/console/change_feed.h"
-#include "server/pipeline/pipeline.h"
-#include "server/store/store.h"
+#include "server/api/api.h"
 
 namespace selfcal::server {
 
@@ -23,7 +21,6 @@ struct ConsoleOptions {
   // certificates state the rights.
   Role local_role = Role::kRead;
   TlsOptions tls;  // for an address that is not on the loopback interface
-  std::string program_version;
 };
 
 class Console {
@@ -39,12 +36,9 @@ class Console {
 // for unusable TLS files, and in a build without the console.
 absl::Status CheckConsole(const ConsoleOptions& options);
 
-// Starts the console; all three pointers must outlive it. Errors are those of
-// CheckConsole; UNAVAILABLE if the port cannot be opened.
+// Starts the console; `api` must outlive it. Errors are those of CheckConsole;
+// UNAVAILABLE if it cannot open the port.
 absl::StatusOr<std::unique_ptr<Console>> MakeConsole(
-    Store* store,
-    Pipeline* pipeline,
-    ChangeFeed* feed,
-    const ConsoleOptions& options);
+    const Api* api, const ConsoleOptions& options);
 
 }  // namespace selfcal::server

@@ -1,15 +1,16 @@
 // A request to the console and its response.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "server/access/grants.h"
-#include "server/console/outbox.h"
 
 namespace selfcal::server {
 
@@ -22,16 +23,25 @@ struct HttpRequest {
   Caller caller;
 };
 
+// The part of a response that is sent as it is made. Any thread may call Close.
+class HttpStream {
+ public:
+  virtual ~HttpStream() = default;
+  // Waits for at most `timeout` for bytes to send. Empty: none so far; nullopt:
+  // the stream has ended.
+  virtual std::optional<std::string> Take(
+      std::chrono::milliseconds timeout) = 0;
+  // Ends the stream soon.
+  virtual void Close() = 0;
+};
+
 struct HttpResponse {
   int status = 200;
   std::string type = "application/json";
   std::string body;
   std::vector<std::pair<std::string, std::string>> headers = {};
-  // If set, its lines are sent after the body, until it is closed or the client
-  // has disconnected.
-  std::shared_ptr<Outbox> stream = nullptr;
-  // An object that must live until the response is sent.
-  std::shared_ptr<void> keep = nullptr;
+  // If set, sent after the body, until it ends or the client has disconnected.
+  std::shared_ptr<HttpStream> stream = nullptr;
 };
 
 using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;

@@ -55,8 +55,7 @@ struct Exchange {
 // The stream that is sent after the body of a response.
 struct Sending {
   std::string waiting;
-  std::shared_ptr<Outbox> stream;
-  std::shared_ptr<void> keep;
+  std::shared_ptr<HttpStream> stream;
   MHD_socket reader = MHD_INVALID_SOCKET;
   std::chrono::milliseconds silent{0};
 };
@@ -138,7 +137,6 @@ MHD_Result Send(MHD_Connection* connection, HttpResponse answer) {
     auto sending = std::make_unique<Sending>();
     sending->waiting = std::move(answer.body);
     sending->stream = std::move(answer.stream);
-    sending->keep = std::move(answer.keep);
     sending->reader = SocketOf(connection);
     response = MHD_create_response_from_callback(
         MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream, sending.get(), EndStream);
@@ -358,7 +356,7 @@ class MicroServer final : public HttpServer {
   }
 
   // True if one more stream is allowed.
-  bool Admit(const std::shared_ptr<Outbox>& stream) {
+  bool Admit(const std::shared_ptr<HttpStream>& stream) {
     const std::lock_guard lock(mutex_);
     streams_.remove_if([](const auto& weak) { return weak.expired(); });
     if (stopping_ || streams_.size() >= kMaxStreams) return false;
@@ -371,7 +369,7 @@ class MicroServer final : public HttpServer {
   const bool loopback_;
   std::string url_;
   std::mutex mutex_;  // guards the five below
-  std::list<std::weak_ptr<Outbox>> streams_;
+  std::list<std::weak_ptr<HttpStream>> streams_;
   std::set<MHD_socket> connections_;
   std::condition_variable disconnected_;
   bool announced_ = false;  // a connection is about to be counted

@@ -69,4 +69,12 @@ HttpResponse ErrorResponse(const absl::Status& status) {
   return response;
 }
 
+std::string MessageEvent(const google::protobuf::Message& message) {
+  return "data: " + JsonResponse(message).body + "\n\n";
+}
+
+std::string ErrorEvent(const absl::Status& status) {
+  return "event: error\ndata: " + ErrorResponse(status).body + "\n\n";
+}
+
 }  // namespace selfcal::server

@@ -4,6 +4,8 @@
 #include <absl/status/status.h>
 #include <google/protobuf/message.h>
 
+#include <string>
+
 #include "server/console/http.h"
 
 namespace selfcal::server {
@@ -14,5 +16,9 @@ HttpResponse JsonResponse(const google::protobuf::Message& message);
 
 // A response {"code": "NOT_FOUND", "message": ..., "whatToDo": ...}.
 HttpResponse ErrorResponse(const absl::Status& status);
+
+// The same as server-sent events.
+std::string MessageEvent(const google::protobuf::Message& message);
+std::string ErrorEvent(const absl::Status& status);
 
 }  // namespace selfcal::server

@@ -10,7 +10,7 @@ absl::Status CheckConsole(const ConsoleOptions&) {
 }
 
 absl::StatusOr<std::unique_ptr<Console>> MakeConsole(
-    Store*, Pipeline*, ChangeFeed*, const ConsoleOptions& options) {
+    const Api*, const ConsoleOptions& options) {
   return CheckConsole(options);
 }
 

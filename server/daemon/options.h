@@ -12,7 +12,7 @@
 #include "core/verify/scorer.h"
 #include "server/domain/domain_options.h"
 #include "server/host/host_conditions.h"
-#include "server/service/server.h"
+#include "server/grpc/server.h"
 
 namespace selfcal::server {
 

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/api/api.h"
 #include "server/console/console.h"
 #include "server/daemon/log.h"
 #include "server/daemon/memory.h"
@@ -23,7 +24,7 @@
 #include "server/host/host_conditions.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
-#include "server/service/grpc_log.h"
+#include "server/grpc/grpc_log.h"
 #include "server/store/store_sqlite.h"
 #include "server/worker/worker.h"
 
@@ -104,10 +105,7 @@ absl::StatusOr<std::unique_ptr<Metrics>> OpenMetrics(
 }
 
 ConsoleOptions OptionsOfConsole(const DaemonOptions& options) {
-  return {options.console,
-          options.console_role,
-          options.server.tls,
-          SELFCAL_VERSION};
+  return {options.console, options.console_role, options.server.tls};
 }
 
 // Returns an error if the settings require Ceres and this build does not have
@@ -124,12 +122,9 @@ absl::Status CheckCeres(const DaemonOptions& options) {
 
 // Opens the console; null if it is off.
 absl::StatusOr<std::unique_ptr<Console>> OpenConsole(
-    const DaemonOptions& options,
-    Store* store,
-    Pipeline* pipeline,
-    ChangeFeed* feed) {
+    const DaemonOptions& options, const Api* api) {
   if (options.console == "off") return nullptr;
-  auto opened = MakeConsole(store, pipeline, feed, OptionsOfConsole(options));
+  auto opened = MakeConsole(api, OptionsOfConsole(options));
   if (opened.ok()) spdlog::info("console: {}", (*opened)->url());
   return opened;
 }
@@ -181,28 +176,23 @@ std::optional<int> ServeOnce(
   const auto metrics = OpenMetrics(options, database, store->get());
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
-  PipelineObserver* observer =
-      *metrics == nullptr ? nullptr : (*metrics)->observer();
-  std::optional<ChangeFeed> feed;
-  if (options.console != "off") {
-    observer = &feed.emplace(store->get(), observer);
-  }
+  ChangeFeed changes(store->get(),
+                     *metrics == nullptr ? nullptr : (*metrics)->observer());
   const auto conditions = MakeHostConditions(options.host);
   const auto pipeline =
       MakePipeline(&domain,
-                   OptionsOfPipeline(options, conditions.get(), observer),
+                   OptionsOfPipeline(options, conditions.get(), &changes),
                    EstimatorsOfPipeline(options));
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);
   }
-  auto console = OpenConsole(
-      options, store->get(), pipeline.get(), feed ? &*feed : nullptr);
+  Api api(&domain, pipeline.get(), &changes, {RequestRestart, SELFCAL_VERSION});
+  auto console = OpenConsole(options, &api);
   if (!console.ok()) {
     pipeline->Stop();
     return Failed("cannot open the console", console.status());
   }
-  const auto server =
-      MakeServer(&domain, pipeline.get(), options.server, RequestRestart);
+  const auto server = MakeServer(&api, options.server);
   if (!server.ok()) {
     pipeline->Stop();
     return Failed("cannot serve", server.status());
@@ -223,6 +213,7 @@ std::optional<int> ServeOnce(
         "stopping, to be restarted: the limit of open files was reached, and "
         "no new connections are accepted");
   }
+  api.Stop();
   console->reset();
   (*server)->Shutdown(kCallLimit);
   pipeline->Stop();

@@ -16,6 +16,7 @@ constexpr int kMinMessageBytes = 1 << 20;
 constexpr std::int64_t kMinMemoryBytes = 16 << 20;
 constexpr std::int64_t kMaxMemoryBytes = std::int64_t{1} << 40;
 constexpr int kMaxThreads = 100'000;
+constexpr int kMaxWatches = 1'000'000;
 constexpr int kMaxSeconds = 86'400;
 constexpr int kMaxBacklog = 1'000'000;
 constexpr int kMaxMetricsRigs = 1000;
@@ -129,8 +130,14 @@ void DefineLimits(Definer* define, DaemonOptions* options) {
   define
       ->Add("max-threads",
             &server.max_threads,
-            "Limit on the threads for calls; each watch occupies one")
+            "Limit on the calls that are answered at once; each has a thread")
       ->check(CLI::Range(8, kMaxThreads))
+      ->capture_default_str();
+  define
+      ->Add("max-watches",
+            &server.max_watches,
+            "Limit on open watches; they have no threads")
+      ->check(CLI::Range(1, kMaxWatches))
       ->capture_default_str();
   define
       ->Add("max-streams",
@@ -144,7 +151,10 @@ void DefineLimits(Definer* define, DaemonOptions* options) {
             "Limit on concurrent streams of segments; each has a thread")
       ->check(CLI::Range(1, kMaxThreads))
       ->capture_default_str();
-  define->Add("max-rigs", &server.max_rigs, "Limit on the number of rigs")
+  define
+      ->Add("max-rigs",
+            &options->domain.quotas.max_rigs,
+            "Limit on the number of rigs")
       ->check(CLI::Range(1, kMaxRigs))
       ->capture_default_str();
   define

@@ -8,6 +8,7 @@
 #include "server/domain/age_trigger.h"
 #include "server/domain/calibration_life.h"
 #include "server/domain/intake.h"
+#include "server/domain/quotas.h"
 #include "server/domain/run_creation.h"
 #include "server/domain/run_life.h"
 #include "server/domain/run_results.h"
@@ -23,6 +24,7 @@ absl::StatusOr<StoredRig> Domain::CreateRig(const Rig& rig,
                                             const RigPolicy& policy) {
   const StoredRig stored{rig, clock_(), policy};
   SELFCAL_RETURN_IF_ERROR(store_->InsertRig(stored, [&](UnitOfWork* tx) {
+    SELFCAL_RETURN_IF_ERROR(CheckRigQuota(tx, options_.quotas));
     SELFCAL_RETURN_IF_ERROR(InsertTables(tx, MakeTables(rig)));
     SELFCAL_RETURN_IF_ERROR(AppendEvent(tx, EventKind::kRigCreated, "created"));
     return StoreFactoryCalibration(tx, stored);

@@ -43,7 +43,8 @@ class Domain {
   Store* store() const { return store_; }
 
   // --- Rigs. Creates the rig with its factory calibration as version 1,
-  // active, and its empty tables. ALREADY_EXISTS.
+  // active, and its empty tables. ALREADY_EXISTS; RESOURCE_EXHAUSTED where the
+  // quota of rigs leaves no room.
   absl::StatusOr<StoredRig> CreateRig(const Rig& rig,
                                       const RigPolicy& policy = {});
 

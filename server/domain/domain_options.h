@@ -21,6 +21,7 @@ struct Quotas {
   // The whole database. Near it new segments are refused, so that what is
   // stored can still be scored.
   std::int64_t max_database_bytes = 0;
+  std::int64_t max_rigs = 10'000;
 
   friend bool operator==(const Quotas&, const Quotas&) = default;
 };

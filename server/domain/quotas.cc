@@ -10,6 +10,7 @@
 #include "server/domain/exclusion.h"
 #include "server/store/database_size.h"
 #include "server/store/events.h"
+#include "server/store/rigs.h"
 #include "server/store/segment_rows.h"
 #include "server/store/status_macros.h"
 
@@ -70,6 +71,15 @@ absl::Status Evict(UnitOfWork* tx,
 }
 
 }  // namespace
+
+absl::Status CheckRigQuota(UnitOfWork* tx, const Quotas& quotas) {
+  if (quotas.max_rigs == 0) return absl::OkStatus();
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rigs, CountRigs(tx));
+  if (rigs <= quotas.max_rigs) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      "there are as many rigs as the setting max-rigs allows; ask the operator "
+      "to raise it");
+}
 
 absl::Status MakeRoom(UnitOfWork* tx,
                       std::int64_t bytes,

@@ -10,6 +10,10 @@
 
 namespace selfcal::server {
 
+// RESOURCE_EXHAUSTED if there are more rigs than the quota allows, that of the
+// unit of work included.
+absl::Status CheckRigQuota(UnitOfWork* tx, const Quotas& quotas);
+
 // Makes room for a segment of `bytes` that is about to be stored.
 // RESOURCE_EXHAUSTED, naming the quota, where nothing may be evicted.
 absl::Status MakeRoom(UnitOfWork* tx, std::int64_t bytes, const Quotas& quotas);

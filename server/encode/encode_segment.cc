@@ -88,13 +88,45 @@ std::string ReasonText(const TableAbsence& absence) {
   return "unknown to this program";
 }
 
+v1::TableExclusion::Cause EncodeCause(AbsenceCause cause) {
+  switch (cause) {
+    case AbsenceCause::kSaysTooLittle:
+      return v1::TableExclusion::INSUFFICIENT_GAIN;
+    case AbsenceCause::kOthersSayMore:
+      return v1::TableExclusion::OUTRANKED;
+    case AbsenceCause::kPushedOut:
+      return v1::TableExclusion::REPLACED;
+    case AbsenceCause::kTooOld:
+      return v1::TableExclusion::TOO_OLD;
+    case AbsenceCause::kDeviceChanged:
+      return v1::TableExclusion::DEVICE_CHANGED;
+    case AbsenceCause::kDataEvicted:
+      return v1::TableExclusion::DATA_EVICTED;
+    case AbsenceCause::kUnusable:
+      return v1::TableExclusion::UNUSABLE;
+    case AbsenceCause::kDoesNotFit:
+      return v1::TableExclusion::DOES_NOT_FIT;
+    case AbsenceCause::kManyOutliers:
+      return v1::TableExclusion::MANY_OUTLIERS;
+  }
+  // Written by a newer program.
+  return v1::TableExclusion::CAUSE_UNSPECIFIED;
+}
+
 }  // namespace
 
-v1::TableExclusion Encode(const TableAbsence& absence) {
+v1::TableExclusion Encode(const std::string& rig, const TableAbsence& absence) {
   v1::TableExclusion message;
   message.set_group(absence.group);
   message.set_reason(ReasonText(absence));
   SetTime(absence.time_ns, message.mutable_time());
+  message.set_cause(EncodeCause(absence.cause));
+  if (absence.rival) message.set_rival(SegmentName(rig, *absence.rival));
+  if (absence.rival_entropy) {
+    message.set_rival_entropy_nats(*absence.rival_entropy);
+  }
+  if (absence.fit) message.set_fit(*absence.fit);
+  if (absence.fit_limit) message.set_fit_limit(*absence.fit_limit);
   return message;
 }
 

@@ -88,6 +88,13 @@ absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx) {
   return ReadRig(tx->db(), tx->rig());
 }
 
+absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx) {
+  Statement read(tx->db(), "SELECT COUNT(*) FROM rigs");
+  const std::int64_t rigs = read.Next() ? read.Int(0) : 0;
+  if (!read.status().ok()) return read.status();
+  return rigs;
+}
+
 absl::StatusOr<std::vector<std::string>> RigNames(Connection* db) {
   Statement read(db, "SELECT id FROM rigs ORDER BY rig");
   return ReadNames(&read);

@@ -20,6 +20,8 @@ absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig);
 // NOT_FOUND; DATA_LOSS if it is not as it was written.
 absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig);
 absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);
+// Number of rigs in the database.
+absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx);
 
 absl::StatusOr<std::vector<std::string>> RigNames(Connection* db);
 // Store::ListIdleRigs.

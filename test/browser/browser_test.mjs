@@ -18,6 +18,7 @@ import { kPatience, Reader, until } from './reader.mjs';
 const [, , selfcald, selfcal, fillState, sendSegments, web, screenshots] = process.argv;
 const kChromium = '/usr/bin/chromium';
 const kSkipped = 77;
+const kReconnectMs = 5000; // longer than Chromium waits before it reconnects
 
 if (!existsSync(kChromium)) {
   console.log(`skipped: there is no ${kChromium} (Debian's package chromium)`);
@@ -134,7 +135,8 @@ const tests = {
     await r.sees('At version 1,');
     assert.ok((await r.page.locator('g.observation line').count()) > 0);
     await r.picture('segment');
-    await r.page.getByLabel('Residuals at').selectOption('active');
+    const { version } = await r.api('rigs/tablet/calibrations/active');
+    await r.page.getByLabel('Residuals at').selectOption(version);
     await r.sees(/^At version [2-9],/);
     await r.page.getByLabel('IMU residuals between keyframes').selectOption('0');
     await r.page.getByRole('img', { name: /between keyframes: rotation/ }).waitFor();
@@ -152,7 +154,7 @@ const tests = {
     await r.detail('segment');
   },
 
-  async 'a session shows its way, coloured by what each piece says'(r) {
+  async 'a session shows its path, coloured by the entropy of its segments'(r) {
     await r.shows('/rigs/tablet/sessions', 'Sessions of tablet', ['walk'], 'sessions');
     await r.page.getByRole('link', { name: 'walk', exact: true }).click();
     await r.heading('Session walk');
@@ -186,7 +188,7 @@ const tests = {
   },
 
   async 'a segment whose data is gone says so'(r) {
-    const { segments } = await r.api('rigs/tablet/segments?page_size=100');
+    const { segments } = await r.api('rigs/tablet/segments?page_size=100&view=BASIC');
     const gone = segments.find((s) => !s.hasData);
     assert.ok(gone, 'every segment has its data');
     await r.page.goto(`${r.base}/${gone.name}`);
@@ -195,17 +197,17 @@ const tests = {
     await r.picture('segment-dropped');
     // An entry that a later segment replaced names that segment.
     for (const { name } of segments) {
-      const { absences } = await r.api(name + '/absences');
-      const pushed = absences.find((absence) => absence.cause === 'PUSHED_OUT');
-      if (!pushed) continue;
+      const { exclusions } = await r.api(name);
+      const replaced = exclusions.find((exclusion) => exclusion.cause === 'REPLACED');
+      if (!replaced) continue;
       await r.page.goto(`${r.base}/${name}`);
       await r.sees('kept until');
       const rival = r.page.getByRole('cell', { name: /kept until/ }).first().getByRole('link');
-      assert.equal(await rival.getAttribute('href'), '/' + pushed.rival);
-      await r.picture('segment-pushed-out');
+      assert.equal(await rival.getAttribute('href'), '/' + replaced.rival);
+      await r.picture('segment-replaced');
       return;
     }
-    assert.fail('no segment was pushed out of a table');
+    assert.fail('no segment was replaced in a table');
   },
 
   async 'the history compares versions and shows their origin'(r) {
@@ -295,15 +297,30 @@ const tests = {
       });
       // A page that is opened now shows it from the beginning.
       await other.shows('/' + name, heading, ['Iteration ', 'focal length of camera 0, x']);
-      const way = await other.page.locator('.way .path').first().getAttribute('points');
-      assert.ok(way.split(' ').length >= 3, way);
+      const line = other.page.locator('.way .path').first();
+      const points = await line.getAttribute('points');
+      assert.ok(points.split(' ').length >= 3, points);
+      assert.equal(await line.evaluate((e) => getComputedStyle(e).fill), 'none');
       await other.picture('run-live');
       await other.detail('run');
+      // An error that ends a stream is shown.
+      const event = 'event: error\ndata: {"code": "DATA_LOSS", "message": "the run is damaged"}\n\n';
+      const isWatch = (url) => url.pathname.endsWith(':watch');
+      await other.page.route(isWatch, (route) =>
+        route.fulfill({ contentType: 'text/event-stream', body: event }));
+      await other.shows('/' + name, heading, ['the run is damaged']);
+      await other.page.unroute(isWatch);
     } finally {
       process.kill(worker, 'SIGCONT');
     }
-    // The drawing stays when the run has ended.
+    // The drawing stays when the run has ended, and its stream is not opened again.
+    let opened = 0;
+    r.page.on('request', (request) => {
+      if (/recalibrations\/\d+:watch$/.test(request.url())) ++opened;
+    });
     await r.sees('Solver report');
+    await sleep(kReconnectMs);
+    assert.equal(opened, 0, 'the stream of a run that has ended is opened again');
     await r.sees('Over the iterations');
     await r.picture('run-ended');
   },

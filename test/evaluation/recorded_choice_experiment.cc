@@ -9,9 +9,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -81,18 +83,34 @@ std::vector<int> ChooseJointly(const ScoredRecording& recording,
 }
 
 // How far the calibration on these segments is from that on all: rms over the
-// directions of theta, in sigmas of the latter.
-double Distance(const ScoredRecording& recording,
-                const std::vector<int>& chosen) {
+// directions of theta, in sigmas of the latter. NaN if it does not converge.
+double DistanceIfConverged(const ScoredRecording& recording,
+                           const std::vector<int>& chosen) {
   const RecordedDevice& device = recording.device;
   const CalibrationResult result =
-      CalibrateOn(device.rig, device.segments, chosen);
+      Calibrate(device.rig,
+                device.rig.factory,
+                Pick(device.segments, chosen),
+                ComparedOptions());
+  if (result.status != CalibrateStatus::kConverged) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
   const std::vector<int> free = FreeComponents(device.rig);
   const Eigen::VectorXd off =
       BoxMinus(result.theta, recording.batch.theta)(free);
   const Eigen::MatrixXd covariance = recording.batch.covariance(free, free);
   return std::sqrt(off.dot(covariance.ldlt().solve(off)) /
                    static_cast<double>(off.size()));
+}
+
+// The same for a choice that has to converge.
+double Distance(const ScoredRecording& recording,
+                const std::vector<int>& chosen) {
+  const double distance = DistanceIfConverged(recording, chosen);
+  if (std::isnan(distance)) {
+    throw std::runtime_error("the calibration on chosen segments failed");
+  }
+  return distance;
 }
 
 std::vector<int> RandomChoice(int count, int size, std::mt19937_64* random) {
@@ -123,7 +141,7 @@ void CompareAtSize(const ScoredRecording& recording,
       Distance(recording, ChooseJointly(recording, size, true));
   const double by_joint_alone =
       Distance(recording, ChooseJointly(recording, size, false));
-  const double by_least = Distance(recording, least);
+  const double by_least = DistanceIfConverged(recording, least);
   std::mt19937_64 random(kSeed + size);
   std::vector<std::vector<int>> choices;
   for (int i = 0; i < random_draws; ++i) {
@@ -131,7 +149,17 @@ void CompareAtSize(const ScoredRecording& recording,
   }
   std::vector<double> draws(random_draws);
   context->ForEach(random_draws,
-                   [&](int i) { draws[i] = Distance(recording, choices[i]); });
+                   [&](int i) {
+                     draws[i] = DistanceIfConverged(recording, choices[i]);
+                   });
+  // The daemon would reject them; they are as bad as any.
+  const auto converged = std::count_if(
+      draws.begin(), draws.end(), [](double d) { return !std::isnan(d); });
+  std::replace_if(
+      draws.begin(),
+      draws.end(),
+      [](double d) { return std::isnan(d); },
+      std::numeric_limits<double>::infinity());
   const auto better = [&](double distance) {
     return static_cast<double>(
                std::count_if(draws.begin(),
@@ -147,6 +175,7 @@ void CompareAtSize(const ScoredRecording& recording,
               Quantile(draws, 0.25),
               MedianOf(draws),
               Quantile(draws, 0.75),
+              static_cast<long>(random_draws - converged),
               better(by_entropy),
               better(by_joint)});
   const auto add = [&](std::size_t series, double y) {
@@ -180,6 +209,7 @@ void RunRecordedChoice(Context* context) {
                      "random, quartile",
                      "median",
                      "quartile above",
+                     "random not converged",
                      "random better than entropy",
                      "random better than joint"});
   const std::optional<RecordedDevice> tango = ReadTango();

@@ -19,6 +19,10 @@ from selfcal.v1 import (
     rig_pb2_grpc as rig_grpc,
     segment_pb2 as segment,
     segment_pb2_grpc as segment_grpc,
+    session_pb2 as session,
+    session_pb2_grpc as session_grpc,
+    store_service_pb2 as store,
+    store_service_pb2_grpc as store_grpc,
 )
 
 _PAGE_SIZE = 500
@@ -64,6 +68,8 @@ class Daemon:
         )
 
         self.activity_service = activity_grpc.ActivityServiceStub(channel)
+        self.session_service = session_grpc.SessionServiceStub(channel)
+        self.store_service = store_grpc.StoreServiceStub(channel)
 
     def __enter__(self) -> Daemon:
         return self
@@ -134,6 +140,52 @@ class Daemon:
         return self.calibration_service.WatchCalibration(
             calibration.WatchCalibrationRequest(parent=f"rigs/{rig_id}")
         )
+
+    def sessions(self, rig_id: str) -> Iterator[session.Session]:
+        """By name."""
+        request = session.ListSessionsRequest(parent=f"rigs/{rig_id}")
+        for page in self._pages(self.session_service.ListSessions, request):
+            yield from page.sessions
+
+    def trajectory(
+        self, rig_id: str, session_id: str
+    ) -> Iterator[session.TrajectorySegment]:
+        """The path of the device in a session, segment by segment."""
+        request = session.GetTrajectoryRequest(
+            name=f"rigs/{rig_id}/sessions/{session_id}"
+        )
+        for page in self._pages(self.session_service.GetTrajectory, request):
+            yield from page.segments
+
+    def segment_information(
+        self, rig_id: str, segment_id: str
+    ) -> segment.SegmentInformation:
+        """What a segment alone tells about each component."""
+        return self.segment_service.GetSegmentInformation(
+            segment.GetSegmentInformationRequest(
+                name=f"rigs/{rig_id}/segments/{segment_id}"
+            ),
+            timeout=self._timeout_s,
+        )
+
+    def segment_residuals(
+        self, rig_id: str, segment_id: str, version: int = 0
+    ) -> segment.SegmentResiduals:
+        """Residuals at a version; 0: the one it was estimated with."""
+        return self.segment_service.GetSegmentResiduals(
+            segment.GetSegmentResidualsRequest(
+                name=f"rigs/{rig_id}/segments/{segment_id}",
+                calibration_version=version,
+            ),
+            timeout=self._timeout_s,
+        )
+
+    def events(self, rig_id: str = "") -> Iterator[store.Event]:
+        """Oldest first; of every rig without an id."""
+        parent = f"rigs/{rig_id}" if rig_id else ""
+        request = store.ListEventsRequest(parent=parent)
+        for page in self._pages(self.store_service.ListEvents, request):
+            yield from page.events
 
     def recalibrations(
         self, rig_id: str

@@ -25,7 +25,7 @@ import selfcal  # noqa: E402
 from device import RIG  # noqa: E402
 from google.protobuf import json_format  # noqa: E402
 from running_daemon import RunningDaemon  # noqa: E402
-from selfcal.v1 import rig_pb2, segment_pb2  # noqa: E402
+from selfcal.v1 import rig_pb2, segment_pb2, store_service_pb2  # noqa: E402
 
 KEYFRAMES = 12
 
@@ -86,6 +86,22 @@ class PythonTest(unittest.TestCase):
         self.assertAlmostEqual(frame.seconds[0], 1.1)
         self.assertTrue(math.isnan(frame.temperature_c[0]))
         self.assertEqual(list(frame.temperature_c[1:]), [20.5, 41])
+
+    def test_reads_sessions_and_what_a_segment_tells(self) -> None:
+        list(self.daemon.stream(map(segment_at_rest, range(2))))
+        (session,) = self.daemon.sessions("tablet")
+        self.assertEqual((session.session, session.segments), ("rest", 2))
+        path = list(self.daemon.trajectory("tablet", "rest"))
+        self.assertEqual(
+            [piece.segment for piece in path],
+            [f"rigs/tablet/segments/rest~{k}" for k in range(2)],
+        )
+        residuals = self.daemon.segment_residuals("tablet", "rest~0")
+        self.assertEqual(residuals.calibration_version, 1)
+        self.assertEqual(len(residuals.intervals.whitened) % 15, 0)
+        self.daemon.segment_information("tablet", "rest~0")
+        kinds = [event.kind for event in self.daemon.events("tablet")]
+        self.assertIn(store_service_pb2.Event.RIG_CREATED, kinds)
 
     def test_plots_the_history(self) -> None:
         frame = history.calibration_frame(self.daemon, "tablet")

@@ -6,24 +6,25 @@
 #include <google/protobuf/dynamic_message.h>
 
 #include <memory>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "selfcal/v1/access.pb.h"
 #include "selfcal/v1/activity_service.pb.h"
 #include "selfcal/v1/calibration_service.pb.h"
 #include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/rig.pb.h"
 #include "selfcal/v1/segment.pb.h"
+#include "selfcal/v1/session.pb.h"
 #include "selfcal/v1/store_service.pb.h"
-#include "server/access/rules.h"
+#include "server/access/grants.h"
 
 namespace selfcal::server {
 
 using google::protobuf::MethodDescriptor;
 
-// Those of the six services; a test compares these with the services that the
+// Those of the contract; a test compares these with the services that the
 // server offers.
 inline std::vector<const google::protobuf::ServiceDescriptor*> Services() {
   std::vector<const google::protobuf::ServiceDescriptor*> services;
@@ -32,6 +33,7 @@ inline std::vector<const google::protobuf::ServiceDescriptor*> Services() {
                            v1::GetCalibrationRequest::descriptor()->file(),
                            v1::GetRecalibrationRequest::descriptor()->file(),
                            v1::ListEventsRequest::descriptor()->file(),
+                           v1::ListSessionsRequest::descriptor()->file(),
                            v1::ListActivityRequest::descriptor()->file()}) {
     for (int s = 0; s < file->service_count(); ++s) {
       services.push_back(file->service(s));
@@ -40,21 +42,42 @@ inline std::vector<const google::protobuf::ServiceDescriptor*> Services() {
   return services;
 }
 
-inline std::vector<const MethodDescriptor*> Methods() {
+// All methods, or those for which `chosen` returns true.
+template <typename Chosen>
+std::vector<const MethodDescriptor*> MethodsThat(const Chosen& chosen) {
   std::vector<const MethodDescriptor*> methods;
   for (const auto* service : Services()) {
     for (int m = 0; m < service->method_count(); ++m) {
-      methods.push_back(service->method(m));
+      if (chosen(*service->method(m))) methods.push_back(service->method(m));
     }
   }
   return methods;
 }
 
-inline const AccessRule& RuleOf(const MethodDescriptor& method) {
-  for (const AccessRule& rule : AccessRules()) {
-    if (rule.method == method.full_name()) return rule;
+inline bool IsOpenToAnybody(const MethodDescriptor& method) {
+  return method.options().GetExtension(v1::access).role() ==
+         v1::AccessRule::ANYBODY;
+}
+
+// The methods that need a role.
+inline std::vector<const MethodDescriptor*> Methods() {
+  return MethodsThat([](const auto& method) { return !IsOpenToAnybody(method); });
+}
+
+// The access rule of a method, as its option in the contract states it.
+struct AccessRule {
+  Role role = Role::kAdminister;
+  std::vector<std::string> rig_field;
+};
+
+inline AccessRule RuleOf(const MethodDescriptor& method) {
+  const v1::AccessRule& rule = method.options().GetExtension(v1::access);
+  if (rule.role() < v1::AccessRule::READ ||
+      rule.role() > v1::AccessRule::ADMINISTER) {
+    throw std::runtime_error(method.full_name() + " has no access rule");
   }
-  throw std::runtime_error(method.full_name() + " has no access rule");
+  return {static_cast<Role>(rule.role() - v1::AccessRule::READ),
+          {rule.rig_field().begin(), rule.rig_field().end()}};
 }
 
 // Writes the name to the field at a path like "rig.name".
@@ -80,8 +103,7 @@ inline std::unique_ptr<google::protobuf::Message> RequestFor(
       google::protobuf::MessageFactory::generated_factory()
           ->GetPrototype(method.input_type())
           ->New());
-  std::istringstream fields{std::string(RuleOf(method).rig_field)};
-  for (std::string field; std::getline(fields, field, ',');) {
+  for (const std::string& field : RuleOf(method).rig_field) {
     SetAt(request.get(), field, name);
   }
   return request;

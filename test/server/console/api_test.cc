@@ -28,7 +28,7 @@ Message Parsed(const Reply& reply) {
 TEST_F(ApiTest, RigsComeInPagesFilteredAndSorted) {
   for (const char* id : {"phone", "tablet-1", "tablet-2"}) AddRig(id);
   const auto first =
-      Get("/api/v1/rigs?filter=tablet&order_by=name%20desc&page_size=1").json();
+      Get("/api/v1/activity?filter=tablet&order_by=name%20desc&page_size=1").json();
   ASSERT_EQ(first["rigs"].size(), 1u);
   EXPECT_EQ(first["rigs"][0]["name"], "rigs/tablet-2");
   EXPECT_EQ(first["rigs"][0]["activeVersion"], "1");
@@ -37,7 +37,7 @@ TEST_F(ApiTest, RigsComeInPagesFilteredAndSorted) {
   const std::string token = first["nextPageToken"];
   const auto second =
       Get("/api/v1/"
-          "rigs?filter=tablet&order_by=name+desc&page_size=1&page_token=" +
+          "activity?filter=tablet&order_by=name+desc&page_size=1&page_token=" +
           token)
           .json();
   ASSERT_EQ(second["rigs"].size(), 1u);
@@ -69,7 +69,7 @@ TEST_F(ApiTest, ValuesAreThoseOfTheContract) {
     score.clear_unobserved();
   }
   const auto segments =
-      Parsed<v1::ListSegmentsResponse>(Get("/api/v1/rigs/r/segments"));
+      Parsed<v1::ListSegmentsResponse>(Get("/api/v1/rigs/r/segments?view=BASIC"));
   ASSERT_EQ(segments.segments_size(), 1);
   EXPECT_EQ(segments.segments(0).SerializeAsString(),
             segment.SerializeAsString());
@@ -122,11 +122,12 @@ TEST_F(ApiTest, SegmentsAreFilteredAndSorted) {
 
 TEST_F(ApiTest, TwoVersionsAreCompared) {
   AddVersion(AddRig("r"));
-  const auto compared = Get("/api/v1/rigs/r/compare?a=1&b=active").json();
+  const auto compared = Get("/api/v1/rigs/r/calibrations/1:compare"
+          "?b=rigs/r/calibrations/active").json();
   EXPECT_EQ(compared["versionA"], "1");
   EXPECT_EQ(compared["versionB"], "2");
   EXPECT_EQ(compared["significant"], false);
-  EXPECT_EQ(Get("/api/v1/rigs/r/compare?a=1").status, 400);
+  EXPECT_EQ(Get("/api/v1/rigs/r/calibrations/1:compare").status, 400);
 }
 
 TEST_F(ApiTest, TheCoachSaysWhatItSaysOverGrpc) {
@@ -134,20 +135,23 @@ TEST_F(ApiTest, TheCoachSaysWhatItSaysOverGrpc) {
   const auto expected = pipeline_->AdviseMotion("r");
   ASSERT_TRUE(expected.ok()) << expected.status();
   const auto told =
-      Parsed<v1::AdviseMotionResponse>(Get("/api/v1/rigs/r/coach"));
+      Parsed<v1::AdviseMotionResponse>(Get("/api/v1/rigs/r:adviseMotion"));
   EXPECT_EQ(told.SerializeAsString(), Encode(*expected, 3).SerializeAsString());
   EXPECT_EQ(told.advice_size(), 3);
-  EXPECT_EQ(Get("/api/v1/rigs/r/coach?max_advice=1").json()["advice"].size(),
+  EXPECT_EQ(Get("/api/v1/rigs/r:adviseMotion?max_advice=1")
+                .json()["advice"]
+                .size(),
             1u);
 }
 
-TEST_F(ApiTest, EventsComeNewestFirst) {
+TEST_F(ApiTest, EventsComeInTheOrderThatIsAskedFor) {
   AddRig("a");
   AddRig("b");
-  const auto all = Get("/api/v1/events").json()["events"];
+  const auto all = Get("/api/v1/events?order_by=number%20desc").json()["events"];
   ASSERT_GE(all.size(), 2u);
   EXPECT_EQ(all[0]["rig"], "rigs/b");
   EXPECT_EQ(all.back()["kind"], "RIG_CREATED");
+  EXPECT_EQ(Get("/api/v1/events").json()["events"][0], all.back());
   const auto of_one = Get("/api/v1/rigs/a/events").json()["events"];
   ASSERT_FALSE(of_one.empty());
   for (const auto& event : of_one) EXPECT_EQ(event["rig"], "rigs/a");
@@ -167,11 +171,14 @@ TEST_F(ApiTest, MistakesSayWhatToDo) {
       {"/api/v1/rigs/r/recalibrations/1", 404},
       {"/api/v1/rigs?page_size=many", 400},
       {"/api/v1/rigs?page_token=zz", 400},
-      {"/api/v1/rigs?order_by=colour", 400},
-      {"/api/v1/rigs/none/coach", 404},
-      {"/api/v1/rigs/r/coach?max_advice=all", 400},
-      {"/api/v1/stream?run=r/1", 400},
-      {"/api/v1/stream?rig=none", 404},
+      {"/api/v1/rigs?colour=red", 400},
+      {"/api/v1/activity?order_by=colour", 400},
+      {"/api/v1/rigs/none:adviseMotion", 404},
+      {"/api/v1/rigs/r:adviseMotion?max_advice=all", 400},
+      {"/api/v1/rigs/r/recalibrations/x:watch", 400},
+      {"/api/v1/rigs/r/recalibrations/1:watch", 404},
+      {"/api/v1/rigs/none/changes:watch", 404},
+      {"/api/v1/rigs/none/calibrations:watch", 404},
       {"/api/v1/nothing", 404},
       {"/api/v2/rigs", 404},
   };

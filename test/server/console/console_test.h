@@ -18,9 +18,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "server/api/api.h"
+#include "server/api/change_feed.h"
 #include "server/console/console.h"
 #include "server/store/store_sqlite.h"
-#include "test/server/service/fake_pipeline.h"
+#include "test/server/grpc/fake_pipeline.h"
 #include "test/server/test_records.h"
 #include "test/server/test_segments.h"
 
@@ -87,20 +89,22 @@ class ConsoleTest : public ::testing::Test {
     domain_.emplace(store_.get());
     pipeline_ = std::make_unique<FakePipeline>(&*domain_);
     feed_ = std::make_unique<ChangeFeed>(store_.get(), nullptr);
+    api_.emplace(&*domain_,
+                 pipeline_.get(),
+                 feed_.get(),
+                 ApiOptions{.program_version = "test"});
     Open(Role::kRead);
   }
   ~ConsoleTest() override {
     console_.reset();
+    api_.reset();
     feed_.reset();
     std::filesystem::remove_all(folder_);
   }
 
   void Open(Role role) {
     console_.reset();
-    auto console = MakeConsole(store_.get(),
-                               pipeline_.get(),
-                               feed_.get(),
-                               {"127.0.0.1:0", role, {}, "test"});
+    auto console = MakeConsole(&*api_, {"127.0.0.1:0", role, {}});
     if (!console.ok()) throw std::runtime_error(console.status().ToString());
     console_ = *std::move(console);
   }
@@ -170,6 +174,7 @@ class ConsoleTest : public ::testing::Test {
   std::optional<Domain> domain_;
   std::unique_ptr<FakePipeline> pipeline_;
   std::unique_ptr<ChangeFeed> feed_;
+  std::optional<Api> api_;
   std::unique_ptr<Console> console_;
 };
 

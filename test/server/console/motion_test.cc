@@ -1,6 +1,6 @@
-// Sessions, absences and residuals over HTTP.
+// Sessions, exclusions and residuals over HTTP.
 #include "core/information/segment_residuals.h"
-#include "server/console/api.h"
+#include "server/console/transcoding.h"
 #include "test/server/console/console_test.h"
 #include "test/server/store/fake_information.h"
 
@@ -37,8 +37,7 @@ class MotionTest : public ConsoleTest {
     request.method = "GET";
     request.path = path;
     request.caller = {"somebody", grants};
-    return AnswerApi({store_.get(), pipeline_.get(), feed_.get(), "test"},
-                     request);
+    return Transcoding(&*api_).Answer(request);
   }
 };
 
@@ -101,16 +100,14 @@ TEST_F(MotionTest, AnEvictedSegmentSaysWhatCameInstead) {
   Score(rig, 0, -1);
   Score(rig, 1, -3);
   Score(rig, 2, -2);
-  const auto absences =
-      Get("/api/v1/rigs/r/segments/s~0/absences").json()["absences"];
-  ASSERT_EQ(absences.size(), rig.groups.size());
-  EXPECT_EQ(absences[0]["group"], rig.groups[0].name);
-  EXPECT_EQ(absences[0]["cause"], "PUSHED_OUT");
-  EXPECT_EQ(absences[0]["rival"], "rigs/r/segments/s~2");
-  EXPECT_EQ(absences[0]["rivalEntropyNats"], -2);
-  EXPECT_EQ(
-      Get("/api/v1/rigs/r/segments/s~2/absences").json()["absences"].size(),
-      0u);
+  const auto exclusions =
+      Get("/api/v1/rigs/r/segments/s~0").json()["exclusions"];
+  ASSERT_EQ(exclusions.size(), rig.groups.size());
+  EXPECT_EQ(exclusions[0]["group"], rig.groups[0].name);
+  EXPECT_EQ(exclusions[0]["cause"], "REPLACED");
+  EXPECT_EQ(exclusions[0]["rival"], "rigs/r/segments/s~2");
+  EXPECT_EQ(exclusions[0]["rivalEntropyNats"], -2);
+  EXPECT_EQ(Get("/api/v1/rigs/r/segments/s~2").json()["exclusions"].size(), 0u);
 }
 
 TEST_F(MotionTest, InformationIsTheSigmaOfEachComponentBeforeAndAfter) {
@@ -165,8 +162,8 @@ TEST_F(MotionTest, ResidualsAreThoseOfTheCoreAtTheVersionThatIsAskedFor) {
   ASSERT_EQ(whitened.size(), 15 * (segment.keyframes.size() - 1));
   EXPECT_NEAR(
       whitened[3].get<double>(), expected.intervals[0].whitened[3], 1e-9);
-  EXPECT_EQ(Get(path + "?version=active").json()["calibrationVersion"], "2");
-  EXPECT_EQ(Get(path + "?version=2").json()["calibrationVersion"], "2");
+  EXPECT_EQ(
+      Get(path + "?calibration_version=2").json()["calibrationVersion"], "2");
 }
 
 TEST_F(MotionTest, MistakesSayWhatToDo) {
@@ -177,11 +174,10 @@ TEST_F(MotionTest, MistakesSayWhatToDo) {
       {"rigs/r/sessions/none/trajectory", 404},
       {"rigs/r/sessions/a%25/trajectory", 400},
       {"rigs/r/sessions/s/trajectory?page_token=x", 400},
-      {"rigs/r/segments/s~9/absences", 404},
-      {"rigs/r/segments/x/absences", 400},
       {"rigs/r/segments/s~9/information", 404},
-      {"rigs/r/segments/s~0/residuals?version=7", 404},
-      {"rigs/r/segments/s~0/residuals?version=x", 400},
+      {"rigs/r/segments/s~0/residuals?calibration_version=7", 404},
+      {"rigs/r/segments/s~0/residuals?calibration_version=x", 400},
+      {"rigs/r/segments/s~0/residuals?calibration_version=-1", 400},
       {"rigs/r/segments/s~9/residuals", 404},
   };
   for (const auto& [path, status] : kMistakes) {
@@ -202,7 +198,6 @@ TEST_F(MotionTest, EachCallNeedsTheRoleOnItsRig) {
   AddSegments(rig, 1);
   for (const char* path : {"/api/v1/rigs/r/sessions",
                            "/api/v1/rigs/r/sessions/s/trajectory",
-                           "/api/v1/rigs/r/segments/s~0/absences",
                            "/api/v1/rigs/r/segments/s~0/information",
                            "/api/v1/rigs/r/segments/s~0/residuals"}) {
     EXPECT_EQ(GetAs({{Role::kRead, "r"}}, path).status, 200) << path;

@@ -11,9 +11,10 @@ using ::testing::HasSubstr;
 
 class StreamTest : public ConsoleTest {
  protected:
-  std::unique_ptr<Wire> OpenStream(const std::string& query) {
+  std::unique_ptr<Wire> OpenStream(
+      const std::string& path = "changes:watch") {
     auto wire = std::make_unique<Wire>(port());
-    wire->Send("GET /api/v1/stream" + query +
+    wire->Send("GET /api/v1/" + path +
                " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
     return wire;
   }
@@ -22,11 +23,11 @@ class StreamTest : public ConsoleTest {
   std::unique_ptr<Wire> OpenStreamWithin(std::chrono::seconds time) {
     const auto end = std::chrono::steady_clock::now() + time;
     for (;;) {
-      auto wire = OpenStream("");
+      auto wire = OpenStream();
       const std::string answer = wire->ReadUntil("\r\n\r\n");
       if (answer.starts_with("HTTP/1.1 200") ||
           std::chrono::steady_clock::now() > end) {
-        wire->ReadUntil("everything");
+        wire->ReadUntil("EVERYTHING");
         return wire;
       }
     }
@@ -35,34 +36,34 @@ class StreamTest : public ConsoleTest {
 
 TEST_F(StreamTest, TellsWhatThePipelineDoes) {
   AddRig("a");
-  const auto wire = OpenStream("?rig=a");
-  EXPECT_THAT(wire->ReadUntil("everything"), HasSubstr("text/event-stream"));
+  const auto wire = OpenStream("rigs/a/changes:watch");
+  EXPECT_THAT(wire->ReadUntil("EVERYTHING"), HasSubstr("text/event-stream"));
   feed_->OnVerdict("b", PipelineObserver::Verdict::kStored);
   feed_->OnVerdict("a", PipelineObserver::Verdict::kRejected);
   feed_->OnVerdict("a", PipelineObserver::Verdict::kStored);
-  const std::string told = wire->ReadUntil("segments");
-  EXPECT_THAT(told, HasSubstr(R"(data: {"what":"segments","rig":"rigs/a"})"));
+  const std::string told = wire->ReadUntil("SEGMENTS");
+  EXPECT_THAT(told, HasSubstr(R"(data: {"what":"SEGMENTS","rig":"rigs/a"})"));
   EXPECT_EQ(told.find("rigs/b"), told.npos);
   StoredRun run;
   run.rig = "a";
   feed_->OnRun(run);
-  EXPECT_THAT(wire->ReadUntil("runs"), HasSubstr(R"("what":"runs")"));
+  EXPECT_THAT(wire->ReadUntil("RUNS"), HasSubstr(R"("what":"RUNS")"));
 }
 
 TEST_F(StreamTest, TellsWhatIsWrittenIntoTheLogOfEvents) {
   AddRig("a");
-  const auto wire = OpenStream("");
-  wire->ReadUntil("everything");
+  const auto wire = OpenStream();
+  wire->ReadUntil("EVERYTHING");
   AddRig("b");
-  EXPECT_THAT(wire->ReadUntil("rigs/b"), HasSubstr("event: change"));
+  EXPECT_THAT(wire->ReadUntil("rigs/b"), HasSubstr(R"("what":"EVENTS")"));
 }
 
 TEST_F(StreamTest, RunIsToldUntilItsEnd) {
   AddVersion(AddRig("a"));
   const auto run = domain_->CreateManualRun("a", true);
   ASSERT_TRUE(run.ok()) << run.status();
-  const auto wire = OpenStream("?run=rigs/a/recalibrations/2");
-  EXPECT_THAT(wire->ReadUntil("PENDING"), HasSubstr("event: run"));
+  const auto wire = OpenStream("rigs/a/recalibrations/2:watch");
+  EXPECT_THAT(wire->ReadUntil("PENDING"), HasSubstr("data: {"));
   RunUpdate update{*run, {}};
   update.run.state = RunState::kRunning;
   update.progress.iteration = 3;
@@ -81,7 +82,7 @@ TEST_F(StreamTest, RunIsToldFromItsFirstIteration) {
   AddVersion(rig);
   const auto run = domain_->CreateManualRun("a", true);
   ASSERT_TRUE(run.ok()) << run.status();
-  const auto wire = OpenStream("?run=rigs/a/recalibrations/2");
+  const auto wire = OpenStream("rigs/a/recalibrations/2:watch");
   wire->ReadUntil("PENDING");
   RunUpdate update{*run};
   update.progress.iteration = 3;
@@ -112,10 +113,10 @@ TEST_F(StreamTest, RunIsToldFromItsFirstIteration) {
 TEST_F(StreamTest, StreamsAreBounded) {
   std::vector<std::unique_ptr<Wire>> open;
   for (int i = 0; i < 16; ++i) {
-    open.push_back(OpenStream(""));
-    EXPECT_THAT(open.back()->ReadUntil("everything"), HasSubstr("200 OK"));
+    open.push_back(OpenStream());
+    EXPECT_THAT(open.back()->ReadUntil("EVERYTHING"), HasSubstr("200 OK"));
   }
-  EXPECT_EQ(Get("/api/v1/stream").status, 503);
+  EXPECT_EQ(Get("/api/v1/changes:watch").status, 503);
   EXPECT_EQ(Get("/api/v1/rigs").status, 200);
 }
 
@@ -125,17 +126,17 @@ TEST_F(StreamTest, ReadersThatHaveGoneMakeRoom) {
     for (int i = 0; i < 16; ++i) {
       // Sooner than two heartbeats, the first of which a dead socket takes.
       open.push_back(OpenStreamWithin(std::chrono::seconds(4)));
-      ASSERT_THAT(open.back()->ReadUntil("everything"), HasSubstr("200 OK"));
+      ASSERT_THAT(open.back()->ReadUntil("EVERYTHING"), HasSubstr("200 OK"));
     }
   }
 }
 
 TEST_F(StreamTest, ConsoleEndsWithStreamsOpen) {
   AddRig("a");
-  const auto wire = OpenStream("");
-  wire->ReadUntil("everything");
+  const auto wire = OpenStream();
+  wire->ReadUntil("EVERYTHING");
   console_.reset();
-  EXPECT_THAT(wire->ReadUntil(""), HasSubstr("everything"));
+  EXPECT_THAT(wire->ReadUntil(""), HasSubstr("EVERYTHING"));
 }
 
 }  // namespace

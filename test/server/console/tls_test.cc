@@ -19,15 +19,12 @@ class TlsTest : public ConsoleTest {
     certificates_.AddAuthority("other");
     certificates_.Add("stranger", "other", role + "administer");
     console_.reset();
-    auto console = MakeConsole(store_.get(),
-                               pipeline_.get(),
-                               feed_.get(),
+    auto console = MakeConsole(&*api_,
                                {"0.0.0.0:0",
                                 Role::kRead,
                                 {certificates_.Pem("server"),
                                  certificates_.Key("server"),
-                                 certificates_.Pem("ca")},
-                                "test"});
+                                 certificates_.Pem("ca")}});
     if (!console.ok()) throw std::runtime_error(console.status().ToString());
     console_ = *std::move(console);
   }
@@ -90,14 +87,15 @@ TEST_F(TlsTest, CertificateSaysWhichRigs) {
                            "/api/v1/rigs/b/tables",
                            "/api/v1/rigs/b/segments/s~0/data",
                            "/api/v1/rigs/b/calibrations/1",
-                           "/api/v1/rigs/b/compare?a=1&b=1",
+                           "/api/v1/rigs/b/calibrations/1:compare?b=rigs/b/calibrations/1",
                            "/api/v1/rigs/b/recalibrations",
                            "/api/v1/rigs/b/events",
                            "/api/v1/rigs",
                            "/api/v1/events",
-                           "/api/v1/stream",
-                           "/api/v1/stream?rig=b",
-                           "/api/v1/stream?run=rigs/b/recalibrations/1"}) {
+                           "/api/v1/activity",
+                           "/api/v1/changes:watch",
+                           "/api/v1/rigs/b/changes:watch",
+                           "/api/v1/rigs/b/recalibrations/1:watch"}) {
     EXPECT_EQ(Ask("owner", path).status, 403) << path;
     EXPECT_EQ(Ask("nobody", path).status, 403) << path;
   }

@@ -194,7 +194,7 @@ TEST_F(OptionsTest, FlagGoesBeforeEnvironmentBeforeFileBeforeDefault) {
   EXPECT_THAT(options_.server.listen, ElementsAre("unix:/a", "unix:/b"));
   EXPECT_EQ(options_.scoring_threads, 2);
   EXPECT_EQ(options_.max_backlog, 6);
-  EXPECT_EQ(options_.server.max_rigs, 7);
+  EXPECT_EQ(options_.domain.quotas.max_rigs, 7);
   EXPECT_EQ(options_.metrics, "off");
 }
 

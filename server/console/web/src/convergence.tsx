@@ -2,7 +2,7 @@
 // its sigma, relative to its start value.
 import { useMemo } from 'preact/hooks';
 import type uPlot from 'uplot';
-import type { ComponentProgress } from './api';
+import type { ComponentProgress } from './contract';
 import { component, number, quantity } from './format';
 import { DataTable } from './parts';
 import { kColours, Plot } from './plot';

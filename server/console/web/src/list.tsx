@@ -13,11 +13,13 @@ export interface Column<T> {
   order?: string; // its name in order_by, if the list can be sorted by it
 }
 
-interface Listing<T> {
-  path: string; // under /api/v1
-  items: string; // the field of the response that has them
+interface Listing<R, T> {
+  path: string;
+  items: (response: R) => T[];
   query?: string[]; // query parameters of the address that go to the daemon
-  order?: [string, SortDirection]; // default, without order_by in the address
+  fixed?: Record<string, string>; // query parameters that are not in the address
+  // Default of the query parameter order_by; without it the list has none.
+  order?: [string, SortDirection];
   version: number;
   columns: Column<T>[]; // the first names the item
   next: string; // text of the link to the next page
@@ -65,7 +67,7 @@ function Pager(props: { next: string; token: string; more: string }) {
   );
 }
 
-function Items<T>(props: Listing<T> & { title: string; items: string; of: T[] }) {
+function Items<R, T>(props: Listing<R, T> & { title: string; of: T[] }) {
   const address = useAddress().searchParams;
   const heads = props.columns.map(({ head, order }) => {
     if (!order || !props.order) return { text: head };
@@ -86,16 +88,18 @@ function Items<T>(props: Listing<T> & { title: string; items: string; of: T[] })
   );
 }
 
-export function ListPage<T>(props: Listing<T> & { title: string }) {
+export function ListPage<R extends { nextPageToken: string }, T>(
+  props: Listing<R, T> & { title: string },
+) {
   const address = useAddress().searchParams;
-  const asked = ['page_token', ...(props.query ?? [])].map((key): [string, string] => [
-    key,
-    address.get(key) ?? '',
-  ]);
-  const read = useRead<Record<string, unknown> & { nextPageToken: string }>(
-    `${props.path}?${new URLSearchParams(asked)}`,
-    props.version,
-  );
+  const query = new URLSearchParams(props.fixed);
+  for (const key of ['page_token', ...(props.query ?? [])]) {
+    query.set(key, address.get(key) ?? '');
+  }
+  if (props.order) {
+    query.set('order_by', address.get('order_by') || props.order.join(' '));
+  }
+  const read = useRead<R>(`${props.path}?${query}`, props.version);
   const mistake = props.above && read.error?.code === 'INVALID_ARGUMENT' ? read.error : null;
   return (
     <>
@@ -104,7 +108,7 @@ export function ListPage<T>(props: Listing<T> & { title: string }) {
       {!mistake && (
         <Loaded read={read}>
           {(listed) => {
-            const items = listed[props.items] as T[];
+            const items = props.items(listed);
             if (items.length === 0) return <Empty>{props.empty}</Empty>;
             return (
               <>

@@ -3,7 +3,7 @@
 import './style.css';
 import { render } from 'preact';
 import { useEffect } from 'preact/hooks';
-import type { Session } from './api';
+import type { Caller } from './contract';
 import { Empty, Link, Problem, Title } from './parts';
 import { useAddress, useLive, useRead } from './state';
 import { Calibrations } from './pages/calibrations';
@@ -45,11 +45,11 @@ function RigNav(props: { rig: string; page: string }) {
 
 function Page(props: {
   parts: string[];
-  session: Session | null;
+  caller: Caller | null;
   version: number;
 }) {
   const [top, rig, page, id] = props.parts;
-  const { version, session } = props;
+  const { version, caller } = props;
   if (!top) return <Rigs version={version} />;
   if (top === 'events' && !rig) return <Events rig="" version={version} />;
   if (top === 'rigs' && rig) {
@@ -58,7 +58,7 @@ function Page(props: {
       if (page === 'coach') return <CoachPage rig={rig} version={version} />;
       if (page === 'events') return <Events rig={rig} version={version} />;
       if (page === 'calibrations' && !id) {
-        return <Calibrations rig={rig} session={session} version={version} />;
+        return <Calibrations rig={rig} caller={caller} version={version} />;
       }
       if (page === 'recalibrations') {
         return id ? (
@@ -113,7 +113,7 @@ function App() {
     .filter(Boolean)
     .map(decodeURIComponent);
   const rig = parts[0] === 'rigs' ? (parts[1] ?? '') : '';
-  const session = useRead<Session>('session');
+  const caller = useRead<Caller>('caller');
   const { version, live } = useLive(rig);
   useEffect(() => window.scrollTo(0, 0), [url.pathname]);
   return (
@@ -138,15 +138,14 @@ function App() {
         </span>
       </header>
       <main id="content">
-        {session.error ? (
-          <Problem error={session.error} />
+        {caller.error ? (
+          <Problem error={caller.error} />
         ) : (
-          <Page parts={parts} session={session.value} version={version} />
+          <Page parts={parts} caller={caller.value} version={version} />
         )}
       </main>
       <footer class="quiet">
-        {session.value &&
-          `selfcald ${session.value.programVersion}, as ${session.value.caller}`}
+        {caller.value && `selfcald ${caller.value.programVersion}, as ${caller.value.name}`}
       </footer>
     </>
   );

@@ -1,7 +1,8 @@
 // Components that several pages share.
 import type { ComponentChildren, JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
-import { idOf, pageOf, type ApiError, type Solver } from './api';
+import { idOf, pageOf, type ApiError } from './api';
+import type { SolverReport } from './contract';
 import { ago, clock, number } from './format';
 import { go } from './state';
 
@@ -154,7 +155,9 @@ export function Figures(props: { of: (Figure | null)[] }) {
 }
 
 // Figures about a solver run, for several pages.
-export function solverFigures(solver: Solver): Record<'iterations' | 'reprojection' | 'rank', Figure> {
+export function solverFigures(
+  solver: SolverReport,
+): Record<'iterations' | 'reprojection' | 'rank', Figure> {
   return {
     iterations: ['Iterations', solver.iterations],
     reprojection: [

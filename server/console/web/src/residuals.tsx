@@ -1,7 +1,8 @@
 // The residuals of a segment: of its observations and between its keyframes.
 import { useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
-import type { SegmentData, SegmentResiduals } from './api';
+import type { SegmentResiduals } from './contract';
+import type { SegmentData } from './segment_data';
 import { number } from './format';
 import { Choice } from './parts';
 import { kColours, Plot } from './plot';

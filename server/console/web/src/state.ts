@@ -1,6 +1,8 @@
 // State that pages share: the address, data from the daemon, and its updates.
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { Failure, get, type ApiError } from './api';
+import { Failure, get, rigPath, type ApiError } from './api';
+import type { Change } from './contract';
+import { openStream } from './stream';
 
 // ------------------------------------------------------------- addresses
 
@@ -99,13 +101,8 @@ export function useLive(rig: string): { version: number; live: boolean } {
   const [live, setLive] = useState(false);
   const timer = useRef<number | undefined>(undefined);
   useEffect(() => {
-    const source = new EventSource(
-      '/api/v1/stream' + (rig ? '?rig=' + encodeURIComponent(rig) : ''),
-    );
     let first = true;
-    source.onopen = () => setLive(true);
-    source.onerror = () => setLive(false);
-    source.addEventListener('change', () => {
+    const changed = () => {
       setLive(true);
       if (first) {
         // The stream is connected: the data that was read before is up to date.
@@ -117,9 +114,14 @@ export function useLive(rig: string): { version: number; live: boolean } {
         timer.current = undefined;
         setVersion((count) => count + 1);
       }, kSettleMs);
+    };
+    const close = openStream<Change>((rig ? rigPath(rig) + '/' : '') + 'changes:watch', {
+      onMessage: changed,
+      onOpen: () => setLive(true),
+      onLost: () => setLive(false),
     });
     return () => {
-      source.close();
+      close();
       clearTimeout(timer.current);
       timer.current = undefined;
     };

@@ -1,16 +1,8 @@
 // The path of a device through a session: reads it, and draws it coloured by the
 // entropy of each segment.
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import {
-  Failure,
-  get,
-  idOf,
-  pageOf,
-  type ApiError,
-  type SessionOverview,
-  type SessionPiece,
-  type SessionTrajectory,
-} from './api';
+import { Failure, get, idOf, pageOf, type ApiError } from './api';
+import type { Session, SessionTrajectory, TrajectorySegment } from './contract';
 import { number } from './format';
 import { Choice, Empty } from './parts';
 import { go } from './state';
@@ -22,21 +14,21 @@ const kPageSize = 1000;
 const kSteps = 6; // number of colours
 
 export interface Way {
-  session: SessionOverview;
-  pieces: SessionPiece[];
+  session: Session;
+  segments: TrajectorySegment[];
   whole: boolean; // no page is missing
 }
 
 async function readWay(path: string): Promise<Way> {
-  const pieces: SessionPiece[] = [];
+  const segments: TrajectorySegment[] = [];
   let token = '';
   for (let page = 1; ; ++page) {
     const query = new URLSearchParams({ page_size: String(kPageSize), page_token: token });
     const read = await get<SessionTrajectory>(`${path}/trajectory?${query}`);
-    pieces.push(...read.segments);
+    segments.push(...read.segments);
     token = read.nextPageToken;
     if (!token || page === kPages) {
-      return { session: read.session, pieces, whole: !token };
+      return { session: read.session!, segments, whole: !token };
     }
   }
 }
@@ -98,8 +90,8 @@ function scaleOf(entropies: number[]): Scale {
   };
 }
 
-export function entropyOf(piece: SessionPiece, group: string): number {
-  const score = piece.scores.find((s) => s.group === group);
+export function entropyOf(segment: TrajectorySegment, group: string): number {
+  const score = segment.scores.find((s) => s.group === group);
   return score ? Number(score.entropyNats) : NaN;
 }
 
@@ -134,56 +126,56 @@ function Legend(props: { scale: Scale; counts: number[]; unknown: number }) {
 
 // ------------------------------------------------------------- the picture
 
-export const isKept = (piece: SessionPiece) => piece.tables.length > 0;
+export const isKept = (segment: TrajectorySegment) => segment.tables.length > 0;
 
-function middle(piece: SessionPiece): number[] {
-  const points = piece.positionsM.length / 3;
+function middle(segment: TrajectorySegment): number[] {
+  const points = segment.positionsM.length / 3;
   const i = 3 * Math.floor(points / 2);
-  return piece.positionsM.slice(i, i + 3);
+  return segment.positionsM.slice(i, i + 3);
 }
 
-function nameOf(piece: SessionPiece): string {
-  return decodeURIComponent(idOf(piece.segment));
+function nameOf(segment: TrajectorySegment): string {
+  return decodeURIComponent(idOf(segment.segment));
 }
 
-function say(piece: SessionPiece, group: string): string {
-  const entropy = entropyOf(piece, group);
+function say(segment: TrajectorySegment, group: string): string {
+  const entropy = entropyOf(segment, group);
   return (
-    nameOf(piece) +
+    nameOf(segment) +
     (Number.isNaN(entropy) ? ': no score' : `: entropy ${number(entropy, 4)} nats`) +
-    (isKept(piece) ? `, kept for ${piece.tables.join(', ')}` : ', not kept')
+    (isKept(segment) ? `, kept for ${segment.tables.join(', ')}` : ', not kept')
   );
 }
 
-// Consecutive pieces are joined if the gap between them is small.
-function wayOf(piece: SessionPiece, next: SessionPiece | undefined): number[] {
-  const close = next && next.positionsM.length > 0 && joins(piece, next);
-  return close ? [...piece.positionsM, ...next.positionsM.slice(0, 3)] : piece.positionsM;
+// Consecutive segments are joined if the gap between them is small.
+function wayOf(segment: TrajectorySegment, next: TrajectorySegment | undefined): number[] {
+  const close = next && next.positionsM.length > 0 && joins(segment, next);
+  return close ? [...segment.positionsM, ...next.positionsM.slice(0, 3)] : segment.positionsM;
 }
 
 const kMostGapNs = 1_000_000_000n;
-function joins(piece: SessionPiece, next: SessionPiece): boolean {
-  return BigInt(next.startNs) - BigInt(piece.endNs) <= kMostGapNs;
+function joins(segment: TrajectorySegment, next: TrajectorySegment): boolean {
+  return BigInt(next.startNs) - BigInt(segment.endNs) <= kMostGapNs;
 }
 
-function strandsOf(drawn: SessionPiece[], group: string, scale: Scale): Strand[] {
-  const ways = (of: (piece: SessionPiece) => boolean) =>
-    drawn.flatMap((piece, i) => (of(piece) ? [wayOf(piece, drawn[i + 1])] : []));
-  const stepOf = (piece: SessionPiece) => {
-    const entropy = entropyOf(piece, group);
+function strandsOf(drawn: TrajectorySegment[], group: string, scale: Scale): Strand[] {
+  const ways = (of: (segment: TrajectorySegment) => boolean) =>
+    drawn.flatMap((segment, i) => (of(segment) ? [wayOf(segment, drawn[i + 1])] : []));
+  const stepOf = (segment: TrajectorySegment) => {
+    const entropy = entropyOf(segment, group);
     return Number.isNaN(entropy) ? -1 : scale.stepOf(entropy);
   };
   const steps = Array.from({ length: kSteps }, (_, step) => step);
   const strands: Strand[] = [
-    { ways: ways((piece) => stepOf(piece) < 0), class: 'unknown' },
+    { ways: ways((segment) => stepOf(segment) < 0), class: 'unknown' },
     ...steps.map((step) => ({
-      ways: ways((piece) => stepOf(piece) === step && !isKept(piece)),
+      ways: ways((segment) => stepOf(segment) === step && !isKept(segment)),
       class: 'info-' + step,
     })),
-    // Kept pieces are drawn on top, with an edge.
+    // Kept segments are drawn on top, with an edge.
     { ways: ways(isKept), class: 'edge' },
     ...steps.map((step) => ({
-      ways: ways((piece) => stepOf(piece) === step && isKept(piece)),
+      ways: ways((segment) => stepOf(segment) === step && isKept(segment)),
       class: 'kept info-' + step,
     })),
   ];
@@ -194,18 +186,18 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
   const { way, group, scale } = props;
   const [pointed, setPointed] = useState(-1);
   const drawn = useMemo(
-    () => way.pieces.filter((piece) => piece.positionsM.length > 0),
+    () => way.segments.filter((segment) => segment.positionsM.length > 0),
     [way],
   );
   const strands = useMemo(() => strandsOf(drawn, group, scale), [drawn, group, scale]);
   const targets = useMemo(() => drawn.map(middle), [drawn]);
   const kept = useMemo(
     () =>
-      drawn.filter(isKept).map((piece): Mark => ({
-        at: middle(piece),
-        class: piece.tables.includes(group) ? 'kept own' : 'kept',
+      drawn.filter(isKept).map((segment): Mark => ({
+        at: middle(segment),
+        class: segment.tables.includes(group) ? 'kept own' : 'kept',
         radius: 4.5,
-        title: say(piece, group),
+        title: say(segment, group),
       })),
     [drawn, group],
   );
@@ -238,11 +230,11 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
       <p class="quiet">
         {now
           ? say(now, group) + '; click to open it'
-          : 'Point at the path to see the segment. Thick pieces with a mark are kept; a filled mark means kept for this group.'}
+          : 'Point at the path to see the segment. Thick segments with a mark are kept; a filled mark means kept for this group.'}
       </p>
-      {drawn.length < way.pieces.length && (
+      {drawn.length < way.segments.length && (
         <p class="quiet">
-          {way.pieces.length - drawn.length} segments are not drawn: they were
+          {way.segments.length - drawn.length} segments are not drawn: they were
           received before positions were stored.
         </p>
       )}
@@ -259,13 +251,13 @@ export function ColouredWay(props: {
 }) {
   const { way, group } = props;
   const { scale, counts, unknown } = useMemo(() => {
-    const entropies = way.pieces
-      .map((piece) => entropyOf(piece, group))
+    const entropies = way.segments
+      .map((segment) => entropyOf(segment, group))
       .filter((entropy) => !Number.isNaN(entropy));
     const scale = scaleOf(entropies);
     const counts = new Array<number>(kSteps).fill(0);
     for (const entropy of entropies) counts[scale.stepOf(entropy)]++;
-    return { scale, counts, unknown: way.pieces.length - entropies.length };
+    return { scale, counts, unknown: way.segments.length - entropies.length };
   }, [way, group]);
   return (
     <>
@@ -281,7 +273,7 @@ export function ColouredWay(props: {
       <Legend scale={scale} counts={counts} unknown={unknown} />
       {!way.whole && (
         <p class="warning">
-          Only the first {way.pieces.length} of {way.session.segments} segments are
+          Only the first {way.segments.length} of {way.session.segments} segments are
           drawn.
         </p>
       )}

@@ -1,18 +1,13 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
-import {
-  Failure,
-  idOf,
-  mayActivate,
-  pageOf,
-  post,
-  rigPath,
-  type ApiError,
-  type Calibration,
-  type Comparison,
-  type Session,
-  type Solver,
-} from '../api';
+import { Failure, idOf, pageOf, post, rigPath, type ApiError } from '../api';
+import type {
+  Calibration,
+  Caller,
+  CompareCalibrationsResponse,
+  ListCalibrationsResponse,
+  SolverReport,
+} from '../contract';
 import { component, number, quantity, shown, words } from '../format';
 import {
   Badge,
@@ -100,8 +95,9 @@ function Difference(props: { rig: string; of: Calibration[] }) {
   const newest = props.of[0].version;
   const a = query.get('a') ?? props.of[1]?.version ?? newest;
   const b = query.get('b') ?? newest;
-  const read = useRead<Comparison>(
-    `${rigPath(props.rig)}/compare?a=${encodeURIComponent(a)}&b=${encodeURIComponent(b)}`,
+  const other = new URLSearchParams({ b: `rigs/${props.rig}/calibrations/${b}` });
+  const read = useRead<CompareCalibrationsResponse>(
+    `${rigPath(props.rig)}/calibrations/${encodeURIComponent(a)}:compare?${other}`,
   );
   const choose = (which: 'a' | 'b', value: string, name: string) => (
     <Choice
@@ -277,7 +273,7 @@ function Origin(props: { of: Calibration }) {
   );
 }
 
-function Noise(props: { of: Solver }) {
+function Noise(props: { of: SolverReport }) {
   if (props.of.noiseFactors.length === 0) return null;
   return (
     <DataTable
@@ -297,7 +293,7 @@ function Noise(props: { of: Solver }) {
 }
 
 // The fit of each segment, where it was measured.
-function Fits(props: { of: Solver }) {
+function Fits(props: { of: SolverReport }) {
   if (props.of.segmentFits.length === 0) return null;
   return (
     <DataTable
@@ -356,18 +352,24 @@ function Version(props: { of: Calibration }) {
   );
 }
 
-export function Calibrations(props: { rig: string; session: Session | null; version: number }) {
+function mayActivate(caller: Caller | null, rig: string): boolean {
+  return (caller?.grants ?? []).some(
+    (grant) => grant.role === 'administer' && (grant.rig === '' || grant.rig === rig),
+  );
+}
+
+export function Calibrations(props: { rig: string; caller: Caller | null; version: number }) {
   const url = useAddress();
   const shown = /\/calibrations\/(\d+)$/.exec(url.pathname)?.[1];
   const [asked, setAsked] = useState<Calibration | null>(null);
   const [changed, setChanged] = useState(0);
   const base = rigPath(props.rig) + '/calibrations';
-  const read = useRead<{ calibrations: Calibration[]; nextPageToken: string }>(
+  const read = useRead<ListCalibrationsResponse>(
     base + '?page_size=100',
     props.version + changed,
   );
   const title = 'Calibrations of ' + props.rig;
-  const may = mayActivate(props.session, 'rigs/' + props.rig);
+  const may = mayActivate(props.caller, 'rigs/' + props.rig);
   return (
     <>
       <Title text={title}>{title}</Title>

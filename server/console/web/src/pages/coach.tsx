@@ -1,6 +1,11 @@
 // The motion with the largest predicted gain, for the person who holds the
 // device.
-import { pageOf, rigPath, type Advice, type Coaching } from '../api';
+import { pageOf, rigPath } from '../api';
+import type {
+  AdviseMotionResponse,
+  AdviseMotionResponse_Advice,
+  AdviseMotionResponse_WeakDirection,
+} from '../contract';
 import { component, number, quantity, words } from '../format';
 import { DataTable, Link, Problem, Title } from '../parts';
 import { useCalm, useRead } from '../state';
@@ -12,11 +17,11 @@ const kLeastMs = 2000;
 const kHardly = 0.02;
 
 // The reduction of sigma, in the geometric mean over all estimated directions.
-function shrink(advice: Advice): number {
+function shrink(advice: AdviseMotionResponse_Advice): number {
   return 1 - Math.exp(-advice.gainNats / Math.max(1, advice.sigmaChanges.length));
 }
 
-function Sharpens(props: { of: Advice }) {
+function Sharpens(props: { of: AdviseMotionResponse_Advice }) {
   const changes = props.of.sigmaChanges;
   if (changes.length === 0) return null;
   const ratio = (c: (typeof changes)[number]) => c.sigmaAfter / c.sigmaNow;
@@ -29,7 +34,7 @@ function Sharpens(props: { of: Advice }) {
   );
 }
 
-function Best(props: { of: Advice; seconds: number }) {
+function Best(props: { of: AdviseMotionResponse_Advice; seconds: number }) {
   const part = shrink(props.of);
   return (
     <div class="box advice" aria-live="polite">
@@ -52,7 +57,7 @@ function Best(props: { of: Advice; seconds: number }) {
   );
 }
 
-function Motions(props: { of: Coaching }) {
+function Motions(props: { of: AdviseMotionResponse }) {
   return (
     <>
       <h2>All motions</h2>
@@ -72,7 +77,7 @@ function Motions(props: { of: Coaching }) {
   );
 }
 
-function Weakest(props: { of: Coaching['weakest'] }) {
+function Weakest(props: { of: AdviseMotionResponse_WeakDirection[] }) {
   return (
     <>
       <h2>Least known</h2>
@@ -99,7 +104,10 @@ function Weakest(props: { of: Coaching['weakest'] }) {
 
 export function CoachPage(props: { rig: string; version: number }) {
   const version = useCalm(props.version, kLeastMs);
-  const read = useRead<Coaching>(`${rigPath(props.rig)}/coach?max_advice=${kAll}`, version);
+  const read = useRead<AdviseMotionResponse>(
+    `${rigPath(props.rig)}:adviseMotion?max_advice=${kAll}`,
+    version,
+  );
   const title = 'Coach of ' + props.rig;
   const coaching = read.value;
   return (

@@ -1,4 +1,5 @@
-import { idOf, pageOf, rigPath, type Event } from '../api';
+import { idOf, pageOf, rigPath } from '../api';
+import type { Event, ListEventsResponse } from '../contract';
 import { clock, words } from '../format';
 import { ListPage, type Column } from '../list';
 import { Link } from '../parts';
@@ -20,7 +21,8 @@ export function Events(props: { rig: string; version: number }) {
     <ListPage
       title={props.rig ? 'Events of ' + props.rig : 'Events'}
       path={props.rig ? rigPath(props.rig) + '/events' : 'events'}
-      items="events"
+      items={(response: ListEventsResponse) => response.events}
+      order={['number', 'desc']}
       version={props.version}
       columns={kColumns}
       next="Older events"

@@ -2,17 +2,12 @@
 // its cameras, the readings of its IMU, and the residuals.
 import { useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
-import {
-  rigPath,
-  type Calibration,
-  type Rig,
-  type Segment,
-  type SegmentData,
-  type SegmentResiduals,
-} from '../api';
+import { rigPath } from '../api';
+import type { Calibration, MotionSegment, Rig, Segment, SegmentResiduals } from '../contract';
 import { Choice, Empty, Loaded } from '../parts';
 import { kColours, Plot } from '../plot';
 import { Residuals } from '../residuals';
+import { drawable, type SegmentData } from '../segment_data';
 import { useRead } from '../state';
 import { Scene, type Mark, type Strand } from '../trajectory';
 
@@ -224,7 +219,7 @@ function Choices(props: {
         of={[
           [scored, `version ${scored}, used for its score`],
           ...(props.active && props.active !== scored
-            ? [['active', `version ${props.active}, active`] as [string, string]]
+            ? [[props.active, `version ${props.active}, active`] as [string, string]]
             : []),
         ]}
         onChoice={props.onVersion}
@@ -248,13 +243,15 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
   const [version, setVersion] = useState(props.segment.calibrationVersion);
   const rig = useRead<Rig>(rigPath(props.rig));
   const active = useRead<Calibration>(rigPath(props.rig) + '/calibrations/active');
-  const residuals = useRead<SegmentResiduals>(`${props.path}/residuals?version=${version}`);
+  const residuals = useRead<SegmentResiduals>(
+    `${props.path}/residuals?calibration_version=${version}`,
+  );
   const gyro = useMemo(() => triple(imu.tNs, imu.gyro), [props.data]);
   const accel = useMemo(() => triple(imu.tNs, imu.accel), [props.data]);
   const keyframe = nearest(keyframes.tNs, BigInt(imu.tNs[at]));
   const toKeyframe = (k: number) => setAt(nearest(imu.tNs, BigInt(keyframes.tNs[k])));
   const seconds = (gyro[0][at] as number).toFixed(3);
-  const cameras = rig.value?.factory.cameras;
+  const cameras = rig.value?.factory?.cameras;
   return (
     <>
       <label class="scrubber">
@@ -310,7 +307,8 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
 }
 
 export function Data(props: { rig: string; path: string; segment: Segment }) {
-  const read = useRead<SegmentData>(props.segment.hasData ? props.path + '/data' : null);
+  const read = useRead<MotionSegment>(props.segment.hasData ? props.path + '/data' : null);
+  const data = useMemo(() => read.value && drawable(read.value), [read.value]);
   if (!props.segment.hasData) {
     return (
       <Empty>
@@ -325,11 +323,11 @@ export function Data(props: { rig: string; path: string; segment: Segment }) {
   }
   return (
     <Loaded read={read}>
-      {(data) =>
-        data.imu.tNs.length === 0 ? (
-          <Empty>The segment has no IMU samples.</Empty>
-        ) : (
+      {() =>
+        data ? (
           <Motion rig={props.rig} path={props.path} data={data} segment={props.segment} />
+        ) : (
+          <Empty>The segment has no keyframes or no IMU samples.</Empty>
         )
       }
     </Loaded>

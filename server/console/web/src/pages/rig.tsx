@@ -1,15 +1,15 @@
 import { useMemo, useState } from 'preact/hooks';
 import uPlot from 'uplot';
-import {
-  idOf,
-  pageOf,
-  rigPath,
-  type Calibration,
-  type Estimate,
-  type Rig,
-  type Segment,
-  type Table,
-} from '../api';
+import { idOf, pageOf, rigPath } from '../api';
+import type {
+  Calibration,
+  ComponentEstimate,
+  ListSegmentsResponse,
+  ListTablesResponse,
+  Rig,
+  Segment,
+  Table,
+} from '../contract';
 import { component, matches, number, quantity } from '../format';
 import {
   Badge,
@@ -32,7 +32,7 @@ import { kColours, Plot } from '../plot';
 import { NewestSession } from './session';
 import { useRead } from '../state';
 
-interface Known extends Estimate {
+interface Known extends ComponentEstimate {
   tolerance: number;
   ratio: number; // sigma as a fraction of the factory tolerance
 }
@@ -204,8 +204,8 @@ function Histogram(props: { segments: Segment[]; group: string }) {
 
 function Entropies(props: { rig: string; groups: string[]; version: number }) {
   const [group, setGroup] = useState(props.groups[0]);
-  const read = useRead<{ segments: Segment[] }>(
-    rigPath(props.rig) + '/segments?page_size=200',
+  const read = useRead<ListSegmentsResponse>(
+    rigPath(props.rig) + '/segments?page_size=200&view=BASIC',
     props.version,
   );
   return (
@@ -247,7 +247,7 @@ export function RigPage(props: { rig: string; version: number }) {
   const rig = useRead<Rig>(base);
   const active = useRead<Calibration>(base + '/calibrations/active', props.version);
   const factory = useRead<Calibration>(base + '/calibrations/1');
-  const tables = useRead<{ tables: Table[] }>(base + '/tables', props.version);
+  const tables = useRead<ListTablesResponse>(base + '/tables', props.version);
   const both = useMemo(
     () =>
       active.value && factory.value ? known(active.value, factory.value) : null,

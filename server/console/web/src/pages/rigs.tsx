@@ -1,5 +1,6 @@
 import type { JSX } from 'preact';
-import { idOf, pageOf, type RigOverview } from '../api';
+import { idOf, pageOf } from '../api';
+import type { ListActivityResponse, RigActivity } from '../contract';
 import { ListPage, type Column } from '../list';
 import { Link, Meter, Problem, When } from '../parts';
 import { go, useAddress, withQuery } from '../state';
@@ -15,7 +16,7 @@ function Alarms(props: { of: string[] }) {
   );
 }
 
-const kColumns: Column<RigOverview>[] = [
+const kColumns: Column<RigActivity>[] = [
   {
     head: 'Rig',
     cell: (rig) => <Link to={pageOf(rig.name)}>{idOf(rig.name)}</Link>,
@@ -65,9 +66,9 @@ export function Rigs(props: { version: number }) {
   return (
     <ListPage
       title="Rigs"
-      path="rigs"
-      items="rigs"
-      query={['filter', 'order_by']}
+      path="activity"
+      items={(response: ListActivityResponse) => response.rigs}
+      query={['filter']}
       order={['name', 'asc']}
       version={props.version}
       columns={kColumns}

@@ -1,19 +1,31 @@
 // One run: its progress while it computes, and its result.
 import { useEffect, useState } from 'preact/hooks';
-import { rigPath, type Run } from '../api';
+import { rigPath, type ApiError } from '../api';
+import type { Recalibration } from '../contract';
 import { Convergence, type Step } from '../convergence';
 import { number, words } from '../format';
-import { Badge, Empty, Figures, Loaded, SegmentLinks, solverFigures, Title, When } from '../parts';
+import {
+  Badge,
+  Empty,
+  Figures,
+  Loaded,
+  Problem,
+  SegmentLinks,
+  solverFigures,
+  Title,
+  When,
+} from '../parts';
 import { useRead } from '../state';
+import { openStream } from '../stream';
 import { costs, Result } from './runs';
 
-function isRunning(run: Run): boolean {
+function isRunning(run: Recalibration): boolean {
   return run.state === 'PENDING' || run.state === 'RUNNING';
 }
 
 // Adds the step, in order; of several updates about an iteration, the first is
 // used.
-function withStep(steps: Step[], run: Run): Step[] {
+function withStep(steps: Step[], run: Recalibration): Step[] {
   if (run.iteration === 0 && run.parameters.length === 0) return steps;
   if (steps.some((s) => s.iteration === run.iteration)) return steps;
   const step = {
@@ -25,27 +37,39 @@ function withStep(steps: Step[], run: Run): Step[] {
   return [...steps, step].sort((a, b) => a.iteration - b.iteration);
 }
 
-// All iterations from the first; they are kept when the run has ended.
-function useSteps(name: string, running: boolean): { steps: Step[]; now: Run | null } {
-  const [steps, setSteps] = useState<Step[]>([]);
-  const [now, setNow] = useState<Run | null>(null);
-  useEffect(() => {
-    if (!running) return;
-    const source = new EventSource('/api/v1/stream?run=' + encodeURIComponent(name));
-    source.addEventListener('run', (event) => {
-      const update = JSON.parse((event as MessageEvent<string>).data) as Run;
-      // An update without a name means that the daemon has skipped some.
-      if (!update.name) return;
-      setNow(update);
-      setSteps((before) => withStep(before, update));
-      if (!isRunning(update)) source.close();
-    });
-    return () => source.close();
-  }, [name, running]);
-  return { steps, now };
+interface Progress {
+  steps: Step[]; // all iterations from the first
+  now: Recalibration | null;
+  error: ApiError | null; // the reason why there are no more updates
 }
 
-function Report(props: { run: Run }) {
+// Watches a run until it has ended; the steps are kept after that.
+function useProgress(path: string, running: boolean): Progress {
+  const [steps, setSteps] = useState<Step[]>([]);
+  const [now, setNow] = useState<Recalibration | null>(null);
+  const [error, setError] = useState<ApiError | null>(null);
+  useEffect(() => {
+    if (!running) return;
+    // The daemon ends the stream when the run has ended; the browser would open
+    // it again.
+    const close = openStream<Recalibration>(path + ':watch', {
+      onMessage: (update) => {
+        setError(null);
+        setNow(update);
+        setSteps((before) => withStep(before, update));
+        if (!isRunning(update)) close();
+      },
+      onError: (failure) => {
+        setError(failure);
+        if (failure.code !== 'UNAVAILABLE') close();
+      },
+    });
+    return close;
+  }, [path, running]);
+  return { steps, now, error };
+}
+
+function Report(props: { run: Recalibration }) {
   const solver = props.run.solver;
   if (!solver) return null;
   const figures = solverFigures(solver);
@@ -68,7 +92,7 @@ function Report(props: { run: Run }) {
   );
 }
 
-function Going(props: { run: Run }) {
+function Going(props: { run: Recalibration }) {
   const { iteration, maxIterations, cost, state } = props.run;
   return (
     <p role="status">
@@ -82,12 +106,12 @@ function Going(props: { run: Run }) {
 }
 
 export function RunPage(props: { rig: string; run: string; version: number }) {
-  const name = `rigs/${props.rig}/recalibrations/${props.run}`;
-  const read = useRead<Run>(
-    `${rigPath(props.rig)}/recalibrations/${encodeURIComponent(props.run)}`,
-    props.version,
+  const path = `${rigPath(props.rig)}/recalibrations/${encodeURIComponent(props.run)}`;
+  const read = useRead<Recalibration>(path, props.version);
+  const { steps, now, error } = useProgress(
+    path,
+    read.value !== null && isRunning(read.value),
   );
-  const { steps, now } = useSteps(name, read.value !== null && isRunning(read.value));
   const title = `Run ${props.run} of ${props.rig}`;
   return (
     <>
@@ -108,7 +132,7 @@ export function RunPage(props: { rig: string; run: string; version: number }) {
                 ]}
               />
               {shown.message && <p class="warning">{shown.message}</p>}
-              {isRunning(shown) && <Going run={shown} />}
+              {isRunning(shown) && (error ? <Problem error={error} /> : <Going run={shown} />)}
               <Report run={run} />
               {steps.length > 0 && <Convergence steps={steps} />}
               {isRunning(shown) && steps.length === 0 && (

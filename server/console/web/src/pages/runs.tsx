@@ -1,18 +1,19 @@
-import { idOf, pageOf, rigPath, type Run, type Solver } from '../api';
+import { idOf, pageOf, rigPath } from '../api';
+import type { ListRecalibrationsResponse, Recalibration, SolverReport } from '../contract';
 import { number, words } from '../format';
 import { ListPage, type Column } from '../list';
 import { Badge, Link, When } from '../parts';
 
-export function costs(solver: Solver): string {
+export function costs(solver: SolverReport): string {
   return `${number(solver.initialCost)} to ${number(solver.finalCost)}`;
 }
 
-export function Result(props: { of: Run }) {
+export function Result(props: { of: Recalibration }) {
   const { calibration } = props.of;
   return <Link to={pageOf(calibration)}>version {idOf(calibration)}</Link>;
 }
 
-const kColumns: Column<Run>[] = [
+const kColumns: Column<Recalibration>[] = [
   { head: 'Run', cell: (run) => <Link to={pageOf(run.name)}>{idOf(run.name)}</Link> },
   { head: 'State', cell: (run) => <Badge state={run.state} /> },
   { head: 'Trigger', cell: (run) => words(run.trigger) },
@@ -28,7 +29,7 @@ export function Runs(props: { rig: string; version: number }) {
     <ListPage
       title={'Runs of ' + props.rig}
       path={rigPath(props.rig) + '/recalibrations'}
-      items="recalibrations"
+      items={(response: ListRecalibrationsResponse) => response.recalibrations}
       version={props.version}
       columns={kColumns}
       next="Older runs"

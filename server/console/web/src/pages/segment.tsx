@@ -1,13 +1,15 @@
-import {
-  idOf,
-  pageOf,
-  rigPath,
-  type Absence,
-  type ComponentInformation,
-  type Direction,
-  type Segment,
-  type Table,
-} from '../api';
+import { idOf, pageOf, rigPath } from '../api';
+import type {
+  GroupScore,
+  ListTablesResponse,
+  Segment,
+  SegmentInformation,
+  SegmentInformation_Component,
+  Table,
+  Table_Entry,
+  TableExclusion,
+  UnobservedDirection,
+} from '../contract';
 import { bytes, clock, component, number } from '../format';
 import {
   Badge,
@@ -28,34 +30,29 @@ import { sessionOf } from './session';
 // The name of the table that is for all groups together.
 const kJoint = 'joint';
 
-type Score = Segment['scores'][number];
-type Entry = Table['entries'][number];
-
 // Describes the last entry of the table, or states that there is none.
 function worstOf(table: Table): string {
-  const last = table.entries[table.entries.length - 1] as Entry | undefined;
+  const last = table.entries[table.entries.length - 1] as Table_Entry | undefined;
   if (!last) return 'the table is empty now';
   return `its worst entry now has ${number(last.entropyNats, 4)}`;
 }
 
-function Rival(props: { of: Absence; none: string }) {
+function Rival(props: { of: TableExclusion; none: string }) {
   return props.of.rival ? <SegmentLink name={props.of.rival} /> : <>{props.none}</>;
 }
 
 // Explains an exclusion. Entropies are shown only if the table ranks by them.
-function Gone(props: { of: Absence; table: Table; entropy: number | undefined }) {
+function Exclusion(props: { of: TableExclusion; table: Table; entropy: number | undefined }) {
   const { of, table, entropy } = props;
   const values =
     entropy !== undefined && of.rivalEntropyNats !== undefined
       ? ` (entropy ${number(of.rivalEntropyNats, 4)}, this one ${number(entropy, 4)}; lower is more informative)`
       : '';
-  const last = table.entries[table.entries.length - 1] as Entry | undefined;
+  const last = table.entries[table.entries.length - 1] as Table_Entry | undefined;
   const changed = last?.segment !== of.rival;
   const now = entropy === undefined || !changed ? '' : '; ' + worstOf(table);
   switch (of.cause) {
-    case 'SAYS_TOO_LITTLE':
-      return <>not kept: insufficient gain</>;
-    case 'OTHERS_SAY_MORE':
+    case 'OUTRANKED':
       return (
         <>
           not kept: the table was full, and its worst entry,{' '}
@@ -63,7 +60,7 @@ function Gone(props: { of: Absence; table: Table; entropy: number | undefined })
           {now}
         </>
       );
-    case 'PUSHED_OUT':
+    case 'REPLACED':
       return (
         <>
           kept until <time dateTime={of.time}>{clock(of.time)}</time>, when{' '}
@@ -94,17 +91,8 @@ function Gone(props: { of: Absence; table: Table; entropy: number | undefined })
       );
     case 'UNUSABLE':
       return <>kept until it was found unusable</>;
-    case 'DOES_NOT_FIT':
-      return (
-        <>
-          excluded: it does not fit; its residuals are {number(of.fit ?? 0)} times what is expected,
-          and up to {number(of.fitLimit ?? 0)} times is usual for this rig
-        </>
-      );
-    case 'MANY_OUTLIERS':
-      return <>excluded: more than a fifth of its observations are outliers</>;
     default:
-      return <>not kept</>;
+      return <>not kept; {of.reason}</>;
   }
 }
 
@@ -113,7 +101,7 @@ function Gone(props: { of: Absence; table: Table; entropy: number | undefined })
 function Why(props: {
   segment: Segment;
   table: Table | undefined;
-  absence: Absence | undefined;
+  exclusion: TableExclusion | undefined;
   entropy?: number; // if the table ranks by it
 }) {
   const { table, entropy } = props;
@@ -127,8 +115,8 @@ function Why(props: {
       </>
     );
   }
-  if (props.absence) return <Gone of={props.absence} table={table} entropy={entropy} />;
-  const last = table.entries[table.entries.length - 1] as Entry | undefined;
+  if (props.exclusion) return <Exclusion of={props.exclusion} table={table} entropy={entropy} />;
+  const last = table.entries[table.entries.length - 1] as Table_Entry | undefined;
   const full = table.entries.length >= table.capacity;
   if (full && last && entropy !== undefined && entropy >= last.entropyNats) {
     return (
@@ -141,13 +129,13 @@ function Why(props: {
   return <>not kept; the reason was not recorded when it was scored</>;
 }
 
-function directions(of: Direction[]): string {
+function directions(of: UnobservedDirection[]): string {
   return of
     .map((d) => d.parts.slice(0, 2).map((p) => component(p.component)).join(' with '))
     .join('; ');
 }
 
-function Information(props: { of: Segment; tables: Table[]; absences: Absence[] }) {
+function Information(props: { of: Segment; tables: Table[] }) {
   if (props.of.scores.length === 0) {
     return (
       <Empty>
@@ -158,16 +146,16 @@ function Information(props: { of: Segment; tables: Table[]; absences: Absence[] 
     );
   }
   const tables = new Map(props.tables.map((t) => [idOf(t.name), t]));
-  const absences = new Map(props.absences.map((a) => [a.group, a]));
+  const exclusions = new Map(props.of.exclusions.map((e) => [e.group, e]));
   const reason = (group: string, entropy?: number) => (
     <Why
       segment={props.of}
       table={tables.get(group)}
-      absence={absences.get(group)}
+      exclusion={exclusions.get(group)}
       entropy={entropy}
     />
   );
-  const row = (score: Score) => [
+  const row = (score: GroupScore) => [
     score.group,
     number(score.gainNats, 4),
     number(score.entropyNats, 4),
@@ -188,10 +176,10 @@ function Information(props: { of: Segment; tables: Table[]; absences: Absence[] 
 }
 
 // Information by parameter, the best determined first.
-function Parameters(props: { of: ComponentInformation[] }) {
+function Parameters(props: { of: SegmentInformation_Component[] }) {
   if (props.of.length === 0) return null;
-  const ratio = (c: ComponentInformation) => c.sigma / c.priorSigma;
-  const unit = (c: ComponentInformation) => (c.unit === '-' ? '' : ` [${c.unit}]`);
+  const ratio = (c: SegmentInformation_Component) => c.sigma / c.priorSigma;
+  const unit = (c: SegmentInformation_Component) => (c.unit === '-' ? '' : ` [${c.unit}]`);
   return (
     <details>
       <summary>Information of this segment alone about each parameter</summary>
@@ -214,12 +202,8 @@ function Parameters(props: { of: ComponentInformation[] }) {
 export function SegmentPage(props: { rig: string; segment: string; version: number }) {
   const path = `${rigPath(props.rig)}/segments/${encodeURIComponent(props.segment)}`;
   const read = useRead<Segment>(path, props.version);
-  const tables = useRead<{ tables: Table[] }>(rigPath(props.rig) + '/tables', props.version);
-  const absences = useRead<{ absences: Absence[] }>(path + '/absences', props.version);
-  const information = useRead<{ components: ComponentInformation[] }>(
-    path + '/information',
-    props.version,
-  );
+  const tables = useRead<ListTablesResponse>(rigPath(props.rig) + '/tables', props.version);
+  const information = useRead<SegmentInformation>(path + '/information', props.version);
   const title = 'Segment ' + decodeURIComponent(props.segment);
   return (
     <>
@@ -244,11 +228,7 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
             />
             {segment.problem && <p class="warning">{segment.problem}</p>}
             <h2>Information</h2>
-            <Information
-              of={segment}
-              tables={tables.value?.tables ?? []}
-              absences={absences.value?.absences ?? []}
-            />
+            <Information of={segment} tables={tables.value?.tables ?? []} />
             <Parameters of={information.value?.components ?? []} />
             {segment.residuals && (
               <Figures

@@ -1,7 +1,8 @@
 // The segments of a rig, filtered and sorted.
 import type { JSX } from 'preact';
 import { useEffect, useState } from 'preact/hooks';
-import { rigPath, type ApiError, type Rig, type Segment } from '../api';
+import { rigPath, type ApiError } from '../api';
+import type { GroupScore, ListSegmentsResponse, Rig, Segment } from '../contract';
 import { bytes, number } from '../format';
 import { ListPage, orderOf, type Column } from '../list';
 import { Badge, Choice, Link, SegmentLink, When } from '../parts';
@@ -14,7 +15,7 @@ function kept(segment: Segment): string {
 
 // The columns, with the score for one group.
 function columns(group: string): Column<Segment>[] {
-  const of = (segment: Segment, show: (score: Segment['scores'][number]) => string) => {
+  const of = (segment: Segment, show: (score: GroupScore) => string) => {
     const score = segment.scores.find((s) => s.group === group);
     return score ? show(score) : '';
   };
@@ -196,8 +197,9 @@ export function Segments(props: { rig: string; version: number }) {
     <ListPage
       title={'Segments of ' + props.rig}
       path={rigPath(props.rig) + '/segments'}
-      items="segments"
-      query={['filter', 'order_by']}
+      items={(response: ListSegmentsResponse) => response.segments}
+      query={['filter']}
+      fixed={{ view: 'BASIC' }}
       order={kNewestFirst}
       version={props.version}
       columns={columns(group)}

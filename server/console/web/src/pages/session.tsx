@@ -1,6 +1,7 @@
 // The list of sessions, and the page of one session with the device's path.
 import { useState } from 'preact/hooks';
-import { idOf, pageOf, rigPath, type Rig, type Segment, type SessionOverview } from '../api';
+import { idOf, pageOf, rigPath } from '../api';
+import type { ListSegmentsResponse, ListSessionsResponse, Rig, Session } from '../contract';
 import { number } from '../format';
 import { ListPage, type Column } from '../list';
 import { DataTable, Figures, Link, Loaded, SegmentLink, Title, When } from '../parts';
@@ -8,23 +9,23 @@ import { useRead } from '../state';
 import { ColouredWay, entropyOf, isKept, useWay, type Way } from '../way';
 
 function Kept(props: { way: Way; group: string }) {
-  const { pieces } = props.way;
-  const kept = pieces
+  const { segments } = props.way;
+  const kept = segments
     .filter(isKept)
     .sort((a, b) => entropyOf(a, props.group) - entropyOf(b, props.group));
   if (kept.length === 0) {
     return <p>No segment of this session is in a table now.</p>;
   }
-  const start = BigInt(pieces[0].startNs);
+  const start = BigInt(segments[0].startNs);
   return (
     <DataTable
       caption="Segments of this session that are kept, most informative first"
       head={['Segment', `Entropy of ${props.group} [nats]`, 'Kept for', 'Starts at [s]']}
-      rows={kept.map((piece) => [
-        <SegmentLink name={piece.segment} />,
-        number(entropyOf(piece, props.group), 4),
-        piece.tables.join(', '),
-        number(Number(BigInt(piece.startNs) - start) / 1e9, 4),
+      rows={kept.map((segment) => [
+        <SegmentLink name={segment.segment} />,
+        number(entropyOf(segment, props.group), 4),
+        segment.tables.join(', '),
+        number(Number(BigInt(segment.startNs) - start) / 1e9, 4),
       ])}
     />
   );
@@ -65,9 +66,9 @@ export function SessionPage(props: { rig: string; session: string; version: numb
             <Figures
               of={[
                 ['Segments', way.session.segments],
-                ['Kept', way.pieces.filter(isKept).length],
-                ['Started', <When time={way.session.firstReceived} />],
-                ['Newest', <When time={way.session.lastReceived} />],
+                ['Kept', way.segments.filter(isKept).length],
+                ['Started', <When time={way.session.firstReceiveTime} />],
+                ['Newest', <When time={way.session.lastReceiveTime} />],
               ]}
             />
             <WayAndKept way={way} groups={groups} />
@@ -88,7 +89,7 @@ function Newest(props: { rig: string; session: string; version: number }) {
         <>
           <p>
             <Link to={pageOf(way.session.name)}>{way.session.session}</Link>:{' '}
-            {way.session.segments} segments, of which {way.pieces.filter(isKept).length} are
+            {way.session.segments} segments, of which {way.segments.filter(isKept).length} are
             kept.
           </p>
           <ColouredWay
@@ -108,8 +109,8 @@ export function sessionOf(segment: string): string {
 }
 
 export function NewestSession(props: { rig: string; version: number }) {
-  const read = useRead<{ segments: Segment[] }>(
-    rigPath(props.rig) + '/segments?page_size=1',
+  const read = useRead<ListSegmentsResponse>(
+    rigPath(props.rig) + '/segments?page_size=1&view=BASIC',
     props.version,
   );
   const newest = read.value?.segments[0]?.name;
@@ -130,11 +131,11 @@ export function NewestSession(props: { rig: string; version: number }) {
   );
 }
 
-const kColumns: Column<SessionOverview>[] = [
+const kColumns: Column<Session>[] = [
   { head: 'Session', cell: (s) => <Link to={pageOf(s.name)}>{s.session}</Link> },
   { head: 'Segments', cell: (s) => s.segments },
-  { head: 'Started', cell: (s) => <When time={s.firstReceived} /> },
-  { head: 'Newest segment', cell: (s) => <When time={s.lastReceived} /> },
+  { head: 'Started', cell: (s) => <When time={s.firstReceiveTime} /> },
+  { head: 'Newest segment', cell: (s) => <When time={s.lastReceiveTime} /> },
 ];
 
 export function Sessions(props: { rig: string; version: number }) {
@@ -142,7 +143,7 @@ export function Sessions(props: { rig: string; version: number }) {
     <ListPage
       title={'Sessions of ' + props.rig}
       path={rigPath(props.rig) + '/sessions'}
-      items="sessions"
+      items={(response: ListSessionsResponse) => response.sessions}
       version={props.version}
       columns={kColumns}
       next="Next sessions"

@@ -1,0 +1,102 @@
+// sessions: lists the sessions of a rig, and shows the path of one.
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/text/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/session.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using Service = v1::SessionService::StubInterface;
+
+int List(Context* context, const std::string& rig) {
+  const auto stub = v1::SessionService::NewStub(context->Channel());
+  v1::ListSessionsRequest request;
+  request.set_parent(RigName(rig));
+  v1::ListSessionsResponse sessions;
+  const auto status = CallForAllPages<Service>(
+      stub.get(), &Service::ListSessions, request, &sessions);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(sessions);
+    return kDone;
+  }
+  Table table({{"session"}, {"segments", true}, {"first"}, {"last"}});
+  for (const v1::Session& session : sessions.sessions()) {
+    table.Add({LastPart(session.name()),
+               fmt::format("{}", session.segments()),
+               TimeText(session.first_receive_time()),
+               TimeText(session.last_receive_time())});
+  }
+  context->Print(table);
+  return kDone;
+}
+
+// The path, as a table with a row for each point.
+int Show(Context* context, const std::string& rig, const std::string& session) {
+  const auto stub = v1::SessionService::NewStub(context->Channel());
+  v1::GetTrajectoryRequest request;
+  request.set_name(RigName(rig) + "/sessions/" + LastPart(session));
+  v1::SessionTrajectory trajectory;
+  const auto status = CallForAllPages<Service>(
+      stub.get(), &Service::GetTrajectory, request, &trajectory);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(trajectory);
+    return kDone;
+  }
+  constexpr double kNanoseconds = 1e-9;
+  Table table({{"segment"},
+               {"time [s]", true},
+               {"x [m]", true},
+               {"y [m]", true},
+               {"z [m]", true}});
+  for (const v1::TrajectorySegment& segment : trajectory.segments()) {
+    for (int k = 0; k < segment.seconds_size(); ++k) {
+      const auto metres = [&](int axis) {
+        return fmt::format("{:.3f}", segment.positions_m(3 * k + axis));
+      };
+      table.Add({LastPart(segment.segment()),
+                 fmt::format("{:.3f}",
+                             kNanoseconds *
+                                     static_cast<double>(segment.start_ns()) +
+                                 segment.seconds(k)),
+                 metres(0),
+                 metres(1),
+                 metres(2)});
+    }
+  }
+  context->Print(table);
+  return kDone;
+}
+
+}  // namespace
+
+void AddSessionCommands(CLI::App* app, Context* context) {
+  CLI::App* sessions = app->add_subcommand("sessions", "Show sessions");
+  sessions->require_subcommand(1);
+  const auto rig = std::make_shared<std::string>();
+  const auto session = std::make_shared<std::string>();
+  CLI::App* list = sessions->add_subcommand(
+      "list", "List the sessions of a rig of which segments are stored");
+  list->add_option("RIG", *rig)->required();
+  list->callback([context, rig] {
+    context->command = [context, rig] { return List(context, *rig); };
+  });
+  CLI::App* show = sessions->add_subcommand(
+      "show", "Show the path of a session, in its frame and by its clock");
+  show->add_option("RIG", *rig)->required();
+  show->add_option("SESSION", *session, "As in the list")->required();
+  show->callback([context, rig, session] {
+    context->command = [context, rig, session] {
+      return Show(context, *rig, *session);
+    };
+  });
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,157 @@
+#include <optional>
+
+#include "proto/resource_names.h"
+#include "selfcal/v1/activity_service.pb.h"
+#include "selfcal/v1/rig.pb.h"
+#include "server/api/change_feed.h"
+#include "server/api/methods.h"
+#include "server/api/paging.h"
+#include "server/api/traffic.h"
+#include "server/domain/clock.h"
+#include "server/encode/encode.h"
+#include "server/encode/encode_activity.h"
+#include "server/encode/encode_parts.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+v1::SegmentTraffic Encode(const TrafficCounts& counts) {
+  v1::SegmentTraffic message;
+  message.set_streams(counts.streams);
+  message.set_stored(counts.stored);
+  message.set_rejected(counts.rejected);
+  message.set_stored_per_minute(counts.stored_per_minute);
+  return message;
+}
+
+bool IsUnfinished(RunState state) {
+  return state == RunState::kPending || state == RunState::kRunning;
+}
+
+// The run as it is now; nullopt if it has ended in the meantime.
+std::optional<RunUpdate> CurrentRun(const ApiContext& context,
+                                    const std::string& rig,
+                                    std::int64_t run) {
+  std::optional<RunUpdate> now;
+  // A watch starts with the current state.
+  const auto watch =
+      context.pipeline->WatchRun(rig, run, [&](const RunUpdate& update) {
+        if (!now) now = update;
+      });
+  return now && IsUnfinished(now->run.state) ? now : std::nullopt;
+}
+
+v1::RigActivity EncodeRig(const ApiContext& context, const RigSummary& rig) {
+  v1::RigActivity message = server::Encode(rig);
+  *message.mutable_traffic() = Encode(context.traffic->Of(rig.rig));
+  if (rig.newest_run != 0 && IsUnfinished(rig.run_state)) {
+    if (const auto update = CurrentRun(context, rig.rig, rig.newest_run)) {
+      *message.mutable_run() =
+          server::Encode(update->run, update->progress, nullptr);
+    }
+  }
+  return message;
+}
+
+absl::StatusOr<RigQuery> QueryOf(const v1::ListActivityRequest& request) {
+  RigQuery query;
+  query.text = request.filter();
+  query.order = RigQuery::Order::kLastSeen;
+  query.descending = true;
+  if (request.order_by().empty()) return query;
+  const std::string field = request.order_by().substr(
+      0, request.order_by().find(' '));
+  const std::string direction = request.order_by().substr(field.size());
+  const bool known_field = field == "name" || field == "last_seen";
+  const bool known_direction =
+      direction.empty() || direction == " asc" || direction == " desc";
+  if (!known_field || !known_direction) {
+    return InvalidFields(
+        {{"order_by",
+          "must be name or last_seen, followed by asc, desc or nothing"}});
+  }
+  query.order = field == "name" ? RigQuery::Order::kName
+                                : RigQuery::Order::kLastSeen;
+  query.descending = direction == " desc";
+  return query;
+}
+
+absl::StatusOr<v1::ListActivityResponse> ListActivity(
+    const ApiContext& context,
+    const Call&,
+    const v1::ListActivityRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const RigQuery query, QueryOf(request));
+  SELFCAL_ASSIGN_OR_RETURN(
+      v1::ListActivityResponse response,
+      FillPage<v1::ListActivityResponse>(
+          request,
+          "",
+          [&](const Page& page) {
+            return context.store->ListRigSummaries(query, page);
+          },
+          [&](const RigSummary& rig, v1::ListActivityResponse* to) {
+            *to->add_rigs() = EncodeRig(context, rig);
+            return absl::OkStatus();
+          }));
+  SetTime(NowNs(), response.mutable_time());
+  SetTime(context.traffic->start_time_ns(), response.mutable_start_time());
+  *response.mutable_traffic() = Encode(context.traffic->OfAll());
+  return response;
+}
+
+absl::StatusOr<std::shared_ptr<void>> WatchChanges(
+    const ApiContext& context,
+    const v1::WatchChangesRequest& request,
+    const Watch<v1::Change>& watch) {
+  std::string rig;
+  if (!request.parent().empty()) {
+    const auto parsed = ParseRigName(request.parent());
+    if (!parsed) return BadName("parent", "rigs/{rig}");
+    const absl::Status found = context.store->GetRig(*parsed).status();
+    if (!found.ok()) {
+      return About(found, {"selfcal.v1.Rig", request.parent(), "parent"});
+    }
+    rig = *parsed;
+  }
+  const auto put = [watch](v1::Change::What what, const std::string& of) {
+    const std::string name = of.empty() ? "" : RigName(of);
+    watch.Put(std::to_string(what) + name,
+              [=](v1::Change* to) -> absl::StatusOr<bool> {
+                to->set_what(what);
+                to->set_rig(name);
+                return true;
+              });
+  };
+  watch.SetSummary([](v1::Change* to) -> absl::StatusOr<bool> {
+    to->set_what(v1::Change::EVERYTHING);
+    return true;
+  });
+  // Sent at once, so that the reader knows that its watch stands.
+  put(v1::Change::EVERYTHING, "");
+  return context.changes->Subscribe(rig, put);
+}
+
+absl::StatusOr<v1::Caller> GetCaller(const ApiContext& context,
+                                     const Call& call,
+                                     const v1::GetCallerRequest&) {
+  v1::Caller response;
+  response.set_name(call.caller.name);
+  for (const Grant& grant : call.caller.grants) {
+    v1::Caller::Grant* added = response.add_grants();
+    added->set_role(std::string(RoleName(grant.role)));
+    if (!grant.rig.empty()) added->set_rig(RigName(grant.rig));
+  }
+  response.set_program_version(context.program_version);
+  return response;
+}
+
+}  // namespace
+
+void AddActivityMethods(Methods* methods) {
+  methods->Add(ListActivity);
+  methods->Add(WatchChanges);
+  methods->Add(GetCaller);
+}
+
+}  // namespace selfcal::server

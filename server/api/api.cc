@@ -1,0 +1,31 @@
+#include "server/api/api.h"
+
+#include <utility>
+
+#include "server/api/methods.h"
+
+namespace selfcal::server {
+
+Api::Api(Domain* domain,
+         Pipeline* pipeline,
+         ChangeFeed* changes,
+         ApiOptions options) {
+  Methods methods({domain,
+                   domain->store(),
+                   pipeline,
+                   changes,
+                   &traffic_,
+                   &stopping_,
+                   std::move(options.restored),
+                   std::move(options.program_version)});
+  AddRigMethods(&methods);
+  AddSegmentMethods(&methods);
+  AddSessionMethods(&methods);
+  AddCalibrationMethods(&methods);
+  AddRecalibrationMethods(&methods);
+  AddStoreMethods(&methods);
+  AddActivityMethods(&methods);
+  methods_ = methods.Take();
+}
+
+}  // namespace selfcal::server

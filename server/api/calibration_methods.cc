@@ -1,0 +1,172 @@
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.pb.h"
+#include "server/api/methods.h"
+#include "server/api/paging.h"
+#include "server/api/read_version.h"
+#include "server/encode/compare.h"
+#include "server/encode/encode.h"
+#include "server/encode/encode_coaching.h"
+#include "server/encode/encode_verification.h"
+#include "server/encode/reason.h"
+#include "server/encode/versions.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr char kType[] = "selfcal.v1.Calibration";
+constexpr char kRigType[] = "selfcal.v1.Rig";
+constexpr int kDefaultAdvice = 3;
+
+absl::StatusOr<v1::Calibration> EncodeNamed(
+    const ApiContext& context,
+    const StoredCalibration& calibration,
+    const std::string& name) {
+  auto encoded = Encode(context.store, calibration);
+  if (!encoded.ok()) return About(encoded.status(), {kType, name, {}});
+  return encoded;
+}
+
+absl::StatusOr<v1::Calibration> GetCalibration(
+    const ApiContext& context,
+    const Call&,
+    const v1::GetCalibrationRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const StoredCalibration calibration,
+      ReadVersion(context.store, "name", request.name()));
+  return EncodeNamed(context, calibration, request.name());
+}
+
+absl::StatusOr<v1::Calibration> ActivateCalibration(
+    const ApiContext& context,
+    const Call& call,
+    const v1::ActivateCalibrationRequest& request) {
+  const auto parts = ParseChildName(request.name(), "calibrations");
+  const auto version = parts ? ParseCount(parts->id) : std::nullopt;
+  if (!version) return BadName("name", "rigs/{rig}/calibrations/{version}");
+  if (!IsReason(request.reason())) {
+    return InvalidFields({{"reason", std::string(kReasonRule)}});
+  }
+  const auto active = context.pipeline->ActivateCalibration(
+      parts->rig, *version, call.caller.name, request.reason());
+  if (!active.ok()) {
+    return About(active.status(), {kType, request.name(), "name"});
+  }
+  return EncodeNamed(context, *active, request.name());
+}
+
+absl::StatusOr<v1::CompareCalibrationsResponse> CompareCalibrations(
+    const ApiContext& context,
+    const Call&,
+    const v1::CompareCalibrationsRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration a,
+                           ReadVersion(context.store, "a", request.a()));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration b,
+                           ReadVersion(context.store, "b", request.b()));
+  if (a.rig != b.rig) {
+    return InvalidFields({{"b", "must be a version of the rig of a"}});
+  }
+  auto compared = Compare(context.store, a, b);
+  if (!compared.ok()) {
+    return About(compared.status(), {kType, request.a(), "a"});
+  }
+  return compared;
+}
+
+absl::StatusOr<v1::AdviseMotionResponse> AdviseMotion(
+    const ApiContext& context,
+    const Call&,
+    const v1::AdviseMotionRequest& request) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  if (request.max_advice() < 0) {
+    return InvalidFields({{"max_advice", "must be 0 or more"}});
+  }
+  const auto coaching = context.pipeline->AdviseMotion(*rig);
+  if (!coaching.ok()) {
+    return About(coaching.status(), {kRigType, request.parent(), "parent"});
+  }
+  return Encode(
+      *coaching,
+      request.max_advice() > 0 ? request.max_advice() : kDefaultAdvice);
+}
+
+absl::Status VerifyRig(const ApiContext& context,
+                       const Call& call,
+                       const v1::VerifyRigRequest& request,
+                       const Writer<v1::VerifyRigResponse>& write) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  const auto verification = context.pipeline->VerifyRig(
+      *rig,
+      [&](const VerificationStep& step) { write(Encode(*rig, step)); },
+      [&] { return call.cancelled() || context.stopping->load(); });
+  if (!verification.ok()) {
+    return About(verification.status(),
+                 {kRigType, request.parent(), "parent"});
+  }
+  write(Encode(*verification));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
+    const ApiContext& context,
+    const Call&,
+    const v1::ListCalibrationsRequest& request) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  return FillPage<v1::ListCalibrationsResponse>(
+      request,
+      request.parent(),
+      [&](const Page& page) {
+        return context.store->ListCalibrations(*rig, page);
+      },
+      [&](const StoredCalibration& calibration,
+          v1::ListCalibrationsResponse* to) -> absl::Status {
+        SELFCAL_ASSIGN_OR_RETURN(
+            *to->add_calibrations(),
+            EncodeNamed(context, calibration, request.parent()));
+        return absl::OkStatus();
+      });
+}
+
+absl::StatusOr<std::shared_ptr<void>> WatchCalibration(
+    const ApiContext& context,
+    const v1::WatchCalibrationRequest& request,
+    const Watch<v1::Calibration>& watch) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  // A version that was rolled back and became active again while the reader was
+  // slow is the one that the reader has.
+  auto sent = std::make_shared<std::int64_t>(0);
+  auto subscription = context.pipeline->WatchCalibration(
+      *rig, [=, &context](const StoredCalibration& active) {
+        watch.Put("", [=, &context](v1::Calibration* to) -> absl::StatusOr<bool> {
+          if (active.version == std::exchange(*sent, active.version)) {
+            return false;
+          }
+          SELFCAL_ASSIGN_OR_RETURN(
+              *to, EncodeNamed(context, active, request.parent()));
+          return true;
+        });
+      });
+  if (!subscription.ok()) {
+    return About(subscription.status(),
+                 {kRigType, request.parent(), "parent"});
+  }
+  return std::shared_ptr<void>(*std::move(subscription));
+}
+
+}  // namespace
+
+void AddCalibrationMethods(Methods* methods) {
+  methods->Add(GetCalibration);
+  methods->Add(ListCalibrations);
+  methods->Add(WatchCalibration);
+  methods->Add(ActivateCalibration);
+  methods->Add(CompareCalibrations);
+  methods->Add(AdviseMotion);
+  methods->Add(VerifyRig);
+}
+
+}  // namespace selfcal::server

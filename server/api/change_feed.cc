@@ -1,0 +1,108 @@
+#include "server/api/change_feed.h"
+
+#include <chrono>
+#include <utility>
+
+namespace selfcal::server {
+namespace {
+
+constexpr std::chrono::milliseconds kPollInterval{500};
+constexpr std::size_t kEvents = 50;  // number of events that a poll reads
+
+}  // namespace
+
+ChangeFeed::ChangeFeed(Store* store, PipelineObserver* next)
+    : store_(store), next_(next), poller_([this] { PollEvents(); }) {}
+
+ChangeFeed::~ChangeFeed() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  stop_.notify_all();
+  poller_.join();
+}
+
+void ChangeFeed::OnVerdict(const std::string& rig, Verdict verdict) {
+  if (next_ != nullptr) next_->OnVerdict(rig, verdict);
+  if (verdict == Verdict::kStored) Notify(v1::Change::SEGMENTS, rig);
+}
+
+void ChangeFeed::OnScore(const SegmentInformation& information,
+                         double seconds) {
+  if (next_ != nullptr) next_->OnScore(information, seconds);
+  Notify(v1::Change::SCORES, "");
+}
+
+void ChangeFeed::OnRun(const StoredRun& run) {
+  if (next_ != nullptr) next_->OnRun(run);
+  Notify(v1::Change::RUNS, run.rig);
+}
+
+void ChangeFeed::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
+  if (next_ != nullptr) next_->OnCheck(subject, outcome);
+}
+
+std::shared_ptr<void> ChangeFeed::Subscribe(const std::string& rig,
+                                            OnChange on_change) {
+  const auto events = store_->ListNewestEvents({1, ""});
+  const bool known = events.ok() && !events->items.empty();
+  auto reader = std::make_shared<Reader>(
+      rig, known ? events->items[0].event : 0, std::move(on_change));
+  const std::lock_guard lock(mutex_);
+  readers_.push_back(reader);
+  return reader;
+}
+
+std::vector<std::shared_ptr<ChangeFeed::Reader>> ChangeFeed::Readers() {
+  std::vector<std::shared_ptr<Reader>> readers;
+  std::erase_if(readers_, [&](const std::weak_ptr<Reader>& weak) {
+    auto reader = weak.lock();
+    if (reader == nullptr) return true;
+    readers.push_back(std::move(reader));
+    return false;
+  });
+  return readers;
+}
+
+void ChangeFeed::Notify(v1::Change::What what, const std::string& rig) {
+  const std::lock_guard lock(mutex_);
+  for (const auto& reader : Readers()) {
+    if (rig.empty() || reader->rig.empty() || reader->rig == rig) {
+      reader->on_change(what, rig);
+    }
+  }
+}
+
+void ChangeFeed::PollEvents() {
+  std::unique_lock lock(mutex_);
+  while (!stop_.wait_for(lock, kPollInterval, [this] { return stopping_; })) {
+    if (Readers().empty()) continue;
+    lock.unlock();
+    // If the store fails now, the next poll tries again.
+    const auto events =
+        store_->ListNewestEvents({static_cast<int>(kEvents), ""});
+    if (events.ok() && !events->items.empty()) NotifyOfEvents(events->items);
+    lock.lock();
+  }
+}
+
+void ChangeFeed::NotifyOfEvents(const std::vector<StoredEvent>& newest) {
+  const std::lock_guard lock(mutex_);
+  for (const auto& reader : Readers()) {
+    const bool more = newest.size() == kEvents &&
+                      newest.back().event > reader->newest_event + 1;
+    if (more && reader->newest_event > 0) {
+      reader->on_change(v1::Change::EVERYTHING, "");
+    }
+    for (const StoredEvent& event : newest) {
+      if (event.event <= reader->newest_event) break;
+      if (reader->rig.empty() || reader->rig == event.rig) {
+        reader->on_change(v1::Change::EVENTS, event.rig);
+      }
+    }
+    reader->newest_event = newest.front().event;
+  }
+}
+
+}  // namespace selfcal::server

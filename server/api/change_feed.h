@@ -1,0 +1,64 @@
+// Reports that something has changed, so that whoever shows it reads it anew.
+// Changes by the pipeline come from its observer; changes that callers commit
+// come from the event log, which is polled while there is a reader. Any thread
+// may call.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "selfcal/v1/activity_service.pb.h"
+#include "server/pipeline/observer.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+class ChangeFeed final : public PipelineObserver {
+ public:
+  // Forwards to `next`, which may be null. Both must outlive the feed.
+  ChangeFeed(Store* store, PipelineObserver* next);
+  ~ChangeFeed() override;
+
+  void OnVerdict(const std::string& rig, Verdict verdict) override;
+  void OnScore(const SegmentInformation& information, double seconds) override;
+  void OnRun(const StoredRun& run) override;
+  void OnCheck(CheckSubject subject, VerificationOutcome outcome) override;
+
+  // Reports changes from now on, about one rig or, with an empty name, all
+  // rigs; `rig` is empty in a change that may concern any. The callback returns
+  // at once. The subscription ends when its last owner releases it, and may
+  // outlive the feed.
+  using OnChange =
+      std::function<void(v1::Change::What what, const std::string& rig)>;
+  std::shared_ptr<void> Subscribe(const std::string& rig, OnChange on_change);
+
+ private:
+  struct Reader {
+    std::string rig;
+    std::int64_t newest_event = 0;  // events up to this one are not reported
+    OnChange on_change;
+  };
+
+  void Notify(v1::Change::What what, const std::string& rig);
+  // The readers that exist; with the lock held.
+  std::vector<std::shared_ptr<Reader>> Readers();
+  void PollEvents();
+  void NotifyOfEvents(const std::vector<StoredEvent>& newest);
+
+  Store* store_;
+  PipelineObserver* next_;
+  std::mutex mutex_;  // guards what follows
+  std::condition_variable stop_;
+  std::list<std::weak_ptr<Reader>> readers_;
+  bool stopping_ = false;
+  std::thread poller_;
+};
+
+}  // namespace selfcal::server

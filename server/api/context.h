@@ -1,0 +1,29 @@
+// What the handlers work on. All of it outlives the API.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+
+#include "server/domain/domain.h"
+#include "server/pipeline/pipeline.h"
+
+namespace selfcal::server {
+
+class ChangeFeed;  // change_feed.h
+class Traffic;     // traffic.h
+
+struct ApiContext {
+  Domain* domain = nullptr;
+  Store* store = nullptr;  // of `domain`
+  Pipeline* pipeline = nullptr;
+  ChangeFeed* changes = nullptr;
+  Traffic* traffic = nullptr;  // of segments
+  // True once the daemon is stopping: watches and streams end with UNAVAILABLE.
+  const std::atomic<bool>* stopping = nullptr;
+  // Called when a restored database is ready for the next start; may be null.
+  std::function<void()> restored;
+  std::string program_version;
+};
+
+}  // namespace selfcal::server

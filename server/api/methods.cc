@@ -1,0 +1,169 @@
+#include "server/api/methods.h"
+
+#include <google/protobuf/descriptor.h>
+#include <spdlog/spdlog.h>
+
+#include <stdexcept>
+
+#include "server/access/rules.h"
+
+namespace selfcal::server {
+namespace {
+
+using google::protobuf::MethodDescriptor;
+
+// The method with this type of request, in the file of its service.
+const MethodDescriptor* DescriptorOf(const Message& request) {
+  const auto& file = *request.GetDescriptor()->file();
+  for (int s = 0; s < file.service_count(); ++s) {
+    for (int m = 0; m < file.service(s)->method_count(); ++m) {
+      const MethodDescriptor* method = file.service(s)->method(m);
+      if (method->input_type() == request.GetDescriptor()) return method;
+    }
+  }
+  throw std::logic_error(request.GetTypeName() + " is no request of a method");
+}
+
+absl::Status Authorised(const Call& call,
+                        const MethodDescriptor& method,
+                        const Message& request) {
+  absl::Status status = Authorise(call.caller, method, request);
+  if (!status.ok()) {
+    spdlog::debug("denied to '{}': {}", call.caller.name, method.full_name());
+  }
+  return status;
+}
+
+// Runs a handler; no exception leaves it, and an error is one for a client. The
+// result is a Status or a StatusOr.
+template <typename Handler>
+auto Guarded(const ApiContext& context, const Handler& handler)
+    -> decltype(handler()) {
+  absl::Status failed;
+  try {
+    auto result = handler();
+    if constexpr (std::is_same_v<decltype(result), absl::Status>) {
+      failed = result;
+    } else {
+      failed = result.status();
+    }
+    if (failed.ok()) return result;
+  } catch (const std::bad_alloc&) {
+    failed =
+        absl::ResourceExhaustedError("out of memory; send less at once");
+  } catch (const std::exception& error) {
+    failed = absl::InternalError(error.what());
+  }
+  return context.stopping->load() ? ShuttingDown() : ForClient(failed);
+}
+
+// Checks access to each request of an exchange.
+class AuthorisedExchange final : public Exchange {
+ public:
+  AuthorisedExchange(const ApiContext& context,
+                     const Call& call,
+                     const MethodDescriptor& method,
+                     const Message& response,
+                     std::unique_ptr<Exchange> exchange)
+      : context_(context),
+        call_(call),
+        method_(method),
+        response_(response),
+        exchange_(std::move(exchange)) {}
+
+  void Take(const Message& request, const Done& done) override {
+    const absl::Status refused = Guarded(context_, [&] {
+      const absl::Status may = Authorised(call_, method_, request);
+      if (!may.ok()) return may;
+      exchange_->Take(request, done);
+      return absl::OkStatus();
+    });
+    if (!refused.ok()) done(refused, response_);
+  }
+
+ private:
+  const ApiContext& context_;
+  const Call& call_;
+  const MethodDescriptor& method_;
+  const Message& response_;
+  std::unique_ptr<Exchange> exchange_;
+};
+
+}  // namespace
+
+void Methods::AddUnary(Method method, UnaryHandler handler) {
+  method.descriptor = DescriptorOf(*method.request);
+  method.handler = UnaryHandler(
+      [this_method = method.descriptor, context = context_, handler](
+          const Call& call, const Message& request, Message* response) {
+        return Guarded(context, [&] {
+          absl::Status status = Authorised(call, *this_method, request);
+          return status.ok() ? handler(call, request, response) : status;
+        });
+      });
+  methods_.push_back(std::move(method));
+}
+
+void Methods::AddStreaming(Method method, StreamingHandler handler) {
+  method.descriptor = DescriptorOf(*method.request);
+  method.handler = StreamingHandler(
+      [this_method = method.descriptor, context = context_, handler](
+          const Call& call, const Message& request, const WriteResponse& write) {
+        return Guarded(context, [&] {
+          absl::Status status = Authorised(call, *this_method, request);
+          if (!status.ok()) return status;
+          return handler(call, request, [&](const Message& response) {
+            return !context.stopping->load() && write(response);
+          });
+        });
+      });
+  methods_.push_back(std::move(method));
+}
+
+void Methods::AddWatch(Method method, WatchHandler handler) {
+  method.descriptor = DescriptorOf(*method.request);
+  method.handler = WatchHandler(
+      [this_method = method.descriptor, context = context_, handler](
+          const Call& call,
+          const Message& request,
+          const std::shared_ptr<WatchQueue>& queue)
+          -> absl::StatusOr<std::shared_ptr<void>> {
+        return Guarded(
+            context, [&]() -> absl::StatusOr<std::shared_ptr<void>> {
+              absl::Status status = Authorised(call, *this_method, request);
+              if (!status.ok()) return status;
+              return handler(call, request, queue);
+            });
+      });
+  methods_.push_back(std::move(method));
+}
+
+void Methods::AddUpload(Method method, UploadHandler handler) {
+  method.descriptor = DescriptorOf(*method.request);
+  method.handler = UploadHandler(
+      [this_method = method.descriptor,
+       empty = method.request,
+       context = context_,
+       handler](const Call& call, const ReadRequest& read, Message* response) {
+        return Guarded(context, [&] {
+          absl::Status status = Authorised(call, *this_method, *empty);
+          return status.ok() ? handler(call, read, response) : status;
+        });
+      });
+  methods_.push_back(std::move(method));
+}
+
+void Methods::AddExchange(Method method, ExchangeHandler handler) {
+  method.descriptor = DescriptorOf(*method.request);
+  method.handler = ExchangeHandler(
+      [this_method = method.descriptor,
+       response = method.response,
+       context = context_,
+       handler](const Call& call) -> std::unique_ptr<Exchange> {
+        return std::make_unique<AuthorisedExchange>(
+            context, call, *this_method, *response, handler(call));
+      });
+  methods_.push_back(std::move(method));
+}
+
+}  // namespace selfcal::server

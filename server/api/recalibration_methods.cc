@@ -1,0 +1,124 @@
+#include "proto/resource_names.h"
+#include "selfcal/v1/recalibration.pb.h"
+#include "server/api/methods.h"
+#include "server/api/paging.h"
+#include "server/encode/encode.h"
+#include "server/encode/versions.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr char kType[] = "selfcal.v1.Recalibration";
+
+bool HasEnded(RunState state) {
+  return state == RunState::kSucceeded || state == RunState::kFailed ||
+         state == RunState::kCancelled;
+}
+
+struct RunId {
+  std::string rig;
+  std::int64_t run = 0;
+};
+
+absl::StatusOr<RunId> ParseRun(const std::string& name) {
+  const auto parts = ParseChildName(name, "recalibrations");
+  const auto run = parts ? ParseCount(parts->id) : std::nullopt;
+  if (!run) return BadName("name", "rigs/{rig}/recalibrations/{run}");
+  return RunId{parts->rig, *run};
+}
+
+absl::StatusOr<v1::Recalibration> StartRecalibration(
+    const ApiContext& context,
+    const Call&,
+    const v1::StartRecalibrationRequest& request) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  const auto run = context.pipeline->StartRecalibration(*rig, request.force());
+  if (!run.ok()) {
+    return About(run.status(), {"selfcal.v1.Rig", request.parent(), "parent"});
+  }
+  return EncodeWithReport(context.store, *run, {});
+}
+
+absl::StatusOr<v1::Recalibration> GetRecalibration(
+    const ApiContext& context,
+    const Call&,
+    const v1::GetRecalibrationRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const RunId id, ParseRun(request.name()));
+  const auto run = context.store->GetRun(id.rig, id.run);
+  if (!run.ok()) return About(run.status(), {kType, request.name(), {}});
+  return EncodeWithReport(context.store, *run, {});
+}
+
+absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
+    const ApiContext& context,
+    const Call&,
+    const v1::ListRecalibrationsRequest& request) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  return FillPage<v1::ListRecalibrationsResponse>(
+      request,
+      request.parent(),
+      [&](const Page& page) { return context.store->ListRuns(*rig, page); },
+      [&](const StoredRun& run,
+          v1::ListRecalibrationsResponse* to) -> absl::Status {
+        SELFCAL_ASSIGN_OR_RETURN(*to->add_recalibrations(),
+                                 EncodeWithReport(context.store, run, {}));
+        return absl::OkStatus();
+      });
+}
+
+absl::StatusOr<std::shared_ptr<void>> WatchRecalibration(
+    const ApiContext& context,
+    const v1::WatchRecalibrationRequest& request,
+    const Watch<v1::Recalibration>& watch) {
+  SELFCAL_ASSIGN_OR_RETURN(const RunId id, ParseRun(request.name()));
+  const auto put = [watch, store = context.store](
+                       const StoredRun& run,
+                       const CalibrateProgress& progress) {
+    // Each iteration has a key of its own: a reader that plots them all gets
+    // them all.
+    watch.Put(std::to_string(run.attempts) + "." +
+                  std::to_string(progress.iteration),
+              [=](v1::Recalibration* to) -> absl::StatusOr<bool> {
+                SELFCAL_ASSIGN_OR_RETURN(
+                    *to, EncodeWithReport(store, run, progress));
+                return true;
+              });
+  };
+  auto subscription = context.pipeline->WatchRun(
+      id.rig, id.run, [=](const RunUpdate& update) {
+        for (const CalibrateProgress& missed : update.missed) {
+          put(update.run, missed);
+        }
+        put(update.run, update.progress);
+        if (HasEnded(update.run.state)) watch.Close();
+      });
+  if (!subscription.ok()) {
+    return About(subscription.status(), {kType, request.name(), "name"});
+  }
+  return std::shared_ptr<void>(*std::move(subscription));
+}
+
+absl::StatusOr<v1::Recalibration> CancelRecalibration(
+    const ApiContext& context,
+    const Call&,
+    const v1::CancelRecalibrationRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const RunId id, ParseRun(request.name()));
+  const auto run = context.pipeline->CancelRecalibration(id.rig, id.run);
+  if (!run.ok()) return About(run.status(), {kType, request.name(), {}});
+  return EncodeWithReport(context.store, *run, {});
+}
+
+}  // namespace
+
+void AddRecalibrationMethods(Methods* methods) {
+  methods->Add(StartRecalibration);
+  methods->Add(GetRecalibration);
+  methods->Add(ListRecalibrations);
+  methods->Add(WatchRecalibration);
+  methods->Add(CancelRecalibration);
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,229 @@
+#include <algorithm>
+#include <optional>
+
+#include "core/information/segment_residuals.h"
+#include "proto/convert.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/segment.pb.h"
+#include "server/api/methods.h"
+#include "server/api/paging.h"
+#include "server/api/segment_stream.h"
+#include "server/encode/encode.h"
+#include "server/encode/encode_session.h"
+#include "server/encode/reason.h"
+#include "server/encode/segment_filter.h"
+#include "server/encode/shortened.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr char kRigType[] = "selfcal.v1.Rig";
+constexpr char kSegmentType[] = "selfcal.v1.Segment";
+constexpr char kTableType[] = "selfcal.v1.Table";
+
+absl::StatusOr<SegmentNameParts> ParseSegment(const std::string& name) {
+  const auto parts = ParseSegmentName(name);
+  if (!parts) return BadName("name", "rigs/{rig}/segments/{session}~{index}");
+  return *parts;
+}
+
+void ClearDirections(v1::Segment* segment) {
+  segment->clear_unobserved();
+  for (v1::GroupScore& score : *segment->mutable_scores()) {
+    score.clear_unobserved();
+  }
+}
+
+absl::StatusOr<v1::ListSegmentsResponse> ListSegments(
+    const ApiContext& context,
+    const Call&,
+    const v1::ListSegmentsRequest& request) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  SegmentQuery query;
+  if (const auto filter = ParseSegmentFilter(request.filter(), &query);
+      !filter.ok()) {
+    return About(filter, {kSegmentType, "", "filter"});
+  }
+  if (const auto order = ParseSegmentOrder(request.order_by(), &query);
+      !order.ok()) {
+    return About(order, {kSegmentType, "", "order_by"});
+  }
+  return FillPage<v1::ListSegmentsResponse>(
+      request,
+      request.parent(),
+      [&](const Page& page) {
+        return context.store->ListSegments(*rig, query, page);
+      },
+      [&](const StoredSegment& segment, v1::ListSegmentsResponse* to) {
+        v1::Segment* added = to->add_segments();
+        *added = Encode(segment);
+        if (request.view() == v1::ListSegmentsRequest::BASIC) ClearDirections(added);
+        return absl::OkStatus();
+      });
+}
+
+absl::StatusOr<v1::Segment> GetSegment(const ApiContext& context,
+                                       const Call&,
+                                       const v1::GetSegmentRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts parts,
+                           ParseSegment(request.name()));
+  const Subject subject{kSegmentType, request.name(), {}};
+  const auto segment = context.store->GetSegment(parts.rig, parts.key);
+  if (!segment.ok()) return About(segment.status(), subject);
+  const auto absences = context.store->ListAbsences(parts.rig, parts.key);
+  if (!absences.ok()) return About(absences.status(), subject);
+  v1::Segment response = Encode(*segment);
+  for (const TableAbsence& absence : *absences) {
+    *response.add_exclusions() = Encode(parts.rig, absence);
+  }
+  return response;
+}
+
+absl::StatusOr<v1::MotionSegment> GetSegmentData(
+    const ApiContext& context,
+    const Call&,
+    const v1::GetSegmentDataRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts parts,
+                           ParseSegment(request.name()));
+  const auto data = context.store->GetSegmentData(parts.rig, parts.key);
+  if (!data.ok()) {
+    return About(data.status(), {kSegmentType, request.name(), {}});
+  }
+  return ToProto(*data);
+}
+
+absl::StatusOr<v1::SegmentInformation> GetSegmentInformation(
+    const ApiContext& context,
+    const Call&,
+    const v1::GetSegmentInformationRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts parts,
+                           ParseSegment(request.name()));
+  const auto segment = context.store->GetSegment(parts.rig, parts.key);
+  if (!segment.ok()) {
+    return About(segment.status(), {kSegmentType, request.name(), {}});
+  }
+  if (!segment->information) return v1::SegmentInformation();
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig,
+                           context.store->GetRig(parts.rig));
+  return Encode(rig.rig, *segment->information);
+}
+
+absl::StatusOr<v1::SegmentResiduals> GetSegmentResiduals(
+    const ApiContext& context,
+    const Call&,
+    const v1::GetSegmentResidualsRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts parts,
+                           ParseSegment(request.name()));
+  const Subject subject{kSegmentType, request.name(), {}};
+  const auto data = context.store->GetSegmentData(parts.rig, parts.key);
+  if (!data.ok()) return About(data.status(), subject);
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig,
+                           context.store->GetRig(parts.rig));
+  if (request.calibration_version() < 0) {
+    return InvalidFields({{"calibration_version",
+                           "is negative; send 0 for the version with which "
+                           "the segment was estimated"}});
+  }
+  const std::int64_t number = request.calibration_version() == 0
+                                  ? data->calibration_version
+                                  : request.calibration_version();
+  const auto version = context.store->GetCalibration(parts.rig, number);
+  if (!version.ok()) {
+    return About(version.status(),
+                 {"selfcal.v1.Calibration",
+                  ChildName(parts.rig, "calibrations", std::to_string(number)),
+                  "calibration_version"});
+  }
+  v1::SegmentResiduals response =
+      Encode(EvaluateResiduals(rig.rig, version->theta, *data),
+             *data,
+             static_cast<int>(version->theta.cameras.size()));
+  response.set_calibration_version(number);
+  return response;
+}
+
+absl::StatusOr<v1::ListTablesResponse> ListTables(
+    const ApiContext& context,
+    const Call&,
+    const v1::ListTablesRequest& request) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  const auto tables = context.store->GetTables(*rig);
+  if (!tables.ok()) {
+    return About(tables.status(), {kRigType, request.parent(), {}});
+  }
+  v1::ListTablesResponse response;
+  for (const Table& table : *tables) {
+    *response.add_tables() = Encode(*rig, table);
+  }
+  return response;
+}
+
+absl::StatusOr<v1::Table> GetTable(const ApiContext& context,
+                                   const Call&,
+                                   const v1::GetTableRequest& request) {
+  const auto parts = ParseChildName(request.name(), "tables");
+  if (!parts) return BadName("name", "rigs/{rig}/tables/{group}");
+  const Subject subject{kTableType, request.name(), {}};
+  const auto tables = context.store->GetTables(parts->rig);
+  if (!tables.ok()) return About(tables.status(), subject);
+  const auto table =
+      std::find_if(tables->begin(), tables->end(), [&](const Table& t) {
+        return t.group == parts->id;
+      });
+  if (table == tables->end()) {
+    return About(absl::NotFoundError("the rig has no group of parameters '" +
+                                     Shortened(parts->id, 100) + "'"),
+                 subject);
+  }
+  return Encode(parts->rig, *table);
+}
+
+absl::StatusOr<v1::QuarantineSegmentsResponse> QuarantineSegments(
+    const ApiContext& context,
+    const Call& call,
+    const v1::QuarantineSegmentsRequest& request) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  if (request.session().empty()) {
+    return InvalidFields({{"session", "is empty; name the session"}});
+  }
+  if (!IsReason(request.reason())) {
+    return InvalidFields({{"reason", std::string(kReasonRule)}});
+  }
+  const auto commit = context.pipeline->QuarantineSegments(
+      *rig,
+      request.session(),
+      request.has_index() ? std::optional(request.index()) : std::nullopt,
+      call.caller.name,
+      request.reason());
+  if (!commit.ok()) {
+    return About(commit.status(),
+                 {kSegmentType,
+                  request.parent() + "/segments/" + request.session(),
+                  {}});
+  }
+  v1::QuarantineSegmentsResponse response;
+  response.set_quarantined(commit->quarantined);
+  response.set_unusable(commit->unusable);
+  return response;
+}
+
+}  // namespace
+
+void AddSegmentMethods(Methods* methods) {
+  methods->AddExchange<v1::StreamSegmentsRequest, v1::StreamSegmentsResponse>(
+      MakeSegmentStream);
+  methods->Add(ListSegments);
+  methods->Add(GetSegment);
+  methods->Add(GetSegmentData);
+  methods->Add(GetSegmentInformation);
+  methods->Add(GetSegmentResiduals);
+  methods->Add(ListTables);
+  methods->Add(GetTable);
+  methods->Add(QuarantineSegments);
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,126 @@
+#include "proto/resource_names.h"
+#include "selfcal/v1/store_service.pb.h"
+#include "server/api/methods.h"
+#include "server/api/paging.h"
+#include "server/encode/encode.h"
+#include "server/store/maintenance.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+absl::StatusOr<StoreMaintenance*> MaintenanceOf(const ApiContext& context) {
+  StoreMaintenance* maintenance = context.store->maintenance();
+  if (maintenance != nullptr) return maintenance;
+  return absl::UnimplementedError(
+      "this store is maintained by the tools of its own engine");
+}
+
+absl::Status CheckStore(const ApiContext& context,
+                        const Call&,
+                        const v1::CheckStoreRequest&,
+                        const Writer<v1::CheckStoreResponse>& write) {
+  SELFCAL_ASSIGN_OR_RETURN(StoreMaintenance* const maintenance,
+                           MaintenanceOf(context));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const CheckSummary summary,
+      maintenance->Check([&](const StoreProblem& problem) {
+        v1::CheckStoreResponse response;
+        response.mutable_problem()->set_place(problem.place);
+        response.mutable_problem()->set_description(problem.description);
+        return write(response);
+      }));
+  v1::CheckStoreResponse response;
+  response.mutable_summary()->set_bytes(summary.bytes);
+  response.mutable_summary()->set_checksums(summary.checksums);
+  response.mutable_summary()->set_payloads(summary.payloads);
+  response.mutable_summary()->set_problems(summary.problems);
+  write(response);
+  return absl::OkStatus();
+}
+
+absl::Status BackupStore(const ApiContext& context,
+                         const Call&,
+                         const v1::BackupStoreRequest&,
+                         const Writer<v1::BackupStoreResponse>& write) {
+  SELFCAL_ASSIGN_OR_RETURN(StoreMaintenance* const maintenance,
+                           MaintenanceOf(context));
+  SELFCAL_ASSIGN_OR_RETURN(const BackupSummary summary,
+                           maintenance->Backup([&](std::string_view bytes) {
+                             v1::BackupStoreResponse response;
+                             response.set_data(bytes.data(), bytes.size());
+                             return write(response);
+                           }));
+  v1::BackupStoreResponse response;
+  response.mutable_summary()->set_bytes(summary.bytes);
+  response.mutable_summary()->set_sha256(summary.sha256);
+  write(response);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<v1::RestoreStoreResponse> RestoreStore(
+    const ApiContext& context,
+    const Call&,
+    const Reader<v1::RestoreStoreRequest>& read) {
+  SELFCAL_ASSIGN_OR_RETURN(StoreMaintenance* const maintenance,
+                           MaintenanceOf(context));
+  SELFCAL_ASSIGN_OR_RETURN(const auto restoration, maintenance->BeginRestore());
+  v1::RestoreStoreRequest request;
+  while (read(&request)) {
+    if (context.stopping->load()) return ShuttingDown();
+    if (request.part_case() == v1::RestoreStoreRequest::kSha256) {
+      v1::RestoreStoreResponse response;
+      SELFCAL_ASSIGN_OR_RETURN(*response.mutable_previous_database(),
+                               restoration->Finish(request.sha256()));
+      if (context.restored) context.restored();
+      return response;
+    }
+    SELFCAL_RETURN_IF_ERROR(restoration->Append(request.data()));
+  }
+  return InvalidFields({{"sha256",
+                         "is missing: send the checksum of the backup after "
+                         "its last piece"}});
+}
+
+absl::StatusOr<v1::ListEventsResponse> ListEvents(
+    const ApiContext& context,
+    const Call&,
+    const v1::ListEventsRequest& request) {
+  std::string rig;
+  if (!request.parent().empty()) {
+    const auto parsed = ParseRigName(request.parent());
+    if (!parsed) return BadName("parent", "rigs/{rig}");
+    const absl::Status found = context.store->GetRig(*parsed).status();
+    if (!found.ok()) {
+      return About(found, {"selfcal.v1.Rig", request.parent(), "parent"});
+    }
+    rig = *parsed;
+  }
+  const bool newest_first = request.order_by() == "number desc";
+  if (!newest_first && !request.order_by().empty() &&
+      request.order_by() != "number") {
+    return InvalidFields({{"order_by", "must be 'number' or 'number desc'"}});
+  }
+  return FillPage<v1::ListEventsResponse>(
+      request,
+      request.parent(),
+      [&](const Page& page) {
+        return newest_first ? context.store->ListNewestEvents(page, rig)
+                            : context.store->ListEvents(page, rig);
+      },
+      [](const StoredEvent& event, v1::ListEventsResponse* to) {
+        *to->add_events() = Encode(event);
+        return absl::OkStatus();
+      });
+}
+
+}  // namespace
+
+void AddStoreMethods(Methods* methods) {
+  methods->Add(CheckStore);
+  methods->Add(BackupStore);
+  methods->Add(RestoreStore);
+  methods->Add(ListEvents);
+}
+
+}  // namespace selfcal::server

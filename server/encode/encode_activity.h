@@ -1,0 +1,12 @@
+// A rig in the list of activities, as the message of the contract.
+#pragma once
+
+#include "selfcal/v1/activity_service.pb.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+// What the store keeps, with alarms; without traffic and the current run.
+v1::RigActivity Encode(const RigSummary& rig);
+
+}  // namespace selfcal::server

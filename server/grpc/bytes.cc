@@ -1,0 +1,31 @@
+#include "server/grpc/bytes.h"
+
+#include <grpcpp/support/proto_buffer_reader.h>
+#include <grpcpp/support/proto_buffer_writer.h>
+
+#include <algorithm>
+
+namespace selfcal::server {
+
+absl::Status Parse(const grpc::ByteBuffer& bytes,
+                   google::protobuf::Message* message) {
+  grpc::ByteBuffer copy = bytes;  // shares the bytes
+  grpc::ProtoBufferReader reader(&copy);
+  if (reader.status().ok() && message->ParseFromZeroCopyStream(&reader)) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError("the request is no message of type " +
+                                    message->GetTypeName());
+}
+
+grpc::ByteBuffer Serialise(const google::protobuf::Message& message) {
+  constexpr int kBlockBytes = 1 << 20;
+  const int size = static_cast<int>(message.ByteSizeLong());
+  grpc::ByteBuffer bytes;
+  grpc::ProtoBufferWriter writer(
+      &bytes, std::clamp(size, 1, kBlockBytes), size);
+  message.SerializeToZeroCopyStream(&writer);
+  return bytes;
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,67 @@
+#include <memory>
+#include <variant>
+
+#include "server/api/errors.h"
+#include "server/grpc/bytes.h"
+#include "server/grpc/caller.h"
+#include "server/grpc/calls.h"
+#include "server/grpc/status.h"
+
+namespace selfcal::server {
+namespace {
+
+class UnaryCall final : public grpc::ServerUnaryReactor {
+ public:
+  UnaryCall(const CallContext& context,
+            const Method& method,
+            const Rpc& rpc,
+            const grpc::ByteBuffer& request,
+            grpc::ByteBuffer* response)
+      : method_(method),
+        call_{CallerOf(rpc, context.local_role), [this] { return gone_.load(); }},
+        request_(request),
+        response_(response) {}
+
+  void Run() {
+    const std::unique_ptr<Message> request(method_.request->New());
+    const std::unique_ptr<Message> response(method_.response->New());
+    absl::Status status = Parse(request_, request.get());
+    if (status.ok()) {
+      status = std::get<UnaryHandler>(method_.handler)(
+          call_, *request, response.get());
+    }
+    if (status.ok()) *response_ = Serialise(*response);
+    Finish(ToGrpc(status));  // may delete this
+  }
+
+  void OnCancel() override { gone_ = true; }
+  void OnDone() override { delete this; }
+
+ private:
+  const Method& method_;
+  std::atomic<bool> gone_ = false;  // the caller has disconnected
+  const Call call_;
+  const grpc::ByteBuffer request_;
+  grpc::ByteBuffer* const response_;
+};
+
+}  // namespace
+
+grpc::ServerUnaryReactor* StartUnary(const CallContext& context,
+                                     const Method& method,
+                                     Rpc* rpc,
+                                     const grpc::ByteBuffer* request,
+                                     grpc::ByteBuffer* response) {
+  auto* call = new UnaryCall(context, method, *rpc, *request, response);
+  if (!context.threads->Run([call] { call->Run(); })) {
+    call->Finish(ToGrpc(TooManyCalls()));
+  }
+  return call;
+}
+
+absl::Status TooManyCalls() {
+  return ForClient(absl::ResourceExhaustedError(
+      "too many calls are being answered: try again in a moment"));
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,235 @@
+// Many watches of one rig on a real daemon: its threads and resident memory,
+// and how long after an activation each watcher has the new version.
+//
+//   selfcal_watch_load --daemon build/release/server/daemon/selfcald
+//       --folder DIR [--watches N] [--activations N]
+#include <fmt/format.h>
+#include <grpcpp/create_channel.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/demo/daemon_process.h"
+#include "client/demo/daemon_view.h"
+#include "core/simulation/simulate.h"
+#include "core/simulation/trajectory.h"
+#include "proto/convert.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
+#include "selfcal/v1/segment.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kWatchesOfAConnection = 100;
+
+struct Options {
+  std::string daemon;
+  std::string folder;
+  int watches = 10'000;
+  int activations = 5;
+};
+
+// The number on a line of /proc/PID/status: KiB, or a count.
+double StatusOf(pid_t pid, const std::string& name) {
+  std::ifstream file(fmt::format("/proc/{}/status", pid));
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with(name + ":")) {
+      return std::stod(line.substr(name.size() + 1));
+    }
+  }
+  throw std::runtime_error("the daemon has ended");
+}
+
+// One watch; counts the versions that it has been sent.
+class Watcher final : public grpc::ClientReadReactor<v1::Calibration> {
+ public:
+  Watcher(v1::CalibrationService::Stub* stub, const std::string& rig) {
+    v1::WatchCalibrationRequest request;
+    request.set_parent("rigs/" + rig);
+    request_ = request;
+    stub->async()->WatchCalibration(&context_, &request_, this);
+    StartRead(&version_);
+    StartCall();
+  }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) return;
+    last_ = Clock::now();
+    ++received_;
+    StartRead(&version_);
+  }
+  void OnDone(const grpc::Status& /*status*/) override { done_ = true; }
+
+  void Cancel() { context_.TryCancel(); }
+  int received() const { return received_; }
+  bool done() const { return done_; }
+  Clock::time_point last() const { return last_; }
+
+ private:
+  grpc::ClientContext context_;
+  v1::WatchCalibrationRequest request_;
+  v1::Calibration version_;
+  std::atomic<int> received_ = 0;
+  std::atomic<bool> done_ = false;
+  std::atomic<Clock::time_point> last_{Clock::time_point()};
+};
+
+using Watchers = std::vector<std::unique_ptr<Watcher>>;
+
+void WaitUntil(const std::function<bool()>& condition) {
+  const auto end = Clock::now() + std::chrono::minutes(2);
+  while (!condition()) {
+    if (Clock::now() > end) throw std::runtime_error("waited for 2 minutes");
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+bool HaveAll(const Watchers& watchers, int versions) {
+  return std::all_of(watchers.begin(), watchers.end(), [&](const auto& w) {
+    return w->received() >= versions;
+  });
+}
+
+std::shared_ptr<grpc::Channel> Connect(const std::string& target) {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  return grpc::CreateCustomChannel(
+      target, grpc::InsecureChannelCredentials(), arguments);
+}
+
+// A rig with two versions, of which either can be activated.
+void MakeTwoVersions(const std::string& target, const std::string& id) {
+  const Rig rig = HandheldRig(id);
+  DaemonView view(target, id);
+  const auto check = [](const absl::Status& status) {
+    if (!status.ok()) throw std::runtime_error(status.ToString());
+  };
+  check(view.CreateRig(rig));
+  const auto trajectory = MakeHandheld(60.0, 1.0, 1);
+  const auto segments =
+      Simulate(rig, rig.factory, rig.factory, *trajectory, "s", {}).segments;
+  grpc::ClientContext context;
+  const auto stub = v1::SegmentService::NewStub(Connect(target));
+  const auto stream = stub->StreamSegments(&context);
+  for (const MotionSegment& segment : segments) {
+    v1::StreamSegmentsRequest request;
+    request.set_parent("rigs/" + id);
+    *request.mutable_segment() = ToProto(segment);
+    v1::StreamSegmentsResponse response;
+    stream->Write(request);
+    stream->Read(&response);
+  }
+  stream->WritesDone();
+  static_cast<void>(stream->Finish());
+  WaitUntil([&] {
+    const auto runs = view.GetRuns();
+    return runs.ok() && !runs->empty() &&
+           runs->back().state() == v1::Recalibration::SUCCEEDED &&
+           runs->front().state() == v1::Recalibration::SUCCEEDED;
+  });
+}
+
+void Run(const Options& options) {
+  const std::string state = options.folder + "/watches";
+  fs::remove_all(state);
+  auto started = DaemonProcess::Start(options.daemon, state);
+  if (!started.ok()) throw std::runtime_error(started.status().ToString());
+  const std::unique_ptr<DaemonProcess> daemon = *std::move(started);
+  const std::string rig = "watched";
+  MakeTwoVersions(daemon->target(), rig);
+  // Its memory settles, and no run is under way any more.
+  std::this_thread::sleep_for(std::chrono::seconds(5));
+  const double memory = StatusOf(daemon->pid(), "VmRSS");
+  const double threads = StatusOf(daemon->pid(), "Threads");
+
+  std::vector<std::unique_ptr<v1::CalibrationService::Stub>> stubs;
+  Watchers watchers;
+  for (int k = 0; k < options.watches; ++k) {
+    if (k % kWatchesOfAConnection == 0) {
+      stubs.push_back(
+          v1::CalibrationService::NewStub(Connect(daemon->target())));
+    }
+    watchers.push_back(std::make_unique<Watcher>(stubs.back().get(), rig));
+  }
+  WaitUntil([&] { return HaveAll(watchers, 1); });
+  fmt::print(
+      "{} watches on {} connections: {:.1f} KiB of the daemon's resident memory "
+      "for each; threads {} before, {} with them\n",
+      options.watches,
+      stubs.size(),
+      (StatusOf(daemon->pid(), "VmRSS") - memory) / options.watches,
+      threads,
+      StatusOf(daemon->pid(), "Threads"));
+
+  std::vector<double> latencies;
+  const auto admin =
+      v1::CalibrationService::NewStub(Connect(daemon->target()));
+  for (int k = 0; k < options.activations; ++k) {
+    v1::ActivateCalibrationRequest request;
+    request.set_name(
+        fmt::format("rigs/{}/calibrations/{}", rig, k % 2 == 0 ? 1 : 2));
+    request.set_reason("measured");
+    grpc::ClientContext context;
+    v1::Calibration active;
+    const auto begin = Clock::now();
+    const grpc::Status status =
+        admin->ActivateCalibration(&context, request, &active);
+    if (!status.ok()) throw std::runtime_error(status.error_message());
+    WaitUntil([&] { return HaveAll(watchers, k + 2); });
+    for (const auto& watcher : watchers) {
+      latencies.push_back(
+          std::chrono::duration<double>(watcher->last() - begin).count());
+    }
+  }
+  std::sort(latencies.begin(), latencies.end());
+  fmt::print(
+      "after {} activations each watcher had the new version in {:.3f} s "
+      "(median), {:.3f} s (99th percentile), {:.3f} s (longest)\n",
+      options.activations,
+      latencies[latencies.size() / 2],
+      latencies[latencies.size() * 99 / 100],
+      latencies.back());
+  for (const auto& watcher : watchers) watcher->Cancel();
+  for (const auto& watcher : watchers) {
+    WaitUntil([&] { return watcher->done(); });
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::client
+
+int main(int argc, char** argv) {
+  CLI::App app("The daemon with many watches");
+  selfcal::client::Options options;
+  app.add_option("--daemon", options.daemon, "selfcald")
+      ->required()
+      ->check(CLI::ExistingFile);
+  app.add_option("--folder", options.folder, "For the daemon's state")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--watches", options.watches)->check(CLI::Range(1, 1'000'000));
+  app.add_option("--activations", options.activations)
+      ->check(CLI::Range(1, 1000));
+  CLI11_PARSE(app, argc, argv);
+  try {
+    selfcal::client::Run(options);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 1;
+  }
+  return 0;
+}

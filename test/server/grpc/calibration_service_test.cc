@@ -1,0 +1,419 @@
+#include <cmath>
+#include <numbers>
+
+#include "core/model/so3.h"
+#include "server/encode/encode.h"
+#include "test/server/grpc/service_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+class CalibrationServiceTest : public ServiceTest {
+ protected:
+  // A rig whose second version is active.
+  Rig AddCalibrated() {
+    Rig rig = AddScored(1);
+    const auto run = domain_->CreateManualRun(rig.id);
+    EXPECT_TRUE(run.ok()) << run.status();
+    FinishRun(rig, run->run);
+    return rig;
+  }
+
+  grpc::Status Get(const std::string& name, v1::Calibration* calibration) {
+    Context context;
+    v1::GetCalibrationRequest request;
+    request.set_name(name);
+    return calibrations_->GetCalibration(&context, request, calibration);
+  }
+
+  grpc::Status List(const std::string& parent,
+                    int size,
+                    const std::string& token,
+                    v1::ListCalibrationsResponse* response) {
+    Context context;
+    v1::ListCalibrationsRequest request;
+    request.set_parent(parent);
+    request.set_page_size(size);
+    request.set_page_token(token);
+    return calibrations_->ListCalibrations(&context, request, response);
+  }
+
+  grpc::Status Activate(const std::string& name,
+                        const std::string& reason,
+                        v1::Calibration* calibration) {
+    Context context;
+    v1::ActivateCalibrationRequest request;
+    request.set_name(name);
+    request.set_reason(reason);
+    return calibrations_->ActivateCalibration(&context, request, calibration);
+  }
+
+  std::unique_ptr<grpc::ClientReader<v1::Calibration>> Watch(
+      Context* context, const std::string& parent) {
+    v1::WatchCalibrationRequest request;
+    request.set_parent(parent);
+    return calibrations_->WatchCalibration(context, request);
+  }
+};
+
+TEST_F(CalibrationServiceTest, VersionShowsEstimatesWithSigmas) {
+  const Rig rig = AddCalibrated();
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  const auto components = TangentComponents(rig.factory);
+  const Eigen::VectorXd values = ReadableValues(rig.factory);
+  const int size = static_cast<int>(components.size());
+  ASSERT_EQ(read.estimates_size(), size);
+  for (int i = 0; i < size; ++i) {
+    EXPECT_EQ(read.estimates(i).component(), components[i].name);
+    EXPECT_EQ(read.estimates(i).unit(), components[i].unit);
+    EXPECT_EQ(read.estimates(i).value(), values[i]);
+    EXPECT_EQ(read.estimates(i).sigma(), 2);
+  }
+  EXPECT_EQ(read.covariance_size(), size * (size + 1) / 2);
+}
+
+TEST_F(CalibrationServiceTest, VersionShowsWhereItCameFrom) {
+  AddCalibrated();
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  EXPECT_EQ(read.version(), 2);
+  EXPECT_EQ(read.state(), v1::Calibration::ACTIVE);
+  EXPECT_EQ(read.provenance().recalibration(), "rigs/r/recalibrations/1");
+  EXPECT_EQ(read.provenance().base_version(), 1);
+  EXPECT_EQ(read.provenance().program_version(), "test");
+  EXPECT_THAT(read.provenance().segments(), ElementsAre("rigs/r/segments/s~0"));
+  EXPECT_EQ(read.solver().status(), "converged");
+  EXPECT_EQ(read.solver().iterations(), 7);
+}
+
+TEST_F(CalibrationServiceTest, VersionShowsTheTemperaturesOfItsSegments) {
+  const Rig rig = AddRig();
+  auto segments = TestSegments(rig, 2);
+  segments[0].temperature_c = 20;
+  segments[1].temperature_c = 31;
+  for (const MotionSegment& segment : segments) {
+    ASSERT_TRUE(domain_->PutSegment("r", segment).ok());
+    Score(rig, segment.key, 10);
+  }
+  FinishRun(rig, 1);
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  const auto& temperature = read.provenance().temperature();
+  EXPECT_EQ(temperature.segments(), 2);
+  EXPECT_EQ(temperature.mean_c(), 25.5);
+  EXPECT_EQ(temperature.min_c(), 20);
+  EXPECT_EQ(temperature.max_c(), 31);
+  ASSERT_TRUE(Get("rigs/r/calibrations/1", &read).ok());
+  EXPECT_FALSE(read.provenance().has_temperature());
+}
+
+TEST_F(CalibrationServiceTest, ActiveIsTheNewestThatWasPublished) {
+  AddCalibrated();
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/active", &read).ok());
+  EXPECT_EQ(read.name(), "rigs/r/calibrations/2");
+  ASSERT_TRUE(Get("rigs/r/calibrations/1", &read).ok());
+  EXPECT_EQ(read.state(), v1::Calibration::SUPERSEDED);
+}
+
+TEST_F(CalibrationServiceTest, VersionThatDoesNotExistIsNotFound) {
+  v1::Calibration read;
+  ExpectNotFound(Get("rigs/r/calibrations/active", &read),
+                 "rigs/r/calibrations/active");
+  AddRig();
+  ExpectNotFound(Get("rigs/r/calibrations/7", &read), "rigs/r/calibrations/7");
+}
+
+TEST_F(CalibrationServiceTest, WhatIsNoNameIsRefused) {
+  AddRig();
+  v1::Calibration read;
+  for (const std::string name : {"rigs/r",
+                                 "rigs/r/calibrations/",
+                                 "rigs/r/calibrations/0",
+                                 "rigs/r/calibrations/-1",
+                                 "rigs/r/calibrations/01",
+                                 "rigs/r/calibrations/newest",
+                                 "rigs/r/calibrations/99999999999999999999"}) {
+    EXPECT_THAT(BadFields(Get(name, &read)), ElementsAre("name")) << name;
+  }
+}
+
+TEST_F(CalibrationServiceTest, PagesHoldEveryVersionNewestFirst) {
+  AddCalibrated();
+  v1::ListCalibrationsResponse page;
+  ASSERT_TRUE(List("rigs/r", 1, "", &page).ok());
+  ASSERT_EQ(page.calibrations_size(), 1);
+  EXPECT_EQ(page.calibrations(0).version(), 2);
+  const std::string token = page.next_page_token();
+  ASSERT_TRUE(List("rigs/r", 1, token, &page).ok());
+  ASSERT_EQ(page.calibrations_size(), 1);
+  EXPECT_EQ(page.calibrations(0).version(), 1);
+}
+
+TEST_F(CalibrationServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
+  v1::ListCalibrationsResponse page;
+  EXPECT_THAT(BadFields(List("", 0, "", &page)), ElementsAre("parent"));
+  ExpectNotFound(List("rigs/r", 0, "", &page), "rigs/r");
+  AddRig();
+  EXPECT_THAT(BadFields(List("rigs/r", -1, "", &page)),
+              ElementsAre("page_size"));
+  EXPECT_THAT(BadFields(List("rigs/r", 1, "x", &page)),
+              ElementsAre("page_token"));
+}
+
+TEST_F(CalibrationServiceTest, WatchBeginsWithTheActiveAndGetsTheNext) {
+  const Rig rig = AddScored(1);
+  Context context;
+  const auto reader = Watch(&context, "rigs/r");
+  v1::Calibration seen;
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 1);
+  const auto run = domain_->CreateManualRun(rig.id);
+  ASSERT_TRUE(run.ok());
+  pipeline_->Publish(FinishRun(rig, run->run));
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 2);
+  context.TryCancel();
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_TRUE(Eventually([&] { return pipeline_->watchers() == 0; }));
+}
+
+TEST_F(CalibrationServiceTest, WatchIsToldOfARollBackAndNoneTwice) {
+  AddCalibrated();
+  Context context;
+  const auto reader = Watch(&context, "rigs/r");
+  v1::Calibration seen;
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 2);
+  v1::Calibration active;
+  ASSERT_TRUE(Activate("rigs/r/calibrations/1", "drifts", &active).ok());
+  EXPECT_EQ(active.version(), 1);
+  EXPECT_EQ(active.state(), v1::Calibration::ACTIVE);
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 1);
+  // What the reader has, activated once more, is not told.
+  pipeline_->Publish(*store_->GetActiveCalibration("r"));
+  ASSERT_TRUE(Activate("rigs/r/calibrations/2", "fine", &active).ok());
+  ASSERT_TRUE(reader->Read(&seen));
+  EXPECT_EQ(seen.version(), 2);
+  context.TryCancel();
+  reader->Finish();
+}
+
+TEST_F(CalibrationServiceTest, RolledBackVersionSaysSo) {
+  AddCalibrated();
+  v1::Calibration read;
+  ASSERT_TRUE(Activate("rigs/r/calibrations/1", "drifts", &read).ok());
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  EXPECT_EQ(read.state(), v1::Calibration::ROLLED_BACK);
+  ASSERT_TRUE(Get("rigs/r/calibrations/active", &read).ok());
+  EXPECT_EQ(read.version(), 1);
+  const StoredEvent event = store_->ListEvents({1000, ""})->items.back();
+  EXPECT_EQ(event.kind, EventKind::kCalibrationRolledBack);
+  EXPECT_THAT(event.detail, ::testing::HasSubstr("by local"));
+  EXPECT_THAT(event.detail, ::testing::HasSubstr("drifts"));
+}
+
+TEST_F(CalibrationServiceTest, ActivationNeedsAVersionAndAReason) {
+  AddCalibrated();
+  v1::Calibration read;
+  for (const std::string name :
+       {"rigs/r", "rigs/r/calibrations/active", "rigs/r/calibrations/x"}) {
+    EXPECT_THAT(BadFields(Activate(name, "why", &read)), ElementsAre("name"));
+  }
+  EXPECT_THAT(BadFields(Activate("rigs/r/calibrations/1", "", &read)),
+              ElementsAre("reason"));
+  EXPECT_THAT(BadFields(Activate(
+                  "rigs/r/calibrations/1", std::string(501, 'x'), &read)),
+              ElementsAre("reason"));
+  ExpectNotFound(Activate("rigs/r/calibrations/9", "why", &read),
+                 "rigs/r/calibrations/9");
+  EXPECT_EQ(store_->GetActiveCalibration("r")->version, 2);
+}
+
+TEST_F(CalibrationServiceTest, WhatItWasJudgedByIsShown) {
+  const Rig rig = AddScored(1);
+  const auto run = domain_->CreateManualRun(rig.id);
+  ASSERT_TRUE(domain_->BeginRun(rig.id, run->run).ok());
+  StoredCalibration rejected = *store_->GetActiveCalibration(rig.id);
+  rejected.state = CalibrationState::kRejected;
+  rejected.reasons = {"does not fit"};
+  rejected.settings = {{"loss", "huber"}};
+  rejected.validation = StoredValidation();
+  rejected.validation->active_version = 1;
+  rejected.validation->checks = {
+      {"held_out_probability", 0.5e-9, 1e-4, CheckOutcome::kFailed, "No fit."},
+      {"halves", 0, 1e-4, CheckOutcome::kNotTested, "Too few."}};
+  rejected.validation->held_out = {5, 3, {99, 26, 0.5e-9}, {20, 26, 0.8}, 4};
+  rejected.verdict = {VerdictKind::kNotTrustworthy, {"does not fit"}};
+  rejected.report = CalibrationResult();
+  rejected.report->segment_fits = {{{"s", 0}, 1.5, 893, {}, "a spike"}};
+  rejected.report->halves = {30, 26, 0.25};
+  rejected.report->noise_factors = {
+      {NoiseKind::kGyro, 3, 0.05, 100, 2.9, true}};
+  ASSERT_TRUE(domain_->FinishRun(rig.id, run->run, rejected).ok());
+  v1::Calibration read;
+  ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());
+  EXPECT_EQ(read.validation().verdict(), v1::Validation::REJECTED);
+  ASSERT_EQ(read.validation().checks_size(), 2);
+  EXPECT_EQ(read.validation().checks(0).value(), 0.5e-9);
+  EXPECT_FALSE(read.validation().checks(0).passed());
+  EXPECT_EQ(read.validation().checks(0).outcome(),
+            v1::Validation::Check::FAILED);
+  EXPECT_EQ(read.validation().checks(0).sentence(), "No fit.");
+  EXPECT_FALSE(read.validation().checks(1).passed());
+  EXPECT_EQ(read.validation().checks(1).outcome(),
+            v1::Validation::Check::NOT_TESTED);
+  EXPECT_EQ(read.verdict().kind(), v1::Verdict::NOT_TRUSTWORTHY);
+  EXPECT_EQ(read.verdict().text(), "not trustworthy");
+  EXPECT_THAT(read.verdict().sentences(), ElementsAre("does not fit"));
+  ASSERT_EQ(read.solver().segment_fits_size(), 1);
+  EXPECT_EQ(read.solver().segment_fits(0).segment(), "rigs/r/segments/s~0");
+  EXPECT_EQ(read.solver().segment_fits(0).inertial_ratio(), 893);
+  EXPECT_EQ(read.solver().segment_fits(0).excluded(), "a spike");
+  EXPECT_EQ(read.solver().halves().chi_square(), 30);
+  EXPECT_EQ(read.solver().halves().probability(), 0.25);
+  EXPECT_EQ(read.solver().noise_factors(0).used(), 2.9);
+  EXPECT_TRUE(read.solver().noise_factors(0).converged());
+  EXPECT_EQ(read.validation().held_out().left_out(), 3);
+  EXPECT_EQ(read.validation().held_out().rescored(), 4);
+  EXPECT_EQ(read.validation().held_out().chi_square(), 99);
+  EXPECT_EQ(read.validation().held_out().active_probability(), 0.8);
+  ASSERT_EQ(read.provenance().settings_size(), 1);
+  EXPECT_EQ(read.provenance().settings(0).name(), "loss");
+  EXPECT_GE(read.provenance().schema_version(), 3);
+  EXPECT_EQ(Activate("rigs/r/calibrations/2", "why not", &read).error_code(),
+            grpc::StatusCode::FAILED_PRECONDITION);
+}
+
+// Near pi the rotation vectors of two versions point to opposite sides.
+TEST_F(CalibrationServiceTest, RotationsAreToldFromTheFactorys) {
+  Rig rig = TestRig("turned");
+  constexpr double kPi = std::numbers::pi;
+  rig.factory.cameras[0].q_CI = Exp({kPi - 0.001, 0, 0});
+  const auto estimate = [&](const Calibration& theta) {
+    StoredCalibration version;
+    version.rig = rig.id;
+    version.theta = theta;
+    const v1::Calibration encoded = Encode(version, StoredRig{rig});
+    for (const auto& one : encoded.estimates()) {
+      if (one.component() == "cam0.q_CI.x") return one;
+    }
+    ADD_FAILURE();
+    return v1::ComponentEstimate();
+  };
+  const auto before = estimate(rig.factory);
+  Calibration turned = rig.factory;
+  turned.cameras[0].q_CI = turned.cameras[0].q_CI * Exp({0.003, 0, 0});
+  const auto after = estimate(turned);
+  EXPECT_GT(std::abs(after.value() - before.value()), 6);
+  EXPECT_NEAR(before.from_factory(), 0, 1e-12);
+  EXPECT_NEAR(after.from_factory(), 0.003, 1e-9);
+}
+
+TEST_F(CalibrationServiceTest, SigmasComeWithTheWalkOfTheRig) {
+  StoredRig rig{TestRig("old")};
+  rig.policy.walk_densities = {{"cam0.focal.x", 0.3}};
+  StoredCalibration version;
+  version.rig = "old";
+  version.theta = rig.rig.factory;
+  int stated = 0;
+  const v1::Calibration encoded = Encode(version, rig);
+  for (const auto& estimate : encoded.estimates()) {
+    if (estimate.component() == "cam0.focal.x") {
+      EXPECT_EQ(estimate.walk(), 0.3);
+      ++stated;
+    } else {
+      EXPECT_NE(estimate.walk(), 0.3) << estimate.component();
+    }
+  }
+  EXPECT_EQ(stated, 1);
+}
+
+TEST_F(CalibrationServiceTest, VersionsAreCompared) {
+  const Rig rig = AddCalibrated();
+  Context context;
+  v1::CompareCalibrationsRequest request;
+  request.set_a("rigs/r/calibrations/1");
+  request.set_b("rigs/r/calibrations/active");
+  v1::CompareCalibrationsResponse compared;
+  ASSERT_TRUE(
+      calibrations_->CompareCalibrations(&context, request, &compared).ok());
+  EXPECT_EQ(compared.version_a(), 1);
+  EXPECT_EQ(compared.version_b(), 2);
+  EXPECT_EQ(compared.differences_size(),
+            static_cast<int>(FreeComponents(rig).size()));
+  EXPECT_EQ(compared.differences(0).component(), "imu.gyro.scale.x");
+  EXPECT_EQ(compared.differences(0).difference(), 0);
+  EXPECT_GT(compared.differences(0).sigma(), 2);
+  EXPECT_FALSE(compared.significant());
+  Context other;
+  AddRig("other");
+  request.set_b("rigs/other/calibrations/1");
+  EXPECT_THAT(
+      BadFields(calibrations_->CompareCalibrations(&other, request, &compared)),
+      ElementsAre("b"));
+  Context missing;
+  request.set_b("rigs/r/calibrations/7");
+  ExpectNotFound(
+      calibrations_->CompareCalibrations(&missing, request, &compared),
+      "rigs/r/calibrations/7");
+}
+
+TEST_F(CalibrationServiceTest, EveryWatcherGetsTheNewVersion) {
+  AddRig();
+  StoredCalibration next = *store_->GetActiveCalibration("r");
+  next.version = 2;
+  std::array<Context, 2> contexts;
+  std::array<std::unique_ptr<grpc::ClientReader<v1::Calibration>>, 2> readers;
+  v1::Calibration seen;
+  for (int i = 0; i < 2; ++i) {
+    readers[i] = Watch(&contexts[i], "rigs/r");
+    ASSERT_TRUE(readers[i]->Read(&seen));
+    EXPECT_EQ(seen.version(), 1);
+  }
+  pipeline_->Publish(next);
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(readers[i]->Read(&seen));
+    EXPECT_EQ(seen.version(), 2);
+    contexts[i].TryCancel();
+    readers[i]->Finish();
+  }
+}
+
+TEST_F(CalibrationServiceTest, SlowWatcherEndsUpWithTheNewest) {
+  AddRig();
+  StoredCalibration next = *store_->GetActiveCalibration("r");
+  Context context;
+  const auto reader = Watch(&context, "rigs/r");
+  v1::Calibration seen;
+  ASSERT_TRUE(reader->Read(&seen));
+  for (next.version = 2; next.version <= 3000; ++next.version) {
+    pipeline_->Publish(next);
+  }
+  std::int64_t before = 1;
+  while (before < 3000 && reader->Read(&seen)) {
+    EXPECT_GT(seen.version(), before);
+    before = seen.version();
+  }
+  EXPECT_EQ(before, 3000);
+  context.TryCancel();
+  reader->Finish();
+}
+
+TEST_F(CalibrationServiceTest, WatchOfAnUnknownRigIsRefused) {
+  v1::Calibration seen;
+  Context unknown;
+  const auto reader = Watch(&unknown, "rigs/r");
+  EXPECT_FALSE(reader->Read(&seen));
+  ExpectNotFound(reader->Finish(), "rigs/r");
+  Context malformed;
+  EXPECT_THAT(BadFields(Watch(&malformed, "r")->Finish()),
+              ElementsAre("parent"));
+}
+
+}  // namespace
+}  // namespace selfcal::server
