@@ -9,6 +9,8 @@
 namespace selfcal::client {
 
 void AddRigCommands(CLI::App* app, Context* context);
+// Adds commands below `rig`.
+void AddRigChanges(CLI::App* rig, Context* context);
 void AddImportCommand(CLI::App* app, Context* context);
 void AddPreflightCommand(CLI::App* app, Context* context);
 void AddSegmentCommands(CLI::App* app, Context* context);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -92,63 +93,69 @@ absl::StatusOr<std::unique_ptr<Sink>> OpenSink(const ExportOptions& options) {
   return sink;
 }
 
-// Returns the names of the segments to export; if none is given, those of all
-// segments with data, oldest first.
-grpc::Status FindNames(Service* stub,
+using OnSegment = std::function<absl::Status(const std::string& name,
+                                             const v1::MotionSegment& segment)>;
+
+// Reads each named segment.
+grpc::Status ReadNamed(Service* stub,
                        const ExportOptions& options,
-                       std::vector<std::string>* names) {
+                       const OnSegment& on_segment,
+                       absl::Status* written) {
   for (const std::string& id : options.segments) {
-    names->push_back(RigName(options.rig) + "/segments/" + LastPart(id));
+    v1::GetSegmentDataRequest request;
+    request.set_name(RigName(options.rig) + "/segments/" + LastPart(id));
+    v1::MotionSegment segment;
+    const auto status =
+        Call<Service>(stub, &Service::GetSegmentData, request, &segment);
+    if (!status.ok()) return status;
+    *written = on_segment(request.name(), segment);
+    if (!written->ok()) break;
   }
-  if (!names->empty()) return grpc::Status::OK;
-  v1::ListSegmentsRequest request;
+  return grpc::Status::OK;
+}
+
+// Reads all segments that meet the filter and have data.
+grpc::Status ReadAll(Service* stub,
+                     const ExportOptions& options,
+                     const OnSegment& on_segment,
+                     absl::Status* written) {
+  v1::DownloadSegmentsRequest request;
   request.set_parent(RigName(options.rig));
-  request.set_filter(options.filter.empty()
-                         ? "has_data = true"
-                         : options.filter + " AND has_data = true");
-  request.set_order_by("receive_time asc");
-  v1::ListSegmentsResponse listed;
-  const auto status =
-      CallForAllPages<Service>(stub, &Service::ListSegments, request, &listed);
-  for (const v1::Segment& segment : listed.segments()) {
-    names->push_back(segment.name());
+  request.set_filter(options.filter);
+  grpc::ClientContext call;
+  const auto reader = stub->DownloadSegments(&call, request);
+  v1::DownloadSegmentsResponse response;
+  while (written->ok() && reader->Read(&response)) {
+    *written = on_segment(response.name(), response.segment());
   }
-  return status;
+  if (!written->ok()) call.TryCancel();
+  const grpc::Status status = reader->Finish();
+  return written->ok() ? status : grpc::Status::OK;
 }
 
 int Export(Context* context, const ExportOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
-  std::vector<std::string> names;
-  const auto found = FindNames(stub.get(), options, &names);
-  if (!found.ok()) return Fail(*context, found);
   auto sink = options.format == "csv" ? OpenSink<CsvFolder>(options)
                                       : OpenSink<JsonLines>(options);
   if (!sink.ok()) return FailInput(sink.status());
   Progress progress("export");
-  int written = 0;
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    progress.Show(k, names.size(), LastPart(names[k]));
-    v1::GetSegmentDataRequest request;
-    request.set_name(names[k]);
-    v1::MotionSegment segment;
-    const auto status =
-        Call<Service>(stub.get(), &Service::GetSegmentData, request, &segment);
-    // The data was dropped since the segment was listed.
-    if (options.segments.empty() &&
-        status.error_code() == grpc::StatusCode::FAILED_PRECONDITION) {
-      continue;
-    }
-    progress.Clear();
-    if (!status.ok()) return Fail(*context, status);
-    const absl::Status added = (*sink)->Add(segment);
-    if (!added.ok()) return FailInput(added);
-    ++written;
-  }
+  std::size_t segments = 0;
+  const auto add = [&](const std::string& name,
+                       const v1::MotionSegment& segment) {
+    progress.Say(fmt::format("{} segments, {}", ++segments, LastPart(name)));
+    return (*sink)->Add(segment);
+  };
+  absl::Status written;
+  const grpc::Status status =
+      options.segments.empty() ? ReadAll(stub.get(), options, add, &written)
+                               : ReadNamed(stub.get(), options, add, &written);
   progress.Clear();
+  if (!status.ok()) return Fail(*context, status);
+  if (!written.ok()) return FailInput(written);
   const absl::Status finished = (*sink)->Finish();
   if (!finished.ok()) return FailInput(finished);
   Facts facts;
-  facts.Add("segments", fmt::format("{}", written));
+  facts.Add("segments", fmt::format("{}", segments));
   facts.Add("written", options.output);
   if (!context->json) context->Print(facts);
   return kDone;

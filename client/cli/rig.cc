@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cctype>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -133,22 +134,45 @@ int Create(Context* context, const RigInput& input) {
   return kDone;
 }
 
-int List(Context* context) {
+struct ListOptions {
+  std::string filter;
+  std::string order_by;
+};
+
+std::string LabelsText(const v1::Rig& rig) {
+  const std::map<std::string, std::string> labels(rig.labels().begin(),
+                                                  rig.labels().end());
+  std::string text;
+  for (const auto& [name, value] : labels) {
+    text += (text.empty() ? "" : " ") + name + "=" + value;
+  }
+  return text;
+}
+
+int List(Context* context, const ListOptions& options) {
   const auto stub = v1::RigService::NewStub(context->Channel());
+  v1::ListRigsRequest request;
+  request.set_filter(options.filter);
+  request.set_order_by(options.order_by);
   v1::ListRigsResponse rigs;
   const auto status = CallForAllPages<Service>(
-      stub.get(), &Service::ListRigs, v1::ListRigsRequest(), &rigs);
+      stub.get(), &Service::ListRigs, request, &rigs);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(rigs);
     return kDone;
   }
-  Table table({{"rig"}, {"cameras", true}, {"table size", true}, {"created"}});
+  Table table({{"rig"},
+               {"cameras", true},
+               {"table size", true},
+               {"created"},
+               {"labels"}});
   for (const v1::Rig& rig : rigs.rigs()) {
     table.Add({LastPart(rig.name()),
                fmt::format("{}", rig.factory().cameras_size()),
                fmt::format("{}", rig.table_size()),
-               TimeText(rig.create_time())});
+               TimeText(rig.create_time()),
+               LabelsText(rig)});
   }
   context->Print(table);
   return kDone;
@@ -256,8 +280,21 @@ void AddRigCommands(CLI::App* app, Context* context) {
   });
 
   CLI::App* list = rig->add_subcommand("list", "List the rigs");
-  list->callback(
-      [context] { context->command = [context] { return List(context); }; });
+  const auto list_options = std::make_shared<ListOptions>();
+  list->add_option("--filter",
+                   list_options->filter,
+                   "Conditions joined by AND, e.g. 'phone AND labels.batch = "
+                   "7': a text in the name, and labels");
+  list->add_option("--order-by",
+                   list_options->order_by,
+                   "name or last_seen, then asc or desc");
+  list->callback([context, list_options] {
+    context->command = [context, list_options] {
+      return List(context, *list_options);
+    };
+  });
+
+  AddRigChanges(rig, context);
 
   CLI::App* show = rig->add_subcommand("show", "Show a rig");
   const auto id = std::make_shared<std::string>();

@@ -269,6 +269,47 @@ int Quarantine(Context* context, const QuarantineOptions& options) {
   return kDone;
 }
 
+struct DeleteOptions {
+  std::string rig;
+  std::string segment;
+  std::string reason;
+};
+
+int Delete(Context* context, const DeleteOptions& options) {
+  const auto stub = v1::SegmentService::NewStub(context->Channel());
+  v1::DeleteSegmentRequest request;
+  request.set_name(RigName(options.rig) + "/segments/" +
+                   LastPart(options.segment));
+  request.set_reason(options.reason);
+  google::protobuf::Empty response;
+  const auto status =
+      Call<Service>(stub.get(), &Service::DeleteSegment, request, &response);
+  if (!status.ok()) return Fail(*context, status);
+  if (!context->json) PrintText(fmt::format("deleted {}\n", request.name()));
+  return kDone;
+}
+
+void AddDelete(CLI::App* segments, Context* context) {
+  const auto options = std::make_shared<DeleteOptions>();
+  CLI::App* remove = segments->add_subcommand(
+      "delete",
+      "Delete a segment that no calibration was computed from. This cannot be "
+      "undone");
+  remove->add_option("RIG", options->rig)->required();
+  remove
+      ->add_option(
+          "SEGMENT", options->segment, "session~index, as in the list")
+      ->required();
+  remove
+      ->add_option("--reason",
+                   options->reason,
+                   "The reason; the event log records it with your name")
+      ->required();
+  remove->callback([context, options] {
+    context->command = [context, options] { return Delete(context, *options); };
+  });
+}
+
 void AddQuarantine(CLI::App* segments, Context* context) {
   const auto options = std::make_shared<QuarantineOptions>();
   CLI::App* quarantine = segments->add_subcommand(
@@ -330,6 +371,7 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   });
 
   AddSegmentDetails(segments, context);
+  AddDelete(segments, context);
   AddQuarantine(segments, context);
   AddSegmentExport(segments, context);
 }

@@ -6,6 +6,7 @@
 #include "server/api/change_feed.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
+#include "server/api/read_rig_query.h"
 #include "server/api/traffic.h"
 #include "server/domain/clock.h"
 #include "server/encode/encode.h"
@@ -54,34 +55,13 @@ v1::RigActivity EncodeRig(const ApiContext& context, const RigSummary& rig) {
   return message;
 }
 
-absl::StatusOr<RigQuery> QueryOf(const v1::ListActivityRequest& request) {
-  RigQuery query;
-  query.text = request.filter();
-  query.order = RigQuery::Order::kLastSeen;
-  query.descending = true;
-  if (request.order_by().empty()) return query;
-  const std::string field = request.order_by().substr(
-      0, request.order_by().find(' '));
-  const std::string direction = request.order_by().substr(field.size());
-  const bool known_field = field == "name" || field == "last_seen";
-  const bool known_direction =
-      direction.empty() || direction == " asc" || direction == " desc";
-  if (!known_field || !known_direction) {
-    return InvalidFields(
-        {{"order_by",
-          "must be name or last_seen, followed by asc, desc or nothing"}});
-  }
-  query.order = field == "name" ? RigQuery::Order::kName
-                                : RigQuery::Order::kLastSeen;
-  query.descending = direction == " desc";
-  return query;
-}
-
 absl::StatusOr<v1::ListActivityResponse> ListActivity(
     const ApiContext& context,
     const Call&,
     const v1::ListActivityRequest& request) {
-  SELFCAL_ASSIGN_OR_RETURN(const RigQuery query, QueryOf(request));
+  RigQuery query{.order = RigQuery::Order::kLastSeen, .descending = true};
+  SELFCAL_RETURN_IF_ERROR(
+      ReadRigQuery(request.filter(), request.order_by(), &query));
   SELFCAL_ASSIGN_OR_RETURN(
       v1::ListActivityResponse response,
       FillPage<v1::ListActivityResponse>(

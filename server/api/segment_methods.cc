@@ -1,3 +1,5 @@
+#include <google/protobuf/empty.pb.h>
+
 #include <algorithm>
 #include <optional>
 
@@ -181,6 +183,61 @@ absl::StatusOr<v1::Table> GetTable(const ApiContext& context,
   return Encode(parts->rig, *table);
 }
 
+absl::Status DownloadSegments(
+    const ApiContext& context,
+    const Call& call,
+    const v1::DownloadSegmentsRequest& request,
+    const Writer<v1::DownloadSegmentsResponse>& write) {
+  const auto rig = ParseRigName(request.parent());
+  if (!rig) return BadName("parent", "rigs/{rig}");
+  SegmentQuery query;
+  if (const auto filter = ParseSegmentFilter(request.filter(), &query);
+      !filter.ok()) {
+    return About(filter, {kSegmentType, "", "filter"});
+  }
+  query.has_data = true;
+  query.descending = false;
+  Page page{kMaxPageSize, ""};
+  do {
+    const auto listed = context.store->ListSegments(*rig, query, page);
+    if (!listed.ok()) {
+      return About(listed.status(), {kRigType, request.parent(), "parent"});
+    }
+    for (const StoredSegment& segment : listed->items) {
+      const auto data = context.store->GetSegmentData(*rig, segment.key);
+      // Dropped since the list was made.
+      if (absl::IsFailedPrecondition(data.status()) ||
+          absl::IsNotFound(data.status())) {
+        continue;
+      }
+      if (!data.ok()) return data.status();
+      v1::DownloadSegmentsResponse response;
+      response.set_name(SegmentName(*rig, segment.key));
+      *response.mutable_segment() = ToProto(*data);
+      if (!write(response) || call.cancelled()) {
+        return absl::CancelledError("the caller has disconnected");
+      }
+    }
+    page.token = listed->next_token;
+  } while (!page.token.empty());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<google::protobuf::Empty> DeleteSegment(
+    const ApiContext& context,
+    const Call& call,
+    const v1::DeleteSegmentRequest& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentNameParts parts,
+                           ParseSegment(request.name()));
+  if (!IsReason(request.reason())) {
+    return InvalidFields({{"reason", std::string(kReasonRule)}});
+  }
+  const absl::Status deleted = context.pipeline->DeleteSegment(
+      parts.rig, parts.key, call.caller.name, request.reason());
+  if (!deleted.ok()) return About(deleted, {kSegmentType, request.name(), {}});
+  return google::protobuf::Empty();
+}
+
 absl::StatusOr<v1::QuarantineSegmentsResponse> QuarantineSegments(
     const ApiContext& context,
     const Call& call,
@@ -223,6 +280,8 @@ void AddSegmentMethods(Methods* methods) {
   methods->Add(GetSegmentResiduals);
   methods->Add(ListTables);
   methods->Add(GetTable);
+  methods->Add(DownloadSegments);
+  methods->Add(DeleteSegment);
   methods->Add(QuarantineSegments);
 }
 

@@ -7,6 +7,7 @@
 
 #include "server/domain/age_trigger.h"
 #include "server/domain/calibration_life.h"
+#include "server/domain/deletion.h"
 #include "server/domain/intake.h"
 #include "server/domain/quotas.h"
 #include "server/domain/run_creation.h"
@@ -20,16 +21,32 @@
 
 namespace selfcal::server {
 
-absl::StatusOr<StoredRig> Domain::CreateRig(const Rig& rig,
-                                            const RigPolicy& policy) {
-  const StoredRig stored{rig, clock_(), policy};
+absl::StatusOr<StoredRig> Domain::CreateRig(const StoredRig& rig) {
+  StoredRig stored = rig;
+  stored.create_time_ns = clock_();
   SELFCAL_RETURN_IF_ERROR(store_->InsertRig(stored, [&](UnitOfWork* tx) {
     SELFCAL_RETURN_IF_ERROR(CheckRigQuota(tx, options_.quotas));
-    SELFCAL_RETURN_IF_ERROR(InsertTables(tx, MakeTables(rig)));
+    SELFCAL_RETURN_IF_ERROR(InsertTables(tx, MakeTables(rig.rig)));
     SELFCAL_RETURN_IF_ERROR(AppendEvent(tx, EventKind::kRigCreated, "created"));
     return StoreFactoryCalibration(tx, stored);
   }));
   return stored;
+}
+
+absl::StatusOr<RigUpdate> Domain::UpdateRig(const std::string& rig,
+                                            const RigChange& change,
+                                            const std::string& caller) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::UpdateRig(tx, change, caller);
+  });
+}
+
+absl::StatusOr<int> Domain::DeleteRig(const std::string& rig,
+                                      const std::string& caller,
+                                      const std::string& reason) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::DeleteRig(tx, caller, reason);
+  });
 }
 
 absl::StatusOr<PutVerdict> Domain::PutSegment(const std::string& rig,
@@ -96,6 +113,15 @@ absl::Status Domain::MarkUnusable(const std::string& rig,
                                   const std::string& problem) {
   return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
     return server::MarkUnusable(tx, key, problem);
+  });
+}
+
+absl::StatusOr<bool> Domain::DeleteSegment(const std::string& rig,
+                                           const SegmentKey& key,
+                                           const std::string& caller,
+                                           const std::string& reason) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::DeleteSegment(tx, key, caller, reason);
   });
 }
 

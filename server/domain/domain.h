@@ -24,6 +24,7 @@
 #include "server/domain/domain_options.h"
 #include "server/domain/memory.h"
 #include "server/domain/quarantine.h"
+#include "server/domain/rig_update.h"
 #include "server/domain/score_commit.h"
 #include "server/store/store.h"
 
@@ -45,8 +46,20 @@ class Domain {
   // --- Rigs. Creates the rig with its factory calibration as version 1,
   // active, and its empty tables. ALREADY_EXISTS; RESOURCE_EXHAUSTED where the
   // quota of rigs leaves no room.
+  absl::StatusOr<StoredRig> CreateRig(const StoredRig& rig);
   absl::StatusOr<StoredRig> CreateRig(const Rig& rig,
-                                      const RigPolicy& policy = {});
+                                      const RigPolicy& policy = {}) {
+    return CreateRig(StoredRig{rig, 0, policy});
+  }
+
+  // UpdateRig of rig_update.h.
+  absl::StatusOr<RigUpdate> UpdateRig(const std::string& rig,
+                                      const RigChange& change,
+                                      const std::string& caller);
+  // DeleteRig of deletion.h.
+  absl::StatusOr<int> DeleteRig(const std::string& rig,
+                                const std::string& caller,
+                                const std::string& reason);
 
   // --- Segments. `segment` must be valid for the rig. The same key again
   // changes nothing. RESOURCE_EXHAUSTED where a quota leaves no room.
@@ -94,6 +107,11 @@ class Domain {
   // stored: an event records who did it and why. A run under way that uses one
   // of them ends with a rejected calibration. NOT_FOUND if nothing is stored of
   // it.
+  // DeleteSegment of deletion.h.
+  absl::StatusOr<bool> DeleteSegment(const std::string& rig,
+                                     const SegmentKey& key,
+                                     const std::string& caller,
+                                     const std::string& reason);
   absl::StatusOr<QuarantineCommit> QuarantineSegments(
       const std::string& rig,
       const std::string& session,

@@ -44,6 +44,7 @@ v1::RigActivity Encode(const RigSummary& rig) {
   const TableFill fill = FillOf(rig.tables);
   message.set_table_entries(fill.entries);
   message.set_table_capacity(fill.capacity);
+  message.mutable_labels()->insert(rig.labels.begin(), rig.labels.end());
   AddAlarms(rig, &message);
   return message;
 }

@@ -133,6 +133,7 @@ v1::TableExclusion Encode(const std::string& rig, const TableAbsence& absence) {
 v1::Rig Encode(const StoredRig& rig) {
   v1::Rig message = ToProto(rig.rig);
   PutPolicy(rig.policy, &message);
+  message.mutable_labels()->insert(rig.labels.begin(), rig.labels.end());
   SetTime(rig.create_time_ns, message.mutable_create_time());
   return message;
 }

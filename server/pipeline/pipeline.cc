@@ -178,6 +178,49 @@ class PipelineImpl : public Pipeline {
     recalibrator_.EndSession(rig);
   }
 
+  absl::StatusOr<StoredRig> UpdateRig(const std::string& rig,
+                                      const RigChange& change,
+                                      const std::string& caller) override {
+    SELFCAL_ASSIGN_OR_RETURN(RigUpdate update,
+                             domain_->UpdateRig(rig, change, caller));
+    spdlog::info("{} has changed rig {}", caller, rig);
+    if (update.rescore) {
+      SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
+                               store_->GetActiveCalibration(rig));
+      RescoreKept(domain_, estimators_, rig, active.theta);
+    }
+    return std::move(update.rig);
+  }
+
+  absl::Status DeleteRig(const std::string& rig,
+                         const std::string& caller,
+                         const std::string& reason) override {
+    SELFCAL_RETURN_IF_ERROR(scoring_.Delete(
+        rig, [&] { return domain_->DeleteRig(rig, caller, reason); }));
+    spdlog::warn("{} has deleted rig {}: {}", caller, rig, reason);
+    return absl::OkStatus();
+  }
+
+  absl::Status DeleteSegment(const std::string& rig,
+                             const SegmentKey& key,
+                             const std::string& caller,
+                             const std::string& reason) override {
+    SELFCAL_RETURN_IF_ERROR(
+        scoring_.Delete(rig, [&]() -> absl::StatusOr<int> {
+          SELFCAL_ASSIGN_OR_RETURN(
+              const bool waiting,
+              domain_->DeleteSegment(rig, key, caller, reason));
+          return waiting ? 1 : 0;
+        }));
+    spdlog::warn("{} has deleted segment {}~{} of rig {}: {}",
+                 caller,
+                 key.session,
+                 key.index,
+                 rig,
+                 reason);
+    return absl::OkStatus();
+  }
+
   absl::StatusOr<QuarantineCommit> QuarantineSegments(
       const std::string& rig,
       const std::string& session,

@@ -158,6 +158,20 @@ class Pipeline {
   // run once it is scored (Domain::StartSessionRuns). Does not wait for that.
   virtual void EndSession(const std::string& rig) = 0;
 
+  // Domain::UpdateRig; scores the stored segments anew if the prior has changed.
+  virtual absl::StatusOr<StoredRig> UpdateRig(const std::string& rig,
+                                              const RigChange& change,
+                                              const std::string& caller) = 0;
+  // Domain::DeleteRig, once no segment of the rig is being scored.
+  virtual absl::Status DeleteRig(const std::string& rig,
+                                 const std::string& caller,
+                                 const std::string& reason) = 0;
+  // Domain::DeleteSegment, once no segment of the rig is being scored.
+  virtual absl::Status DeleteSegment(const std::string& rig,
+                                     const SegmentKey& key,
+                                     const std::string& caller,
+                                     const std::string& reason) = 0;
+
   // Domain::QuarantineSegments.
   virtual absl::StatusOr<QuarantineCommit> QuarantineSegments(
       const std::string& rig,

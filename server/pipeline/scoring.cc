@@ -132,6 +132,27 @@ absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
   return commit;
 }
 
+absl::Status ScoringWorkers::Delete(
+    const std::string& rig,
+    const std::function<absl::StatusOr<int>()>& change) {
+  absl::StatusOr<int> waiting = absl::UnknownError("");
+  {
+    std::unique_lock lock(mutex_);
+    const auto deleting = deleting_.insert(rig);
+    changed_.wait(lock, [&] {
+      const auto first = claimed_.lower_bound(
+          {rig, std::numeric_limits<std::int64_t>::min()});
+      return first == claimed_.end() || first->first != rig;
+    });
+    waiting = change();
+    if (waiting.ok()) backlog_ -= *waiting;
+    deleting_.erase(deleting);
+    ++arrivals_;  // what was passed over meanwhile is looked at again
+  }
+  changed_.notify_all();
+  return waiting.status();
+}
+
 void ScoringWorkers::Run() {
   while (const std::optional<Claim> claim = NextClaim()) {
     Process(*claim);
@@ -145,8 +166,9 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
     // Listed under the lock: a segment is in the list, or its FillPlace is yet
     // to come and wakes this thread.
     const std::int64_t seen = arrivals_;
-    const auto unscored =
-        store_->ListUnscored(static_cast<int>(claimed_.size()) + 1);
+    const auto unscored = store_->ListUnscored(
+        deleting_.empty() ? static_cast<int>(claimed_.size()) + 1
+                          : std::numeric_limits<int>::max());
     if (!unscored.ok()) {
       spdlog::error("cannot list what to score: {}",
                     unscored.status().ToString());
@@ -154,6 +176,7 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
       continue;
     }
     for (const Claim& candidate : *unscored) {
+      if (deleting_.contains(candidate.rig)) continue;
       if (claimed_.emplace(candidate.rig, candidate.sequence).second) {
         return candidate;
       }

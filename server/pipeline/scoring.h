@@ -58,6 +58,12 @@ class ScoringWorkers {
       const std::string& rig,
       const std::function<absl::StatusOr<QuarantineCommit>()>& change);
 
+  // Deletes segments of the rig by `change`, while none of them is being
+  // scored; it returns how many were waiting for their scores, whose places are
+  // given back. Errors of `change`.
+  absl::Status Delete(const std::string& rig,
+                      const std::function<absl::StatusOr<int>()>& change);
+
  private:
   using Claim = Store::Unscored;
   // What is computed of a segment.
@@ -96,6 +102,7 @@ class ScoringWorkers {
   std::set<std::int64_t> waiting_;  // for a place; the lowest is next
   std::int64_t arrivals_ = 0;       // segments stored since the start
   std::set<std::pair<std::string, std::int64_t>> claimed_;  // rig, sequence
+  std::multiset<std::string> deleting_;  // rigs of which no segment is claimed
   std::vector<std::thread> threads_;
 };
 

@@ -98,6 +98,8 @@ std::string SerializeRig(const StoredRig& rig) {
   store::RigRecord record;
   *record.mutable_rig() = ToProto(rig.rig);
   PutPolicy(rig.policy, record.mutable_rig());
+  record.mutable_rig()->mutable_labels()->insert(rig.labels.begin(),
+                                                 rig.labels.end());
   return record.SerializeAsString();
 }
 
@@ -114,6 +116,7 @@ absl::StatusOr<StoredRig> ParseRig(std::string_view bytes,
       !GetPolicy(record.rig(), &rig.policy).empty()) {
     return DamagedRecord(what);
   }
+  rig.labels.insert(record.rig().labels().begin(), record.rig().labels().end());
   return rig;
 }
 

@@ -3,15 +3,12 @@
 #include <fmt/format.h>
 
 #include "server/store/checksum.h"
-#include "server/store/paging.h"
 #include "server/store/records.h"
 #include "server/store/statement.h"
 #include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
-
-constexpr char kList[] = "rigs";
 
 absl::Status NoSuchRig(const std::string& rig) {
   return absl::NotFoundError(
@@ -36,6 +33,22 @@ absl::StatusOr<std::vector<std::string>> ReadNames(Statement* read) {
   return names;
 }
 
+absl::Status InsertLabels(Connection* db,
+                          std::int64_t row,
+                          const StoredRig& rig) {
+  for (const auto& [name, value] : rig.labels) {
+    SELFCAL_RETURN_IF_ERROR(
+        Statement(db,
+                  "INSERT INTO rig_labels (rig, name, value) "
+                  "VALUES (?1, ?2, ?3)",
+                  row,
+                  name,
+                  value)
+            .Run());
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig) {
@@ -58,7 +71,64 @@ absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig) {
                 BlobView{bytes},
                 BlobView{sha256})
           .Run());
-  return LastInsertedRow(db);
+  const std::int64_t row = LastInsertedRow(db);
+  SELFCAL_RETURN_IF_ERROR(InsertLabels(db, row, rig));
+  return row;
+}
+
+absl::Status WriteRig(UnitOfWork* tx, const StoredRig& rig) {
+  const std::string bytes = SerializeRig(rig);
+  const std::string sha256 = Sha256(bytes);
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(tx->db(),
+                "UPDATE rigs SET definition = ?2, sha256 = ?3 WHERE rig = ?1",
+                tx->rig_row(),
+                BlobView{bytes},
+                BlobView{sha256})
+          .Run());
+  SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
+                                    "DELETE FROM rig_labels WHERE rig = ?1",
+                                    tx->rig_row())
+                              .Run());
+  return InsertLabels(tx->db(), tx->rig_row(), rig);
+}
+
+absl::Status DeleteRigRows(UnitOfWork* tx) {
+  const auto run = [&](const std::string& sql) {
+    return Statement(tx->db(), sql, tx->rig_row()).Run();
+  };
+  SELFCAL_RETURN_IF_ERROR(
+      run("UPDATE rigs SET deleting = 1 WHERE rig = ?1"));
+  // Each before what it refers to.
+  for (const char* table : {"table_absences",
+                            "segment_scores",
+                            "segment_information",
+                            "segment_paths"}) {
+    SELFCAL_RETURN_IF_ERROR(
+        run(fmt::format("DELETE FROM {} WHERE segment IN "
+                        "(SELECT segment FROM segments WHERE rig = ?1)",
+                        table)));
+  }
+  for (const char* table : {"payloads",
+                            "segment_ends",
+                            "table_entries",
+                            "tables",
+                            "disagreements",
+                            "validations",
+                            "activations",
+                            "change_groups",
+                            "changes",
+                            "calibration_segments",
+                            "calibrations",
+                            "run_segments",
+                            "runs",
+                            "segments",
+                            "rig_labels",
+                            "rigs"}) {
+    SELFCAL_RETURN_IF_ERROR(
+        run(fmt::format("DELETE FROM {} WHERE rig = ?1", table)));
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig) {
@@ -107,26 +177,6 @@ absl::StatusOr<std::vector<std::string>> IdleRigNames(
                  "AND last_seen_ns <= ?1 ORDER BY rig",
                  idle_since_ns);
   return ReadNames(&read);
-}
-
-absl::StatusOr<Listed<StoredRig>> ListRigRows(Connection* db,
-                                              const Page& page) {
-  SELFCAL_ASSIGN_OR_RETURN(const auto after, PageKey(kList, page));
-  const int size = PageSize(page);
-  Statement read(db,
-                 "SELECT id, create_time_ns, definition, sha256 "
-                 "FROM rigs WHERE id > ?1 ORDER BY id LIMIT ?2",
-                 after.value_or(""),
-                 size + 1);
-  Listed<StoredRig> listed;
-  while (read.Next()) {
-    SELFCAL_ASSIGN_OR_RETURN(StoredRig stored, RigFromRow(read, 0));
-    listed.items.push_back(std::move(stored));
-  }
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  CutPage(
-      kList, size, [](const auto& item) { return item.rig.id; }, &listed);
-  return listed;
 }
 
 }  // namespace selfcal::server

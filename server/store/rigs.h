@@ -14,6 +14,10 @@ namespace selfcal::server {
 
 // Returns its row. ALREADY_EXISTS.
 absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig);
+// Replaces the definition and the labels of the rig.
+absl::Status WriteRig(UnitOfWork* tx, const StoredRig& rig);
+// Deletes everything that is stored of the rig, except its events.
+absl::Status DeleteRigRows(UnitOfWork* tx);
 
 // NOT_FOUND.
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig);
@@ -27,8 +31,5 @@ absl::StatusOr<std::vector<std::string>> RigNames(Connection* db);
 // Store::ListIdleRigs.
 absl::StatusOr<std::vector<std::string>> IdleRigNames(
     Connection* db, std::int64_t idle_since_ns);
-
-// By name.
-absl::StatusOr<Listed<StoredRig>> ListRigRows(Connection* db, const Page& page);
 
 }  // namespace selfcal::server

@@ -92,6 +92,12 @@ absl::StatusOr<std::vector<SegmentRow>> SegmentsOfSession(
   return ReadRows(&read);
 }
 
+absl::StatusOr<std::int64_t> CountUnscored(UnitOfWork* tx) {
+  return ReadInt(tx->db(),
+                 "SELECT count(*) FROM segments WHERE rig = ?1 AND state = 1",
+                 tx->rig_row());
+}
+
 absl::StatusOr<bool> HasUnscored(UnitOfWork* tx) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t found,
                            ReadInt(tx->db(),
@@ -246,8 +252,28 @@ absl::Status WriteProblem(UnitOfWork* tx,
       .Run();
 }
 
+absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t segment) {
+  SegmentUsers users;
+  Statement version(tx->db(),
+                    "SELECT max(version) FROM calibration_segments "
+                    "WHERE segment = ?1",
+                    segment);
+  if (version.Next() && !version.IsNull(0)) users.version = version.Int(0);
+  SELFCAL_RETURN_IF_ERROR(version.status());
+  Statement run(tx->db(),
+                "SELECT max(r.run) FROM run_segments x JOIN runs r "
+                "  ON r.rig = x.rig AND r.run = x.run "
+                "WHERE x.segment = ?1 AND r.state IN (1, 2)",
+                segment);
+  if (run.Next() && !run.IsNull(0)) users.unfinished_run = run.Int(0);
+  SELFCAL_RETURN_IF_ERROR(run.status());
+  return users;
+}
+
 absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t segment) {
-  for (const char* table : {"payloads",
+  for (const char* table : {"table_entries",
+                            "run_segments",
+                            "payloads",
                             "table_absences",
                             "segment_scores",
                             "segment_information",

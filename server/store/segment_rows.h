@@ -79,6 +79,7 @@ absl::StatusOr<std::vector<SegmentRow>> SegmentsOfSession(
     std::optional<std::int64_t> index);
 // Stored and not scored yet.
 absl::StatusOr<bool> HasUnscored(UnitOfWork* tx);
+absl::StatusOr<std::int64_t> CountUnscored(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> CountScored(UnitOfWork* tx,
                                          std::int64_t first_sequence);
 // 0 if there are none.
@@ -142,7 +143,14 @@ absl::Status WriteUnusable(UnitOfWork* tx,
 absl::Status WriteProblem(UnitOfWork* tx,
                           std::int64_t segment,
                           const std::string& problem);
-// All that is known of it. Nothing may refer to it.
+// Who refers to a segment, so that it cannot be deleted.
+struct SegmentUsers {
+  std::optional<std::int64_t> version;         // the newest computed from it
+  std::optional<std::int64_t> unfinished_run;  // that has it in its snapshot
+};
+absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t segment);
+// All that is known of it; it leaves the snapshots of runs that have ended, and
+// tables. Neither a calibration nor an unfinished run may refer to it.
 absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t segment);
 
 }  // namespace selfcal::server

@@ -18,6 +18,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -68,6 +69,7 @@ struct StoredRig {
   Rig rig;
   std::int64_t create_time_ns = 0;  // since the Unix epoch
   RigPolicy policy = {};
+  std::map<std::string, std::string> labels = {};
 };
 
 struct StoredSegment {
@@ -229,6 +231,7 @@ struct StoredChange {
 struct RigSummary {
   std::string rig;
   std::int64_t create_time_ns = 0;
+  std::map<std::string, std::string> labels;
   std::int64_t last_seen_ns = 0;  // its newest segment arrived; 0: none so far
   std::int64_t active_version = 0;
   std::int64_t active_since_ns = 0;
@@ -273,9 +276,13 @@ class Store {
 
   // --- Rigs.
   virtual absl::StatusOr<StoredRig> GetRig(const std::string& rig) = 0;
-  virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) = 0;
-  // Reads no more than the page, however many rigs there are, unless it looks
-  // for a text.
+  // Both read no more than the page, however many rigs there are, unless the
+  // query has conditions.
+  virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const RigQuery& query,
+                                                     const Page& page) = 0;
+  absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) {
+    return ListRigs({}, page);
+  }
   virtual absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
       const RigQuery& query, const Page& page) = 0;
   virtual absl::StatusOr<std::vector<std::string>> ListRigNames() = 0;

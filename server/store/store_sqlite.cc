@@ -14,7 +14,7 @@
 #include "server/store/maintenance_sqlite.h"
 #include "server/store/payload.h"
 #include "server/store/restore.h"
-#include "server/store/rig_summaries.h"
+#include "server/store/rig_lists.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
@@ -83,8 +83,10 @@ class SqliteStore : public Store {
         [&](Connection* db) { return IdleRigNames(db, idle_since_ns); });
   }
 
-  absl::StatusOr<Listed<StoredRig>> ListRigs(const Page& page) override {
-    return Read([&](Connection* db) { return ListRigRows(db, page); });
+  using Store::ListRigs;
+  absl::StatusOr<Listed<StoredRig>> ListRigs(const RigQuery& query,
+                                             const Page& page) override {
+    return Read([&](Connection* db) { return ListRigRows(db, query, page); });
   }
 
   absl::StatusOr<Listed<RigSummary>> ListRigSummaries(

@@ -21,6 +21,9 @@ enum class EventKind {
   kRunHeldBack,
   kSegmentQuarantined,  // by a run, neighbours, or by hand
   kCoresDisagree,       // a verification found a difference
+  kRigUpdated,          // by hand, as the next two
+  kRigDeleted,
+  kSegmentDeleted,
 };
 
 struct StoredEvent {

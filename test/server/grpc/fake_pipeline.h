@@ -72,6 +72,27 @@ class FakePipeline final : public Pipeline {
     ended_.push_back(rig);
   }
 
+  absl::StatusOr<StoredRig> UpdateRig(const std::string& rig,
+                                      const RigChange& change,
+                                      const std::string& caller) override {
+    auto update = domain_->UpdateRig(rig, change, caller);
+    if (!update.ok()) return update.status();
+    return std::move(update->rig);
+  }
+
+  absl::Status DeleteRig(const std::string& rig,
+                         const std::string& caller,
+                         const std::string& reason) override {
+    return domain_->DeleteRig(rig, caller, reason).status();
+  }
+
+  absl::Status DeleteSegment(const std::string& rig,
+                             const SegmentKey& key,
+                             const std::string& caller,
+                             const std::string& reason) override {
+    return domain_->DeleteSegment(rig, key, caller, reason).status();
+  }
+
   absl::StatusOr<QuarantineCommit> QuarantineSegments(
       const std::string& rig,
       const std::string& session,

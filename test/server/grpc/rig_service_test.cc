@@ -204,5 +204,129 @@ TEST_F(RigServiceTest, PageIsCutToWhatAClientReceivesByDefault) {
   EXPECT_EQ(rigs, 100);
 }
 
+TEST_F(RigServiceTest, UpdateChangesWhatTheMaskNamesAndNothingElse) {
+  v1::Rig rig = ToProto(TestRig("r"));
+  (*rig.mutable_labels())["batch"] = "7";
+  ASSERT_TRUE(Create(rig).ok());
+  v1::UpdateRigRequest request;
+  request.mutable_rig()->set_name("rigs/r");
+  request.mutable_rig()->set_min_gain_nats(3);
+  request.mutable_rig()->set_retrigger_fraction(0.25);
+  request.mutable_update_mask()->add_paths("min_gain_nats");
+  v1::Rig updated;
+  {
+    Context context;
+    const auto status = rigs_->UpdateRig(&context, request, &updated);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+  }
+  EXPECT_EQ(updated.min_gain_nats(), 3);
+  EXPECT_EQ(updated.retrigger_fraction(), TestRig("r").retrigger_fraction);
+  EXPECT_EQ(updated.labels().at("batch"), "7");
+  // A field of the mask that is not set gets its default.
+  request.mutable_rig()->clear_min_gain_nats();
+  request.mutable_update_mask()->add_paths("labels");
+  {
+    Context context;
+    ASSERT_TRUE(rigs_->UpdateRig(&context, request, &updated).ok());
+  }
+  EXPECT_EQ(updated.min_gain_nats(), 1);
+  EXPECT_TRUE(updated.labels().empty());
+  // Without a mask: what is set.
+  request.clear_update_mask();
+  {
+    Context context;
+    ASSERT_TRUE(rigs_->UpdateRig(&context, request, &updated).ok());
+  }
+  EXPECT_EQ(updated.retrigger_fraction(), 0.25);
+  v1::Rig read;
+  ASSERT_TRUE(Get("rigs/r", &read).ok());
+  EXPECT_EQ(read.retrigger_fraction(), 0.25);
+}
+
+TEST_F(RigServiceTest, UpdateOfWhatCannotChangeSaysWhy) {
+  ASSERT_TRUE(Create(ToProto(TestRig("r"))).ok());
+  v1::UpdateRigRequest request;
+  *request.mutable_rig() = ToProto(TestRig("r"));
+  for (const char* path : {"factory", "groups", "imu_noise", "colour"}) {
+    request.mutable_update_mask()->add_paths(path);
+  }
+  Context context;
+  v1::Rig updated;
+  const auto status = rigs_->UpdateRig(&context, request, &updated);
+  EXPECT_THAT(BadFields(status),
+              ElementsAre("update_mask.factory",
+                          "update_mask.groups",
+                          "update_mask.imu_noise",
+                          "update_mask.colour"));
+  EXPECT_THAT(status.error_message(), HasSubstr("versions never change"));
+  Context missing;
+  request.clear_update_mask();
+  request.mutable_rig()->set_name("rigs/none");
+  ExpectNotFound(rigs_->UpdateRig(&missing, request, &updated), "rigs/none");
+}
+
+TEST_F(RigServiceTest, LabelsFollowTheirRules) {
+  v1::Rig rig = ToProto(TestRig("r"));
+  (*rig.mutable_labels())["Batch"] = "7";
+  EXPECT_THAT(BadFields(Create(rig)), ElementsAre("rig.labels"));
+  rig.clear_labels();
+  (*rig.mutable_labels())["batch"] = "two\nlines";
+  EXPECT_THAT(BadFields(Create(rig)), ElementsAre("rig.labels.batch"));
+  rig.clear_labels();
+  for (int k = 0; k < 65; ++k) {
+    (*rig.mutable_labels())["k" + std::to_string(k)] = "";
+  }
+  EXPECT_THAT(BadFields(Create(rig)), ElementsAre("rig.labels"));
+}
+
+TEST_F(RigServiceTest, ListIsFilteredAndSorted) {
+  for (const char* id : {"phone-1", "phone-2", "tablet"}) {
+    v1::Rig rig = ToProto(TestRig(id));
+    (*rig.mutable_labels())["batch"] = id == std::string("phone-2") ? "8" : "7";
+    ASSERT_TRUE(Create(rig).ok());
+  }
+  const auto list = [&](const std::string& filter,
+                        const std::string& order_by) {
+    Context context;
+    v1::ListRigsRequest request;
+    request.set_filter(filter);
+    request.set_order_by(order_by);
+    v1::ListRigsResponse response;
+    const auto status = rigs_->ListRigs(&context, request, &response);
+    std::vector<std::string> names;
+    for (const v1::Rig& rig : response.rigs()) names.push_back(rig.name());
+    if (!status.ok()) names = BadFields(status);
+    return names;
+  };
+  EXPECT_THAT(list("labels.batch = 7", "name desc"),
+              ElementsAre("rigs/tablet", "rigs/phone-1"));
+  EXPECT_THAT(list("phone AND labels.batch = \"7\"", ""),
+              ElementsAre("rigs/phone-1"));
+  EXPECT_THAT(list("colour = red", ""), ElementsAre("filter"));
+  EXPECT_THAT(list("", "colour"), ElementsAre("order_by"));
+}
+
+TEST_F(RigServiceTest, DeletedRigIsGone) {
+  AddScored(1);
+  v1::DeleteRigRequest request;
+  request.set_name("rigs/r");
+  google::protobuf::Empty nothing;
+  {
+    Context context;
+    EXPECT_THAT(BadFields(rigs_->DeleteRig(&context, request, &nothing)),
+                ElementsAre("reason"));
+  }
+  request.set_reason("sold");
+  {
+    Context context;
+    const auto status = rigs_->DeleteRig(&context, request, &nothing);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+  }
+  v1::Rig read;
+  ExpectNotFound(Get("rigs/r", &read), "rigs/r");
+  Context context;
+  ExpectNotFound(rigs_->DeleteRig(&context, request, &nothing), "rigs/r");
+}
+
 }  // namespace
 }  // namespace selfcal::server

@@ -281,5 +281,62 @@ TEST_F(SegmentServiceTest, TableOfAnUnknownGroupOrRigIsNotFound) {
   ExpectNotFound(Tables("rigs/nobody", &tables), "rigs/nobody");
 }
 
+TEST_F(SegmentServiceTest, DownloadSendsWhatIsStoredOldestFirst) {
+  const Rig rig = AddRig();
+  for (const char* session : {"a", "b"}) {
+    for (const MotionSegment& segment : TestSegments(rig, 2, session)) {
+      ASSERT_TRUE(domain_->PutSegment(rig.id, segment).ok());
+    }
+  }
+  ASSERT_TRUE(domain_->MarkUnusable("r", {"b", 0}, "test").ok());
+  const auto download = [&](const std::string& filter) {
+    Context context;
+    v1::DownloadSegmentsRequest request;
+    request.set_parent("rigs/r");
+    request.set_filter(filter);
+    const auto reader = segments_->DownloadSegments(&context, request);
+    std::vector<std::string> names;
+    v1::DownloadSegmentsResponse response;
+    while (reader->Read(&response)) {
+      names.push_back(response.name());
+      EXPECT_GT(response.segment().keyframes().t_ns_size(), 0);
+    }
+    const auto status = reader->Finish();
+    if (!status.ok()) names = BadFields(status);
+    return names;
+  };
+  EXPECT_THAT(download(""),
+              ElementsAre("rigs/r/segments/a~0",
+                          "rigs/r/segments/a~1",
+                          "rigs/r/segments/b~1"));
+  EXPECT_THAT(download("session = a"),
+              ElementsAre("rigs/r/segments/a~0", "rigs/r/segments/a~1"));
+  EXPECT_THAT(download("colour = 1"), ElementsAre("filter"));
+}
+
+TEST_F(SegmentServiceTest, DeletedSegmentIsGone) {
+  const Rig rig = AddRig();
+  const MotionSegment segment = TestSegments(rig, 1)[0];
+  ASSERT_TRUE(domain_->PutSegment(rig.id, segment).ok());
+  v1::DeleteSegmentRequest request;
+  request.set_name("rigs/r/segments/s~0");
+  google::protobuf::Empty nothing;
+  {
+    Context context;
+    EXPECT_THAT(
+        BadFields(segments_->DeleteSegment(&context, request, &nothing)),
+        ElementsAre("reason"));
+  }
+  request.set_reason("private");
+  {
+    Context context;
+    const auto status = segments_->DeleteSegment(&context, request, &nothing);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+  }
+  Context context;
+  ExpectNotFound(segments_->DeleteSegment(&context, request, &nothing),
+                 "rigs/r/segments/s~0");
+}
+
 }  // namespace
 }  // namespace selfcal::server

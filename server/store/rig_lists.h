@@ -14,4 +14,9 @@ absl::StatusOr<Listed<RigSummary>> ListSummaryRows(Connection* db,
                                                    const RigQuery& query,
                                                    const Page& page);
 
+// The same with the definitions of the rigs.
+absl::StatusOr<Listed<StoredRig>> ListRigRows(Connection* db,
+                                              const RigQuery& query,
+                                              const Page& page);
+
 }  // namespace selfcal::server

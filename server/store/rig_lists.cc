@@ -1,11 +1,16 @@
-#include "server/store/rig_summaries.h"
+#include "server/store/rig_lists.h"
 
 #include <fmt/format.h>
 
 #include <charconv>
 #include <limits>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "server/store/paging.h"
+#include "server/store/rigs.h"
 #include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
@@ -24,11 +29,19 @@ struct Place {
   std::string id;
 };
 
+// A line for each label, between line feeds. Names and values have none.
+std::string LinesOf(const std::map<std::string, std::string>& labels) {
+  std::string lines = "\n";
+  for (const auto& [name, value] : labels) lines += name + "=" + value + "\n";
+  return lines;
+}
+
 std::string ListOf(const RigQuery& query) {
-  return fmt::format("rigs by {}{} with {}",
+  return fmt::format("rigs by {}{} with {}{}",
                      query.order == RigQuery::Order::kName ? "name" : "seen",
                      query.descending ? " desc" : "",
-                     query.text);
+                     query.text,
+                     LinesOf(query.labels));
 }
 
 std::string KeyOf(const RigSummary& summary) {
@@ -72,6 +85,9 @@ std::string SqlOf(const RigQuery& query) {
   return fmt::format(
       "SELECT rig, id, create_time_ns, last_seen_ns FROM rigs "
       "WHERE {} AND (?4 = '' OR instr(id, ?4) > 0) AND ?1 IS NOT NULL "
+      "AND (?6 = 0 OR ?6 = "
+      "  (SELECT count(*) FROM rig_labels l WHERE l.rig = rigs.rig "
+      "   AND instr(?5, char(10) || l.name || '=' || l.value || char(10)) > 0)) "
       "ORDER BY {} LIMIT ?3",
       place,
       order);
@@ -81,8 +97,14 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
                                             const RigQuery& query,
                                             const Place& place,
                                             int limit) {
-  Statement read(
-      db, SqlOf(query), place.last_seen_ns, place.id, limit, query.text);
+  Statement read(db,
+                 SqlOf(query),
+                 place.last_seen_ns,
+                 place.id,
+                 limit,
+                 query.text,
+                 LinesOf(query.labels),
+                 static_cast<std::int64_t>(query.labels.size()));
   std::vector<Found> found;
   while (read.Next()) {
     Found rig;
@@ -121,7 +143,14 @@ absl::Status ReadVersions(Connection* db,
   return newest.status();
 }
 
+absl::Status ReadLabels(Connection* db, std::int64_t rig, RigSummary* summary) {
+  Statement read(db, "SELECT name, value FROM rig_labels WHERE rig = ?1", rig);
+  while (read.Next()) summary->labels[read.Text(0)] = read.Text(1);
+  return read.status();
+}
+
 absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
+  SELFCAL_RETURN_IF_ERROR(ReadLabels(db, rig, summary));
   SELFCAL_RETURN_IF_ERROR(ReadVersions(db, rig, summary));
   SELFCAL_ASSIGN_OR_RETURN(summary->tables, ReadTables(db, rig));
   Statement run(db,
@@ -141,26 +170,48 @@ absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
   return absl::OkStatus();
 }
 
+// A page of what `read` makes of each rig that is found.
+template <typename Item, typename Read>
+absl::StatusOr<Listed<Item>> ListFound(Connection* db,
+                                       const RigQuery& query,
+                                       const Page& page,
+                                       const Read& read) {
+  SELFCAL_ASSIGN_OR_RETURN(const Place place, PlaceOf(query, page));
+  const int size = PageSize(page);
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Found> found,
+                           FindRigs(db, query, place, size + 1));
+  Listed<Item> listed;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    if (static_cast<int>(k) == size) {
+      listed.next_token =
+          MakePageToken(ListOf(query), KeyOf(found[k - 1].summary));
+      break;
+    }
+    SELFCAL_ASSIGN_OR_RETURN(Item item, read(found[k]));
+    listed.items.push_back(std::move(item));
+  }
+  return listed;
+}
+
 }  // namespace
 
 absl::StatusOr<Listed<RigSummary>> ListSummaryRows(Connection* db,
                                                    const RigQuery& query,
                                                    const Page& page) {
-  SELFCAL_ASSIGN_OR_RETURN(const Place place, PlaceOf(query, page));
-  const int size = PageSize(page);
-  SELFCAL_ASSIGN_OR_RETURN(std::vector<Found> found,
-                           FindRigs(db, query, place, size + 1));
-  Listed<RigSummary> listed;
-  for (Found& rig : found) {
-    if (static_cast<int>(listed.items.size()) == size) {
-      listed.next_token =
-          MakePageToken(ListOf(query), KeyOf(listed.items.back()));
-      break;
-    }
-    SELFCAL_RETURN_IF_ERROR(ReadRest(db, rig.rowid, &rig.summary));
-    listed.items.push_back(std::move(rig.summary));
-  }
-  return listed;
+  return ListFound<RigSummary>(
+      db, query, page, [db](const Found& found) -> absl::StatusOr<RigSummary> {
+        RigSummary summary = found.summary;
+        SELFCAL_RETURN_IF_ERROR(ReadRest(db, found.rowid, &summary));
+        return summary;
+      });
+}
+
+absl::StatusOr<Listed<StoredRig>> ListRigRows(Connection* db,
+                                              const RigQuery& query,
+                                              const Page& page) {
+  return ListFound<StoredRig>(db, query, page, [db](const Found& found) {
+    return ReadRig(db, found.summary.rig);
+  });
 }
 
 }  // namespace selfcal::server

@@ -1,0 +1,234 @@
+// rig update, rig delete.
+#include <absl/strings/numbers.h>
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/cli/commands.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/rig.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using google::protobuf::util::TimeUtil;
+using Service = v1::RigService::StubInterface;
+
+struct UpdateOptions {
+  std::string rig;
+  std::vector<std::string> labels;  // name=value
+  std::vector<std::string> removed_labels;
+  std::vector<std::string> prior_sigmas;    // pattern=value
+  std::vector<std::string> walk_densities;  // pattern=value
+  std::optional<double> min_gain_nats;
+  std::optional<double> retrigger_fraction;
+  std::optional<double> table_max_age_s;
+  std::optional<double> min_interval_s;
+  std::optional<double> calibration_max_age_s;
+};
+
+// Splits at the first '=', since a name has none.
+std::optional<std::pair<std::string, std::string>> SplitPair(
+    const std::string& text) {
+  const auto equals = text.find('=');
+  if (equals == text.npos || equals == 0) return std::nullopt;
+  return std::pair(text.substr(0, equals), text.substr(equals + 1));
+}
+
+absl::Status NotAPair(const std::string& text, const char* form) {
+  return absl::InvalidArgumentError(
+      fmt::format("'{}' is not of the form {}", text, form));
+}
+
+absl::Status ReadSettings(
+    const std::vector<std::string>& texts,
+    google::protobuf::RepeatedPtrField<v1::ComponentSetting>* settings) {
+  for (const std::string& text : texts) {
+    const auto pair = SplitPair(text);
+    double value = 0;
+    if (!pair || !absl::SimpleAtod(pair->second, &value)) {
+      return NotAPair(text, "COMPONENT=NUMBER");
+    }
+    v1::ComponentSetting* added = settings->Add();
+    added->set_pattern(pair->first);
+    added->set_value(value);
+  }
+  return absl::OkStatus();
+}
+
+void SetSeconds(const std::optional<double>& seconds,
+                const char* field,
+                google::protobuf::Duration* duration,
+                v1::UpdateRigRequest* request) {
+  if (!seconds) return;
+  *duration = TimeUtil::NanosecondsToDuration(
+      static_cast<std::int64_t>(*seconds * 1e9));
+  request->mutable_update_mask()->add_paths(field);
+}
+
+// Applies the options to the labels of the rig as it is.
+absl::Status ReadLabels(const UpdateOptions& options,
+                        const v1::Rig& rig,
+                        v1::UpdateRigRequest* request) {
+  if (options.labels.empty() && options.removed_labels.empty()) {
+    return absl::OkStatus();
+  }
+  auto& labels = *request->mutable_rig()->mutable_labels();
+  labels = rig.labels();
+  for (const std::string& text : options.labels) {
+    const auto pair = SplitPair(text);
+    if (!pair) return NotAPair(text, "NAME=VALUE");
+    labels[pair->first] = pair->second;
+  }
+  for (const std::string& name : options.removed_labels) labels.erase(name);
+  request->mutable_update_mask()->add_paths("labels");
+  return absl::OkStatus();
+}
+
+absl::Status ReadRequest(const UpdateOptions& options,
+                         const v1::Rig& rig,
+                         v1::UpdateRigRequest* request) {
+  v1::Rig* update = request->mutable_rig();
+  update->set_name(RigName(options.rig));
+  auto* mask = request->mutable_update_mask();
+  absl::Status status = ReadLabels(options, rig, request);
+  if (!status.ok()) return status;
+  if (!options.prior_sigmas.empty()) mask->add_paths("prior_sigmas");
+  status = ReadSettings(options.prior_sigmas, update->mutable_prior_sigmas());
+  if (!status.ok()) return status;
+  if (!options.walk_densities.empty()) mask->add_paths("walk_densities");
+  status =
+      ReadSettings(options.walk_densities, update->mutable_walk_densities());
+  if (!status.ok()) return status;
+  if (options.min_gain_nats) {
+    update->set_min_gain_nats(*options.min_gain_nats);
+    mask->add_paths("min_gain_nats");
+  }
+  if (options.retrigger_fraction) {
+    update->set_retrigger_fraction(*options.retrigger_fraction);
+    mask->add_paths("retrigger_fraction");
+  }
+  SetSeconds(options.table_max_age_s,
+             "table_max_age",
+             update->mutable_table_max_age(),
+             request);
+  SetSeconds(options.min_interval_s,
+             "recalibration_min_interval",
+             update->mutable_recalibration_min_interval(),
+             request);
+  SetSeconds(options.calibration_max_age_s,
+             "calibration_max_age",
+             update->mutable_calibration_max_age(),
+             request);
+  if (mask->paths().empty()) {
+    return absl::InvalidArgumentError(
+        "nothing to change; `selfcal rig update --help` lists what can be");
+  }
+  return absl::OkStatus();
+}
+
+int Update(Context* context, const UpdateOptions& options) {
+  const auto stub = v1::RigService::NewStub(context->Channel());
+  v1::GetRigRequest get;
+  get.set_name(RigName(options.rig));
+  v1::Rig rig;
+  auto status = Call<Service>(stub.get(), &Service::GetRig, get, &rig);
+  if (!status.ok()) return Fail(*context, status);
+  v1::UpdateRigRequest request;
+  const absl::Status read = ReadRequest(options, rig, &request);
+  if (!read.ok()) return FailInput(read);
+  status = Call<Service>(stub.get(), &Service::UpdateRig, request, &rig);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(rig);
+    return kDone;
+  }
+  Facts facts;
+  for (const std::string& field : request.update_mask().paths()) {
+    facts.Add("changed", field);
+  }
+  context->Print(facts);
+  return kDone;
+}
+
+struct DeleteOptions {
+  std::string rig;
+  std::string reason;
+};
+
+int Delete(Context* context, const DeleteOptions& options) {
+  const auto stub = v1::RigService::NewStub(context->Channel());
+  v1::DeleteRigRequest request;
+  request.set_name(RigName(options.rig));
+  request.set_reason(options.reason);
+  google::protobuf::Empty response;
+  const auto status =
+      Call<Service>(stub.get(), &Service::DeleteRig, request, &response);
+  if (!status.ok()) return Fail(*context, status);
+  if (!context->json) PrintText(fmt::format("deleted {}\n", request.name()));
+  return kDone;
+}
+
+void AddUpdate(CLI::App* rig, Context* context) {
+  const auto options = std::make_shared<UpdateOptions>();
+  CLI::App* update = rig->add_subcommand(
+      "update", "Change the labels, tolerances or thresholds of a rig");
+  update->add_option("RIG", options->rig)->required();
+  update->add_option(
+      "--label", options->labels, "NAME=VALUE: add or change; repeatable");
+  update->add_option("--remove-label", options->removed_labels, "repeatable");
+  update->add_option("--prior-sigma",
+                     options->prior_sigmas,
+                     "COMPONENT=VALUE: replaces all prior sigmas; repeatable");
+  update->add_option("--walk-density",
+                     options->walk_densities,
+                     "COMPONENT=VALUE [unit/sqrt(day)]: replaces all walk "
+                     "densities; repeatable");
+  update->add_option("--min-gain",
+                     options->min_gain_nats,
+                     "Minimum gain of a segment to enter a table [nat]");
+  update->add_option("--retrigger-fraction",
+                     options->retrigger_fraction,
+                     "Fraction of the table entries that must be new to "
+                     "trigger another run");
+  update->add_option("--table-max-age",
+                     options->table_max_age_s,
+                     "Age at which segments leave the tables [s]; 0: none");
+  update->add_option("--min-interval",
+                     options->min_interval_s,
+                     "Minimum time between runs [s]; 0: none");
+  update->add_option("--calibration-max-age",
+                     options->calibration_max_age_s,
+                     "Age of the active version that triggers a run [s]; 0: "
+                     "none");
+  update->callback([context, options] {
+    context->command = [context, options] { return Update(context, *options); };
+  });
+}
+
+}  // namespace
+
+void AddRigChanges(CLI::App* rig, Context* context) {
+  AddUpdate(rig, context);
+  const auto options = std::make_shared<DeleteOptions>();
+  CLI::App* remove = rig->add_subcommand(
+      "delete",
+      "Delete a rig with all its segments, runs and calibrations. This cannot "
+      "be undone");
+  remove->add_option("RIG", options->rig)->required();
+  remove
+      ->add_option("--reason",
+                   options->reason,
+                   "The reason; the event log records it with your name")
+      ->required();
+  remove->callback([context, options] {
+    context->command = [context, options] { return Delete(context, *options); };
+  });
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,62 @@
+#include "server/domain/deletion.h"
+
+#include <fmt/format.h>
+
+#include "server/store/events.h"
+#include "server/store/rigs.h"
+#include "server/store/runs.h"
+#include "server/store/segment_rows.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+
+absl::StatusOr<bool> DeleteSegment(UnitOfWork* tx,
+                                   const SegmentKey& key,
+                                   const std::string& caller,
+                                   const std::string& reason) {
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentUsers users,
+                           UsersOf(tx, segment.rowid));
+  const std::string text = SegmentText(tx->rig(), key);
+  if (users.unfinished_run) {
+    return absl::FailedPreconditionError(fmt::format(
+        "run {} uses {}; cancel it, or try again when it has ended",
+        *users.unfinished_run,
+        text));
+  }
+  if (users.version) {
+    return absl::FailedPreconditionError(fmt::format(
+        "version {} was computed from {}, and a version keeps its origin; "
+        "quarantine the segment so that no later version uses it, or delete "
+        "the rig",
+        *users.version,
+        text));
+  }
+  SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, segment.rowid));
+  SELFCAL_RETURN_IF_ERROR(
+      AppendEvent(tx,
+                  EventKind::kSegmentDeleted,
+                  fmt::format("{} by {}: {}", text, caller, reason)));
+  return segment.state == SegmentState::kStored;
+}
+
+absl::StatusOr<int> DeleteRig(UnitOfWork* tx,
+                              const std::string& caller,
+                              const std::string& reason) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t unfinished, UnfinishedRun(tx));
+  if (unfinished != 0) {
+    return absl::FailedPreconditionError(fmt::format(
+        "run {} of rig {} has not ended; cancel it first",
+        unfinished,
+        tx->rig()));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t waiting, CountUnscored(tx));
+  SELFCAL_RETURN_IF_ERROR(
+      AppendEvent(tx,
+                  EventKind::kRigDeleted,
+                  fmt::format("by {}: {}", caller, reason)));
+  SELFCAL_RETURN_IF_ERROR(DeleteRigRows(tx));
+  return static_cast<int>(waiting);
+}
+
+}  // namespace selfcal::server

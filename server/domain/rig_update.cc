@@ -1,0 +1,50 @@
+#include "server/domain/rig_update.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "server/store/events.h"
+#include "server/store/records.h"
+#include "server/store/rigs.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+namespace {
+
+// The rig without what can change, to compare the rest.
+std::string Unchanging(StoredRig rig) {
+  rig.policy = {};
+  rig.labels.clear();
+  rig.rig.prior_sigmas.clear();
+  rig.rig.min_gain_nats = 0;
+  rig.rig.retrigger_fraction = 0;
+  rig.rig.reweight_noise = false;
+  return SerializeRig(rig);
+}
+
+}  // namespace
+
+absl::StatusOr<RigUpdate> UpdateRig(UnitOfWork* tx,
+                                    const RigChange& change,
+                                    const std::string& caller) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig before, ReadRig(tx));
+  SELFCAL_ASSIGN_OR_RETURN(StoredRig after, change(before));
+  after.create_time_ns = before.create_time_ns;
+  if (Unchanging(before) != Unchanging(after)) {
+    return absl::InvalidArgumentError(
+        "only labels, prior_sigmas, thresholds, ages and reweight_noise of a "
+        "rig can change: what is stored was computed with the rest; create "
+        "another rig");
+  }
+  if (SerializeRig(before) == SerializeRig(after)) {
+    return RigUpdate{std::move(after), false};
+  }
+  SELFCAL_RETURN_IF_ERROR(WriteRig(tx, after));
+  SELFCAL_RETURN_IF_ERROR(AppendEvent(
+      tx, EventKind::kRigUpdated, fmt::format("changed by {}", caller)));
+  const bool rescore = PriorSigmas(before.rig) != PriorSigmas(after.rig);
+  return RigUpdate{std::move(after), rescore};
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,42 @@
+// The terms of the filter and the order of a list request, as text. Internal to
+// server/encode.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+namespace selfcal::server {
+
+// A condition, e.g. gain.camera >= 2. A word alone is a condition, too: it has
+// a value only.
+struct FilterTerm {
+  std::string field;
+  std::string group;  // after the dot of the field, if there is one
+  std::string sign;   // = < <= > >=
+  std::string value;
+};
+
+// Calls `apply` for each condition, which are joined by AND, until it fails.
+// INVALID_ARGUMENT says where and what was expected.
+absl::Status ForEachTerm(
+    std::string_view filter,
+    const std::function<absl::Status(const FilterTerm& term)>& apply);
+
+// A field to sort by, then asc or desc.
+struct ListOrder {
+  std::string field;
+  bool descending = false;
+};
+// `direction` is used if the text has none. The text must not be empty.
+absl::StatusOr<ListOrder> ParseOrder(std::string_view order_by,
+                                     std::string_view direction);
+
+// INVALID_ARGUMENT: "'`what`' is not `expected`".
+absl::Status NotWhatIsExpected(std::string_view what,
+                               std::string_view expected);
+
+}  // namespace selfcal::server

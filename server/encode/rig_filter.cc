@@ -1,0 +1,40 @@
+#include "server/encode/rig_filter.h"
+
+#include "server/encode/filter_terms.h"
+#include "server/store/status_macros.h"
+
+namespace selfcal::server {
+
+absl::Status ParseRigFilter(std::string_view filter, RigQuery* query) {
+  return ForEachTerm(filter, [query](const FilterTerm& term) -> absl::Status {
+    if (term.field.empty()) {
+      if (!query->text.empty()) {
+        return NotWhatIsExpected(term.value,
+                                 "a condition: give one text for the name");
+      }
+      query->text = term.value;
+      return absl::OkStatus();
+    }
+    if (term.field != "labels" || term.group.empty() || term.sign != "=") {
+      return NotWhatIsExpected(
+          term.field, "a condition: labels.NAME = VALUE, or a text alone");
+    }
+    query->labels[term.group] = term.value;
+    return absl::OkStatus();
+  });
+}
+
+absl::Status ParseRigOrder(std::string_view order_by, RigQuery* query) {
+  if (order_by.empty()) return absl::OkStatus();
+  SELFCAL_ASSIGN_OR_RETURN(const ListOrder order, ParseOrder(order_by, "asc"));
+  if (order.field != "name" && order.field != "last_seen") {
+    return NotWhatIsExpected(order.field,
+                             "a field to sort by: name or last_seen");
+  }
+  query->order = order.field == "name" ? RigQuery::Order::kName
+                                       : RigQuery::Order::kLastSeen;
+  query->descending = order.descending;
+  return absl::OkStatus();
+}
+
+}  // namespace selfcal::server

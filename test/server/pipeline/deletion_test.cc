@@ -1,0 +1,120 @@
+// Deletion beside scoring: whatever is being scored is waited for, and nothing
+// of a deleted rig comes back.
+#include <future>
+
+#include "test/server/pipeline/pipeline_test.h"
+
+namespace selfcal::server {
+namespace {
+
+class DeletionTest : public PipelineTest {
+ protected:
+  ~DeletionTest() override {
+    blocked_ = false;
+    pipeline_.reset();
+  }
+
+  void BlockScores() {
+    blocked_ = true;
+    estimators_.score =
+        [this](const Rig& rig, const Calibration&, const MotionSegment& s) {
+          ++scoring_;
+          while (blocked_) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+          }
+          return FakeInformation(rig, EntropyOf(s.key.index));
+        };
+  }
+
+  bool AScoreIsUnderWay() {
+    return Eventually([&] { return scoring_ > 0; });
+  }
+
+  void CreateRig() {
+    Rig rig = TestRig("a");
+    rig.table_size = 8;
+    ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  }
+
+  std::atomic<bool> blocked_ = false;
+  std::atomic<int> scoring_ = 0;
+};
+
+TEST_F(DeletionTest, RigIsDeletedOnceNothingOfItIsScoredAndCanBeMadeAgain) {
+  options_.max_backlog = 3;
+  BlockScores();
+  CreateRig();
+  StartOne();
+  for (int k = 0; k < 3; ++k) Submit(k);
+  ASSERT_TRUE(AScoreIsUnderWay());
+  auto deleted = std::async(std::launch::async, [&] {
+    return pipeline_->DeleteRig("a", "eve", "sold");
+  });
+  // It waits for the segment at hand.
+  EXPECT_EQ(deleted.wait_for(std::chrono::milliseconds(100)),
+            std::future_status::timeout);
+  EXPECT_TRUE(store_->GetRig("a").ok());
+  blocked_ = false;
+  const absl::Status status = deleted.get();
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_TRUE(absl::IsNotFound(store_->GetRig("a").status()));
+  // Every place of the backlog is free again.
+  CreateRig();
+  for (int k = 0; k < 4; ++k) Submit(k);
+  ASSERT_TRUE(AllScored());
+  EXPECT_EQ(store_->ListSegments("a", Page())->items.size(), 4u);
+}
+
+TEST_F(DeletionTest, SegmentThatWaitsForItsScoreGivesItsPlaceBack) {
+  options_.max_backlog = 2;
+  BlockScores();
+  CreateRig();
+  StartOne();
+  for (int k = 0; k < 2; ++k) Submit(k);
+  ASSERT_TRUE(AScoreIsUnderWay());
+  auto deleted = std::async(std::launch::async, [&] {
+    return pipeline_->DeleteSegment("a", {"s", 1}, "eve", "private");
+  });
+  EXPECT_EQ(deleted.wait_for(std::chrono::milliseconds(100)),
+            std::future_status::timeout);
+  blocked_ = false;
+  EXPECT_TRUE(deleted.get().ok());
+  for (int k = 2; k < 5; ++k) Submit(k);
+  ASSERT_TRUE(AllScored());
+  EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("a", {"s", 1}).status()));
+  EXPECT_EQ(store_->ListSegments("a", Page())->items.size(), 4u);
+}
+
+TEST_F(DeletionTest, OtherTolerancesScoreWhatIsKeptAnew) {
+  CreateRig();
+  std::atomic<int> scored = 0;
+  estimators_.ends = CoreEstimators().ends;
+  estimators_.score =
+      [&](const Rig& rig, const Calibration&, const MotionSegment& s) {
+        ++scored;
+        return FakeInformation(rig, EntropyOf(s.key.index));
+      };
+  StartOne();
+  for (int k = 0; k < 2; ++k) Submit(k);
+  ASSERT_TRUE(AllScored());
+  ASSERT_EQ(scored, 2);
+  const auto update = [&](const std::function<void(StoredRig*)>& change) {
+    return pipeline_->UpdateRig(
+        "a",
+        [&](const StoredRig& before) -> absl::StatusOr<StoredRig> {
+          StoredRig after = before;
+          change(&after);
+          return after;
+        },
+        "eve");
+  };
+  ASSERT_TRUE(update([](StoredRig* rig) { rig->labels["a"] = "b"; }).ok());
+  EXPECT_EQ(scored, 2);
+  ASSERT_TRUE(update([](StoredRig* rig) {
+                rig->rig.prior_sigmas.push_back({"imu.gyro.scale.*", 0.001});
+              }).ok());
+  EXPECT_EQ(scored, 4);
+}
+
+}  // namespace
+}  // namespace selfcal::server
