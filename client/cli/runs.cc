@@ -96,6 +96,26 @@ int Cancel(Context* context, const RunOptions& options) {
   return kDone;
 }
 
+int ShowConvergence(Context* context, const RunOptions& options) {
+  const auto stub = v1::RecalibrationService::NewStub(context->Channel());
+  v1::Recalibration run;
+  const auto status =
+      Ask(stub.get(), &Service::GetRecalibration, options, &run);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(run);
+    return kDone;
+  }
+  Table table({{"iteration", true}, {"cost", true}, {"step [sigma]", true}});
+  for (const v1::ConvergenceStep& step : run.convergence()) {
+    table.Add({fmt::format("{}", step.iteration()),
+               fmt::format("{:.6g}", step.cost()),
+               fmt::format("{:.3g}", step.step_sigmas())});
+  }
+  context->Print(table);
+  return kDone;
+}
+
 }  // namespace
 
 void AddRunCommands(CLI::App* app, Context* context) {
@@ -126,6 +146,10 @@ void AddRunCommands(CLI::App* app, Context* context) {
       "Wait for the end of a run and show the result; exits with 1 if the "
       "result was rejected. With --json, prints a line for each iteration",
       Watch);
+  add("convergence",
+      "Show the iterations of a run that has computed a version; --json has the "
+      "estimate of each parameter, too",
+      ShowConvergence);
   add("cancel",
       "Cancel a run that has not ended; its result is discarded",
       Cancel);

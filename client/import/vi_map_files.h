@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "client/import/vi_map.pb.h"
+#include "selfcal/vi_map/vi_map.pb.h"
 
 namespace selfcal::client {
 

@@ -59,7 +59,9 @@ absl::StatusOr<v1::ListActivityResponse> ListActivity(
     const ApiContext& context,
     const Call&,
     const v1::ListActivityRequest& request) {
-  RigQuery query{.order = RigQuery::Order::kLastSeen, .descending = true};
+  RigQuery query;
+  query.order = RigQuery::Order::kLastSeen;
+  query.descending = true;
   SELFCAL_RETURN_IF_ERROR(
       ReadRigQuery(request.filter(), request.order_by(), &query));
   SELFCAL_ASSIGN_OR_RETURN(

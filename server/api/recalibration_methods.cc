@@ -48,7 +48,7 @@ absl::StatusOr<v1::Recalibration> GetRecalibration(
   SELFCAL_ASSIGN_OR_RETURN(const RunId id, ParseRun(request.name()));
   const auto run = context.store->GetRun(id.rig, id.run);
   if (!run.ok()) return About(run.status(), {kType, request.name(), {}});
-  return EncodeWithReport(context.store, *run, {});
+  return EncodeWithConvergence(context.store, *run);
 }
 
 absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(

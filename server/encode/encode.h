@@ -36,5 +36,9 @@ v1::Recalibration Encode(const StoredRun& run,
 // Does the same, with the solver's report, which it reads from the store.
 absl::StatusOr<v1::Recalibration> EncodeWithReport(
     Store* store, const StoredRun& run, const CalibrateProgress& progress);
+// The same with the iterations of the solver.
+absl::StatusOr<v1::Recalibration> EncodeWithConvergence(Store* store,
+                                                        const StoredRun& run);
+
 
 }  // namespace selfcal::server

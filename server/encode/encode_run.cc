@@ -40,11 +40,11 @@ v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
   return v1::Recalibration::TRIGGER_UNSPECIFIED;
 }
 
-// Components that the rig holds fixed have no sigma and are skipped.
-void FillProgress(const CalibrateProgress& progress,
-                  v1::Recalibration* message) {
+// Components that the rig holds fixed have no sigma and are skipped. The message
+// is a Recalibration or a ConvergenceStep.
+template <typename Message>
+void FillProgress(const CalibrateProgress& progress, Message* message) {
   message->set_iteration(progress.iteration);
-  message->set_max_iterations(progress.max_iterations);
   message->set_cost(progress.cost);
   message->set_step_sigmas(progress.step_sigmas);
   if (progress.sigmas.size() == 0) return;
@@ -79,6 +79,7 @@ v1::Recalibration Encode(const StoredRun& run,
     message.add_segments(SegmentName(run.rig, key));
   }
   FillProgress(progress, &message);
+  message.set_max_iterations(progress.max_iterations);
   message.set_message(run.message);
   message.set_attempts(run.attempts);
   if (run.calibration_version != 0) {
@@ -101,6 +102,19 @@ absl::StatusOr<v1::Recalibration> EncodeWithReport(
       const StoredCalibration calibration,
       store->GetCalibration(run.rig, run.calibration_version));
   return Encode(run, progress, &calibration);
+}
+
+absl::StatusOr<v1::Recalibration> EncodeWithConvergence(Store* store,
+                                                        const StoredRun& run) {
+  if (run.calibration_version == 0) return Encode(run, {}, nullptr);
+  SELFCAL_ASSIGN_OR_RETURN(
+      const StoredCalibration calibration,
+      store->GetCalibration(run.rig, run.calibration_version));
+  v1::Recalibration message = Encode(run, {}, &calibration);
+  for (const CalibrateProgress& step : calibration.steps) {
+    FillProgress(step, message.add_convergence());
+  }
+  return message;
 }
 
 }  // namespace selfcal::server

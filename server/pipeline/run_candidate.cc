@@ -43,6 +43,7 @@ absl::StatusOr<StoredCalibration> Recalibrator::FindCandidate(
   candidate.program_version = options_.program_version;
   candidate.settings = RunSettings(options, run.change);
   candidate.report = std::move(result);
+  candidate.steps = StepsOf(run.rig, run.run);
   candidate.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin)
           .count();

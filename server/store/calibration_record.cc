@@ -211,6 +211,32 @@ CalibrationResult GetSolver(const SolverRecord& record) {
   return result;
 }
 
+void PutStep(const CalibrateProgress& step, store::StepRecord* record) {
+  record->set_iteration(step.iteration);
+  record->set_max_iterations(step.max_iterations);
+  record->set_cost(step.cost);
+  record->set_step_sigmas(step.step_sigmas);
+  if (step.sigmas.size() == 0) return;
+  *record->mutable_theta() = ToProto(step.theta);
+  record->mutable_moved()->Add(step.moved.begin(), step.moved.end());
+  record->mutable_sigmas()->Add(step.sigmas.begin(), step.sigmas.end());
+}
+
+bool GetStep(const store::StepRecord& record, CalibrateProgress* step) {
+  step->iteration = record.iteration();
+  step->max_iterations = record.max_iterations();
+  step->cost = record.cost();
+  step->step_sigmas = record.step_sigmas();
+  if (record.sigmas().empty()) return true;
+  if (!FromProto(record.theta(), "", &step->theta).empty()) return false;
+  const int size = TangentSize(step->theta);
+  if (record.moved_size() != size || record.sigmas_size() != size) return false;
+  step->moved = Eigen::Map<const Eigen::VectorXd>(record.moved().data(), size);
+  step->sigmas =
+      Eigen::Map<const Eigen::VectorXd>(record.sigmas().data(), size);
+  return true;
+}
+
 }  // namespace
 
 std::string SerializeCalibration(const StoredCalibration& calibration) {
@@ -230,6 +256,9 @@ std::string SerializeCalibration(const StoredCalibration& calibration) {
     auto* setting = record.add_settings();
     setting->set_name(name);
     setting->set_value(value);
+  }
+  for (const CalibrateProgress& step : calibration.steps) {
+    PutStep(step, record.add_steps());
   }
   return record.SerializeAsString();
 }
@@ -258,6 +287,11 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
   calibration.schema_version = record.schema_version();
   for (const auto& setting : record.settings()) {
     calibration.settings.emplace_back(setting.name(), setting.value());
+  }
+  for (const store::StepRecord& step : record.steps()) {
+    if (!GetStep(step, &calibration.steps.emplace_back())) {
+      return DamagedRecord(what);
+    }
   }
   return calibration;
 }

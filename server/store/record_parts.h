@@ -12,7 +12,7 @@
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
 #include "selfcal/v1/calibration.pb.h"
-#include "server/store/records.pb.h"
+#include "selfcal/store/records.pb.h"
 
 namespace selfcal::server {
 

@@ -1,5 +1,5 @@
 // Between the values of the store and the bytes of its blobs
-// (records.proto). Doubles come back as they were, to the bit.
+// (proto/selfcal/store/records.proto). Doubles come back as they were, to the bit.
 //
 // The parsing functions return DATA_LOSS for bytes that are not what they
 // should be, naming `what`.

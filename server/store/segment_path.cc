@@ -4,7 +4,7 @@
 
 #include "server/store/checksum.h"
 #include "server/store/record_parts.h"
-#include "server/store/records.pb.h"
+#include "selfcal/store/records.pb.h"
 #include "server/store/statement.h"
 #include "server/store/status_macros.h"
 

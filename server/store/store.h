@@ -175,6 +175,7 @@ struct StoredCalibration {
   // Name and value of what shaped the run's result.
   std::vector<std::pair<std::string, std::string>> settings;
   std::optional<CalibrationResult> report;     // of the solver
+  std::vector<CalibrateProgress> steps;        // the iterations of the solver
   std::optional<StoredValidation> validation;  // of one that was a candidate
   Verdict verdict;                             // the same
   double seconds = 0;                          // it took

@@ -6,7 +6,7 @@
 #include "server/store/record_parts.h"
 #include "server/store/records.h"
 #include "server/store/segment_ends.h"
-#include "server/worker/job.pb.h"
+#include "selfcal/worker/job.pb.h"
 
 namespace selfcal::server {
 namespace {

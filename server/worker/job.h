@@ -1,5 +1,5 @@
-// Serialisation of the input and result of a calibration or a score
-// (job.proto), for a worker. Doubles are exact, bit for bit.
+// Serialisation of the input and result of a calibration or a score, for a
+// worker (proto/selfcal/worker/job.proto). Doubles are exact, bit for bit.
 #pragma once
 
 #include <absl/status/statusor.h>

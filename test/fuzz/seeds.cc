@@ -1,6 +1,6 @@
 #include "test/fuzz/seeds.h"
 
-#include "client/import/vi_map.pb.h"
+#include "selfcal/vi_map/vi_map.pb.h"
 #include "core/simulation/simulate.h"
 #include "proto/convert.h"
 

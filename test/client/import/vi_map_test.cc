@@ -10,7 +10,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "client/import/vi_map.pb.h"
+#include "selfcal/vi_map/vi_map.pb.h"
 #include "core/factor/inertial.h"
 #include "core/factor/reprojection.h"
 #include "core/model/so3.h"

@@ -7,7 +7,7 @@
 #include "core/selection/joint_selection.h"
 #include "proto/convert.h"
 #include "server/store/records.h"
-#include "server/store/records.pb.h"
+#include "selfcal/store/records.pb.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {

@@ -121,6 +121,37 @@ TEST_P(LifecycleTest, DatabaseLetsOnlyCandidatesAndTheFactorysBegin) {
   }
 }
 
+TEST_P(LifecycleTest, IterationsOfARunAreKeptWithItsCandidate) {
+  const StoredRun run = Begin();
+  StoredCalibration found = Found(CalibrationState::kCandidate);
+  const auto size = found.covariance.rows();
+  for (int k = 1; k <= 2; ++k) {
+    CalibrateProgress step;
+    step.iteration = k;
+    step.max_iterations = 30;
+    step.cost = 10.5 / k;
+    step.step_sigmas = 0.25 / k;
+    step.theta = found.theta;
+    step.moved = Eigen::VectorXd::Constant(size, 0.5 * k);
+    step.sigmas = Eigen::VectorXd::Constant(size, 2.0 * k);
+    found.steps.push_back(step);
+  }
+  ASSERT_TRUE(domain_->StoreCandidate("a", run.run, found).ok());
+  Reopen();
+  const auto kept = store_->GetCandidate("a", run.run);
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  ASSERT_EQ(kept->steps.size(), 2u);
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(kept->steps[k].iteration, found.steps[k].iteration);
+    EXPECT_EQ(kept->steps[k].max_iterations, 30);
+    EXPECT_EQ(kept->steps[k].cost, found.steps[k].cost);
+    EXPECT_EQ(kept->steps[k].step_sigmas, found.steps[k].step_sigmas);
+    ExpectSameCalibration(kept->steps[k].theta, found.steps[k].theta);
+    EXPECT_EQ(kept->steps[k].moved, found.steps[k].moved);
+    EXPECT_EQ(kept->steps[k].sigmas, found.steps[k].sigmas);
+  }
+}
+
 TEST_P(LifecycleTest, CandidateIsKeptUntilItIsJudged) {
   const StoredRun run = Begin();
   EXPECT_TRUE(absl::IsNotFound(store_->GetCandidate("a", run.run).status()));

@@ -37,6 +37,16 @@ function withStep(steps: Step[], run: Recalibration): Step[] {
   return [...steps, step].sort((a, b) => a.iteration - b.iteration);
 }
 
+// The iterations as the daemon keeps them once the run has ended.
+function stepsOf(run: Recalibration): Step[] {
+  return run.convergence.map((step) => ({
+    iteration: step.iteration,
+    cost: step.cost,
+    step: step.stepSigmas,
+    parameters: step.parameters,
+  }));
+}
+
 interface Progress {
   steps: Step[]; // all iterations from the first
   now: Recalibration | null;
@@ -119,6 +129,7 @@ export function RunPage(props: { rig: string; run: string; version: number }) {
       <Loaded read={read}>
         {(run) => {
           const shown = isRunning(run) && now ? { ...run, ...now } : run;
+          const iterations = steps.length > 0 ? steps : stepsOf(run);
           return (
             <>
               <Figures
@@ -134,8 +145,8 @@ export function RunPage(props: { rig: string; run: string; version: number }) {
               {shown.message && <p class="warning">{shown.message}</p>}
               {isRunning(shown) && (error ? <Problem error={error} /> : <Going run={shown} />)}
               <Report run={run} />
-              {steps.length > 0 && <Convergence steps={steps} />}
-              {isRunning(shown) && steps.length === 0 && (
+              {iterations.length > 0 && <Convergence steps={iterations} />}
+              {isRunning(shown) && iterations.length === 0 && (
                 <Empty>Iterations are shown here as they are computed.</Empty>
               )}
               <h2>Segments</h2>
