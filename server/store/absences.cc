@@ -7,7 +7,7 @@
 
 namespace selfcal::server {
 
-// As in kFits.
+// The numbers in kFits.
 static_assert(static_cast<int>(AbsenceCause::kDoesNotFit) == 8 &&
               static_cast<int>(AbsenceCause::kManyOutliers) == 9);
 

@@ -1,4 +1,4 @@
-// Why tables do not hold a segment, in the database.
+// Records of exclusions: why a table does not hold a scored segment.
 #pragma once
 
 #include <absl/status/status.h>
@@ -15,22 +15,23 @@
 
 namespace selfcal::server {
 
-// In the order of the rig's groups. NOT_FOUND for the segment.
+// Exclusions of a segment, in the order of the rig's groups. NOT_FOUND if there
+// is no such segment.
 absl::StatusOr<std::vector<TableAbsence>> ListAbsenceRows(
     Connection* db, const std::string& rig, const SegmentKey& key);
 
-// Condition on a row `s` of segments: the tables were not refused to it, nor
-// was it taken out of them, for its residuals. One that was is evidence for
-// nothing: it is not remembered, tests no candidate, and shows no change of the
-// device.
+// SQL condition on a row `s` of segments: no table has refused or removed the
+// segment because of its residuals. Such a misfit is evidence of nothing: it is
+// not remembered, does not validate a candidate, and does not indicate a device
+// change.
 inline constexpr std::string_view kFits =
     "NOT EXISTS (SELECT 1 FROM table_absences a "
     "  WHERE a.segment = s.segment AND a.cause IN (8, 9))";
 
 // --- Within a unit of work.
 
-// Instead of what was known of the segment and the group before; the time is
-// that of the unit of work.
+// An exclusion to write. It replaces an earlier one of the same segment and
+// group; its time is that of the unit of work.
 struct Absence {
   AbsenceCause cause = AbsenceCause::kSaysTooLittle;
   std::optional<std::int64_t> rival = std::nullopt;  // row of a segment

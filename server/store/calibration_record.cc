@@ -1,4 +1,4 @@
-// The record of a calibration and of the solver's report beside it.
+// Record of a calibration, with the solver's report.
 #include "proto/convert.h"
 #include "server/store/record_parts.h"
 #include "server/store/records.h"
@@ -47,7 +47,8 @@ void PutAgreement(const AgreementTest& test, v1::AgreementTest* message) {
 }
 
 AgreementTest GetAgreement(const v1::AgreementTest& message) {
-  // As before a test was made: one that is absent has no probability.
+  // No test was made: the probability is 1 by default, not the 0 of an absent
+  // message.
   if (message.degrees() == 0) return {};
   return {message.chi_square(), message.degrees(), message.probability()};
 }
@@ -62,8 +63,8 @@ void PutNoiseFactor(const NoiseFactor& factor, v1::NoiseFactor* message) {
   message->set_converged(factor.converged);
 }
 
-// Records from before noise was weighted by other than what the rig states, or
-// said so, have `used` 0.
+// `used` is 0 in records from before the noise could be reweighted, or before
+// that was stored.
 void GetNoiseFactor(const v1::NoiseFactor& message,
                     std::vector<NoiseFactor>* factors) {
   const auto kind = FindNoiseKind(message.kind());
@@ -143,7 +144,7 @@ DeviceSplit GetSplit(const store::DeviceSplitRecord& record) {
           {record.concerned().begin(), record.concerned().end()}};
 }
 
-// theta and covariance are those of the calibration, and stored once.
+// Leaves out theta and covariance, which are stored with the calibration.
 void PutSolver(const CalibrationResult& result, SolverRecord* record) {
   record->set_status(ToRecord(result.status));
   record->set_message(result.message);

@@ -1,4 +1,4 @@
-// How versions of a calibration are written.
+// Writes calibration versions.
 #include "server/store/calibrations.h"
 #include "server/store/checksum.h"
 #include "server/store/records.h"
@@ -12,7 +12,7 @@ absl::Status InsertContent(UnitOfWork* tx,
                            const StoredCalibration& calibration) {
   const std::string content = SerializeCalibration(calibration);
   const std::string sha256 = Sha256(content);
-  // A version that no run produced has run 0 here, which becomes NULL.
+  // A version without a run has run 0 here, which becomes NULL.
   return Statement(
              tx->db(),
              "INSERT INTO calibrations (rig, version, state, create_time_ns, "

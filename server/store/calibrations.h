@@ -1,5 +1,6 @@
-// Records of the versions of a calibration. They never change but for their
-// state; triggers of the schema see to that, checksums notice the rest.
+// Records of calibration versions. Once written, only their state changes:
+// triggers of the schema enforce this, and checksums detect any other
+// modification.
 #pragma once
 
 #include <absl/status/status.h>
@@ -14,7 +15,7 @@
 
 namespace selfcal::server {
 
-// NOT_FOUND; DATA_LOSS if it is not as it was written.
+// NOT_FOUND; DATA_LOSS if the record is damaged.
 absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
                                                   const std::string& rig,
                                                   std::int64_t version);
@@ -25,7 +26,7 @@ absl::StatusOr<StoredCalibration> ReadActiveCalibration(Connection* db,
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
     Connection* db, const std::string& rig, const Page& page);
 
-// The version of the run's candidate; nothing if it has none.
+// The version of the run's candidate; nullopt if it has none.
 absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(Connection* db,
                                                            std::int64_t rig,
                                                            std::int64_t run);
@@ -44,26 +45,28 @@ absl::StatusOr<std::int64_t> ActiveVersion(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> NextVersion(UnitOfWork* tx);
 absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(UnitOfWork* tx,
                                                            std::int64_t run);
-// When it became active (StoredCalibration::activation).
+// Time of an activation (StoredCalibration::activation), in ns since the Unix
+// epoch.
 absl::StatusOr<std::int64_t> ActivationTime(UnitOfWork* tx,
                                             std::int64_t activation);
-// Of the database.
+// Schema version of the database.
 absl::StatusOr<std::int64_t> SchemaVersion(UnitOfWork* tx);
 
-// Writes a version of that state with the segments of its run.
+// Writes a version, in the state that it has, with the segments of its run.
 absl::Status InsertCalibration(UnitOfWork* tx,
                                const StoredCalibration& calibration);
-// Reasons, validation and verdict of a candidate.
+// Writes the reasons, validation and verdict of a candidate.
 absl::Status InsertValidation(UnitOfWork* tx,
                               const StoredCalibration& calibration);
-// Triggers of the schema refuse what the life of a calibration does not have.
+// Triggers of the schema refuse transitions that do not exist.
 absl::Status WriteState(UnitOfWork* tx,
                         std::int64_t version,
                         CalibrationState from,
                         CalibrationState to);
-// A version became active: subscribers are notified in the order of these.
+// Records that a version became active. Subscribers are notified in the order
+// of these records.
 absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version);
-// A version keeps the first finding.
+// Records the finding of a verification; a version keeps the first one.
 absl::Status InsertDisagreement(UnitOfWork* tx,
                                 std::int64_t version,
                                 const std::string& finding);

@@ -19,7 +19,7 @@ absl::StatusOr<StoredChange> ReadChange(Connection* db,
 
 // --- Within a unit of work.
 
-// The number of the newest change of the rig, 0 if there is none.
+// The number of the newest device change of the rig, 0 if there is none.
 absl::StatusOr<std::int64_t> NewestChange(UnitOfWork* tx);
 absl::StatusOr<StoredChange> ReadChange(UnitOfWork* tx, std::int64_t change);
 absl::Status InsertChange(UnitOfWork* tx, const StoredChange& change);

@@ -15,7 +15,7 @@
 namespace selfcal::server {
 namespace {
 
-// What one check has found so far.
+// Findings of one check so far.
 class Findings {
  public:
   explicit Findings(const StoreMaintenance::OnProblem& on_problem)
@@ -41,7 +41,7 @@ std::int64_t Number(Connection* db, std::string_view sql) {
   return read.Next() ? read.Int(0) : 0;
 }
 
-// Columns of all tables with their types, in their order.
+// Columns of all tables with their types, in order.
 absl::StatusOr<std::vector<std::string>> Columns(Connection* db) {
   Statement read(db,
                  "SELECT t.name, c.name, c.type FROM sqlite_schema t "
@@ -58,7 +58,7 @@ absl::StatusOr<std::vector<std::string>> Columns(Connection* db) {
   return columns;
 }
 
-// What the migrations of the database's version make of an empty one.
+// The columns that the migrations up to `version` create in an empty database.
 absl::StatusOr<std::vector<std::string>> ExpectedColumns(std::int64_t version) {
   SELFCAL_ASSIGN_OR_RETURN(
       Connection empty,
@@ -70,8 +70,7 @@ absl::StatusOr<std::vector<std::string>> ExpectedColumns(std::int64_t version) {
   return Columns(&empty);
 }
 
-// A name that was damaged hides what is under it, and SQLite sees nothing
-// wrong with it.
+// Verifies names: a damaged one hides its contents, and SQLite does not notice.
 void CheckSchema(Connection* db, Findings* findings) {
   const auto found = Columns(db);
   const auto expected = ExpectedColumns(Number(db, "PRAGMA user_version"));
@@ -88,7 +87,7 @@ void CheckSchema(Connection* db, Findings* findings) {
   }
 }
 
-// SQLite's own: of each page, record and index.
+// SQLite's own check of each page, record and index.
 void CheckStructure(Connection* db, Findings* findings) {
   Statement check(db, "PRAGMA integrity_check(100)");
   while (!findings->cancelled() && check.Next()) {
@@ -110,7 +109,7 @@ void CheckReferences(Connection* db, Findings* findings) {
   }
 }
 
-// A blob and the column beside it with its checksum.
+// A blob with a column beside it that has its checksum.
 struct Checked {
   std::string table;
   std::string blob;

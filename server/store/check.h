@@ -1,4 +1,4 @@
-// Reads a whole database and tells what is wrong with it.
+// Verifies a whole database.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -8,7 +8,7 @@
 
 namespace selfcal::server {
 
-// CANCELLED if `on_problem` said so.
+// CANCELLED if `on_problem` returned false.
 absl::StatusOr<CheckSummary> CheckDatabase(
     Connection* db, const StoreMaintenance::OnProblem& on_problem);
 

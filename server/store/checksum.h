@@ -1,4 +1,4 @@
-// SHA-256 of bytes: 32 bytes, as they lie in the sha256 columns.
+// SHA-256 checksums: 32 bytes, as stored in the sha256 columns.
 #pragma once
 
 #include <absl/status/status.h>
@@ -11,13 +11,13 @@ namespace selfcal::server {
 
 std::string Sha256(std::string_view bytes);
 
-// The same of bytes that come in pieces.
+// Checksum of bytes that arrive in pieces.
 class Sha256Stream {
  public:
   Sha256Stream();
   ~Sha256Stream();
   void Add(std::string_view bytes);
-  std::string Finish();  // once
+  std::string Finish();  // call once
 
  private:
   struct State;

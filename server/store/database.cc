@@ -10,14 +10,14 @@ namespace {
 
 constexpr int kOpenFlags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
 
-// Of a new database; one that exists keeps its own. Twice SQLite's default
-// halves the calls for the data of a segment, of which there are many pages;
-// more would write more where a row changes.
+// Page size of a new database; an existing one keeps its own. Twice SQLite's
+// default halves the calls for the data of a segment, which spans many pages;
+// larger pages would write more for each changed row.
 constexpr int kPageBytes = 8192;
 
-// A group of segments stays in memory whole until its commit: pages that are
-// written to the log before it are written again when they change once more.
-// What is beyond the cache is given back after the commit.
+// Keeps a group of segments in memory until its commit: a page that is written
+// to the log before that is written again when it changes once more. Memory
+// beyond the cache is released after the commit.
 constexpr int kSpillKiB = 16 << 10;
 
 absl::Status SetSafetyPragmas(Connection* connection) {
@@ -74,7 +74,7 @@ absl::Status ApplyFrom(Connection* connection,
   return absl::OkStatus();
 }
 
-// What was applied must be what this program would have applied.
+// Verifies that the applied migrations are those of this program.
 absl::Status VerifyApplied(Connection* connection,
                            std::span<const Migration> migrations,
                            int version) {
@@ -127,8 +127,8 @@ absl::Status Create(const std::string& path,
   return RenameDurably(unfinished, path);
 }
 
-// Closing the last connection moves the write-ahead log into the file; not into
-// one that is about to be refused.
+// Closing the last connection moves the write-ahead log into the file, which
+// must not happen to a file that is about to be refused.
 void SetCheckpointOnClose(Connection* connection, bool on) {
   sqlite3_db_config(connection->handle(),
                     SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE,

@@ -1,10 +1,11 @@
-// Opens the database of the daemon at the schema of the program: creates it,
-// verifies it, or migrates it.
+// Opens the daemon's database at the schema of the program, creating or
+// migrating it if necessary.
 //
-// The file at `path` is only ever touched if it is a database of this program
-// and not from a newer one. Creation happens under another name (path.new), so
-// that a kill leaves either nothing or a complete database. A migration is one
-// transaction, after a copy of the database was left at path.backup-v<old>.
+// A file at `path` is modified only if it is a database of this program and not
+// of a newer version. A new database is created under another name (path.new)
+// and then renamed, so that being killed leaves either nothing or a complete
+// database. Each migration is one transaction; before the first one, the
+// database is copied to path.backup-v<old>.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -17,14 +18,15 @@
 
 namespace selfcal::server {
 
-// The one connection that writes: WAL, synchronous=FULL, foreign keys.
-// FAILED_PRECONDITION: not ours, from a newer program, or applied migrations
-// differ from those embedded. DATA_LOSS: damaged. UNAVAILABLE: the disk.
+// Returns the one connection that writes: WAL, synchronous=FULL, foreign keys.
+// FAILED_PRECONDITION if the file is not a database of this program, is of a
+// newer version, or its migrations differ from the embedded ones; DATA_LOSS if
+// it is damaged; UNAVAILABLE if the disk fails.
 absl::StatusOr<Connection> OpenDatabase(const std::string& path,
                                         std::span<const Migration> migrations);
 
-// Whether a database is one that this program opens as it is or migrates.
-// FAILED_PRECONDITION otherwise. `path` is for the message.
+// FAILED_PRECONDITION unless this program can open or migrate the database.
+// `path` is for the message.
 absl::Status VerifySchema(Connection* connection,
                           const std::string& path,
                           std::span<const Migration> migrations);

@@ -1,5 +1,5 @@
-// What lies at a path, found out without touching it, and the few operations on
-// whole files that must survive a power cut. No SQL.
+// Inspection of the file at a path without modifying it, and the operations on
+// whole files that must survive a power failure. No SQL.
 #pragma once
 
 #include <absl/status/status.h>
@@ -10,21 +10,20 @@
 
 namespace selfcal::server {
 
-// "SCAL": says in the header of the file whose it is.
+// "SCAL", the application id in the header of a database of this program.
 inline constexpr std::int32_t kApplicationId = 0x5343414c;
 
 enum class DatabaseFile { kAbsent, kOurs };
 
-// Reads the header. FAILED_PRECONDITION for anything else than a database of
-// this program: another file, another program's database, an empty file, the
-// log of a database that is not there.
+// Reads the header. FAILED_PRECONDITION for anything but a database of this
+// program: a file of another kind, another program's database, an empty file,
+// or a log without its database.
 absl::StatusOr<DatabaseFile> InspectDatabaseFile(const std::string& path);
 
-// Syncs `from` and its folder, and gives it the name `to`, at once or not at
-// all.
+// Syncs `from`, renames it to `to` atomically, and syncs the folder.
 absl::Status RenameDurably(const std::string& from, const std::string& to);
 
-// Removes a database that was never finished, and its logs.
+// Removes an unfinished database and its logs.
 absl::Status RemoveDatabaseFiles(const std::string& path);
 
 }  // namespace selfcal::server

@@ -10,7 +10,7 @@
 
 namespace selfcal::server {
 
-// Limits the file; 0: any size.
+// Limits the size of the file; 0 for no limit.
 absl::Status LimitSize(Connection* db, std::int64_t max_bytes);
 
 // Bytes in use.

@@ -9,7 +9,8 @@
 namespace selfcal::server {
 namespace {
 
-// `which` has ?1: an event's number, ?2: how many, and ?3: the rig, if any.
+// `which` is the rest of the query: ?1 is an event's number, ?2 the limit, and
+// ?3 the rig, if any.
 absl::StatusOr<Listed<StoredEvent>> ReadPage(Connection* db,
                                              const std::string& which,
                                              const std::string& list,

@@ -1,4 +1,4 @@
-// The append-only log of what happened, in the database.
+// Records of events: an append-only log.
 #pragma once
 
 #include <absl/status/status.h>
@@ -15,7 +15,7 @@ absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail);
 
-// Of one rig, or with an empty name of all; oldest first.
+// Events of one rig, or of all if `rig` is empty; oldest first.
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
                                                   const Page& page,
                                                   const std::string& rig);

@@ -1,8 +1,8 @@
-// The care of what is stored, while it is in use: check, back up, restore. An
-// engine that has tools of its own for this offers none.
+// Check, backup and restore of a database while it is in use. An engine that
+// has tools of its own for this offers none.
 //
-// Any thread may call; a check or a backup holds up neither those who read nor
-// those who write. Errors as of Store.
+// Any thread may call; a check or a backup blocks neither readers nor writers.
+// Errors as for Store.
 #pragma once
 
 #include <absl/status/status.h>
@@ -23,8 +23,8 @@ struct StoreProblem {
 
 struct CheckSummary {
   std::int64_t bytes = 0;      // of the database
-  std::int64_t checksums = 0;  // of blobs, compared
-  std::int64_t payloads = 0;   // segments' data, decoded
+  std::int64_t checksums = 0;  // of blobs, verified
+  std::int64_t payloads = 0;   // data of segments, decoded
   std::int64_t problems = 0;
 };
 
@@ -33,15 +33,16 @@ struct BackupSummary {
   std::string sha256;  // 32 bytes
 };
 
-// A database that arrives in pieces. Destroying it unfinished leaves nothing.
+// A restore in progress: a database that arrives in pieces. Destroying it
+// before Finish discards them.
 class Restoration {
  public:
   virtual ~Restoration() = default;
   virtual absl::Status Append(std::string_view bytes) = 0;
-  // DATA_LOSS if the bytes are not those of `sha256` or the database is
-  // damaged; FAILED_PRECONDITION if it is not one of this program. Otherwise it
-  // takes the place of the present one at the next start; returns the name that
-  // the present one then gets.
+  // DATA_LOSS if `sha256` is not the checksum of the bytes or the database is
+  // damaged; FAILED_PRECONDITION if it is not a database of this program.
+  // Otherwise the database replaces the present one at the next start; returns
+  // the name that the present one then gets.
   virtual absl::StatusOr<std::string> Finish(std::string_view sha256) = 0;
 };
 
@@ -49,18 +50,18 @@ class StoreMaintenance {
  public:
   virtual ~StoreMaintenance() = default;
 
-  // The whole database: its structure, references, and every checksum. The
-  // callbacks end what they are called from by returning false (CANCELLED).
+  // Checks the whole database: its structure, references, and every checksum. A
+  // callback that returns false ends the call it belongs to (CANCELLED).
   using OnProblem = std::function<bool(const StoreProblem&)>;
   virtual absl::StatusOr<CheckSummary> Check(const OnProblem& on_problem) = 0;
 
-  // A copy of one instant, in pieces of at most a MiB. Needs as much space
-  // again on the disk while it is read.
+  // Copies one state of the database, in pieces of at most 1 MiB. The copy
+  // takes as much disk space again until the call ends.
   using OnBytes = std::function<bool(std::string_view)>;
   virtual absl::StatusOr<BackupSummary> Backup(const OnBytes& on_bytes) = 0;
 
-  // FAILED_PRECONDITION while another is under way, or waits for the next
-  // start.
+  // FAILED_PRECONDITION while another restore is in progress or waits for the
+  // next start.
   virtual absl::StatusOr<std::unique_ptr<Restoration>> BeginRestore() = 0;
 };
 

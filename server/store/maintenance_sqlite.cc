@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kPiece = 1 << 20;
 
-// Goes with whatever was written of it.
+// Removes its file when destroyed, however much of it was written.
 class TemporaryDatabase {
  public:
   explicit TemporaryDatabase(std::string path) : path_(std::move(path)) {}
@@ -34,7 +34,7 @@ class TemporaryDatabase {
   const std::string path_;
 };
 
-// One instant of `from`, as a file that needs no log beside it.
+// Copies one state of `from` to a file that needs no log beside it.
 absl::Status Copy(Connection* from, const std::string& to) {
   SELFCAL_RETURN_IF_ERROR(RemoveDatabaseFiles(to));
   SELFCAL_ASSIGN_OR_RETURN(
@@ -61,7 +61,7 @@ class SqliteMaintenance final : public StoreMaintenance {
   }
 
   absl::StatusOr<BackupSummary> Backup(const OnBytes& on_bytes) override {
-    const std::lock_guard lock(backup_mutex_);  // one copy on the disk at once
+    const std::lock_guard lock(backup_mutex_);  // one copy at a time
     const TemporaryDatabase copy(path_ + ".backup.new");
     {
       SELFCAL_ASSIGN_OR_RETURN(Connection db, OpenToRead());

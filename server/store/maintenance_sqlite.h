@@ -1,4 +1,4 @@
-// The care of an SQLite file, on connections of its own that only read.
+// Maintenance of an SQLite file, over read-only connections of its own.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace selfcal::server {
 
-// `path` is that of a database which this process has open.
+// `path` is that of a database that this process has open.
 std::unique_ptr<StoreMaintenance> MakeSqliteMaintenance(std::string path);
 
 }  // namespace selfcal::server

@@ -1,4 +1,4 @@
-// Opaque tokens of pages: where the last page ended, bound to its list.
+// Opaque page tokens: where the last page ended, bound to its list.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -12,15 +12,15 @@
 
 namespace selfcal::server {
 
-// Items of the page: 50 where none is given, 1000 at most.
+// Number of items of the page: 50 if none is given, at most 1000.
 int PageSize(const Page& page);
 
-// The token after the item with `key` of the list named `list`.
+// The token of the page after the item with `key`, in the list named `list`.
 std::string MakePageToken(std::string_view list, std::string_view key);
 std::string MakePageToken(std::string_view list, std::int64_t key);
 
-// The key in the token of a page, nothing for the first page.
-// INVALID_ARGUMENT for a token that is not one of this list.
+// The key in the token of a page; nullopt for the first page. INVALID_ARGUMENT
+// for a token of another list.
 absl::StatusOr<std::optional<std::string>> PageKey(std::string_view list,
                                                    const Page& page);
 absl::StatusOr<std::optional<std::int64_t>> PageNumber(std::string_view list,
@@ -28,8 +28,8 @@ absl::StatusOr<std::optional<std::int64_t>> PageNumber(std::string_view list,
 
 absl::Status BadPageToken();
 
-// For a list that was read one item longer than the page: drops that item, and
-// makes the token if it was there. `key` gives the key of an item.
+// For a list that was read one item beyond the page: drops that item and makes
+// the token, if the item was there. `key` returns the key of an item.
 template <typename T, typename Key>
 void CutPage(std::string_view list, int size, Key key, Listed<T>* listed) {
   if (static_cast<int>(listed->items.size()) > size) {

@@ -15,10 +15,10 @@
 namespace selfcal::server {
 namespace {
 
-// Packed doubles gain 3% more from level 3, which takes three times as long to
-// write and to read.
+// Level 3 compresses packed doubles 3 % better, but takes three times as long
+// to write and to read.
 constexpr int kCompressionLevel = -1;
-// Over what a segment within SegmentLimits can need, and under what a message
+// More than a segment within SegmentLimits can need, and less than a message
 // can hold.
 constexpr std::int64_t kMaxRawBytes = std::int64_t{1} << 30;
 
@@ -32,8 +32,8 @@ struct Free {
 };
 using Context = std::unique_ptr<ZSTD_CCtx, Free>;
 
-// Contexts of half a MB each that are not in use: to set one up takes as long
-// as to compress a segment.
+// Pool of idle compression contexts, half a MB each: creating one takes as long
+// as compressing a segment.
 class Contexts {
  public:
   Context Take() {

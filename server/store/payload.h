@@ -1,4 +1,4 @@
-// The data of a segment as it lies in the database: a zstd frame of the message
+// The data of a segment as stored in the database: a zstd frame of the message
 // selfcal.v1.MotionSegment, with the checksum of the frame.
 #pragma once
 
@@ -19,7 +19,7 @@ struct Payload {
 
 absl::StatusOr<Payload> PackSegment(const MotionSegment& segment);
 
-// DATA_LOSS, naming `what`, if any byte is not as it was written.
+// DATA_LOSS, naming `what`, if the data is not as it was written.
 absl::StatusOr<MotionSegment> UnpackSegment(const Payload& payload,
                                             const std::string& what);
 

@@ -10,8 +10,8 @@ namespace {
 using RowMajor =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Where the components of a tangent without time offsets are; empty if `size`
-// is not that of one.
+// Indices of all components but the time offsets; empty if `size` is not that
+// of a tangent space without time offsets.
 std::vector<int> WithoutTimeOffsets(const Calibration& theta,
                                     Eigen::Index size) {
   const int cameras = static_cast<int>(theta.cameras.size());

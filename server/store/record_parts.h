@@ -1,4 +1,5 @@
-// Parts that several records share: matrices, vectors, directions.
+// Conversion of parts that several records share: matrices, vectors,
+// directions.
 #pragma once
 
 #include <absl/status/status.h>
@@ -17,11 +18,12 @@
 namespace selfcal::server {
 
 void PutMatrix(const Eigen::MatrixXd& matrix, store::MatrixRecord* record);
-// False if the sizes do not fit each other.
+// False if the number of values does not match the dimensions.
 bool GetMatrix(const store::MatrixRecord& record, Eigen::MatrixXd* matrix);
 
-// Of theta's tangent, as it was before cameras had a time offset: gets zeros
-// for that of each camera, which was known. Otherwise unchanged.
+// Extends a matrix or vector over the tangent space of theta that was stored
+// before cameras had a time offset: inserts zeros for that of each camera,
+// which was known then. Leaves any other unchanged.
 void AddTimeOffsets(const Calibration& theta, Eigen::MatrixXd* matrix);
 void AddTimeOffsets(const Calibration& theta, Eigen::VectorXd* vector);
 

@@ -108,7 +108,7 @@ absl::StatusOr<StoredRig> ParseRig(std::string_view bytes,
   store::RigRecord record;
   SELFCAL_RETURN_IF_ERROR(ParseMessage(bytes, what, &record));
   StoredRig rig;
-  // What was stored before there was a choice.
+  // Stored before the selection could be chosen.
   if (record.rig().selection() == v1::Rig::SELECTION_UNSPECIFIED) {
     record.mutable_rig()->set_selection(v1::Rig::TABLES);
   }

@@ -1,8 +1,8 @@
-// Between the values of the store and the bytes of its blobs
-// (proto/selfcal/store/records.proto). Doubles come back as they were, to the bit.
+// Conversion between the values of the store and the bytes of its blobs
+// (proto/selfcal/store/records.proto). Doubles are preserved to the bit.
 //
-// The parsing functions return DATA_LOSS for bytes that are not what they
-// should be, naming `what`.
+// The parsing functions return DATA_LOSS, naming `what`, for bytes that are not
+// such a record.
 #pragma once
 
 #include <absl/status/status.h>
@@ -17,7 +17,7 @@
 
 namespace selfcal::server {
 
-// All of it but create_time_ns.
+// Everything but create_time_ns.
 std::string SerializeRig(const StoredRig& rig);
 absl::StatusOr<StoredRig> ParseRig(std::string_view bytes,
                                    const std::string& what);
@@ -26,13 +26,13 @@ std::string SerializeInformation(const SegmentInformation& information);
 absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
                                                     const std::string& what);
 
-// All of it but state, create_time_ns, run and segments, which are columns, and
-// but what a candidate was judged by.
+// Everything but state, create_time_ns, run and segments, which are columns,
+// and the validation of a candidate.
 std::string SerializeCalibration(const StoredCalibration& calibration);
 absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
                                                    const std::string& what);
 
-// Reasons and validation of a candidate that was judged.
+// Reasons, validation and verdict of a candidate.
 std::string SerializeValidation(const StoredCalibration& judged);
 absl::Status ParseValidation(std::string_view bytes,
                              const std::string& what,

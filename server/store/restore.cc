@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kWaiting = ".restore-";
 
-// The time in the name of a database that waits, nothing if none does.
+// The time in the name of the database that waits; nullopt if there is none.
 absl::StatusOr<std::optional<std::string>> WaitingTime(
     const std::string& path) {
   const fs::path folder = fs::path(path).parent_path();
@@ -34,7 +34,7 @@ absl::StatusOr<std::optional<std::string>> WaitingTime(
       fs::path(path).filename().string() + std::string(kWaiting);
   std::error_code error;
   fs::directory_iterator entries(folder.empty() ? "." : folder, error);
-  if (error) return std::nullopt;  // the folder: opening will say so
+  if (error) return std::nullopt;  // opening the database reports it
   for (const fs::directory_entry& entry : entries) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(prefix)) continue;
@@ -55,7 +55,7 @@ absl::Status Damaged(std::string_view how) {
       "the backup is damaged and was not restored, use another: {}", how));
 }
 
-// Whether it is a database that this program can migrate.
+// Opens a database that this program can use or migrate.
 absl::StatusOr<Connection> OpenApart(const std::string& path) {
   SELFCAL_ASSIGN_OR_RETURN(const DatabaseFile file, InspectDatabaseFile(path));
   if (file == DatabaseFile::kAbsent) {
@@ -69,7 +69,7 @@ absl::StatusOr<Connection> OpenApart(const std::string& path) {
 
 absl::Status VerifyApart(const std::string& path) {
   auto db = OpenApart(path);
-  // Such errors advise about the database in use, which is sound.
+  // The message would give advice about the database in use, which is intact.
   if (absl::IsDataLoss(db.status())) return Damaged("it cannot be opened");
   SELFCAL_RETURN_IF_ERROR(db.status());
   std::string first;
@@ -91,7 +91,7 @@ class FileRestoration final : public Restoration {
         busy_(busy) {}
   ~FileRestoration() override {
     file_.close();
-    // What could not be removed is replaced by the next.
+    // The next restore replaces files that could not be removed.
     RemoveDatabaseFiles(arriving_).IgnoreError();
     *busy_ = false;
   }
@@ -145,11 +145,11 @@ absl::Status TakeOverRestored(const std::string& path) {
   SELFCAL_ASSIGN_OR_RETURN(const auto time, WaitingTime(path));
   if (!time) return absl::OkStatus();
   const std::string before = path + ".before-restore-" + *time;
-  // The log first: beside a database that is not its own it would be lost.
+  // The log first: beside another database it would be lost.
   SELFCAL_RETURN_IF_ERROR(MoveIfThere(path + "-wal", before + "-wal"));
   SELFCAL_RETURN_IF_ERROR(MoveIfThere(path, before));
   std::error_code ignored;
-  fs::remove(path + "-shm", ignored);  // SQLite makes it anew
+  fs::remove(path + "-shm", ignored);  // SQLite creates it again
   return RenameDurably(path + std::string(kWaiting) + *time, path);
 }
 

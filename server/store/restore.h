@@ -1,11 +1,10 @@
-// A database that waits to take the place of the present one. No SQL but to
-// check it.
+// A restored database that waits to replace the present one. No SQL except to
+// verify it.
 //
-// It arrives as <path>.restore.new, is verified, and gets the name
-// <path>.restore-<time> in one durable step. From then on the next start
-// carries the change through, whatever happens on the way: the present log and
-// database are moved to <path>.before-restore-<time>, then the new one takes
-// its name.
+// It is received as <path>.restore.new, verified, and durably renamed to
+// <path>.restore-<time>. From then on the next start completes the replacement,
+// however often it is interrupted: it moves the present log and database to
+// <path>.before-restore-<time> and then renames the new database to <path>.
 #pragma once
 
 #include <absl/status/status.h>
@@ -19,11 +18,12 @@
 
 namespace selfcal::server {
 
-// Before the database at `path` is opened: puts the one that waits in its
-// place. OK if none does.
+// Replaces the database at `path` by the one that waits, if there is one. Call
+// before the database is opened.
 absl::Status TakeOverRestored(const std::string& path);
 
-// `busy` is set while it lives.
+// FAILED_PRECONDITION if `busy`, which is true as long as the result lives, or
+// if a restored database waits already.
 absl::StatusOr<std::unique_ptr<Restoration>> BeginRestoration(
     const std::string& path, std::atomic<bool>* busy);
 

@@ -17,13 +17,13 @@
 namespace selfcal::server {
 namespace {
 
-// A rig of the page, with what tells its place in the order.
+// A rig of the page, with its row.
 struct Found {
   std::int64_t rowid = 0;
   RigSummary summary;
 };
 
-// Where a page goes on.
+// The position after which a page begins.
 struct Place {
   std::int64_t last_seen_ns = 0;
   std::string id;
@@ -48,7 +48,7 @@ std::string KeyOf(const RigSummary& summary) {
   return fmt::format("{} {}", summary.last_seen_ns, summary.rig);
 }
 
-// Before the first rig.
+// The position before the first rig.
 Place Beginning(const RigQuery& query) {
   if (!query.descending) return {-1, ""};
   return {std::numeric_limits<std::int64_t>::max(), "~"};
@@ -81,7 +81,7 @@ std::string SqlOf(const RigQuery& query) {
   const std::string order =
       by_name ? fmt::format("id {}", direction)
               : fmt::format("last_seen_ns {0}, id {0}", direction);
-  // ?1 is not in the condition on the name, and has to stand somewhere.
+  // The condition on the name does not use ?1, so it is used here.
   return fmt::format(
       "SELECT rig, id, create_time_ns, last_seen_ns FROM rigs "
       "WHERE {} AND (?4 = '' OR instr(id, ?4) > 0) AND ?1 IS NOT NULL "

@@ -1,5 +1,5 @@
-// Lists of many rigs, in the database. Pages go on after the key of the last
-// rig, so that a late one costs what the first does.
+// Summaries of many rigs. A page begins after the key of the last rig, so that
+// a late page costs no more than the first.
 #pragma once
 
 #include <absl/status/statusor.h>

@@ -1,4 +1,4 @@
-// The policy of a rig as fields of its message.
+// Conversion of the policy of a rig to and from the fields of its message.
 #pragma once
 
 #include <vector>
@@ -11,9 +11,9 @@ namespace selfcal::server {
 
 void PutPolicy(const RigPolicy& policy, v1::Rig* message);
 
-// Fills *policy, or returns every violation: durations are from 0 (no matter)
-// to a hundred years. Walk densities are for Validate of core/change/aged.h,
-// which knows the rig.
+// Fills *policy, or returns every violation: durations are between 0 (disabled)
+// and a hundred years. Walk densities are validated by Validate of
+// core/change/aged.h, which needs the rig.
 std::vector<Violation> GetPolicy(const v1::Rig& message, RigPolicy* policy);
 
 }  // namespace selfcal::server

@@ -1,4 +1,4 @@
-// Which rigs a list shows, and in which order.
+// Filter and order of a list of rigs.
 #pragma once
 
 #include <map>
@@ -7,8 +7,8 @@
 namespace selfcal::server {
 
 struct RigQuery {
-  std::string text;  // that the name contains; empty: every rig
-  std::map<std::string, std::string> labels;  // that it has, with these values
+  std::string text;  // part of the name; empty: every rig
+  std::map<std::string, std::string> labels;  // which the rig must have
   enum class Order { kName, kLastSeen } order = Order::kName;
   bool descending = false;
 };

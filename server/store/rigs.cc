@@ -15,7 +15,7 @@ absl::Status NoSuchRig(const std::string& rig) {
       fmt::format("rig {} does not exist; create it first", rig));
 }
 
-// From columns id, create_time_ns, definition, sha256, starting at `column`.
+// Reads the columns id, create_time_ns, definition, sha256, from `column` on.
 absl::StatusOr<StoredRig> RigFromRow(const Statement& row, int column) {
   const std::string what = "rig " + row.Text(column);
   const std::string bytes = row.Text(column + 2);

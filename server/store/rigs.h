@@ -1,4 +1,4 @@
-// Rigs in the database.
+// Records of rigs.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -21,7 +21,7 @@ absl::Status DeleteRigRows(UnitOfWork* tx);
 
 // NOT_FOUND.
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig);
-// NOT_FOUND; DATA_LOSS if it is not as it was written.
+// NOT_FOUND; DATA_LOSS if the record is damaged.
 absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig);
 absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);
 // Number of rigs in the database.

@@ -37,7 +37,7 @@ absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
   return ReadKeys(&read);
 }
 
-// From the columns cause, change and session_ended.
+// The trigger that the columns cause, change and session_ended encode.
 RunTrigger TriggerOf(std::int64_t cause,
                      std::int64_t change,
                      bool session_ended) {
@@ -83,7 +83,7 @@ absl::StatusOr<std::vector<StoredRun>> ReadAll(Connection* db,
   return runs;
 }
 
-// In the column cause.
+// The value of the column cause.
 int CauseOf(RunTrigger trigger) {
   switch (trigger) {
     case RunTrigger::kTablesFull:

@@ -1,5 +1,5 @@
-// Records of runs of the solver: with their trigger and the snapshot of the
-// tables, so that a restart finds them.
+// Records of runs: with their trigger and their snapshot of the tables, so that
+// a restart finds them.
 #pragma once
 
 #include <absl/status/status.h>
@@ -30,27 +30,28 @@ absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(Connection* db);
 // NOT_FOUND.
 absl::StatusOr<StoredRun> ReadRun(UnitOfWork* tx, std::int64_t run);
 
-// Numbers of runs of the rig; 0: there is none.
+// The number of the newest such run of the rig; 0 if there is none.
 absl::StatusOr<std::int64_t> NewestRun(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> UnfinishedRun(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> NewestSucceededRun(UnitOfWork* tx);
-// That the tables started by themselves since this change of the device.
+// The newest run since this device change that was triggered by full or changed
+// tables, also at the end of a session.
 absl::StatusOr<std::int64_t> NewestRunOfTables(UnitOfWork* tx,
                                                std::int64_t change);
 
-// With its snapshot of segments; pending.
+// Writes a pending run with its snapshot of segments.
 absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run);
 // Writes state, attempts, end_time_ns, calibration_version and message.
 absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run);
-// The result of the run does not use this segment of its snapshot.
+// Records that the result of the run does not use this segment of its snapshot.
 absl::Status MarkExcluded(UnitOfWork* tx,
                           std::int64_t run,
                           std::int64_t segment);
-// Segments of the snapshot that the result uses, by key.
+// Segments of the snapshot that the result uses, ordered by key.
 absl::StatusOr<std::vector<SegmentKey>> UsedSegments(UnitOfWork* tx,
                                                      std::int64_t run);
-// Segments of the snapshot that are unusable by now, in order of arrival: all,
-// or those that the result uses.
+// Segments of the snapshot that have become unusable, in order of arrival: all
+// of them, or only those that the result uses.
 absl::StatusOr<std::vector<SegmentKey>> UnusableSegments(UnitOfWork* tx,
                                                          std::int64_t run,
                                                          bool only_used);

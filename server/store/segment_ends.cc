@@ -19,7 +19,7 @@ namespace {
 
 constexpr char kWhat[] = "what is remembered of a segment";
 
-// Of a triangle with so many rows.
+// Number of entries of a triangle with this many rows.
 Eigen::Index Entries(Eigen::Index rows) { return rows * (rows + 1) / 2; }
 
 bool GetTriangle(const google::protobuf::RepeatedField<double>& values,

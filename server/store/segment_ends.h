@@ -1,5 +1,5 @@
-// Records of the ends of segments (core/information/segment_ends.h), which stay
-// when their data is gone.
+// Records of the ends of segments (core/information/segment_ends.h), which
+// remain when the data is gone.
 #pragma once
 
 #include <absl/status/status.h>
@@ -18,7 +18,7 @@
 namespace selfcal::server {
 
 std::string SerializeEnds(const SegmentEnds& ends);
-// DATA_LOSS for bytes that are not what they should be.
+// DATA_LOSS for bytes that are not such a record.
 absl::StatusOr<SegmentEnds> ParseEnds(std::string_view bytes);
 
 // --- Within a unit of work.
@@ -27,19 +27,20 @@ absl::StatusOr<SegmentEnds> ParseEnds(std::string_view bytes);
 struct EndsRow {
   SegmentRow segment;
   bool has_data = false;
-  // Read for segments without data; missing where they are damaged.
+  // Read only for segments without data; nullopt if the record is damaged.
   std::optional<SegmentEnds> ends = std::nullopt;
 };
-// Those from this sequence on, of the segments that VisitScored visits:
-// sessions in the order in which they began, each by index.
+// The segments with ends, from this sequence on, among those that VisitScored
+// visits: sessions in the order in which they began, each by index.
 absl::StatusOr<std::vector<EndsRow>> ReadEnds(UnitOfWork* tx,
                                               std::int64_t first_sequence);
-// When the scored segments that have ends arrived [ns].
+// Arrival times of the scored segments that have ends [ns since the Unix
+// epoch].
 absl::StatusOr<std::vector<std::int64_t>> ArrivalsOfEnds(UnitOfWork* tx);
-// Rows of the segments that have ends and no data, newest first.
+// Rows of the segments that have ends but no data, newest first.
 absl::StatusOr<std::vector<std::int64_t>> EndsWithoutData(UnitOfWork* tx);
 
-// In place of those that the segment had.
+// Replaces the ends that the segment had.
 absl::Status WriteEnds(UnitOfWork* tx,
                        std::int64_t segment,
                        const SegmentEnds& ends);

@@ -1,5 +1,5 @@
-// The way of the device during a segment, in a few hundred bytes that stay when
-// its data goes.
+// The path of the device during a segment, in a few hundred bytes that remain
+// when the data is gone.
 #pragma once
 
 #include <absl/status/status.h>
@@ -16,11 +16,11 @@
 
 namespace selfcal::server {
 
-// Keyframes that are spread evenly, the first and the last among them.
+// Positions at evenly spread keyframes, the first and the last among them.
 std::vector<PathPoint> PathOf(const MotionSegment& segment);
 
 std::string SerializePath(const std::vector<PathPoint>& path);
-// DATA_LOSS for bytes that are not what they should be, naming `what`.
+// DATA_LOSS, naming `what`, for bytes that are not such a record.
 absl::StatusOr<std::vector<PathPoint>> ParsePath(std::string_view bytes,
                                                  const std::string& what);
 

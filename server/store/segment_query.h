@@ -1,4 +1,4 @@
-// Which segments of a rig a list shows, and in which order.
+// Filter and order of a list of the segments of a rig.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@ namespace selfcal::server {
 
 enum class SegmentState;
 
-// Both ends belong to it; nothing: no end.
+// A closed interval; nullopt means no bound.
 template <typename T>
 struct Range {
   std::optional<T> least;
@@ -18,8 +18,8 @@ struct Range {
   friend bool operator==(const Range&, const Range&) = default;
 };
 
-// A segment of which a quantity is not known, because it has no score or no
-// temperature, is in no range of it and in no list that is sorted by it.
+// A segment without a quantity, because it has no score or no temperature, is
+// in no range of that quantity and in no list sorted by it.
 struct SegmentQuery {
   std::optional<SegmentState> state;
   std::optional<std::string> session;
@@ -30,7 +30,7 @@ struct SegmentQuery {
   Range<std::int64_t> landmarks;
   Range<std::int64_t> observations;
   Range<double> temperature_c;
-  // Of one group; empty: of none.
+  // The group whose scores are filtered; empty for no filter.
   std::string scored_group;
   Range<double> entropy_nats;
   Range<double> gain_nats;
@@ -45,7 +45,7 @@ struct SegmentQuery {
   };
   Order order = Order::kArrival;
   std::string order_group;
-  bool descending = true;  // else what has least of it comes first
+  bool descending = true;  // otherwise the smallest comes first
 
   friend bool operator==(const SegmentQuery&, const SegmentQuery&) = default;
 };

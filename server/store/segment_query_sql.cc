@@ -60,7 +60,8 @@ std::string_view KeyColumn(SegmentQuery::Order order) {
   return "s.sequence";
 }
 
-// The rows of the page first, by what is small; then what they show.
+// The inner query finds the rows of the page, the outer one reads their
+// content.
 std::string Sql(const std::string& columns, const SegmentQuery& query) {
   const bool by_arrival = query.order == SegmentQuery::Order::kArrival;
   const std::string_view way = query.descending ? "DESC" : "ASC";

@@ -1,5 +1,6 @@
-// A SegmentQuery in SQL. One text for each order: what is not asked for is
-// NULL, so that a connection keeps few statements whatever clients ask.
+// A SegmentQuery in SQL. There is one text for each order, and filters that are
+// not set are NULL, so that a connection keeps few statements whatever clients
+// ask for.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -12,25 +13,26 @@
 
 namespace selfcal::server {
 
-// Where a page begins: after the segment of this key and sequence.
+// The position of a page: it begins after the segment with this key and
+// sequence.
 struct SegmentPlace {
   double key = 0;
   std::int64_t sequence = 0;
 };
 
-// The list that the query makes of the rig, for tokens: different queries have
-// different ones.
+// Name of the list of the rig for page tokens; different queries have different
+// names.
 std::string ListName(const std::string& rig, const SegmentQuery& query);
 
-// The place in the token of a page, or the beginning. INVALID_ARGUMENT for a
-// token that is not one of this list.
+// The position in the token of a page, or the beginning of the list.
+// INVALID_ARGUMENT for a token of another list.
 absl::StatusOr<SegmentPlace> PlaceOfPage(const std::string& list,
                                          const SegmentQuery& query,
                                          const Page& page);
 std::string TokenAfter(const std::string& list, const SegmentPlace& place);
 
-// Runs `columns`, from segments `s` with their information `i`, over the rows
-// of a page and one more; the last column after them is the key.
+// Selects `columns` of segments `s` and their information `i`, for at most
+// `limit` rows after the position. The key follows as the last column.
 Statement SelectSegments(Connection* db,
                          const std::string& columns,
                          std::int64_t rig,

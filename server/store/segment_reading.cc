@@ -1,5 +1,5 @@
-// StoredSegment from its rows, one or a page of them; and the writing of the
-// information that is read here.
+// Reads StoredSegments, one or a page of them, and writes the information that
+// is read here.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -25,7 +25,7 @@ constexpr char kColumns[] =
     "  i.information, i.sha256, "
     "  (SELECT length(p.data) FROM payloads p WHERE p.segment = s.segment), "
     "  s.temperature_c";
-constexpr int kKeyColumn = 18;  // behind those of a list
+constexpr int kKeyColumn = 18;  // after the columns of a list
 
 StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
   StoredSegment segment;
@@ -48,7 +48,7 @@ StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
   return segment;
 }
 
-// Fills all that it can; the status tells about the information.
+// Fills what it can; the status is that of the information.
 absl::Status FillFromRow(Connection* db,
                          const Statement& row,
                          const std::string& rig,

@@ -28,7 +28,7 @@ struct SegmentRow {
 // "segment <session>~<index> of rig <rig>", for messages.
 std::string SegmentText(const std::string& rig, const SegmentKey& key);
 
-// What is written of a segment that was received.
+// The record of a segment that was received.
 struct NewSegment {
   SegmentKey key;
   std::int64_t calibration_version = 1;
@@ -43,7 +43,7 @@ struct NewSegment {
   Payload payload;
 };
 
-// Compresses: the larger part of the work, and needs no database.
+// Compresses the data, which is most of the work; needs no database.
 absl::StatusOr<NewSegment> PackNewSegment(const MotionSegment& segment);
 
 // DATA_LOSS if its information is damaged.
@@ -51,8 +51,8 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
                                           const std::string& rig,
                                           const SegmentKey& key);
 
-// Damaged information leaves a `problem` instead, so that one bad row does not
-// hide the others.
+// A segment with damaged information is listed with a `problem`, so that one
+// damaged row does not hide the others.
 absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
                                                       const std::string& rig,
                                                       const SegmentQuery& query,
@@ -72,12 +72,12 @@ absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
 absl::StatusOr<SegmentRow> FindSegment(UnitOfWork* tx, const SegmentKey& key);
 absl::StatusOr<StoredSegment> ReadSegment(UnitOfWork* tx,
                                           const SegmentKey& key);
-// All of a session in order of arrival, or the one with this index.
+// All segments of a session in order of arrival, or the one with this index.
 absl::StatusOr<std::vector<SegmentRow>> SegmentsOfSession(
     UnitOfWork* tx,
     const std::string& session,
     std::optional<std::int64_t> index);
-// Stored and not scored yet.
+// True if a segment of the rig waits for its score.
 absl::StatusOr<bool> HasUnscored(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> CountUnscored(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> CountScored(UnitOfWork* tx,
@@ -86,18 +86,19 @@ absl::StatusOr<std::int64_t> CountScored(UnitOfWork* tx,
 absl::StatusOr<std::int64_t> NewestSequence(UnitOfWork* tx);
 // Fits of the newest scored segments.
 absl::StatusOr<std::vector<double>> NewestFits(UnitOfWork* tx, int limit);
-// Segments that do not wait for their score and that no table, run or
-// calibration refers to; oldest first.
+// Segments that are not waiting for their score and that no table, run or
+// calibration references; oldest first.
 absl::StatusOr<std::vector<SegmentRow>> UnreferencedSegments(UnitOfWork* tx,
                                                              int limit);
 
-// Scored segments whose information is looked through.
+// Selects the scored segments to visit.
 struct ScoredFilter {
   std::int64_t first_sequence = 1;
-  // Neither in the snapshot of this run, nor used for this version; 0: any.
+  // Leaves out those in the snapshot of this run, and those used for this
+  // version; 0 for none.
   std::int64_t not_in_run = 0;
   std::int64_t not_in_version = 0;
-  bool with_data_first = false;  // each part newest first
+  bool with_data_first = false;  // both parts newest first
   int limit = 0;
 };
 struct ScoredSegment {
@@ -105,33 +106,33 @@ struct ScoredSegment {
   bool has_data = false;
   absl::StatusOr<SegmentInformation> information;  // DATA_LOSS if damaged
 };
-// Calls `visit` with those that tables were not refused to for their residuals
+// Calls `visit` with the scored segments that are not misfits
 // (AbsenceCause::kDoesNotFit, kManyOutliers), until it returns false.
 absl::Status VisitScored(
     UnitOfWork* tx,
     const ScoredFilter& filter,
     const std::function<bool(const ScoredSegment&)>& visit);
 
-// A segment whose data is kept and that does not wait for its score.
+// A segment whose data is kept and that is not waiting for its score.
 struct DataHolder {
   SegmentRow segment;
   std::int64_t bytes = 0;  // compressed
   bool in_unfinished_run = false;
-  // The largest in the tables that hold it; nothing: none does.
+  // The largest gain in the tables that hold it; nullopt if none does.
   std::optional<double> gain;
   bool misfit = false;  // as for VisitScored
 };
 // In order of arrival.
 absl::StatusOr<std::vector<DataHolder>> DataHolders(UnitOfWork* tx);
-// Of all segments, compressed.
+// Bytes of the data of all segments, compressed.
 absl::StatusOr<std::int64_t> DataBytes(UnitOfWork* tx);
 absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t segment);
 absl::Status DeleteData(UnitOfWork* tx, std::int64_t segment);
 
-// Waits for its score. The key must be new.
+// Inserts a segment that waits for its score. The key must be new.
 absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment);
 // Stored or scored -> scored, with its information and the scores of its
-// groups, in place of earlier ones.
+// groups; replaces earlier ones.
 absl::Status WriteScore(UnitOfWork* tx,
                         std::int64_t segment,
                         const SegmentInformation& information);
@@ -139,7 +140,7 @@ absl::Status WriteScore(UnitOfWork* tx,
 absl::Status WriteUnusable(UnitOfWork* tx,
                            std::int64_t segment,
                            const std::string& problem);
-// Why its data is gone.
+// Records why its data is gone.
 absl::Status WriteProblem(UnitOfWork* tx,
                           std::int64_t segment,
                           const std::string& problem);

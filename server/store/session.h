@@ -1,5 +1,5 @@
-// What is kept of every segment for whoever looks back at a session: where the
-// device went, what each piece said, and why a table does not hold it.
+// Records that remain of the segments of a session: the path of the device, the
+// scores, and why a table does not hold a segment.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,19 +12,19 @@
 
 namespace selfcal::server {
 
-// kUnusable: its data is damaged or cannot be scored, or it is quarantined: a
-// run has found that it contradicts the others, or an operator has. Its problem
-// says why; its information enters nothing any more.
+// kUnusable: quarantined, since its data is damaged or cannot be scored, it
+// contradicts other segments, or an operator chose so. Its problem says why;
+// its information is not used any more.
 enum class SegmentState { kStored, kScored, kUnusable };
 
 struct SessionSummary {
   std::string session;
-  std::int64_t segments = 0;  // that are known
+  std::int64_t segments = 0;  // that have records
   std::int64_t first_receive_ns = 0;
   std::int64_t last_receive_ns = 0;
 };
 
-// Rounded to floats: for pictures, not for estimates.
+// Rounded to floats: for display, not for estimation.
 struct PathPoint {
   float seconds = 0;  // since the first keyframe of the segment
   Eigen::Vector3f p_GI = Eigen::Vector3f::Zero();  // [m]
@@ -32,50 +32,50 @@ struct PathPoint {
   friend bool operator==(const PathPoint&, const PathPoint&) = default;
 };
 
-// A piece of the way of a session.
+// A segment of a session, with its path.
 struct SessionSegment {
   SegmentKey key;
   SegmentState state = SegmentState::kStored;
   bool has_data = false;
   std::int64_t start_ns = 0;  // clock of the session
   std::int64_t end_ns = 0;
-  // Of at most kMaxPathPoints keyframes, the first and the last among them.
-  // Empty for a segment from before paths were kept, and for a damaged one.
+  // At most kMaxPathPoints keyframes, the first and the last among them. Empty
+  // for a segment from before paths were stored, and for a damaged record.
   std::vector<PathPoint> path;
   struct Score {
     std::string group;
-    double entropy = 0;  // [nat]; NaN where it is not a number
+    double entropy = 0;  // [nat]; NaN if not a number
     double gain = 0;
   };
-  std::vector<Score> scores;        // by the name of the group
+  std::vector<Score> scores;        // ordered by group
   std::vector<std::string> tables;  // groups that hold it
 };
 
 inline constexpr int kMaxPathPoints = 16;
 
-// As they lie in the database, from 1: only ever extended.
+// The numbers, from 1, are stored in the database: only ever extended.
 enum class AbsenceCause {
-  kSaysTooLittle = 1,  // with a joint selection, beyond what is kept
-  kOthersSayMore,      // all that were in the full table
-  kPushedOut,          // by one that came later
+  kSaysTooLittle = 1,  // insufficient gain; joint: beyond that kept
+  kOthersSayMore,      // outranked by all entries of the full table
+  kPushedOut,          // evicted by a later segment
   kTooOld,
   kDeviceChanged,
   kDataEvicted,  // by a quota
   kUnusable,
-  kDoesNotFit,    // its residuals, against those of the rig's other segments
-  kManyOutliers,  // too many of its observations were left out
+  kDoesNotFit,    // larger residuals than the rig's other segments
+  kManyOutliers,  // too many of its observations were excluded
 };
 
-// Why the table of a group does not hold a scored segment.
+// An exclusion: why the table of a group does not hold a scored segment.
 struct TableAbsence {
   std::string group;
   AbsenceCause cause = AbsenceCause::kSaysTooLittle;
   std::int64_t time_ns = 0;
-  // kOthersSayMore: the worst in the table at that time; kPushedOut: what came
-  // instead. The key is missing once nothing is kept of that segment.
+  // kOthersSayMore: the worst entry of the table at that time; kPushedOut: the
+  // segment that replaced it. No key once the records of that segment are gone.
   std::optional<SegmentKey> rival;
   std::optional<double> rival_entropy;  // [nat]
-  // kDoesNotFit: ResidualStatistics::fit, and the largest that fits.
+  // kDoesNotFit: ResidualStatistics::fit, and the largest that is admitted.
   std::optional<double> fit;
   std::optional<double> fit_limit;
 };

@@ -34,7 +34,7 @@ absl::StatusOr<SessionSummary> Summarise(Connection* db,
                                          const std::string& session) {
   SessionSummary summary;
   summary.session = session;
-  // Counts in the index; looks at two rows.
+  // Counts in the index and reads two rows.
   Statement read(db,
                  "SELECT count(*), "
                  "  (SELECT receive_time_ns FROM segments WHERE rig = ?1 "
@@ -70,7 +70,8 @@ absl::StatusOr<std::vector<SessionSegment::Score>> ReadScores(
   return scores;
 }
 
-// Empty where there is none or it is damaged: the doctor tells which.
+// Empty if there is none or it is damaged; the check of the database tells them
+// apart.
 std::vector<PathPoint> PathFromRow(const Statement& row,
                                    int path,
                                    int sha256,

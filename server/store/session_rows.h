@@ -1,4 +1,4 @@
-// Sessions and the way of each, in the database.
+// Records of sessions and of their segments.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -10,7 +10,8 @@
 
 namespace selfcal::server {
 
-// Goes from one name to the next in an index, however many segments each has.
+// Steps from one name to the next in an index, however many segments each
+// session has.
 absl::StatusOr<Listed<SessionSummary>> ListSessionRows(Connection* db,
                                                        const std::string& rig,
                                                        const Page& page);

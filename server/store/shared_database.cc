@@ -12,15 +12,15 @@
 namespace selfcal::server {
 namespace {
 
-// Bounds how long the first of a group waits for the last.
+// Bounds how long the first write of a group waits for the last.
 constexpr std::size_t kMaxGroup = 64;
 
-// The log is moved into the file when it is this large: some groups of
+// The log is moved into the file when it is this large: several groups of
 // segments, so that a page that many of them change is written once.
 constexpr std::int64_t kCheckpointBytes = 32 << 20;
-constexpr std::int64_t kLeastPage = 512;  // of SQLite
+constexpr std::int64_t kLeastPage = 512;  // the smallest of SQLite
 
-// A COMMIT failed, or a statement of it: the disk, not the question.
+// True if the disk failed, rather than the write or the query.
 bool IsDiskError(const absl::Status& status) {
   return absl::IsUnavailable(status);
 }
@@ -42,7 +42,7 @@ absl::Status QuickCheck(Connection* connection) {
       words + ")");
 }
 
-// What a change throws fails it alone.
+// Turns what a write throws into an error of that write alone.
 absl::Status RunGuarded(const SharedDatabase::Work& work,
                         Connection* connection) {
   try {
@@ -54,7 +54,7 @@ absl::Status RunGuarded(const SharedDatabase::Work& work,
   }
 }
 
-// Takes the place of SQLite's own checkpoint, which is part of a commit.
+// Replaces SQLite's automatic checkpoint, which is part of a commit.
 int NoteLogPages(void* log_pages, sqlite3*, const char*, int pages) {
   *static_cast<int*>(log_pages) = pages;
   return SQLITE_OK;
@@ -118,7 +118,7 @@ absl::Status SharedDatabase::Recover() {
 void SharedDatabase::CheckpointIfLarge() {
   if (failed_ || log_pages_ < checkpoint_pages_) return;
   log_pages_ = 0;  // until the next commit
-  // As far as those who read allow; the rest next time.
+  // As far as readers allow; the rest next time.
   const int code = sqlite3_wal_checkpoint_v2(
       writer_->handle(), nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
   if (code != SQLITE_BUSY) Failed(writer_->StatusOf(code, "checkpoint"));
@@ -142,8 +142,8 @@ absl::Status SharedDatabase::Read(const Work& query) {
   return status;
 }
 
-// The thread that writes opens the database again. Nobody waits for that here:
-// that thread could be waiting for whoever reads.
+// Makes the writing thread reopen the database, without waiting for it: that
+// thread could be waiting for a reader.
 void SharedDatabase::WakeToRecover() {
   {
     const std::lock_guard lock(mutex_);
@@ -163,7 +163,7 @@ void SharedDatabase::Write(Work change, Done done) {
 }
 
 absl::Status SharedDatabase::Write(Work change) {
-  // Shared: this thread may be gone before set_value has returned.
+  // Shared, because this function may return before set_value has.
   const auto committed = std::make_shared<std::promise<absl::Status>>();
   Write(std::move(change), [committed](const absl::Status& status) {
     committed->set_value(status);
@@ -185,7 +185,7 @@ void SharedDatabase::Run() {
     lock.unlock();
     Commit(group);
     for (const Job& job : group) job.done(job.status);
-    group.clear();  // what the changes hold goes while others may queue
+    group.clear();  // releases their memory before taking the lock
     CheckpointIfLarge();
     lock.lock();
   }
@@ -201,7 +201,8 @@ void SharedDatabase::Commit(std::span<Job> group) {
     }
   }
   if (CommitTogether(group) || group.size() == 1) return;
-  // One of them was too much, for a disk that is almost full: each by itself.
+  // One of them may have been too large for an almost full disk: try each
+  // alone.
   for (Job& job : group) {
     if (failed_) {
       job.status = Checking();
@@ -211,8 +212,8 @@ void SharedDatabase::Commit(std::span<Job> group) {
   }
 }
 
-// False: nothing was committed, and each is worth a try of its own. True: the
-// statuses are final.
+// False if nothing was committed and each write deserves a try of its own; true
+// if the statuses are final.
 bool SharedDatabase::CommitTogether(std::span<Job> group) {
   const auto fail = [&](const absl::Status& status) {
     Failed(status);

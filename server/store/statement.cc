@@ -5,7 +5,7 @@
 namespace selfcal::server {
 namespace {
 
-// Kept by a connection; some kB each.
+// Prepared statements that a connection keeps, a few kB each.
 constexpr std::size_t kMaxPrepared = 128;
 
 absl::StatusCode CanonicalCode(int primary) {
@@ -61,7 +61,7 @@ absl::StatusOr<Connection> Connection::Open(const std::string& path,
                                             int flags) {
   sqlite3* handle = nullptr;
   const int code = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
-  Connection connection(handle);  // also a failed open gives one to close
+  Connection connection(handle);  // to be closed even if opening failed
   if (code != SQLITE_OK) {
     return connection.StatusOf(code, "open " + path);
   }
@@ -103,7 +103,7 @@ Connection::Prepared Connection::Take(std::string_view sql, int* code) {
                              &prepared,
                              nullptr);
   Prepared owned(prepared);
-  // Its place is made here, where want of memory may be told.
+  // Allocates its place here, since Keep runs in a destructor.
   if (found == prepared_.end() && prepared_.size() < kMaxPrepared) {
     prepared_.emplace(sql, nullptr);
   }
@@ -114,7 +114,7 @@ void Connection::Keep(Prepared prepared) {
   if (prepared == nullptr) return;
   const auto place = prepared_.find(sqlite3_sql(prepared.get()));
   if (place == prepared_.end() || place->second != nullptr) return;
-  sqlite3_reset(prepared.get());  // returns the error of its last step again
+  sqlite3_reset(prepared.get());  // repeats the error of the last step
   sqlite3_clear_bindings(prepared.get());
   place->second = std::move(prepared);
 }
@@ -186,7 +186,7 @@ void Statement::Bind(int index, const std::string& value) {
 
 void Statement::Bind(int index, BlobView value) {
   if (status_.ok()) {
-    // The statement is stepped and gone before the caller's bytes are.
+    // The caller's bytes outlive the statement.
     Check(sqlite3_bind_blob64(statement_.get(),
                               index,
                               value.bytes.data(),
@@ -211,8 +211,7 @@ Transaction::Transaction(Connection* connection)
 }
 
 Transaction::~Transaction() {
-  // SQLite has rolled back by itself after some errors; then there is nothing
-  // left to do.
+  // After some errors SQLite has rolled back by itself.
   if (open_ && connection_->in_transaction()) {
     sqlite3_exec(connection_->handle(),
                  nested_ ? "ROLLBACK TO part; RELEASE part" : "ROLLBACK",

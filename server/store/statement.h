@@ -1,9 +1,9 @@
-// A thin owner of SQLite handles: connections, statements, transactions.
+// Thin owners of SQLite handles: connections, statements, transactions.
 //
 // A connection and everything made from it may be used by one thread at a time.
-// Errors of SQLite become canonical ones with a sentence that says what to do
-// (SqliteStatus). A statement keeps its first error: bind, step and read, then
-// ask for the status once.
+// SQLite errors become canonical ones that say what to do
+// (Connection::StatusOf). A statement keeps its first error: bind, step and
+// read, then check the status once.
 #pragma once
 
 #include <absl/status/status.h>
@@ -21,7 +21,7 @@
 
 namespace selfcal::server {
 
-// Bytes that are bound as a BLOB. Does not own them.
+// Bytes to bind as a BLOB. Does not own them.
 struct BlobView {
   std::string_view bytes;
 };
@@ -31,14 +31,14 @@ class Connection {
   // `flags` as for sqlite3_open_v2.
   static absl::StatusOr<Connection> Open(const std::string& path, int flags);
 
-  // Runs one or several statements that return nothing.
+  // Runs one or several statements that return no rows.
   absl::Status Execute(const std::string& sql);
 
-  // The canonical error of a result code, with SQLite's own words; OK for
+  // The canonical error of a result code, with SQLite's message; OK for
   // SQLITE_OK, SQLITE_ROW and SQLITE_DONE.
   absl::Status StatusOf(int code, std::string_view what) const;
 
-  // Whether a transaction is open; SQLite ends one by itself after some errors.
+  // True if a transaction is open; after some errors SQLite ends one by itself.
   bool in_transaction() const {
     return sqlite3_get_autocommit(handle_.get()) == 0;
   }
@@ -62,12 +62,12 @@ class Connection {
   void Keep(Prepared prepared);
 
   std::unique_ptr<sqlite3, Close> handle_;
-  // By their SQL: to prepare a statement takes longer than to run it. Null
-  // while it is in use.
+  // Prepared statements by their SQL: preparing one takes longer than running
+  // it. Null while in use.
   std::map<std::string, Prepared, std::less<>> prepared_;
 };
 
-// Its connection outlives it, and stays where it is meanwhile.
+// The connection must outlive the statement and must not move meanwhile.
 class Statement {
  public:
   // Prepares `sql` and binds the arguments to ?1, ?2, ...
@@ -82,13 +82,13 @@ class Statement {
   Statement(const Statement&) = delete;
   Statement& operator=(const Statement&) = delete;
 
-  // Steps. True: there is a row to read. False: at the end, or an error.
+  // Steps to the next row. False at the end, or after an error.
   bool Next();
   // Steps to the end.
   absl::Status Run();
   const absl::Status& status() const { return status_; }
 
-  // Columns of the row, from 0.
+  // Columns of the current row, from 0.
   std::int64_t Int(int column) const;
   double Double(int column) const;
   std::string Text(int column) const;  // of a TEXT or a BLOB
@@ -101,7 +101,7 @@ class Statement {
   void Bind(int index, double value);
   template <typename T>
   void Bind(int index, const std::optional<T>& value) {
-    if (value) Bind(index, *value);  // what is not bound is NULL
+    if (value) Bind(index, *value);  // unbound is NULL
   }
   void Bind(int index, std::string_view value);
   void Bind(int index, const std::string& value);
@@ -114,8 +114,8 @@ class Statement {
 };
 
 // BEGIN IMMEDIATE; rolls back unless committed. Inside another transaction it
-// is a savepoint of that one: its rollback leaves the other's changes, and its
-// commit becomes durable with the other's.
+// is a savepoint: its rollback keeps the changes of the outer transaction, and
+// its commit becomes durable with the outer one.
 class Transaction {
  public:
   explicit Transaction(Connection* connection);
@@ -123,7 +123,7 @@ class Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
-  // Whether it could begin.
+  // An error if it could not begin.
   const absl::Status& status() const { return status_; }
   absl::Status Commit();
 
@@ -149,10 +149,10 @@ class Snapshot {
   absl::Status status_;
 };
 
-// The row that the last INSERT made.
+// The row id of the last INSERT.
 std::int64_t LastInsertedRow(Connection* db);
 
-// The number that `sql` gives in its first row; 0 without one.
+// The number in the first row of `sql`; 0 if there is none.
 template <typename... Args>
 absl::StatusOr<std::int64_t> ReadInt(Connection* db,
                                      std::string_view sql,

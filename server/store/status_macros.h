@@ -1,4 +1,4 @@
-// Passing errors on. Abseil has no such macros of its own.
+// Macros that propagate errors; Abseil has none of its own.
 #pragma once
 
 #include <absl/status/status.h>

@@ -1,15 +1,15 @@
-// Records of everything that selfcald keeps, and transactions on them. It holds
-// no policy: server/domain decides what is written. The SQLite store
-// (store_sqlite.h) is the implementation; another engine proves itself by the
-// same tests.
+// Records of everything that selfcald keeps, and transactions on them. The
+// store has no policy: server/domain decides what is written. The SQLite store
+// (store_sqlite.h) is the implementation; any other engine must pass the same
+// tests.
 //
 // A transaction happens as a whole or not at all: when Transact returns OK it
 // is committed and synced, when it returns an error nothing has changed.
-// Transactions that come at the same time may share one commit and its sync.
-// Any thread may call; writes are serialised inside.
-// Errors: NOT_FOUND, ALREADY_EXISTS, FAILED_PRECONDITION from the caller's
-// side; RESOURCE_EXHAUSTED (disk full), DATA_LOSS (a checksum does not match),
-// UNAVAILABLE from the environment.
+// Concurrent transactions may share one commit and its sync. Any thread may
+// call; writes are serialised inside. Errors caused by the caller: NOT_FOUND,
+// ALREADY_EXISTS, FAILED_PRECONDITION, and INVALID_ARGUMENT for a page token.
+// Errors of the environment: RESOURCE_EXHAUSTED (disk full), DATA_LOSS (a
+// checksum does not match), UNAVAILABLE.
 #pragma once
 
 #include <absl/status/status.h>
@@ -39,10 +39,10 @@
 
 namespace selfcal::server {
 
-// A page of a list: everything after the token of the page before.
+// Selects a page of a list.
 struct Page {
   int size = 50;
-  std::string token;  // opaque; empty for the first page
+  std::string token;  // opaque, from the page before; empty for the first
 };
 template <typename T>
 struct Listed {
@@ -50,16 +50,15 @@ struct Listed {
   std::string next_token;  // empty on the last page
 };
 
-// What of a rig goes by the clock; 0: no matter.
+// Time-based policy of a rig; 0 disables a rule.
 struct RigPolicy {
   // Segments that arrived longer ago leave the tables.
   std::int64_t table_max_age_ns = 0;
-  // From the end of a run to the beginning of the next that the tables or the
-  // age of the calibration call for.
+  // From the end of a run to the beginning of the next one that is not manual.
   std::int64_t recalibration_min_interval_ns = 0;
-  // A calibration that has been active for longer is computed anew.
+  // A calibration that has been active for longer is recalibrated.
   std::int64_t calibration_max_age_ns = 0;
-  // How fast components change by themselves (core/change/aged.h).
+  // Random walk of the components (core/change/aged.h).
   std::vector<WalkDensity> walk_densities;
 
   friend bool operator==(const RigPolicy&, const RigPolicy&) = default;
@@ -88,14 +87,14 @@ struct StoredSegment {
   int landmarks = 0;
   int observations = 0;
   std::optional<double> temperature_c;            // of the device
-  std::optional<SegmentInformation> information;  // once scored
+  std::optional<SegmentInformation> information;  // if scored
   std::vector<std::string> tables;                // groups that hold it
-  // Why it is unusable, or its data gone; empty: neither, or no table and no
-  // run needs the data.
+  // Why it is unusable or its data is gone. Empty if neither holds, or if the
+  // data was deleted because no table and no run needs it.
   std::string problem;
 };
 
-// What may become what: calibration_states.h.
+// The transitions between them are in server/domain/calibration_life.h.
 enum class CalibrationState {
   kActive,
   kSuperseded,
@@ -104,7 +103,7 @@ enum class CalibrationState {
   kRolledBack,
 };
 
-// A check that could not be made never counts as passed.
+// A check that could not be made is never treated as passed.
 enum class CheckOutcome { kPassed, kFailed, kNotTested };
 
 struct ValidationCheck {
@@ -112,16 +111,16 @@ struct ValidationCheck {
   double value = 0;
   double limit = 0;
   CheckOutcome outcome = CheckOutcome::kNotTested;
-  // The value, what it means and what to do. Of one that passed only where
-  // there is something to note.
+  // The value, what it means and what to do. Empty for a check that passed,
+  // unless there is something to note.
   std::string sentence = {};
 };
 
-// Of segments that a candidate was not calibrated on: how well it predicts what
-// they show, and how well the active version does.
+// How well a candidate, and the active version, predict the information of
+// segments that the candidate was not calibrated on.
 struct HeldOutTest {
   int segments = 0;  // that were tested
-  int left_out = 0;  // that could not be tested, or fit worst
+  int left_out = 0;  // not testable, or the one that fits worst
   ConsistencyTest candidate;
   ConsistencyTest active;
   int rescored = 0;  // of `segments`: scored again at the candidate
@@ -129,27 +128,27 @@ struct HeldOutTest {
 
 // The checks of a candidate.
 struct StoredValidation {
-  std::int64_t active_version = 0;  // that it was validated against
+  std::int64_t active_version = 0;  // it was validated against this
   std::vector<ValidationCheck> checks;
   HeldOutTest held_out;
 };
 
 enum class VerdictKind {
-  kUnknown,  // not validated yet, or from before there were verdicts
+  kUnknown,  // not validated yet, or stored before there were verdicts
   kGood,
   kWeak,
   kNotTrustworthy,
   kFactory,
 };
 
-// What a version is good for, computed once, when it was validated
+// The verdict on a version, computed once, when it was validated
 // (server/pipeline/verdict.h). Every interface shows this one.
 struct Verdict {
   VerdictKind kind = VerdictKind::kUnknown;
-  std::vector<std::string> sentences;  // what it rests on
+  std::vector<std::string> sentences;  // the reasons
 };
 
-// Of the device in the segments of a calibration that say so.
+// Temperatures of the device in those segments of a calibration that state one.
 struct SegmentTemperatures {
   int segments = 0;
   double mean_c = 0;
@@ -159,30 +158,30 @@ struct SegmentTemperatures {
 
 struct StoredCalibration {
   std::string rig;
-  std::int64_t version = 0;  // the factory's is 1
+  std::int64_t version = 0;  // 1 is the factory calibration
   CalibrationState state = CalibrationState::kActive;
   std::int64_t create_time_ns = 0;
   Calibration theta;
   Eigen::MatrixXd covariance;        // D x D
   std::vector<std::string> reasons;  // why it was rejected
   std::optional<std::int64_t> run;   // that produced it
-  std::int64_t base_version = 0;     // where the solver started, 0: none
+  std::int64_t base_version = 0;     // start of the solver; 0: none
   std::vector<SegmentKey> segments;
-  // Read with it, never written: the segments have it.
+  // Derived from the segments when read, never written.
   std::optional<SegmentTemperatures> temperatures;
   std::string program_version;
-  int schema_version = 0;  // of the database; 0 from before it was kept
-  // Name and value of what shaped the run's result.
+  int schema_version = 0;  // of the database; 0 if it was not recorded
+  // Names and values of the settings that shape the result.
   std::vector<std::pair<std::string, std::string>> settings;
   std::optional<CalibrationResult> report;     // of the solver
-  std::vector<CalibrateProgress> steps;        // the iterations of the solver
-  std::optional<StoredValidation> validation;  // of one that was a candidate
-  Verdict verdict;                             // the same
-  double seconds = 0;                          // it took
-  // What a verification found, by which the two cores disagree on what this
-  // version stands on: it is not to be trusted. Empty: nothing.
+  std::vector<CalibrateProgress> steps;        // iterations of the solver
+  std::optional<StoredValidation> validation;  // if it was validated
+  Verdict verdict;                             // likewise
+  double seconds = 0;                          // to compute it
+  // The finding of a verification by which the two cores disagree on what this
+  // version rests on, so that it must not be trusted. Empty: none.
   std::string disagreement;
-  // Counts the activations of all rigs: that of its newest, 0 if it never was
+  // Number of its newest activation, counted over all rigs; 0 if it never was
   // active.
   std::int64_t activation = 0;
 };
@@ -192,9 +191,9 @@ enum class RunTrigger {
   kTablesFull,
   kTablesChanged,
   kManual,
-  kChangeDetected,  // the tables are full again, for the first time since one
+  kChangeDetected,  // the tables are full for the first time since one
   kCalibrationAged,
-  kSessionEnded,  // and the tables have changed since the last run
+  kSessionEnded,  // and a run is due (server/domain/session_trigger.h)
 };
 
 struct StoredRun {
@@ -205,43 +204,43 @@ struct StoredRun {
   std::int64_t create_time_ns = 0;
   std::int64_t end_time_ns = 0;      // 0 until it has ended
   std::int64_t base_version = 0;     // active when it was created
-  std::int64_t change = 0;           // the newest when it was created, 0: none
+  std::int64_t change = 0;           // the newest when it was created; 0: none
   std::vector<SegmentKey> segments;  // the snapshot of the tables
   int attempts = 0;
   std::int64_t calibration_version = 0;  // 0 until it succeeded
-  // Why it failed; while it is pending, why it is held back.
+  // Why it failed or was cancelled; while it is pending, why it is deferred.
   std::string message;
 };
 
-// The device has changed.
+// A device change.
 struct StoredChange {
   std::string rig;
   std::int64_t change = 0;   // counts from 1 in a rig
   std::int64_t time_ns = 0;  // when it was detected
   ChangeKind kind = ChangeKind::kSudden;
-  // Segments of a smaller sequence lie before it.
+  // Segments with a smaller sequence lie before it.
   std::int64_t first_sequence = 0;
-  // The calibration that was active: what it knows of other groups than these
-  // stays known.
+  // The calibration that was active. What it knows of groups that are not
+  // concerned remains known.
   std::int64_t base_version = 0;
   std::vector<std::string> groups;  // concerned
-  double inflation = 1;             // of the variances of segments in the test
+  double inflation = 1;             // factor on the variances of segments
 };
 
-// A rig in a list of many.
+// Summary of a rig, for lists.
 struct RigSummary {
   std::string rig;
   std::int64_t create_time_ns = 0;
   std::map<std::string, std::string> labels;
-  std::int64_t last_seen_ns = 0;  // its newest segment arrived; 0: none so far
+  std::int64_t last_seen_ns = 0;  // when its newest segment arrived; 0: none
   std::int64_t active_version = 0;
   std::int64_t active_since_ns = 0;
   std::vector<Table> tables;  // in the order of the rig's groups
   std::int64_t newest_version = 0;
   CalibrationState newest_state = CalibrationState::kActive;
-  std::int64_t newest_run = 0;  // 0: none so far, as the change
+  std::int64_t newest_run = 0;  // 0: none, as for the change
   RunState run_state = RunState::kPending;
-  std::int64_t newest_change_ns = 0;  // of the device
+  std::int64_t newest_change_ns = 0;  // device change
 };
 
 class StoreMaintenance;  // maintenance.h
@@ -252,27 +251,27 @@ class Store {
   virtual ~Store() = default;
 
   // --- Transactions. `work` uses the record functions of this module on its
-  // unit of work; it must be short, and may run again if the commit that it was
-  // part of failed for another reason.
+  // unit of work. It must be short, and may run again if the commit that
+  // included it failed for another reason.
   using Work = std::function<absl::Status(UnitOfWork*)>;
   using Done = std::function<void(const absl::Status&)>;
 
-  // Commits what `work` writes, unless it returns an error. `time_ns` is
-  // stamped on what is written. NOT_FOUND for the rig.
+  // Commits what `work` writes, unless it returns an error. `time_ns` is the
+  // time of all that it writes. NOT_FOUND if there is no such rig.
   virtual absl::Status Transact(const std::string& rig,
                                 std::int64_t time_ns,
                                 const Work& work) = 0;
-  // The same without waiting. What one thread begins is carried out in that
-  // order. `done` is called once, on a thread of the store; it must be short
-  // and must not call the store.
+  // Transact without waiting. Transactions of one thread are carried out in the
+  // order in which they begin. `done` is called once, on a thread of the store;
+  // it must be short and must not call the store.
   virtual void BeginTransaction(const std::string& rig,
                                 std::int64_t time_ns,
                                 Work work,
                                 Done done) = 0;
-  // The same for a rig that is inserted first; stamped with its creation time.
+  // Transact for a rig that is inserted first, at its creation time.
   // ALREADY_EXISTS.
   virtual absl::Status InsertRig(const StoredRig& rig, const Work& work) = 0;
-  // `work` only reads, one state of the database.
+  // Runs `work`, which only reads, on one state of the database.
   virtual absl::Status Inspect(const std::string& rig, const Work& work) = 0;
 
   // --- Rigs.
@@ -287,7 +286,7 @@ class Store {
   virtual absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
       const RigQuery& query, const Page& page) = 0;
   virtual absl::StatusOr<std::vector<std::string>> ListRigNames() = 0;
-  // Names of rigs whose newest segment arrived, but not after this time.
+  // Names of rigs that have received segments, but none after this time.
   virtual absl::StatusOr<std::vector<std::string>> ListIdleRigs(
       std::int64_t idle_since_ns) = 0;
 
@@ -296,7 +295,7 @@ class Store {
                                                    const SegmentKey& key) = 0;
   virtual absl::StatusOr<Listed<StoredSegment>> ListSegments(
       const std::string& rig, const SegmentQuery& query, const Page& page) = 0;
-  // All, newest first.
+  // All segments, newest first.
   absl::StatusOr<Listed<StoredSegment>> ListSegments(const std::string& rig,
                                                      const Page& page) {
     return ListSegments(rig, {}, page);
@@ -307,12 +306,12 @@ class Store {
   // Sessions of a rig by name.
   virtual absl::StatusOr<Listed<SessionSummary>> ListSessions(
       const std::string& rig, const Page& page) = 0;
-  // Of one session by index. NOT_FOUND if nothing is kept of it.
+  // Segments of one session by index. NOT_FOUND if there is no record of it.
   virtual absl::StatusOr<Listed<SessionSegment>> ListSessionSegments(
       const std::string& rig, const std::string& session, const Page& page) = 0;
   virtual absl::StatusOr<SessionSummary> GetSession(
       const std::string& rig, const std::string& session) = 0;
-  // Why tables do not hold the segment, as far as that was written down.
+  // Exclusions of the segment, as far as they were recorded.
   virtual absl::StatusOr<std::vector<TableAbsence>> ListAbsences(
       const std::string& rig, const SegmentKey& key) = 0;
   // The oldest unscored segments of all rigs, in the order of their arrival.
@@ -344,12 +343,12 @@ class Store {
                                            std::int64_t run) = 0;
   virtual absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
                                                      const Page& page) = 0;
-  // Pending or running runs of all rigs, oldest first: after a restart a
+  // Pending and running runs of all rigs, oldest first. After a restart, a
   // running one starts again.
   virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns() = 0;
 
-  // --- Events, oldest or newest first; of one rig unless it is empty. They are
-  // only ever appended.
+  // --- Events, oldest or newest first, of one rig or, if `rig` is empty, of
+  // all. They are only ever appended.
   virtual absl::StatusOr<Listed<StoredEvent>> ListEvents(
       const Page& page, const std::string& rig = "") = 0;
   virtual absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(

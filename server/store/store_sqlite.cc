@@ -27,7 +27,7 @@
 namespace selfcal::server {
 namespace {
 
-// Gives the work of each subject its connection.
+// Runs the record functions of each subject on the right connection.
 class SqliteStore : public Store {
  public:
   SqliteStore(const std::string& path, std::unique_ptr<SharedDatabase> db)
@@ -209,7 +209,7 @@ class SqliteStore : public Store {
   StoreMaintenance* maintenance() override { return maintenance_.get(); }
 
  private:
-  // `query` returns a Status or a StatusOr of what it has read.
+  // `query` returns a Status or a StatusOr.
   template <typename Query>
   auto Read(const Query& query) -> std::invoke_result_t<Query, Connection*> {
     std::invoke_result_t<Query, Connection*> result = absl::UnknownError("");

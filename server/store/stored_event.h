@@ -1,4 +1,4 @@
-// The log of what happened to rigs.
+// Events: the log of what happened to rigs.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace selfcal::server {
 
-// As they lie in the database, from 1: only ever extended.
+// The numbers, from 1, are stored in the database: only ever extended.
 enum class EventKind {
   kRigCreated,
   kRunStarted,
@@ -16,10 +16,10 @@ enum class EventKind {
   kSegmentUnusable,
   kChangeDetected,
   kDataEvicted,            // a quota was reached
-  kCalibrationActivated,   // by hand
-  kCalibrationRolledBack,  // by hand
+  kCalibrationActivated,   // manually
+  kCalibrationRolledBack,  // manually
   kRunHeldBack,
-  kSegmentQuarantined,  // by a run, neighbours, or by hand
+  kSegmentQuarantined,  // by a run, by its neighbours, or manually
   kCoresDisagree,       // a verification found a difference
   kRigUpdated,          // by hand, as the next two
   kRigDeleted,

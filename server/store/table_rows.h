@@ -14,7 +14,8 @@
 
 namespace selfcal::server {
 
-// In the order of the rig's groups, entries sorted as Table says.
+// Tables in the order of the rig's groups, with the entries sorted as Table
+// says.
 absl::StatusOr<std::vector<Table>> ReadTables(Connection* db, std::int64_t rig);
 // Groups whose table holds the segment, in the order of the rig.
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
@@ -22,12 +23,12 @@ absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
 
 // --- Within a unit of work.
 
-// New ones, empty.
+// Inserts empty tables.
 absl::Status InsertTables(UnitOfWork* tx, const std::vector<Table>& tables);
 absl::StatusOr<std::vector<Table>> ReadTables(UnitOfWork* tx);
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(UnitOfWork* tx,
                                                          std::int64_t segment);
-// How many scored segments a table was offered.
+// Writes how many scored segments a table was offered.
 absl::Status WriteScored(UnitOfWork* tx,
                          const std::string& group,
                          std::int64_t scored);
@@ -39,7 +40,7 @@ absl::Status InsertEntry(UnitOfWork* tx,
 absl::Status DeleteEntry(UnitOfWork* tx,
                          const std::string& group,
                          std::int64_t segment);
-// A later score of a segment in the table of its group, if that holds it.
+// Replaces the score of a segment in the table of its group, if that holds it.
 absl::Status WriteEntryScore(UnitOfWork* tx,
                              std::int64_t segment,
                              const GroupScore& score);

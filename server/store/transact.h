@@ -13,7 +13,7 @@
 
 namespace selfcal::server {
 
-// `work` takes a UnitOfWork* and returns an absl::StatusOr of what is returned
+// `work` takes a UnitOfWork* and returns an absl::StatusOr, which is returned
 // here once it is committed. It may be called again (Store::Work).
 template <typename Work>
 auto TransactFor(Store* store,

@@ -25,9 +25,9 @@ class UnitOfWork {
   UnitOfWork(const UnitOfWork&) = delete;
   UnitOfWork& operator=(const UnitOfWork&) = delete;
 
-  // Name of the rig; it exists.
+  // Name of the rig, which exists.
   const std::string& rig() const { return rig_; }
-  // Stamped on what is written [ns since the Unix epoch].
+  // The time of what is written [ns since the Unix epoch].
   std::int64_t time_ns() const { return time_ns_; }
 
   // For the statements of this module.

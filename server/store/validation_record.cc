@@ -1,4 +1,4 @@
-// The record of how a candidate was validated.
+// Record of the validation of a candidate.
 #include "server/store/record_parts.h"
 #include "server/store/records.h"
 
@@ -49,7 +49,7 @@ CheckOutcome OutcomeOf(const v1::Validation::Check& check) {
       return CheckOutcome::kFailed;
     case v1::Validation::Check::NOT_TESTED:
       return CheckOutcome::kNotTested;
-    default:  // from before it was recorded
+    default:  // stored before there were outcomes
       return check.passed() ? CheckOutcome::kPassed : CheckOutcome::kFailed;
   }
 }
