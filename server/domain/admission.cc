@@ -12,7 +12,7 @@
 namespace selfcal::server {
 namespace {
 
-// Segments that tables hold, each once.
+// The segments in the tables, each once.
 absl::StatusOr<std::vector<SegmentRow>> KeptSegments(UnitOfWork* tx) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
   std::vector<SegmentRow> kept;

@@ -1,4 +1,4 @@
-// Which segments fit well enough to be offered to the tables
+// Admission by fit: which segments fit well enough to be offered to the tables
 // (core/selection/fit.h).
 #pragma once
 
@@ -13,10 +13,10 @@
 
 namespace selfcal::server {
 
-// LargestFit of the rig as it is.
+// LargestFit of the rig in its present state; nullopt if there is no limit yet.
 absl::StatusOr<std::optional<double>> LargestFitOfRig(UnitOfWork* tx);
 
-// Takes segments with a larger fit out of all tables.
+// Removes segments with a larger fit from all tables.
 absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit);
 
 // False for a segment that is not offered to the tables, because it does not

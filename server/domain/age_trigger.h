@@ -1,4 +1,4 @@
-// An old active calibration may start a run.
+// The trigger by age: an old active calibration may start a run.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -11,10 +11,10 @@
 
 namespace selfcal::server {
 
-// The run of a rig whose calibration is the result of a run and has been active
-// for longer than the policy of the rig allows, where the tables hold a segment
-// that the last run was not created with, no run is unfinished, and the last
-// one began as long ago.
+// Creates a run if the active calibration is the result of a run and has been
+// active for longer than the policy of the rig allows, the tables hold a
+// segment that the last run was not created with, no run is unfinished, and the
+// last one was created as long ago.
 absl::StatusOr<std::optional<StoredRun>> CreateAgedRun(UnitOfWork* tx,
                                                        const StoredRig& rig,
                                                        std::int64_t now_ns);

@@ -18,7 +18,7 @@ struct Transition {
   CalibrationState to;
 };
 
-// Those of migrations/0004_lifecycle.sql.
+// The same as in migrations/0004_lifecycle.sql.
 constexpr Transition kTransitions[] = {
     {CalibrationState::kCandidate, CalibrationState::kActive},
     {CalibrationState::kCandidate, CalibrationState::kRejected},
@@ -48,7 +48,7 @@ absl::Status ChangeState(UnitOfWork* tx,
   return WriteState(tx, version, from, to);
 }
 
-// Makes a version of that state the active one.
+// Makes a version the active one. `from` is its present state.
 absl::Status MakeActive(UnitOfWork* tx,
                         std::int64_t version,
                         CalibrationState from,

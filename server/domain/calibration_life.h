@@ -1,7 +1,7 @@
 // The life of a calibration:
 //
-//   candidate -> active       it was validated
-//   candidate -> rejected     it was not; the end
+//   candidate -> active       validation passed
+//   candidate -> rejected     validation failed; final
 //   active -> superseded      a newer one became active
 //   active -> rolled back     an older one was activated manually
 //   superseded -> active      manually
@@ -27,12 +27,13 @@ bool MayBecome(CalibrationState from, CalibrationState to);
 // "rolled back".
 const char* StateName(CalibrationState state);
 
-// Writes the factory calibration of a new rig, active: what is known of it are
-// the tolerances.
+// Writes the factory calibration of a new rig as its active one; its covariance
+// is that of the tolerances.
 absl::Status StoreFactoryCalibration(UnitOfWork* tx, const StoredRig& rig);
 
-// Candidate -> active or rejected, as the state of `validated` says, with its
-// reasons and validation, and the event. What was active is superseded.
+// Candidate -> active or rejected, as the state of `validated` says; writes its
+// reasons, its validation and the event. The version that was active is
+// superseded.
 absl::Status EndValidation(UnitOfWork* tx, const StoredCalibration& validated);
 
 // Domain::ActivateCalibration.

@@ -1,4 +1,4 @@
-// The clock whose time is stamped on what is stored.
+// The clock that gives the time of what is stored.
 #pragma once
 
 #include <chrono>

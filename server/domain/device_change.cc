@@ -23,16 +23,16 @@
 namespace selfcal::server {
 namespace {
 
-// A run is as likely to find a change where there is none as the tests of so
-// many single segments: about as many come between two runs.
+// A run may raise as many false alarms as the tests of this many single
+// segments: about as many arrive between two runs.
 constexpr double kSegmentsOfARun = 10;
 
-// The newest segments that can be tested, oldest first: `count` of twice as
-// many, without those that are isolated (core/change/isolated.h).
+// The newest segments that can be tested, oldest first: at most `count` of
+// twice as many, without the isolated ones (core/change/isolated.h).
 struct Newest {
   std::vector<OffsetInformation> segments;
   std::vector<std::int64_t> sequences;
-  // Those between two neighbours that both contradict them.
+  // Segments between two neighbours that both contradict them.
   std::vector<SegmentRow> isolated;
 };
 
@@ -69,10 +69,10 @@ absl::StatusOr<Newest> ReadNewest(UnitOfWork* tx,
   return newest;
 }
 
-// True if segments can be tested against the calibration: the factory's is a
-// prior, not an estimate; one from before the last change is no longer that of
-// the device; and one from before the noise of tracks was measured claims
-// sigmas that are too small.
+// True if segments can be tested against the calibration. The factory
+// calibration is a prior, not an estimate; one from before the last device
+// change is no longer that of the device; and one from before the track noise
+// was measured states sigmas that are too small.
 absl::StatusOr<bool> IsTestable(UnitOfWork* tx,
                                 const StoredCalibration& active,
                                 std::int64_t change) {
@@ -133,7 +133,7 @@ absl::Status RestartTables(UnitOfWork* tx, std::int64_t first_sequence) {
   return absl::OkStatus();
 }
 
-// Stores the change and its event; tables and memory start again after it.
+// Stores the change and its event, and starts tables and memory again after it.
 absl::Status StartAfter(UnitOfWork* tx,
                         const StoredChange& change,
                         const std::string& description) {

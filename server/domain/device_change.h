@@ -1,6 +1,6 @@
-// Device changes: the device has another theta than before. They are found in
-// the newest segments, or among those of a run; after one the tables and the
-// memory start again with the segments after it.
+// Device changes: the device has another theta than before. They are detected
+// among the newest segments, or among the segments of a run. Afterwards the
+// tables and the memory start again with the segments after the change.
 #pragma once
 
 #include <absl/status/status.h>
@@ -15,13 +15,14 @@
 
 namespace selfcal::server {
 
-// Covariance of a calibration at a later time: widened by the random walk of
-// the rig since it was computed.
+// Covariance of a calibration at a later time: increased by the random walk of
+// the rig since the calibration was computed.
 Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
                              const StoredCalibration& calibration,
                              std::int64_t time_ns);
 
-// Segments with a smaller sequence lie before the change; 0: there was none.
+// The first sequence after the device change: segments with a smaller one lie
+// before it. `change` is 0 if there was none.
 absl::StatusOr<std::int64_t> FirstSequenceSince(UnitOfWork* tx,
                                                 std::int64_t change);
 
@@ -31,17 +32,17 @@ struct NewestExamined {
 };
 
 // Tests the newest scored segments of the rig against its active calibration,
-// if that is the result of a run since the last change. Those that it was
-// computed on are not examined, nor what is damaged. A segment that shows
-// another theta than both of its neighbours (core/change/isolated.h) is
-// quarantined. A change that is found is stored.
+// if that is the result of a run since the last device change. Segments that it
+// was computed on, and damaged ones, are left out. A segment that shows another
+// theta than both of its neighbours (core/change/isolated.h) is quarantined. A
+// device change that is detected is stored.
 absl::StatusOr<NewestExamined> ExamineNewest(UnitOfWork* tx,
                                              const StoredRig& rig,
                                              const ChangeOptions& options);
 
-// Stores the change that the result of a run shows among its segments
-// (DeviceSplit), if it is sure enough and none was found since the run was
-// created.
+// Stores the device change that the result of a run shows among its segments
+// (DeviceSplit), if it is probable enough and no change was stored since the
+// run was created.
 absl::StatusOr<std::optional<StoredChange>> StoreSplit(
     UnitOfWork* tx,
     const StoredRun& run,

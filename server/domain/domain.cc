@@ -64,7 +64,7 @@ void Domain::BeginPutSegment(const std::string& rig,
                              PutDone done) {
   auto packed = PackNewSegment(segment);
   if (!packed.ok()) return done(packed.status());
-  // Shared by the transaction and by what is notified of it.
+  // Shared by the transaction and its callback.
   struct Put {
     NewSegment segment;
     PutVerdict verdict;
@@ -183,7 +183,7 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartAgedRuns(
   std::vector<StoredRun> started;
   for (const std::string& name : names) {
     const auto rig = store_->GetRig(name);
-    // A damaged one must not hold up the others.
+    // A damaged rig must not hold up the others.
     if (!rig.ok() || rig->policy.calibration_max_age_ns <= 0) continue;
     SELFCAL_ASSIGN_OR_RETURN(
         auto run, TransactFor(store_, name, clock_(), [&](UnitOfWork* tx) {
@@ -204,7 +204,7 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
   for (const std::string& name : names) {
     const auto due = InspectFor(
         store_, name, [&](UnitOfWork* tx) { return IsSessionRunDue(tx); });
-    // Neither a damaged one nor one that is gone must hold up the others.
+    // Neither a damaged rig nor one that is gone must hold up the others.
     if (!due.ok() || !*due) continue;
     SELFCAL_ASSIGN_OR_RETURN(
         auto run, TransactFor(store_, name, clock_(), [&](UnitOfWork* tx) {

@@ -1,9 +1,9 @@
 // The rules of selfcald: what happens to rigs, segments, runs and calibrations,
-// and when. Each method is one transaction of the store (store.h), or one state
-// of it, carried out by the functions of this module; errors are those of the
-// store.
+// and when. Each method is one transaction of the store (store.h), or reads one
+// state of it, by the functions of this module. Errors are those of the store.
 //
-// Any thread may call. What waits for nothing is named Begin...
+// Any thread may call. All methods that write return after the commit, but for
+// BeginPutSegment.
 #pragma once
 
 #include <absl/status/status.h>
@@ -34,8 +34,7 @@ enum class PutVerdict { kStored, kDuplicate };
 
 class Domain {
  public:
-  // `store` must outlive it. `clock` gives the time that is stamped on what is
-  // written.
+  // `store` must outlive it. `clock` gives the time of what is written.
   explicit Domain(Store* store,
                   const DomainOptions& options = {},
                   Clock clock = NowNs)
@@ -61,27 +60,27 @@ class Domain {
                                 const std::string& caller,
                                 const std::string& reason);
 
-  // --- Segments. `segment` must be valid for the rig. The same key again
-  // changes nothing. RESOURCE_EXHAUSTED where a quota leaves no room.
+  // --- Segments. `segment` must be valid for the rig. Storing a key again
+  // changes nothing. RESOURCE_EXHAUSTED if a quota leaves no room.
   absl::StatusOr<PutVerdict> PutSegment(const std::string& rig,
                                         const MotionSegment& segment);
-  // The same without waiting for the disk. What one thread puts is stored in
-  // that order. `done` is called once: on this thread where the segment is
-  // refused before it is written, else on one of the store's; it must be short
-  // and not call the store.
+  // PutSegment without waiting for the disk. Segments of one thread are stored
+  // in the order of its calls. `done` is called once: on this thread if the
+  // segment is refused before it is written, otherwise on a thread of the
+  // store; it must be short and must not call the store.
   using PutDone = std::function<void(const absl::StatusOr<PutVerdict>&)>;
   void BeginPutSegment(const std::string& rig,
                        const MotionSegment& segment,
                        PutDone done);
 
-  // Writes the information of one stored segment, and its ends where they are
-  // known; removes entries from the tables that were too old when it arrived;
-  // offers it to the tables; tests the newest segments for a device change
-  // (core/change); deletes data that is not needed any more; and creates the
-  // run that the tables call for, if no run is unfinished. A segment that is
-  // scored already changes nothing. After a device change the segments from
-  // before leave all tables, and a run that was created before it ends with a
-  // rejected calibration.
+  // Commits the score of one stored segment: writes its information, and its
+  // ends if given; removes entries from the tables that were too old when it
+  // arrived; offers it to the tables; tests the newest segments for a device
+  // change (core/change); deletes data that is no longer needed; and creates
+  // the run that the tables call for, if no run is unfinished. Changes nothing
+  // if the segment is scored already. After a device change the segments from
+  // before it leave all tables, and a run that was created before it ends with
+  // a rejected calibration.
   absl::StatusOr<ScoreCommit> CommitScore(
       const std::string& rig,
       const SegmentKey& key,
@@ -89,29 +88,30 @@ class Domain {
       const std::optional<SegmentEnds>& ends = std::nullopt);
 
   // Replaces the score of a scored segment by a later one, also in the tables
-  // that hold it. Changes nothing where its data is gone.
+  // that hold it. Changes nothing if its data is gone.
   absl::Status ReplaceScore(const std::string& rig,
                             const SegmentKey& key,
                             const SegmentInformation& information,
                             const SegmentEnds& ends);
 
-  // Takes a segment that cannot be used out of the queue and out of the tables
-  // for good, and deletes its data unless an unfinished run references it. An
-  // event records the problem. A segment that is unusable already stays as it
-  // is.
+  // Quarantines a segment that cannot be used: removes it from the queue and
+  // from the tables for good, and deletes its data unless an unfinished run
+  // references it. An event records the problem. Changes nothing if the segment
+  // is unusable already.
   absl::Status MarkUnusable(const std::string& rig,
                             const SegmentKey& key,
                             const std::string& problem);
 
-  // The same by an operator, for one segment of a session or for all that are
-  // stored: an event records who did it and why. A run under way that uses one
-  // of them ends with a rejected calibration. NOT_FOUND if nothing is stored of
-  // it.
   // DeleteSegment of deletion.h.
   absl::StatusOr<bool> DeleteSegment(const std::string& rig,
                                      const SegmentKey& key,
                                      const std::string& caller,
                                      const std::string& reason);
+
+  // Quarantine by an operator, of one segment of a session or of all that are
+  // stored: an event records who did it and why. An unfinished run that uses
+  // one of them ends with a rejected calibration. NOT_FOUND if no such segment
+  // is stored.
   absl::StatusOr<QuarantineCommit> QuarantineSegments(
       const std::string& rig,
       const std::string& session,
@@ -119,82 +119,87 @@ class Domain {
       const std::string& caller,
       const std::string& reason);
 
-  // What is known of segments beside the data of those that the run uses, in
-  // the order of time, each session in one run: of those without data their
-  // ends (of the newest kRemembered), of the others that they are there. None
-  // from before its device change, and no misfits.
+  // Segments known besides the data that the run uses, in order of time, with
+  // each session contiguous: for those without data their ends (of the newest
+  // kRemembered), for the others only that they exist. None from before its
+  // device change, and no misfits.
   absl::StatusOr<std::vector<RememberedSegment>> ListRemembered(
       const std::string& rig, std::int64_t run);
 
   // Scored segments that the run does not use: first those with data (the
-  // reserve, kReserve), each part newest first. None from before its device
-  // change, none whose information is damaged.
+  // reserve among them), then the others, each part newest first. None from
+  // before its device change, no misfits, and none whose information is
+  // damaged.
   absl::StatusOr<std::vector<HeldOut>> ListHeldOut(const std::string& rig,
                                                    std::int64_t run,
                                                    int limit);
 
   // --- Calibrations. Activates a version manually; an event records who did it
-  // and why. What was active becomes superseded, or rolled back if it is the
-  // newer of the two. The version that is active already changes nothing.
-  // FAILED_PRECONDITION for a candidate or a rejected one.
+  // and why. The version that was active becomes superseded, or rolled back if
+  // it is the newer of the two. Changes nothing if the version is active
+  // already. FAILED_PRECONDITION for a candidate or a rejected version.
   absl::StatusOr<StoredCalibration> ActivateCalibration(
       const std::string& rig,
       std::int64_t version,
       const std::string& caller,
       const std::string& reason);
 
-  // Records what a verification found, by which the two cores disagree, with
-  // the version that it concerns and in an event. A version keeps the first
-  // finding.
+  // Records the finding of a verification by which the two cores disagree, with
+  // the version concerned and in an event. A version keeps the first finding.
   absl::Status ReportDisagreement(const std::string& rig,
                                   std::int64_t version,
                                   const std::string& finding);
 
-  // --- Runs. On the tables as they are. FAILED_PRECONDITION if they are empty,
-  // a run of the rig is unfinished, or, without `force`, a version was computed
-  // on the same tables, from the version that is active or to become it.
+  // --- Runs. Creates a run on the present tables. FAILED_PRECONDITION if they
+  // are empty, if a run of the rig is unfinished, or, without `force`, if the
+  // newest version of a run was computed on the same tables and started from
+  // the active version or is the active one.
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
                                             bool force = false);
-  // Of every rig whose calibration is older than its policy allows
-  // (age_trigger.h).
+  // Creates the runs of all rigs whose calibration is older than their policy
+  // allows (age_trigger.h).
   absl::StatusOr<std::vector<StoredRun>> StartAgedRuns(std::int64_t now_ns);
-  // Of every rig whose session has ended (session_trigger.h): it is one of
-  // `ended`, or its newest segment arrived before `idle_since_ns`.
+  // Creates the runs of all rigs whose session has ended (session_trigger.h):
+  // the rig is one of `ended`, or none of its segments arrived after
+  // `idle_since_ns`.
   absl::StatusOr<std::vector<StoredRun>> StartSessionRuns(
       const std::vector<std::string>& ended, std::int64_t idle_since_ns);
-  // Records why a pending run is deferred; the first time with an event.
+  // Records why a pending run is deferred; the first time also in an event.
   absl::Status HoldRun(const std::string& rig,
                        std::int64_t run,
                        const std::string& reason);
-  // Pending or running -> running, one attempt more.
+  // Pending or running -> running, with one attempt more.
   absl::StatusOr<StoredRun> BeginRun(const std::string& rig, std::int64_t run);
-  // Running -> pending, the attempt not counted: an orderly stop gives it back.
+  // Running -> pending at an orderly stop; the attempt is not counted.
   absl::StatusOr<StoredRun> ReleaseRun(const std::string& rig,
                                        std::int64_t run);
-  // Stores what a running run has found as the next version, a candidate; where
-  // it has one already, changes nothing and returns that. The version is
-  // assigned here.
+  // Stores the result of a running run as the next version, a candidate, whose
+  // number is assigned here. If the run has a candidate already, changes
+  // nothing and returns that.
   absl::StatusOr<StoredCalibration> StoreCandidate(
       const std::string& rig,
       std::int64_t run,
       const StoredCalibration& calibration);
-  // Ends a running run with its calibration, stored as a candidate if it was
-  // not yet: active (the one before becomes superseded) or rejected, as its
-  // state, reasons and validation say. ABORTED if it was validated against
-  // another version than is active now. Deletes data that only the run
-  // referenced. May create the next run, as CommitScore does. Where it becomes
-  // active, segments that its report excludes (SegmentFit::excluded) are
-  // quarantined. It is rejected where the device has changed, or a segment of
-  // the run was quarantined, since the run was created. Where its report shows
-  // surely enough for DomainOptions::change that the device changed among its
-  // segments (EvictedUse::split) that is a device change, as in CommitScore,
-  // and none of them is quarantined.
+  // Ends a running run with its calibration, which is stored as a candidate if
+  // it was not yet, and becomes active (the version before becomes superseded)
+  // or rejected, as its state, reasons and validation say. ABORTED if it was
+  // validated against another version than the one that is active now.
+  //
+  // The calibration is rejected if the device has changed, or a segment of the
+  // run was quarantined, since the run was created. If it becomes active,
+  // segments that its report excludes (SegmentFit::excluded) are quarantined.
+  // If the report shows with enough certainty for DomainOptions::change that
+  // the device changed among the segments of the run (EvictedUse::split), that
+  // is a device change, as in CommitScore, and none of them is quarantined.
+  //
+  // Deletes data that only the run referenced. May create the next run, as
+  // CommitScore does.
   absl::StatusOr<StoredCalibration> FinishRun(
       const std::string& rig,
       std::int64_t run,
       const StoredCalibration& calibration);
-  // Ends it without a calibration: kFailed or kCancelled. Its candidate is
-  // rejected, with the message.
+  // Ends a run without a calibration: kFailed or kCancelled. Its candidate, if
+  // it has one, is rejected with the message.
   absl::StatusOr<StoredRun> EndRun(const std::string& rig,
                                    std::int64_t run,
                                    RunState state,

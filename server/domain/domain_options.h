@@ -1,4 +1,4 @@
-// What an operator sets of the rules.
+// Settings of the rules.
 #pragma once
 
 #include <cstdint>
@@ -7,19 +7,21 @@
 
 namespace selfcal::server {
 
-// Limits of what is kept; 0: none. Whatever they remove leaves an event.
+// Limits on what is kept; 0: no limit. Whatever they remove is recorded in an
+// event.
 struct Quotas {
-  // Compressed data of one rig's segments. For a new one the data of the least
-  // informative segments is evicted, which then leave the tables; never that of
-  // a segment that waits for its score or that an unfinished run needs.
+  // Compressed data of one rig's segments. To make room for a new one, the data
+  // of the least informative segments is evicted, which then leave the tables;
+  // never that of a segment that waits for its score or that an unfinished run
+  // needs.
   std::int64_t max_payload_bytes_per_rig = 0;
-  // Metadata and information of one rig's segments, the newest kept; never of
-  // one that waits for its score, is in a table, or that a run or a calibration
-  // used.
+  // Segments of one rig whose metadata and information are kept, the newest
+  // ones; a segment that waits for its score, is in a table, or was used by a
+  // run or a calibration is never removed.
   std::int64_t max_segments_per_rig = 0;
-  std::int64_t max_segment_age_s = 0;  // the same by the time of arrival
-  // The whole database. Near it new segments are refused, so that what is
-  // stored can still be scored.
+  std::int64_t max_segment_age_s = 0;  // the same, by age
+  // Size of the whole database. Near the limit new segments are refused, so
+  // that those stored can still be scored.
   std::int64_t max_database_bytes = 0;
   std::int64_t max_rigs = 10'000;
 

@@ -1,4 +1,5 @@
-// Segments leave tables, and the reason is recorded (TableAbsence).
+// Removal of segments from tables; the reason is recorded as an exclusion
+// (TableAbsence).
 #pragma once
 
 #include <absl/status/status.h>
@@ -12,18 +13,18 @@
 
 namespace selfcal::server {
 
-// Takes a segment out of all tables that hold it.
+// Removes a segment from all tables that hold it.
 absl::Status LeaveTables(UnitOfWork* tx,
                          std::int64_t segment,
                          const Absence& reason);
 
-// Takes the entries out of their tables for which `leaves` is true.
+// Removes the entries for which `leaves` is true from their tables.
 absl::Status LeaveTablesIf(
     UnitOfWork* tx,
     AbsenceCause cause,
     const std::function<bool(const TableEntry&)>& leaves);
 
-// Records for every table that it was not offered the segment.
+// Records, for every table, why the segment was not offered to it.
 absl::Status RefuseTables(UnitOfWork* tx,
                           std::int64_t segment,
                           const Absence& reason);

@@ -1,4 +1,4 @@
-// A segment that was received is stored, within the quotas of its rig.
+// Storing of received segments, within the quotas of the rig.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -10,7 +10,7 @@
 namespace selfcal::server {
 
 // False if a segment with this key is stored already. RESOURCE_EXHAUSTED,
-// naming the quota, where there is no room.
+// naming the quota, if there is no room.
 absl::StatusOr<bool> StoreSegment(UnitOfWork* tx,
                                   const NewSegment& segment,
                                   const Quotas& quotas);

@@ -1,4 +1,4 @@
-// What is known of segments beside the data that a run calibrates on.
+// What is known of segments besides the data that a run calibrates on.
 #pragma once
 
 #include <absl/status/status.h>
@@ -14,11 +14,11 @@
 
 namespace selfcal::server {
 
-// Ends of so many of the newest segments without data are kept.
+// Number of the newest segments without data whose ends are kept.
 inline constexpr int kRemembered = 256;
 
-// Data of so many of the newest scored segments that no table holds is kept
-// (the reserve), to validate candidates on.
+// The reserve: number of the newest scored segments in no table whose data is
+// kept, to validate candidates on.
 inline constexpr int kReserve = 4;
 
 // A segment on which a candidate is validated.
@@ -28,8 +28,8 @@ struct HeldOut {
   SegmentInformation information;
 };
 
-// Writes the ends of a segment, and deletes those of segments without data
-// beyond kRemembered, the oldest first.
+// Writes the ends of a segment, and deletes the oldest of those without data
+// beyond kRemembered.
 absl::Status Remember(UnitOfWork* tx,
                       std::int64_t segment,
                       const SegmentEnds& ends);

@@ -25,8 +25,8 @@ std::optional<TableChange> OfferToGroup(const Rig& rig,
                table);
 }
 
-// The kept segments of a joint selection, in order of arrival. One whose
-// information is damaged cannot be compared with anything: it becomes unusable.
+// The kept segments of a joint selection, in order of arrival. A segment whose
+// information is damaged cannot be compared with others and becomes unusable.
 absl::StatusOr<std::vector<Candidate>> ReadKept(UnitOfWork* tx,
                                                 const Rig& rig,
                                                 Table* table) {
@@ -62,7 +62,7 @@ const TableEntry& EntryOf(const Table& table, const SegmentKey& key) {
                        [&](const TableEntry& e) { return e.key == key; });
 }
 
-// Writes what an offer did to a table.
+// Writes the table update of an offer.
 absl::Status WriteOffer(UnitOfWork* tx,
                         const SegmentRow& segment,
                         const TableChange& change,
@@ -85,7 +85,7 @@ absl::Status WriteOffer(UnitOfWork* tx,
   return InsertEntry(tx, table.group, segment.rowid, entry.entropy, entry.gain);
 }
 
-// Records why a table did not take the segment.
+// Records why a table refused the segment.
 absl::Status ExplainRefusal(UnitOfWork* tx,
                             const Rig& rig,
                             const SegmentRow& segment,

@@ -1,4 +1,4 @@
-// A scored segment is offered to the tables (core/selection/tables.h).
+// Offers of scored segments to the tables (core/selection/tables.h).
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -18,7 +18,7 @@ namespace selfcal::server {
 const GroupScore* FindGroup(const SegmentInformation& information,
                             const std::string& group);
 
-// Offers the segment to every table, writes what that changes, and records why
+// Offers the segment to every table, writes the table updates, and records why
 // a table does not hold it, or what it evicted. Returns the groups it entered.
 absl::StatusOr<std::vector<std::string>> OfferToTables(
     UnitOfWork* tx,

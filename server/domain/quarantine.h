@@ -1,5 +1,5 @@
-// Segments that are taken out of everything: damaged ones, those that
-// contradict the others, and those that an operator names.
+// Quarantine: segments that are not used any more, because they are damaged,
+// contradict the others, or were named by an operator.
 #pragma once
 
 #include <absl/status/status.h>
@@ -17,17 +17,18 @@
 
 namespace selfcal::server {
 
-// What a quarantine by an operator did.
+// Result of a quarantine by an operator.
 struct QuarantineCommit {
   std::int64_t quarantined = 0;
-  std::int64_t unusable = 0;  // that were so before
-  // Of the quarantined ones, those that were waiting for their score.
+  std::int64_t unusable = 0;  // those unusable before
+  // The quarantined ones that were waiting for their score.
   std::vector<std::int64_t> unscored_sequences;
 };
 
-// Any state -> unusable, out of all tables, with an event: kSegmentUnusable for
-// a segment that is damaged or cannot be scored, kSegmentQuarantined for one
-// that contradicts others. Its data stays until DropUnneededData.
+// Any state -> unusable; removes the segment from all tables and appends an
+// event: kSegmentUnusable if it is damaged or cannot be scored,
+// kSegmentQuarantined if it contradicts others. Its data stays until
+// DropUnneededData.
 absl::Status Quarantine(UnitOfWork* tx,
                         const SegmentRow& segment,
                         EventKind event,

@@ -17,7 +17,7 @@
 namespace selfcal::server {
 namespace {
 
-// Part of the database for scores, runs and calibrations of what is stored.
+// Share of the database reserved for scores, runs and calibrations.
 constexpr double kReservedPart = 0.1;
 constexpr int kMaxDropped = 100;
 
@@ -36,8 +36,9 @@ absl::Status CheckDatabaseSize(UnitOfWork* tx,
       quotas.max_database_bytes));
 }
 
-// The segment with data that is worth least: in no table, or with the smallest
-// gain in those that hold it; the older one of equals.
+// The segment whose data is the least informative: one in no table, or else the
+// one whose largest gain in a table is the smallest; the older one of equals.
+// Removes those that an unfinished run needs from `holders`.
 std::vector<DataHolder>::iterator LeastInformative(
     std::vector<DataHolder>* holders) {
   const auto end =
@@ -47,7 +48,7 @@ std::vector<DataHolder>::iterator LeastInformative(
   holders->erase(end, holders->end());
   return std::min_element(
       holders->begin(), holders->end(), [](const auto& a, const auto& b) {
-        return a.gain < b.gain;  // nothing is less than any value
+        return a.gain < b.gain;  // nullopt is less than any value
       });
 }
 
@@ -119,7 +120,7 @@ absl::Status DropOldSegments(UnitOfWork* tx, const Quotas& quotas) {
                            UnreferencedSegments(tx, kMaxDropped));
   int dropped = 0;
   for (const SegmentRow& segment : unreferenced) {
-    // The newest stays whatever its age: sequences count on from it.
+    // The newest stays whatever its age: the next sequence continues from it.
     if (segment.sequence == newest) continue;
     const bool too_many =
         quotas.max_segments_per_rig > 0 &&

@@ -15,11 +15,11 @@ namespace selfcal::server {
 absl::Status CheckRigQuota(UnitOfWork* tx, const Quotas& quotas);
 
 // Makes room for a segment of `bytes` that is about to be stored.
-// RESOURCE_EXHAUSTED, naming the quota, where nothing may be evicted.
+// RESOURCE_EXHAUSTED, naming the quota, if nothing may be evicted.
 absl::Status MakeRoom(UnitOfWork* tx, std::int64_t bytes, const Quotas& quotas);
 
-// Drops metadata that is older or more than the quotas allow, at most that of a
-// hundred segments at a time.
+// Deletes the records of segments that are older or more than the quotas allow,
+// of at most a hundred segments in one call.
 absl::Status DropOldSegments(UnitOfWork* tx, const Quotas& quotas);
 
 }  // namespace selfcal::server

@@ -1,5 +1,4 @@
-// What is kept, and for how long: segments in tables by their age, data by who
-// needs it.
+// Retention: how long segments stay in tables, and whose data is kept.
 #pragma once
 
 #include <absl/status/status.h>
@@ -14,15 +13,15 @@
 
 namespace selfcal::server {
 
-// The tables, after segments have left them that are too old at that time by
-// the policy of the rig.
+// Removes segments from the tables that are too old at `now_ns` by the policy
+// of the rig, and returns the tables.
 absl::StatusOr<std::vector<Table>> RemoveAgedEntries(UnitOfWork* tx,
                                                      const StoredRig& rig,
                                                      std::int64_t now_ns);
 
-// Deletes the data of each segment that neither waits for its score nor is in a
-// table or an unfinished run, nor is part of the reserve. Segments from before
-// the newest device change and misfits are never part of it.
+// Deletes the data of each segment that is not waiting for its score and is in
+// no table, no unfinished run and not in the reserve. Segments from before the
+// newest device change and misfits are never in the reserve.
 absl::Status DropUnneededData(UnitOfWork* tx);
 
 }  // namespace selfcal::server

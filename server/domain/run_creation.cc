@@ -35,9 +35,9 @@ const char* TriggerText(RunTrigger trigger) {
   return "asked for";
 }
 
-// FAILED_PRECONDITION if a run on these tables would find what the newest
-// version of a run already has: on the same segments, after the same device
-// change, and starting where that run or its result left the calibration.
+// FAILED_PRECONDITION if a run on these tables would repeat the newest
+// successful run: the same segments, no device change since, and the active
+// version is the one that run started from or its result.
 absl::Status CheckThatTablesChanged(UnitOfWork* tx,
                                     const std::vector<Table>& tables) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestSucceededRun(tx));

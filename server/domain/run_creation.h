@@ -1,4 +1,4 @@
-// Runs are created: by the tables, by an operator, or by the other triggers.
+// Creation of runs: by the tables, by an operator, or by the other triggers.
 #pragma once
 
 #include <absl/status/status.h>
@@ -13,13 +13,14 @@
 
 namespace selfcal::server {
 
-// A run on the tables as they are. FAILED_PRECONDITION if they are empty or a
-// run is unfinished.
+// Creates a run on the present tables. FAILED_PRECONDITION if they are empty or
+// a run is unfinished.
 absl::StatusOr<StoredRun> CreateRun(UnitOfWork* tx,
                                     const std::vector<Table>& tables,
                                     RunTrigger trigger);
 
-// The run that the tables call for (EvaluateTrigger), if no run is unfinished.
+// Creates the run that the tables call for (EvaluateTrigger), if no run is
+// unfinished.
 absl::StatusOr<std::optional<StoredRun>> CreateRunOfTables(
     UnitOfWork* tx, const StoredRig& rig, const std::vector<Table>& tables);
 
@@ -29,11 +30,11 @@ bool HoldAnother(const std::vector<Table>& tables, const StoredRun& run);
 // Domain::CreateManualRun.
 absl::StatusOr<StoredRun> CreateManualRun(UnitOfWork* tx, bool force);
 
-// The snapshot of the newest run, with which the trigger compares the tables,
-// however it ended, so that a failure is not repeated on the same data. Nothing
-// until the tables have started a run of their own since the last device
-// change: a manual run on half-filled tables does not stand for the first full
-// ones.
+// The snapshot of the newest run, with which the trigger compares the tables.
+// How that run ended does not matter, so that a failure is not repeated on the
+// same data. nullopt until the tables have started a run of their own since the
+// last device change: a manual run on half-filled tables does not replace the
+// run on the first full ones.
 absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
     UnitOfWork* tx);
 

@@ -21,7 +21,7 @@ absl::Status Ended(const StoredRun& run) {
       fmt::format("recalibration {} of rig {} has ended", run.run, run.rig));
 }
 
-// The candidate of a run that ends without a calibration.
+// Rejects the candidate of a run that ends without a calibration.
 absl::Status RejectCandidate(UnitOfWork* tx, const StoredRun& run) {
   SELFCAL_ASSIGN_OR_RETURN(const auto version, CandidateOfRun(tx, run.run));
   if (!version) {

@@ -23,7 +23,7 @@ absl::StatusOr<StoredRun> EndRun(UnitOfWork* tx,
                                  RunState state,
                                  const std::string& message);
 
-// A running run has ended: writes its state and the event.
+// Writes the state of a run that has ended, and the event.
 absl::Status WriteEnd(UnitOfWork* tx, const StoredRun& run);
 
 }  // namespace selfcal::server

@@ -30,7 +30,7 @@ absl::StatusOr<StoredRun> ReadRunningRun(UnitOfWork* tx, std::int64_t number) {
   return run;
 }
 
-// The candidate of the run: the one that it has, or a new one.
+// Returns the candidate of the run, and stores it if there is none yet.
 absl::StatusOr<StoredCalibration> EnsureCandidate(
     UnitOfWork* tx,
     const StoredRun& run,
@@ -55,7 +55,7 @@ absl::StatusOr<StoredCalibration> EnsureCandidate(
   return stored;
 }
 
-// It was compared with the version that is active now.
+// ABORTED if it was validated against another version than the active one.
 absl::Status CheckValidation(UnitOfWork* tx,
                              const StoredCalibration& calibration) {
   if (!calibration.validation) {
@@ -71,14 +71,14 @@ absl::Status CheckValidation(UnitOfWork* tx,
   return absl::OkStatus();
 }
 
-// What has happened since the run was created may reject its result.
+// Rejects a result that is outdated by what happened since the run was created.
 absl::Status RejectIfOutdated(UnitOfWork* tx,
                               const StoredRun& run,
                               bool has_split,
                               StoredCalibration* validated) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change, NewestChange(tx));
-  // The result accounts for a change among its own segments: its theta is that
-  // of the newest of them.
+  // The result accounts for a device change among its own segments: its theta
+  // is that of the newest ones.
   if (!has_split && run.change != change) {
     validated->state = CalibrationState::kRejected;
     validated->reasons.push_back(
@@ -131,7 +131,7 @@ absl::StatusOr<StoredCalibration> FinishRun(
   SELFCAL_RETURN_IF_ERROR(
       RejectIfOutdated(tx, run, split.has_value(), &validated));
   SELFCAL_RETURN_IF_ERROR(EndValidation(tx, validated));
-  // Segments of a changed device contradict each other, and none is wrong.
+  // Segments of a device that changed contradict each other, and none is wrong.
   if (validated.state == CalibrationState::kActive && calibration.report &&
       !split) {
     SELFCAL_RETURN_IF_ERROR(

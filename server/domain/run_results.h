@@ -1,4 +1,4 @@
-// What a run ends with: its calibration, a candidate first, then validated.
+// Results of runs: a calibration is first a candidate, then validated.
 #pragma once
 
 #include <absl/status/statusor.h>

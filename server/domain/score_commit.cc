@@ -40,7 +40,7 @@ absl::StatusOr<ScoreCommit> CommitScore(UnitOfWork* tx,
   SELFCAL_ASSIGN_OR_RETURN(const std::optional<double> largest_fit,
                            LargestFitOfRig(tx));
   SELFCAL_RETURN_IF_ERROR(RemoveMisfits(tx, largest_fit));
-  // By the time at which it arrived, however long it waited for its score.
+  // At the time of its arrival, however long it waited for its score.
   SELFCAL_ASSIGN_OR_RETURN(std::vector<Table> tables,
                            RemoveAgedEntries(tx, rig, segment.receive_time_ns));
   SELFCAL_ASSIGN_OR_RETURN(
@@ -76,7 +76,7 @@ absl::Status ReplaceScore(UnitOfWork* tx,
   }
   SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.rowid, information));
   SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.rowid, ends));
-  // Entries of a joint selection have scores of all of them together.
+  // Entries of a joint selection have the scores of all its segments together.
   const bool by_score = rig.rig.selection == Selection::kTables;
   for (const GroupScore& score : information.groups) {
     if (!by_score || !std::isfinite(score.entropy)) continue;

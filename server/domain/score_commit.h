@@ -1,5 +1,5 @@
-// The score of a stored segment is committed: it is offered to the tables, the
-// newest segments are examined for a device change, and a run may start.
+// Commits the score of a stored segment: the segment is offered to the tables,
+// the newest segments are tested for a device change, and a run may start.
 #pragma once
 
 #include <absl/status/status.h>
@@ -17,7 +17,7 @@
 
 namespace selfcal::server {
 
-// What the commit of a score did.
+// Result of the commit of a score.
 struct ScoreCommit {
   std::vector<std::string> tables;       // groups it entered
   std::optional<StoredRun> started_run;  // the trigger fired

@@ -16,8 +16,8 @@
 namespace selfcal::server {
 namespace {
 
-// Part of what is remembered that came since a run, from which on the next is
-// worth its cost.
+// A run is worth its cost once one in this many of the remembered segments
+// arrived after the last run.
 constexpr std::int64_t kOneOf = 3;
 
 absl::StatusOr<bool> MemoryHasGrown(UnitOfWork* tx, const StoredRun& run) {
