@@ -1,5 +1,5 @@
-// What a calibration from before a change of the device still says after it.
-// Pure.
+// What remains known of a calibration from before a device change. Pure
+// functions.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,14 +15,14 @@
 
 namespace selfcal::server {
 
-// `since`: what the segments since the change show. `before` is the
+// `since` is the information of the segments since the change, `before` the
 // calibration from before it (change.base_version). Groups that the change was
-// not found to concern may have changed all the same, by as much as these
-// segments would not show: what was known of them is as much less certain
+// not found to concern may have changed as well, by as much as these segments
+// would not show; their earlier estimates are less certain by that much
 // (core/change/group_concern.h).
 
-// The prior of the runs after it: what `before` knows of the components that
-// the change does not concern.
+// The prior of the runs after the change: what `before` knows of the components
+// that the change does not concern.
 ThetaPrior KnownAfter(const Rig& rig,
                       const StoredChange& change,
                       const StoredCalibration& before,
@@ -35,8 +35,8 @@ Eigen::MatrixXd CovarianceAfter(const Rig& rig,
                                 const StoredCalibration& before,
                                 std::span<const SegmentInformation> since);
 
-// Groups of parameters that may go on to change: those of a drift, or of two
-// changes that follow each other.
+// Groups that may keep changing: those of a drift, or of two consecutive device
+// changes.
 std::vector<std::string> ChangingGroups(
     const StoredChange& newest, const std::optional<StoredChange>& earlier);
 

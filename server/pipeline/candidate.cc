@@ -9,7 +9,7 @@
 namespace selfcal::server {
 namespace {
 
-// What is wrong with the numbers as such; nothing else can be checked then.
+// What is wrong with the numbers; if anything, nothing else can be checked.
 std::string NumbersProblem(const Rig& rig, const CalibrationResult& result) {
   const Eigen::Index size = TangentSize(rig.factory);
   if (!SameShape(result.theta, rig.factory) ||

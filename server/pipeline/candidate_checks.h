@@ -1,5 +1,5 @@
-// The checks of a candidate, by what they look at. Each adds one or more to the
-// list. Internal to the validation (candidate.h).
+// The checks of a candidate, by subject. Each function adds one or more of them
+// to the list. Internal to the validation (candidate.h).
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ struct CheckContext {
   const CandidateLimits& limits;
 };
 
-// Adds a check that passed, or, with a sentence that says why not, failed.
+// Adds a check that passed, or, if `failure` is not empty, failed.
 void AddResult(std::string name,
                double value,
                double limit,
@@ -33,12 +33,13 @@ void AddNotTested(std::string name,
 void CheckFit(const CheckContext& context,
               std::vector<ValidationCheck>* checks);
 
-// candidate_estimate.cc: the estimate against the factory's and the active one.
-// prior_sigmas, rank, sigma_growth.
+// candidate_estimate.cc: the estimate compared with the factory's and the
+// active one. prior_sigmas, rank, sigma_growth.
 void CheckEstimate(const CheckContext& context,
                    std::vector<ValidationCheck>* checks);
 
-// candidate_confirmation.cc: halves, held_out_probability, confirmed.
+// candidate_confirmation.cc: independent data. halves, disagreement,
+// held_out_probability, confirmed.
 void CheckConfirmation(const CheckContext& context,
                        StoredValidation* validation);
 

@@ -1,5 +1,5 @@
-// Whether data confirms a candidate that did not make it: its own halves, and
-// segments that it was not calibrated on.
+// Confirmation of a candidate: by the halves of its segments, by each segment
+// against the others, and by segments that it was not calibrated on.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace selfcal::server {
 namespace {
 
-// With fewer, what chance makes of a ratio is no ground to reject.
+// With fewer degrees, chance alone could reject a candidate.
 constexpr int kLeastDegrees = 50;
 
 void CheckHalves(const CheckContext& context,
@@ -49,9 +49,9 @@ double LargestByChance(int degrees) {
   return std::pow(1 - variance + kSigmas * std::sqrt(variance), 3);
 }
 
-// Of the tests of each segment against all others. Where the squares exceed
-// their expectation by as much, errors are not those of noise, and what is
-// common to all segments cannot be told from it.
+// Sums the tests of each segment against all others. If the squares exceed
+// their expectation by this much, there are errors other than noise, and their
+// part that is common to all segments would go unnoticed.
 void CheckDisagreement(const CheckContext& context,
                        std::vector<ValidationCheck>* checks) {
   double squares = 0;

@@ -1,4 +1,4 @@
-// The estimate of a candidate against the factory's and the active one.
+// The estimate of a candidate compared with the factory's and the active one.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -89,7 +89,7 @@ void CheckCertainty(const CheckContext& context,
   const auto components = TangentComponents(context.rig.factory);
   const Eigen::VectorXd prior = PriorSigmas(context.rig);
   const Eigen::VectorXd before = active.covariance.diagonal().cwiseSqrt();
-  // The chance that the device changed is no lack of information.
+  // The probability of a device change is no lack of information.
   Eigen::VectorXd after = context.result.covariance.diagonal();
   const Eigen::VectorXd& change = context.result.evicted.change_sigmas;
   if (change.size() == after.size()) after -= change.cwiseAbs2();

@@ -1,4 +1,4 @@
-// How well the data of a candidate fits it.
+// How well a candidate fits its data.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 namespace selfcal::server {
 namespace {
 
-// What is hardly determined still tells, if it is so many standard deviations
-// off.
+// A noise scale that is hardly determined is still significant if it is this
+// many standard deviations off.
 constexpr double kOffSigmas = 3;
 
 void CheckObservations(const CheckContext& context,
@@ -69,7 +69,7 @@ void CheckPixels(const CheckContext& context,
                  std::vector<ValidationCheck>* checks) {
   const CalibrationResult& result = context.result;
   const double limit = context.limits.max_residual_ratio;
-  // Errors that go together along tracks are at least partly a larger sigma.
+  // Correlated errors along tracks are at least partly a larger sigma.
   const double noise =
       std::max(UsedNoise(result, NoiseKind::kPixel), result.track_noise_factor);
   // An observation has two components.
@@ -131,7 +131,7 @@ void CheckSegmentResiduals(const CheckContext& context,
   AddResult("segment_residuals", largest, limit, failure, checks);
 }
 
-// Whether the residuals show that noise is larger than what was used.
+// True if the residuals show that the noise is larger than what was used.
 bool Contradicts(const NoiseFactor& factor, double limit) {
   const double off = std::log(factor.factor / factor.used);
   return off > std::max(std::log(limit), kOffSigmas * factor.log_sigma);
@@ -211,9 +211,9 @@ bool EstimatesTimeOffset(const Rig& rig) {
   return false;
 }
 
-// Whether what was found biases the calibration. Lost, repeated and saturated
+// True if the finding biases the calibration. Lost, repeated and saturated
 // samples are noise in some segments, which their residuals show; a time offset
-// is none where it is estimated.
+// does not bias it if it is estimated.
 bool Biases(const Rig& rig, const Finding& finding) {
   switch (finding.kind) {
     case FindingKind::kDroppedSamples:

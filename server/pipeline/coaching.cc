@@ -22,7 +22,7 @@ std::size_t BytesOf(const Predictions& predictions) {
   return bytes;
 }
 
-// They are few, and count from 1.
+// Reads all of them: they are few, and count from 1.
 absl::StatusOr<std::optional<StoredChange>> NewestChange(
     Store* store, const std::string& rig) {
   std::optional<StoredChange> newest;
@@ -34,8 +34,8 @@ absl::StatusOr<std::optional<StoredChange>> NewestChange(
   }
 }
 
-// Of the segments in the tables that the version did not come from; what is
-// damaged is left out.
+// The information of the segments in the tables that the version was not
+// computed on, without what is damaged.
 absl::StatusOr<std::vector<SegmentInformation>> InformationSince(
     Store* store, const StoredCalibration& active) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,

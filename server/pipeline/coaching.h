@@ -1,15 +1,15 @@
-// Which motion would teach a rig the most now (core/coach), from what the store
-// knows of it.
+// The most informative next motion for a rig (core/coach), from the records in
+// the store.
 //
-// What is known: the covariance of the active version (after a change of the
-// device: of what that does not concern, and the factory's prior for the rest),
-// and what the segments in the tables say that it did not come from, as the
-// next run will use them.
+// Known are the covariance of the active version (after a device change: for
+// the components that it does not concern, with the factory's prior for the
+// rest), and the information of the segments in the tables that the version was
+// not computed on, which the next run will use.
 //
-// What the motions are predicted to say is computed at the first question about
-// a version of a rig and kept, for the rigs that were asked for last. Any
-// thread may call; one prediction is computed at a time, on the thread that
-// asks, while answers from predictions that are kept go on.
+// The predicted information of the motions is computed at the first request for
+// a version of a rig and kept, for the most recently requested rigs. Any thread
+// may call; one prediction is computed at a time, on the calling thread, while
+// requests that need no computation are answered.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -29,24 +29,24 @@ namespace selfcal::server {
 struct RigCoaching {
   Coaching coaching;
   std::int64_t calibration_version = 0;  // the active one
-  int segments_since = 0;                // in the tables, that it did not use
-  double segment_s = 0;                  // that the gains are of
+  int segments_since = 0;                // in the tables, which it did not use
+  double segment_s = 0;                  // segment length of the gains
 };
 
 class RigCoach {
  public:
-  // Predictions of more than this together are not kept.
+  // Limit on the size of all predictions that are kept.
   static constexpr std::size_t kMaxBytes = 64 << 20;
 
   // The store must outlive it.
   explicit RigCoach(Store* store, std::size_t max_bytes = kMaxBytes)
       : store_(store), max_bytes_(max_bytes) {}
 
-  // NOT_FOUND for an unknown rig; FAILED_PRECONDITION for a version whose
-  // covariance says nothing; errors of the store.
+  // NOT_FOUND for an unknown rig; FAILED_PRECONDITION if the covariance of the
+  // active version is not positive definite; errors of the store.
   absl::StatusOr<RigCoaching> Advise(const std::string& rig);
 
-  // How often predictions were computed.
+  // Number of predictions computed so far.
   int computed() const;
 
  private:
@@ -64,7 +64,7 @@ class RigCoach {
   const std::size_t max_bytes_;
   std::mutex computing_;
   mutable std::mutex mutex_;  // guards what follows; taken after computing_
-  std::list<Entry> entries_;  // the last used first
+  std::list<Entry> entries_;  // most recently used first
   std::size_t bytes_ = 0;
   int computed_ = 0;
 };

@@ -14,7 +14,7 @@ OffsetInformation Fuse(const ConsistencyTester& tester,
   return sum;
 }
 
-// Which segment to leave out; all are kept where there are only two.
+// The segment to leave out. Call with more than two.
 std::size_t LeastFitting(const ConsistencyTester& tester,
                          const std::vector<const HeldOutSegment*>& segments) {
   const OffsetInformation sum = Fuse(tester, segments);

@@ -1,5 +1,5 @@
-// How well a candidate predicts what segments show that it was not calibrated
-// on. Pure.
+// Test of how well a candidate predicts the information of segments that it was
+// not calibrated on. Pure functions.
 #pragma once
 
 #include <vector>
@@ -11,21 +11,21 @@
 
 namespace selfcal::server {
 
-// What a segment shows, scored again at the candidate with the noise that it
-// found, or as it was scored when it came.
+// Information of a segment, scored again at the candidate with its noise, or as
+// it was scored on arrival.
 struct HeldOutSegment {
   SegmentInformation information;
   bool rescored = false;
 };
 using HeldOutSegments = std::vector<HeldOutSegment>;
 
-// Tests what the segments show together against candidate and active version,
-// with the track noise that the candidate has found
-// (core/change/consistency.h). Of three segments or more, the one is left out
-// without which the candidate fits best: a single segment that fits nothing
-// proves nothing. Those that were linearised too far from the candidate are
-// left out and counted; the active version, of the same segments, is taken
-// linearly however far it is.
+// Tests the combined information of the segments against the candidate and the
+// active version, with the track noise of the candidate
+// (core/change/consistency.h). Of three segments or more, the one without which
+// the candidate fits best is left out: a single segment that does not fit
+// proves nothing. Segments linearised too far from the candidate are left out
+// and counted; for the active version, the same segments are used, however far
+// they are linearised from it.
 HeldOutTest TestHeldOut(const Rig& rig,
                         const KnownCalibration& candidate,
                         const KnownCalibration& active,

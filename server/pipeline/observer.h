@@ -1,4 +1,4 @@
-// What happens in the pipeline, told to who counts it.
+// Observer of what happens in the pipeline, for metrics and live updates.
 #pragma once
 
 #include <optional>
@@ -10,24 +10,24 @@
 
 namespace selfcal::server {
 
-// Called from the threads of the pipeline and of its callers, several at once.
-// It holds them up: an implementation returns soon, does not throw, and does
+// Called from the threads of the pipeline and of its callers, concurrently. It
+// holds them up: an implementation must return soon, must not throw, and must
 // not call the pipeline.
 class PipelineObserver {
  public:
   virtual ~PipelineObserver() = default;
 
   enum class Verdict { kStored, kDuplicate, kRejected, kFailed };
-  // On each segment that was submitted, with what became of it.
+  // A segment was submitted, with this verdict.
   virtual void OnVerdict(const std::string& rig, Verdict verdict) = 0;
-  // A segment was scored, in so many seconds; not yet committed.
+  // A segment was scored, in this time, but not yet committed.
   virtual void OnScore(const SegmentInformation& information,
                        double seconds) = 0;
-  // A run began, came one iteration further, or ended.
+  // A run was deferred, began, completed an iteration, or ended.
   virtual void OnRun(const StoredRun& run) = 0;
 
   enum class CheckSubject { kScore, kCalibration };
-  // Something was computed by both cores.
+  // A score or a calibration was computed by both cores and compared.
   virtual void OnCheck(CheckSubject subject, VerificationOutcome outcome) = 0;
 };
 

@@ -40,7 +40,7 @@ PipelineObserver::Verdict VerdictOf(
   return Verdict::kFailed;
 }
 
-// The estimators with each score told to the observer, if there is one.
+// The estimators, with each score reported to the observer, if there is one.
 Estimators ObserveScores(Estimators estimators, PipelineObserver* observer) {
   if (observer == nullptr) return estimators;
   const auto score = estimators.score;
@@ -57,7 +57,7 @@ Estimators ObserveScores(Estimators estimators, PipelineObserver* observer) {
   return estimators;
 }
 
-// The estimators with each score offered to the sampler.
+// The estimators, with each score offered to the sampler.
 Estimators SampleScores(Estimators estimators, VerificationSampler* sampler) {
   const auto score = estimators.score;
   estimators.score = [=](const Rig& rig,
@@ -91,8 +91,8 @@ absl::StatusOr<SegmentInformation> ScoreByCore(
   }
 }
 
-// Wires the two kinds of threads, and does on the caller's thread what comes
-// before them.
+// Connects the three kinds of threads, and does on the caller's thread what
+// comes before them.
 class PipelineImpl : public Pipeline {
  public:
   PipelineImpl(Domain* domain,
@@ -122,7 +122,7 @@ class PipelineImpl : public Pipeline {
             },
             [this](const std::string& rig) { recalibrator_.NoteScore(rig); }) {}
 
-  // A check that is under way is not waited for.
+  // Interrupts a verification that is in progress.
   ~PipelineImpl() override { Stop(); }
 
   absl::Status Start() override {
@@ -309,7 +309,7 @@ class PipelineImpl : public Pipeline {
   }
 
  private:
-  // Tells the observer, if there is one, before `done`.
+  // Notifies the observer, if there is one, before `done`.
   SubmitDone Observed(const std::string& rig, const SubmitDone& done) const {
     PipelineObserver* observer = options_.observer;
     if (observer == nullptr) return done;
@@ -319,7 +319,8 @@ class PipelineImpl : public Pipeline {
     };
   }
 
-  // Gives the place in the backlog its segment, or gives it back.
+  // Fills the place in the backlog with the segment that was stored, or returns
+  // the place.
   absl::StatusOr<SubmitResult> Settle(
       const absl::StatusOr<PutVerdict>& verdict) {
     if (verdict.ok() && *verdict == PutVerdict::kStored) {
@@ -331,8 +332,8 @@ class PipelineImpl : public Pipeline {
     return SubmitResult{SubmitResult::Verdict::kDuplicate, {}};
   }
 
-  // Every violation of a segment: those of its values, and the version that it
-  // names, which only the store knows.
+  // Every violation of a segment: those of its values, and of the version that
+  // it names, which only the store knows.
   absl::StatusOr<std::vector<Violation>> Check(const std::string& rig_name,
                                                const MotionSegment& segment) {
     SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(rig_name));
@@ -384,13 +385,13 @@ Estimators CoreEstimators() {
   return {[](const Rig& rig,
              const Calibration& theta0,
              const MotionSegment& segment) {
-            // What a very long segment needs is not kept.
+            // The workspace of a very long segment is not kept.
             constexpr std::size_t kMaxKeptKeyframes = 200;
             if (segment.keyframes.size() > kMaxKeptKeyframes) {
               return ScoreSegment(rig, theta0, segment);
             }
-            // One workspace for each thread that scores; not in its static
-            // storage, which every thread of the process would have to hold.
+            // One workspace for each scoring thread, on the heap: in static
+            // storage every thread of the process would hold one.
             thread_local const auto scorer = std::make_unique<SegmentScorer>();
             SegmentInformation information;
             scorer->Score(rig, theta0, segment, {}, &information);

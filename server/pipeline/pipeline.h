@@ -1,10 +1,11 @@
 // receive -> score -> select -> trigger -> recalibrate -> validate -> publish.
 //
-// Owns the worker threads: `scoring_threads` that score, one that recalibrates.
-// Scores are committed in the order of arrival within a rig, so that tables do
-// not depend on the number of threads. Knows no gRPC. Any thread may call.
-// Nothing is kept only in memory: whatever is stored and unscored, or started
-// and unfinished, is taken up by Start().
+// Owns the worker threads: `scoring_threads` that score, one that recalibrates,
+// and one that verifies a sample of the results. Scores are committed in the
+// order of arrival within a rig, so that tables do not depend on the number of
+// threads. Independent of gRPC. Any thread may call. Nothing is kept only in
+// memory: segments that are stored and unscored, and runs that are unfinished,
+// are resumed by Start().
 #pragma once
 
 #include <absl/status/status.h>
@@ -30,34 +31,34 @@
 
 namespace selfcal::server {
 
-// Whether now is a time for a run that nobody asked for by hand.
+// Conditions for runs that were not started manually.
 class Conditions {
  public:
   virtual ~Conditions() = default;
-  // Why it is none, in words that stay the same while the reason does; empty if
-  // it is one. Called from the pipeline's threads, often: returns at once.
+  // Why such a run is deferred now, in words that stay the same while the
+  // reason does; empty if it is not. Called often, from the pipeline's threads:
+  // must return at once.
   virtual std::string HoldReason() = 0;
 };
 
 struct PipelineOptions {
   int scoring_threads = 1;
-  // Received, durable, but unscored segments beyond this make Submit wait.
+  // Submit waits while more segments than this are stored and unscored.
   int max_backlog = 64;
   std::string program_version;
   SegmentLimits limits;
   CalibrateOptions calibrate;
-  ScorerKind scorer = ScorerKind::kStructured;  // that Estimators::score is
-  // Of new scores and calibrations, the share that is verified while the device
-  // is idle (verification_sampler.h), in [0, 1].
+  ScorerKind scorer = ScorerKind::kStructured;  // what Estimators::score uses
+  // Share of new scores and calibrations that is verified while the device is
+  // idle (verification_sampler.h), in [0, 1].
   double verify_share = 0;
   PipelineObserver* observer = nullptr;  // must outlive the pipeline
-  // Outlives the pipeline; none: every time is one.
+  // Must outlive the pipeline; null: no run is deferred for conditions.
   Conditions* conditions = nullptr;
-  // How often runs that are held back are looked at again, and whether a
-  // calibration has become old.
+  // Interval of looking again at deferred runs and at the age of calibrations.
   std::chrono::milliseconds recheck = std::chrono::seconds(30);
-  // A rig of which no segment arrives for so long has ended its session; 0:
-  // only a caller ends one.
+  // The session of a rig has ended when no segment of it arrives for this time;
+  // 0: only a caller ends it.
   std::chrono::milliseconds session_idle = std::chrono::minutes(1);
   // A run that takes longer fails.
   std::chrono::milliseconds max_run_time = std::chrono::minutes(30);
@@ -65,7 +66,7 @@ struct PipelineOptions {
   std::function<std::int64_t()> now_ns = NowNs;
 };
 
-// What the pipeline computes with. Called from its threads; what they throw
+// The computations of the pipeline. Called from its threads; what they throw
 // ends the segment or the run, never the process.
 struct Estimators {
   std::function<SegmentInformation(
@@ -78,7 +79,7 @@ struct Estimators {
                                   const ProgressCallback& progress,
                                   const std::function<bool()>& interrupted)>
       calibrate;
-  // By either core, for a check. CANCELLED where it was interrupted.
+  // Scores by either core, for a verification. CANCELLED if it was interrupted.
   std::function<absl::StatusOr<SegmentInformation>(
       ScorerKind scorer,
       const Rig& rig,
@@ -86,35 +87,35 @@ struct Estimators {
       const MotionSegment& segment,
       const std::function<bool()>& interrupted)>
       score_by;
-  // What is remembered of a segment; none: nothing is.
+  // The ends of a segment, which are remembered; null: nothing is.
   std::function<SegmentEnds(
       const Rig& rig, const Calibration& theta0, const MotionSegment& segment)>
       ends = nullptr;
 };
 
-// ScoreSegment, Calibrate, ScoreSegmentBy and SummariseSettledEnds of core;
-// they ask nobody whether they are interrupted, but for calls of `progress`.
+// ScoreSegment, Calibrate, ScoreSegmentBy and SummariseSettledEnds of core.
+// They do not poll `interrupted`; only `progress` can end a calibration.
 Estimators CoreEstimators();
 
 // The verdict on one segment; durable when it is kStored or kDuplicate.
 struct SubmitResult {
   enum class Verdict { kStored, kDuplicate, kRejected };
   Verdict verdict = Verdict::kRejected;
-  std::vector<Violation> violations;  // of a rejected one
+  std::vector<Violation> violations;  // if rejected
 };
 
-// What a watcher of a run is told.
+// An update to the watchers of a run.
 struct RunUpdate {
   StoredRun run;
   CalibrateProgress progress = {};
-  // In the first update of a watcher: the iterations that it has missed.
+  // In the first update of a watcher, the iterations before it.
   std::vector<CalibrateProgress> missed = {};
 };
 
-// A subscription; destroying it ends it (no callback runs after that). It may
-// outlive the pipeline. Callbacks come from the pipeline's threads and hold
-// them up: they hand over and return, and neither destroy their own
-// subscription nor call the pipeline.
+// A subscription, which ends when it is destroyed (no callback runs after
+// that). It may outlive the pipeline. Callbacks come from the pipeline's
+// threads and hold them up: they must pass the update on and return, and must
+// neither destroy their own subscription nor call the pipeline.
 class Subscription {
  public:
   virtual ~Subscription() = default;
@@ -124,25 +125,26 @@ class Pipeline {
  public:
   virtual ~Pipeline() = default;
 
-  // Takes up what a stop or a crash left, and starts the threads.
+  // Resumes what a stop or a crash left unfinished, and starts the threads.
   virtual absl::Status Start() = 0;
-  // Stops the threads: scoring after the segment at hand, a run by cancelling
-  // it (it stays unfinished in the store and starts again at the next start).
+  // Stops the threads: scoring after the current segments, a run by
+  // interrupting it (it stays unfinished in the store and starts again at the
+  // next start).
   virtual void Stop() = 0;
 
   // Validates and stores one segment and wakes a worker. NOT_FOUND for an
-  // unknown rig; errors of the store as they are. Blocks while the backlog is
+  // unknown rig; errors of the store are passed on. Blocks while the backlog is
   // full, until `cancelled` returns true (then CANCELLED). UNAVAILABLE while
   // the pipeline is not started. The segment must have been estimated with a
-  // version of the rig that was published.
+  // published version of the rig, or it is rejected.
   virtual absl::StatusOr<SubmitResult> Submit(
       const std::string& rig,
       const MotionSegment& segment,
       const std::function<bool()>& cancelled) = 0;
 
-  // The same without waiting for the disk, so that segments of one caller can
-  // share a commit: it returns when the segment is refused or queued to be
-  // written. `done` is called once, on any thread; it is short and calls
+  // Submit without waiting for the disk, so that segments of one caller can
+  // share a commit: returns when the segment is refused or queued to be
+  // written. `done` is called once, on any thread; it must be short and call
   // neither the pipeline nor the store. Segments of one caller are stored in
   // the order of its calls.
   using SubmitDone =
@@ -154,8 +156,9 @@ class Pipeline {
     done(Submit(rig, segment, cancelled));
   }
 
-  // A caller has sent all it has of a session of the rig, which may call for a
-  // run once it is scored (Domain::StartSessionRuns). Does not wait for that.
+  // Notes that a caller has sent all segments of a session of the rig. That may
+  // start a run once they are scored (Domain::StartSessionRuns), for which this
+  // does not wait.
   virtual void EndSession(const std::string& rig) = 0;
 
   // Domain::UpdateRig; scores the stored segments anew if the prior has changed.
@@ -180,50 +183,49 @@ class Pipeline {
       const std::string& caller,
       const std::string& reason) = 0;
 
-  // On the tables as they are (Domain::CreateManualRun).
+  // Creates a run on the present tables (Domain::CreateManualRun).
   virtual absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig,
                                                        bool force) = 0;
   absl::StatusOr<StoredRun> StartRecalibration(const std::string& rig) {
     return StartRecalibration(rig, false);
   }
-  // Returns once the run has ended. FAILED_PRECONDITION if it has ended another
-  // way; UNAVAILABLE if the pipeline stops meanwhile: the run then starts
-  // again.
+  // Returns once the run has ended. FAILED_PRECONDITION if it ended in another
+  // way; UNAVAILABLE if the pipeline stops meanwhile, in which case the run
+  // starts again.
   virtual absl::StatusOr<StoredRun> CancelRecalibration(const std::string& rig,
                                                         std::int64_t run) = 0;
 
-  // Domain::ActivateCalibration, and tells the watchers.
+  // Domain::ActivateCalibration, then notifies the watchers.
   virtual absl::StatusOr<StoredCalibration> ActivateCalibration(
       const std::string& rig,
       std::int64_t version,
       const std::string& caller,
       const std::string& reason) = 0;
 
-  // Which motion would teach the rig the most now: RigCoach::Advise
-  // (coaching.h). The first call for a version takes as long as simulating a
-  // segment of every motion.
+  // The most informative next motion: RigCoach::Advise (coaching.h). The first
+  // call for a version takes as long as simulating a segment of every motion.
   virtual absl::StatusOr<RigCoaching> AdviseMotion(const std::string& rig) = 0;
 
   // Computes the scores of all segments whose data is kept, and the active
-  // calibration, by both cores on what is kept, and compares them; a difference
-  // is kept as an event and with the version (Domain::ReportDisagreement). One
-  // at a time: FAILED_PRECONDITION while another is under way. `interrupted` is
-  // asked every few milliseconds; CANCELLED then. Takes minutes; `on_step` is
-  // called on this thread.
+  // calibration, by both cores on the data that is kept, and compares them. A
+  // difference is recorded in an event and with the version
+  // (Domain::ReportDisagreement). FAILED_PRECONDITION while another
+  // verification is in progress. `interrupted` is polled often; CANCELLED then.
+  // Takes minutes; `on_step` is called on this thread.
   virtual absl::StatusOr<Verification> VerifyRig(
       const std::string& rig,
       const OnVerificationStep& on_step,
       const std::function<bool()>& interrupted) = 0;
 
-  // The callback gets the active calibration of the rig at once (on the calling
-  // thread), then each that becomes active, in the order in which they did:
-  // each activation once.
+  // The callback receives the active calibration of the rig at once (on the
+  // calling thread), then each one that becomes active, in that order: each
+  // activation once.
   virtual absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
       std::function<void(const StoredCalibration&)> callback) = 0;
 
-  // The callback gets the run as it is at once, then every change of state and
-  // iteration, the end included.
+  // The callback receives the run in its present state at once, then every
+  // change of state and iteration, including the end.
   virtual absl::StatusOr<std::unique_ptr<Subscription>> WatchRun(
       const std::string& rig,
       std::int64_t run,

@@ -94,7 +94,7 @@ absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
   {
     std::unique_lock lock(mutex_);
     if (!IsCurrent(rig, run)) {
-      // Under the lock: the thread cannot begin it meanwhile.
+      // Under the lock, so that the thread cannot begin it meanwhile.
       auto ended = domain_->EndRun(
           rig, run, RunState::kCancelled, "cancelled on request");
       lock.unlock();
@@ -191,7 +191,8 @@ void Recalibrator::Loop() {
 Recalibrator::Clock::time_point Recalibrator::NextLook() const {
   const auto now = Clock::now();
   Clock::time_point next = now + options_.recheck;
-  // One that is due already waits for scores or for a run, which wake.
+  // A session end that is due waits for scores or for a run, which wake the
+  // thread.
   for (const auto& [rig, due] : ended_) {
     if (due > now) next = std::min(next, due);
   }
@@ -253,7 +254,7 @@ absl::StatusOr<std::string> Recalibrator::HoldReason(const StoredRun& run) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
   const std::int64_t interval_ns = rig.policy.recalibration_min_interval_ns;
   if (interval_ns > 0) {
-    // The newest is this one.
+    // The newest is this run.
     SELFCAL_ASSIGN_OR_RETURN(const auto newest,
                              store_->ListRuns(run.rig, {2, ""}));
     const bool too_early =

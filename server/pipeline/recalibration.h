@@ -1,14 +1,13 @@
 // The thread that recalibrates: takes the unfinished runs of the store, oldest
-// first, solves, validates, and has the result stored and told.
+// first, solves and validates, and has the result stored and published.
 //
-// A run is a row in the store from its trigger to its end. A crash leaves it
-// running and it starts again, from its candidate if it had stored that; after
-// kMaxAttempts crashes it fails instead. An orderly stop gives it back, which
-// counts for nothing.
+// A run is a record in the store from its trigger to its end. After a crash it
+// is still running and starts again, from its candidate if that was stored;
+// after kMaxAttempts crashes it fails instead. An orderly stop releases it
+// without counting the attempt.
 //
-// One that nobody asked for by hand waits while the minimum interval of its rig
-// or the conditions hold it back: it stays pending, with a message that says
-// why.
+// A run that was not started manually is deferred by the minimum interval of
+// its rig or by the conditions: it stays pending, with a message that says why.
 #pragma once
 
 #include <absl/status/status.h>
@@ -37,7 +36,7 @@ namespace selfcal::server {
 class Recalibrator {
  public:
   static constexpr int kMaxAttempts = 3;
-  // A client whose connection broke is back within a few seconds.
+  // A client whose connection broke reconnects within a few seconds.
   static constexpr std::chrono::seconds kSessionGrace{5};
 
   // The watchers must outlive it.
@@ -51,31 +50,31 @@ class Recalibrator {
   absl::Status Start();
   // Returns when the thread has ended.
   void Stop();
-  // There may be a new run in the store.
+  // Looks for new runs in the store.
   void Wake();
-  // No more segments of the rig's session are to come; once this has stood for
-  // kSessionGrace without another, and all are scored, the store is asked for
-  // the run of its end.
+  // Notes that the rig's session has no more segments. If none arrives for
+  // kSessionGrace, and all are scored, the run at the end of the session is
+  // created if it is due.
   void EndSession(const std::string& rig);
-  // Another segment has come after all.
+  // Notes that another segment of the session has arrived after all.
   void ContinueSession(const std::string& rig);
-  // A segment of the rig is scored.
+  // Notes that a segment of the rig was scored.
   void NoteScore(const std::string& rig);
   // As Pipeline::CancelRecalibration.
   absl::StatusOr<StoredRun> Cancel(const std::string& rig, std::int64_t run);
-  // Each iteration of the run so far; nothing for one that is not at work.
+  // Each iteration of the run so far; empty unless it is being executed.
   std::vector<CalibrateProgress> StepsOf(const std::string& rig,
                                          std::int64_t run);
 
  private:
-  // The run that the thread works on.
+  // The run that the thread executes.
   struct Current {
     std::string rig;
     std::int64_t run = 0;
     bool cancelled = false;
     std::vector<CalibrateProgress> steps;
   };
-  // What a run came to: a candidate, or why there is none.
+  // The outcome of a run: a candidate, or why there is none.
   struct Outcome {
     absl::Status status;
     std::optional<StoredCalibration> candidate;
@@ -88,11 +87,12 @@ class Recalibrator {
   void Loop();
   // Creates the runs of sessions that have ended.
   absl::Status StartSessionRuns();
-  // Those that are due, and have nothing under way that comes first.
+  // Rigs whose session end is due, without unscored segments or an unfinished
+  // run.
   absl::StatusOr<std::vector<std::string>> EndedSessions();
-  // Until when to sleep. With the lock held.
+  // When to look again. Call with the lock held.
   Clock::time_point NextLook() const;
-  // Of all unfinished runs; the worst of them.
+  // Executes all unfinished runs; returns the worst result.
   absl::StatusOr<Execution> ExecuteAll();
   Execution Execute(const StoredRun& run);
   Execution ExecuteBegun(const StoredRun& run);
@@ -116,8 +116,8 @@ class Recalibrator {
       const CalibrateOptions& options);
   void Report(const StoredRun& run, const CalibrateProgress& progress);
   void TellEnd(const StoredRun& ended);
-  // State, reasons, validation and verdict of the candidate against what is
-  // active.
+  // Sets state, reasons, validation and verdict of the candidate, validated
+  // against the active version.
   absl::Status Validate(const StoredRun& run, StoredCalibration* candidate);
   absl::StatusOr<HeldOutSegments> GatherHeldOut(
       const StoredRun& run, const Rig& rig, const CalibrationResult& result);
@@ -128,7 +128,7 @@ class Recalibrator {
       const Calibration& theta);
   absl::StatusOr<std::optional<Diagnosis>> DiagnoseUsed(
       const StoredRun& run, const Rig& rig, const CalibrationResult& result);
-  // Validates and stores it, again where another version became active
+  // Validates and stores the candidate, again if another version becomes active
   // meanwhile.
   absl::StatusOr<StoredCalibration> Finish(const StoredRun& run,
                                            StoredCalibration candidate);
@@ -144,8 +144,9 @@ class Recalibrator {
   bool Interrupted();  // cancelled, or stopping
   bool Cancelled();
   bool Pause(std::chrono::milliseconds time);  // false when interrupted
-  // Calls until it succeeds or fails for good; when interrupted, returns what
-  // came last. A result that took minutes is not thrown away for a full disk.
+  // Repeats the call until it succeeds or fails for good; when interrupted,
+  // returns the last result. A result that took minutes is not discarded
+  // because the disk is full.
   absl::StatusOr<StoredCalibration> Retry(
       const std::function<absl::StatusOr<StoredCalibration>()>& call);
 
@@ -165,7 +166,7 @@ class Recalibrator {
   std::thread thread_;
 };
 
-// What the topic of a run's watchers is called.
+// The topic of the watchers of a run.
 std::string RunTopic(const std::string& rig, std::int64_t run);
 
 }  // namespace selfcal::server

@@ -24,7 +24,7 @@ absl::Status TryRescore(Domain* domain,
     const auto segment = store->GetSegmentData(rig_id, stored.key);
     if (absl::IsDataLoss(segment.status()) ||
         absl::IsFailedPrecondition(segment.status())) {
-      continue;  // damaged, which the next run finds, or dropped meanwhile
+      continue;  // damaged, as the next run finds, or deleted meanwhile
     }
     SELFCAL_RETURN_IF_ERROR(segment.status());
     SELFCAL_RETURN_IF_ERROR(

@@ -1,4 +1,4 @@
-// Scores of kept segments about today's calibration.
+// Scores of kept segments at the present calibration.
 #pragma once
 
 #include <string>
@@ -9,12 +9,12 @@
 
 namespace selfcal::server {
 
-// Scores all segments of the rig whose data is kept anew, at `theta`: the
-// calibration that is active, or about to be. Tables, change detection and
-// predictions then stand on it, and what is remembered of a segment that loses
-// its data was linearised near by. A segment that cannot be read, scored or
-// written keeps the score that it has, and the log says why. Nothing where the
-// estimators compute no ends.
+// Scores again, at `theta`, all scored segments of the rig whose data is kept.
+// `theta` is the calibration that is active or about to be. Tables, change
+// detection and predictions then rest on it, and the ends of a segment that
+// loses its data were linearised near it. Segments whose data is damaged or
+// gone keep their scores; any other error ends the rescoring and is logged.
+// Does nothing if the estimators compute no ends.
 void RescoreKept(Domain* domain,
                  const Estimators& estimators,
                  const std::string& rig,

@@ -1,4 +1,4 @@
-// Waiting for an environment that has failed to come back.
+// Retries while the environment fails.
 #pragma once
 
 #include <absl/status/status.h>
@@ -8,13 +8,13 @@
 
 namespace selfcal::server {
 
-// Whether the same call may succeed later: it is the disk or the memory, not
-// the question, that is at fault.
+// True if the same call may succeed later: the disk or the memory failed, not
+// the request.
 inline bool IsTransient(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsResourceExhausted(status);
 }
 
-// The time before the next try: twice the last, up to half a minute.
+// The time before the next retry: twice the last, up to 30 s.
 class Backoff {
  public:
   std::chrono::milliseconds Next() {

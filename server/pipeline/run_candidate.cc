@@ -1,4 +1,4 @@
-// How a run comes to its candidate.
+// Computation of the candidate of a run.
 #include <fmt/format.h>
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// One run from its beginning to its end, on the thread of the Recalibrator.
+// Executes one run from beginning to end, on the thread of the Recalibrator.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -38,7 +38,7 @@ Recalibrator::Execution Recalibrator::Execute(const StoredRun& pending) {
     }
   }
   if (!begun.ok()) {
-    // One that was cancelled meanwhile is done.
+    // A run that was cancelled meanwhile is done.
     spdlog::warn("cannot begin run {} of rig {}: {}",
                  pending.run,
                  pending.rig,
@@ -73,7 +73,7 @@ Recalibrator::Execution Recalibrator::Hold(const StoredRun& run,
   }
   const absl::Status held = domain_->HoldRun(run.rig, run.run, reason);
   if (!held.ok()) {
-    // One that was cancelled meanwhile is done.
+    // A run that was cancelled meanwhile is done.
     return absl::IsFailedPrecondition(held) ? Execution::kDone
                                             : Execution::kTryLater;
   }
@@ -118,7 +118,7 @@ absl::Status Recalibrator::Conclude(const StoredRun& run,
     return Succeed(run, *outcome.candidate);
   }
   if (absl::IsCancelled(outcome.status) || IsTransient(outcome.status)) {
-    // A stop, or the disk: the run goes back, and starts again later.
+    // A stop, or the disk: the run is released and starts again later.
     SELFCAL_RETURN_IF_ERROR(domain_->ReleaseRun(run.rig, run.run).status());
     return IsTransient(outcome.status) ? outcome.status : absl::OkStatus();
   }

@@ -8,9 +8,8 @@
 
 namespace selfcal::server {
 
-// `options` with what rig and run add to them: what is remembered of segments
-// without data, and, after a change of the device, what is still known. Errors
-// of the store.
+// `options` with the additions of rig and run: the remembered segments, and,
+// after a device change, what is still known. Errors of the store.
 absl::StatusOr<CalibrateOptions> OptionsOfRun(Domain* domain,
                                               CalibrateOptions options,
                                               const StoredRig& rig,

@@ -10,8 +10,8 @@
 
 namespace selfcal::server {
 
-// Name and value of every setting that shapes the result; `change` is the
-// change of the device whose calibration from before is the prior, 0: none.
+// Name and value of every setting that shapes the result. `change` is the
+// device change whose earlier calibration is the prior; 0: none.
 std::vector<std::pair<std::string, std::string>> RunSettings(
     const CalibrateOptions& options, std::int64_t change);
 

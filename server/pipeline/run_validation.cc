@@ -1,5 +1,5 @@
-// What becomes of a run's candidate: the evidence is gathered, and it is
-// validated against what is active.
+// Validation of a run's candidate: gathers the evidence and validates it
+// against the active version.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -19,10 +19,10 @@
 namespace selfcal::server {
 namespace {
 
-// Segments that a candidate is tested with.
+// Number of held-out segments that a candidate is tested with.
 constexpr int kHeldOut = 8;
-// What was scored with the noise that the rig states is worth testing with as
-// long as the noise that was used is not larger than so many times that.
+// Scores with the noise that the rig states are used for tests while the noise
+// that was used is at most this many times as large.
 constexpr double kMaxNoiseOff = 1.5;
 
 // The rig with the noise that the calibration was weighted with.
@@ -49,8 +49,9 @@ bool IsExcluded(const CalibrationResult& result, const SegmentKey& key) {
                      });
 }
 
-// True for a version of a run that was created before the change was found,
-// also where that run found it: its tables held segments from before.
+// True for the factory calibration, and for a version whose run was created
+// before the change was found, even if that run found it: its tables held
+// segments from before.
 absl::StatusOr<bool> IsFromBefore(Store* store,
                                   const StoredCalibration& active,
                                   std::int64_t change) {
@@ -62,7 +63,7 @@ absl::StatusOr<bool> IsFromBefore(Store* store,
 
 }  // namespace
 
-// Nothing where the data cannot be used; an error where it cannot be read now.
+// nullopt if the data cannot be used; an error if it cannot be read now.
 absl::StatusOr<std::optional<SegmentInformation>> Recalibrator::Rescore(
     const std::string& rig_id,
     const SegmentKey& key,
@@ -86,8 +87,8 @@ absl::StatusOr<std::optional<SegmentInformation>> Recalibrator::Rescore(
   }
 }
 
-// Segments without data are held out only where the result does not stand on
-// what is remembered of them.
+// Segments without data are held out only if the result does not rest on their
+// ends.
 absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
     const StoredRun& run, const Rig& rig, const CalibrationResult& result) {
   HeldOutSegments segments;
@@ -111,7 +112,7 @@ absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
   return segments;
 }
 
-// Nothing where the data of a segment is damaged, or gone.
+// nullopt if the data of a segment is damaged or gone.
 absl::StatusOr<std::optional<Diagnosis>> Recalibrator::DiagnoseUsed(
     const StoredRun& run, const Rig& rig, const CalibrationResult& result) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration base,
@@ -169,8 +170,8 @@ absl::StatusOr<StoredCalibration> Recalibrator::Finish(
     const StoredRun& run, StoredCalibration candidate) {
   for (;;) {
     SELFCAL_RETURN_IF_ERROR(Validate(run, &candidate));
-    // Before the run ends: a crash between the two repeats it, and whoever sees
-    // the version sees the scores at it.
+    // Before the run ends, so that a crash between the two repeats it, and
+    // whoever sees the version sees the scores at it.
     const bool becomes_active = candidate.state == CalibrationState::kActive;
     if (becomes_active) {
       RescoreKept(domain_, estimators_, run.rig, candidate.theta);

@@ -13,7 +13,7 @@
 namespace selfcal::server {
 namespace {
 
-// How late a waiting Submit notices that its caller has gone.
+// Delay after which a waiting Submit notices that its caller has gone.
 constexpr std::chrono::milliseconds kCancelPoll{50};
 
 std::string Name(const Store::Unscored& claim) {
@@ -119,8 +119,8 @@ absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
     const std::function<absl::StatusOr<QuarantineCommit>()>& change) {
   absl::StatusOr<QuarantineCommit> commit = absl::UnknownError("");
   {
-    // Under the lock no worker claims a segment, or is done with one: whoever
-    // has claimed one gives its place back.
+    // Under the lock no worker claims or finishes a segment; a worker that has
+    // claimed one returns its place itself.
     const std::lock_guard lock(mutex_);
     commit = change();
     if (!commit.ok()) return commit;
@@ -163,8 +163,8 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
   Backoff backoff;
   std::unique_lock lock(mutex_);
   while (running_) {
-    // Listed under the lock: a segment is in the list, or its FillPlace is yet
-    // to come and wakes this thread.
+    // Under the lock, a segment is either in the list, or its FillPlace is
+    // still to come and wakes this thread.
     const std::int64_t seen = arrivals_;
     const auto unscored = store_->ListUnscored(
         deleting_.empty() ? static_cast<int>(claimed_.size()) + 1

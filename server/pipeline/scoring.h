@@ -1,11 +1,11 @@
-// The threads that score: each claims the oldest segment that nobody has
-// claimed, scores it without a lock, and commits it when all older ones of its
-// rig are committed. What is claimed is known in memory only: after a crash the
-// store still lists it as unscored.
+// The threads that score: each claims the oldest segment that is not claimed,
+// scores it without a lock, and commits the score when all older ones of its
+// rig are committed. Claims are only in memory: after a crash the store still
+// lists the segment as unscored.
 //
-// A segment is scored at the calibration that is active, whatever version its
-// states were estimated with: scores are about today's calibration, also those
-// of a SLAM process that never takes a new version.
+// A segment is scored at the active calibration, whatever version its states
+// were estimated with, so that scores refer to the present calibration even if
+// a SLAM process never takes a new version.
 #pragma once
 
 #include <absl/status/status.h>
@@ -31,8 +31,8 @@ namespace selfcal::server {
 
 class ScoringWorkers {
  public:
-  // `on_run` is called on a worker for each run that a commit has started,
-  // `on_done` for each segment that was scored or set aside, with its rig.
+  // `on_run` is called on a worker for each run that a commit creates,
+  // `on_done` with the rig of each segment that a worker is done with.
   ScoringWorkers(Domain* domain,
                  const PipelineOptions& options,
                  Estimators estimators,
@@ -41,19 +41,18 @@ class ScoringWorkers {
   ~ScoringWorkers();
 
   absl::Status Start();
-  // Returns when every thread has ended, each after the segment at hand.
+  // Returns when every thread has ended, each after its current segment.
   void Stop();
 
-  // Waits until there is room in the backlog and takes one place, first come,
-  // first served. CANCELLED,
-  // UNAVAILABLE as Pipeline::Submit.
+  // Waits for room in the backlog and takes one place, first come, first
+  // served. CANCELLED and UNAVAILABLE as for Pipeline::Submit.
   absl::Status TakePlace(const std::function<bool()>& cancelled);
   // The place is filled by a stored segment, or was not needed.
   void FillPlace();
   void ReturnPlace();
 
-  // Domain::QuarantineSegments, and gives back the places of those that were
-  // waiting for their score.
+  // Calls Domain::QuarantineSegments, and returns the places of the segments
+  // that were waiting for their score.
   absl::StatusOr<QuarantineCommit> Quarantine(
       const std::string& rig,
       const std::function<absl::StatusOr<QuarantineCommit>()>& change);
@@ -66,7 +65,7 @@ class ScoringWorkers {
 
  private:
   using Claim = Store::Unscored;
-  // What is computed of a segment.
+  // Results for a segment.
   struct Score {
     SegmentInformation information;
     std::optional<SegmentEnds> ends;
@@ -75,15 +74,15 @@ class ScoringWorkers {
   void Run();
   std::optional<Claim> NextClaim();
   void Process(const Claim& claim);
-  // The score, or what is wrong with the segment. Nothing when stopping.
+  // The score, or what is wrong with the segment. nullopt when stopping.
   std::optional<absl::StatusOr<Score>> FindScore(const Claim& claim);
   absl::StatusOr<Score> TryScore(const Claim& claim);
   bool WaitForTurn(const Claim& claim);
   void Commit(const Claim& claim, const absl::StatusOr<Score>& score);
   absl::Status TryCommit(const Claim& claim, const Score& score);
   void SetAside(const Claim& claim, const absl::Status& why);
-  // Calls until it succeeds or fails for good; then, or when stopping, returns
-  // what came last.
+  // Repeats the call until it succeeds or fails for good; when stopping,
+  // returns the last result.
   absl::Status Retry(const std::function<absl::Status()>& call);
   bool Pause(std::chrono::milliseconds time);  // false when stopping
 

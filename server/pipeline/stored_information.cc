@@ -38,7 +38,7 @@ absl::StatusOr<std::vector<StoredSegment>> ListKept(Store* store,
     SELFCAL_ASSIGN_OR_RETURN(Listed<StoredSegment> listed,
                              store->ListSegments(rig, query, page));
     for (StoredSegment& segment : listed.items) {
-      // What waits for its score is no score yet.
+      // A segment that waits for its score has no information.
       if (segment.information) segments.push_back(std::move(segment));
     }
     page.token = listed.next_token;

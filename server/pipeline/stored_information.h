@@ -1,4 +1,4 @@
-// What segments show, as it is stored.
+// Reading of stored information of segments.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -13,12 +13,12 @@
 
 namespace selfcal::server {
 
-// In the order of the keys; of segments that are not scored, or damaged, there
-// is none. Errors of the store.
+// The information of the segments, in the order of the keys; those that are not
+// scored, or are damaged, have none. Errors of the store.
 absl::StatusOr<std::vector<SegmentInformation>> ListInformation(
     Store* store, const std::string& rig, std::span<const SegmentKey> segments);
 
-// The scored segments that have their data, in order of arrival. Errors of the
+// The scored segments whose data is kept, in order of arrival. Errors of the
 // store.
 absl::StatusOr<std::vector<StoredSegment>> ListKept(Store* store,
                                                     const std::string& rig);

@@ -1,5 +1,5 @@
-// The one verdict on a version of a calibration: good, weak, not trustworthy.
-// Every interface shows this one and makes up none of its own. Pure functions.
+// The one verdict on a calibration version: good, weak, not trustworthy. Every
+// interface shows this one and derives none of its own. Pure functions.
 #pragma once
 
 #include <string>
@@ -11,22 +11,24 @@
 
 namespace selfcal::server {
 
-// Of a candidate that was validated.
-// - Not trustworthy if a check failed: the sentences of those.
-// - Weak if directions were held, if the data says less about a component than
-//   what was known before (its sigma is over half the prior's), or if a check
-//   could not be made, each with a sentence; but held-out segments need not be
-//   there where two halves agree.
-// - Good otherwise; what the checks noted are its sentences.
+// The verdict on a candidate that was validated.
+// - Not trustworthy if a check failed; the sentences are those of the failed
+//   checks.
+// - Weak if directions were held constant, if the data determines a component
+//   little better than the prior (its sigma is over half the prior's), or if a
+//   check could not be made, each with a sentence. Held-out segments may be
+//   missing if two halves agree.
+// - Good otherwise; the notes of the checks are its sentences.
 Verdict MakeVerdict(const Rig& rig,
                     const CalibrationResult& result,
                     const CandidateValidation& validated,
                     const CandidateLimits& limits = {});
 
-// Of a version as it is stored: that which was stored with it. The factory's is
-// kFactory, a rejected one not trustworthy for the reasons that it was rejected
-// for, one on which a verification found the cores to disagree not trustworthy
-// for that, one from before there were verdicts unknown.
+// The verdict on a stored version: the one stored with it, except that the
+// factory calibration is kFactory, a rejected version is not trustworthy for
+// the reasons of its rejection, one on which the cores disagree in a
+// verification is not trustworthy for that reason, and one without a stored
+// verdict is unknown.
 Verdict VerdictOf(const StoredCalibration& calibration);
 
 // "good", "weak", "not trustworthy", "factory", "unknown".

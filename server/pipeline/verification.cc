@@ -7,7 +7,7 @@
 namespace selfcal::server {
 namespace {
 
-// By how many times the largest difference exceeds what is rounding.
+// The largest difference as a multiple of what rounding explains.
 double Excess(const ScoreDifference& difference) {
   return std::max({difference.entropy_nats,
                    difference.information,

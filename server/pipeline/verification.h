@@ -1,5 +1,5 @@
-// What comes of computing a score or a calibration by both cores, the
-// structured one and Ceres (core/verify), and comparing them.
+// Results of a verification: a score or a calibration is computed by both
+// cores, the structured one and Ceres (core/verify), and compared.
 #pragma once
 
 #include <cstdint>
@@ -31,19 +31,19 @@ struct CalibrationCheck {
   std::int64_t version = 0;
   VerificationOutcome outcome = VerificationOutcome::kNotCompared;
   ResultDifference difference;
-  int segments = 0;       // that both solved
-  int segments_gone = 0;  // of the version, whose data is not kept any more
+  int segments = 0;       // solved by both
+  int segments_gone = 0;  // of the version, without data
   std::string message;    // why it was not compared
 };
 
 struct Verification {
-  std::int64_t version = 0;  // that was active
+  std::int64_t version = 0;  // the active one
   std::vector<ScoreCheck> scores;
-  // None where the factory's version is active: no core has computed it.
+  // nullopt if the factory calibration is active, which no core has computed.
   std::optional<CalibrationCheck> calibration;
 };
 
-// What a verification does now, and what it has just found, if anything.
+// Progress of a verification: what it does now, and the latest result, if any.
 struct VerificationStep {
   int done = 0;  // of the scores and the calibration
   int total = 0;
@@ -53,9 +53,8 @@ struct VerificationStep {
 };
 using OnVerificationStep = std::function<void(const VerificationStep&)>;
 
-// What makes the version one that is not to be trusted, in a sentence: the
-// calibration or scores that differ, with the largest difference. Empty where
-// none does.
+// Why the version must not be trusted, in a sentence: the calibration or scores
+// that differ, with the largest difference. Empty if none does.
 std::string Finding(const Verification& verification);
 
 }  // namespace selfcal::server

@@ -1,12 +1,11 @@
-// The thread that verifies a share of what the pipeline computes while the
-// device is idle: of newly scored segments, whose score it has computed by the
-// other core, and of runs, whose calibration it has computed by both.
+// The thread that verifies a share of the results of the pipeline while the
+// device is idle: it computes newly scored segments by the other core, and the
+// calibrations of runs by both.
 //
-// Whether a segment or a run belongs to the sample follows from a hash of its
-// name: the same ones on every machine and after every start. What is to be
-// verified waits in memory, a few segments and runs at most, the newest are
-// dropped beyond that: a check that does not take place is made up for by
-// others.
+// A hash of its name decides whether a segment or a run belongs to the sample:
+// the same ones on every machine and after every start. A few segments and runs
+// wait in memory; when there are more, the newest are dropped, since others
+// make up for a check that is not made.
 #pragma once
 
 #include <condition_variable>
@@ -25,7 +24,8 @@
 
 namespace selfcal::server {
 
-// Whether what has this name belongs to a sample of that share, in [0, 1].
+// True if the segment or run of this name belongs to a sample of that share, in
+// [0, 1].
 bool IsSampled(std::string_view name, double share);
 
 class VerificationSampler {
@@ -42,7 +42,7 @@ class VerificationSampler {
   // Returns when the thread has ended; the verifier must have been stopped.
   void Stop();
 
-  // Something was computed. Return at once; any thread may call.
+  // Report that something was computed. Return at once; any thread may call.
   void OnScore(const Rig& rig,
                const MotionSegment& segment,
                const SegmentInformation& information);

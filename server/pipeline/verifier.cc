@@ -17,8 +17,8 @@ absl::Status Interruption() {
   return absl::CancelledError("the verification was interrupted");
 }
 
-// Of data that a table or a quota has let go of, or that is damaged: there is
-// nothing to compute on.
+// True if there is no data to compute on: it was deleted, evicted, or is
+// damaged.
 bool IsGone(const absl::Status& status) {
   return absl::IsFailedPrecondition(status) || absl::IsNotFound(status) ||
          absl::IsDataLoss(status);

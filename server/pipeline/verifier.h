@@ -1,9 +1,9 @@
-// Computes scores and calibrations of a rig by both cores on what is kept, and
-// compares them. What differs by more than rounding or convergence explains is
-// kept as an event, and with the version that was checked: for scores, on which
-// tables, tests of candidates and change detection stand, the active one.
+// Computes scores and calibrations of a rig by both cores, on the data that is
+// kept, and compares them. A difference beyond rounding or convergence is
+// recorded in an event, and with the version that was checked: for scores, on
+// which tables, validation and change detection rest, with the active one.
 //
-// Any thread may call; it computes on the caller's.
+// Any thread may call; it computes on the thread of the caller.
 #pragma once
 
 #include <absl/status/status.h>
@@ -34,7 +34,7 @@ class Verifier {
         options_(options),
         estimators_(estimators) {}
 
-  // From now on every call returns soon, with CANCELLED.
+  // Makes every call return soon, with CANCELLED, from now on.
   void Stop() { stopped_ = true; }
 
   // As Pipeline::VerifyRig.
@@ -43,21 +43,23 @@ class Verifier {
       const OnVerificationStep& on_step,
       const std::function<bool()>& interrupted);
 
-  // The score of one segment by the core that has not computed `information`.
+  // Compares `information` of a segment with its score by the other core.
   absl::StatusOr<ScoreCheck> CheckScore(
       const Rig& rig,
       const MotionSegment& segment,
       const SegmentInformation& information,
       const std::function<bool()>& interrupted);
 
-  // A version by both cores, on those of its segments whose data is kept. They
-  // start from the version, so that both are soon done where it is right.
+  // Computes a version by both cores, on those of its segments whose data is
+  // kept. They start from the version, so that both soon converge if it is
+  // right.
   absl::StatusOr<CalibrationCheck> CheckCalibration(
       const std::string& rig,
       std::int64_t version,
       const std::function<bool()>& interrupted);
 
-  // Tells the observer of each check, and keeps the finding, if there is one.
+  // Reports each check to the observer, and records the finding, if there is
+  // one.
   absl::Status Conclude(const std::string& rig,
                         const Verification& verification);
 

@@ -1,8 +1,8 @@
-// Who wants to be told, and telling them.
+// Watchers of a topic, and publication to them.
 //
-// Each watcher gets its first update on its own thread and the others from
-// whoever publishes, one at a time and in order: an update is told only if it
-// Follows the last one told.
+// Each watcher gets its first update on its own thread and the others from the
+// publishing threads, one at a time and in order: an update is passed on only
+// if it Follows the last one.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -20,14 +20,14 @@
 
 namespace selfcal::server {
 
-// Each activation once, in order. The newest need not be that of the highest
-// version: an older one may have been made active again.
+// Each activation once, in order. The newest one need not have the highest
+// version: an older version may have been activated again.
 inline bool Follows(const StoredCalibration& last,
                     const StoredCalibration& next) {
   return next.activation > last.activation;
 }
 
-// Nothing after the end of a run.
+// No update after the end of a run.
 inline bool Follows(const RunUpdate& last, const RunUpdate& /*next*/) {
   return last.run.state == RunState::kPending ||
          last.run.state == RunState::kRunning;
@@ -38,12 +38,12 @@ class Watchers {
  public:
   using Callback = std::function<void(const Update&)>;
 
-  // `every` gets each update of every topic before those who watch it; may be
+  // `every` receives each update of every topic before its watchers do; may be
   // empty.
   explicit Watchers(Callback every = nullptr) : every_(std::move(every)) {}
 
-  // Subscribes to `topic`. `now` tells how things are; it is called after the
-  // subscription stands, so that nothing is missed between the two.
+  // Subscribes to `topic`. `now` returns the present state; it is called once
+  // the subscription exists, so that nothing is missed in between.
   absl::StatusOr<std::unique_ptr<Subscription>> Watch(
       const std::string& topic,
       Callback callback,
