@@ -72,6 +72,9 @@ TEST_F(DaemonTest, ScoresFillTablesAndSurviveAKill) {
   const Rig rig = CreateRig();
   Stream(TestSegments(rig, 4));
   ASSERT_TRUE(AllScored());
+  // The full tables start a run, which scores their segments anew at its end.
+  ASSERT_EQ(WatchToTheEnd("rigs/r/recalibrations/1").state(),
+            v1::Recalibration::SUCCEEDED);
   const v1::ListTablesResponse tables = Tables();
   ASSERT_EQ(tables.tables_size(), static_cast<int>(rig.groups.size()));
   EXPECT_EQ(tables.tables(0).entries_size(), rig.table_size);
