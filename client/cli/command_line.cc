@@ -56,7 +56,7 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddImportCommand(&app, &context);
     AddPreflightCommand(&app, &context);
     AddSegmentCommands(&app, &context);
-  AddSessionCommands(&app, &context);
+    AddSessionCommands(&app, &context);
     AddTablesCommand(&app, &context);
     AddRecalibrateCommand(&app, &context);
     AddRunCommands(&app, &context);

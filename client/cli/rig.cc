@@ -155,8 +155,8 @@ int List(Context* context, const ListOptions& options) {
   request.set_filter(options.filter);
   request.set_order_by(options.order_by);
   v1::ListRigsResponse rigs;
-  const auto status = CallForAllPages<Service>(
-      stub.get(), &Service::ListRigs, request, &rigs);
+  const auto status =
+      CallForAllPages<Service>(stub.get(), &Service::ListRigs, request, &rigs);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(rigs);

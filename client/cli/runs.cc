@@ -147,7 +147,8 @@ void AddRunCommands(CLI::App* app, Context* context) {
       "result was rejected. With --json, prints a line for each iteration",
       Watch);
   add("convergence",
-      "Show the iterations of a run that has computed a version; --json has the "
+      "Show the iterations of a run that has computed a version; --json has "
+      "the "
       "estimate of each parameter, too",
       ShowConvergence);
   add("cancel",

@@ -43,12 +43,12 @@ int Information(Context* context, const Options& options) {
                {"sigma", true},
                {"ratio", true}});
   for (const auto& component : information.components()) {
-    table.Add({component.component(),
-               component.unit(),
-               fmt::format("{:.4g}", component.prior_sigma()),
-               fmt::format("{:.4g}", component.sigma()),
-               fmt::format("{:.4g}",
-                           component.sigma() / component.prior_sigma())});
+    table.Add(
+        {component.component(),
+         component.unit(),
+         fmt::format("{:.4g}", component.prior_sigma()),
+         fmt::format("{:.4g}", component.sigma()),
+         fmt::format("{:.4g}", component.sigma() / component.prior_sigma())});
   }
   context->Print(table);
   return kDone;
@@ -76,10 +76,13 @@ int Residuals(Context* context, const Options& options) {
                           camera.inliers(),
                           camera.observations()));
   }
-  facts.Add("median", fmt::format("{:.3f} px",
-                                  residuals.reprojection_median_px()));
-  constexpr const char* kKinds[] = {
-      "rotation", "velocity", "position", "accelerometer bias", "gyroscope bias"};
+  facts.Add("median",
+            fmt::format("{:.3f} px", residuals.reprojection_median_px()));
+  constexpr const char* kKinds[] = {"rotation",
+                                    "velocity",
+                                    "position",
+                                    "accelerometer bias",
+                                    "gyroscope bias"};
   for (int k = 0; k < residuals.inertial_rms_size() && k < 5; ++k) {
     facts.Add(kKinds[k],
               fmt::format("{:.2f} standard deviations rms",

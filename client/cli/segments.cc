@@ -297,8 +297,7 @@ void AddDelete(CLI::App* segments, Context* context) {
       "undone");
   remove->add_option("RIG", options->rig)->required();
   remove
-      ->add_option(
-          "SEGMENT", options->segment, "session~index, as in the list")
+      ->add_option("SEGMENT", options->segment, "session~index, as in the list")
       ->required();
   remove
       ->add_option("--reason",

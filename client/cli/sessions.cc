@@ -61,14 +61,14 @@ int Show(Context* context, const std::string& rig, const std::string& session) {
       const auto metres = [&](int axis) {
         return fmt::format("{:.3f}", segment.positions_m(3 * k + axis));
       };
-      table.Add({LastPart(segment.segment()),
-                 fmt::format("{:.3f}",
-                             kNanoseconds *
-                                     static_cast<double>(segment.start_ns()) +
-                                 segment.seconds(k)),
-                 metres(0),
-                 metres(1),
-                 metres(2)});
+      table.Add(
+          {LastPart(segment.segment()),
+           fmt::format("{:.3f}",
+                       kNanoseconds * static_cast<double>(segment.start_ns()) +
+                           segment.seconds(k)),
+           metres(0),
+           metres(1),
+           metres(2)});
     }
   }
   context->Print(table);

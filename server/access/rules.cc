@@ -57,15 +57,14 @@ bool Passes(const Caller& caller,
             Role role,
             const Message& request) {
   if (rule.rig_field().empty()) return HoldsOnEveryRig(caller, role);
-  return std::all_of(
-      rule.rig_field().begin(),
-      rule.rig_field().end(),
-      [&](const std::string& field) {
-        const std::string name = TextAt(request, field);
-        return name.empty() && rule.empty_means_all()
-                   ? HoldsOnEveryRig(caller, role)
-                   : Holds(caller, role, name);
-      });
+  return std::all_of(rule.rig_field().begin(),
+                     rule.rig_field().end(),
+                     [&](const std::string& field) {
+                       const std::string name = TextAt(request, field);
+                       return name.empty() && rule.empty_means_all()
+                                  ? HoldsOnEveryRig(caller, role)
+                                  : Holds(caller, role, name);
+                     });
 }
 
 std::optional<Role> RoleOf(v1::AccessRule::Role role) {

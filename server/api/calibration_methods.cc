@@ -31,9 +31,8 @@ absl::StatusOr<v1::Calibration> GetCalibration(
     const ApiContext& context,
     const Call&,
     const v1::GetCalibrationRequest& request) {
-  SELFCAL_ASSIGN_OR_RETURN(
-      const StoredCalibration calibration,
-      ReadVersion(context.store, "name", request.name()));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration calibration,
+                           ReadVersion(context.store, "name", request.name()));
   return EncodeNamed(context, calibration, request.name());
 }
 
@@ -102,8 +101,7 @@ absl::Status VerifyRig(const ApiContext& context,
       [&](const VerificationStep& step) { write(Encode(*rig, step)); },
       [&] { return call.cancelled() || context.stopping->load(); });
   if (!verification.ok()) {
-    return About(verification.status(),
-                 {kRigType, request.parent(), "parent"});
+    return About(verification.status(), {kRigType, request.parent(), "parent"});
   }
   write(Encode(*verification));
   return absl::OkStatus();
@@ -141,18 +139,18 @@ absl::StatusOr<std::shared_ptr<void>> WatchCalibration(
   auto sent = std::make_shared<std::int64_t>(0);
   auto subscription = context.pipeline->WatchCalibration(
       *rig, [=, &context](const StoredCalibration& active) {
-        watch.Put("", [=, &context](v1::Calibration* to) -> absl::StatusOr<bool> {
-          if (active.version == std::exchange(*sent, active.version)) {
-            return false;
-          }
-          SELFCAL_ASSIGN_OR_RETURN(
-              *to, EncodeNamed(context, active, request.parent()));
-          return true;
-        });
+        watch.Put(
+            "", [=, &context](v1::Calibration* to) -> absl::StatusOr<bool> {
+              if (active.version == std::exchange(*sent, active.version)) {
+                return false;
+              }
+              SELFCAL_ASSIGN_OR_RETURN(
+                  *to, EncodeNamed(context, active, request.parent()));
+              return true;
+            });
       });
   if (!subscription.ok()) {
-    return About(subscription.status(),
-                 {kRigType, request.parent(), "parent"});
+    return About(subscription.status(), {kRigType, request.parent(), "parent"});
   }
   return std::shared_ptr<void>(*std::move(subscription));
 }

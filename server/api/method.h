@@ -26,9 +26,8 @@ using UnaryHandler = std::function<absl::Status(
 // `write` waits until the response is sent; false: the caller has disconnected
 // or the daemon is stopping, and the handler should return.
 using WriteResponse = std::function<bool(const Message& response)>;
-using StreamingHandler = std::function<absl::Status(const Call& call,
-                                                    const Message& request,
-                                                    const WriteResponse& write)>;
+using StreamingHandler = std::function<absl::Status(
+    const Call& call, const Message& request, const WriteResponse& write)>;
 
 // One request, then updates as they happen, which arrive in the queue until it
 // is closed or the reader destroys what is returned. Occupies no thread.
@@ -59,7 +58,7 @@ using ExchangeHandler =
 
 struct Method {
   const google::protobuf::MethodDescriptor* descriptor = nullptr;
-  const Message* request = nullptr;   // default instances
+  const Message* request = nullptr;  // default instances
   const Message* response = nullptr;
   std::variant<UnaryHandler,
                StreamingHandler,

@@ -49,8 +49,7 @@ auto Guarded(const ApiContext& context, const Handler& handler)
     }
     if (failed.ok()) return result;
   } catch (const std::bad_alloc&) {
-    failed =
-        absl::ResourceExhaustedError("out of memory; send less at once");
+    failed = absl::ResourceExhaustedError("out of memory; send less at once");
   } catch (const std::exception& error) {
     failed = absl::InternalError(error.what());
   }
@@ -106,17 +105,19 @@ void Methods::AddUnary(Method method, UnaryHandler handler) {
 
 void Methods::AddStreaming(Method method, StreamingHandler handler) {
   method.descriptor = DescriptorOf(*method.request);
-  method.handler = StreamingHandler(
-      [this_method = method.descriptor, context = context_, handler](
-          const Call& call, const Message& request, const WriteResponse& write) {
-        return Guarded(context, [&] {
-          absl::Status status = Authorised(call, *this_method, request);
-          if (!status.ok()) return status;
-          return handler(call, request, [&](const Message& response) {
-            return !context.stopping->load() && write(response);
-          });
-        });
+  method.handler = StreamingHandler([this_method = method.descriptor,
+                                     context = context_,
+                                     handler](const Call& call,
+                                              const Message& request,
+                                              const WriteResponse& write) {
+    return Guarded(context, [&] {
+      absl::Status status = Authorised(call, *this_method, request);
+      if (!status.ok()) return status;
+      return handler(call, request, [&](const Message& response) {
+        return !context.stopping->load() && write(response);
       });
+    });
+  });
   methods_.push_back(std::move(method));
 }
 
@@ -128,12 +129,11 @@ void Methods::AddWatch(Method method, WatchHandler handler) {
           const Message& request,
           const std::shared_ptr<WatchQueue>& queue)
           -> absl::StatusOr<std::shared_ptr<void>> {
-        return Guarded(
-            context, [&]() -> absl::StatusOr<std::shared_ptr<void>> {
-              absl::Status status = Authorised(call, *this_method, request);
-              if (!status.ok()) return status;
-              return handler(call, request, queue);
-            });
+        return Guarded(context, [&]() -> absl::StatusOr<std::shared_ptr<void>> {
+          absl::Status status = Authorised(call, *this_method, request);
+          if (!status.ok()) return status;
+          return handler(call, request, queue);
+        });
       });
   methods_.push_back(std::move(method));
 }
@@ -155,11 +155,11 @@ void Methods::AddUpload(Method method, UploadHandler handler) {
 
 void Methods::AddExchange(Method method, ExchangeHandler handler) {
   method.descriptor = DescriptorOf(*method.request);
-  method.handler = ExchangeHandler(
-      [this_method = method.descriptor,
-       response = method.response,
-       context = context_,
-       handler](const Call& call) -> std::unique_ptr<Exchange> {
+  method.handler =
+      ExchangeHandler([this_method = method.descriptor,
+                       response = method.response,
+                       context = context_,
+                       handler](const Call& call) -> std::unique_ptr<Exchange> {
         return std::make_unique<AuthorisedExchange>(
             context, call, *this_method, *response, handler(call));
       });

@@ -76,15 +76,14 @@ class Methods {
                                    const Call&,
                                    const Request&,
                                    const Writer<Response>&)) {
-    AddStreaming(Of<Request, Response>(),
-                 [context = context_, handler](const Call& call,
-                                               const Message& request,
-                                               const WriteResponse& write) {
-                   return handler(context,
-                                  call,
-                                  static_cast<const Request&>(request),
-                                  write);
-                 });
+    AddStreaming(
+        Of<Request, Response>(),
+        [context = context_, handler](const Call& call,
+                                      const Message& request,
+                                      const WriteResponse& write) {
+          return handler(
+              context, call, static_cast<const Request&>(request), write);
+        });
   }
 
   template <typename Request, typename Response>
@@ -105,14 +104,15 @@ class Methods {
   void Add(absl::StatusOr<Response> (*handler)(const ApiContext&,
                                                const Call&,
                                                const Reader<Request>&)) {
-    AddUpload(Of<Request, Response>(),
-              [context = context_, handler](
-                  const Call& call, const ReadRequest& read, Message* response) {
-                auto answer = handler(context, call, read);
-                if (!answer.ok()) return answer.status();
-                *static_cast<Response*>(response) = *std::move(answer);
-                return absl::OkStatus();
-              });
+    AddUpload(
+        Of<Request, Response>(),
+        [context = context_, handler](
+            const Call& call, const ReadRequest& read, Message* response) {
+          auto answer = handler(context, call, read);
+          if (!answer.ok()) return answer.status();
+          *static_cast<Response*>(response) = *std::move(answer);
+          return absl::OkStatus();
+        });
   }
 
   template <typename Request, typename Response>

@@ -21,10 +21,7 @@ inline constexpr std::size_t kMaxPageBytes = 3u << 20;
 
 // Returns a page. `fetch` takes a Page and returns a StatusOr<Listed<T>>; `add`
 // takes a T and the response, and returns an absl::Status.
-template <typename Response,
-          typename Request,
-          typename Fetch,
-          typename Add>
+template <typename Response, typename Request, typename Fetch, typename Add>
 absl::StatusOr<Response> FillPage(const Request& request,
                                   const std::string& parent,
                                   const Fetch& fetch,

@@ -79,16 +79,15 @@ absl::StatusOr<std::shared_ptr<void>> WatchRecalibration(
                        const CalibrateProgress& progress) {
     // Each iteration has a key of its own: a reader that plots them all gets
     // them all.
-    watch.Put(std::to_string(run.attempts) + "." +
-                  std::to_string(progress.iteration),
-              [=](v1::Recalibration* to) -> absl::StatusOr<bool> {
-                SELFCAL_ASSIGN_OR_RETURN(
-                    *to, EncodeWithReport(store, run, progress));
-                return true;
-              });
+    watch.Put(
+        std::to_string(run.attempts) + "." + std::to_string(progress.iteration),
+        [=](v1::Recalibration* to) -> absl::StatusOr<bool> {
+          SELFCAL_ASSIGN_OR_RETURN(*to, EncodeWithReport(store, run, progress));
+          return true;
+        });
   };
-  auto subscription = context.pipeline->WatchRun(
-      id.rig, id.run, [=](const RunUpdate& update) {
+  auto subscription =
+      context.pipeline->WatchRun(id.rig, id.run, [=](const RunUpdate& update) {
         for (const CalibrateProgress& missed : update.missed) {
           put(update.run, missed);
         }

@@ -122,9 +122,9 @@ absl::StatusOr<v1::Rig> UpdateRig(const ApiContext& context,
     v1::Rig set = request.rig();
     for (int k = 0; k < v1::Rig::descriptor()->field_count(); ++k) {
       const auto* field = v1::Rig::descriptor()->field(k);
-      const bool chosen = std::find(fields.begin(),
-                                    fields.end(),
-                                    field->name()) != fields.end();
+      const bool chosen =
+          std::find(fields.begin(), fields.end(), field->name()) !=
+          fields.end();
       v1::Rig* other = chosen ? &rig : &set;
       other->GetReflection()->ClearField(other, field);
     }

@@ -61,7 +61,8 @@ absl::StatusOr<v1::ListSegmentsResponse> ListSegments(
       [&](const StoredSegment& segment, v1::ListSegmentsResponse* to) {
         v1::Segment* added = to->add_segments();
         *added = Encode(segment);
-        if (request.view() == v1::ListSegmentsRequest::BASIC) ClearDirections(added);
+        if (request.view() == v1::ListSegmentsRequest::BASIC)
+          ClearDirections(added);
         return absl::OkStatus();
       });
 }

@@ -90,10 +90,10 @@ class SegmentStream final : public Exchange {
             FillVerdict(*result, &response);
             return Answer(response, done);
           }
-          done(stopped() ? ShuttingDown()
-                         : ForClient(About(
-                               result.status(),
-                               {"selfcal.v1.Rig", parent_, "segment"})),
+          done(stopped()
+                   ? ShuttingDown()
+                   : ForClient(About(result.status(),
+                                     {"selfcal.v1.Rig", parent_, "segment"})),
                response);
         });
   }

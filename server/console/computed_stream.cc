@@ -81,8 +81,8 @@ class ComputedStream final : public HttpStream {
 
   bool Put(std::string event) {
     std::unique_lock lock(mutex_);
-    changed_.wait(
-        lock, [this] { return closed_ || events_.size() < kMaxWaiting; });
+    changed_.wait(lock,
+                  [this] { return closed_ || events_.size() < kMaxWaiting; });
     if (closed_) return false;
     events_.push_back(std::move(event));
     changed_.notify_all();

@@ -164,8 +164,7 @@ std::optional<std::map<std::string, std::string>> Routes::Match(
   return fields;
 }
 
-absl::StatusOr<Routes::Request> Routes::Find(
-    const HttpRequest& request) const {
+absl::StatusOr<Routes::Request> Routes::Find(const HttpRequest& request) const {
   constexpr std::string_view kPrefix = "/api/";
   std::string_view path = request.path;
   path.remove_prefix(path.starts_with(kPrefix) ? kPrefix.size() : path.size());

@@ -28,7 +28,8 @@ HttpResponse Invoke(const Routes::Request& request, const Caller& caller) {
   const auto& handler = request.method->handler;
   if (const auto* unary = std::get_if<UnaryHandler>(&handler)) {
     const std::unique_ptr<Message> response(request.method->response->New());
-    const absl::Status status = (*unary)(call, *request.message, response.get());
+    const absl::Status status =
+        (*unary)(call, *request.message, response.get());
     return status.ok() ? JsonResponse(*response) : ErrorResponse(status);
   }
   if (std::holds_alternative<WatchHandler>(handler)) {

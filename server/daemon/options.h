@@ -11,8 +11,8 @@
 #include "core/calibration/calibrate.h"
 #include "core/verify/scorer.h"
 #include "server/domain/domain_options.h"
-#include "server/host/host_conditions.h"
 #include "server/grpc/server.h"
+#include "server/host/host_conditions.h"
 
 namespace selfcal::server {
 

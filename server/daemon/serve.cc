@@ -21,10 +21,10 @@
 #include "server/daemon/state_lock.h"
 #include "server/daemon/stop.h"
 #include "server/domain/domain.h"
+#include "server/grpc/grpc_log.h"
 #include "server/host/host_conditions.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
-#include "server/grpc/grpc_log.h"
 #include "server/store/store_sqlite.h"
 #include "server/worker/worker.h"
 

@@ -19,10 +19,10 @@ absl::StatusOr<bool> DeleteSegment(UnitOfWork* tx,
                            UsersOf(tx, segment.rowid));
   const std::string text = SegmentText(tx->rig(), key);
   if (users.unfinished_run) {
-    return absl::FailedPreconditionError(fmt::format(
-        "run {} uses {}; cancel it, or try again when it has ended",
-        *users.unfinished_run,
-        text));
+    return absl::FailedPreconditionError(
+        fmt::format("run {} uses {}; cancel it, or try again when it has ended",
+                    *users.unfinished_run,
+                    text));
   }
   if (users.version) {
     return absl::FailedPreconditionError(fmt::format(
@@ -45,16 +45,14 @@ absl::StatusOr<int> DeleteRig(UnitOfWork* tx,
                               const std::string& reason) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t unfinished, UnfinishedRun(tx));
   if (unfinished != 0) {
-    return absl::FailedPreconditionError(fmt::format(
-        "run {} of rig {} has not ended; cancel it first",
-        unfinished,
-        tx->rig()));
+    return absl::FailedPreconditionError(
+        fmt::format("run {} of rig {} has not ended; cancel it first",
+                    unfinished,
+                    tx->rig()));
   }
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t waiting, CountUnscored(tx));
-  SELFCAL_RETURN_IF_ERROR(
-      AppendEvent(tx,
-                  EventKind::kRigDeleted,
-                  fmt::format("by {}: {}", caller, reason)));
+  SELFCAL_RETURN_IF_ERROR(AppendEvent(
+      tx, EventKind::kRigDeleted, fmt::format("by {}: {}", caller, reason)));
   SELFCAL_RETURN_IF_ERROR(DeleteRigRows(tx));
   return static_cast<int>(waiting);
 }

@@ -40,5 +40,4 @@ absl::StatusOr<v1::Recalibration> EncodeWithReport(
 absl::StatusOr<v1::Recalibration> EncodeWithConvergence(Store* store,
                                                         const StoredRun& run);
 
-
 }  // namespace selfcal::server

@@ -40,8 +40,8 @@ v1::Recalibration::Trigger EncodeTrigger(RunTrigger trigger) {
   return v1::Recalibration::TRIGGER_UNSPECIFIED;
 }
 
-// Components that the rig holds fixed have no sigma and are skipped. The message
-// is a Recalibration or a ConvergenceStep.
+// Components that the rig holds fixed have no sigma and are skipped. The
+// message is a Recalibration or a ConvergenceStep.
 template <typename Message>
 void FillProgress(const CalibrateProgress& progress, Message* message) {
   message->set_iteration(progress.iteration);

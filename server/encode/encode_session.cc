@@ -10,8 +10,7 @@
 
 namespace selfcal::server {
 
-v1::Session Encode(const std::string& rig,
-                                const SessionSummary& session) {
+v1::Session Encode(const std::string& rig, const SessionSummary& session) {
   v1::Session message;
   message.set_name(ChildName(rig, "sessions", session.session));
   message.set_session(session.session);
@@ -49,7 +48,7 @@ v1::TrajectorySegment Encode(const std::string& rig,
 }
 
 v1::SegmentInformation Encode(const Rig& rig,
-                                   const SegmentInformation& information) {
+                              const SegmentInformation& information) {
   const auto components = TangentComponents(rig.factory);
   const Eigen::VectorXd prior = PriorSigmas(rig);
   const FusedEstimate alone = Fuse(rig, std::span(&information, 1));
@@ -65,8 +64,8 @@ v1::SegmentInformation Encode(const Rig& rig,
 }
 
 v1::SegmentResiduals Encode(const SegmentResiduals& residuals,
-                                 const MotionSegment& segment,
-                                 int cameras) {
+                            const MotionSegment& segment,
+                            int cameras) {
   v1::SegmentResiduals message;
   for (int k = 0; k < cameras; ++k) message.add_cameras()->set_camera(k);
   for (std::size_t i = 0; i < residuals.observations.size(); ++i) {

@@ -27,8 +27,8 @@ class Words {
 
   bool at_end() const { return rest_.empty(); }
   bool at_comparison() const {
-    return !rest_.empty() &&
-           std::string_view("<>=").find(rest_.front()) != std::string_view::npos;
+    return !rest_.empty() && std::string_view("<>=").find(rest_.front()) !=
+                                 std::string_view::npos;
   }
 
   absl::StatusOr<std::string> Word(std::string_view expected) {
@@ -50,7 +50,8 @@ class Words {
       SkipSpace();
       return std::string(sign);
     }
-    return NotWhatIsExpected(rest_.empty() ? "the end" : rest_, "one of = < <= > >=");
+    return NotWhatIsExpected(rest_.empty() ? "the end" : rest_,
+                             "one of = < <= > >=");
   }
 
  private:
@@ -76,10 +77,10 @@ class Words {
   std::string_view rest_;
 };
 
-absl::StatusOr<FilterTerm> NextTerm(Words* words) {
+absl::StatusOr<FilterTerm> NextTerm(Words* words, LoneTexts lone_texts) {
   FilterTerm term;
-  SELFCAL_ASSIGN_OR_RETURN(term.field, words->Word("a condition"));
-  if (!words->at_comparison()) {
+  SELFCAL_ASSIGN_OR_RETURN(term.field, words->Word("a field"));
+  if (lone_texts == LoneTexts::kAllowed && !words->at_comparison()) {
     term.value = std::move(term.field);
     term.field.clear();
     return term;
@@ -104,6 +105,7 @@ absl::Status NotWhatIsExpected(std::string_view what,
 
 absl::Status ForEachTerm(
     std::string_view filter,
+    LoneTexts lone_texts,
     const std::function<absl::Status(const FilterTerm& term)>& apply) {
   if (filter.size() > kMaxFilter) {
     return absl::InvalidArgumentError(
@@ -111,7 +113,8 @@ absl::Status ForEachTerm(
   }
   Words words(filter);
   while (!words.at_end()) {
-    SELFCAL_ASSIGN_OR_RETURN(const FilterTerm term, NextTerm(&words));
+    SELFCAL_ASSIGN_OR_RETURN(const FilterTerm term,
+                             NextTerm(&words, lone_texts));
     SELFCAL_RETURN_IF_ERROR(apply(term));
     if (words.at_end()) break;
     SELFCAL_ASSIGN_OR_RETURN(const std::string joint, words.Word("AND"));

@@ -11,8 +11,7 @@
 
 namespace selfcal::server {
 
-// A condition, e.g. gain.camera >= 2. A word alone is a condition, too: it has
-// a value only.
+// A condition, e.g. gain.camera >= 2. A text alone has a value only.
 struct FilterTerm {
   std::string field;
   std::string group;  // after the dot of the field, if there is one
@@ -20,10 +19,14 @@ struct FilterTerm {
   std::string value;
 };
 
+// Whether a text alone is a condition.
+enum class LoneTexts { kRefused, kAllowed };
+
 // Calls `apply` for each condition, which are joined by AND, until it fails.
 // INVALID_ARGUMENT says where and what was expected.
 absl::Status ForEachTerm(
     std::string_view filter,
+    LoneTexts lone_texts,
     const std::function<absl::Status(const FilterTerm& term)>& apply);
 
 // A field to sort by, then asc or desc.

@@ -38,8 +38,8 @@ std::vector<Violation> GetLabels(const v1::Rig& message,
                             "has a name that is not 1 to 63 characters of a-z, "
                             "0-9, _ and -, beginning with a letter"});
     } else if (!IsValue(value)) {
-      violations.push_back({"labels." + name,
-                            "is not at most 63 bytes of printable ASCII"});
+      violations.push_back(
+          {"labels." + name, "is not at most 63 bytes of printable ASCII"});
     } else {
       labels->emplace(name, value);
     }

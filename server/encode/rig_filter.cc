@@ -6,7 +6,7 @@
 namespace selfcal::server {
 
 absl::Status ParseRigFilter(std::string_view filter, RigQuery* query) {
-  return ForEachTerm(filter, [query](const FilterTerm& term) -> absl::Status {
+  const auto apply = [query](const FilterTerm& term) -> absl::Status {
     if (term.field.empty()) {
       if (!query->text.empty()) {
         return NotWhatIsExpected(term.value,
@@ -21,7 +21,8 @@ absl::Status ParseRigFilter(std::string_view filter, RigQuery* query) {
     }
     query->labels[term.group] = term.value;
     return absl::OkStatus();
-  });
+  };
+  return ForEachTerm(filter, LoneTexts::kAllowed, apply);
 }
 
 absl::Status ParseRigOrder(std::string_view order_by, RigQuery* query) {

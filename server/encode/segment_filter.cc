@@ -49,8 +49,8 @@ absl::Status NarrowByNumber(const FilterTerm& term, Range<T>* range) {
   const auto parsed = std::from_chars(term.value.data(), end, value);
   const bool finite = std::isfinite(static_cast<double>(value));
   if (parsed.ec != std::errc() || parsed.ptr != end || !finite) {
-    return NotWhatIsExpected(term.value,
-                 std::is_integral_v<T> ? "a whole number" : "a number");
+    return NotWhatIsExpected(
+        term.value, std::is_integral_v<T> ? "a whole number" : "a number");
   }
   Narrow(term.sign, value, range);
   return absl::OkStatus();
@@ -89,7 +89,8 @@ absl::Status NarrowByScore(const FilterTerm& term, SegmentQuery* query) {
       term, term.field == "gain" ? &query->gain_nats : &query->entropy_nats);
 }
 
-absl::Status ReadState(const FilterTerm& term, std::optional<SegmentState>* state) {
+absl::Status ReadState(const FilterTerm& term,
+                       std::optional<SegmentState>* state) {
   if (term.value == "STORED") {
     *state = SegmentState::kStored;
   } else if (term.value == "SCORED") {
@@ -113,7 +114,8 @@ absl::Status ReadBool(const FilterTerm& term, std::optional<bool>* value) {
 // Applies a condition on a field that supports only '='.
 absl::Status ApplyEquality(const FilterTerm& term, SegmentQuery* query) {
   if (term.sign != "=") {
-    return NotWhatIsExpected(term.sign, fmt::format("= : {} has no order", term.field));
+    return NotWhatIsExpected(term.sign,
+                             fmt::format("= : {} has no order", term.field));
   }
   if (term.field == "state") return ReadState(term, &query->state);
   if (term.field == "has_data") return ReadBool(term, &query->has_data);
@@ -150,18 +152,20 @@ absl::Status Apply(const FilterTerm& term, SegmentQuery* query) {
       return NarrowByNumber(term, &query->temperature_c);
     }
   }
-  return NotWhatIsExpected(term.field,
-               "a field: state, session, has_data, in_table, receive_time, "
-               "calibration_version, landmarks, observations, temperature_c, "
-               "entropy.GROUP or gain.GROUP");
+  return NotWhatIsExpected(
+      term.field,
+      "a field: state, session, has_data, in_table, receive_time, "
+      "calibration_version, landmarks, observations, temperature_c, "
+      "entropy.GROUP or gain.GROUP");
 }
 
 }  // namespace
 
 absl::Status ParseSegmentFilter(std::string_view filter, SegmentQuery* query) {
-  return ForEachTerm(filter, [query](const FilterTerm& term) {
-    return Apply(term, query);
-  });
+  return ForEachTerm(
+      filter, LoneTexts::kRefused, [query](const FilterTerm& term) {
+        return Apply(term, query);
+      });
 }
 
 absl::Status ParseSegmentOrder(std::string_view order_by, SegmentQuery* query) {
@@ -183,9 +187,10 @@ absl::Status ParseSegmentOrder(std::string_view order_by, SegmentQuery* query) {
   } else if (field.starts_with("gain.")) {
     query->order = Order::kGain;
   } else {
-    return NotWhatIsExpected(field,
-                 "a field to sort by: receive_time, landmarks, observations, "
-                 "temperature_c, entropy.GROUP or gain.GROUP");
+    return NotWhatIsExpected(
+        field,
+        "a field to sort by: receive_time, landmarks, observations, "
+        "temperature_c, entropy.GROUP or gain.GROUP");
   }
   const auto dot = field.find('.');
   if (dot != std::string::npos) query->order_group = field.substr(dot + 1);

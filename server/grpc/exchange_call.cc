@@ -28,7 +28,8 @@ class ExchangeCall final : public Reactor {
   ExchangeCall(const CallContext& context, const Method& method, const Rpc& rpc)
       : method_(method),
         exchanges_(context.exchanges),
-        call_{CallerOf(rpc, context.local_role), [this] { return gone_.load(); }},
+        call_{CallerOf(rpc, context.local_role),
+              [this] { return gone_.load(); }},
         exchange_(std::get<ExchangeHandler>(method.handler)(call_)) {
     std::thread([this] { Run(); }).detach();
   }
@@ -115,11 +116,11 @@ class ExchangeCall final : public Reactor {
         !parsed.ok()) {
       return Fill(slot, parsed, *method_.response);
     }
-    exchange_->Take(*request,
-                    [this, slot](const absl::Status& status,
-                                 const Message& response) {
-                      Fill(slot, status, response);
-                    });
+    exchange_->Take(
+        *request,
+        [this, slot](const absl::Status& status, const Message& response) {
+          Fill(slot, status, response);
+        });
   }
 
   // Once the lock is released the call may be over and deleted, unless a write

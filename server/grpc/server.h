@@ -1,7 +1,7 @@
-// The gRPC server: the services of the API, grpc.health.v1 and reflection, on unix
-// sockets or TCP ports (credentials.h describes their security). server/access
-// defines what a caller may do; health and reflection are open to all
-// connections. Any thread may call.
+// The gRPC server: the services of the API, grpc.health.v1 and reflection, on
+// unix sockets or TCP ports (credentials.h describes their security).
+// server/access defines what a caller may do; health and reflection are open to
+// all connections. Any thread may call.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -61,10 +61,10 @@ class Server {
   // The addresses with the actual ports, in the form for a client.
   virtual const std::vector<std::string>& addresses() const = 0;
 
-  // Stops the server and the API. Health becomes NOT_SERVING, and no new call is accepted.
-  // Watches, and streams between segments, end with UNAVAILABLE soon; calls
-  // that remain after the deadline are cancelled. When it returns, no handler
-  // runs. A second call does nothing.
+  // Stops the server and the API. Health becomes NOT_SERVING, and no new call
+  // is accepted. Watches, and streams between segments, end with UNAVAILABLE
+  // soon; calls that remain after the deadline are cancelled. When it returns,
+  // no handler runs. A second call does nothing.
   virtual void Shutdown(std::chrono::milliseconds deadline) = 0;
 };
 

@@ -20,7 +20,8 @@ class StreamingCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
                 const Rpc& rpc,
                 const grpc::ByteBuffer& request)
       : method_(method),
-        call_{CallerOf(rpc, context.local_role), [this] { return gone_.load(); }},
+        call_{CallerOf(rpc, context.local_role),
+              [this] { return gone_.load(); }},
         request_(request) {}
 
   void Run() {

@@ -18,7 +18,8 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
             const grpc::ByteBuffer& request,
             grpc::ByteBuffer* response)
       : method_(method),
-        call_{CallerOf(rpc, context.local_role), [this] { return gone_.load(); }},
+        call_{CallerOf(rpc, context.local_role),
+              [this] { return gone_.load(); }},
         request_(request),
         response_(response) {}
 

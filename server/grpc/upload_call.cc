@@ -20,7 +20,8 @@ class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
              const Rpc& rpc,
              grpc::ByteBuffer* response)
       : method_(method),
-        call_{CallerOf(rpc, context.local_role), [this] { return gone_.load(); }},
+        call_{CallerOf(rpc, context.local_role),
+              [this] { return gone_.load(); }},
         response_(response) {}
 
   void Run() {

@@ -205,13 +205,11 @@ class PipelineImpl : public Pipeline {
                              const SegmentKey& key,
                              const std::string& caller,
                              const std::string& reason) override {
-    SELFCAL_RETURN_IF_ERROR(
-        scoring_.Delete(rig, [&]() -> absl::StatusOr<int> {
-          SELFCAL_ASSIGN_OR_RETURN(
-              const bool waiting,
-              domain_->DeleteSegment(rig, key, caller, reason));
-          return waiting ? 1 : 0;
-        }));
+    SELFCAL_RETURN_IF_ERROR(scoring_.Delete(rig, [&]() -> absl::StatusOr<int> {
+      SELFCAL_ASSIGN_OR_RETURN(
+          const bool waiting, domain_->DeleteSegment(rig, key, caller, reason));
+      return waiting ? 1 : 0;
+    }));
     spdlog::warn("{} has deleted segment {}~{} of rig {}: {}",
                  caller,
                  key.session,

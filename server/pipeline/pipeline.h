@@ -161,7 +161,8 @@ class Pipeline {
   // does not wait.
   virtual void EndSession(const std::string& rig) = 0;
 
-  // Domain::UpdateRig; scores the stored segments anew if the prior has changed.
+  // Domain::UpdateRig; scores the stored segments anew if the prior has
+  // changed.
   virtual absl::StatusOr<StoredRig> UpdateRig(const std::string& rig,
                                               const RigChange& change,
                                               const std::string& caller) = 0;

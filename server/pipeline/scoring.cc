@@ -140,8 +140,8 @@ absl::Status ScoringWorkers::Delete(
     std::unique_lock lock(mutex_);
     const auto deleting = deleting_.insert(rig);
     changed_.wait(lock, [&] {
-      const auto first = claimed_.lower_bound(
-          {rig, std::numeric_limits<std::int64_t>::min()});
+      const auto first =
+          claimed_.lower_bound({rig, std::numeric_limits<std::int64_t>::min()});
       return first == claimed_.end() || first->first != rig;
     });
     waiting = change();

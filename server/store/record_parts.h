@@ -12,8 +12,8 @@
 
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
-#include "selfcal/v1/calibration.pb.h"
 #include "selfcal/store/records.pb.h"
+#include "selfcal/v1/calibration.pb.h"
 
 namespace selfcal::server {
 

@@ -87,7 +87,8 @@ std::string SqlOf(const RigQuery& query) {
       "WHERE {} AND (?4 = '' OR instr(id, ?4) > 0) AND ?1 IS NOT NULL "
       "AND (?6 = 0 OR ?6 = "
       "  (SELECT count(*) FROM rig_labels l WHERE l.rig = rigs.rig "
-      "   AND instr(?5, char(10) || l.name || '=' || l.value || char(10)) > 0)) "
+      "   AND instr(?5, char(10) || l.name || '=' || l.value || char(10)) > "
+      "0)) "
       "ORDER BY {} LIMIT ?3",
       place,
       order);

@@ -97,8 +97,7 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
   const auto run = [&](const std::string& sql) {
     return Statement(tx->db(), sql, tx->rig_row()).Run();
   };
-  SELFCAL_RETURN_IF_ERROR(
-      run("UPDATE rigs SET deleting = 1 WHERE rig = ?1"));
+  SELFCAL_RETURN_IF_ERROR(run("UPDATE rigs SET deleting = 1 WHERE rig = ?1"));
   // Each before what it refers to.
   for (const char* table : {"table_absences",
                             "segment_scores",

@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "proto/convert.h"
+#include "selfcal/store/records.pb.h"
 #include "server/store/absences.h"
 #include "server/store/checksum.h"
 #include "server/store/record_parts.h"
-#include "selfcal/store/records.pb.h"
 #include "server/store/statement.h"
 #include "server/store/status_macros.h"
 #include "server/store/store.h"

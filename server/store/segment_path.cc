@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
+#include "selfcal/store/records.pb.h"
 #include "server/store/checksum.h"
 #include "server/store/record_parts.h"
-#include "selfcal/store/records.pb.h"
 #include "server/store/statement.h"
 #include "server/store/status_macros.h"
 

@@ -3,10 +3,10 @@
 #include <utility>
 
 #include "proto/convert.h"
+#include "selfcal/worker/job.pb.h"
 #include "server/store/record_parts.h"
 #include "server/store/records.h"
 #include "server/store/segment_ends.h"
-#include "selfcal/worker/job.pb.h"
 
 namespace selfcal::server {
 namespace {

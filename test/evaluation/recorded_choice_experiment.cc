@@ -87,11 +87,10 @@ std::vector<int> ChooseJointly(const ScoredRecording& recording,
 double DistanceIfConverged(const ScoredRecording& recording,
                            const std::vector<int>& chosen) {
   const RecordedDevice& device = recording.device;
-  const CalibrationResult result =
-      Calibrate(device.rig,
-                device.rig.factory,
-                Pick(device.segments, chosen),
-                ComparedOptions());
+  const CalibrationResult result = Calibrate(device.rig,
+                                             device.rig.factory,
+                                             Pick(device.segments, chosen),
+                                             ComparedOptions());
   if (result.status != CalibrateStatus::kConverged) {
     return std::numeric_limits<double>::quiet_NaN();
   }
@@ -148,10 +147,9 @@ void CompareAtSize(const ScoredRecording& recording,
     choices.push_back(RandomChoice(count, size, &random));
   }
   std::vector<double> draws(random_draws);
-  context->ForEach(random_draws,
-                   [&](int i) {
-                     draws[i] = DistanceIfConverged(recording, choices[i]);
-                   });
+  context->ForEach(random_draws, [&](int i) {
+    draws[i] = DistanceIfConverged(recording, choices[i]);
+  });
   // The daemon would reject them; they are as bad as any.
   const auto converged = std::count_if(
       draws.begin(), draws.end(), [](double d) { return !std::isnan(d); });

@@ -1,8 +1,8 @@
 #include "test/fuzz/seeds.h"
 
-#include "selfcal/vi_map/vi_map.pb.h"
 #include "core/simulation/simulate.h"
 #include "proto/convert.h"
+#include "selfcal/vi_map/vi_map.pb.h"
 
 namespace selfcal {
 namespace {

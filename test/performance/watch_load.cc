@@ -167,7 +167,8 @@ void Run(const Options& options) {
   }
   WaitUntil([&] { return HaveAll(watchers, 1); });
   fmt::print(
-      "{} watches on {} connections: {:.1f} KiB of the daemon's resident memory "
+      "{} watches on {} connections: {:.1f} KiB of the daemon's resident "
+      "memory "
       "for each; threads {} before, {} with them\n",
       options.watches,
       stubs.size(),
@@ -176,8 +177,7 @@ void Run(const Options& options) {
       StatusOf(daemon->pid(), "Threads"));
 
   std::vector<double> latencies;
-  const auto admin =
-      v1::CalibrationService::NewStub(Connect(daemon->target()));
+  const auto admin = v1::CalibrationService::NewStub(Connect(daemon->target()));
   for (int k = 0; k < options.activations; ++k) {
     v1::ActivateCalibrationRequest request;
     request.set_name(

@@ -10,10 +10,10 @@
 #include <fstream>
 #include <iterator>
 
-#include "selfcal/vi_map/vi_map.pb.h"
 #include "core/factor/inertial.h"
 #include "core/factor/reprojection.h"
 #include "core/model/so3.h"
+#include "selfcal/vi_map/vi_map.pb.h"
 #include "test/recordings.h"
 
 namespace selfcal::client {

@@ -61,7 +61,8 @@ inline bool IsOpenToAnybody(const MethodDescriptor& method) {
 
 // The methods that need a role.
 inline std::vector<const MethodDescriptor*> Methods() {
-  return MethodsThat([](const auto& method) { return !IsOpenToAnybody(method); });
+  return MethodsThat(
+      [](const auto& method) { return !IsOpenToAnybody(method); });
 }
 
 // The access rule of a method, as its option in the contract states it.

@@ -17,7 +17,9 @@ namespace {
 using google::protobuf::Descriptor;
 
 const MethodDescriptor& Streaming() {
-  return *v1::StreamSegmentsRequest::descriptor()->file()->service(0)
+  return *v1::StreamSegmentsRequest::descriptor()
+              ->file()
+              ->service(0)
               ->FindMethodByName("StreamSegments");
 }
 
@@ -55,7 +57,8 @@ TEST(Rules, EveryMethodWithANameInItsRequestIsBoundToTheRig) {
 TEST(Rules, NobodyWithoutAGrantPasses) {
   for (const MethodDescriptor* method : Methods()) {
     for (const std::string name : {"", "rigs/a", "rigs/a/segments/s~1", "x"}) {
-      const auto status = Authorise({"nobody", {}}, *method, *RequestFor(*method, name));
+      const auto status =
+          Authorise({"nobody", {}}, *method, *RequestFor(*method, name));
       EXPECT_TRUE(absl::IsPermissionDenied(status)) << method->full_name();
     }
   }
@@ -88,7 +91,8 @@ TEST(Rules, RightsOnOneRigEndThere) {
         {"x/rigs/a", false},
     };
     for (const auto& [name, passes] : expected) {
-      EXPECT_EQ(Authorise(caller, *method, *RequestFor(*method, name)).ok(), passes)
+      EXPECT_EQ(Authorise(caller, *method, *RequestFor(*method, name)).ok(),
+                passes)
           << method->full_name() << " of " << name;
     }
   }
@@ -100,7 +104,8 @@ TEST(Rules, GrantsAddUp) {
   request.set_parent("rigs/b");
   EXPECT_TRUE(Authorise(caller, Streaming(), request).ok());
   request.set_parent("rigs/a");
-  EXPECT_TRUE(absl::IsPermissionDenied(Authorise(caller, Streaming(), request)));
+  EXPECT_TRUE(
+      absl::IsPermissionDenied(Authorise(caller, Streaming(), request)));
   // A later message of a stream.
   EXPECT_TRUE(Authorise(caller, Streaming(), v1::StreamSegmentsRequest()).ok());
 }
@@ -108,7 +113,8 @@ TEST(Rules, GrantsAddUp) {
 TEST(Rules, DenialSaysWhatIsMissing) {
   v1::StreamSegmentsRequest request;
   request.set_parent("rigs/b");
-  const auto status = Authorise({"device", {{Role::kProduce, "a"}}}, Streaming(), request);
+  const auto status =
+      Authorise({"device", {{Role::kProduce, "a"}}}, Streaming(), request);
   EXPECT_NE(status.message().find("'produce' on the rig"), std::string::npos)
       << status;
   EXPECT_NE(status.message().find("device"), std::string::npos) << status;

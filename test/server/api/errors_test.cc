@@ -45,8 +45,8 @@ TEST(Errors, SayWhenToTryAgain) {
        {ForClient(absl::UnavailableError("x")),
         ForClient(absl::ResourceExhaustedError("x")),
         ShuttingDown()}) {
-    EXPECT_GT(
-        DetailOf<google::rpc::RetryInfo>(status).retry_delay().seconds(), 0);
+    EXPECT_GT(DetailOf<google::rpc::RetryInfo>(status).retry_delay().seconds(),
+              0);
   }
 }
 

@@ -33,7 +33,8 @@ TEST_F(AccessTest, WhoMayActivatesWithAReason) {
   EXPECT_EQ(done.status, 200) << done.body;
   EXPECT_EQ(done.json()["version"], "1");
   EXPECT_EQ(store_->GetActiveCalibration("r")->version, 1);
-  const auto event = Get("/api/v1/rigs/r/events?order_by=number%20desc").json()["events"][0];
+  const auto event =
+      Get("/api/v1/rigs/r/events?order_by=number%20desc").json()["events"][0];
   EXPECT_EQ(event["kind"], "CALIBRATION_ROLLED_BACK");
   EXPECT_THAT(event["detail"].get<std::string>(), HasSubstr("it was better"));
 }
@@ -83,9 +84,8 @@ TEST_F(AccessTest, AddressesOffTheLoopbackNeedTls) {
 }
 
 TEST_F(AccessTest, PortThatIsTakenIsAnError) {
-  const auto second =
-      MakeConsole(&*api_,
-                  {"127.0.0.1:" + std::to_string(port()), Role::kRead, {}});
+  const auto second = MakeConsole(
+      &*api_, {"127.0.0.1:" + std::to_string(port()), Role::kRead, {}});
   EXPECT_TRUE(absl::IsUnavailable(second.status())) << second.status();
 }
 

@@ -28,7 +28,8 @@ Message Parsed(const Reply& reply) {
 TEST_F(ApiTest, RigsComeInPagesFilteredAndSorted) {
   for (const char* id : {"phone", "tablet-1", "tablet-2"}) AddRig(id);
   const auto first =
-      Get("/api/v1/activity?filter=tablet&order_by=name%20desc&page_size=1").json();
+      Get("/api/v1/activity?filter=tablet&order_by=name%20desc&page_size=1")
+          .json();
   ASSERT_EQ(first["rigs"].size(), 1u);
   EXPECT_EQ(first["rigs"][0]["name"], "rigs/tablet-2");
   EXPECT_EQ(first["rigs"][0]["activeVersion"], "1");
@@ -68,8 +69,8 @@ TEST_F(ApiTest, ValuesAreThoseOfTheContract) {
   for (v1::GroupScore& score : *segment.mutable_scores()) {
     score.clear_unobserved();
   }
-  const auto segments =
-      Parsed<v1::ListSegmentsResponse>(Get("/api/v1/rigs/r/segments?view=BASIC"));
+  const auto segments = Parsed<v1::ListSegmentsResponse>(
+      Get("/api/v1/rigs/r/segments?view=BASIC"));
   ASSERT_EQ(segments.segments_size(), 1);
   EXPECT_EQ(segments.segments(0).SerializeAsString(),
             segment.SerializeAsString());
@@ -123,7 +124,8 @@ TEST_F(ApiTest, SegmentsAreFilteredAndSorted) {
 TEST_F(ApiTest, TwoVersionsAreCompared) {
   AddVersion(AddRig("r"));
   const auto compared = Get("/api/v1/rigs/r/calibrations/1:compare"
-          "?b=rigs/r/calibrations/active").json();
+                            "?b=rigs/r/calibrations/active")
+                            .json();
   EXPECT_EQ(compared["versionA"], "1");
   EXPECT_EQ(compared["versionB"], "2");
   EXPECT_EQ(compared["significant"], false);
@@ -138,16 +140,16 @@ TEST_F(ApiTest, TheCoachSaysWhatItSaysOverGrpc) {
       Parsed<v1::AdviseMotionResponse>(Get("/api/v1/rigs/r:adviseMotion"));
   EXPECT_EQ(told.SerializeAsString(), Encode(*expected, 3).SerializeAsString());
   EXPECT_EQ(told.advice_size(), 3);
-  EXPECT_EQ(Get("/api/v1/rigs/r:adviseMotion?max_advice=1")
-                .json()["advice"]
-                .size(),
-            1u);
+  EXPECT_EQ(
+      Get("/api/v1/rigs/r:adviseMotion?max_advice=1").json()["advice"].size(),
+      1u);
 }
 
 TEST_F(ApiTest, EventsComeInTheOrderThatIsAskedFor) {
   AddRig("a");
   AddRig("b");
-  const auto all = Get("/api/v1/events?order_by=number%20desc").json()["events"];
+  const auto all =
+      Get("/api/v1/events?order_by=number%20desc").json()["events"];
   ASSERT_GE(all.size(), 2u);
   EXPECT_EQ(all[0]["rig"], "rigs/b");
   EXPECT_EQ(all.back()["kind"], "RIG_CREATED");

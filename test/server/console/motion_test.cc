@@ -162,8 +162,8 @@ TEST_F(MotionTest, ResidualsAreThoseOfTheCoreAtTheVersionThatIsAskedFor) {
   ASSERT_EQ(whitened.size(), 15 * (segment.keyframes.size() - 1));
   EXPECT_NEAR(
       whitened[3].get<double>(), expected.intervals[0].whitened[3], 1e-9);
-  EXPECT_EQ(
-      Get(path + "?calibration_version=2").json()["calibrationVersion"], "2");
+  EXPECT_EQ(Get(path + "?calibration_version=2").json()["calibrationVersion"],
+            "2");
 }
 
 TEST_F(MotionTest, MistakesSayWhatToDo) {

@@ -11,8 +11,7 @@ using ::testing::HasSubstr;
 
 class StreamTest : public ConsoleTest {
  protected:
-  std::unique_ptr<Wire> OpenStream(
-      const std::string& path = "changes:watch") {
+  std::unique_ptr<Wire> OpenStream(const std::string& path = "changes:watch") {
     auto wire = std::make_unique<Wire>(port());
     wire->Send("GET /api/v1/" + path +
                " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");

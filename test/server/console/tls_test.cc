@@ -83,19 +83,20 @@ TEST_F(TlsTest, CertificateSaysWhichRigs) {
   EXPECT_EQ(Ask("owner", "/").status, 200);
   EXPECT_EQ(Ask("owner", "/api/v1/rigs/a").status, 200);
   EXPECT_EQ(Ask("owner", "/api/v1/rigs/a/events").status, 200);
-  for (const char* path : {"/api/v1/rigs/b",
-                           "/api/v1/rigs/b/tables",
-                           "/api/v1/rigs/b/segments/s~0/data",
-                           "/api/v1/rigs/b/calibrations/1",
-                           "/api/v1/rigs/b/calibrations/1:compare?b=rigs/b/calibrations/1",
-                           "/api/v1/rigs/b/recalibrations",
-                           "/api/v1/rigs/b/events",
-                           "/api/v1/rigs",
-                           "/api/v1/events",
-                           "/api/v1/activity",
-                           "/api/v1/changes:watch",
-                           "/api/v1/rigs/b/changes:watch",
-                           "/api/v1/rigs/b/recalibrations/1:watch"}) {
+  for (const char* path :
+       {"/api/v1/rigs/b",
+        "/api/v1/rigs/b/tables",
+        "/api/v1/rigs/b/segments/s~0/data",
+        "/api/v1/rigs/b/calibrations/1",
+        "/api/v1/rigs/b/calibrations/1:compare?b=rigs/b/calibrations/1",
+        "/api/v1/rigs/b/recalibrations",
+        "/api/v1/rigs/b/events",
+        "/api/v1/rigs",
+        "/api/v1/events",
+        "/api/v1/activity",
+        "/api/v1/changes:watch",
+        "/api/v1/rigs/b/changes:watch",
+        "/api/v1/rigs/b/recalibrations/1:watch"}) {
     EXPECT_EQ(Ask("owner", path).status, 403) << path;
     EXPECT_EQ(Ask("nobody", path).status, 403) << path;
   }

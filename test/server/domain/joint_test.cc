@@ -6,8 +6,8 @@
 
 #include "core/selection/joint_selection.h"
 #include "proto/convert.h"
-#include "server/store/records.h"
 #include "selfcal/store/records.pb.h"
+#include "server/store/records.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {

@@ -33,11 +33,13 @@ class RigUpdateTest : public StoreTest {
 SELFCAL_STORE_TEST_SUITE(RigUpdateTest);
 
 TEST_P(RigUpdateTest, LabelsAreKeptAndReplaced) {
-  ASSERT_TRUE(
-      Update([](StoredRig* rig) { rig->labels = {{"batch", "7"}}; }).ok());
+  ASSERT_TRUE(Update([](StoredRig* rig) {
+                rig->labels = {{"batch", "7"}};
+              }).ok());
   EXPECT_THAT(store_->GetRig("a")->labels, ElementsAre(Pair("batch", "7")));
-  const auto update =
-      Update([](StoredRig* rig) { rig->labels = {{"site", "roof"}}; });
+  const auto update = Update([](StoredRig* rig) {
+    rig->labels = {{"site", "roof"}};
+  });
   ASSERT_TRUE(update.ok()) << update.status();
   EXPECT_FALSE(update->rescore);
   EXPECT_THAT(store_->GetRig("a")->labels, ElementsAre(Pair("site", "roof")));

@@ -183,7 +183,8 @@ TEST_F(AccessTest, NobodyDoesWhatItMayNot) {
     const MethodDescriptor& method = *pick(Methods());
     const std::string name = pick(std::vector<std::string>{"rigs/a", "rigs/b"});
     const auto request = RequestFor(method, name);
-    const bool may = kind.known && Authorise({"x", kind.grants}, method, *request).ok();
+    const bool may =
+        kind.known && Authorise({"x", kind.grants}, method, *request).ok();
     const auto code = CallWith(As(kind.certificate),
                                method,
                                *request,

@@ -305,10 +305,10 @@ TEST_F(SegmentServiceTest, DownloadSendsWhatIsStoredOldestFirst) {
     if (!status.ok()) names = BadFields(status);
     return names;
   };
-  EXPECT_THAT(download(""),
-              ElementsAre("rigs/r/segments/a~0",
-                          "rigs/r/segments/a~1",
-                          "rigs/r/segments/b~1"));
+  EXPECT_THAT(
+      download(""),
+      ElementsAre(
+          "rigs/r/segments/a~0", "rigs/r/segments/a~1", "rigs/r/segments/b~1"));
   EXPECT_THAT(download("session = a"),
               ElementsAre("rigs/r/segments/a~0", "rigs/r/segments/a~1"));
   EXPECT_THAT(download("colour = 1"), ElementsAre("filter"));

@@ -1,5 +1,5 @@
-#include "server/store/records.h"
 #include "selfcal/store/records.pb.h"
+#include "server/store/records.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {

@@ -62,7 +62,7 @@ class DatabaseTest : public ::testing::Test {
 TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = EmbeddedMigrations();
-  ASSERT_EQ(migrations.size(), 10u);
+  ASSERT_EQ(migrations.size(), 11u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -94,6 +94,9 @@ TEST_F(DatabaseTest, EmbeddedMigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[9].name, "0010_segment_ends.sql");
   EXPECT_EQ(migrations[9].sha256,
             "3df89de6874b16777da0c78e0a806a250ebb17739e27d4d58734bd5abe2d7d7d");
+  EXPECT_EQ(migrations[10].name, "0011_labels.sql");
+  EXPECT_EQ(migrations[10].sha256,
+            "5297621fc586c3d9c906053da0604bb501290f651721e38a28f54924ae429068");
 }
 
 TEST_F(DatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

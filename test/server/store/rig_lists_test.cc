@@ -59,7 +59,8 @@ TEST_P(RigSummariesTest, TokenOfAnotherQueryIsRefused) {
   ASSERT_TRUE(listed.ok());
   for (const Page& page : {Page{1, listed->next_token}, Page{1, "nonsense"}}) {
     EXPECT_TRUE(absl::IsInvalidArgument(
-        store_->ListRigSummaries({"a", {}, Order::kName, false}, page).status()));
+        store_->ListRigSummaries({"a", {}, Order::kName, false}, page)
+            .status()));
   }
 }
 

@@ -29,13 +29,11 @@ async function answer<T>(response: Response): Promise<T> {
   if (response.ok && body !== null) return body as T;
   const error = body as ApiError | null;
   throw new Failure(
-    error?.code
-      ? error
-      : {
-          code: String(response.status),
-          message: 'The response of the daemon cannot be read.',
-          whatToDo: 'Reload the page; see the log of selfcald.',
-        },
+      error?.code ? error : {
+        code: String(response.status),
+        message: 'The response of the daemon cannot be read.',
+        whatToDo: 'Reload the page; see the log of selfcald.',
+      },
   );
 }
 
@@ -46,7 +44,8 @@ async function reach(path: string, init?: RequestInit): Promise<Response> {
     throw new Failure({
       code: 'UNAVAILABLE',
       message: 'The daemon does not answer.',
-      whatToDo: 'Check that selfcald is running; this page reconnects by itself.',
+      whatToDo:
+          'Check that selfcald is running; this page reconnects by itself.',
     });
   }
 }

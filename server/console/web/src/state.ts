@@ -1,8 +1,8 @@
 // State that pages share: the address, data from the daemon, and its updates.
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { Failure, get, rigPath, type ApiError } from './api';
-import type { Change } from './contract';
-import { openStream } from './stream';
+import {Failure, get, rigPath, type ApiError} from './api';
+import type {Change} from './contract';
+import {openStream} from './stream';
 
 // ------------------------------------------------------------- addresses
 
@@ -44,11 +44,11 @@ export function withQuery(values: Record<string, string>): string {
 export interface Read<T> {
   value: T | null;
   error: ApiError | null;
-  busy: boolean; // a request is in progress
+  busy: boolean;  // a request is in progress
 }
 
-// Reads a path, and reads it again when `version` changes; the old value is kept
-// until the new one arrives. A null path reads nothing.
+// Reads a path, and reads it again when `version` changes; the old value is
+// kept until the new one arrives. A null path reads nothing.
 export function useRead<T>(path: string | null, version = 0): Read<T> {
   const [read, setRead] = useState<{
     value: T | null;
@@ -115,11 +115,12 @@ export function useLive(rig: string): { version: number; live: boolean } {
         setVersion((count) => count + 1);
       }, kSettleMs);
     };
-    const close = openStream<Change>((rig ? rigPath(rig) + '/' : '') + 'changes:watch', {
-      onMessage: changed,
-      onOpen: () => setLive(true),
-      onLost: () => setLive(false),
-    });
+    const close =
+        openStream<Change>((rig ? rigPath(rig) + '/' : '') + 'changes:watch', {
+          onMessage: changed,
+          onOpen: () => setLive(true),
+          onLost: () => setLive(false),
+        });
     return () => {
       close();
       clearTimeout(timer.current);
