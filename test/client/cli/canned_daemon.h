@@ -177,6 +177,21 @@ struct CannedDaemon final : v1::RigService::Service,
     }
     return {grpc::StatusCode::FAILED_PRECONDITION, "its data was dropped"};
   }
+  grpc::Status DownloadSegments(
+      grpc::ServerContext*,
+      const v1::DownloadSegmentsRequest* request,
+      grpc::ServerWriter<v1::DownloadSegmentsResponse>* writer) override {
+    last_name = request->parent();
+    last_filter = request->filter();
+    for (const v1::MotionSegment& one : data) {
+      v1::DownloadSegmentsResponse response;
+      response.set_name("rigs/device/segments/" + one.session() + "~" +
+                        std::to_string(one.index()));
+      *response.mutable_segment() = one;
+      writer->Write(response);
+    }
+    return grpc::Status::OK;
+  }
   grpc::Status GetSegment(grpc::ServerContext*,
                           const v1::GetSegmentRequest* request,
                           v1::Segment* response) override {

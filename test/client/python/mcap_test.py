@@ -292,7 +292,7 @@ class McapTest(unittest.TestCase):
             ),
         )
         self.assertEqual(done.returncode, 2)
-        self.assertIn("walk.mcap is not written", done.stderr)
+        self.assertIn("walk.mcap was not written", done.stderr)
         self.assertEqual(os.listdir(folder), ["walk.mcap"])
         after = pathlib.Path(f"{folder}/walk.mcap").read_bytes()
         self.assertEqual(after, before)
