@@ -119,7 +119,8 @@ void MakeTwoVersions(const std::string& target, const std::string& id) {
     if (!status.ok()) throw std::runtime_error(status.ToString());
   };
   check(view.CreateRig(rig));
-  const auto trajectory = MakeHandheld(60.0, 1.0, 1);
+  // Too few for full tables, whose run waits for an idle machine.
+  const auto trajectory = MakeHandheld(28.0, 1.0, 1);
   const auto segments =
       Simulate(rig, rig.factory, rig.factory, *trajectory, "s", {}).segments;
   grpc::ClientContext context;
@@ -135,6 +136,7 @@ void MakeTwoVersions(const std::string& target, const std::string& id) {
   }
   stream->WritesDone();
   static_cast<void>(stream->Finish());
+  WaitUntil([&] { return view.StartRun().ok(); });
   WaitUntil([&] {
     const auto runs = view.GetRuns();
     return runs.ok() && !runs->empty() &&
