@@ -5,7 +5,8 @@
 
 The documents are plain Markdown that reads well beside the code, too. What a
 site needs besides is added to the copy: links into the code lead to pages with
-that code, and index.md gets its table of contents, from its own lists.
+that code, and each index.md and README.md gets its table of contents, from its
+own lists.
 """
 
 import os
@@ -102,6 +103,7 @@ def main() -> None:
         text = with_code_links(source.read_text(encoding="utf-8"), source)
         if source == DOCS / "index.md":
             text = text.replace("<!-- reference -->", REFERENCE)
+        if source.name in ("index.md", "README.md"):
             text += "\n" + contents(text)
         copy.write_text(text + "\n")
     shutil.copytree(DOCS / "pictures", OUT / "pictures")
