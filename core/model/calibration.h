@@ -54,7 +54,7 @@ struct Calibration {
   std::vector<CameraCalibration> cameras;
 };
 
-// One component of the tangent. TangentComponents() is the only list of names
+// One component of the tangent. TangentComponents is the only list of names
 // and units in the project: every table, message and export uses it.
 struct TangentComponent {
   std::string name;  // "imu.gyro.scale.x", "cam0.focal.x", "cam0.p_CI.x"
