@@ -20,21 +20,33 @@ CallThreads::~CallThreads() {
   changed_.wait(lock, [this] { return threads_ == 0; });
 }
 
+bool CallThreads::MakeRoom() {
+  if (static_cast<int>(queue_.size()) < idle_) return true;
+  if (threads_ >= limit_) return false;
+  try {
+    std::thread([this] { Work(); }).detach();
+  } catch (const std::system_error&) {
+    return false;
+  }
+  ++threads_;
+  ++idle_;  // until it takes the work
+  return true;
+}
+
 bool CallThreads::Run(std::function<void()> work) {
   const std::lock_guard lock(mutex_);
-  if (static_cast<int>(queue_.size()) == idle_) {
-    if (threads_ >= limit_) return false;
-    try {
-      std::thread([this] { Work(); }).detach();
-    } catch (const std::system_error&) {
-      return false;
-    }
-    ++threads_;
-    ++idle_;  // until it takes the work
-  }
+  if (!MakeRoom()) return false;
   queue_.push_back(std::move(work));
   changed_.notify_one();
   return true;
+}
+
+void CallThreads::RunSoon(std::function<void()> work) {
+  const std::lock_guard lock(mutex_);
+  // Without room, a thread takes it when it is done with what it does.
+  MakeRoom();
+  queue_.push_back(std::move(work));
+  changed_.notify_one();
 }
 
 void CallThreads::Work() {

@@ -20,14 +20,18 @@ class CallThreads {
   // Runs the work on a thread of its own. Returns false, and drops the work, if
   // every thread is busy and the limit is reached.
   bool Run(std::function<void()> work);
+  // The same for short work, which waits for a thread instead.
+  void RunSoon(std::function<void()> work);
 
  private:
+  // Makes sure that a thread is free for one more work; false if none can be.
+  bool MakeRoom();
   void Work();
 
   const int limit_;
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
-  std::deque<std::function<void()>> queue_;  // at most one for each idle thread
+  std::deque<std::function<void()>> queue_;
   int threads_ = 0;
   int idle_ = 0;
   bool stopping_ = false;

@@ -153,9 +153,8 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* StartWatch(
   const auto call =
       std::make_shared<WatchCall>(context, method, *rpc, *request);
   call->Hold();
-  if (!context.threads->Run([call] { call->Start(); })) {
-    call->End(TooManyCalls());
-  }
+  // Many may be opened at once, e.g. after a restart of the daemon.
+  context.threads->RunSoon([call] { call->Start(); });
   return call.get();
 }
 

@@ -167,6 +167,28 @@ TEST_F(ServerTest, ShutdownDoesNotWaitForAnIdleStreamBeyondItsDeadline) {
   EXPECT_FALSE(stream->Finish().ok());
 }
 
+TEST_F(ServerTest, WatchesThatAreOpenedAtOnceAllStand) {
+  AddRig();
+  ServerOptions options;
+  options.max_threads = 2;
+  StartServer(options);
+  std::vector<std::unique_ptr<Context>> contexts;
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::Calibration>>> readers;
+  v1::WatchCalibrationRequest request;
+  request.set_parent("rigs/r");
+  for (int i = 0; i < 90; ++i) {
+    contexts.push_back(std::make_unique<Context>());
+    readers.push_back(
+        calibrations_->WatchCalibration(contexts.back().get(), request));
+  }
+  v1::Calibration seen;
+  for (int i = 0; i < 90; ++i) {
+    EXPECT_TRUE(readers[i]->Read(&seen)) << i;
+    contexts[i]->TryCancel();
+    readers[i]->Finish();
+  }
+}
+
 TEST_F(ServerTest, ManyWatchersDoNotKeepOthersOut) {
   AddRig();
   std::vector<std::unique_ptr<Context>> contexts;
