@@ -1,7 +1,12 @@
-#include <google/protobuf/repeated_field.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
 
+#include <cctype>
+#include <string>
 #include <utility>
 
+#include "core/model/camera_model.h"
+#include "core/model/parameter_blocks.h"
 #include "proto/convert.h"
 
 namespace selfcal {
@@ -43,47 +48,132 @@ void Require(bool present, std::string field, Violations* violations) {
   if (!present) violations->push_back({std::move(field), "is missing"});
 }
 
-v1::DistortionModel ToProto(DistortionModel model) {
-  switch (model) {
-    case DistortionModel::kFov:
-      return v1::DISTORTION_MODEL_FOV;
-    case DistortionModel::kRadialTangential:
-      return v1::DISTORTION_MODEL_RADIAL_TANGENTIAL;
-    case DistortionModel::kEquidistant:
-      return v1::DISTORTION_MODEL_EQUIDISTANT;
+// The name of a model in the contract: DISTORTION_MODEL_RADIAL_TANGENTIAL for
+// "radial-tangential".
+std::string ProtoName(DistortionModel model) {
+  std::string name = "DISTORTION_MODEL_";
+  for (const char letter : DistortionName(model)) {
+    name += letter == '-' ? '_'
+                          : static_cast<char>(std::toupper(
+                                static_cast<unsigned char>(letter)));
   }
-  return v1::DISTORTION_MODEL_UNSPECIFIED;
+  return name;
+}
+
+v1::DistortionModel ToProto(DistortionModel model) {
+  v1::DistortionModel message = v1::DISTORTION_MODEL_UNSPECIFIED;
+  v1::DistortionModel_Parse(ProtoName(model), &message);
+  return message;
 }
 
 bool FromProto(v1::DistortionModel message, DistortionModel* model) {
-  switch (message) {
-    case v1::DISTORTION_MODEL_FOV:
-      *model = DistortionModel::kFov;
-      return true;
-    case v1::DISTORTION_MODEL_RADIAL_TANGENTIAL:
-      *model = DistortionModel::kRadialTangential;
-      return true;
-    case v1::DISTORTION_MODEL_EQUIDISTANT:
-      *model = DistortionModel::kEquidistant;
-      return true;
-    default:
-      return false;
+  for (const DistortionModel candidate : DistortionModels()) {
+    if (ToProto(candidate) != message) continue;
+    *model = candidate;
+    return true;
+  }
+  return false;
+}
+
+const google::protobuf::FieldDescriptor* FieldOf(
+    const BlockInfo& info, const google::protobuf::Message& message) {
+  std::string name;
+  for (const char letter : info.field) {
+    name += static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+  }
+  return message.GetDescriptor()->FindFieldByName(name);
+}
+
+// The message of a block in that of its sensor.
+template <class Part>
+Part* MutablePart(const BlockInfo& info, google::protobuf::Message* message) {
+  return google::protobuf::DynamicCastToGenerated<Part>(
+      message->GetReflection()->MutableMessage(message,
+                                               FieldOf(info, *message)));
+}
+
+void FillBlock(const BlockInfo& info,
+               const Eigen::Vector2d& value,
+               google::protobuf::Message* message) {
+  Fill(value, MutablePart<v1::Vector2>(info, message));
+}
+void FillBlock(const BlockInfo& info,
+               const Eigen::Vector3d& value,
+               google::protobuf::Message* message) {
+  Fill(value, MutablePart<v1::Vector3>(info, message));
+}
+void FillBlock(const BlockInfo& info,
+               const Eigen::Quaterniond& value,
+               google::protobuf::Message* message) {
+  Fill(value, MutablePart<v1::Quaternion>(info, message));
+}
+void FillBlock(const BlockInfo& info,
+               double value,
+               google::protobuf::Message* message) {
+  message->GetReflection()->SetDouble(message, FieldOf(info, *message), value);
+}
+void FillBlock(const BlockInfo& info,
+               const DistortionVector& value,
+               google::protobuf::Message* message) {
+  for (const double coefficient : value) {
+    message->GetReflection()->AddDouble(
+        message, FieldOf(info, *message), coefficient);
   }
 }
 
-void FillCamera(const CameraCalibration& camera,
-                v1::CameraCalibration* message) {
-  Fill(camera.q_CI, message->mutable_q_ci());
-  Fill(camera.p_CI, message->mutable_p_ci());
-  Fill(camera.f, message->mutable_f());
-  Fill(camera.c, message->mutable_c());
-  message->set_distortion_model(ToProto(camera.model));
-  message->mutable_distortion()->Add(camera.distortion.begin(),
-                                     camera.distortion.end());
-  message->set_width_px(camera.width_px);
-  message->set_height_px(camera.height_px);
-  message->set_time_offset_s(camera.time_offset_s);
+// Reads the message of a block; one that stored data has had from the beginning
+// must be present.
+template <class Part, class Read>
+void ReadPart(const BlockInfo& info,
+              const google::protobuf::Message& message,
+              const std::string& prefix,
+              Read* value,
+              Violations* violations) {
+  const auto* field = FieldOf(info, message);
+  const auto* reflection = message.GetReflection();
+  if (!reflection->HasField(message, field)) {
+    Require(
+        info.since != StoredSince::kBegin, prefix + field->name(), violations);
+    return;
+  }
+  *value = Value(*google::protobuf::DynamicCastToGenerated<Part>(
+      &reflection->GetMessage(message, field)));
 }
+
+void ReadBlock(const BlockInfo& info,
+               const google::protobuf::Message& message,
+               const std::string& prefix,
+               Eigen::Vector2d* value,
+               Violations* violations) {
+  ReadPart<v1::Vector2>(info, message, prefix, value, violations);
+}
+void ReadBlock(const BlockInfo& info,
+               const google::protobuf::Message& message,
+               const std::string& prefix,
+               Eigen::Vector3d* value,
+               Violations* violations) {
+  ReadPart<v1::Vector3>(info, message, prefix, value, violations);
+}
+void ReadBlock(const BlockInfo& info,
+               const google::protobuf::Message& message,
+               const std::string& prefix,
+               Eigen::Quaterniond* value,
+               Violations* violations) {
+  ReadPart<v1::Quaternion>(info, message, prefix, value, violations);
+}
+void ReadBlock(const BlockInfo& info,
+               const google::protobuf::Message& message,
+               const std::string&,
+               double* value,
+               Violations*) {
+  *value = message.GetReflection()->GetDouble(message, FieldOf(info, message));
+}
+// ReadDistortion reads the coefficients with their model.
+void ReadBlock(const BlockInfo&,
+               const google::protobuf::Message&,
+               const std::string&,
+               DistortionVector*,
+               Violations*) {}
 
 void ReadDistortion(const v1::CameraCalibration& message,
                     const std::string& prefix,
@@ -108,52 +198,53 @@ void ReadDistortion(const v1::CameraCalibration& message,
       Eigen::Map<const Eigen::VectorXd>(message.distortion().data(), size);
 }
 
+template <class Sensor, class Blocks>
+void FillSensor(const Blocks& blocks,
+                const Sensor& sensor,
+                google::protobuf::Message* message) {
+  VisitSensorBlocks(
+      blocks,
+      [&](const BlockInfo& info, const auto& value) {
+        FillBlock(info, value, message);
+      },
+      sensor);
+}
+
+template <class Sensor, class Blocks>
+void ReadSensor(const Blocks& blocks,
+                const google::protobuf::Message& message,
+                const std::string& prefix,
+                Sensor* sensor,
+                Violations* violations) {
+  VisitSensorBlocks(
+      blocks,
+      [&](const BlockInfo& info, auto& value) {
+        ReadBlock(info, message, prefix, &value, violations);
+      },
+      *sensor);
+}
+
 void ReadCamera(const v1::CameraCalibration& message,
                 const std::string& prefix,
                 CameraCalibration* camera,
                 Violations* violations) {
-  Require(message.has_q_ci(), prefix + "q_ci", violations);
-  Require(message.has_p_ci(), prefix + "p_ci", violations);
-  Require(message.has_f(), prefix + "f", violations);
-  Require(message.has_c(), prefix + "c", violations);
-  camera->q_CI = Value(message.q_ci());
-  camera->p_CI = Value(message.p_ci());
-  camera->f = Value(message.f());
-  camera->c = Value(message.c());
+  ReadSensor(kCameraBlocks, message, prefix, camera, violations);
   camera->width_px = message.width_px();
   camera->height_px = message.height_px();
-  camera->time_offset_s = message.time_offset_s();
   ReadDistortion(message, prefix, camera, violations);
-}
-
-void ReadImu(const v1::ImuCalibration& message,
-             const std::string& prefix,
-             ImuCalibration* imu,
-             Violations* violations) {
-  Require(message.has_s_g(), prefix + "s_g", violations);
-  Require(message.has_m_g(), prefix + "m_g", violations);
-  Require(message.has_s_a(), prefix + "s_a", violations);
-  Require(message.has_m_a(), prefix + "m_a", violations);
-  Require(message.has_q_ai(), prefix + "q_ai", violations);
-  imu->s_g = Value(message.s_g());
-  imu->m_g = Value(message.m_g());
-  imu->s_a = Value(message.s_a());
-  imu->m_a = Value(message.m_a());
-  imu->q_AI = Value(message.q_ai());
 }
 
 }  // namespace
 
 v1::CalibrationParameters ToProto(const Calibration& theta) {
   v1::CalibrationParameters message;
-  v1::ImuCalibration* imu = message.mutable_imu();
-  Fill(theta.imu.s_g, imu->mutable_s_g());
-  Fill(theta.imu.m_g, imu->mutable_m_g());
-  Fill(theta.imu.s_a, imu->mutable_s_a());
-  Fill(theta.imu.m_a, imu->mutable_m_a());
-  Fill(theta.imu.q_AI, imu->mutable_q_ai());
+  FillSensor(kImuBlocks, theta.imu, message.mutable_imu());
   for (const CameraCalibration& camera : theta.cameras) {
-    FillCamera(camera, message.add_cameras());
+    v1::CameraCalibration* added = message.add_cameras();
+    FillSensor(kCameraBlocks, camera, added);
+    added->set_distortion_model(ToProto(camera.model));
+    added->set_width_px(camera.width_px);
+    added->set_height_px(camera.height_px);
   }
   return message;
 }
@@ -164,7 +255,8 @@ Violations FromProto(const v1::CalibrationParameters& message,
   Violations violations;
   Calibration read;
   if (message.has_imu()) {
-    ReadImu(message.imu(), prefix + "imu.", &read.imu, &violations);
+    ReadSensor(
+        kImuBlocks, message.imu(), prefix + "imu.", &read.imu, &violations);
   } else {
     Require(false, prefix + "imu", &violations);
   }

@@ -27,7 +27,8 @@ double SecondsBetween(const JoinedSegment& a, const JoinedSegment& b) {
     return static_cast<double>(b.ends->first.t_ns - a.ends->first.t_ns) /
            static_cast<double>(kSecond);
   }
-  return static_cast<double>((b.time_ns - a.time_ns) / kSecond);
+  const std::int64_t whole_s = (b.time_ns - a.time_ns) / kSecond;
+  return static_cast<double>(whole_s);
 }
 
 // A chain that ages between its segments.

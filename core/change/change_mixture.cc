@@ -13,7 +13,7 @@ using Eigen::VectorXd;
 
 void ChangeMixture::Add(const MatrixXd& L,
                         const VectorXd& s,
-                        MatrixXd by_change,
+                        const MatrixXd& by_change,
                         double prior) {
   no_change_ -= prior;
   const double each = prior / static_cast<double>(kChangeSizes.size());

@@ -34,7 +34,7 @@ class ChangeMixture {
   // hypotheses is below 1: the rest is the probability of no change.
   void Add(const Eigen::MatrixXd& L,
            const Eigen::VectorXd& s,
-           Eigen::MatrixXd by_change,
+           const Eigen::MatrixXd& by_change,
            double prior);
 
   // At least one hypothesis must have been added.

@@ -1,5 +1,6 @@
 // Searches for a change over courses and blocks of parameters. Detection
-// (detect_change.h) and the test of a set (split.h) share it.
+// (detect_change.h) and the test of a set (core/calibration/memory_split.h)
+// share it.
 #pragma once
 
 #include <Eigen/Core>

@@ -5,16 +5,10 @@
 #include <numeric>
 #include <utility>
 
+#include "core/model/parameter_blocks.h"
+
 namespace selfcal {
 namespace {
-
-constexpr char kTimeOffset[] = ".time_offset";
-
-// The name of a component without its axis or the number of its coefficient.
-std::string Stem(const std::string& component) {
-  if (component.ends_with(kTimeOffset)) return component;
-  return component.substr(0, component.rfind('.'));
-}
 
 ParameterBlock Components(std::string name,
                           std::vector<int> at,
@@ -83,11 +77,12 @@ std::vector<ParameterBlock> ParameterBlocks(const Rig& rig) {
   for (ParameterBlock& group : GroupBlocks(rig)) {
     AddUnlessKnown(std::move(group), &blocks);
   }
-  const auto components = TangentComponents(rig.factory);
+  const std::vector<std::string> component_blocks =
+      ComponentBlocks(rig.factory);
   std::vector<std::string> names;
   std::map<std::string, std::vector<int>> stems;
   for (std::size_t k = 0; k < free.size(); ++k) {
-    names.push_back(Stem(components[free[k]].name));
+    names.push_back(component_blocks[free[k]]);
     stems[names.back()].push_back(static_cast<int>(k));
   }
   for (auto& [stem, at] : stems) {

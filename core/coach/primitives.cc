@@ -43,13 +43,13 @@ std::vector<Primitive> MakePrimitives() {
                       "each way, not quite once a second.",
        .swings = {{kPitch, 0.4, 0.7}}},
       {.name = "roll",
-       .instruction = "Turn the device about the line it looks along, like a "
+       .instruction = "Turn the device about its viewing direction, like a "
                       "steering wheel, 30 degrees to each side, not quite "
                       "once a second.",
        .swings = {{kRoll, 0.4, 0.7}}},
       {.name = "thrust",
-       .instruction = "Shake the device forward and back along the line it "
-                      "looks along, a hand's breadth, three times in two "
+       .instruction = "Shake the device forward and back along its viewing "
+                      "direction, a hand's breadth, three times in two "
                       "seconds.",
        .swings = {{kForward, 0.06, 1.5}}},
       {.name = "sway",
@@ -61,14 +61,14 @@ std::vector<Primitive> MakePrimitives() {
                       "times in two seconds, without turning it.",
        .swings = {{kUp, 0.06, 1.5}}},
       {.name = "figure_eight",
-       .instruction = "Draw a lying eight in the air, half a metre wide, and "
+       .instruction = "Trace a sideways figure eight, half a metre wide, and "
                       "lean the device into its curves, two seconds each.",
        .swings = {{kLeft, 0.25, 0.5},
                   {kUp, 0.12, 1.0},
                   {kRoll, 0.5, 0.5, kQuarterTurn}}},
       {.name = "orbit",
-       .instruction = "Carry the device in an arc to and fro about a thing one "
-                      "metre ahead, and keep looking at it.",
+       .instruction = "Carry the device in an arc to and fro around an object "
+                      "one metre ahead, and keep looking at it.",
        .swings = {{kYaw, 0.6, 0.35}, {kPitch, 0.2, 0.5}},
        .pivot_m = 1},
       {.name = "walk",
@@ -76,8 +76,8 @@ std::vector<Primitive> MakePrimitives() {
        .swings = {{kUp, 0.02, 1.9}, {kLeft, 0.02, 0.95}, {kPitch, 0.02, 1.9}},
        .forward_mps = 1.2},
       {.name = "lay_on_sides",
-       .instruction = "Turn the device slowly onto its left side, over upright "
-                      "onto its right side, and back.",
+       .instruction = "Turn the device slowly onto its left side, through "
+                      "upright to its right side, and back.",
        .swings = {{kRoll, 1.45, 0.2}}},
       {.name = "ceiling_and_floor",
        .instruction = "Point the device slowly at the ceiling, then at the "
@@ -85,13 +85,14 @@ std::vector<Primitive> MakePrimitives() {
        .swings = {{kPitch, 1.2, 0.22}}},
       {.name = "lay_and_shake",
        .instruction = "Turn the device slowly from one side onto the other "
-                      "and shake it meanwhile, forward and back and sideways.",
+                      "and shake it at the same time, forward, back and "
+                      "sideways.",
        .swings = {{kRoll, 1.3, 0.2},
                   {kForward, 0.05, 1.4},
                   {kLeft, 0.05, 1.15}}},
       {.name = "tumble",
-       .instruction = "Turn the device about all its axes as far as the wrist "
-                      "goes, and move it in all directions meanwhile.",
+       .instruction = "Turn the device about all its axes as far as your wrist "
+                      "allows, and move it in all directions at the same time.",
        .swings = {{kRoll, 0.8, 0.23},
                   {kPitch, 0.6, 0.29},
                   {kYaw, 0.6, 0.26},

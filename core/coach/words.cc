@@ -5,38 +5,22 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/model/parameter_blocks.h"
+
 namespace selfcal {
 namespace {
 
 constexpr std::size_t kMaxParts = 3;
 
-struct Phrase {
-  std::string_view block;  // of a name without the sensor and the last part
-  std::string_view words;
-};
-
-constexpr Phrase kImuPhrases[] = {
-    {"gyro.scale.", "the gyroscope's scale on "},
-    {"gyro.misalignment.", "the gyroscope's misalignment "},
-    {"accel.scale.", "the accelerometer's scale on "},
-    {"accel.misalignment.", "the accelerometer's misalignment "},
-    {"q_AI.", "the turn of the accelerometer against the gyroscope about "},
-};
-constexpr Phrase kCameraPhrases[] = {
-    {"q_CI.", "the turn against the IMU about "},
-    {"p_CI.", "the distance from the IMU along "},
-    {"focal.", "the focal length in "},
-    {"principal.", "the principal point in "},
-    {"distortion.", "the distortion "},
-    {"time_offset", "the delay of the images"},
-};
-
-template <std::size_t N>
-std::string Words(const Phrase (&phrases)[N], std::string_view rest) {
-  for (const Phrase& phrase : phrases) {
-    if (!rest.starts_with(phrase.block)) continue;
-    rest.remove_prefix(phrase.block.size());
-    return fmt::format("{}{}", phrase.words, rest);
+// `rest` is the name of a component without its sensor; empty if no block has
+// it.
+template <class Blocks>
+std::string Words(const Blocks& blocks, std::string_view rest) {
+  for (const auto& block : blocks) {
+    const BlockInfo& info = block.info;
+    if (rest == info.name) return std::string(info.words);
+    if (!rest.starts_with(info.name) || rest[info.name.size()] != '.') continue;
+    return fmt::format("{}{}", info.words, rest.substr(info.name.size() + 1));
   }
   return "";
 }
@@ -50,9 +34,9 @@ std::string ComponentInWords(std::string_view component) {
       component.substr(std::min(dot + 1, component.size()));
   std::string words;
   if (sensor == "imu") {
-    words = Words(kImuPhrases, rest);
+    words = Words(kImuBlocks, rest);
   } else if (sensor.starts_with("cam")) {
-    words = Words(kCameraPhrases, rest);
+    words = Words(kCameraBlocks, rest);
     if (!words.empty()) {
       words += fmt::format(" of camera {}", sensor.substr(3));
     }
@@ -68,7 +52,7 @@ std::string DirectionInWords(const UnobservedDirection& direction) {
   }
   if (count == 1) return parts.front();
   const bool more = count < direction.parts.size();
-  return fmt::format("a mix of {}{}{}",
+  return fmt::format("a combination of {}{}{}",
                      fmt::join(parts.begin(), parts.end() - 1, ", "),
                      more ? ", " : " and ",
                      more ? parts.back() + " and others" : parts.back());

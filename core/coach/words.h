@@ -13,8 +13,8 @@ namespace selfcal {
 // returned unchanged.
 std::string ComponentInWords(std::string_view component);
 
-// "the accelerometer's scale on z", or "a mix of ... and ..." of the largest
-// parts, at most three. A direction has at least one part.
+// "the accelerometer's scale on z", or "a combination of ... and ..." of the
+// largest parts, at most three. A direction has at least one part.
 std::string DirectionInWords(const UnobservedDirection& direction);
 
 }  // namespace selfcal

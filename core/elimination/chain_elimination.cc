@@ -1,167 +1,76 @@
 #include "core/elimination/chain_elimination.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/elimination/chain_places.h"
-#include "core/elimination/landmark_rows.h"
+#include "core/elimination/chain_steps.h"
 
 namespace selfcal {
 
 using namespace chain;
 
-void ChainElimination::LayOut(const ChainShape& shape) {
-  camera_sizes_.assign(shape.camera_sizes.begin(), shape.camera_sizes.end());
-  camera_offsets_.clear();
-  sums_offsets_.clear();
-  landmark_shared_ = 0;
-  sums_size_ = 0;
-  int largest_row = 0;
-  for (const int size : camera_sizes_) {
-    camera_offsets_.push_back(landmark_shared_);
-    landmark_shared_ += size;
-    sums_offsets_.push_back(sums_size_);
-    sums_size_ += 3 * RowsStride(size);
-    largest_row = std::max(largest_row, RowsStride(size));
-  }
-  kept_ = shape.kept;
-  landmark_place_ = kKeptPlace + WholeVectors(kept_);
-  constant_ = landmark_place_ + landmark_shared_;
-  fixed_ = WholeVectors(constant_ + 1);
-  GrowTo(static_cast<std::size_t>(largest_row) * (largest_row + kPanelPad),
-         &gram_);
-
-  const int slots = structure_.max_slots();
-  // The front advances by one place with each keyframe, and is moved back at
-  // its end.
-  places_ = std::max(
-      places_,
-      std::min(shape.keyframes, slots + slots / 4 + kPlacesBetweenMoves));
-  front_stride_ = fixed_ + places_ * kPose + kZeros;
-  GrowTo(static_cast<std::size_t>(front_stride_) *
-             (fixed_ + places_ * kPose + kPanelPad),
-         &front_);
-  // Clears only the fixed part: poses are cleared as they enter.
-  for (int j = 0; j < fixed_; ++j) Zero(&Front(0, j), fixed_ + kPanelPad);
-  panel_stride_ = fixed_ + WholeVectors(slots * kPose) + kZeros;
-  for (auto* panel : {&coupling_, &substituted_, &product_, &half_}) {
-    GrowTo(static_cast<std::size_t>(kTileState) * panel_stride_, panel);
-  }
-  GrowTo(static_cast<std::size_t>(fixed_ + kPose + kPanelPad) * kLinkColumns,
-         &link_terms_);
-
-  keyframe_stride_ = kPose + landmark_shared_ + 1;
-  const std::size_t sums =
-      static_cast<std::size_t>(shape.keyframes) * kPose * keyframe_stride_;
-  keyframe_sums_.assign(sums, 0);
-  shared_sums_.assign((landmark_shared_ + 1) * (landmark_shared_ + 1), 0);
-}
-
 void ChainElimination::Start(const ChainShape& shape, Record record) {
   structure_.Find(shape.keyframes, shape.tracks, shape.track_keyframes);
-  LayOut(shape);
-  FindViews(shape);
-  record_ = record;
-  steps_.clear();
-  products_.clear();
-  if (record == Record::kSteps) ReserveSteps();
-  first_place_ = 0;
-  slots_ = 0;
+  layout_ = ChainLayout(shape);
+  landmark_equations_.Start(shape, structure_, layout_);
+  keyframe_equations_.Start(layout_, shape.keyframes);
+  front_.Start(layout_, structure_);
+  landmarks_.Start(shape, layout_);
+  state_.Start(layout_, structure_);
+  record_.Start(layout_, structure_, record == Record::kSteps);
   current_ = 0;
   begun_ = false;
 }
 
 void ChainElimination::TakeScratch(ChainElimination* finished) {
-  for (const auto buffer : {&ChainElimination::front_,
-                            &ChainElimination::group_panels_,
-                            &ChainElimination::own_poses_,
-                            &ChainElimination::gram_,
-                            &ChainElimination::keyframe_sums_,
-                            &ChainElimination::coupling_,
-                            &ChainElimination::substituted_,
-                            &ChainElimination::product_,
-                            &ChainElimination::half_,
-                            &ChainElimination::link_terms_}) {
-    (this->*buffer).swap(finished->*buffer);
-  }
-  targets_.swap(finished->targets_);
+  std::swap(products_, finished->products_);
+  keyframe_equations_.TakeMemory(&finished->keyframe_equations_);
+  front_.TakeMemory(&finished->front_);
+  landmarks_.TakeMemory(&finished->landmarks_);
+  state_.TakeMemory(&finished->state_);
 }
 
-void ChainElimination::OpenSlots(int slots) {
-  if (first_place_ + slots > places_) {
-    // All poses are moved to the first places; every entry moves up or left, so
-    // that ascending order never overwrites entries that are still to be read.
-    const int from = Pose(0), to = fixed_, size = PosesSize();
-    for (int j = 0; j < fixed_; ++j) {
-      std::memmove(&Front(to, j), &Front(from, j), size * sizeof(double));
-    }
-    for (int j = 0; j < size; ++j) {
-      std::memmove(&Front(to + j, to + j),
-                   &Front(from + j, from + j),
-                   (size - j) * sizeof(double));
-    }
-    first_place_ = 0;
-  }
-  for (; slots_ < slots; ++slots_) {
-    const int row = Pose(slots_);
-    const auto clear = [&](int column) {
-      double* entries = &Front(row, column);
-      for (int i = 0; i < kPose; ++i) entries[i] = 0;
-    };
-    for (int j = 0; j < fixed_; ++j) clear(j);
-    for (int j = Pose(0); j < row + kPose; ++j) clear(j);
-  }
+void ChainElimination::AddObservations(int keyframe,
+                                       int camera,
+                                       const double* rows,
+                                       std::span<const int> observations,
+                                       const PoseRotation* by_rotation) {
+  const RowProducts products = products_.Add(
+      width_, camera, rows, observations, by_rotation, &landmark_equations_);
+  keyframe_equations_.Add(
+      keyframe, landmark_equations_.camera(camera), products, by_rotation);
 }
 
-// Swaps the poses in `slot` and in slot 1.
-void ChainElimination::SwapPoses(int slot) {
-  if (slot == 1) return;
-  const auto entry = [&](int i, int j) -> double& {
-    return i >= j ? Front(i, j) : Front(j, i);
-  };
-  const int a = Pose(1), b = Pose(slot), end = Pose(slots_);
-  for (int n = 0; n < kPose; ++n) {
-    // The rest of the front, except the two blocks themselves.
-    for (int j = 0; j < end; ++j) {
-      if (j >= fixed_ && j < Pose(0)) continue;
-      if ((j >= a && j < a + kPose) || (j >= b && j < b + kPose)) continue;
-      std::swap(entry(a + n, j), entry(b + n, j));
-    }
-    for (int j = 0; j <= n; ++j)
-      std::swap(Front(a + n, a + j), Front(b + n, b + j));
-    for (int j = 0; j < n; ++j)
-      std::swap(Front(b + n, a + j), Front(b + j, a + n));
-  }
+void ChainElimination::AddLandmarkPrior(int landmark,
+                                        const Eigen::Matrix3d& H,
+                                        const Eigen::Vector3d& g) {
+  landmark_equations_.AddPrior(landmark, H, g);
 }
 
 void ChainElimination::BeginKeyframe() {
   if (begun_) return;
   begun_ = true;
-  OpenSlots(static_cast<int>(structure_.Poses(current_).size()));
-  const int pose = Pose(0);
-  for (int i = 0; i < kPose; ++i) {
-    const double* row =
-        &keyframe_sums_[(current_ * kPose + i) * keyframe_stride_];
-    for (int j = 0; j <= i; ++j) Front(pose + i, pose + j) += row[j];
-    for (int c = 0; c <= landmark_shared_; ++c) {
-      Front(pose + i, landmark_place_ + c) += row[kPose + c];
-    }
-  }
-  EliminateLandmarks();
-  SwapPoses(structure_.SwapWithNext(current_));
+  front_.OpenSlots(static_cast<int>(structure_.Poses(current_).size()));
+  keyframe_equations_.AddKeyframeTo(&front_, current_);
+  landmarks_.Eliminate(
+      structure_, current_, record_.wanted(), &landmark_equations_, &front_);
+  front_.SwapPoses(structure_.SwapWithNext(current_));
 }
 
 void ChainElimination::AddPrior(const ChainStateMatrix& information) {
   BeginKeyframe();
-  const int pose = Pose(0);
+  const int pose = front_.Pose(0);
   for (int i = 0; i < kPose; ++i) {
-    for (int j = 0; j <= i; ++j) Front(pose + i, pose + j) += information(i, j);
+    for (int j = 0; j <= i; ++j)
+      front_(pose + i, pose + j) += information(i, j);
     for (int j = 0; j < kMotion; ++j) {
-      Front(pose + i, kMotionPlace + j) += information(i, kPose + j);
+      front_(pose + i, kMotionPlace + j) += information(i, kPose + j);
     }
   }
   for (int i = 0; i < kMotion; ++i) {
     for (int j = 0; j <= i; ++j) {
-      Front(kMotionPlace + i, kMotionPlace + j) +=
+      front_(kMotionPlace + i, kMotionPlace + j) +=
           information(kPose + i, kPose + j);
     }
   }
@@ -173,11 +82,11 @@ void ChainElimination::AddKeptBias(int kept, const KeptBiasRows& rows) {
     const int bias = kMotionPlace + 3 + m;
     const int place = kKeptPlace + kept + m;
     const double a = rows.by_bias[m], b = rows.by_kept[m];
-    Front(bias, bias) += a * a;
-    Front(place, bias) += a * b;
-    Front(place, place) += b * b;
-    Front(constant_, bias) += a * rows.residual[m];
-    Front(constant_, place) += b * rows.residual[m];
+    front_(bias, bias) += a * a;
+    front_(place, bias) += a * b;
+    front_(place, place) += b * b;
+    front_(layout_.constant, bias) += a * rows.residual[m];
+    front_(layout_.constant, place) += b * rows.residual[m];
   }
 }
 
@@ -185,58 +94,57 @@ void ChainElimination::AddKeptState(int kept,
                                     const ChainStateVector& information) {
   BeginKeyframe();
   for (int m = 0; m < kState; ++m) {
-    const int state = m < kPose ? Pose(0) + m : kMotionPlace + m - kPose;
+    const int state = m < kPose ? front_.Pose(0) + m : kMotionPlace + m - kPose;
     const int place = kKeptPlace + kept + m;
-    Front(state, state) += information[m];
-    Front(place, place) += information[m];
-    Front(std::max(state, place), std::min(state, place)) -= information[m];
+    front_(state, state) += information[m];
+    front_(place, place) += information[m];
+    front_(std::max(state, place), std::min(state, place)) -= information[m];
   }
 }
 
 void ChainElimination::Advance(const ChainTransition& link) {
   BeginKeyframe();
-  TakeState();
-  Substitute(link);
-  FindRootOf(link);
-  Eliminate(substituted_);
-  AddPosesWithFixed(link);
-  RecordStep(&link);
+  record_.Add(state_.ByLink(link, &front_), &link);
   ++current_;
   begun_ = false;
 }
 
-int ChainElimination::Place(int shared) const {
-  if (shared < kChainLinkShared) return shared;
-  const int landmark = shared - kChainLinkShared;
-  return landmark < landmark_shared_ ? landmark_place_ + landmark
-                                     : kKeptPlace + landmark - landmark_shared_;
-}
-
 void ChainElimination::Finish(SharedInformation* result) {
   BeginKeyframe();
-  TakeState();
-  EliminateByItself();
+  record_.Add(state_.ByItself(&front_), nullptr);
   // The products among camera parameters were summed separately.
-  const int rows = landmark_shared_ + 1;
-  for (int j = 0; j < landmark_shared_; ++j) {
-    for (int i = j; i < rows; ++i) {
-      Front(landmark_place_ + i, landmark_place_ + j) +=
-          shared_sums_[j * rows + i];
-    }
-  }
+  keyframe_equations_.AddSharedTo(&front_);
   const int size = shared_size();
   result->Lambda.resize(size, size);
   result->eta.resize(size);
-  result->constant = Front(constant_, constant_);
+  result->constant = front_(layout_.constant, layout_.constant);
   for (int j = 0; j < size; ++j) {
     for (int i = j; i < size; ++i) {
-      const int a = Place(i), b = Place(j);
-      const double information = Front(std::max(a, b), std::min(a, b));
+      const int a = layout_.Place(i), b = layout_.Place(j);
+      const double information = front_(std::max(a, b), std::min(a, b));
       result->Lambda(i, j) = information;
       result->Lambda(j, i) = information;
     }
-    result->eta(j) = -Front(constant_, Place(j));
+    result->eta(j) = -front_(layout_.constant, layout_.Place(j));
   }
+}
+
+void ChainElimination::FindSteps(
+    const Eigen::VectorXd& shared,
+    std::vector<ChainStateVector>* states,
+    std::vector<Eigen::Vector3d>* landmarks) const {
+  const Eigen::VectorXd z = SharedInPlaces(Recorded(), shared);
+  FindStateSteps(Recorded(), z, states);
+  landmarks_.FindSteps(landmark_equations_, z, *states, landmarks);
+}
+
+void ChainElimination::FindPosterior(
+    const Eigen::VectorXd& shared,
+    const Eigen::MatrixXd& shared_covariance,
+    const std::vector<ChainStateVector>& states,
+    ChainPosterior* posterior) const {
+  FindChainPosterior(
+      Recorded(), width_, shared, shared_covariance, states, posterior);
 }
 
 }  // namespace selfcal

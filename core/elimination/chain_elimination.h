@@ -22,33 +22,35 @@
 // rows, so that weak information is not lost beside information that is 10^7
 // times stronger.
 //
+// The phases: observations are summed to normal equations of landmarks and of
+// keyframes; then for each keyframe in turn, its landmarks and its state are
+// eliminated from the front, and recorded for the back-substitution.
+//
 // One object is a workspace for one chain at a time: Start() begins the next
 // chain and reuses the memory, so that nothing is allocated after the largest.
 // Not thread-safe. Deterministic for one width of vectors.
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <span>
 #include <vector>
 
+#include "core/elimination/chain_front.h"
+#include "core/elimination/chain_layout.h"
+#include "core/elimination/chain_posterior.h"
+#include "core/elimination/chain_record.h"
+#include "core/elimination/chain_shape.h"
 #include "core/elimination/chain_structure.h"
 #include "core/elimination/chain_transition.h"
-#include "core/elimination/dense_lanes.h"
+#include "core/elimination/chain_unknowns.h"
+#include "core/elimination/keyframe_equations.h"
+#include "core/elimination/landmark_elimination.h"
+#include "core/elimination/landmark_equations.h"
+#include "core/elimination/observation_products.h"
+#include "core/elimination/state_elimination.h"
 #include "core/simd/vector_width.h"
 
 namespace selfcal {
-
-// Unknowns of a keyframe: pose 6, then velocity and biases 9.
-inline constexpr int kChainPoseSize = 6;
-inline constexpr int kChainMotionSize = 9;
-inline constexpr int kChainStateSize = kChainPoseSize + kChainMotionSize;
-// Shared parameters on which links depend; they come first.
-inline constexpr int kChainLinkShared = 15;
-
-using ChainStateVector = Eigen::Matrix<double, kChainStateSize, 1>;
-using ChainStateMatrix =
-    Eigen::Matrix<double, kChainStateSize, kChainStateSize>;
 
 // Six rows (by_bias b + by_kept x + residual), one for each component of the
 // biases of a keyframe and of six kept unknowns x.
@@ -68,37 +70,10 @@ struct SharedInformation {
   double constant = 0;
 };
 
-// Posterior of a chain given all factors, the step and the covariance of the
-// shared parameters.
-struct ChainPosterior {
-  // The noise e of each link: its minimiser and its covariance, between zero
-  // and the identity, which is its prior.
-  std::vector<ChainStateVector> noise;
-  std::vector<ChainStateMatrix> noise_covariance;
-  std::vector<ChainStateMatrix> state_covariance;  // of each keyframe
-  // 15 x shared_size(): covariance of the first and of the last keyframe with
-  // the shared parameters.
-  Eigen::MatrixXd first_with_shared, last_with_shared;
-};
-
-// The observations, as in ChainStructure::Find, and for each camera the number
-// of its parameters. They are in the order of the cameras, after the link
-// parameters.
-struct ChainShape {
-  int keyframes = 0;
-  std::span<const int> camera_sizes;
-  std::span<const int> tracks;
-  std::span<const int> track_keyframes;
-  // Number of kept unknowns; and for each landmark the first of its three, or
-  // -1 if it is eliminated. Empty: all are eliminated.
-  int kept = 0;
-  std::span<const int> kept_landmarks = {};
-};
-
 class ChainElimination {
  public:
   explicit ChainElimination(VectorWidth width = WidestVectors())
-      : width_(width) {}
+      : width_(width), landmarks_(width), state_(width) {}
 
   // Begins a chain. Use Record::kSteps if steps will be requested later.
   enum class Record { kNothing, kSteps };
@@ -108,7 +83,7 @@ class ChainElimination {
   // only for its next chain: its recorded steps stay valid.
   void TakeScratch(ChainElimination* finished);
 
-  using PoseRotation = Eigen::Matrix<double, kChainPoseSize, 3>;
+  using PoseRotation = ChainPoseRotation;
 
   // First, in any order: the factors of one keyframe and camera, as rows of
   // landmark_rows.h; `observations` are indices into track_keyframes. The
@@ -147,147 +122,24 @@ class ChainElimination {
                      ChainPosterior* posterior) const;
 
   // Link parameters, landmark parameters and kept unknowns.
-  int shared_size() const {
-    return kChainLinkShared + landmark_shared_ + kept_;
-  }
+  int shared_size() const { return layout_.shared_size(); }
 
  private:
-  class CovarianceWalk;
-
-  void LayOut(const ChainShape& shape);
-  void FindViews(const ChainShape& shape);
-  void ExpandGram(int keyframe, int camera, const PoseRotation* by_rotation);
-  void CollectPoses(int count);
-  void SpreadPoses(int count, const PoseRotation& by_rotation);
   void BeginKeyframe();
-  void OpenSlots(int slots);
-  void EliminateLandmarks();
-  double* PoseRow(int landmark, int row);
-  int PosesOf(int landmark) const;
-  Eigen::Matrix3d PreparePanel(int landmark, double* panel, int stride);
-  void RecordPanel(int landmark, const double* panel, int stride);
-  void SetRoot(int landmark, Eigen::Matrix3d information);
-  void KeepLandmark(int landmark,
-                    const Eigen::Matrix3d& information,
-                    double* panel,
-                    int stride);
-  void SwapPoses(int slot);
-  void TakeState();
-  void Substitute(const ChainTransition& link);
-  void FindRoot(double (*M)[16], double (*panel)[16]);
-  void FindRootOf(const ChainTransition& link);
-  void Eliminate(const std::vector<double>& terms);
-  void AddPosesWithFixed(const ChainTransition& link);
-  void EliminateByItself();
-  void ReserveSteps();
-  void RecordStep(const ChainTransition* link);
-  Eigen::VectorXd SharedInPlaces(const Eigen::VectorXd& shared) const;
-  void PlaceStates(int keyframe,
-                   const std::vector<ChainStateVector>& states,
-                   Eigen::VectorXd* z) const;
-
-  double* Row(std::vector<double>* panel, int k) const {
-    return panel->data() + k * panel_stride_;
-  }
-  double& Front(int i, int j) {
-    return front_[static_cast<std::size_t>(j) * front_stride_ + i];
-  }
-  Target FrontAt(int i, int j) { return {&Front(i, j), front_stride_}; }
-  int Pose(int slot) const {
-    return fixed_ + (first_place_ + slot) * kChainPoseSize;
-  }
-  int PosesSize() const { return slots_ * kChainPoseSize; }
-  // Place of a shared parameter in the front.
-  int Place(int shared) const;
-
-  template <typename Function>
-  void WithKernels(const Function& function) const {
-    WithLanes(width_, [&]<int W>() { function(DenseLanes<W>()); });
-  }
+  EliminatedChain Recorded() const { return {layout_, structure_, record_}; }
 
   VectorWidth width_;
   ChainStructure structure_;
-  Record record_ = Record::kNothing;
-
-  // Layout. The front begins with fixed_ places for everything but poses: link
-  // parameters, motion, kept unknowns, landmark parameters, the constant,
-  // padded to whole vectors.
-  std::vector<int> camera_sizes_, camera_offsets_;
-  int landmark_shared_ = 0;
-  int kept_ = 0;
-  int landmark_place_ = 0;
-  int constant_ = 0;
-  int fixed_ = 0;
-
-  // For each landmark: for each camera 3 rows of sums; 3 rows over the poses
-  // that observe it; the Cholesky factor of its information, with inverse
-  // diagonal. After its elimination, if steps are recorded, the rows over poses
-  // are those of its panel, and the first 3 rows of the sums those over
-  // landmark parameters and constant.
-  std::vector<double> sums_, pose_rows_, landmark_priors_, roots_;
-  std::vector<int> kept_landmarks_;  // -1: eliminated
-  std::vector<int> sums_offsets_;
-  int sums_size_ = 0;
-  std::vector<int> landmark_of_observation_;
-  std::size_t landmarks_count_ = 0;
-  // The poses that observe landmark m, by time, from views_begin_[m] on; and
-  // for each observation the index of its pose among all of these.
-  struct View {
-    int keyframe;
-    int slot;  // at the elimination of the landmark
-  };
-  std::vector<View> views_;
-  std::vector<int> views_begin_;
-  std::vector<int> view_of_observation_;
-  // Panels of the landmarks that are eliminated together, 3 rows each over the
-  // front from the landmark parameters on.
-  std::vector<double> group_panels_;
-  std::vector<LandmarkTarget> targets_;
-  struct PosePanel {
-    double* data;
-    int stride;
-  };
-  std::vector<PosePanel> panels_of_poses_;
-  std::vector<double> own_poses_;
-  std::vector<int> depths_;
-  std::vector<double> gram_;
-  // Sums of each keyframe: 6 rows over its pose, landmark parameters and
-  // constant.
-  std::vector<double> keyframe_sums_;
-  int keyframe_stride_ = 0;
-  // Sums over landmark parameters and constant, lower triangle by columns.
-  std::vector<double> shared_sums_;
-
-  // The front, lower triangle by columns, with room for `places_` poses.
-  std::vector<double> front_;
-  int front_stride_ = 0;
-  int places_ = 0;
-  int first_place_ = 0;  // of slot 0
-  int slots_ = 0;
-  int current_ = 0;
-  bool begun_ = false;
-
-  // The state that is being eliminated: its information S; panels of 15 rows
-  // over the front: coupling Y, Z = Y + S G, P = root^T Z; and Y + S G / 2. One
-  // additional zero makes tiles whole.
-  Eigen::Matrix<double, 16, 16> information_ =
-      Eigen::Matrix<double, 16, 16>::Zero();
-  alignas(64) double root_[kChainStateSize][16] = {};  // A L^-T
-  alignas(64) double root_transposed_[kChainStateSize][16] = {};
-  double factor_[kChainStateSize][16] = {};  // L^T, the upper triangle
-  int panel_stride_ = 0;
-  std::vector<double> coupling_, substituted_, product_, half_, link_terms_;
-
-  struct Step {
-    std::size_t product;  // of its P in products_
-    int stride;
-    double root[kChainStateSize][16];
-    double factor[kChainStateSize][16];
-    bool linked;
-    ChainTransition link;
-  };
-  std::vector<Step> steps_;
-  std::vector<double> products_;
+  ChainLayout layout_;
+  ObservationProducts products_;
+  LandmarkEquations landmark_equations_;
+  KeyframeEquations keyframe_equations_;
+  ChainFront front_;
+  LandmarkElimination landmarks_;
+  StateElimination state_;
+  ChainRecord record_;
+  int current_ = 0;     // keyframe
+  bool begun_ = false;  // its slot is open, its landmarks are eliminated
 };
 
 }  // namespace selfcal

@@ -1,12 +1,14 @@
-// Places of unknowns in the front of ChainElimination, and its memory. Internal
-// to core/elimination.
+// Sizes and fixed places of unknowns in the front of a chain, and its memory.
+// Internal to core/elimination.
 #pragma once
 
 #include <cstddef>
 #include <cstring>
 #include <vector>
 
-#include "core/elimination/chain_elimination.h"
+#include "core/elimination/chain_transition.h"
+#include "core/elimination/chain_unknowns.h"
+#include "core/elimination/dense_lanes.h"
 
 namespace selfcal::chain {
 

@@ -1,19 +1,18 @@
-// Back-substitution of covariances through a chain: from that of the shared
-// parameters to those of the states and of the noise of the links.
-//
 // Given the front z that remained when a state was eliminated, the state is
 //   C z + noise of covariance root root^T,
 // and the noise of its link is
 //   -L^-T (P z + noise of unit covariance).
 // Everything that was in the front before is either the state, or still in the
 // front.
-#include <Eigen/Core>
-#include <algorithm>
-#include <span>
-#include <vector>
+#include "core/elimination/chain_posterior.h"
 
-#include "core/elimination/chain_elimination.h"
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+#include "core/elimination/chain_kernels.h"
 #include "core/elimination/chain_places.h"
+#include "core/elimination/chain_steps.h"
 
 namespace selfcal {
 
@@ -67,35 +66,37 @@ class PosePlaces {
   std::vector<int> keyframes_;
 };
 
-}  // namespace
-
 // The covariance of the front, by places: first the fixed part as in a panel,
 // then poses, each in one place as long as it is in the front. Values in other
 // places are finite, and not used.
-class ChainElimination::CovarianceWalk {
+class CovarianceWalk {
  public:
-  CovarianceWalk(const ChainElimination& chain, const Eigen::MatrixXd& shared)
-      : chain_(chain),
-        poses_(chain.structure_.max_slots()),
-        stride_(
-            WholeVectors(chain.fixed_ + chain.structure_.max_slots() * kPose) +
-            kZeros),
+  CovarianceWalk(const EliminatedChain& chain,
+                 VectorWidth width,
+                 const Eigen::MatrixXd& shared)
+      : layout_(chain.layout),
+        structure_(chain.structure),
+        record_(chain.record),
+        width_(width),
+        poses_(structure_.max_slots()),
+        stride_(WholeVectors(layout_.fixed + structure_.max_slots() * kPose) +
+                kZeros),
         covariance_(static_cast<std::size_t>(stride_) * stride_, 0.0),
         product_(static_cast<std::size_t>(kState) * stride_, 0.0),
         with_front_(product_),
         panel_(static_cast<std::size_t>(stride_) * kTileState, 0.0) {
-    for (int j = 0; j < chain.shared_size(); ++j) {
-      for (int i = 0; i < chain.shared_size(); ++i) {
-        At(chain.Place(i), chain.Place(j)) = shared(i, j);
+    for (int j = 0; j < layout_.shared_size(); ++j) {
+      for (int i = 0; i < layout_.shared_size(); ++i) {
+        At(layout_.Place(i), layout_.Place(j)) = shared(i, j);
       }
     }
   }
 
   // Reverses the elimination of keyframe k.
-  void Step(int k) {
-    const ChainElimination::Step& step = chain_.steps_[k];
-    const std::span<const int> poses = chain_.structure_.Poses(k);
-    size_ = chain_.fixed_ + poses_.end() * kPose;
+  void Reverse(int k) {
+    const ChainRecord::Step& step = record_.step(k);
+    const std::span<const int> poses = structure_.Poses(k);
+    size_ = layout_.fixed + poses_.end() * kPose;
     SetPanel(step, poses);
     Multiply(step, poses);
     SetState(step, poses);
@@ -103,8 +104,8 @@ class ChainElimination::CovarianceWalk {
   // Prepares for keyframe k - 1: k takes a place, and poses that were not in
   // the front at that time leave it.
   void Enter(int k) {
-    poses_.Keep(chain_.structure_.Poses(k - 1).subspan(1));
-    const int pose = chain_.fixed_ + poses_.Enter(k) * kPose;
+    poses_.Keep(structure_.Poses(k - 1).subspan(1));
+    const int pose = layout_.fixed + poses_.Enter(k) * kPose;
     const auto put = [&](int m, int place) {
       const double* row = &with_front_[m * stride_];
       std::copy_n(row, size_, &At(0, place));
@@ -121,7 +122,7 @@ class ChainElimination::CovarianceWalk {
 
   const ChainStateMatrix& state() const { return state_; }
   // Covariance of the noise of its link.
-  ChainStateMatrix Noise(const ChainElimination::Step& step) const {
+  ChainStateMatrix Noise(const ChainRecord::Step& step) const {
     const auto factor = RowMajorState<kTileState>(&step.factor[0][0])
                             .leftCols<kState>()
                             .triangularView<Eigen::Upper>();
@@ -130,10 +131,10 @@ class ChainElimination::CovarianceWalk {
     return factor.solve(half.transpose().eval());
   }
   Eigen::MatrixXd WithShared() const {
-    Eigen::MatrixXd columns(kState, chain_.shared_size());
-    for (int i = 0; i < chain_.shared_size(); ++i) {
+    Eigen::MatrixXd columns(kState, layout_.shared_size());
+    for (int i = 0; i < layout_.shared_size(); ++i) {
       for (int m = 0; m < kState; ++m) {
-        columns(m, i) = with_front_[m * stride_ + chain_.Place(i)];
+        columns(m, i) = with_front_[m * stride_ + layout_.Place(i)];
       }
     }
     return columns;
@@ -144,14 +145,13 @@ class ChainElimination::CovarianceWalk {
     return covariance_[static_cast<std::size_t>(j) * stride_ + i];
   }
   int PlaceOf(int keyframe) const {
-    return chain_.fixed_ + poses_.Find(keyframe) * kPose;
+    return layout_.fixed + poses_.Find(keyframe) * kPose;
   }
 
   // The transpose of P, by places.
-  void SetPanel(const ChainElimination::Step& step,
-                std::span<const int> poses) {
+  void SetPanel(const ChainRecord::Step& step, std::span<const int> poses) {
     std::fill_n(panel_.begin(), size_ * kTileState, 0.0);
-    const double* P = &chain_.products_[step.product];
+    const double* P = record_.Product(step);
     const auto copy = [&](int from, int to, int count) {
       for (int i = 0; i < count; ++i) {
         for (int k = 0; k < kState; ++k) {
@@ -159,17 +159,16 @@ class ChainElimination::CovarianceWalk {
         }
       }
     };
-    copy(0, 0, chain_.fixed_);
+    copy(0, 0, layout_.fixed);
     for (std::size_t s = 1; s < poses.size(); ++s) {
-      copy(chain_.fixed_ + static_cast<int>(s - 1) * kPose,
+      copy(layout_.fixed + static_cast<int>(s - 1) * kPose,
            PlaceOf(poses[s]),
            kPose);
     }
   }
 
   // product_ = P covariance, and with_front_ = (G - root P) covariance.
-  void Multiply(const ChainElimination::Step& step,
-                std::span<const int> poses) {
+  void Multiply(const ChainRecord::Step& step, std::span<const int> poses) {
     alignas(64) double root[kState][kTileState] = {};
     alignas(64) double G[kKeptPlace + kPose][kTileState] = {};
     for (int i = 0; i < kState; ++i) {
@@ -182,7 +181,7 @@ class ChainElimination::CovarianceWalk {
     }
     const int next =
         step.linked ? PlaceOf(poses[1]) : 0;  // G is zero without a link
-    chain_.WithKernels([&](auto kernels) {
+    WithKernels(width_, [&](auto kernels) {
       kernels.SetProduct({covariance_.data(), stride_},
                          size_,
                          {panel_.data(), kTileState},
@@ -221,8 +220,7 @@ class ChainElimination::CovarianceWalk {
   }
 
   // with_front_ (G - root P)^T, plus the state's own covariance.
-  void SetState(const ChainElimination::Step& step,
-                std::span<const int> poses) {
+  void SetState(const ChainRecord::Step& step, std::span<const int> poses) {
     const auto root =
         RowMajorState<kTileState>(&step.root[0][0]).leftCols<kState>();
     state_ = (root - ByPanel(with_front_)) * root.transpose();
@@ -238,7 +236,10 @@ class ChainElimination::CovarianceWalk {
     state_ = (0.5 * (state_ + state_.transpose())).eval();
   }
 
-  const ChainElimination& chain_;
+  const ChainLayout& layout_;
+  const ChainStructure& structure_;
+  const ChainRecord& record_;
+  const VectorWidth width_;
   PosePlaces poses_;
   const int stride_;
   int size_ = 0;  // of the front, by places
@@ -250,26 +251,29 @@ class ChainElimination::CovarianceWalk {
   ChainStateMatrix state_;
 };
 
-void ChainElimination::FindPosterior(
-    const Eigen::VectorXd& shared,
-    const Eigen::MatrixXd& shared_covariance,
-    const std::vector<ChainStateVector>& states,
-    ChainPosterior* posterior) const {
-  const int keyframes = structure_.keyframes();
+}  // namespace
+
+void FindChainPosterior(const EliminatedChain& chain,
+                        VectorWidth width,
+                        const Eigen::VectorXd& shared,
+                        const Eigen::MatrixXd& shared_covariance,
+                        const std::vector<ChainStateVector>& states,
+                        ChainPosterior* posterior) {
+  const int keyframes = chain.structure.keyframes();
   posterior->noise.resize(keyframes - 1);
   posterior->noise_covariance.resize(keyframes - 1);
   posterior->state_covariance.resize(keyframes);
-  Eigen::VectorXd z = SharedInPlaces(shared);
-  CovarianceWalk walk(*this, shared_covariance);
+  Eigen::VectorXd z = SharedInPlaces(chain, shared);
+  CovarianceWalk walk(chain, width, shared_covariance);
   for (int k = keyframes - 1; k >= 0; --k) {
-    const Step& step = steps_[k];
-    walk.Step(k);
+    const ChainRecord::Step& step = chain.record.step(k);
+    walk.Reverse(k);
     posterior->state_covariance[k] = walk.state();
     if (k + 1 == keyframes) posterior->last_with_shared = walk.WithShared();
     if (k == 0) posterior->first_with_shared = walk.WithShared();
     if (step.linked) {
-      PlaceStates(k, states, &z);
-      const RowMajorPanel P(&products_[step.product],
+      PlaceStates(chain, k, states, &z);
+      const RowMajorPanel P(chain.record.Product(step),
                             kState,
                             step.stride,
                             Eigen::OuterStride<>(step.stride));

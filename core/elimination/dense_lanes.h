@@ -33,6 +33,8 @@ struct LandmarkTarget {
 // Number of rows of a panel in a sum: for its column i all of them, or those of
 // a staircase by_step[i / step], which never increases.
 struct Depth {
+  // Implicit: mostly it is a number of rows.
+  // NOLINTNEXTLINE(google-explicit-constructor)
   Depth(int all) : all(all) {}
   Depth(const int* by_step, int step) : by_step(by_step), step(step) {}
 

@@ -25,7 +25,7 @@ RunGeometry GeometryOf(const ObservationRun& run) {
       exposure.by_offset;
   CopyByRows(run.camera->q_CI.toRotationMatrix(), geometry.R_CI);
   Eigen::Map<Eigen::Vector3d>(geometry.p_CI) = run.camera->p_CI;
-  geometry.pinhole = PinholeOf(*run.camera);
+  geometry.pixels = PixelMapOf(*run.camera);
   return geometry;
 }
 
@@ -37,7 +37,7 @@ void WithKernels(VectorWidth width,
                  const Function& function) {
   if (run.count == 0) return;
   const RunGeometry geometry = GeometryOf(run);
-  VisitDistortion(*run.camera, [&](const auto& model) {
+  VisitCameraModel(*run.camera, [&](const auto& model) {
     using Model = std::decay_t<decltype(model)>;
     WithLanes(width, [&]<int W>() {
       function.template operator()<ReprojectionLanes<W, Model>>(geometry,

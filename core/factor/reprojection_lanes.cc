@@ -82,11 +82,8 @@ Evaluated<Model> Evaluate(const RunGeometry& geometry,
   Evaluated<Model> e;
   e.p_I = ToBody(geometry, batch);
   Vector2 z_px;
-  e.valid = ProjectWith<T>(geometry.pinhole,
-                           model,
-                           ToCamera(geometry, e.p_I, batch.w),
-                           &z_px,
-                           &e.parts);
+  e.valid = model.template Project<T>(
+      geometry.pixels, ToCamera(geometry, e.p_I, batch.w), &z_px, &e.parts);
   e.r_px = Vector2(z_px[0] - batch.z_px[0], z_px[1] - batch.z_px[1]);
   e.by_p_I = Times(e.parts.point, geometry.R_CI);
   return e;
@@ -211,12 +208,11 @@ void ReprojectionLanes<W, Model>::Squares(const RunGeometry& geometry,
   for (int first = 0; first < run.count; first += W) {
     const Batch batch = Gather(run, points, first);
     Vector2 z_px;
-    const auto valid =
-        ProjectWith<T>(geometry.pinhole,
-                       model,
-                       ToCamera(geometry, ToBody(geometry, batch), batch.w),
-                       &z_px,
-                       nullptr);
+    const auto valid = model.template Project<T>(
+        geometry.pixels,
+        ToCamera(geometry, ToBody(geometry, batch), batch.w),
+        &z_px,
+        nullptr);
     const T x = z_px[0] - batch.z_px[0];
     const T y = z_px[1] - batch.z_px[1];
     StorePart(
@@ -224,8 +220,21 @@ void ReprojectionLanes<W, Model>::Squares(const RunGeometry& geometry,
   }
 }
 
-template struct ReprojectionLanes<kLanes, DistortionFov>;
-template struct ReprojectionLanes<kLanes, DistortionRadialTangential>;
-template struct ReprojectionLanes<kLanes, DistortionEquidistant>;
+namespace {
 
+// Naming the kernels of a model instantiates them.
+template <class Model>
+struct Kernels {
+  using Lanes = ReprojectionLanes<kLanes, Model>;
+  decltype(&Lanes::Linearise) linearise = &Lanes::Linearise;
+  decltype(&Lanes::AddLandmarkSums) add_sums = &Lanes::AddLandmarkSums;
+  decltype(&Lanes::Squares) squares = &Lanes::Squares;
+};
+template <class List>
+struct AllKernels;
+template <class... Models>
+struct AllKernels<CameraModelList<Models...>> : Kernels<Models>... {};
+[[gnu::used]] constexpr AllKernels<CameraModels> kAllKernels;
+
+}  // namespace
 }  // namespace selfcal

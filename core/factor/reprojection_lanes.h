@@ -3,7 +3,7 @@
 #pragma once
 
 #include "core/factor/reprojection_batch.h"
-#include "core/model/projection.h"
+#include "core/model/camera_models.h"
 
 namespace selfcal {
 
@@ -16,7 +16,7 @@ struct RunGeometry {
   double p_CI[3];
   double
       by_offset[6];  // derivative of the pose with respect to the time offset
-  Pinhole pinhole;
+  PixelMap pixels;
 };
 
 template <int W, class Model>

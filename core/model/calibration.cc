@@ -1,7 +1,9 @@
 #include "core/model/calibration.h"
 
 #include <cassert>
+#include <type_traits>
 
+#include "core/model/parameter_blocks.h"
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -16,9 +18,46 @@ Eigen::Matrix3d ScaleAndMisalignment(const Eigen::Vector3d& s,
   return T;
 }
 
-Eigen::Quaterniond Rotated(const Eigen::Quaterniond& q,
-                           const Eigen::Vector3d& delta) {
-  return (q * Exp(delta)).normalized();
+void Add(const Eigen::VectorXd& delta, int offset, Eigen::Quaterniond* q) {
+  *q = (*q * Exp(delta.segment<3>(offset))).normalized();
+}
+void Add(const Eigen::VectorXd& delta, int offset, double* value) {
+  *value += delta[offset];
+}
+template <class Vector>
+void Add(const Eigen::VectorXd& delta, int offset, Vector* v) {
+  *v += delta.segment(offset, v->size());
+}
+
+Eigen::Vector3d Difference(const Eigen::Quaterniond& a,
+                           const Eigen::Quaterniond& b) {
+  return Log(b.conjugate() * a);
+}
+Eigen::Matrix<double, 1, 1> Difference(double a, double b) {
+  return Eigen::Matrix<double, 1, 1>(a - b);
+}
+template <class Vector>
+Vector Difference(const Vector& a, const Vector& b) {
+  return a - b;
+}
+
+void SetZero(Eigen::Quaterniond* q) { q->setIdentity(); }
+void SetZero(double* value) { *value = 0; }
+template <class Vector>
+void SetZero(Vector* v) {
+  v->setZero();
+}
+
+template <class Sensor, class Blocks>
+int SensorTangentSize(const Blocks& blocks, const Sensor& sensor) {
+  int size = 0;
+  VisitSensorBlocks(
+      blocks,
+      [&](const BlockInfo&, const auto& value) {
+        size += TangentDimension(value);
+      },
+      sensor);
+  return size;
 }
 
 }  // namespace
@@ -32,7 +71,7 @@ Eigen::Matrix3d ImuCalibration::T_a() const {
 }
 
 int CameraTangentSize(const CameraCalibration& camera) {
-  return kCameraIntrinsics + camera.IntrinsicsSize() + 1;
+  return SensorTangentSize(kCameraBlocks, camera);
 }
 
 int CameraTangentOffset(const Calibration& theta, int camera) {
@@ -54,49 +93,22 @@ int TangentSize(const Calibration& theta) {
 Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta) {
   assert(delta.size() == TangentSize(theta));
   Calibration moved = theta;
-  ImuCalibration& imu = moved.imu;
-  imu.s_g += delta.segment<3>(kGyroScale);
-  imu.m_g += delta.segment<3>(kGyroMisalignment);
-  imu.s_a += delta.segment<3>(kAccelScale);
-  imu.m_a += delta.segment<3>(kAccelMisalignment);
-  imu.q_AI = Rotated(imu.q_AI, delta.segment<3>(kAccelRotation));
-  int offset = kImuTangentSize;
-  for (CameraCalibration& camera : moved.cameras) {
-    const auto part = delta.segment(offset, CameraTangentSize(camera));
-    camera.q_CI = Rotated(camera.q_CI, part.segment<3>(kCameraRotation));
-    camera.p_CI += part.segment<3>(kCameraPosition);
-    camera.f += part.segment<2>(kCameraIntrinsics);
-    camera.c += part.segment<2>(kCameraIntrinsics + 2);
-    camera.distortion +=
-        part.segment(kCameraDistortion, camera.distortion.size());
-    camera.time_offset_s += part(part.size() - 1);
-    offset += CameraTangentSize(camera);
-  }
+  VisitBlocks([&](const BlockPlace& place,
+                  auto& value) { Add(delta, place.offset, &value); },
+              moved);
   return moved;
 }
 
 Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b) {
   assert(SameShape(a, b));
   Eigen::VectorXd delta(TangentSize(b));
-  delta.segment<3>(kGyroScale) = a.imu.s_g - b.imu.s_g;
-  delta.segment<3>(kGyroMisalignment) = a.imu.m_g - b.imu.m_g;
-  delta.segment<3>(kAccelScale) = a.imu.s_a - b.imu.s_a;
-  delta.segment<3>(kAccelMisalignment) = a.imu.m_a - b.imu.m_a;
-  delta.segment<3>(kAccelRotation) = Log(b.imu.q_AI.conjugate() * a.imu.q_AI);
-  int offset = kImuTangentSize;
-  for (std::size_t j = 0; j < b.cameras.size(); ++j) {
-    const CameraCalibration& to = a.cameras[j];
-    const CameraCalibration& from = b.cameras[j];
-    auto part = delta.segment(offset, CameraTangentSize(from));
-    part.segment<3>(kCameraRotation) = Log(from.q_CI.conjugate() * to.q_CI);
-    part.segment<3>(kCameraPosition) = to.p_CI - from.p_CI;
-    part.segment<2>(kCameraIntrinsics) = to.f - from.f;
-    part.segment<2>(kCameraIntrinsics + 2) = to.c - from.c;
-    part.segment(kCameraDistortion, from.distortion.size()) =
-        to.distortion - from.distortion;
-    part(part.size() - 1) = to.time_offset_s - from.time_offset_s;
-    offset += CameraTangentSize(from);
-  }
+  VisitBlocks(
+      [&](const BlockPlace& place, const auto& from, const auto& to) {
+        delta.segment(place.offset, TangentDimension(from)) =
+            Difference(to, from);
+      },
+      b,
+      a);
   return delta;
 }
 
@@ -104,14 +116,14 @@ Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
                               const Eigen::VectorXd& d) {
   const int size = TangentSize(reference);
   Eigen::MatrixXd derivative = Eigen::MatrixXd::Identity(size, size);
-  const auto set_rotation = [&](int offset) {
-    derivative.block<3, 3>(offset, offset) =
-        RightJacobian(d.segment<3>(offset));
-  };
-  set_rotation(kAccelRotation);
-  for (int j = 0; j < static_cast<int>(reference.cameras.size()); ++j) {
-    set_rotation(CameraTangentOffset(reference, j) + kCameraRotation);
-  }
+  VisitBlocks(
+      [&]<class Value>(const BlockPlace& place, const Value&) {
+        if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
+          derivative.block<3, 3>(place.offset, place.offset) =
+              RightJacobian(d.segment<3>(place.offset));
+        }
+      },
+      reference);
   return derivative;
 }
 
@@ -130,19 +142,7 @@ Eigen::VectorXd ReadableValues(const Calibration& theta) {
   // Difference to the calibration in which everything is zero: rotations become
   // Log(q), scalars remain.
   Calibration zero = theta;
-  zero.imu.s_g.setZero();
-  zero.imu.m_g.setZero();
-  zero.imu.s_a.setZero();
-  zero.imu.m_a.setZero();
-  zero.imu.q_AI.setIdentity();
-  for (CameraCalibration& camera : zero.cameras) {
-    camera.q_CI.setIdentity();
-    camera.p_CI.setZero();
-    camera.f.setZero();
-    camera.c.setZero();
-    camera.distortion.setZero();
-    camera.time_offset_s = 0;
-  }
+  VisitBlocks([](const BlockPlace&, auto& value) { SetZero(&value); }, zero);
   return BoxMinus(theta, zero);
 }
 

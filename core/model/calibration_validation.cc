@@ -1,24 +1,17 @@
 // Validation of a calibration; all other modules rely on it.
-#include <cmath>
-#include <numbers>
+#include <iterator>
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include "core/model/camera_model.h"
+#include "core/model/parameter_blocks.h"
 #include "core/model/rig.h"
 #include "core/model/violation_list.h"
 
 namespace selfcal {
 namespace {
 
-constexpr double kQuaternionTolerance = 1e-6;
-// Far beyond any real device; values within these limits do not overflow.
-constexpr double kMaxScale = 10;
-constexpr double kMaxMisalignment = 10;
-constexpr double kMaxPosition_m = 1e3;
-constexpr double kMaxFocal_px = 1e6;
-constexpr double kMaxPrincipal_px = 1e6;
-constexpr double kMaxCoefficient = 1e3;
-constexpr double kMaxTimeOffset_s = 0.5;
 constexpr int kMaxImageSize_px = 100'000;
 
 void AddIf(const std::string& field, std::string fault, ViolationList* list) {
@@ -50,13 +43,17 @@ std::string DistortionFault(const CameraCalibration& camera) {
            " coefficients; the " + std::string(DistortionName(camera.model)) +
            " model has " + std::to_string(expected);
   }
-  if (camera.model != DistortionModel::kFov) {
-    return SizeFault(camera.distortion, kMaxCoefficient);
-  }
   if (!camera.distortion.allFinite()) return "is not finite";
-  if (std::abs(camera.distortion[0]) < std::numbers::pi) return "";
-  return "w is " + Readable(camera.distortion[0]) +
-         " rad; its magnitude must be below pi";
+  for (int i = 0; i < expected; ++i) {
+    const CameraCoefficient& coefficient =
+        ModelInfo(camera.model).coefficients[i];
+    const double value = camera.distortion[i];
+    const auto [low, high] = coefficient.valid;
+    if (value > low && value < high) continue;
+    return std::string(coefficient.name) + " is " + Readable(value) +
+           "; it must be between " + Readable(low) + " and " + Readable(high);
+  }
+  return "";
 }
 
 std::string ImageSizeFault(int size_px) {
@@ -65,29 +62,47 @@ std::string ImageSizeFault(int size_px) {
          std::to_string(kMaxImageSize_px) + "]";
 }
 
+// The fault of the value of a block; empty if there is none.
+template <class Value>
+std::string Fault(const BlockInfo& info, const Value& value) {
+  if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
+    return QuaternionFault(value, info.limit);
+  } else if constexpr (std::is_same_v<Value, double>) {
+    return Fault(info, Eigen::Matrix<double, 1, 1>(value));
+  } else {
+    if (info.accepted == Accepted::kPositive) {
+      return PositiveFault(value, info.limit);
+    }
+    if (info.accepted == Accepted::kLength) {
+      return VectorFault(value, info.limit, info.unit);
+    }
+    return SizeFault(value, info.limit);
+  }
+}
+
 void CheckImu(const ImuCalibration& imu,
               const std::string& path,
               ViolationList* list) {
-  AddIf(path + ".s_g", PositiveFault(imu.s_g, kMaxScale), list);
-  AddIf(path + ".m_g", SizeFault(imu.m_g, kMaxMisalignment), list);
-  AddIf(path + ".s_a", PositiveFault(imu.s_a, kMaxScale), list);
-  AddIf(path + ".m_a", SizeFault(imu.m_a, kMaxMisalignment), list);
-  AddIf(path + ".q_AI", QuaternionFault(imu.q_AI, kQuaternionTolerance), list);
+  VisitSensorBlocks(
+      kImuBlocks,
+      [&](const BlockInfo& info, const auto& value) {
+        AddIf(path + "." + std::string(info.field), Fault(info, value), list);
+      },
+      imu);
 }
 
 void CheckCamera(const CameraCalibration& camera,
                  const std::string& path,
                  ViolationList* list) {
-  AddIf(
-      path + ".q_CI", QuaternionFault(camera.q_CI, kQuaternionTolerance), list);
-  AddIf(path + ".p_CI", VectorFault(camera.p_CI, kMaxPosition_m, "m"), list);
-  AddIf(path + ".f", PositiveFault(camera.f, kMaxFocal_px), list);
-  AddIf(path + ".c", SizeFault(camera.c, kMaxPrincipal_px), list);
-  AddIf(path + ".distortion", DistortionFault(camera), list);
-  AddIf(path + ".time_offset_s",
-        SizeFault(Eigen::Matrix<double, 1, 1>(camera.time_offset_s),
-                  kMaxTimeOffset_s),
-        list);
+  VisitSensorBlocks(
+      kCameraBlocks,
+      [&](const BlockInfo& info, const auto& value) {
+        AddIf(path + "." + std::string(info.field),
+              info.accepted == Accepted::kCoefficients ? DistortionFault(camera)
+                                                       : Fault(info, value),
+              list);
+      },
+      camera);
   AddIf(path + ".width_px", ImageSizeFault(camera.width_px), list);
   AddIf(path + ".height_px", ImageSizeFault(camera.height_px), list);
 }
@@ -97,7 +112,9 @@ void CheckCamera(const CameraCalibration& camera,
 std::vector<Violation> Validate(const Calibration& theta,
                                 const std::string& prefix) {
   // kMaxCameras cameras cannot produce more violations.
-  ViolationList list(9 * (kMaxCameras + 1));
+  ViolationList list(static_cast<int>(std::size(kImuBlocks)) +
+                     static_cast<int>(std::size(kCameraBlocks) + 3) *
+                         kMaxCameras);
   const std::string begin = prefix.empty() ? "" : prefix + ".";
   CheckImu(theta.imu, begin + "imu", &list);
   const std::string cameras = begin + "cameras";

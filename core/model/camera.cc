@@ -1,9 +1,11 @@
 #include "core/model/camera.h"
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <type_traits>
 
-#include "core/model/projection.h"
+#include "core/model/camera_models.h"
 
 namespace selfcal {
 namespace {
@@ -23,30 +25,48 @@ bool UsableParameters(const CameraCalibration& camera) {
   return usable;
 }
 
+template <class... Models>
+constexpr auto ModelsOf(CameraModelList<Models...>) {
+  std::array<DistortionModel, sizeof...(Models)> models;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    models[i] = static_cast<DistortionModel>(i);
+  }
+  return models;
+}
+
+template <class... Models>
+constexpr auto InfosOf(CameraModelList<Models...>) {
+  return std::array<CameraModelInfo, sizeof...(Models)>{
+      CameraModelInfo{Models::kName, Models::kCoefficients, Models::kTools}...};
+}
+
 }  // namespace
 
 int DistortionSize(DistortionModel model) {
-  switch (model) {
-    case DistortionModel::kFov:
-      return DistortionFov::kSize;
-    case DistortionModel::kRadialTangential:
-      return DistortionRadialTangential::kSize;
-    case DistortionModel::kEquidistant:
-      return DistortionEquidistant::kSize;
-  }
-  return 0;
+  return static_cast<int>(ModelInfo(model).coefficients.size());
 }
 
 std::string_view DistortionName(DistortionModel model) {
-  switch (model) {
-    case DistortionModel::kFov:
-      return "fov";
-    case DistortionModel::kRadialTangential:
-      return "radial-tangential";
-    case DistortionModel::kEquidistant:
-      return "equidistant";
+  return ModelInfo(model).name;
+}
+
+std::span<const DistortionModel> DistortionModels() {
+  static constexpr auto kModels = ModelsOf(CameraModels());
+  return kModels;
+}
+
+const CameraModelInfo& ModelInfo(DistortionModel model) {
+  static constexpr auto kInfos = InfosOf(CameraModels());
+  return kInfos.at(static_cast<std::size_t>(model));
+}
+
+DistortionVector Undistorted(DistortionModel model) {
+  const auto coefficients = ModelInfo(model).coefficients;
+  DistortionVector values(coefficients.size());
+  for (std::size_t i = 0; i < coefficients.size(); ++i) {
+    values[static_cast<Eigen::Index>(i)] = coefficients[i].undistorted;
   }
-  return "unknown";
+  return values;
 }
 
 bool Project(const CameraCalibration& camera,
@@ -54,17 +74,19 @@ bool Project(const CameraCalibration& camera,
              Eigen::Vector2d* z_px,
              ProjectionJacobians* jacobians) {
   if (!UsableParameters(camera)) return false;
-  const Pinhole pinhole = PinholeOf(camera);
-  return VisitDistortion(camera, [&](const auto& model) {
+  const PixelMap pixels = PixelMapOf(camera);
+  return VisitCameraModel(camera, [&](const auto& model) {
     constexpr int kSize = std::decay_t<decltype(model)>::kSize;
     Eigen::Vector2d z;
     if (jacobians == nullptr) {
-      if (!ProjectWith<double>(pinhole, model, p_C, &z, nullptr)) return false;
+      if (!model.template Project<double>(pixels, p_C, &z, nullptr)) {
+        return false;
+      }
       *z_px = z;
       return true;
     }
     ProjectionParts<double, kSize> parts;
-    if (!ProjectWith<double>(pinhole, model, p_C, &z, &parts)) return false;
+    if (!model.template Project<double>(pixels, p_C, &z, &parts)) return false;
     *z_px = z;
     jacobians->point = parts.point;
     jacobians->intrinsics.resize(2, 4 + kSize);
@@ -81,12 +103,11 @@ bool Unproject(const CameraCalibration& camera,
   if (!UsableParameters(camera)) return false;
   const Eigen::Vector2d d = (z_px - camera.c).cwiseQuotient(camera.f);
   if (!d.allFinite()) return false;
-  Eigen::Vector2d u;
-  const bool inverted = VisitDistortion(
-      camera, [&](const auto& model) { return model.Undistort(d, &u); });
+  Eigen::Vector3d ray_C;
+  const bool inverted = VisitCameraModel(
+      camera, [&](const auto& model) { return model.Unproject(d, &ray_C); });
   if (!inverted) return false;
-  if (!(u.cwiseAbs().maxCoeff() * kMinDepthRatio <= 1)) return false;
-  *bearing_C = u.homogeneous().normalized();
+  *bearing_C = ray_C.normalized();
   return true;
 }
 

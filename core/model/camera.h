@@ -1,11 +1,11 @@
-// Pinhole camera with one of three distortion models, behind one interface.
+// Cameras of any registered model, behind one interface.
 //
-// A point p_C (camera frame, z forward, any positive scale) has the normalised
-// coordinates u = (x/z, y/z), the distorted ones d = distort(u), and the pixel
+// A model maps a point p_C (camera frame, z forward, any positive scale) to
+// coordinates d, and these have the pixel
 //   z_x = f_x d_x + c_x,   z_y = f_y d_y + c_y.
-// Each distortion model is a separate file (distortion_fov.h, ...) with the
-// same static interface and the mathematics; other modules include only this
-// header. Pure functions, callable from any thread. A point that cannot be
+// A pinhole distorts u = (x/z, y/z): d = distort(u). Each model is a separate
+// file (distortion_fov.h, ...) with its mathematics; camera_models.h lists them
+// all. Pure functions, callable from any thread. A point that cannot be
 // projected is reported by the return value, never as a NaN.
 #pragma once
 
@@ -15,19 +15,22 @@
 
 namespace selfcal {
 
-enum class DistortionModel {
+// A registered model: its index in the list of camera_models.h. Those that code
+// refers to have an enumerator.
+enum class DistortionModel : int {
   kFov,               // w: Devernay and Faugeras 2001
   kRadialTangential,  // k1 k2 p1 p2: Brown
   kEquidistant,       // k1 k2 k3 k4: Kannala and Brandt
 };
 
-inline constexpr int kMaxDistortion = 4;
+// Room for the coefficients of every model, so that none are allocated.
+inline constexpr int kMaxDistortion = 8;
 inline constexpr int kMaxIntrinsics = 4 + kMaxDistortion;
 
 // Number of coefficients of a model.
 int DistortionSize(DistortionModel model);
 
-// "fov", "radial-tangential", "equidistant".
+// "fov", "radial-tangential", "equidistant", ...
 std::string_view DistortionName(DistortionModel model);
 
 // Coefficients of a model, at most kMaxDistortion, stored without allocation.
@@ -62,9 +65,9 @@ struct ProjectionJacobians {
 };
 
 // Projects p_C to the pixel *z_px, and fills *jacobians unless it is null.
-// Returns false and changes neither for a point behind the camera plane or
-// within 1e-6 rad of it, for a point outside the region in which the model is
-// one-to-one, and for points or parameters that are not finite or are beyond
+// Returns false and changes neither for a point outside the region in which the
+// model is one-to-one (for a pinhole, also within 1e-6 rad of the camera plane
+// or behind it), and for points or parameters that are not finite or are beyond
 // any physical value. It does not check the borders of the image.
 bool Project(const CameraCalibration& camera,
              const Eigen::Vector3d& p_C,
@@ -72,8 +75,7 @@ bool Project(const CameraCalibration& camera,
              ProjectionJacobians* jacobians);
 
 // Computes the unit bearing in C of a pixel: the inverse of Project up to
-// scale, in closed form for kFov, by a safeguarded Newton iteration for the
-// others. Returns false and does not change *bearing_C for a pixel to which no
+// scale. Returns false and does not change *bearing_C for a pixel to which no
 // point projects.
 bool Unproject(const CameraCalibration& camera,
                const Eigen::Vector2d& z_px,

@@ -26,17 +26,54 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <span>
+#include <string_view>
 
+#include "core/model/camera_model.h"
 #include "core/model/distortion_series.h"
 #include "core/model/monotonic.h"
 
 namespace selfcal {
 
 class DistortionEquidistant {
+  static constexpr Interval kValid = {-1e3, 1e3};
+
  public:
-  static constexpr int kSize = 4;
+  static constexpr std::string_view kName = "equidistant";
+  // sigma_ref is chosen, not measured: the value that moves a point at the edge
+  // of a typical image by about 1.5 px. These sigmas shift every entropy of a
+  // group by one constant and do not affect the ranking.
+  static constexpr CameraCoefficient kCoefficients[] = {
+      {.name = "k1", .sigma_ref = 5e-3, .valid = kValid, .usual = {-0.1, 0.1}},
+      {.name = "k2",
+       .sigma_ref = 5e-3,
+       .valid = kValid,
+       .usual = {-0.05, 0.05}},
+      {.name = "k3",
+       .sigma_ref = 5e-3,
+       .valid = kValid,
+       .usual = {-0.05, 0.05}},
+      {.name = "k4",
+       .sigma_ref = 5e-3,
+       .valid = kValid,
+       .usual = {-0.01, 0.01}}};
+  static constexpr ToolModel kTools[] = {
+      {.tool = "kalibr", .name = "pinhole", .distortion = "equidistant"},
+      {.tool = "openvins", .name = "pinhole", .distortion = "equidistant"},
+      {.tool = "orb_slam3",
+       .name = "KannalaBrandt8",
+       .coefficients = "k1 k2 k3 k4"},
+      {.tool = "vins_fusion",
+       .name = "KANNALA_BRANDT",
+       .coefficients = "projection_parameters.k2 projection_parameters.k3 "
+                       "projection_parameters.k4 projection_parameters.k5",
+       .pixels = "projection_parameters.mu projection_parameters.mv "
+                 "projection_parameters.u0 projection_parameters.v0"},
+      {.tool = "basalt", .name = "kb4", .coefficients = "k1 k2 k3 k4"},
+      {.tool = "maplab", .name = "pinhole", .distortion = "equidistant"}};
+  static constexpr int kSize = std::size(kCoefficients);
 
   explicit DistortionEquidistant(std::span<const double, kSize> k)
       : k_{k[0], k[1], k[2], k[3]} {}

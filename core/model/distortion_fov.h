@@ -25,16 +25,31 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <span>
+#include <string_view>
 
+#include "core/model/camera_model.h"
 #include "core/model/distortion_series.h"
 
 namespace selfcal {
 
 class DistortionFov {
  public:
-  static constexpr int kSize = 1;
+  static constexpr std::string_view kName = "fov";
+  // sigma_ref: of 22 moving segments of a hand-held recording with such a
+  // camera.
+  static constexpr CameraCoefficient kCoefficients[] = {
+      {.name = "w",
+       .sigma_ref = 2.7e-3,
+       .valid = {-std::numbers::pi, std::numbers::pi},
+       .usual = {-1.3, 1.3}}};
+  static constexpr ToolModel kTools[] = {
+      {.tool = "kalibr", .name = "pinhole", .distortion = "fov"},
+      {.tool = "basalt", .name = "fov", .coefficients = "w"},
+      {.tool = "maplab", .name = "pinhole", .distortion = "fisheye"}};
+  static constexpr int kSize = std::size(kCoefficients);
 
   explicit DistortionFov(std::span<const double, kSize> coefficients)
       : DistortionFov(coefficients[0]) {}

@@ -29,15 +29,48 @@
 #include <Eigen/LU>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <span>
+#include <string_view>
 
+#include "core/model/camera_model.h"
 #include "core/model/monotonic.h"
 
 namespace selfcal {
 
 class DistortionRadialTangential {
+  static constexpr Interval kValid = {-1e3, 1e3};
+  static constexpr Interval kTangential = {-2e-3, 2e-3};
+
  public:
-  static constexpr int kSize = 4;
+  static constexpr std::string_view kName = "radial-tangential";
+  // sigma_ref is chosen, not measured: the value that moves a point at the edge
+  // of a typical image by about 1.5 px. These sigmas shift every entropy of a
+  // group by one constant and do not affect the ranking.
+  static constexpr CameraCoefficient kCoefficients[] = {
+      {.name = "k1", .sigma_ref = 5e-3, .valid = kValid, .usual = {-0.4, 0.2}},
+      {.name = "k2", .sigma_ref = 5e-3, .valid = kValid, .usual = {-0.1, 0.1}},
+      {.name = "p1", .sigma_ref = 5e-4, .valid = kValid, .usual = kTangential},
+      {.name = "p2", .sigma_ref = 5e-4, .valid = kValid, .usual = kTangential}};
+  static constexpr ToolModel kTools[] = {
+      {.tool = "kalibr", .name = "pinhole", .distortion = "radtan"},
+      {.tool = "openvins", .name = "pinhole", .distortion = "radtan"},
+      {.tool = "orb_slam3",
+       .name = "PinHole",
+       .coefficients = "k1 k2 p1 p2",
+       .zeros = "k3"},
+      {.tool = "vins_fusion",
+       .name = "PINHOLE",
+       .coefficients = "distortion_parameters.k1 distortion_parameters.k2 "
+                       "distortion_parameters.p1 distortion_parameters.p2",
+       .pixels = "projection_parameters.fx projection_parameters.fy "
+                 "projection_parameters.cx projection_parameters.cy"},
+      {.tool = "basalt",
+       .name = "pinhole-radtan8",
+       .coefficients = "k1 k2 p1 p2",
+       .zeros = "k3 k4 k5 k6"},
+      {.tool = "maplab", .name = "pinhole", .distortion = "radial-tangential"}};
+  static constexpr int kSize = std::size(kCoefficients);
 
   explicit DistortionRadialTangential(
       std::span<const double, kSize> coefficients)

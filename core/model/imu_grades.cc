@@ -1,16 +1,19 @@
 #include "core/model/imu_grades.h"
 
+#include <string>
+
+#include "core/model/parameter_blocks.h"
+
 namespace selfcal {
 namespace {
 
-std::vector<ComponentSetting> Tolerances(double scale,
-                                         double misalignment,
-                                         double rotation_rad) {
-  return {{"imu.gyro.scale.*", scale},
-          {"imu.gyro.misalignment.*", misalignment},
-          {"imu.accel.scale.*", scale},
-          {"imu.accel.misalignment.*", misalignment},
-          {"imu.q_AI.*", rotation_rad}};
+std::vector<ComponentSetting> Tolerances(double GradeTolerance::*grade) {
+  std::vector<ComponentSetting> settings;
+  for (const auto& block : kImuBlocks) {
+    settings.push_back({"imu." + std::string(block.info.name) + ".*",
+                        block.info.tolerance.*grade});
+  }
+  return settings;
 }
 
 }  // namespace
@@ -25,9 +28,9 @@ std::optional<ImuGrade> ParseImuGrade(std::string_view text) {
 std::vector<ComponentSetting> ImuTolerances(ImuGrade grade) {
   switch (grade) {
     case ImuGrade::kConsumer:
-      return Tolerances(2e-2, 2e-2, 2e-2);
+      return Tolerances(&GradeTolerance::consumer);
     case ImuGrade::kFactoryCalibrated:
-      return Tolerances(3e-3, 2e-3, 2e-3);
+      return Tolerances(&GradeTolerance::factory_calibrated);
     case ImuGrade::kUnknown:
       break;
   }

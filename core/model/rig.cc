@@ -2,12 +2,23 @@
 
 #include <algorithm>
 #include <iterator>
+#include <string>
 #include <string_view>
+#include <variant>
+
+#include "core/model/parameter_blocks.h"
 
 namespace selfcal {
 namespace {
 
-constexpr char kTimeOffsets[] = "*.time_offset";
+constexpr std::string_view kTimeOffset = "time_offset";
+
+// Matches the components of a block; `sensor` is "imu", or "*" for all cameras.
+template <class Sensor>
+std::string Pattern(const std::string& sensor, const Block<Sensor>& block) {
+  const bool scalar = std::holds_alternative<double Sensor::*>(block.value);
+  return sensor + "." + std::string(block.info.name) + (scalar ? "" : ".*");
+}
 
 bool Matches(std::string_view name, std::string_view pattern) {
   const bool open_begin = pattern.starts_with('*');
@@ -34,7 +45,16 @@ std::vector<int> Without(const std::vector<int>& all,
 std::vector<int> HeldComponents(
     const Rig& rig, const std::vector<TangentComponent>& components) {
   std::vector<std::string> patterns = rig.fixed;
-  if (!rig.estimate_time_offset) patterns.push_back(kTimeOffsets);
+  for (const auto& block : kImuBlocks) {
+    if (!block.info.estimated) patterns.push_back(Pattern("imu", block));
+  }
+  for (const auto& block : kCameraBlocks) {
+    const bool asked =
+        rig.estimate_time_offset && block.info.name == kTimeOffset;
+    if (!block.info.estimated && !asked) {
+      patterns.push_back(Pattern("*", block));
+    }
+  }
   return MatchComponents(components, patterns);
 }
 
@@ -42,11 +62,15 @@ std::vector<int> HeldComponents(
 
 std::vector<ParameterGroup> DefaultGroups(bool estimate_time_offset) {
   std::vector<ParameterGroup> groups = {
-      {"imu", {"imu.*"}},
-      {"camera", {"*.focal.*", "*.principal.*", "*.distortion.*"}},
-      {"extrinsics", {"*.q_CI.*", "*.p_CI.*"}},
-  };
-  if (estimate_time_offset) groups.push_back({"time", {kTimeOffsets}});
+      {"imu", {"imu.*"}}, {"camera", {}}, {"extrinsics", {}}};
+  if (estimate_time_offset) groups.push_back({"time", {}});
+  for (const auto& block : kCameraBlocks) {
+    for (ParameterGroup& group : groups) {
+      if (group.name == block.info.group) {
+        group.patterns.push_back(Pattern("*", block));
+      }
+    }
+  }
   return groups;
 }
 

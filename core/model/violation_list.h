@@ -80,9 +80,8 @@ inline std::string QuaternionFault(const Eigen::Quaterniond& q,
 
 // Describes the fault of a vector that must be finite and no longer than
 // `limit`; empty if there is none.
-inline std::string VectorFault(const Eigen::Vector3d& v,
-                               double limit,
-                               std::string_view unit) {
+template <class Vector>
+std::string VectorFault(const Vector& v, double limit, std::string_view unit) {
   if (!v.allFinite()) return "is not finite";
   const double norm = v.stableNorm();
   if (norm <= limit) return "";

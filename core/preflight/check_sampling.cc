@@ -115,7 +115,7 @@ void CheckSampling(std::span<const MotionSegment> segments,
   if (share(counts.bad_stamps) > kMinShare) {
     diagnosis->findings.push_back(
         {FindingKind::kRepeatedSamples,
-         "stamps of the IMU do not rise: those of " +
+         "timestamps of the IMU do not increase: those of " +
              OfSamples(counts.bad_stamps, counts.samples) +
              " are not later than the one before",
          "send each sample once, in the order of time",

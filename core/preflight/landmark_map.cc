@@ -96,7 +96,7 @@ std::optional<LandmarkMap> AsMap(const Affine& map, const Normalisation& from) {
   const Eigen::Matrix3d A = map.leftCols<3>() / from.size;
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(
       A, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d s = svd.singularValues();
+  const Eigen::Vector3d& s = svd.singularValues();
   if (!(s[2] > 0) || s[0] - s[2] > kUneven * s[1]) return std::nullopt;
   const Eigen::Matrix3d R = svd.matrixU() * svd.matrixV().transpose();
   if (R.determinant() < 0) return std::nullopt;

@@ -57,6 +57,7 @@ struct Lanes {
 
   Lanes() = default;
   // The same value in each lane; implicit, so that formulae stay readable.
+  // NOLINTNEXTLINE(google-explicit-constructor)
   Lanes(double x) : v(x - Register{}) {}
   explicit Lanes(Register r) : v(r) {}
 

@@ -1,6 +1,7 @@
 // Small hand-made segments, for tests that depend on structure only.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -19,7 +20,7 @@ inline MotionSegment HandMadeSegment(const std::string& session,
                                      const std::vector<std::uint64_t>& ids,
                                      int keyframes = 4) {
   const auto to_ns = [](double t_s) {
-    return static_cast<std::int64_t>(t_s * 1e9 + 0.5);
+    return static_cast<std::int64_t>(std::llround(t_s * 1e9));
   };
   MotionSegment segment;
   segment.key = {session, index};

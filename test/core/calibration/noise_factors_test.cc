@@ -91,6 +91,29 @@ TEST(NoiseFactors, ReweightingAppliesDeterminedScales) {
   }
 }
 
+// With the noise that the rig states, the data seems to say nothing about most
+// directions.
+TEST(NoiseFactors,
+     DirectionsHeldUnderTooMuchNoiseAreEstimatedAfterReweighting) {
+  const Rig truth = NoisyRig();
+  const std::vector<MotionSegment> segments = Walk(truth, 3, 40, 100, 3);
+  Rig believed = truth;
+  for (const NoiseKind kind : {NoiseKind::kGyro,
+                               NoiseKind::kAccel,
+                               NoiseKind::kGyroBiasWalk,
+                               NoiseKind::kAccelBiasWalk}) {
+    ScaleNoise(kind, 10, &believed);
+  }
+  const CalibrationResult stated = Calibrate(
+      believed, believed.factory, segments, {.reweight_noise = false});
+  const CalibrationResult result = CalibrateBelieving(believed, segments);
+  const CalibrationResult right = CalibrateBelieving(truth, segments);
+  ASSERT_EQ(result.status, CalibrateStatus::kConverged);
+  ASSERT_EQ(right.status, CalibrateStatus::kConverged);
+  ASSERT_LT(stated.rank, right.rank);
+  EXPECT_EQ(result.rank, right.rank);
+}
+
 TEST(NoiseFactors, UndeterminedScalesAreReported) {
   const Rig rig = HandheldRig("r");
   const CalibrationResult result =

@@ -20,7 +20,7 @@ Partitioning Partition(const std::vector<MotionSegment>& segments,
 }
 
 // Keyframes at begin, begin + 0.1 .. begin + 0.3; the next begins at + 0.4.
-MotionSegment Neighbour(int index, std::vector<std::uint64_t> ids = {}) {
+MotionSegment Neighbour(int index, const std::vector<std::uint64_t>& ids = {}) {
   const double begin_s = 0.4 * index;
   return HandMadeSegment("a", index, begin_s, begin_s + 0.4, ids);
 }

@@ -42,13 +42,15 @@ TEST(Words, OfADirectionNameItsLargestParts) {
   EXPECT_EQ(DirectionInWords(direction), "the gyroscope's scale on x");
   direction.parts.push_back({"cam0.focal.x", -0.3});
   EXPECT_EQ(DirectionInWords(direction),
-            "a mix of the gyroscope's scale on x and the focal length in x of "
+            "a combination of the gyroscope's scale on x and the focal length "
+            "in x of "
             "camera 0");
   direction.parts.push_back({"imu.gyro.scale.y", 0.2});
   direction.parts.push_back({"imu.gyro.scale.z", 0.2});
-  EXPECT_EQ(DirectionInWords(direction),
-            "a mix of the gyroscope's scale on x, the focal length in x of "
-            "camera 0, the gyroscope's scale on y and others");
+  EXPECT_EQ(
+      DirectionInWords(direction),
+      "a combination of the gyroscope's scale on x, the focal length in x of "
+      "camera 0, the gyroscope's scale on y and others");
 }
 
 }  // namespace

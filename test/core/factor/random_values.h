@@ -11,6 +11,7 @@
 
 #include "core/factor/keyframe_motion.h"
 #include "core/model/calibration.h"
+#include "core/model/camera_model.h"
 #include "core/model/segment.h"
 #include "core/model/so3.h"
 
@@ -71,6 +72,12 @@ class RandomValues {
       case DistortionModel::kEquidistant:
         camera.distortion = 0.01 * NormalVector(4);
         break;
+      default:
+        camera.distortion = Undistorted(model);
+        for (int i = 0; i < camera.distortion.size(); ++i) {
+          const Interval usual = ModelInfo(model).coefficients[i].usual;
+          camera.distortion[i] = Uniform(usual.low, usual.high);
+        }
     }
     return camera;
   }
@@ -114,11 +121,6 @@ class RandomValues {
   std::mt19937_64 engine_;
   std::normal_distribution<double> normal_;
 };
-
-inline constexpr DistortionModel kAllDistortionModels[] = {
-    DistortionModel::kFov,
-    DistortionModel::kRadialTangential,
-    DistortionModel::kEquidistant};
 
 // Largest difference of two matrices, relative to the size of each row.
 inline double RowwiseDifference(const Eigen::MatrixXd& a,

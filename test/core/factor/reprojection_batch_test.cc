@@ -82,9 +82,7 @@ Scene RandomScene(RandomValues& random,
 template <typename Check>
 void ForRandomScenes(unsigned seed, const Check& check) {
   RandomValues random(seed);
-  for (const DistortionModel model : {DistortionModel::kFov,
-                                      DistortionModel::kRadialTangential,
-                                      DistortionModel::kEquidistant}) {
+  for (const DistortionModel model : DistortionModels()) {
     for (const int count : {1, 2, 3, 7, 8, 9, 50}) {
       for (const bool moves : {false, true}) {
         const Scene scene = RandomScene(random, model, count, moves);

@@ -38,10 +38,10 @@ struct View {
 View RandomView(RandomValues& random) {
   View view;
   view.reference.imu = random.Imu();
-  for (DistortionModel model : kAllDistortionModels) {
+  for (DistortionModel model : DistortionModels()) {
     view.reference.cameras.push_back(random.Camera(model));
   }
-  view.camera = random.Index(3);
+  view.camera = random.Index(static_cast<int>(DistortionModels().size()));
   view.q_GI = random.Rotation();
   view.p_GI = random.Normal3(5);
   const CameraCalibration& camera = view.reference.cameras[view.camera];

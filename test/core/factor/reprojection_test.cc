@@ -121,7 +121,8 @@ class ReprojectionOfEachModel : public testing::TestWithParam<DistortionModel> {
 
 INSTANTIATE_TEST_SUITE_P(Models,
                          ReprojectionOfEachModel,
-                         testing::ValuesIn(kAllDistortionModels),
+                         testing::ValuesIn(DistortionModels().begin(),
+                                           DistortionModels().end()),
                          [](const auto& info) {
                            std::string name(DistortionName(info.param));
                            std::erase(name, '-');

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/camera_model.h"
 #include "test/core/model/random_values.h"
 #include "test/core/numeric_jacobian.h"
 
@@ -105,9 +106,8 @@ class CameraTest : public testing::TestWithParam<DistortionModel> {};
 
 INSTANTIATE_TEST_SUITE_P(Models,
                          CameraTest,
-                         testing::Values(DistortionModel::kFov,
-                                         DistortionModel::kRadialTangential,
-                                         DistortionModel::kEquidistant),
+                         testing::ValuesIn(DistortionModels().begin(),
+                                           DistortionModels().end()),
                          [](const auto& model) {
                            std::string name(DistortionName(model.param));
                            std::erase(name, '-');
@@ -120,7 +120,7 @@ TEST_P(CameraTest, WithoutDistortionInTheModelOnTheAxisIsAPinhole) {
     CameraCalibration camera = random.Camera(GetParam());
     const Eigen::Vector2d u = 1e-5 * random.Vector(2, 1);
     Eigen::Vector2d z_px;
-    camera.distortion.setZero();
+    camera.distortion = Undistorted(GetParam());
     ASSERT_TRUE(Project(camera, u.homogeneous(), &z_px, nullptr));
     // The next term of every model is of third order: 1e-15 here.
     EXPECT_LT((z_px - camera.f.cwiseProduct(u) - camera.c).norm(), 1e-12);
@@ -177,7 +177,8 @@ TEST_P(CameraTest, JacobiansHoldUpToTheBorderOfTheRegion) {
     const Eigen::Vector2d u = border * (1 - 1e-2) * direction;
     ExpectJacobiansHold(camera, u.homogeneous(), 1e-5, 1e-9);
   }
-  if (GetParam() != DistortionModel::kFov) {
+  if (GetParam() == DistortionModel::kRadialTangential ||
+      GetParam() == DistortionModel::kEquidistant) {
     EXPECT_GT(with_border, 100);
   }
 }
@@ -277,7 +278,15 @@ TEST(Unproject, RefusesPixelsOfRaysThatProjectRefuses) {
   EXPECT_GT(refused, kTrials / 10);
 }
 
-TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefused) {
+// Returns true for a pinhole with a distortion, which sees no ray at 90 degrees
+// or beyond.
+bool IsPinhole(DistortionModel model) {
+  return model == DistortionModel::kFov ||
+         model == DistortionModel::kRadialTangential ||
+         model == DistortionModel::kEquidistant;
+}
+
+TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefusedOrInverted) {
   RandomValues random(10);
   for (int i = 0; i < kTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
@@ -287,8 +296,15 @@ TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefused) {
     if (i % 3 == 1) p_C.z() = 1e-8 * p_C.head<2>().norm();
     const Eigen::Vector2d before(1, 2);
     Eigen::Vector2d z_px = before;
-    EXPECT_FALSE(Project(camera, p_C, &z_px, nullptr));
-    EXPECT_EQ(z_px, before);
+    if (Project(camera, p_C, &z_px, nullptr)) {
+      EXPECT_FALSE(IsPinhole(GetParam()));
+      Eigen::Vector3d bearing_C;
+      ASSERT_TRUE(Unproject(camera, z_px, &bearing_C)) << p_C.transpose();
+      EXPECT_LT((bearing_C - p_C.normalized()).norm(), 1e-6)
+          << p_C.transpose() << " with " << camera.distortion.transpose();
+    } else {
+      EXPECT_EQ(z_px, before);
+    }
   }
 }
 
@@ -374,7 +390,7 @@ TEST_P(CameraTest, ExtremePixelsNeverGiveWhatIsNotFinite) {
 TEST_P(CameraTest, WrongNumberOfCoefficientsIsRefused) {
   RandomValues random(14);
   CameraCalibration camera = random.Camera(GetParam());
-  camera.distortion.setZero(2);
+  camera.distortion.setZero(DistortionSize(GetParam()) - 1);
   Eigen::Vector2d z_px;
   Eigen::Vector3d bearing_C;
   EXPECT_FALSE(Project(camera, Eigen::Vector3d::UnitZ(), &z_px, nullptr));

@@ -8,6 +8,7 @@
 
 #include "core/model/calibration.h"
 #include "core/model/camera.h"
+#include "core/model/camera_model.h"
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -45,18 +46,9 @@ class RandomValues {
   // Coefficients as of real lenses, and somewhat beyond, either way.
   DistortionVector Distortion(DistortionModel model) {
     DistortionVector k(DistortionSize(model));
-    switch (model) {
-      case DistortionModel::kFov:
-        k << Uniform(-1, 1) * 1.3;
-        break;
-      case DistortionModel::kRadialTangential:
-        k << Uniform(-0.4, 0.2), Uniform(-0.1, 0.1), Uniform(-2e-3, 2e-3),
-            Uniform(-2e-3, 2e-3);
-        break;
-      case DistortionModel::kEquidistant:
-        k << Uniform(-0.1, 0.1), Uniform(-0.05, 0.05), Uniform(-0.05, 0.05),
-            Uniform(-0.01, 0.01);
-        break;
+    for (int i = 0; i < k.size(); ++i) {
+      const Interval usual = ModelInfo(model).coefficients[i].usual;
+      k[i] = Uniform(usual.low, usual.high);
     }
     return k;
   }
@@ -74,7 +66,7 @@ class RandomValues {
     return camera;
   }
 
-  // One camera of each model.
+  // Three cameras of different models.
   Calibration Theta() {
     Calibration theta;
     theta.imu.s_g += Vector(3, 0.02);

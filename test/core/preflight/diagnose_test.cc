@@ -90,7 +90,7 @@ TEST(Diagnose, FindsTimestampsThatDoNotIncrease) {
                           diagnosis.findings.end(),
                           [](const auto& f) {
                             return f.kind == FindingKind::kRepeatedSamples &&
-                                   f.cause.find("do not rise") !=
+                                   f.cause.find("do not increase") !=
                                        std::string::npos;
                           }))
       << Text(diagnosis);

@@ -1,0 +1,73 @@
+#include "core/calibration/noise_weighting.h"
+
+#include <optional>
+
+#include "core/calibration/noise_factors.h"
+#include "core/calibration/screening.h"
+#include "core/calibration/subspace.h"
+#include "core/calibration/track_noise.h"
+
+namespace selfcal {
+namespace {
+
+// Correlated pixel errors that increase the sigmas of theta by less than this
+// fraction are treated as independent.
+constexpr double kLeastTrackNoise = 0.05;
+constexpr int kMaxReweightings = 4;
+
+constexpr double Square(double x) { return x * x; }
+
+}  // namespace
+
+bool NoiseWeighting::Reweight() {
+  for (int i = 0; descent_->converged(); ++i) {
+    if (!WeightByTracks()) return false;
+    if (!descent_->converged() || !options_.noise_factors) break;
+    EstimateFactors();
+    if (!options_.reweight_noise || i == kMaxReweightings) break;
+    const std::optional<Rig> next =
+        selfcal::Reweight(stated_, point_->rig(), factors_);
+    if (!next) break;
+    point_->WeightByNoise(*next);
+    if (!descent_->Repeat()) return false;
+  }
+  return true;
+}
+
+bool NoiseWeighting::WeightByTracks() {
+  if (!options_.correlated_tracks) return true;
+  const Eigen::MatrixXd basis = TangentBasis(point_->rig(), point_->subspace());
+  track_noise_ = TrackNoiseFactor(point_->Round(basis),
+                                  point_->linearised(),
+                                  point_->estimate(),
+                                  point_->screening().landmarks);
+  if (track_noise_ < 1 + kLeastTrackNoise) return true;
+  point_->WeightByTracks(track_noise_);
+  return descent_->Repeat();
+}
+
+void NoiseWeighting::EstimateFactors() {
+  const Eigen::MatrixXd basis = TangentBasis(point_->rig(), point_->subspace());
+  // The noise scales require weights without the track noise.
+  std::vector<ScreenedLandmark> landmarks = point_->screening().landmarks;
+  ScaleWeights(Square(point_->screening().track_noise_factor), &landmarks);
+  // Their estimation has its own linear system.
+  point_->linearised().system.ReleaseChains();
+  factors_ = EstimateNoiseFactors(stated_,
+                                  point_->Round(basis),
+                                  point_->estimate(),
+                                  landmarks,
+                                  track_noise_);
+}
+
+std::vector<NoiseFactor> NoiseWeighting::FactorsOfStated() const {
+  std::vector<NoiseFactor> factors = factors_;
+  for (NoiseFactor& factor : factors) {
+    factor.used =
+        NoiseOf(factor.kind, point_->rig()) / NoiseOf(factor.kind, stated_);
+    factor.factor *= factor.used;
+  }
+  return factors;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,95 @@
+#include "core/elimination/keyframe_equations.h"
+
+#include "core/elimination/chain_places.h"
+#include "core/elimination/landmark_rows.h"
+
+namespace selfcal {
+
+using namespace chain;
+
+void KeyframeEquations::Start(const ChainLayout& layout, int keyframes) {
+  layout_ = layout;
+  stride_ = kPose + layout.landmark_shared + 1;
+  sums_.assign(static_cast<std::size_t>(keyframes) * kPose * stride_, 0);
+  shared_sums_.assign(
+      (layout.landmark_shared + 1) * (layout.landmark_shared + 1), 0);
+}
+
+void KeyframeEquations::Add(int keyframe,
+                            const CameraColumns& camera,
+                            const RowProducts& products,
+                            const ChainPoseRotation* by_rotation) {
+  const int residual = RowsResidual(camera.size);
+  // by_pose(i, c): pose i and column c; poses(i, j): two of the pose.
+  const auto add_pose = [&](const auto& by_pose, const auto& poses) {
+    for (int i = 0; i < kPose; ++i) {
+      double* row = &sums_[(keyframe * kPose + i) * stride_];
+      for (int j = 0; j <= i; ++j) row[j] += poses(i, j);
+      double* shared = row + kPose + camera.offset;
+      for (int c = 0; c < 3; ++c) shared[c] -= by_pose(i, kRowsTurn + c);
+      for (int c = 3; c < camera.size; ++c) {
+        shared[c] += by_pose(i, kRowsOwn + c - 3);
+      }
+      row[kPose + layout_.landmark_shared] += by_pose(i, residual);
+    }
+  };
+  if (by_rotation == nullptr) {
+    add_pose(products, products);
+  } else {
+    Eigen::Matrix<double, kPose, kPose> turn;
+    turn.setIdentity();
+    turn.leftCols<3>() = *by_rotation;
+    const auto by_pose = [&](int i, int c) {
+      double sum = 0;
+      for (int n = 0; n < kPose; ++n) sum += turn(n, i) * products(n, c);
+      return sum;
+    };
+    add_pose(by_pose, [&](int i, int j) {
+      double sum = 0;
+      for (int n = 0; n < kPose; ++n) sum += by_pose(i, n) * turn(n, j);
+      return sum;
+    });
+  }
+  AddShared(camera, products);
+}
+
+void KeyframeEquations::AddShared(const CameraColumns& camera,
+                                  const RowProducts& products) {
+  const int rows = layout_.landmark_shared + 1;
+  const int residual = RowsResidual(camera.size);
+  const auto column = [](int c) {
+    return c < 3 ? kRowsTurn + c : kRowsOwn + c - 3;
+  };
+  for (int j = 0; j < camera.size; ++j) {
+    double* to = &shared_sums_[(camera.offset + j) * rows];
+    for (int i = j; i < camera.size; ++i) {
+      const double product = products(column(i), column(j));
+      to[camera.offset + i] += (i < 3) == (j < 3) ? product : -product;
+    }
+    const double product = products(residual, column(j));
+    to[layout_.landmark_shared] += j < 3 ? -product : product;
+  }
+}
+
+void KeyframeEquations::AddKeyframeTo(ChainFront* front, int keyframe) const {
+  const int pose = front->Pose(0);
+  for (int i = 0; i < kPose; ++i) {
+    const double* row = &sums_[(keyframe * kPose + i) * stride_];
+    for (int j = 0; j <= i; ++j) (*front)(pose + i, pose + j) += row[j];
+    for (int c = 0; c <= layout_.landmark_shared; ++c) {
+      (*front)(pose + i, layout_.landmark_place + c) += row[kPose + c];
+    }
+  }
+}
+
+void KeyframeEquations::AddSharedTo(ChainFront* front) const {
+  const int rows = layout_.landmark_shared + 1;
+  for (int j = 0; j < layout_.landmark_shared; ++j) {
+    for (int i = j; i < rows; ++i) {
+      (*front)(layout_.landmark_place + i, layout_.landmark_place + j) +=
+          shared_sums_[j * rows + i];
+    }
+  }
+}
+
+}  // namespace selfcal

@@ -1,0 +1,241 @@
+// The parameter blocks of theta, each declared once, in the order of the
+// tangent. Offsets, box-plus and box-minus, names, validation, groups,
+// tolerances, conversion to messages, and wording follow from this list.
+// Internal to the project: not an installed header.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <variant>
+#include <vector>
+
+#include "core/model/calibration.h"
+
+namespace selfcal {
+
+// Values that are accepted, with a limit far beyond any real device.
+enum class Accepted {
+  kPositive,      // each positive and at most the limit
+  kMagnitude,     // each of a magnitude of at most the limit
+  kLength,        // a vector of at most this length
+  kUnit,          // a unit quaternion; the limit is the tolerance of its norm
+  kCoefficients,  // what the camera's model accepts
+};
+
+// When data began to have a block: data from before gets its default.
+enum class StoredSince { kBegin, kTimeOffset };
+
+// Standard deviations by grade of IMU (imu_grades.h).
+struct GradeTolerance {
+  double consumer = 0;
+  double factory_calibrated = 0;
+};
+
+struct BlockInfo {
+  // "gyro.scale": its components are imu.gyro.scale.x, .y, .z. Components of a
+  // distortion have the names of the model's coefficients, a scalar has none.
+  std::string_view name;
+  // Name of the value, and in lower case of the field of the contract.
+  std::string_view field;
+  std::string_view unit;
+  // See TangentComponent. In pixels: for images of kReferenceWidth_px, since in
+  // a finer image the same errors of the same scene are more pixels. Ignored
+  // for a distortion.
+  double sigma_ref = 0;
+  Accepted accepted = Accepted::kMagnitude;
+  double limit = 0;
+  std::string_view group = {};  // of a camera's block; an IMU's is in "imu"
+  std::string_view words;       // before the name of a component, for people
+  GradeTolerance tolerance = {};
+  // If false, it is held constant unless the rig estimates it.
+  bool estimated = true;
+  StoredSince since = StoredSince::kBegin;
+};
+
+inline constexpr int kReferenceWidth_px = 640;
+
+// The default of the member is that of data from before the block existed.
+template <class Sensor>
+struct Block {
+  BlockInfo info;
+  std::variant<Eigen::Vector3d Sensor::*,
+               Eigen::Vector2d Sensor::*,
+               Eigen::Quaterniond Sensor::*,
+               DistortionVector Sensor::*,
+               double Sensor::*>
+      value;
+};
+
+// Sigmas are expected standard deviations after one reference segment:
+// statistics of 22 moving segments of a hand-held recording with a FOV camera;
+// for the time offset, the median over simulated segments of a hand-held device
+// that moves as calmly as in that recording.
+inline constexpr Block<ImuCalibration> kImuBlocks[] = {
+    {{.name = "gyro.scale",
+      .field = "s_g",
+      .unit = "-",
+      .sigma_ref = 6e-3,
+      .accepted = Accepted::kPositive,
+      .limit = 10,
+      .words = "the gyroscope's scale on ",
+      .tolerance = {2e-2, 3e-3}},
+     &ImuCalibration::s_g},
+    {{.name = "gyro.misalignment",
+      .field = "m_g",
+      .unit = "-",
+      .sigma_ref = 7e-3,
+      .limit = 10,
+      .words = "the gyroscope's misalignment ",
+      .tolerance = {2e-2, 2e-3}},
+     &ImuCalibration::m_g},
+    {{.name = "accel.scale",
+      .field = "s_a",
+      .unit = "-",
+      .sigma_ref = 4e-2,
+      .accepted = Accepted::kPositive,
+      .limit = 10,
+      .words = "the accelerometer's scale on ",
+      .tolerance = {2e-2, 3e-3}},
+     &ImuCalibration::s_a},
+    {{.name = "accel.misalignment",
+      .field = "m_a",
+      .unit = "-",
+      .sigma_ref = 4e-2,
+      .limit = 10,
+      .words = "the accelerometer's misalignment ",
+      .tolerance = {2e-2, 2e-3}},
+     &ImuCalibration::m_a},
+    {{.name = "q_AI",
+      .field = "q_AI",
+      .unit = "rad",
+      .sigma_ref = 3.5e-2,
+      .accepted = Accepted::kUnit,
+      .limit = 1e-6,
+      .words =
+          "the rotation of the accelerometer relative to the gyroscope about ",
+      .tolerance = {2e-2, 2e-3}},
+     &ImuCalibration::q_AI},
+};
+
+inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
+    {{.name = "q_CI",
+      .field = "q_CI",
+      .unit = "rad",
+      .sigma_ref = 5e-3,
+      .accepted = Accepted::kUnit,
+      .limit = 1e-6,
+      .group = "extrinsics",
+      .words = "the rotation relative to the IMU about "},
+     &CameraCalibration::q_CI},
+    {{.name = "p_CI",
+      .field = "p_CI",
+      .unit = "m",
+      .sigma_ref = 1.3e-2,
+      .accepted = Accepted::kLength,
+      .limit = 1e3,
+      .group = "extrinsics",
+      .words = "the distance from the IMU along "},
+     &CameraCalibration::p_CI},
+    {{.name = "focal",
+      .field = "f",
+      .unit = "px",
+      .sigma_ref = 1.5,
+      .accepted = Accepted::kPositive,
+      .limit = 1e6,
+      .group = "camera",
+      .words = "the focal length in "},
+     &CameraCalibration::f},
+    {{.name = "principal",
+      .field = "c",
+      .unit = "px",
+      .sigma_ref = 1.5,
+      .limit = 1e6,
+      .group = "camera",
+      .words = "the principal point in "},
+     &CameraCalibration::c},
+    {{.name = "distortion",
+      .field = "distortion",
+      .unit = "-",
+      .accepted = Accepted::kCoefficients,
+      .group = "camera",
+      .words = "the distortion "},
+     &CameraCalibration::distortion},
+    {{.name = "time_offset",
+      .field = "time_offset_s",
+      .unit = "s",
+      .sigma_ref = 6e-4,
+      .limit = 0.5,
+      .group = "time",
+      .words = "the delay of the images",
+      .estimated = false,
+      .since = StoredSince::kTimeOffset},
+     &CameraCalibration::time_offset_s},
+};
+
+template <class Value>
+int TangentDimension(const Value& value) {
+  if constexpr (std::is_same_v<Value, double>) {
+    return 1;
+  } else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
+    return 3;
+  } else {
+    return static_cast<int>(value.size());
+  }
+}
+
+struct BlockPlace {
+  const BlockInfo& info;
+  int offset;  // in the tangent of theta
+  int camera;  // -1: the IMU
+
+  // "imu" or "cam0"
+  std::string Sensor() const {
+    return camera < 0 ? "imu" : "cam" + std::to_string(camera);
+  }
+  // "imu.gyro.scale"
+  std::string Name() const { return Sensor() + "." + std::string(info.name); }
+};
+
+// Calls visit(info, value, values...) for each block of a sensor, with the
+// values of this sensor and of others of the same shape.
+template <class Sensor, class Blocks, class Visitor, class... Sensors>
+void VisitSensorBlocks(const Blocks& blocks,
+                       const Visitor& visit,
+                       Sensor& sensor,
+                       Sensors&... sensors) {
+  for (const auto& block : blocks) {
+    std::visit(
+        [&](auto member) {
+          visit(block.info, sensor.*member, (sensors.*member)...);
+        },
+        block.value);
+  }
+}
+
+// Calls visit(place, value, values...) for each block of theta, with its values
+// in theta and in others of the same shape.
+template <class Visitor, class Theta, class... Thetas>
+void VisitBlocks(const Visitor& visit, Theta& theta, Thetas&... others) {
+  int offset = 0;
+  int camera = -1;
+  const auto visit_block =
+      [&](const BlockInfo& info, auto& value, auto&... values) {
+        visit(BlockPlace{info, offset, camera}, value, values...);
+        offset += TangentDimension(value);
+      };
+  VisitSensorBlocks(kImuBlocks, visit_block, theta.imu, others.imu...);
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    camera = static_cast<int>(j);
+    VisitSensorBlocks(
+        kCameraBlocks, visit_block, theta.cameras[j], others.cameras[j]...);
+  }
+}
+
+// The name of the block of each component, in the order of the tangent.
+std::vector<std::string> ComponentBlocks(const Calibration& theta);
+
+}  // namespace selfcal
