@@ -1,5 +1,6 @@
-# Writes OUTPUT, a C++ file with the name, text and SHA-256 of each file of
-# MIGRATIONS, in their order. Run as a script: cmake -DOUTPUT= -DMIGRATIONS= -P.
+# Writes OUTPUT, a C++ file that defines FUNCTION, which returns the name, text
+# and SHA-256 of each file of MIGRATIONS, in their order. Run as a script:
+# cmake -DOUTPUT= -DFUNCTION= -DMIGRATIONS= -P.
 set(entries "")
 foreach(path IN LISTS MIGRATIONS)
   get_filename_component(name ${path} NAME)
@@ -21,7 +22,7 @@ ${entries}};
 
 }  // namespace
 
-std::span<const Migration> EmbeddedMigrations() { return kMigrations; }
+std::span<const Migration> ${FUNCTION}() { return kMigrations; }
 
 }  // namespace selfcal::server
 ")

@@ -1,4 +1,4 @@
-// The numbered SQL files of this folder, as they were when the program was
+// The numbered SQL files of each engine, as they were when the program was
 // built. Migration k (from 1) takes the schema from version k - 1 to k; all of
 // them together are the schema that the program works on.
 #pragma once
@@ -15,6 +15,6 @@ struct Migration {
 };
 
 // In the order in which they are applied. Lives as long as the program.
-std::span<const Migration> EmbeddedMigrations();
+std::span<const Migration> SqliteMigrations();
 
 }  // namespace selfcal::server

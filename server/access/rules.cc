@@ -102,4 +102,11 @@ absl::Status Authorise(const Caller& caller,
   return absl::PermissionDeniedError(message);
 }
 
+std::string RigOf(const google::protobuf::MethodDescriptor& method,
+                  const Message& request) {
+  const v1::AccessRule& rule = method.options().GetExtension(v1::access);
+  if (rule.rig_field_size() != 1) return "";
+  return RigOf(TextAt(request, rule.rig_field(0)));
+}
+
 }  // namespace selfcal::server

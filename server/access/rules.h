@@ -7,6 +7,8 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include <string>
+
 #include "server/access/grants.h"
 
 namespace selfcal::server {
@@ -19,5 +21,10 @@ namespace selfcal::server {
 absl::Status Authorise(const Caller& caller,
                        const google::protobuf::MethodDescriptor& method,
                        const google::protobuf::Message& request);
+
+// The {rig} that the request names, by the rule of its method; empty if the
+// request names none, or several.
+std::string RigOf(const google::protobuf::MethodDescriptor& method,
+                  const google::protobuf::Message& request);
 
 }  // namespace selfcal::server

@@ -11,8 +11,8 @@
 #include "server/domain/clock.h"
 #include "server/encode/encode.h"
 #include "server/encode/encode_activity.h"
-#include "server/encode/encode_parts.h"
-#include "server/store/status_macros.h"
+#include "server/encode/set_time.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "server/api/change_feed.h"
 #include "server/api/method.h"
+#include "server/api/rig_watches.h"
 #include "server/api/traffic.h"
 #include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
@@ -44,6 +45,7 @@ class Api {
 
  private:
   std::atomic<bool> stopping_ = false;
+  RigWatches watches_;
   Traffic traffic_;
   std::vector<Method> methods_;
 };

@@ -9,7 +9,7 @@
 #include "server/encode/encode_verification.h"
 #include "server/encode/reason.h"
 #include "server/encode/versions.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -48,7 +48,7 @@ std::shared_ptr<void> ChangeFeed::Subscribe(const std::string& rig,
   const auto events = store_->ListNewestEvents({1, ""});
   const bool known = events.ok() && !events->items.empty();
   auto reader = std::make_shared<Reader>(
-      rig, known ? events->items[0].event : 0, std::move(on_change));
+      Reader{rig, known ? events->items[0].event : 0, std::move(on_change)});
   const std::lock_guard lock(mutex_);
   readers_.push_back(reader);
   return reader;

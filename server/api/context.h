@@ -11,6 +11,7 @@
 namespace selfcal::server {
 
 class ChangeFeed;  // change_feed.h
+class RigWatches;  // rig_watches.h
 class Traffic;     // traffic.h
 
 struct ApiContext {
@@ -18,6 +19,7 @@ struct ApiContext {
   Store* store = nullptr;  // of `domain`
   Pipeline* pipeline = nullptr;
   ChangeFeed* changes = nullptr;
+  RigWatches* watches = nullptr;
   Traffic* traffic = nullptr;  // of segments
   // True once the daemon is stopping: watches and streams end with UNAVAILABLE.
   const std::atomic<bool>* stopping = nullptr;

@@ -3,9 +3,13 @@
 #include <google/protobuf/descriptor.h>
 #include <spdlog/spdlog.h>
 
+#include <array>
 #include <stdexcept>
+#include <utility>
 
 #include "server/access/rules.h"
+#include "server/api/rig_watches.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -93,7 +97,9 @@ class AuthorisedExchange final : public Exchange {
 void Methods::AddUnary(Method method, UnaryHandler handler) {
   method.descriptor = DescriptorOf(*method.request);
   method.handler = UnaryHandler(
-      [this_method = method.descriptor, context = context_, handler](
+      [this_method = method.descriptor,
+       context = context_,
+       handler = std::move(handler)](
           const Call& call, const Message& request, Message* response) {
         return Guarded(context, [&] {
           absl::Status status = Authorised(call, *this_method, request);
@@ -105,36 +111,44 @@ void Methods::AddUnary(Method method, UnaryHandler handler) {
 
 void Methods::AddStreaming(Method method, StreamingHandler handler) {
   method.descriptor = DescriptorOf(*method.request);
-  method.handler = StreamingHandler([this_method = method.descriptor,
-                                     context = context_,
-                                     handler](const Call& call,
-                                              const Message& request,
-                                              const WriteResponse& write) {
-    return Guarded(context, [&] {
-      absl::Status status = Authorised(call, *this_method, request);
-      if (!status.ok()) return status;
-      return handler(call, request, [&](const Message& response) {
-        return !context.stopping->load() && write(response);
+  method.handler = StreamingHandler(
+      [this_method = method.descriptor,
+       context = context_,
+       handler = std::move(handler)](const Call& call,
+                                     const Message& request,
+                                     const WriteResponse& write) {
+        return Guarded(context, [&] {
+          absl::Status status = Authorised(call, *this_method, request);
+          if (!status.ok()) return status;
+          return handler(call, request, [&](const Message& response) {
+            return !context.stopping->load() && write(response);
+          });
+        });
       });
-    });
-  });
   methods_.push_back(std::move(method));
 }
 
 void Methods::AddWatch(Method method, WatchHandler handler) {
   method.descriptor = DescriptorOf(*method.request);
-  method.handler = WatchHandler(
-      [this_method = method.descriptor, context = context_, handler](
-          const Call& call,
-          const Message& request,
-          const std::shared_ptr<WatchQueue>& queue)
-          -> absl::StatusOr<std::shared_ptr<void>> {
-        return Guarded(context, [&]() -> absl::StatusOr<std::shared_ptr<void>> {
-          absl::Status status = Authorised(call, *this_method, request);
-          if (!status.ok()) return status;
-          return handler(call, request, queue);
-        });
-      });
+  method.handler = WatchHandler([this_method = method.descriptor,
+                                 context = context_,
+                                 handler = std::move(handler)](
+                                    const Call& call,
+                                    const Message& request,
+                                    const std::shared_ptr<WatchQueue>& queue)
+                                    -> absl::StatusOr<std::shared_ptr<void>> {
+    return Guarded(context, [&]() -> absl::StatusOr<std::shared_ptr<void>> {
+      absl::Status status = Authorised(call, *this_method, request);
+      if (!status.ok()) return status;
+      const std::string rig = RigOf(*this_method, request);
+      // Registered first: a rig that is deleted meanwhile is not missed.
+      auto of_rig = rig.empty() ? nullptr : context.watches->Add(rig, queue);
+      SELFCAL_ASSIGN_OR_RETURN(auto subscription,
+                               handler(call, request, queue));
+      return std::make_shared<std::array<std::shared_ptr<void>, 2>>(
+          std::array{std::move(of_rig), std::move(subscription)});
+    });
+  });
   methods_.push_back(std::move(method));
 }
 
@@ -144,7 +158,8 @@ void Methods::AddUpload(Method method, UploadHandler handler) {
       [this_method = method.descriptor,
        empty = method.request,
        context = context_,
-       handler](const Call& call, const ReadRequest& read, Message* response) {
+       handler = std::move(handler)](
+          const Call& call, const ReadRequest& read, Message* response) {
         return Guarded(context, [&] {
           absl::Status status = Authorised(call, *this_method, *empty);
           return status.ok() ? handler(call, read, response) : status;
@@ -159,7 +174,8 @@ void Methods::AddExchange(Method method, ExchangeHandler handler) {
       ExchangeHandler([this_method = method.descriptor,
                        response = method.response,
                        context = context_,
-                       handler](const Call& call) -> std::unique_ptr<Exchange> {
+                       handler = std::move(handler)](
+                          const Call& call) -> std::unique_ptr<Exchange> {
         return std::make_unique<AuthorisedExchange>(
             context, call, *this_method, *response, handler(call));
       });

@@ -4,7 +4,7 @@
 #include "server/api/paging.h"
 #include "server/encode/encode.h"
 #include "server/encode/versions.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

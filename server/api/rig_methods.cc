@@ -12,11 +12,12 @@
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/api/read_rig_query.h"
+#include "server/api/rig_watches.h"
 #include "server/encode/encode.h"
 #include "server/encode/labels.h"
 #include "server/encode/reason.h"
+#include "server/status/status_macros.h"
 #include "server/store/rig_policy.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -151,6 +152,11 @@ absl::StatusOr<google::protobuf::Empty> DeleteRig(
   const absl::Status deleted =
       context.pipeline->DeleteRig(*id, call.caller.name, request.reason());
   if (!deleted.ok()) return About(deleted, {kType, request.name(), {}});
+  context.watches->End(
+      *id,
+      About(absl::NotFoundError(request.name() + " was deleted; this watch "
+                                                 "has ended"),
+            {kType, request.name(), {}}));
   return google::protobuf::Empty();
 }
 

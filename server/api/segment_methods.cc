@@ -15,7 +15,7 @@
 #include "server/encode/reason.h"
 #include "server/encode/segment_filter.h"
 #include "server/encode/shortened.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -75,11 +75,11 @@ absl::StatusOr<v1::Segment> GetSegment(const ApiContext& context,
   const Subject subject{kSegmentType, request.name(), {}};
   const auto segment = context.store->GetSegment(parts.rig, parts.key);
   if (!segment.ok()) return About(segment.status(), subject);
-  const auto absences = context.store->ListAbsences(parts.rig, parts.key);
-  if (!absences.ok()) return About(absences.status(), subject);
+  const auto exclusions = context.store->ListExclusions(parts.rig, parts.key);
+  if (!exclusions.ok()) return About(exclusions.status(), subject);
   v1::Segment response = Encode(*segment);
-  for (const TableAbsence& absence : *absences) {
-    *response.add_exclusions() = Encode(parts.rig, absence);
+  for (const Exclusion& exclusion : *exclusions) {
+    *response.add_exclusions() = Encode(parts.rig, exclusion);
   }
   return response;
 }

@@ -5,7 +5,7 @@
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/encode/encode_session.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -2,29 +2,21 @@
 #include "selfcal/v1/store_service.pb.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
+#include "server/domain/clock.h"
 #include "server/encode/encode.h"
+#include "server/status/status_macros.h"
 #include "server/store/maintenance.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
-
-absl::StatusOr<StoreMaintenance*> MaintenanceOf(const ApiContext& context) {
-  StoreMaintenance* maintenance = context.store->maintenance();
-  if (maintenance != nullptr) return maintenance;
-  return absl::UnimplementedError(
-      "this store is maintained by the tools of its own engine");
-}
 
 absl::Status CheckStore(const ApiContext& context,
                         const Call&,
                         const v1::CheckStoreRequest&,
                         const Writer<v1::CheckStoreResponse>& write) {
-  SELFCAL_ASSIGN_OR_RETURN(StoreMaintenance* const maintenance,
-                           MaintenanceOf(context));
   SELFCAL_ASSIGN_OR_RETURN(
       const CheckSummary summary,
-      maintenance->Check([&](const StoreProblem& problem) {
+      context.store->maintenance()->Check([&](const StoreProblem& problem) {
         v1::CheckStoreResponse response;
         response.mutable_problem()->set_place(problem.place);
         response.mutable_problem()->set_description(problem.description);
@@ -43,14 +35,13 @@ absl::Status BackupStore(const ApiContext& context,
                          const Call&,
                          const v1::BackupStoreRequest&,
                          const Writer<v1::BackupStoreResponse>& write) {
-  SELFCAL_ASSIGN_OR_RETURN(StoreMaintenance* const maintenance,
-                           MaintenanceOf(context));
-  SELFCAL_ASSIGN_OR_RETURN(const BackupSummary summary,
-                           maintenance->Backup([&](std::string_view bytes) {
-                             v1::BackupStoreResponse response;
-                             response.set_data(bytes.data(), bytes.size());
-                             return write(response);
-                           }));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const BackupSummary summary,
+      context.store->maintenance()->Backup([&](std::string_view bytes) {
+        v1::BackupStoreResponse response;
+        response.set_data(bytes.data(), bytes.size());
+        return write(response);
+      }));
   v1::BackupStoreResponse response;
   response.mutable_summary()->set_bytes(summary.bytes);
   response.mutable_summary()->set_sha256(summary.sha256);
@@ -62,16 +53,15 @@ absl::StatusOr<v1::RestoreStoreResponse> RestoreStore(
     const ApiContext& context,
     const Call&,
     const Reader<v1::RestoreStoreRequest>& read) {
-  SELFCAL_ASSIGN_OR_RETURN(StoreMaintenance* const maintenance,
-                           MaintenanceOf(context));
-  SELFCAL_ASSIGN_OR_RETURN(const auto restoration, maintenance->BeginRestore());
+  SELFCAL_ASSIGN_OR_RETURN(const auto restoration,
+                           context.store->maintenance()->BeginRestore());
   v1::RestoreStoreRequest request;
   while (read(&request)) {
     if (context.stopping->load()) return ShuttingDown();
     if (request.part_case() == v1::RestoreStoreRequest::kSha256) {
       v1::RestoreStoreResponse response;
       SELFCAL_ASSIGN_OR_RETURN(*response.mutable_previous_database(),
-                               restoration->Finish(request.sha256()));
+                               restoration->Finish(request.sha256(), NowNs()));
       if (context.restored) context.restored();
       return response;
     }

@@ -7,7 +7,7 @@
 #include "server/console/http_server.h"
 #include "server/console/json.h"
 #include "server/console/transcoding.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

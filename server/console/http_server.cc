@@ -26,7 +26,7 @@
 #include "server/console/json.h"
 #include "server/console/policy.h"
 #include "server/console/tls_files.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -50,9 +50,10 @@ absl::Status CheckOrigin(const HttpRequest& request, bool loopback) {
   if (request.method == "GET" || request.method == "HEAD") {
     return absl::OkStatus();
   }
-  if (request.method != "POST") {
+  if (request.method != "POST" && request.method != "PATCH" &&
+      request.method != "DELETE") {
     return absl::UnimplementedError(
-        "the console supports only GET, HEAD and POST");
+        "the console supports only GET, HEAD, POST, PATCH and DELETE");
   }
   if (HeaderOf(request, "x-selfcal-console").empty()) {
     return absl::PermissionDeniedError(

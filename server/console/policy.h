@@ -19,7 +19,7 @@ const std::array<Header, 6>& SecurityHeaders();
 // Checks the origin of a request. PERMISSION_DENIED on the loopback interface
 // if the header Host is none of its names (DNS rebinding), and for a change
 // without the header X-Selfcal-Console, which pages of other sites cannot send.
-// UNIMPLEMENTED for methods other than GET, HEAD and POST.
+// UNIMPLEMENTED for methods other than GET, HEAD, POST, PATCH and DELETE.
 absl::Status CheckOrigin(const HttpRequest& request, bool loopback);
 
 }  // namespace selfcal::server

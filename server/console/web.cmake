@@ -2,9 +2,9 @@
 # and SELFCAL_CONSOLE_ASSETS: the source file with them.
 #
 # The packages of package-lock.json are fetched into the build directory when the
-# build is configured, and again when the lock file changes. One of them,
-# ts-proto, is a plugin of protoc and generates the types of the contract's
-# messages.
+# build is configured, and again when the lock file changes; without those that
+# only test/lint needs. One of them, ts-proto, is a plugin of protoc and generates
+# the types of the contract's messages.
 
 set(web_source ${CMAKE_CURRENT_SOURCE_DIR}/web)
 set(web ${CMAKE_CURRENT_BINARY_DIR}/web)
@@ -42,7 +42,7 @@ else()
     configure_file(
       ${web_source}/package-lock.json ${web}/package-lock.json COPYONLY)
     execute_process(
-      COMMAND ${SELFCAL_NPM} ci --ignore-scripts --no-audit --no-fund
+      COMMAND ${SELFCAL_NPM} ci --omit=dev --ignore-scripts --no-audit --no-fund
       WORKING_DIRECTORY ${web}
       RESULT_VARIABLE failed
       OUTPUT_QUIET
@@ -61,17 +61,10 @@ if(SELFCAL_HAS_CONSOLE)
   message(STATUS "web console: on")
   file(GLOB_RECURSE web_files CONFIGURE_DEPENDS ${web_source}/src/*)
   list(APPEND web_files ${web_source}/index.html ${web_source}/tsconfig.json
-    ${web_source}/build.mjs ${web_source}/package-lock.json)
-  set(proto ${PROJECT_SOURCE_DIR}/proto)
-  file(GLOB proto_files CONFIGURE_DEPENDS ${proto}/selfcal/v1/*.proto)
-  # The messages as the daemon prints them in JSON: all fields except messages
-  # and optional fields that are not set; times, 64-bit integers and enumerators
-  # as strings.
-  set(ts_proto_options
-    onlyTypes=true useJsonWireFormat=true forceLong=string useOptionals=messages
-    enumsAsLiterals=true unrecognizedEnum=false outputServices=false
-    exportCommonSymbols=false emitImportedFiles=false)
-  list(JOIN ts_proto_options "," ts_proto_options)
+    ${web_source}/build.mjs ${web_source}/generate.mjs
+    ${web_source}/package-lock.json)
+  file(GLOB proto_files CONFIGURE_DEPENDS
+    ${PROJECT_SOURCE_DIR}/proto/selfcal/v1/*.proto)
   set(built ${web}/dist/index.html ${web}/dist/assets/app.js
     ${web}/dist/assets/app.css)
   # The pages are built in a copy, beside the packages.
@@ -79,11 +72,8 @@ if(SELFCAL_HAS_CONSOLE)
     OUTPUT ${built}
     COMMAND ${CMAKE_COMMAND} -E rm -rf ${web}/src ${web}/generated ${web}/dist
     COMMAND ${CMAKE_COMMAND} -E copy_directory ${web_source} ${web}
-    COMMAND ${CMAKE_COMMAND} -E make_directory ${web}/generated
-    COMMAND protobuf::protoc --proto_path=${proto}
-      --plugin=protoc-gen-ts_proto=${web}/node_modules/.bin/protoc-gen-ts_proto
-      --ts_proto_out=${web}/generated --ts_proto_opt=${ts_proto_options}
-      ${proto_files}
+    COMMAND ${SELFCAL_NODE} generate.mjs
+      $<TARGET_FILE:protobuf::protoc> ${PROJECT_SOURCE_DIR}/proto
     COMMAND ${SELFCAL_NODE} node_modules/typescript/bin/tsc --noEmit
     COMMAND ${SELFCAL_NODE} build.mjs
     WORKING_DIRECTORY ${web}

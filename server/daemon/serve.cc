@@ -25,7 +25,8 @@
 #include "server/host/host_conditions.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
-#include "server/store/store_sqlite.h"
+#include "server/store/make_store.h"
+#include "server/store/sqlite/sqlite.h"
 #include "server/worker/worker.h"
 
 namespace selfcal::server {
@@ -169,14 +170,17 @@ std::optional<int> ServeOnce(
   if (!lock.ok()) return Failed("cannot start", lock.status());
   const std::string database = (options.state_dir / "selfcal.db").string();
   NotifyStatus("opening the database, with migrations if it is older");
-  const auto store =
-      MakeSqliteStore(database, options.domain.quotas.max_database_bytes);
-  if (!store.ok()) return Failed("cannot open " + database, store.status());
-  Domain domain(store->get(), options.domain);
-  const auto metrics = OpenMetrics(options, database, store->get());
+  auto sqlite =
+      OpenSqlite({.path = database,
+                  .max_bytes = options.domain.quotas.max_database_bytes,
+                  .time_ns = NowNs()});
+  if (!sqlite.ok()) return Failed("cannot open " + database, sqlite.status());
+  const std::unique_ptr<Store> store = MakeStore(*std::move(sqlite));
+  Domain domain(store.get(), options.domain);
+  const auto metrics = OpenMetrics(options, database, store.get());
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
-  ChangeFeed changes(store->get(),
+  ChangeFeed changes(store.get(),
                      *metrics == nullptr ? nullptr : (*metrics)->observer());
   const auto conditions = MakeHostConditions(options.host);
   const auto pipeline =
@@ -201,7 +205,7 @@ std::optional<int> ServeOnce(
                fmt::join((*server)->addresses(), ", "));
   NotifyReady();
 
-  const auto signal = RunUntilStopped(store->get(), read_log_level);
+  const auto signal = RunUntilStopped(store.get(), read_log_level);
   deadline.emplace(kStopLimit);
   NotifyStopping();
   if (signal == kRestart) {

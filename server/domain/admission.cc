@@ -5,8 +5,8 @@
 
 #include "core/selection/fit.h"
 #include "server/domain/exclusion.h"
+#include "server/status/status_macros.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
@@ -44,7 +44,7 @@ absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit) {
     if (segment.fit <= *largest_fit) continue;
     SELFCAL_RETURN_IF_ERROR(LeaveTables(tx,
                                         segment.rowid,
-                                        {.cause = AbsenceCause::kDoesNotFit,
+                                        {.cause = ExclusionCause::kDoesNotFit,
                                          .fit = segment.fit,
                                          .fit_limit = largest_fit}));
   }
@@ -58,14 +58,14 @@ absl::StatusOr<bool> AdmitByFit(UnitOfWork* tx,
   if (largest_fit && residuals.fit > *largest_fit) {
     SELFCAL_RETURN_IF_ERROR(RefuseTables(tx,
                                          segment,
-                                         {.cause = AbsenceCause::kDoesNotFit,
+                                         {.cause = ExclusionCause::kDoesNotFit,
                                           .fit = residuals.fit,
                                           .fit_limit = largest_fit}));
     return false;
   }
   if (residuals.many_outliers) {
     SELFCAL_RETURN_IF_ERROR(
-        RefuseTables(tx, segment, {.cause = AbsenceCause::kManyOutliers}));
+        RefuseTables(tx, segment, {.cause = ExclusionCause::kManyOutliers}));
     return false;
   }
   return true;

@@ -4,9 +4,9 @@
 
 #include "server/domain/retention.h"
 #include "server/domain/run_creation.h"
+#include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/runs.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 

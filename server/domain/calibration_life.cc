@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <iterator>
 
+#include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/events.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
+#include "server/status/status_macros.h"
 #include "server/store/events.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 

@@ -11,13 +11,13 @@
 #include "core/change/isolated.h"
 #include "server/domain/exclusion.h"
 #include "server/domain/quarantine.h"
+#include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
 #include "server/store/events.h"
 #include "server/store/runs.h"
 #include "server/store/segment_ends.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
@@ -47,7 +47,8 @@ absl::StatusOr<Newest> ReadNewest(UnitOfWork* tx,
       tx,
       {.first_sequence = first_sequence,
        .not_in_version = active.version,
-       .limit = 2 * count},
+       .limit = 2 * count,
+       .not_excluded_for = kMisfit},
       [&](const ScoredSegment& scored) {
         if (scored.information.ok() && tester.Accepts(*scored.information)) {
           rows.push_back(scored.segment);
@@ -121,7 +122,7 @@ std::string Describe(const DeviceSplit& split,
 
 absl::Status RestartTables(UnitOfWork* tx, std::int64_t first_sequence) {
   SELFCAL_RETURN_IF_ERROR(LeaveTablesIf(
-      tx, AbsenceCause::kDeviceChanged, [&](const TableEntry& entry) {
+      tx, ExclusionCause::kDeviceChanged, [&](const TableEntry& entry) {
         return entry.sequence < first_sequence;
       }));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t scored,

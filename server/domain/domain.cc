@@ -14,8 +14,8 @@
 #include "server/domain/run_life.h"
 #include "server/domain/run_results.h"
 #include "server/domain/session_trigger.h"
+#include "server/status/status_macros.h"
 #include "server/store/events.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 #include "server/store/transact.h"
 

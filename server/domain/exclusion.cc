@@ -3,19 +3,19 @@
 #include <string>
 #include <vector>
 
+#include "server/status/status_macros.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
 
 absl::Status LeaveTables(UnitOfWork* tx,
                          std::int64_t segment,
-                         const Absence& reason) {
+                         const NewExclusion& reason) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> groups,
                            TablesOfSegment(tx, segment));
   for (const std::string& group : groups) {
-    SELFCAL_RETURN_IF_ERROR(WriteAbsence(tx, segment, group, reason));
+    SELFCAL_RETURN_IF_ERROR(WriteExclusion(tx, segment, group, reason));
     SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, group, segment));
   }
   return absl::OkStatus();
@@ -23,7 +23,7 @@ absl::Status LeaveTables(UnitOfWork* tx,
 
 absl::Status LeaveTablesIf(
     UnitOfWork* tx,
-    AbsenceCause cause,
+    ExclusionCause cause,
     const std::function<bool(const TableEntry&)>& leaves) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
   for (const Table& table : tables) {
@@ -32,7 +32,7 @@ absl::Status LeaveTablesIf(
       SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
                                FindSegment(tx, entry.key));
       SELFCAL_RETURN_IF_ERROR(
-          WriteAbsence(tx, segment.rowid, table.group, {.cause = cause}));
+          WriteExclusion(tx, segment.rowid, table.group, {.cause = cause}));
       SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, segment.rowid));
     }
   }
@@ -41,10 +41,10 @@ absl::Status LeaveTablesIf(
 
 absl::Status RefuseTables(UnitOfWork* tx,
                           std::int64_t segment,
-                          const Absence& reason) {
+                          const NewExclusion& reason) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
   for (const Table& table : tables) {
-    SELFCAL_RETURN_IF_ERROR(WriteAbsence(tx, segment, table.group, reason));
+    SELFCAL_RETURN_IF_ERROR(WriteExclusion(tx, segment, table.group, reason));
   }
   return absl::OkStatus();
 }

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "server/domain/quotas.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 

@@ -4,10 +4,11 @@
 #include <utility>
 
 #include "server/domain/device_change.h"
+#include "server/domain/exclusion.h"
+#include "server/status/status_macros.h"
 #include "server/store/runs.h"
 #include "server/store/segment_ends.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 
@@ -29,7 +30,7 @@ absl::StatusOr<std::vector<RememberedSegment>> ListRemembered(
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
                            FirstSequenceSince(tx, run.change));
   SELFCAL_ASSIGN_OR_RETURN(std::vector<EndsRow> rows,
-                           ReadEnds(tx, first_sequence));
+                           ReadEnds(tx, first_sequence, kMisfit));
   std::vector<RememberedSegment> remembered;
   for (EndsRow& row : rows) {
     if (!row.has_data && !row.ends) continue;
@@ -53,7 +54,8 @@ absl::StatusOr<std::vector<HeldOut>> ListHeldOut(UnitOfWork* tx,
       {.first_sequence = first_sequence,
        .not_in_run = run_number,
        .with_data_first = true,
-       .limit = limit},
+       .limit = limit,
+       .not_excluded_for = kMisfit},
       [&](const ScoredSegment& scored) {
         if (scored.information.ok()) {
           held_out.push_back(

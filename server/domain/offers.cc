@@ -7,8 +7,8 @@
 
 #include "core/selection/joint_selection.h"
 #include "server/domain/quarantine.h"
-#include "server/store/absences.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
+#include "server/store/exclusions.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
@@ -73,12 +73,12 @@ absl::Status WriteOffer(UnitOfWork* tx,
                              FindSegment(tx, change.evicted->key));
     SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, evicted.rowid));
     SELFCAL_RETURN_IF_ERROR(
-        WriteAbsence(tx,
-                     evicted.rowid,
-                     table.group,
-                     {.cause = AbsenceCause::kPushedOut,
-                      .rival = segment.rowid,
-                      .rival_entropy = EntryOf(table, segment.key).entropy}));
+        WriteExclusion(tx,
+                       evicted.rowid,
+                       table.group,
+                       {.cause = ExclusionCause::kReplaced,
+                        .rival = segment.rowid,
+                        .rival_entropy = EntryOf(table, segment.key).entropy}));
   }
   if (!change.inserted) return absl::OkStatus();
   const TableEntry& entry = EntryOf(table, segment.key);
@@ -96,19 +96,19 @@ absl::Status ExplainRefusal(UnitOfWork* tx,
                          score->gain >= rig.min_gain_nats &&
                          !table.entries.empty();
   if (!outranked) {
-    return WriteAbsence(tx,
-                        segment.rowid,
-                        table.group,
-                        {.cause = AbsenceCause::kSaysTooLittle});
+    return WriteExclusion(tx,
+                          segment.rowid,
+                          table.group,
+                          {.cause = ExclusionCause::kInsufficientGain});
   }
   const TableEntry& worst = table.entries.back();
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow rival, FindSegment(tx, worst.key));
-  return WriteAbsence(tx,
-                      segment.rowid,
-                      table.group,
-                      {.cause = AbsenceCause::kOthersSayMore,
-                       .rival = rival.rowid,
-                       .rival_entropy = worst.entropy});
+  return WriteExclusion(tx,
+                        segment.rowid,
+                        table.group,
+                        {.cause = ExclusionCause::kOutranked,
+                         .rival = rival.rowid,
+                         .rival_entropy = worst.entropy});
 }
 
 }  // namespace

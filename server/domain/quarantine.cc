@@ -4,10 +4,10 @@
 
 #include "server/domain/exclusion.h"
 #include "server/domain/retention.h"
+#include "server/status/status_macros.h"
 #include "server/store/events.h"
 #include "server/store/runs.h"
 #include "server/store/segment_ends.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -27,7 +27,7 @@ absl::Status MakeUnusable(UnitOfWork* tx,
                           const std::string& problem) {
   SELFCAL_RETURN_IF_ERROR(WriteUnusable(tx, segment, problem));
   SELFCAL_RETURN_IF_ERROR(DeleteEnds(tx, segment));
-  return LeaveTables(tx, segment, {.cause = AbsenceCause::kUnusable});
+  return LeaveTables(tx, segment, {.cause = ExclusionCause::kUnusable});
 }
 
 }  // namespace

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "server/domain/exclusion.h"
+#include "server/status/status_macros.h"
 #include "server/store/database_size.h"
 #include "server/store/events.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -63,7 +63,7 @@ absl::Status Evict(UnitOfWork* tx,
   const std::int64_t segment = holder.segment.rowid;
   SELFCAL_RETURN_IF_ERROR(WriteProblem(tx, segment, why));
   SELFCAL_RETURN_IF_ERROR(
-      LeaveTables(tx, segment, {.cause = AbsenceCause::kDataEvicted}));
+      LeaveTables(tx, segment, {.cause = ExclusionCause::kDataEvicted}));
   SELFCAL_RETURN_IF_ERROR(DeleteData(tx, segment));
   return AppendEvent(
       tx,

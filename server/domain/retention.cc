@@ -6,9 +6,9 @@
 #include "server/domain/device_change.h"
 #include "server/domain/exclusion.h"
 #include "server/domain/memory.h"
+#include "server/status/status_macros.h"
 #include "server/store/change_rows.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
@@ -24,7 +24,7 @@ std::int64_t BeginOfReserve(const std::vector<DataHolder>& holders,
   std::vector<std::int64_t> sequences;
   for (const DataHolder& holder : holders) {
     if (holder.segment.state == SegmentState::kScored && !holder.gain &&
-        !holder.misfit && holder.segment.sequence >= first_sequence) {
+        !holder.excluded && holder.segment.sequence >= first_sequence) {
       sequences.push_back(holder.segment.sequence);
     }
   }
@@ -46,7 +46,7 @@ absl::StatusOr<std::vector<Table>> RemoveAgedEntries(UnitOfWork* tx,
                                FindSegment(tx, entry.key));
       if (segment.receive_time_ns >= now_ns - max_age_ns) continue;
       SELFCAL_RETURN_IF_ERROR(
-          LeaveTables(tx, segment.rowid, {.cause = AbsenceCause::kTooOld}));
+          LeaveTables(tx, segment.rowid, {.cause = ExclusionCause::kTooOld}));
     }
   }
   return ReadTables(tx);
@@ -54,14 +54,14 @@ absl::StatusOr<std::vector<Table>> RemoveAgedEntries(UnitOfWork* tx,
 
 absl::Status DropUnneededData(UnitOfWork* tx) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<DataHolder> holders,
-                           DataHolders(tx));
+                           DataHolders(tx, kMisfit));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change, NewestChange(tx));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
                            FirstSequenceSince(tx, change));
   const std::int64_t reserve = BeginOfReserve(holders, first_sequence);
   for (const DataHolder& holder : holders) {
     const bool in_reserve = holder.segment.state == SegmentState::kScored &&
-                            !holder.misfit &&
+                            !holder.excluded &&
                             holder.segment.sequence >= reserve;
     if (IsReferenced(holder) || in_reserve) continue;
     SELFCAL_RETURN_IF_ERROR(DeleteData(tx, holder.segment.rowid));

@@ -4,10 +4,10 @@
 
 #include <utility>
 
+#include "server/status/status_macros.h"
 #include "server/store/events.h"
 #include "server/store/records.h"
 #include "server/store/rigs.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -7,12 +7,12 @@
 #include <string>
 
 #include "server/domain/retention.h"
+#include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
 #include "server/store/events.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -32,7 +32,7 @@ const char* TriggerText(RunTrigger trigger) {
     case RunTrigger::kManual:
       break;
   }
-  return "asked for";
+  return "requested by an operator";
 }
 
 // FAILED_PRECONDITION if a run on these tables would repeat the newest
@@ -79,7 +79,12 @@ absl::StatusOr<std::optional<std::vector<SegmentKey>>> LastRunKeys(
   std::optional<std::vector<SegmentKey>> keys;
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t change, NewestChange(tx));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t of_tables,
-                           NewestRunOfTables(tx, change));
+                           NewestRunOf(tx,
+                                       {RunTrigger::kTablesFull,
+                                        RunTrigger::kChangeDetected,
+                                        RunTrigger::kTablesChanged,
+                                        RunTrigger::kSessionEnded},
+                                       change));
   if (of_tables == 0) {
     return keys;
   }

@@ -4,10 +4,10 @@
 
 #include "server/domain/calibration_life.h"
 #include "server/domain/retention.h"
+#include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/events.h"
 #include "server/store/runs.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -64,8 +64,8 @@ absl::Status HoldRun(UnitOfWork* tx,
   if (run.message.empty()) {
     SELFCAL_RETURN_IF_ERROR(
         AppendEvent(tx,
-                    EventKind::kRunHeldBack,
-                    fmt::format("run {} is held back: {}", run.run, reason)));
+                    EventKind::kRunDeferred,
+                    fmt::format("run {} is deferred: {}", run.run, reason)));
   }
   run.message = reason;
   return UpdateRun(tx, run);

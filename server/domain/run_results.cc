@@ -11,12 +11,12 @@
 #include "server/domain/retention.h"
 #include "server/domain/run_creation.h"
 #include "server/domain/run_life.h"
+#include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -8,9 +8,9 @@
 #include "server/domain/offers.h"
 #include "server/domain/retention.h"
 #include "server/domain/run_creation.h"
+#include "server/status/status_macros.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {

@@ -4,7 +4,7 @@
 #include <iterator>
 
 #include "core/change/compare.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -15,7 +15,7 @@ namespace selfcal::server {
 
 v1::Rig Encode(const StoredRig& rig);
 v1::Segment Encode(const StoredSegment& segment);
-v1::TableExclusion Encode(const std::string& rig, const TableAbsence& absence);
+v1::TableExclusion Encode(const std::string& rig, const Exclusion& exclusion);
 v1::Event Encode(const StoredEvent& event);
 v1::Table Encode(const std::string& rig, const Table& table);
 

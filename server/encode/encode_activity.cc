@@ -3,7 +3,7 @@
 #include <string>
 
 #include "proto/resource_names.h"
-#include "server/encode/encode_parts.h"
+#include "server/encode/set_time.h"
 #include "server/encode/table_fill.h"
 
 namespace selfcal::server {

@@ -1,6 +1,6 @@
 #include "proto/resource_names.h"
 #include "server/encode/encode.h"
-#include "server/encode/encode_parts.h"
+#include "server/encode/set_time.h"
 
 namespace selfcal::server {
 

@@ -1,7 +1,8 @@
 #include "proto/resource_names.h"
+#include "server/convert/convert.h"
 #include "server/encode/encode.h"
-#include "server/encode/encode_parts.h"
-#include "server/store/status_macros.h"
+#include "server/encode/set_time.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -87,10 +88,8 @@ v1::Recalibration Encode(const StoredRun& run,
         run.rig, "calibrations", std::to_string(run.calibration_version)));
   }
   if (calibration != nullptr && calibration->report) {
-    FillReport(run.rig,
-               *calibration->report,
-               calibration->seconds,
-               message.mutable_solver());
+    *message.mutable_solver() =
+        ToProto(*calibration->report, run.rig, calibration->seconds);
   }
   return message;
 }

@@ -4,8 +4,9 @@
 
 #include "proto/convert.h"
 #include "proto/resource_names.h"
+#include "server/convert/convert.h"
 #include "server/encode/encode.h"
-#include "server/encode/encode_parts.h"
+#include "server/encode/set_time.h"
 #include "server/store/rig_policy.h"
 
 namespace selfcal::server {
@@ -23,90 +24,65 @@ v1::Segment::State EncodeState(SegmentState state) {
   return v1::Segment::STATE_UNSPECIFIED;
 }
 
-void FillScore(const GroupScore& score,
-               const std::vector<std::string>& tables,
-               v1::GroupScore* message) {
-  message->set_group(score.group);
-  message->set_size(score.size);
-  message->set_entropy_nats(score.entropy);
-  message->set_gain_nats(score.gain);
-  message->set_rank(score.rank);
-  AddDirections(score.unobserved, message->mutable_unobserved());
-  message->set_in_table(std::find(tables.begin(), tables.end(), score.group) !=
-                        tables.end());
+bool InTable(const StoredSegment& segment, const std::string& group) {
+  return std::find(segment.tables.begin(), segment.tables.end(), group) !=
+         segment.tables.end();
 }
 
-void FillResiduals(const ResidualStatistics& residuals,
-                   v1::ResidualStatistics* message) {
-  message->set_observations(residuals.observations);
-  message->set_inliers(residuals.inliers);
-  message->set_not_projectable(residuals.not_projectable);
-  message->set_outliers(residuals.outliers);
-  message->set_landmarks(residuals.landmarks);
-  message->set_landmarks_used(residuals.landmarks_used);
-  message->set_reprojection_rms_px(residuals.reprojection_rms_px);
-  message->set_reprojection_median_px(residuals.reprojection_median_px);
-  message->mutable_inertial_rms()->Add(residuals.inertial_rms.begin(),
-                                       residuals.inertial_rms.end());
-  message->set_many_outliers(residuals.many_outliers);
-  message->set_fit(residuals.fit);
-  message->set_imu_gaps(residuals.imu_gaps);
-  message->set_longest_imu_gap_s(residuals.longest_imu_gap_s);
-}
-
-std::string ReasonText(const TableAbsence& absence) {
+std::string ReasonText(const Exclusion& exclusion) {
   const std::string rival =
-      absence.rival
-          ? fmt::format("{}~{}", absence.rival->session, absence.rival->index)
+      exclusion.rival
+          ? fmt::format(
+                "{}~{}", exclusion.rival->session, exclusion.rival->index)
           : "a segment that was dropped since";
-  switch (absence.cause) {
-    case AbsenceCause::kSaysTooLittle:
+  switch (exclusion.cause) {
+    case ExclusionCause::kInsufficientGain:
       return "insufficient gain";
-    case AbsenceCause::kOthersSayMore:
+    case ExclusionCause::kOutranked:
       return "outranked by all entries of the full table, the last of which "
              "is " +
              rival;
-    case AbsenceCause::kPushedOut:
+    case ExclusionCause::kReplaced:
       return "replaced by " + rival;
-    case AbsenceCause::kTooOld:
+    case ExclusionCause::kTooOld:
       return "older than the rig's table_max_age";
-    case AbsenceCause::kDeviceChanged:
+    case ExclusionCause::kDeviceChanged:
       return "from before a device change";
-    case AbsenceCause::kDataEvicted:
+    case ExclusionCause::kDataEvicted:
       return "its data was evicted by a quota";
-    case AbsenceCause::kUnusable:
+    case ExclusionCause::kUnusable:
       return "unusable; see the segment's problem";
-    case AbsenceCause::kDoesNotFit:
+    case ExclusionCause::kDoesNotFit:
       return fmt::format(
           "does not fit: its residuals are {:.3g} times what is expected, and "
           "up to {:.3g} is usual for this rig",
-          absence.fit.value_or(0),
-          absence.fit_limit.value_or(0));
-    case AbsenceCause::kManyOutliers:
+          exclusion.fit.value_or(0),
+          exclusion.fit_limit.value_or(0));
+    case ExclusionCause::kManyOutliers:
       return "more than a fifth of its observations are outliers";
   }
   return "unknown to this program";
 }
 
-v1::TableExclusion::Cause EncodeCause(AbsenceCause cause) {
+v1::TableExclusion::Cause EncodeCause(ExclusionCause cause) {
   switch (cause) {
-    case AbsenceCause::kSaysTooLittle:
+    case ExclusionCause::kInsufficientGain:
       return v1::TableExclusion::INSUFFICIENT_GAIN;
-    case AbsenceCause::kOthersSayMore:
+    case ExclusionCause::kOutranked:
       return v1::TableExclusion::OUTRANKED;
-    case AbsenceCause::kPushedOut:
+    case ExclusionCause::kReplaced:
       return v1::TableExclusion::REPLACED;
-    case AbsenceCause::kTooOld:
+    case ExclusionCause::kTooOld:
       return v1::TableExclusion::TOO_OLD;
-    case AbsenceCause::kDeviceChanged:
+    case ExclusionCause::kDeviceChanged:
       return v1::TableExclusion::DEVICE_CHANGED;
-    case AbsenceCause::kDataEvicted:
+    case ExclusionCause::kDataEvicted:
       return v1::TableExclusion::DATA_EVICTED;
-    case AbsenceCause::kUnusable:
+    case ExclusionCause::kUnusable:
       return v1::TableExclusion::UNUSABLE;
-    case AbsenceCause::kDoesNotFit:
+    case ExclusionCause::kDoesNotFit:
       return v1::TableExclusion::DOES_NOT_FIT;
-    case AbsenceCause::kManyOutliers:
+    case ExclusionCause::kManyOutliers:
       return v1::TableExclusion::MANY_OUTLIERS;
   }
   // Written by a newer program.
@@ -115,18 +91,18 @@ v1::TableExclusion::Cause EncodeCause(AbsenceCause cause) {
 
 }  // namespace
 
-v1::TableExclusion Encode(const std::string& rig, const TableAbsence& absence) {
+v1::TableExclusion Encode(const std::string& rig, const Exclusion& exclusion) {
   v1::TableExclusion message;
-  message.set_group(absence.group);
-  message.set_reason(ReasonText(absence));
-  SetTime(absence.time_ns, message.mutable_time());
-  message.set_cause(EncodeCause(absence.cause));
-  if (absence.rival) message.set_rival(SegmentName(rig, *absence.rival));
-  if (absence.rival_entropy) {
-    message.set_rival_entropy_nats(*absence.rival_entropy);
+  message.set_group(exclusion.group);
+  message.set_reason(ReasonText(exclusion));
+  SetTime(exclusion.time_ns, message.mutable_time());
+  message.set_cause(EncodeCause(exclusion.cause));
+  if (exclusion.rival) message.set_rival(SegmentName(rig, *exclusion.rival));
+  if (exclusion.rival_entropy) {
+    message.set_rival_entropy_nats(*exclusion.rival_entropy);
   }
-  if (absence.fit) message.set_fit(*absence.fit);
-  if (absence.fit_limit) message.set_fit_limit(*absence.fit_limit);
+  if (exclusion.fit) message.set_fit(*exclusion.fit);
+  if (exclusion.fit_limit) message.set_fit_limit(*exclusion.fit_limit);
   return message;
 }
 
@@ -158,13 +134,15 @@ v1::Segment Encode(const StoredSegment& segment) {
   if (!segment.information) return message;
   const SegmentInformation& information = *segment.information;
   for (const GroupScore& score : information.groups) {
-    FillScore(score, segment.tables, message.add_scores());
+    v1::GroupScore* added = message.add_scores();
+    *added = ToProto(score);
+    added->set_in_table(InTable(segment, score.group));
   }
-  FillResiduals(information.residuals, message.mutable_residuals());
+  *message.mutable_residuals() = ToProto(information.residuals);
   message.set_rank(information.rank);
   message.set_components(information.rank +
                          static_cast<int>(information.unobserved.size()));
-  AddDirections(information.unobserved, message.mutable_unobserved());
+  ToProto(information.unobserved, message.mutable_unobserved());
   return message;
 }
 

@@ -6,7 +6,7 @@
 
 #include "core/information/fusion.h"
 #include "proto/resource_names.h"
-#include "server/encode/encode_parts.h"
+#include "server/encode/set_time.h"
 
 namespace selfcal::server {
 

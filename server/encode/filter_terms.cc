@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "server/encode/shortened.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

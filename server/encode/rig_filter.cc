@@ -1,7 +1,7 @@
 #include "server/encode/rig_filter.h"
 
 #include "server/encode/filter_terms.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 

@@ -12,7 +12,7 @@
 
 #include "server/encode/filter_terms.h"
 #include "server/encode/shortened.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {

@@ -17,7 +17,7 @@
 #include "server/grpc/credentials.h"
 #include "server/grpc/grpc_log.h"
 #include "server/grpc/watch_sender.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -11,7 +11,7 @@
 #include "server/metrics/event_metrics.h"
 #include "server/metrics/recent_rigs.h"
 #include "server/metrics/state_metrics.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

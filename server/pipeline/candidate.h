@@ -1,5 +1,5 @@
 // Validation of a candidate: whether a calibration that the solver has found
-// may become the active one (method, section 6). Pure functions.
+// may become the active one (docs/operations.md, Validation). Pure functions.
 //
 // Each check passes, fails, or cannot be made. One that fails rejects the
 // candidate, with a sentence that has the value, what it means and what to do;

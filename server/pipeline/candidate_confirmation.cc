@@ -30,7 +30,7 @@ void CheckHalves(const CheckContext& context,
     failure = fmt::format(
         "Calibrations on two halves of the segments contradict each other: "
         "chi-square {:.1f} with {} degrees (probability {:.1e}, at least "
-        "{:.0e} is asked for). Segments are corrupted, or the device changed "
+        "{:.0e} is required). Segments are corrupted, or the device changed "
         "between them: look for those that fit worst, and send new motion.",
         halves.statistic,
         halves.degrees,
@@ -76,7 +76,8 @@ void CheckDisagreement(const CheckContext& context,
     failure = fmt::format(
         "The segments contradict one another by {:.2f} times the variance that "
         "noise explains, over {} degrees; at most {:.2f} is noise. Something "
-        "that is not modelled acts on all of them: look at the stamps, at lost "
+        "that is not modelled acts on all of them: look at the timestamps, at "
+        "lost "
         "samples, at the camera model and at the noise that is stated.",
         excess,
         degrees,
@@ -112,7 +113,7 @@ void CheckHeldOut(const CheckContext& context, StoredValidation* validation) {
   if (!(test.candidate.probability >= limit)) {
     failure = fmt::format(
         "{} held-out segments do not fit it: chi-square {:.1f} with {} degrees "
-        "(probability {:.1e}, at least {:.0e} is asked for); to active version "
+        "(probability {:.1e}, at least {:.0e} is required); to active version "
         "{} they fit with {:.1f}. Segments of the run are corrupted or of "
         "another device, or the device has changed: send new motion.",
         test.segments,
@@ -142,11 +143,12 @@ void CheckConfirmation(const CheckContext& context,
   AddResult("confirmed",
             tests,
             1,
-            tests > 0 ? ""
-                      : "Nothing but its own fit speaks for it: neither halves "
-                        "of its segments nor held-out segments could be "
-                        "tested. Send more motion, so that there are segments "
-                        "to test it on.",
+            tests > 0
+                ? ""
+                : "Nothing confirms it except its own fit: neither halves "
+                  "of its segments nor held-out segments could be "
+                  "tested. Send more motion, so that there are segments "
+                  "to test it on.",
             &validation->checks);
 }
 

@@ -26,8 +26,9 @@ void CheckObservations(const CheckContext& context,
   if (!(share >= limit)) {
     failure = fmt::format(
         "{} of {} observations were used ({:.1f} %, at least {:.0f} % are "
-        "asked for): the result rests on what happened to fit. Check tracks, "
-        "landmarks and stamps of what is sent (selfcal preflight).",
+        "required): the result is based on the few that happened to fit. Check "
+        "tracks, "
+        "landmarks and timestamps of what is sent (selfcal preflight).",
         result.observations,
         all,
         100 * share,
@@ -82,7 +83,7 @@ void CheckPixels(const CheckContext& context,
         "The reprojection error of {:.3g} px (rms) is {:.1f} times what the "
         "noise predicts, at most {:.1f} times are plausible: the model does "
         "not explain what was seen. Check the pixel sigma of the rig, the "
-        "tracks and the stamps (selfcal preflight).",
+        "tracks and the timestamps (selfcal preflight).",
         result.reprojection_rms_after_px,
         ratio,
         limit);

@@ -8,8 +8,8 @@
 #include "core/selection/tables.h"
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/stored_information.h"
+#include "server/status/status_macros.h"
 #include "server/store/records.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -18,7 +18,7 @@
 #include "server/pipeline/verification_sampler.h"
 #include "server/pipeline/verifier.h"
 #include "server/pipeline/watchers.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -413,7 +413,7 @@ Estimators CoreEstimators() {
 
 std::unique_ptr<Pipeline> MakePipeline(Domain* domain,
                                        const PipelineOptions& options,
-                                       Estimators estimators) {
+                                       const Estimators& estimators) {
   return std::make_unique<PipelineImpl>(domain, options, estimators);
 }
 

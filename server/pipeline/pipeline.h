@@ -237,6 +237,6 @@ class Pipeline {
 std::unique_ptr<Pipeline> MakePipeline(
     Domain* domain,
     const PipelineOptions& options,
-    Estimators estimators = CoreEstimators());
+    const Estimators& estimators = CoreEstimators());
 
 }  // namespace selfcal::server

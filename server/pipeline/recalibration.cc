@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "server/pipeline/retry.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 std::string RunTopic(const std::string& rig, std::int64_t run) {

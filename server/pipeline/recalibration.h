@@ -80,7 +80,7 @@ class Recalibrator {
     std::optional<StoredCalibration> candidate;
     std::optional<SegmentKey> damaged;
   };
-  enum class Execution { kDone, kHeldBack, kTryLater };
+  enum class Execution { kDone, kDeferred, kTryLater };
 
   using Clock = std::chrono::steady_clock;
 

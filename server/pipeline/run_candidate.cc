@@ -7,7 +7,7 @@
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/run_options.h"
 #include "server/pipeline/run_settings.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 

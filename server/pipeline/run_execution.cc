@@ -7,7 +7,7 @@
 
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/retry.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 
@@ -69,7 +69,7 @@ Recalibrator::Execution Recalibrator::ExecuteBegun(const StoredRun& run) {
 Recalibrator::Execution Recalibrator::Hold(const StoredRun& run,
                                            const std::string& reason) {
   if (run.message == reason) {
-    return Execution::kHeldBack;
+    return Execution::kDeferred;
   }
   const absl::Status held = domain_->HoldRun(run.rig, run.run, reason);
   if (!held.ok()) {
@@ -77,11 +77,11 @@ Recalibrator::Execution Recalibrator::Hold(const StoredRun& run,
     return absl::IsFailedPrecondition(held) ? Execution::kDone
                                             : Execution::kTryLater;
   }
-  spdlog::info("run {} of rig {} is held back: {}", run.run, run.rig, reason);
+  spdlog::info("run {} of rig {} is deferred: {}", run.run, run.rig, reason);
   StoredRun now = run;
   now.message = reason;
   run_watchers_->Publish(RunTopic(run.rig, run.run), {now, {}});
-  return Execution::kHeldBack;
+  return Execution::kDeferred;
 }
 
 bool Recalibrator::GiveUp(const StoredRun& run) {

@@ -7,7 +7,7 @@
 #include "core/change/aged.h"
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/stored_information.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 

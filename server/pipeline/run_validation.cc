@@ -14,7 +14,7 @@
 #include "server/pipeline/rescoring.h"
 #include "server/pipeline/stored_information.h"
 #include "server/pipeline/verdict.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "server/pipeline/retry.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -251,7 +251,7 @@ void ScoringWorkers::Commit(const Claim& claim,
       score.ok() ? Retry([&] { return TryCommit(claim, *score); })
                  : score.status();
   if (!status.ok() && !IsTransient(status)) {
-    SetAside(claim, status);
+    Quarantine(claim, status);
   }
 }
 
@@ -275,9 +275,9 @@ absl::Status ScoringWorkers::TryCommit(const Claim& claim, const Score& score) {
   return absl::OkStatus();
 }
 
-void ScoringWorkers::SetAside(const Claim& claim, const absl::Status& why) {
+void ScoringWorkers::Quarantine(const Claim& claim, const absl::Status& why) {
   const std::string problem(why.message());
-  spdlog::error("{} is set aside: {}", Name(claim), problem);
+  spdlog::error("{} is quarantined: {}", Name(claim), problem);
   Backoff backoff;
   for (;;) {
     const absl::Status status =
@@ -285,7 +285,7 @@ void ScoringWorkers::SetAside(const Claim& claim, const absl::Status& why) {
     if (status.ok() || absl::IsNotFound(status)) {
       return;
     }
-    spdlog::error("cannot set {} aside: {}", Name(claim), status.ToString());
+    spdlog::error("cannot quarantine {}: {}", Name(claim), status.ToString());
     if (!Pause(backoff.Next())) {
       return;
     }

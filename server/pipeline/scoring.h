@@ -80,7 +80,7 @@ class ScoringWorkers {
   bool WaitForTurn(const Claim& claim);
   void Commit(const Claim& claim, const absl::StatusOr<Score>& score);
   absl::Status TryCommit(const Claim& claim, const Score& score);
-  void SetAside(const Claim& claim, const absl::Status& why);
+  void Quarantine(const Claim& claim, const absl::Status& why);
   // Repeats the call until it succeeds or fails for good; when stopping,
   // returns the last result.
   absl::Status Retry(const std::function<absl::Status()>& call);

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

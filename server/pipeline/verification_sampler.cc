@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/information/landmark_sketch.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 

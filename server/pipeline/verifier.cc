@@ -8,7 +8,7 @@
 
 #include "server/pipeline/run_options.h"
 #include "server/pipeline/stored_information.h"
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

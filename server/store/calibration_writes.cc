@@ -1,9 +1,9 @@
 // Writes calibration versions.
+#include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/checksum.h"
+#include "server/store/driver/statement.h"
 #include "server/store/records.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -12,17 +12,16 @@ absl::Status InsertContent(UnitOfWork* tx,
                            const StoredCalibration& calibration) {
   const std::string content = SerializeCalibration(calibration);
   const std::string sha256 = Sha256(content);
-  // A version without a run has run 0 here, which becomes NULL.
   return Statement(
              tx->db(),
              "INSERT INTO calibrations (rig, version, state, create_time_ns, "
              "  run, content, sha256) "
-             "VALUES (?1, ?2, ?3, ?4, nullif(?5, 0), ?6, ?7)",
+             "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
              tx->rig_row(),
              calibration.version,
              static_cast<int>(calibration.state) + 1,
              calibration.create_time_ns,
-             calibration.run.value_or(0),
+             calibration.run,
              BlobView{content},
              BlobView{sha256})
       .Run();

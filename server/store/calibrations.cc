@@ -4,12 +4,12 @@
 
 #include <cstdint>
 
+#include "server/status/status_macros.h"
 #include "server/store/checksum.h"
+#include "server/store/driver/statement.h"
 #include "server/store/paging.h"
 #include "server/store/records.h"
 #include "server/store/rigs.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -217,7 +217,7 @@ absl::StatusOr<std::int64_t> ActivationTime(UnitOfWork* tx,
 }
 
 absl::StatusOr<std::int64_t> SchemaVersion(UnitOfWork* tx) {
-  return ReadInt(tx->db(), "PRAGMA user_version");
+  return ReadInt(tx->db(), "SELECT max(version) FROM schema_migrations");
 }
 
 }  // namespace selfcal::server

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "server/status/status_macros.h"
+#include "server/store/driver/statement.h"
 #include "server/store/rigs.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 

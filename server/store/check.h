@@ -3,8 +3,8 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/store/driver/driver.h"
 #include "server/store/maintenance.h"
-#include "server/store/statement.h"
 
 namespace selfcal::server {
 

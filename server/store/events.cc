@@ -2,9 +2,9 @@
 
 #include <limits>
 
+#include "server/status/status_macros.h"
+#include "server/store/driver/statement.h"
 #include "server/store/paging.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {

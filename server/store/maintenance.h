@@ -1,5 +1,4 @@
-// Check, backup and restore of a database while it is in use. An engine that
-// has tools of its own for this offers none.
+// Check, backup and restore of a database while it is in use.
 //
 // Any thread may call; a check or a backup blocks neither readers nor writers.
 // Errors as for Store.
@@ -14,12 +13,9 @@
 #include <string>
 #include <string_view>
 
-namespace selfcal::server {
+#include "server/store/driver/store_problem.h"
 
-struct StoreProblem {
-  std::string place;  // e.g. "payloads, row 7"
-  std::string description;
-};
+namespace selfcal::server {
 
 struct CheckSummary {
   std::int64_t bytes = 0;      // of the database
@@ -42,8 +38,10 @@ class Restoration {
   // DATA_LOSS if `sha256` is not the checksum of the bytes or the database is
   // damaged; FAILED_PRECONDITION if it is not a database of this program.
   // Otherwise the database replaces the present one at the next start; returns
-  // the name that the present one then gets.
-  virtual absl::StatusOr<std::string> Finish(std::string_view sha256) = 0;
+  // the name that the present one then gets, of which `time_ns` is a part [ns
+  // since the Unix epoch].
+  virtual absl::StatusOr<std::string> Finish(std::string_view sha256,
+                                             std::int64_t time_ns) = 0;
 };
 
 class StoreMaintenance {
@@ -55,6 +53,8 @@ class StoreMaintenance {
   using OnProblem = std::function<bool(const StoreProblem&)>;
   virtual absl::StatusOr<CheckSummary> Check(const OnProblem& on_problem) = 0;
 
+  // UNIMPLEMENTED, as for restoring, if the engine has tools of its own for it.
+
   // Copies one state of the database, in pieces of at most 1 MiB. The copy
   // takes as much disk space again until the call ends.
   using OnBytes = std::function<bool(std::string_view)>;
@@ -64,5 +64,10 @@ class StoreMaintenance {
   // next start.
   virtual absl::StatusOr<std::unique_ptr<Restoration>> BeginRestore() = 0;
 };
+
+class Database;
+
+// `database` must outlive it.
+std::unique_ptr<StoreMaintenance> MakeMaintenance(Database* database);
 
 }  // namespace selfcal::server

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "server/store/status_macros.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {

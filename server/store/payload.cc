@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "proto/convert.h"
+#include "server/status/status_macros.h"
 #include "server/store/checksum.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -2,7 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <utility>
+#include <vector>
+
+#include "proto/convert.h"
+#include "server/convert/convert.h"
 
 namespace selfcal::server {
 namespace {
@@ -62,42 +67,29 @@ bool GetMatrix(const store::MatrixRecord& record, Eigen::MatrixXd* matrix) {
   return true;
 }
 
-void PutVector(const Eigen::VectorXd& vector,
-               google::protobuf::RepeatedField<double>* values) {
-  values->Assign(vector.data(), vector.data() + vector.size());
+void PutStep(const CalibrateProgress& step, store::StepRecord* record) {
+  record->set_iteration(step.iteration);
+  record->set_max_iterations(step.max_iterations);
+  record->set_cost(step.cost);
+  record->set_step_sigmas(step.step_sigmas);
+  if (step.sigmas.size() == 0) return;
+  *record->mutable_theta() = ToProto(step.theta);
+  ToProto(step.moved, record->mutable_moved());
+  ToProto(step.sigmas, record->mutable_sigmas());
 }
 
-Eigen::VectorXd GetVector(
-    const google::protobuf::RepeatedField<double>& values) {
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), values.size());
-}
-
-void PutDirections(const std::vector<UnobservedDirection>& directions,
-                   DirectionMessages* messages) {
-  for (const UnobservedDirection& direction : directions) {
-    v1::UnobservedDirection* message = messages->Add();
-    message->set_information_ratio(direction.information_ratio);
-    for (const UnobservedDirection::Part& part : direction.parts) {
-      auto* part_message = message->add_parts();
-      part_message->set_component(part.component);
-      part_message->set_weight(part.weight);
-    }
-  }
-}
-
-std::vector<UnobservedDirection> GetDirections(
-    const DirectionMessages& messages) {
-  std::vector<UnobservedDirection> directions;
-  directions.reserve(messages.size());
-  for (const v1::UnobservedDirection& message : messages) {
-    UnobservedDirection direction;
-    direction.information_ratio = message.information_ratio();
-    for (const auto& part : message.parts()) {
-      direction.parts.push_back({part.component(), part.weight()});
-    }
-    directions.push_back(std::move(direction));
-  }
-  return directions;
+bool GetStep(const store::StepRecord& record, CalibrateProgress* step) {
+  step->iteration = record.iteration();
+  step->max_iterations = record.max_iterations();
+  step->cost = record.cost();
+  step->step_sigmas = record.step_sigmas();
+  if (record.sigmas().empty()) return true;
+  if (!FromProto(record.theta(), "", &step->theta).empty()) return false;
+  const int size = TangentSize(step->theta);
+  if (record.moved_size() != size || record.sigmas_size() != size) return false;
+  step->moved = FromProto(record.moved());
+  step->sigmas = FromProto(record.sigmas());
+  return true;
 }
 
 absl::Status DamagedRecord(const std::string& what) {

@@ -1,19 +1,14 @@
-// Conversion of parts that several records share: matrices, vectors,
-// directions.
+// Conversion of parts that several records share.
 #pragma once
 
 #include <absl/status/status.h>
-#include <google/protobuf/repeated_field.h>
-#include <google/protobuf/repeated_ptr_field.h>
 
 #include <Eigen/Core>
 #include <string>
-#include <vector>
 
-#include "core/information/segment_information.h"
+#include "core/calibration/calibrate.h"
 #include "core/model/calibration.h"
 #include "selfcal/store/records.pb.h"
-#include "selfcal/v1/calibration.pb.h"
 
 namespace selfcal::server {
 
@@ -27,17 +22,9 @@ bool GetMatrix(const store::MatrixRecord& record, Eigen::MatrixXd* matrix);
 void AddTimeOffsets(const Calibration& theta, Eigen::MatrixXd* matrix);
 void AddTimeOffsets(const Calibration& theta, Eigen::VectorXd* vector);
 
-void PutVector(const Eigen::VectorXd& vector,
-               google::protobuf::RepeatedField<double>* values);
-Eigen::VectorXd GetVector(
-    const google::protobuf::RepeatedField<double>& values);
-
-using DirectionMessages =
-    google::protobuf::RepeatedPtrField<v1::UnobservedDirection>;
-void PutDirections(const std::vector<UnobservedDirection>& directions,
-                   DirectionMessages* messages);
-std::vector<UnobservedDirection> GetDirections(
-    const DirectionMessages& messages);
+// `moved` and `sigmas` may be empty. False if they have not the size of theta.
+void PutStep(const CalibrateProgress& step, store::StepRecord* record);
+bool GetStep(const store::StepRecord& record, CalibrateProgress* step);
 
 absl::Status DamagedRecord(const std::string& what);
 

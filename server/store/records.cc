@@ -1,9 +1,10 @@
 #include "server/store/records.h"
 
 #include "proto/convert.h"
+#include "server/convert/convert.h"
+#include "server/status/status_macros.h"
 #include "server/store/record_parts.h"
 #include "server/store/rig_policy.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -15,64 +16,6 @@ absl::Status ParseMessage(std::string_view bytes,
   return message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))
              ? absl::OkStatus()
              : DamagedRecord(what);
-}
-
-void PutResiduals(const ResidualStatistics& residuals,
-                  v1::ResidualStatistics* message) {
-  message->set_observations(residuals.observations);
-  message->set_inliers(residuals.inliers);
-  message->set_not_projectable(residuals.not_projectable);
-  message->set_outliers(residuals.outliers);
-  message->set_landmarks(residuals.landmarks);
-  message->set_landmarks_used(residuals.landmarks_used);
-  message->set_reprojection_rms_px(residuals.reprojection_rms_px);
-  message->set_reprojection_median_px(residuals.reprojection_median_px);
-  for (const double rms : residuals.inertial_rms) {
-    message->add_inertial_rms(rms);
-  }
-  message->set_many_outliers(residuals.many_outliers);
-  message->set_fit(residuals.fit);
-  message->set_imu_gaps(residuals.imu_gaps);
-  message->set_longest_imu_gap_s(residuals.longest_imu_gap_s);
-}
-
-ResidualStatistics GetResiduals(const v1::ResidualStatistics& message) {
-  ResidualStatistics residuals;
-  residuals.observations = message.observations();
-  residuals.inliers = message.inliers();
-  residuals.not_projectable = message.not_projectable();
-  residuals.outliers = message.outliers();
-  residuals.landmarks = message.landmarks();
-  residuals.landmarks_used = message.landmarks_used();
-  residuals.reprojection_rms_px = message.reprojection_rms_px();
-  residuals.reprojection_median_px = message.reprojection_median_px();
-  residuals.inertial_rms.assign(message.inertial_rms().begin(),
-                                message.inertial_rms().end());
-  residuals.many_outliers = message.many_outliers();
-  residuals.fit = message.fit();
-  residuals.imu_gaps = message.imu_gaps();
-  residuals.longest_imu_gap_s = message.longest_imu_gap_s();
-  return residuals;
-}
-
-void PutGroup(const GroupScore& score, v1::GroupScore* message) {
-  message->set_group(score.group);
-  message->set_size(score.size);
-  message->set_entropy_nats(score.entropy);
-  message->set_gain_nats(score.gain);
-  message->set_rank(score.rank);
-  PutDirections(score.unobserved, message->mutable_unobserved());
-}
-
-GroupScore GetGroup(const v1::GroupScore& message) {
-  GroupScore score;
-  score.group = message.group();
-  score.size = message.size();
-  score.entropy = message.entropy_nats();
-  score.gain = message.gain_nats();
-  score.rank = message.rank();
-  score.unobserved = GetDirections(message.unobserved());
-  return score;
 }
 
 void PutLandmarks(const LandmarkSketch& landmarks,
@@ -124,13 +67,13 @@ std::string SerializeInformation(const SegmentInformation& information) {
   store::SegmentInformationRecord record;
   *record.mutable_theta0() = ToProto(information.theta0);
   PutMatrix(information.Lambda, record.mutable_lambda());
-  PutVector(information.eta, record.mutable_eta());
+  ToProto(information.eta, record.mutable_eta());
   record.set_rank(information.rank);
-  PutDirections(information.unobserved, record.mutable_unobserved());
+  ToProto(information.unobserved, record.mutable_unobserved());
   for (const GroupScore& score : information.groups) {
-    PutGroup(score, record.add_groups());
+    *record.add_groups() = ToProto(score);
   }
-  PutResiduals(information.residuals, record.mutable_residuals());
+  *record.mutable_residuals() = ToProto(information.residuals);
   PutLandmarks(information.landmarks, record.mutable_landmarks());
   return record.SerializeAsString();
 }
@@ -145,15 +88,15 @@ absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
       !GetLandmarks(record.landmarks(), &information.landmarks)) {
     return DamagedRecord(what);
   }
-  information.eta = GetVector(record.eta());
+  information.eta = FromProto(record.eta());
   AddTimeOffsets(information.theta0, &information.Lambda);
   AddTimeOffsets(information.theta0, &information.eta);
   information.rank = record.rank();
-  information.unobserved = GetDirections(record.unobserved());
+  information.unobserved = FromProto(record.unobserved());
   for (const v1::GroupScore& group : record.groups()) {
-    information.groups.push_back(GetGroup(group));
+    information.groups.push_back(FromProto(group));
   }
-  information.residuals = GetResiduals(record.residuals());
+  information.residuals = FromProto(record.residuals());
   return information;
 }
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "server/status/status_macros.h"
 #include "server/store/paging.h"
 #include "server/store/rigs.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
@@ -81,14 +81,16 @@ std::string SqlOf(const RigQuery& query) {
   const std::string order =
       by_name ? fmt::format("id {}", direction)
               : fmt::format("last_seen_ns {0}, id {0}", direction);
-  // The condition on the name does not use ?1, so it is used here.
+  // The condition on the name does not use ?1, so it is used here. A text
+  // contains another if it changes when that is removed.
   return fmt::format(
       "SELECT rig, id, create_time_ns, last_seen_ns FROM rigs "
-      "WHERE {} AND (?4 = '' OR instr(id, ?4) > 0) AND ?1 IS NOT NULL "
+      "WHERE {} AND (?4 = '' OR replace(id, ?4, '') <> id) "
+      "AND CAST(?1 AS BIGINT) IS NOT NULL "
       "AND (?6 = 0 OR ?6 = "
       "  (SELECT count(*) FROM rig_labels l WHERE l.rig = rigs.rig "
-      "   AND instr(?5, char(10) || l.name || '=' || l.value || char(10)) > "
-      "0)) "
+      "   AND replace(?5, '\n' || l.name || '=' || l.value || '\n', '') "
+      "     <> ?5)) "
       "ORDER BY {} LIMIT ?3",
       place,
       order);

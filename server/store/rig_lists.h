@@ -4,7 +4,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/store/statement.h"
+#include "server/store/driver/statement.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "server/status/status_macros.h"
 #include "server/store/checksum.h"
+#include "server/store/driver/statement.h"
 #include "server/store/records.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -24,6 +24,17 @@ absl::StatusOr<StoredRig> RigFromRow(const Statement& row, int column) {
   SELFCAL_ASSIGN_OR_RETURN(stored, ParseRig(bytes, what));
   stored.create_time_ns = row.Int(column + 1);
   return stored;
+}
+
+// Reads the row id that `sql` selects for the rig.
+absl::StatusOr<std::int64_t> FindRig(Connection* db,
+                                     std::string_view sql,
+                                     const std::string& rig) {
+  Statement read(db, sql, rig);
+  const bool found = read.Next();
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  if (!found) return NoSuchRig(rig);
+  return read.Int(0);
 }
 
 absl::StatusOr<std::vector<std::string>> ReadNames(Statement* read) {
@@ -62,16 +73,15 @@ absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig) {
   }
   const std::string bytes = SerializeRig(rig);
   const std::string sha256 = Sha256(bytes);
-  SELFCAL_RETURN_IF_ERROR(
-      Statement(db,
-                "INSERT INTO rigs (id, create_time_ns, definition, sha256) "
-                "VALUES (?1, ?2, ?3, ?4)",
-                id,
-                rig.create_time_ns,
-                BlobView{bytes},
-                BlobView{sha256})
-          .Run());
-  const std::int64_t row = LastInsertedRow(db);
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t row,
+      InsertReturning(db,
+                      "INSERT INTO rigs (id, create_time_ns, definition, "
+                      "  sha256) VALUES (?1, ?2, ?3, ?4) RETURNING rig",
+                      id,
+                      rig.create_time_ns,
+                      BlobView{bytes},
+                      BlobView{sha256}));
   SELFCAL_RETURN_IF_ERROR(InsertLabels(db, row, rig));
   return row;
 }
@@ -131,13 +141,14 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
 }
 
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig) {
-  Statement read(db, "SELECT rig FROM rigs WHERE id = ?1", rig);
-  const bool found = read.Next();
-  SELFCAL_RETURN_IF_ERROR(read.status());
-  if (!found) {
-    return NoSuchRig(rig);
-  }
-  return read.Int(0);
+  return FindRig(db, "SELECT rig FROM rigs WHERE id = ?1", rig);
+}
+
+absl::StatusOr<std::int64_t> LockRig(Connection* db, const std::string& rig) {
+  return FindRig(db,
+                 fmt::format("SELECT rig FROM rigs WHERE id = ?1{}",
+                             db->dialect().for_update),
+                 rig);
 }
 
 absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig) {
@@ -158,10 +169,7 @@ absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx) {
 }
 
 absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx) {
-  Statement read(tx->db(), "SELECT COUNT(*) FROM rigs");
-  const std::int64_t rigs = read.Next() ? read.Int(0) : 0;
-  if (!read.status().ok()) return read.status();
-  return rigs;
+  return ReadInt(tx->db(), "SELECT count(*) FROM rigs");
 }
 
 absl::StatusOr<std::vector<std::string>> RigNames(Connection* db) {

@@ -21,6 +21,9 @@ absl::Status DeleteRigRows(UnitOfWork* tx);
 
 // NOT_FOUND.
 absl::StatusOr<std::int64_t> FindRigId(Connection* db, const std::string& rig);
+// FindRigId for a transaction that writes: until it ends, no other one writes
+// records of the rig.
+absl::StatusOr<std::int64_t> LockRig(Connection* db, const std::string& rig);
 // NOT_FOUND; DATA_LOSS if the record is damaged.
 absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig);
 absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);

@@ -4,10 +4,10 @@
 
 #include <cstdint>
 
+#include "server/status/status_macros.h"
+#include "server/store/driver/statement.h"
 #include "server/store/paging.h"
 #include "server/store/rigs.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -100,6 +100,11 @@ int CauseOf(RunTrigger trigger) {
   return 3;
 }
 
+// The value of the column session_ended.
+int EndsSession(RunTrigger trigger) {
+  return trigger == RunTrigger::kSessionEnded ? 1 : 0;
+}
+
 absl::StatusOr<std::int64_t> NewestWhere(UnitOfWork* tx,
                                          const std::string& condition) {
   return ReadInt(
@@ -160,7 +165,7 @@ absl::StatusOr<StoredRun> ReadRun(UnitOfWork* tx, std::int64_t run) {
 }
 
 absl::StatusOr<std::int64_t> NewestRun(UnitOfWork* tx) {
-  return NewestWhere(tx, "1");
+  return NewestWhere(tx, "TRUE");
 }
 
 absl::StatusOr<std::int64_t> UnfinishedRun(UnitOfWork* tx) {
@@ -171,10 +176,19 @@ absl::StatusOr<std::int64_t> NewestSucceededRun(UnitOfWork* tx) {
   return NewestWhere(tx, "state = 3");
 }
 
-absl::StatusOr<std::int64_t> NewestRunOfTables(UnitOfWork* tx,
-                                               std::int64_t change) {
-  return NewestWhere(tx,
-                     fmt::format("cause IN (1, 2) AND change = {}", change));
+absl::StatusOr<std::int64_t> NewestRunOf(
+    UnitOfWork* tx,
+    std::initializer_list<RunTrigger> triggers,
+    std::int64_t change) {
+  std::vector<std::string> columns;
+  for (const RunTrigger trigger : triggers) {
+    columns.push_back(fmt::format("(cause = {} AND session_ended = {})",
+                                  CauseOf(trigger),
+                                  EndsSession(trigger)));
+  }
+  return NewestWhere(
+      tx,
+      fmt::format("change = {} AND ({})", change, fmt::join(columns, " OR ")));
 }
 
 absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
@@ -189,7 +203,7 @@ absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
                 run.create_time_ns,
                 run.base_version,
                 run.change,
-                run.trigger == RunTrigger::kSessionEnded ? 1 : 0)
+                EndsSession(run.trigger))
           .Run());
   for (const SegmentKey& key : run.segments) {
     SELFCAL_RETURN_IF_ERROR(

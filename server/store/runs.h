@@ -6,6 +6,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -34,10 +35,11 @@ absl::StatusOr<StoredRun> ReadRun(UnitOfWork* tx, std::int64_t run);
 absl::StatusOr<std::int64_t> NewestRun(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> UnfinishedRun(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> NewestSucceededRun(UnitOfWork* tx);
-// The newest run since this device change that was triggered by full or changed
-// tables, also at the end of a session.
-absl::StatusOr<std::int64_t> NewestRunOfTables(UnitOfWork* tx,
-                                               std::int64_t change);
+// Of those with one of these triggers, since this device change.
+absl::StatusOr<std::int64_t> NewestRunOf(
+    UnitOfWork* tx,
+    std::initializer_list<RunTrigger> triggers,
+    std::int64_t change);
 
 // Writes a pending run with its snapshot of segments.
 absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run);

@@ -7,11 +7,11 @@
 
 #include "proto/convert.h"
 #include "selfcal/store/records.pb.h"
-#include "server/store/absences.h"
+#include "server/convert/convert.h"
+#include "server/status/status_macros.h"
 #include "server/store/checksum.h"
+#include "server/store/driver/statement.h"
 #include "server/store/record_parts.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -58,7 +58,7 @@ std::string SerializeEnds(const SegmentEnds& ends) {
       record.add_lambda(ends.Lambda(i, j));
     }
   }
-  PutVector(ends.eta, record.mutable_eta());
+  ToProto(ends.eta, record.mutable_eta());
   return record.SerializeAsString();
 }
 
@@ -78,12 +78,14 @@ absl::StatusOr<SegmentEnds> ParseEnds(std::string_view bytes) {
   ends.first = states.keyframes[0];
   ends.last = states.keyframes[1];
   ends.tail = std::move(states.imu);
-  ends.eta = GetVector(record.eta());
+  ends.eta = FromProto(record.eta());
   return ends;
 }
 
-absl::StatusOr<std::vector<EndsRow>> ReadEnds(UnitOfWork* tx,
-                                              std::int64_t first_sequence) {
+absl::StatusOr<std::vector<EndsRow>> ReadEnds(
+    UnitOfWork* tx,
+    std::int64_t first_sequence,
+    ExclusionCauses not_excluded_for) {
   Statement read(
       tx->db(),
       fmt::format("SELECT s.segment, s.session, s.session_index, s.sequence, "
@@ -92,12 +94,13 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(UnitOfWork* tx,
                   "    WHERE p.segment = s.segment) "
                   "FROM segment_ends e JOIN segments s USING (segment) "
                   "WHERE e.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
-                  "  AND {} "
+                  "  AND NOT {} "
                   "ORDER BY min(s.sequence) OVER (PARTITION BY s.session), "
                   "  s.session_index",
-                  kFits),
+                  ExcludedFor("?3")),
       tx->rig_row(),
-      first_sequence);
+      first_sequence,
+      not_excluded_for.bits());
   std::vector<EndsRow> rows;
   while (read.Next()) {
     EndsRow row{.segment = {.rowid = read.Int(0),
@@ -142,8 +145,10 @@ absl::Status WriteEnds(UnitOfWork* tx,
   const std::string bytes = SerializeEnds(ends);
   const std::string sha256 = Sha256(bytes);
   return Statement(tx->db(),
-                   "INSERT OR REPLACE INTO segment_ends (segment, rig, ends, "
-                   "  sha256) VALUES (?1, ?2, ?3, ?4)",
+                   "INSERT INTO segment_ends (segment, rig, ends, sha256) "
+                   "VALUES (?1, ?2, ?3, ?4) "
+                   "ON CONFLICT (segment) DO UPDATE SET "
+                   "  ends = excluded.ends, sha256 = excluded.sha256",
                    segment,
                    tx->rig_row(),
                    BlobView{bytes},

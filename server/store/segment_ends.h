@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/information/segment_ends.h"
+#include "server/store/exclusions.h"
 #include "server/store/segment_rows.h"
 #include "server/store/unit_of_work.h"
 
@@ -30,10 +31,12 @@ struct EndsRow {
   // Read only for segments without data; nullopt if the record is damaged.
   std::optional<SegmentEnds> ends = std::nullopt;
 };
-// The segments with ends, from this sequence on, among those that VisitScored
-// visits: sessions in the order in which they began, each by index.
+// The scored segments with ends, from this sequence on, without those that a
+// table does not hold for one of these causes: sessions in the order in which
+// they began, each by index.
 absl::StatusOr<std::vector<EndsRow>> ReadEnds(UnitOfWork* tx,
-                                              std::int64_t first_sequence);
+                                              std::int64_t first_sequence,
+                                              ExclusionCauses not_excluded_for);
 // Arrival times of the scored segments that have ends [ns since the Unix
 // epoch].
 absl::StatusOr<std::vector<std::int64_t>> ArrivalsOfEnds(UnitOfWork* tx);

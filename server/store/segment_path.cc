@@ -3,10 +3,10 @@
 #include <algorithm>
 
 #include "selfcal/store/records.pb.h"
+#include "server/status/status_macros.h"
 #include "server/store/checksum.h"
+#include "server/store/driver/statement.h"
 #include "server/store/record_parts.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 

@@ -6,8 +6,8 @@
 #include <limits>
 #include <string_view>
 
+#include "server/status/status_macros.h"
 #include "server/store/paging.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <string>
 
-#include "server/store/statement.h"
+#include "server/store/driver/statement.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {

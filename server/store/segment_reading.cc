@@ -5,14 +5,14 @@
 #include <cmath>
 #include <cstdint>
 
-#include "server/store/absences.h"
+#include "server/status/status_macros.h"
 #include "server/store/checksum.h"
+#include "server/store/exclusions.h"
 #include "server/store/paging.h"
 #include "server/store/records.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_query_sql.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
@@ -138,8 +138,11 @@ absl::Status WriteScore(UnitOfWork* tx,
   const std::string sha256 = Sha256(bytes);
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
-                "INSERT OR REPLACE INTO segment_information (segment, "
-                "  information, sha256) VALUES (?1, ?2, ?3)",
+                "INSERT INTO segment_information (segment, information, "
+                "  sha256) VALUES (?1, ?2, ?3) "
+                "ON CONFLICT (segment) DO UPDATE SET "
+                "  information = excluded.information, "
+                "  sha256 = excluded.sha256",
                 segment,
                 BlobView{bytes},
                 BlobView{sha256})
@@ -147,8 +150,11 @@ absl::Status WriteScore(UnitOfWork* tx,
   for (const GroupScore& score : information.groups) {
     SELFCAL_RETURN_IF_ERROR(
         Statement(tx->db(),
-                  "INSERT OR REPLACE INTO segment_scores (segment, group_name, "
-                  "  entropy, gain, rank) VALUES (?1, ?2, ?3, ?4, ?5)",
+                  "INSERT INTO segment_scores (segment, group_name, entropy, "
+                  "  gain, rank) VALUES (?1, ?2, ?3, ?4, ?5) "
+                  "ON CONFLICT (segment, group_name) DO UPDATE SET "
+                  "  entropy = excluded.entropy, gain = excluded.gain, "
+                  "  rank = excluded.rank",
                   segment,
                   score.group,
                   score.entropy,
@@ -172,7 +178,7 @@ absl::Status VisitScored(
                   "    WHERE p.segment = s.segment) AS has_data "
                   "FROM segments s JOIN segment_information i USING (segment) "
                   "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
-                  "  AND {} "
+                  "  AND NOT {} "
                   "  AND NOT EXISTS (SELECT 1 FROM run_segments x "
                   "    WHERE x.rig = ?1 AND x.run = ?3 "
                   "      AND x.segment = s.segment) "
@@ -180,13 +186,14 @@ absl::Status VisitScored(
                   "    WHERE c.rig = ?1 AND c.version = ?4 "
                   "      AND c.segment = s.segment) "
                   "ORDER BY {} s.sequence DESC LIMIT ?5",
-                  kFits,
+                  ExcludedFor("?6"),
                   filter.with_data_first ? "has_data DESC," : ""),
       tx->rig_row(),
       filter.first_sequence,
       filter.not_in_run,
       filter.not_in_version,
-      filter.limit);
+      filter.limit,
+      filter.not_excluded_for.bits());
   while (read.Next()) {
     const std::string bytes = read.Text(6);
     const absl::Status intact = VerifySha256(bytes, read.Text(7), kWhat);

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include "server/store/absences.h"
+#include "server/status/status_macros.h"
+#include "server/store/driver/statement.h"
+#include "server/store/exclusions.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_path.h"
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -154,8 +154,9 @@ absl::StatusOr<std::vector<SegmentRow>> UnreferencedSegments(UnitOfWork* tx,
 }
 
 absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
-  SELFCAL_RETURN_IF_ERROR(
-      Statement(
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t row,
+      InsertReturning(
           tx->db(),
           "INSERT INTO segments (rig, session, session_index, sequence, "
           "  state, receive_time_ns, calibration_version, start_ns, end_ns, "
@@ -163,7 +164,7 @@ absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
           "  temperature_c) "
           "VALUES (?1, ?2, ?3, (SELECT coalesce(max(sequence), 0) + 1 "
           "    FROM segments WHERE rig = ?1), "
-          "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+          "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) RETURNING segment",
           tx->rig_row(),
           segment.key.session,
           segment.key.index,
@@ -175,9 +176,7 @@ absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
           segment.imu_samples,
           segment.landmarks,
           segment.observations,
-          segment.temperature_c)
-          .Run());
-  const std::int64_t row = LastInsertedRow(tx->db());
+          segment.temperature_c));
   SELFCAL_RETURN_IF_ERROR(InsertPath(tx, row, segment.path));
   return Statement(tx->db(),
                    "INSERT INTO payloads (segment, rig, data, raw_bytes, "
@@ -289,7 +288,8 @@ absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t segment) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<DataHolder>> DataHolders(UnitOfWork* tx) {
+absl::StatusOr<std::vector<DataHolder>> DataHolders(
+    UnitOfWork* tx, ExclusionCauses excluded_for) {
   Statement read(
       tx->db(),
       fmt::format("SELECT {}, length(p.data), "
@@ -298,12 +298,13 @@ absl::StatusOr<std::vector<DataHolder>> DataHolders(UnitOfWork* tx) {
                   "    WHERE x.segment = p.segment AND r.state IN (1, 2)), "
                   "  (SELECT max(e.gain) FROM table_entries e "
                   "    WHERE e.segment = p.segment), "
-                  "  NOT {} "
+                  "  {} "
                   "FROM payloads p JOIN segments s USING (segment) "
                   "WHERE p.rig = ?1 AND s.state <> 1 ORDER BY s.segment",
                   kColumns,
-                  kFits),
-      tx->rig_row());
+                  ExcludedFor("?2")),
+      tx->rig_row(),
+      excluded_for.bits());
   std::vector<DataHolder> holders;
   while (read.Next()) {
     DataHolder& holder = holders.emplace_back();
@@ -311,7 +312,7 @@ absl::StatusOr<std::vector<DataHolder>> DataHolders(UnitOfWork* tx) {
     holder.bytes = read.Int(7);
     holder.in_unfinished_run = read.Int(8) != 0;
     if (!read.IsNull(9)) holder.gain = read.Double(9);
-    holder.misfit = read.Int(10) != 0;
+    holder.excluded = read.Int(10) != 0;
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return holders;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/store/exclusions.h"
 #include "server/store/payload.h"
 #include "server/store/store.h"
 #include "server/store/unit_of_work.h"
@@ -100,14 +101,15 @@ struct ScoredFilter {
   std::int64_t not_in_version = 0;
   bool with_data_first = false;  // both parts newest first
   int limit = 0;
+  // Leaves out those that a table does not hold for one of these causes.
+  ExclusionCauses not_excluded_for = {};
 };
 struct ScoredSegment {
   SegmentRow segment;
   bool has_data = false;
   absl::StatusOr<SegmentInformation> information;  // DATA_LOSS if damaged
 };
-// Calls `visit` with the scored segments that are not misfits
-// (AbsenceCause::kDoesNotFit, kManyOutliers), until it returns false.
+// Calls `visit` with these segments until it returns false.
 absl::Status VisitScored(
     UnitOfWork* tx,
     const ScoredFilter& filter,
@@ -120,10 +122,11 @@ struct DataHolder {
   bool in_unfinished_run = false;
   // The largest gain in the tables that hold it; nullopt if none does.
   std::optional<double> gain;
-  bool misfit = false;  // as for VisitScored
+  bool excluded = false;  // from a table, for one of the causes asked for
 };
 // In order of arrival.
-absl::StatusOr<std::vector<DataHolder>> DataHolders(UnitOfWork* tx);
+absl::StatusOr<std::vector<DataHolder>> DataHolders(
+    UnitOfWork* tx, ExclusionCauses excluded_for = {});
 // Bytes of the data of all segments, compressed.
 absl::StatusOr<std::int64_t> DataBytes(UnitOfWork* tx);
 absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t segment);

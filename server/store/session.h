@@ -54,10 +54,10 @@ struct SessionSegment {
 inline constexpr int kMaxPathPoints = 16;
 
 // The numbers, from 1, are stored in the database: only ever extended.
-enum class AbsenceCause {
-  kSaysTooLittle = 1,  // insufficient gain; joint: beyond that kept
-  kOthersSayMore,      // outranked by all entries of the full table
-  kPushedOut,          // evicted by a later segment
+enum class ExclusionCause {
+  kInsufficientGain = 1,  // joint: beyond what the kept segments have
+  kOutranked,             // by all entries of the full table
+  kReplaced,              // by a later segment
   kTooOld,
   kDeviceChanged,
   kDataEvicted,  // by a quota
@@ -67,11 +67,11 @@ enum class AbsenceCause {
 };
 
 // An exclusion: why the table of a group does not hold a scored segment.
-struct TableAbsence {
+struct Exclusion {
   std::string group;
-  AbsenceCause cause = AbsenceCause::kSaysTooLittle;
+  ExclusionCause cause = ExclusionCause::kInsufficientGain;
   std::int64_t time_ns = 0;
-  // kOthersSayMore: the worst entry of the table at that time; kPushedOut: the
+  // kOutranked: the worst entry of the table at that time; kReplaced: the
   // segment that replaced it. No key once the records of that segment are gone.
   std::optional<SegmentKey> rival;
   std::optional<double> rival_entropy;  // [nat]

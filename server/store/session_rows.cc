@@ -5,12 +5,12 @@
 #include <limits>
 #include <optional>
 
+#include "server/status/status_macros.h"
 #include "server/store/checksum.h"
 #include "server/store/paging.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_path.h"
 #include "server/store/segment_rows.h"
-#include "server/store/status_macros.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "server/store/statement.h"
+#include "server/store/driver/statement.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {

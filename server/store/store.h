@@ -1,7 +1,7 @@
 // Records of everything that selfcald keeps, and transactions on them. The
-// store has no policy: server/domain decides what is written. The SQLite store
-// (store_sqlite.h) is the implementation; any other engine must pass the same
-// tests.
+// store has no policy: server/domain decides what is written. It keeps them in
+// the database of an engine behind a driver (make_store.h, driver/driver.h);
+// every engine must pass the same tests.
 //
 // A transaction happens as a whole or not at all: when Transact returns OK it
 // is committed and synced, when it returns an error nothing has changed.
@@ -312,7 +312,7 @@ class Store {
   virtual absl::StatusOr<SessionSummary> GetSession(
       const std::string& rig, const std::string& session) = 0;
   // Exclusions of the segment, as far as they were recorded.
-  virtual absl::StatusOr<std::vector<TableAbsence>> ListAbsences(
+  virtual absl::StatusOr<std::vector<Exclusion>> ListExclusions(
       const std::string& rig, const SegmentKey& key) = 0;
   // The oldest unscored segments of all rigs, in the order of their arrival.
   struct Unscored {
@@ -354,9 +354,8 @@ class Store {
   virtual absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(
       const Page& page, const std::string& rig = "") = 0;
 
-  // Check, backup and restore; null for an engine that has tools of its own for
-  // them. Lives as long as the store.
-  virtual StoreMaintenance* maintenance() { return nullptr; }
+  // Check, backup and restore. Lives as long as the store.
+  virtual StoreMaintenance* maintenance() = 0;
 };
 
 }  // namespace selfcal::server

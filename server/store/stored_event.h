@@ -18,7 +18,7 @@ enum class EventKind {
   kDataEvicted,            // a quota was reached
   kCalibrationActivated,   // manually
   kCalibrationRolledBack,  // manually
-  kRunHeldBack,
+  kRunDeferred,
   kSegmentQuarantined,  // by a run, by its neighbours, or manually
   kCoresDisagree,       // a verification found a difference
   kRigUpdated,          // by hand, as the next two

@@ -1,7 +1,9 @@
 #include "server/store/table_rows.h"
 
-#include "server/store/statement.h"
-#include "server/store/status_macros.h"
+#include <algorithm>
+
+#include "server/status/status_macros.h"
+#include "server/store/driver/statement.h"
 
 namespace selfcal::server {
 namespace {
@@ -11,8 +13,7 @@ absl::Status ReadEntries(Connection* db, std::int64_t rig, Table* table) {
                  "SELECT s.session, s.session_index, s.sequence, e.entropy, "
                  "  e.gain "
                  "FROM table_entries e JOIN segments s USING (segment) "
-                 "WHERE e.rig = ?1 AND e.group_name = ?2 "
-                 "ORDER BY e.entropy, s.sequence",
+                 "WHERE e.rig = ?1 AND e.group_name = ?2",
                  rig,
                  table->group);
   while (read.Next()) {
@@ -21,6 +22,7 @@ absl::Status ReadEntries(Connection* db, std::int64_t rig, Table* table) {
                               read.Double(3),
                               read.Double(4)});
   }
+  std::sort(table->entries.begin(), table->entries.end(), Better);
   return read.status();
 }
 

@@ -13,7 +13,7 @@
 
 namespace selfcal::server {
 
-class Connection;  // statement.h
+class Connection;  // driver/driver.h
 
 class UnitOfWork {
  public:

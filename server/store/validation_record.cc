@@ -1,4 +1,5 @@
-// Record of the validation of a candidate.
+#include "server/store/validation_record.h"
+
 #include "server/store/record_parts.h"
 #include "server/store/records.h"
 
@@ -96,6 +97,27 @@ void PutCheck(const ValidationCheck& check, v1::Validation::Check* message) {
 
 }  // namespace
 
+v1::Validation ValidationMessage(const StoredValidation& validation,
+                                 bool accepted) {
+  v1::Validation message;
+  message.set_verdict(accepted ? v1::Validation::ACCEPTED
+                               : v1::Validation::REJECTED);
+  message.set_active_version(validation.active_version);
+  for (const ValidationCheck& check : validation.checks) {
+    PutCheck(check, message.add_checks());
+  }
+  PutHeldOut(validation.held_out, message.mutable_held_out());
+  return message;
+}
+
+v1::Verdict VerdictMessage(const Verdict& verdict) {
+  v1::Verdict message;
+  message.set_kind(ToRecord(verdict.kind));
+  message.mutable_sentences()->Assign(verdict.sentences.begin(),
+                                      verdict.sentences.end());
+  return message;
+}
+
 std::string SerializeValidation(const StoredCalibration& judged) {
   store::ValidationRecord record;
   record.set_rig(judged.rig);
@@ -103,19 +125,10 @@ std::string SerializeValidation(const StoredCalibration& judged) {
   record.mutable_reasons()->Assign(judged.reasons.begin(),
                                    judged.reasons.end());
   if (judged.validation) {
-    v1::Validation* message = record.mutable_validation();
-    message->set_verdict(judged.state == CalibrationState::kRejected
-                             ? v1::Validation::REJECTED
-                             : v1::Validation::ACCEPTED);
-    message->set_active_version(judged.validation->active_version);
-    for (const ValidationCheck& check : judged.validation->checks) {
-      PutCheck(check, message->add_checks());
-    }
-    PutHeldOut(judged.validation->held_out, message->mutable_held_out());
+    *record.mutable_validation() = ValidationMessage(
+        *judged.validation, judged.state != CalibrationState::kRejected);
   }
-  record.mutable_verdict()->set_kind(ToRecord(judged.verdict.kind));
-  record.mutable_verdict()->mutable_sentences()->Assign(
-      judged.verdict.sentences.begin(), judged.verdict.sentences.end());
+  *record.mutable_verdict() = VerdictMessage(judged.verdict);
   return record.SerializeAsString();
 }
 

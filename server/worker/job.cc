@@ -4,6 +4,7 @@
 
 #include "proto/convert.h"
 #include "selfcal/worker/job.pb.h"
+#include "server/convert/convert.h"
 #include "server/store/record_parts.h"
 #include "server/store/records.h"
 #include "server/store/segment_ends.h"
@@ -25,7 +26,7 @@ void PutRemembered(const CalibrateOptions& options, worker::Options* message) {
     added->set_fit(one.fit);
     added->set_time_ns(one.time_ns);
   }
-  PutVector(options.walk, message->mutable_walk());
+  ToProto(options.walk, message->mutable_walk());
   message->mutable_changing()->Assign(options.changing.begin(),
                                       options.changing.end());
 }
@@ -66,7 +67,7 @@ bool GetRemembered(const worker::Options& message, CalibrateOptions* options) {
     if (!ends.ok()) return false;
     added.ends = *std::move(ends);
   }
-  options->walk = GetVector(message.walk());
+  options->walk = FromProto(message.walk());
   options->changing.assign(message.changing().begin(),
                            message.changing().end());
   return true;
@@ -128,15 +129,9 @@ std::string EncodeScoreJob(ScorerKind scorer,
 }
 
 std::string EncodeProgress(const CalibrateProgress& progress) {
-  worker::Progress message;
-  message.set_iteration(progress.iteration);
-  message.set_max_iterations(progress.max_iterations);
-  message.set_cost(progress.cost);
-  message.set_step_sigmas(progress.step_sigmas);
-  *message.mutable_theta() = ToProto(progress.theta);
-  message.mutable_moved()->Add(progress.moved.begin(), progress.moved.end());
-  message.mutable_sigmas()->Add(progress.sigmas.begin(), progress.sigmas.end());
-  return message.SerializeAsString();
+  store::StepRecord record;
+  PutStep(progress, &record);
+  return record.SerializeAsString();
 }
 
 std::string EncodeResult(const CalibrationResult& result) {
@@ -146,6 +141,7 @@ std::string EncodeResult(const CalibrationResult& result) {
     return message.SerializeAsString();
   }
   StoredCalibration calibration;
+  calibration.rig = "-";  // any: a worker does not know its name
   calibration.theta = result.theta;
   calibration.covariance = result.covariance;
   calibration.report = result;
@@ -186,22 +182,12 @@ std::optional<Job> DecodeJob(std::string_view bytes) {
 }
 
 std::optional<CalibrateProgress> DecodeProgress(std::string_view bytes) {
-  worker::Progress message;
+  store::StepRecord record;
   CalibrateProgress progress;
-  if (!Parse(bytes, &message) ||
-      !FromProto(message.theta(), "", &progress.theta).empty() ||
-      message.moved_size() != TangentSize(progress.theta) ||
-      message.sigmas_size() != TangentSize(progress.theta)) {
+  if (!Parse(bytes, &record) || record.sigmas().empty() ||
+      !GetStep(record, &progress)) {
     return std::nullopt;
   }
-  progress.iteration = message.iteration();
-  progress.max_iterations = message.max_iterations();
-  progress.cost = message.cost();
-  progress.step_sigmas = message.step_sigmas();
-  progress.moved = Eigen::Map<const Eigen::VectorXd>(message.moved().data(),
-                                                     message.moved_size());
-  progress.sigmas = Eigen::Map<const Eigen::VectorXd>(message.sigmas().data(),
-                                                      message.sigmas_size());
   return progress;
 }
 

@@ -35,10 +35,10 @@ const tests = {
     await r.page.getByRole('link', { name: 'Next rigs' }).click();
     await r.page.getByRole('link', { name: 'First page' }).waitFor();
     await r.sees('phone-070');
-    await r.page.getByLabel('Name contains').fill('tab');
+    await r.page.getByLabel('Filter').fill('tab');
     await r.rows((names) => names.length === 1 && names[0] === 'tablet');
     assert.match(r.page.url(), /filter=tab/);
-    await r.page.getByLabel('Name contains').fill('');
+    await r.page.getByLabel('Filter').fill('');
     await r.page.getByRole('link', { name: 'Last seen' }).click();
     await r.page.locator('th[aria-sort=ascending]', { hasText: 'Last seen' }).waitFor();
     await r.page.getByRole('link', { name: 'Last seen' }).click();
@@ -253,6 +253,39 @@ const tests = {
     await r.page.getByRole('dialog').waitFor({ state: 'detached', timeout: kPatience });
     await other.sees('the browser test asked for it');
     await other.picture('events');
+  },
+
+  async 'a rig is labelled, found by its label, and deleted'(r) {
+    await r.open('/rigs/phone-049', 'phone-049');
+    await r.page.getByRole('button', { name: 'Edit labels' }).click();
+    await r.page.getByRole('dialog').getByRole('textbox').fill('site = lab\nowner = me');
+    await r.picture('labels');
+    await r.page.getByRole('button', { name: 'Save' }).click();
+    await r.sees('owner = me');
+    await r.open('/', 'Rigs');
+    await r.page.getByLabel('Filter').fill('labels.site = lab');
+    await r.rows((names) => names.length === 1 && names[0] === 'phone-049');
+    await r.open('/rigs/phone-049', 'phone-049');
+    await r.page.getByRole('button', { name: 'Delete rig' }).click();
+    await r.page.getByLabel('Reason').fill('it was lost');
+    await r.page.getByRole('button', { name: 'Delete', exact: true }).click();
+    await r.heading('Rigs');
+    await r.shows('/events', 'Events', ['it was lost']);
+  },
+
+  async 'a segment that a calibration was computed from is not deleted'(r) {
+    const { calibrations } = await r.api('rigs/tablet/calibrations');
+    const [name] = calibrations.find((c) => c.provenance).provenance.segments;
+    await r.open('/' + name, 'Segment ' + decodeURIComponent(name.slice(name.lastIndexOf('/') + 1)));
+    r.expectProblems = true;
+    await r.page.getByRole('button', { name: 'Delete', exact: true }).click();
+    const dialog = r.page.getByRole('dialog');
+    await dialog.getByLabel('Reason').fill('a try');
+    await dialog.getByRole('button', { name: 'Delete', exact: true }).click();
+    await dialog.getByRole('alert').waitFor();
+    assert.match(await dialog.getByRole('alert').textContent(), /version \d+ was computed from/);
+    await dialog.getByRole('button', { name: 'Cancel' }).click();
+    r.expectProblems = false;
   },
 
   async 'events of all rigs are listed'(r) {

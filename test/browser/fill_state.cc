@@ -14,9 +14,9 @@
 
 #include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
-#include "server/store/status_macros.h"
-#include "server/store/store_sqlite.h"
+#include "server/status/status_macros.h"
 #include "test/browser/simulated_device.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
 
 namespace selfcal::server {
 namespace {
@@ -57,7 +57,7 @@ absl::Status AddDevice(Domain* domain, const std::string& id) {
 absl::Status Fill(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   SELFCAL_ASSIGN_OR_RETURN(const auto store,
-                           MakeSqliteStore(folder / "selfcal.db"));
+                           OpenSqliteStore(folder / "selfcal.db"));
   Domain domain(store.get());
   for (int i = 1; i <= kIdleRigs; ++i) {
     SELFCAL_RETURN_IF_ERROR(

@@ -52,13 +52,12 @@ std::vector<MotionSegment> Segments(const MapCase& of) {
   const int count = (of.segments - 1) * of.every + 1;
   const double duration_s =
       (count * options.keyframes_per_segment + 5) / options.keyframe_rate_hz;
-  SimulatedSession session =
-      Simulate(of.rig,
-               of.rig.factory,
-               PerturbCalibration(of.rig.factory, {}, 1),
-               *MakeHandheld(duration_s, 0.7, 1),
-               "session",
-               options);
+  SimulatedSession session = Simulate(of.rig,
+                                      of.rig.factory,
+                                      PerturbCalibration(of.rig.factory, {}, 1),
+                                      *MakeHandheld(duration_s, 0.7, 1),
+                                      "session",
+                                      options);
   std::vector<MotionSegment> segments;
   for (int s = 0; s < count; s += of.every) {
     segments.push_back(std::move(session.segments.at(s)));

@@ -25,8 +25,8 @@
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
 #include "server/domain/domain.h"
-#include "server/store/store_sqlite.h"
-#include "test/server/store/fault_vfs.h"
+#include "test/server/store/sqlite/fault_vfs.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
 
 namespace selfcal::server {
 namespace {
@@ -107,7 +107,7 @@ Measured MeasureStore(const Options& options, const MotionSegment& segment) {
   const std::string path = options.folder + "/bench.db";
   for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(path + suffix);
   FaultVfs vfs;
-  auto store = MakeSqliteStore(path);
+  auto store = OpenSqliteStore(path);
   if (!store.ok()) throw std::runtime_error(store.status().ToString());
   Domain domain(store->get());
   if (!domain.CreateRig(HandheldRig("bench")).ok()) {

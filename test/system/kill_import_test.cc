@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "client/selfcal/client.h"
+#include "test/support/eventually.h"
 #include "test/system/running_daemon.h"
 #include "test/system/simulated_walk.h"
 
@@ -78,11 +79,12 @@ Outcome Import(const Device& device,
   send_until(device.segments.size());
   EXPECT_TRUE(stream.Drain(milliseconds(120'000)).ok());
   for (int kill = 0; kill < kills_in_run; ++kill) {
-    EXPECT_TRUE(WaitUntil(120, [&] { return IsRunning(view); }));
+    EXPECT_TRUE(Eventually(
+        [&] { return IsRunning(view); }, 2 * kLongWait, kDaemonInterval));
     daemon->Kill();
     daemon = folder.StartDaemon();
   }
-  EXPECT_TRUE(WaitUntilIdle(view, device.segments.size(), 240).ok());
+  EXPECT_TRUE(WaitUntilIdle(view, device.segments.size(), 4 * kLongWait).ok());
   outcome.stream = stream.statistics();
   outcome.state = *view.GetState();
   outcome.runs = *view.GetRuns();

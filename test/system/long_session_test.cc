@@ -14,6 +14,7 @@
 #include "client/selfcal/client.h"
 #include "client/selfcal/segment_builder.h"
 #include "core/simulation/simulate.h"
+#include "test/support/eventually.h"
 #include "test/system/looped_session.h"
 #include "test/system/running_daemon.h"
 
@@ -93,7 +94,7 @@ TEST(LongSession, AnHourGoesThroughAtConstantMemory) {
   options.rig = rig.id;
   SegmentStream stream(options, nullptr);
   const auto wait_for_room = [&] {
-    return WaitUntil(60, [&] {
+    return Eventually([&] {
       const StreamStatistics s = stream.statistics();
       return s.queued <
              s.stored + static_cast<std::uint64_t>(options.max_queue);
@@ -124,7 +125,9 @@ TEST(LongSession, AnHourGoesThroughAtConstantMemory) {
   ASSERT_EQ(sent, kSegments);
   ASSERT_TRUE(stream.Drain(std::chrono::milliseconds(60'000)).ok());
 
-  ASSERT_TRUE(WaitUntil(120, [&] { return CountScored(view) == kSegments; }));
+  ASSERT_TRUE(Eventually([&] { return CountScored(view) == kSegments; },
+                         2 * kLongWait,
+                         kDaemonInterval));
   daemon_memory.Sample();
   client_memory.ExpectConstant("client");
   daemon_memory.ExpectConstant("daemon");

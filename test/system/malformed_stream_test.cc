@@ -8,6 +8,7 @@
 
 #include "proto/convert.h"
 #include "selfcal/v1/segment.grpc.pb.h"
+#include "test/support/eventually.h"
 #include "test/system/running_daemon.h"
 #include "test/system/simulated_walk.h"
 
@@ -148,7 +149,7 @@ void MalformedStream::ExpectEachRefusedAndTheNextStored(
   stream->WritesDone();
   EXPECT_TRUE(stream->Finish().ok());
   // Nothing but the good ones, and the daemon can use them.
-  ASSERT_TRUE(WaitUntilIdle(view_, damages.size() + 1, 60).ok());
+  ASSERT_TRUE(WaitUntilIdle(view_, damages.size() + 1, kLongWait).ok());
   const auto state = view_.GetState();
   ASSERT_TRUE(state.ok());
   for (const v1::Segment& segment : state->segments) {

@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <thread>
 
+#include "test/support/eventually.h"
+
 namespace selfcal::client {
 namespace {
 
@@ -62,20 +64,11 @@ std::unique_ptr<DaemonProcess> ScratchFolder::StartDaemon() const {
   return *std::move(daemon);
 }
 
-bool WaitUntil(double seconds, const std::function<bool()>& done) {
-  using Clock = std::chrono::steady_clock;
-  const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
-  while (!done()) {
-    if (Clock::now() > deadline) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
-  return true;
-}
-
 absl::Status WaitUntilIdle(DaemonView& view,
                            std::size_t segments,
-                           double seconds) {
-  if (WaitUntil(seconds, [&] { return IsIdle(view, segments); })) {
+                           std::chrono::seconds limit) {
+  if (Eventually(
+          [&] { return IsIdle(view, segments); }, limit, kDaemonInterval)) {
     return absl::OkStatus();
   }
   return absl::DeadlineExceededError("not all is scored and calibrated");

@@ -35,13 +35,10 @@ class ScratchFolder {
   std::string state_dir_;
 };
 
-// Calls `done` every 50 ms until it holds; false after `seconds`.
-bool WaitUntil(double seconds, const std::function<bool()>& done);
-
 // Waits until `segments` are scored and no run is unfinished.
 absl::Status WaitUntilIdle(DaemonView& view,
                            std::size_t segments,
-                           double seconds);
+                           std::chrono::seconds limit);
 
 // "recorded~3" of "rigs/r/segments/recorded~3".
 std::string LastPart(const std::string& name);

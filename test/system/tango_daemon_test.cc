@@ -13,7 +13,7 @@
 namespace selfcal::client {
 namespace {
 
-constexpr double kSeconds = 600;
+constexpr std::chrono::seconds kLimit{600};
 
 // Streams all segments and waits until nothing is left to do.
 DaemonState Import(const Device& device, const ScratchFolder& folder) {
@@ -29,7 +29,7 @@ DaemonState Import(const Device& device, const ScratchFolder& folder) {
     EXPECT_TRUE(stream.Send(segment));
   }
   EXPECT_TRUE(stream.Drain(std::chrono::seconds(60)).ok());
-  EXPECT_TRUE(WaitUntilIdle(view, device.segments.size(), kSeconds).ok());
+  EXPECT_TRUE(WaitUntilIdle(view, device.segments.size(), kLimit).ok());
   return view.GetState().value_or(DaemonState());
 }
 

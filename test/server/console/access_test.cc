@@ -46,6 +46,31 @@ TEST_F(AccessTest, ChangeNeedsTheHeaderThatOtherSitesCannotSend) {
   EXPECT_EQ(store_->GetActiveCalibration("r")->version, 2);
 }
 
+TEST_F(AccessTest, EachKindOfChangeNeedsRoleAndHeader) {
+  AddRig("r");
+  const std::string labels = R"({"name": "rigs/r", "labels": {"site": "lab"}})";
+  const auto label = [&](const std::string& headers) {
+    return Change("PATCH", "/api/v1/rigs/r?updateMask=labels", labels, headers)
+        .status;
+  };
+  const auto remove = [&](const std::string& headers) {
+    return Change("DELETE", "/api/v1/rigs/r?reason=retired", "", headers)
+        .status;
+  };
+  EXPECT_EQ(label(kConsoleHeader), 403);
+  EXPECT_EQ(remove(kConsoleHeader), 403);
+  Open(Role::kAdminister);
+  EXPECT_EQ(label(""), 403);
+  EXPECT_EQ(remove(""), 403);
+  EXPECT_TRUE(store_->GetRig("r")->labels.empty());
+
+  EXPECT_EQ(label(kConsoleHeader), 200);
+  EXPECT_EQ(store_->GetRig("r")->labels.at("site"), "lab");
+  EXPECT_EQ(remove(kConsoleHeader), 200);
+  EXPECT_TRUE(absl::IsNotFound(store_->GetRig("r").status()));
+  EXPECT_EQ(Change("PUT", "/api/v1/rigs/r", labels).status, 405);
+}
+
 TEST_F(AccessTest, NamesThatWereMadeToPointHereAreRefused) {
   AddRig("r");
   for (const char* host : {"evil.example", "127.0.0.1.evil.example:80", ""}) {

@@ -21,8 +21,8 @@
 #include "server/api/api.h"
 #include "server/api/change_feed.h"
 #include "server/console/console.h"
-#include "server/store/store_sqlite.h"
 #include "test/server/grpc/fake_pipeline.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/test_records.h"
 #include "test/server/test_segments.h"
 
@@ -80,10 +80,12 @@ struct Reply {
 
 class ConsoleTest : public ::testing::Test {
  protected:
+  static constexpr char kConsoleHeader[] = "X-Selfcal-Console: 1\r\n";
+
   ConsoleTest() {
     std::string folder = std::filesystem::temp_directory_path() / "scw-XXXXXX";
     folder_ = mkdtemp(folder.data());
-    auto store = MakeSqliteStore(folder_ / "test.db");
+    auto store = OpenSqliteStore(folder_ / "test.db");
     if (!store.ok()) throw std::runtime_error(store.status().ToString());
     store_ = *std::move(store);
     domain_.emplace(store_.get());
@@ -139,8 +141,15 @@ class ConsoleTest : public ::testing::Test {
 
   Reply Post(const std::string& path,
              const std::string& body,
-             const std::string& headers = "X-Selfcal-Console: 1\r\n") const {
-    return Exchange("POST " + path +
+             const std::string& headers = kConsoleHeader) const {
+    return Change("POST", path, body, headers);
+  }
+
+  Reply Change(const std::string& method,
+               const std::string& path,
+               const std::string& body,
+               const std::string& headers = kConsoleHeader) const {
+    return Exchange(method + " " + path +
                     " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" +
                     headers + "Content-Length: " + std::to_string(body.size()) +
                     "\r\n\r\n" + body);

@@ -109,6 +109,25 @@ TEST_F(StreamTest, RunIsToldFromItsFirstIteration) {
                 R"("unit":"-","value":1.5,"moved":0.5,"sigma":0.25}])"));
 }
 
+TEST_F(StreamTest, StreamsOfADeletedRigEndWithAnError) {
+  AddRig("a");
+  Open(Role::kAdminister);
+  const auto changes = OpenStream("rigs/a/changes:watch");
+  changes->ReadUntil("EVERYTHING");
+  const auto versions = OpenStream("rigs/a/calibrations:watch");
+  versions->ReadUntil("data: {");
+  const Reply deleted = Exchange(
+      "DELETE /api/v1/rigs/a?reason=sold HTTP/1.1\r\nHost: localhost\r\n"
+      "Connection: close\r\nX-Selfcal-Console: 1\r\n\r\n");
+  ASSERT_EQ(deleted.status, 200) << deleted.body;
+  for (Wire* wire : {changes.get(), versions.get()}) {
+    const std::string rest = wire->ReadUntil("");
+    EXPECT_THAT(rest, HasSubstr("event: error"));
+    EXPECT_THAT(rest, HasSubstr("NOT_FOUND"));
+    EXPECT_THAT(rest, HasSubstr("deleted"));
+  }
+}
+
 TEST_F(StreamTest, StreamsAreBounded) {
   std::vector<std::unique_ptr<Wire>> open;
   for (int i = 0; i < 16; ++i) {

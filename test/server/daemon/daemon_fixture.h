@@ -19,6 +19,7 @@
 #include "selfcal/v1/segment.grpc.pb.h"
 #include "test/server/daemon/process.h"
 #include "test/server/test_segments.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 
@@ -107,17 +108,17 @@ class DaemonTest : public ::testing::Test {
 
   // Waits until every segment is scored.
   bool AllScored() {
-    for (int i = 0; i < 600; ++i) {
-      const v1::ListSegmentsResponse listed = Segments();
-      const auto& segments = listed.segments();
-      if (std::all_of(segments.begin(), segments.end(), [](const auto& s) {
-            return s.state() == v1::Segment::SCORED;
-          })) {
-        return true;
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-    return false;
+    return Eventually(
+        [this] {
+          const v1::ListSegmentsResponse listed = Segments();
+          const auto& segments = listed.segments();
+          return std::all_of(
+              segments.begin(), segments.end(), [](const auto& s) {
+                return s.state() == v1::Segment::SCORED;
+              });
+        },
+        kLongWait,
+        kDaemonInterval);
   }
 
   // The last update of the run, when its watch has ended.

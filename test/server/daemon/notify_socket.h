@@ -18,7 +18,9 @@ class NotifySocket {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     path.copy(address.sun_path, sizeof(address.sun_path) - 1);
-    bind(file_, reinterpret_cast<sockaddr*>(&address), sizeof(address));
+    // Where it fails no message comes.
+    static_cast<void>(
+        bind(file_, reinterpret_cast<sockaddr*>(&address), sizeof(address)));
     const timeval limit{60, 0};
     setsockopt(file_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
   }

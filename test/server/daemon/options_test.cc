@@ -90,7 +90,7 @@ TEST_F(OptionsTest, ScorerHasANameAndVerificationAShare) {
   EXPECT_EQ(Parse({"--state-dir", "s", "--verify-share", "1.5"}), 2);
 }
 
-TEST_F(OptionsTest, RunsAreHeldBackAndLimitedAsSet) {
+TEST_F(OptionsTest, RunsAreDeferredAndLimitedAsSet) {
   EXPECT_EQ(Parse({"--state-dir", "s"}), std::nullopt);
   EXPECT_EQ(options_.host, HostLimits());
   EXPECT_EQ(options_.max_run_minutes, 30);

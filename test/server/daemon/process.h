@@ -18,6 +18,8 @@
 #include <thread>
 #include <vector>
 
+#include "test/support/eventually.h"
+
 namespace selfcal::server {
 
 class Process {
@@ -52,15 +54,12 @@ class Process {
   // The exit code, or minus the signal that ended it; nothing if it still runs
   // after a minute.
   std::optional<int> Wait() {
-    for (int i = 0; i < 6000; ++i) {
-      int status = 0;
-      if (waitpid(pid_, &status, WNOHANG) == pid_) {
-        pid_ = 0;
-        return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    int status = 0;
+    if (!Eventually([&] { return waitpid(pid_, &status, WNOHANG) == pid_; })) {
+      return std::nullopt;
     }
-    return std::nullopt;
+    pid_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
   }
 
   std::string Log() const {
@@ -70,13 +69,11 @@ class Process {
 
   // Whether the log shows the text within a minute; after `first`, if given.
   bool Says(const std::string& text, const std::string& first = "") const {
-    for (int i = 0; i < 6000; ++i) {
+    return Eventually([&] {
       const std::string log = Log();
       const size_t from = log.find(first);
-      if (from != log.npos && log.find(text, from) != log.npos) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return false;
+      return from != log.npos && log.find(text, from) != log.npos;
+    });
   }
 
   // What stands behind the text in the log, to the end of the word.

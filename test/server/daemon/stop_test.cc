@@ -22,8 +22,15 @@ TEST(StopDeathTest, DeadlineEndsAStopThatHangs) {
       "");
 }
 
-TEST(Stop, DeadlineLetsAStopInTimePass) {
-  const StopDeadline deadline(hours(1));
+TEST(StopDeathTest, DeadlineOfAStopInTimeDoesNotEndTheProcess) {
+  EXPECT_EXIT(
+      {
+        { const StopDeadline deadline(milliseconds(20)); }
+        std::this_thread::sleep_for(milliseconds(200));
+        std::_Exit(3);
+      },
+      ::testing::ExitedWithCode(3),
+      "");
 }
 
 TEST(StopDeathTest, BlockedSignalIsReceivedInsteadOfEndingTheProcess) {

@@ -28,12 +28,12 @@ class FitRowsTest : public StoreTest {
     ASSERT_TRUE(commit.ok()) << commit.status();
   }
 
-  std::optional<TableAbsence> AbsenceOf(std::int64_t index) {
-    const auto absences = store_->ListAbsences("a", {"s", index});
-    EXPECT_TRUE(absences.ok()) << absences.status();
-    if (absences->empty()) return std::nullopt;
-    EXPECT_EQ(absences->size(), rig_.groups.size());
-    return absences->front();
+  std::optional<Exclusion> ExclusionOf(std::int64_t index) {
+    const auto exclusions = store_->ListExclusions("a", {"s", index});
+    EXPECT_TRUE(exclusions.ok()) << exclusions.status();
+    if (exclusions->empty()) return std::nullopt;
+    EXPECT_EQ(exclusions->size(), rig_.groups.size());
+    return exclusions->front();
   }
 
   Rig rig_;
@@ -44,14 +44,14 @@ TEST_P(FitRowsTest, AVigorousSegmentThatDoesNotFitEntersNoTable) {
   for (int k = 0; k < 6; ++k) ScoreWithFit(k, 10 + k, 1.0 + 0.1 * k);
   ScoreWithFit(6, -50, 20);
   EXPECT_THAT(TableIndices("a", 0), ElementsAre(0, 1, 2, 3, 4, 5));
-  const auto absence = AbsenceOf(6);
-  ASSERT_TRUE(absence.has_value());
-  EXPECT_EQ(absence->cause, AbsenceCause::kDoesNotFit);
-  EXPECT_EQ(absence->fit, 20);
-  ASSERT_TRUE(absence->fit_limit.has_value());
+  const auto exclusion = ExclusionOf(6);
+  ASSERT_TRUE(exclusion.has_value());
+  EXPECT_EQ(exclusion->cause, ExclusionCause::kDoesNotFit);
+  EXPECT_EQ(exclusion->fit, 20);
+  ASSERT_TRUE(exclusion->fit_limit.has_value());
   // Of those in the table: the median, and ten standard deviations of a median
   // distance of 0.1.
-  EXPECT_NEAR(*absence->fit_limit, 1.2 + 10 * 0.14826, 1e-6);
+  EXPECT_NEAR(*exclusion->fit_limit, 1.2 + 10 * 0.14826, 1e-6);
   Reopen();
   EXPECT_EQ(store_->GetSegment("a", {"s", 6})->information->residuals.fit, 20);
 }
@@ -63,10 +63,10 @@ TEST_P(FitRowsTest, BadSegmentsThatCameFirstLeaveForGoodOnes) {
   const auto kept = TableIndices("a", 0);
   ASSERT_EQ(kept.size(), 8u);
   for (const std::int64_t index : kept) EXPECT_GE(index, 15);
-  const auto absence = AbsenceOf(14);
-  ASSERT_TRUE(absence.has_value());
-  EXPECT_EQ(absence->cause, AbsenceCause::kDoesNotFit);
-  EXPECT_EQ(absence->fit, 50);
+  const auto exclusion = ExclusionOf(14);
+  ASSERT_TRUE(exclusion.has_value());
+  EXPECT_EQ(exclusion->cause, ExclusionCause::kDoesNotFit);
+  EXPECT_EQ(exclusion->fit, 50);
   EXPECT_FALSE(HasData("a", 14));
 }
 
@@ -84,9 +84,9 @@ TEST_P(FitRowsTest, NoiseThatIsStatedWrongExcludesNobody) {
 TEST_P(FitRowsTest, ASegmentWithManyOutliersEntersNoTable) {
   ScoreWithFit(0, -50, 0, true);
   EXPECT_THAT(TableIndices("a", 0), IsEmpty());
-  const auto absence = AbsenceOf(0);
-  ASSERT_TRUE(absence.has_value());
-  EXPECT_EQ(absence->cause, AbsenceCause::kManyOutliers);
+  const auto exclusion = ExclusionOf(0);
+  ASSERT_TRUE(exclusion.has_value());
+  EXPECT_EQ(exclusion->cause, ExclusionCause::kManyOutliers);
 }
 
 TEST_P(FitRowsTest, AJointSelectionKeepsWhatFitsAlone) {

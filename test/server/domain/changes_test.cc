@@ -168,10 +168,10 @@ TEST_P(ChangesTest, SegmentsFromBeforeLeaveTheTables) {
   }
   int left = 0;
   for (std::int64_t k = 0; k < next_; ++k) {
-    const auto absences = store_->ListAbsences("a", {"s", k});
-    ASSERT_TRUE(absences.ok()) << absences.status();
-    for (const auto& absence : *absences) {
-      if (absence.cause != AbsenceCause::kDeviceChanged) continue;
+    const auto exclusions = store_->ListExclusions("a", {"s", k});
+    ASSERT_TRUE(exclusions.ok()) << exclusions.status();
+    for (const auto& exclusion : *exclusions) {
+      if (exclusion.cause != ExclusionCause::kDeviceChanged) continue;
       EXPECT_LT(k + 1, change.first_sequence) << "from before";
       ++left;
     }

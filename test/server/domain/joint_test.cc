@@ -128,8 +128,8 @@ TEST_P(JointTest, TableHoldsTheChoiceAndItsDataAlways) {
       for (int i = 0; i <= k; ++i) {
         ASSERT_EQ(HasData(id, i), kept.contains(i) || reserve.contains(i))
             << i << " after " << k;
-        const auto absences = store_->ListAbsences(id, {"s", i});
-        ASSERT_EQ(absences->empty(), kept.contains(i)) << i << " after " << k;
+        const auto exclusions = store_->ListExclusions(id, {"s", i});
+        ASSERT_EQ(exclusions->empty(), kept.contains(i)) << i << " after " << k;
       }
     }
     EXPECT_EQ(static_cast<int>(TableIndices(id, 0).size()), settings.capacity);
@@ -149,11 +149,12 @@ TEST_P(JointTest, ARunStartsWithAsManyAsOneGroupNeeds) {
               ElementsAre(SegmentKey{"s", 4}, SegmentKey{"s", 9}));
 }
 
-TEST_P(JointTest, AKeptSegmentOfDamagedInformationIsSetAside) {
+TEST_P(JointTest, AKeptSegmentOfDamagedInformationIsQuarantined) {
   const Rig rig = CreateJointRig("a", Selection::kJointD);
   Commit(rig, 4);
   store_.reset();
-  ASSERT_TRUE(GetParam().damage_information(folder_));
+  ASSERT_TRUE(
+      GetParam().damage(folder_, "segment_information", "information").ok());
   Reopen();
   Commit(rig, 9);
   EXPECT_THAT(TableIndices("a", 0), ElementsAre(9));

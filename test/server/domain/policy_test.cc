@@ -1,9 +1,8 @@
 // What of a rig goes by the clock: ages of tables and calibrations, and runs
-// that are held back.
+// that are deferred.
 #include <random>
 
 #include "server/domain/clock.h"
-#include "server/store/statement.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -24,24 +23,13 @@ class PolicyTest : public StoreTest {
     return rig;
   }
 
-  void Execute(const std::string& sql) {
-    auto db =
-        Connection::Open(folder_.File("selfcal.db"), SQLITE_OPEN_READWRITE);
-    ASSERT_TRUE(db.ok());
-    ASSERT_TRUE(db->Execute("PRAGMA busy_timeout = 1000").ok());
-    const absl::Status status = db->Execute(sql);
-    ASSERT_TRUE(status.ok()) << status;
-  }
-
-  // Puts and scores a segment as if it had arrived at that time.
+  // Puts and scores a segment at that time.
   ScoreCommit Arrive(const Rig& rig,
                      std::int64_t index,
                      double entropy,
                      std::int64_t time_s) {
+    now_ns_ = time_s * kSecond;
     Put("a", index);
-    Execute("UPDATE segments SET receive_time_ns = " +
-            std::to_string(time_s * kSecond) +
-            " WHERE session_index = " + std::to_string(index));
     return Score(rig, index, entropy);
   }
 
@@ -103,8 +91,7 @@ TEST_P(PolicyTest, RunByHandTakesNoSegmentThatIsTooOld) {
   const std::int64_t now_s = NowNs() / kSecond;
   Arrive(rig, 0, 1, now_s - 3500);
   Arrive(rig, 1, 2, now_s);
-  Execute("UPDATE segments SET receive_time_ns = receive_time_ns - " +
-          std::to_string(200 * kSecond) + " WHERE session_index = 0");
+  now_ns_ += 200 * kSecond;
   const auto run = domain_->CreateManualRun("a");
   ASSERT_TRUE(run.ok()) << run.status();
   EXPECT_THAT(run->segments, ElementsAre(SegmentKey{"s", 1}));
@@ -146,7 +133,7 @@ TEST_P(PolicyTest, OldCalibrationStartsOneRunOnNewSegments) {
   EXPECT_EQ(domain_->StartAgedRuns(later)->size(), 1u);
 }
 
-TEST_P(PolicyTest, HeldBackRunSaysWhyAndIsLoggedOnce) {
+TEST_P(PolicyTest, DeferredRunSaysWhyAndIsLoggedOnce) {
   const Rig rig = Create({});
   Put("a", 0);
   Score(rig, 0, 1);
@@ -159,7 +146,7 @@ TEST_P(PolicyTest, HeldBackRunSaysWhyAndIsLoggedOnce) {
   int held = 0;
   const auto events = store_->ListEvents({1000, ""});
   for (const StoredEvent& event : events->items) {
-    if (event.kind != EventKind::kRunHeldBack) continue;
+    if (event.kind != EventKind::kRunDeferred) continue;
     ++held;
     EXPECT_THAT(event.detail, HasSubstr("on battery"));
   }

@@ -2,20 +2,18 @@
 // where nothing may go a segment is refused.
 #include "server/domain/quotas.h"
 
-#include "test/server/store/sqlite_test.h"
+#include "test/server/store/store_test.h"
 
 namespace selfcal::server {
 namespace {
 
 using ::testing::HasSubstr;
 
-class QuotasTest : public SqliteTest {
+class QuotasTest : public StoreTest {
  protected:
   // Tables of two segments in each of their groups.
   void OpenWith(const Quotas& quotas) {
-    store_.reset();
-    const absl::Status opened = Open({.quotas = quotas});
-    ASSERT_TRUE(opened.ok()) << opened;
+    Reopen({.quotas = quotas});
     if (!store_->GetRig("a").ok()) {
       ASSERT_TRUE(domain_->CreateRig(rig_).ok());
     }
@@ -53,9 +51,12 @@ class QuotasTest : public SqliteTest {
     }
     return details;
   }
-};
 
-TEST_F(QuotasTest, TheLeastInformativeDataGoesAndSaysWhy) {
+  const Rig rig_ = TestRig("a");
+};
+SELFCAL_STORE_TEST_SUITE(QuotasTest);
+
+TEST_P(QuotasTest, TheLeastInformativeDataGoesAndSaysWhy) {
   const std::int64_t bytes = SegmentBytes();
   ASSERT_TRUE(domain_->MarkUnusable("a", {"s", 1000}, "not needed").ok());
   OpenWith({.max_payload_bytes_per_rig = 2 * bytes + bytes / 2});
@@ -81,12 +82,12 @@ TEST_F(QuotasTest, TheLeastInformativeDataGoesAndSaysWhy) {
     ASSERT_EQ(table.entries.size(), 1u);
     EXPECT_EQ(table.entries[0].key.index, 1);
   }
-  const auto absences = store_->ListAbsences("a", {"s", 0});
-  ASSERT_EQ(absences->size(), rig_.groups.size());
-  EXPECT_EQ(absences->front().cause, AbsenceCause::kDataEvicted);
+  const auto exclusions = store_->ListExclusions("a", {"s", 0});
+  ASSERT_EQ(exclusions->size(), rig_.groups.size());
+  EXPECT_EQ(exclusions->front().cause, ExclusionCause::kDataEvicted);
 }
 
-TEST_F(QuotasTest, WhatWaitsForItsScoreIsNeverEvicted) {
+TEST_P(QuotasTest, WhatWaitsForItsScoreIsNeverEvicted) {
   const std::int64_t bytes = SegmentBytes();
   OpenWith({.max_payload_bytes_per_rig = 3 * bytes + bytes / 2});
   ASSERT_TRUE(Put(0).ok());
@@ -104,7 +105,7 @@ TEST_F(QuotasTest, WhatWaitsForItsScoreIsNeverEvicted) {
   EXPECT_TRUE(Put(2).ok());
 }
 
-TEST_F(QuotasTest, WhatAnUnfinishedRunNeedsIsNeverEvicted) {
+TEST_P(QuotasTest, WhatAnUnfinishedRunNeedsIsNeverEvicted) {
   const std::int64_t bytes = SegmentBytes();
   ASSERT_TRUE(domain_->MarkUnusable("a", {"s", 1000}, "").ok());
   OpenWith({.max_payload_bytes_per_rig = 2 * bytes + bytes / 2});
@@ -117,7 +118,7 @@ TEST_F(QuotasTest, WhatAnUnfinishedRunNeedsIsNeverEvicted) {
   EXPECT_TRUE(Put(2).ok());
 }
 
-TEST_F(QuotasTest, OneRigDoesNotTakeFromAnother) {
+TEST_P(QuotasTest, OneRigDoesNotTakeFromAnother) {
   const std::int64_t bytes = SegmentBytes();
   OpenWith({.max_payload_bytes_per_rig = bytes + bytes / 2});
   ASSERT_TRUE(domain_->CreateRig(TestRig("b")).ok());
@@ -125,13 +126,13 @@ TEST_F(QuotasTest, OneRigDoesNotTakeFromAnother) {
   EXPECT_TRUE(domain_->PutSegment("b", Segment(1)).ok());
 }
 
-TEST_F(QuotasTest, ADuplicateNeedsNoRoom) {
+TEST_P(QuotasTest, ADuplicateNeedsNoRoom) {
   const std::int64_t bytes = SegmentBytes();
   OpenWith({.max_payload_bytes_per_rig = bytes});
   EXPECT_EQ(*domain_->PutSegment("a", Segment(1000)), PutVerdict::kDuplicate);
 }
 
-TEST_F(QuotasTest, OldMetadataGoesButNotWhatACalibrationCameFrom) {
+TEST_P(QuotasTest, OldMetadataGoesButNotWhatACalibrationCameFrom) {
   OpenWith({});
   PutAndScore(0, 2, 5);
   PutAndScore(1, 1, 9);
@@ -165,17 +166,13 @@ TEST_F(QuotasTest, OldMetadataGoesButNotWhatACalibrationCameFrom) {
   EXPECT_EQ(store_->GetCalibration("a", 2)->segments.size(), 2u);
 }
 
-TEST_F(QuotasTest, MetadataOlderThanItMayBeGoes) {
+TEST_P(QuotasTest, MetadataOlderThanItMayBeGoes) {
   OpenWith({});
-  for (int k = 0; k < 4; ++k) PutAndScore(k, 50, 0);  // enter no table
-  store_.reset();
-  auto db = Connection::Open(Path(), SQLITE_OPEN_READWRITE);
-  ASSERT_TRUE(db.ok());
-  ASSERT_TRUE(db->Execute("UPDATE segments SET receive_time_ns = "
-                          "receive_time_ns - 7200 * 1000000000 "
-                          "WHERE session_index < 2")
-                  .ok());
-  db = absl::UnknownError("closed");
+  const std::int64_t now_ns = NowNs();
+  for (int k = 0; k < 4; ++k) {
+    now_ns_ = k < 2 ? now_ns - 7200 * 1'000'000'000LL : now_ns;
+    PutAndScore(k, 50, 0);  // enters no table
+  }
   OpenWith({.max_segment_age_s = 3600});
   ASSERT_TRUE(Put(4).ok());
   EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("a", {"s", 1}).status()));
@@ -184,7 +181,7 @@ TEST_F(QuotasTest, MetadataOlderThanItMayBeGoes) {
   EXPECT_THAT(Evictions()[0], HasSubstr("2 segments"));
 }
 
-TEST_F(QuotasTest, AFullDatabaseRefusesSegmentsAndStillScoresWhatItHas) {
+TEST_P(QuotasTest, AFullDatabaseRefusesSegmentsAndStillScoresWhatItHas) {
   OpenWith({.max_database_bytes = 2'000'000});
   absl::Status refused;
   int stored = 0;

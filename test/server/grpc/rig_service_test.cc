@@ -1,3 +1,6 @@
+#include <chrono>
+
+#include "selfcal/v1/activity_service.grpc.pb.h"
 #include "test/server/grpc/service_test.h"
 
 namespace selfcal::server {
@@ -326,6 +329,49 @@ TEST_F(RigServiceTest, DeletedRigIsGone) {
   ExpectNotFound(Get("rigs/r", &read), "rigs/r");
   Context context;
   ExpectNotFound(rigs_->DeleteRig(&context, request, &nothing), "rigs/r");
+}
+
+TEST_F(RigServiceTest, WatchesOfADeletedRigEnd) {
+  AddRig("r");
+  AddRig("s");
+  const auto deadline =
+      std::chrono::system_clock::now() + std::chrono::seconds(20);
+  Context contexts[3];
+  for (Context& context : contexts) context.set_deadline(deadline);
+  v1::WatchCalibrationRequest of_versions;
+  of_versions.set_parent("rigs/r");
+  const auto versions =
+      calibrations_->WatchCalibration(&contexts[0], of_versions);
+  v1::Calibration version;
+  ASSERT_TRUE(versions->Read(&version));
+  const auto activity = v1::ActivityService::NewStub(channel_);
+  v1::WatchChangesRequest of_changes;
+  of_changes.set_parent("rigs/r");
+  const auto changes = activity->WatchChanges(&contexts[1], of_changes);
+  v1::Change change;
+  ASSERT_TRUE(changes->Read(&change));
+  of_versions.set_parent("rigs/s");
+  const auto others =
+      calibrations_->WatchCalibration(&contexts[2], of_versions);
+  ASSERT_TRUE(others->Read(&version));
+
+  v1::DeleteRigRequest request;
+  request.set_name("rigs/r");
+  request.set_reason("sold");
+  google::protobuf::Empty nothing;
+  Context context;
+  ASSERT_TRUE(rigs_->DeleteRig(&context, request, &nothing).ok());
+  while (versions->Read(&version)) {
+  }
+  const grpc::Status ended = versions->Finish();
+  ExpectNotFound(ended, "rigs/r");
+  EXPECT_THAT(ended.error_message(), HasSubstr("deleted"));
+  while (changes->Read(&change)) {
+  }
+  ExpectNotFound(changes->Finish(), "rigs/r");
+  // That of another rig goes on.
+  contexts[2].TryCancel();
+  EXPECT_EQ(others->Finish().error_code(), grpc::StatusCode::CANCELLED);
 }
 
 }  // namespace

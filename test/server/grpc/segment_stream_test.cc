@@ -5,6 +5,7 @@
 
 #include "server/grpc/calls.h"
 #include "test/server/grpc/service_test.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 namespace {
@@ -89,9 +90,7 @@ TEST_F(SegmentStreamTest, ItsEndIsTheEndOfASessionIfItStoredAnything) {
   const Rig rig = AddRig();
   const MotionSegment segment = TestSegments(rig, 1)[0];
   const auto ended = [&] {
-    for (int k = 0; k < 1000 && pipeline_->ended().empty(); ++k) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
+    EXPECT_TRUE(Eventually([&] { return !pipeline_->ended().empty(); }));
     return pipeline_->ended();
   };
   {

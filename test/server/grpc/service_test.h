@@ -26,10 +26,11 @@
 #include "server/api/api.h"
 #include "server/api/change_feed.h"
 #include "server/grpc/server.h"
-#include "server/store/store_sqlite.h"
 #include "test/server/grpc/fake_pipeline.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/test_records.h"
 #include "test/server/test_segments.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 
@@ -173,22 +174,12 @@ class ServiceTest : public ::testing::Test {
     return mkdtemp(folder.data());
   }
   static std::unique_ptr<Store> NewStore(const std::filesystem::path& folder) {
-    auto store = MakeSqliteStore(folder / "test.db");
+    auto store = OpenSqliteStore(folder / "test.db");
     if (!store.ok()) throw std::runtime_error(store.status().ToString());
     return std::move(*store);
   }
 
   int generation_ = 0;
 };
-
-// Waits until the condition holds, for at most 20 s.
-template <typename Condition>
-bool Eventually(const Condition& condition) {
-  for (int i = 0; i < 2000; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
-}
 
 }  // namespace selfcal::server

@@ -2,8 +2,8 @@
 #include <filesystem>
 
 #include "selfcal/v1/store_service.grpc.pb.h"
-#include "server/store/statement.h"
 #include "test/server/grpc/service_test.h"
+#include "test/server/store/sqlite/tamper.h"
 
 namespace selfcal::server {
 namespace {
@@ -80,15 +80,9 @@ TEST_F(StoreServiceTest, ACheckEndsWithItsSummary) {
 
 TEST_F(StoreServiceTest, ACheckTellsEachProblem) {
   AddScored(2);
-  {
-    auto db =
-        Connection::Open((folder_ / "test.db").string(), SQLITE_OPEN_READWRITE);
-    ASSERT_TRUE(db.ok());
-    ASSERT_TRUE(
-        db->Execute("PRAGMA busy_timeout = 5000;"
-                    "UPDATE segment_information SET information = x'00'")
-            .ok());
-  }
+  ASSERT_TRUE(
+      DamageColumn(folder_ / "test.db", "segment_information", "information")
+          .ok());
   std::vector<v1::CheckStoreResponse::Problem> problems;
   EXPECT_EQ(Check(&problems).problems(), 2);
   ASSERT_EQ(problems.size(), 2u);
@@ -107,7 +101,7 @@ TEST_F(StoreServiceTest, ABackupIsADatabaseAndCanBeRestored) {
               ::testing::HasSubstr("test.db.before-restore-"));
   server_.reset();
   store_.reset();
-  store_ = *MakeSqliteStore(folder_ / "test.db");
+  store_ = *OpenSqliteStore(folder_ / "test.db");
   domain_.emplace(store_.get());
   EXPECT_EQ(store_->ListSegments(rig.id, {})->items.size(), 2u);
   EXPECT_TRUE(std::filesystem::exists(response.previous_database()));

@@ -1,6 +1,7 @@
 #include <thread>
 
 #include "test/server/grpc/service_test.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 namespace {
@@ -71,12 +72,7 @@ TEST_F(VerifyRigTest, EndsWhenItsCallerGoes) {
       [&](const auto&,
           const std::function<bool()>& stop) -> absl::StatusOr<Verification> {
     begun = true;
-    const auto deadline =
-        std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (!stop() && std::chrono::steady_clock::now() < deadline) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    }
-    interrupted = stop();
+    interrupted = Eventually(stop);
     return absl::CancelledError("interrupted");
   };
   Context context;
@@ -84,7 +80,7 @@ TEST_F(VerifyRigTest, EndsWhenItsCallerGoes) {
   request.set_parent("rigs/r");
   const auto reader = calibrations_->VerifyRig(&context, request);
   std::thread thread([&] {
-    while (!begun) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_TRUE(Eventually([&] { return begun.load(); }));
     context.TryCancel();
   });
   Response response;

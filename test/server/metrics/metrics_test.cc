@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "server/domain/domain.h"
-#include "server/store/store_sqlite.h"
 #include "test/server/http_get.h"
 #include "test/server/store/fake_information.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/store/temp_folder.h"
 #include "test/server/test_segments.h"
 
@@ -20,7 +20,7 @@ using Verdict = PipelineObserver::Verdict;
 class MetricsTest : public ::testing::Test {
  protected:
   MetricsTest() {
-    store_ = *MakeSqliteStore(folder_.File("test.db"));
+    store_ = *OpenSqliteStore(folder_.File("test.db"));
     domain_.emplace(store_.get());
     MetricsOptions options;
     options.address = "127.0.0.1:0";
@@ -45,8 +45,8 @@ TEST_F(MetricsTest, SeriesAreThereBeforeTheFirstEvent) {
   for (const std::string line : {"selfcal_build_info{version=\"1.2.3\"} 1",
                                  "selfcal_segments_total{verdict=\"stored\"} 0",
                                  "selfcal_runs_total{outcome=\"activated\"} 0",
-                                 "selfcal_checks_total{outcome=\"differs\","
-                                 "subject=\"calibration\"} 0",
+                                 ("selfcal_checks_total{outcome=\"differs\","
+                                  "subject=\"calibration\"} 0"),
                                  "selfcal_queue_length 0",
                                  "selfcal_database_bytes{file=\"database\"} ",
                                  "selfcal_disk_free_bytes ",

@@ -3,6 +3,7 @@
 #include <future>
 
 #include "test/server/pipeline/pipeline_test.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 namespace {
@@ -19,9 +20,7 @@ class DeletionTest : public PipelineTest {
     estimators_.score =
         [this](const Rig& rig, const Calibration&, const MotionSegment& s) {
           ++scoring_;
-          while (blocked_) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
-          }
+          EXPECT_TRUE(Eventually([this] { return !blocked_; }));
           return FakeInformation(rig, EntropyOf(s.key.index));
         };
   }

@@ -96,11 +96,11 @@ TEST_F(MisfitTest, GoodSegmentsAfterADivergedSessionTakeItsPlaces) {
   EXPECT_GE(held.at("good"), places / 2);
   int misfits = 0;
   for (int k = 0; k < 12; ++k) {
-    const auto absences = store_->ListAbsences("a", {"diverged", k});
-    ASSERT_TRUE(absences.ok()) << absences.status();
-    for (const TableAbsence& absence : *absences) {
-      if (absence.cause != AbsenceCause::kDoesNotFit) continue;
-      EXPECT_GT(absence.fit.value_or(0), absence.fit_limit.value_or(1e9));
+    const auto exclusions = store_->ListExclusions("a", {"diverged", k});
+    ASSERT_TRUE(exclusions.ok()) << exclusions.status();
+    for (const Exclusion& exclusion : *exclusions) {
+      if (exclusion.cause != ExclusionCause::kDoesNotFit) continue;
+      EXPECT_GT(exclusion.fit.value_or(0), exclusion.fit_limit.value_or(1e9));
       ++misfits;
     }
   }

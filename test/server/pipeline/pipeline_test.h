@@ -16,23 +16,13 @@
 
 #include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
-#include "server/store/store_sqlite.h"
 #include "test/server/store/fake_information.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/store/temp_folder.h"
 #include "test/server/test_segments.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
-
-// Waits for what other threads bring about; false if it never comes.
-inline bool Eventually(const std::function<bool()>& condition) {
-  const auto deadline =
-      std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (std::chrono::steady_clock::now() < deadline) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
-  return false;
-}
 
 class PipelineTest : public ::testing::Test {
  protected:
@@ -79,7 +69,7 @@ class PipelineTest : public ::testing::Test {
   void OpenStore() {
     domain_.reset();
     store_.reset();
-    auto store = MakeSqliteStore(folder_.File("selfcal.db"));
+    auto store = OpenSqliteStore(folder_.File("selfcal.db"));
     ASSERT_TRUE(store.ok()) << store.status();
     store_ = *std::move(store);
     domain_.emplace(store_.get());

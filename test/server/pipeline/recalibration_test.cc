@@ -2,8 +2,8 @@
 #include <mutex>
 #include <stdexcept>
 
-#include "server/store/statement.h"
 #include "test/server/pipeline/pipeline_test.h"
+#include "test/server/store/sqlite/tamper.h"
 
 namespace selfcal::server {
 namespace {
@@ -243,13 +243,7 @@ TEST_F(RecalibrationTest, DamagedSegmentFailsTheRunAndLeavesTheTables) {
   FillTables();
   pipeline_.reset();
   store_.reset();
-  {
-    auto db =
-        Connection::Open(folder_.File("selfcal.db"), SQLITE_OPEN_READWRITE);
-    ASSERT_TRUE(db.ok());
-    ASSERT_TRUE(
-        db->Execute("UPDATE payloads SET data = x'00' WHERE segment = 1").ok());
-  }
+  ASSERT_TRUE(DamageSegmentData(folder_.File("selfcal.db"), 0).ok());
   Restart();
   ASSERT_TRUE(RunIs(RunState::kFailed));
   EXPECT_NE(store_->GetRun("a", 1)->message.find("s~0"), std::string::npos);

@@ -1,13 +1,13 @@
 // A daemon that is killed on either side of every commit of a run, and in the
 // solver: the trigger still gives one run, and that one version.
 #include <signal.h>
+#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <string_view>
 
-#include "server/store/statement.h"
 #include "test/promise.h"
 #include "test/server/pipeline/pipeline_test.h"
 
@@ -76,7 +76,7 @@ bool Ended(Store* store) {
 [[noreturn]] void Live(const std::string& path, const Bomb& planted) {
   bomb = planted;
   sqlite3_auto_extension(reinterpret_cast<void (*)()>(Watch));
-  auto store = MakeSqliteStore(path);
+  auto store = OpenSqliteStore(path);
   if (!store.ok()) _exit(2);
   Domain domain(store->get());
   const auto rig = domain.CreateRig(TestRig("a"));
@@ -120,7 +120,7 @@ bool LiveAndDie(const std::string& path, const Bomb& planted) {
 }
 
 bool OneRunGaveOneVersion(const std::string& path) {
-  const auto store = MakeSqliteStore(path);
+  const auto store = OpenSqliteStore(path);
   if (!store.ok()) return false;
   const auto runs = (*store)->ListRuns("a", {});
   const auto versions = (*store)->ListCalibrations("a", {});

@@ -2,8 +2,8 @@
 #include <random>
 #include <stdexcept>
 
-#include "server/store/statement.h"
 #include "test/server/pipeline/pipeline_test.h"
+#include "test/server/store/sqlite/tamper.h"
 
 namespace selfcal::server {
 namespace {
@@ -12,17 +12,7 @@ class ScoringTest : public PipelineTest {
  protected:
   void DamageData(std::int64_t index) {
     store_.reset();
-    auto db =
-        Connection::Open(folder_.File("selfcal.db"), SQLITE_OPEN_READWRITE);
-    ASSERT_TRUE(db.ok());
-    ASSERT_TRUE(
-        Statement(&*db,
-                  "UPDATE payloads SET data = x'00' WHERE segment = "
-                  "(SELECT segment FROM segments WHERE session_index = ?1)",
-                  index)
-            .Run()
-            .ok());
-    db = absl::UnknownError("closed");
+    ASSERT_TRUE(DamageSegmentData(folder_.File("selfcal.db"), index).ok());
     OpenStore();
   }
 };

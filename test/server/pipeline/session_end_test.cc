@@ -2,6 +2,7 @@
 // that are quarantined leave the queue.
 #include "server/domain/clock.h"
 #include "test/server/pipeline/pipeline_test.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 namespace {
@@ -36,9 +37,7 @@ class SessionEndTest : public PipelineTest {
   void BlockScores() {
     estimators_.score =
         [this](const Rig& rig, const Calibration&, const MotionSegment& s) {
-          while (blocked_) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
-          }
+          EXPECT_TRUE(Eventually([this] { return !blocked_; }));
           return FakeInformation(rig, EntropyOf(s.key.index));
         };
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "test/server/pipeline/pipeline_test.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 namespace {
@@ -121,7 +122,7 @@ TEST_F(SubmitTest, WhoWaitsLongestIsNext) {
       });
       EXPECT_TRUE(result.ok()) << result.status();
     });
-    while (!waits) std::this_thread::yield();
+    EXPECT_TRUE(Eventually([&] { return waits.load(); }));
   }
   gate.unlock();
   for (std::thread& sender : senders) sender.join();

@@ -163,10 +163,10 @@ TEST(CalibrationRecord, OfAnOlderVersionReadsAsNotTested) {
                                 {"rank", 1, 2, CheckOutcome::kFailed}};
   store::CalibrationRecord record;
   ASSERT_TRUE(record.ParseFromString(SerializeCalibration(version)));
-  auto* factor = record.mutable_solver()->mutable_noise_factors(0);
+  auto* factor = record.mutable_report()->mutable_noise_factors(0);
   factor->clear_used();
   factor->clear_converged();
-  record.mutable_solver()->clear_halves();
+  record.mutable_report()->clear_halves();
   store::ValidationRecord validation;
   ASSERT_TRUE(validation.ParseFromString(SerializeValidation(version)));
   validation.clear_verdict();

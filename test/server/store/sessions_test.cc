@@ -2,7 +2,8 @@
 #include <cmath>
 #include <limits>
 
-#include "test/server/store/sqlite_test.h"
+#include "server/store/segment_rows.h"
+#include "test/server/store/store_test.h"
 
 namespace selfcal::server {
 namespace {
@@ -157,13 +158,13 @@ TEST_P(SessionsTest, AScoreThatIsNotANumberIsListed) {
 
 // --- Why a table does not hold a segment.
 
-TEST_P(SessionsTest, ASegmentOfATableIsAbsentFromNone) {
+TEST_P(SessionsTest, ASegmentInATableHasNoExclusion) {
   const Rig rig = CreateTestRig("a");
   Put("a", 0);
-  EXPECT_TRUE(store_->ListAbsences("a", {"s", 0})->empty());
+  EXPECT_TRUE(store_->ListExclusions("a", {"s", 0})->empty());
   Score(rig, 0, 1.0);
-  EXPECT_TRUE(store_->ListAbsences("a", {"s", 0})->empty());
-  EXPECT_TRUE(absl::IsNotFound(store_->ListAbsences("a", {"s", 9}).status()));
+  EXPECT_TRUE(store_->ListExclusions("a", {"s", 0})->empty());
+  EXPECT_TRUE(absl::IsNotFound(store_->ListExclusions("a", {"s", 9}).status()));
 }
 
 TEST_P(SessionsTest, ASegmentThatWasPushedOutNamesWhatCameInstead) {
@@ -174,33 +175,33 @@ TEST_P(SessionsTest, ASegmentThatWasPushedOutNamesWhatCameInstead) {
   Score(rig, 2, 2.0);  // instead of 0
   Score(rig, 3, 2.5);  // never enters
   Reopen();
-  const auto pushed = store_->ListAbsences("a", {"s", 0});
+  const auto pushed = store_->ListExclusions("a", {"s", 0});
   ASSERT_TRUE(pushed.ok()) << pushed.status();
   ASSERT_EQ(pushed->size(), rig.groups.size());
   for (std::size_t g = 0; g < pushed->size(); ++g) {
-    const TableAbsence& absence = (*pushed)[g];
-    EXPECT_EQ(absence.group, rig.groups[g].name);
-    EXPECT_EQ(absence.cause, AbsenceCause::kPushedOut);
-    EXPECT_GT(absence.time_ns, 0);
-    EXPECT_EQ(absence.rival, (SegmentKey{"s", 2}));
-    EXPECT_EQ(absence.rival_entropy, 2.0);
+    const Exclusion& exclusion = (*pushed)[g];
+    EXPECT_EQ(exclusion.group, rig.groups[g].name);
+    EXPECT_EQ(exclusion.cause, ExclusionCause::kReplaced);
+    EXPECT_GT(exclusion.time_ns, 0);
+    EXPECT_EQ(exclusion.rival, (SegmentKey{"s", 2}));
+    EXPECT_EQ(exclusion.rival_entropy, 2.0);
   }
-  const auto refused = store_->ListAbsences("a", {"s", 3});
+  const auto refused = store_->ListExclusions("a", {"s", 3});
   ASSERT_EQ(refused->size(), rig.groups.size());
-  EXPECT_EQ(refused->front().cause, AbsenceCause::kOthersSayMore);
+  EXPECT_EQ(refused->front().cause, ExclusionCause::kOutranked);
   EXPECT_EQ(refused->front().rival, (SegmentKey{"s", 2}));
   EXPECT_EQ(refused->front().rival_entropy, 2.0);
 }
 
-TEST_P(SessionsTest, ASegmentThatSaysTooLittleHasNoRival) {
+TEST_P(SessionsTest, ASegmentOfInsufficientGainHasNoRival) {
   const Rig rig = CreateTestRig("a");
   Put("a", 0);
   Score(rig, 0, 1.0, rig.min_gain_nats / 2);
-  const auto absences = store_->ListAbsences("a", {"s", 0});
-  ASSERT_EQ(absences->size(), rig.groups.size());
-  EXPECT_EQ(absences->front().cause, AbsenceCause::kSaysTooLittle);
-  EXPECT_FALSE(absences->front().rival);
-  EXPECT_FALSE(absences->front().rival_entropy);
+  const auto exclusions = store_->ListExclusions("a", {"s", 0});
+  ASSERT_EQ(exclusions->size(), rig.groups.size());
+  EXPECT_EQ(exclusions->front().cause, ExclusionCause::kInsufficientGain);
+  EXPECT_FALSE(exclusions->front().rival);
+  EXPECT_FALSE(exclusions->front().rival_entropy);
 }
 
 TEST_P(SessionsTest, ASegmentThatBecameTooOldSaysSo) {
@@ -212,59 +213,50 @@ TEST_P(SessionsTest, ASegmentThatBecameTooOldSaysSo) {
   Score(rig, 0, 1.0);
   Put("a", 1);
   Score(rig, 1, 2.0);
-  const auto absences = store_->ListAbsences("a", {"s", 0});
-  ASSERT_EQ(absences->size(), rig.groups.size());
-  EXPECT_EQ(absences->front().cause, AbsenceCause::kTooOld);
+  const auto exclusions = store_->ListExclusions("a", {"s", 0});
+  ASSERT_EQ(exclusions->size(), rig.groups.size());
+  EXPECT_EQ(exclusions->front().cause, ExclusionCause::kTooOld);
 }
 
-TEST_P(SessionsTest, ASegmentThatIsSetAsideSaysSo) {
+TEST_P(SessionsTest, AQuarantinedSegmentIsExcludedAsUnusable) {
   const Rig rig = CreateTestRig("a");
   Put("a", 0);
   Score(rig, 0, 1.0);
   ASSERT_TRUE(domain_->MarkUnusable("a", {"s", 0}, "broken").ok());
-  const auto absences = store_->ListAbsences("a", {"s", 0});
-  ASSERT_EQ(absences->size(), rig.groups.size());
-  EXPECT_EQ(absences->front().cause, AbsenceCause::kUnusable);
+  const auto exclusions = store_->ListExclusions("a", {"s", 0});
+  ASSERT_EQ(exclusions->size(), rig.groups.size());
+  EXPECT_EQ(exclusions->front().cause, ExclusionCause::kUnusable);
 }
 
-// --- What only SQLite is asked.
+// The records of a segment as they are when its data is gone.
+absl::Status InsertScored(UnitOfWork* tx,
+                          const NewSegment& segment,
+                          const SegmentInformation& information) {
+  const absl::Status inserted = InsertSegment(tx, segment);
+  if (!inserted.ok()) return inserted;
+  const auto row = FindSegment(tx, segment.key);
+  if (!row.ok()) return row.status();
+  const absl::Status scored = WriteScore(tx, row->rowid, information);
+  return scored.ok() ? DeleteData(tx, row->rowid) : scored;
+}
 
-class LongSessionTest : public SqliteTest {
- protected:
-  void SetUp() override {
-    ASSERT_TRUE(Open().ok());
-    ASSERT_TRUE(domain_->CreateRig(rig_).ok());
-    ASSERT_TRUE(domain_->PutSegment("a", Segment(0)).ok());
-    ASSERT_TRUE(
-        domain_->CommitScore("a", {"s", 0}, FakeInformation(rig_, 1, 5)).ok());
-    store_.reset();
-  }
-  void Execute(const std::string& sql) {
-    auto db = Connection::Open(Path(), SQLITE_OPEN_READWRITE);
-    ASSERT_TRUE(db.ok());
-    const absl::Status status = db->Execute(sql);
-    ASSERT_TRUE(status.ok()) << status;
-  }
-};
-
-TEST_F(LongSessionTest, TenThousandSegmentsComeInTenPages) {
+TEST_P(SessionsTest, TenThousandSegmentsComeInTenPages) {
   constexpr int kSegments = 10'000;
-  // Copies of the first, without its data.
-  Execute(
-      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n "
-      "  WHERE i < 9999) "
-      "INSERT INTO segments (rig, session, session_index, sequence, state, "
-      "  receive_time_ns, calibration_version, start_ns, end_ns, keyframes, "
-      "  imu_samples, landmarks, observations) "
-      "SELECT rig, session, i, i + 1, 2, receive_time_ns + i, 1, start_ns + i, "
-      "  end_ns + i, keyframes, imu_samples, landmarks, observations "
-      "FROM n, segments WHERE session_index = 0;"
-      "INSERT INTO segment_paths SELECT s.segment, p.path, p.sha256 "
-      "  FROM segments s, segment_paths p WHERE s.session_index > 0;"
-      "INSERT INTO segment_scores SELECT s.segment, c.group_name, c.entropy, "
-      "  c.gain, c.rank FROM segments s, segment_scores c "
-      "  WHERE s.session_index > 0;");
-  ASSERT_TRUE(Open().ok());
+  const Rig rig = CreateTestRig("a");
+  auto packed = PackNewSegment(Segment(0));
+  ASSERT_TRUE(packed.ok()) << packed.status();
+  SegmentInformation information = FakeInformation(rig, 1);
+  information.Lambda.resize(0, 0);
+  information.eta.resize(0);
+  const absl::Status written = store_->Transact("a", 1, [&](UnitOfWork* tx) {
+    for (packed->key.index = 0; packed->key.index < kSegments;
+         ++packed->key.index) {
+      const absl::Status inserted = InsertScored(tx, *packed, information);
+      if (!inserted.ok()) return inserted;
+    }
+    return absl::OkStatus();
+  });
+  ASSERT_TRUE(written.ok()) << written;
   EXPECT_EQ(store_->GetSession("a", "s")->segments, kSegments);
   Page page{5000, ""};  // more than a page may have
   int pages = 0;
@@ -277,38 +269,12 @@ TEST_F(LongSessionTest, TenThousandSegmentsComeInTenPages) {
     for (const SessionSegment& segment : listed->items) {
       ASSERT_EQ(segment.key.index, next++);
       ASSERT_EQ(segment.path.size(), 8u);
-      ASSERT_EQ(segment.scores.size(), rig_.groups.size());
+      ASSERT_EQ(segment.scores.size(), rig.groups.size());
     }
     page.token = listed->next_token;
   } while (!page.token.empty());
   EXPECT_EQ(pages, 10);
   EXPECT_EQ(next, kSegments);
-}
-
-// Each page is found by the index of sessions, and nothing is sorted.
-TEST_F(LongSessionTest, PagesAreFoundInTheIndex) {
-  auto db = Connection::Open(Path(), SQLITE_OPEN_READWRITE);
-  ASSERT_TRUE(db.ok());
-  for (const char* sql :
-       {"SELECT session_index FROM segments WHERE rig = 1 AND session = 's' "
-        "AND session_index > 5 ORDER BY session_index LIMIT 10",
-        "SELECT session FROM segments WHERE rig = 1 AND session > 's' "
-        "ORDER BY session LIMIT 1"}) {
-    Statement plan(&*db, std::string("EXPLAIN QUERY PLAN ") + sql);
-    ASSERT_TRUE(plan.Next());
-    EXPECT_THAT(plan.Text(3), ::testing::HasSubstr("SEARCH segments USING"));
-    EXPECT_FALSE(plan.Next()) << plan.Text(3);
-  }
-}
-
-TEST_F(LongSessionTest, ADamagedPathHidesNothingElse) {
-  Execute("UPDATE segment_paths SET path = x'00'");
-  ASSERT_TRUE(Open().ok());
-  const auto listed = store_->ListSessionSegments("a", "s", {});
-  ASSERT_TRUE(listed.ok()) << listed.status();
-  ASSERT_EQ(listed->items.size(), 1u);
-  EXPECT_TRUE(listed->items[0].path.empty());
-  EXPECT_EQ(listed->items[0].scores.size(), rig_.groups.size());
 }
 
 }  // namespace

@@ -12,11 +12,12 @@
 #include <string>
 #include <vector>
 
+#include "migrations/migrations.h"
 #include "server/domain/domain.h"
-#include "server/store/statement.h"
 #include "server/store/store.h"
-#include "server/store/store_sqlite.h"
 #include "test/server/store/fake_information.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
+#include "test/server/store/sqlite/tamper.h"
 #include "test/server/store/temp_folder.h"
 #include "test/server/test_segments.h"
 
@@ -24,25 +25,28 @@ namespace selfcal::server {
 
 struct Engine {
   std::string name;
-  // The store that this folder stands for, empty the first time.
-  std::function<absl::StatusOr<std::unique_ptr<Store>>(const TempFolder&)> open;
-  // Spoils the information of every segment, behind the back of a store that
-  // is closed.
-  std::function<bool(const TempFolder&)> damage_information;
+  int schema_version = 0;  // the newest
+  // The store that this folder stands for, empty the first time; of at most
+  // this many bytes, unless 0.
+  std::function<absl::StatusOr<std::unique_ptr<Store>>(const TempFolder&,
+                                                       std::int64_t max_bytes)>
+      open;
+  // Damages all blobs of a column, behind the back of a store that is closed.
+  std::function<absl::Status(
+      const TempFolder&, const std::string& table, const std::string& column)>
+      damage;
 };
 
 inline std::vector<Engine> Engines() {
   return {{"Sqlite",
-           [](const TempFolder& folder) {
-             return MakeSqliteStore(folder.File("selfcal.db"));
+           static_cast<int>(SqliteMigrations().size()),
+           [](const TempFolder& folder, std::int64_t max_bytes) {
+             return OpenSqliteStore(folder.File("selfcal.db"), max_bytes);
            },
-           [](const TempFolder& folder) {
-             auto db = Connection::Open(folder.File("selfcal.db"),
-                                        SQLITE_OPEN_READWRITE);
-             return db.ok() &&
-                    db->Execute(
-                          "UPDATE segment_information SET information = x'00'")
-                        .ok();
+           [](const TempFolder& folder,
+              const std::string& table,
+              const std::string& column) {
+             return DamageColumn(folder.File("selfcal.db"), table, column);
            }}};
 }
 
@@ -51,13 +55,15 @@ class StoreTest : public ::testing::TestWithParam<Engine> {
   StoreTest() { Reopen(); }
 
   // As a restart of the daemon does.
-  void Reopen() {
+  void Reopen(const DomainOptions& options = {}) {
     domain_.reset();
     store_.reset();
-    auto opened = GetParam().open(folder_);
+    auto opened = GetParam().open(folder_, options.quotas.max_database_bytes);
     ASSERT_TRUE(opened.ok()) << opened.status();
     store_ = *std::move(opened);
-    domain_.emplace(store_.get());
+    domain_.emplace(store_.get(), options, [this] {
+      return now_ns_ > 0 ? now_ns_ : NowNs();
+    });
   }
 
   Rig CreateTestRig(const std::string& id) {
@@ -125,6 +131,7 @@ class StoreTest : public ::testing::TestWithParam<Engine> {
   TempFolder folder_;
   std::unique_ptr<Store> store_;
   std::optional<Domain> domain_;
+  std::int64_t now_ns_ = 0;  // the time for the domain; 0: the clock's
 };
 
 #define SELFCAL_STORE_TEST_SUITE(fixture)                                      \

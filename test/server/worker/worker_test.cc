@@ -22,6 +22,7 @@
 #include "server/worker/channel.h"
 #include "server/worker/job.h"
 #include "test/server/test_segments.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 namespace {
@@ -255,7 +256,7 @@ TEST_F(WorkerTest, AnInterruptedOneIsKilledWhereverItIs) {
 TEST_F(WorkerTest, ProgressThatIsNotWantedEndsIt) {
   progress_ = [](const CalibrateProgress&) { return false; };
   EXPECT_EQ(InWorker().status, CalibrateStatus::kCancelled);
-  EXPECT_EQ(Child(), 0);
+  EXPECT_TRUE(Eventually([] { return Child() == 0; }));
 }
 
 TEST_F(WorkerTest, OneThatEndsBadlyFailsWithAMessage) {
@@ -336,10 +337,7 @@ TEST_F(WorkerTest, ItDiesWithTheDaemon) {
   ASSERT_TRUE(IsAlive(worker));
   kill(daemon, SIGKILL);
   waitpid(daemon, nullptr, 0);
-  for (int k = 0; k < 3000 && IsAlive(worker); ++k) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  EXPECT_FALSE(IsAlive(worker));
+  EXPECT_TRUE(Eventually([&] { return !IsAlive(worker); }));
   close(told[0]);
   close(told[1]);
 }

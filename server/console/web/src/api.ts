@@ -29,11 +29,13 @@ async function answer<T>(response: Response): Promise<T> {
   if (response.ok && body !== null) return body as T;
   const error = body as ApiError | null;
   throw new Failure(
-      error?.code ? error : {
-        code: String(response.status),
-        message: 'The response of the daemon cannot be read.',
-        whatToDo: 'Reload the page; see the log of selfcald.',
-      },
+    error?.code
+      ? error
+      : {
+          code: String(response.status),
+          message: 'The response of the daemon cannot be read.',
+          whatToDo: 'Reload the page; see the log of selfcald.',
+        },
   );
 }
 
@@ -44,8 +46,7 @@ async function reach(path: string, init?: RequestInit): Promise<Response> {
     throw new Failure({
       code: 'UNAVAILABLE',
       message: 'The daemon does not answer.',
-      whatToDo:
-          'Check that selfcald is running; this page reconnects by itself.',
+      whatToDo: 'Check that selfcald is running; this page reconnects by itself.',
     });
   }
 }
@@ -54,14 +55,27 @@ export async function get<T>(path: string): Promise<T> {
   return answer<T>(await reach(path));
 }
 
-export async function post<T>(path: string, body: unknown): Promise<T> {
+// The header is one that pages of other sites cannot send.
+async function change<T>(method: string, path: string, body?: unknown): Promise<T> {
   return answer<T>(
     await reach(path, {
-      method: 'POST',
+      method,
       headers: { 'Content-Type': 'application/json', 'X-Selfcal-Console': '1' },
-      body: JSON.stringify(body),
+      body: body === undefined ? undefined : JSON.stringify(body),
     }),
   );
+}
+
+export async function post<T>(path: string, body: unknown): Promise<T> {
+  return change<T>('POST', path, body);
+}
+
+export async function patch<T>(path: string, body: unknown): Promise<T> {
+  return change<T>('PATCH', path, body);
+}
+
+export async function remove(path: string, reason: string): Promise<void> {
+  await change('DELETE', path + '?reason=' + encodeURIComponent(reason));
 }
 
 // The last part of a resource name, encoded as in an address.

@@ -25,8 +25,7 @@ const kStill = 0.01;
 function Way(props: { of: ComponentProgress[]; label: string }) {
   const ends = props.of.flatMap((p) => [p.moved - p.sigma, p.moved + p.sigma, 0]);
   const [least, most] = [Math.min(...ends), Math.max(...ends)];
-  const x = (i: number) =>
-    kEdge + (i * (kWidth - 2 * kEdge)) / Math.max(1, props.of.length - 1);
+  const x = (i: number) => kEdge + (i * (kWidth - 2 * kEdge)) / Math.max(1, props.of.length - 1);
   const y = (value: number) =>
     kHeight - kEdge - ((value - least) * (kHeight - 2 * kEdge)) / (most - least || 1);
   const line = (value: (p: ComponentProgress) => number) =>
@@ -75,12 +74,18 @@ function Parameters(props: { steps: Step[] }) {
     <>
       <h2>Parameters</h2>
       <p class="quiet">
-        Each relative to its start value (dashed), with a band of one sigma at
-        that iteration.
+        Each relative to its start value (dashed), with a band of one sigma at that iteration.
       </p>
       <DataTable
         caption="Parameters by iteration"
-        head={['Parameter', 'Now', 'Moved by', 'Sigma', 'Last step [sigmas]', 'Over the iterations']}
+        head={[
+          'Parameter',
+          'Now',
+          'Moved by',
+          'Sigma',
+          'Last step [sigmas]',
+          'Over the iterations',
+        ]}
         rows={rows}
       />
     </>
@@ -100,10 +105,21 @@ export function Convergence(props: { steps: Step[] }) {
   return (
     <>
       <div class="side">
-        <Plot label="Cost by iteration" data={cost} x={x} y="cost" log={steps.every((s) => s.cost > 0)}
-          series={[{ label: 'cost', stroke: kColours[0], width: 2 }]} />
-        <Plot label="Largest step of a parameter by iteration" data={step} x={x} y="step [sigmas]"
-          series={[{ label: 'step', stroke: kColours[1], width: 2 }]} />
+        <Plot
+          label="Cost by iteration"
+          data={cost}
+          x={x}
+          y="cost"
+          log={steps.every((s) => s.cost > 0)}
+          series={[{ label: 'cost', stroke: kColours[0], width: 2 }]}
+        />
+        <Plot
+          label="Largest step of a parameter by iteration"
+          data={step}
+          x={x}
+          y="step [sigmas]"
+          series={[{ label: 'step', stroke: kColours[1], width: 2 }]}
+        />
       </div>
       {steps.some((s) => s.parameters.length > 0) && <Parameters steps={steps} />}
     </>

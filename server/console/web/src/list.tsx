@@ -72,10 +72,11 @@ function Items<R, T>(props: Listing<R, T> & { title: string; of: T[] }) {
   const heads = props.columns.map(({ head, order }) => {
     if (!order || !props.order) return { text: head };
     const now = orderOf(address, props.order);
-    const sorted = now[0] === order ? (now[1] === 'asc' ? 'ascending' : 'descending') : 'none';
+    const sorted: 'ascending' | 'descending' | 'none' =
+      now[0] === order ? (now[1] === 'asc' ? 'ascending' : 'descending') : 'none';
     return {
       text: <SortBy column={order} head={head} now={now} first={props.order[1]} />,
-      sorted: sorted as 'ascending' | 'descending' | 'none',
+      sorted,
     };
   });
   return (

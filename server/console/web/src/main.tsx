@@ -43,18 +43,14 @@ function RigNav(props: { rig: string; page: string }) {
   );
 }
 
-function Page(props: {
-  parts: string[];
-  caller: Caller | null;
-  version: number;
-}) {
+function Page(props: { parts: string[]; caller: Caller | null; version: number }) {
   const [top, rig, page, id] = props.parts;
   const { version, caller } = props;
   if (!top) return <Rigs version={version} />;
   if (top === 'events' && !rig) return <Events rig="" version={version} />;
   if (top === 'rigs' && rig) {
     const shown = () => {
-      if (!page) return <RigPage rig={rig} version={version} />;
+      if (!page) return <RigPage rig={rig} caller={caller} version={version} />;
       if (page === 'coach') return <CoachPage rig={rig} version={version} />;
       if (page === 'events') return <Events rig={rig} version={version} />;
       if (page === 'calibrations' && !id) {
@@ -76,7 +72,7 @@ function Page(props: {
       }
       if (page === 'segments') {
         return id ? (
-          <SegmentPage key={id} rig={rig} segment={id} version={version} />
+          <SegmentPage key={id} rig={rig} caller={caller} segment={id} version={version} />
         ) : (
           <Segments rig={rig} version={version} />
         );
@@ -97,8 +93,7 @@ function Page(props: {
     <>
       <Title text="Not found">There is no such page</Title>
       <Empty>
-        The console has no page at this address. Start at the{' '}
-        <Link to="/">list of rigs</Link>.
+        The console has no page at this address. Start at the <Link to="/">list of rigs</Link>.
       </Empty>
     </>
   );

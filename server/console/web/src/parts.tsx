@@ -144,12 +144,14 @@ export type Figure = [string, ComponentChildren];
 export function Figures(props: { of: (Figure | null)[] }) {
   return (
     <dl class="figures">
-      {props.of.filter((figure) => figure !== null).map(([name, value]) => (
-        <div key={name}>
-          <dt>{name}</dt>
-          <dd>{value}</dd>
-        </div>
-      ))}
+      {props.of
+        .filter((figure) => figure !== null)
+        .map(([name, value]) => (
+          <div key={name}>
+            <dt>{name}</dt>
+            <dd>{value}</dd>
+          </div>
+        ))}
     </dl>
   );
 }
@@ -194,10 +196,7 @@ export function Choice(props: {
   return (
     <label>
       {props.label}
-      <select
-        value={props.value}
-        onChange={(event) => props.onChoice(event.currentTarget.value)}
-      >
+      <select value={props.value} onChange={(event) => props.onChoice(event.currentTarget.value)}>
         {props.of.map(([value, name]) => (
           <option key={value} value={value}>
             {name}

@@ -50,9 +50,7 @@ function axis(label: string | undefined, integers = false, log = false): uPlot.A
             values.map((value) => (value === null ? '' : number(value, 1))),
         }
       : {}),
-    ...(integers
-      ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] }
-      : {}),
+    ...(integers ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] } : {}),
   };
 }
 
@@ -111,6 +109,8 @@ export function Plot(props: PlotProps) {
       made.destroy();
       plot.current = null;
     };
+    // Series, axes and bands belong to the data; callers pass new but equal objects.
+    // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [props.data, props.height, props.label]);
 
   useEffect(() => {
@@ -118,7 +118,7 @@ export function Plot(props: PlotProps) {
     if (!made || props.cursor === undefined) return;
     moving.current = true;
     made.setCursor({
-      left: made.valToPos(props.data[0][props.cursor] as number, 'x'),
+      left: made.valToPos(props.data[0][props.cursor], 'x'),
       top: 10,
     });
     moving.current = false;

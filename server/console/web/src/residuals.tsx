@@ -90,15 +90,22 @@ const kKinds: uPlot.Series[] = kParts.map((part, i) => ({
 }));
 const kAxes = ['x', 'y', 'z'].map((label, i) => ({ label, stroke: kColours[i], width: 1.2 }));
 
-function intervalsOf(shown: Shown, part: string): uPlot.AlignedData {
-  const { whitened, residual } = shown.residuals.intervals!;
-  const seconds = secondsOf(shown.data.keyframes.tNs).slice(0, -1);
+function intervalsOf(
+  segment: SegmentData,
+  residuals: SegmentResiduals,
+  part: string,
+): uPlot.AlignedData {
+  const { whitened, residual } = residuals.intervals!;
+  const seconds = secondsOf(segment.keyframes.tNs).slice(0, -1);
   const three = (of: number[], k: number, kind: number) =>
     of.slice(kSize * k + 3 * kind, kSize * k + 3 * kind + 3);
   if (part === kWhitened) {
     const rms = (k: number, kind: number) =>
       Math.sqrt(three(whitened, k, kind).reduce((sum, x) => sum + x * x, 0) / 3);
-    return [seconds, ...kParts.map((_, kind) => seconds.map((_, k) => rms(k, kind)))] as uPlot.AlignedData;
+    return [
+      seconds,
+      ...kParts.map((_, kind) => seconds.map((_, k) => rms(k, kind))),
+    ] as uPlot.AlignedData;
   }
   const kind = Number(part);
   return [
@@ -109,7 +116,8 @@ function intervalsOf(shown: Shown, part: string): uPlot.AlignedData {
 
 function Intervals(props: Shown) {
   const [part, setPart] = useState(kWhitened);
-  const data = useMemo(() => intervalsOf(props, part), [props.data, props.residuals, part]);
+  const { data: segment, residuals } = props;
+  const data = useMemo(() => intervalsOf(segment, residuals, part), [segment, residuals, part]);
   const whitened = part === kWhitened;
   const { name, unit } = whitened
     ? { name: 'all, in standard deviations', unit: 'sigma' }
@@ -144,9 +152,7 @@ function Intervals(props: Shown) {
 
 function InWords(props: { of: SegmentResiduals }) {
   const { cameras, inertialRms, calibrationVersion, notProjectable } = props.of;
-  const kinds = kParts
-    .map((part, i) => `${part.name} ${number(inertialRms[i] ?? NaN)}`)
-    .join(', ');
+  const kinds = kParts.map((part, i) => `${part.name} ${number(inertialRms[i] ?? NaN)}`).join(', ');
   return (
     <>
       <ul>
@@ -163,9 +169,9 @@ function InWords(props: { of: SegmentResiduals }) {
         {inertialRms.length > 0 && <li>IMU, rms in standard deviations: {kinds}.</li>}
       </ul>
       <p class="quiet">
-        At version {calibrationVersion}, with the states that the client's SLAM
-        system sent; landmarks are refined as for a score, everything else is held
-        constant. For the residuals after a calibration, see the page of its run.
+        At version {calibrationVersion}, with the states that the client's SLAM system sent;
+        landmarks are refined as for a score, everything else is held constant. For the residuals
+        after a calibration, see the page of its run.
       </p>
     </>
   );

@@ -1,13 +1,12 @@
 // The data of a segment, as the pages draw it.
-import type {MotionSegment} from './contract';
+import type { MotionSegment } from './contract';
 
-export type SegmentData =
-    Required<Pick<MotionSegment, 'keyframes'|'imu'|'observations'>>;
+export type SegmentData = Required<Pick<MotionSegment, 'keyframes' | 'imu' | 'observations'>>;
 
 // Returns null for a segment without keyframes or IMU samples, of which there
 // is nothing to draw.
-export function drawable(segment: MotionSegment): SegmentData|null {
-  const {keyframes, imu} = segment;
+export function drawable(segment: MotionSegment): SegmentData | null {
+  const { keyframes, imu } = segment;
   if (!keyframes?.tNs.length || !imu?.tNs.length) return null;
   const observations = segment.observations ?? {
     keyframe: [],
@@ -15,5 +14,5 @@ export function drawable(segment: MotionSegment): SegmentData|null {
     landmark: [],
     zPx: [],
   };
-  return {keyframes, imu, observations};
+  return { keyframes, imu, observations };
 }

@@ -1,8 +1,8 @@
 // State that pages share: the address, data from the daemon, and its updates.
 import { useEffect, useRef, useState } from 'preact/hooks';
-import {Failure, get, rigPath, type ApiError} from './api';
-import type {Change} from './contract';
-import {openStream} from './stream';
+import { Failure, get, rigPath, type ApiError } from './api';
+import type { Change } from './contract';
+import { openStream } from './stream';
 
 // ------------------------------------------------------------- addresses
 
@@ -44,7 +44,7 @@ export function withQuery(values: Record<string, string>): string {
 export interface Read<T> {
   value: T | null;
   error: ApiError | null;
-  busy: boolean;  // a request is in progress
+  busy: boolean; // a request is in progress
 }
 
 // Reads a path, and reads it again when `version` changes; the old value is
@@ -61,8 +61,7 @@ export function useRead<T>(path: string | null, version = 0): Read<T> {
     let gone = false;
     get<T>(path).then(
       (value) => !gone && setRead({ value, error: null, path, version }),
-      (failure: Failure) =>
-        !gone && setRead({ value: null, error: failure.error, path, version }),
+      (failure: Failure) => !gone && setRead({ value: null, error: failure.error, path, version }),
     );
     return () => {
       gone = true;
@@ -115,12 +114,11 @@ export function useLive(rig: string): { version: number; live: boolean } {
         setVersion((count) => count + 1);
       }, kSettleMs);
     };
-    const close =
-        openStream<Change>((rig ? rigPath(rig) + '/' : '') + 'changes:watch', {
-          onMessage: changed,
-          onOpen: () => setLive(true),
-          onLost: () => setLive(false),
-        });
+    const close = openStream<Change>((rig ? rigPath(rig) + '/' : '') + 'changes:watch', {
+      onMessage: changed,
+      onOpen: () => setLive(true),
+      onLost: () => setLive(false),
+    });
     return () => {
       close();
       clearTimeout(timer.current);

@@ -114,10 +114,7 @@ export function Scene(props: {
     () => props.strands.map(({ ways }) => drawn(ways, seen.place)),
     [props.strands, seen],
   );
-  const places = useMemo(
-    () => props.marks.map(({ at }) => seen.place(at)),
-    [props.marks, seen],
-  );
+  const places = useMemo(() => props.marks.map(({ at }) => seen.place(at)), [props.marks, seen]);
   const point = (event: PointerEvent) => {
     const frame = (event.currentTarget as SVGSVGElement).getScreenCTM()?.inverse();
     if (!frame) return;

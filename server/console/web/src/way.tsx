@@ -53,7 +53,7 @@ export function useWay(path: string, version: number) {
     if (now.busy) return;
     now.busy = true;
     const read = async () => {
-      for (let done = -1; done !== now.wanted && !now.gone; ) {
+      for (let done = -1; done !== now.wanted && !now.gone;) {
         done = now.wanted;
         try {
           setWay(await readWay(path));
@@ -65,7 +65,7 @@ export function useWay(path: string, version: number) {
       now.busy = false;
     };
     void read();
-  }, [version]);
+  }, [path, version]);
   return { value: error ? null : way, error };
 }
 
@@ -100,7 +100,9 @@ function Legend(props: { scale: Scale; counts: number[]; unknown: number }) {
   const range = (step: number) => {
     const [from, to] = [bounds[kSteps - 2 - step], bounds[kSteps - 1 - step]];
     if (from === undefined) return `under ${number(to, 4)}`;
-    return to === undefined ? `${number(from, 4)} and more` : `${number(from, 4)} to ${number(to, 4)}`;
+    return to === undefined
+      ? `${number(from, 4)} and more`
+      : `${number(from, 4)} to ${number(to, 4)}`;
   };
   const sample = (name: string) => (
     <svg viewBox="0 0 40 12" class="sample" aria-hidden="true">
@@ -204,8 +206,8 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
   if (drawn.length === 0) {
     return (
       <Empty>
-        No positions of this session are stored: it was received before the daemon
-        stored them. Its segments are listed with the others of the rig.
+        No positions of this session are stored: it was received before the daemon stored them. Its
+        segments are listed with the others of the rig.
       </Empty>
     );
   }
@@ -234,8 +236,8 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
       </p>
       {drawn.length < way.segments.length && (
         <p class="quiet">
-          {way.segments.length - drawn.length} segments are not drawn: they were
-          received before positions were stored.
+          {way.segments.length - drawn.length} segments are not drawn: they were received before
+          positions were stored.
         </p>
       )}
     </>
@@ -273,8 +275,7 @@ export function ColouredWay(props: {
       <Legend scale={scale} counts={counts} unknown={unknown} />
       {!way.whole && (
         <p class="warning">
-          Only the first {way.segments.length} of {way.session.segments} segments are
-          drawn.
+          Only the first {way.segments.length} of {way.session.segments} segments are drawn.
         </p>
       )}
     </>

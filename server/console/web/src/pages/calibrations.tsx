@@ -1,6 +1,7 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
-import { Failure, idOf, pageOf, post, rigPath, type ApiError } from '../api';
+import { ActionDialog, mayAdminister } from '../action';
+import { idOf, pageOf, post, rigPath } from '../api';
 import type {
   Calibration,
   Caller,
@@ -38,10 +39,11 @@ function History(props: { of: Calibration[] }) {
   const query = useAddress().searchParams;
   const [factory, setFactory] = useState(props.of.length === 1);
   // The factory's sigmas are so large that later versions would look flat.
-  const versions = [...props.of].reverse().filter((v) => factory || v.version !== '1');
-  const names = versions[0].estimates
-    .filter((e) => e.sigma > 0)
-    .map((e) => e.component);
+  const versions = useMemo(
+    () => [...props.of].reverse().filter((v) => factory || v.version !== '1'),
+    [props.of, factory],
+  );
+  const names = versions[0].estimates.filter((e) => e.sigma > 0).map((e) => e.component);
   const chosen = query.get('parameter') ?? names[0];
   const data = useMemo(() => {
     const at = versions.map((v) => estimateOf(v, chosen));
@@ -51,7 +53,7 @@ function History(props: { of: Calibration[] }) {
       at.map((e) => (e ? e.value + kBand * e.sigma : null)),
       at.map((e) => (e ? e.value - kBand * e.sigma : null)),
     ] as uPlot.AlignedData;
-  }, [props.of, chosen, factory]);
+  }, [versions, chosen]);
   const unit = estimateOf(versions[0], chosen)?.unit ?? '';
   const bound = { stroke: kColours[0] + '66', width: 1, points: { show: false } };
   return (
@@ -80,7 +82,12 @@ function History(props: { of: Calibration[] }) {
         x={{ label: 'version', integers: true }}
         y={unit === '-' ? 'value' : unit}
         series={[
-          { label: component(chosen), stroke: kColours[0], width: 2, points: { show: true, size: 7 } },
+          {
+            label: component(chosen),
+            stroke: kColours[0],
+            width: 2,
+            points: { show: true, size: 7 },
+          },
           { label: 'plus two sigmas', ...bound },
           { label: 'minus two sigmas', ...bound },
         ]}
@@ -124,21 +131,33 @@ function Difference(props: { rig: string; of: Calibration[] }) {
             </p>
             <DataTable
               caption={`Version ${compared.versionB} minus version ${compared.versionA}`}
-              head={['Parameter', `Version ${compared.versionA}`, `Version ${compared.versionB}`, 'Difference', 'Sigma', 'In sigmas']}
+              head={[
+                'Parameter',
+                `Version ${compared.versionA}`,
+                `Version ${compared.versionB}`,
+                'Difference',
+                'Sigma',
+                'In sigmas',
+              ]}
               rows={compared.differences.map((d) => {
                 const sigmas = Math.abs(d.difference) / d.sigma;
                 const side = (value: number, fromFactory?: number) =>
                   shown({ ...d, value, fromFactory });
                 const a = side(d.valueA, d.fromFactoryA);
                 const b = side(d.valueB, d.fromFactoryB);
-                const by = side(d.difference, d.fromFactoryA === undefined ? undefined : d.difference);
+                const by = side(
+                  d.difference,
+                  d.fromFactoryA === undefined ? undefined : d.difference,
+                );
                 return [
                   component(d.component),
                   quantity(a.value, a.unit),
                   quantity(b.value, b.unit),
                   number(by.value),
                   number(by.sigma),
-                  <span class={sigmas > 3 ? 'strong' : ''}>{d.sigma > 0 ? number(sigmas, 2) : ''}</span>,
+                  <span class={sigmas > 3 ? 'strong' : ''}>
+                    {d.sigma > 0 ? number(sigmas, 2) : ''}
+                  </span>,
                 ];
               })}
             />
@@ -150,53 +169,22 @@ function Difference(props: { rig: string; of: Calibration[] }) {
 }
 
 function Activate(props: { calibration: Calibration; active: string; onEnd: () => void }) {
-  const dialog = useRef<HTMLDialogElement>(null);
-  const [reason, setReason] = useState('');
-  const [error, setError] = useState<ApiError | null>(null);
-  const [busy, setBusy] = useState(false);
-  useEffect(() => dialog.current?.showModal(), []);
-  const back = Number(props.calibration.version) < Number(props.active);
-  const send = async (event: SubmitEvent) => {
-    event.preventDefault();
-    setBusy(true);
-    try {
-      await post(props.calibration.name + ':activate', { reason });
-      props.onEnd();
-    } catch (failure) {
-      setError((failure as Failure).error);
-      setBusy(false);
-    }
-  };
+  const { calibration } = props;
+  const back = Number(calibration.version) < Number(props.active);
   return (
-    <dialog ref={dialog} onClose={props.onEnd} aria-labelledby="activate">
-      <form onSubmit={send}>
-        <h2 id="activate">
-          {back ? 'Roll back to' : 'Activate'} version {props.calibration.version}?
-        </h2>
-        <p>
-          Every device that watches this rig receives it at once, and uses it in
-          place of version {props.active}. The event log records the reason.
-        </p>
-        <label>
-          Reason
-          <textarea
-            required
-            maxLength={500}
-            value={reason}
-            onInput={(event) => setReason(event.currentTarget.value)}
-          />
-        </label>
-        {error && <Problem error={error} />}
-        <p class="buttons">
-          <button type="button" onClick={props.onEnd}>
-            Cancel
-          </button>
-          <button type="submit" class="strong" disabled={busy || !reason.trim()}>
-            {back ? 'Roll back' : 'Activate'}
-          </button>
-        </p>
-      </form>
-    </dialog>
+    <ActionDialog
+      title={`${back ? 'Roll back to' : 'Activate'} version ${calibration.version}?`}
+      button={back ? 'Roll back' : 'Activate'}
+      act={async (reason) => {
+        await post(calibration.name + ':activate', { reason });
+      }}
+      onEnd={props.onEnd}
+    >
+      <p>
+        Every device that watches this rig receives it at once, and uses it in place of version{' '}
+        {props.active}. The event log records the reason.
+      </p>
+    </ActionDialog>
   );
 }
 
@@ -264,8 +252,8 @@ function Origin(props: { of: Calibration }) {
   return (
     <>
       <p>
-        Computed by <Link to={pageOf(from.recalibration)}>run {idOf(from.recalibration)}</Link>{' '}
-        of selfcald {from.programVersion}, starting from version {from.baseVersion}, from{' '}
+        Computed by <Link to={pageOf(from.recalibration)}>run {idOf(from.recalibration)}</Link> of
+        selfcald {from.programVersion}, starting from version {from.baseVersion}, from{' '}
         {from.segments.length} segments:
       </p>
       <SegmentLinks names={from.segments} />
@@ -284,9 +272,7 @@ function Noise(props: { of: SolverReport }) {
         factor.determined
           ? `${number(factor.factor)} (+- ${number(100 * factor.logSigma, 2)} %)`
           : 'not determined',
-        factor.used === 0
-          ? ''
-          : number(factor.used) + (factor.converged ? '' : ' (not converged)'),
+        factor.used === 0 ? '' : number(factor.used) + (factor.converged ? '' : ' (not converged)'),
       ])}
     />
   );
@@ -352,24 +338,15 @@ function Version(props: { of: Calibration }) {
   );
 }
 
-function mayActivate(caller: Caller | null, rig: string): boolean {
-  return (caller?.grants ?? []).some(
-    (grant) => grant.role === 'administer' && (grant.rig === '' || grant.rig === rig),
-  );
-}
-
 export function Calibrations(props: { rig: string; caller: Caller | null; version: number }) {
   const url = useAddress();
   const shown = /\/calibrations\/(\d+)$/.exec(url.pathname)?.[1];
   const [asked, setAsked] = useState<Calibration | null>(null);
   const [changed, setChanged] = useState(0);
   const base = rigPath(props.rig) + '/calibrations';
-  const read = useRead<ListCalibrationsResponse>(
-    base + '?page_size=100',
-    props.version + changed,
-  );
+  const read = useRead<ListCalibrationsResponse>(base + '?page_size=100', props.version + changed);
   const title = 'Calibrations of ' + props.rig;
-  const may = mayActivate(props.caller, 'rigs/' + props.rig);
+  const may = mayAdminister(props.caller, 'rigs/' + props.rig);
   return (
     <>
       <Title text={title}>{title}</Title>
@@ -382,7 +359,15 @@ export function Calibrations(props: { rig: string; caller: Caller | null; versio
               {nextPageToken && <p class="quiet">The newest 100 versions.</p>}
               <DataTable
                 caption="Versions"
-                  head={['Version', 'State', 'Verdict', 'Created', 'Segments', 'Reprojection rms [px]', ...(may ? ['Change'] : [])]}
+                head={[
+                  'Version',
+                  'State',
+                  'Verdict',
+                  'Created',
+                  'Segments',
+                  'Reprojection rms [px]',
+                  ...(may ? ['Change'] : []),
+                ]}
                 rows={calibrations.map((c) => [
                   <Link to={pageOf(c.name)} current={c.version === shown}>
                     {c.version === '1' ? '1 (factory)' : c.version}

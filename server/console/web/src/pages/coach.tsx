@@ -41,16 +41,14 @@ function Best(props: { of: AdviseMotionResponse_Advice; seconds: number }) {
       <p class="instruction">{props.of.instruction}</p>
       {part < kHardly ? (
         <p>
-          No motion helps much now: {number(props.seconds)} s of it reduce the
-          uncertainty by {number(100 * part, 2)} %. A new calibration, or other
-          surroundings, may help more.
+          No motion helps much now: {number(props.seconds)} s of it reduce the uncertainty by{' '}
+          {number(100 * part, 2)} %. A new calibration, or other surroundings, may help more.
         </p>
       ) : (
         <p>
           Expected from {number(props.seconds)} s: the uncertainty becomes{' '}
-          <strong>{number(100 * part, 2)} % smaller</strong> in the mean over all
-          directions (gain {number(props.of.gainNats)} nats). Largest
-          improvement: <Sharpens of={props.of} />.
+          <strong>{number(100 * part, 2)} % smaller</strong> in the mean over all directions (gain{' '}
+          {number(props.of.gainNats)} nats). Largest improvement: <Sharpens of={props.of} />.
         </p>
       )}
     </div>
@@ -63,7 +61,14 @@ function Motions(props: { of: AdviseMotionResponse }) {
       <h2>All motions</h2>
       <DataTable
         caption={`Predicted gain of a segment of ${number(props.of.segmentSeconds)} s`}
-        head={['Motion', 'What to do', 'Smaller by', 'Gain [nats]', 'By group [nats]', 'Largest improvement']}
+        head={[
+          'Motion',
+          'What to do',
+          'Smaller by',
+          'Gain [nats]',
+          'By group [nats]',
+          'Largest improvement',
+        ]}
         rows={props.of.advice.map((advice) => [
           words(advice.motion),
           advice.instruction,
@@ -82,8 +87,7 @@ function Weakest(props: { of: AdviseMotionResponse_WeakDirection[] }) {
     <>
       <h2>Least known</h2>
       <p class="quiet">
-        In reference sigmas: one usual segment reaches about 1, a new device starts
-        at about 10.
+        In reference sigmas: one usual segment reaches about 1, a new device starts at about 10.
       </p>
       <ol>
         {props.of.map((weak) => (
@@ -116,8 +120,8 @@ export function CoachPage(props: { rig: string; version: number }) {
       {read.error && <Problem error={read.error} />}
       {!read.error && !coaching && (
         <p role="status">
-          Simulating each motion with the calibration of this device. The first
-          time for a version, this takes a few seconds ...
+          Simulating each motion with the calibration of this device. The first time for a version,
+          this takes a few seconds ...
         </p>
       )}
       {coaching && (
@@ -128,9 +132,8 @@ export function CoachPage(props: { rig: string; version: number }) {
             <Link to={`${pageOf('rigs/' + props.rig)}/calibrations/${coaching.calibrationVersion}`}>
               version {coaching.calibrationVersion}
             </Link>{' '}
-            and {coaching.segmentsSince}{' '}
-            {coaching.segmentsSince === 1 ? 'segment' : 'segments'} in the tables
-            that it does not use; updates when segments arrive.
+            and {coaching.segmentsSince} {coaching.segmentsSince === 1 ? 'segment' : 'segments'} in
+            the tables that it does not use; updates when segments arrive.
             {read.busy && ' Updating ...'}
           </p>
           <Weakest of={coaching.weakest} />

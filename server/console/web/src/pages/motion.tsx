@@ -11,14 +11,15 @@ import { drawable, type SegmentData } from '../segment_data';
 import { useRead } from '../state';
 import { Scene, type Mark, type Strand } from '../trajectory';
 
+const place = (positions: number[], i: number) => positions.slice(3 * i, 3 * i + 3);
+
 function Trajectory(props: { positions: number[]; at: number }) {
   const { positions } = props;
   const strands = useMemo((): Strand[] => [{ ways: [positions], class: 'path' }], [positions]);
-  const place = (i: number) => positions.slice(3 * i, 3 * i + 3);
   const keyframes = useMemo(
     () =>
       Array.from({ length: positions.length / 3 }, (_, i): Mark => ({
-        at: place(i),
+        at: place(positions, i),
         class: 'keyframe',
         radius: 2.5,
       })),
@@ -28,7 +29,7 @@ function Trajectory(props: { positions: number[]; at: number }) {
     <Scene
       label="Trajectory of the IMU"
       strands={strands}
-      marks={[...keyframes, { at: place(props.at), class: 'now', radius: 6 }]}
+      marks={[...keyframes, { at: place(positions, props.at), class: 'now', radius: 6 }]}
     >
       Trajectory
     </Scene>
@@ -246,11 +247,11 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
   const residuals = useRead<SegmentResiduals>(
     `${props.path}/residuals?calibration_version=${version}`,
   );
-  const gyro = useMemo(() => triple(imu.tNs, imu.gyro), [props.data]);
-  const accel = useMemo(() => triple(imu.tNs, imu.accel), [props.data]);
+  const gyro = useMemo(() => triple(imu.tNs, imu.gyro), [imu]);
+  const accel = useMemo(() => triple(imu.tNs, imu.accel), [imu]);
   const keyframe = nearest(keyframes.tNs, BigInt(imu.tNs[at]));
   const toKeyframe = (k: number) => setAt(nearest(imu.tNs, BigInt(keyframes.tNs[k])));
-  const seconds = (gyro[0][at] as number).toFixed(3);
+  const seconds = gyro[0][at].toFixed(3);
   const cameras = rig.value?.factory?.cameras;
   return (
     <>
@@ -285,10 +286,26 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
           />
         )}
       </div>
-      <Plot label="Angular rates of the gyroscope" data={gyro} series={kAxes}
-        x={{ label: 'seconds' }} y="gyro [rad/s]" cursor={at} onCursor={setAt} height={200} />
-      <Plot label="Readings of the accelerometer" data={accel} series={kAxes}
-        x={{ label: 'seconds' }} y="accel [m/s²]" cursor={at} onCursor={setAt} height={200} />
+      <Plot
+        label="Angular rates of the gyroscope"
+        data={gyro}
+        series={kAxes}
+        x={{ label: 'seconds' }}
+        y="gyro [rad/s]"
+        cursor={at}
+        onCursor={setAt}
+        height={200}
+      />
+      <Plot
+        label="Readings of the accelerometer"
+        data={accel}
+        series={kAxes}
+        x={{ label: 'seconds' }}
+        y="accel [m/s²]"
+        cursor={at}
+        onCursor={setAt}
+        height={200}
+      />
       <h2>Residuals</h2>
       <Loaded read={residuals}>
         {(value) => (
@@ -298,7 +315,7 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
             keyframe={keyframe}
             onKeyframe={toKeyframe}
             camera={camera}
-            end={gyro[0][imu.tNs.length - 1] as number}
+            end={gyro[0][imu.tNs.length - 1]}
           />
         )}
       </Loaded>
@@ -316,8 +333,8 @@ export function Data(props: { rig: string; path: string; segment: Segment }) {
         {props.segment.problem
           ? `: ${props.segment.problem}`
           : ', because no table and no run needs it'}
-        . Its information about the calibration is kept, and its path is shown with
-        that of its session.
+        . Its information about the calibration is kept, and its path is shown with that of its
+        session.
       </Empty>
     );
   }

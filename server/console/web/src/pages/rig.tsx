@@ -1,8 +1,10 @@
 import { useMemo, useState } from 'preact/hooks';
 import uPlot from 'uplot';
-import { idOf, pageOf, rigPath } from '../api';
+import { ActionDialog, mayAdminister } from '../action';
+import { idOf, pageOf, remove, rigPath } from '../api';
 import type {
   Calibration,
+  Caller,
   ComponentEstimate,
   ListSegmentsResponse,
   ListTablesResponse,
@@ -11,6 +13,7 @@ import type {
   Table,
 } from '../contract';
 import { component, matches, number, quantity } from '../format';
+import { EditLabels, Labels } from '../labels';
 import {
   Badge,
   Choice,
@@ -30,7 +33,7 @@ import {
 } from '../parts';
 import { kColours, Plot } from '../plot';
 import { NewestSession } from './session';
-import { useRead } from '../state';
+import { go, useRead } from '../state';
 
 interface Known extends ComponentEstimate {
   tolerance: number;
@@ -53,9 +56,7 @@ function verdict(ratio: number): string {
 }
 
 function Group(props: { name: string; of: Known[] }) {
-  const mean = Math.exp(
-    props.of.reduce((sum, e) => sum + Math.log(e.ratio), 0) / props.of.length,
-  );
+  const mean = Math.exp(props.of.reduce((sum, e) => sum + Math.log(e.ratio), 0) / props.of.length);
   return (
     <section>
       <h3>
@@ -84,8 +85,8 @@ function Weak(props: { of: Known[] }) {
   return (
     <>
       <p>
-        {weak.length} of {props.of.length} parameters are hardly better known than
-        from the factory. The recordings so far do not determine:
+        {weak.length} of {props.of.length} parameters are hardly better known than from the factory.
+        The recordings so far do not determine:
       </p>
       <ul>
         {weak.slice(0, 8).map((e) => (
@@ -105,8 +106,8 @@ function Knowledge(props: { rig: Rig; of: Known[] }) {
       <h2>Weak parameters</h2>
       <Weak of={props.of} />
       <p>
-        <Link to={pageOf(props.rig.name) + '/coach'}>The coach</Link> recommends
-        the motion with the largest gain.
+        <Link to={pageOf(props.rig.name) + '/coach'}>The coach</Link> recommends the motion with the
+        largest gain.
       </p>
       <h2>Uncertainty by group</h2>
       {props.rig.groups.map((group) => {
@@ -137,14 +138,12 @@ function Tables(props: { of: Table[] }) {
           </h3>
           {table.starved && (
             <p class="warning">
-              The table does not fill: {table.scored} segments were offered. Move
-              the device in more directions, and closer to what it sees.
+              The table does not fill: {table.scored} segments were offered. Move the device in more
+              directions, and closer to what it sees.
             </p>
           )}
           {table.entries.length === 0 ? (
-            <p class="quiet">
-              Empty: no segment has enough information about this group yet.
-            </p>
+            <p class="quiet">Empty: no segment has enough information about this group yet.</p>
           ) : (
             <DataTable
               caption={'Segments in the table ' + idOf(table.name)}
@@ -195,8 +194,20 @@ function Histogram(props: { segments: Segment[]; group: string }) {
       x={{ label: 'entropy [nats], lower is more informative', range: [low, high] }}
       y="segments"
       series={[
-        { label: 'all', fill: kColours[0] + '66', stroke: kColours[0], paths: bars, points: { show: false } },
-        { label: 'kept in the table', fill: kColours[1], stroke: kColours[1], paths: bars, points: { show: false } },
+        {
+          label: 'all',
+          fill: kColours[0] + '66',
+          stroke: kColours[0],
+          paths: bars,
+          points: { show: false },
+        },
+        {
+          label: 'kept in the table',
+          fill: kColours[1],
+          stroke: kColours[1],
+          paths: bars,
+          points: { show: false },
+        },
       ]}
     />
   );
@@ -242,15 +253,60 @@ function Entropies(props: { rig: string; groups: string[]; version: number }) {
   );
 }
 
-export function RigPage(props: { rig: string; version: number }) {
+function Delete(props: { rig: string; onEnd: () => void }) {
+  return (
+    <ActionDialog
+      title={`Delete the rig ${props.rig}?`}
+      button="Delete"
+      act={async (reason) => {
+        await remove(rigPath(props.rig), reason);
+        go('/');
+      }}
+      onEnd={props.onEnd}
+    >
+      <p>
+        All its segments, tables, runs and calibrations are deleted. This cannot be undone. The
+        event log keeps its events, and the reason.
+      </p>
+    </ActionDialog>
+  );
+}
+
+// What an administrator may change here.
+function Administration(props: { rig: string; of: Rig; onChange: () => void }) {
+  const [asked, setAsked] = useState<'labels' | 'delete' | null>(null);
+  return (
+    <p class="buttons">
+      <button type="button" onClick={() => setAsked('labels')}>
+        Edit labels
+      </button>
+      <button type="button" onClick={() => setAsked('delete')}>
+        Delete rig
+      </button>
+      {asked === 'labels' && (
+        <EditLabels
+          rig={props.rig}
+          of={props.of}
+          onEnd={() => {
+            setAsked(null);
+            props.onChange();
+          }}
+        />
+      )}
+      {asked === 'delete' && <Delete rig={props.rig} onEnd={() => setAsked(null)} />}
+    </p>
+  );
+}
+
+export function RigPage(props: { rig: string; caller: Caller | null; version: number }) {
   const base = rigPath(props.rig);
-  const rig = useRead<Rig>(base);
+  const [changed, setChanged] = useState(0);
+  const rig = useRead<Rig>(base, changed);
   const active = useRead<Calibration>(base + '/calibrations/active', props.version);
   const factory = useRead<Calibration>(base + '/calibrations/1');
   const tables = useRead<ListTablesResponse>(base + '/tables', props.version);
   const both = useMemo(
-    () =>
-      active.value && factory.value ? known(active.value, factory.value) : null,
+    () => (active.value && factory.value ? known(active.value, factory.value) : null),
     [active.value, factory.value],
   );
   // An error is shown once, not for each part of the page.
@@ -270,19 +326,32 @@ export function RigPage(props: { rig: string; version: number }) {
         {(calibration) => (
           <Figures
             of={[
-              [
-                'Active version',
-                <Link to={pageOf(calibration.name)}>{calibration.version}</Link>,
-              ],
+              ['Active version', <Link to={pageOf(calibration.name)}>{calibration.version}</Link>],
               ['State', <Badge state={calibration.state} />],
               ['Created', <When time={calibration.createTime} />],
-              ['From', calibration.provenance
-                ? `${calibration.provenance.segments.length} segments`
-                : 'the factory'],
+              [
+                'From',
+                calibration.provenance
+                  ? `${calibration.provenance.segments.length} segments`
+                  : 'the factory',
+              ],
             ]}
           />
         )}
       </Loaded>
+      {rig.value && (
+        <>
+          <h2>Labels</h2>
+          <Labels of={rig.value.labels} />
+          {mayAdminister(props.caller, rig.value.name) && (
+            <Administration
+              rig={props.rig}
+              of={rig.value}
+              onChange={() => setChanged(changed + 1)}
+            />
+          )}
+        </>
+      )}
       <Loaded read={{ value: rig.value && both && { rig: rig.value, both }, error: null }}>
         {(value) => <Knowledge rig={value.rig} of={value.both} />}
       </Loaded>

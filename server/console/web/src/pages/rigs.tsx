@@ -1,6 +1,7 @@
 import type { JSX } from 'preact';
 import { idOf, pageOf } from '../api';
 import type { ListActivityResponse, RigActivity } from '../contract';
+import { Labels } from '../labels';
 import { ListPage, type Column } from '../list';
 import { Link, Meter, Problem, When } from '../parts';
 import { go, useAddress, withQuery } from '../state';
@@ -42,18 +43,17 @@ const kColumns: Column<RigActivity>[] = [
       />
     ),
   },
+  { head: 'Labels', cell: (rig) => <Labels of={rig.labels} /> },
   { head: 'Alarms', cell: (rig) => <Alarms of={rig.alarms} /> },
 ];
 
 function Nothing(props: { filter: string }) {
   return props.filter ? (
-    <p>
-      No rig has '{props.filter}' in its name. Clear the filter to see all.
-    </p>
+    <p>No rig matches '{props.filter}'. Clear the filter to see all.</p>
   ) : (
     <p>
-      There is no rig yet. Create one with <code>selfcal rig create</code>, then
-      send segments with the client library or <code>selfcal import</code>.
+      There is no rig yet. Create one with <code>selfcal rig create</code>, then send segments with
+      the client library or <code>selfcal import</code>.
     </p>
   );
 }
@@ -77,8 +77,14 @@ export function Rigs(props: { version: number }) {
       above={(mistake) => (
         <form class="bar" role="search" onSubmit={(event) => event.preventDefault()}>
           <label>
-            Name contains
-            <input type="search" value={filter} onInput={search} />
+            Filter
+            <input
+              type="search"
+              value={filter}
+              placeholder="a part of the name, or labels.site = lab"
+              size={40}
+              onInput={search}
+            />
           </label>
           {mistake && <Problem error={mistake} />}
         </form>

@@ -118,10 +118,7 @@ function Going(props: { run: Recalibration }) {
 export function RunPage(props: { rig: string; run: string; version: number }) {
   const path = `${rigPath(props.rig)}/recalibrations/${encodeURIComponent(props.run)}`;
   const read = useRead<Recalibration>(path, props.version);
-  const { steps, now, error } = useProgress(
-    path,
-    read.value !== null && isRunning(read.value),
-  );
+  const { steps, now, error } = useProgress(path, read.value !== null && isRunning(read.value));
   const title = `Run ${props.run} of ${props.rig}`;
   return (
     <>

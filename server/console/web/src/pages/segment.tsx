@@ -1,5 +1,8 @@
-import { idOf, pageOf, rigPath } from '../api';
+import { useState } from 'preact/hooks';
+import { ActionDialog, mayAdminister } from '../action';
+import { idOf, pageOf, post, remove, rigPath } from '../api';
 import type {
+  Caller,
   GroupScore,
   ListTablesResponse,
   Segment,
@@ -23,7 +26,7 @@ import {
   Unknown,
   When,
 } from '../parts';
-import { useRead } from '../state';
+import { go, useRead } from '../state';
 import { Data } from './motion';
 import { sessionOf } from './session';
 
@@ -55,8 +58,8 @@ function Exclusion(props: { of: TableExclusion; table: Table; entropy: number | 
     case 'OUTRANKED':
       return (
         <>
-          not kept: the table was full, and its worst entry,{' '}
-          <Rival of={of} none="since dropped" />, is more informative{values}
+          not kept: the table was full, and its worst entry, <Rival of={of} none="since dropped" />,
+          is more informative{values}
           {now}
         </>
       );
@@ -110,8 +113,7 @@ function Why(props: {
   if (place >= 0) {
     return (
       <>
-        kept: rank {place + 1} of {table.entries.length}, most informative first;{' '}
-        {worstOf(table)}
+        kept: rank {place + 1} of {table.entries.length}, most informative first; {worstOf(table)}
       </>
     );
   }
@@ -121,8 +123,7 @@ function Why(props: {
   if (full && last && entropy !== undefined && entropy >= last.entropyNats) {
     return (
       <>
-        not kept: its entropy of {number(entropy, 4)} is above that of all entries;{' '}
-        {worstOf(table)}
+        not kept: its entropy of {number(entropy, 4)} is above that of all entries; {worstOf(table)}
       </>
     );
   }
@@ -131,7 +132,12 @@ function Why(props: {
 
 function directions(of: UnobservedDirection[]): string {
   return of
-    .map((d) => d.parts.slice(0, 2).map((p) => component(p.component)).join(' with '))
+    .map((d) =>
+      d.parts
+        .slice(0, 2)
+        .map((p) => component(p.component))
+        .join(' with '),
+    )
     .join('; ');
 }
 
@@ -199,9 +205,68 @@ function Parameters(props: { of: SegmentInformation_Component[] }) {
   );
 }
 
-export function SegmentPage(props: { rig: string; segment: string; version: number }) {
+// What an administrator may do with a segment.
+function Administration(props: { rig: string; segment: Segment; onChange: () => void }) {
+  const [asked, setAsked] = useState<'quarantine' | 'delete' | null>(null);
+  const key = decodeURIComponent(idOf(props.segment.name));
+  const at = key.lastIndexOf('~');
+  return (
+    <p class="buttons">
+      <button type="button" onClick={() => setAsked('quarantine')}>
+        Quarantine
+      </button>
+      <button type="button" onClick={() => setAsked('delete')}>
+        Delete
+      </button>
+      {asked === 'quarantine' && (
+        <ActionDialog
+          title={`Quarantine the segment ${key}?`}
+          button="Quarantine"
+          act={async (reason) => {
+            await post(rigPath(props.rig) + '/segments:quarantine', {
+              session: key.slice(0, at),
+              index: key.slice(at + 1),
+              reason,
+            });
+            props.onChange();
+          }}
+          onEnd={() => setAsked(null)}
+        >
+          <p>It leaves the tables, and no calibration uses it any more. This cannot be undone.</p>
+        </ActionDialog>
+      )}
+      {asked === 'delete' && (
+        <ActionDialog
+          title={`Delete the segment ${key}?`}
+          button="Delete"
+          act={async (reason) => {
+            await remove(
+              `${rigPath(props.rig)}/segments/${encodeURIComponent(idOf(props.segment.name))}`,
+              reason,
+            );
+            go(`/rigs/${props.rig}/segments`);
+          }}
+          onEnd={() => setAsked(null)}
+        >
+          <p>
+            Its data, its score and its place in tables are deleted. This cannot be undone. A
+            segment that a calibration was computed from is refused: quarantine it instead.
+          </p>
+        </ActionDialog>
+      )}
+    </p>
+  );
+}
+
+export function SegmentPage(props: {
+  rig: string;
+  caller: Caller | null;
+  segment: string;
+  version: number;
+}) {
+  const [changed, setChanged] = useState(0);
   const path = `${rigPath(props.rig)}/segments/${encodeURIComponent(props.segment)}`;
-  const read = useRead<Segment>(path, props.version);
+  const read = useRead<Segment>(path, props.version + changed);
   const tables = useRead<ListTablesResponse>(rigPath(props.rig) + '/tables', props.version);
   const information = useRead<SegmentInformation>(path + '/information', props.version);
   const title = 'Segment ' + decodeURIComponent(props.segment);
@@ -215,7 +280,10 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
               of={[
                 ['State', <Badge state={segment.state} />],
                 ['Received', <When time={segment.receiveTime} />],
-                ['Length', number(Number(BigInt(segment.endNs) - BigInt(segment.startNs)) / 1e9) + ' s'],
+                [
+                  'Length',
+                  number(Number(BigInt(segment.endNs) - BigInt(segment.startNs)) / 1e9) + ' s',
+                ],
                 ['Keyframes', segment.keyframes],
                 ['IMU samples', segment.imuSamples],
                 ['Landmarks', segment.landmarks],
@@ -249,13 +317,19 @@ export function SegmentPage(props: { rig: string; segment: string; version: numb
               <Link to={pageOf(`rigs/${props.rig}/sessions/${sessionOf(segment.name)}`)}>
                 {decodeURIComponent(sessionOf(segment.name))}
               </Link>
-              ,
-              estimated with{' '}
+              , estimated with{' '}
               <Link to={pageOf(`rigs/${props.rig}/calibrations/${segment.calibrationVersion}`)}>
                 version {segment.calibrationVersion}
               </Link>
               .
             </p>
+            {mayAdminister(props.caller, 'rigs/' + props.rig) && (
+              <Administration
+                rig={props.rig}
+                segment={segment}
+                onChange={() => setChanged(changed + 1)}
+              />
+            )}
           </>
         )}
       </Loaded>

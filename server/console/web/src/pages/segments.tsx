@@ -50,13 +50,11 @@ function columns(group: string): Column<Segment>[] {
     { head: 'Observations', cell: (segment) => segment.observations, order: 'observations' },
     {
       head: 'Rms [px]',
-      cell: (segment) =>
-        segment.residuals ? number(segment.residuals.reprojectionRmsPx) : '',
+      cell: (segment) => (segment.residuals ? number(segment.residuals.reprojectionRmsPx) : ''),
     },
     {
       head: '°C',
-      cell: (segment) =>
-        segment.temperatureC === undefined ? '' : number(segment.temperatureC),
+      cell: (segment) => (segment.temperatureC === undefined ? '' : number(segment.temperatureC)),
       order: 'temperature_c',
     },
     {
@@ -79,9 +77,8 @@ function Help(props: { group: string }) {
       <p>Conditions joined by AND; a segment has to meet all of them.</p>
       <ul>
         <li>
-          With <code>=</code>: <code>state</code> (STORED, SCORED or UNUSABLE),{' '}
-          <code>session</code>, <code>has_data</code> (true or false),{' '}
-          <code>in_table</code> (a group).
+          With <code>=</code>: <code>state</code> (STORED, SCORED or UNUSABLE), <code>session</code>
+          , <code>has_data</code> (true or false), <code>in_table</code> (a group).
         </li>
         <li>
           With <code>=</code> <code>&lt;</code> <code>&lt;=</code> <code>&gt;</code>{' '}
@@ -204,9 +201,7 @@ export function Segments(props: { rig: string; version: number }) {
       version={props.version}
       columns={columns(group)}
       next="Next segments"
-      empty={
-        <Nothing rig={props.rig} filter={address.get('filter') ?? ''} order={order} />
-      }
+      empty={<Nothing rig={props.rig} filter={address.get('filter') ?? ''} order={order} />}
       above={(mistake) => (
         <>
           <Filter mistake={mistake} group={group} groups={groups} />

@@ -88,16 +88,10 @@ function Newest(props: { rig: string; session: string; version: number }) {
       {({ way, groups }) => (
         <>
           <p>
-            <Link to={pageOf(way.session.name)}>{way.session.session}</Link>:{' '}
-            {way.session.segments} segments, of which {way.segments.filter(isKept).length} are
-            kept.
+            <Link to={pageOf(way.session.name)}>{way.session.session}</Link>: {way.session.segments}{' '}
+            segments, of which {way.segments.filter(isKept).length} are kept.
           </p>
-          <ColouredWay
-            way={way}
-            groups={groups}
-            group={group ?? groups[0]}
-            onGroup={setGroup}
-          />
+          <ColouredWay way={way} groups={groups} group={group ?? groups[0]} onGroup={setGroup} />
         </>
       )}
     </Loaded>

@@ -1,0 +1,251 @@
+#include "server/store/make_store.h"
+
+#include <memory>
+#include <type_traits>
+#include <utility>
+
+#include "server/status/status_macros.h"
+#include "server/store/calibrations.h"
+#include "server/store/change_rows.h"
+#include "server/store/driver/transaction.h"
+#include "server/store/events.h"
+#include "server/store/exclusions.h"
+#include "server/store/maintenance.h"
+#include "server/store/payload.h"
+#include "server/store/rig_lists.h"
+#include "server/store/rigs.h"
+#include "server/store/runs.h"
+#include "server/store/segment_rows.h"
+#include "server/store/session_rows.h"
+#include "server/store/table_rows.h"
+#include "server/store/unit_of_work.h"
+
+namespace selfcal::server {
+namespace {
+
+// Runs the record functions of each subject on the right connection.
+class DatabaseStore final : public Store {
+ public:
+  explicit DatabaseStore(std::unique_ptr<Database> db)
+      : db_(std::move(db)), maintenance_(MakeMaintenance(db_.get())) {}
+
+  absl::Status Transact(const std::string& rig,
+                        std::int64_t time_ns,
+                        const Work& work) override {
+    return db_->Write(
+        [&](Connection* db) { return CarryOut(db, rig, time_ns, work); });
+  }
+
+  void BeginTransaction(const std::string& rig,
+                        std::int64_t time_ns,
+                        Work work,
+                        Done done) override {
+    db_->BeginWrite(
+        [rig, time_ns, work = std::move(work)](Connection* db) {
+          return CarryOut(db, rig, time_ns, work);
+        },
+        std::move(done));
+  }
+
+  absl::Status InsertRig(const StoredRig& rig, const Work& work) override {
+    return db_->Write([&](Connection* db) -> absl::Status {
+      Transaction transaction(db);
+      SELFCAL_RETURN_IF_ERROR(transaction.status());
+      SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row,
+                               server::InsertRig(db, rig));
+      UnitOfWork tx(db, rig.rig.id, row, rig.create_time_ns);
+      SELFCAL_RETURN_IF_ERROR(work(&tx));
+      return transaction.Commit();
+    });
+  }
+
+  absl::Status Inspect(const std::string& rig, const Work& work) override {
+    return db_->Read([&](Connection* db) -> absl::Status {
+      SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, FindRigId(db, rig));
+      UnitOfWork tx(db, rig, row, 0);
+      return work(&tx);
+    });
+  }
+
+  absl::StatusOr<StoredRig> GetRig(const std::string& rig) override {
+    return Read([&](Connection* db) { return ReadRig(db, rig); });
+  }
+
+  absl::StatusOr<std::vector<std::string>> ListRigNames() override {
+    return Read([&](Connection* db) { return RigNames(db); });
+  }
+
+  absl::StatusOr<std::vector<std::string>> ListIdleRigs(
+      std::int64_t idle_since_ns) override {
+    return Read(
+        [&](Connection* db) { return IdleRigNames(db, idle_since_ns); });
+  }
+
+  using Store::ListRigs;
+  absl::StatusOr<Listed<StoredRig>> ListRigs(const RigQuery& query,
+                                             const Page& page) override {
+    return Read([&](Connection* db) { return ListRigRows(db, query, page); });
+  }
+
+  absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
+      const RigQuery& query, const Page& page) override {
+    return Read(
+        [&](Connection* db) { return ListSummaryRows(db, query, page); });
+  }
+
+  absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
+                                           const SegmentKey& key) override {
+    return Read([&](Connection* db) { return ReadSegment(db, rig, key); });
+  }
+
+  using Store::ListSegments;
+  absl::StatusOr<Listed<StoredSegment>> ListSegments(
+      const std::string& rig,
+      const SegmentQuery& query,
+      const Page& page) override {
+    return Read(
+        [&](Connection* db) { return ListSegmentRows(db, rig, query, page); });
+  }
+
+  absl::StatusOr<MotionSegment> GetSegmentData(const std::string& rig,
+                                               const SegmentKey& key) override {
+    SELFCAL_ASSIGN_OR_RETURN(const Payload payload, Read([&](Connection* db) {
+                               return ReadPayload(db, rig, key);
+                             }));
+    return UnpackSegment(payload, SegmentText(rig, key));
+  }
+
+  absl::StatusOr<Listed<SessionSummary>> ListSessions(
+      const std::string& rig, const Page& page) override {
+    return Read([&](Connection* db) { return ListSessionRows(db, rig, page); });
+  }
+
+  absl::StatusOr<Listed<SessionSegment>> ListSessionSegments(
+      const std::string& rig,
+      const std::string& session,
+      const Page& page) override {
+    return Read([&](Connection* db) {
+      return ListSessionSegmentRows(db, rig, session, page);
+    });
+  }
+
+  absl::StatusOr<SessionSummary> GetSession(
+      const std::string& rig, const std::string& session) override {
+    return Read([&](Connection* db) { return ReadSession(db, rig, session); });
+  }
+
+  absl::StatusOr<std::vector<Exclusion>> ListExclusions(
+      const std::string& rig, const SegmentKey& key) override {
+    return Read(
+        [&](Connection* db) { return ListExclusionRows(db, rig, key); });
+  }
+
+  absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) override {
+    return Read([&](Connection* db) { return ListUnscoredRows(db, limit); });
+  }
+
+  absl::StatusOr<std::vector<Table>> GetTables(
+      const std::string& rig) override {
+    return Read([&](Connection* db) -> absl::StatusOr<std::vector<Table>> {
+      SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+      return ReadTables(db, rig_id);
+    });
+  }
+
+  absl::StatusOr<StoredChange> GetChange(const std::string& rig,
+                                         std::int64_t change) override {
+    return Read([&](Connection* db) { return ReadChange(db, rig, change); });
+  }
+
+  absl::StatusOr<StoredCalibration> GetCalibration(
+      const std::string& rig, std::int64_t version) override {
+    return Read(
+        [&](Connection* db) { return ReadCalibration(db, rig, version); });
+  }
+
+  absl::StatusOr<StoredCalibration> GetActiveCalibration(
+      const std::string& rig) override {
+    return Read([&](Connection* db) { return ReadActiveCalibration(db, rig); });
+  }
+
+  absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
+      const std::string& rig, const Page& page) override {
+    return Read(
+        [&](Connection* db) { return ListCalibrationRows(db, rig, page); });
+  }
+
+  absl::StatusOr<StoredRun> GetRun(const std::string& rig,
+                                   std::int64_t run) override {
+    return Read([&](Connection* db) { return ReadRun(db, rig, run); });
+  }
+
+  absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
+                                             const Page& page) override {
+    return Read([&](Connection* db) { return ListRunRows(db, rig, page); });
+  }
+
+  absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns() override {
+    return Read([&](Connection* db) { return ListUnfinishedRunRows(db); });
+  }
+
+  absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
+                                                 std::int64_t run) override {
+    return Read(
+        [&](Connection* db) { return CandidateCalibration(db, rig, run); });
+  }
+
+  absl::StatusOr<Listed<StoredEvent>> ListEvents(
+      const Page& page, const std::string& rig) override {
+    return Read([&](Connection* db) { return ListEventRows(db, page, rig); });
+  }
+
+  absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(
+      const Page& page, const std::string& rig) override {
+    return Read(
+        [&](Connection* db) { return ListNewestEventRows(db, page, rig); });
+  }
+
+  StoreMaintenance* maintenance() override { return maintenance_.get(); }
+
+ private:
+  // `query` returns a Status or a StatusOr.
+  template <typename Query>
+  auto Read(const Query& query) -> std::invoke_result_t<Query, Connection*> {
+    std::invoke_result_t<Query, Connection*> result = absl::UnknownError("");
+    const absl::Status status = db_->Read([&](Connection* db) {
+      result = query(db);
+      return StatusOf(result);
+    });
+    SELFCAL_RETURN_IF_ERROR(status);
+    return result;
+  }
+
+  static absl::Status CarryOut(Connection* db,
+                               const std::string& rig,
+                               std::int64_t time_ns,
+                               const Work& work) {
+    Transaction transaction(db);
+    SELFCAL_RETURN_IF_ERROR(transaction.status());
+    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, rig));
+    UnitOfWork tx(db, rig, row, time_ns);
+    SELFCAL_RETURN_IF_ERROR(work(&tx));
+    return transaction.Commit();
+  }
+
+  static absl::Status StatusOf(const absl::Status& status) { return status; }
+  template <typename T>
+  static absl::Status StatusOf(const absl::StatusOr<T>& result) {
+    return result.status();
+  }
+
+  const std::unique_ptr<Database> db_;
+  const std::unique_ptr<StoreMaintenance> maintenance_;
+};
+
+}  // namespace
+
+std::unique_ptr<Store> MakeStore(std::unique_ptr<Database> database) {
+  return std::make_unique<DatabaseStore>(std::move(database));
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,151 @@
+// Databases of every schema that was released: each opens with all that it
+// held, and a migration that is killed at any instant changes nothing or is
+// done.
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "migrations/migrations.h"
+#include "test/promise.h"
+#include "test/server/store/fixture_content.h"
+#include "test/server/store/sqlite/fault_vfs.h"
+#include "test/server/store/sqlite/sqlite_test.h"
+
+namespace selfcal::server {
+namespace {
+
+class FixturesTest : public SqliteTest {
+ protected:
+  static int Newest() { return static_cast<int>(SqliteMigrations().size()); }
+
+  static std::string Fixture(int version) {
+    return std::string(SELFCAL_STORE_FIXTURES) + "/schema_v" +
+           std::to_string(version) + ".sql";
+  }
+  // Schema versions from 1 that have a fixture: those that were released.
+  static int Released() {
+    int version = 0;
+    while (std::filesystem::exists(Fixture(version + 1))) ++version;
+    EXPECT_GE(version, 2);
+    return version;
+  }
+
+  // The database of a schema version, in place of what was there.
+  void Load(int version) {
+    store_.reset();
+    for (const auto& entry :
+         std::filesystem::directory_iterator(folder_.path())) {
+      std::filesystem::remove_all(entry);
+    }
+    const std::string sql = ReadBytes(Fixture(version));
+    ASSERT_FALSE(sql.empty()) << "no fixture of schema version " << version;
+    const absl::Status loaded =
+        ExecuteInFile(Path(), sql + "PRAGMA journal_mode = WAL");
+    ASSERT_TRUE(loaded.ok()) << loaded;
+  }
+
+  // Paths and exclusions, which segments from before schema version 7 have not.
+  void ExpectMotion(bool kept) {
+    const auto listed = store_->ListSessionSegments("a", "s", {});
+    ASSERT_TRUE(listed.ok()) << listed.status();
+    ASSERT_EQ(listed->items.size(), 4u);
+    for (const SessionSegment& segment : listed->items) {
+      EXPECT_EQ(segment.path.size(), kept ? 8u : 0u);
+    }
+    const auto exclusions = store_->ListExclusions("a", {"s", 0});
+    ASSERT_TRUE(exclusions.ok()) << exclusions.status();
+    EXPECT_EQ(exclusions->size(), kept ? FixtureRig().groups.size() : 0u);
+  }
+
+  static std::int64_t Version(const std::string& path) {
+    return ReadIntInFile(path, "PRAGMA user_version").value_or(-1);
+  }
+
+  // Opens in a process of its own that is killed before operation n on the
+  // disk. False: it was done before that.
+  bool OpenAndKillAt(int n) {
+    const pid_t child = fork();
+    if (child == 0) {
+      FaultVfs vfs;
+      vfs.SetFault([n](int number, DiskOperation::Kind) {
+        if (number == n) raise(SIGKILL);
+        return SQLITE_OK;
+      });
+      _exit(Open().ok() ? 0 : 1);
+    }
+    int status = 0;
+    EXPECT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFSIGNALED(status) || WEXITSTATUS(status) == 0);
+    return WIFSIGNALED(status);
+  }
+};
+
+TEST_F(FixturesTest, EverySchemaThatWasReleasedOpensWithAllItHeld) {
+  Promise promise("any past schema opens");
+  for (int version = 1; version <= Released(); ++version) {
+    SCOPED_TRACE("schema version " + std::to_string(version));
+    Load(version);
+    ++promise.trials;
+    const absl::Status opened = Open();
+    EXPECT_TRUE(opened.ok()) << opened;
+    if (!opened.ok()) {
+      ++promise.lost;
+      continue;
+    }
+    ExpectFixture(store_.get());
+    ExpectMotion(version >= 7);
+    // And works on.
+    MotionSegment segment = FixtureSegments()[0];
+    segment.key = {"later", 0};
+    EXPECT_TRUE(domain_->PutSegment("a", segment).ok());
+    EXPECT_TRUE(domain_
+                    ->CommitScore(
+                        "a", {"s", 3}, FakeInformation(FixtureRig(), 0.5, 5, 9))
+                    .ok());
+    store_.reset();
+    EXPECT_EQ(IntegrityOf(Path()), "ok");
+    EXPECT_EQ(Version(Path()), Newest());
+    if (version < Newest()) {
+      EXPECT_EQ(Version(Path() + ".backup-v" + std::to_string(version)),
+                version);
+    }
+  }
+}
+
+TEST_F(FixturesTest, AMigrationThatIsKilledChangesNothingOrIsDone) {
+  Promise promise("a killed migration changes nothing");
+  for (int version = 1; version <= Released(); ++version) {
+    if (version == Newest()) break;
+    Load(version);
+    int operations = 0;
+    {
+      FaultVfs vfs;
+      vfs.SetFault(nullptr);
+      ASSERT_TRUE(Open().ok());
+      operations = vfs.operations();
+      store_.reset();
+    }
+    const int step = std::max(1, operations / Trials(25));
+    for (int n = 1; n <= operations; n += step) {
+      SCOPED_TRACE("schema version " + std::to_string(version) +
+                   ", killed before operation " + std::to_string(n));
+      Load(version);
+      if (!OpenAndKillAt(n)) break;
+      ++promise.trials;
+      const absl::Status opened = Open();
+      EXPECT_TRUE(opened.ok()) << opened;
+      if (!opened.ok()) {
+        ++promise.lost;
+        return;
+      }
+      ExpectFixture(store_.get());
+      store_.reset();
+      EXPECT_EQ(IntegrityOf(Path()), "ok");
+      EXPECT_EQ(Version(Path()), Newest());
+      if (HasFailure()) return;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::server

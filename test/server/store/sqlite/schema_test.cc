@@ -1,0 +1,112 @@
+// What the schema itself refuses, whoever writes, and how it is searched.
+#include "server/domain/calibration_life.h"
+#include "test/server/store/fixture_content.h"
+#include "test/server/store/sqlite/sqlite_test.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr CalibrationState kStates[] = {CalibrationState::kActive,
+                                        CalibrationState::kSuperseded,
+                                        CalibrationState::kRejected,
+                                        CalibrationState::kCandidate,
+                                        CalibrationState::kRolledBack};
+
+class SchemaTest : public SqliteTest {
+ protected:
+  void SetUp() override { ASSERT_TRUE(Open().ok()); }
+
+  absl::Status Execute(const std::string& sql) const {
+    return ExecuteInFile(Path(), sql);
+  }
+};
+
+TEST_F(SchemaTest, CalibrationCannotBeChangedOrDeleted) {
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
+  store_.reset();
+  for (const char* sql : {"UPDATE calibrations SET content = x'00'",
+                          "UPDATE calibrations SET sha256 = x'00'",
+                          "UPDATE calibrations SET version = 5",
+                          "UPDATE calibrations SET create_time_ns = 5",
+                          "UPDATE calibrations SET state = 3",
+                          "DELETE FROM calibrations",
+                          "UPDATE events SET detail = ''",
+                          "DELETE FROM events"}) {
+    EXPECT_FALSE(Execute(sql).ok()) << sql;
+  }
+}
+
+TEST_F(SchemaTest, CalibrationInAnotherRowIsNoticed) {
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
+  ASSERT_TRUE(domain_->CreateRig(TestRig("b")).ok());
+  store_.reset();
+  ASSERT_TRUE(
+      Execute("DROP TRIGGER calibrations_never_change;"
+              "UPDATE calibrations SET "
+              "  content = (SELECT content FROM calibrations WHERE rig = 1), "
+              "  sha256 = (SELECT sha256 FROM calibrations WHERE rig = 1) "
+              "WHERE rig = 2")
+          .ok());
+  ASSERT_TRUE(Open().ok());
+  EXPECT_TRUE(store_->GetActiveCalibration("a").ok());
+  EXPECT_TRUE(absl::IsDataLoss(store_->GetActiveCalibration("b").status()));
+}
+
+TEST_F(SchemaTest, DatabaseRefusesEveryTransitionThatIsNotInTheTable) {
+  ASSERT_TRUE(WriteFixture(store_.get()));
+  store_.reset();
+  const auto trigger = ReadTextInFile(
+      Path(),
+      "SELECT sql FROM sqlite_schema WHERE name = 'calibration_transitions'");
+  ASSERT_TRUE(trigger.ok()) << trigger.status();
+  const auto set = [](CalibrationState state) {
+    return "UPDATE calibrations SET state = " +
+           std::to_string(static_cast<int>(state) + 1) + " WHERE version = 2;";
+  };
+  int allowed = 0;
+  for (const CalibrationState from : kStates) {
+    for (const CalibrationState to : kStates) {
+      ASSERT_TRUE(Execute("DROP TRIGGER calibration_transitions;" + set(from) +
+                          *trigger)
+                      .ok());
+      EXPECT_EQ(Execute(set(to)).ok(), MayBecome(from, to))
+          << StateName(from) << " -> " << StateName(to);
+      allowed += MayBecome(from, to) ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(allowed, 6);
+}
+
+TEST_F(SchemaTest, DatabaseLetsOnlyCandidatesAndTheFactorysBegin) {
+  ASSERT_TRUE(domain_->CreateRig(rig_).ok());
+  store_.reset();
+  for (const CalibrationState state : kStates) {
+    const std::string sql =
+        "INSERT INTO calibrations SELECT rig, 9, " +
+        std::to_string(static_cast<int>(state) + 1) +
+        ", create_time_ns, run, content, sha256 FROM calibrations";
+    EXPECT_EQ(Execute("BEGIN;" + sql + ";ROLLBACK").ok(),
+              state == CalibrationState::kCandidate)
+        << StateName(state);
+  }
+}
+
+// Each page of a session is found by an index, and nothing is sorted.
+TEST_F(SchemaTest, PagesOfASessionAreFoundInTheIndex) {
+  store_.reset();
+  const auto db = SqliteConnection::Open(Path(), SQLITE_OPEN_READWRITE);
+  ASSERT_TRUE(db.ok());
+  for (const char* sql :
+       {"SELECT session_index FROM segments WHERE rig = 1 AND session = 's' "
+        "AND session_index > 5 ORDER BY session_index LIMIT 10",
+        "SELECT session FROM segments WHERE rig = 1 AND session > 's' "
+        "ORDER BY session LIMIT 1"}) {
+    Statement plan(db->get(), std::string("EXPLAIN QUERY PLAN ") + sql);
+    ASSERT_TRUE(plan.Next());
+    EXPECT_THAT(plan.Text(3), ::testing::HasSubstr("SEARCH segments USING"));
+    EXPECT_FALSE(plan.Next()) << plan.Text(3);
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::server
