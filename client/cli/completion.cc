@@ -89,10 +89,16 @@ complete -o default -F _selfcal selfcal
       global);
 }
 
+// Sourced, or from a file _selfcal in the fpath: then it is the function of its
+// own name, and completes at once.
 std::string ZshCompletion(const CLI::App& app) {
-  return "autoload -U +X compinit && compinit\n"
+  return "#compdef selfcal\n"
+         "(( $+functions[compdef] )) || { autoload -U +X compinit && compinit "
+         "}\n"
          "autoload -U +X bashcompinit && bashcompinit\n" +
-         BashCompletion(app);
+         BashCompletion(app) +
+         "[[ $funcstack[1] == _selfcal ]] && "
+         "_bash_complete -o default -F _selfcal\n";
 }
 
 std::string FishCompletion(const CLI::App& app) {

@@ -164,7 +164,7 @@ ExportedFiles ExportBasalt(const Rig& rig,
   for (const CameraCalibration& camera : theta.cameras) {
     poses.push_back(
         PoseJson(RigidInverse(TransformFromBody(camera, body.R_BI))));
-    intrinsics.push_back(BasaltCameraJson(camera));
+    intrinsics.push_back(BasaltCameraJson(camera, intrinsics.size()));
     sizes.push_back({camera.width_px, camera.height_px});
   }
   const auto all_axes = [](double value) { return Json{value, value, value}; };

@@ -7,40 +7,29 @@
 
 #include "client/formats/format_error.h"
 #include "client/formats/json_values.h"
+#include "client/formats/tool_models.h"
 
 namespace selfcal::client {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Model {
-  const char* type;
-  DistortionModel model;
-  std::vector<const char*> coefficients;
-};
+constexpr char kRadTan8[] = "pinhole-radtan8";
+// A camera without coefficients, which selfcal has as a radtan8.
+constexpr char kIdeal[] = "pinhole";
 
-// For each distortion model, the first entry is the one that is written.
-const std::vector<Model>& Models() {
-  static const std::vector<Model> models = {
-      {"fov", DistortionModel::kFov, {"w"}},
-      {"kb4", DistortionModel::kEquidistant, {"k1", "k2", "k3", "k4"}},
-      {"pinhole-radtan8",
-       DistortionModel::kRadialTangential,
-       {"k1", "k2", "p1", "p2"}},
-      {"pinhole", DistortionModel::kRadialTangential, {}}};
-  return models;
-}
-
-// Checks the coefficients of a radtan8 that selfcal does not have.
-void CheckRest(const Json& values, std::vector<Loss>* losses) {
-  for (const char* key : {"k3", "k4", "k5", "k6"}) {
+// Checks the coefficients that selfcal does not have.
+void CheckRest(const ToolModel& model,
+               const Json& values,
+               std::vector<Loss>* losses) {
+  for (const std::string& key : Words(model.zeros)) {
     if (JsonNumber(values, key, 0) == 0) continue;
-    throw FormatError(fmt::format(
-        "{} of a pinhole-radtan8 is not 0: selfcal's radial-tangential model "
-        "has k1 k2 p1 p2",
-        key));
+    throw FormatError(fmt::format("{} of a {} is not 0: selfcal's model has {}",
+                                  key,
+                                  model.name,
+                                  model.coefficients));
   }
-  if (JsonNumber(values, "rpmax", 0) == 0) return;
+  if (model.name != kRadTan8 || JsonNumber(values, "rpmax", 0) == 0) return;
   losses->push_back(
       {"rpmax", "selfcal computes the valid radius of a model", false});
 }
@@ -54,23 +43,29 @@ CameraCalibration ReadBasaltCamera(const Json& node,
     throw FormatError("field 'camera_type' is not a string");
   }
   const Json& values = JsonMember(node, "intrinsics");
-  for (const Model& model : Models()) {
-    if (type != model.type) continue;
-    CameraCalibration camera;
-    camera.f = {JsonNumber(values, "fx"), JsonNumber(values, "fy")};
-    camera.c = {JsonNumber(values, "cx"), JsonNumber(values, "cy")};
-    camera.model = model.model;
-    camera.distortion = DistortionVector::Zero(DistortionSize(model.model));
-    for (std::size_t i = 0; i < model.coefficients.size(); ++i) {
-      camera.distortion[static_cast<Eigen::Index>(i)] =
-          JsonNumber(values, model.coefficients[i]);
-    }
-    if (type == "pinhole-radtan8") CheckRest(values, losses);
-    return camera;
+  const bool ideal = type == kIdeal;
+  const auto found =
+      FindModel("basalt", ideal ? kRadTan8 : type.get<std::string>());
+  if (!found) {
+    throw FormatError(fmt::format("camera_type {} is not {} or one of {}",
+                                  type.dump(),
+                                  kIdeal,
+                                  ToolModelNames("basalt")));
   }
-  throw FormatError(
-      fmt::format("camera_type {} is not fov, kb4, pinhole-radtan8 or pinhole",
-                  type.dump()));
+  CameraCalibration camera;
+  camera.model = *found;
+  camera.distortion = Undistorted(camera.model);
+  camera.f = {JsonNumber(values, "fx"), JsonNumber(values, "fy")};
+  camera.c = {JsonNumber(values, "cx"), JsonNumber(values, "cy")};
+  if (ideal) return camera;
+  const ToolModel& model = *FindToolModel("basalt", camera.model);
+  const std::vector<std::string> names = Words(model.coefficients);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    camera.distortion[static_cast<Eigen::Index>(i)] =
+        JsonNumber(values, names[i]);
+  }
+  CheckRest(model, values, losses);
+  return camera;
 }
 
 void SetBasaltResolution(const Json& size, CameraCalibration* camera) {
@@ -90,31 +85,25 @@ void SetBasaltResolution(const Json& size, CameraCalibration* camera) {
   camera->height_px = pixels(size[1]);
 }
 
-Json BasaltCameraJson(const CameraCalibration& camera) {
-  for (const Model& model : Models()) {
-    if (model.model != camera.model) continue;
-    constexpr double kLeastFov = 1e-4;  // below it Basalt's equations fail
-    if (camera.model == DistortionModel::kFov &&
-        !(camera.distortion[0] > kLeastFov)) {
-      throw FormatError("basalt's fov needs a w above 0");
-    }
-    Json values = {{"fx", camera.f.x()},
-                   {"fy", camera.f.y()},
-                   {"cx", camera.c.x()},
-                   {"cy", camera.c.y()}};
-    for (std::size_t i = 0; i < model.coefficients.size(); ++i) {
-      values[model.coefficients[i]] =
-          camera.distortion[static_cast<Eigen::Index>(i)];
-    }
-    if (model.model == DistortionModel::kRadialTangential) {
-      // 0: no radius beyond which Basalt rejects points.
-      for (const char* key : {"k3", "k4", "k5", "k6", "rpmax"}) {
-        values[key] = 0.0;
-      }
-    }
-    return {{"camera_type", model.type}, {"intrinsics", values}};
+Json BasaltCameraJson(const CameraCalibration& camera, std::size_t number) {
+  const ToolModel& model = ToolModelOf("basalt", number, camera.model);
+  constexpr double kLeastFov = 1e-4;  // below it Basalt's equations fail
+  if (camera.model == DistortionModel::kFov &&
+      !(camera.distortion[0] > kLeastFov)) {
+    throw FormatError("basalt's fov needs a w above 0");
   }
-  throw FormatError("basalt does not have this distortion model");
+  Json values = {{"fx", camera.f.x()},
+                 {"fy", camera.f.y()},
+                 {"cx", camera.c.x()},
+                 {"cy", camera.c.y()}};
+  const std::vector<std::string> names = Words(model.coefficients);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    values[names[i]] = camera.distortion[static_cast<Eigen::Index>(i)];
+  }
+  for (const std::string& key : Words(model.zeros)) values[key] = 0.0;
+  // 0: no radius beyond which Basalt rejects points.
+  if (model.name == kRadTan8) values["rpmax"] = 0.0;
+  return {{"camera_type", model.name}, {"intrinsics", values}};
 }
 
 }  // namespace selfcal::client

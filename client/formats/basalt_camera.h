@@ -1,6 +1,7 @@
-// Basalt's camera models fov, kb4, pinhole-radtan8 and pinhole.
+// Cameras in Basalt's calibrations.
 #pragma once
 
+#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -15,6 +16,8 @@ CameraCalibration ReadBasaltCamera(const nlohmann::ordered_json& node,
                                    std::vector<Loss>* losses);
 void SetBasaltResolution(const nlohmann::ordered_json& size,
                          CameraCalibration* camera);
-nlohmann::ordered_json BasaltCameraJson(const CameraCalibration& camera);
+// FormatError for a model that Basalt does not have; `number` is the camera's.
+nlohmann::ordered_json BasaltCameraJson(const CameraCalibration& camera,
+                                        std::size_t number);
 
 }  // namespace selfcal::client

@@ -3,41 +3,56 @@
 #include <fmt/format.h>
 
 #include "client/formats/format_error.h"
+#include "client/formats/tool_models.h"
 #include "client/formats/yaml_values.h"
 
 namespace selfcal::client {
 namespace {
 
-std::string ModelText(DistortionModel model) {
-  switch (model) {
-    case DistortionModel::kFov:
-      return "fov";
-    case DistortionModel::kRadialTangential:
-      return "radtan";
-    case DistortionModel::kEquidistant:
-      break;
-  }
-  return "equidistant";
+// The tool that has the names of all models of a chain; OpenVINS has some of
+// them.
+constexpr char kTool[] = "kalibr";
+
+Eigen::VectorXd ReadList(const YAML::Node& node,
+                         const std::string& key,
+                         Eigen::Index size) {
+  return size == 0
+             ? Eigen::VectorXd()
+             : Eigen::VectorXd(GetMatrix(node, key, static_cast<int>(size), 1));
 }
 
-void ReadDistortion(const YAML::Node& node, CameraCalibration* camera) {
-  const std::string text = GetText(node, "distortion_model");
-  if (text == "none") {
-    camera->model = DistortionModel::kRadialTangential;
-    camera->distortion = DistortionVector::Zero(4);
-    return;
+DistortionModel ReadModel(const YAML::Node& node) {
+  const std::string projection = GetText(node, "camera_model");
+  const std::string distortion = GetText(node, "distortion_model");
+  const auto model = FindModel(kTool, projection, distortion);
+  if (model) return *model;
+  for (const DistortionModel other : DistortionModels()) {
+    const ToolModel* tool = FindToolModel(kTool, other);
+    if (tool == nullptr || tool->name != projection) continue;
+    throw FormatError(fmt::format("distortion_model '{}' is not one of {}",
+                                  distortion,
+                                  ToolModelNames(kTool)));
   }
-  for (const DistortionModel model : {DistortionModel::kFov,
-                                      DistortionModel::kRadialTangential,
-                                      DistortionModel::kEquidistant}) {
-    if (text != ModelText(model)) continue;
-    camera->model = model;
-    camera->distortion =
-        GetMatrix(node, "distortion_coeffs", DistortionSize(model), 1);
-    return;
-  }
-  throw FormatError(fmt::format(
-      "distortion_model '{}' is not radtan, equidistant, fov or none", text));
+  throw FormatError(
+      fmt::format("camera_model '{}' is not supported: the models are {}",
+                  projection,
+                  ToolModelNames(kTool)));
+}
+
+void ReadIntrinsics(const YAML::Node& node, CameraCalibration* camera) {
+  const bool ideal = GetText(node, "camera_model") == "pinhole" &&
+                     GetText(node, "distortion_model") == "none";
+  camera->model = ideal ? DistortionModel::kRadialTangential : ReadModel(node);
+  camera->distortion = Undistorted(camera->model);
+  const ToolModel& tool = *FindToolModel(kTool, camera->model);
+  const Eigen::VectorXd all =
+      ReadList(node, "intrinsics", tool.before_pixels + 4);
+  camera->f = all.segment<2>(tool.before_pixels);
+  camera->c = all.tail<2>();
+  if (ideal) return;
+  const Eigen::Index rest = camera->distortion.size() - tool.before_pixels;
+  camera->distortion << all.head(tool.before_pixels),
+      ReadList(node, "distortion_coeffs", rest);
 }
 
 }  // namespace
@@ -59,16 +74,8 @@ ChainFiles ReadChainFiles(const std::vector<TextFile>& files) {
 }
 
 CameraCalibration ReadChainCamera(const YAML::Node& node) {
-  const std::string projection = GetText(node, "camera_model");
-  if (projection != "pinhole") {
-    throw FormatError(
-        fmt::format("camera_model '{}' is not pinhole", projection));
-  }
   CameraCalibration camera;
-  const Eigen::Vector4d intrinsics = GetMatrix(node, "intrinsics", 4, 1);
-  camera.f = intrinsics.head<2>();
-  camera.c = intrinsics.tail<2>();
-  ReadDistortion(node, &camera);
+  ReadIntrinsics(node, &camera);
   const std::vector<int> size = GetInts(node, "resolution", 2);
   camera.width_px = size[0];
   camera.height_px = size[1];
@@ -77,18 +84,22 @@ CameraCalibration ReadChainCamera(const YAML::Node& node) {
 }
 
 std::string ChainCameraText(const CameraCalibration& camera) {
+  const ToolModel& tool = *FindToolModel(kTool, camera.model);
   const DistortionVector& k = camera.distortion;
+  std::vector<double> intrinsics(k.begin(), k.begin() + tool.before_pixels);
+  intrinsics.insert(intrinsics.end(), camera.f.begin(), camera.f.end());
+  intrinsics.insert(intrinsics.end(), camera.c.begin(), camera.c.end());
   return fmt::format(
-      "  camera_model: pinhole\n"
+      "  camera_model: {}\n"
       "  intrinsics: {}\n"
       "  distortion_model: {}\n"
       "  distortion_coeffs: {}\n"
       "  resolution: [{}, {}]\n"
       "  timeshift_cam_imu: {}\n",
-      ListText(
-          std::vector{camera.f.x(), camera.f.y(), camera.c.x(), camera.c.y()}),
-      ModelText(camera.model),
-      ListText({k.data(), static_cast<std::size_t>(k.size())}),
+      tool.name,
+      ListText(intrinsics),
+      tool.distortion,
+      ListText(std::vector(k.begin() + tool.before_pixels, k.end())),
       camera.width_px,
       camera.height_px,
       NumberText(camera.time_offset_s));

@@ -6,6 +6,7 @@
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
 #include "client/formats/losses.h"
+#include "client/formats/tool_models.h"
 #include "client/formats/yaml_values.h"
 
 namespace selfcal::client {
@@ -82,6 +83,7 @@ ExportedFiles ExportKalibr(const Rig& rig,
   Eigen::Matrix4d before;
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
     const CameraCalibration& camera = theta.cameras[j];
+    ToolModelOf("kalibr", j, camera.model);
     const Eigen::Matrix4d T_CB = TransformFromBody(camera, body.R_BI);
     chain += fmt::format("cam{}:\n  T_cam_imu:\n{}", j, RowsText(T_CB, "  "));
     if (j > 0) {

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "client/formats/format_error.h"
-
 namespace selfcal::client {
 
 void AddImuLoss(const std::string& tool,
@@ -91,19 +89,6 @@ double ImuRate(const FormatOptions& options,
                                  kUsual_hz),
                      false});
   return kUsual_hz;
-}
-
-void NoSuchModel(const std::string& tool,
-                 std::size_t camera,
-                 DistortionModel model,
-                 const std::string& models) {
-  throw FormatError(
-      fmt::format("cam{} has the distortion model {}, but {} has only {}; "
-                  "kalibr, basalt and maplab have all models of selfcal",
-                  camera,
-                  DistortionName(model),
-                  tool,
-                  models));
 }
 
 }  // namespace selfcal::client

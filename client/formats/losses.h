@@ -39,10 +39,4 @@ double ImuRate(const FormatOptions& options,
                const std::string& field,
                std::vector<Loss>* losses);
 
-// Throws a FormatError about a distortion model that the tool does not have.
-[[noreturn]] void NoSuchModel(const std::string& tool,
-                              std::size_t camera,
-                              DistortionModel model,
-                              const std::string& models);
-
 }  // namespace selfcal::client

@@ -8,6 +8,7 @@
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
 #include "client/formats/losses.h"
+#include "client/formats/tool_models.h"
 #include "client/formats/yaml_values.h"
 
 namespace selfcal::client {
@@ -23,38 +24,22 @@ ImuNoise ReadNoise(const YAML::Node& imu) {
               GetDouble(sigmas, "acc_bias_random_walk_noise_density")};
 }
 
-const char* ModelText(DistortionModel model) {
-  switch (model) {
-    case DistortionModel::kFov:
-      return "fisheye";
-    case DistortionModel::kRadialTangential:
-      return "radial-tangential";
-    case DistortionModel::kEquidistant:
-      break;
-  }
-  return "equidistant";
-}
-
-DistortionModel ReadModel(const std::string& type) {
-  for (const DistortionModel model : {DistortionModel::kFov,
-                                      DistortionModel::kRadialTangential,
-                                      DistortionModel::kEquidistant}) {
-    if (type == ModelText(model)) return model;
-  }
-  throw FormatError(fmt::format(
-      "distortion type '{}' is not fisheye, radial-tangential or equidistant",
-      type));
-}
-
 CameraCalibration ReadCamera(const YAML::Node& entry,
                              std::vector<Loss>* losses) {
   const YAML::Node camera = Get(entry, "camera");
   CameraCalibration result;
+  const YAML::Node distortion = Get(camera, "distortion");
+  const std::string type = GetText(distortion, "type");
+  const auto model = FindModel("maplab", "pinhole", type);
+  if (!model) {
+    throw FormatError(fmt::format("distortion type '{}' is not one of {}",
+                                  type,
+                                  ToolModelNames("maplab")));
+  }
+  result.model = *model;
   const Eigen::Vector4d intrinsics = GetMatrixData(camera, "intrinsics", 4, 1);
   result.f = intrinsics.head<2>();
   result.c = intrinsics.tail<2>();
-  const YAML::Node distortion = Get(camera, "distortion");
-  result.model = ReadModel(GetText(distortion, "type"));
   result.distortion =
       GetMatrixData(distortion, "parameters", DistortionSize(result.model), 1);
   result.width_px = GetInt(camera, "image_width");
@@ -154,7 +139,7 @@ std::string CameraText(const CameraCalibration& camera,
       camera.width_px,
       ListText(
           std::vector{camera.f.x(), camera.f.y(), camera.c.x(), camera.c.y()}),
-      ModelText(camera.model),
+      ToolModelOf("maplab", number, camera.model).distortion,
       k.size(),
       ListText({k.data(), static_cast<std::size_t>(k.size())}),
       RowsText(T_BC, "            "));

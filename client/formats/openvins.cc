@@ -6,6 +6,7 @@
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
 #include "client/formats/losses.h"
+#include "client/formats/tool_models.h"
 #include "client/formats/yaml_values.h"
 
 namespace selfcal::client {
@@ -73,8 +74,10 @@ ImportedRig ImportOpenVins(const std::vector<TextFile>& files,
   for (int j = 0; Has(chain.cameras, fmt::format("cam{}", j)); ++j) {
     const YAML::Node node = chain.cameras[fmt::format("cam{}", j)];
     CameraCalibration camera = ReadChainCamera(node);
-    if (camera.model == DistortionModel::kFov) {
-      throw FormatError("distortion_model 'fov' is not supported by OpenVINS");
+    if (FindToolModel("openvins", camera.model) == nullptr) {
+      throw FormatError(
+          fmt::format("distortion_model '{}' is not supported by OpenVINS",
+                      GetText(node, "distortion_model")));
     }
     SetTransformFromBody(ReadExtrinsics(node), body.R_IB.transpose(), &camera);
     auto& cameras = result.rig.factory.cameras;
@@ -97,9 +100,7 @@ ExportedFiles ExportOpenVins(const Rig& rig,
   std::string chain = "%YAML:1.0\n---\n";
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
     CameraCalibration camera = theta.cameras[j];
-    if (camera.model == DistortionModel::kFov) {
-      NoSuchModel("openvins", j, camera.model, "radtan and equidistant");
-    }
+    ToolModelOf("openvins", j, camera.model);
     camera.time_offset_s = theta.cameras[0].time_offset_s;
     const Eigen::Matrix4d T_IC =
         RigidInverse(TransformFromBody(camera, Eigen::Matrix3d::Identity()));

@@ -5,44 +5,49 @@
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
 #include "client/formats/losses.h"
+#include "client/formats/tool_models.h"
 #include "client/formats/yaml_values.h"
 
 namespace selfcal::client {
 namespace {
 
-constexpr const char* kRadialTangential[] = {"k1", "k2", "p1", "p2"};
-constexpr const char* kEquidistant[] = {"k1", "k2", "k3", "k4"};
+constexpr char kPinhole[] = "PinHole";
+constexpr char kFisheye[] = "KannalaBrandt8";
 
 DistortionModel ReadModel(const YAML::Node& root) {
   const std::string type = GetText(root, "Camera.type");
-  if (type == "PinHole") return DistortionModel::kRadialTangential;
-  if (type == "KannalaBrandt8") return DistortionModel::kEquidistant;
+  if (const auto model = FindModel("orb_slam3", type)) return *model;
   throw FormatError(fmt::format(
-      "Camera.type '{}' is not PinHole or KannalaBrandt8; a rectified image "
-      "has another calibration than the camera",
-      type));
+      "Camera.type '{}' is not one of {}; a rectified image has another "
+      "calibration than the camera",
+      type,
+      ToolModelNames("orb_slam3")));
 }
 
 CameraCalibration ReadCamera(const YAML::Node& root, int number) {
-  const auto key = [number](const char* name) {
+  const auto key = [number](const std::string& name) {
     return fmt::format("Camera{}.{}", number, name);
   };
   CameraCalibration camera;
   camera.f = {GetDouble(root, key("fx")), GetDouble(root, key("fy"))};
   camera.c = {GetDouble(root, key("cx")), GetDouble(root, key("cy"))};
   camera.model = ReadModel(root);
-  camera.distortion = DistortionVector::Zero(4);
-  const bool pinhole = camera.model == DistortionModel::kRadialTangential;
-  if (!pinhole || Has(root, key("k1"))) {
-    const auto& names = pinhole ? kRadialTangential : kEquidistant;
-    for (int i = 0; i < 4; ++i) {
-      camera.distortion[i] = GetDouble(root, key(names[i]));
+  camera.distortion = Undistorted(camera.model);
+  const ToolModel& tool = *FindToolModel("orb_slam3", camera.model);
+  // A pinhole may have no coefficients.
+  if (tool.name != kPinhole || Has(root, key("k1"))) {
+    const std::vector<std::string> names = Words(tool.coefficients);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      camera.distortion[static_cast<Eigen::Index>(i)] =
+          GetDouble(root, key(names[i]));
     }
   }
-  if (pinhole && GetDouble(root, key("k3"), 0) != 0) {
-    throw FormatError(fmt::format(
-        "{} is not 0: selfcal's radial-tangential model has k1 k2 p1 p2",
-        key("k3")));
+  for (const std::string& zero : Words(tool.zeros)) {
+    if (GetDouble(root, key(zero), 0) == 0) continue;
+    throw FormatError(fmt::format("{} is not 0: selfcal's {} model has {}",
+                                  key(zero),
+                                  DistortionName(camera.model),
+                                  tool.coefficients));
   }
   camera.width_px = GetInt(root, "Camera.width");
   camera.height_px = GetInt(root, "Camera.height");
@@ -50,18 +55,20 @@ CameraCalibration ReadCamera(const YAML::Node& root, int number) {
 }
 
 std::string CameraText(const CameraCalibration& camera, std::size_t number) {
-  const bool pinhole = camera.model == DistortionModel::kRadialTangential;
-  const auto& names = pinhole ? kRadialTangential : kEquidistant;
+  const ToolModel& tool = *FindToolModel("orb_slam3", camera.model);
+  const std::vector<std::string> names = Words(tool.coefficients);
   std::string text;
-  const auto add = [&](const char* name, double value) {
+  const auto add = [&](const std::string& name, double value) {
     text += fmt::format("Camera{}.{}: {}\n", number, name, NumberText(value));
   };
   add("fx", camera.f.x());
   add("fy", camera.f.y());
   add("cx", camera.c.x());
   add("cy", camera.c.y());
-  for (int i = 0; i < 4; ++i) add(names[i], camera.distortion[i]);
-  if (!pinhole) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    add(names[i], camera.distortion[static_cast<Eigen::Index>(i)]);
+  }
+  if (tool.name == kFisheye) {
     text += fmt::format(
         "Camera{0}.overlappingBegin: 0\nCamera{0}.overlappingEnd: {1}\n",
         number,
@@ -73,10 +80,7 @@ std::string CameraText(const CameraCalibration& camera, std::size_t number) {
 void CheckCameras(const std::vector<CameraCalibration>& cameras) {
   for (std::size_t j = 0; j < cameras.size(); ++j) {
     const CameraCalibration& camera = cameras[j];
-    if (camera.model == DistortionModel::kFov) {
-      NoSuchModel(
-          "orb_slam3", j, camera.model, "radial-tangential and equidistant");
-    }
+    ToolModelOf("orb_slam3", j, camera.model);
     if (camera.model != cameras[0].model ||
         camera.width_px != cameras[0].width_px ||
         camera.height_px != cameras[0].height_px) {
@@ -143,14 +147,13 @@ ExportedFiles ExportOrbSlam3(const Rig& rig,
   const std::vector<CameraCalibration>& cameras = kept.cameras;
   CheckCameras(cameras);
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  const bool pinhole = cameras[0].model == DistortionModel::kRadialTangential;
   std::string text = fmt::format(
       "%YAML:1.0\n---\n"
       "File.version: \"1.0\"\n"
       "Camera.type: \"{}\"\n"
       "Camera.width: {}\n"
       "Camera.height: {}\n",
-      pinhole ? "PinHole" : "KannalaBrandt8",
+      ToolModelOf("orb_slam3", 0, cameras[0].model).name,
       cameras[0].width_px,
       cameras[0].height_px);
   for (std::size_t j = 0; j < cameras.size(); ++j) {

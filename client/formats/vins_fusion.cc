@@ -7,6 +7,7 @@
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
 #include "client/formats/losses.h"
+#include "client/formats/tool_models.h"
 #include "client/formats/yaml_values.h"
 
 namespace selfcal::client {
@@ -36,83 +37,76 @@ YAML::Node FindConfiguration(const std::vector<TextFile>& files) {
 CameraCalibration ReadCamera(const TextFile& file) {
   const YAML::Node root = ParseYaml(file);
   const std::string type = GetText(root, "model_type");
-  const YAML::Node p = Get(root, "projection_parameters");
-  CameraCalibration camera;
-  if (type == "PINHOLE") {
-    const YAML::Node k = Get(root, "distortion_parameters");
-    camera.f = {GetDouble(p, "fx"), GetDouble(p, "fy")};
-    camera.c = {GetDouble(p, "cx"), GetDouble(p, "cy")};
-    camera.model = DistortionModel::kRadialTangential;
-    camera.distortion = Eigen::Vector4d(GetDouble(k, "k1"),
-                                        GetDouble(k, "k2"),
-                                        GetDouble(k, "p1"),
-                                        GetDouble(k, "p2"));
-  } else if (type == "KANNALA_BRANDT") {
-    camera.f = {GetDouble(p, "mu"), GetDouble(p, "mv")};
-    camera.c = {GetDouble(p, "u0"), GetDouble(p, "v0")};
-    camera.model = DistortionModel::kEquidistant;
-    camera.distortion = Eigen::Vector4d(GetDouble(p, "k2"),
-                                        GetDouble(p, "k3"),
-                                        GetDouble(p, "k4"),
-                                        GetDouble(p, "k5"));
-  } else {
-    throw FormatError(
-        fmt::format("{}: model_type '{}' is not PINHOLE or KANNALA_BRANDT",
-                    file.name,
-                    type));
+  const auto found = FindModel("vins_fusion", type);
+  if (!found) {
+    throw FormatError(fmt::format("{}: model_type '{}' is not one of {}",
+                                  file.name,
+                                  type,
+                                  ToolModelNames("vins_fusion")));
   }
+  CameraCalibration camera;
+  camera.model = *found;
+  camera.distortion = Undistorted(camera.model);
+  const ToolModel& tool = *FindToolModel("vins_fusion", camera.model);
+  const auto value = [&](const std::string& path) {
+    const std::size_t dot = path.find('.');
+    return GetDouble(Get(root, path.substr(0, dot)), path.substr(dot + 1));
+  };
+  const std::vector<std::string> names = Words(tool.coefficients);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    camera.distortion[static_cast<Eigen::Index>(i)] = value(names[i]);
+  }
+  const std::vector<std::string> pixels = Words(tool.pixels);
+  camera.f = {value(pixels[0]), value(pixels[1])};
+  camera.c = {value(pixels[2]), value(pixels[3])};
   camera.width_px = GetInt(root, "image_width");
   camera.height_px = GetInt(root, "image_height");
   return camera;
 }
 
+// Appends the value at a path "section.name"; `section` is that of the one
+// before.
+void AddValue(const std::string& path,
+              double value,
+              std::string* section,
+              std::string* text) {
+  const std::size_t dot = path.find('.');
+  if (path.substr(0, dot) != *section) {
+    *section = path.substr(0, dot);
+    *text += *section + ":\n";
+  }
+  *text += fmt::format("  {}: {}\n", path.substr(dot + 1), NumberText(value));
+}
+
 std::string CameraText(const CameraCalibration& camera) {
-  const bool pinhole = camera.model == DistortionModel::kRadialTangential;
-  const DistortionVector& k = camera.distortion;
-  const auto four =
-      [](const char* names, double a, double b, double c, double d) {
-        return fmt::format(fmt::runtime(names),
-                           NumberText(a),
-                           NumberText(b),
-                           NumberText(c),
-                           NumberText(d));
-      };
+  const ToolModel& tool = *FindToolModel("vins_fusion", camera.model);
   std::string text = fmt::format(
       "%YAML:1.0\n---\n"
       "model_type: {}\n"
       "camera_name: camera\n"
       "image_width: {}\n"
       "image_height: {}\n",
-      pinhole ? "PINHOLE" : "KANNALA_BRANDT",
+      tool.name,
       camera.width_px,
       camera.height_px);
-  const Eigen::Vector2d& f = camera.f;
-  const Eigen::Vector2d& c = camera.c;
-  if (pinhole) {
-    text += "distortion_parameters:\n";
-    text += four(
-        "  k1: {}\n  k2: {}\n  p1: {}\n  p2: {}\n", k[0], k[1], k[2], k[3]);
-    text += "projection_parameters:\n";
-    text += four(
-        "  fx: {}\n  fy: {}\n  cx: {}\n  cy: {}\n", f.x(), f.y(), c.x(), c.y());
-  } else {
-    text += "projection_parameters:\n";
-    text += four(
-        "  k2: {}\n  k3: {}\n  k4: {}\n  k5: {}\n", k[0], k[1], k[2], k[3]);
-    text += four(
-        "  mu: {}\n  mv: {}\n  u0: {}\n  v0: {}\n", f.x(), f.y(), c.x(), c.y());
+  std::string section;
+  const std::vector<std::string> names = Words(tool.coefficients);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    AddValue(names[i],
+             camera.distortion[static_cast<Eigen::Index>(i)],
+             &section,
+             &text);
   }
+  const std::vector<std::string> pixels = Words(tool.pixels);
+  const Eigen::Vector4d values(
+      camera.f.x(), camera.f.y(), camera.c.x(), camera.c.y());
+  for (int i = 0; i < 4; ++i) AddValue(pixels[i], values[i], &section, &text);
   return text;
 }
 
 void CheckCameras(const std::vector<CameraCalibration>& cameras) {
   for (std::size_t j = 0; j < cameras.size(); ++j) {
-    if (cameras[j].model == DistortionModel::kFov) {
-      NoSuchModel("vins_fusion",
-                  j,
-                  cameras[j].model,
-                  "radial-tangential and equidistant");
-    }
+    ToolModelOf("vins_fusion", j, cameras[j].model);
     if (cameras[j].width_px != cameras[0].width_px ||
         cameras[j].height_px != cameras[0].height_px) {
       throw FormatError("vins_fusion has one image size for both cameras");

@@ -16,7 +16,7 @@ import selfcal
 from selfcal.v1 import calibration_service_pb2, segment_pb2
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402
+from matplotlib import pyplot
 
 
 def segment_frame(daemon: selfcal.Daemon, rig: str) -> pandas.DataFrame:

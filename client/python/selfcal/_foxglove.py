@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from typing import Iterable, Iterator, List, Tuple
+from collections.abc import Iterable, Iterator
 
 from foxglove_schemas_protobuf import (
     CameraCalibration_pb2,
@@ -21,35 +21,39 @@ from foxglove_schemas_protobuf import (
 from google.protobuf import timestamp_pb2
 
 from selfcal import mcap_messages_pb2 as messages
-from selfcal.v1 import calibration_pb2 as v1
-from selfcal.v1 import segment_pb2
+from selfcal.v1 import calibration_pb2 as v1, segment_pb2
 
-Timed = Tuple[int, str, object]  # t_ns, topic, message
+Timed = tuple[int, str, object]  # t_ns, topic, message
 
+# The models that Foxglove's schema knows.
 _DISTORTION = {
     v1.DISTORTION_MODEL_RADIAL_TANGENTIAL: "plumb_bob",
     v1.DISTORTION_MODEL_EQUIDISTANT: "kannala_brandt",
-    v1.DISTORTION_MODEL_FOV: "fov",  # Foxglove does not know it
 }
 
 
+def _model_name(camera: v1.CameraCalibration) -> str:
+    """Foxglove's name of a model, or selfcal's."""
+    name = v1.DistortionModel.Name(camera.distortion_model)
+    own = name.removeprefix("DISTORTION_MODEL_").lower()
+    return _DISTORTION.get(camera.distortion_model, own)
+
+
 def _stamp(t_ns: int) -> timestamp_pb2.Timestamp:
-    return timestamp_pb2.Timestamp(
-        seconds=t_ns // 10**9, nanos=t_ns % 10**9
-    )
+    return timestamp_pb2.Timestamp(seconds=t_ns // 10**9, nanos=t_ns % 10**9)
 
 
-def _triples(values: Iterable[float]) -> Iterator[Tuple[float, float, float]]:
+def _triples(values: Iterable[float]) -> Iterator[tuple[float, float, float]]:
     return zip(*[iter(values)] * 3)
 
 
-def _contract_vector(xyz: Tuple[float, float, float]) -> v1.Vector3:
+def _contract_vector(xyz: tuple[float, float, float]) -> v1.Vector3:
     return v1.Vector3(x=xyz[0], y=xyz[1], z=xyz[2])
 
 
 def _inverse(
     q: v1.Quaternion, p: v1.Vector3
-) -> Tuple[Quaternion_pb2.Quaternion, Vector3_pb2.Vector3]:
+) -> tuple[Quaternion_pb2.Quaternion, Vector3_pb2.Vector3]:
     """Returns T_BA for T_AB = (q, p)."""
     w, x, y, z = q.w, -q.x, -q.y, -q.z
     # -q^-1 p: twice the cross products of Rodrigues' formula.
@@ -60,8 +64,7 @@ def _inverse(
         x * cross[1] - y * cross[0],
     )
     rotated = [
-        a + 2 * (w * b + c)
-        for a, b, c in zip((p.x, p.y, p.z), cross, again)
+        a + 2 * (w * b + c) for a, b, c in zip((p.x, p.y, p.z), cross, again)
     ]
     return (
         Quaternion_pb2.Quaternion(w=w, x=x, y=y, z=z),
@@ -78,12 +81,16 @@ def sensors(
         parts.append((f"cam{number}", camera.q_ci, camera.p_ci))
     for frame, q, p in parts:
         rotation, translation = _inverse(q, p)
-        yield t_ns, "/tf", FrameTransform_pb2.FrameTransform(
-            timestamp=_stamp(t_ns),
-            parent_frame_id="I",
-            child_frame_id=frame,
-            rotation=rotation,
-            translation=translation,
+        yield (
+            t_ns,
+            "/tf",
+            FrameTransform_pb2.FrameTransform(
+                timestamp=_stamp(t_ns),
+                parent_frame_id="I",
+                child_frame_id=frame,
+                rotation=rotation,
+                translation=translation,
+            ),
         )
     for number, camera in enumerate(calibration.cameras):
         f, c = camera.f, camera.c
@@ -95,7 +102,7 @@ def sensors(
             frame_id=f"cam{number}",
             width=camera.width_px,
             height=camera.height_px,
-            distortion_model=_DISTORTION[camera.distortion_model],
+            distortion_model=_model_name(camera),
             D=coefficients,
             K=[f.x, 0, c.x, 0, f.y, c.y, 0, 0, 1],
             R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
@@ -118,24 +125,30 @@ def keyframes(
     for t_ns, (w, x, y, z), p, v, b_a, b_g in columns:
         rotation = Quaternion_pb2.Quaternion(w=w, x=x, y=y, z=z)
         place = Vector3_pb2.Vector3(x=p[0], y=p[1], z=p[2])
-        yield t_ns, "/tf", FrameTransform_pb2.FrameTransform(
-            timestamp=_stamp(t_ns),
-            parent_frame_id="G",
-            child_frame_id="I",
-            rotation=rotation,
-            translation=place,
+        yield (
+            t_ns,
+            "/tf",
+            FrameTransform_pb2.FrameTransform(
+                timestamp=_stamp(t_ns),
+                parent_frame_id="G",
+                child_frame_id="I",
+                rotation=rotation,
+                translation=place,
+            ),
         )
-        pose = PoseInFrame_pb2.PoseInFrame(
-            timestamp=_stamp(t_ns), frame_id="G"
-        )
+        pose = PoseInFrame_pb2.PoseInFrame(timestamp=_stamp(t_ns), frame_id="G")
         pose.pose.position.CopyFrom(place)
         pose.pose.orientation.CopyFrom(rotation)
         yield t_ns, "/keyframes", pose
-        yield t_ns, "/motion", messages.KeyframeMotion(
-            timestamp=_stamp(t_ns),
-            v_gi=_contract_vector(v),
-            b_a=_contract_vector(b_a),
-            b_g=_contract_vector(b_g),
+        yield (
+            t_ns,
+            "/motion",
+            messages.KeyframeMotion(
+                timestamp=_stamp(t_ns),
+                v_gi=_contract_vector(v),
+                b_a=_contract_vector(b_a),
+                b_g=_contract_vector(b_g),
+            ),
         )
 
 
@@ -143,10 +156,14 @@ def imu(samples: segment_pb2.MotionSegment.ImuSamples) -> Iterator[Timed]:
     for t_ns, gyro, accel in zip(
         samples.t_ns, _triples(samples.gyro), _triples(samples.accel)
     ):
-        yield t_ns, "/imu", messages.ImuReading(
-            timestamp=_stamp(t_ns),
-            gyro=_contract_vector(gyro),
-            accel=_contract_vector(accel),
+        yield (
+            t_ns,
+            "/imu",
+            messages.ImuReading(
+                timestamp=_stamp(t_ns),
+                gyro=_contract_vector(gyro),
+                accel=_contract_vector(accel),
+            ),
         )
 
 
@@ -213,14 +230,16 @@ def observations(segment: segment_pb2.MotionSegment) -> Iterator[Timed]:
         )
 
 
-def losses(calibration: v1.CalibrationParameters) -> List[str]:
+def losses(calibration: v1.CalibrationParameters) -> list[str]:
     lost = []
     for number, camera in enumerate(calibration.cameras):
-        if camera.distortion_model == v1.DISTORTION_MODEL_FOV:
+        if camera.distortion_model not in _DISTORTION:
+            name = _model_name(camera)
             lost.append(
-                f"cam{number}: Foxglove's schema does not know the FOV model; "
-                "it is named 'fov' with D = [w], and viewers that project "
-                "points into the image do so without distortion or not at all"
+                f"cam{number}: Foxglove's schema does not know the model; it "
+                f"is named '{name}' with selfcal's coefficients as D, and "
+                "viewers that project points into the image do so without "
+                "distortion or not at all"
             )
         if camera.time_offset_s != 0:
             lost.append(

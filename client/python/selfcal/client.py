@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from typing import Callable, Iterable, Iterator, Optional, TypeVar
+from collections.abc import Iterable, Iterator
+from typing import Callable, TypeVar
 
 import grpc
 
@@ -218,7 +219,7 @@ class Daemon:
             request.page_token = page.next_page_token
 
 
-def connect(target: str, tls: Optional[Tls] = None) -> Daemon:
+def connect(target: str, tls: Tls | None = None) -> Daemon:
     """Returns a client for `target`, as in gRPC: unix:/path or host:port.
 
     Returns at once; the first call makes the connection.

@@ -30,13 +30,13 @@ import os
 import pathlib
 import sys
 import urllib.parse
-from typing import IO, Dict, Iterable, List, Tuple, Union
+from collections.abc import Iterable
+from typing import IO
 
 import grpc
 
 from selfcal.client import Tls, connect
-from selfcal.v1 import calibration_pb2 as v1
-from selfcal.v1 import segment_pb2
+from selfcal.v1 import calibration_pb2 as v1, segment_pb2
 
 try:
     from mcap_protobuf.writer import Writer
@@ -50,18 +50,19 @@ except ImportError as error:
 
 __all__ = ["write"]
 
+
 def write(
-    output: Union[str, IO[bytes]],
+    output: str | IO[bytes],
     segments: Iterable[segment_pb2.MotionSegment],
     calibration: v1.CalibrationParameters,
-) -> List[str]:
+) -> list[str]:
     """Writes segments of one session with the calibration that applies to them.
 
     Returns what the file cannot express, one sentence each. Raises ValueError
     for segments of several sessions, because each session has its own clock and
     frame, and for times before zero, which MCAP does not support.
     """
-    timed: List[_foxglove.Timed] = []
+    timed: list[_foxglove.Timed] = []
     sessions = set()
     readings: set = set()  # neighbours share samples
     names = []
@@ -117,12 +118,12 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-_Sessions = Dict[str, List[segment_pb2.MotionSegment]]
+_Sessions = dict[str, list[segment_pb2.MotionSegment]]
 
 
 def _fetch(
     flags: argparse.Namespace,
-) -> Tuple[v1.CalibrationParameters, _Sessions]:
+) -> tuple[v1.CalibrationParameters, _Sessions]:
     tls = Tls(flags.ca, flags.cert, flags.key) if flags.ca else None
     with connect(flags.target, tls) as daemon:
         calibration = daemon.calibration(flags.rig, flags.version).parameters

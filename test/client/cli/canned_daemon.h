@@ -57,7 +57,7 @@ struct CannedDaemon final : v1::RigService::Service,
   std::string cancelled;                // the run
   std::string last_filter;
   std::string last_order;
-  v1::MotionSegment last_segment;      // that was sent
+  v1::MotionSegment last_segment;  // that was sent
   v1::QuarantineSegmentsRequest last_quarantine;
   bool last_force = false;             // of a recalibration
   std::int64_t reject_index = -1;      // of the segments that are sent

@@ -55,8 +55,10 @@ TEST(Completion, OffersTheFlagsOfACommandAndTheGlobalOnes) {
 }
 
 TEST(Completion, OtherShellsKnowTheSameCommands) {
-  EXPECT_THAT(Selfcal({"completion", "zsh"}).out,
-              HasSubstr(Selfcal({"completion", "bash"}).out));
+  const std::string zsh = Selfcal({"completion", "zsh"}).out;
+  EXPECT_THAT(zsh, HasSubstr(Selfcal({"completion", "bash"}).out));
+  // As a file in zsh's fpath.
+  EXPECT_THAT(zsh, testing::StartsWith("#compdef selfcal\n"));
   const Outcome fish = Selfcal({"completion", "fish"});
   EXPECT_THAT(fish.out,
               HasSubstr("complete -c selfcal -n '__fish_seen_subcommand_from "

@@ -1,6 +1,6 @@
 """selfcal top on a terminal, against a real daemon.
 
-    top_terminal_test.py SELFCAL SELFCALD
+top_terminal_test.py SELFCAL SELFCALD
 """
 
 import fcntl
@@ -22,8 +22,8 @@ import unittest
 SELFCAL, SELFCALD = sys.argv[1:3]
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
 
-from device import RIG  # noqa: E402
-from running_daemon import RunningDaemon  # noqa: E402
+from device import RIG
+from running_daemon import RunningDaemon
 
 ENTER, LEAVE, HOME = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l", "\x1b[H"
 
@@ -114,8 +114,9 @@ class TopTest(unittest.TestCase):
         top.resize(100, 30)
         top.read_until(lambda text: len(screens(text)) > before)
         top.read_until(
-            lambda text: sum("phone-" in line for line in screens(text)[-1])
-            == 12
+            lambda text: (
+                sum("phone-" in line for line in screens(text)[-1]) == 12
+            )
         )
         os.kill(top.pid, signal.SIGTERM)
         self.assertEqual(top.wait(), 0)

@@ -64,6 +64,29 @@ for program in "${programs[@]}"; do
     fail "$program links CHOLMOD"
 done
 
+# Manual pages without mistakes, with every flag that the completion offers.
+share=$work/root/usr/share
+for page in man1/selfcal.1 man8/selfcald.8; do
+  zcat "$share/man/$page.gz" >"$work/page" || fail "no manual page $page"
+  ! command -v groff >/dev/null ||
+    mistakes=$(groff -man -Tutf8 -ww -z "$work/page" 2>&1)
+  [[ -z ${mistakes:-} ]] || fail "the manual page $page: $mistakes"
+  sed 's/\\-/-/g' "$work/page" >"$work/$(basename "$page")"
+done
+completion=$share/bash-completion/completions/selfcal
+flags=$(grep -oE -- '--[a-z][a-z-]+' "$completion" | sort -u)
+(($(wc -l <<<"$flags") > 20)) || fail 'the completion has no flags'
+while read -r flag; do
+  grep -qF -- "$flag" "$work/selfcal.1" ||
+    fail "the manual page of selfcal has no $flag"
+done <<<"$flags"
+grep -qF -- --max-run-memory "$work/selfcald.8" ||
+  fail 'the manual page of selfcald has no settings'
+bash -n "$completion" || fail 'the completion is no script'
+[[ -f $share/zsh/vendor-completions/_selfcal ]] || fail 'nothing for zsh'
+[[ -f $share/fish/vendor_completions.d/selfcal.fish ]] ||
+  fail 'nothing for fish'
+
 "$work/root/usr/bin/selfcald" --version | grep -qF "$version" ||
   fail 'selfcald --version'
 "$work/root/usr/bin/selfcal" --version | grep -qF "$version" ||

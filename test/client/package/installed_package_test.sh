@@ -48,12 +48,14 @@ done
 
 echo 'example: with CMake'
 cp -r "$source/client/example" "$work/example"
-cmake -S "$work/example" -B "$work/build" -DCMAKE_PREFIX_PATH="$work/prefix" \
-  -DCMAKE_BUILD_TYPE=Debug >"$work/log" 2>&1 &&
-  cmake --build "$work/build" >>"$work/log" 2>&1 || {
+if ! {
+  cmake -S "$work/example" -B "$work/build" \
+    -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_BUILD_TYPE=Debug &&
+    cmake --build "$work/build"
+} >"$work/log" 2>&1; then
   cat "$work/log" >&2
   exit 1
-}
+fi
 
 echo 'example: with pkg-config'
 PKG_CONFIG_PATH=$(dirname "$(find "$work/prefix" -name selfcal.pc)")

@@ -1,6 +1,6 @@
 """selfcal.apply makes of a calibration what the C++ library does.
 
-    apply_test.py PACKAGE_DIR WRITE_PREDICTIONS
+apply_test.py PACKAGE_DIR WRITE_PREDICTIONS
 """
 
 import subprocess
@@ -10,22 +10,23 @@ import unittest
 PACKAGE, WRITE_PREDICTIONS = sys.argv[1:3]
 sys.path.insert(0, PACKAGE)
 
-import numpy as np  # noqa: E402
+import numpy as np
 
-from selfcal import apply  # noqa: E402
-from selfcal.v1 import calibration_pb2 as v1  # noqa: E402
+from selfcal import apply
+from selfcal.v1 import calibration_pb2 as v1
 
 
 def vector(values) -> v1.Vector3:
     return v1.Vector3(x=values[0], y=values[1], z=values[2])
 
 
-def camera_of(values) -> v1.CameraCalibration:
+def camera_of(model: str, values) -> v1.CameraCalibration:
+    name = "DISTORTION_MODEL_" + model.upper().replace("-", "_")
     return v1.CameraCalibration(
-        distortion_model=int(values[0]),
-        f=v1.Vector2(x=values[1], y=values[2]),
-        c=v1.Vector2(x=values[3], y=values[4]),
-        distortion=values[5:],
+        distortion_model=name,
+        f=v1.Vector2(x=values[0], y=values[1]),
+        c=v1.Vector2(x=values[2], y=values[3]),
+        distortion=values[4:],
         q_ci=v1.Quaternion(w=1),
         p_ci=v1.Vector3(),
     )
@@ -41,12 +42,13 @@ class ApplyTest(unittest.TestCase):
         cls.cameras = []  # with what it projects and what it unprojects
         for line in lines:
             what, *texts = line.split()
+            model = texts.pop(0) if what == "camera" else ""
             values = [float(text) for text in texts]
             if what == "imu":
                 cls.imus.append(values)
             elif what == "camera":
                 cls.cameras.append(
-                    (camera_of(values), {"project": [], "unproject": []})
+                    (camera_of(model, values), {"project": [], "unproject": []})
                 )
             else:
                 cls.cameras[-1][1][what].append(values)

@@ -16,15 +16,17 @@ import unittest
 PACKAGE, EXTRA, SELFCALD, DEMO = sys.argv[1:5]
 sys.path[:0] = [PACKAGE, EXTRA, str(pathlib.Path(__file__).parents[1])]
 
-import numpy as np  # noqa: E402
-from mcap.reader import make_reader  # noqa: E402
-from mcap_protobuf.decoder import DecoderFactory  # noqa: E402
+import numpy as np
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+from running_daemon import RunningDaemon
 
-import selfcal  # noqa: E402
-from running_daemon import RunningDaemon  # noqa: E402
-from selfcal import apply, mcap  # noqa: E402
-from selfcal.v1 import calibration_pb2 as v1  # noqa: E402
-from selfcal.v1 import segment_pb2  # noqa: E402
+import selfcal
+from selfcal import apply, mcap
+from selfcal.v1 import (
+    calibration_pb2 as v1,
+    segment_pb2,
+)
 
 
 def read(file) -> dict:
@@ -119,7 +121,9 @@ class McapTest(unittest.TestCase):
         times = [t for column in columns for t in column.t_ns]
         poses = self.topics["/keyframes"]
         motions = self.topics["/motion"]
-        bodies = [m for _, _, m in self.topics["/tf"] if m.child_frame_id == "I"]
+        bodies = [
+            m for _, _, m in self.topics["/tf"] if m.child_frame_id == "I"
+        ]
         self.assertEqual([t for _, t, _ in poses], times)
         sent = {
             name: np.array(
@@ -136,7 +140,9 @@ class McapTest(unittest.TestCase):
             for q in (pose.pose.orientation, body.rotation):
                 self.assertEqual([q.w, *xyz(q)], list(sent["q_gi"][k]))
             for name in ("v_gi", "b_a", "b_g"):
-                self.assertEqual(xyz(getattr(motion, name)), list(sent[name][k]))
+                self.assertEqual(
+                    xyz(getattr(motion, name)), list(sent[name][k])
+                )
 
     def test_readings_are_as_they_were_sent_and_none_twice(self) -> None:
         sent = {}
@@ -187,7 +193,9 @@ class McapTest(unittest.TestCase):
                 got[t_ns, id] = [point.x, point.y]
         self.assertEqual(got, seen)
         clouds = self.topics["/landmarks"]
-        for (_, t_ns, cloud), segment in zip(clouds, self.segments, strict=True):
+        for (_, t_ns, cloud), segment in zip(
+            clouds, self.segments, strict=True
+        ):
             self.assertEqual(t_ns, segment.keyframes.t_ns[0])
             places = np.array(segment.landmarks.p_g).reshape(-1, 3)
             self.assertEqual(
@@ -239,7 +247,8 @@ class McapTest(unittest.TestCase):
         self.assertEqual(camera.distortion_model, "fov")
         self.assertEqual(list(camera.D), list(sent.distortion))
         self.assertEqual(
-            list(camera.K), [sent.f.x, 0, sent.c.x, 0, sent.f.y, sent.c.y, 0, 0, 1]
+            list(camera.K),
+            [sent.f.x, 0, sent.c.x, 0, sent.f.y, sent.c.y, 0, 0, 1],
         )
 
     def test_models_that_foxglove_knows_lose_nothing(self) -> None:
@@ -249,14 +258,19 @@ class McapTest(unittest.TestCase):
             for axis in "xyz":
                 setattr(getattr(calibration.imu, vector), axis, nominal)
         known = {
-            v1.DISTORTION_MODEL_RADIAL_TANGENTIAL: ("plumb_bob", [1, 2, 3, 4, 0]),
+            v1.DISTORTION_MODEL_RADIAL_TANGENTIAL: (
+                "plumb_bob",
+                [1, 2, 3, 4, 0],
+            ),
             v1.DISTORTION_MODEL_EQUIDISTANT: ("kannala_brandt", [1, 2, 3, 4]),
         }
         for model, (name, coefficients) in known.items():
             calibration.cameras[0].distortion_model = model
             calibration.cameras[0].distortion[:] = [1, 2, 3, 4]
             file = io.BytesIO()
-            self.assertEqual(mcap.write(file, self.segments[:1], calibration), [])
+            self.assertEqual(
+                mcap.write(file, self.segments[:1], calibration), []
+            )
             file.seek(0)
             _, _, camera = read(file)["/cam0/calibration"][0]
             self.assertEqual(camera.distortion_model, name)

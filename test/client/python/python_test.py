@@ -1,6 +1,6 @@
 """The Python package and its example against a real daemon.
 
-    python_test.py PACKAGE_DIR EXAMPLE SELFCALD
+python_test.py PACKAGE_DIR EXAMPLE SELFCALD
 """
 
 import math
@@ -18,14 +18,14 @@ sys.path[:0] = [
     str(pathlib.Path(__file__).parents[1]),
 ]
 
-import grpc  # noqa: E402
+import grpc
+import history
+from device import RIG
+from google.protobuf import json_format
+from running_daemon import RunningDaemon
 
-import history  # noqa: E402
-import selfcal  # noqa: E402
-from device import RIG  # noqa: E402
-from google.protobuf import json_format  # noqa: E402
-from running_daemon import RunningDaemon  # noqa: E402
-from selfcal.v1 import rig_pb2, segment_pb2, store_service_pb2  # noqa: E402
+import selfcal
+from selfcal.v1 import rig_pb2, segment_pb2, store_service_pb2
 
 KEYFRAMES = 12
 
@@ -79,9 +79,7 @@ class PythonTest(unittest.TestCase):
         (rig,) = self.daemon.activity().rigs
         self.assertEqual((rig.name, rig.traffic.stored), ("rigs/tablet", 3))
         frame = history.segment_frame(self.daemon, "tablet")
-        self.assertEqual(
-            list(frame.segment), ["rest~0", "rest~1", "rest~2"]
-        )
+        self.assertEqual(list(frame.segment), ["rest~0", "rest~1", "rest~2"])
         self.assertEqual(list(frame.keyframes), [KEYFRAMES] * 3)
         self.assertAlmostEqual(frame.seconds[0], 1.1)
         self.assertTrue(math.isnan(frame.temperature_c[0]))

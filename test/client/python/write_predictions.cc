@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/model/camera.h"
+#include "core/model/camera_model.h"
 #include "core/model/imu.h"
 #include "test/core/model/random_values.h"
 
@@ -50,9 +51,8 @@ void PrintImu(const selfcal::ImuCalibration& imu, RandomValues* random) {
 
 void PrintCamera(const selfcal::CameraCalibration& camera,
                  RandomValues* random) {
-  Print(
-      ("camera " + std::to_string(static_cast<int>(camera.model) + 1)).c_str(),
-      {camera.f, camera.c, camera.distortion});
+  Print(("camera " + std::string(DistortionName(camera.model))).c_str(),
+        {camera.f, camera.c, camera.distortion});
   for (int i = 0; i < 50; ++i) {
     Eigen::Vector3d p_C = random->Vector(3, 2);
     if (i == 0) p_C = Eigen::Vector3d::UnitZ();
@@ -75,8 +75,8 @@ int main() {
   for (int trial = 0; trial < 20; ++trial) {
     const selfcal::Calibration theta = random.Theta();
     PrintImu(theta.imu, &random);
-    for (const selfcal::CameraCalibration& camera : theta.cameras) {
-      PrintCamera(camera, &random);
+    for (const selfcal::DistortionModel model : selfcal::DistortionModels()) {
+      PrintCamera(random.Camera(model), &random);
     }
   }
 }

@@ -11,6 +11,7 @@
 #include "client/selfcal/client.h"
 #include "proto/convert.h"
 #include "test/client/selfcal/fake_daemon.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::client {
 namespace {
@@ -118,7 +119,7 @@ TEST_F(CalibrationWatchTest, TellsNoVersionTwiceOverRestarts) {
     // Half of the time the same one is sent again by the next daemon.
     daemon_.Start();
     if (version % 2 == 0) {
-      while (!watch.connection_status().ok()) std::this_thread::yield();
+      ASSERT_TRUE(Eventually([&] { return watch.connection_status().ok(); }));
     }
     daemon_.Publish(Version(version + 1));
     ASSERT_TRUE(told_.WaitFor(static_cast<std::size_t>(version) + 1));
@@ -131,7 +132,7 @@ TEST_F(CalibrationWatchTest, WaitsForARigThatDoesNotExistYet) {
   daemon_.FailStreamsWith({grpc::StatusCode::NOT_FOUND, "no such rig"});
   daemon_.Start();
   CalibrationWatch watch(Options(), told_.Callback());
-  while (watch.connection_status().ok()) std::this_thread::yield();
+  ASSERT_TRUE(Eventually([&] { return !watch.connection_status().ok(); }));
   EXPECT_TRUE(absl::IsNotFound(watch.connection_status()));
   daemon_.Publish(Version(1));
   daemon_.FailStreamsWith(grpc::Status::OK);
@@ -145,7 +146,7 @@ TEST_F(CalibrationWatchTest, LeavesOutACalibrationThatCannotBeUsed) {
   daemon_.Start();
   CalibrationWatch watch(Options(), told_.Callback());
   ASSERT_TRUE(daemon_.WaitForWatcher(1));
-  while (watch.connection_status().ok()) std::this_thread::yield();
+  ASSERT_TRUE(Eventually([&] { return !watch.connection_status().ok(); }));
   EXPECT_EQ(watch.connection_status().code(), absl::StatusCode::kDataLoss);
   daemon_.Publish(Version(2));
   ASSERT_TRUE(told_.WaitFor(1));
@@ -158,16 +159,16 @@ TEST_F(CalibrationWatchTest, CountsCallbacksThatThrow) {
   CalibrationWatch watch(Options(), [](const CalibrationVersion&) {
     throw std::runtime_error("a bug");
   });
-  while (watch.callback_failures() < 1) std::this_thread::yield();
+  ASSERT_TRUE(Eventually([&] { return watch.callback_failures() == 1; }));
   daemon_.Publish(Version(2));
-  while (watch.callback_failures() < 2) std::this_thread::yield();
+  EXPECT_TRUE(Eventually([&] { return watch.callback_failures() == 2; }));
 }
 
 TEST_F(CalibrationWatchTest, CanBeDestroyedInAnyState) {
   for (int trial = 0; trial < 20; ++trial) {
     CalibrationWatch watch(Options(), told_.Callback());
     if (trial % 2 == 0) {
-      while (watch.connection_status().ok()) std::this_thread::yield();
+      ASSERT_TRUE(Eventually([&] { return !watch.connection_status().ok(); }));
     }
   }
   daemon_.Publish(Version(1));

@@ -35,7 +35,7 @@ class FakeDaemon final : private v1::SegmentService::Service,
   };
 
   FakeDaemon();  // not started
-  ~FakeDaemon();
+  ~FakeDaemon() override;
 
   std::string target() const { return target_; }
   void Start();

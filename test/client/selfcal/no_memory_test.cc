@@ -94,6 +94,7 @@ TEST(NoMemory, NoCallOfTheBuilderThrowsAndItGoesOn) {
 TEST(NoMemory, WhatWasMovedFromRefuses) {
   SegmentBuilder builder({.session = "s"});
   const SegmentBuilder other(std::move(builder));
+  // NOLINTNEXTLINE(bugprone-use-after-move): what it does is the contract.
   EXPECT_FALSE(builder.AddImu({1}));
   EXPECT_FALSE(builder.AddKeyframe({}, {}));
   builder.Flush(2);

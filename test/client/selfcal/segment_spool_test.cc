@@ -17,6 +17,7 @@
 #include "test/client/selfcal/fake_daemon.h"
 #include "test/client/selfcal/test_folder.h"
 #include "test/promise.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::client {
 namespace {
@@ -63,7 +64,7 @@ class SegmentSpoolTest : public ::testing::Test {
   void Send(SegmentStream* stream, std::int64_t begin, std::int64_t end) {
     for (std::int64_t i = begin; i < end; ++i) {
       const std::uint64_t before = stream->statistics().dropped;
-      while (!stream->Send(Segment(i))) std::this_thread::yield();
+      ASSERT_TRUE(Eventually([&] { return stream->Send(Segment(i)); }));
       refused_ += stream->statistics().dropped - before;
     }
   }
@@ -89,7 +90,7 @@ class SegmentSpoolTest : public ::testing::Test {
 TEST_F(SegmentSpoolTest, HoldsOnDiskWhatMemoryHasNoRoomFor) {
   SegmentStream stream(Options(), Callback());
   Send(&stream, 0, 50);
-  while (stream.statistics().spooled < 48) std::this_thread::yield();
+  ASSERT_TRUE(Eventually([&] { return stream.statistics().spooled >= 48; }));
   EXPECT_EQ(stream.statistics().spool_segments, 48u);
   EXPECT_GT(stream.statistics().spool_bytes, 48u * 5000);
   EXPECT_EQ(Files(".segment").size(), 48u);

@@ -11,6 +11,7 @@
 
 #include "client/selfcal/client.h"
 #include "test/client/selfcal/fake_daemon.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::client {
 namespace {
@@ -248,7 +249,7 @@ TEST_F(SegmentStreamTest, ConnectsAgainAfterAnyOtherError) {
     daemon_.FailStreamsWith({code, "the disk is full"});
     SegmentStream stream(Options(), nullptr);
     ASSERT_TRUE(stream.Send(Segment(0)));
-    while (stream.connection_status().ok()) std::this_thread::yield();
+    ASSERT_TRUE(Eventually([&] { return !stream.connection_status().ok(); }));
     EXPECT_EQ(stream.connection_status().message(), "the disk is full");
     daemon_.FailStreamsWith(grpc::Status::OK);
     EXPECT_TRUE(stream.Drain(kLong).ok());
@@ -258,11 +259,12 @@ TEST_F(SegmentStreamTest, ConnectsAgainAfterAnyOtherError) {
 
 TEST_F(SegmentStreamTest, CanBeDestroyedInAnyState) {
   for (int trial = 0; trial < 20; ++trial) {
+    // NOLINTNEXTLINE(bugprone-unused-raii): destroyed as soon as it is made.
     SegmentStream(Options(), acks_.Callback());
     SegmentStream stream(Options(), acks_.Callback());
     stream.Send(Segment(0));  // nobody listens
     if (trial % 2 == 0) {
-      while (stream.connection_status().ok()) std::this_thread::yield();
+      ASSERT_TRUE(Eventually([&] { return !stream.connection_status().ok(); }));
     }
   }
   daemon_.Hold(true);
@@ -277,7 +279,7 @@ TEST_F(SegmentStreamTest, CanBeDestroyedInAnyState) {
   backing_off.min_backoff = backing_off.max_backoff = std::chrono::hours(1);
   SegmentStream stream(backing_off, acks_.Callback());
   stream.Send(Segment(0));
-  while (stream.connection_status().ok()) std::this_thread::yield();
+  ASSERT_TRUE(Eventually([&] { return !stream.connection_status().ok(); }));
 }
 
 TEST_F(SegmentStreamTest, CountsCallbacksThatThrowAndGoesOn) {

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "client/selfcal/client.h"
+#include "test/support/eventually.h"
 
 int main(int argc, char** argv) {
   if (argc != 3) return 2;
@@ -19,7 +20,7 @@ int main(int argc, char** argv) {
     segment.key = {"walk", i};
     segment.keyframes.resize(3);
     segment.imu.resize(100);
-    while (!stream.Send(segment)) std::this_thread::yield();
+    if (!selfcal::Eventually([&] { return stream.Send(segment); })) return 1;
     const auto spooled = stream.statistics().spooled;
     if (spooled == 0) continue;
     std::printf("%llu\n", static_cast<unsigned long long>(spooled));

@@ -9,6 +9,7 @@
 #include "client/selfcal/client.h"
 #include "test/client/selfcal/fake_daemon.h"
 #include "test/client/selfcal/test_folder.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::client {
 namespace {
@@ -81,11 +82,11 @@ class TlsTest : public ::testing::Test {
     MotionSegment segment;
     segment.key = {"walk", 0};
     EXPECT_TRUE(stream.Send(segment));
-    while (stream.connection_status().ok()) {
-      if (stream.statistics().stored > 0) return absl::OkStatus();
-      std::this_thread::yield();
-    }
-    return stream.connection_status();
+    EXPECT_TRUE(Eventually([&] {
+      return !stream.connection_status().ok() || stream.statistics().stored > 0;
+    }));
+    return stream.statistics().stored > 0 ? absl::OkStatus()
+                                          : stream.connection_status();
   }
 
   TestFolder folder_;
@@ -117,7 +118,7 @@ TEST_F(TlsTest, TakesCertificatesThatComeLater) {
   MotionSegment segment;
   segment.key = {"walk", 0};
   ASSERT_TRUE(stream.Send(segment));
-  while (stream.connection_status().ok()) std::this_thread::yield();
+  ASSERT_TRUE(Eventually([&] { return !stream.connection_status().ok(); }));
   const absl::Status status = stream.connection_status();
   EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
   EXPECT_NE(std::string(status.message()).find("device.pem"),
