@@ -6,6 +6,7 @@
 Every experiment must run, every file must parse, no value may be missing or
 not finite, and the figures that are marked as robust must hold.
 """
+
 import csv
 import json
 import math
@@ -41,8 +42,11 @@ def check_table(path):
     rows = list(csv.reader(path.open()))
     if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
         fail(f"{path}: no rows, or rows of different length")
-    if any(cell.lower() in ("nan", "-nan", "inf", "-inf")
-           for row in rows for cell in row):
+    if any(
+        cell.lower() in ("nan", "-nan", "inf", "-inf")
+        for row in rows
+        for cell in row
+    ):
         fail(f"{path}: a value is not finite")
     lines = path.with_suffix(".md").read_text().splitlines()
     if len(lines) != len(rows) + 1:
@@ -71,8 +75,9 @@ def main():
     shutil.rmtree(out, ignore_errors=True)
     subprocess.run([program, "--out", out, "--quick"], check=True)
     subprocess.run([plot_script, out], check=True)
-    listed = subprocess.run([program, "--list"], check=True, text=True,
-                            stdout=subprocess.PIPE).stdout
+    listed = subprocess.run(
+        [program, "--list"], check=True, text=True, stdout=subprocess.PIPE
+    ).stdout
     for line in listed.splitlines():
         folder = out / line.split()[0]
         tables = sorted(folder.glob("*.csv"))
@@ -82,7 +87,7 @@ def main():
             check_table(table)
         for plot in sorted(folder.glob("*.plot.json")):
             load(plot)
-            svg = plot.with_name(plot.name[:-len(".plot.json")] + ".svg")
+            svg = plot.with_name(plot.name[: -len(".plot.json")] + ".svg")
             xml.etree.ElementTree.parse(svg)
     check_summary(out)
 

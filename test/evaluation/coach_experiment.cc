@@ -32,9 +32,10 @@ struct WayOutcome {
   bool reached[2] = {};
   double with_changes_s[2] = {};
   double rate_radps = 0, accel_mps2 = 0;
-  double error = 0;  // of a calibration on the first segments [sigma_ref], rms
-  double claimed = 0;  // the same of its sigmas
-  double nees = 0;     // over the degrees
+  bool converged = false;  // of a calibration on the first segments
+  double error = 0;        // of that [sigma_ref], rms
+  double claimed = 0;      // the same of its sigmas
+  double nees = 0;         // over the degrees
   std::vector<std::string> motions;
 };
 
@@ -50,7 +51,11 @@ void CompareWithTruth(const CoachedDevice& device,
   const int count =
       std::min(kCalibrated, static_cast<int>(recording.segments.size()));
   const CalibrationResult result =
-      CalibrateOn(device.rig, recording.segments, AllSegments(count));
+      Calibrate(device.rig,
+                device.rig.factory,
+                Pick(recording.segments, AllSegments(count)));
+  outcome->converged = result.status == CalibrateStatus::kConverged;
+  if (!outcome->converged) return;
   const std::vector<int> free = FreeComponents(device.rig);
   const Eigen::VectorXd reference = ReferenceSigmas(device.rig)(free);
   const Eigen::VectorXd error = BoxMinus(device.truth, result.theta);
@@ -101,6 +106,7 @@ struct WaySeries {
   std::vector<double> seconds[2], with_changes[2], factors[2];
   std::vector<double> rates, accels, errors, claimed, nees;
   long reached[2] = {};
+  int converged = 0;
 };
 
 WaySeries Collect(const std::vector<Outcome>& all,
@@ -119,6 +125,8 @@ WaySeries Collect(const std::vector<Outcome>& all,
     }
     series.rates.push_back(of.rate_radps);
     series.accels.push_back(of.accel_mps2);
+    series.converged += of.converged;
+    if (!of.converged) continue;
     series.errors.push_back(of.error);
     series.claimed.push_back(of.claimed);
     series.nees.push_back(of.nees);
@@ -143,6 +151,7 @@ void TabulateTimes(const std::vector<Outcome>& all,
                      "way",
                      "rms rate [rad/s]",
                      "rms acceleration [m/s^2]",
+                     "converged",
                      "error after 6 segments [sigma_ref]",
                      "claimed [sigma_ref]",
                      "NEES / D"});
@@ -167,6 +176,7 @@ void TabulateTimes(const std::vector<Outcome>& all,
                  NameOf(way),
                  Mean(series.rates),
                  Mean(series.accels),
+                 static_cast<long>(series.converged),
                  Rms(series.errors),
                  Rms(series.claimed),
                  Mean(series.nees)});
@@ -241,7 +251,7 @@ void ComparePredictions(int seeds, Context* context) {
   const int count = kCoachedRigs * seeds;
   std::vector<std::vector<Prediction>> all(count);
   context->ForEach(count, [&](int i) {
-    all[i] = PredictAll(i / seeds, static_cast<std::uint64_t>(i % seeds + 1));
+    all[i] = PredictAll(i / seeds, static_cast<std::uint64_t>(i % seeds) + 1);
   });
   ResultTable table({"motion",
                      "segments",
@@ -280,7 +290,7 @@ void RunCoach(Context* context) {
   std::vector<Outcome> all(rigs * seeds);
   context->ForEach(rigs * seeds, [&](int i) {
     all[i] = RunOne(
-        i / seeds, static_cast<std::uint64_t>(i % seeds + 1), context->quick());
+        i / seeds, static_cast<std::uint64_t>(i % seeds) + 1, context->quick());
     context->Progress(all[i].device + ", " + std::to_string(i % seeds + 1));
   });
   std::vector<std::string> devices;

@@ -160,8 +160,7 @@ std::vector<MotionSegment> Diverge(const std::vector<MotionSegment>& session,
       }
       state.q_GI = (q * state.q_GI).normalized();
       state.p_GI = q * state.p_GI + p;
-      state.v_GI =
-          q * state.v_GI + divergence.velocity_mps * random.Normal3();
+      state.v_GI = q * state.v_GI + divergence.velocity_mps * random.Normal3();
       state.b_a += divergence.accel_bias_mps2 * random.Normal3();
       state.b_g += divergence.gyro_bias_radps * random.Normal3();
     }

@@ -169,13 +169,13 @@ Seed RunSeed(std::uint64_t seed, double duration_s) {
   options.min_depth_m = 3;
   options.max_depth_m = 8;
   const Motion motion = MakeMotion(kGore, duration_s);
-  const auto session = std::make_shared<const SimulatedSession>(
-      Simulate(device.sensors,
-               *device.truth,
-               device.rig.factory,
-               *motion.trajectory,
-               motion.name,
-               options));
+  const auto session =
+      std::make_shared<const SimulatedSession>(Simulate(device.sensors,
+                                                        *device.truth,
+                                                        device.rig.factory,
+                                                        *motion.trajectory,
+                                                        motion.name,
+                                                        options));
   device.sessions.push_back([session](const Calibration&) {
     return TrustSession{session->segments, {}};
   });
@@ -186,10 +186,8 @@ Seed RunSeed(std::uint64_t seed, double duration_s) {
         fmt::format("seed {}: no version became active", seed));
   }
   result.sent = driven.segments;
-  result.tables = Assess(device.rig,
-                         *device.truth,
-                         driven.final_theta,
-                         driven.final_covariance);
+  result.tables = Assess(
+      device.rig, *device.truth, driven.final_theta, driven.final_covariance);
   result.tables.seconds = driven.pipeline_seconds;
   for (const TrustVersion& version : driven.versions) {
     if (version.stored.version == driven.final_version) {
@@ -290,10 +288,10 @@ void ReportSeeds(const std::vector<Seed>& seeds, Context* context) {
   }
   context->WriteTable("seeds", table);
   const auto count = static_cast<double>(seeds.size());
-  const double bound = NeesBounds(seeds.front().tables.degrees,
-                                  static_cast<int>(seeds.size()),
-                                  0.95)
-                           .second;
+  const double bound =
+      NeesBounds(
+          seeds.front().tables.degrees, static_cast<int>(seeds.size()), 0.95)
+          .second;
   context->AtMost("openvins_scenario.nees_mean", nees / count, bound);
   context->AtMost(
       "openvins_scenario.batch_nees_mean", nees_batch / count, bound);

@@ -5,6 +5,7 @@
 
 The description is that of plot.h. The same description gives the same bytes.
 """
+
 import json
 import pathlib
 import sys
@@ -12,16 +13,18 @@ import sys
 import matplotlib
 
 matplotlib.use("svg")
-matplotlib.rcParams.update({
-    "svg.hashsalt": "selfcal",
-    "svg.fonttype": "path",
-    "font.size": 10,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.alpha": 0.3,
-    "legend.fontsize": 8,
-})
-from matplotlib import pyplot  # noqa: E402
+matplotlib.rcParams.update(
+    {
+        "svg.hashsalt": "selfcal",
+        "svg.fonttype": "path",
+        "font.size": 10,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "grid.alpha": 0.3,
+        "legend.fontsize": 8,
+    }
+)
+from matplotlib import pyplot
 
 
 def error_bars(series):
@@ -35,35 +38,71 @@ def error_bars(series):
 
 def draw_line(axes, series, _plot, _place, color):
     steps = "post" if series["style"] == "steps" else None
-    axes.plot(series["x"], series["y"], label=series["label"] or None,
-              color=color, linestyle="--" if series["dashed"] else "-",
-              drawstyle="steps-post" if steps else "default")
+    axes.plot(
+        series["x"],
+        series["y"],
+        label=series["label"] or None,
+        color=color,
+        linestyle="--" if series["dashed"] else "-",
+        drawstyle="steps-post" if steps else "default",
+    )
     if series["low"]:
-        axes.fill_between(series["x"], series["low"], series["high"],
-                          step=steps, color=color, alpha=0.2, linewidth=0)
+        axes.fill_between(
+            series["x"],
+            series["low"],
+            series["high"],
+            step=steps,
+            color=color,
+            alpha=0.2,
+            linewidth=0,
+        )
 
 
 def draw_scatter(axes, series, _plot, _place, color):
-    axes.errorbar(series["x"], series["y"], yerr=error_bars(series), fmt="o",
-                  markersize=3, capsize=2, color=color,
-                  label=series["label"] or None)
+    axes.errorbar(
+        series["x"],
+        series["y"],
+        yerr=error_bars(series),
+        fmt="o",
+        markersize=3,
+        capsize=2,
+        color=color,
+        label=series["label"] or None,
+    )
 
 
 def draw_bars(axes, series, plot, place, color):
     index, count = place
     width = 0.8 / count
-    x = [i + (index - (count - 1) / 2) * width
-         for i in range(len(plot["categories"]))]
-    axes.bar(x, series["y"], width, yerr=error_bars(series), capsize=2,
-             color=color, label=series["label"] or None)
+    x = [
+        i + (index - (count - 1) / 2) * width
+        for i in range(len(plot["categories"]))
+    ]
+    axes.bar(
+        x,
+        series["y"],
+        width,
+        yerr=error_bars(series),
+        capsize=2,
+        color=color,
+        label=series["label"] or None,
+    )
 
 
 def draw_histogram(axes, series, plot, _place, color):
-    values = [x for s in plot["series"] if s["style"] == "histogram"
-              for x in s["x"]]
-    axes.hist(series["x"], bins=plot["bins"], range=(min(values), max(values)),
-              histtype="stepfilled", alpha=0.4, edgecolor=color, color=color,
-              label=series["label"] or None)
+    values = [
+        x for s in plot["series"] if s["style"] == "histogram" for x in s["x"]
+    ]
+    axes.hist(
+        series["x"],
+        bins=plot["bins"],
+        range=(min(values), max(values)),
+        histtype="stepfilled",
+        alpha=0.4,
+        edgecolor=color,
+        color=color,
+        label=series["label"] or None,
+    )
 
 
 DRAW = {
@@ -87,9 +126,12 @@ def draw(path):
         axes.axhline(value, color="black", linewidth=0.8, linestyle=":")
     if plot["categories"]:
         long = any(len(name) > 8 for name in plot["categories"])
-        axes.set_xticks(range(len(plot["categories"])), plot["categories"],
-                        rotation=45 if long else 0,
-                        ha="right" if long else "center")
+        axes.set_xticks(
+            range(len(plot["categories"])),
+            plot["categories"],
+            rotation=45 if long else 0,
+            ha="right" if long else "center",
+        )
     axes.set_title(plot["title"])
     axes.set_xlabel(plot["x_label"])
     axes.set_ylabel(plot["y_label"])
@@ -100,7 +142,7 @@ def draw(path):
     if any(series["label"] for series in plot["series"]):
         axes.legend()
     figure.tight_layout()
-    name = path.name[:-len(".plot.json")]
+    name = path.name[: -len(".plot.json")]
     figure.savefig(path.with_name(name + ".svg"), metadata={"Date": None})
     pyplot.close(figure)
 

@@ -64,7 +64,7 @@ struct Data {
   Rig rig;
   Calibration truth;
   std::vector<MotionSegment> segments;
-  std::vector<SegmentInformation> informations;
+  std::vector<SegmentInformation> information;
   std::vector<ScoredSegment> scored;
   std::vector<Candidate> candidates;
 };
@@ -94,15 +94,15 @@ Data MakeData(const Scenario& scenario, double duration_s, int index) {
     AddTrackErrors(scenario.track_sigma_px, seed, &data.segments);
   }
   for (const MotionSegment& segment : data.segments) {
-    data.informations.push_back(
+    data.information.push_back(
         ScoreSegment(data.rig, data.rig.factory, segment));
   }
   for (std::size_t i = 0; i < data.segments.size(); ++i) {
     const auto sequence = static_cast<std::int64_t>(i);
     const SegmentKey& key = data.segments[i].key;
-    data.scored.push_back({key, sequence, &data.informations[i]});
+    data.scored.push_back({key, sequence, &data.information[i]});
     data.candidates.push_back(
-        MakeCandidate(data.rig, key, sequence, data.informations[i]));
+        MakeCandidate(data.rig, key, sequence, data.information[i]));
   }
   return data;
 }

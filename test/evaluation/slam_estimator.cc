@@ -75,11 +75,11 @@ class Stretch {
 
   void AddKeyframes(ceres::Problem* problem) {
     for (std::size_t k = 0; k < states_.size(); ++k) {
-      problem->AddParameterBlock(states_[k].q.data(),
-                                 4,
-                                 (k == 0 ? MakeGaugeRotationManifold()
-                                         : MakeRotationManifold())
-                                     .release());
+      problem->AddParameterBlock(
+          states_[k].q.data(),
+          4,
+          (k == 0 ? MakeGaugeRotationManifold() : MakeRotationManifold())
+              .release());
       problem->AddParameterBlock(states_[k].p.data(), 3);
     }
     problem->SetParameterBlockConstant(states_.front().p.data());
@@ -165,11 +165,8 @@ class Stretch {
         const std::size_t k = first + static_cast<std::size_t>(o.keyframe);
         seen_by.emplace(id, k);
         problem->AddResidualBlock(
-            MakeReprojectionCost(theta_,
-                                 o.camera,
-                                 o.z_px,
-                                 rig_.pixel_sigma_px,
-                                 std::nullopt)
+            MakeReprojectionCost(
+                theta_, o.camera, o.z_px, rig_.pixel_sigma_px, std::nullopt)
                 .release(),
             new ceres::HuberLoss(kHuber_sigmas),
             offset_.data(),

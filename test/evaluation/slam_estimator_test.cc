@@ -58,8 +58,7 @@ double MeanAccelBiasError(const std::vector<MotionSegment>& estimated,
   int count = 0;
   for (std::size_t s = 0; s < truth.size(); ++s) {
     for (std::size_t k = 0; k < truth[s].keyframes.size(); ++k, ++count) {
-      sum +=
-          (estimated[s].keyframes[k].b_a - truth[s].keyframes[k].b_a).norm();
+      sum += (estimated[s].keyframes[k].b_a - truth[s].keyframes[k].b_a).norm();
     }
   }
   return sum / count;
@@ -96,8 +95,7 @@ TEST(SlamEstimatorTest, WithAWrongCalibrationStatesAreWrongTogether) {
 }
 
 TEST(SlamEstimatorTest, SegmentsKeepTheirDataAndStayValid) {
-  const Calibration wrong =
-      PerturbCalibration(HandheldRig("a").factory, {}, 6);
+  const Calibration wrong = PerturbCalibration(HandheldRig("a").factory, {}, 6);
   const Example example = MakeExample(wrong, true);
   // Stretches that end within the session.
   const auto estimated = EstimateStates(

@@ -28,29 +28,29 @@ TrustKind Corrupt(std::string name,
                   int quick_devices,
                   TrustDevice (*device_of)(std::uint64_t seed),
                   int every,
-                  Corruption corrupt,
-                  Corruption clean = nullptr) {
+                  const Corruption& corrupt,
+                  const Corruption& clean = nullptr) {
   const auto make = [=](std::uint64_t seed, bool corrupted) {
     TrustDevice device = device_of(seed);
     const TrustDevice base = device;
-    AddSession(MakeHandheld(kGoodSession_s, 1, seed),
-               "handheld",
-               TrustOptions(seed),
-               &device,
-               [=](const Calibration&, SimulatedSession* session) {
-                 const SimulatedSession good = *session;
-                 session->segments.clear();
-                 const int count = static_cast<int>(good.segments.size());
-                 const int first = static_cast<int>(seed) % every;
-                 for (int i = 0; i < count; ++i) {
-                   if (i % every != first) {
-                     session->segments.push_back(good.segments[i]);
-                   } else if (const Corruption& one =
-                                  corrupted ? corrupt : clean) {
-                     session->segments.push_back(one(base, good, i));
-                   }
-                 }
-               });
+    AddSession(
+        MakeHandheld(kGoodSession_s, 1, seed),
+        "handheld",
+        TrustOptions(seed),
+        &device,
+        [=](const Calibration&, SimulatedSession* session) {
+          const SimulatedSession good = *session;
+          session->segments.clear();
+          const int count = static_cast<int>(good.segments.size());
+          const int first = static_cast<int>(seed) % every;
+          for (int i = 0; i < count; ++i) {
+            if (i % every != first) {
+              session->segments.push_back(good.segments[i]);
+            } else if (const Corruption& one = corrupted ? corrupt : clean) {
+              session->segments.push_back(one(base, good, i));
+            }
+          }
+        });
     return device;
   };
   return {std::move(name),

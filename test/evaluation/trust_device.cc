@@ -15,8 +15,8 @@
 #include "core/change/chi_square.h"
 #include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
-#include "server/store/store_sqlite.h"
 #include "test/evaluation/statistics.h"
+#include "test/server/store/sqlite/open_sqlite_store.h"
 
 namespace selfcal {
 namespace {
@@ -69,7 +69,7 @@ class Driver {
  public:
   explicit Driver(const TrustDevice& device)
       : device_(device), name_(device.rig.id) {
-    store_ = Get(server::MakeSqliteStore(scratch_.File("selfcal.db")));
+    store_ = Get(server::OpenSqliteStore(scratch_.File("selfcal.db")));
     domain_.emplace(store_.get());
     Check(domain_->CreateRig(device.rig).status());
     pipeline_ = server::MakePipeline(&*domain_, {});

@@ -60,9 +60,8 @@ TrustSeeds SeedsToUse() {
     return TrustSeeds::kJudging;
   }
   if (std::string(seeds) == "design") return TrustSeeds::kDesign;
-  throw std::invalid_argument(
-      fmt::format("SELFCAL_TRUST_SEEDS is '{}'; give judging or design",
-                  seeds));
+  throw std::invalid_argument(fmt::format(
+      "SELFCAL_TRUST_SEEDS is '{}'; give judging or design", seeds));
 }
 
 std::vector<Trial> ListTrials(bool quick) {
@@ -127,10 +126,9 @@ std::optional<double> FromClean(const Trial& trial) {
       BoxMinus(trial.outcome.final_theta, trial.clean->final_theta);
   double largest = 0;
   for (const int i : FreeComponents(trial.rig)) {
-    largest = std::max(
-        largest,
-        std::abs(difference(i)) /
-            std::sqrt(trial.clean->final_covariance(i, i)));
+    largest = std::max(largest,
+                       std::abs(difference(i)) /
+                           std::sqrt(trial.clean->final_covariance(i, i)));
   }
   return largest;
 }
@@ -153,9 +151,10 @@ void Run(Trial* trial, const Context& context) {
   }
   const TrustOutcome& outcome = trial->outcome;
   const TrustVersion* worst = WorstActive(*trial);
-  std::string text = fmt::format(
-      "{}{}: {} versions", HasFailed(*trial) ? "FAILURE " : "", trial->Name(),
-      outcome.versions.size());
+  std::string text = fmt::format("{}{}: {} versions",
+                                 HasFailed(*trial) ? "FAILURE " : "",
+                                 trial->Name(),
+                                 outcome.versions.size());
   if (worst == nullptr) {
     text += HasActive(*trial) ? ", truth unknown" : ", none became active";
   } else {
@@ -217,12 +216,23 @@ std::string StateOf(const TrustVersion& version) {
 }
 
 void WriteVersions(const std::vector<Trial>& trials, Context* context) {
-  std::vector<std::string> columns = {
-      "kind",          "seed",      "version",  "state",
-      "after segment", "NEES",      "degrees",  "probability",
-      "largest error [sigma]",      "component", "failure",
-      "rank",          "held",      "segments", "observations",
-      "dropped",       "rms [px]"};
+  std::vector<std::string> columns = {"kind",
+                                      "seed",
+                                      "version",
+                                      "state",
+                                      "after segment",
+                                      "NEES",
+                                      "degrees",
+                                      "probability",
+                                      "largest error [sigma]",
+                                      "component",
+                                      "failure",
+                                      "rank",
+                                      "held",
+                                      "segments",
+                                      "observations",
+                                      "dropped",
+                                      "rms [px]"};
   for (int i = 0; i < kNoiseKinds; ++i) {
     columns.push_back(NoiseKindName(static_cast<NoiseKind>(i)) + " / truth");
   }
@@ -297,26 +307,25 @@ void WriteDevices(const std::vector<Trial>& trials, Context* context) {
     const auto of_final = [&](auto value) {
       return o.final_error ? Cell(value(*o.final_error)) : Cell();
     };
-    table.Add(
-        {trial.kind->name,
-         static_cast<long>(trial.seed),
-         static_cast<long>(o.segments),
-         static_cast<long>(o.versions.size()),
-         rejected,
-         static_cast<long>(o.failed_runs.size()),
-         o.before_change > 0 ? Cell(long{o.before_change}) : Cell(),
-         fmt::format("{}", fmt::join(o.changes, " ")),
-         static_cast<long>(o.final_version),
-         of_final(NeesOf),
-         of_final(DegreesOf),
-         of_final(SigmasOf),
-         of_final(ComponentOf),
-         Number(o.largest_sigmas_in_use),
-         worst == nullptr ? Cell() : NeesOf(*worst->error),
-         from_clean ? Number(*from_clean) : Cell(),
-         HasFailed(trial) ? "FAILURE" : "",
-         o.simulation_seconds,
-         o.pipeline_seconds});
+    table.Add({trial.kind->name,
+               static_cast<long>(trial.seed),
+               static_cast<long>(o.segments),
+               static_cast<long>(o.versions.size()),
+               rejected,
+               static_cast<long>(o.failed_runs.size()),
+               o.before_change > 0 ? Cell(long{o.before_change}) : Cell(),
+               fmt::format("{}", fmt::join(o.changes, " ")),
+               static_cast<long>(o.final_version),
+               of_final(NeesOf),
+               of_final(DegreesOf),
+               of_final(SigmasOf),
+               of_final(ComponentOf),
+               Number(o.largest_sigmas_in_use),
+               worst == nullptr ? Cell() : NeesOf(*worst->error),
+               from_clean ? Number(*from_clean) : Cell(),
+               HasFailed(trial) ? "FAILURE" : "",
+               o.simulation_seconds,
+               o.pipeline_seconds});
   }
   context->WriteTable("devices", table);
 }
@@ -400,11 +409,11 @@ void ReportKinds(const std::vector<Trial>& trials, Context* context) {
       context->AtMost(prefix + ".nees_mean", sum.MeanNees(), sum.Bound());
     }
     if (!sum.from_clean.empty()) {
-      context->AtMost(prefix + ".from_clean",
-                      *std::max_element(sum.from_clean.begin(),
-                                        sum.from_clean.end()),
-                      kMaxFromClean,
-                      {.unit = "sigma"});
+      context->AtMost(
+          prefix + ".from_clean",
+          *std::max_element(sum.from_clean.begin(), sum.from_clean.end()),
+          kMaxFromClean,
+          {.unit = "sigma"});
     }
   }
   context->WriteTable("kinds", table);
@@ -420,10 +429,8 @@ void ReportAll(const std::vector<Trial>& trials, Context* context) {
     ++active;
     unlikely += trial.outcome.final_error->probability < kUnlikely;
   }
-  context->AtMost("trust.silent_failures",
-                  failures,
-                  0,
-                  {.unit = "active versions"});
+  context->AtMost(
+      "trust.silent_failures", failures, 0, {.unit = "active versions"});
   if (active > 0) {
     context->AtMost("trust.beyond_99_percent",
                     unlikely,

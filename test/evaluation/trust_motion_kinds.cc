@@ -63,10 +63,8 @@ std::shared_ptr<const Trajectory> Rotation(double distance_m,
 // Tables of 8, the default: with smaller ones fewer of these devices fail.
 TrustDevice RotationInPlace(std::uint64_t seed, double distance_m) {
   TrustDevice device = MakeTrustDevice(seed, 8);
-  AddSession(Rotation(distance_m, seed),
-             "rotation",
-             TrustOptions(seed),
-             &device);
+  AddSession(
+      Rotation(distance_m, seed), "rotation", TrustOptions(seed), &device);
   return device;
 }
 

@@ -42,10 +42,8 @@ TrustDevice WithOptions(std::uint64_t seed,
   TrustDevice device = MakeTrustDevice(seed);
   SimulationOptions options = TrustOptions(seed);
   change(&options);
-  AddSession(MakeHandheld(kTrustSession_s, 1, seed),
-             "handheld",
-             options,
-             &device);
+  AddSession(
+      MakeHandheld(kTrustSession_s, 1, seed), "handheld", options, &device);
   return device;
 }
 
@@ -72,8 +70,7 @@ std::vector<TrustKind> NoiseKinds() {
   for (const int factor : {3, 10}) {
     for (const bool small : {true, false}) {
       kinds.push_back(
-          {fmt::format(
-               "imu_noise_{}x_{}", factor, small ? "small" : "large"),
+          {fmt::format("imu_noise_{}x_{}", factor, small ? "small" : "large"),
            fmt::format("IMU noise stated {} times too {}",
                        factor,
                        small ? "small" : "large"),

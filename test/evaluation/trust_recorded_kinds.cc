@@ -20,10 +20,8 @@ std::optional<TrustDevice> OnRecordedMotion(std::uint64_t seed) {
   Motion motion = MakeMotion(dataset, kRecorded_s);
   if (!motion.recorded) return std::nullopt;
   TrustDevice device = MakeTrustDevice(seed);
-  AddSession(std::move(motion.trajectory),
-             motion.name,
-             TrustOptions(seed),
-             &device);
+  AddSession(
+      std::move(motion.trajectory), motion.name, TrustOptions(seed), &device);
   return device;
 }
 

@@ -33,18 +33,18 @@ void AddSession(std::shared_ptr<const Trajectory> motion,
                 const SimulationOptions& options,
                 TrustDevice* device,
                 SessionEdit edit) {
-  device->sessions.push_back([sensors = device->sensors,
-                              truth = device->truth.value(),
-                              motion = std::move(motion),
-                              name,
-                              options,
-                              edit = std::move(edit)](
-                                 const Calibration& theta_slam) {
-    SimulatedSession session =
-        Simulate(sensors, truth, theta_slam, *motion, name, options);
-    if (edit) edit(theta_slam, &session);
-    return TrustSession{std::move(session.segments), truth};
-  });
+  device->sessions.push_back(
+      [sensors = device->sensors,
+       truth = device->truth.value(),
+       motion = std::move(motion),
+       name,
+       options,
+       edit = std::move(edit)](const Calibration& theta_slam) {
+        SimulatedSession session =
+            Simulate(sensors, truth, theta_slam, *motion, name, options);
+        if (edit) edit(theta_slam, &session);
+        return TrustSession{std::move(session.segments), truth};
+      });
 }
 
 }  // namespace selfcal
