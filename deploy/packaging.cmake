@@ -71,4 +71,51 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DAEMON_PACKAGE_GENERATE_SHLIBS OFF)
 set(CPACK_DEBIAN_CLI_PACKAGE_GENERATE_SHLIBS OFF)
 
+# Manual pages and completion, written by the programs themselves: a target of
+# its own, since installing builds nothing. Not by programs with sanitizers.
+if(NOT SELFCAL_SANITIZE)
+  find_program(SELFCAL_PYTHON python3
+    PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
+  set(pages ${PROJECT_BINARY_DIR}/pages)
+  file(MAKE_DIRECTORY ${pages})
+  set(written)
+
+  # selfcal_page(NAME SECTION TARGET COMPONENT)
+  function(selfcal_page name section target component)
+    set(page ${pages}/${name}.${section}.gz)
+    add_custom_command(
+      OUTPUT ${page}
+      COMMAND ${SELFCAL_PYTHON} ${deploy}/manual_page.py ${name} ${section}
+        ${PROJECT_VERSION} ${page}
+        ${CMAKE_CROSSCOMPILING_EMULATOR} $<TARGET_FILE:${target}>
+      DEPENDS ${target} ${deploy}/manual_page.py
+      VERBATIM)
+    install(FILES ${page}
+      DESTINATION ${CMAKE_INSTALL_MANDIR}/man${section}
+      COMPONENT ${component})
+    set(written ${written} ${page} PARENT_SCOPE)
+  endfunction()
+  selfcal_page(selfcal 1 selfcal-cli cli)
+  selfcal_page(selfcald 8 selfcald daemon)
+
+  # selfcal_completion(SHELL FOLDER FILE): in the folder that the shell reads.
+  function(selfcal_completion shell folder file)
+    set(script ${pages}/${shell}/${file})
+    file(MAKE_DIRECTORY ${pages}/${shell})
+    add_custom_command(
+      OUTPUT ${script}
+      COMMAND selfcal-cli completion ${shell} > ${script}
+      DEPENDS selfcal-cli
+      VERBATIM)
+    install(FILES ${script}
+      DESTINATION ${CMAKE_INSTALL_DATADIR}/${folder}
+      COMPONENT cli)
+    set(written ${written} ${script} PARENT_SCOPE)
+  endfunction()
+  selfcal_completion(bash bash-completion/completions selfcal)
+  selfcal_completion(zsh zsh/vendor-completions _selfcal)
+  selfcal_completion(fish fish/vendor_completions.d selfcal.fish)
+  add_custom_target(selfcal_pages ALL DEPENDS ${written})
+endif()
+
 include(CPack)

@@ -10,7 +10,6 @@ import pathlib
 import sys
 
 from google.protobuf import descriptor_pb2 as d
-
 from markdown_lines import escaped
 
 _Field = d.FieldDescriptorProto
@@ -64,7 +63,7 @@ class _Page:
         package = self._file.package + "."
         if not name.startswith(package):
             return f"`{name}`"
-        return f"{{ref}}`{name[len(package):]} <{name.lower()}>`"
+        return f"{{ref}}`{name[len(package) :]} <{name.lower()}>`"
 
     def _type(self, field: _Field, nested: dict) -> str:
         if field.type_name in nested:  # a map's entry
@@ -123,7 +122,11 @@ class _Page:
 
     def whole(self) -> str:
         name = pathlib.PurePath(self._file.name).stem
-        self.lines += [f"# {name.replace('_', ' ')}", "", f"`{self._file.name}`"]
+        self.lines += [
+            f"# {name.replace('_', ' ')}",
+            "",
+            f"`{self._file.name}`",
+        ]
         syntax = self._comments.get((12,))
         if syntax is not None:
             text = "".join(syntax.leading_detached_comments)

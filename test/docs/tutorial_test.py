@@ -13,6 +13,7 @@ The build is BUILD instead of build/dev, ports are free ones, and RECORDINGS (or
 SELFCAL_TEST_DATA) is in the environment.
 """
 
+import contextlib
 import os
 import pathlib
 import re
@@ -94,10 +95,9 @@ def run(tutorial: Tutorial, root: str, home: str, recordings: str):
         try:
             code = process.wait(TIMEOUT_S)
         finally:
-            try:
+            # There is no such process if nothing was left running.
+            with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-            except ProcessLookupError:
-                pass  # nothing was left running
         printed.seek(0)
         return code, printed.read()
 

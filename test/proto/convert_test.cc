@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 
@@ -27,7 +29,7 @@ bool SameBits(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return SameBits(a.coeffs(), b.coeffs());
 }
 bool SameBits(double a, double b) {
-  return std::memcmp(&a, &b, sizeof(double)) == 0;
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
 void ExpectSame(const Calibration& a, const Calibration& b) {
@@ -55,7 +57,12 @@ void ExpectSame(const Calibration& a, const Calibration& b) {
 void ExpectSame(const Rig& a, const Rig& b) {
   EXPECT_EQ(a.id, b.id);
   ExpectSame(a.factory, b.factory);
-  EXPECT_EQ(std::memcmp(&a.imu_noise, &b.imu_noise, sizeof(ImuNoise)), 0);
+  for (const auto noise : {&ImuNoise::gyro_noise_density,
+                           &ImuNoise::accel_noise_density,
+                           &ImuNoise::gyro_bias_random_walk,
+                           &ImuNoise::accel_bias_random_walk}) {
+    EXPECT_TRUE(SameBits(a.imu_noise.*noise, b.imu_noise.*noise));
+  }
   EXPECT_TRUE(SameBits(a.pixel_sigma_px, b.pixel_sigma_px));
   EXPECT_TRUE(SameBits(a.gravity_mps2, b.gravity_mps2));
   ASSERT_EQ(a.groups.size(), b.groups.size());
