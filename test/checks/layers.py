@@ -33,8 +33,8 @@ FOLDERS = (*LAYERS, "test")
 _DECLARATIONS = {"selfcal_module", "selfcal_test"}
 _KEYWORDS = {
     "SOURCES", "LANES", "USES", "PRIVATE_USES", "PROTOS", "IMPORT_DIRS",
-    "LABELS", "TIMEOUT", "PUBLIC", "PRIVATE", "INTERFACE", "TARGET",
-    "LANGUAGE", "GENERATE_EXTENSIONS", "PLUGIN", "PROTOC_OUT_DIR",
+    "LABELS", "TIMEOUT", "NOT_SANITIZED", "PUBLIC", "PRIVATE", "INTERFACE",
+    "TARGET", "LANGUAGE", "GENERATE_EXTENSIONS", "PLUGIN", "PROTOC_OUT_DIR",
 }  # fmt: skip
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"')
 
@@ -283,7 +283,7 @@ def cycles(project: Project) -> list:
 
 def tracked_files(root: pathlib.Path) -> list:
     listed = subprocess.run(
-        ["git", "-C", root, "ls-files", "--cached", "--others",
+        ["git", "-c", "safe.directory=*", "-C", root, "ls-files", "--cached", "--others",
          "--exclude-standard"],
         check=True, capture_output=True, text=True,
     ).stdout.splitlines()  # fmt: skip
