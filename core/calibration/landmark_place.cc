@@ -146,6 +146,24 @@ void LandmarkPlace::Move(const Eigen::Vector3d& step) {
   inverse_depth << point.head<2>() / point.z(), rho / point.z();
 }
 
+LandmarkPrior InverseDepthPrior(const LandmarkPlace& place, double weight) {
+  const double rho = place.inverse_depth.z();
+  const Eigen::Vector3d rho_by_p = -rho * rho * place.anchor.R_GA.col(2);
+  const double information =
+      weight * (1 / (kInverseDepthSigma * kInverseDepthSigma));
+  return {information * rho_by_p * rho_by_p.transpose(),
+          information * rho * rho_by_p};
+}
+
+Eigen::Vector3d InverseDepthStep(const LandmarkPlace& place,
+                                 const Eigen::Vector3d& step_G) {
+  const double rho = place.inverse_depth.z();
+  const Eigen::Vector3d q = rho * (place.anchor.R_GA.transpose() * step_G);
+  return {q.x() - place.inverse_depth.x() * q.z(),
+          q.y() - place.inverse_depth.y() * q.z(),
+          -rho * q.z()};
+}
+
 LandmarkPlace PlaceAt(const LandmarkScene& scene,
                       const Track& track,
                       const Eigen::Vector4d& point_G) {

@@ -101,6 +101,20 @@ struct LandmarkPlace {
   void Move(const Eigen::Vector3d& step);
 };
 
+// Adds x^T H x + 2 g^T x for a step x of a landmark's position in G.
+struct LandmarkPrior {
+  Eigen::Matrix3d H;
+  Eigen::Vector3d g;
+};
+
+// The prior on inverse depth, times a weight, linearised at a position.
+LandmarkPrior InverseDepthPrior(const LandmarkPlace& place, double weight);
+
+// Converts a step of p_G = a + R (alpha, beta, 1) / rho to one of (alpha, beta,
+// rho), to first order.
+Eigen::Vector3d InverseDepthStep(const LandmarkPlace& place,
+                                 const Eigen::Vector3d& step_G);
+
 // Position of a homogeneous point in G, anchored at the track's first camera.
 LandmarkPlace PlaceAt(const LandmarkScene& scene,
                       const Track& track,

@@ -174,12 +174,12 @@ bool LineariseFactors(const SolverRound& round,
   const Calibration theta = BoxPlus(round.reference, estimate.d);
   result->theta_by_offset = ThetaByOffset(round.reference, estimate.d);
   result->roots = RootsOf(round);
-  result->system.Linearise(round.rig,
-                           theta,
-                           round.problem,
-                           estimate.keyframes,
-                           round.motions,
-                           landmarks,
+  result->system.Linearise({round.rig,
+                            theta,
+                            round.problem,
+                            estimate.keyframes,
+                            round.motions,
+                            landmarks},
                            result->roots,
                            loss,
                            damping);
