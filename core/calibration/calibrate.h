@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/noise_factor.h"
+#include "core/calibration/noise_scale.h"
 #include "core/calibration/remembered_segment.h"
 #include "core/calibration/segment_fit.h"
 #include "core/calibration/theta_prior.h"
@@ -41,8 +41,8 @@ struct CalibrateOptions {
   // Measures the correlation of the pixel errors along tracks, and weights them
   // accordingly (track_noise.h).
   bool correlated_tracks = true;
-  // Estimates the noise scales of the rig (noise_factors.h).
-  bool noise_factors = true;
+  // Estimates the noise scales of the rig (noise_scales.h).
+  bool noise_scales = true;
   // Weights by the noise of the rig times the noise scales, as far as the
   // residuals determine them, instead of by the noise that the rig states.
   bool reweight_noise = true;
@@ -122,8 +122,8 @@ struct CalibrationResult {
   int observations = 0;  // used
   int observations_dropped = 0;
   // Noise scales relative to the noise that the rig states, one for each kind
-  // (noise_factors.h); empty if there is no result or they were not requested.
-  std::vector<NoiseFactor> noise_factors;
+  // (noise_scales.h); empty if there is no result or they were not requested.
+  std::vector<NoiseScale> noise_scales;
   // One for each input segment, by key, including those that the result does
   // not use. Empty if there is no result.
   std::vector<SegmentFit> segment_fits;

@@ -74,11 +74,11 @@ std::string MessageOf(const DescentState& state) {
 
 // Expected sum over the two rows of a reprojection, from the redundancy of all;
 // 0: unknown.
-double ExpectedReprojectionSquares(const std::vector<NoiseFactor>& factors,
+double ExpectedReprojectionSquares(const std::vector<NoiseScale>& scales,
                                    int observations) {
-  for (const NoiseFactor& factor : factors) {
-    if (factor.kind == NoiseKind::kPixel) {
-      return factor.redundancy / std::max(1, observations);
+  for (const NoiseScale& scale : scales) {
+    if (scale.kind == NoiseKind::kPixel) {
+      return scale.redundancy / std::max(1, observations);
     }
   }
   return 0;
@@ -92,16 +92,16 @@ void TestSegments(const std::vector<const MotionSegment*>& segments,
   CalibrationResult& result = run->result;
   Rig rig = point.rig();
   rig.pixel_sigma_px *= point.track_noise_factor();
-  run->evidence = CollectEvidence(
-      rig,
-      result.theta,
-      segments,
-      point.problem(),
-      point.estimate().keyframes,
-      point.screening(),
-      point.subspace(),
-      ExpectedReprojectionSquares(result.noise_factors,
-                                  point.screening().observations));
+  run->evidence =
+      CollectEvidence(rig,
+                      result.theta,
+                      segments,
+                      point.problem(),
+                      point.estimate().keyframes,
+                      point.screening(),
+                      point.subspace(),
+                      ExpectedReprojectionSquares(
+                          result.noise_scales, point.screening().observations));
   const double excess = TestEach(&run->evidence);
   result.covariance *= excess;
   run->estimate = {.reference = point.reference(),
@@ -109,8 +109,8 @@ void TestSegments(const std::vector<const MotionSegment*>& segments,
                    .subspace = point.subspace(),
                    .Lambda = point.information().Lambda,
                    .excess = excess,
-                   .noise_factor = LargestNoise(result.noise_factors,
-                                                point.track_noise_factor())};
+                   .noise_scale = LargestNoise(result.noise_scales,
+                                               point.track_noise_factor())};
   result.halves = TestHalves(run->evidence, excess);
   for (const SegmentEvidence& one : run->evidence) {
     result.segment_fits.push_back(one.fit);
@@ -179,7 +179,7 @@ CalibrationRun RunCalibration(const Rig& rig,
     result.message = state.message;
     return run;
   }
-  result.noise_factors = noise.FactorsOfStated();
+  result.noise_scales = noise.ScalesOfStated();
   result.message = MessageOf(state);
   ReportEstimate(&point, &result);
   TestSegments(segments, point, &run);

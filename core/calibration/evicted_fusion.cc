@@ -45,7 +45,7 @@ class Fusion {
         basis_(TangentBasis(rig, estimate.subspace)),
         with_data_(basis_.transpose() * estimate.Lambda * basis_),
         options_(options) {
-    options_.noise_factor = estimate.noise_factor;
+    options_.noise_scale = estimate.noise_scale;
     SegmentScorer scorer;
     SegmentInformation information;
     for (const MotionSegment* segment : segments) {

@@ -38,7 +38,7 @@ struct DataEstimate {
   // Upper bound of the noise scales of pixels and IMU. Information that was
   // linearised with the stated noise is weighted as if all noise were this much
   // larger, so that it is not overconfident, whatever its kind.
-  double noise_factor = 1;
+  double noise_scale = 1;
 };
 
 // If nothing is added to the estimate from data, only `use` is set.

@@ -65,7 +65,7 @@ class SegmentWeights {
                  const EvictedOptions& options)
       : rig_(rig),
         point_(point),
-        noise_factor_(std::max(1.0, options.noise_factor)) {}
+        noise_scale_(std::max(1.0, options.noise_scale)) {}
 
   // Weight of a segment whose linearisation error counts; nullopt if its
   // linearisation point is too far away.
@@ -93,13 +93,13 @@ class SegmentWeights {
     return Reach(rig_, segment.ends->theta0, point_);
   }
   double WeightAt(const JoinedSegment& segment, double reach) const {
-    const double noise = noise_factor_ * std::max(1.0, segment.fit);
+    const double noise = noise_scale_ * std::max(1.0, segment.fit);
     return ReachWeight(std::max(1, segments_), reach) / (noise * noise);
   }
 
   const Rig& rig_;
   const Calibration& point_;
-  const double noise_factor_;
+  const double noise_scale_;
   int segments_ = 0;
   int too_far_ = 0;
   double reach_ = 0;

@@ -48,7 +48,7 @@ struct EvictedOptions {
   // constant.
   Eigen::VectorXd walk = {};
   // Noise scale that the calibration found, relative to the rig's stated noise.
-  double noise_factor = 1;
+  double noise_scale = 1;
   // Groups of parameters that have changed before, and may continue to.
   std::vector<std::string> changing = {};
 };

@@ -1,5 +1,5 @@
 // Squares and redundancies of each kind of noise at the end of a calibration,
-// for whitening with any scales of the rig's stated noise; noise_factors.h
+// for whitening with any scales of the rig's stated noise; noise_scales.h
 // finds the noise scales from them. States, landmarks and theta stay at their
 // linearisation point; the shift of the minimum for other scales is part of the
 // linear system.
@@ -13,7 +13,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/calibration/noise_factor.h"
+#include "core/calibration/noise_scale.h"
 #include "core/calibration/problem.h"
 #include "core/calibration/robust_loss.h"
 #include "core/calibration/screening.h"
@@ -36,7 +36,7 @@ struct NoiseBalance {
 
 class NoiseProblem {
  public:
-  // The arguments are those of EstimateNoiseFactors; they must outlive this.
+  // The arguments are those of EstimateNoiseScales; they must outlive this.
   NoiseProblem(const SolverRound& round,
                const CalibrationEstimate& estimate,
                const std::vector<ScreenedLandmark>& landmarks,

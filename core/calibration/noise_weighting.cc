@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "core/calibration/noise_factors.h"
+#include "core/calibration/noise_scales.h"
 #include "core/calibration/screening.h"
 #include "core/calibration/subspace.h"
 #include "core/calibration/track_noise.h"
@@ -22,11 +22,11 @@ constexpr double Square(double x) { return x * x; }
 bool NoiseWeighting::Reweight() {
   for (int i = 0; descent_->converged(); ++i) {
     if (!WeightByTracks()) return false;
-    if (!descent_->converged() || !options_.noise_factors) break;
+    if (!descent_->converged() || !options_.noise_scales) break;
     EstimateFactors();
     if (!options_.reweight_noise || i == kMaxReweightings) break;
     const std::optional<Rig> next =
-        selfcal::Reweight(stated_, point_->rig(), factors_);
+        selfcal::Reweight(stated_, point_->rig(), scales_);
     if (!next) break;
     point_->WeightByNoise(*next);
     if (!descent_->Repeat()) return false;
@@ -53,21 +53,21 @@ void NoiseWeighting::EstimateFactors() {
   ScaleWeights(Square(point_->screening().track_noise_factor), &landmarks);
   // Their estimation has its own linear system.
   point_->linearised().system.ReleaseChains();
-  factors_ = EstimateNoiseFactors(stated_,
-                                  point_->Round(basis),
-                                  point_->estimate(),
-                                  landmarks,
-                                  track_noise_);
+  scales_ = EstimateNoiseScales(stated_,
+                                point_->Round(basis),
+                                point_->estimate(),
+                                landmarks,
+                                track_noise_);
 }
 
-std::vector<NoiseFactor> NoiseWeighting::FactorsOfStated() const {
-  std::vector<NoiseFactor> factors = factors_;
-  for (NoiseFactor& factor : factors) {
-    factor.used =
-        NoiseOf(factor.kind, point_->rig()) / NoiseOf(factor.kind, stated_);
-    factor.factor *= factor.used;
+std::vector<NoiseScale> NoiseWeighting::ScalesOfStated() const {
+  std::vector<NoiseScale> scales = scales_;
+  for (NoiseScale& scale : scales) {
+    scale.used =
+        NoiseOf(scale.kind, point_->rig()) / NoiseOf(scale.kind, stated_);
+    scale.factor *= scale.used;
   }
-  return factors;
+  return scales;
 }
 
 }  // namespace selfcal

@@ -1,13 +1,13 @@
 // Weights a calibration by the noise that its residuals show: the correlation
 // of pixel errors along tracks (track_noise.h) and the noise scales
-// (noise_factors.h).
+// (noise_scales.h).
 #pragma once
 
 #include <vector>
 
 #include "core/calibration/calibrate.h"
 #include "core/calibration/descent.h"
-#include "core/calibration/noise_factor.h"
+#include "core/calibration/noise_scale.h"
 #include "core/calibration/working_point.h"
 #include "core/model/rig.h"
 
@@ -30,7 +30,7 @@ class NoiseWeighting {
   bool Reweight();
 
   // Relative to the noise that the rig states, with the weights in `used`.
-  std::vector<NoiseFactor> FactorsOfStated() const;
+  std::vector<NoiseScale> ScalesOfStated() const;
 
  private:
   bool WeightByTracks();
@@ -40,8 +40,8 @@ class NoiseWeighting {
   const CalibrateOptions& options_;
   WorkingPoint* point_;
   Descent* descent_;
-  double track_noise_ = 0;            // as TrackNoiseFactor
-  std::vector<NoiseFactor> factors_;  // relative to the noise of the weights
+  double track_noise_ = 0;          // as TrackNoiseFactor
+  std::vector<NoiseScale> scales_;  // relative to the noise of the weights
 };
 
 }  // namespace selfcal

@@ -66,31 +66,31 @@ AgreementTest Get(const v1::AgreementTest& message) {
   return {message.chi_square(), message.degrees(), message.probability()};
 }
 
-void Put(const NoiseFactor& factor, v1::NoiseFactor* message) {
-  message->set_kind(NoiseKindName(factor.kind));
-  message->set_factor(factor.factor);
-  message->set_log_sigma(factor.log_sigma);
-  message->set_redundancy(factor.redundancy);
-  message->set_determined(factor.determined());
-  message->set_used(factor.used);
-  message->set_converged(factor.converged);
+void Put(const NoiseScale& scale, v1::NoiseFactor* message) {
+  message->set_kind(NoiseKindName(scale.kind));
+  message->set_factor(scale.factor);
+  message->set_log_sigma(scale.log_sigma);
+  message->set_redundancy(scale.redundancy);
+  message->set_determined(scale.determined());
+  message->set_used(scale.used);
+  message->set_converged(scale.converged);
 }
 
 // `used` is 0 in messages from before the noise could be reweighted, or before
 // that was stored. Nothing for a kind that is unknown.
-std::optional<NoiseFactor> Get(const v1::NoiseFactor& message) {
+std::optional<NoiseScale> Get(const v1::NoiseFactor& message) {
   const auto kind = FindNoiseKind(message.kind());
   if (!kind) return std::nullopt;
-  NoiseFactor factor;
-  factor.kind = *kind;
-  factor.factor = message.factor();
-  factor.log_sigma = message.log_sigma();
-  factor.redundancy = message.redundancy();
+  NoiseScale scale;
+  scale.kind = *kind;
+  scale.factor = message.factor();
+  scale.log_sigma = message.log_sigma();
+  scale.redundancy = message.redundancy();
   if (message.used() > 0) {
-    factor.used = message.used();
-    factor.converged = message.converged();
+    scale.used = message.used();
+    scale.converged = message.converged();
   }
-  return factor;
+  return scale;
 }
 
 void Put(const std::string& rig,
@@ -197,8 +197,8 @@ v1::SolverReport ToProto(const CalibrationResult& result,
   message.set_observations_dropped(result.observations_dropped);
   message.set_seconds(seconds);
   message.set_track_noise_factor(result.track_noise_factor);
-  for (const NoiseFactor& factor : result.noise_factors) {
-    Put(factor, message.add_noise_factors());
+  for (const NoiseScale& scale : result.noise_scales) {
+    Put(scale, message.add_noise_factors());
   }
   for (const SegmentFit& fit : result.segment_fits) {
     Put(rig, fit, message.add_segment_fits());
@@ -231,7 +231,7 @@ CalibrationResult FromProto(const v1::SolverReport& message) {
   result.observations_dropped = message.observations_dropped();
   result.track_noise_factor = message.track_noise_factor();
   for (const v1::NoiseFactor& factor : message.noise_factors()) {
-    if (const auto known = Get(factor)) result.noise_factors.push_back(*known);
+    if (const auto known = Get(factor)) result.noise_scales.push_back(*known);
   }
   for (const v1::SegmentFit& fit : message.segment_fits()) {
     result.segment_fits.push_back(Get(fit));

@@ -127,8 +127,8 @@ bool HasUsableNumbers(const Rig& rig, const CalibrationResult& result) {
 }
 
 double UsedNoise(const CalibrationResult& result, NoiseKind kind) {
-  for (const NoiseFactor& factor : result.noise_factors) {
-    if (factor.kind == kind) return factor.used;
+  for (const NoiseScale& scale : result.noise_scales) {
+    if (scale.kind == kind) return scale.used;
   }
   return 1;
 }

@@ -133,33 +133,32 @@ void CheckSegmentResiduals(const CheckContext& context,
 }
 
 // True if the residuals show that the noise is larger than what was used.
-bool Contradicts(const NoiseFactor& factor, double limit) {
-  const double off = std::log(factor.factor / factor.used);
-  return off > std::max(std::log(limit), kOffSigmas * factor.log_sigma);
+bool Contradicts(const NoiseScale& scale, double limit) {
+  const double off = std::log(scale.factor / scale.used);
+  return off > std::max(std::log(limit), kOffSigmas * scale.log_sigma);
 }
 
-std::string NoiseFailure(const CheckContext& context,
-                         const NoiseFactor& factor) {
+std::string NoiseFailure(const CheckContext& context, const NoiseScale& scale) {
   const CandidateLimits& limits = context.limits;
-  if (Contradicts(factor, limits.max_noise_ratio)) {
+  if (Contradicts(scale, limits.max_noise_ratio)) {
     return fmt::format(
         "The {} noise is {:.2f} times what the rig states (+- {:.0f} %), and "
         "{:.2f} times was used: the sigmas are too small. Correct the noise "
         "of the rig, or let it be estimated.",
-        NoiseKindName(factor.kind),
-        factor.factor,
-        100 * factor.log_sigma,
-        factor.used);
+        NoiseKindName(scale.kind),
+        scale.factor,
+        100 * scale.log_sigma,
+        scale.used);
   }
-  const double most = factor.kind == NoiseKind::kPixel ? limits.max_pixel_noise
-                                                       : limits.max_imu_noise;
-  if (factor.used > most) {
+  const double most = scale.kind == NoiseKind::kPixel ? limits.max_pixel_noise
+                                                      : limits.max_imu_noise;
+  if (scale.used > most) {
     return fmt::format(
         "The {} noise was taken for {:.1f} times what the rig states, at most "
         "{:.0f} times can be noise: the data or the model is wrong, or the "
         "noise of the rig is. Check both (selfcal preflight, data sheet).",
-        NoiseKindName(factor.kind),
-        factor.used,
+        NoiseKindName(scale.kind),
+        scale.used,
         most);
   }
   return "";
@@ -171,19 +170,19 @@ void CheckNoise(const CheckContext& context,
   double largest = 0;
   std::string failure;
   std::string not_converged;
-  for (const NoiseFactor& factor : context.result.noise_factors) {
-    if (!factor.converged) {
+  for (const NoiseScale& scale : context.result.noise_scales) {
+    if (!scale.converged) {
       not_converged += (not_converged.empty() ? "" : ", ");
-      not_converged += NoiseKindName(factor.kind);
+      not_converged += NoiseKindName(scale.kind);
     }
-    if (factor.determined()) {
-      largest = std::max(largest, factor.factor / factor.used);
+    if (scale.determined()) {
+      largest = std::max(largest, scale.factor / scale.used);
     }
-    if (failure.empty()) failure = NoiseFailure(context, factor);
+    if (failure.empty()) failure = NoiseFailure(context, scale);
   }
   if (!failure.empty()) {
     AddResult("noise", largest, limit, failure, checks);
-  } else if (context.result.noise_factors.empty()) {
+  } else if (context.result.noise_scales.empty()) {
     AddNotTested("noise",
                  limit,
                  "The noise could not be estimated: the sigmas rest on what "

@@ -35,7 +35,7 @@ std::vector<std::pair<std::string, std::string>> RunSettings(
       {"prior", PriorName(options, change)},
       {"max_iterations", fmt::format("{}", options.max_iterations)},
       {"correlated_tracks", YesNo(options.correlated_tracks)},
-      {"noise_factors", YesNo(options.noise_factors)},
+      {"noise_factors", YesNo(options.noise_scales)},
       {"reweight_noise", YesNo(options.reweight_noise)},
       {"leave_out_contradictions", YesNo(options.leave_out_contradictions)},
       {"merge_landmarks", fmt::format("{}", options.merge_landmarks)},

@@ -28,17 +28,17 @@ constexpr double kMaxNoiseOff = 1.5;
 // The rig with the noise that the calibration was weighted with.
 Rig WithUsedNoise(const Rig& rig, const CalibrationResult& result) {
   Rig used = rig;
-  for (const NoiseFactor& factor : result.noise_factors) {
-    ScaleNoise(factor.kind, factor.used, &used);
+  for (const NoiseScale& scale : result.noise_scales) {
+    ScaleNoise(scale.kind, scale.used, &used);
   }
   return used;
 }
 
 bool StatedNoiseHolds(const CalibrationResult& result) {
   return std::all_of(
-      result.noise_factors.begin(),
-      result.noise_factors.end(),
-      [](const NoiseFactor& factor) { return factor.used <= kMaxNoiseOff; });
+      result.noise_scales.begin(),
+      result.noise_scales.end(),
+      [](const NoiseScale& scale) { return scale.used <= kMaxNoiseOff; });
 }
 
 bool IsExcluded(const CalibrationResult& result, const SegmentKey& key) {

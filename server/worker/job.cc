@@ -42,7 +42,7 @@ void PutOptions(const CalibrateOptions& options, worker::Options* message) {
   }
   message->set_max_iterations(options.max_iterations);
   message->set_correlated_tracks(options.correlated_tracks);
-  message->set_noise_factors(options.noise_factors);
+  message->set_noise_factors(options.noise_scales);
   message->set_reweight_noise(options.reweight_noise);
   message->set_merge_landmarks(options.merge_landmarks);
   message->set_solver(static_cast<int>(options.solver));
@@ -85,7 +85,7 @@ bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
   }
   options->max_iterations = message.max_iterations();
   options->correlated_tracks = message.correlated_tracks();
-  options->noise_factors = message.noise_factors();
+  options->noise_scales = message.noise_factors();
   options->reweight_noise = message.reweight_noise();
   options->merge_landmarks = message.merge_landmarks();
   options->solver = static_cast<SolverKind>(message.solver());

@@ -16,7 +16,7 @@ namespace selfcal {
 // the rig is another matter, and takes as long again.
 inline CalibrateOptions ComparedOptions() {
   CalibrateOptions options;
-  options.noise_factors = false;
+  options.noise_scales = false;
   return options;
 }
 

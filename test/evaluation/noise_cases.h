@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/calibration/noise_factor.h"
+#include "core/calibration/noise_scale.h"
 #include "test/evaluation/datasets.h"
 
 namespace selfcal {
@@ -43,11 +43,11 @@ inline Rig Believe(Rig rig, const Belief& belief) {
   return rig;
 }
 
-inline std::vector<NoiseFactor> OverTruth(const CalibrationResult& result,
-                                          const Rig& stated,
-                                          const Rig& truth) {
-  std::vector<NoiseFactor> factors = result.noise_factors;
-  for (NoiseFactor& factor : factors) {
+inline std::vector<NoiseScale> OverTruth(const CalibrationResult& result,
+                                         const Rig& stated,
+                                         const Rig& truth) {
+  std::vector<NoiseScale> factors = result.noise_scales;
+  for (NoiseScale& factor : factors) {
     factor.factor *= NoiseOf(factor.kind, stated) / NoiseOf(factor.kind, truth);
   }
   return factors;

@@ -54,7 +54,7 @@ std::vector<Belief> Beliefs(const Device& device) {
 }
 
 // Of one dataset: found factors over the truth, by belief and kind.
-using FoundFactors = std::vector<std::vector<NoiseFactor>>;
+using FoundFactors = std::vector<std::vector<NoiseScale>>;
 
 FoundFactors Find(const Device& device, int index) {
   const Dataset dataset = MakeDataset(index,
@@ -74,10 +74,10 @@ FoundFactors Find(const Device& device, int index) {
 std::vector<double> Over(const std::vector<FoundFactors>& found,
                          std::size_t belief,
                          NoiseKind kind,
-                         double NoiseFactor::*figure) {
+                         double NoiseScale::*figure) {
   std::vector<double> values;
   for (const FoundFactors& of_dataset : found) {
-    for (const NoiseFactor& factor : of_dataset[belief]) {
+    for (const NoiseScale& factor : of_dataset[belief]) {
       if (factor.kind == kind) values.push_back(factor.*figure);
     }
   }
@@ -99,7 +99,7 @@ void CheckFound(const Device& device,
   for (std::size_t b = 0; b < beliefs.size(); ++b) {
     const std::vector<NoiseKind>& wrong = beliefs[b].kinds;
     if (std::find(wrong.begin(), wrong.end(), kind) == wrong.end()) continue;
-    for (const double ratio : Over(found, b, kind, &NoiseFactor::factor)) {
+    for (const double ratio : Over(found, b, kind, &NoiseScale::factor)) {
       ratios.push_back(ratio);
     }
   }
@@ -118,12 +118,12 @@ void AddFound(const Device& device,
   const std::vector<Belief> beliefs = Beliefs(device);
   for (std::size_t b = 0; b < beliefs.size(); ++b) {
     for (const NoiseKind kind : AllKinds()) {
-      const auto over = [&](double NoiseFactor::*figure) {
+      const auto over = [&](double NoiseScale::*figure) {
         return Over(found, b, kind, figure);
       };
-      const std::vector<double> ratios = over(&NoiseFactor::factor);
+      const std::vector<double> ratios = over(&NoiseScale::factor);
       if (ratios.empty()) continue;
-      const std::vector<double> log_sigmas = over(&NoiseFactor::log_sigma);
+      const std::vector<double> log_sigmas = over(&NoiseScale::log_sigma);
       table->Add({device.name,
                   beliefs[b].name,
                   NoiseKindName(kind),
@@ -131,7 +131,7 @@ void AddFound(const Device& device,
                   Quantile(ratios, 0),
                   Quantile(ratios, 1),
                   MedianOf(log_sigmas),
-                  MedianOf(over(&NoiseFactor::redundancy)),
+                  MedianOf(over(&NoiseScale::redundancy)),
                   std::to_string(std::count_if(
                       log_sigmas.begin(),
                       log_sigmas.end(),
@@ -145,8 +145,8 @@ void AddFound(const Device& device,
 double WorstDetermined(const std::vector<FoundFactors>& found) {
   double worst = 0;
   for (const FoundFactors& of_dataset : found) {
-    for (const std::vector<NoiseFactor>& of_belief : of_dataset) {
-      for (const NoiseFactor& factor : of_belief) {
+    for (const std::vector<NoiseScale>& of_belief : of_dataset) {
+      for (const NoiseScale& factor : of_belief) {
         if (!factor.determined()) continue;
         worst = std::max(worst, std::abs(factor.factor - 1));
       }
@@ -206,7 +206,7 @@ void MeasureCost(Context* context) {
   for (const double duration_s :
        context->quick() ? std::vector{8.5} : std::vector{24.5, 64.5}) {
     const Dataset dataset = MakeDataset(0, duration_s);
-    const double without = Seconds(dataset, {.noise_factors = false});
+    const double without = Seconds(dataset, {.noise_scales = false});
     const double with = Seconds(dataset, {});
     const double cost = with / without - 1;
     most = std::max(most, cost);

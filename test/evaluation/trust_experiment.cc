@@ -187,7 +187,7 @@ void AddNoise(const Trial& trial,
     const auto kind = static_cast<NoiseKind>(i);
     Cell cell;
     if (report != nullptr) {
-      for (const NoiseFactor& factor : report->noise_factors) {
+      for (const NoiseScale& factor : report->noise_scales) {
         if (factor.kind != kind) continue;
         cell = factor.factor * NoiseOf(kind, trial.rig) /
                NoiseOf(kind, trial.sensors);

@@ -45,7 +45,7 @@ struct Run {
   double sigma_ratio = 0;     // claimed, over that of the right noise; median
   double error_ratio = 0;     // rms error, in sigmas of the right noise
   double largest_sigmas = 0;  // in claimed sigmas
-  std::vector<NoiseFactor> factors;  // over the truth
+  std::vector<NoiseScale> factors;  // over the truth
 };
 
 Run Measure(const Dataset& dataset,
@@ -111,7 +111,7 @@ struct Summary {
   double MedianFactor(NoiseKind kind) const {
     std::vector<double> values;
     for (const Run& run : runs) {
-      for (const NoiseFactor& factor : run.factors) {
+      for (const NoiseScale& factor : run.factors) {
         if (factor.kind == kind) values.push_back(factor.factor);
       }
     }

@@ -55,7 +55,7 @@ Measurement StructuredAgainstCeres(const TimingOptions& options) {
   CalibrateOptions ceres, structured;
   ceres.solver = SolverKind::kCeres;
   structured.solver = SolverKind::kStructured;
-  ceres.noise_factors = structured.noise_factors = false;
+  ceres.noise_scales = structured.noise_scales = false;
   int ceres_iterations = 0;
   int structured_iterations = 0;
   Measurement result = CompareTimes(
@@ -67,10 +67,10 @@ Measurement StructuredAgainstCeres(const TimingOptions& options) {
   return result;
 }
 
-Measurement NoiseFactorsAgainstNone(const TimingOptions& options) {
+Measurement NoiseScalesAgainstNone(const TimingOptions& options) {
   const Scene scene = MakeCalibrationScene();
   CalibrateOptions with, without;
-  without.noise_factors = false;
+  without.noise_scales = false;
   int iterations = 0;
   return CompareTimes(CalibrationOf("with", scene, with, &iterations),
                       CalibrationOf("without", scene, without, &iterations),
@@ -224,7 +224,7 @@ std::vector<Case> CalibrationCases() {
            .must = 2,
            .goal = 1.2,
            .higher_is_better = false,
-           .measure = NoiseFactorsAgainstNone},
+           .measure = NoiseScalesAgainstNone},
           {.name = "iterations from the fused information",
            .must = 3,
            .goal = 2,

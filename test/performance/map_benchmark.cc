@@ -87,12 +87,12 @@ double ResidentMebibytes() {
 }
 
 // In a process of its own, whose memory is that of this case.
-void Measure(const MapCase& of, bool noise_factors) {
+void Measure(const MapCase& of, bool noise_scales) {
   std::vector<MotionSegment> segments = Segments(of);
   Rig rig = of.rig;
   rig.factory = PerturbCalibration(of.rig.factory, {}, 1);
   CalibrateOptions options;
-  options.noise_factors = noise_factors;
+  options.noise_scales = noise_scales;
   const double before = ResidentMebibytes();
   const std::clock_t begin = std::clock();
   const CalibrationResult result =
@@ -117,11 +117,11 @@ void Measure(const MapCase& of, bool noise_factors) {
       result.rank);
 }
 
-bool MeasureApart(const MapCase& of, bool noise_factors) {
+bool MeasureApart(const MapCase& of, bool noise_scales) {
   std::fflush(stdout);
   const pid_t child = fork();
   if (child == 0) {
-    Measure(of, noise_factors);
+    Measure(of, noise_scales);
     std::fflush(stdout);
     std::_Exit(EXIT_SUCCESS);
   }
@@ -138,14 +138,14 @@ bool MeasureApart(const MapCase& of, bool noise_factors) {
 int main(int argc, char** argv) {
   CLI::App app("What a calibration costs where a map is used again");
   std::string only;
-  bool noise_factors = true;
+  bool noise_scales = true;
   app.add_option("--only", only, "Cases whose names begin so");
-  app.add_flag("!--no-noise-factors", noise_factors, "Leave them out");
+  app.add_flag("!--no-noise-factors", noise_scales, "Leave them out");
   CLI11_PARSE(app, argc, argv);
   bool done = true;
   for (const selfcal::MapCase& of : selfcal::Cases()) {
     if (of.name.starts_with(only)) {
-      done = selfcal::MeasureApart(of, noise_factors) && done;
+      done = selfcal::MeasureApart(of, noise_scales) && done;
     }
   }
   return done ? EXIT_SUCCESS : EXIT_FAILURE;

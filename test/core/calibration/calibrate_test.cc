@@ -244,7 +244,7 @@ TEST(Calibrate, IterationsContinueWhenNoiseIsReweighted) {
         return true;
       });
   ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
-  EXPECT_LT(result.noise_factors[0].used, 0.5);
+  EXPECT_LT(result.noise_scales[0].used, 0.5);
   EXPECT_EQ(told.back().iteration, result.iterations);
   int descents = 0;  // each reports its start, without a step
   for (std::size_t i = 0; i < told.size(); ++i) {
@@ -260,8 +260,8 @@ TEST(Calibrate, WronglyStatedNoiseIsReplacedAndReported) {
   Scenario s = Simulated(HandheldRig("r"), SmallOptions(12), 3);
   s.rig.pixel_sigma_px /= 3;
   const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
-  ASSERT_EQ(result.noise_factors.size(), static_cast<std::size_t>(kNoiseKinds));
-  const NoiseFactor& pixel = result.noise_factors.front();
+  ASSERT_EQ(result.noise_scales.size(), static_cast<std::size_t>(kNoiseKinds));
+  const NoiseScale& pixel = result.noise_scales.front();
   EXPECT_TRUE(pixel.converged);
   EXPECT_NEAR(pixel.factor, 3, 0.05 * 3);
   EXPECT_NEAR(pixel.used, 3, 0.05 * 3);

@@ -52,7 +52,7 @@ class EvictedFusionTest : public ::testing::Test {
     std::vector<MotionSegment> picked;
     for (const std::int64_t i : set) picked.push_back(segments_[i]);
     CalibrateOptions options;
-    options.noise_factors = false;
+    options.noise_scales = false;
     options.remembered = remembered;
     return Calibrate(rig_, rig_.factory, picked, options);
   }

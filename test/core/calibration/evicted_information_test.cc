@@ -121,7 +121,7 @@ TEST_F(EvictedInformationTest, HasLessWeightWithMoreNoiseAndWithAge) {
         false);
   };
   const double plain = most({});
-  EXPECT_LT(most({.noise_factor = 2}), 0.4 * plain);
+  EXPECT_LT(most({.noise_scale = 2}), 0.4 * plain);
   // In the 8 s from the middle of the session theta walks one reference sigma.
   EvictedOptions ageing;
   ageing.walk = ReferenceSigmas(rig_) / std::sqrt(8.0);

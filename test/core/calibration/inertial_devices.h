@@ -65,7 +65,7 @@ inline InertialOutcome CalibrateInertialDevice(const InertialCase& of,
                "session",
                options);
   const CalibrationResult result =
-      Calibrate(rig, rig.factory, session.segments, {.noise_factors = false});
+      Calibrate(rig, rig.factory, session.segments, {.noise_scales = false});
   InertialOutcome outcome = {.status = result.status,
                              .message = result.message};
   if (result.covariance.size() == 0) return outcome;

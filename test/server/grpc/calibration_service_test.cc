@@ -252,8 +252,7 @@ TEST_F(CalibrationServiceTest, WhatItWasJudgedByIsShown) {
   rejected.report = CalibrationResult();
   rejected.report->segment_fits = {{{"s", 0}, 1.5, 893, {}, "a spike"}};
   rejected.report->halves = {30, 26, 0.25};
-  rejected.report->noise_factors = {
-      {NoiseKind::kGyro, 3, 0.05, 100, 2.9, true}};
+  rejected.report->noise_scales = {{NoiseKind::kGyro, 3, 0.05, 100, 2.9, true}};
   ASSERT_TRUE(domain_->FinishRun(rig.id, run->run, rejected).ok());
   v1::Calibration read;
   ASSERT_TRUE(Get("rigs/r/calibrations/2", &read).ok());

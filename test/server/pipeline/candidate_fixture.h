@@ -31,9 +31,9 @@ class CandidateTest : public ::testing::Test {
     result_.observations = 9000;
     result_.observations_dropped = 1000;
     result_.reprojection_rms_after_px = 1.4 * rig_.pixel_sigma_px;
-    result_.noise_factors = {{NoiseKind::kPixel, 1.02, 0.01, 9e3},
-                             {NoiseKind::kGyro, 1.1, 0.05, 400},
-                             {NoiseKind::kGyroBiasWalk, 2.5, 0.7, 3}};
+    result_.noise_scales = {{NoiseKind::kPixel, 1.02, 0.01, 9e3},
+                            {NoiseKind::kGyro, 1.1, 0.05, 400},
+                            {NoiseKind::kGyroBiasWalk, 2.5, 0.7, 3}};
     for (int k = 0; k < 8; ++k) {
       result_.segment_fits.push_back({{"s", k}, 1.1, 0.9, {20, 25, 0.7}, ""});
     }
@@ -63,11 +63,11 @@ class CandidateTest : public ::testing::Test {
     return problems.empty() ? std::string() : problems.front();
   }
   Verdict TheVerdict() const { return MakeVerdict(rig_, result_, Validate()); }
-  NoiseFactor& Factor(NoiseKind kind) {
-    for (NoiseFactor& factor : result_.noise_factors) {
+  NoiseScale& Factor(NoiseKind kind) {
+    for (NoiseScale& factor : result_.noise_scales) {
       if (factor.kind == kind) return factor;
     }
-    return result_.noise_factors.emplace_back();
+    return result_.noise_scales.emplace_back();
   }
   void Find(FindingKind kind) {
     evidence_.diagnosis->findings.push_back(

@@ -122,7 +122,7 @@ TEST_F(CandidateTest, NoiseMayNotContradictWhatWasUsed) {
 }
 
 TEST_F(CandidateTest, NoiseThatIsHardlyDeterminedContradictsIfFarOff) {
-  NoiseFactor& walk = Factor(NoiseKind::kGyroBiasWalk);
+  NoiseScale& walk = Factor(NoiseKind::kGyroBiasWalk);
   walk.factor = std::exp(2.9 * walk.log_sigma);
   EXPECT_THAT(Problems(), IsEmpty());
   walk.factor = std::exp(3.1 * walk.log_sigma);
@@ -134,7 +134,7 @@ TEST_F(CandidateTest, NoiseThatWasNotEstimatedIsNotTested) {
   EXPECT_EQ(OutcomeOf("noise"), CheckOutcome::kNotTested);
   EXPECT_THAT(Check("noise").sentence, HasSubstr("gyro"));
   EXPECT_EQ(TheVerdict().kind, VerdictKind::kWeak);
-  result_.noise_factors.clear();
+  result_.noise_scales.clear();
   EXPECT_EQ(OutcomeOf("noise"), CheckOutcome::kNotTested);
   EXPECT_THAT(Problems(), IsEmpty());
   EXPECT_EQ(TheVerdict().kind, VerdictKind::kWeak);

@@ -35,7 +35,7 @@ class CalibrationsTest : public StoreTest {
     report.iterations = 12;
     report.final_cost = 1.0 / 9;
     report.rank = size - 1;
-    report.noise_factors = {
+    report.noise_scales = {
         {NoiseKind::kAccel, 1.0 / 7, 0.03, 100.5, 1.0 / 6, true},
         {NoiseKind::kGyroBiasWalk, 2, 1.5, 0.25, 1, false}};
     report.segment_fits = {
@@ -107,8 +107,8 @@ TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   EXPECT_EQ(stored->report->final_cost, 1.0 / 9);
   EXPECT_EQ(stored->report->observations, 1234);
   EXPECT_EQ(stored->report->track_noise_factor, 1.0 / 0.7);
-  ASSERT_EQ(stored->report->noise_factors.size(), 2u);
-  const NoiseFactor& factor = stored->report->noise_factors[0];
+  ASSERT_EQ(stored->report->noise_scales.size(), 2u);
+  const NoiseScale& factor = stored->report->noise_scales[0];
   EXPECT_EQ(factor.kind, NoiseKind::kAccel);
   EXPECT_EQ(factor.factor, 1.0 / 7);
   EXPECT_EQ(factor.log_sigma, 0.03);
@@ -116,8 +116,8 @@ TEST_P(CalibrationsTest, VersionComesBackWithItsProvenance) {
   EXPECT_TRUE(factor.determined());
   EXPECT_EQ(factor.used, 1.0 / 6);
   EXPECT_TRUE(factor.converged);
-  EXPECT_FALSE(stored->report->noise_factors[1].determined());
-  EXPECT_FALSE(stored->report->noise_factors[1].converged);
+  EXPECT_FALSE(stored->report->noise_scales[1].determined());
+  EXPECT_FALSE(stored->report->noise_scales[1].converged);
   ASSERT_EQ(stored->report->segment_fits.size(), 2u);
   const SegmentFit& fit = stored->report->segment_fits[0];
   EXPECT_EQ(fit.key, (SegmentKey{"s", 0}));
@@ -157,7 +157,7 @@ TEST(CalibrationRecord, OfAnOlderVersionReadsAsNotTested) {
   const int size = TangentSize(rig.factory);
   version.covariance = Eigen::MatrixXd::Identity(size, size);
   version.report = CalibrationResult();
-  version.report->noise_factors = {{NoiseKind::kGyro, 3, 0.05, 100}};
+  version.report->noise_scales = {{NoiseKind::kGyro, 3, 0.05, 100}};
   version.validation = StoredValidation();
   version.validation->checks = {{"converged", 1, 1, CheckOutcome::kPassed},
                                 {"rank", 1, 2, CheckOutcome::kFailed}};
@@ -177,8 +177,8 @@ TEST(CalibrationRecord, OfAnOlderVersionReadsAsNotTested) {
 
   auto read = ParseCalibration(record.SerializeAsString(), "it");
   ASSERT_TRUE(read.ok()) << read.status();
-  EXPECT_EQ(read->report->noise_factors[0].used, 1);
-  EXPECT_TRUE(read->report->noise_factors[0].converged);
+  EXPECT_EQ(read->report->noise_scales[0].used, 1);
+  EXPECT_TRUE(read->report->noise_scales[0].converged);
   EXPECT_TRUE(read->report->segment_fits.empty());
   EXPECT_EQ(read->report->halves.degrees, 0);
   EXPECT_EQ(read->report->halves.probability, 1);

@@ -94,7 +94,7 @@ TEST_F(WorkerTest, ResultAndProgressAreThoseOfCalibrateToTheBit) {
   EXPECT_EQ(result.rank, expected.rank);
   EXPECT_EQ(result.final_cost, expected.final_cost);
   EXPECT_EQ(result.track_noise_factor, expected.track_noise_factor);
-  EXPECT_EQ(result.noise_factors.size(), expected.noise_factors.size());
+  EXPECT_EQ(result.noise_scales.size(), expected.noise_scales.size());
   EXPECT_GT(here.size(), 2u);
   EXPECT_EQ(there, here);
 }
@@ -107,7 +107,7 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   const int size = TangentSize(rig_.factory);
   result.covariance = Eigen::MatrixXd::Identity(size, size);
   result.Lambda = result.covariance;
-  result.noise_factors = {{NoiseKind::kGyro, 3, 0.05, 100, 2.9, false}};
+  result.noise_scales = {{NoiseKind::kGyro, 3, 0.05, 100, 2.9, false}};
   result.segment_fits = {{{"s", 7}, 1.5, 893, {40, 25, 0.03}, "a spike"}};
   result.halves = {30, 26, 0.25};
   result.evicted = {9, 1, 2, 0.75, {20, 24, 0.7}, "not at all"};
@@ -116,9 +116,9 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   const auto decoded = DecodeResult(EncodeResult(result));
   ASSERT_TRUE(decoded.has_value());
   EXPECT_EQ(decoded->status, CalibrateStatus::kStalled);
-  ASSERT_EQ(decoded->noise_factors.size(), 1u);
-  EXPECT_EQ(decoded->noise_factors[0].used, 2.9);
-  EXPECT_FALSE(decoded->noise_factors[0].converged);
+  ASSERT_EQ(decoded->noise_scales.size(), 1u);
+  EXPECT_EQ(decoded->noise_scales[0].used, 2.9);
+  EXPECT_FALSE(decoded->noise_scales[0].converged);
   ASSERT_EQ(decoded->segment_fits.size(), 1u);
   EXPECT_EQ(decoded->segment_fits[0].key, (SegmentKey{"s", 7}));
   EXPECT_EQ(decoded->segment_fits[0].inertial_ratio, 893);
@@ -163,7 +163,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   options_.prior = FactoryPrior(rig_);
   options_.max_iterations = 7;
   options_.correlated_tracks = false;
-  options_.noise_factors = false;
+  options_.noise_scales = false;
   options_.reweight_noise = true;
   options_.merge_landmarks = 3;
   options_.leave_out_contradictions = false;
@@ -191,7 +191,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   EXPECT_EQ(job->options.prior->information, options_.prior->information);
   EXPECT_EQ(job->options.max_iterations, 7);
   EXPECT_FALSE(job->options.correlated_tracks);
-  EXPECT_FALSE(job->options.noise_factors);
+  EXPECT_FALSE(job->options.noise_scales);
   EXPECT_TRUE(job->options.reweight_noise);
   EXPECT_EQ(job->options.merge_landmarks, 3);
   EXPECT_FALSE(job->options.leave_out_contradictions);

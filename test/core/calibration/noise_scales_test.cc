@@ -1,4 +1,4 @@
-#include "core/calibration/noise_factors.h"
+#include "core/calibration/noise_scales.h"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ CalibrationResult CalibrateBelieving(
 }
 
 double FactorOf(const CalibrationResult& result, NoiseKind kind) {
-  return result.noise_factors.at(At(kind)).factor;
+  return result.noise_scales.at(At(kind)).factor;
 }
 
 // The true noise is `off` times the assumed noise.
@@ -31,42 +31,42 @@ void ExpectFound(const std::vector<NoiseKind>& kinds, double off) {
   for (const NoiseKind kind : kinds) ScaleNoise(kind, 1 / off, &believed);
   const CalibrationResult result = CalibrateBelieving(believed, segments);
   ASSERT_EQ(result.status, CalibrateStatus::kConverged);
-  ASSERT_EQ(result.noise_factors.size(), 5u);
+  ASSERT_EQ(result.noise_scales.size(), 5u);
   for (const NoiseKind kind :
        {NoiseKind::kPixel, NoiseKind::kGyro, NoiseKind::kAccel}) {
     SCOPED_TRACE(NoiseKindName(kind));
     const bool wrong =
         std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
-    EXPECT_TRUE(result.noise_factors[At(kind)].determined());
+    EXPECT_TRUE(result.noise_scales[At(kind)].determined());
     EXPECT_NEAR(FactorOf(result, kind) / (wrong ? off : 1), 1, 0.2);
   }
 }
 
-TEST(NoiseFactors, AreOneIfTheRigIsRight) { ExpectFound({}, 1); }
+TEST(NoiseScales, AreOneIfTheRigIsRight) { ExpectFound({}, 1); }
 
-TEST(NoiseFactors, AFactorOfThreeOfThePixelsIsFound) {
+TEST(NoiseScales, AScaleOfThreeOfThePixelsIsFound) {
   ExpectFound({NoiseKind::kPixel}, 3);
   ExpectFound({NoiseKind::kPixel}, 1.0 / 3);
 }
 
-TEST(NoiseFactors, AFactorOfThreeOfTheGyroscopeIsFound) {
+TEST(NoiseScales, AScaleOfThreeOfTheGyroscopeIsFound) {
   ExpectFound({NoiseKind::kGyro}, 3);
   ExpectFound({NoiseKind::kGyro}, 1.0 / 3);
 }
 
-TEST(NoiseFactors, AFactorOfThreeOfTheAccelerometerIsFound) {
+TEST(NoiseScales, AScaleOfThreeOfTheAccelerometerIsFound) {
   ExpectFound({NoiseKind::kAccel}, 3);
   ExpectFound({NoiseKind::kAccel}, 1.0 / 3);
 }
 
-TEST(NoiseFactors, AFactorOfThreeOfAllIsFound) {
+TEST(NoiseScales, AScaleOfThreeOfAllIsFound) {
   const std::vector<NoiseKind> all = {
       NoiseKind::kPixel, NoiseKind::kGyro, NoiseKind::kAccel};
   ExpectFound(all, 3);
   ExpectFound(all, 1.0 / 3);
 }
 
-TEST(NoiseFactors, ReweightingAppliesDeterminedScales) {
+TEST(NoiseScales, ReweightingAppliesDeterminedScales) {
   const Rig truth = NoisyRig();
   const std::vector<MotionSegment> segments = Walk(truth, 2, 40, 80, 5);
   Rig believed = truth;
@@ -93,8 +93,7 @@ TEST(NoiseFactors, ReweightingAppliesDeterminedScales) {
 
 // With the noise that the rig states, the data seems to say nothing about most
 // directions.
-TEST(NoiseFactors,
-     DirectionsHeldUnderTooMuchNoiseAreEstimatedAfterReweighting) {
+TEST(NoiseScales, DirectionsHeldUnderTooMuchNoiseAreEstimatedAfterReweighting) {
   const Rig truth = NoisyRig();
   const std::vector<MotionSegment> segments = Walk(truth, 3, 40, 100, 3);
   Rig believed = truth;
@@ -114,16 +113,16 @@ TEST(NoiseFactors,
   EXPECT_EQ(result.rank, right.rank);
 }
 
-TEST(NoiseFactors, UndeterminedScalesAreReported) {
+TEST(NoiseScales, UndeterminedScalesAreReported) {
   const Rig rig = HandheldRig("r");
   const CalibrationResult result =
       CalibrateBelieving(rig, Walk(rig, 2, 40, 100, 4));
-  ASSERT_EQ(result.noise_factors.size(), 5u);
-  EXPECT_TRUE(result.noise_factors[At(NoiseKind::kPixel)].determined());
+  ASSERT_EQ(result.noise_scales.size(), 5u);
+  EXPECT_TRUE(result.noise_scales[At(NoiseKind::kPixel)].determined());
   for (const NoiseKind kind :
        {NoiseKind::kGyroBiasWalk, NoiseKind::kAccelBiasWalk}) {
-    EXPECT_FALSE(result.noise_factors[At(kind)].determined());
-    EXPECT_LT(result.noise_factors[At(kind)].redundancy, 5);
+    EXPECT_FALSE(result.noise_scales[At(kind)].determined());
+    EXPECT_LT(result.noise_scales[At(kind)].redundancy, 5);
   }
 }
 

@@ -1,4 +1,4 @@
-#include "core/calibration/noise_factors.h"
+#include "core/calibration/noise_scales.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -257,7 +257,7 @@ double GuessPixelFactor(const SolverRound& round,
 
 }  // namespace
 
-std::vector<NoiseFactor> EstimateNoiseFactors(
+std::vector<NoiseScale> EstimateNoiseScales(
     const Rig& stated,
     const SolverRound& round,
     const CalibrationEstimate& estimate,
@@ -277,19 +277,19 @@ std::vector<NoiseFactor> EstimateNoiseFactors(
   const std::optional<Maximum> maximum = Maximise(&likelihood);
   if (!maximum) return {};
   const NoiseMatrix covariance = maximum->fisher.inverse();
-  std::vector<NoiseFactor> factors;
+  std::vector<NoiseScale> scales;
   for (int i = 0; i < kNoiseKinds; ++i) {
     const double redundancy = likelihood.balance().redundancy[i];
     // The information may have been computed at a distant point.
     const double least = 1 / (2 * redundancy + PriorInformation()(i, i));
-    factors.push_back({static_cast<NoiseKind>(i),
-                       std::exp(likelihood.at()[i]),
-                       std::sqrt(std::max(covariance(i, i), least)),
-                       redundancy,
-                       1,
-                       maximum->converged});
+    scales.push_back({static_cast<NoiseKind>(i),
+                      std::exp(likelihood.at()[i]),
+                      std::sqrt(std::max(covariance(i, i), least)),
+                      redundancy,
+                      1,
+                      maximum->converged});
   }
-  return factors;
+  return scales;
 }
 
 }  // namespace selfcal

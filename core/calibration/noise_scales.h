@@ -22,7 +22,7 @@
 
 #include <vector>
 
-#include "core/calibration/noise_factor.h"
+#include "core/calibration/noise_scale.h"
 #include "core/calibration/screening.h"
 #include "core/calibration/solver.h"
 
@@ -38,7 +38,7 @@ namespace selfcal {
 // errors are correlated along tracks, and the reprojections are weighted by it
 // relative to all other factors. Returns an empty vector if the linear system
 // fails.
-std::vector<NoiseFactor> EstimateNoiseFactors(
+std::vector<NoiseScale> EstimateNoiseScales(
     const Rig& stated,
     const SolverRound& round,
     const CalibrationEstimate& estimate,

@@ -10,7 +10,7 @@
 
 namespace selfcal {
 
-// Kinds of noise, in the order of NoiseFactors.
+// Kinds of noise, in the order of NoiseScales.
 enum class NoiseKind {
   kPixel,
   kGyro,
@@ -25,7 +25,7 @@ inline constexpr int kNoiseKinds = 5;
 inline constexpr double kDeterminedLogSigma = 0.1;
 
 // Ratio of the actual noise of one kind to the noise that the rig states.
-struct NoiseFactor {
+struct NoiseScale {
   NoiseKind kind = NoiseKind::kPixel;
   double factor = 1;
   double log_sigma = 0;  // standard deviation of the logarithm of the factor
@@ -48,7 +48,7 @@ std::optional<NoiseKind> FindNoiseKind(const std::string& name);
 double NoiseOf(NoiseKind kind, const Rig& rig);
 void ScaleNoise(NoiseKind kind, double factor, Rig* rig);
 
-// Returns the rig with the noise that `factors`, which are relative to the
+// Returns the rig with the noise that `scales`, which are relative to the
 // noise of `taken`, suggest. It applies those that are determined, or larger
 // than one by more than one of their standard deviations, each with the mean of
 // the variance over its uncertainty. The noise of any kind stays within a
@@ -56,12 +56,11 @@ void ScaleNoise(NoiseKind kind, double factor, Rig* rig);
 // difference is less than 5 % for all kinds.
 std::optional<Rig> Reweight(const Rig& stated,
                             const Rig& taken,
-                            const std::vector<NoiseFactor>& factors);
+                            const std::vector<NoiseScale>& scales);
 
-// Returns the largest NoiseFactor::used, at least 1, over all kinds but the
+// Returns the largest NoiseScale::used, at least 1, over all kinds but the
 // walks, which are rarely determined and matter least; `track_noise`
 // additionally scales the noise of pixels.
-double LargestNoise(const std::vector<NoiseFactor>& factors,
-                    double track_noise);
+double LargestNoise(const std::vector<NoiseScale>& scales, double track_noise);
 
 }  // namespace selfcal

@@ -1,4 +1,4 @@
-#include "core/calibration/noise_factor.h"
+#include "core/calibration/noise_scale.h"
 
 #include <algorithm>
 #include <cmath>
@@ -68,41 +68,40 @@ void ScaleNoise(NoiseKind kind, double factor, Rig* rig) {
 
 std::optional<Rig> Reweight(const Rig& stated,
                             const Rig& taken,
-                            const std::vector<NoiseFactor>& factors) {
+                            const std::vector<NoiseScale>& scales) {
   Rig next = taken;
   double change = 0;
-  for (const NoiseFactor& factor : factors) {
+  for (const NoiseScale& scale : scales) {
     // Overestimated noise does no harm; underestimated noise makes a
     // calibration overconfident.
-    if (!factor.determined() &&
-        std::log(factor.factor) < kOffSigmas * factor.log_sigma) {
+    if (!scale.determined() &&
+        std::log(scale.factor) < kOffSigmas * scale.log_sigma) {
       continue;
     }
-    const double before = NoiseOf(factor.kind, taken);
-    const double most = kMostOff * NoiseOf(factor.kind, stated);
+    const double before = NoiseOf(scale.kind, taken);
+    const double most = kMostOff * NoiseOf(scale.kind, stated);
     // Mean of the variance, which is the relevant quantity, over the
     // uncertainty of the scale.
     const double uncertain =
-        std::exp(std::min(factor.log_sigma * factor.log_sigma, kMostUncertain));
+        std::exp(std::min(scale.log_sigma * scale.log_sigma, kMostUncertain));
     const double after = std::clamp(
-        factor.factor * uncertain * before, most / (kMostOff * kMostOff), most);
-    ScaleNoise(factor.kind, after / before, &next);
+        scale.factor * uncertain * before, most / (kMostOff * kMostOff), most);
+    ScaleNoise(scale.kind, after / before, &next);
     change = std::max(change, std::abs(std::log(after / before)));
   }
   if (change < kLeastChange) return std::nullopt;
   return next;
 }
 
-double LargestNoise(const std::vector<NoiseFactor>& factors,
-                    double track_noise) {
+double LargestNoise(const std::vector<NoiseScale>& scales, double track_noise) {
   double largest = 1;
-  for (const NoiseFactor& factor : factors) {
-    if (factor.kind == NoiseKind::kGyroBiasWalk ||
-        factor.kind == NoiseKind::kAccelBiasWalk) {
+  for (const NoiseScale& scale : scales) {
+    if (scale.kind == NoiseKind::kGyroBiasWalk ||
+        scale.kind == NoiseKind::kAccelBiasWalk) {
       continue;
     }
-    const double tracks = factor.kind == NoiseKind::kPixel ? track_noise : 1;
-    largest = std::max(largest, factor.used * tracks);
+    const double tracks = scale.kind == NoiseKind::kPixel ? track_noise : 1;
+    largest = std::max(largest, scale.used * tracks);
   }
   return largest;
 }

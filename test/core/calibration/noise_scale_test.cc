@@ -1,4 +1,4 @@
-#include "core/calibration/noise_factor.h"
+#include "core/calibration/noise_scale.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 double Gyro(const Rig& rig) { return rig.imu_noise.gyro_noise_density; }
 
-TEST(NoiseFactor, NamesFindTheirKinds) {
+TEST(NoiseScale, NamesFindTheirKinds) {
   for (int i = 0; i < kNoiseKinds; ++i) {
     const auto kind = static_cast<NoiseKind>(i);
     EXPECT_EQ(FindNoiseKind(NoiseKindName(kind)), kind);
@@ -19,7 +19,7 @@ TEST(NoiseFactor, NamesFindTheirKinds) {
   EXPECT_FALSE(FindNoiseKind("voxel").has_value());
 }
 
-TEST(NoiseFactor, EachKindScalesItsOwnNoise) {
+TEST(NoiseScale, EachKindScalesItsOwnNoise) {
   const Rig before = HandheldRig("r");
   Rig rig = before;
   for (int i = 0; i < kNoiseKinds; ++i) {
