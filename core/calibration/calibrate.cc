@@ -116,13 +116,13 @@ void CompleteWithRemembered(const Rig& rig,
                             CalibrationRun* run) {
   if (run->evidence.empty() || options.remembered.empty()) return;
   CompletedEstimate completed =
-      FuseEvicted(rig,
-                  run->estimate,
-                  used,
-                  options.remembered,
-                  {.walk = options.walk, .changing = options.changing});
+      FuseRemembered(rig,
+                     run->estimate,
+                     used,
+                     options.remembered,
+                     {.walk = options.walk, .changing = options.changing});
   CalibrationResult& result = run->result;
-  result.evicted = std::move(completed.use);
+  result.remembered = std::move(completed.use);
   if (completed.covariance.size() == 0) return;
   result.theta = std::move(completed.theta);
   result.covariance = std::move(completed.covariance);

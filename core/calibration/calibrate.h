@@ -52,7 +52,7 @@ struct CalibrateOptions {
   // All usable segments of the device, in the order of time, with those of a
   // session consecutive: those with data in the calibration and, with their
   // ends, those without data. The information of the latter completes the
-  // result (evicted_fusion.h).
+  // result (remembered_fusion.h).
   std::vector<RememberedSegment> remembered = {};
   // Densities (D) of a random walk of theta [tangent units / sqrt(s)], by which
   // remembered information decreases with age. Empty: it does not decrease.
@@ -130,7 +130,7 @@ struct CalibrationResult {
   // Test of calibrations on two halves of the segments against each other.
   AgreementTest halves;
   // Contribution of segments without data.
-  EvictedUse evicted;
+  RememberedUse remembered;
 };
 
 // Calibrates on the segments (valid for the rig, distinct keys, any order),

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/calibration/evicted_fusion.h"
+#include "core/calibration/remembered_fusion.h"
 #include "core/calibration/segment_agreement.h"
 
 namespace selfcal {
@@ -14,8 +14,8 @@ struct CalibrationRun {
   CalibrationResult result;
   // One for each segment; empty if no minimum was reached.
   std::vector<SegmentEvidence> evidence;
-  DataEstimate
-      estimate;  // in the form that FuseEvicted needs; set if there is evidence
+  DataEstimate estimate;  // in the form that FuseRemembered needs; set if there
+                          // is evidence
 };
 
 // Same as Calibrate(), with segments in the order of their keys, all of which

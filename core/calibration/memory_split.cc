@@ -106,7 +106,7 @@ class SplitSearch {
               const Eigen::MatrixXd& estimated,
               double excess,
               std::span<const JoinedSegment> segments,
-              const EvictedOptions& options)
+              const RememberedOptions& options)
       : rig_(rig),
         theta_(theta),
         free_(FreeComponents(rig)),
@@ -271,7 +271,7 @@ class SplitSearch {
   const Eigen::MatrixXd prior_;  // root of its covariance, along the directions
   const double excess_;
   const std::span<const JoinedSegment> segments_;
-  const EvictedOptions& options_;
+  const RememberedOptions& options_;
   const std::vector<ParameterBlock> blocks_;
   const std::vector<Part> parts_;
   std::vector<OffsetInformation> shown_;  // by part
@@ -284,7 +284,7 @@ SplitFindings FindSplit(const Rig& rig,
                         const Eigen::MatrixXd& estimated,
                         double excess,
                         std::span<const JoinedSegment> segments,
-                        const EvictedOptions& options) {
+                        const RememberedOptions& options) {
   return SplitSearch(rig, theta, estimated, excess, segments, options).Run();
 }
 

@@ -27,7 +27,7 @@
 #include <optional>
 #include <span>
 
-#include "core/calibration/evicted_information.h"
+#include "core/calibration/remembered_information.h"
 #include "core/calibration/remembered_segment.h"
 #include "core/change/change_mixture.h"
 #include "core/model/calibration.h"
@@ -56,6 +56,6 @@ SplitFindings FindSplit(const Rig& rig,
                         const Eigen::MatrixXd& estimated,
                         double excess,
                         std::span<const JoinedSegment> segments,
-                        const EvictedOptions& options);
+                        const RememberedOptions& options);
 
 }  // namespace selfcal

@@ -1,5 +1,5 @@
 // Segments of a device in addition to those whose data a calibration has, and
-// their use by the calibration (evicted_fusion.h). Values.
+// their use by the calibration (remembered_fusion.h). Values.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,7 +45,7 @@ struct DeviceSplit {
 };
 
 // Contribution of segments without data to a result.
-struct EvictedUse {
+struct RememberedUse {
   int segments = 0;  // that contribute, besides those with data
   // Excluded segments: those that contradict the segments with data and, if
   // others are used, those that were linearised too far from the result.

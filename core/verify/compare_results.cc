@@ -25,10 +25,10 @@ std::string WhyIncomparable(const CalibrationResult& a,
     return "the solvers use " + std::to_string(a.segments) + " and " +
            std::to_string(b.segments) + " segments";
   }
-  if (a.evicted.segments != b.evicted.segments) {
+  if (a.remembered.segments != b.remembered.segments) {
     return "the results are completed by " +
-           std::to_string(a.evicted.segments) + " and " +
-           std::to_string(b.evicted.segments) + " segments without data";
+           std::to_string(a.remembered.segments) + " and " +
+           std::to_string(b.remembered.segments) + " segments without data";
   }
   return "";
 }

@@ -140,7 +140,7 @@ DeviceSplit Get(const v1::DeviceSplit& message) {
 }
 
 void Put(const std::string& rig,
-         const EvictedUse& use,
+         const RememberedUse& use,
          v1::EvictedUse* message) {
   message->set_segments(use.segments);
   message->set_too_far(use.too_far);
@@ -153,8 +153,8 @@ void Put(const std::string& rig,
   if (use.split) Put(rig, *use.split, message->mutable_split());
 }
 
-EvictedUse Get(const v1::EvictedUse& message) {
-  EvictedUse use;
+RememberedUse Get(const v1::EvictedUse& message) {
+  RememberedUse use;
   use.segments = message.segments();
   use.too_far = message.too_far();
   use.contradicting = message.contradicting();
@@ -204,7 +204,7 @@ v1::SolverReport ToProto(const CalibrationResult& result,
     Put(rig, fit, message.add_segment_fits());
   }
   Put(result.halves, message.mutable_halves());
-  Put(rig, result.evicted, message.mutable_evicted());
+  Put(rig, result.remembered, message.mutable_evicted());
   return message;
 }
 
@@ -237,7 +237,7 @@ CalibrationResult FromProto(const v1::SolverReport& message) {
     result.segment_fits.push_back(Get(fit));
   }
   result.halves = Get(message.halves());
-  result.evicted = Get(message.evicted());
+  result.remembered = Get(message.evicted());
   return result;
 }
 

@@ -226,8 +226,8 @@ absl::StatusOr<std::optional<StoredChange>> StoreSplit(
     const StoredCalibration& result,
     const ChangeOptions& options) {
   const std::optional<StoredChange> none;
-  if (!result.report || !result.report->evicted.split) return none;
-  const DeviceSplit& split = *result.report->evicted.split;
+  if (!result.report || !result.report->remembered.split) return none;
+  const DeviceSplit& split = *result.report->remembered.split;
   if (!(split.without_one < kSegmentsOfARun * options.false_alarm_rate)) {
     return none;
   }

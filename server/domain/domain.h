@@ -189,8 +189,9 @@ class Domain {
   // run was quarantined, since the run was created. If it becomes active,
   // segments that its report excludes (SegmentFit::excluded) are quarantined.
   // If the report shows with enough certainty for DomainOptions::change that
-  // the device changed among the segments of the run (EvictedUse::split), that
-  // is a device change, as in CommitScore, and none of them is quarantined.
+  // the device changed among the segments of the run (RememberedUse::split),
+  // that is a device change, as in CommitScore, and none of them is
+  // quarantined.
   //
   // Deletes data that only the run referenced. May create the next run, as
   // CommitScore does.

@@ -99,9 +99,9 @@ struct CandidateValidation {
 //   components that have changed since;
 // - sigma_growth: no component that `active` observes has become much less
 //   certain, whatever its uncertainty, apart from what the probability of a
-//   device change adds (EvictedUse::change_sigmas). Not tested if the segments
-//   differ so that the device may have changed (EvictedUse::split): then
-//   `active` is in doubt, and a larger sigma is consistent;
+//   device change adds (RememberedUse::change_sigmas). Not tested if the
+//   segments differ so that the device may have changed (RememberedUse::split):
+//   then `active` is in doubt, and a larger sigma is consistent;
 // - halves: calibrations on two halves of the segments agree;
 // - disagreement: each segment agrees with all others as far as noise allows;
 // - held_out_probability: the information of held-out segments is not too

@@ -71,7 +71,7 @@ void CheckCertainty(const CheckContext& context,
                     std::vector<ValidationCheck>* checks) {
   const StoredCalibration& active = context.evidence.active;
   const double limit = context.limits.max_sigma_growth;
-  if (const auto& split = context.result.evicted.split) {
+  if (const auto& split = context.result.remembered.split) {
     AddNotTested(
         "sigma_growth",
         limit,
@@ -91,7 +91,7 @@ void CheckCertainty(const CheckContext& context,
   const Eigen::VectorXd before = active.covariance.diagonal().cwiseSqrt();
   // The probability of a device change is no lack of information.
   Eigen::VectorXd after = context.result.covariance.diagonal();
-  const Eigen::VectorXd& change = context.result.evicted.change_sigmas;
+  const Eigen::VectorXd& change = context.result.remembered.change_sigmas;
   if (change.size() == after.size()) after -= change.cwiseAbs2();
   after = after.cwiseMax(0).cwiseSqrt().eval();
   double largest = 0;

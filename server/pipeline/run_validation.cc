@@ -105,7 +105,7 @@ absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
     }
     if (again) {
       segments.push_back({*std::move(again), true});
-    } else if (stated_noise_holds && result.evicted.segments == 0) {
+    } else if (stated_noise_holds && result.remembered.segments == 0) {
       segments.push_back({std::move(one.information), false});
     }
   }

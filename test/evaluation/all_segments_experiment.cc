@@ -96,7 +96,7 @@ class DeviceInUse {
                            newest_,
                            Pick(segments_, kind == kBatch ? Seen() : kept()),
                            options);
-    if (kind == kEnds) reach_ = result.evicted.reach;
+    if (kind == kEnds) reach_ = result.remembered.reach;
     if (result.status != CalibrateStatus::kConverged) {
       throw std::runtime_error(
           fmt::format("a calibration ({}) did not converge: {}",

@@ -34,7 +34,7 @@ class MemorySplitTest : public ::testing::Test {
 
   DeviceSplit Find() const { return FindAll().split; }
 
-  SplitFindings FindAll(const EvictedOptions& options = {}) const {
+  SplitFindings FindAll(const RememberedOptions& options = {}) const {
     std::vector<JoinedSegment> joined;
     for (const SegmentEnds& ends : ends_) joined.push_back({.ends = &ends});
     return FindSplit(

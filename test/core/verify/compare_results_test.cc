@@ -82,7 +82,8 @@ TEST_F(CompareResultsTest, DoesNotCompareResultsThatDidNotConvergeOrHoldMore) {
   other.status = CalibrateStatus::kNotConverged;
   EXPECT_NE(CompareResults(rig_, result_, other).incomparable, "");
   other = result_;
-  other.evicted.segments += 1;  // on one side alone, what is remembered helps
+  other.remembered.segments +=
+      1;  // on one side alone, what is remembered helps
   EXPECT_NE(CompareResults(rig_, result_, other).incomparable, "");
 }
 

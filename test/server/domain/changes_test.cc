@@ -274,12 +274,12 @@ class SplitRunTest : public ChangesTest {
     run_ = *run;
     EXPECT_TRUE(domain_->BeginRun("a", run->run).ok());
     StoredCalibration result = Result(rig_.factory);
-    result.report->evicted.split = {.probability = without_one / 2,
-                                    .without_one = without_one,
-                                    .newer = 3,
-                                    .first = {"s", next_ - 3},
-                                    .block = "cam0.q_CI",
-                                    .concerned = {"extrinsics"}};
+    result.report->remembered.split = {.probability = without_one / 2,
+                                       .without_one = without_one,
+                                       .newer = 3,
+                                       .first = {"s", next_ - 3},
+                                       .block = "cam0.q_CI",
+                                       .concerned = {"extrinsics"}};
     const auto finished = domain_->FinishRun("a", run->run, result);
     EXPECT_TRUE(finished.ok()) << finished.status();
     return finished.value_or(StoredCalibration());
@@ -320,10 +320,10 @@ TEST_P(SplitRunTest, ASureOneIsAChangeOfTheDevice) {
   // The split is kept with the candidate.
   Reopen();
   const auto report = store_->GetCalibration("a", finished.version)->report;
-  ASSERT_TRUE(report && report->evicted.split);
-  EXPECT_EQ(report->evicted.split->first, (SegmentKey{"s", next_ - 3}));
-  EXPECT_EQ(report->evicted.split->newer, 3);
-  EXPECT_THAT(report->evicted.split->concerned, ElementsAre("extrinsics"));
+  ASSERT_TRUE(report && report->remembered.split);
+  EXPECT_EQ(report->remembered.split->first, (SegmentKey{"s", next_ - 3}));
+  EXPECT_EQ(report->remembered.split->newer, 3);
+  EXPECT_THAT(report->remembered.split->concerned, ElementsAre("extrinsics"));
 }
 
 TEST_P(SplitRunTest, OneThatIsNotSureIsNone) {

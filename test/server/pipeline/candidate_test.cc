@@ -212,9 +212,9 @@ TEST_F(CandidateTest, TheChanceOfAChangeIsNoLossOfCertainty) {
   const double before = evidence_.active.covariance(5, 5);
   result_.covariance(5, 5) = 3 * before;
   EXPECT_NE(Problem("sigma_growth"), "");
-  result_.evicted.change_sigmas =
+  result_.remembered.change_sigmas =
       Eigen::VectorXd::Zero(result_.covariance.rows());
-  result_.evicted.change_sigmas(5) = std::sqrt(2 * before);
+  result_.remembered.change_sigmas(5) = std::sqrt(2 * before);
   EXPECT_THAT(Problems(), IsEmpty());
 }
 

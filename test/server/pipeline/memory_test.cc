@@ -51,7 +51,7 @@ TEST_F(MemoryTest, ARunStandsOnTheSegmentsWithoutDataToo) {
   const int without = WithoutData();
   ASSERT_GE(without, 4);
   const StoredCalibration informed = Recalibrated();
-  const EvictedUse& use = informed.report->evicted;
+  const RememberedUse& use = informed.report->remembered;
   EXPECT_EQ(use.unused, "");
   EXPECT_EQ(use.segments + use.too_far + use.contradicting, without);
   EXPECT_GE(use.segments, without / 2);
@@ -67,7 +67,7 @@ TEST_F(MemoryTest, ARunStandsOnTheSegmentsWithoutDataToo) {
   };
   StartOne();
   const StoredCalibration alone = Recalibrated();
-  EXPECT_EQ(alone.report->evicted.segments, 0);
+  EXPECT_EQ(alone.report->remembered.segments, 0);
   const std::vector<int> free = FreeComponents(TestRig("a"));
   const Eigen::VectorXd ratio =
       informed.covariance.diagonal()(free).cwiseQuotient(
@@ -80,7 +80,7 @@ TEST_F(MemoryTest, ARunStandsOnTheSegmentsWithoutDataToo) {
 TEST_F(MemoryTest, HeldOutAreThoseWithDataAlone) {
   SubmitAll();
   const StoredCalibration informed = Recalibrated();
-  ASSERT_GT(informed.report->evicted.segments, 0);
+  ASSERT_GT(informed.report->remembered.segments, 0);
   const HeldOutTest& held_out = informed.validation->held_out;
   EXPECT_GT(held_out.segments, 0);
   EXPECT_LE(held_out.segments + held_out.left_out, kReserve);

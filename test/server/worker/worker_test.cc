@@ -110,9 +110,9 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   result.noise_scales = {{NoiseKind::kGyro, 3, 0.05, 100, 2.9, false}};
   result.segment_fits = {{{"s", 7}, 1.5, 893, {40, 25, 0.03}, "a spike"}};
   result.halves = {30, 26, 0.25};
-  result.evicted = {9, 1, 2, 0.75, {20, 24, 0.7}, "not at all"};
-  result.evicted.change_probability = 0.125;
-  result.evicted.change_sigmas = Eigen::VectorXd::LinSpaced(size, 0, 1);
+  result.remembered = {9, 1, 2, 0.75, {20, 24, 0.7}, "not at all"};
+  result.remembered.change_probability = 0.125;
+  result.remembered.change_sigmas = Eigen::VectorXd::LinSpaced(size, 0, 1);
   const auto decoded = DecodeResult(EncodeResult(result));
   ASSERT_TRUE(decoded.has_value());
   EXPECT_EQ(decoded->status, CalibrateStatus::kStalled);
@@ -125,14 +125,14 @@ TEST_F(WorkerTest, AStalledResultComesBackWithItsFits) {
   EXPECT_EQ(decoded->segment_fits[0].others.degrees, 25);
   EXPECT_EQ(decoded->segment_fits[0].excluded, "a spike");
   EXPECT_EQ(decoded->halves.probability, 0.25);
-  EXPECT_EQ(decoded->evicted.segments, 9);
-  EXPECT_EQ(decoded->evicted.too_far, 1);
-  EXPECT_EQ(decoded->evicted.contradicting, 2);
-  EXPECT_EQ(decoded->evicted.reach, 0.75);
-  EXPECT_EQ(decoded->evicted.agreement.degrees, 24);
-  EXPECT_EQ(decoded->evicted.unused, "not at all");
-  EXPECT_EQ(decoded->evicted.change_probability, 0.125);
-  EXPECT_EQ(decoded->evicted.change_sigmas, result.evicted.change_sigmas);
+  EXPECT_EQ(decoded->remembered.segments, 9);
+  EXPECT_EQ(decoded->remembered.too_far, 1);
+  EXPECT_EQ(decoded->remembered.contradicting, 2);
+  EXPECT_EQ(decoded->remembered.reach, 0.75);
+  EXPECT_EQ(decoded->remembered.agreement.degrees, 24);
+  EXPECT_EQ(decoded->remembered.unused, "not at all");
+  EXPECT_EQ(decoded->remembered.change_probability, 0.125);
+  EXPECT_EQ(decoded->remembered.change_sigmas, result.remembered.change_sigmas);
 }
 
 // As many cameras as a rig may have.

@@ -1,4 +1,4 @@
-#include "core/calibration/evicted_fusion.h"
+#include "core/calibration/remembered_fusion.h"
 
 #include <gtest/gtest.h>
 
@@ -15,9 +15,9 @@ namespace selfcal {
 namespace {
 
 // A session of eight segments, of which a calibration has the data of three.
-class EvictedFusionTest : public ::testing::Test {
+class RememberedFusionTest : public ::testing::Test {
  protected:
-  EvictedFusionTest() : truth_(rig_.factory) {
+  RememberedFusionTest() : truth_(rig_.factory) {
     rig_.factory = PerturbCalibration(truth_, {}, 1);
     segments_ = Session(*MakeHandheld(16.5, 1, 5));
   }
@@ -73,7 +73,7 @@ class EvictedFusionTest : public ::testing::Test {
 };
 
 // The reference is a calibration on the data of all segments.
-TEST_F(EvictedFusionTest, AFewSegmentsWithRememberedOnesEqualAll) {
+TEST_F(RememberedFusionTest, AFewSegmentsWithRememberedOnesEqualAll) {
   ASSERT_EQ(segments_.size(), 8u);
   const CalibrationResult batch = CalibrateOn(all_, {});
   const CalibrationResult alone = CalibrateOn(kept_, {});
@@ -82,13 +82,13 @@ TEST_F(EvictedFusionTest, AFewSegmentsWithRememberedOnesEqualAll) {
   const CalibrationResult informed =
       CalibrateOn(kept_, RememberedAt(alone.theta));
   ASSERT_EQ(informed.status, CalibrateStatus::kConverged);
-  EXPECT_EQ(informed.evicted.unused, "");
-  EXPECT_EQ(informed.evicted.segments, 5);
-  EXPECT_EQ(informed.evicted.too_far, 0);
-  EXPECT_EQ(informed.evicted.contradicting, 0);
-  EXPECT_EQ(informed.evicted.reach, 0);
-  EXPECT_GT(informed.evicted.agreement.degrees, 10);
-  EXPECT_GT(informed.evicted.agreement.probability, 1e-3);
+  EXPECT_EQ(informed.remembered.unused, "");
+  EXPECT_EQ(informed.remembered.segments, 5);
+  EXPECT_EQ(informed.remembered.too_far, 0);
+  EXPECT_EQ(informed.remembered.contradicting, 0);
+  EXPECT_EQ(informed.remembered.reach, 0);
+  EXPECT_GT(informed.remembered.agreement.degrees, 10);
+  EXPECT_GT(informed.remembered.agreement.probability, 1e-3);
   const Eigen::VectorXd ratio = Sigmas(informed).cwiseQuotient(Sigmas(batch));
   EXPECT_GT(Sigmas(alone).cwiseQuotient(Sigmas(batch)).minCoeff(), 1.2);
   // The rest is the information of landmarks that continue.
@@ -102,20 +102,20 @@ TEST_F(EvictedFusionTest, AFewSegmentsWithRememberedOnesEqualAll) {
             1.7);
 }
 
-TEST_F(EvictedFusionTest, WithoutMemoryNothingChanges) {
+TEST_F(RememberedFusionTest, WithoutMemoryNothingChanges) {
   const CalibrationResult alone = CalibrateOn(kept_, {});
   std::vector<RememberedSegment> own;
   for (const std::int64_t i : kept_) own.push_back({.key = {"session", i}});
   const CalibrationResult same = CalibrateOn(kept_, own);
   EXPECT_TRUE(Moved(alone.theta, same.theta).isZero());
   EXPECT_EQ(same.covariance, alone.covariance);
-  EXPECT_EQ(same.evicted.segments, 0);
-  EXPECT_EQ(same.evicted.unused, "");
+  EXPECT_EQ(same.remembered.segments, 0);
+  EXPECT_EQ(same.remembered.unused, "");
 }
 
 // A rotation of a quarter of a degree between two sessions, all with their
 // data.
-TEST_F(EvictedFusionTest, ReportsThatTheDataIsOfTwoDevices) {
+TEST_F(RememberedFusionTest, ReportsThatTheDataIsOfTwoDevices) {
   Eigen::VectorXd turn = Eigen::VectorXd::Zero(TangentSize(truth_));
   const int i =
       MatchComponents(TangentComponents(truth_), {"cam0.q_CI.x"}).at(0);
@@ -130,19 +130,20 @@ TEST_F(EvictedFusionTest, ReportsThatTheDataIsOfTwoDevices) {
     own.push_back({.key = segments_[k].key});
   }
   const CalibrationResult mixed = CalibrateOn(picked, own);
-  ASSERT_TRUE(mixed.evicted.split);
-  EXPECT_LT(mixed.evicted.split->without_one, 1e-4);
-  EXPECT_EQ(mixed.evicted.split->first, (SegmentKey{"later", 1}));
-  EXPECT_EQ(mixed.evicted.unused, "");
+  ASSERT_TRUE(mixed.remembered.split);
+  EXPECT_LT(mixed.remembered.split->without_one, 1e-4);
+  EXPECT_EQ(mixed.remembered.split->first, (SegmentKey{"later", 1}));
+  EXPECT_EQ(mixed.remembered.unused, "");
   // The result is nevertheless that of the newer device.
-  EXPECT_GT(mixed.evicted.change_probability, 0.999);
+  EXPECT_GT(mixed.remembered.change_probability, 0.999);
   EXPECT_LT(LargestInSigmas(BoxMinus(mixed.theta, truth_), mixed.covariance),
             3.5);
-  EXPECT_GT(mixed.evicted.change_sigmas(i), 0);
-  EXPECT_LT(mixed.evicted.change_sigmas(i), std::sqrt(mixed.covariance(i, i)));
+  EXPECT_GT(mixed.remembered.change_sigmas(i), 0);
+  EXPECT_LT(mixed.remembered.change_sigmas(i),
+            std::sqrt(mixed.covariance(i, i)));
 }
 
-TEST_F(EvictedFusionTest, ExcludesSegmentsThatContradictTheData) {
+TEST_F(RememberedFusionTest, ExcludesSegmentsThatContradictTheData) {
   const CalibrationResult alone = CalibrateOn(kept_, {});
   std::vector<RememberedSegment> remembered = RememberedAt(alone.theta);
   std::vector<RememberedSegment> without = remembered;
@@ -152,13 +153,13 @@ TEST_F(EvictedFusionTest, ExcludesSegmentsThatContradictTheData) {
   const int size = TangentSize(truth_);
   wrong.eta += wrong.Lambda.leftCols(size) * ReferenceSigmas(rig_);
   const CalibrationResult healed = CalibrateOn(kept_, remembered);
-  EXPECT_EQ(healed.evicted.contradicting, 1);
-  EXPECT_EQ(healed.evicted.segments, 4);
+  EXPECT_EQ(healed.remembered.contradicting, 1);
+  EXPECT_EQ(healed.remembered.segments, 4);
   EXPECT_TRUE(Moved(clean.theta, healed.theta).isZero());
   EXPECT_TRUE((healed.covariance - clean.covariance).isZero());
 }
 
-TEST_F(EvictedFusionTest, UsesNoneIfMostContradictTheData) {
+TEST_F(RememberedFusionTest, UsesNoneIfMostContradictTheData) {
   const CalibrationResult alone = CalibrateOn(kept_, {});
   std::vector<RememberedSegment> remembered = RememberedAt(alone.theta);
   const int size = TangentSize(truth_);
@@ -167,24 +168,24 @@ TEST_F(EvictedFusionTest, UsesNoneIfMostContradictTheData) {
     one.ends->eta += one.ends->Lambda.leftCols(size) * ReferenceSigmas(rig_);
   }
   const CalibrationResult result = CalibrateOn(kept_, remembered);
-  EXPECT_EQ(result.evicted.segments, 0);
-  EXPECT_NE(result.evicted.unused, "");
+  EXPECT_EQ(result.remembered.segments, 0);
+  EXPECT_NE(result.remembered.unused, "");
   EXPECT_TRUE(Moved(alone.theta, result.theta).isZero());
   EXPECT_EQ(result.covariance, alone.covariance);
 }
 
-TEST_F(EvictedFusionTest, IgnoresSegmentsLinearisedTooFarAway) {
+TEST_F(RememberedFusionTest, IgnoresSegmentsLinearisedTooFarAway) {
   const CalibrationResult alone = CalibrateOn(kept_, {});
   const CalibrationResult result = CalibrateOn(
       kept_, RememberedAt(BoxPlus(alone.theta, 2.1 * ReferenceSigmas(rig_))));
-  EXPECT_EQ(result.evicted.segments, 0);
-  EXPECT_NE(result.evicted.unused, "");
+  EXPECT_EQ(result.remembered.segments, 0);
+  EXPECT_NE(result.remembered.unused, "");
   EXPECT_TRUE(Moved(alone.theta, result.theta).isZero());
 }
 
 // Noise in states looks like information about directions that a rotation in
 // place does not observe: remembered segments must not add it.
-TEST_F(EvictedFusionTest, DeterminesNoDirectionThatTheDataDoesNot) {
+TEST_F(RememberedFusionTest, DeterminesNoDirectionThatTheDataDoesNot) {
   segments_ = Session(*MakeRotationInPlace(16.5, {.pivot_jitter_m = 0}, 5));
   ASSERT_EQ(segments_.size(), 8u);
   const CalibrationResult alone = CalibrateOn(kept_, {});
@@ -192,7 +193,7 @@ TEST_F(EvictedFusionTest, DeterminesNoDirectionThatTheDataDoesNot) {
   ASSERT_FALSE(alone.held_constant.empty());
   const CalibrationResult informed =
       CalibrateOn(kept_, RememberedAt(alone.theta));
-  EXPECT_EQ(informed.evicted.segments, 5);
+  EXPECT_EQ(informed.remembered.segments, 5);
   EXPECT_EQ(informed.rank, alone.rank);
   // The position of the camera stays as uncertain as it was.
   const auto components = TangentComponents(truth_);
@@ -211,7 +212,7 @@ TEST_F(EvictedFusionTest, DeterminesNoDirectionThatTheDataDoesNot) {
   EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 54.1);
 }
 
-TEST_F(EvictedFusionTest, RejectsSegmentsOfAnotherShape) {
+TEST_F(RememberedFusionTest, RejectsSegmentsOfAnotherShape) {
   std::vector<RememberedSegment> remembered = RememberedAt(rig_.factory);
   remembered[0].ends->eta.resize(5);
   const CalibrationResult result = CalibrateOn(kept_, remembered);

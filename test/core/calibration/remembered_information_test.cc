@@ -1,4 +1,4 @@
-#include "core/calibration/evicted_information.h"
+#include "core/calibration/remembered_information.h"
 
 #include <gtest/gtest.h>
 
@@ -13,9 +13,9 @@ namespace selfcal {
 namespace {
 
 // A session of eight segments.
-class EvictedInformationTest : public ::testing::Test {
+class RememberedInformationTest : public ::testing::Test {
  protected:
-  EvictedInformationTest() : truth_(rig_.factory) {
+  RememberedInformationTest() : truth_(rig_.factory) {
     rig_.factory = PerturbCalibration(truth_, {}, 1);
     SimulationOptions options;
     options.seed = 5;
@@ -60,10 +60,10 @@ class EvictedInformationTest : public ::testing::Test {
   }
 
   // The resulting offset from the point, with the rig's prior.
-  Eigen::VectorXd Solve(const EvictedInformation& evicted) const {
-    Eigen::MatrixXd Lambda = evicted.information.Lambda;
+  Eigen::VectorXd Solve(const RememberedInformation& remembered) const {
+    Eigen::MatrixXd Lambda = remembered.information.Lambda;
     Lambda.diagonal() += PriorSigmas(rig_).cwiseAbs2().cwiseInverse();
-    return Lambda.ldlt().solve(evicted.information.eta);
+    return Lambda.ldlt().solve(remembered.information.eta);
   }
 
   const std::vector<int> kept_ = {1, 2, 5};
@@ -73,73 +73,75 @@ class EvictedInformationTest : public ::testing::Test {
   std::vector<SegmentEnds> ends_;
 };
 
-TEST_F(EvictedInformationTest, IsZeroIfAllSegmentsHaveTheirData) {
+TEST_F(RememberedInformationTest, IsZeroIfAllSegmentsHaveTheirData) {
   SummariseAt(truth_);
-  const EvictedInformation evicted =
-      InformationOfEvicted(rig_, truth_, Remembered({0, 1, 2, 3, 4, 5, 6, 7}));
-  EXPECT_EQ(evicted.segments, 0);
-  EXPECT_TRUE(evicted.information.Lambda.isZero());
-  EXPECT_TRUE(evicted.information.eta.isZero());
+  const RememberedInformation remembered = InformationOfRemembered(
+      rig_, truth_, Remembered({0, 1, 2, 3, 4, 5, 6, 7}));
+  EXPECT_EQ(remembered.segments, 0);
+  EXPECT_TRUE(remembered.information.Lambda.isZero());
+  EXPECT_TRUE(remembered.information.eta.isZero());
 }
 
 // Data never reduces information.
-TEST_F(EvictedInformationTest, IsSemidefiniteWhateverHasData) {
+TEST_F(RememberedInformationTest, IsSemidefiniteWhateverHasData) {
   SummariseAt(truth_);
   for (const std::vector<int>& set :
        {std::vector<int>{}, {0}, {3, 4}, {0, 7}, {1, 2, 3, 4, 5, 6}}) {
-    const EvictedInformation evicted =
-        InformationOfEvicted(rig_, truth_, Remembered(set));
-    EXPECT_GE(InPriorUnits(evicted.information.Lambda, true), -1e-6);
-    EXPECT_GT(InPriorUnits(evicted.information.Lambda, false), 1e3);
+    const RememberedInformation remembered =
+        InformationOfRemembered(rig_, truth_, Remembered(set));
+    EXPECT_GE(InPriorUnits(remembered.information.Lambda, true), -1e-6);
+    EXPECT_GT(InPriorUnits(remembered.information.Lambda, false), 1e3);
   }
 }
 
-TEST_F(EvictedInformationTest, HasLessWeightFromFarAndNoneFromTooFar) {
+TEST_F(RememberedInformationTest, HasLessWeightFromFarAndNoneFromTooFar) {
   const Eigen::VectorXd reference = ReferenceSigmas(rig_);
   const Calibration near = BoxPlus(truth_, 1.0 * reference);
   const Calibration far = BoxPlus(truth_, 2.1 * reference);
   SummariseAt(truth_);
-  const double here = InPriorUnits(
-      InformationOfEvicted(rig_, truth_, Remembered(kept_)).information.Lambda,
-      false);
-  const EvictedInformation from_near =
-      InformationOfEvicted(rig_, near, Remembered(kept_));
+  const double here =
+      InPriorUnits(InformationOfRemembered(rig_, truth_, Remembered(kept_))
+                       .information.Lambda,
+                   false);
+  const RememberedInformation from_near =
+      InformationOfRemembered(rig_, near, Remembered(kept_));
   EXPECT_NEAR(from_near.reach, 1, 0.05);
   EXPECT_LT(InPriorUnits(from_near.information.Lambda, false), here);
-  const EvictedInformation from_far =
-      InformationOfEvicted(rig_, far, Remembered(kept_));
+  const RememberedInformation from_far =
+      InformationOfRemembered(rig_, far, Remembered(kept_));
   EXPECT_EQ(from_far.segments, 0);
   EXPECT_EQ(from_far.left_out, 5);
 }
 
-TEST_F(EvictedInformationTest, HasLessWeightWithMoreNoiseAndWithAge) {
+TEST_F(RememberedInformationTest, HasLessWeightWithMoreNoiseAndWithAge) {
   SummariseAt(truth_);
-  const auto most = [&](const EvictedOptions& options) {
+  const auto most = [&](const RememberedOptions& options) {
     return InPriorUnits(
-        InformationOfEvicted(rig_, truth_, Remembered(kept_), options)
+        InformationOfRemembered(rig_, truth_, Remembered(kept_), options)
             .information.Lambda,
         false);
   };
   const double plain = most({});
   EXPECT_LT(most({.noise_scale = 2}), 0.4 * plain);
   // In the 8 s from the middle of the session theta walks one reference sigma.
-  EvictedOptions ageing;
+  RememberedOptions ageing;
   ageing.walk = ReferenceSigmas(rig_) / std::sqrt(8.0);
   EXPECT_LT(most(ageing), 0.2 * plain);
 }
 
 // The key is used for a segment with other data.
-TEST_F(EvictedInformationTest, HasLessWeightIfASegmentFitsBadly) {
+TEST_F(RememberedInformationTest, HasLessWeightIfASegmentFitsBadly) {
   SummariseAt(truth_);
   std::vector<JoinedSegment> all = Remembered(kept_);
-  const EvictedInformation plain = InformationOfEvicted(rig_, truth_, all);
+  const RememberedInformation plain =
+      InformationOfRemembered(rig_, truth_, all);
   SegmentEnds wrong = ends_[3];
   wrong.eta.head(TangentSize(truth_)) +=
       wrong.Lambda.topLeftCorner(27, 27) * ReferenceSigmas(rig_);
   all[3].ends = &wrong;
   const auto moved = [&](double fit) {
     all[3].fit = fit;
-    return (Solve(InformationOfEvicted(rig_, truth_, all)) - Solve(plain))
+    return (Solve(InformationOfRemembered(rig_, truth_, all)) - Solve(plain))
         .cwiseQuotient(ReferenceSigmas(rig_))
         .norm();
   };

@@ -1,4 +1,4 @@
-#include "core/calibration/evicted_information.h"
+#include "core/calibration/remembered_information.h"
 
 #include <algorithm>
 #include <cmath>
@@ -62,7 +62,7 @@ class SegmentWeights {
  public:
   SegmentWeights(const Rig& rig,
                  const Calibration& point,
-                 const EvictedOptions& options)
+                 const RememberedOptions& options)
       : rig_(rig),
         point_(point),
         noise_scale_(std::max(1.0, options.noise_scale)) {}
@@ -118,10 +118,11 @@ double ReachWeight(int k, double reach) {
   return 1 / (loss * loss);
 }
 
-EvictedInformation InformationOfEvicted(const Rig& rig,
-                                        const Calibration& point,
-                                        std::span<const JoinedSegment> segments,
-                                        const EvictedOptions& options) {
+RememberedInformation InformationOfRemembered(
+    const Rig& rig,
+    const Calibration& point,
+    std::span<const JoinedSegment> segments,
+    const RememberedOptions& options) {
   SegmentWeights weights(rig, point, options);
   AgeingChain all(rig, point, options.walk);
   AgeingChain with_data(rig, point, options.walk);
@@ -135,7 +136,7 @@ EvictedInformation InformationOfEvicted(const Rig& rig,
     all.Add(*segment.ends, *weight);
     if (segment.calibrated_on) with_data.Add(*segment.ends, *weight);
   }
-  EvictedInformation result;
+  RememberedInformation result;
   result.information = all.Theta();
   const ThetaInformation theirs = with_data.Theta();
   result.information.Lambda -= theirs.Lambda;
@@ -149,7 +150,7 @@ EvictedInformation InformationOfEvicted(const Rig& rig,
 ThetaInformation InformationOfAll(const Rig& rig,
                                   const Calibration& point,
                                   std::span<const JoinedSegment> segments,
-                                  const EvictedOptions& options) {
+                                  const RememberedOptions& options) {
   SegmentWeights weights(rig, point, options);
   AgeingChain all(rig, point, options.walk);
   for (const JoinedSegment& segment : segments) {

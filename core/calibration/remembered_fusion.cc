@@ -1,4 +1,4 @@
-#include "core/calibration/evicted_fusion.h"
+#include "core/calibration/remembered_fusion.h"
 
 #include <algorithm>
 #include <deque>
@@ -37,7 +37,7 @@ class Fusion {
   Fusion(const Rig& rig,
          const DataEstimate& estimate,
          const std::vector<const MotionSegment*>& segments,
-         const EvictedOptions& options)
+         const RememberedOptions& options)
       : rig_(rig),
         at_(estimate),
         theta_(BoxPlus(estimate.reference, estimate.d)),
@@ -58,17 +58,17 @@ class Fusion {
   CompletedEstimate Run(const std::vector<RememberedSegment>& remembered) {
     Join(remembered);
     if (basis_.cols() == 0) return std::move(result_);
-    const auto evicted = Count();
-    EvictedUse& use = result_.use;
-    if (evicted > 0) use.contradicting = ExcludeContradictions();
-    if (2 * use.contradicting > evicted) {
+    const auto joined = Count();
+    RememberedUse& use = result_.use;
+    if (joined > 0) use.contradicting = ExcludeContradictions();
+    if (2 * use.contradicting > joined) {
       use.unused = "most of them contradict the segments whose data is kept";
       return std::move(result_);
     }
     const SplitFindings found = FindSplit(
         rig_, theta_, at_.subspace.estimated, at_.excess, Near(), options_);
     if (found.split.probability < kRareSplit) use.split = found.split;
-    if (evicted > 0) Add();
+    if (joined > 0) Add();
     if (found.doubt) AddDoubt(*found.doubt);
     return std::move(result_);
   }
@@ -128,50 +128,50 @@ class Fusion {
                          at_.excess);
   }
 
-  // Tests each evicted segment separately.
+  // Tests each of them separately.
   int ExcludeContradictions() {
     const double limit = kChance / static_cast<double>(Count());
     return static_cast<int>(
         std::erase_if(joined_, [&](const JoinedSegment& one) {
           if (one.calibrated_on) return false;
-          const EvictedInformation alone =
-              InformationOfEvicted(rig_, theta_, {&one, 1}, options_);
+          const RememberedInformation alone =
+              InformationOfRemembered(rig_, theta_, {&one, 1}, options_);
           return alone.segments > 0 &&
                  TestWithData(ReducedOf(alone.information)).probability < limit;
         }));
   }
 
   void Add() {
-    const EvictedInformation evicted =
-        InformationOfEvicted(rig_, theta_, joined_, options_);
-    EvictedUse& use = result_.use;
-    use.too_far = evicted.left_out;
-    if (evicted.segments == 0) {
+    const RememberedInformation found =
+        InformationOfRemembered(rig_, theta_, joined_, options_);
+    RememberedUse& use = result_.use;
+    use.too_far = found.left_out;
+    if (found.segments == 0) {
       use.unused = "they were linearised too far from the result";
       return;
     }
-    use.agreement = TestWithData(ReducedOf(evicted.information));
+    use.agreement = TestWithData(ReducedOf(found.information));
     if (use.agreement.probability < kChance) {
       use.unused = "together they contradict the segments whose data is kept";
       return;
     }
-    use.segments = evicted.segments;
-    use.reach = evicted.reach;
+    use.segments = found.segments;
+    use.reach = found.reach;
     // Their weight is reduced if they differ by more than chance explains.
     const double weight = use.agreement.probability < kLikely
                               ? use.agreement.degrees / use.agreement.statistic
                               : 1;
     const Eigen::MatrixXd all = at_.Lambda + weight * by_offset_.transpose() *
-                                                 evicted.information.Lambda *
+                                                 found.information.Lambda *
                                                  by_offset_;
     const Eigen::VectorXd step =
         SubspaceStep(rig_,
                      at_.subspace,
                      all,
-                     weight * by_offset_.transpose() * evicted.information.eta);
+                     weight * by_offset_.transpose() * found.information.eta);
     result_.theta = BoxPlus(at_.reference, at_.d + step);
     result_.covariance = Covariance(all);
-    result_.Lambda = weight * evicted.information.Lambda;
+    result_.Lambda = weight * found.information.Lambda;
   }
 
   // Accounts for the probability that the device changed.
@@ -194,7 +194,7 @@ class Fusion {
   const Eigen::MatrixXd by_offset_;
   const Eigen::MatrixXd basis_;
   const Eigen::MatrixXd with_data_;
-  EvictedOptions options_;
+  RememberedOptions options_;
   std::deque<OwnSegment> own_;
   std::vector<JoinedSegment> joined_;
   CompletedEstimate result_;
@@ -202,11 +202,12 @@ class Fusion {
 
 }  // namespace
 
-CompletedEstimate FuseEvicted(const Rig& rig,
-                              const DataEstimate& estimate,
-                              const std::vector<const MotionSegment*>& segments,
-                              const std::vector<RememberedSegment>& remembered,
-                              const EvictedOptions& options) {
+CompletedEstimate FuseRemembered(
+    const Rig& rig,
+    const DataEstimate& estimate,
+    const std::vector<const MotionSegment*>& segments,
+    const std::vector<RememberedSegment>& remembered,
+    const RememberedOptions& options) {
   return Fusion(rig, estimate, segments, options).Run(remembered);
 }
 

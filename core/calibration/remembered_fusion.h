@@ -3,9 +3,9 @@
 //
 // The estimate from data comes first. It decides which directions are
 // determined, what the noise scales are, and which segments contradict the
-// rest. The information of the other segments (evicted_information.h) is then
-// added within the determined directions only, in one linear step: only data
-// can distinguish actual information from noise in states that looks like
+// rest. The information of the other segments (remembered_information.h) is
+// then added within the determined directions only, in one linear step: only
+// data can distinguish actual information from noise in states that looks like
 // motion, so that segments without data never determine directions that those
 // with data do not.
 //
@@ -15,7 +15,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/calibration/evicted_information.h"
+#include "core/calibration/remembered_information.h"
 #include "core/calibration/remembered_segment.h"
 #include "core/calibration/subspace.h"
 #include "core/model/calibration.h"
@@ -47,7 +47,7 @@ struct CompletedEstimate {
   Eigen::MatrixXd covariance;  // D x D, tangent at theta
   // Information that was added (D x D, tangent at theta).
   Eigen::MatrixXd Lambda;
-  EvictedUse use;
+  RememberedUse use;
 };
 
 // `segments` are those with data, on which the estimate is based. `remembered`
@@ -59,10 +59,11 @@ struct CompletedEstimate {
 // The result reports whether the newest of all segments differ from those
 // before (memory_split.h), and its covariance accounts for the remaining doubt,
 // even if no segment is without data.
-CompletedEstimate FuseEvicted(const Rig& rig,
-                              const DataEstimate& estimate,
-                              const std::vector<const MotionSegment*>& segments,
-                              const std::vector<RememberedSegment>& remembered,
-                              const EvictedOptions& options);
+CompletedEstimate FuseRemembered(
+    const Rig& rig,
+    const DataEstimate& estimate,
+    const std::vector<const MotionSegment*>& segments,
+    const std::vector<RememberedSegment>& remembered,
+    const RememberedOptions& options);
 
 }  // namespace selfcal

@@ -3,11 +3,11 @@
 //
 // All segments are joined at their ends (session_chain.h), and the joint
 // information of those of the calibration is subtracted from that of all:
-//   Lambda(evicted) = Lambda(all) - Lambda(of the calibration),
+//   Lambda(remembered) = Lambda(all) - Lambda(of the calibration),
 // and eta likewise. Data only adds information, so that the difference is
-// semidefinite. It contains the information of an evicted segment about theta,
-// and its information through the states of a neighbour that is part of the
-// calibration: no information is counted twice, and the sum of both is the
+// semidefinite. It contains the information of a remembered segment about
+// theta, and its information through the states of a neighbour that is part of
+// the calibration: no information is counted twice, and the sum of both is the
 // linearisation of a calibration on all of the data. Each observation belongs
 // to one segment; a landmark that several segments observe is a separate
 // landmark of each.
@@ -42,7 +42,7 @@ struct JoinedSegment {
   std::int64_t time_ns = 0;
 };
 
-struct EvictedOptions {
+struct RememberedOptions {
   // Densities (D) of a random walk of theta [tangent units / sqrt(s)], by which
   // information older than the newest segment decreases. Empty: theta is
   // constant.
@@ -60,7 +60,7 @@ bool IsTooFar(const Rig& rig,
               const SegmentEnds& ends,
               const Calibration& point);
 
-struct EvictedInformation {
+struct RememberedInformation {
   ThetaInformation information;  // about theta [-] point
   int segments = 0;              // without data, that contribute
   int left_out = 0;              // excluded: linearised too far away
@@ -77,10 +77,11 @@ double ReachWeight(int k, double reach);
 
 // Segments are in the order of time, with those of a session consecutive. The
 // caller excludes segments that contradict the others.
-EvictedInformation InformationOfEvicted(const Rig& rig,
-                                        const Calibration& point,
-                                        std::span<const JoinedSegment> segments,
-                                        const EvictedOptions& options = {});
+RememberedInformation InformationOfRemembered(
+    const Rig& rig,
+    const Calibration& point,
+    std::span<const JoinedSegment> segments,
+    const RememberedOptions& options = {});
 
 // Information about theta [-] point of all segments, whether or not the
 // calibration has their data; those that were linearised too far away are
@@ -88,6 +89,6 @@ EvictedInformation InformationOfEvicted(const Rig& rig,
 ThetaInformation InformationOfAll(const Rig& rig,
                                   const Calibration& point,
                                   std::span<const JoinedSegment> segments,
-                                  const EvictedOptions& options = {});
+                                  const RememberedOptions& options = {});
 
 }  // namespace selfcal
