@@ -177,7 +177,7 @@ CalibrationResult Calibrate(const Rig& rig,
     result.theta = theta_start;
     return result;
   }
-  if (options.leave_out_contradictions) {
+  if (options.exclude_contradictions) {
     return CalibrateOnWhatAgrees(rig, theta_start, sorted, options, progress);
   }
   CalibrationRun run =

@@ -48,7 +48,7 @@ struct CalibrateOptions {
   bool reweight_noise = true;
   // Excludes segments that contradict the rest, by their residuals or by their
   // own estimate of theta (segment_agreement.h).
-  bool leave_out_contradictions = true;
+  bool exclude_contradictions = true;
   // All usable segments of the device, in the order of time, with those of a
   // session consecutive: those with data in the calibration and, with their
   // ends, those without data. The information of the latter completes the

@@ -83,7 +83,7 @@ class Builder {
       keyframes_.push_back(ToBlocks(x));
     }
     for (const ScreenedLandmark& landmark : landmarks) {
-      places_.push_back(landmark.place.inverse_depth);
+      positions_.push_back(landmark.position.inverse_depth);
     }
     AddTheta();
     AddKeyframes();
@@ -97,8 +97,8 @@ class Builder {
   // Landmarks are eliminated first, each separately.
   std::shared_ptr<ceres::ParameterBlockOrdering> Ordering() {
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    for (Eigen::Vector3d& place : places_) {
-      ordering->AddElementToGroup(place.data(), 0);
+    for (Eigen::Vector3d& position : positions_) {
+      ordering->AddElementToGroup(position.data(), 0);
     }
     for (KeyframeBlocks& x : keyframes_) {
       ordering->AddElementToGroup(x.q.data(), 1);
@@ -115,8 +115,8 @@ class Builder {
     for (std::size_t k = 0; k < keyframes_.size(); ++k) {
       FromBlocks(keyframes_[k], &estimate->keyframes[k]);
     }
-    for (std::size_t i = 0; i < places_.size(); ++i) {
-      (*landmarks)[i].place.inverse_depth = places_[i];
+    for (std::size_t i = 0; i < positions_.size(); ++i) {
+      (*landmarks)[i].position.inverse_depth = positions_[i];
     }
   }
 
@@ -200,7 +200,7 @@ class Builder {
       problem_.AddResidualBlock(
           MakePriorCost(far, Eigen::Vector3d::Zero()).release(),
           nullptr,
-          places_[i].data());
+          positions_[i].data());
       const Track& track = round_.problem.tracks[landmarks[i].track];
       for (const UsedObservation& used : landmarks[i].used) {
         const TrackObservation& seen = track.observations[used.index];
@@ -210,14 +210,14 @@ class Builder {
                                  seen.camera,
                                  seen.z_px,
                                  round_.rig.pixel_sigma_px,
-                                 landmarks[i].place.anchor,
+                                 landmarks[i].position.anchor,
                                  round_.motions.At(seen.keyframe, seen.camera))
                 .release(),
             &losses_.back(),
             d_.data(),
             keyframes_[seen.keyframe].q.data(),
             keyframes_[seen.keyframe].p.data(),
-            places_[i].data());
+            positions_[i].data());
       }
     }
   }
@@ -225,7 +225,7 @@ class Builder {
   const SolverRound& round_;
   Eigen::VectorXd d_;
   std::vector<KeyframeBlocks> keyframes_;
-  std::vector<Eigen::Vector3d> places_;
+  std::vector<Eigen::Vector3d> positions_;
   std::unique_ptr<ceres::Manifold> rotation_;
   std::unique_ptr<ceres::Manifold> gauge_;
   std::unique_ptr<ceres::Manifold> subspace_;

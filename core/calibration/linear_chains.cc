@@ -25,10 +25,10 @@ KeptBiasRows HalfWalkRows(const BiasLink& link,
           .residual = 0.5 * weight.cwiseProduct(off)};
 }
 
-// Adds the unknowns from `place` in the interface to those that a chain keeps.
-int KeepInChain(int place, int size, ChainPlan* chain) {
+// Adds the unknowns from `first` in the interface to those that a chain keeps.
+int KeepInChain(int first, int size, ChainPlan* chain) {
   const int kept = static_cast<int>(chain->interface.size());
-  for (int i = 0; i < size; ++i) chain->interface.push_back(place + i);
+  for (int i = 0; i < size; ++i) chain->interface.push_back(first + i);
   return kept;
 }
 
@@ -71,10 +71,10 @@ std::vector<int> StartChains(const CalibrationProblem& problem,
   return chain_of_keyframe;
 }
 
-// Adds a piece of a track, without its observations of zero weight. `place`:
+// Adds a piece of a track, without its observations of zero weight. `first`:
 // of the landmark in the interface, or kNone.
 void AddPiece(int landmark,
-              int place,
+              int first,
               int cameras,
               std::span<LinearObservation> piece,
               ChainPlan* chain) {
@@ -84,10 +84,10 @@ void AddPiece(int landmark,
     chain->track_keyframes.push_back(seen.view / cameras - chain->range.begin);
   }
   int kept = kNone;
-  if (place != kNone) {
+  if (first != kNone) {
     kept = !chain->landmarks.empty() && chain->landmarks.back() == landmark
                ? chain->kept_landmarks.back()
-               : KeepInChain(place, 3, chain);
+               : KeepInChain(first, 3, chain);
   }
   chain->tracks.push_back(static_cast<int>(chain->track_keyframes.size()));
   chain->landmarks.push_back(landmark);
@@ -103,17 +103,17 @@ void PlanTracks(const std::vector<int>& chain_of_keyframe,
   for (int m = 0; m < observations->landmarks(); ++m) {
     const std::span<LinearObservation> track = observations->OfLandmark(m);
     int held = 0;
-    int first = kNone, last = kNone;  // pieces with a weight
+    int first_piece = kNone, last_piece = kNone;  // with a weight
     for (const LinearObservation& seen : track) {
       if (!HasWeight(seen)) continue;
       ++held;
-      last = seen.piece;
-      if (first == kNone) first = last;
+      last_piece = seen.piece;
+      if (first_piece == kNone) first_piece = last_piece;
     }
     if (held < kMinObservations) continue;
-    int& place = plan->interface_of_landmark[m];
-    if (first != last) {
-      place = plan->interface_size;
+    int& first = plan->interface_of_landmark[m];
+    if (first_piece != last_piece) {
+      first = plan->interface_size;
       plan->interface_size += 3;
     }
     for (std::size_t begin = 0; begin < track.size();) {
@@ -124,7 +124,7 @@ void PlanTracks(const std::vector<int>& chain_of_keyframe,
       const auto piece = track.subspan(begin, end - begin);
       if (std::any_of(piece.begin(), piece.end(), HasWeight)) {
         const int chain = chain_of_keyframe[piece.front().view / cameras];
-        AddPiece(m, place, cameras, piece, &plan->chains[chain]);
+        AddPiece(m, first, cameras, piece, &plan->chains[chain]);
       }
       begin = end;
     }

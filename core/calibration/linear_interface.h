@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "core/calibration/landmark_place.h"
+#include "core/calibration/landmark_position.h"
 #include "core/elimination/chain_elimination.h"
 
 namespace selfcal {

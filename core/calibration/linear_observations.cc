@@ -8,8 +8,8 @@ namespace {
 // The modelled distance of a landmark is at most 1 / this [m].
 constexpr double kLeastInverseDepth = 1e-9;
 
-double UsedInverseDepth(const LandmarkPlace& place) {
-  const double rho = place.inverse_depth.z();
+double UsedInverseDepth(const LandmarkPosition& position) {
+  const double rho = position.inverse_depth.z();
   return std::abs(rho) < kLeastInverseDepth ? kLeastInverseDepth : rho;
 }
 
@@ -17,12 +17,12 @@ double UsedInverseDepth(const LandmarkPlace& place) {
 
 void LinearObservations::PlaceLandmarks(const LinearPoint& point) {
   points_.resize(4 * point.landmarks.size());
-  places_.clear();
+  positions_.clear();
   for (std::size_t i = 0; i < point.landmarks.size(); ++i) {
-    LandmarkPlace place = point.landmarks[i].place;
-    place.inverse_depth.z() = UsedInverseDepth(place);
-    Eigen::Vector4d::Map(&points_[4 * i]) = place.Homogeneous();
-    places_.push_back(place);
+    LandmarkPosition position = point.landmarks[i].position;
+    position.inverse_depth.z() = UsedInverseDepth(position);
+    Eigen::Vector4d::Map(&points_[4 * i]) = position.Homogeneous();
+    positions_.push_back(position);
   }
 }
 

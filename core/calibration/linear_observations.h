@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/calibration/landmark_place.h"
+#include "core/calibration/landmark_position.h"
 #include "core/calibration/linear_point.h"
 
 namespace selfcal {
@@ -30,7 +30,7 @@ class LinearObservations {
 
   int cameras() const { return cameras_; }
   int views() const { return static_cast<int>(view_begin_.size()) - 1; }
-  int landmarks() const { return static_cast<int>(places_.size()); }
+  int landmarks() const { return static_cast<int>(positions_.size()); }
 
   std::span<LinearObservation> OfLandmark(int landmark) {
     return std::span(all_).subspan(landmark_begin_[landmark], Count(landmark));
@@ -47,7 +47,7 @@ class LinearObservations {
   const LinearObservation& operator[](int index) const { return all_[index]; }
 
   // Position of a landmark, with an inverse depth that is not zero.
-  const LandmarkPlace& place(int landmark) const { return places_[landmark]; }
+  const LandmarkPosition& position(int landmark) const { return positions_[landmark]; }
   // The same as homogeneous points in G, 4 numbers for each landmark.
   const double* points() const { return points_.data(); }
 
@@ -62,7 +62,7 @@ class LinearObservations {
   std::vector<LinearObservation> all_;  // by landmark
   std::vector<int> landmark_begin_;
   std::vector<int> by_view_, view_begin_;
-  std::vector<LandmarkPlace> places_;
+  std::vector<LandmarkPosition> positions_;
   std::vector<double> points_;
 };
 

@@ -64,7 +64,7 @@ void AddLandmarks(const LinearObservations& observations,
     }
     if (shares == 0) continue;
     const double rho =
-        observations.place(m).inverse_depth.z() / kInverseDepthSigma;
+        observations.position(m).inverse_depth.z() / kInverseDepthSigma;
     posterior->pixel_squares += landmarks[m].weight * rho * rho;
     posterior->weighted_observations += shares;
     posterior->landmark_weights += squared / shares;

@@ -52,7 +52,7 @@ bool LinearRange::GrowsAsClaimed(const Eigen::VectorXd& sigma_step,
   const double tolerance = kGrowthTolerance * std::max(1.0, length * length);
   CalibrationEstimate estimate = estimate_;
   std::vector<ScreenedLandmark> landmarks = landmarks_;
-  GoAlong(linearised_, length * sigma_step, &estimate, &landmarks);
+  ApplyStep(linearised_, length * sigma_step, &estimate, &landmarks);
   double last = 0;
   SolverRound walk = round_;
   walk.max_iterations = kMaxIterations;

@@ -25,7 +25,7 @@ void LinearSystem::EliminateChain(const LinearPoint& point,
     if (plan.kept_landmarks[m] >= 0) continue;
     const int landmark = plan.landmarks[m];
     const LandmarkPrior prior = InverseDepthPrior(
-        observations_.place(landmark), point.landmarks[landmark].weight);
+        observations_.position(landmark), point.landmarks[landmark].weight);
     elimination->AddLandmarkPrior(static_cast<int>(m), prior.H, prior.g);
   }
 
@@ -78,7 +78,7 @@ void LinearSystem::Linearise(const LinearPoint& point,
     if (at < 0) continue;
     interface_.AddLandmarkPrior(
         at,
-        InverseDepthPrior(observations_.place(m), point.landmarks[m].weight));
+        InverseDepthPrior(observations_.position(m), point.landmarks[m].weight));
   }
   decrease_ += interface_.Eliminate(&information_);
 }
@@ -102,7 +102,7 @@ void LinearSystem::FindSteps(const Eigen::VectorXd& theta_step,
     for (std::size_t m = 0; m < plan.landmarks.size(); ++m) {
       const int landmark = plan.landmarks[m];
       (*landmarks)[landmark] =
-          InverseDepthStep(observations_.place(landmark), points[m]);
+          InverseDepthStep(observations_.position(landmark), points[m]);
     }
   }
 }

@@ -44,9 +44,9 @@ double BorderWeight(const CameraCalibration& camera,
 
 Selected Select(const LandmarkScene& scene,
                 const Track& track,
-                const LandmarkPlace& place,
+                const LandmarkPosition& position,
                 double gate_px) {
-  const Eigen::Vector4d point_G = place.Homogeneous();
+  const Eigen::Vector4d point_G = position.Homogeneous();
   Selected result;
   for (int i = 0; i < static_cast<int>(track.observations.size()); ++i) {
     const TrackObservation& seen = track.observations[i];
@@ -80,10 +80,10 @@ bool EnoughLeft(const Selected& selected) {
 }
 
 // Candidate positions of a track.
-struct TrackPlaces {
-  std::optional<LandmarkPlace> found;
+struct TrackPositions {
+  std::optional<LandmarkPosition> found;
   // Its previous position, if that is to be tried as well.
-  std::optional<LandmarkPlace> other;
+  std::optional<LandmarkPosition> other;
 };
 
 // Thresholds for all landmarks.
@@ -95,21 +95,21 @@ struct Thresholds {
 Thresholds FindThresholds(const LandmarkScene& scene,
                           const CalibrateOptions& options,
                           const CalibrationProblem& problem,
-                          const std::vector<TrackPlaces>& places) {
+                          const std::vector<TrackPositions>& positions) {
   std::vector<double> norms_px;
   std::vector<double> inverse_depths;
-  for (std::size_t t = 0; t < places.size(); ++t) {
-    if (!places[t].found) {
+  for (std::size_t t = 0; t < positions.size(); ++t) {
+    if (!positions[t].found) {
       continue;
     }
-    const LandmarkPlace& place = *places[t].found;
+    const LandmarkPosition& position = *positions[t].found;
     for (const double norm :
-         ResidualNorms(scene, problem.tracks[t], place.Homogeneous())) {
+         ResidualNorms(scene, problem.tracks[t], position.Homogeneous())) {
       if (std::isfinite(norm)) {
         norms_px.push_back(norm);
       }
     }
-    inverse_depths.push_back(std::abs(place.inverse_depth.z()));
+    inverse_depths.push_back(std::abs(position.inverse_depth.z()));
   }
   const double robust_sigmas =
       Median(std::move(norms_px)) / kMedianOfRayleigh / scene.pixel_sigma_px();
@@ -129,18 +129,18 @@ double InverseDepthSigma(const Eigen::Matrix3d& information) {
 }
 
 // Position of a landmark at a minimum of its cost.
-struct SettledPlace {
-  LandmarkPlace place;
-  RefinedPlace refined;
+struct SettledPosition {
+  LandmarkPosition position;
+  RefinedPosition refined;
 };
 
-SettledPlace SettlePlace(const LandmarkScene& scene,
+SettledPosition SettlePosition(const LandmarkScene& scene,
                          const Track& track,
                          const RobustLoss& loss,
-                         const LandmarkPlace& start) {
-  SettledPlace settled{start, {}};
+                         const LandmarkPosition& start) {
+  SettledPosition settled{start, {}};
   settled.refined =
-      RefinePlace(scene, track, AllOf(track), loss, {}, &settled.place);
+      RefinePosition(scene, track, AllOf(track), loss, {}, &settled.position);
   return settled;
 }
 
@@ -149,38 +149,38 @@ SettledPlace SettlePlace(const LandmarkScene& scene,
 std::optional<ScreenedLandmark> AssessLandmark(const LandmarkScene& scene,
                                                const Track& track,
                                                const Thresholds& thresholds,
-                                               const SettledPlace& settled) {
+                                               const SettledPosition& settled) {
   const double sigma = InverseDepthSigma(settled.refined.information);
   const double weight = 2 * (1 - sigma / thresholds.max_inverse_depth_sigma);
   Selected selected = Select(scene,
                              track,
-                             settled.place,
+                             settled.position,
                              thresholds.loss.gate * scene.pixel_sigma_px());
   if (settled.refined.behind || !EnoughLeft(selected) || !(weight > 0)) {
     return std::nullopt;
   }
   return ScreenedLandmark{
-      0, settled.place, std::min(weight, 1.0), std::move(selected.used)};
+      0, settled.position, std::min(weight, 1.0), std::move(selected.used)};
 }
 
 Screening Screen(const LandmarkScene& scene,
                  const CalibrationProblem& problem,
                  const CalibrateOptions& options,
-                 const std::vector<TrackPlaces>& places) {
-  const Thresholds thresholds = FindThresholds(scene, options, problem, places);
+                 const std::vector<TrackPositions>& positions) {
+  const Thresholds thresholds = FindThresholds(scene, options, problem, positions);
 
   Screening result;
   result.loss = thresholds.loss;
-  for (std::size_t t = 0; t < places.size(); ++t) {
+  for (std::size_t t = 0; t < positions.size(); ++t) {
     const Track& track = problem.tracks[t];
     const auto observed = static_cast<int>(track.observations.size());
     std::optional<ScreenedLandmark> landmark;
-    if (places[t].found) {
-      SettledPlace settled =
-          SettlePlace(scene, track, thresholds.loss, *places[t].found);
-      if (places[t].other) {
-        SettledPlace other =
-            SettlePlace(scene, track, thresholds.loss, *places[t].other);
+    if (positions[t].found) {
+      SettledPosition settled =
+          SettlePosition(scene, track, thresholds.loss, *positions[t].found);
+      if (positions[t].other) {
+        SettledPosition other =
+            SettlePosition(scene, track, thresholds.loss, *positions[t].other);
         if (other.refined.cost < settled.refined.cost) settled = other;
       }
       landmark = AssessLandmark(scene, track, thresholds, settled);
@@ -223,20 +223,20 @@ void LimitWeights(const CalibrationProblem& problem,
 
 // Previous position of a track, with a new anchor; it is the position found if
 // the whole track lies within the gate there.
-TrackPlaces PlacesBefore(const LandmarkScene& scene,
+TrackPositions PositionsBefore(const LandmarkScene& scene,
                          const Track& track,
-                         const LandmarkPlace& before,
+                         const LandmarkPosition& before,
                          double gate_px,
                          bool keep_other) {
   const Eigen::Vector4d point_G = before.Homogeneous();
   const std::vector<double> norms_px = ResidualNorms(scene, track, point_G);
-  TrackPlaces places;
+  TrackPositions positions;
   if (*std::max_element(norms_px.begin(), norms_px.end()) <= gate_px) {
-    places.found = PlaceAt(scene, track, point_G);
+    positions.found = PositionAt(scene, track, point_G);
   } else if (keep_other) {
-    places.other = PlaceAt(scene, track, point_G);
+    positions.other = PositionAt(scene, track, point_G);
   }
-  return places;
+  return positions;
 }
 
 }  // namespace
@@ -259,27 +259,27 @@ Screening ScreenLandmarks(const Rig& rig,
                           const CalibrateOptions& options,
                           const Screening* before) {
   const LandmarkScene scene(theta, keyframes, motions, rig.pixel_sigma_px);
-  std::vector<TrackPlaces> places(problem.tracks.size());
+  std::vector<TrackPositions> positions(problem.tracks.size());
   const int screenings = before != nullptr ? before->screenings + 1 : 1;
   const bool settle = screenings > kFreeScreenings;
   if (before != nullptr) {
     for (const ScreenedLandmark& landmark : before->landmarks) {
-      places[landmark.track] =
-          PlacesBefore(scene,
+      positions[landmark.track] =
+          PositionsBefore(scene,
                        problem.tracks[landmark.track],
-                       landmark.place,
+                       landmark.position,
                        before->loss.gate * rig.pixel_sigma_px,
                        settle);
     }
   }
-  for (std::size_t t = 0; t < places.size(); ++t) {
+  for (std::size_t t = 0; t < positions.size(); ++t) {
     const Track& track = problem.tracks[t];
-    if (!places[t].found &&
+    if (!positions[t].found &&
         track.observations.size() >= kMinTrackObservations) {
-      places[t].found = TriangulateTrack(scene, track);
+      positions[t].found = TriangulateTrack(scene, track);
     }
   }
-  Screening result = Screen(scene, problem, options, places);
+  Screening result = Screen(scene, problem, options, positions);
   result.screenings = screenings;
   if (before != nullptr) {
     SetTrackNoise(before->track_noise_factor, &result);
@@ -300,8 +300,8 @@ void RefineOnWhatIsUsed(const Rig& rig,
   for (ScreenedLandmark& landmark : screening->landmarks) {
     const Track& track = problem.tracks[landmark.track];
     if (!InFull(landmark.used, track)) {
-      RefinePlace(
-          scene, track, landmark.used, screening->loss, {}, &landmark.place);
+      RefinePosition(
+          scene, track, landmark.used, screening->loss, {}, &landmark.position);
     }
   }
 }
@@ -319,7 +319,7 @@ ReprojectionStatistics MeasureReprojection(
   int used = 0;
   for (const ScreenedLandmark& landmark : landmarks) {
     const std::vector<double> norms = ResidualNorms(
-        scene, problem.tracks[landmark.track], landmark.place.Homogeneous());
+        scene, problem.tracks[landmark.track], landmark.position.Homogeneous());
     std::copy_if(norms.begin(),
                  norms.end(),
                  std::back_inserter(projected_px),

@@ -52,7 +52,7 @@ inline constexpr int kFreeScreenings = 10;
 
 struct ScreenedLandmark {
   int track = 0;  // index into CalibrationProblem::tracks
-  LandmarkPlace place;
+  LandmarkPosition position;
   // Weight in (0, 1] of all factors of the landmark.
   double weight = 1;
   std::vector<UsedObservation> used;

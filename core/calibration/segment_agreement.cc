@@ -53,7 +53,7 @@ MotionSegment AtEstimate(const MotionSegment& segment,
       at.observations.resize(before);
       continue;
     }
-    at.landmarks.push_back({track.id, landmark.place.Point()});
+    at.landmarks.push_back({track.id, landmark.position.Point()});
   }
   return at;
 }

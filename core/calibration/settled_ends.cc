@@ -59,13 +59,13 @@ MotionSegment At(const MotionSegment& segment,
                  const std::vector<ScreenedLandmark>& landmarks) {
   MotionSegment at = segment;
   at.keyframes = estimate.keyframes;
-  std::unordered_map<std::uint64_t, Eigen::Vector3d> places;
+  std::unordered_map<std::uint64_t, Eigen::Vector3d> positions;
   for (const ScreenedLandmark& landmark : landmarks) {
-    places.emplace(problem.tracks[landmark.track].id, landmark.place.Point());
+    positions.emplace(problem.tracks[landmark.track].id, landmark.position.Point());
   }
   for (Landmark& landmark : at.landmarks) {
-    const auto found = places.find(landmark.id);
-    if (found != places.end()) landmark.p_G = found->second;
+    const auto found = positions.find(landmark.id);
+    if (found != positions.end()) landmark.p_G = found->second;
   }
   return at;
 }

@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include "core/calibration/landmark_place.h"
+#include "core/calibration/landmark_position.h"
 #include "core/calibration/theta_information.h"
 #include "core/model/so3.h"
 
@@ -84,7 +84,7 @@ double NextLength(double length, double rise, double slope) {
 // A trial point of the line search, with its cost.
 struct Trial {
   CalibrationEstimate estimate;
-  std::vector<LandmarkPlace> places;
+  std::vector<LandmarkPosition> positions;
   double cost = 0;
 };
 
@@ -124,7 +124,7 @@ double Evaluate(const SolverRound& round,
                 const CalibrationEstimate& estimate,
                 const std::vector<ScreenedLandmark>& landmarks,
                 const RefineLimits& limits,
-                std::vector<LandmarkPlace>* places) {
+                std::vector<LandmarkPosition>* positions) {
   const Calibration theta = BoxPlus(round.reference, estimate.d);
   double sum = MotionSquares(round, roots, theta, estimate.keyframes);
   if (round.prior_information != nullptr) {
@@ -134,25 +134,25 @@ double Evaluate(const SolverRound& round,
       theta, estimate.keyframes, round.motions, round.rig.pixel_sigma_px);
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     sum += landmarks[i].weight *
-           RefinePlace(scene,
+           RefinePosition(scene,
                        round.problem.tracks[landmarks[i].track],
                        landmarks[i].used,
                        round.loss,
                        limits,
-                       &(*places)[i])
+                       &(*positions)[i])
                .cost;
   }
   return sum / 2;
 }
 
-std::vector<LandmarkPlace> Places(
+std::vector<LandmarkPosition> Positions(
     const std::vector<ScreenedLandmark>& landmarks) {
-  std::vector<LandmarkPlace> places;
-  places.reserve(landmarks.size());
+  std::vector<LandmarkPosition> positions;
+  positions.reserve(landmarks.size());
   for (const ScreenedLandmark& landmark : landmarks) {
-    places.push_back(landmark.place);
+    positions.push_back(landmark.position);
   }
-  return places;
+  return positions;
 }
 
 }  // namespace
@@ -160,9 +160,9 @@ std::vector<LandmarkPlace> Places(
 double RoundCost(const SolverRound& round,
                  const CalibrationEstimate& estimate,
                  const std::vector<ScreenedLandmark>& landmarks) {
-  std::vector<LandmarkPlace> places = Places(landmarks);
+  std::vector<LandmarkPosition> positions = Positions(landmarks);
   return Evaluate(
-      round, RootsOf(round), estimate, landmarks, {.steps = 0}, &places);
+      round, RootsOf(round), estimate, landmarks, {.steps = 0}, &positions);
 }
 
 bool LineariseFactors(const SolverRound& round,
@@ -222,7 +222,7 @@ class LineSearch {
         direction_(FirstStep(round, linearised)),
         estimate_(estimate),
         landmarks_(landmarks),
-        places_(Places(landmarks)) {}
+        positions_(Positions(landmarks)) {}
 
   // Returns the trial point of lowest cost, which may be above that of the
   // start. Further lengths are tried until one decreases the cost.
@@ -253,13 +253,13 @@ class LineSearch {
   }
 
   Trial At(double length) const {
-    Trial trial{estimate_, places_, 0};
+    Trial trial{estimate_, positions_, 0};
     trial.estimate.d += length * direction_.d;
     for (std::size_t k = 0; k < direction_.keyframes.size(); ++k) {
       Move(length * direction_.keyframes[k], &trial.estimate.keyframes[k]);
     }
     for (std::size_t i = 0; i < direction_.landmarks.size(); ++i) {
-      trial.places[i].Move(length * direction_.landmarks[i]);
+      trial.positions[i].Move(length * direction_.landmarks[i]);
     }
     const RefineLimits limits{.decrease =
                                   kRefineDecrease * direction_.slope /
@@ -269,7 +269,7 @@ class LineSearch {
                           trial.estimate,
                           landmarks_,
                           limits,
-                          &trial.places);
+                          &trial.positions);
     return trial;
   }
 
@@ -278,7 +278,7 @@ class LineSearch {
   const Direction direction_;
   const CalibrationEstimate& estimate_;
   const std::vector<ScreenedLandmark>& landmarks_;
-  const std::vector<LandmarkPlace> places_;
+  const std::vector<LandmarkPosition> positions_;
   double length_ = 0;
 };
 
@@ -308,25 +308,25 @@ StepOutcome TakeStep(const SolverRound& round,
   }
   *estimate = std::move(best.estimate);
   for (std::size_t i = 0; i < landmarks->size(); ++i) {
-    (*landmarks)[i].place = best.places[i];
+    (*landmarks)[i].position = best.positions[i];
   }
   return {true, best.cost};
 }
 
-void GoAlong(const LinearisedRound& linearised,
+void ApplyStep(const LinearisedRound& linearised,
              const Eigen::VectorXd& step_d,
              CalibrationEstimate* estimate,
              std::vector<ScreenedLandmark>* landmarks) {
   std::vector<ChainStateVector> keyframes;
-  std::vector<Eigen::Vector3d> places;
+  std::vector<Eigen::Vector3d> positions;
   linearised.system.FindSteps(
-      linearised.theta_by_offset * step_d, &keyframes, &places);
+      linearised.theta_by_offset * step_d, &keyframes, &positions);
   estimate->d += step_d;
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
     Move(keyframes[k], &estimate->keyframes[k]);
   }
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    (*landmarks)[i].place.Move(places[i]);
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    (*landmarks)[i].position.Move(positions[i]);
   }
 }
 

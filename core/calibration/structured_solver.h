@@ -59,7 +59,7 @@ StepOutcome TakeStep(const SolverRound& round,
                      std::vector<ScreenedLandmark>* landmarks);
 
 // Moves d by a step, and all other unknowns by the back-substituted steps.
-void GoAlong(const LinearisedRound& linearised,
+void ApplyStep(const LinearisedRound& linearised,
              const Eigen::VectorXd& step_d,
              CalibrationEstimate* estimate,
              std::vector<ScreenedLandmark>* landmarks);

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "core/calibration/landmark_place.h"
+#include "core/calibration/landmark_position.h"
 #include "core/factor/reprojection.h"
 
 namespace selfcal {
@@ -58,11 +58,11 @@ struct TrackSums {
 };
 
 // Derivative of the homogeneous point with respect to (alpha, beta, rho).
-Eigen::Matrix<double, 4, 3> PointByPlace(const LandmarkPlace& place) {
-  Eigen::Matrix<double, 4, 3> by_place = Eigen::Matrix<double, 4, 3>::Zero();
-  by_place.topLeftCorner<3, 2>() = place.anchor.R_GA.leftCols<2>();
-  by_place.col(2) << place.anchor.a_G, 1;
-  return by_place;
+Eigen::Matrix<double, 4, 3> PointByPosition(const LandmarkPosition& position) {
+  Eigen::Matrix<double, 4, 3> by_position = Eigen::Matrix<double, 4, 3>::Zero();
+  by_position.topLeftCorner<3, 2>() = position.anchor.R_GA.leftCols<2>();
+  by_position.col(2) << position.anchor.a_G, 1;
+  return by_position;
 }
 
 class TrackSummer {
@@ -78,8 +78,8 @@ class TrackSummer {
   TrackSums Sum(const ScreenedLandmark& landmark) const {
     const Eigen::Index D = directions_.theta.cols();
     const Track& track = round_.problem.tracks[landmark.track];
-    const Eigen::Vector4d point_G = landmark.place.Homogeneous();
-    const Eigen::Matrix<double, 4, 3> by_place = PointByPlace(landmark.place);
+    const Eigen::Vector4d point_G = landmark.position.Homogeneous();
+    const Eigen::Matrix<double, 4, 3> by_position = PointByPosition(landmark.position);
     TrackSums sums;
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(D);
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -92,7 +92,7 @@ class TrackSummer {
       if (!row) continue;
       const double s = row->r.squaredNorm();
       const double weight = used.weight * round_.loss.Weight(s);
-      const Eigen::Matrix<double, 2, 3> by_landmark = row->by_point * by_place;
+      const Eigen::Matrix<double, 2, 3> by_landmark = row->by_point * by_position;
       const double square = row->along.squaredNorm();
       gradient += weight * row->along.transpose() * row->r;
       H += weight * by_landmark.transpose() * by_landmark;

@@ -66,7 +66,7 @@ std::optional<Eigen::Vector4d> IntersectRays(const Ray& a, const Ray& b) {
 
 }  // namespace
 
-std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
+std::optional<LandmarkPosition> TriangulateTrack(const LandmarkScene& scene,
                                               const Track& track) {
   const std::vector<Ray> rays = SpreadRays(scene, track);
   double best_px = std::numeric_limits<double>::infinity();
@@ -94,17 +94,17 @@ std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
   if (!std::isfinite(best_px)) {
     return std::nullopt;
   }
-  LandmarkPlace place = PlaceAt(scene, track, best_G);
+  LandmarkPosition position = PositionAt(scene, track, best_G);
   const double robust_sigmas =
       std::max(1.0, best_px / kMedianOfRayleigh / scene.pixel_sigma_px());
-  RefinePlace(
+  RefinePosition(
       scene,
       track,
       AllOf(track),
       {.kind = LossKind::kCauchy, .scale = kSearchLossScale * robust_sigmas},
       {},
-      &place);
-  return place;
+      &position);
+  return position;
 }
 
 }  // namespace selfcal

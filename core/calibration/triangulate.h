@@ -7,7 +7,7 @@
 
 #include <optional>
 
-#include "core/calibration/landmark_place.h"
+#include "core/calibration/landmark_position.h"
 #include "core/calibration/problem.h"
 
 namespace selfcal {
@@ -16,7 +16,7 @@ namespace selfcal {
 // nearly half of the observations may be outliers, and refines it with a loss
 // that gives gross errors no weight. Returns nullopt if no pair of rays gives a
 // point in front of the cameras.
-std::optional<LandmarkPlace> TriangulateTrack(const LandmarkScene& scene,
+std::optional<LandmarkPosition> TriangulateTrack(const LandmarkScene& scene,
                                               const Track& track);
 
 }  // namespace selfcal

@@ -37,7 +37,7 @@ std::vector<std::pair<std::string, std::string>> RunSettings(
       {"correlated_tracks", YesNo(options.correlated_tracks)},
       {"noise_factors", YesNo(options.noise_scales)},
       {"reweight_noise", YesNo(options.reweight_noise)},
-      {"leave_out_contradictions", YesNo(options.leave_out_contradictions)},
+      {"exclude_contradictions", YesNo(options.exclude_contradictions)},
       {"merge_landmarks", fmt::format("{}", options.merge_landmarks)},
       {"solver",
        options.solver == SolverKind::kStructured ? "structured" : "ceres"},

@@ -47,7 +47,7 @@ void PutOptions(const CalibrateOptions& options, worker::Options* message) {
   message->set_merge_landmarks(options.merge_landmarks);
   message->set_solver(static_cast<int>(options.solver));
   message->set_threads(options.threads);
-  message->set_leave_out_contradictions(options.leave_out_contradictions);
+  message->set_exclude_contradictions(options.exclude_contradictions);
   PutRemembered(options, message);
 }
 
@@ -90,7 +90,7 @@ bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
   options->merge_landmarks = message.merge_landmarks();
   options->solver = static_cast<SolverKind>(message.solver());
   options->threads = message.threads();
-  options->leave_out_contradictions = message.leave_out_contradictions();
+  options->exclude_contradictions = message.exclude_contradictions();
   return GetRemembered(message, options);
 }
 

@@ -152,7 +152,7 @@ void RunChangeRecalibrations(const std::vector<ChangeDevice>& devices,
                               {.prior = KnownAfter(device, sent)});
     // All of them: a calibration by itself would leave out the minority.
     mixed[i] = CalibrateAfter(
-        device, Kept(device.rig, sent, 0), {.leave_out_contradictions = false});
+        device, Kept(device.rig, sent, 0), {.exclude_contradictions = false});
   });
   ResultTable table({"calibration after a turn of 0.5 deg",
                      "runs",

@@ -280,7 +280,7 @@ class DenseRound {
   void AddLandmark(std::size_t m) {
     const ScreenedLandmark& landmark = solved_.landmarks[m];
     const Track& track = solved_.problem.tracks[landmark.track];
-    const Eigen::Vector4d point = landmark.place.Homogeneous();
+    const Eigen::Vector4d point = landmark.position.Homogeneous();
     const int column = landmark_column_ + 3 * static_cast<int>(m);
     shares_.emplace_back();
     for (const UsedObservation& used : landmark.used) {
@@ -313,10 +313,10 @@ class DenseRound {
             scale * point.w() * J.landmark.row(i).head<3>();
       }
     }
-    const double rho = landmark.place.inverse_depth.z();
+    const double rho = landmark.position.inverse_depth.z();
     const double scale = std::sqrt(Weight(landmark)) / kInverseDepthSigma;
     AddRow(scale * rho).J.segment<3>(column) =
-        -scale * rho * rho * landmark.place.anchor.R_GA.col(2).transpose();
+        -scale * rho * rho * landmark.position.anchor.R_GA.col(2).transpose();
   }
 
   const Solved& solved_;

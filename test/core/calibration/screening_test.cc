@@ -34,7 +34,7 @@ void VisitUsed(const ScreenedSession& session, const Visitor& visit) {
       const TrackObservation& seen = track.observations[used.index];
       Eigen::Vector2d r_px;
       ASSERT_TRUE(
-          scene.Residual(seen, landmark.place.Homogeneous(), &r_px, nullptr));
+          scene.Residual(seen, landmark.position.Homogeneous(), &r_px, nullptr));
       const Eigen::Vector2d z_px = seen.z_px + r_px;
       const Eigen::Vector4d distances(z_px.x(),
                                       z_px.y(),

@@ -131,11 +131,11 @@ TEST(Contradictions, AreFoundWhenTheyPreventConvergence) {
   session.segments[kWrong] = Simulated(4, 77).segments[kWrong];
   CalibrateOptions options;
   options.max_iterations = 8;
-  options.leave_out_contradictions = false;
+  options.exclude_contradictions = false;
   const CalibrationResult with_it =
       Calibrate(session.rig, session.rig.factory, session.segments, options);
   ASSERT_EQ(with_it.status, CalibrateStatus::kNotConverged);
-  options.leave_out_contradictions = true;
+  options.exclude_contradictions = true;
   const CalibrationResult without_it =
       Calibrate(session.rig, session.rig.factory, session.segments, options);
   EXPECT_EQ(without_it.status, CalibrateStatus::kConverged);

@@ -209,7 +209,7 @@ class Posed {
       for (int j = 0; j < 3; ++j) {
         expect_middle(
             [&](double by, Solved* s) {
-              s->landmarks[i].place.inverse_depth(j) += by;
+              s->landmarks[i].position.inverse_depth(j) += by;
             },
             1e-3);
       }

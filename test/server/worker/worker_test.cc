@@ -166,7 +166,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   options_.noise_scales = false;
   options_.reweight_noise = true;
   options_.merge_landmarks = 3;
-  options_.leave_out_contradictions = false;
+  options_.exclude_contradictions = false;
   options_.solver = SolverKind::kCeres;
   options_.threads = 2;
   options_.remembered = {
@@ -194,7 +194,7 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   EXPECT_FALSE(job->options.noise_scales);
   EXPECT_TRUE(job->options.reweight_noise);
   EXPECT_EQ(job->options.merge_landmarks, 3);
-  EXPECT_FALSE(job->options.leave_out_contradictions);
+  EXPECT_FALSE(job->options.exclude_contradictions);
   EXPECT_EQ(job->options.solver, SolverKind::kCeres);
   EXPECT_EQ(job->options.threads, 2);
   ASSERT_EQ(job->options.remembered.size(), 2u);

@@ -83,7 +83,7 @@ class LandmarkScene {
 
 // A landmark by inverse depth from the camera that observed it first, with the
 // depth axis pointing at it.
-struct LandmarkPlace {
+struct LandmarkPosition {
   LandmarkAnchor anchor;
   Eigen::Vector3d inverse_depth = Eigen::Vector3d::Zero();
 
@@ -108,15 +108,15 @@ struct LandmarkPrior {
 };
 
 // The prior on inverse depth, times a weight, linearised at a position.
-LandmarkPrior InverseDepthPrior(const LandmarkPlace& place, double weight);
+LandmarkPrior InverseDepthPrior(const LandmarkPosition& position, double weight);
 
 // Converts a step of p_G = a + R (alpha, beta, 1) / rho to one of (alpha, beta,
 // rho), to first order.
-Eigen::Vector3d InverseDepthStep(const LandmarkPlace& place,
+Eigen::Vector3d InverseDepthStep(const LandmarkPosition& position,
                                  const Eigen::Vector3d& step_G);
 
 // Position of a homogeneous point in G, anchored at the track's first camera.
-LandmarkPlace PlaceAt(const LandmarkScene& scene,
+LandmarkPosition PositionAt(const LandmarkScene& scene,
                       const Track& track,
                       const Eigen::Vector4d& point_G);
 
@@ -134,7 +134,7 @@ struct RefineLimits {
   double decrease = 1e-8;
 };
 
-struct RefinedPlace {
+struct RefinedPosition {
   Eigen::Matrix3d information;  // of (alpha, beta, rho)
   double cost = 0;  // sum of the loss and of the prior on inverse depth
   // The minimum lies further beyond infinity than is allowed; the position is
@@ -150,12 +150,12 @@ inline constexpr double kNotProjectedSigmas = 1e3;
 // prior on inverse depth, by damped Gauss-Newton, with the landmark in front of
 // its anchor camera. If the start is behind that camera, the search starts at
 // infinity.
-RefinedPlace RefinePlace(const LandmarkScene& scene,
+RefinedPosition RefinePosition(const LandmarkScene& scene,
                          const Track& track,
                          std::span<const UsedObservation> used,
                          const RobustLoss& loss,
                          const RefineLimits& limits,
-                         LandmarkPlace* place);
+                         LandmarkPosition* position);
 
 // All observations of the track, with full weight.
 std::vector<UsedObservation> AllOf(const Track& track);

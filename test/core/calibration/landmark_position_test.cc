@@ -1,4 +1,4 @@
-#include "core/calibration/landmark_place.h"
+#include "core/calibration/landmark_position.h"
 
 #include <gtest/gtest.h>
 
@@ -76,38 +76,38 @@ class TwoViews : public ::testing::Test {
     return track;
   }
 
-  RefinedPlace Refine(const Track& track, const Eigen::Vector4d& from_G) {
+  RefinedPosition Refine(const Track& track, const Eigen::Vector4d& from_G) {
     const LandmarkScene scene(rig_.factory, keyframes_, motions_, 1);
-    place_ = PlaceAt(scene, track, from_G);
-    return RefinePlace(
-        scene, track, AllOf(track), {.kind = LossKind::kNone}, {}, &place_);
+    position_ = PositionAt(scene, track, from_G);
+    return RefinePosition(
+        scene, track, AllOf(track), {.kind = LossKind::kNone}, {}, &position_);
   }
 
   Rig rig_ = HandheldRig("r");
   std::vector<KeyframeState> keyframes_ = std::vector<KeyframeState>(2);
   const KeyframeMotions motions_;
-  LandmarkPlace place_;
+  LandmarkPosition position_;
 };
 
 TEST_F(TwoViews, APointInFrontIsFound) {
   const Eigen::Vector4d point(0.1, 0.2, 2, 1);
   EXPECT_FALSE(Refine(Seen(point), {0.1, 0.2, 5, 1}).behind);
   EXPECT_TRUE(
-      place_.Homogeneous().hnormalized().isApprox(point.hnormalized(), 1e-3));
+      position_.Homogeneous().hnormalized().isApprox(point.hnormalized(), 1e-3));
 }
 
 // A mirrored point, as a reversed lever arm makes of all points, has the same
 // rays and lies beyond infinity.
 TEST_F(TwoViews, AMirroredPointIsHeldNearInfinity) {
   const Eigen::Vector4d mirrored(0.1, 0.2, 2, -1);
-  const RefinedPlace refined = Refine(Seen(mirrored), {0.1, 0.2, 20, 1});
+  const RefinedPosition refined = Refine(Seen(mirrored), {0.1, 0.2, 20, 1});
   EXPECT_TRUE(refined.behind);
   const double sigma = std::sqrt(refined.information.inverse()(2, 2));
-  EXPECT_GT(place_.inverse_depth.z(), -2.5 * sigma);
+  EXPECT_GT(position_.inverse_depth.z(), -2.5 * sigma);
   EXPECT_GT(refined.cost, 100);
   // Also from the position to which its residuals pull it.
   EXPECT_TRUE(Refine(Seen(mirrored), mirrored).behind);
-  EXPECT_GT(place_.inverse_depth.z(), -2.5 * sigma);
+  EXPECT_GT(position_.inverse_depth.z(), -2.5 * sigma);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "core/calibration/landmark_place.h"
+#include "core/calibration/landmark_position.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -26,18 +26,18 @@ Linearised Linearise(const LandmarkScene& scene,
                      const Track& track,
                      std::span<const UsedObservation> used,
                      const RobustLoss& loss,
-                     const LandmarkPlace& place) {
+                     const LandmarkPosition& position) {
   Linearised sum;
-  const Eigen::Vector4d point_G = place.Homogeneous();
+  const Eigen::Vector4d point_G = position.Homogeneous();
   const double prior = 1 / (kInverseDepthSigma * kInverseDepthSigma);
-  const double rho = place.inverse_depth.z();
+  const double rho = position.inverse_depth.z();
   sum.cost = prior * rho * rho;
   sum.H(2, 2) = prior;
   sum.g(2) = prior * rho;
   const double scale = 1 / scene.pixel_sigma_px();
   Eigen::Vector2d r;
   Eigen::Matrix<double, 2, 3> by_p_C;
-  Eigen::Matrix3d p_C_by_place;
+  Eigen::Matrix3d p_C_by_position;
   for (const UsedObservation& one : used) {
     const TrackObservation& seen = track.observations[one.index];
     if (!scene.Residual(seen, point_G, &r, &by_p_C)) {
@@ -48,9 +48,9 @@ Linearised Linearise(const LandmarkScene& scene,
     ++sum.projected;
     r *= scale;
     const Eigen::Matrix3d& R_CG = scene.R_CG(seen);
-    p_C_by_place.leftCols<2>() = R_CG * place.anchor.R_GA.leftCols<2>();
-    p_C_by_place.col(2) = R_CG * place.anchor.a_G + scene.p_CG(seen);
-    const Eigen::Matrix<double, 2, 3> J = scale * by_p_C * p_C_by_place;
+    p_C_by_position.leftCols<2>() = R_CG * position.anchor.R_GA.leftCols<2>();
+    p_C_by_position.col(2) = R_CG * position.anchor.a_G + scene.p_CG(seen);
+    const Eigen::Matrix<double, 2, 3> J = scale * by_p_C * p_C_by_position;
     const double s = r.squaredNorm();
     const double weight = one.weight * loss.Weight(s);
     sum.cost += one.weight * loss.Value(s);
@@ -128,12 +128,12 @@ bool LandmarkScene::Residual(const TrackObservation& seen,
   return true;
 }
 
-Eigen::Vector3d LandmarkPlace::Point() const {
+Eigen::Vector3d LandmarkPosition::Point() const {
   const Eigen::Vector4d point = Homogeneous();
   return point.head<3>() / std::max(point(3), kLeastInverseDepth);
 }
 
-void LandmarkPlace::Move(const Eigen::Vector3d& step) {
+void LandmarkPosition::Move(const Eigen::Vector3d& step) {
   const double rho = inverse_depth.z();
   if (std::abs(step.z()) > kMaxRelativeStep * rho) {
     inverse_depth += step;
@@ -146,49 +146,49 @@ void LandmarkPlace::Move(const Eigen::Vector3d& step) {
   inverse_depth << point.head<2>() / point.z(), rho / point.z();
 }
 
-LandmarkPrior InverseDepthPrior(const LandmarkPlace& place, double weight) {
-  const double rho = place.inverse_depth.z();
-  const Eigen::Vector3d rho_by_p = -rho * rho * place.anchor.R_GA.col(2);
+LandmarkPrior InverseDepthPrior(const LandmarkPosition& position, double weight) {
+  const double rho = position.inverse_depth.z();
+  const Eigen::Vector3d rho_by_p = -rho * rho * position.anchor.R_GA.col(2);
   const double information =
       weight * (1 / (kInverseDepthSigma * kInverseDepthSigma));
   return {information * rho_by_p * rho_by_p.transpose(),
           information * rho * rho_by_p};
 }
 
-Eigen::Vector3d InverseDepthStep(const LandmarkPlace& place,
+Eigen::Vector3d InverseDepthStep(const LandmarkPosition& position,
                                  const Eigen::Vector3d& step_G) {
-  const double rho = place.inverse_depth.z();
-  const Eigen::Vector3d q = rho * (place.anchor.R_GA.transpose() * step_G);
-  return {q.x() - place.inverse_depth.x() * q.z(),
-          q.y() - place.inverse_depth.y() * q.z(),
+  const double rho = position.inverse_depth.z();
+  const Eigen::Vector3d q = rho * (position.anchor.R_GA.transpose() * step_G);
+  return {q.x() - position.inverse_depth.x() * q.z(),
+          q.y() - position.inverse_depth.y() * q.z(),
           -rho * q.z()};
 }
 
-LandmarkPlace PlaceAt(const LandmarkScene& scene,
+LandmarkPosition PositionAt(const LandmarkScene& scene,
                       const Track& track,
                       const Eigen::Vector4d& point_G) {
   const TrackObservation& first = track.observations.front();
-  LandmarkPlace place;
-  place.anchor.a_G = -(scene.R_CG(first).transpose() * scene.p_CG(first));
-  const Eigen::Vector3d ray = point_G.head<3>() - point_G(3) * place.anchor.a_G;
-  place.anchor.R_GA =
+  LandmarkPosition position;
+  position.anchor.a_G = -(scene.R_CG(first).transpose() * scene.p_CG(first));
+  const Eigen::Vector3d ray = point_G.head<3>() - point_G(3) * position.anchor.a_G;
+  position.anchor.R_GA =
       Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), ray)
           .toRotationMatrix();
-  place.inverse_depth = {0, 0, point_G(3) / ray.norm()};
-  return place;
+  position.inverse_depth = {0, 0, point_G(3) / ray.norm()};
+  return position;
 }
 
-RefinedPlace RefinePlace(const LandmarkScene& scene,
+RefinedPosition RefinePosition(const LandmarkScene& scene,
                          const Track& track,
                          std::span<const UsedObservation> used,
                          const RobustLoss& loss,
                          const RefineLimits& limits,
-                         LandmarkPlace* place) {
-  Linearised here = Linearise(scene, track, used, loss, *place);
+                         LandmarkPosition* position) {
+  Linearised here = Linearise(scene, track, used, loss, *position);
   double least = LeastInverseDepth(here.H);
-  if (limits.steps > 0 && place->inverse_depth.z() < 2 * least) {
-    place->inverse_depth.z() = 0;
-    here = Linearise(scene, track, used, loss, *place);
+  if (limits.steps > 0 && position->inverse_depth.z() < 2 * least) {
+    position->inverse_depth.z() = 0;
+    here = Linearise(scene, track, used, loss, *position);
     least = LeastInverseDepth(here.H);
   }
   bool behind = false;
@@ -202,7 +202,7 @@ RefinedPlace RefinePlace(const LandmarkScene& scene,
     H.diagonal() *= 1 + damping;
     H.diagonal().array() += std::numeric_limits<double>::min();
     Eigen::Vector3d step = -H.ldlt().solve(here.g);
-    const double room = least - place->inverse_depth.z();
+    const double room = least - position->inverse_depth.z();
     behind = stretch * step.z() < room;
     if (behind) {
       stretch = 1;
@@ -211,13 +211,13 @@ RefinedPlace RefinePlace(const LandmarkScene& scene,
     if (!step.allFinite() || -step.dot(here.g) < limits.decrease) {
       break;
     }
-    LandmarkPlace next = *place;
+    LandmarkPosition next = *position;
     next.inverse_depth += stretch * step;
     const Linearised there = Linearise(scene, track, used, loss, next);
     if (there.projected >= here.projected && there.cost < here.cost) {
       const double predicted = -stretch * (2 - stretch) * step.dot(here.g);
       stretch = here.cost - there.cost > predicted ? 2 * stretch : 1;
-      *place = next;
+      *position = next;
       here = there;
       least = LeastInverseDepth(here.H);
       damping *= 0.1;
