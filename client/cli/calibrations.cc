@@ -14,15 +14,18 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::CalibrationService::StubInterface;
+using CalibrationService = v1::CalibrationService::StubInterface;
 
-int List(Context* context, const std::string& rig) {
+int ListCalibrations(Context* context, const std::string& rig) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::ListCalibrationsRequest request;
   request.set_parent(RigName(rig));
   v1::ListCalibrationsResponse calibrations;
-  const auto status = CallForAllPages<Service>(
-      stub.get(), &Service::ListCalibrations, request, &calibrations);
+  const auto status =
+      CallForAllPages<CalibrationService>(stub.get(),
+                                          &CalibrationService::ListCalibrations,
+                                          request,
+                                          &calibrations);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(calibrations);
@@ -46,13 +49,15 @@ int List(Context* context, const std::string& rig) {
   return kDone;
 }
 
-int Show(Context* context, const std::string& rig, const std::string& version) {
+int ShowCalibration(Context* context,
+                    const std::string& rig,
+                    const std::string& version) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::GetCalibrationRequest request;
   request.set_name(ChildName(rig, "calibrations", version));
   v1::Calibration calibration;
-  const auto status = Call<Service>(
-      stub.get(), &Service::GetCalibration, request, &calibration);
+  const auto status = Call<CalibrationService>(
+      stub.get(), &CalibrationService::GetCalibration, request, &calibration);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(calibration);
@@ -73,8 +78,11 @@ int Activate(Context* context,
   request.set_name(ChildName(rig, "calibrations", version));
   request.set_reason(reason);
   v1::Calibration calibration;
-  const auto status = Call<Service>(
-      stub.get(), &Service::ActivateCalibration, request, &calibration);
+  const auto status =
+      Call<CalibrationService>(stub.get(),
+                               &CalibrationService::ActivateCalibration,
+                               request,
+                               &calibration);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(calibration);
@@ -93,8 +101,11 @@ int Diff(Context* context,
   request.set_a(ChildName(rig, "calibrations", a));
   request.set_b(ChildName(rig, "calibrations", b));
   v1::CompareCalibrationsResponse differences;
-  const auto status = Call<Service>(
-      stub.get(), &Service::CompareCalibrations, request, &differences);
+  const auto status =
+      Call<CalibrationService>(stub.get(),
+                               &CalibrationService::CompareCalibrations,
+                               request,
+                               &differences);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(differences);
@@ -108,7 +119,9 @@ int Diff(Context* context,
 
 // Prints `count` versions or, if `count` is 0, continues until the daemon ends
 // the stream.
-int Watch(Context* context, const std::string& rig, std::int64_t count) {
+int WatchCalibrations(Context* context,
+                      const std::string& rig,
+                      std::int64_t count) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   grpc::ClientContext call;
   v1::WatchCalibrationRequest request;
@@ -145,7 +158,9 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
       calibrations->add_subcommand("list", "List the versions, newest first");
   list->add_option("RIG", *rig)->required();
   list->callback([context, rig] {
-    context->command = [context, rig] { return List(context, *rig); };
+    context->command = [context, rig] {
+      return ListCalibrations(context, *rig);
+    };
   });
 
   const auto version = std::make_shared<std::string>("active");
@@ -155,7 +170,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
       ->capture_default_str();
   show->callback([context, rig, version] {
     context->command = [context, rig, version] {
-      return Show(context, *rig, *version);
+      return ShowCalibration(context, *rig, *version);
     };
   });
 
@@ -199,7 +214,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
       ->check(CLI::PositiveNumber);
   watch->callback([context, rig, count] {
     context->command = [context, rig, count] {
-      return Watch(context, *rig, *count);
+      return WatchCalibrations(context, *rig, *count);
     };
   });
 }

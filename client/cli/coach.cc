@@ -17,8 +17,8 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::CalibrationService::StubInterface;
-using Response = v1::AdviseMotionResponse;
+using CalibrationService = v1::CalibrationService::StubInterface;
+using AdviceResponse = v1::AdviseMotionResponse;
 
 // A segment is scored every few seconds.
 constexpr std::chrono::milliseconds kPoll(1000);
@@ -28,7 +28,7 @@ std::string GainText(double gain_nats) {
 }
 
 // Returns e.g. "imu 3.10, camera 0.42".
-std::string GroupsText(const Response::Advice& advice) {
+std::string GroupsText(const AdviceResponse::Advice& advice) {
   std::vector<std::string> parts;
   for (const auto& gain : advice.group_gains()) {
     parts.push_back(
@@ -39,7 +39,7 @@ std::string GroupsText(const Response::Advice& advice) {
 
 // Returns the component whose sigma the motion reduces most, e.g.
 // "cam0.p_CI.z 0.013 -> 0.0041 m".
-std::string SharpestText(const Response::Advice& advice) {
+std::string SharpestText(const AdviceResponse::Advice& advice) {
   const auto& changes = advice.sigma_changes();
   const auto sharpest = std::min_element(
       changes.begin(), changes.end(), [](const auto& a, const auto& b) {
@@ -56,13 +56,13 @@ std::string SharpestText(const Response::Advice& advice) {
                      unit);
 }
 
-std::string KnownText(const Response& response) {
+std::string KnownText(const AdviceResponse& response) {
   return fmt::format("version {} and {} segments since",
                      response.calibration_version(),
                      response.segments_since());
 }
 
-Table AdviceTable(const Response& response) {
+Table AdviceTable(const AdviceResponse& response) {
   Table table({{"#", true},
                {"motion"},
                {"gain [nat]", true},
@@ -81,7 +81,7 @@ Table AdviceTable(const Response& response) {
   return table;
 }
 
-void Print(const Context& context, const Response& response) {
+void PrintAdvice(const Context& context, const AdviceResponse& response) {
   if (context.json) {
     context.PrintJson(response);
     return;
@@ -100,7 +100,7 @@ void Print(const Context& context, const Response& response) {
 }
 
 // Prints one line: the best motion now, and its gain.
-void PrintLine(const Context& context, const Response& response) {
+void PrintLine(const Context& context, const AdviceResponse& response) {
   if (context.json) {
     context.PrintJson(response, true);
     return;
@@ -114,43 +114,44 @@ void PrintLine(const Context& context, const Response& response) {
                         KnownText(response)));
 }
 
-grpc::Status Ask(Context* context,
-                 const std::string& rig,
-                 int top,
-                 Response* response) {
+grpc::Status AskForAdvice(Context* context,
+                          const std::string& rig,
+                          int top,
+                          AdviceResponse* response) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::AdviseMotionRequest request;
   request.set_parent(RigName(rig));
   request.set_max_advice(top);
-  return Call<Service>(stub.get(), &Service::AdviseMotion, request, response);
+  return Call<CalibrationService>(
+      stub.get(), &CalibrationService::AdviseMotion, request, response);
 }
 
 int Coach(Context* context, const std::string& rig, int top) {
-  Response response;
-  const auto status = Ask(context, rig, top, &response);
+  AdviceResponse response;
+  const auto status = AskForAdvice(context, rig, top, &response);
   if (!status.ok()) return Fail(*context, status);
-  Print(*context, response);
+  PrintAdvice(*context, response);
   return kDone;
 }
 
 // A new line is printed when the motion changes, or the information that it
 // follows from.
-using Subject = std::tuple<std::string, std::int64_t, int>;
-Subject SubjectOf(const Response& response) {
+using AdviceSubject = std::tuple<std::string, std::int64_t, int>;
+AdviceSubject SubjectOf(const AdviceResponse& response) {
   return {response.advice().empty() ? "" : response.advice(0).motion(),
           response.calibration_version(),
           response.segments_since()};
 }
 
 // Prints `count` lines or, if `count` is 0, continues until the daemon ends.
-int Watch(Context* context,
-          const std::string& rig,
-          int top,
-          std::int64_t count) {
-  Subject printed;
+int WatchAdvice(Context* context,
+                const std::string& rig,
+                int top,
+                std::int64_t count) {
+  AdviceSubject printed;
   for (std::int64_t lines = 0;;) {
-    Response response;
-    const auto status = Ask(context, rig, top, &response);
+    AdviceResponse response;
+    const auto status = AskForAdvice(context, rig, top, &response);
     if (!status.ok()) return Fail(*context, status);
     if (SubjectOf(response) != printed) {
       printed = SubjectOf(response);
@@ -181,7 +182,7 @@ void AddCoachCommand(CLI::App* app, Context* context) {
       ->check(CLI::PositiveNumber);
   coach->callback([context, rig, top, watch, count] {
     context->command = [context, rig, top, watch, count] {
-      return *watch ? Watch(context, *rig, *top, *count)
+      return *watch ? WatchAdvice(context, *rig, *top, *count)
                     : Coach(context, *rig, *top);
     };
   });

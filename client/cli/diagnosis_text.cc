@@ -14,7 +14,7 @@ google::protobuf::Value Text(std::string_view text) {
   return value;
 }
 
-google::protobuf::Value List(const std::vector<std::string>& lines) {
+google::protobuf::Value ListValue(const std::vector<std::string>& lines) {
   google::protobuf::Value value;
   value.mutable_list_value();
   for (const std::string& line : lines) {
@@ -73,8 +73,8 @@ google::protobuf::Struct DiagnosisJson(const Diagnosis& diagnosis) {
     one["remedy"] = Text(finding.remedy);
     one["value"].set_number_value(finding.value);
   }
-  fields["checked"] = List(diagnosis.checked);
-  fields["not_checked"] = List(diagnosis.not_checked);
+  fields["checked"] = ListValue(diagnosis.checked);
+  fields["not_checked"] = ListValue(diagnosis.not_checked);
   return document;
 }
 

@@ -10,15 +10,15 @@
 namespace selfcal::client {
 namespace {
 
-void Print(const Context& context,
-           const v1::CheckStoreResponse::Problem& problem) {
+void PrintChecks(const Context& context,
+                 const v1::CheckStoreResponse::Problem& problem) {
   Table line({{""}, {""}, {""}});
   line.Add({"problem", problem.place(), problem.description()});
   context.Print(line);
 }
 
-void Print(const Context& context,
-           const v1::CheckStoreResponse::Summary& summary) {
+void PrintChecks(const Context& context,
+                 const v1::CheckStoreResponse::Summary& summary) {
   Facts facts;
   facts.Add("database", BytesText(summary.bytes()));
   facts.Add("checksums", fmt::format("{}", summary.checksums()));
@@ -43,9 +43,9 @@ int Doctor(Context* context) {
     if (context->json) {
       context->PrintJson(response, /*line=*/true);
     } else if (response.has_problem()) {
-      Print(*context, response.problem());
+      PrintChecks(*context, response.problem());
     } else {
-      Print(*context, response.summary());
+      PrintChecks(*context, response.summary());
     }
   }
   const grpc::Status status = reader->Finish();

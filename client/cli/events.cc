@@ -20,11 +20,11 @@ namespace {
 
 using google::protobuf::Timestamp;
 using google::protobuf::util::TimeUtil;
-using Service = v1::StoreService::StubInterface;
+using StoreService = v1::StoreService::StubInterface;
 
 constexpr int kPageSize = 500;
 
-struct Options {
+struct EventOptions {
   std::string rig;                 // empty: all rigs
   std::vector<std::string> kinds;  // as KindName returns them; empty: all
   std::string since;
@@ -49,7 +49,7 @@ std::vector<std::string> KindNames() {
 }
 
 bool IsWanted(const v1::Event& event,
-              const Options& options,
+              const EventOptions& options,
               const std::optional<Timestamp>& since) {
   if (since && event.time() < *since) return false;
   return options.kinds.empty() ||
@@ -61,7 +61,7 @@ bool IsWanted(const v1::Event& event,
 // Reads page by page, so that a long history needs no more memory than the
 // events that are wanted.
 grpc::Status Read(Context* context,
-                  const Options& options,
+                  const EventOptions& options,
                   const std::optional<Timestamp>& since,
                   std::deque<v1::Event>* events) {
   const auto stub = v1::StoreService::NewStub(context->Channel());
@@ -70,8 +70,8 @@ grpc::Status Read(Context* context,
   request.set_page_size(kPageSize);
   do {
     v1::ListEventsResponse page;
-    const grpc::Status status =
-        Call<Service>(stub.get(), &Service::ListEvents, request, &page);
+    const grpc::Status status = Call<StoreService>(
+        stub.get(), &StoreService::ListEvents, request, &page);
     if (!status.ok()) return status;
     for (const v1::Event& event : page.events()) {
       if (IsWanted(event, options, since)) events->push_back(event);
@@ -84,7 +84,7 @@ grpc::Status Read(Context* context,
   return grpc::Status::OK;
 }
 
-void Print(const Context& context, const std::deque<v1::Event>& events) {
+void PrintEvents(const Context& context, const std::deque<v1::Event>& events) {
   if (context.json) {
     v1::ListEventsResponse document;
     for (const v1::Event& event : events) *document.add_events() = event;
@@ -102,7 +102,7 @@ void Print(const Context& context, const std::deque<v1::Event>& events) {
   context.Print(table);
 }
 
-int List(Context* context, const Options& options) {
+int ListEvents(Context* context, const EventOptions& options) {
   std::optional<Timestamp> since;
   if (!options.since.empty()) {
     const auto time = ParseTime(options.since, TimeUtil::GetCurrentTime());
@@ -112,7 +112,7 @@ int List(Context* context, const Options& options) {
   std::deque<v1::Event> events;
   const grpc::Status status = Read(context, options, since, &events);
   if (!status.ok()) return Fail(*context, status);
-  Print(*context, events);
+  PrintEvents(*context, events);
   return kDone;
 }
 
@@ -121,7 +121,7 @@ int List(Context* context, const Options& options) {
 void AddEventsCommand(CLI::App* app, Context* context) {
   CLI::App* events = app->add_subcommand(
       "events", "List the events of one rig or of all, oldest first");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EventOptions>();
   events->add_option("RIG", options->rig);
   events->add_option("--kind", options->kinds, "Only this kind; repeatable")
       ->check(CLI::IsMember(KindNames()));
@@ -132,7 +132,9 @@ void AddEventsCommand(CLI::App* app, Context* context) {
   events->add_option("--limit", options->limit, "Only this many, the newest")
       ->check(CLI::PositiveNumber);
   events->callback([context, options] {
-    context->command = [context, options] { return List(context, *options); };
+    context->command = [context, options] {
+      return ListEvents(context, *options);
+    };
   });
 }
 

@@ -61,8 +61,8 @@ int Fetch(const Context& context, const ExportInput& input, Source* source) {
   return kFailed;
 }
 
-google::protobuf::Struct ToMessage(const std::vector<std::string>& paths,
-                                   const std::vector<Loss>& losses) {
+google::protobuf::Struct FilesMessage(const std::vector<std::string>& paths,
+                                      const std::vector<Loss>& losses) {
   google::protobuf::Struct message;
   auto* files = (*message.mutable_fields())["files"].mutable_list_value();
   for (const std::string& path : paths) {
@@ -79,7 +79,7 @@ google::protobuf::Struct ToMessage(const std::vector<std::string>& paths,
   return message;
 }
 
-int Export(Context* context, const ExportInput& input) {
+int ExportCalibration(Context* context, const ExportInput& input) {
   Source source;
   if (const int code = Fetch(*context, input, &source); code != kDone) {
     return code;
@@ -107,7 +107,7 @@ int Export(Context* context, const ExportInput& input) {
     return kFailed;
   }
   if (context->json) {
-    context->PrintJson(ToMessage(paths, exported->losses));
+    context->PrintJson(FilesMessage(paths, exported->losses));
     return kDone;
   }
   Table table({{"file"}});
@@ -143,7 +143,9 @@ void AddCalibrationExport(CLI::App* calibrations, Context* context) {
                     "from those of selfcal");
   command->add_flag("--force", input->force, "Overwrite existing files");
   command->callback([context, input] {
-    context->command = [context, input] { return Export(context, *input); };
+    context->command = [context, input] {
+      return ExportCalibration(context, *input);
+    };
   });
 }
 

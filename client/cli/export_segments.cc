@@ -19,7 +19,7 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::SegmentService::StubInterface;
+using SegmentService = v1::SegmentService::StubInterface;
 
 struct ExportOptions {
   std::string rig;
@@ -97,7 +97,7 @@ using OnSegment = std::function<absl::Status(const std::string& name,
                                              const v1::MotionSegment& segment)>;
 
 // Reads each named segment.
-grpc::Status ReadNamed(Service* stub,
+grpc::Status ReadNamed(SegmentService* stub,
                        const ExportOptions& options,
                        const OnSegment& on_segment,
                        absl::Status* written) {
@@ -105,8 +105,8 @@ grpc::Status ReadNamed(Service* stub,
     v1::GetSegmentDataRequest request;
     request.set_name(RigName(options.rig) + "/segments/" + LastPart(id));
     v1::MotionSegment segment;
-    const auto status =
-        Call<Service>(stub, &Service::GetSegmentData, request, &segment);
+    const auto status = Call<SegmentService>(
+        stub, &SegmentService::GetSegmentData, request, &segment);
     if (!status.ok()) return status;
     *written = on_segment(request.name(), segment);
     if (!written->ok()) break;
@@ -115,7 +115,7 @@ grpc::Status ReadNamed(Service* stub,
 }
 
 // Reads all segments that meet the filter and have data.
-grpc::Status ReadAll(Service* stub,
+grpc::Status ReadAll(SegmentService* stub,
                      const ExportOptions& options,
                      const OnSegment& on_segment,
                      absl::Status* written) {
@@ -133,7 +133,7 @@ grpc::Status ReadAll(Service* stub,
   return written->ok() ? status : grpc::Status::OK;
 }
 
-int Export(Context* context, const ExportOptions& options) {
+int ExportSegments(Context* context, const ExportOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   auto sink = options.format == "csv" ? OpenSink<CsvFolder>(options)
                                       : OpenSink<JsonLines>(options);
@@ -184,7 +184,9 @@ void AddSegmentExport(CLI::App* segments, Context* context) {
       ->required();
   command->add_flag("--force", options->force, "Overwrite existing files");
   command->callback([context, options] {
-    context->command = [context, options] { return Export(context, *options); };
+    context->command = [context, options] {
+      return ExportSegments(context, *options);
+    };
   });
 }
 

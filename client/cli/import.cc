@@ -30,7 +30,7 @@ struct ImportOptions {
   double timeout_s = 60;
 };
 
-v1::StreamSegmentsResponse ToMessage(const Acknowledgement& ack) {
+v1::StreamSegmentsResponse ToResponse(const Acknowledgement& ack) {
   v1::StreamSegmentsResponse message;
   message.set_session(ack.key.session);
   message.set_index(ack.key.index);
@@ -65,7 +65,7 @@ class Reporter {
     const std::lock_guard lock(mutex_);
     ++done_;
     if (ack.verdict == Acknowledgement::Verdict::kRejected) Complain(ack);
-    const v1::StreamSegmentsResponse message = ToMessage(ack);
+    const v1::StreamSegmentsResponse message = ToResponse(ack);
     if (context_.json) {
       context_.PrintJson(message, true);
     } else if (!context_.terminal) {
@@ -132,9 +132,9 @@ absl::Status DrainPatiently(SegmentStream* stream,
   }
 }
 
-int Send(Context* context,
-         const ImportOptions& options,
-         std::vector<MotionSegment> segments) {
+int SendSegments(Context* context,
+                 const ImportOptions& options,
+                 std::vector<MotionSegment> segments) {
   ClientOptions client = context->Connection();
   client.rig = options.rig;
   client.max_queue = static_cast<int>(segments.size());
@@ -180,7 +180,7 @@ int Import(Context* context, const ImportOptions& options) {
   const grpc::Status found = ReadDevice(context, options.rig, &rig);
   if (!found.ok()) return Fail(*context, found);
   WarnBeforeSending(context, rig, options, recording->segments);
-  return Send(context, options, std::move(recording->segments));
+  return SendSegments(context, options, std::move(recording->segments));
 }
 
 }  // namespace

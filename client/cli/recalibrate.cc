@@ -10,22 +10,22 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::RecalibrationService::StubInterface;
+using RecalibrationService = v1::RecalibrationService::StubInterface;
 
-struct Options {
+struct RecalibrateOptions {
   std::string rig;
   bool force = false;
   bool no_wait = false;
 };
 
-int Recalibrate(Context* context, const Options& options) {
+int Recalibrate(Context* context, const RecalibrateOptions& options) {
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::StartRecalibrationRequest request;
   request.set_parent(RigName(options.rig));
   request.set_force(options.force);
   v1::Recalibration run;
-  const grpc::Status status =
-      Call<Service>(stub.get(), &Service::StartRecalibration, request, &run);
+  const grpc::Status status = Call<RecalibrationService>(
+      stub.get(), &RecalibrationService::StartRecalibration, request, &run);
   if (!status.ok()) return Fail(*context, status);
   if (!options.no_wait) return FollowRun(context, stub.get(), std::move(run));
   PrintRun(*context, run);
@@ -39,7 +39,7 @@ void AddRecalibrateCommand(CLI::App* app, Context* context) {
       "recalibrate",
       "Calibrate on the segments of the tables; exits with 1 if the result was "
       "rejected");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RecalibrateOptions>();
   recalibrate->add_option("RIG", options->rig)->required();
   recalibrate->add_flag("--force",
                         options->force,

@@ -63,7 +63,7 @@ grpc::Status GatherSegments(Context* context,
   return status;
 }
 
-int Report(Context* context, const ReportOptions& options) {
+int WriteReportFile(Context* context, const ReportOptions& options) {
   using Service = v1::RigService::StubInterface;
   NewFile file;
   absl::Status written = file.Open(options.output, options.force);
@@ -95,7 +95,9 @@ void AddReportCommand(CLI::App* app, Context* context) {
   report->add_flag(
       "--force", options->force, "Overwrite the file if it exists");
   report->callback([context, options] {
-    context->command = [context, options] { return Report(context, *options); };
+    context->command = [context, options] {
+      return WriteReportFile(context, *options);
+    };
   });
 }
 

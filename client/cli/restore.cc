@@ -20,13 +20,13 @@ namespace selfcal::client {
 namespace {
 
 using Clock = std::chrono::system_clock;
-using Service = v1::StoreService::StubInterface;
+using StoreService = v1::StoreService::StubInterface;
 
 constexpr std::size_t kPiece = 1 << 20;
 constexpr std::chrono::milliseconds kRetryEvery{200};
 constexpr double kDefaultTimeoutS = 120;
 
-struct Options {
+struct RestoreOptions {
   std::string path;
   bool yes = false;
   double timeout_s = kDefaultTimeoutS;
@@ -72,9 +72,9 @@ bool Confirmed(const Context& context, const std::string& path) {
 }
 
 // Sends the file. Returns false if it could not be read to its end.
-bool Send(std::ifstream* file,
-          std::size_t size,
-          grpc::ClientWriterInterface<v1::RestoreStoreRequest>* writer) {
+bool SendFile(std::ifstream* file,
+              std::size_t size,
+              grpc::ClientWriterInterface<v1::RestoreStoreRequest>* writer) {
   Progress progress("restore");
   Sha256 digest;
   std::vector<char> piece(kPiece);
@@ -102,8 +102,8 @@ bool Answers(Context* context) {
   v1::ListEventsRequest request;
   request.set_page_size(1);
   v1::ListEventsResponse response;
-  return !IsUnreachable(
-      Call<Service>(stub.get(), &Service::ListEvents, request, &response));
+  return !IsUnreachable(Call<StoreService>(
+      stub.get(), &StoreService::ListEvents, request, &response));
 }
 
 // Waits until the present connection breaks, because the daemon stops, and the
@@ -125,9 +125,9 @@ bool WaitForNewStart(Context* context, double timeout_s) {
   return false;
 }
 
-int Report(Context* context,
-           const Options& options,
-           const v1::RestoreStoreResponse& response) {
+int ReportRestored(Context* context,
+                   const RestoreOptions& options,
+                   const v1::RestoreStoreResponse& response) {
   if (context->json) {
     context->PrintJson(response);
   } else {
@@ -145,7 +145,7 @@ int Report(Context* context,
   return kUnreachable;
 }
 
-int Restore(Context* context, const Options& options) {
+int Restore(Context* context, const RestoreOptions& options) {
   std::ifstream file;
   const absl::Status opened = OpenBackup(options.path, &file);
   if (!opened.ok()) return FailInput(opened);
@@ -159,7 +159,7 @@ int Restore(Context* context, const Options& options) {
   const auto writer = stub->RestoreStore(&call, &response);
   std::error_code error;
   const auto size = std::filesystem::file_size(options.path, error);
-  const bool read = Send(&file, error ? 0 : size, writer.get());
+  const bool read = SendFile(&file, error ? 0 : size, writer.get());
   if (!read) call.TryCancel();
   const grpc::Status status = writer->Finish();
   if (!read) {
@@ -167,7 +167,7 @@ int Restore(Context* context, const Options& options) {
         fmt::format("cannot read {} to its end", options.path)));
   }
   if (!status.ok()) return Fail(*context, status);
-  return Report(context, options, response);
+  return ReportRestored(context, options, response);
 }
 
 }  // namespace
@@ -177,7 +177,7 @@ void AddRestoreCommand(CLI::App* app, Context* context) {
       "restore",
       "Replace the daemon's database by a backup: the daemon verifies the "
       "backup, keeps the present database under another name and restarts");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RestoreOptions>();
   restore->add_option("FILE", options->path, "A file written by selfcal backup")
       ->required();
   restore->add_flag("--yes", options->yes, "Do not ask for confirmation");

@@ -17,7 +17,7 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::RigService::StubInterface;
+using RigService = v1::RigService::StubInterface;
 
 std::string CameraText(const v1::CameraCalibration& camera) {
   std::string model = v1::DistortionModel_Name(camera.distortion_model());
@@ -128,13 +128,13 @@ int Create(Context* context, const RigInput& input) {
   *request.mutable_rig() = *rig;
   v1::Rig created;
   const auto status =
-      Call<Service>(stub.get(), &Service::CreateRig, request, &created);
+      Call<RigService>(stub.get(), &RigService::CreateRig, request, &created);
   if (!status.ok()) return Fail(*context, status);
   PrintRig(*context, created);
   return kDone;
 }
 
-struct ListOptions {
+struct RigListOptions {
   std::string filter;
   std::string order_by;
 };
@@ -149,14 +149,14 @@ std::string LabelsText(const v1::Rig& rig) {
   return text;
 }
 
-int List(Context* context, const ListOptions& options) {
+int ListRigs(Context* context, const RigListOptions& options) {
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::ListRigsRequest request;
   request.set_filter(options.filter);
   request.set_order_by(options.order_by);
   v1::ListRigsResponse rigs;
-  const auto status =
-      CallForAllPages<Service>(stub.get(), &Service::ListRigs, request, &rigs);
+  const auto status = CallForAllPages<RigService>(
+      stub.get(), &RigService::ListRigs, request, &rigs);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(rigs);
@@ -178,13 +178,13 @@ int List(Context* context, const ListOptions& options) {
   return kDone;
 }
 
-int Show(Context* context, const std::string& id) {
+int ShowRig(Context* context, const std::string& id) {
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::GetRigRequest request;
   request.set_name(RigName(id));
   v1::Rig rig;
   const auto status =
-      Call<Service>(stub.get(), &Service::GetRig, request, &rig);
+      Call<RigService>(stub.get(), &RigService::GetRig, request, &rig);
   if (!status.ok()) return Fail(*context, status);
   PrintRig(*context, rig);
   return kDone;
@@ -280,7 +280,7 @@ void AddRigCommands(CLI::App* app, Context* context) {
   });
 
   CLI::App* list = rig->add_subcommand("list", "List the rigs");
-  const auto list_options = std::make_shared<ListOptions>();
+  const auto list_options = std::make_shared<RigListOptions>();
   list->add_option("--filter",
                    list_options->filter,
                    "Conditions joined by AND, e.g. 'phone AND labels.batch = "
@@ -290,7 +290,7 @@ void AddRigCommands(CLI::App* app, Context* context) {
                    "name or last_seen, then asc or desc");
   list->callback([context, list_options] {
     context->command = [context, list_options] {
-      return List(context, *list_options);
+      return ListRigs(context, *list_options);
     };
   });
 
@@ -300,7 +300,7 @@ void AddRigCommands(CLI::App* app, Context* context) {
   const auto id = std::make_shared<std::string>();
   show->add_option("RIG", *id)->required();
   show->callback([context, id] {
-    context->command = [context, id] { return Show(context, *id); };
+    context->command = [context, id] { return ShowRig(context, *id); };
   });
 }
 

@@ -17,7 +17,7 @@ namespace selfcal::client {
 namespace {
 
 using google::protobuf::util::TimeUtil;
-using Service = v1::RigService::StubInterface;
+using RigService = v1::RigService::StubInterface;
 
 struct UpdateOptions {
   std::string rig;
@@ -137,12 +137,12 @@ int Update(Context* context, const UpdateOptions& options) {
   v1::GetRigRequest get;
   get.set_name(RigName(options.rig));
   v1::Rig rig;
-  auto status = Call<Service>(stub.get(), &Service::GetRig, get, &rig);
+  auto status = Call<RigService>(stub.get(), &RigService::GetRig, get, &rig);
   if (!status.ok()) return Fail(*context, status);
   v1::UpdateRigRequest request;
   const absl::Status read = ReadRequest(options, rig, &request);
   if (!read.ok()) return FailInput(read);
-  status = Call<Service>(stub.get(), &Service::UpdateRig, request, &rig);
+  status = Call<RigService>(stub.get(), &RigService::UpdateRig, request, &rig);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(rig);
@@ -156,19 +156,19 @@ int Update(Context* context, const UpdateOptions& options) {
   return kDone;
 }
 
-struct DeleteOptions {
+struct RigDeletion {
   std::string rig;
   std::string reason;
 };
 
-int Delete(Context* context, const DeleteOptions& options) {
+int DeleteRig(Context* context, const RigDeletion& options) {
   const auto stub = v1::RigService::NewStub(context->Channel());
   v1::DeleteRigRequest request;
   request.set_name(RigName(options.rig));
   request.set_reason(options.reason);
   google::protobuf::Empty response;
   const auto status =
-      Call<Service>(stub.get(), &Service::DeleteRig, request, &response);
+      Call<RigService>(stub.get(), &RigService::DeleteRig, request, &response);
   if (!status.ok()) return Fail(*context, status);
   if (!context->json) PrintText(fmt::format("deleted {}\n", request.name()));
   return kDone;
@@ -215,7 +215,7 @@ void AddUpdate(CLI::App* rig, Context* context) {
 
 void AddRigChanges(CLI::App* rig, Context* context) {
   AddUpdate(rig, context);
-  const auto options = std::make_shared<DeleteOptions>();
+  const auto options = std::make_shared<RigDeletion>();
   CLI::App* remove = rig->add_subcommand(
       "delete",
       "Delete a rig with all its segments, runs and calibrations. This cannot "
@@ -227,7 +227,9 @@ void AddRigChanges(CLI::App* rig, Context* context) {
                    "The reason; the event log records it with your name")
       ->required();
   remove->callback([context, options] {
-    context->command = [context, options] { return Delete(context, *options); };
+    context->command = [context, options] {
+      return DeleteRig(context, *options);
+    };
   });
 }
 

@@ -17,11 +17,11 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::RecalibrationService::StubInterface;
+using RecalibrationService = v1::RecalibrationService::StubInterface;
 
 // How long to wait for a daemon that restarts; the run starts again then.
 constexpr std::chrono::seconds kPatience{60};
-constexpr std::chrono::milliseconds kRetryEvery{500};
+constexpr std::chrono::milliseconds kReadEvery{500};
 
 bool HasEnded(const v1::Recalibration& run) {
   return run.state() == v1::Recalibration::SUCCEEDED ||
@@ -44,7 +44,7 @@ void ShowProgress(const v1::Recalibration& run, Progress* progress) {
 using OnUpdate = std::function<void(const v1::Recalibration&)>;
 
 // Watches over one connection; *run is the last update, if there was any.
-grpc::Status WatchOnce(Service* stub,
+grpc::Status WatchOnce(RecalibrationService* stub,
                        const OnUpdate& on_update,
                        v1::Recalibration* run,
                        bool* updated) {
@@ -61,7 +61,7 @@ grpc::Status WatchOnce(Service* stub,
   return stream->Finish();
 }
 
-grpc::Status WatchToEnd(Service* stub,
+grpc::Status WatchToEnd(RecalibrationService* stub,
                         const OnUpdate& on_update,
                         v1::Recalibration* run) {
   using Clock = std::chrono::steady_clock;
@@ -72,7 +72,7 @@ grpc::Status WatchToEnd(Service* stub,
     if (!status.ok() && !IsUnreachable(status)) return status;
     if (updated) give_up = Clock::now() + kPatience;
     if (!status.ok() && Clock::now() > give_up) return status;
-    if (!HasEnded(*run)) std::this_thread::sleep_for(kRetryEvery);
+    if (!HasEnded(*run)) std::this_thread::sleep_for(kReadEvery);
   }
   return grpc::Status::OK;
 }
@@ -128,7 +128,7 @@ void PrintRun(const Context& context, const v1::Recalibration& run) {
 }
 
 int FollowRun(Context* context,
-              Service* stub,
+              RecalibrationService* stub,
               v1::Recalibration run,
               ShownAsJson shown) {
   const bool lines = context->json && shown == ShownAsJson::kEachUpdate;

@@ -12,20 +12,20 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::RecalibrationService::StubInterface;
+using RecalibrationService = v1::RecalibrationService::StubInterface;
 
 struct RunOptions {
   std::string rig;
   std::string run;
 };
 
-int List(Context* context, const RunOptions& options) {
+int ListRuns(Context* context, const RunOptions& options) {
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::ListRecalibrationsRequest request;
   request.set_parent(RigName(options.rig));
   v1::ListRecalibrationsResponse runs;
-  const auto status = CallForAllPages<Service>(
-      stub.get(), &Service::ListRecalibrations, request, &runs);
+  const auto status = CallForAllPages<RecalibrationService>(
+      stub.get(), &RecalibrationService::ListRecalibrations, request, &runs);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(runs);
@@ -55,32 +55,33 @@ int List(Context* context, const RunOptions& options) {
 
 // Makes a call about a run: the request names it, the response is the run.
 template <typename Request>
-grpc::Status Ask(Service* stub,
-                 grpc::Status (Service::*method)(grpc::ClientContext*,
+grpc::Status GetRun(
+    RecalibrationService* stub,
+    grpc::Status (RecalibrationService::*method)(grpc::ClientContext*,
                                                  const Request&,
                                                  v1::Recalibration*),
-                 const RunOptions& options,
-                 v1::Recalibration* run) {
+    const RunOptions& options,
+    v1::Recalibration* run) {
   Request request;
   request.set_name(ChildName(options.rig, "recalibrations", options.run));
-  return Call<Service>(stub, method, request, run);
+  return Call<RecalibrationService>(stub, method, request, run);
 }
 
-int Show(Context* context, const RunOptions& options) {
+int ShowRun(Context* context, const RunOptions& options) {
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::Recalibration run;
-  const auto status =
-      Ask(stub.get(), &Service::GetRecalibration, options, &run);
+  const auto status = GetRun(
+      stub.get(), &RecalibrationService::GetRecalibration, options, &run);
   if (!status.ok()) return Fail(*context, status);
   PrintRun(*context, run);
   return kDone;
 }
 
-int Watch(Context* context, const RunOptions& options) {
+int WatchRun(Context* context, const RunOptions& options) {
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::Recalibration run;
-  const auto status =
-      Ask(stub.get(), &Service::GetRecalibration, options, &run);
+  const auto status = GetRun(
+      stub.get(), &RecalibrationService::GetRecalibration, options, &run);
   if (!status.ok()) return Fail(*context, status);
   return FollowRun(
       context, stub.get(), std::move(run), ShownAsJson::kEachUpdate);
@@ -89,8 +90,8 @@ int Watch(Context* context, const RunOptions& options) {
 int Cancel(Context* context, const RunOptions& options) {
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::Recalibration run;
-  const auto status =
-      Ask(stub.get(), &Service::CancelRecalibration, options, &run);
+  const auto status = GetRun(
+      stub.get(), &RecalibrationService::CancelRecalibration, options, &run);
   if (!status.ok()) return Fail(*context, status);
   PrintRun(*context, run);
   return kDone;
@@ -99,8 +100,8 @@ int Cancel(Context* context, const RunOptions& options) {
 int ShowConvergence(Context* context, const RunOptions& options) {
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::Recalibration run;
-  const auto status =
-      Ask(stub.get(), &Service::GetRecalibration, options, &run);
+  const auto status = GetRun(
+      stub.get(), &RecalibrationService::GetRecalibration, options, &run);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(run);
@@ -128,7 +129,9 @@ void AddRunCommands(CLI::App* app, Context* context) {
       runs->add_subcommand("list", "List the runs of a rig, newest first");
   list->add_option("RIG", options->rig)->required();
   list->callback([context, options] {
-    context->command = [context, options] { return List(context, *options); };
+    context->command = [context, options] {
+      return ListRuns(context, *options);
+    };
   });
 
   const auto add = [&](const char* name, const char* what, auto command) {
@@ -141,11 +144,11 @@ void AddRunCommands(CLI::App* app, Context* context) {
       };
     });
   };
-  add("show", "Show a run", Show);
+  add("show", "Show a run", ShowRun);
   add("watch",
       "Wait for the end of a run and show the result; exits with 1 if the "
       "result was rejected. With --json, prints a line for each iteration",
-      Watch);
+      WatchRun);
   add("convergence",
       "Show the iterations of a run that has computed a version; --json has "
       "the "

@@ -13,9 +13,9 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::SegmentService::StubInterface;
+using SegmentService = v1::SegmentService::StubInterface;
 
-struct Options {
+struct SegmentOptions {
   std::string rig;
   std::string segment;
   std::int64_t version = 0;
@@ -25,13 +25,16 @@ struct Options {
   }
 };
 
-int Information(Context* context, const Options& options) {
+int Information(Context* context, const SegmentOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::GetSegmentInformationRequest request;
   request.set_name(options.name());
   v1::SegmentInformation information;
-  const auto status = Call<Service>(
-      stub.get(), &Service::GetSegmentInformation, request, &information);
+  const auto status =
+      Call<SegmentService>(stub.get(),
+                           &SegmentService::GetSegmentInformation,
+                           request,
+                           &information);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(information);
@@ -54,14 +57,14 @@ int Information(Context* context, const Options& options) {
   return kDone;
 }
 
-int Residuals(Context* context, const Options& options) {
+int Residuals(Context* context, const SegmentOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::GetSegmentResidualsRequest request;
   request.set_name(options.name());
   request.set_calibration_version(options.version);
   v1::SegmentResiduals residuals;
-  const auto status = Call<Service>(
-      stub.get(), &Service::GetSegmentResiduals, request, &residuals);
+  const auto status = Call<SegmentService>(
+      stub.get(), &SegmentService::GetSegmentResiduals, request, &residuals);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(residuals);
@@ -95,7 +98,7 @@ int Residuals(Context* context, const Options& options) {
 }  // namespace
 
 void AddSegmentDetails(CLI::App* segments, Context* context) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SegmentOptions>();
   const auto add = [&](const std::string& name, const std::string& help) {
     CLI::App* command = segments->add_subcommand(name, help);
     command->add_option("RIG", options->rig)->required();

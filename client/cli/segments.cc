@@ -12,9 +12,9 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::SegmentService::StubInterface;
+using SegmentService = v1::SegmentService::StubInterface;
 
-std::string SecondsText(const v1::Segment& segment) {
+std::string DurationText(const v1::Segment& segment) {
   return fmt::format(
       "{:.2f}",
       static_cast<double>(segment.end_ns() - segment.start_ns()) * 1e-9);
@@ -88,7 +88,7 @@ Table ListTable(const v1::ListSegmentsResponse& segments) {
         StateText(segment.state()),
         segment.has_data() ? BytesText(segment.payload_bytes()) : "-",
         fmt::format("{}", segment.keyframes()),
-        SecondsText(segment),
+        DurationText(segment),
         fmt::format("{}", segment.landmarks()),
         fmt::format("{}", segment.observations())};
     for (const std::string& group : groups) {
@@ -110,7 +110,7 @@ Facts Describe(const v1::Segment& segment) {
   facts.Add("data",
             segment.has_data() ? BytesText(segment.payload_bytes()) : "-");
   facts.Add("calibration", fmt::format("{}", segment.calibration_version()));
-  facts.Add("seconds", SecondsText(segment));
+  facts.Add("seconds", DurationText(segment));
   facts.Add("keyframes", fmt::format("{}", segment.keyframes()));
   if (segment.has_temperature_c()) {
     facts.Add("temperature", TemperatureText(segment) + " C");
@@ -164,7 +164,7 @@ Table Scores(const v1::Segment& segment) {
   return table;
 }
 
-struct ListOptions {
+struct SegmentListOptions {
   std::string rig;
   std::string filter;
   std::string order_by;
@@ -172,22 +172,22 @@ struct ListOptions {
 };
 
 // Returns the conditions of the list, with that of the flag --quarantined.
-std::string FilterOf(const ListOptions& options) {
+std::string FilterOf(const SegmentListOptions& options) {
   constexpr char kUnusable[] = "state = UNUSABLE";
   if (!options.quarantined) return options.filter;
   return options.filter.empty() ? kUnusable
                                 : options.filter + " AND " + kUnusable;
 }
 
-int List(Context* context, const ListOptions& options) {
+int ListSegments(Context* context, const SegmentListOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::ListSegmentsRequest request;
   request.set_parent(RigName(options.rig));
   request.set_filter(FilterOf(options));
   request.set_order_by(options.order_by);
   v1::ListSegmentsResponse segments;
-  const auto status = CallForAllPages<Service>(
-      stub.get(), &Service::ListSegments, request, &segments);
+  const auto status = CallForAllPages<SegmentService>(
+      stub.get(), &SegmentService::ListSegments, request, &segments);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(segments);
@@ -198,13 +198,15 @@ int List(Context* context, const ListOptions& options) {
   return kDone;
 }
 
-int Show(Context* context, const std::string& rig, const std::string& id) {
+int ShowSegment(Context* context,
+                const std::string& rig,
+                const std::string& id) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::GetSegmentRequest request;
   request.set_name(RigName(rig) + "/segments/" + LastPart(id));
   v1::Segment segment;
-  const auto status =
-      Call<Service>(stub.get(), &Service::GetSegment, request, &segment);
+  const auto status = Call<SegmentService>(
+      stub.get(), &SegmentService::GetSegment, request, &segment);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(segment);
@@ -255,8 +257,8 @@ int Quarantine(Context* context, const QuarantineOptions& options) {
   request.set_reason(options.reason);
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::QuarantineSegmentsResponse response;
-  const auto status = Call<Service>(
-      stub.get(), &Service::QuarantineSegments, request, &response);
+  const auto status = Call<SegmentService>(
+      stub.get(), &SegmentService::QuarantineSegments, request, &response);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(response);
@@ -269,28 +271,28 @@ int Quarantine(Context* context, const QuarantineOptions& options) {
   return kDone;
 }
 
-struct DeleteOptions {
+struct SegmentDeletion {
   std::string rig;
   std::string segment;
   std::string reason;
 };
 
-int Delete(Context* context, const DeleteOptions& options) {
+int DeleteSegment(Context* context, const SegmentDeletion& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::DeleteSegmentRequest request;
   request.set_name(RigName(options.rig) + "/segments/" +
                    LastPart(options.segment));
   request.set_reason(options.reason);
   google::protobuf::Empty response;
-  const auto status =
-      Call<Service>(stub.get(), &Service::DeleteSegment, request, &response);
+  const auto status = Call<SegmentService>(
+      stub.get(), &SegmentService::DeleteSegment, request, &response);
   if (!status.ok()) return Fail(*context, status);
   if (!context->json) PrintText(fmt::format("deleted {}\n", request.name()));
   return kDone;
 }
 
 void AddDelete(CLI::App* segments, Context* context) {
-  const auto options = std::make_shared<DeleteOptions>();
+  const auto options = std::make_shared<SegmentDeletion>();
   CLI::App* remove = segments->add_subcommand(
       "delete",
       "Delete a segment that no calibration was computed from. This cannot be "
@@ -305,7 +307,9 @@ void AddDelete(CLI::App* segments, Context* context) {
                    "The reason; the event log records it with your name")
       ->required();
   remove->callback([context, options] {
-    context->command = [context, options] { return Delete(context, *options); };
+    context->command = [context, options] {
+      return DeleteSegment(context, *options);
+    };
   });
 }
 
@@ -339,7 +343,7 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   CLI::App* segments = app->add_subcommand("segments", "Show segments");
   segments->require_subcommand(1);
 
-  const auto options = std::make_shared<ListOptions>();
+  const auto options = std::make_shared<SegmentListOptions>();
   CLI::App* list = segments->add_subcommand(
       "list",
       "List the segments of a rig, newest first, with the entropy of each "
@@ -357,7 +361,9 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
                  "List only unusable and quarantined segments, with the "
                  "reasons");
   list->callback([context, options] {
-    context->command = [context, options] { return List(context, *options); };
+    context->command = [context, options] {
+      return ListSegments(context, *options);
+    };
   });
 
   const auto rig = std::make_shared<std::string>();
@@ -366,7 +372,9 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   show->add_option("RIG", *rig)->required();
   show->add_option("SEGMENT", *id, "session~index, as in the list")->required();
   show->callback([context, rig, id] {
-    context->command = [context, rig, id] { return Show(context, *rig, *id); };
+    context->command = [context, rig, id] {
+      return ShowSegment(context, *rig, *id);
+    };
   });
 
   AddSegmentDetails(segments, context);

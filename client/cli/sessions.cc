@@ -12,15 +12,15 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::SessionService::StubInterface;
+using SessionService = v1::SessionService::StubInterface;
 
-int List(Context* context, const std::string& rig) {
+int ListSessions(Context* context, const std::string& rig) {
   const auto stub = v1::SessionService::NewStub(context->Channel());
   v1::ListSessionsRequest request;
   request.set_parent(RigName(rig));
   v1::ListSessionsResponse sessions;
-  const auto status = CallForAllPages<Service>(
-      stub.get(), &Service::ListSessions, request, &sessions);
+  const auto status = CallForAllPages<SessionService>(
+      stub.get(), &SessionService::ListSessions, request, &sessions);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(sessions);
@@ -38,13 +38,15 @@ int List(Context* context, const std::string& rig) {
 }
 
 // The path, as a table with a row for each point.
-int Show(Context* context, const std::string& rig, const std::string& session) {
+int ShowSession(Context* context,
+                const std::string& rig,
+                const std::string& session) {
   const auto stub = v1::SessionService::NewStub(context->Channel());
   v1::GetTrajectoryRequest request;
   request.set_name(RigName(rig) + "/sessions/" + LastPart(session));
   v1::SessionTrajectory trajectory;
-  const auto status = CallForAllPages<Service>(
-      stub.get(), &Service::GetTrajectory, request, &trajectory);
+  const auto status = CallForAllPages<SessionService>(
+      stub.get(), &SessionService::GetTrajectory, request, &trajectory);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(trajectory);
@@ -86,7 +88,7 @@ void AddSessionCommands(CLI::App* app, Context* context) {
       "list", "List the sessions of a rig of which segments are stored");
   list->add_option("RIG", *rig)->required();
   list->callback([context, rig] {
-    context->command = [context, rig] { return List(context, *rig); };
+    context->command = [context, rig] { return ListSessions(context, *rig); };
   });
   CLI::App* show = sessions->add_subcommand(
       "show", "Show the path of a session, in its frame and by its clock");
@@ -94,7 +96,7 @@ void AddSessionCommands(CLI::App* app, Context* context) {
   show->add_option("SESSION", *session, "As in the list")->required();
   show->callback([context, rig, session] {
     context->command = [context, rig, session] {
-      return Show(context, *rig, *session);
+      return ShowSession(context, *rig, *session);
     };
   });
 }

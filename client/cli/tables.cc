@@ -11,7 +11,7 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::SegmentService::StubInterface;
+using SegmentService = v1::SegmentService::StubInterface;
 
 void PrintTable(const v1::Table& table) {
   PrintText(fmt::format("{}: {} of {} entries, {} segments offered{}\n",
@@ -52,8 +52,8 @@ int ListTables(Context* context, const std::string& rig) {
   v1::ListTablesRequest request;
   request.set_parent(RigName(rig));
   v1::ListTablesResponse tables;
-  const auto status =
-      Call<Service>(stub.get(), &Service::ListTables, request, &tables);
+  const auto status = Call<SegmentService>(
+      stub.get(), &SegmentService::ListTables, request, &tables);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(tables);

@@ -12,29 +12,30 @@
 namespace selfcal::client {
 namespace {
 
-using Service = v1::ActivityService::StubInterface;
+using ActivityService = v1::ActivityService::StubInterface;
 
 constexpr int kMostRigs = 1000;  // limit of a page
 
-struct Options {
+struct TopOptions {
   double interval_s = 2;
   bool once = false;
   int rigs = 50;
 };
 
 // Requests the rigs that sent last; the daemon reads only these.
-grpc::Status Ask(Context* context,
-                 int rigs,
-                 v1::ListActivityResponse* activity) {
+grpc::Status ReadActivity(Context* context,
+                          int rigs,
+                          v1::ListActivityResponse* activity) {
   const auto stub = v1::ActivityService::NewStub(context->Channel());
   v1::ListActivityRequest request;
   request.set_page_size(rigs);
-  return Call<Service>(stub.get(), &Service::ListActivity, request, activity);
+  return Call<ActivityService>(
+      stub.get(), &ActivityService::ListActivity, request, activity);
 }
 
-int Snapshot(Context* context, const Options& options) {
+int Snapshot(Context* context, const TopOptions& options) {
   v1::ListActivityResponse activity;
-  const grpc::Status status = Ask(context, options.rigs, &activity);
+  const grpc::Status status = ReadActivity(context, options.rigs, &activity);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(activity);
@@ -45,14 +46,14 @@ int Snapshot(Context* context, const Options& options) {
 }
 
 // Redraws until the user quits or the daemon does not answer.
-grpc::Status Draw(Context* context, const Options& options, Screen* screen) {
+grpc::Status Draw(Context* context, const TopOptions& options, Screen* screen) {
   const std::chrono::milliseconds interval(
       static_cast<std::int64_t>(1000 * options.interval_s));
   do {
     const Screen::Size size = screen->size();
     v1::ListActivityResponse activity;
-    const grpc::Status status =
-        Ask(context, std::min(RigsOnScreen(size.rows), kMostRigs), &activity);
+    const grpc::Status status = ReadActivity(
+        context, std::min(RigsOnScreen(size.rows), kMostRigs), &activity);
     if (!status.ok()) return status;
     if (!screen->Show(ActivityScreen(activity, size.columns, size.rows))) {
       break;
@@ -61,7 +62,7 @@ grpc::Status Draw(Context* context, const Options& options, Screen* screen) {
   return grpc::Status::OK;
 }
 
-int Top(Context* context, const Options& options) {
+int Top(Context* context, const TopOptions& options) {
   if (options.once || context->json || !context->terminal) {
     return Snapshot(context, options);
   }
@@ -80,7 +81,7 @@ void AddTopCommand(CLI::App* app, Context* context) {
       "top",
       "Show the current activity: the rigs that sent last, streams, tables and "
       "runs. Updates until Ctrl-C on a terminal, prints once into a pipe");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<TopOptions>();
   top->add_option("--interval", options->interval_s, "Seconds between updates")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();

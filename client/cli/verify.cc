@@ -14,21 +14,22 @@
 namespace selfcal::client {
 namespace {
 
-using Response = v1::VerifyRigResponse;
+using VerifyResponse = v1::VerifyRigResponse;
 
-std::string OutcomeText(Response::Outcome outcome, const std::string& message) {
+std::string OutcomeText(VerifyResponse::Outcome outcome,
+                        const std::string& message) {
   switch (outcome) {
-    case Response::AGREES:
+    case VerifyResponse::AGREES:
       return "agrees";
-    case Response::DIFFERS:
+    case VerifyResponse::DIFFERS:
       return "differs";
     default:
       return "not compared: " + message;
   }
 }
 
-std::string DifferenceText(const Response::ScoreCheck& check) {
-  if (check.outcome() == Response::NOT_COMPARED) return "";
+std::string DifferenceText(const VerifyResponse::ScoreCheck& check) {
+  if (check.outcome() == VerifyResponse::NOT_COMPARED) return "";
   return fmt::format(
       "entropy {:.2g} nat, information {:.2g}, estimate {:.2g} sigma",
       check.entropy_difference_nats(),
@@ -36,8 +37,8 @@ std::string DifferenceText(const Response::ScoreCheck& check) {
       check.estimate_difference_sigmas());
 }
 
-std::string DifferenceText(const Response::CalibrationCheck& check) {
-  if (check.outcome() == Response::NOT_COMPARED) return "";
+std::string DifferenceText(const VerifyResponse::CalibrationCheck& check) {
+  if (check.outcome() == VerifyResponse::NOT_COMPARED) return "";
   return fmt::format(
       "{} {:.2g} sigma, sigma of {} {:.2g} %, covariance {:.2g} %",
       check.theta_component(),
@@ -48,7 +49,7 @@ std::string DifferenceText(const Response::CalibrationCheck& check) {
 }
 
 // Prints each check when it is done.
-void Print(const Context& context, const Response& response) {
+void PrintVerification(const Context& context, const VerifyResponse& response) {
   Table line({{""}, {""}, {""}});
   if (response.has_score()) {
     const auto& check = response.score();
@@ -64,7 +65,8 @@ void Print(const Context& context, const Response& response) {
   context.Print(line);
 }
 
-void Print(const Context& context, const Response::Summary& summary) {
+void PrintVerification(const Context& context,
+                       const VerifyResponse::Summary& summary) {
   Facts facts;
   facts.Add("active version", fmt::format("{}", summary.version()));
   facts.Add("scores",
@@ -96,7 +98,7 @@ void Print(const Context& context, const Response::Summary& summary) {
 }
 
 // Returns 1 if the cores disagree or not everything could be compared.
-int ExitCode(const Response::Summary& summary) {
+int ExitCode(const VerifyResponse::Summary& summary) {
   if (!summary.finding().empty()) {
     PrintError(fmt::format("version {} is not trustworthy: {}",
                            summary.version(),
@@ -106,7 +108,7 @@ int ExitCode(const Response::Summary& summary) {
   const bool compared =
       summary.scores_not_compared() == 0 &&
       (!summary.has_calibration() ||
-       summary.calibration().outcome() != Response::NOT_COMPARED);
+       summary.calibration().outcome() != VerifyResponse::NOT_COMPARED);
   if (compared) return kDone;
   PrintError("not everything could be compared; what was compared agrees");
   return kFailed;
@@ -118,7 +120,7 @@ int Verify(Context* context, const std::string& rig) {
   v1::VerifyRigRequest request;
   request.set_parent(RigName(rig));
   const auto reader = stub->VerifyRig(&call, request);
-  Response response;
+  VerifyResponse response;
   bool whole = false;
   {
     Progress progress("verification");
@@ -133,7 +135,7 @@ int Verify(Context* context, const std::string& rig) {
         context->PrintJson(response, /*line=*/true);
       } else if (response.has_score() || response.has_calibration()) {
         progress.Clear();
-        Print(*context, response);
+        PrintVerification(*context, response);
       }
     }
   }
@@ -143,7 +145,7 @@ int Verify(Context* context, const std::string& rig) {
     PrintError("the verification ended without a summary: try again");
     return kFailed;
   }
-  if (!context->json) Print(*context, response.summary());
+  if (!context->json) PrintVerification(*context, response.summary());
   return ExitCode(response.summary());
 }
 

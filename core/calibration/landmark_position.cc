@@ -146,7 +146,8 @@ void LandmarkPosition::Move(const Eigen::Vector3d& step) {
   inverse_depth << point.head<2>() / point.z(), rho / point.z();
 }
 
-LandmarkPrior InverseDepthPrior(const LandmarkPosition& position, double weight) {
+LandmarkPrior InverseDepthPrior(const LandmarkPosition& position,
+                                double weight) {
   const double rho = position.inverse_depth.z();
   const Eigen::Vector3d rho_by_p = -rho * rho * position.anchor.R_GA.col(2);
   const double information =
@@ -165,12 +166,13 @@ Eigen::Vector3d InverseDepthStep(const LandmarkPosition& position,
 }
 
 LandmarkPosition PositionAt(const LandmarkScene& scene,
-                      const Track& track,
-                      const Eigen::Vector4d& point_G) {
+                            const Track& track,
+                            const Eigen::Vector4d& point_G) {
   const TrackObservation& first = track.observations.front();
   LandmarkPosition position;
   position.anchor.a_G = -(scene.R_CG(first).transpose() * scene.p_CG(first));
-  const Eigen::Vector3d ray = point_G.head<3>() - point_G(3) * position.anchor.a_G;
+  const Eigen::Vector3d ray =
+      point_G.head<3>() - point_G(3) * position.anchor.a_G;
   position.anchor.R_GA =
       Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), ray)
           .toRotationMatrix();
@@ -179,11 +181,11 @@ LandmarkPosition PositionAt(const LandmarkScene& scene,
 }
 
 RefinedPosition RefinePosition(const LandmarkScene& scene,
-                         const Track& track,
-                         std::span<const UsedObservation> used,
-                         const RobustLoss& loss,
-                         const RefineLimits& limits,
-                         LandmarkPosition* position) {
+                               const Track& track,
+                               std::span<const UsedObservation> used,
+                               const RobustLoss& loss,
+                               const RefineLimits& limits,
+                               LandmarkPosition* position) {
   Linearised here = Linearise(scene, track, used, loss, *position);
   double least = LeastInverseDepth(here.H);
   if (limits.steps > 0 && position->inverse_depth.z() < 2 * least) {

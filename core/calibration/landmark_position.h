@@ -108,7 +108,8 @@ struct LandmarkPrior {
 };
 
 // The prior on inverse depth, times a weight, linearised at a position.
-LandmarkPrior InverseDepthPrior(const LandmarkPosition& position, double weight);
+LandmarkPrior InverseDepthPrior(const LandmarkPosition& position,
+                                double weight);
 
 // Converts a step of p_G = a + R (alpha, beta, 1) / rho to one of (alpha, beta,
 // rho), to first order.
@@ -117,8 +118,8 @@ Eigen::Vector3d InverseDepthStep(const LandmarkPosition& position,
 
 // Position of a homogeneous point in G, anchored at the track's first camera.
 LandmarkPosition PositionAt(const LandmarkScene& scene,
-                      const Track& track,
-                      const Eigen::Vector4d& point_G);
+                            const Track& track,
+                            const Eigen::Vector4d& point_G);
 
 // An observation of a track that a position is based on.
 struct UsedObservation {
@@ -151,11 +152,11 @@ inline constexpr double kNotProjectedSigmas = 1e3;
 // its anchor camera. If the start is behind that camera, the search starts at
 // infinity.
 RefinedPosition RefinePosition(const LandmarkScene& scene,
-                         const Track& track,
-                         std::span<const UsedObservation> used,
-                         const RobustLoss& loss,
-                         const RefineLimits& limits,
-                         LandmarkPosition* position);
+                               const Track& track,
+                               std::span<const UsedObservation> used,
+                               const RobustLoss& loss,
+                               const RefineLimits& limits,
+                               LandmarkPosition* position);
 
 // All observations of the track, with full weight.
 std::vector<UsedObservation> AllOf(const Track& track);

@@ -47,7 +47,9 @@ class LinearObservations {
   const LinearObservation& operator[](int index) const { return all_[index]; }
 
   // Position of a landmark, with an inverse depth that is not zero.
-  const LandmarkPosition& position(int landmark) const { return positions_[landmark]; }
+  const LandmarkPosition& position(int landmark) const {
+    return positions_[landmark];
+  }
   // The same as homogeneous points in G, 4 numbers for each landmark.
   const double* points() const { return points_.data(); }
 

@@ -76,9 +76,9 @@ void LinearSystem::Linearise(const LinearPoint& point,
   for (int m = 0; m < observations_.landmarks(); ++m) {
     const int at = plan_.interface_of_landmark[m];
     if (at < 0) continue;
-    interface_.AddLandmarkPrior(
-        at,
-        InverseDepthPrior(observations_.position(m), point.landmarks[m].weight));
+    interface_.AddLandmarkPrior(at,
+                                InverseDepthPrior(observations_.position(m),
+                                                  point.landmarks[m].weight));
   }
   decrease_ += interface_.Eliminate(&information_);
 }

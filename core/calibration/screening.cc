@@ -135,9 +135,9 @@ struct SettledPosition {
 };
 
 SettledPosition SettlePosition(const LandmarkScene& scene,
-                         const Track& track,
-                         const RobustLoss& loss,
-                         const LandmarkPosition& start) {
+                               const Track& track,
+                               const RobustLoss& loss,
+                               const LandmarkPosition& start) {
   SettledPosition settled{start, {}};
   settled.refined =
       RefinePosition(scene, track, AllOf(track), loss, {}, &settled.position);
@@ -167,7 +167,8 @@ Screening Screen(const LandmarkScene& scene,
                  const CalibrationProblem& problem,
                  const CalibrateOptions& options,
                  const std::vector<TrackPositions>& positions) {
-  const Thresholds thresholds = FindThresholds(scene, options, problem, positions);
+  const Thresholds thresholds =
+      FindThresholds(scene, options, problem, positions);
 
   Screening result;
   result.loss = thresholds.loss;
@@ -224,10 +225,10 @@ void LimitWeights(const CalibrationProblem& problem,
 // Previous position of a track, with a new anchor; it is the position found if
 // the whole track lies within the gate there.
 TrackPositions PositionsBefore(const LandmarkScene& scene,
-                         const Track& track,
-                         const LandmarkPosition& before,
-                         double gate_px,
-                         bool keep_other) {
+                               const Track& track,
+                               const LandmarkPosition& before,
+                               double gate_px,
+                               bool keep_other) {
   const Eigen::Vector4d point_G = before.Homogeneous();
   const std::vector<double> norms_px = ResidualNorms(scene, track, point_G);
   TrackPositions positions;
@@ -266,10 +267,10 @@ Screening ScreenLandmarks(const Rig& rig,
     for (const ScreenedLandmark& landmark : before->landmarks) {
       positions[landmark.track] =
           PositionsBefore(scene,
-                       problem.tracks[landmark.track],
-                       landmark.position,
-                       before->loss.gate * rig.pixel_sigma_px,
-                       settle);
+                          problem.tracks[landmark.track],
+                          landmark.position,
+                          before->loss.gate * rig.pixel_sigma_px,
+                          settle);
     }
   }
   for (std::size_t t = 0; t < positions.size(); ++t) {

@@ -61,7 +61,8 @@ MotionSegment At(const MotionSegment& segment,
   at.keyframes = estimate.keyframes;
   std::unordered_map<std::uint64_t, Eigen::Vector3d> positions;
   for (const ScreenedLandmark& landmark : landmarks) {
-    positions.emplace(problem.tracks[landmark.track].id, landmark.position.Point());
+    positions.emplace(problem.tracks[landmark.track].id,
+                      landmark.position.Point());
   }
   for (Landmark& landmark : at.landmarks) {
     const auto found = positions.find(landmark.id);

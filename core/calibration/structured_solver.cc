@@ -135,11 +135,11 @@ double Evaluate(const SolverRound& round,
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     sum += landmarks[i].weight *
            RefinePosition(scene,
-                       round.problem.tracks[landmarks[i].track],
-                       landmarks[i].used,
-                       round.loss,
-                       limits,
-                       &(*positions)[i])
+                          round.problem.tracks[landmarks[i].track],
+                          landmarks[i].used,
+                          round.loss,
+                          limits,
+                          &(*positions)[i])
                .cost;
   }
   return sum / 2;
@@ -314,9 +314,9 @@ StepOutcome TakeStep(const SolverRound& round,
 }
 
 void ApplyStep(const LinearisedRound& linearised,
-             const Eigen::VectorXd& step_d,
-             CalibrationEstimate* estimate,
-             std::vector<ScreenedLandmark>* landmarks) {
+               const Eigen::VectorXd& step_d,
+               CalibrationEstimate* estimate,
+               std::vector<ScreenedLandmark>* landmarks) {
   std::vector<ChainStateVector> keyframes;
   std::vector<Eigen::Vector3d> positions;
   linearised.system.FindSteps(

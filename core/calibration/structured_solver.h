@@ -60,9 +60,9 @@ StepOutcome TakeStep(const SolverRound& round,
 
 // Moves d by a step, and all other unknowns by the back-substituted steps.
 void ApplyStep(const LinearisedRound& linearised,
-             const Eigen::VectorXd& step_d,
-             CalibrationEstimate* estimate,
-             std::vector<ScreenedLandmark>* landmarks);
+               const Eigen::VectorXd& step_d,
+               CalibrationEstimate* estimate,
+               std::vector<ScreenedLandmark>* landmarks);
 
 // Implements SolveRound.
 SolverOutcome SolveRoundByStructure(const SolverRound& round,

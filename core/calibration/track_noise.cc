@@ -79,7 +79,8 @@ class TrackSummer {
     const Eigen::Index D = directions_.theta.cols();
     const Track& track = round_.problem.tracks[landmark.track];
     const Eigen::Vector4d point_G = landmark.position.Homogeneous();
-    const Eigen::Matrix<double, 4, 3> by_position = PointByPosition(landmark.position);
+    const Eigen::Matrix<double, 4, 3> by_position =
+        PointByPosition(landmark.position);
     TrackSums sums;
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(D);
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -92,7 +93,8 @@ class TrackSummer {
       if (!row) continue;
       const double s = row->r.squaredNorm();
       const double weight = used.weight * round_.loss.Weight(s);
-      const Eigen::Matrix<double, 2, 3> by_landmark = row->by_point * by_position;
+      const Eigen::Matrix<double, 2, 3> by_landmark =
+          row->by_point * by_position;
       const double square = row->along.squaredNorm();
       gradient += weight * row->along.transpose() * row->r;
       H += weight * by_landmark.transpose() * by_landmark;

@@ -67,7 +67,7 @@ std::optional<Eigen::Vector4d> IntersectRays(const Ray& a, const Ray& b) {
 }  // namespace
 
 std::optional<LandmarkPosition> TriangulateTrack(const LandmarkScene& scene,
-                                              const Track& track) {
+                                                 const Track& track) {
   const std::vector<Ray> rays = SpreadRays(scene, track);
   double best_px = std::numeric_limits<double>::infinity();
   Eigen::Vector4d best_G = Eigen::Vector4d::UnitZ();

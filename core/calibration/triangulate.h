@@ -17,6 +17,6 @@ namespace selfcal {
 // that gives gross errors no weight. Returns nullopt if no pair of rays gives a
 // point in front of the cameras.
 std::optional<LandmarkPosition> TriangulateTrack(const LandmarkScene& scene,
-                                              const Track& track);
+                                                 const Track& track);
 
 }  // namespace selfcal

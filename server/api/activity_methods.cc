@@ -4,6 +4,7 @@
 #include "selfcal/v1/activity_service.pb.h"
 #include "selfcal/v1/rig.pb.h"
 #include "server/api/change_feed.h"
+#include "server/api/errors.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/api/read_rig_query.h"
@@ -92,7 +93,7 @@ absl::StatusOr<std::shared_ptr<void>> WatchChanges(
     if (!parsed) return BadName("parent", "rigs/{rig}");
     const absl::Status found = context.store->GetRig(*parsed).status();
     if (!found.ok()) {
-      return About(found, {"selfcal.v1.Rig", request.parent(), "parent"});
+      return About(found, {kRigType, request.parent(), "parent"});
     }
     rig = *parsed;
   }

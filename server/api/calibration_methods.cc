@@ -1,5 +1,6 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.pb.h"
+#include "server/api/errors.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/api/read_version.h"
@@ -14,8 +15,6 @@
 namespace selfcal::server {
 namespace {
 
-constexpr char kType[] = "selfcal.v1.Calibration";
-constexpr char kRigType[] = "selfcal.v1.Rig";
 constexpr int kDefaultAdvice = 3;
 
 absl::StatusOr<v1::Calibration> EncodeNamed(
@@ -23,7 +22,8 @@ absl::StatusOr<v1::Calibration> EncodeNamed(
     const StoredCalibration& calibration,
     const std::string& name) {
   auto encoded = Encode(context.store, calibration);
-  if (!encoded.ok()) return About(encoded.status(), {kType, name, {}});
+  if (!encoded.ok())
+    return About(encoded.status(), {kCalibrationType, name, {}});
   return encoded;
 }
 
@@ -49,7 +49,7 @@ absl::StatusOr<v1::Calibration> ActivateCalibration(
   const auto active = context.pipeline->ActivateCalibration(
       parts->rig, *version, call.caller.name, request.reason());
   if (!active.ok()) {
-    return About(active.status(), {kType, request.name(), "name"});
+    return About(active.status(), {kCalibrationType, request.name(), "name"});
   }
   return EncodeNamed(context, *active, request.name());
 }
@@ -67,7 +67,7 @@ absl::StatusOr<v1::CompareCalibrationsResponse> CompareCalibrations(
   }
   auto compared = Compare(context.store, a, b);
   if (!compared.ok()) {
-    return About(compared.status(), {kType, request.a(), "a"});
+    return About(compared.status(), {kCalibrationType, request.a(), "a"});
   }
   return compared;
 }

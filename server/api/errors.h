@@ -17,9 +17,17 @@
 
 namespace selfcal::server {
 
+// Types of resources, as errors name them.
+inline constexpr char kCalibrationType[] = "selfcal.v1.Calibration";
+inline constexpr char kRigType[] = "selfcal.v1.Rig";
+inline constexpr char kRunType[] = "selfcal.v1.Recalibration";
+inline constexpr char kSegmentType[] = "selfcal.v1.Segment";
+inline constexpr char kSessionType[] = "selfcal.v1.Session";
+inline constexpr char kTableType[] = "selfcal.v1.Table";
+
 // The subject of a failed call; parts that do not apply are empty.
 struct Subject {
-  std::string type;   // e.g. "selfcal.v1.Rig"
+  std::string type;   // e.g. kRigType
   std::string name;   // e.g. "rigs/a"
   std::string field;  // field of the request that INVALID_ARGUMENT refers to
 };

@@ -38,7 +38,7 @@ absl::StatusOr<Response> FillPage(const Request& request,
   for (;; page.size /= 2) {
     const auto listed = fetch(page);
     if (!listed.ok()) {
-      return About(listed.status(), {"selfcal.v1.Rig", parent, "page_token"});
+      return About(listed.status(), {kRigType, parent, "page_token"});
     }
     Response response;
     for (const auto& item : listed->items) {

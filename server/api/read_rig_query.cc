@@ -8,11 +8,10 @@ namespace selfcal::server {
 absl::Status ReadRigQuery(const std::string& filter,
                           const std::string& order_by,
                           RigQuery* query) {
-  constexpr char kType[] = "selfcal.v1.Rig";
   absl::Status status = ParseRigFilter(filter, query);
-  if (!status.ok()) return About(status, {kType, "", "filter"});
+  if (!status.ok()) return About(status, {kRigType, "", "filter"});
   status = ParseRigOrder(order_by, query);
-  return About(status, {kType, "", "order_by"});
+  return About(status, {kRigType, "", "order_by"});
 }
 
 }  // namespace selfcal::server

@@ -19,7 +19,7 @@ absl::StatusOr<StoredCalibration> ReadVersion(Store* store,
   auto read = active ? store->GetActiveCalibration(parts->rig)
                      : store->GetCalibration(parts->rig, *version);
   if (!read.ok()) {
-    return About(read.status(), {"selfcal.v1.Calibration", name, {}});
+    return About(read.status(), {kCalibrationType, name, {}});
   }
   return read;
 }

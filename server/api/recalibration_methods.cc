@@ -1,5 +1,6 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.pb.h"
+#include "server/api/errors.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/encode/encode.h"
@@ -8,8 +9,6 @@
 
 namespace selfcal::server {
 namespace {
-
-constexpr char kType[] = "selfcal.v1.Recalibration";
 
 bool HasEnded(RunState state) {
   return state == RunState::kSucceeded || state == RunState::kFailed ||
@@ -36,7 +35,7 @@ absl::StatusOr<v1::Recalibration> StartRecalibration(
   if (!rig) return BadName("parent", "rigs/{rig}");
   const auto run = context.pipeline->StartRecalibration(*rig, request.force());
   if (!run.ok()) {
-    return About(run.status(), {"selfcal.v1.Rig", request.parent(), "parent"});
+    return About(run.status(), {kRigType, request.parent(), "parent"});
   }
   return EncodeWithReport(context.store, *run, {});
 }
@@ -47,7 +46,7 @@ absl::StatusOr<v1::Recalibration> GetRecalibration(
     const v1::GetRecalibrationRequest& request) {
   SELFCAL_ASSIGN_OR_RETURN(const RunId id, ParseRun(request.name()));
   const auto run = context.store->GetRun(id.rig, id.run);
-  if (!run.ok()) return About(run.status(), {kType, request.name(), {}});
+  if (!run.ok()) return About(run.status(), {kRunType, request.name(), {}});
   return EncodeWithConvergence(context.store, *run);
 }
 
@@ -95,7 +94,7 @@ absl::StatusOr<std::shared_ptr<void>> WatchRecalibration(
         if (HasEnded(update.run.state)) watch.Close();
       });
   if (!subscription.ok()) {
-    return About(subscription.status(), {kType, request.name(), "name"});
+    return About(subscription.status(), {kRunType, request.name(), "name"});
   }
   return std::shared_ptr<void>(*std::move(subscription));
 }
@@ -106,7 +105,7 @@ absl::StatusOr<v1::Recalibration> CancelRecalibration(
     const v1::CancelRecalibrationRequest& request) {
   SELFCAL_ASSIGN_OR_RETURN(const RunId id, ParseRun(request.name()));
   const auto run = context.pipeline->CancelRecalibration(id.rig, id.run);
-  if (!run.ok()) return About(run.status(), {kType, request.name(), {}});
+  if (!run.ok()) return About(run.status(), {kRunType, request.name(), {}});
   return EncodeWithReport(context.store, *run, {});
 }
 

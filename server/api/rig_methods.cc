@@ -9,6 +9,7 @@
 #include "proto/field_paths.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/rig.pb.h"
+#include "server/api/errors.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/api/read_rig_query.h"
@@ -21,8 +22,6 @@
 
 namespace selfcal::server {
 namespace {
-
-constexpr char kType[] = "selfcal.v1.Rig";
 
 // The rig of a request, checked; fields are named below "rig.".
 absl::StatusOr<StoredRig> ReadRig(const v1::Rig& message) {
@@ -55,7 +54,7 @@ absl::StatusOr<v1::Rig> CreateRig(const ApiContext& context,
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(request.rig()));
   const auto created = context.domain->CreateRig(rig);
   if (!created.ok()) {
-    return About(created.status(), {kType, request.rig().name(), "rig"});
+    return About(created.status(), {kRigType, request.rig().name(), "rig"});
   }
   return Encode(*created);
 }
@@ -135,7 +134,7 @@ absl::StatusOr<v1::Rig> UpdateRig(const ApiContext& context,
   const auto updated =
       context.pipeline->UpdateRig(*id, change, call.caller.name);
   if (!updated.ok()) {
-    return About(updated.status(), {kType, request.rig().name(), {}});
+    return About(updated.status(), {kRigType, request.rig().name(), {}});
   }
   return Encode(*updated);
 }
@@ -151,12 +150,12 @@ absl::StatusOr<google::protobuf::Empty> DeleteRig(
   }
   const absl::Status deleted =
       context.pipeline->DeleteRig(*id, call.caller.name, request.reason());
-  if (!deleted.ok()) return About(deleted, {kType, request.name(), {}});
+  if (!deleted.ok()) return About(deleted, {kRigType, request.name(), {}});
   context.watches->End(
       *id,
       About(absl::NotFoundError(request.name() + " was deleted; this watch "
                                                  "has ended"),
-            {kType, request.name(), {}}));
+            {kRigType, request.name(), {}}));
   return google::protobuf::Empty();
 }
 
@@ -166,7 +165,7 @@ absl::StatusOr<v1::Rig> GetRig(const ApiContext& context,
   const auto id = ParseRigName(request.name());
   if (!id) return BadName("name", "rigs/{rig}");
   const auto rig = context.store->GetRig(*id);
-  if (!rig.ok()) return About(rig.status(), {kType, request.name(), {}});
+  if (!rig.ok()) return About(rig.status(), {kRigType, request.name(), {}});
   return Encode(*rig);
 }
 

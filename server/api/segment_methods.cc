@@ -7,6 +7,7 @@
 #include "proto/convert.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.pb.h"
+#include "server/api/errors.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/api/segment_stream.h"
@@ -19,10 +20,6 @@
 
 namespace selfcal::server {
 namespace {
-
-constexpr char kRigType[] = "selfcal.v1.Rig";
-constexpr char kSegmentType[] = "selfcal.v1.Segment";
-constexpr char kTableType[] = "selfcal.v1.Table";
 
 absl::StatusOr<SegmentNameParts> ParseSegment(const std::string& name) {
   const auto parts = ParseSegmentName(name);
@@ -135,7 +132,7 @@ absl::StatusOr<v1::SegmentResiduals> GetSegmentResiduals(
   const auto version = context.store->GetCalibration(parts.rig, number);
   if (!version.ok()) {
     return About(version.status(),
-                 {"selfcal.v1.Calibration",
+                 {kCalibrationType,
                   ChildName(parts.rig, "calibrations", std::to_string(number)),
                   "calibration_version"});
   }

@@ -90,10 +90,9 @@ class SegmentStream final : public Exchange {
             FillVerdict(*result, &response);
             return Answer(response, done);
           }
-          done(stopped()
-                   ? ShuttingDown()
-                   : ForClient(About(result.status(),
-                                     {"selfcal.v1.Rig", parent_, "segment"})),
+          done(stopped() ? ShuttingDown()
+                         : ForClient(About(result.status(),
+                                           {kRigType, parent_, "segment"})),
                response);
         });
   }
@@ -106,7 +105,7 @@ class SegmentStream final : public Exchange {
     if (!rig) return BadName("parent", "rigs/{rig}");
     const absl::Status found = context_.store->GetRig(*rig).status();
     if (!found.ok()) {
-      return About(found, {"selfcal.v1.Rig", parent, "parent"});
+      return About(found, {kRigType, parent, "parent"});
     }
     parent_ = parent;
     rig_ = *rig;

@@ -2,6 +2,7 @@
 
 #include "proto/resource_names.h"
 #include "selfcal/v1/session.pb.h"
+#include "server/api/errors.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/encode/encode_session.h"
@@ -10,7 +11,6 @@
 namespace selfcal::server {
 namespace {
 
-constexpr char kType[] = "selfcal.v1.Session";
 // Positions of one session, however long it was; each segment keeps its ends.
 constexpr std::int64_t kPointsOfSession = 16'000;
 
@@ -42,7 +42,7 @@ absl::StatusOr<v1::SessionTrajectory> GetTrajectory(
   }
   const auto summary = context.store->GetSession(name->rig, name->id);
   if (!summary.ok()) {
-    return About(summary.status(), {kType, request.name(), {}});
+    return About(summary.status(), {kSessionType, request.name(), {}});
   }
   const auto points = std::clamp<std::int64_t>(
       kPointsOfSession / std::max<std::int64_t>(1, summary->segments),

@@ -1,5 +1,6 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/store_service.pb.h"
+#include "server/api/errors.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/domain/clock.h"
@@ -82,7 +83,7 @@ absl::StatusOr<v1::ListEventsResponse> ListEvents(
     if (!parsed) return BadName("parent", "rigs/{rig}");
     const absl::Status found = context.store->GetRig(*parsed).status();
     if (!found.ok()) {
-      return About(found, {"selfcal.v1.Rig", request.parent(), "parent"});
+      return About(found, {kRigType, request.parent(), "parent"});
     }
     rig = *parsed;
   }

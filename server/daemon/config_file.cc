@@ -12,9 +12,9 @@
 namespace selfcal::server {
 namespace {
 
-absl::Status Mistake(const std::string& path,
-                     const toml::source_region& where,
-                     const std::string& what) {
+absl::Status FileMistake(const std::string& path,
+                         const toml::source_region& where,
+                         const std::string& what) {
   return absl::InvalidArgumentError(fmt::format(
       "{}:{}:{}: {}", path, where.begin.line, where.begin.column, what));
 }
@@ -89,16 +89,16 @@ absl::Status ApplyConfigFile(const std::string& path, DaemonOptions* options) {
   try {
     table = toml::parse_file(path);
   } catch (const toml::parse_error& error) {
-    return Mistake(path, error.source(), std::string(error.description()));
+    return FileMistake(path, error.source(), std::string(error.description()));
   }
   for (const auto& [key, node] : table) {
     const std::string name(key.str());
     const auto values = Texts(node);
     if (!values) {
-      return Mistake(path, key.source(), WrongKind(name));
+      return FileMistake(path, key.source(), WrongKind(name));
     }
     if (const auto wrong = Set(name, node.is_boolean(), *values, options)) {
-      return Mistake(path, key.source(), *wrong);
+      return FileMistake(path, key.source(), *wrong);
     }
   }
   return absl::OkStatus();

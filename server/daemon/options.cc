@@ -44,7 +44,7 @@ class CommandLine {
   std::string file_;
 };
 
-int Mistake(const std::string& what) {
+int CommandLineMistake(const std::string& what) {
   std::fprintf(stderr, "%s\n", what.c_str());
   return kUsageError;
 }
@@ -64,7 +64,8 @@ std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
   if (const auto exit_code = first.Parse(argc, argv)) return exit_code;
   if (!first.file().empty()) {
     const absl::Status applied = ApplyConfigFile(first.file(), options);
-    if (!applied.ok()) return Mistake(std::string(applied.message()));
+    if (!applied.ok())
+      return CommandLineMistake(std::string(applied.message()));
   }
   CommandLine again(options);
   if (const auto exit_code = again.Parse(argc, argv)) return exit_code;
@@ -73,7 +74,7 @@ std::optional<int> ParseOptions(int argc, char** argv, DaemonOptions* options) {
     options->state_dir = FolderOfTheServiceManager("STATE_DIRECTORY");
   }
   if (options->state_dir.empty()) {
-    return Mistake("state-dir is not set: use --state-dir FOLDER");
+    return CommandLineMistake("state-dir is not set: use --state-dir FOLDER");
   }
   if (options->server.listen.empty()) {
     const std::string runtime = FolderOfTheServiceManager("RUNTIME_DIRECTORY");

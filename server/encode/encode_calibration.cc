@@ -13,7 +13,7 @@
 namespace selfcal::server {
 namespace {
 
-v1::Calibration::State EncodeState(CalibrationState state) {
+v1::Calibration::State EncodeCalibrationState(CalibrationState state) {
   switch (state) {
     case CalibrationState::kActive:
       return v1::Calibration::ACTIVE;
@@ -88,7 +88,7 @@ v1::Calibration Encode(const StoredCalibration& calibration,
   message.set_name(ChildName(
       calibration.rig, "calibrations", std::to_string(calibration.version)));
   message.set_version(calibration.version);
-  message.set_state(EncodeState(calibration.state));
+  message.set_state(EncodeCalibrationState(calibration.state));
   SetTime(calibration.create_time_ns, message.mutable_create_time());
   *message.mutable_parameters() = ToProto(calibration.theta);
   FillEstimates(calibration, rig, &message);

@@ -7,7 +7,7 @@
 namespace selfcal::server {
 namespace {
 
-v1::Recalibration::State EncodeState(RunState state) {
+v1::Recalibration::State EncodeRunState(RunState state) {
   switch (state) {
     case RunState::kPending:
       return v1::Recalibration::PENDING;
@@ -70,7 +70,7 @@ v1::Recalibration Encode(const StoredRun& run,
   v1::Recalibration message;
   message.set_name(
       ChildName(run.rig, "recalibrations", std::to_string(run.run)));
-  message.set_state(EncodeState(run.state));
+  message.set_state(EncodeRunState(run.state));
   message.set_trigger(EncodeTrigger(run.trigger));
   SetTime(run.create_time_ns, message.mutable_create_time());
   if (run.end_time_ns != 0) {

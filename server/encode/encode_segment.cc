@@ -12,7 +12,7 @@
 namespace selfcal::server {
 namespace {
 
-v1::Segment::State EncodeState(SegmentState state) {
+v1::Segment::State EncodeSegmentState(SegmentState state) {
   switch (state) {
     case SegmentState::kStored:
       return v1::Segment::STORED;
@@ -117,7 +117,7 @@ v1::Rig Encode(const StoredRig& rig) {
 v1::Segment Encode(const StoredSegment& segment) {
   v1::Segment message;
   message.set_name(SegmentName(segment.rig, segment.key));
-  message.set_state(EncodeState(segment.state));
+  message.set_state(EncodeSegmentState(segment.state));
   message.set_has_data(segment.has_data);
   message.set_payload_bytes(segment.payload_bytes);
   SetTime(segment.receive_time_ns, message.mutable_receive_time());

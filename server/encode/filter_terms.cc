@@ -12,7 +12,6 @@ namespace selfcal::server {
 namespace {
 
 constexpr std::size_t kMaxFilter = 4000;
-constexpr std::size_t kMaxShown = 60;
 
 bool IsOfWord(char c) {
   return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') ||
@@ -100,7 +99,7 @@ absl::StatusOr<FilterTerm> NextTerm(Words* words, LoneTexts lone_texts) {
 absl::Status NotWhatIsExpected(std::string_view what,
                                std::string_view expected) {
   return absl::InvalidArgumentError(
-      fmt::format("'{}' is not {}", Shortened(what, kMaxShown), expected));
+      fmt::format("'{}' is not {}", Shortened(what, kMaxTermShown), expected));
 }
 
 absl::Status ForEachTerm(

@@ -5,11 +5,15 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <string_view>
 
 namespace selfcal::server {
+
+// Most characters of a part of a filter that an error repeats.
+inline constexpr std::size_t kMaxTermShown = 60;
 
 // A condition, e.g. gain.camera >= 2. A text alone has a value only.
 struct FilterTerm {

@@ -18,8 +18,6 @@
 namespace selfcal::server {
 namespace {
 
-constexpr std::size_t kMaxShown = 60;
-
 std::int64_t Next(std::int64_t value) { return value + (value != INT64_MAX); }
 std::int64_t Before(std::int64_t value) { return value - (value != INT64_MIN); }
 double Next(double value) {
@@ -81,8 +79,8 @@ absl::Status NarrowByScore(const FilterTerm& term, SegmentQuery* query) {
     return absl::InvalidArgumentError(
         fmt::format("conditions on the scores of two groups, {} and {}: use "
                     "one group in a filter",
-                    Shortened(query->scored_group, kMaxShown),
-                    Shortened(term.group, kMaxShown)));
+                    Shortened(query->scored_group, kMaxTermShown),
+                    Shortened(term.group, kMaxTermShown)));
   }
   query->scored_group = term.group;
   return NarrowByNumber(

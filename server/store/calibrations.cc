@@ -14,7 +14,7 @@
 namespace selfcal::server {
 namespace {
 
-constexpr char kColumns[] =
+constexpr char kCalibrationColumns[] =
     "SELECT c.version, c.state, c.create_time_ns, c.run, c.content, c.sha256, "
     "  v.content, v.sha256, "
     "  (SELECT coalesce(max(a.activation), 0) FROM activations a "
@@ -110,10 +110,11 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
                                                   const std::string& rig,
                                                   std::int64_t version) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
-  Statement read(db,
-                 std::string(kColumns) + "WHERE c.rig = ?1 AND c.version = ?2",
-                 rig_id,
-                 version);
+  Statement read(
+      db,
+      std::string(kCalibrationColumns) + "WHERE c.rig = ?1 AND c.version = ?2",
+      rig_id,
+      version);
   const bool found = read.Next();
   SELFCAL_RETURN_IF_ERROR(read.status());
   if (!found) {
@@ -138,7 +139,7 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   const int size = PageSize(page);
   Statement read(db,
-                 std::string(kColumns) +
+                 std::string(kCalibrationColumns) +
                      "WHERE c.rig = ?1 AND c.version < ?2 "
                      "ORDER BY c.version DESC LIMIT ?3",
                  rig_id,

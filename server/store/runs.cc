@@ -12,7 +12,7 @@
 namespace selfcal::server {
 namespace {
 
-constexpr char kColumns[] =
+constexpr char kRunColumns[] =
     "SELECT g.id, r.run, r.state, r.cause, r.create_time_ns, r.end_time_ns, "
     "  r.base_version, r.attempts, r.calibration_version, r.message, r.rig, "
     "  r.change, r.session_ended "
@@ -120,7 +120,7 @@ absl::StatusOr<StoredRun> ReadRun(Connection* db,
                                   std::int64_t run) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   Statement read(db,
-                 std::string(kColumns) + "WHERE r.rig = ?1 AND r.run = ?2",
+                 std::string(kRunColumns) + "WHERE r.rig = ?1 AND r.run = ?2",
                  rig_id,
                  run);
   SELFCAL_ASSIGN_OR_RETURN(std::vector<StoredRun> runs, ReadAll(db, &read));
@@ -139,7 +139,7 @@ absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   const int size = PageSize(page);
   Statement read(db,
-                 std::string(kColumns) +
+                 std::string(kRunColumns) +
                      "WHERE r.rig = ?1 AND r.run < ?2 "
                      "ORDER BY r.run DESC LIMIT ?3",
                  rig_id,
@@ -154,7 +154,7 @@ absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
 
 absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(Connection* db) {
   Statement read(db,
-                 std::string(kColumns) +
+                 std::string(kRunColumns) +
                      "WHERE r.state IN (1, 2) "
                      "ORDER BY r.create_time_ns, r.rig, r.run");
   return ReadAll(db, &read);

@@ -18,7 +18,7 @@
 namespace selfcal::server {
 namespace {
 
-constexpr char kColumns[] =
+constexpr char kSegmentColumns[] =
     "s.segment, s.session, s.session_index, s.sequence, s.state, "
     "  s.problem, s.receive_time_ns, s.calibration_version, s.start_ns, "
     "  s.end_ns, s.keyframes, s.imu_samples, s.landmarks, s.observations, "
@@ -77,7 +77,7 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
                              "LEFT JOIN segment_information i USING (segment) "
                              "WHERE s.rig = ?1 AND s.session = ?2 "
                              "AND s.session_index = ?3",
-                             kColumns),
+                             kSegmentColumns),
                  rig_id,
                  key.session,
                  key.index);
@@ -101,7 +101,7 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   const auto size = static_cast<std::size_t>(PageSize(page));
   Statement read = SelectSegments(
-      db, kColumns, rig_id, query, after, static_cast<int>(size) + 1);
+      db, kSegmentColumns, rig_id, query, after, static_cast<int>(size) + 1);
   Listed<StoredSegment> listed;
   SegmentPlace last;
   while (read.Next()) {

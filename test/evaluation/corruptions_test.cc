@@ -14,12 +14,12 @@
 namespace selfcal {
 namespace {
 
-struct Example {
+struct RigExample {
   Rig rig;
   SimulatedSession session;
 };
 
-Example MakeExample(const Rig& rig) {
+RigExample MakeRigExample(const Rig& rig) {
   SimulationOptions options;
   options.seed = 3;
   options.landmarks_in_view = 40;
@@ -32,7 +32,7 @@ Example MakeExample(const Rig& rig) {
                    options)};
 }
 
-void ExpectValid(const Example& example, const MotionSegment& segment) {
+void ExpectValid(const RigExample& example, const MotionSegment& segment) {
   for (const Violation& violation : Validate(segment, example.rig.factory)) {
     ADD_FAILURE() << violation.field << ": " << violation.message;
   }
@@ -46,7 +46,7 @@ double Median(std::vector<double> values) {
 }
 
 TEST(CorruptionsTest, ShiftedStampsMoveKeyframesAgainstTheImu) {
-  const Example example = MakeExample(HandheldRig("a"));
+  const RigExample example = MakeRigExample(HandheldRig("a"));
   for (const double late_s : {0.01, -0.01}) {
     for (const MotionSegment& segment : example.session.segments) {
       const MotionSegment shifted = ShiftStamps(segment, late_s);
@@ -68,7 +68,7 @@ TEST(CorruptionsTest, ShiftedStampsMoveKeyframesAgainstTheImu) {
 }
 
 TEST(CorruptionsTest, SwappedCamerasExchangeWhatTheySee) {
-  const Example example = MakeExample(StereoRig());
+  const RigExample example = MakeRigExample(StereoRig());
   const MotionSegment& segment = example.session.segments[0];
   const MotionSegment swapped = SwapCameras(segment, example.rig.factory);
   ExpectValid(example, swapped);
@@ -88,7 +88,7 @@ TEST(CorruptionsTest, SwappedCamerasExchangeWhatTheySee) {
 
 // By the pixels at which the moved points would be seen.
 TEST(CorruptionsTest, PartOfTheSceneMovesWithOneVelocity) {
-  const Example example = MakeExample(HandheldRig("a"));
+  const RigExample example = MakeRigExample(HandheldRig("a"));
   const MotionSegment& segment = example.session.segments[1];
   const MotionSegment& truth = example.session.truth[1];
   const SceneMotion motion{0.5, 0.5};
@@ -117,7 +117,7 @@ TEST(CorruptionsTest, PartOfTheSceneMovesWithOneVelocity) {
 }
 
 TEST(CorruptionsTest, LostScaleScalesTheWorldButNotTheSensors) {
-  const Example example = MakeExample(HandheldRig("a"));
+  const RigExample example = MakeRigExample(HandheldRig("a"));
   const MotionSegment& segment = example.session.segments[1];
   const MotionSegment scaled = LoseScale(segment, 0.7);
   ExpectValid(example, scaled);
@@ -130,7 +130,7 @@ TEST(CorruptionsTest, LostScaleScalesTheWorldButNotTheSensors) {
 }
 
 TEST(CorruptionsTest, OneReadingOfTheGyroscopeIsCorrupt) {
-  const Example example = MakeExample(HandheldRig("a"));
+  const RigExample example = MakeRigExample(HandheldRig("a"));
   const MotionSegment& segment = example.session.segments[1];
   const MotionSegment corrupt = CorruptGyroSample(segment, 35, 2);
   ExpectValid(example, corrupt);
@@ -151,7 +151,7 @@ TEST(CorruptionsTest, OneReadingOfTheGyroscopeIsCorrupt) {
 // As from the real filter that diverged: valid segments, with a median residual
 // of tens of pixels at its own states.
 TEST(CorruptionsTest, ADivergedSessionIsValidAndTensOfPixelsOff) {
-  const Example example = MakeExample(HandheldRig("a"));
+  const RigExample example = MakeRigExample(HandheldRig("a"));
   const auto diverged = Diverge(example.session.segments, {}, 11);
   ASSERT_EQ(diverged.size(), example.session.segments.size());
   for (const MotionSegment& segment : diverged) {

@@ -16,7 +16,7 @@ namespace {
 constexpr std::chrono::seconds kLimit{600};
 
 // Streams all segments and waits until nothing is left to do.
-DaemonState Import(const Device& device, const ScratchFolder& folder) {
+DaemonState ImportedState(const Device& device, const ScratchFolder& folder) {
   const auto daemon = folder.StartDaemon();
   DaemonView view(folder.target(), device.rig.id);
   EXPECT_TRUE(view.CreateRig(device.rig).ok());
@@ -51,7 +51,7 @@ TEST(TangoThroughTheDaemon, RestIsThePoorestAndTheTablesBringACalibration) {
   ASSERT_EQ(device->segments.size(), 14u);
   ASSERT_EQ(device->rig.table_size, 8);
   const ScratchFolder folder;
-  const DaemonState state = Import(*device, folder);
+  const DaemonState state = ImportedState(*device, folder);
 
   ASSERT_EQ(state.segments.size(), 14u);
   for (const v1::Segment& segment : state.segments) {

@@ -92,8 +92,8 @@ class TwoViews : public ::testing::Test {
 TEST_F(TwoViews, APointInFrontIsFound) {
   const Eigen::Vector4d point(0.1, 0.2, 2, 1);
   EXPECT_FALSE(Refine(Seen(point), {0.1, 0.2, 5, 1}).behind);
-  EXPECT_TRUE(
-      position_.Homogeneous().hnormalized().isApprox(point.hnormalized(), 1e-3));
+  EXPECT_TRUE(position_.Homogeneous().hnormalized().isApprox(
+      point.hnormalized(), 1e-3));
 }
 
 // A mirrored point, as a reversed lever arm makes of all points, has the same

@@ -87,7 +87,7 @@ std::vector<MotionSegment> MapSession(const Rig& rig, std::uint64_t seed) {
 }
 
 // Components that the rig does not hold.
-std::vector<Eigen::Index> Estimated(const Estimate& estimate) {
+std::vector<Eigen::Index> EstimatedComponents(const Estimate& estimate) {
   std::vector<Eigen::Index> components;
   for (Eigen::Index i = 0; i < estimate.d.size(); ++i) {
     if (estimate.covariance(i, i) > 0) components.push_back(i);
@@ -110,7 +110,7 @@ TEST(MapSolution, DiffersFromTheDenseOneByWhatItDiscards) {
     EXPECT_GT(dense.shared, 3 * bounded.shared);
     EXPECT_GT(bounded.shared, 15);
     EXPECT_EQ(apart.shared, 0);
-    for (const Eigen::Index i : Estimated(dense)) {
+    for (const Eigen::Index i : EstimatedComponents(dense)) {
       const double variance = dense.covariance(i, i);
       const double ratio = bounded.covariance(i, i) / variance;
       EXPECT_GT(ratio, 1 - kScreening) << "component " << i;

@@ -21,7 +21,7 @@ struct Device {
 };
 
 // Simulates a device that is carried, or rotated about the IMU.
-Device Simulated(MotionKind kind, int seed, double duration_s) {
+Device SimulatedDevice(MotionKind kind, int seed, double duration_s) {
   std::mt19937 random(seed * 100 + static_cast<int>(kind));
   Device device{HandheldRig("simulated"), {}, {}};
   device.truth = device.rig.factory;
@@ -77,7 +77,8 @@ TEST(FindSpurious, NamesDirectionsOfWhichInformationDoubles) {
 // was a few centimetres and the error decimetres.
 TEST(Spurious, ARotationAboutTheImuDoesNotObserveTheLeverArm) {
   for (int seed = 1; seed <= 2; ++seed) {
-    const Device device = Simulated(MotionKind::kRotationOnly, seed, 12.5);
+    const Device device =
+        SimulatedDevice(MotionKind::kRotationOnly, seed, 12.5);
     const CalibrationResult result =
         Calibrate(device.rig, device.rig.factory, device.segments);
     ASSERT_EQ(result.status, CalibrateStatus::kConverged) << seed;
@@ -96,7 +97,7 @@ TEST(Spurious, ARotationAboutTheImuDoesNotObserveTheLeverArm) {
 }
 
 TEST(Spurious, NoDirectionOfACarriedDeviceIsHeld) {
-  const Device device = Simulated(MotionKind::kHandheld, 2, 16.5);
+  const Device device = SimulatedDevice(MotionKind::kHandheld, 2, 16.5);
   const CalibrationResult result =
       Calibrate(device.rig, device.rig.factory, device.segments);
   EXPECT_EQ(result.status, CalibrateStatus::kConverged);

@@ -33,8 +33,8 @@ void VisitUsed(const ScreenedSession& session, const Visitor& visit) {
     for (const UsedObservation& used : landmark.used) {
       const TrackObservation& seen = track.observations[used.index];
       Eigen::Vector2d r_px;
-      ASSERT_TRUE(
-          scene.Residual(seen, landmark.position.Homogeneous(), &r_px, nullptr));
+      ASSERT_TRUE(scene.Residual(
+          seen, landmark.position.Homogeneous(), &r_px, nullptr));
       const Eigen::Vector2d z_px = seen.z_px + r_px;
       const Eigen::Vector4d distances(z_px.x(),
                                       z_px.y(),

@@ -25,9 +25,9 @@ struct Session {
   std::vector<MotionSegment> segments;
 };
 
-Session Simulated(int seed,
-                  std::uint64_t device_seed = 0,
-                  double moving_fraction = 0) {
+Session MakeSession(int seed,
+                    std::uint64_t device_seed = 0,
+                    double moving_fraction = 0) {
   Session session{HandheldRig("r"), {}, {}};
   session.truth = session.rig.factory;
   session.rig.factory = PerturbCalibration(session.truth, {}, seed);
@@ -79,7 +79,7 @@ void ExpectOnlyTheWrongOneIsLeftOut(const Session& session,
 }
 
 TEST(Contradictions, NoneAreFoundAmongGoodSegments) {
-  const Session session = Simulated(1);
+  const Session session = MakeSession(1);
   const CalibrationResult result =
       Calibrate(session.rig, session.rig.factory, session.segments);
   ASSERT_EQ(result.segment_fits.size(), session.segments.size());
@@ -95,14 +95,14 @@ TEST(Contradictions, NoneAreFoundAmongGoodSegments) {
 }
 
 TEST(Contradictions, OneReadingOfTheGyroscopeAtTheEndOfItsRange) {
-  Session session = Simulated(2);
+  Session session = MakeSession(2);
   std::vector<ImuSample>& imu = session.segments[kWrong].imu;
   imu[imu.size() / 2].gyro.x() = 35;
   ExpectOnlyTheWrongOneIsLeftOut(session, "residuals");
 }
 
 TEST(Contradictions, TimestampsThatAreOffByTenMilliseconds) {
-  Session session = Simulated(3);
+  Session session = MakeSession(3);
   for (ImuSample& sample : session.segments[kWrong].imu) {
     sample.t_ns += 10'000'000;
   }
@@ -121,14 +121,14 @@ TEST(Contradictions, TimestampsThatAreOffByTenMilliseconds) {
 }
 
 TEST(Contradictions, ASegmentOfAnotherDevice) {
-  Session session = Simulated(4);
-  session.segments[kWrong] = Simulated(4, 77).segments[kWrong];
+  Session session = MakeSession(4);
+  session.segments[kWrong] = MakeSession(4, 77).segments[kWrong];
   ExpectOnlyTheWrongOneIsLeftOut(session, "contradicts");
 }
 
 TEST(Contradictions, AreFoundWhenTheyPreventConvergence) {
-  Session session = Simulated(4);
-  session.segments[kWrong] = Simulated(4, 77).segments[kWrong];
+  Session session = MakeSession(4);
+  session.segments[kWrong] = MakeSession(4, 77).segments[kWrong];
   CalibrateOptions options;
   options.max_iterations = 8;
   options.exclude_contradictions = false;
@@ -144,8 +144,8 @@ TEST(Contradictions, AreFoundWhenTheyPreventConvergence) {
 }
 
 TEST(Contradictions, ASceneThatMoves) {
-  Session session = Simulated(5);
-  session.segments[kWrong] = Simulated(5, 0, 0.9).segments[kWrong];
+  Session session = MakeSession(5);
+  session.segments[kWrong] = MakeSession(5, 0, 0.9).segments[kWrong];
   ExpectOnlyTheWrongOneIsLeftOut(session, "residuals");
 }
 

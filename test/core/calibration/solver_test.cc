@@ -17,7 +17,7 @@
 namespace selfcal {
 namespace {
 
-SimulationOptions SmallOptions(std::uint64_t seed) {
+SimulationOptions SmallestOptions(std::uint64_t seed) {
   SimulationOptions options;
   options.seed = seed;
   options.keyframes_per_segment = 12;
@@ -243,15 +243,15 @@ Posed Simple(const CalibrateOptions& options,
 }
 
 TEST(Solvers, AgreeWithoutALoss) {
-  Simple({.loss = LossKind::kNone}, SmallOptions(1)).ExpectSameMinimum();
+  Simple({.loss = LossKind::kNone}, SmallestOptions(1)).ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeWithHuber) {
-  Simple({.loss = LossKind::kHuber}, SmallOptions(2)).ExpectSameMinimum();
+  Simple({.loss = LossKind::kHuber}, SmallestOptions(2)).ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeWithCauchyAndOutliers) {
-  SimulationOptions simulation = SmallOptions(3);
+  SimulationOptions simulation = SmallestOptions(3);
   simulation.outlier_fraction = 0.05;
   Simple({.loss = LossKind::kCauchy}, simulation).ExpectSameMinimum();
 }
@@ -259,24 +259,24 @@ TEST(Solvers, AgreeWithCauchyAndOutliers) {
 TEST(Solvers, AgreeWithFixedComponents) {
   Rig rig = HandheldRig("r");
   rig.fixed = {"imu.q_AI.*", "cam0.distortion.w"};
-  Simple({}, SmallOptions(4), rig).ExpectSameMinimum();
+  Simple({}, SmallestOptions(4), rig).ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeWithAPrior) {
   Rig rig = HandheldRig("r");
   rig.prior_sigmas = {{"cam0.focal.*", 1e-2}};
-  Simple({.prior = FactoryPrior(WrongRig(rig))}, SmallOptions(5), rig)
+  Simple({.prior = FactoryPrior(WrongRig(rig))}, SmallestOptions(5), rig)
       .ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeWithDirectionsHeld) {
-  Posed posed = Simple({}, SmallOptions(6));
+  Posed posed = Simple({}, SmallestOptions(6));
   posed.Hold(3);
   posed.ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeOnWeightedLandmarks) {
-  Posed posed = Simple({}, SmallOptions(7));
+  Posed posed = Simple({}, SmallestOptions(7));
   for (std::size_t i = 0; i < posed.screening().landmarks.size(); i += 2) {
     posed.mutable_screening()->landmarks[i].weight = 0.3;
   }
@@ -286,7 +286,7 @@ TEST(Solvers, AgreeOnWeightedLandmarks) {
 TEST(Solvers, AgreeAcrossGapsAndSessions) {
   const Rig rig = WrongRig(HandheldRig("r"));
   const Calibration truth = HandheldRig("r").factory;
-  SimulationOptions simulation = SmallOptions(8);
+  SimulationOptions simulation = SmallestOptions(8);
   simulation.revisit_fraction = 0;
   std::vector<MotionSegment> segments = Walk(rig, truth, simulation, 4);
   segments.erase(segments.begin() + 1, segments.begin() + 3);
@@ -305,7 +305,7 @@ TEST(Solvers, AgreeAcrossGapsAndSessions) {
 TEST(Solvers, AgreeWhereLandmarksConnectDistantKeyframes) {
   const Rig rig = WrongRig(HandheldRig("r"));
   const Calibration truth = HandheldRig("r").factory;
-  SimulationOptions simulation = SmallOptions(10);
+  SimulationOptions simulation = SmallestOptions(10);
   simulation.revisit_fraction = 0.5;
   std::vector<MotionSegment> segments = Walk(rig, truth, simulation, 4);
   segments.erase(segments.begin() + 1, segments.begin() + 3);
@@ -329,14 +329,14 @@ Rig TwoCameraRig() {
 }
 
 TEST(Solvers, AgreeWithTwoCameras) {
-  Simple({}, SmallOptions(11), TwoCameraRig()).ExpectSameMinimum();
+  Simple({}, SmallestOptions(11), TwoCameraRig()).ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeWithKnownTimeOffsets) {
   Rig rig = TwoCameraRig();
   rig.factory.cameras[0].time_offset_s = 0.02;
   rig.factory.cameras[1].time_offset_s = -0.013;
-  Simple({}, SmallOptions(12), rig).ExpectSameMinimum();
+  Simple({}, SmallestOptions(12), rig).ExpectSameMinimum();
 }
 
 TEST(Solvers, AgreeWithEstimatedTimeOffsets) {
@@ -345,10 +345,10 @@ TEST(Solvers, AgreeWithEstimatedTimeOffsets) {
   rig.factory.cameras[0].time_offset_s = 0.02;
   // The first is known, the second estimated, starting without a motion.
   rig.fixed = {"cam0.time_offset"};
-  Simple({}, SmallOptions(13), rig).ExpectSameMinimum();
+  Simple({}, SmallestOptions(13), rig).ExpectSameMinimum();
   rig.fixed.clear();
   rig.factory.cameras[1].time_offset_s = -0.013;
-  Simple({}, SmallOptions(14), rig).ExpectSameMinimum();
+  Simple({}, SmallestOptions(14), rig).ExpectSameMinimum();
 }
 
 }  // namespace

@@ -7,7 +7,7 @@ namespace selfcal::server {
 namespace {
 
 using ::testing::ElementsAre;
-using Response = v1::VerifyRigResponse;
+using VerifyResponse = v1::VerifyRigResponse;
 
 class VerifyRigTest : public ServiceTest {
  protected:
@@ -17,12 +17,12 @@ class VerifyRigTest : public ServiceTest {
     request.set_parent(parent);
     const auto reader = calibrations_->VerifyRig(&context, request);
     responses_.clear();
-    Response response;
+    VerifyResponse response;
     while (reader->Read(&response)) responses_.push_back(response);
     return reader->Finish();
   }
 
-  std::vector<Response> responses_;
+  std::vector<VerifyResponse> responses_;
 };
 
 TEST_F(VerifyRigTest, TellsStepsChecksAndASummary) {
@@ -50,9 +50,10 @@ TEST_F(VerifyRigTest, TellsStepsChecksAndASummary) {
   EXPECT_EQ(responses_[0].progress().total(), 2);
   EXPECT_EQ(responses_[0].progress().subject(), "segment a b~7");
   EXPECT_EQ(responses_[1].score().segment(), "rigs/r/segments/a%20b~7");
-  EXPECT_EQ(responses_[1].score().outcome(), Response::DIFFERS);
+  EXPECT_EQ(responses_[1].score().outcome(), VerifyResponse::DIFFERS);
   EXPECT_EQ(responses_[1].score().entropy_difference_nats(), 1e-3);
-  EXPECT_EQ(responses_[2].calibration().outcome(), Response::NOT_COMPARED);
+  EXPECT_EQ(responses_[2].calibration().outcome(),
+            VerifyResponse::NOT_COMPARED);
   EXPECT_EQ(responses_[2].calibration().segments_gone(), 2);
   const auto& summary = responses_[3].summary();
   EXPECT_EQ(summary.version(), 3);
@@ -83,7 +84,7 @@ TEST_F(VerifyRigTest, EndsWhenItsCallerGoes) {
     EXPECT_TRUE(Eventually([&] { return begun.load(); }));
     context.TryCancel();
   });
-  Response response;
+  VerifyResponse response;
   while (reader->Read(&response)) {
   }
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);

@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "server/domain/clock.h"
+#include "test/server/pipeline/fake_conditions.h"
 #include "test/server/pipeline/pipeline_test.h"
 #include "test/support/eventually.h"
 
@@ -15,22 +16,6 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-
-class FakeConditions : public Conditions {
- public:
-  std::string HoldReason() override {
-    const std::lock_guard lock(mutex_);
-    return reason_;
-  }
-  void Set(const std::string& reason) {
-    const std::lock_guard lock(mutex_);
-    reason_ = reason;
-  }
-
- private:
-  std::mutex mutex_;
-  std::string reason_;
-};
 
 class DeferredRunTest : public PipelineTest {
  protected:

@@ -5,7 +5,7 @@
 namespace selfcal::server {
 namespace {
 
-constexpr int kSegments = 14;
+constexpr int kRememberedSegments = 14;
 
 class MemoryTest : public PipelineTest {
  protected:
@@ -15,7 +15,8 @@ class MemoryTest : public PipelineTest {
   void SubmitAll() {
     ASSERT_TRUE(domain_->CreateRig(TestRig("a")).ok());
     StartOne();
-    for (const MotionSegment& segment : TestSegments(TestRig("a"), kSegments)) {
+    for (const MotionSegment& segment :
+         TestSegments(TestRig("a"), kRememberedSegments)) {
       ASSERT_TRUE(pipeline_->Submit("a", segment, nullptr).ok());
       ASSERT_TRUE(AtRest());
     }
@@ -39,7 +40,7 @@ class MemoryTest : public PipelineTest {
   // Of the segments that were sent.
   int WithoutData() {
     int without = 0;
-    for (int k = 0; k < kSegments; ++k) {
+    for (int k = 0; k < kRememberedSegments; ++k) {
       without += store_->GetSegment("a", {"s", k})->has_data ? 0 : 1;
     }
     return without;

@@ -11,7 +11,7 @@
 namespace selfcal::server {
 namespace {
 
-constexpr int kSegments = 12;
+constexpr int kOrderedSegments = 12;
 
 class StreamOrderTest : public PipelineTest {
  protected:
@@ -29,7 +29,7 @@ class StreamOrderTest : public PipelineTest {
     const auto tables = store_->GetTables(rig);
     EXPECT_TRUE(tables.ok());
     for (const Table& table : *tables) {
-      EXPECT_EQ(table.scored, kSegments) << table.group;
+      EXPECT_EQ(table.scored, kOrderedSegments) << table.group;
       for (const TableEntry& entry : table.entries) {
         content[table.group][entry.key.index] = entry.entropy;
       }
@@ -43,7 +43,7 @@ TEST_F(StreamOrderTest, TheSameSegmentsGiveTheSameTables) {
   std::mt19937 random(1);
   StartOne();
   Create("once");
-  for (int k = 0; k < kSegments; ++k) {
+  for (int k = 0; k < kOrderedSegments; ++k) {
     ASSERT_EQ(Submit(k, "once"), SubmitResult::Verdict::kStored);
   }
   ASSERT_TRUE(AllScored());
@@ -53,7 +53,8 @@ TEST_F(StreamOrderTest, TheSameSegmentsGiveTheSameTables) {
     const std::string rig = "r" + std::to_string(promise.trials);
     Create(rig);
     std::vector<int> order;
-    for (int k = 0; k < 3 * kSegments; ++k) order.push_back(k % kSegments);
+    for (int k = 0; k < 3 * kOrderedSegments; ++k)
+      order.push_back(k % kOrderedSegments);
     std::shuffle(order.begin(), order.end(), random);
     std::set<int> sent;
     for (const int k : order) {

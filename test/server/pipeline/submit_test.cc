@@ -12,15 +12,15 @@ namespace selfcal::server {
 namespace {
 
 using SubmitTest = PipelineTest;
-using Verdict = SubmitResult::Verdict;
+using SubmitVerdict = SubmitResult::Verdict;
 
 TEST_F(SubmitTest, StoredThenDuplicate) {
   CreateRig();
   StartOne();
-  EXPECT_EQ(Submit(0), Verdict::kStored);
-  EXPECT_EQ(Submit(0), Verdict::kDuplicate);
+  EXPECT_EQ(Submit(0), SubmitVerdict::kStored);
+  EXPECT_EQ(Submit(0), SubmitVerdict::kDuplicate);
   ASSERT_TRUE(AllScored());
-  EXPECT_EQ(Submit(0), Verdict::kDuplicate);
+  EXPECT_EQ(Submit(0), SubmitVerdict::kDuplicate);
   EXPECT_EQ(store_->ListSegments("a", {})->items.size(), 1u);
 }
 
@@ -38,7 +38,7 @@ TEST_F(SubmitTest, RejectionNamesEveryFieldAndStoresNothing) {
   bad.keyframes[2].q_GI.coeffs() *= 1.1;
   const auto result = pipeline_->Submit("a", bad, nullptr);
   ASSERT_TRUE(result.ok()) << result.status();
-  EXPECT_EQ(result->verdict, Verdict::kRejected);
+  EXPECT_EQ(result->verdict, SubmitVerdict::kRejected);
   std::set<std::string> fields;
   for (const Violation& violation : result->violations) {
     fields.insert(violation.field);
@@ -65,7 +65,7 @@ TEST_F(SubmitTest, NotStartedOrStoppedIsUnavailable) {
   EXPECT_TRUE(absl::IsUnavailable(
       pipeline_->Submit("a", Segment(0), nullptr).status()));
   ASSERT_TRUE(pipeline_->Start().ok());
-  EXPECT_EQ(Submit(0), Verdict::kStored);
+  EXPECT_EQ(Submit(0), SubmitVerdict::kStored);
   pipeline_->Stop();
   EXPECT_TRUE(absl::IsUnavailable(
       pipeline_->Submit("a", Segment(1), nullptr).status()));
@@ -81,14 +81,14 @@ TEST_F(SubmitTest, WaitsWhileTheBacklogIsFullUntilCancelled) {
     return FakeInformation(rig, EntropyOf(segment.key.index));
   };
   StartOne();
-  for (int k = 0; k < 3; ++k) EXPECT_EQ(Submit(k), Verdict::kStored);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(Submit(k), SubmitVerdict::kStored);
   int asked = 0;
   const auto cancelled =
       pipeline_->Submit("a", Segment(3), [&] { return ++asked > 2; });
   EXPECT_TRUE(absl::IsCancelled(cancelled.status())) << cancelled.status();
   EXPECT_EQ(store_->ListSegments("a", {})->items.size(), 3u);
   gate.unlock();
-  EXPECT_EQ(Submit(3), Verdict::kStored);  // now there is room
+  EXPECT_EQ(Submit(3), SubmitVerdict::kStored);  // now there is room
   EXPECT_TRUE(AllScored());
 }
 
@@ -109,7 +109,7 @@ TEST_F(SubmitTest, WhoWaitsLongestIsNext) {
     return FakeInformation(rig, EntropyOf(index));
   };
   StartOne();
-  EXPECT_EQ(Submit(0), Verdict::kStored);
+  EXPECT_EQ(Submit(0), SubmitVerdict::kStored);
   std::vector<std::thread> senders;
   for (int k = 1; k <= 8; ++k) {
     std::atomic<bool> waits = false;

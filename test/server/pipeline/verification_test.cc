@@ -7,6 +7,7 @@
 #include "core/information/segment_information.h"
 #include "server/pipeline/verification_sampler.h"
 #include "server/pipeline/verifier.h"
+#include "test/server/pipeline/fake_conditions.h"
 #include "test/server/pipeline/pipeline_test.h"
 
 namespace selfcal::server {
@@ -14,13 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr int kSegments = 4;
-
-class FakeConditions final : public Conditions {
- public:
-  std::string HoldReason() override { return busy ? "busy" : ""; }
-  std::atomic<bool> busy = false;
-};
+constexpr int kVerifiedSegments = 4;
 
 class Checks final : public PipelineObserver {
  public:
@@ -66,10 +61,10 @@ class VerificationTest : public PipelineTest {
 
   void SubmitSegments() {
     Rig rig = TestRig("a");
-    rig.table_size = kSegments;
+    rig.table_size = kVerifiedSegments;
     ASSERT_TRUE(domain_->CreateRig(rig).ok());
     StartOne();
-    for (const MotionSegment& segment : TestSegments(rig, kSegments)) {
+    for (const MotionSegment& segment : TestSegments(rig, kVerifiedSegments)) {
       const auto result = pipeline_->Submit("a", segment, nullptr);
       ASSERT_TRUE(result.ok()) << result.status();
     }
@@ -117,7 +112,7 @@ TEST_F(VerificationTest, BothCoresAgreeOnWhatIsKept) {
   const auto verification = pipeline_->VerifyRig(
       "a",
       [&](const VerificationStep& step) {
-        EXPECT_EQ(step.total, kSegments + 1);
+        EXPECT_EQ(step.total, kVerifiedSegments + 1);
         if (step.score == nullptr && step.calibration == nullptr) {
           subjects.push_back(step.subject);
         } else {
@@ -127,24 +122,25 @@ TEST_F(VerificationTest, BothCoresAgreeOnWhatIsKept) {
       nullptr);
   ASSERT_TRUE(verification.ok()) << verification.status();
   EXPECT_EQ(verification->version, 2);
-  EXPECT_EQ(verification->scores.size(), static_cast<std::size_t>(kSegments));
+  EXPECT_EQ(verification->scores.size(),
+            static_cast<std::size_t>(kVerifiedSegments));
   for (const ScoreCheck& check : verification->scores) {
     EXPECT_EQ(check.outcome, VerificationOutcome::kAgrees) << check.message;
   }
   ASSERT_TRUE(verification->calibration.has_value());
   EXPECT_EQ(verification->calibration->outcome, VerificationOutcome::kAgrees)
       << verification->calibration->message;
-  EXPECT_EQ(verification->calibration->segments, kSegments);
+  EXPECT_EQ(verification->calibration->segments, kVerifiedSegments);
   EXPECT_EQ(verification->calibration->segments_gone, 0);
   EXPECT_EQ(Finding(*verification), "");
-  EXPECT_EQ(checked, kSegments + 1);
-  ASSERT_EQ(subjects.size(), static_cast<std::size_t>(kSegments + 1));
+  EXPECT_EQ(checked, kVerifiedSegments + 1);
+  ASSERT_EQ(subjects.size(), static_cast<std::size_t>(kVerifiedSegments + 1));
   EXPECT_EQ(subjects.front(), "segment s~0");
   EXPECT_EQ(subjects.back(), "calibration 2");
   EXPECT_TRUE(Disagreements().empty());
   EXPECT_EQ(DisagreementOf(2), "");
   EXPECT_EQ(checks_.Count(Subject::kScore, VerificationOutcome::kAgrees),
-            kSegments);
+            kVerifiedSegments);
   EXPECT_EQ(checks_.Count(Subject::kCalibration, VerificationOutcome::kAgrees),
             1);
 }
@@ -281,15 +277,15 @@ TEST_F(VerificationTest, AShareIsVerifiedWhileTheDeviceIsIdle) {
                                   : information;
   };
   options_.verify_share = 1;
-  conditions_.busy = true;
+  conditions_.Set("busy");
   SubmitSegments();
   EXPECT_EQ(checks_.Count(Subject::kScore, VerificationOutcome::kDiffers), 0);
   EXPECT_EQ(checks_.Count(Subject::kScore, VerificationOutcome::kAgrees), 0);
-  conditions_.busy = false;
+  conditions_.Set("");
   EXPECT_TRUE(Eventually([&] {
     return checks_.Count(Subject::kScore, VerificationOutcome::kAgrees) +
                checks_.Count(Subject::kScore, VerificationOutcome::kDiffers) ==
-           kSegments;
+           kVerifiedSegments;
   }));
   EXPECT_EQ(checks_.Count(Subject::kScore, VerificationOutcome::kDiffers), 1);
   EXPECT_TRUE(Eventually([&] { return Disagreements().size() == 1; }));

@@ -5,7 +5,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-using Order = RigQuery::Order;
+using RigOrder = RigQuery::Order;
 
 class RigSummariesTest : public StoreTest {
  protected:
@@ -29,7 +29,7 @@ SELFCAL_STORE_TEST_SUITE(RigSummariesTest);
 TEST_P(RigSummariesTest, PagesGoByNameBothWays) {
   for (const char* id : {"c", "a", "e", "b", "d"}) CreateTestRig(id);
   EXPECT_THAT(Names({}), ElementsAre("a", "b", "c", "d", "e"));
-  EXPECT_THAT(Names({"", {}, Order::kName, true}),
+  EXPECT_THAT(Names({"", {}, RigOrder::kName, true}),
               ElementsAre("e", "d", "c", "b", "a"));
 }
 
@@ -40,17 +40,17 @@ TEST_P(RigSummariesTest, PagesGoByWhenARigWasSeen) {
   CreateTestRig("also-never");
   Put(b.id, 0);
   Put(a.id, 0);
-  EXPECT_THAT(Names({"", {}, Order::kLastSeen, false}, 1),
+  EXPECT_THAT(Names({"", {}, RigOrder::kLastSeen, false}, 1),
               ElementsAre("also-never", "never", "b", "a"));
-  EXPECT_THAT(Names({"", {}, Order::kLastSeen, true}, 1),
+  EXPECT_THAT(Names({"", {}, RigOrder::kLastSeen, true}, 1),
               ElementsAre("a", "b", "never", "also-never"));
 }
 
 TEST_P(RigSummariesTest, TextIsLookedForInTheName) {
   for (const char* id : {"tablet-1", "phone-1", "tablet-2"}) CreateTestRig(id);
-  EXPECT_THAT(Names({"tablet", {}, Order::kName, false}, 1),
+  EXPECT_THAT(Names({"tablet", {}, RigOrder::kName, false}, 1),
               ElementsAre("tablet-1", "tablet-2"));
-  EXPECT_THAT(Names({"%", {}, Order::kName, false}), IsEmpty());
+  EXPECT_THAT(Names({"%", {}, RigOrder::kName, false}), IsEmpty());
 }
 
 TEST_P(RigSummariesTest, TokenOfAnotherQueryIsRefused) {
@@ -59,7 +59,7 @@ TEST_P(RigSummariesTest, TokenOfAnotherQueryIsRefused) {
   ASSERT_TRUE(listed.ok());
   for (const Page& page : {Page{1, listed->next_token}, Page{1, "nonsense"}}) {
     EXPECT_TRUE(absl::IsInvalidArgument(
-        store_->ListRigSummaries({"a", {}, Order::kName, false}, page)
+        store_->ListRigSummaries({"a", {}, RigOrder::kName, false}, page)
             .status()));
   }
 }

@@ -27,7 +27,7 @@ constexpr Migration kBroken{
 
 constexpr std::int64_t kTime = 7'000'000'000;
 
-std::int64_t Read(SqliteConnection* db, const std::string& sql) {
+std::int64_t ReadNumber(SqliteConnection* db, const std::string& sql) {
   Statement statement(db, sql);
   const bool found = statement.Next();
   EXPECT_TRUE(found) << sql << ": " << statement.status();
@@ -108,21 +108,22 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
   auto db = Open({kFirst, kSecond});
   ASSERT_TRUE(db.ok()) << db.status();
-  EXPECT_EQ(Read(db->get(), "PRAGMA application_id"), kApplicationId);
-  EXPECT_EQ(Read(db->get(), "PRAGMA user_version"), 2);
-  EXPECT_EQ(Read(db->get(), "SELECT count(*) FROM schema_migrations"), 2);
-  EXPECT_EQ(Read(db->get(), "SELECT max(apply_time_ns) FROM schema_migrations"),
-            kTime);
+  EXPECT_EQ(ReadNumber(db->get(), "PRAGMA application_id"), kApplicationId);
+  EXPECT_EQ(ReadNumber(db->get(), "PRAGMA user_version"), 2);
+  EXPECT_EQ(ReadNumber(db->get(), "SELECT count(*) FROM schema_migrations"), 2);
+  EXPECT_EQ(
+      ReadNumber(db->get(), "SELECT max(apply_time_ns) FROM schema_migrations"),
+      kTime);
   EXPECT_FALSE(fs::exists(path_ + ".new"));
 }
 
 TEST_F(OpenDatabaseTest, RunsWithTheSettingsThatKeepThePromises) {
   auto db = Open({kFirst});
   ASSERT_TRUE(db.ok()) << db.status();
-  EXPECT_EQ(Read(db->get(), "PRAGMA synchronous"), 2);
-  EXPECT_EQ(Read(db->get(), "PRAGMA foreign_keys"), 1);
-  EXPECT_EQ(Read(db->get(), "PRAGMA trusted_schema"), 0);
-  EXPECT_EQ(Read(db->get(), "PRAGMA recursive_triggers"), 1);
+  EXPECT_EQ(ReadNumber(db->get(), "PRAGMA synchronous"), 2);
+  EXPECT_EQ(ReadNumber(db->get(), "PRAGMA foreign_keys"), 1);
+  EXPECT_EQ(ReadNumber(db->get(), "PRAGMA trusted_schema"), 0);
+  EXPECT_EQ(ReadNumber(db->get(), "PRAGMA recursive_triggers"), 1);
   Statement mode(db->get(), "PRAGMA journal_mode");
   ASSERT_TRUE(mode.Next());
   EXPECT_EQ(mode.Text(0), "wal");
@@ -132,14 +133,14 @@ TEST_F(OpenDatabaseTest, OlderDatabaseIsMigratedAfterABackup) {
   ASSERT_TRUE(Open({kFirst}).ok());
   auto db = Open({kFirst, kSecond});
   ASSERT_TRUE(db.ok()) << db.status();
-  EXPECT_EQ(Read(db->get(), "PRAGMA user_version"), 2);
-  EXPECT_EQ(Read(db->get(), "SELECT x FROM one"), 7);
+  EXPECT_EQ(ReadNumber(db->get(), "PRAGMA user_version"), 2);
+  EXPECT_EQ(ReadNumber(db->get(), "SELECT x FROM one"), 7);
   const std::string backup = path_ + ".backup-v1";
   ASSERT_TRUE(fs::exists(backup));
   auto old = OpenDatabase(backup, std::vector<Migration>{kFirst}, kTime);
   ASSERT_TRUE(old.ok()) << old.status();
-  EXPECT_EQ(Read(old->get(), "PRAGMA user_version"), 1);
-  EXPECT_EQ(Read(old->get(), "SELECT count(*) FROM one"), 0);
+  EXPECT_EQ(ReadNumber(old->get(), "PRAGMA user_version"), 1);
+  EXPECT_EQ(ReadNumber(old->get(), "SELECT count(*) FROM one"), 0);
 }
 
 TEST_F(OpenDatabaseTest, VersionsFromBeforeStatesWereExplicitKeepTheirLife) {
@@ -166,8 +167,9 @@ TEST_F(OpenDatabaseTest, VersionsFromBeforeStatesWereExplicitKeepTheirLife) {
   }
   auto db = Open({all.begin(), all.end()});
   ASSERT_TRUE(db.ok()) << db.status();
-  EXPECT_EQ(Read(db->get(), "SELECT count(*) FROM pragma_foreign_key_check"),
-            0);
+  EXPECT_EQ(
+      ReadNumber(db->get(), "SELECT count(*) FROM pragma_foreign_key_check"),
+      0);
   for (const char* sql :
        {"SELECT count(*) = 3 FROM calibrations",
         ("SELECT state = 1 AND content = x'05' FROM calibrations "
@@ -180,7 +182,7 @@ TEST_F(OpenDatabaseTest, VersionsFromBeforeStatesWereExplicitKeepTheirLife) {
         "SELECT inflation = 1.5 FROM changes",
         "SELECT group_name = 'imu' FROM change_groups",
         "SELECT event = 7 FROM events"}) {
-    EXPECT_EQ(Read(db->get(), sql), 1) << sql;
+    EXPECT_EQ(ReadNumber(db->get(), sql), 1) << sql;
   }
 }
 
@@ -192,8 +194,8 @@ TEST_F(OpenDatabaseTest, FailedMigrationChangesNothing) {
             std::string::npos);
   auto db = Open({kFirst});
   ASSERT_TRUE(db.ok()) << db.status();
-  EXPECT_EQ(Read(db->get(), "SELECT count(*) FROM one"), 0);
-  EXPECT_EQ(Read(db->get(), "PRAGMA user_version"), 1);
+  EXPECT_EQ(ReadNumber(db->get(), "SELECT count(*) FROM one"), 0);
+  EXPECT_EQ(ReadNumber(db->get(), "PRAGMA user_version"), 1);
 }
 
 TEST_F(OpenDatabaseTest, NewerDatabaseIsRefusedAndUntouched) {
