@@ -7,7 +7,7 @@
 namespace selfcal::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kTrimAfter{5};
 
@@ -20,8 +20,8 @@ void KeepHeapSmall() {
 }
 
 void TrimHeap() {
-  static Clock::time_point last = Clock::now();
-  const auto now = Clock::now();
+  static SteadyClock::time_point last = SteadyClock::now();
+  const auto now = SteadyClock::now();
   if (now - last < kTrimAfter) return;
   last = now;
   malloc_trim(0);
