@@ -34,9 +34,9 @@ SimulationOptions SmallOptions(std::uint64_t seed) {
   return options;
 }
 
-Scenario Simulated(const Rig& rig,
-                   const SimulationOptions& options,
-                   int segments) {
+Scenario SimulatedScenario(const Rig& rig,
+                           const SimulationOptions& options,
+                           int segments) {
   Scenario s{rig, rig.factory, {}};
   // The same wrong factory calibration for every seed: one device.
   s.rig.factory = PerturbCalibration(s.truth, {}, 1);
@@ -92,7 +92,7 @@ void ExpectConsistent(const CalibrationResult& result,
 TEST(Calibrate, WithoutNoiseFindsTheTruth) {
   SimulationOptions options = SmallOptions(1);
   options.noise = false;
-  const Scenario s = Simulated(HandheldRig("r"), options, 4);
+  const Scenario s = SimulatedScenario(HandheldRig("r"), options, 4);
   const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
   ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
   EXPECT_EQ(result.rank, 26);
@@ -103,7 +103,7 @@ TEST(Calibrate, WithoutNoiseFindsTheTruth) {
 }
 
 TEST(Calibrate, OrderOfSegmentsDoesNotMatter) {
-  Scenario s = Simulated(HandheldRig("r"), SmallOptions(2), 4);
+  Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(2), 4);
   const CalibrationResult a = Calibrate(s.rig, s.rig.factory, s.segments);
   std::reverse(s.segments.begin(), s.segments.end());
   std::swap(s.segments[0], s.segments[2]);
@@ -114,9 +114,9 @@ TEST(Calibrate, OrderOfSegmentsDoesNotMatter) {
 }
 
 TEST(Calibrate, SeveralSessionsAndGapsShareOnlyTheta) {
-  Scenario s = Simulated(HandheldRig("r"), SmallOptions(3), 6);
+  Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(3), 6);
   s.segments.erase(s.segments.begin() + 2, s.segments.begin() + 4);
-  Scenario other = Simulated(HandheldRig("r"), SmallOptions(4), 2);
+  Scenario other = SimulatedScenario(HandheldRig("r"), SmallOptions(4), 2);
   for (MotionSegment& segment : other.segments) {
     segment.key.session = "another";
     s.segments.push_back(segment);
@@ -139,7 +139,7 @@ TEST(Calibrate, TwoCamerasWithOtherDistortionModels) {
   second.p_CI += Eigen::Vector3d(0.08, 0.01, 0);
   second.q_CI = Exp(Eigen::Vector3d(0.05, -0.1, 0.02)) * second.q_CI;
   rig.factory.cameras.push_back(second);
-  const Scenario s = Simulated(rig, SmallOptions(5), 4);
+  const Scenario s = SimulatedScenario(rig, SmallOptions(5), 4);
   const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
   ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
   ASSERT_EQ(result.covariance.rows(), TangentSize(rig.factory));
@@ -149,7 +149,7 @@ TEST(Calibrate, TwoCamerasWithOtherDistortionModels) {
 TEST(Calibrate, OutliersAreExcluded) {
   SimulationOptions options = SmallOptions(6);
   options.outlier_fraction = 0.1;
-  const Scenario s = Simulated(HandheldRig("r"), options, 5);
+  const Scenario s = SimulatedScenario(HandheldRig("r"), options, 5);
   const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
   ASSERT_EQ(result.status, CalibrateStatus::kConverged) << result.message;
   EXPECT_GT(result.observations_dropped, 0.08 * result.observations);
@@ -159,7 +159,7 @@ TEST(Calibrate, OutliersAreExcluded) {
 TEST(Calibrate, FixedComponentsStay) {
   Rig rig = HandheldRig("r");
   rig.fixed = {"imu.q_AI.*", "cam0.distortion.w"};
-  const Scenario s = Simulated(rig, SmallOptions(7), 4);
+  const Scenario s = SimulatedScenario(rig, SmallOptions(7), 4);
   const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
   const Eigen::VectorXd moved = BoxMinus(result.theta, s.rig.factory);
   for (const int i :
@@ -171,7 +171,7 @@ TEST(Calibrate, FixedComponentsStay) {
 }
 
 TEST(Calibrate, DeviceAtRestKeepsUnobservableParameters) {
-  Scenario s = Simulated(HandheldRig("r"), SmallOptions(8), 1);
+  Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(8), 1);
   s.segments =
       Simulate(
           s.rig, s.truth, s.rig.factory, *MakeRest(6), "rest", SmallOptions(8))
@@ -189,7 +189,7 @@ TEST(Calibrate, DeviceAtRestKeepsUnobservableParameters) {
 }
 
 TEST(Calibrate, CancelsImmediately) {
-  const Scenario s = Simulated(HandheldRig("r"), SmallOptions(9), 3);
+  const Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(9), 3);
   int calls = 0;
   const CalibrationResult result = Calibrate(
       s.rig, s.rig.factory, s.segments, {}, [&](const CalibrateProgress&) {
@@ -200,7 +200,7 @@ TEST(Calibrate, CancelsImmediately) {
 }
 
 TEST(Calibrate, ProgressReportsTheIterationsToTheResult) {
-  Scenario s = Simulated(HandheldRig("r"), SmallOptions(9), 3);
+  Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(9), 3);
   s.rig.fixed = {"imu.gyro.scale.*"};
   // The scale is true: a parameter held at a wrong value makes segments
   // disagree.
@@ -235,7 +235,7 @@ TEST(Calibrate, ProgressReportsTheIterationsToTheResult) {
 // After reweighting, the calibration continues from its estimate: its
 // iterations are counted on.
 TEST(Calibrate, IterationsContinueWhenNoiseIsReweighted) {
-  Scenario s = Simulated(HandheldRig("r"), SmallOptions(12), 3);
+  Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(12), 3);
   s.rig.pixel_sigma_px *= 3;
   std::vector<CalibrateProgress> told;
   const CalibrationResult result = Calibrate(
@@ -257,7 +257,7 @@ TEST(Calibrate, IterationsContinueWhenNoiseIsReweighted) {
 
 // The noise that a calibration was weighted with is part of its result.
 TEST(Calibrate, WronglyStatedNoiseIsReplacedAndReported) {
-  Scenario s = Simulated(HandheldRig("r"), SmallOptions(12), 3);
+  Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(12), 3);
   s.rig.pixel_sigma_px /= 3;
   const CalibrationResult result = Calibrate(s.rig, s.rig.factory, s.segments);
   ASSERT_EQ(result.noise_scales.size(), static_cast<std::size_t>(kNoiseKinds));
@@ -268,7 +268,7 @@ TEST(Calibrate, WronglyStatedNoiseIsReplacedAndReported) {
 }
 
 TEST(Calibrate, UnusableInputIsReportedWithTheReason) {
-  const Scenario s = Simulated(HandheldRig("r"), SmallOptions(10), 1);
+  const Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(10), 1);
   EXPECT_EQ(Calibrate(s.rig, s.rig.factory, {}).status,
             CalibrateStatus::kFailed);
   const CalibrationResult twice =
@@ -278,7 +278,7 @@ TEST(Calibrate, UnusableInputIsReportedWithTheReason) {
 }
 
 TEST(Calibrate, PriorPullsTowardsTheFactory) {
-  Scenario s = Simulated(HandheldRig("r"), SmallOptions(11), 2);
+  Scenario s = SimulatedScenario(HandheldRig("r"), SmallOptions(11), 2);
   s.rig.prior_sigmas = {{"cam0.focal.*", 1e-3}};
   CalibrateOptions options;
   options.prior = FactoryPrior(s.rig);
