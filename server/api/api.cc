@@ -8,7 +8,7 @@ namespace selfcal::server {
 
 Api::Api(Domain* domain,
          Pipeline* pipeline,
-         ChangeFeed* changes,
+         EventFeed* changes,
          ApiOptions options) {
   Methods methods({domain,
                    domain->store(),

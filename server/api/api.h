@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "server/api/change_feed.h"
+#include "server/api/event_feed.h"
 #include "server/api/method.h"
 #include "server/api/rig_watches.h"
 #include "server/api/traffic.h"
@@ -31,7 +31,7 @@ class Api {
   // watchers.
   Api(Domain* domain,
       Pipeline* pipeline,
-      ChangeFeed* changes,
+      EventFeed* changes,
       ApiOptions options = {});
   Api(const Api&) = delete;
   Api& operator=(const Api&) = delete;

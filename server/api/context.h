@@ -10,7 +10,7 @@
 
 namespace selfcal::server {
 
-class ChangeFeed;  // change_feed.h
+class EventFeed;   // event_feed.h
 class RigWatches;  // rig_watches.h
 class Traffic;     // traffic.h
 
@@ -18,7 +18,7 @@ struct ApiContext {
   Domain* domain = nullptr;
   Store* store = nullptr;  // of `domain`
   Pipeline* pipeline = nullptr;
-  ChangeFeed* changes = nullptr;
+  EventFeed* changes = nullptr;
   RigWatches* watches = nullptr;
   Traffic* traffic = nullptr;  // of segments
   // True once the daemon is stopping: watches and streams end with UNAVAILABLE.

@@ -10,8 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include "server/daemon/heap.h"
 #include "server/daemon/log.h"
-#include "server/daemon/memory.h"
 #include "server/daemon/options.h"
 #include "server/daemon/serve.h"
 #include "server/daemon/stop.h"

@@ -15,8 +15,8 @@
 
 #include "server/api/api.h"
 #include "server/console/console.h"
+#include "server/daemon/heap.h"
 #include "server/daemon/log.h"
-#include "server/daemon/memory.h"
 #include "server/daemon/service_manager.h"
 #include "server/daemon/state_lock.h"
 #include "server/daemon/stop.h"
@@ -180,8 +180,8 @@ std::optional<int> ServeOnce(
   const auto metrics = OpenMetrics(options, database, store.get());
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
-  ChangeFeed changes(store.get(),
-                     *metrics == nullptr ? nullptr : (*metrics)->observer());
+  EventFeed changes(store.get(),
+                    *metrics == nullptr ? nullptr : (*metrics)->observer());
   const auto conditions = MakeHostConditions(options.host);
   const auto pipeline =
       MakePipeline(&domain,

@@ -5,7 +5,7 @@
 
 #include "server/domain/device_change.h"
 #include "server/domain/exclusion.h"
-#include "server/domain/memory.h"
+#include "server/domain/remembered.h"
 #include "server/status/status_macros.h"
 #include "server/store/change_rows.h"
 #include "server/store/segment_rows.h"

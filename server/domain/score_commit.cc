@@ -4,8 +4,8 @@
 
 #include "server/domain/admission.h"
 #include "server/domain/device_change.h"
-#include "server/domain/memory.h"
 #include "server/domain/offers.h"
+#include "server/domain/remembered.h"
 #include "server/domain/retention.h"
 #include "server/domain/run_creation.h"
 #include "server/status/status_macros.h"

@@ -1,11 +1,11 @@
 // The checks of a candidate, by subject. Each function adds one or more of them
-// to the list. Internal to the validation (candidate.h).
+// to the list. Internal to the validation (candidate_validation.h).
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "server/pipeline/candidate.h"
+#include "server/pipeline/candidate_validation.h"
 
 namespace selfcal::server {
 

@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "server/pipeline/retry.h"
+#include "server/pipeline/backoff.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {

@@ -5,8 +5,8 @@
 #include <exception>
 #include <utility>
 
+#include "server/pipeline/backoff.h"
 #include "server/pipeline/recalibration.h"
-#include "server/pipeline/retry.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {

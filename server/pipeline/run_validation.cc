@@ -9,7 +9,7 @@
 #include "core/change/concerned.h"
 #include "server/domain/device_change.h"
 #include "server/pipeline/after_change.h"
-#include "server/pipeline/candidate.h"
+#include "server/pipeline/candidate_validation.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/rescoring.h"
 #include "server/pipeline/stored_information.h"

@@ -7,7 +7,7 @@
 #include <exception>
 #include <limits>
 
-#include "server/pipeline/retry.h"
+#include "server/pipeline/backoff.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {

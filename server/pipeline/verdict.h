@@ -6,7 +6,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/model/rig.h"
-#include "server/pipeline/candidate.h"
+#include "server/pipeline/candidate_validation.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {

@@ -170,10 +170,10 @@ const tests = {
     assert.equal(counts.reduce((sum, n) => sum + n, 0), segments.length);
     await r.picture('session');
     await r.detail('session');
-    const from = await r.page.locator('path.way').first().getAttribute('d');
+    const from = await r.page.locator('path.strand').first().getAttribute('d');
     await r.page.getByRole('button', { name: 'From above' }).click();
     await r.page.waitForFunction(
-      (d) => document.querySelector('path.way').getAttribute('d') !== d, from);
+      (d) => document.querySelector('path.strand').getAttribute('d') !== d, from);
     const own = () => r.page.locator('circle.kept.own').count();
     const before = await r.page.locator('thead').textContent();
     await r.page.getByRole('combobox').selectOption({ index: 1 });
@@ -330,7 +330,7 @@ const tests = {
       });
       // A page that is opened now shows it from the beginning.
       await other.shows('/' + name, heading, ['Iteration ', 'focal length of camera 0, x']);
-      const line = other.page.locator('.way .path').first();
+      const line = other.page.locator('.course .path').first();
       const points = await line.getAttribute('points');
       assert.ok(points.split(' ').length >= 3, points);
       assert.equal(await line.evaluate((e) => getComputedStyle(e).fill), 'none');

@@ -19,7 +19,7 @@
 #include <string>
 
 #include "server/api/api.h"
-#include "server/api/change_feed.h"
+#include "server/api/event_feed.h"
 #include "server/console/console.h"
 #include "test/server/grpc/fake_pipeline.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
@@ -90,7 +90,7 @@ class ConsoleTest : public ::testing::Test {
     store_ = *std::move(store);
     domain_.emplace(store_.get());
     pipeline_ = std::make_unique<FakePipeline>(&*domain_);
-    feed_ = std::make_unique<ChangeFeed>(store_.get(), nullptr);
+    feed_ = std::make_unique<EventFeed>(store_.get(), nullptr);
     api_.emplace(&*domain_,
                  pipeline_.get(),
                  feed_.get(),
@@ -182,7 +182,7 @@ class ConsoleTest : public ::testing::Test {
   std::unique_ptr<Store> store_;
   std::optional<Domain> domain_;
   std::unique_ptr<FakePipeline> pipeline_;
-  std::unique_ptr<ChangeFeed> feed_;
+  std::unique_ptr<EventFeed> feed_;
   std::optional<Api> api_;
   std::unique_ptr<Console> console_;
 };

@@ -24,7 +24,7 @@
 #include "selfcal/v1/rig.grpc.pb.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 #include "server/api/api.h"
-#include "server/api/change_feed.h"
+#include "server/api/event_feed.h"
 #include "server/grpc/server.h"
 #include "test/server/grpc/fake_pipeline.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
@@ -159,7 +159,7 @@ class ServiceTest : public ::testing::Test {
   std::unique_ptr<Store> store_;
   std::optional<Domain> domain_;
   std::unique_ptr<FakePipeline> pipeline_;
-  ChangeFeed feed_;
+  EventFeed feed_;
   std::list<Api> apis_;
   std::unique_ptr<Server> server_;
   std::shared_ptr<grpc::Channel> channel_;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/pipeline/candidate.h"
+#include "server/pipeline/candidate_validation.h"
 #include "server/pipeline/verdict.h"
 #include "test/server/test_segments.h"
 

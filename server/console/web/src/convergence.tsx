@@ -22,7 +22,7 @@ const kStill = 0.01;
 
 // The course of one parameter, with a band of one sigma and a line at its start
 // value.
-function Way(props: { of: ComponentProgress[]; label: string }) {
+function Course(props: { of: ComponentProgress[]; label: string }) {
   const ends = props.of.flatMap((p) => [p.moved - p.sigma, p.moved + p.sigma, 0]);
   const [least, most] = [Math.min(...ends), Math.max(...ends)];
   const x = (i: number) => kEdge + (i * (kWidth - 2 * kEdge)) / Math.max(1, props.of.length - 1);
@@ -34,7 +34,7 @@ function Way(props: { of: ComponentProgress[]; label: string }) {
   const below = line((p) => p.moved - p.sigma).reverse();
   const last = props.of.length - 1;
   return (
-    <svg class="way" viewBox={`0 0 ${kWidth} ${kHeight}`} role="img" aria-label={props.label}>
+    <svg class="course" viewBox={`0 0 ${kWidth} ${kHeight}`} role="img" aria-label={props.label}>
       <polygon points={[...above, ...below].join(' ')} class="spread" />
       <line x1={0} x2={kWidth} y1={y(0)} y2={y(0)} class="start" />
       <polyline points={line((p) => p.moved).join(' ')} class="path" />
@@ -43,22 +43,22 @@ function Way(props: { of: ComponentProgress[]; label: string }) {
   );
 }
 
-function stillMoves(way: ComponentProgress[]): string {
-  if (way.length < 2) return '';
-  const [before, now] = way.slice(-2);
+function stillMoves(course: ComponentProgress[]): string {
+  if (course.length < 2) return '';
+  const [before, now] = course.slice(-2);
   const sigmas = Math.abs(now.moved - before.moved) / now.sigma;
   return sigmas < kStill ? `less than ${kStill}` : number(sigmas, 2);
 }
 
 function Parameters(props: { steps: Step[] }) {
-  const ways = new Map<string, ComponentProgress[]>();
+  const courses = new Map<string, ComponentProgress[]>();
   for (const { parameters } of props.steps) {
     for (const parameter of parameters) {
-      ways.set(parameter.component, [...(ways.get(parameter.component) ?? []), parameter]);
+      courses.set(parameter.component, [...(courses.get(parameter.component) ?? []), parameter]);
     }
   }
-  const rows = [...ways].map(([name, way]) => {
-    const now = way[way.length - 1];
+  const rows = [...courses].map(([name, course]) => {
+    const now = course[course.length - 1];
     const moved = quantity(now.moved, now.unit, 3);
     const sigma = quantity(now.sigma, now.unit, 3);
     return [
@@ -66,8 +66,8 @@ function Parameters(props: { steps: Step[] }) {
       quantity(now.value, now.unit),
       moved,
       sigma,
-      stillMoves(way),
-      <Way of={way} label={`${component(name)} has moved by ${moved}, sigma ${sigma}`} />,
+      stillMoves(course),
+      <Course of={course} label={`${component(name)} has moved by ${moved}, sigma ${sigma}`} />,
     ];
   });
   return (

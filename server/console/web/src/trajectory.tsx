@@ -8,7 +8,7 @@ const kDegree = Math.PI / 180;
 
 // Pieces of a path with the same style; x, y, z in turn.
 export interface Strand {
-  ways: number[][];
+  lines: number[][];
   class: string;
 }
 
@@ -40,10 +40,10 @@ interface Fit {
 // Chooses the scale so that everything is in the picture.
 function fit(strands: Strand[], view: View, width: number, height: number): Fit {
   let [left, right, top, bottom] = [Infinity, -Infinity, Infinity, -Infinity];
-  for (const { ways } of strands) {
-    for (const way of ways) {
-      for (let i = 0; i + 2 < way.length; i += 3) {
-        const [x, y] = project(way[i], way[i + 1], way[i + 2], view);
+  for (const { lines } of strands) {
+    for (const line of lines) {
+      for (let i = 0; i + 2 < line.length; i += 3) {
+        const [x, y] = project(line[i], line[i + 1], line[i + 2], view);
         left = Math.min(left, x);
         right = Math.max(right, x);
         top = Math.min(top, y);
@@ -67,11 +67,11 @@ function fit(strands: Strand[], view: View, width: number, height: number): Fit 
   };
 }
 
-function drawn(ways: number[][], place: Fit['place']): string {
+function drawn(lines: number[][], place: Fit['place']): string {
   let path = '';
-  for (const way of ways) {
-    for (let i = 0; i + 2 < way.length; i += 3) {
-      const [x, y] = place(way, i);
+  for (const line of lines) {
+    for (let i = 0; i + 2 < line.length; i += 3) {
+      const [x, y] = place(line, i);
       path += `${i === 0 ? 'M' : 'L'}${x.toFixed(1)} ${y.toFixed(1)}`;
     }
   }
@@ -111,7 +111,7 @@ export function Scene(props: {
     [props.strands, view, width, height],
   );
   const paths = useMemo(
-    () => props.strands.map(({ ways }) => drawn(ways, seen.place)),
+    () => props.strands.map(({ lines }) => drawn(lines, seen.place)),
     [props.strands, seen],
   );
   const places = useMemo(() => props.marks.map(({ at }) => seen.place(at)), [props.marks, seen]);
@@ -150,7 +150,7 @@ export function Scene(props: {
         onClick={props.onPick}
       >
         {props.strands.map((strand, i) => (
-          <path key={i} d={paths[i]} class={'way ' + strand.class} />
+          <path key={i} d={paths[i]} class={'strand ' + strand.class} />
         ))}
         {props.marks.map((mark, i) => (
           <circle key={i} cx={places[i][0]} cy={places[i][1]} r={mark.radius} class={mark.class}>

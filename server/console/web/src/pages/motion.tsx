@@ -15,7 +15,7 @@ const place = (positions: number[], i: number) => positions.slice(3 * i, 3 * i +
 
 function Trajectory(props: { positions: number[]; at: number }) {
   const { positions } = props;
-  const strands = useMemo((): Strand[] => [{ ways: [positions], class: 'path' }], [positions]);
+  const strands = useMemo((): Strand[] => [{ lines: [positions], class: 'path' }], [positions]);
   const keyframes = useMemo(
     () =>
       Array.from({ length: positions.length / 3 }, (_, i): Mark => ({

@@ -6,10 +6,10 @@ import { number } from '../format';
 import { ListPage, type Column } from '../list';
 import { DataTable, Figures, Link, Loaded, SegmentLink, Title, When } from '../parts';
 import { useRead } from '../state';
-import { ColouredWay, entropyOf, isKept, useWay, type Way } from '../way';
+import { ColouredPath, entropyOf, isKept, useSessionPath, type SessionPath } from '../session_path';
 
-function Kept(props: { way: Way; group: string }) {
-  const { segments } = props.way;
+function Kept(props: { sessionPath: SessionPath; group: string }) {
+  const { segments } = props.sessionPath;
   const kept = segments
     .filter(isKept)
     .sort((a, b) => entropyOf(a, props.group) - entropyOf(b, props.group));
@@ -31,47 +31,55 @@ function Kept(props: { way: Way; group: string }) {
   );
 }
 
-function WayAndKept(props: { way: Way; groups: string[] }) {
+function PathAndKept(props: { sessionPath: SessionPath; groups: string[] }) {
   const [group, setGroup] = useState(props.groups[0]);
   return (
     <>
-      <ColouredWay way={props.way} groups={props.groups} group={group} onGroup={setGroup} />
+      <ColouredPath
+        sessionPath={props.sessionPath}
+        groups={props.groups}
+        group={group}
+        onGroup={setGroup}
+      />
       <h2>Kept segments</h2>
-      <Kept way={props.way} group={group} />
+      <Kept sessionPath={props.sessionPath} group={group} />
     </>
   );
 }
 
 // Reads the path of a session and the groups of its rig.
-function useWayAndGroups(rig: string, session: string, version: number) {
-  const way = useWay(`${rigPath(rig)}/sessions/${encodeURIComponent(session)}`, version);
+function usePathAndGroups(rig: string, session: string, version: number) {
+  const sessionPath = useSessionPath(
+    `${rigPath(rig)}/sessions/${encodeURIComponent(session)}`,
+    version,
+  );
   const described = useRead<Rig>(rigPath(rig));
   const groups = described.value?.groups.map((g) => g.group);
   return {
-    value: way.value && groups ? { way: way.value, groups } : null,
-    error: way.error ?? described.error,
+    value: sessionPath.value && groups ? { sessionPath: sessionPath.value, groups } : null,
+    error: sessionPath.error ?? described.error,
   };
 }
 
 // `session` is encoded as in the names of its segments.
 export function SessionPage(props: { rig: string; session: string; version: number }) {
-  const read = useWayAndGroups(props.rig, props.session, props.version);
+  const read = usePathAndGroups(props.rig, props.session, props.version);
   const title = 'Session ' + decodeURIComponent(props.session);
   return (
     <>
       <Title text={title}>{title}</Title>
       <Loaded read={read}>
-        {({ way, groups }) => (
+        {({ sessionPath, groups }) => (
           <>
             <Figures
               of={[
-                ['Segments', way.session.segments],
-                ['Kept', way.segments.filter(isKept).length],
-                ['Started', <When time={way.session.firstReceiveTime} />],
-                ['Newest', <When time={way.session.lastReceiveTime} />],
+                ['Segments', sessionPath.session.segments],
+                ['Kept', sessionPath.segments.filter(isKept).length],
+                ['Started', <When time={sessionPath.session.firstReceiveTime} />],
+                ['Newest', <When time={sessionPath.session.lastReceiveTime} />],
               ]}
             />
-            <WayAndKept way={way} groups={groups} />
+            <PathAndKept sessionPath={sessionPath} groups={groups} />
           </>
         )}
       </Loaded>
@@ -82,16 +90,22 @@ export function SessionPage(props: { rig: string; session: string; version: numb
 // The session of the newest segment, for the page of a rig.
 function Newest(props: { rig: string; session: string; version: number }) {
   const [group, setGroup] = useState<string | null>(null);
-  const read = useWayAndGroups(props.rig, props.session, props.version);
+  const read = usePathAndGroups(props.rig, props.session, props.version);
   return (
     <Loaded read={read}>
-      {({ way, groups }) => (
+      {({ sessionPath, groups }) => (
         <>
           <p>
-            <Link to={pageOf(way.session.name)}>{way.session.session}</Link>: {way.session.segments}{' '}
-            segments, of which {way.segments.filter(isKept).length} are kept.
+            <Link to={pageOf(sessionPath.session.name)}>{sessionPath.session.session}</Link>:{' '}
+            {sessionPath.session.segments} segments, of which{' '}
+            {sessionPath.segments.filter(isKept).length} are kept.
           </p>
-          <ColouredWay way={way} groups={groups} group={group ?? groups[0]} onGroup={setGroup} />
+          <ColouredPath
+            sessionPath={sessionPath}
+            groups={groups}
+            group={group ?? groups[0]}
+            onGroup={setGroup}
+          />
         </>
       )}
     </Loaded>

@@ -1,4 +1,4 @@
-#include "server/daemon/memory.h"
+#include "server/daemon/heap.h"
 
 #include <malloc.h>
 

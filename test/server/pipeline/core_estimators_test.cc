@@ -4,12 +4,12 @@
 namespace selfcal::server {
 namespace {
 
-class WholeWayTest : public PipelineTest {
+class CoreEstimatorsTest : public PipelineTest {
  protected:
-  WholeWayTest() { estimators_ = CoreEstimators(); }
+  CoreEstimatorsTest() { estimators_ = CoreEstimators(); }
 };
 
-TEST_F(WholeWayTest, SimulatedSegmentsFillTheTablesAndGiveAVersion) {
+TEST_F(CoreEstimatorsTest, SimulatedSegmentsFillTheTablesAndGiveAVersion) {
   Rig rig = TestRig("a");
   rig.table_size = 4;
   ASSERT_TRUE(domain_->CreateRig(rig).ok());
@@ -36,7 +36,7 @@ TEST_F(WholeWayTest, SimulatedSegmentsFillTheTablesAndGiveAVersion) {
   EXPECT_EQ(second->covariance.rows(), TangentSize(rig.factory));
 }
 
-TEST_F(WholeWayTest, ScoresAreTheSameAfterAStop) {
+TEST_F(CoreEstimatorsTest, ScoresAreTheSameAfterAStop) {
   const auto segments = TestSegments(TestRig("a"), 4);
   std::vector<Eigen::MatrixXd> matrices[2];
   for (const int trial : {0, 1}) {
@@ -60,7 +60,7 @@ TEST_F(WholeWayTest, ScoresAreTheSameAfterAStop) {
 }
 
 // Ids are unique within a session: the same ones in another mean nothing.
-TEST_F(WholeWayTest, LandmarksNeverMatchAcrossSessions) {
+TEST_F(CoreEstimatorsTest, LandmarksNeverMatchAcrossSessions) {
   constexpr std::uint64_t kFar = 1'000'000;
   for (const Selection selection : {Selection::kTables, Selection::kJointD}) {
     std::vector<Eigen::VectorXd> values;

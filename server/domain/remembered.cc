@@ -1,4 +1,4 @@
-#include "server/domain/memory.h"
+#include "server/domain/remembered.h"
 
 #include <cstddef>
 #include <utility>

@@ -20,11 +20,11 @@
 
 namespace selfcal::server {
 
-class ChangeFeed final : public PipelineObserver {
+class EventFeed final : public PipelineObserver {
  public:
   // Forwards to `next`, which may be null. Both must outlive the feed.
-  ChangeFeed(Store* store, PipelineObserver* next);
-  ~ChangeFeed() override;
+  EventFeed(Store* store, PipelineObserver* next);
+  ~EventFeed() override;
 
   void OnVerdict(const std::string& rig, Verdict verdict) override;
   void OnScore(const SegmentInformation& information, double seconds) override;

@@ -1,4 +1,4 @@
-#include "server/api/change_feed.h"
+#include "server/api/event_feed.h"
 
 #include <chrono>
 #include <utility>
@@ -11,10 +11,10 @@ constexpr std::size_t kEvents = 50;  // number of events that a poll reads
 
 }  // namespace
 
-ChangeFeed::ChangeFeed(Store* store, PipelineObserver* next)
+EventFeed::EventFeed(Store* store, PipelineObserver* next)
     : store_(store), next_(next), poller_([this] { PollEvents(); }) {}
 
-ChangeFeed::~ChangeFeed() {
+EventFeed::~EventFeed() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
@@ -23,28 +23,27 @@ ChangeFeed::~ChangeFeed() {
   poller_.join();
 }
 
-void ChangeFeed::OnVerdict(const std::string& rig, Verdict verdict) {
+void EventFeed::OnVerdict(const std::string& rig, Verdict verdict) {
   if (next_ != nullptr) next_->OnVerdict(rig, verdict);
   if (verdict == Verdict::kStored) Notify(v1::Change::SEGMENTS, rig);
 }
 
-void ChangeFeed::OnScore(const SegmentInformation& information,
-                         double seconds) {
+void EventFeed::OnScore(const SegmentInformation& information, double seconds) {
   if (next_ != nullptr) next_->OnScore(information, seconds);
   Notify(v1::Change::SCORES, "");
 }
 
-void ChangeFeed::OnRun(const StoredRun& run) {
+void EventFeed::OnRun(const StoredRun& run) {
   if (next_ != nullptr) next_->OnRun(run);
   Notify(v1::Change::RUNS, run.rig);
 }
 
-void ChangeFeed::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
+void EventFeed::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
   if (next_ != nullptr) next_->OnCheck(subject, outcome);
 }
 
-std::shared_ptr<void> ChangeFeed::Subscribe(const std::string& rig,
-                                            OnChange on_change) {
+std::shared_ptr<void> EventFeed::Subscribe(const std::string& rig,
+                                           OnChange on_change) {
   const auto events = store_->ListNewestEvents({1, ""});
   const bool known = events.ok() && !events->items.empty();
   auto reader = std::make_shared<Reader>(
@@ -54,7 +53,7 @@ std::shared_ptr<void> ChangeFeed::Subscribe(const std::string& rig,
   return reader;
 }
 
-std::vector<std::shared_ptr<ChangeFeed::Reader>> ChangeFeed::Readers() {
+std::vector<std::shared_ptr<EventFeed::Reader>> EventFeed::Readers() {
   std::vector<std::shared_ptr<Reader>> readers;
   std::erase_if(readers_, [&](const std::weak_ptr<Reader>& weak) {
     auto reader = weak.lock();
@@ -65,7 +64,7 @@ std::vector<std::shared_ptr<ChangeFeed::Reader>> ChangeFeed::Readers() {
   return readers;
 }
 
-void ChangeFeed::Notify(v1::Change::What what, const std::string& rig) {
+void EventFeed::Notify(v1::Change::What what, const std::string& rig) {
   const std::lock_guard lock(mutex_);
   for (const auto& reader : Readers()) {
     if (rig.empty() || reader->rig.empty() || reader->rig == rig) {
@@ -74,7 +73,7 @@ void ChangeFeed::Notify(v1::Change::What what, const std::string& rig) {
   }
 }
 
-void ChangeFeed::PollEvents() {
+void EventFeed::PollEvents() {
   std::unique_lock lock(mutex_);
   while (!stop_.wait_for(lock, kPollInterval, [this] { return stopping_; })) {
     if (Readers().empty()) continue;
@@ -87,7 +86,7 @@ void ChangeFeed::PollEvents() {
   }
 }
 
-void ChangeFeed::NotifyOfEvents(const std::vector<StoredEvent>& newest) {
+void EventFeed::NotifyOfEvents(const std::vector<StoredEvent>& newest) {
   const std::lock_guard lock(mutex_);
   for (const auto& reader : Readers()) {
     const bool more = newest.size() == kEvents &&

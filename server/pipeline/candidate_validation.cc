@@ -1,4 +1,4 @@
-#include "server/pipeline/candidate.h"
+#include "server/pipeline/candidate_validation.h"
 
 #include <fmt/format.h>
 

@@ -13,13 +13,13 @@ const kPages = 20;
 const kPageSize = 1000;
 const kSteps = 6; // number of colours
 
-export interface Way {
+export interface SessionPath {
   session: Session;
   segments: TrajectorySegment[];
   whole: boolean; // no page is missing
 }
 
-async function readWay(path: string): Promise<Way> {
+async function readSessionPath(path: string): Promise<SessionPath> {
   const segments: TrajectorySegment[] = [];
   let token = '';
   for (let page = 1; ; ++page) {
@@ -36,8 +36,8 @@ async function readWay(path: string): Promise<Way> {
 // Reads the path of one session while the component is mounted. Reads again when
 // something has changed, but never concurrently: reading a long session can take
 // longer than recording its next segment.
-export function useWay(path: string, version: number) {
-  const [way, setWay] = useState<Way | null>(null);
+export function useSessionPath(path: string, version: number) {
+  const [sessionPath, setSessionPath] = useState<SessionPath | null>(null);
   const [error, setError] = useState<ApiError | null>(null);
   const state = useRef({ wanted: version, busy: false, gone: false });
   useEffect(() => {
@@ -56,7 +56,7 @@ export function useWay(path: string, version: number) {
       for (let done = -1; done !== now.wanted && !now.gone;) {
         done = now.wanted;
         try {
-          setWay(await readWay(path));
+          setSessionPath(await readSessionPath(path));
           setError(null);
         } catch (failure) {
           setError((failure as Failure).error);
@@ -66,7 +66,7 @@ export function useWay(path: string, version: number) {
     };
     void read();
   }, [path, version]);
-  return { value: error ? null : way, error };
+  return { value: error ? null : sessionPath, error };
 }
 
 // ------------------------------------------------------------- colours
@@ -106,7 +106,7 @@ function Legend(props: { scale: Scale; counts: number[]; unknown: number }) {
   };
   const sample = (name: string) => (
     <svg viewBox="0 0 40 12" class="sample" aria-hidden="true">
-      <path d="M2 6L38 6" class={'way ' + name} />
+      <path d="M2 6L38 6" class={'strand ' + name} />
     </svg>
   );
   return (
@@ -161,7 +161,7 @@ function joins(segment: TrajectorySegment, next: TrajectorySegment): boolean {
 }
 
 function strandsOf(drawn: TrajectorySegment[], group: string, scale: Scale): Strand[] {
-  const ways = (of: (segment: TrajectorySegment) => boolean) =>
+  const lines = (of: (segment: TrajectorySegment) => boolean) =>
     drawn.flatMap((segment, i) => (of(segment) ? [wayOf(segment, drawn[i + 1])] : []));
   const stepOf = (segment: TrajectorySegment) => {
     const entropy = entropyOf(segment, group);
@@ -169,27 +169,27 @@ function strandsOf(drawn: TrajectorySegment[], group: string, scale: Scale): Str
   };
   const steps = Array.from({ length: kSteps }, (_, step) => step);
   const strands: Strand[] = [
-    { ways: ways((segment) => stepOf(segment) < 0), class: 'unknown' },
+    { lines: lines((segment) => stepOf(segment) < 0), class: 'unknown' },
     ...steps.map((step) => ({
-      ways: ways((segment) => stepOf(segment) === step && !isKept(segment)),
+      lines: lines((segment) => stepOf(segment) === step && !isKept(segment)),
       class: 'info-' + step,
     })),
     // Kept segments are drawn on top, with an edge.
-    { ways: ways(isKept), class: 'edge' },
+    { lines: lines(isKept), class: 'edge' },
     ...steps.map((step) => ({
-      ways: ways((segment) => stepOf(segment) === step && isKept(segment)),
+      lines: lines((segment) => stepOf(segment) === step && isKept(segment)),
       class: 'kept info-' + step,
     })),
   ];
-  return strands.filter((strand) => strand.ways.length > 0);
+  return strands.filter((strand) => strand.lines.length > 0);
 }
 
-function Picture(props: { way: Way; group: string; scale: Scale }) {
-  const { way, group, scale } = props;
+function Picture(props: { sessionPath: SessionPath; group: string; scale: Scale }) {
+  const { sessionPath, group, scale } = props;
   const [pointed, setPointed] = useState(-1);
   const drawn = useMemo(
-    () => way.segments.filter((segment) => segment.positionsM.length > 0),
-    [way],
+    () => sessionPath.segments.filter((segment) => segment.positionsM.length > 0),
+    [sessionPath],
   );
   const strands = useMemo(() => strandsOf(drawn, group, scale), [drawn, group, scale]);
   const targets = useMemo(() => drawn.map(middle), [drawn]);
@@ -217,7 +217,7 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
     <>
       <div class="wide">
         <Scene
-          label={`Path of the device through session ${way.session.session}, coloured by the entropy of group ${group}; the tables below have the numbers`}
+          label={`Path of the device through session ${sessionPath.session.session}, coloured by the entropy of group ${group}; the tables below have the numbers`}
           strands={strands}
           marks={marks}
           width={720}
@@ -234,10 +234,10 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
           ? say(now, group) + '; click to open it'
           : 'Point at the path to see the segment. Thick segments with a mark are kept; a filled mark means kept for this group.'}
       </p>
-      {drawn.length < way.segments.length && (
+      {drawn.length < sessionPath.segments.length && (
         <p class="quiet">
-          {way.segments.length - drawn.length} segments are not drawn: they were received before
-          positions were stored.
+          {sessionPath.segments.length - drawn.length} segments are not drawn: they were received
+          before positions were stored.
         </p>
       )}
     </>
@@ -245,22 +245,22 @@ function Picture(props: { way: Way; group: string; scale: Scale }) {
 }
 
 // The path coloured by a group, with the menu that selects the group.
-export function ColouredWay(props: {
-  way: Way;
+export function ColouredPath(props: {
+  sessionPath: SessionPath;
   groups: string[];
   group: string;
   onGroup: (group: string) => void;
 }) {
-  const { way, group } = props;
+  const { sessionPath, group } = props;
   const { scale, counts, unknown } = useMemo(() => {
-    const entropies = way.segments
+    const entropies = sessionPath.segments
       .map((segment) => entropyOf(segment, group))
       .filter((entropy) => !Number.isNaN(entropy));
     const scale = scaleOf(entropies);
     const counts = new Array<number>(kSteps).fill(0);
     for (const entropy of entropies) counts[scale.stepOf(entropy)]++;
-    return { scale, counts, unknown: way.segments.length - entropies.length };
-  }, [way, group]);
+    return { scale, counts, unknown: sessionPath.segments.length - entropies.length };
+  }, [sessionPath, group]);
   return (
     <>
       <div class="bar">
@@ -271,11 +271,12 @@ export function ColouredWay(props: {
           onChoice={props.onGroup}
         />
       </div>
-      <Picture way={way} group={group} scale={scale} />
+      <Picture sessionPath={sessionPath} group={group} scale={scale} />
       <Legend scale={scale} counts={counts} unknown={unknown} />
-      {!way.whole && (
+      {!sessionPath.whole && (
         <p class="warning">
-          Only the first {way.segments.length} of {way.session.segments} segments are drawn.
+          Only the first {sessionPath.segments.length} of {sessionPath.session.segments} segments
+          are drawn.
         </p>
       )}
     </>
