@@ -12,7 +12,7 @@
 // The information of a segment is linearised at the states of the SLAM system.
 // If noise in these states looks like motion, the segment claims information
 // that the motion does not provide: that theta is equal to the linearisation
-// point. That is no evidence for a change. Therefore the segment is assumed to
+// point. That is not evidence of a change. Therefore the segment is assumed to
 // have an additional unknown error, its reach: in each component, its standard
 // deviation is twice the distance from the linearisation point to the active
 // calibration. A segment that was linearised more than kMaxLinearisation

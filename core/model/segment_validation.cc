@@ -50,7 +50,7 @@ void CheckKey(const MotionSegment& segment, ViolationList* list) {
   if (segment.calibration_version < 1) {
     list->Add("calibration_version",
               std::to_string(segment.calibration_version) +
-                  " is no version; they begin with 1");
+                  " is not a version; versions begin with 1");
   }
 }
 
@@ -63,7 +63,7 @@ void CheckTemperature(const MotionSegment& segment,
   if (c >= limits.min_temperature_c && c <= limits.max_temperature_c) return;
   list->Add("temperature_c",
             std::to_string(c) +
-                " is no temperature of a device; send degrees Celsius, or "
+                " is not the temperature of a device; send degrees Celsius, or "
                 "leave it out");
 }
 

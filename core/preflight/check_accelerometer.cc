@@ -160,8 +160,8 @@ class AccelerometerCheck {
   }
 
   // Returns true if readings are the acceleration without gravity. A small
-  // residual at zero gravity is no proof if the readings may be in units of g:
-  // the residual with those must be larger.
+  // residual at zero gravity proves nothing if the readings may be in units of
+  // g: the residual with those must be larger.
   bool MissingExplains() {
     const double removed =
         Error(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());

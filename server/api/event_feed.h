@@ -1,4 +1,4 @@
-// Reports that something has changed, so that whoever shows it reads it anew.
+// Reports that something has changed, so that whoever shows it reads it again.
 // Changes by the pipeline come from its observer; changes that callers commit
 // come from the event log, which is polled while there is a reader. Any thread
 // may call.

@@ -25,7 +25,8 @@ const MethodDescriptor* DescriptorOf(const Message& request) {
       if (method->input_type() == request.GetDescriptor()) return method;
     }
   }
-  throw std::logic_error(request.GetTypeName() + " is no request of a method");
+  throw std::logic_error(request.GetTypeName() +
+                         " is not the request of a method");
 }
 
 absl::Status Authorised(const Call& call,

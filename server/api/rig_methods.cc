@@ -79,7 +79,7 @@ std::string WhyNot(const std::string& field) {
     if (field == fixed) return kStored;
   }
   return v1::Rig::descriptor()->FindFieldByName(field) == nullptr
-             ? "is no field of a rig"
+             ? "is not a field of a rig"
              : "";
 }
 

@@ -187,7 +187,7 @@ absl::StatusOr<Routes::Request> Routes::Find(const HttpRequest& request) const {
       if (SetText(type, name, text, &values)) continue;
       return InvalidFields(
           {{Shortened(name, kMaxEcho),
-            "is no parameter of this address; docs/api.md lists them"}});
+            "is not a parameter of this address; docs/api.md lists them"}});
     }
     for (const auto& [name, text] : *fields) {
       SetText(type, name, text, &values);

@@ -49,7 +49,7 @@ absl::Status QuarantineExcluded(UnitOfWork* tx,
   for (const SegmentFit& fit : fits) {
     if (fit.excluded.empty()) continue;
     const auto found = FindSegment(tx, fit.key);
-    // A segment without a record is no reason to lose the calibration.
+    // A segment without a record is not a reason to lose the calibration.
     if (absl::IsNotFound(found.status())) continue;
     SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, found);
     SELFCAL_RETURN_IF_ERROR(MarkExcluded(tx, run, segment.rowid));

@@ -59,7 +59,7 @@ absl::Status CheckThatTablesChanged(UnitOfWork* tx,
   }
   return absl::FailedPreconditionError(fmt::format(
       "the tables of rig {} have not changed since version {} was computed; "
-      "send segments with more motion, or force it to be computed anew",
+      "send segments with more motion, or force the computation",
       tx->rig(),
       last.calibration_version));
 }

@@ -30,7 +30,7 @@ absl::StatusOr<ScoreCommit> CommitScore(UnitOfWork* tx,
   if (segment.state == SegmentState::kUnusable) {
     return absl::FailedPreconditionError(
         SegmentText(tx->rig(), key) +
-        " was found unusable; send it anew under "
+        " was found unusable; send it again under "
         "another session");
   }
   SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.rowid, information));

@@ -14,7 +14,7 @@ absl::Status Parse(const grpc::ByteBuffer& bytes,
   if (reader.status().ok() && message->ParseFromZeroCopyStream(&reader)) {
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError("the request is no message of type " +
+  return absl::InvalidArgumentError("the request is not a message of type " +
                                     message->GetTypeName());
 }
 

@@ -89,7 +89,7 @@ void CheckCertainty(const CheckContext& context,
   const auto components = TangentComponents(context.rig.factory);
   const Eigen::VectorXd prior = PriorSigmas(context.rig);
   const Eigen::VectorXd before = active.covariance.diagonal().cwiseSqrt();
-  // The probability of a device change is no lack of information.
+  // The probability of a device change is not a lack of information.
   Eigen::VectorXd after = context.result.covariance.diagonal();
   const Eigen::VectorXd& change = context.result.remembered.change_sigmas;
   if (change.size() == after.size()) after -= change.cwiseAbs2();

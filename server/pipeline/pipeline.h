@@ -161,7 +161,7 @@ class Pipeline {
   // does not wait.
   virtual void EndSession(const std::string& rig) = 0;
 
-  // Domain::UpdateRig; scores the stored segments anew if the prior has
+  // Domain::UpdateRig; rescores the stored segments if the prior has
   // changed.
   virtual absl::StatusOr<StoredRig> UpdateRig(const std::string& rig,
                                               const RigChange& change,

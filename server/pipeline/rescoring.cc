@@ -50,7 +50,7 @@ void RescoreKept(Domain* domain,
     status = absl::InternalError(error.what());
   }
   if (!status.ok()) {
-    spdlog::warn("not all kept segments of rig {} are scored anew: {}",
+    spdlog::warn("not all kept segments of rig {} are rescored: {}",
                  rig,
                  status.ToString());
   }

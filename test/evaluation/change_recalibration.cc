@@ -1,5 +1,5 @@
 // After a shock: the calibration on the segments since, as the daemon makes it,
-// and that on tables that were not started anew.
+// and that on tables that were not restarted.
 #include <cmath>
 #include <numbers>
 #include <span>
@@ -160,7 +160,7 @@ void RunChangeRecalibrations(const std::vector<ChangeDevice>& devices,
                      "of these from before",
                      "rotation error, rms [deg]",
                      "NEES / dimension"});
-  const Summary after = Add("tables started anew", since, &table);
+  const Summary after = Add("tables restarted", since, &table);
   const Summary without = Add("tables as they were", mixed, &table);
   context->WriteTable("recalibration", table);
   context->AtMost("change.segments_from_before_in_calibration",

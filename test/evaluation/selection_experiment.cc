@@ -89,7 +89,7 @@ Data MakeData(const Scenario& scenario, double duration_s, int index) {
           "session",
           options)
           .segments;
-  // Image borders are no matter here: the segments are not validated.
+  // Image borders do not matter here: the segments are not validated.
   if (scenario.track_sigma_px > 0) {
     AddTrackErrors(scenario.track_sigma_px, seed, &data.segments);
   }

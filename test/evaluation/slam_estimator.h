@@ -13,7 +13,7 @@
 namespace selfcal {
 
 struct SlamEstimatorOptions {
-  // Segments that are estimated together. Position and heading begin anew with
+  // Segments that are estimated together. Position and heading restart with
   // each stretch, where the states that are given have them.
   int stretch = 5;
   int max_iterations = 12;

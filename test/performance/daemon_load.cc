@@ -57,7 +57,7 @@ double Memory(pid_t pid, const std::string& name) {
   throw std::runtime_error("the daemon has ended");
 }
 
-// A device with a connection and a rig of its own; its recording begins anew
+// A device with a connection and a rig of its own; its recording restarts
 // as another session.
 class Device {
  public:

@@ -68,7 +68,7 @@ TEST_F(Commands, CoachPrintsJson) {
   EXPECT_EQ(printed.SerializeAsString(), daemon_.advice[0].SerializeAsString());
 }
 
-// The same answer again is no news; another motion or another segment is.
+// The same answer again is not news; another motion or another segment is.
 TEST_F(Commands, CoachWatchPrintsALineWhenTheAdviceChanges) {
   daemon_.advice = {
       Advice("pan", 5), Advice("pan", 5), Advice("pan", 6), Advice("nod", 6)};

@@ -281,7 +281,7 @@ Tool Basalt(const std::vector<TextFile>& files) {
     } else if (type == "pinhole-radtan8") {
       // The rational model with a denominator of 1 and no third coefficient.
       for (const char* zero : {"k3", "k4", "k5", "k6", "rpmax"}) {
-        if (p[zero] != 0) throw std::runtime_error("is no radtan");
+        if (p[zero] != 0) throw std::runtime_error("is not radtan");
       }
       k = {p["k1"], p["k2"], p["p1"], p["p2"]};
     }

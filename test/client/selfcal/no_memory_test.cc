@@ -65,7 +65,7 @@ void Feed(const std::vector<KeyframeObservation>& seen,
 
 TEST(NoMemory, NoCallOfTheBuilderThrowsAndItGoesOn) {
   SegmentBuilderOptions options;
-  options.session = "a session with a name that is no short string";
+  options.session = "a session with a name that is not a short string";
   options.keyframes = 6;
   const std::vector<KeyframeObservation> seen = {{0, 1}, {0, 2}, {0, 3}};
   int failures = 0;

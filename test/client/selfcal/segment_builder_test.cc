@@ -148,7 +148,7 @@ TEST(SegmentBuilder, PutsEveryKeyframeIntoExactlyOneSegment) {
         times.push_back(state.t_ns);
       }
     }
-    // A single keyframe at the end is no segment.
+    // A single keyframe at the end is not a segment.
     const int rest = keyframes % options.keyframes;
     ASSERT_EQ(times.size(),
               static_cast<std::size_t>(rest == 1 ? keyframes - 1 : keyframes));
@@ -380,7 +380,7 @@ TEST_F(RegularStream, FlushesTheRestIfItIsLongEnough) {
   EXPECT_EQ(builder_.statistics().keyframes_dropped, 2u);
   EXPECT_EQ(builder_.next_index(), 2) << "no index is left out";
   builder_.Flush(0);
-  EXPECT_FALSE(builder_.Take().has_value()) << "nothing is no segment";
+  EXPECT_FALSE(builder_.Take().has_value()) << "nothing is not a segment";
 }
 
 TEST_F(RegularStream, FlushLeavesOutKeyframesThatNoSampleCovers) {

@@ -50,7 +50,7 @@ TEST(ParameterBlocks, ExcludeFixedComponentsAndDuplicates) {
   for (const ParameterBlock& block : ParameterBlocks(rig)) {
     names.push_back(block.name);
   }
-  // The block cam0.q_CI is the group "turn"; one focal length is no zoom.
+  // The block cam0.q_CI is the group "turn"; one focal length is not a zoom.
   EXPECT_THAT(names,
               ::testing::UnorderedElementsAre("all",
                                               "camera",

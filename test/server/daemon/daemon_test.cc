@@ -72,7 +72,7 @@ TEST_F(DaemonTest, ScoresFillTablesAndSurviveAKill) {
   const Rig rig = CreateRig();
   Stream(TestSegments(rig, 4));
   ASSERT_TRUE(AllScored());
-  // The full tables start a run, which scores their segments anew at its end.
+  // The full tables start a run, which rescores their segments at its end.
   ASSERT_EQ(WatchToTheEnd("rigs/r/recalibrations/1").state(),
             v1::Recalibration::SUCCEEDED);
   const v1::ListTablesResponse tables = Tables();

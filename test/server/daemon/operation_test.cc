@@ -143,7 +143,7 @@ TEST_F(OperationTest, ServiceManagerIsToldOfStartLifeAndStop) {
 }
 
 // gRPC does not accept any more once it had no file for a connection: a daemon
-// that is deaf ends, so that its service manager starts it anew.
+// that is deaf ends, so that its service manager restarts it.
 TEST_F(OperationTest, MoreConnectionsThanFilesEndItWithAnError) {
   const std::string shell = "ulimit -n 64; exec \"$0\" \"$@\"";
   Process daemon(

@@ -95,7 +95,7 @@ class OldClientsTest : public ServiceTest {
 
   // What the pipeline would have done with the segments: they fill the tables,
   // and the run that this starts gives a version. Another segment enters one of
-  // the tables since: on unchanged ones nothing is calibrated anew.
+  // the tables since: on unchanged ones nothing is recalibrated.
   void FinishFirstRun() {
     const Rig rig = store_->GetRig("r")->rig;
     for (std::int64_t index : {0, 1}) Score(rig, {"walk", index}, 10);

@@ -208,7 +208,7 @@ TEST_F(WatchTest, WhoComesLateIsToldTheIterationsBefore) {
                               const ProgressCallback& progress,
                               const auto&) {
     for (int k = 1; k <= 3; ++k) progress({k, 4, 10.0 / k, 1.0});
-    // Says again where it is, as a solver that begins anew.
+    // Says again where it is, as a solver that restarts.
     progress({3, 4, 10.0 / 3, 0.0});
     iterated = true;
     const std::lock_guard wait(gate);

@@ -20,7 +20,7 @@ inline SegmentInformation FakeInformation(const Rig& rig,
   SegmentInformation information;
   const int size = TangentSize(rig.factory);
   information.theta0 = rig.factory;
-  // So small that nothing is observed: what is no information of a device must
+  // So small that nothing is observed: what is not information of a device must
   // not pass for a change of it.
   information.Lambda = 1e-6 * Eigen::MatrixXd::Zero(size, size).unaryExpr(draw);
   information.eta = Eigen::VectorXd::Zero(size).unaryExpr(draw);
