@@ -1,103 +1,102 @@
-// Executes one run from beginning to end, on the thread of the Recalibrator.
+#include "server/pipeline/run_execution.h"
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <exception>
+#include <optional>
 #include <utility>
 
 #include "server/pipeline/backoff.h"
-#include "server/pipeline/recalibration.h"
+#include "server/pipeline/run_candidate.h"
+#include "server/pipeline/run_validation.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
+namespace {
 
-Recalibrator::Execution Recalibrator::Execute(const StoredRun& pending) {
-  if (pending.attempts >= kMaxAttempts) {
-    return GiveUp(pending) ? Execution::kDone : Execution::kTryLater;
-  }
-  const auto hold = HoldReason(pending);
-  if (!hold.ok()) {
-    spdlog::error("cannot tell whether run {} of rig {} may begin: {}",
-                  pending.run,
-                  pending.rig,
-                  hold.status().ToString());
-    return Execution::kTryLater;
-  }
-  if (pending.state == RunState::kPending && !hold->empty()) {
-    return Hold(pending, *hold);
-  }
-  absl::StatusOr<StoredRun> begun = absl::UnknownError("");
-  {
-    const std::lock_guard lock(mutex_);
-    if (!running_) {
-      return Execution::kDone;
-    }
-    begun = domain_->BeginRun(pending.rig, pending.run);
-    if (begun.ok()) {
-      current_ = Current{pending.rig, pending.run, false, {}};
-    }
-  }
-  if (!begun.ok()) {
-    // A run that was cancelled meanwhile is done.
-    spdlog::warn("cannot begin run {} of rig {}: {}",
-                 pending.run,
-                 pending.rig,
-                 begun.status().ToString());
-    return absl::IsFailedPrecondition(begun.status()) ? Execution::kDone
-                                                      : Execution::kTryLater;
-  }
-  return ExecuteBegun(*begun);
+// A candidate, or why there is none.
+struct Outcome {
+  absl::Status status;
+  std::optional<StoredCalibration> candidate;
+  std::optional<SegmentKey> damaged;
+};
+
+// A run that was cancelled meanwhile is done.
+Execution AfterFailure(const absl::Status& failure) {
+  return absl::IsFailedPrecondition(failure) ? Execution::kDone
+                                             : Execution::kTryLater;
 }
 
-Recalibrator::Execution Recalibrator::ExecuteBegun(const StoredRun& run) {
-  run_watchers_->Publish(RunTopic(run.rig, run.run), {run, {}});
-  const absl::Status status = Conclude(run, Solve(run));
-  if (!status.ok()) {
-    spdlog::error("cannot store the end of run {} of rig {}: {}",
-                  run.run,
-                  run.rig,
-                  status.ToString());
+// Why the run does not begin yet; empty if it may.
+absl::StatusOr<std::string> HoldReason(const RunContext& context,
+                                       const StoredRun& run) {
+  if (run.trigger == RunTrigger::kManual) {
+    return "";
   }
-  {
-    const std::lock_guard lock(mutex_);
-    current_.reset();
+  Store* const store = context.store();
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(run.rig));
+  const std::int64_t interval_ns = rig.policy.recalibration_min_interval_ns;
+  if (interval_ns > 0) {
+    // The newest is this run.
+    SELFCAL_ASSIGN_OR_RETURN(const auto newest,
+                             store->ListRuns(run.rig, {2, ""}));
+    const bool too_early =
+        newest.items.size() > 1 &&
+        context.options.now_ns() - newest.items[1].end_time_ns < interval_ns;
+    if (too_early) {
+      return fmt::format(
+          "the minimum interval of {:g} s since recalibration {} is not over",
+          static_cast<double>(interval_ns) * 1e-9,
+          newest.items[1].run);
+    }
   }
-  changed_.notify_all();
-  return status.ok() ? Execution::kDone : Execution::kTryLater;
+  Conditions* const conditions = context.options.conditions;
+  return conditions == nullptr ? "" : conditions->HoldReason();
 }
 
-Recalibrator::Execution Recalibrator::Hold(const StoredRun& run,
-                                           const std::string& reason) {
+Execution Hold(const RunContext& context,
+               const StoredRun& run,
+               const std::string& reason) {
   if (run.message == reason) {
     return Execution::kDeferred;
   }
-  const absl::Status held = domain_->HoldRun(run.rig, run.run, reason);
-  if (!held.ok()) {
-    // A run that was cancelled meanwhile is done.
-    return absl::IsFailedPrecondition(held) ? Execution::kDone
-                                            : Execution::kTryLater;
-  }
+  const absl::Status held = context.domain->HoldRun(run.rig, run.run, reason);
+  if (!held.ok()) return AfterFailure(held);
   spdlog::info("run {} of rig {} is deferred: {}", run.run, run.rig, reason);
   StoredRun now = run;
   now.message = reason;
-  run_watchers_->Publish(RunTopic(run.rig, run.run), {now, {}});
+  PublishRun(context, now);
   return Execution::kDeferred;
 }
 
-bool Recalibrator::GiveUp(const StoredRun& run) {
-  return End(run,
-             RunState::kFailed,
-             fmt::format("the daemon ended {} times during this run; it is not "
-                         "started again",
-                         run.attempts))
-      .ok();
+// Publishes the end of a run with its last iteration.
+void PublishEnd(const RunContext& context, const StoredRun& ended) {
+  const auto steps = context.current->StepsOf(ended.rig, ended.run);
+  PublishStep(
+      context, ended, steps.empty() ? CalibrateProgress() : steps.back());
 }
 
-Recalibrator::Outcome Recalibrator::Solve(const StoredRun& run) {
+absl::Status EndWithout(const RunContext& context,
+                        const StoredRun& run,
+                        RunState state,
+                        const std::string& message) {
+  spdlog::warn("run {} of rig {} ends without a calibration: {}",
+               run.run,
+               run.rig,
+               message);
+  SELFCAL_ASSIGN_OR_RETURN(
+      const StoredRun ended,
+      context.domain->EndRun(run.rig, run.run, state, message));
+  PublishEnd(context, ended);
+  return absl::OkStatus();
+}
+
+Outcome Solve(const RunContext& context, const StoredRun& run) {
   Outcome outcome;
   try {
     absl::StatusOr<StoredCalibration> candidate =
-        EnsureCandidate(run, &outcome.damaged);
+        EnsureCandidate(context, run, &outcome.damaged);
     outcome.status = candidate.status();
     if (candidate.ok()) {
       outcome.candidate = *std::move(candidate);
@@ -109,40 +108,25 @@ Recalibrator::Outcome Recalibrator::Solve(const StoredRun& run) {
   return outcome;
 }
 
-absl::Status Recalibrator::Conclude(const StoredRun& run,
-                                    const Outcome& outcome) {
-  if (Cancelled()) {
-    return End(run, RunState::kCancelled, "cancelled on request");
-  }
-  if (outcome.candidate) {
-    return Succeed(run, *outcome.candidate);
-  }
-  if (absl::IsCancelled(outcome.status) || IsTransient(outcome.status)) {
-    // A stop, or the disk: the run is released and starts again later.
-    SELFCAL_RETURN_IF_ERROR(domain_->ReleaseRun(run.rig, run.run).status());
-    return IsTransient(outcome.status) ? outcome.status : absl::OkStatus();
-  }
-  const std::string message(outcome.status.message());
-  SELFCAL_RETURN_IF_ERROR(End(run, RunState::kFailed, message));
-  return outcome.damaged
-             ? domain_->MarkUnusable(run.rig, *outcome.damaged, message)
-             : absl::OkStatus();
-}
-
-absl::Status Recalibrator::Succeed(const StoredRun& run,
-                                   const StoredCalibration& candidate) {
-  const auto finished = Retry([&] { return Finish(run, candidate); });
+absl::Status EndWith(const RunContext& context,
+                     Watchers<StoredCalibration>* calibration_watchers,
+                     const StoredRun& run,
+                     const StoredCalibration& candidate) {
+  const auto finished = RetryUnlessInterrupted(
+      context.current, [&] { return FinishRun(context, run, candidate); });
   if (IsTransient(finished.status())) {
     return finished.status();
   }
   if (!finished.ok()) {
-    return End(
-        run, RunState::kFailed, std::string(finished.status().message()));
+    return EndWithout(context,
+                      run,
+                      RunState::kFailed,
+                      std::string(finished.status().message()));
   }
   const StoredCalibration& stored = *finished;
   if (stored.state == CalibrationState::kActive) {
     spdlog::info("rig {} has calibration {}", stored.rig, stored.version);
-    calibration_watchers_->Publish(stored.rig, stored);
+    calibration_watchers->Publish(stored.rig, stored);
   } else {
     spdlog::warn("calibration {} of rig {} is rejected: {}",
                  stored.version,
@@ -150,22 +134,83 @@ absl::Status Recalibrator::Succeed(const StoredRun& run,
                  fmt::join(stored.reasons, " "));
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun ended,
-                           store_->GetRun(run.rig, run.run));
-  TellEnd(ended);
+                           context.store()->GetRun(run.rig, run.run));
+  PublishEnd(context, ended);
   return absl::OkStatus();
 }
 
-absl::Status Recalibrator::End(const StoredRun& run,
-                               RunState state,
-                               const std::string& message) {
-  spdlog::warn("run {} of rig {} ends without a calibration: {}",
-               run.run,
-               run.rig,
-               message);
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRun ended,
-                           domain_->EndRun(run.rig, run.run, state, message));
-  TellEnd(ended);
-  return absl::OkStatus();
+absl::Status Conclude(const RunContext& context,
+                      Watchers<StoredCalibration>* calibration_watchers,
+                      const StoredRun& run,
+                      const Outcome& outcome) {
+  if (context.current->cancelled()) {
+    return EndWithout(
+        context, run, RunState::kCancelled, "cancelled on request");
+  }
+  if (outcome.candidate) {
+    return EndWith(context, calibration_watchers, run, *outcome.candidate);
+  }
+  if (absl::IsCancelled(outcome.status) || IsTransient(outcome.status)) {
+    // A stop, or the disk: the run is released and starts again later.
+    SELFCAL_RETURN_IF_ERROR(
+        context.domain->ReleaseRun(run.rig, run.run).status());
+    return IsTransient(outcome.status) ? outcome.status : absl::OkStatus();
+  }
+  const std::string message(outcome.status.message());
+  SELFCAL_RETURN_IF_ERROR(EndWithout(context, run, RunState::kFailed, message));
+  return outcome.damaged
+             ? context.domain->MarkUnusable(run.rig, *outcome.damaged, message)
+             : absl::OkStatus();
+}
+
+}  // namespace
+
+Execution ExecuteRun(const RunContext& context,
+                     Watchers<StoredCalibration>* calibration_watchers,
+                     const StoredRun& pending) {
+  if (pending.attempts >= kMaxRunAttempts) {
+    const absl::Status ended =
+        EndWithout(context,
+                   pending,
+                   RunState::kFailed,
+                   fmt::format("the daemon ended {} times during this run; it "
+                               "is not started again",
+                               pending.attempts));
+    return ended.ok() ? Execution::kDone : Execution::kTryLater;
+  }
+  const auto hold = HoldReason(context, pending);
+  if (!hold.ok()) {
+    spdlog::error("cannot tell whether run {} of rig {} may begin: {}",
+                  pending.run,
+                  pending.rig,
+                  hold.status().ToString());
+    return Execution::kTryLater;
+  }
+  if (pending.state == RunState::kPending && !hold->empty()) {
+    return Hold(context, pending, *hold);
+  }
+  const auto begun = context.current->Begin(
+      [&] { return context.domain->BeginRun(pending.rig, pending.run); });
+  if (!begun) return Execution::kDone;
+  if (!begun->ok()) {
+    spdlog::warn("cannot begin run {} of rig {}: {}",
+                 pending.run,
+                 pending.rig,
+                 begun->status().ToString());
+    return AfterFailure(begun->status());
+  }
+  const StoredRun& run = **begun;
+  PublishRun(context, run);
+  const absl::Status status =
+      Conclude(context, calibration_watchers, run, Solve(context, run));
+  if (!status.ok()) {
+    spdlog::error("cannot store the end of run {} of rig {}: {}",
+                  run.run,
+                  run.rig,
+                  status.ToString());
+  }
+  context.current->End();
+  return status.ok() ? Execution::kDone : Execution::kTryLater;
 }
 
 }  // namespace selfcal::server

@@ -1,5 +1,5 @@
-// Validation of a run's candidate: gathers the evidence and validates it
-// against the active version.
+#include "server/pipeline/run_validation.h"
+
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "server/domain/device_change.h"
 #include "server/pipeline/after_change.h"
 #include "server/pipeline/candidate_validation.h"
-#include "server/pipeline/recalibration.h"
+#include "server/pipeline/held_out.h"
 #include "server/pipeline/rescoring.h"
 #include "server/pipeline/stored_information.h"
 #include "server/pipeline/verdict.h"
@@ -61,22 +61,21 @@ absl::StatusOr<bool> IsFromBefore(Store* store,
   return run.change < change;
 }
 
-}  // namespace
-
 // nullopt if the data cannot be used; an error if it cannot be read now.
-absl::StatusOr<std::optional<SegmentInformation>> Recalibrator::Rescore(
+absl::StatusOr<std::optional<SegmentInformation>> Rescore(
+    const RunContext& context,
     const std::string& rig_id,
     const SegmentKey& key,
     const Rig& rig,
     const Calibration& theta) {
-  const auto segment = store_->GetSegmentData(rig_id, key);
+  const auto segment = context.store()->GetSegmentData(rig_id, key);
   if (absl::IsDataLoss(segment.status()) ||
       absl::IsFailedPrecondition(segment.status())) {
     return std::nullopt;
   }
   SELFCAL_RETURN_IF_ERROR(segment.status());
   try {
-    return estimators_.score(rig, theta, *segment);
+    return context.estimators.score(rig, theta, *segment);
   } catch (const std::exception& error) {
     spdlog::warn("held-out segment {}~{} of rig {} cannot be scored: {}",
                  key.session,
@@ -89,19 +88,22 @@ absl::StatusOr<std::optional<SegmentInformation>> Recalibrator::Rescore(
 
 // Segments without data are held out only if the result does not rest on their
 // ends.
-absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
-    const StoredRun& run, const Rig& rig, const CalibrationResult& result) {
+absl::StatusOr<HeldOutSegments> GatherHeldOut(const RunContext& context,
+                                              const StoredRun& run,
+                                              const Rig& rig,
+                                              const CalibrationResult& result) {
   HeldOutSegments segments;
   if (!HasUsableNumbers(rig, result)) return segments;
-  SELFCAL_ASSIGN_OR_RETURN(std::vector<HeldOut> held_out,
-                           domain_->ListHeldOut(run.rig, run.run, kHeldOut));
+  SELFCAL_ASSIGN_OR_RETURN(
+      std::vector<HeldOut> held_out,
+      context.domain->ListHeldOut(run.rig, run.run, kHeldOut));
   const Rig used = WithUsedNoise(rig, result);
   const bool stated_noise_holds = StatedNoiseHolds(result);
   for (HeldOut& one : held_out) {
     std::optional<SegmentInformation> again;
     if (one.has_data) {
-      SELFCAL_ASSIGN_OR_RETURN(again,
-                               Rescore(run.rig, one.key, used, result.theta));
+      SELFCAL_ASSIGN_OR_RETURN(
+          again, Rescore(context, run.rig, one.key, used, result.theta));
     }
     if (again) {
       segments.push_back({*std::move(again), true});
@@ -113,14 +115,18 @@ absl::StatusOr<HeldOutSegments> Recalibrator::GatherHeldOut(
 }
 
 // nullopt if the data of a segment is damaged or gone.
-absl::StatusOr<std::optional<Diagnosis>> Recalibrator::DiagnoseUsed(
-    const StoredRun& run, const Rig& rig, const CalibrationResult& result) {
-  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration base,
-                           store_->GetCalibration(run.rig, run.base_version));
+absl::StatusOr<std::optional<Diagnosis>> DiagnoseUsed(
+    const RunContext& context,
+    const StoredRun& run,
+    const Rig& rig,
+    const CalibrationResult& result) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const StoredCalibration base,
+      context.store()->GetCalibration(run.rig, run.base_version));
   std::vector<MotionSegment> segments;
   for (const SegmentKey& key : run.segments) {
     if (IsExcluded(result, key)) continue;
-    auto segment = store_->GetSegmentData(run.rig, key);
+    auto segment = context.store()->GetSegmentData(run.rig, key);
     if (absl::IsDataLoss(segment.status()) ||
         absl::IsFailedPrecondition(segment.status())) {
       return std::nullopt;
@@ -131,32 +137,38 @@ absl::StatusOr<std::optional<Diagnosis>> Recalibrator::DiagnoseUsed(
   return Diagnose(rig, base.theta, segments);
 }
 
-absl::Status Recalibrator::Validate(const StoredRun& run,
-                                    StoredCalibration* candidate) {
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(run.rig));
+// Sets state, reasons, validation and verdict of the candidate, validated
+// against the active version.
+absl::Status Validate(const RunContext& context,
+                      const StoredRun& run,
+                      StoredCalibration* candidate) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig,
+                           context.store()->GetRig(run.rig));
   const CalibrationResult& result = candidate->report.value();
   CandidateEvidence evidence;
   SELFCAL_ASSIGN_OR_RETURN(evidence.active,
-                           store_->GetActiveCalibration(run.rig));
+                           context.store()->GetActiveCalibration(run.rig));
   evidence.active.covariance =
-      CovarianceAt(rig, evidence.active, options_.now_ns());
+      CovarianceAt(rig, evidence.active, context.options.now_ns());
   if (run.change > 0) {
     SELFCAL_ASSIGN_OR_RETURN(const StoredChange change,
-                             store_->GetChange(run.rig, run.change));
-    SELFCAL_ASSIGN_OR_RETURN(const bool from_before,
-                             IsFromBefore(store_, evidence.active, run.change));
+                             context.store()->GetChange(run.rig, run.change));
+    SELFCAL_ASSIGN_OR_RETURN(
+        const bool from_before,
+        IsFromBefore(context.store(), evidence.active, run.change));
     if (from_before) {
-      SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentInformation> since,
-                               ListInformation(store_, run.rig, run.segments));
+      SELFCAL_ASSIGN_OR_RETURN(
+          const std::vector<SegmentInformation> since,
+          ListInformation(context.store(), run.rig, run.segments));
       evidence.active.covariance =
           CovarianceAfter(rig.rig, change, evidence.active, since);
       evidence.changed = ConcernedComponents(rig.rig, change.groups);
     }
   }
   SELFCAL_ASSIGN_OR_RETURN(evidence.held_out,
-                           GatherHeldOut(run, rig.rig, result));
+                           GatherHeldOut(context, run, rig.rig, result));
   SELFCAL_ASSIGN_OR_RETURN(evidence.diagnosis,
-                           DiagnoseUsed(run, rig.rig, result));
+                           DiagnoseUsed(context, run, rig.rig, result));
   CandidateValidation validated = ValidateCandidate(rig.rig, result, evidence);
   candidate->verdict = MakeVerdict(rig.rig, result, validated);
   candidate->state = validated.reasons.empty() ? CalibrationState::kActive
@@ -166,23 +178,26 @@ absl::Status Recalibrator::Validate(const StoredRun& run,
   return absl::OkStatus();
 }
 
-absl::StatusOr<StoredCalibration> Recalibrator::Finish(
-    const StoredRun& run, StoredCalibration candidate) {
+}  // namespace
+
+absl::StatusOr<StoredCalibration> FinishRun(const RunContext& context,
+                                            const StoredRun& run,
+                                            StoredCalibration candidate) {
   for (;;) {
-    SELFCAL_RETURN_IF_ERROR(Validate(run, &candidate));
+    SELFCAL_RETURN_IF_ERROR(Validate(context, run, &candidate));
     // Before the run ends, so that a crash between the two repeats it, and
     // whoever sees the version sees the scores at it.
     const bool becomes_active = candidate.state == CalibrationState::kActive;
     if (becomes_active) {
-      RescoreKept(domain_, estimators_, run.rig, candidate.theta);
+      RescoreKept(context.domain, context.estimators, run.rig, candidate.theta);
     }
-    auto finished = domain_->FinishRun(run.rig, run.run, candidate);
+    auto finished = context.domain->FinishRun(run.rig, run.run, candidate);
     if (absl::IsAborted(finished.status())) continue;
     if (becomes_active && finished.ok() &&
         finished->state != CalibrationState::kActive) {
       SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
-                               store_->GetActiveCalibration(run.rig));
-      RescoreKept(domain_, estimators_, run.rig, active.theta);
+                               context.store()->GetActiveCalibration(run.rig));
+      RescoreKept(context.domain, context.estimators, run.rig, active.theta);
     }
     return finished;
   }

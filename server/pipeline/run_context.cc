@@ -1,0 +1,21 @@
+#include "server/pipeline/run_context.h"
+
+#include <fmt/format.h>
+
+namespace selfcal::server {
+
+std::string RunTopic(const std::string& rig, std::int64_t run) {
+  return fmt::format("{}/{}", rig, run);
+}
+
+void PublishRun(const RunContext& context, const StoredRun& run) {
+  PublishStep(context, run, {});
+}
+
+void PublishStep(const RunContext& context,
+                 const StoredRun& run,
+                 const CalibrateProgress& progress) {
+  context.watchers->Publish(RunTopic(run.rig, run.run), {run, progress});
+}
+
+}  // namespace selfcal::server

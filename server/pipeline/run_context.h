@@ -1,0 +1,36 @@
+// What the phases of a run share: the domain and its store, settings, the
+// computations, and those who watch runs.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "server/domain/domain.h"
+#include "server/pipeline/current_run.h"
+#include "server/pipeline/pipeline.h"
+#include "server/pipeline/watchers.h"
+#include "server/store/store.h"
+
+namespace selfcal::server {
+
+// What it points to must outlive it.
+struct RunContext {
+  Domain* domain;
+  PipelineOptions options;
+  Estimators estimators;
+  Watchers<RunUpdate>* watchers;
+  CurrentRun* current;
+
+  Store* store() const { return domain->store(); }
+};
+
+// The topic of the watchers of a run.
+std::string RunTopic(const std::string& rig, std::int64_t run);
+
+// Publishes a run without or with its newest iteration.
+void PublishRun(const RunContext& context, const StoredRun& run);
+void PublishStep(const RunContext& context,
+                 const StoredRun& run,
+                 const CalibrateProgress& progress);
+
+}  // namespace selfcal::server
