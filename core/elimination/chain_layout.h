@@ -18,9 +18,9 @@ struct ChainLayout {
       : landmark_shared(std::accumulate(
             shape.camera_sizes.begin(), shape.camera_sizes.end(), 0)),
         kept(shape.kept),
-        landmark_place(chain::kKeptPlace + chain::WholeVectors(kept)),
+        landmark_place(chain::kKeptPlace + WholeVectors(kept)),
         constant(landmark_place + landmark_shared),
-        fixed(chain::WholeVectors(constant + 1)) {}
+        fixed(WholeVectors(constant + 1)) {}
 
   // Link parameters, landmark parameters and kept unknowns.
   int shared_size() const { return kChainLinkShared + landmark_shared + kept; }

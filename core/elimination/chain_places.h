@@ -17,20 +17,17 @@ inline constexpr int kMotion = kChainMotionSize;
 inline constexpr int kState = kChainStateSize;
 // Places in the front.
 inline constexpr int kMotionPlace = kChainLinkShared;
-inline constexpr int kKeptPlace = kMotionPlace + kMotion;
-static_assert(kKeptPlace % 8 == 0);
+inline constexpr int kKeptPlace = WholeVectors(kMotionPlace + kMotion);
 static_assert(kTransitionConstant == kKeptPlace);
 inline constexpr int kEliminated = -1;
 // The size of a state in whole tiles.
 inline constexpr int kTileState = 16;
-inline constexpr int kLinkColumns = kTransitionNextPose + kPose;
+inline constexpr int kLinkColumns = kTransitionPoseEnd;
 // Zeros that must follow the valid entries of a panel: the rows of the largest
 // tile.
 inline constexpr int kZeros = 3 * kPanelPad;
 
 inline constexpr int kPlacesBetweenMoves = 8;
-
-inline constexpr int WholeVectors(int size) { return (size + 7) / 8 * 8; }
 
 // Separate products of one factor with its pose.
 inline constexpr int kOwnPoseStride = WholeVectors(kPose);

@@ -225,7 +225,7 @@ class CovarianceWalk {
         RowMajorState<kTileState>(&step.root[0][0]).leftCols<kState>();
     state_ = (root - ByPanel(with_front_)) * root.transpose();
     if (step.linked) {
-      const RowMajorState<32> G(&step.link.G[0][0]);
+      const RowMajorState<kTransitionColumns> G(&step.link.G[0][0]);
       const RowMajorPanel with_front(
           with_front_.data(), kState, size_, Eigen::OuterStride<>(stride_));
       state_ += with_front.leftCols<kKeptPlace>() *

@@ -10,8 +10,9 @@ using namespace chain;
 
 namespace {
 
-using RowMajorRoot = Eigen::Matrix<double, kState, 16, Eigen::RowMajor>;
-using RowMajorLink = Eigen::Matrix<double, kState, 32, Eigen::RowMajor>;
+using RowMajorRoot = Eigen::Matrix<double, kState, kTileState, Eigen::RowMajor>;
+using RowMajorLink =
+    Eigen::Matrix<double, kState, kTransitionColumns, Eigen::RowMajor>;
 using RowMajorPanel =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "core/model/calibration.h"
+
 namespace selfcal {
 
 // Unknowns of a keyframe: pose 6, then velocity and biases 9.
@@ -11,7 +13,7 @@ inline constexpr int kChainPoseSize = 6;
 inline constexpr int kChainMotionSize = 9;
 inline constexpr int kChainStateSize = kChainPoseSize + kChainMotionSize;
 // Shared parameters on which links depend; they come first.
-inline constexpr int kChainLinkShared = 15;
+inline constexpr int kChainLinkShared = kImuTangentSize;
 
 using ChainStateVector = Eigen::Matrix<double, kChainStateSize, 1>;
 using ChainStateMatrix =

@@ -96,7 +96,7 @@ void StateElimination::TakeState(ChainFront* all) {
 // G^T S G + G^T Y + Y^T G = G^T H + H^T G with H = Y + S G / 2.
 void StateElimination::Substitute(const ChainTransition& link,
                                   ChainFront* front) {
-  alignas(64) double by_S[kTileState][32];
+  alignas(64) double by_S[kTileState][kTransitionColumns];
   const int fixed = layout_.fixed;
   const int size = fixed + front->PosesSize();
   for (int k = 0; k < kState; ++k) {
@@ -105,12 +105,12 @@ void StateElimination::Substitute(const ChainTransition& link,
     Zero(Row(&half_, k) + fixed + kPose, kPanelPad);
   }
   WithKernels(width_, [&](auto kernels) {
-    kernels.SetProduct({&link.G[0][0], 32},
+    kernels.SetProduct({&link.G[0][0], kTransitionColumns},
                        kLinkColumns,
                        {information_.data(), kTileState},
                        kTileState,
                        kState,
-                       {&by_S[0][0], 32});
+                       {&by_S[0][0], kTransitionColumns});
   });
   const auto add = [&](double factor, const double* terms, double* to) {
     for (int c = 0; c < kKeptPlace; ++c) to[c] += factor * terms[c];
@@ -133,7 +133,7 @@ void StateElimination::Substitute(const ChainTransition& link,
     kernels.AddProduct(1,
                        {coupling_.data() + fixed + kPose, panel_stride_},
                        rest,
-                       {&link.G[0][kTransitionNextPose], 32},
+                       {&link.G[0][kTransitionNextPose], kTransitionColumns},
                        kPose,
                        kState,
                        front->At(pose + kPose, pose));
@@ -149,7 +149,7 @@ void StateElimination::AddHalf(const ChainTransition& link, ChainFront* all) {
   WithKernels(width_, [&](auto kernels) {
     kernels.SetProduct({half_.data(), panel_stride_},
                        size_f,
-                       {&link.G[0][0], 32},
+                       {&link.G[0][0], kTransitionColumns},
                        kLinkColumns,
                        kState,
                        {link_terms_.data(), stride});

@@ -46,7 +46,7 @@ void FillJacobians(const KeyframeState& x0,
   J0.block<6, 6>(kResidualVelocity, kStateAccelBias) =
       -imu.J_bias.bottomRows<6>();
 
-  InertialMatrix& J_theta = jacobians->theta;
+  auto& J_theta = jacobians->theta;
   J_theta.setZero();
   J_theta.topRows<3>() = by_Delta_R * imu.J_theta.topRows<3>();
   J_theta.middleRows<6>(kResidualVelocity) = -imu.J_theta.bottomRows<6>();

@@ -7,7 +7,7 @@
 // thread.
 // Source: Schneider et al., ICRA 2017, III-B and III-D; Forster et al., "On-
 // Manifold Preintegration for Real-Time Visual-Inertial Odometry" (2017), with
-// the 15 IMU intrinsics added.
+// the IMU intrinsics added.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,7 +27,7 @@ using InertialMatrix = Eigen::Matrix<double, 15, 15>;
 struct InertialJacobians {
   InertialMatrix x0;     // with respect to the first state, 15
   InertialMatrix x1;     // to the second
-  InertialMatrix theta;  // to theta_i
+  Eigen::Matrix<double, 15, kImuTangentSize> theta;  // to theta_i
 };
 
 // Residual 15, not whitened: (Log(Delta_R^T R_0^T R_1), velocity, position in

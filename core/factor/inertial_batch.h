@@ -8,8 +8,8 @@
 //
 //   x0 = A e + G z,   A = J0^-1 U,   G = -J0^-1 [Jt | J1 motion | r | J1 pose]
 //
-// with z = (theta_i 15, velocity and biases of the later state 9, 1, its pose
-// 6). The same numbers as EvaluateInertial gives, to rounding.
+// with z = (theta_i, velocity and biases of the later state 9, 1, its pose 6).
+// The same numbers as EvaluateInertial gives, to rounding.
 #pragma once
 
 #include <Eigen/Core>

@@ -162,7 +162,12 @@ class TransitionSolver {
     WriteNextMotion(rows);
     WriteMotionNoise(turn, root, rows);
     for (int i = 0; i < 9; ++i) {
-      rows->G[i][kTransitionColumns - 1] = T(0);
+      for (int c = kTransitionMotionEnd; c < kTransitionConstant; ++c) {
+        rows->G[i][c] = T(0);
+      }
+      for (int c = kTransitionPoseEnd; c < kTransitionColumns; ++c) {
+        rows->G[i][c] = T(0);
+      }
       rows->A[i][kTransitionNoise - 1] = T(0);
     }
   }

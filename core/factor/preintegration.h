@@ -1,5 +1,5 @@
 // Integrates the IMU samples between two keyframes into one relative motion,
-// with its derivatives with respect to the biases and the 15 IMU intrinsics,
+// with its derivatives with respect to the biases and the IMU intrinsics,
 // and its covariance.
 //
 // Scheme. Raw readings, minus h^2/12 of their second derivative, are linear
@@ -22,7 +22,7 @@
 // Pure, callable from any thread; allocates nothing.
 // Source: Schneider et al., ICRA 2017, III-B and III-D; Forster et al., "On-
 // Manifold Preintegration for Real-Time Visual-Inertial Odometry" (2017), with
-// the 15 IMU intrinsics added.
+// the IMU intrinsics added.
 #pragma once
 
 #include <Eigen/Core>
@@ -49,7 +49,8 @@ struct Preintegration {
   // Derivatives with respect to (b_a 3, b_g 3), and to theta_i in the order of
   // calibration.h.
   Eigen::Matrix<double, 9, 6> J_bias = Eigen::Matrix<double, 9, 6>::Zero();
-  Eigen::Matrix<double, 9, 15> J_theta = Eigen::Matrix<double, 9, 15>::Zero();
+  Eigen::Matrix<double, 9, kImuTangentSize> J_theta =
+      Eigen::Matrix<double, 9, kImuTangentSize>::Zero();
   // Covariance of the nine, from the white noise of the sensors and the walk of
   // their biases; and that of the nine with the walk of (b_a 3, b_g 3) at the
   // end.

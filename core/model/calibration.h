@@ -1,7 +1,8 @@
 // theta, the calibration parameters of a device, as one value with a tangent
 // space of named components.
 //
-// Order of the tangent, 15 + sum over cameras of (6 + 4 + distortion + 1):
+// Order of the tangent, kImuTangentSize + sum over cameras of (6 + 4 +
+// distortion + 1) components:
 //   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3;
 //   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1.
 // Rotations are perturbed on the right (so3.h); all other components are
@@ -21,17 +22,17 @@ namespace selfcal {
 // Limits the memory that one calibration from a client can claim.
 inline constexpr int kMaxCameras = 16;
 
-inline constexpr int kImuTangentSize = 15;
-// Offset of each block in the IMU's tangent.
+// Offset of each block in the IMU's tangent; parameter_blocks.h checks them.
 inline constexpr int kGyroScale = 0;
-inline constexpr int kGyroMisalignment = 3;
-inline constexpr int kAccelScale = 6;
-inline constexpr int kAccelMisalignment = 9;
-inline constexpr int kAccelRotation = 12;
+inline constexpr int kGyroMisalignment = kGyroScale + 3;
+inline constexpr int kAccelScale = kGyroMisalignment + 3;
+inline constexpr int kAccelMisalignment = kAccelScale + 3;
+inline constexpr int kAccelRotation = kAccelMisalignment + 3;
+inline constexpr int kImuTangentSize = kAccelRotation + 3;
 // Offset of each block in a camera's tangent.
 inline constexpr int kCameraRotation = 0;
-inline constexpr int kCameraPosition = 3;
-inline constexpr int kCameraIntrinsics = 6;
+inline constexpr int kCameraPosition = kCameraRotation + 3;
+inline constexpr int kCameraIntrinsics = kCameraPosition + 3;
 inline constexpr int kCameraDistortion = kCameraIntrinsics + 4;
 
 // theta_i: the gyroscope reads T_g w + b_g, the accelerometer

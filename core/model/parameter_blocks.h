@@ -187,6 +187,47 @@ int TangentDimension(const Value& value) {
   }
 }
 
+// The sum of the dimensions of the blocks before the one with this value, or of
+// all if there is none; a distortion has none at compile time.
+template <class Sensor, std::size_t count, class Member = std::nullptr_t>
+consteval int OffsetOf(const Block<Sensor> (&blocks)[count],
+                       Member value = nullptr) {
+  int offset = 0;
+  for (const Block<Sensor>& block : blocks) {
+    if constexpr (!std::is_same_v<Member, std::nullptr_t>) {
+      const Member* member = std::get_if<Member>(&block.value);
+      if (member != nullptr && *member == value) break;
+    }
+    offset += std::visit(
+        []<class Value>(Value Sensor::*) {
+          if constexpr (std::is_same_v<Value, double>) {
+            return 1;
+          } else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
+            return 3;
+          } else {
+            return static_cast<int>(Value::SizeAtCompileTime);
+          }
+        },
+        block.value);
+  }
+  return offset;
+}
+
+static_assert(OffsetOf(kImuBlocks, &ImuCalibration::s_g) == kGyroScale);
+static_assert(OffsetOf(kImuBlocks, &ImuCalibration::m_g) == kGyroMisalignment);
+static_assert(OffsetOf(kImuBlocks, &ImuCalibration::s_a) == kAccelScale);
+static_assert(OffsetOf(kImuBlocks, &ImuCalibration::m_a) == kAccelMisalignment);
+static_assert(OffsetOf(kImuBlocks, &ImuCalibration::q_AI) == kAccelRotation);
+static_assert(OffsetOf(kImuBlocks) == kImuTangentSize);
+static_assert(OffsetOf(kCameraBlocks, &CameraCalibration::q_CI) ==
+              kCameraRotation);
+static_assert(OffsetOf(kCameraBlocks, &CameraCalibration::p_CI) ==
+              kCameraPosition);
+static_assert(OffsetOf(kCameraBlocks, &CameraCalibration::f) ==
+              kCameraIntrinsics);
+static_assert(OffsetOf(kCameraBlocks, &CameraCalibration::distortion) ==
+              kCameraDistortion);
+
 struct BlockPlace {
   const BlockInfo& info;
   int offset;  // in the tangent of theta
