@@ -1,6 +1,5 @@
 #include "core/factor/inertial_batch.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -24,14 +23,6 @@ void SetState(const KeyframeState& x,
   Eigen::Matrix<double, inertial::kStateNumbers, 1> all;
   all << x.q_GI.coeffs(), x.p_GI, x.v_GI, x.b_a, x.b_g;
   for (int i = 0; i < all.size(); ++i) numbers[i][lane] = all[i];
-}
-
-template <int W>
-void SetIntrinsics(const ImuCalibration& imu, KernelInput<W>* input) {
-  using Eigen::Map, Eigen::Matrix3d;
-  Map<Matrix3d>(input->T_g_inverse) = imu.T_g().inverse();
-  Map<Matrix3d>(input->T_a_inverse) = imu.T_a().inverse();
-  Map<Matrix3d>(input->R_IA) = imu.q_AI.toRotationMatrix().transpose();
 }
 
 // Items first .. first + n for W lanes. The other lanes read the last of them,
@@ -127,7 +118,7 @@ void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
                                  const Function& run) {
   WithLanes(width_, [&]<int W>() {
     KernelInput<W> input;
-    SetIntrinsics<W>(imu, &input);
+    input.imu = CorrectionOf(imu);
     input.gravity_mps2 = gravity_mps2;
     for (std::size_t first = 0; first < links.size(); first += W) {
       const std::size_t count = std::min<std::size_t>(W, links.size() - first);

@@ -7,19 +7,11 @@
 namespace selfcal::inertial {
 namespace {
 
-using preintegration::Correction;
 using preintegration::Integrator;
 
 template <int W>
 Vector3<Lanes<W>> LoadVector(const double* from) {
   return {Load<W>(from), Load<W>(from + W), Load<W>(from + 2 * W)};
-}
-
-template <int W>
-Matrix3<Lanes<W>> SameMatrix(const double* columns) {
-  Matrix3<Lanes<W>> m;
-  for (int i = 0; i < 9; ++i) m(i % 3, i / 3) = Lanes<W>(columns[i]);
-  return m;
 }
 
 template <int W>
@@ -42,12 +34,8 @@ struct Link {
       : x0(LoadState<W>(input.x0)),
         x1(LoadState<W>(input.x1)),
         dt(Load<W>(input.dt_s)),
-        correct{.b_a = x0.b_a,
-                .b_g = x0.b_g,
-                .T_g_inverse = SameMatrix<W>(input.T_g_inverse),
-                .T_a_inverse = SameMatrix<W>(input.T_a_inverse),
-                .R_IA = SameMatrix<W>(input.R_IA)},
-        integrator(correct, noise, parts, Corrected(input.readings)) {
+        imu(input.imu),
+        integrator(imu, noise, parts, Corrected(input.readings)) {
     const double* row = input.readings;
     const double* densities = input.densities;
     for (int i = 1; i < input.rows; ++i) {
@@ -68,12 +56,13 @@ struct Link {
   }
 
   preintegration::Reading<T> Corrected(const double* row) const {
-    return correct(LoadVector<W>(row + W), LoadVector<W>(row + 4 * W));
+    return imu.Correct(
+        LoadVector<W>(row + W), LoadVector<W>(row + 4 * W), x0.b_g, x0.b_a);
   }
 
   const State<T> x0, x1;
   const T dt;
-  const Correction<T> correct;
+  const ImuModel<T> imu;
   Integrator<T> integrator;
   StateMotion<T> motion;
   Eigen::Matrix<T, 15, 1> residual;

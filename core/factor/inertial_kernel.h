@@ -8,6 +8,7 @@
 #pragma once
 
 #include "core/factor/inertial_batch.h"
+#include "core/model/imu_model.h"
 
 namespace selfcal::inertial {
 
@@ -30,10 +31,8 @@ struct KernelInput {
   double x0[kStateNumbers][W];
   double x1[kStateNumbers][W];
   double dt_s[W];
-  // Common to all links; column-major.
-  double T_g_inverse[9];
-  double T_a_inverse[9];
-  double R_IA[9];
+  // Common to all links.
+  ImuCorrection imu;
   double gravity_mps2 = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <iterator>
 
+#include "core/model/imu_model.h"
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -27,14 +28,9 @@ class Readings {
   Readings(std::span<const ImuSample> samples,
            const KeyframeState& x,
            const ImuCalibration& imu)
-      : samples_(samples),
-        x_(x),
-        gyro_(imu.T_g().inverse()),
-        accel_(imu.q_AI.toRotationMatrix().transpose() * imu.T_a().inverse()) {}
+      : samples_(samples), x_(x), imu_(CorrectionOf(imu)) {}
 
-  struct Reading {
-    Vector3d w_I, f_I;
-  };
+  using Reading = CorrectedReading<double>;
 
   // Time of the next sample after (dt > 0) or before the given time, or dt if
   // that is nearer.
@@ -64,7 +60,7 @@ class Readings {
   // Like Smooth, shrunk by white noise.
   Vector3d Rate(double t_s, double noise_density) const {
     double variance_Hz;
-    const Vector3d w_I = Smooth(t_s, &variance_Hz).w_I;
+    const Vector3d w_I = Smooth(t_s, &variance_Hz).w;
     const double noise =
         kNoiseSquares * noise_density * noise_density * variance_Hz;
     return std::max(0.0, 1 - noise / w_I.squaredNorm()) * w_I;
@@ -130,12 +126,12 @@ class Readings {
            samples_.begin() - 1;
   }
   Reading Correct(const Vector3d& gyro, const Vector3d& accel) const {
-    return {gyro_ * (gyro - x_.b_g), accel_ * (accel - x_.b_a)};
+    return imu_.Correct(gyro, accel, x_.b_g, x_.b_a);
   }
 
   std::span<const ImuSample> samples_;
   const KeyframeState& x_;
-  Eigen::Matrix3d gyro_, accel_;
+  ImuModel<double> imu_;
 };
 
 }  // namespace
@@ -155,13 +151,13 @@ KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
   motion.w_I = readings.Rate(dt_s, noise.gyro_noise_density);
   if (dt_s == 0) return motion;
   Readings::Reading here = readings.Interpolate(0);
-  Vector3d a_I = here.f_I + g_I;
+  Vector3d a_I = here.f + g_I;
   for (double t_s = 0; t_s != dt_s;) {
     const double next_s = readings.Next(t_s, dt_s);
     const double h = next_s - t_s;
     const Readings::Reading there = readings.Interpolate(next_s);
-    motion.turn = motion.turn * Exp(0.5 * h * (here.w_I + there.w_I));
-    const Vector3d next_a_I = motion.turn * there.f_I + g_I;
+    motion.turn = motion.turn * Exp(0.5 * h * (here.w + there.w));
+    const Vector3d next_a_I = motion.turn * there.f + g_I;
     motion.shift_I += h * motion.v_I + h * h / 6 * (2 * a_I + next_a_I);
     motion.v_I += h / 2 * (a_I + next_a_I);
     t_s = next_s;

@@ -53,19 +53,15 @@ Preintegration Preintegrate(std::span<const ImuSample> samples,
                             const ImuNoise& noise,
                             const PreintegrationParts& parts) {
   using namespace preintegration;
-  const Correction<double> correct = {
-      .b_a = b_a,
-      .b_g = b_g,
-      .T_g_inverse = imu.T_g().inverse(),
-      .T_a_inverse = imu.T_a().inverse(),
-      .R_IA = imu.q_AI.toRotationMatrix().transpose()};
+  const ImuModel<double> model(CorrectionOf(imu));
   std::optional<Integrator<double>> integrator;
   std::optional<Sampling> sampling;
   if (parts.covariance) sampling.emplace(samples, t0_ns, t1_ns, noise);
   const auto visit = [&](const ImuSample& sample, double h, std::size_t next) {
-    const Reading<double> reading = correct(sample.gyro, sample.accel);
+    const Reading<double> reading =
+        model.Correct(sample.gyro, sample.accel, b_g, b_a);
     if (!integrator) {
-      integrator.emplace(correct, noise, parts, reading);
+      integrator.emplace(model, noise, parts, reading);
       return;
     }
     const StepDensities densities =

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "core/factor/preintegration_response.h"
 #include "core/factor/preintegration_step.h"
 
 namespace selfcal::preintegration {

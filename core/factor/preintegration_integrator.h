@@ -32,13 +32,13 @@ template <typename T>
 class Integrator {
  public:
   // Starts at a reading.
-  Integrator(const Correction<T>& correction,
+  Integrator(const ImuModel<T>& imu,
              const ImuNoise& noise,
              const PreintegrationParts& parts,
              const Reading<T>& first)
       : parts_(parts),
-        correction_(correction),
-        accel_correction_(correction.R_IA * correction.T_a_inverse),
+        imu_(imu),
+        force_by_accel_(imu.ForceByAccel()),
         reading_(first),
         f_(first.f),
         walk_(noise.gyro_bias_random_walk, noise.accel_bias_random_walk) {}
@@ -86,7 +86,7 @@ class Integrator {
   const Motion<T>& motion() const { return motion_; }
   const Matrix3<T>& Delta_R() const { return R_; }
   MotionDerivatives<T> Derivatives() const {
-    return jacobians_.Result(correction_, accel_correction_);
+    return jacobians_.Result(imu_, force_by_accel_);
   }
   const MotionCovariance<T>& covariance() const { return covariance_; }
   const BiasWalk<T>& walk() const { return walk_; }
@@ -96,8 +96,8 @@ class Integrator {
     walk_.Advance({t_,
                    motion_.Delta_v,
                    motion_.Delta_p,
-                   jacobians_.ByGyro(correction_.T_g_inverse),
-                   jacobians_.ByAccel(accel_correction_)},
+                   jacobians_.ByGyro(imu_.T_g_inverse),
+                   jacobians_.ByAccel(force_by_accel_)},
                   &covariance_);
   }
 
@@ -123,14 +123,14 @@ class Integrator {
     jacobians_.AddAccel(s, force, reading_, next);
     if (parts_.covariance) {
       covariance_.Propagate(s);
-      covariance_.AddGyroNoise(s, rates, correction_.T_g_inverse, gyro_density);
-      covariance_.AddAccelNoise(s, force, accel_correction_, accel_density);
+      covariance_.AddGyroNoise(s, rates, imu_.T_g_inverse, gyro_density);
+      covariance_.AddAccelNoise(s, force, force_by_accel_, accel_density);
     }
   }
 
   const PreintegrationParts parts_;
-  const Correction<T> correction_;
-  const Matrix3<T> accel_correction_;
+  const ImuModel<T> imu_;
+  const Matrix3<T> force_by_accel_;
 
   Reading<T> reading_;  // at the end of the last step
   Vector3<T> f_;        // its force, in the frame of the first keyframe

@@ -1,5 +1,5 @@
 // One step of the scheme of preintegration.h: the rotation and motion of the
-// body due to readings, and their derivatives. Internal to core/factor.
+// body due to readings. Internal to core/factor.
 //
 // T is double, or Lanes for several intervals at once. A step of length zero
 // changes nothing: intervals with fewer samples than others in the batch are
@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/model/imu_model.h"
 #include "core/model/so3_lanes.h"
 #include "core/simd/lanes.h"
 
@@ -19,29 +20,8 @@ using Vector3 = Eigen::Matrix<T, 3, 1>;
 template <typename T>
 using Matrix3 = Eigen::Matrix<T, 3, 3>;
 
-// One raw reading, corrected; h_A = T_a^-1 (a~ - b_a) is the specific force in
-// A.
 template <typename T>
-struct Reading {
-  Vector3<T> w;
-  Vector3<T> h_A;
-  Vector3<T> f;
-};
-
-// The correction of readings, including the biases.
-template <typename T>
-struct Correction {
-  Vector3<T> b_a, b_g;
-  Matrix3<T> T_g_inverse, T_a_inverse, R_IA;
-
-  Reading<T> operator()(const Vector3<T>& gyro, const Vector3<T>& accel) const {
-    Reading<T> reading;
-    reading.w = T_g_inverse * (gyro - b_g);
-    reading.h_A = T_a_inverse * (accel - b_a);
-    reading.f = R_IA * reading.h_A;
-    return reading;
-  }
-};
+using Reading = CorrectedReading<T>;
 
 // a x each column of M, [a]x M.
 template <typename T, int cols>
@@ -105,69 +85,5 @@ struct Turn {
     return R_0 * RightJacobian<T>(-phi);
   }
 };
-
-// Derivatives with respect to changes of the corrected rates: an offset of each
-// axis 3, then a change of axis r in proportion to axis c, (r, c) = (0, 0), (1,
-// 1), (2, 2), (0, 1), (0, 2), (1, 2). Those with respect to the raw readings
-// follow from them, since T_g is upper triangular.
-template <typename T>
-using RateColumns = Eigen::Matrix<T, 3, 9>;
-
-// A dphi for these changes, for a matrix A that is applied afterwards. With dw
-// = e_r w_c,
-//   dphi = alpha_c e_r + coning (w_0c e_r x w_1 + w_1c w_0 x e_r)
-//        = alpha_c e_r + e_r x (kappa x e_c)
-//        = alpha_c e_r - kappa_r e_c + (e_r . e_c) kappa.
-template <typename T>
-RateColumns<T> ByRates(const Matrix3<T>& A, const Turn<T>& turn) {
-  RateColumns<T> J;
-  J.template leftCols<3>() = turn.gain * A - TimesSkew(A, turn.drift);
-  const Vector3<T> A_kappa = A * turn.kappa;
-  for (int i = 0; i < 3; ++i) {
-    J.col(3 + i) = (turn.alpha[i] - turn.kappa[i]) * A.col(i) + A_kappa;
-  }
-  J.col(6) = turn.alpha[1] * A.col(0) - turn.kappa[0] * A.col(1);
-  J.col(7) = turn.alpha[2] * A.col(0) - turn.kappa[0] * A.col(2);
-  J.col(8) = turn.alpha[2] * A.col(1) - turn.kappa[1] * A.col(2);
-  return J;
-}
-
-// Contribution of a step to the motion's derivatives with respect to the rates:
-// through its own rotation to (psi, Delta_v, Delta_p), psi a left perturbation.
-// A force rotates with its rotation, d f = psi x f.
-template <typename T>
-struct RateResponse {
-  RateColumns<T> psi, v, p;
-};
-
-// turn_m and turn_1: from the beginning of the step to its middle and its end.
-template <typename T>
-RateResponse<T> RespondToRates(const Stage<T>& s,
-                               const Turn<T>& turn_m,
-                               const Matrix3<T>& A_m,
-                               const Turn<T>& turn_1) {
-  const T sixth = s.h * (1.0 / 6);
-  RateResponse<T> response;
-  response.psi = ByRates<T>(turn_1.LeftJacobian(s.R_0), turn_1);
-  const RateColumns<T> middle =
-      ByRates<T>(Cross<T, 3>(-4.0 * sixth * s.f_m, A_m), turn_m);
-  response.v = middle - Cross<T, 9>(sixth * s.f_1, response.psi);
-  response.p = 0.5 * s.h * middle;
-  return response;
-}
-
-// Contribution of a step to velocity and position for a constant force in the
-// body.
-template <typename T>
-struct ForceResponse {
-  Matrix3<T> v, p;
-};
-
-template <typename T>
-ForceResponse<T> RespondToForce(const Stage<T>& s) {
-  const T sixth = s.h * (1.0 / 6);
-  return {sixth * (s.R_0 + 4.0 * s.R_m + s.R_1),
-          sixth * s.h * (s.R_0 + 2.0 * s.R_m)};
-}
 
 }  // namespace selfcal::preintegration

@@ -1,5 +1,7 @@
 #include "core/model/imu.h"
 
+#include "core/model/imu_model.h"
+
 namespace selfcal {
 
 BodyRates CorrectImu(const ImuCalibration& imu,
@@ -7,10 +9,9 @@ BodyRates CorrectImu(const ImuCalibration& imu,
                      const Eigen::Vector3d& accel,
                      const Eigen::Vector3d& b_g,
                      const Eigen::Vector3d& b_a) {
-  const Eigen::Vector3d f_A =
-      imu.T_a().triangularView<Eigen::Upper>().solve(accel - b_a);
-  return {imu.T_g().triangularView<Eigen::Upper>().solve(gyro - b_g),
-          imu.q_AI.conjugate() * f_A};
+  const CorrectedReading<double> reading =
+      ImuModel<double>(CorrectionOf(imu)).Correct(gyro, accel, b_g, b_a);
+  return {reading.w, reading.f};
 }
 
 }  // namespace selfcal

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/model/imu_model.h"
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -47,7 +48,7 @@ std::vector<ForceInterval> CollectForces(const MotionData& data,
                                          const ImuCalibration& imu,
                                          double offset_s) {
   const Eigen::Matrix3d corrected_by_read =
-      imu.q_AI.toRotationMatrix().transpose() * imu.T_a().inverse();
+      ImuModel<double>(CorrectionOf(imu)).ForceByAccel();
   const std::int64_t shift = std::llround(offset_s * 1e9);
   std::vector<ForceInterval> forces;
   for (const MotionInterval& interval : data.intervals) {

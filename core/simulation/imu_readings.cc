@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/imu_model.h"
 #include "core/simulation/random.h"
 #include "core/simulation/streams.h"
 
@@ -14,8 +15,7 @@ ImuReadings PerfectReadings(const Rig& rig,
                             const ImuCalibration& imu,
                             const Trajectory& trajectory,
                             double rate_hz) {
-  const Eigen::Matrix3d T_g = imu.T_g();
-  const Eigen::Matrix3d T_a_R_AI = imu.T_a() * imu.q_AI.toRotationMatrix();
+  const ImuResponse response(imu);
   const Eigen::Vector3d g(0, 0, -rig.gravity_mps2);
   const auto end_ns =
       static_cast<std::int64_t>(std::floor(trajectory.duration_s() * 1e9));
@@ -27,8 +27,8 @@ ImuReadings PerfectReadings(const Rig& rig,
     const BodyMotion motion =
         trajectory.At(static_cast<double>(sample.t_ns) * 1e-9);
     const Eigen::Vector3d f_I = motion.q_GI.conjugate() * (motion.a_GI - g);
-    sample.gyro = T_g * motion.w_I;
-    sample.accel = T_a_R_AI * f_I;
+    sample.gyro = response.Gyro(motion.w_I, f_I);
+    sample.accel = response.Accel(motion.w_I, f_I);
     readings.noise_free.push_back(sample);
     readings.w_I.push_back(motion.w_I);
     readings.f_I.push_back(f_I);

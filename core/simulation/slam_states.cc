@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/imu_model.h"
 #include "core/simulation/random.h"
 #include "core/simulation/streams.h"
 
@@ -89,10 +90,8 @@ std::vector<KeyframeState> SlamStates(const std::vector<KeyframeState>& truth,
   Drift accel_bias(options.slam_accel_bias_mps2 * one, kBiasTime_s);
   Drift gyro_bias(options.slam_gyro_bias_radps * one, kBiasTime_s);
 
-  const Eigen::Matrix3d gyro_mismatch = imu_true.T_g() - imu_slam.T_g();
-  const Eigen::Matrix3d accel_mismatch =
-      imu_true.T_a() * imu_true.q_AI.toRotationMatrix() -
-      imu_slam.T_a() * imu_slam.q_AI.toRotationMatrix();
+  ImuResponse mismatch(imu_true);
+  mismatch -= ImuResponse(imu_slam);
   const WindowMean mean_w_I(imu.measured, imu.w_I);
   const WindowMean mean_f_I(imu.measured, imu.f_I);
 
@@ -109,10 +108,13 @@ std::vector<KeyframeState> SlamStates(const std::vector<KeyframeState>& truth,
     error.segment<3>(kStateRotation) = truth[k].q_GI.conjugate() * rotation_G;
     error.segment<3>(kStatePosition) = position.Next(dt_s, &random);
     error.segment<3>(kStateVelocity) = velocity.Next(dt_s, &random);
+    // The biases absorb the mean error of the readings.
+    const Vector3d w_I = mean_w_I.Around(t_ns);
+    const Vector3d f_I = mean_f_I.Around(t_ns);
     error.segment<3>(kStateAccelBias) =
-        accel_bias.Next(dt_s, &random) + accel_mismatch * mean_f_I.Around(t_ns);
+        accel_bias.Next(dt_s, &random) + mismatch.Accel(w_I, f_I);
     error.segment<3>(kStateGyroBias) =
-        gyro_bias.Next(dt_s, &random) + gyro_mismatch * mean_w_I.Around(t_ns);
+        gyro_bias.Next(dt_s, &random) + mismatch.Gyro(w_I, f_I);
     states.push_back(BoxPlus(truth[k], error));
   }
   return states;
