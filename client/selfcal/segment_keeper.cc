@@ -1,252 +1,147 @@
-// The keeper of the queue: the thread that encodes, spools and reads back, so
-// that neither the SLAM system nor the sender has to wait for this work.
-#include <sched.h>
-#include <sys/resource.h>
-#include <unistd.h>
+#include "client/selfcal/segment_keeper.h"
 
 #include <exception>
 #include <utility>
+#include <variant>
+#include <vector>
 
-#include "client/selfcal/segment_messages.h"
-#include "client/selfcal/segment_queue.h"
-#include "proto/resource_names.h"
+#include "client/selfcal/queue_limits.h"
 
 namespace selfcal::client {
-namespace {
 
-// Time between retries after the disk was full or failed.
-constexpr std::chrono::milliseconds kSpoolRetry{1000};
+SegmentKeeper::SegmentKeeper(const ClientOptions& options,
+                             SegmentQueue* queue,
+                             Refuse refuse)
+    : options_(options), queue_(queue), refuse_(std::move(refuse)) {}
 
-// Prevents this thread from preempting the thread that wakes it, which is the
-// SLAM system's. Without the permission to do so, it continues as it is.
-void LowerPriority() {
-  constexpr int kNice = 10;
-  const sched_param parameters{};
-  sched_setscheduler(0, SCHED_BATCH, &parameters);
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
-}
-
-}  // namespace
-
-void SegmentQueue::Keep() {
-  LowerPriority();
+void SegmentKeeper::Run() noexcept {
   OpenSpool();
-  Lock lock(mutex_);
-  while (!finish_) {
-    const auto due = [this] { return finish_ || HasPending(); };
-    if (!spool_blocked_) {
-      work_.wait(lock, due);
-    } else if (!work_.wait_for(lock, kSpoolRetry, due)) {
-      spool_blocked_ = false;
-    }
-    if (finish_ || !HasPending()) continue;
-    try {
-      ProcessPending(lock);
-    } catch (const std::exception&) {  // out of memory
-      if (!lock.owns_lock()) lock.lock();
-      if (admitting_ && !pending_.has_value()) {
-        ++statistics_.dropped;
-        admitting_ = false;
-      }
-      spool_blocked_ = true;
+  SegmentQueue::State state = queue_->state();
+  while (!state.finishing) {
+    if (ProcessNext(state, Clock::now()) != KeeperStep::kWait) {
+      state = queue_->state();
+    } else {
+      state = queue_->WaitForChange(state, spool_.retry_at());
     }
   }
   try {
-    SpoolRest(lock);
+    SpoolRest();
   } catch (const std::exception&) {  // out of memory: the rest is lost
   }
 }
 
-void SegmentQueue::OpenSpool() {
-  absl::Status status;
-  if (!options_.spool_dir.empty()) {
-    try {
-      if (!ParseRigName(RigName(options_.rig)).has_value()) {
-        status =
-            absl::InvalidArgumentError("no spool: the rig has no valid name");
-      } else if (auto spool = Spool::Open(
-                     std::filesystem::path(options_.spool_dir) / options_.rig,
-                     options_.max_spool_bytes);
-                 spool.ok()) {
-        spool_ = *std::move(spool);
-        next_number_ = spool_->next_number();
-      } else {
-        status = spool.status();
-      }
-    } catch (const std::exception&) {
-      status = absl::Status(absl::StatusCode::kResourceExhausted, "");
+void SegmentKeeper::OpenSpool() {
+  spool_ = SpooledSegments::Open(options_);
+  queue_->ReportSpool(spool_.report());
+}
+
+KeeperStep SegmentKeeper::ProcessNext(const SegmentQueue::State& state,
+                                      Clock::time_point now) {
+  spool_.RetryIfDue(now);
+  const KeeperStep step = NextStep(SituationOf(state));
+  try {
+    TakeStep(step);
+  } catch (const std::exception&) {  // out of memory
+    spool_.Block();
+  }
+  return step;
+}
+
+void SegmentKeeper::SpoolRest() {
+  if (!spool_.exists()) return;
+  RemoveFiles();
+  while (const auto oldest = queue_->TakeOldest()) {
+    if (!oldest->on_disk && !spool_.Write(*oldest)) return;
+  }
+  while (true) {
+    while (!encoded_.has_value()) {
+      if (queue_->state().incoming == 0) return;
+      EncodeIncoming();
     }
+    if (!WriteToSpool()) return;
   }
-  {
-    std::lock_guard lock(mutex_);
-    spool_ready_ = true;
-    spool_status_ = status;
-    if (!status.ok()) ++statistics_.spool_failures;
-    NoteSpool();
-    statistics_.spool_recovered = statistics_.spool_segments;
+}
+
+KeeperSituation SegmentKeeper::SituationOf(
+    const SegmentQueue::State& state) const {
+  KeeperSituation now;
+  now.has_finished_files = state.finished_files > 0;
+  now.has_incoming = state.incoming > 0;
+  now.has_encoded = encoded_.has_value();
+  now.window_is_empty = state.in_window == 0;
+  now.window_has_room =
+      state.in_window < MaxInWindow(options_, spool_.exists());
+  now.has_unloaded = spool_.HasUnloaded();
+  now.spool_is_usable = spool_.exists() && !spool_.blocked();
+  return now;
+}
+
+void SegmentKeeper::TakeStep(KeeperStep step) {
+  switch (step) {
+    case KeeperStep::kWait:
+      break;
+    case KeeperStep::kRemoveFiles:
+      RemoveFiles();
+      break;
+    case KeeperStep::kEncode:
+      EncodeIncoming();
+      break;
+    case KeeperStep::kAppend:
+      queue_->Append(std::move(*encoded_));
+      encoded_.reset();
+      break;
+    case KeeperStep::kSpool:
+      WriteToSpool();
+      break;
+    case KeeperStep::kLoad:
+      Load();
+      break;
   }
-  changed_.notify_all();
 }
 
-bool SegmentQueue::HasPending() const {
-  return !finished_files_.empty() || CanLoad() || CanAdmit();
+void SegmentKeeper::RemoveFiles() {
+  spool_.Remove(queue_->TakeFinishedFiles());
+  queue_->ReportSpool(spool_.report());
 }
 
-bool SegmentQueue::CanLoad() const {
-  return spool_ != nullptr && !spool_blocked_ && head_.size() < max_head_ &&
-         spool_->FirstFrom(loaded_ + 1).has_value();
-}
-
-// True if no segment on disk comes before the one that is admitted now, and the
-// head has room.
-bool SegmentQueue::HeadIsNext() const {
-  const bool none =
-      spool_ == nullptr || !spool_->FirstFrom(loaded_ + 1).has_value();
-  return none && head_.size() < max_head_;
-}
-
-bool SegmentQueue::CanAdmit() const {
-  if (incoming_.empty() && !pending_.has_value()) return false;
-  return HeadIsNext() || (spool_ != nullptr && !spool_blocked_) ||
-         (spool_ == nullptr && head_.size() < max_held_);
-}
-
-void SegmentQueue::ProcessPending(Lock& lock) {
-  if (!finished_files_.empty()) {
-    RemoveFiles(lock);
-  } else if (CanAdmit() && (!head_.empty() || !CanLoad())) {
-    Admit(lock);  // first, because the SLAM system does not wait
+void SegmentKeeper::EncodeIncoming() {
+  auto incoming = queue_->TakeIncoming();
+  if (!incoming.has_value()) return;
+  std::variant<EncodedSegment, Acknowledgement> result;
+  try {
+    result = Encode(options_.rig, *std::move(incoming));
+  } catch (const std::exception&) {
+    queue_->NoteDropped();
+    throw;
+  }
+  if (auto* encoded = std::get_if<EncodedSegment>(&result)) {
+    encoded->number = spool_.NextNumber();
+    encoded_ = std::move(*encoded);
   } else {
-    Load(lock);
+    queue_->NoteRefused();
+    refuse_(std::get<Acknowledgement>(result));
   }
 }
 
-void SegmentQueue::RemoveFiles(Lock& lock) {
-  const std::vector<std::uint64_t> files = std::exchange(finished_files_, {});
-  lock.unlock();
-  for (const std::uint64_t number : files) spool_->Remove(number);
-  lock.lock();
-  spool_blocked_ = false;  // there is room again
-  NoteSpool();
-  changed_.notify_all();
+// Writes the encoded segment to disk; the keeper keeps it if that fails.
+bool SegmentKeeper::WriteToSpool() {
+  if (!spool_.Write(*encoded_)) {
+    queue_->ReportSpool(spool_.report());
+    return false;
+  }
+  encoded_.reset();
+  queue_->NoteSpooled(spool_.report());
+  return true;
 }
 
-void SegmentQueue::Load(Lock& lock) {
-  const std::uint64_t number = *spool_->FirstFrom(loaded_ + 1);
-  lock.unlock();
-  const auto payload = spool_->Read(number);
-  auto request = std::make_shared<Request>();
-  absl::Status status = payload.status();
-  if (status.ok() && (!request->ParseFromString(*payload) ||
-                      request->parent() != RigName(options_.rig))) {
-    status = absl::DataLossError("a file of the spool is of another rig");
+void SegmentKeeper::Load() {
+  auto loaded = spool_.ReadUnloaded();
+  if (loaded.has_value()) {
+    const std::uint64_t number = loaded->number;
+    queue_->Append(*std::move(loaded));
+    spool_.MarkLoaded(number);
   }
-  if (absl::IsDataLoss(status)) spool_->Quarantine(number);
-  lock.lock();
-  if (status.ok()) {
-    const SegmentKey key{request->segment().session(),
-                         request->segment().index()};
-    head_.push_back({number, key, std::move(request), true, false});
-    loaded_ = number;
-  } else {
-    spool_status_ = status;
-    if (absl::IsDataLoss(status)) {
-      ++statistics_.spool_damaged;
-    } else {
-      ++statistics_.spool_failures;
-      spool_blocked_ = true;
-    }
-  }
-  NoteSpool();
-  changed_.notify_all();
-}
-
-void SegmentQueue::Admit(Lock& lock) {
-  if (!pending_.has_value()) {
-    admitting_ = true;
-    Material material = std::move(incoming_.front());
-    incoming_.pop_front();
-    pending_ = Prepare(std::move(material), lock);
-  }
-  if (pending_.has_value() && !HeadIsNext() && spool_ != nullptr) {
-    Write(lock);
-  } else if (pending_.has_value()) {
-    head_.push_back(*std::move(pending_));
-    pending_.reset();
-  }
-  admitting_ = pending_.has_value();
-  changed_.notify_all();
-}
-
-// Assembles and encodes a segment. Returns with the lock held; nullopt if the
-// segment does not fit into a message.
-std::optional<SegmentQueue::Entry> SegmentQueue::Prepare(Material material,
-                                                         Lock& lock) {
-  lock.unlock();
-  if (const auto* closed = std::get_if<ClosedSegment>(&material)) {
-    material = Assemble(*closed);
-  }
-  auto& segment = std::get<MotionSegment>(material);
-  auto request = std::make_shared<Request>();
-  auto violations = MakeRequest(options_.rig, segment, request.get());
-  const SegmentKey key = segment.key;
-  segment = MotionSegment();  // freed before another thread waits for the lock
-  if (violations.empty()) {
-    lock.lock();
-    return Entry{next_number_++, key, std::move(request)};
-  }
-  {
-    std::lock_guard count(mutex_);
-    Count(Acknowledgement::Verdict::kRejected);
-    ++callbacks_due_;
-  }
-  refuse_({key, Acknowledgement::Verdict::kRejected, std::move(violations)});
-  lock.lock();
-  return std::nullopt;
-}
-
-// Writes the pending segment to disk; it stays pending if that fails.
-void SegmentQueue::Write(Lock& lock) {
-  lock.unlock();
-  const absl::Status status =
-      spool_->Write(pending_->number, pending_->request->SerializeAsString());
-  if (status.ok()) pending_.reset();
-  lock.lock();
-  spool_status_ = status;
-  if (status.ok()) {
-    ++statistics_.spooled;
-  } else {
-    if (!absl::IsResourceExhausted(status)) ++statistics_.spool_failures;
-    spool_blocked_ = true;
-  }
-  NoteSpool();
-}
-
-void SegmentQueue::NoteSpool() {
-  statistics_.spool_segments = spool_ == nullptr ? 0 : spool_->size();
-  statistics_.spool_bytes = spool_ == nullptr ? 0 : spool_->bytes();
-}
-
-// Writes the segments that are in memory at the end to disk, oldest first.
-void SegmentQueue::SpoolRest(Lock& lock) {
-  if (spool_ == nullptr) return;
-  RemoveFiles(lock);
-  for (const Entry& entry : head_) {
-    if (entry.on_disk) continue;
-    if (!spool_->Write(entry.number, entry.request->SerializeAsString()).ok()) {
-      return;
-    }
-  }
-  while (pending_.has_value() || !incoming_.empty()) {
-    if (!pending_.has_value()) {
-      Material material = std::move(incoming_.front());
-      incoming_.pop_front();
-      pending_ = Prepare(std::move(material), lock);
-    }
-    if (!pending_.has_value()) continue;
-    Write(lock);
-    if (pending_.has_value()) return;
-  }
+  queue_->ReportSpool(spool_.report());
 }
 
 }  // namespace selfcal::client

@@ -1,140 +1,120 @@
 #include "client/selfcal/segment_queue.h"
 
-#include <algorithm>
 #include <utility>
+
+#include "client/selfcal/queue_limits.h"
 
 namespace selfcal::client {
 namespace {
 
-std::size_t AtLeastOne(int count) {
-  return static_cast<std::size_t>(std::max(count, 1));
-}
-
-// With a spool, half of the queue is for segments that wait for the disk.
-std::size_t HeadRoom(const ClientOptions& options) {
-  const std::size_t all = AtLeastOne(options.max_queue);
-  if (options.spool_dir.empty()) return all;
-  return std::max<std::size_t>(all / 2, 1);
+void Count(Acknowledgement::Verdict verdict, StreamStatistics* statistics) {
+  switch (verdict) {
+    case Acknowledgement::Verdict::kStored:
+      ++statistics->stored;
+      break;
+    case Acknowledgement::Verdict::kDuplicate:
+      ++statistics->duplicates;
+      break;
+    case Acknowledgement::Verdict::kRejected:
+      ++statistics->rejected;
+      break;
+  }
 }
 
 }  // namespace
 
-SegmentQueue::SegmentQueue(const ClientOptions& options, Refuse refuse)
-    : options_(options),
-      refuse_(std::move(refuse)),
-      max_held_(AtLeastOne(options.max_queue)),
-      max_head_(HeadRoom(options)) {
-  keeper_ = std::thread([this] { Keep(); });
-}
+SegmentQueue::SegmentQueue(const ClientOptions& options)
+    : incoming_(MaxInMemory(options)), window_(MaxInFlight(options)) {}
 
-SegmentQueue::~SegmentQueue() {
+bool SegmentQueue::Push(UnencodedSegment segment) noexcept {
   {
     std::lock_guard lock(mutex_);
-    stop_ = true;
-    finish_ = true;
-  }
-  work_.notify_one();
-  keeper_.join();
-}
-
-bool SegmentQueue::Push(Material segment) noexcept {
-  {
-    std::lock_guard lock(mutex_);
-    bool taken = false;
-    if (end_.ok() && !stop_ && Held() < max_held_) {
-      try {
-        incoming_.push_back(std::move(segment));
-        taken = true;
-      } catch (const std::exception&) {  // no memory
-      }
-    }
-    ++(taken ? statistics_.queued : statistics_.dropped);
-    if (!taken) return false;
+    const bool accepted = end_.ok() && !stop_ &&
+                          incoming_.Push(std::move(segment), window_.size());
+    ++(accepted ? statistics_.queued : statistics_.dropped);
+    if (!accepted) return false;
   }
   work_.notify_one();
   return true;
 }
 
 bool SegmentQueue::WaitUntilDone(std::chrono::milliseconds timeout) {
-  Lock lock(mutex_);
+  std::unique_lock lock(mutex_);
   return changed_.wait_for(lock, timeout, [this] {
-    const bool empty = Held() == 0 && statistics_.spool_segments == 0;
-    return !end_.ok() || (spool_ready_ && empty && callbacks_due_ == 0);
+    const bool empty =
+        spool_.has_value() && spool_->segments == 0 && InMemory() == 0;
+    return !end_.ok() || (empty && callbacks_due_ == 0);
   });
 }
 
 std::size_t SegmentQueue::unacknowledged() const {
   std::lock_guard lock(mutex_);
-  const auto loaded =
-      std::count_if(head_.begin(), head_.end(), [](const Entry& entry) {
-        return entry.on_disk;
-      });
-  return Held() - static_cast<std::size_t>(loaded) + statistics_.spool_segments;
+  const std::size_t on_disk = spool_.has_value() ? spool_->segments : 0;
+  return InMemory() - window_.on_disk() + on_disk;
 }
 
 StreamStatistics SegmentQueue::statistics() const {
   std::lock_guard lock(mutex_);
-  return statistics_;
+  StreamStatistics all = statistics_;
+  all.resent = window_.resent();
+  if (!spool_.has_value()) return all;
+  all.spooled = spool_->spooled;
+  all.spool_recovered = spool_->recovered;
+  all.spool_damaged = spool_->damaged;
+  all.spool_failures = spool_->failures;
+  all.spool_segments = spool_->segments;
+  all.spool_bytes = spool_->bytes;
+  return all;
 }
 
 absl::Status SegmentQueue::spool_status() const {
   std::lock_guard lock(mutex_);
-  return spool_status_;
+  return spool_.has_value() ? spool_->status : absl::OkStatus();
 }
 
 bool SegmentQueue::WaitForWork() {
-  Lock lock(mutex_);
-  changed_.wait(lock, [this] { return stop_ || !head_.empty(); });
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return stop_ || window_.size() > 0; });
   return !stop_;
 }
 
 void SegmentQueue::Open() {
   std::lock_guard lock(mutex_);
-  in_flight_ = 0;
-  open_ = true;
+  window_.Open();
 }
 
-std::shared_ptr<const SegmentQueue::Request> SegmentQueue::Next() {
-  Lock lock(mutex_);
-  const std::size_t window = AtLeastOne(options_.max_unacknowledged);
-  changed_.wait(lock, [&] {
-    return stop_ || !open_ || in_flight_ < std::min(window, head_.size());
-  });
-  if (stop_ || !open_) return nullptr;
-  Entry& entry = head_[in_flight_];
-  ++in_flight_;  // before it is sent, because the acknowledgement may be quick
-  if (entry.was_sent) ++statistics_.resent;
-  entry.was_sent = true;
-  return entry.request;
+std::shared_ptr<const v1::StreamSegmentsRequest> SegmentQueue::Next() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(
+      lock, [this] { return stop_ || !window_.open() || window_.CanSend(); });
+  if (stop_ || !window_.open()) return nullptr;
+  return window_.Next();
 }
 
 void SegmentQueue::Close() {
   {
     std::lock_guard lock(mutex_);
-    open_ = false;
+    window_.Close();
   }
   changed_.notify_all();
 }
 
 bool SegmentQueue::Pause(std::chrono::milliseconds time) {
-  Lock lock(mutex_);
+  std::unique_lock lock(mutex_);
   changed_.wait_for(lock, time, [this] { return stop_; });
   return !stop_;
 }
 
 bool SegmentQueue::Acknowledge(const Acknowledgement& ack) {
+  std::optional<EncodedSegment> segment;  // freed without the mutex
   {
     std::lock_guard lock(mutex_);
-    const auto end = head_.begin() + static_cast<std::ptrdiff_t>(in_flight_);
-    const auto entry =
-        std::find_if(head_.begin(), end, [&](const Entry& candidate) {
-          return candidate.key == ack.key;
-        });
-    if (entry == end) return false;
-    if (entry->on_disk) finished_files_.push_back(entry->number);
-    head_.erase(entry);
-    --in_flight_;
-    Count(ack.verdict);
+    // If this throws, nothing has changed.
+    finished_files_.reserve(finished_files_.size() + 1);
+    segment = window_.Acknowledge(ack.key);
+    if (!segment.has_value()) return false;
+    if (segment->on_disk) finished_files_.push_back(segment->number);
+    Count(ack.verdict, &statistics_);
     ++callbacks_due_;
   }
   work_.notify_one();
@@ -182,23 +162,95 @@ bool SegmentQueue::stopped() const {
   return stop_;
 }
 
-// Number of segments in memory.
-std::size_t SegmentQueue::Held() const {
-  return incoming_.size() + (admitting_ ? 1 : 0) + head_.size();
+SegmentQueue::State SegmentQueue::state() const {
+  std::lock_guard lock(mutex_);
+  return StateLocked();
 }
 
-void SegmentQueue::Count(Acknowledgement::Verdict verdict) {
-  switch (verdict) {
-    case Acknowledgement::Verdict::kStored:
-      ++statistics_.stored;
-      break;
-    case Acknowledgement::Verdict::kDuplicate:
-      ++statistics_.duplicates;
-      break;
-    case Acknowledgement::Verdict::kRejected:
-      ++statistics_.rejected;
-      break;
+SegmentQueue::State SegmentQueue::WaitForChange(
+    const State& seen, std::optional<Clock::time_point> until) {
+  std::unique_lock lock(mutex_);
+  const auto differs = [&] { return StateLocked() != seen; };
+  if (until.has_value()) {
+    work_.wait_until(lock, *until, differs);
+  } else {
+    work_.wait(lock, differs);
   }
+  return StateLocked();
+}
+
+std::optional<UnencodedSegment> SegmentQueue::TakeIncoming() {
+  std::lock_guard lock(mutex_);
+  return incoming_.Take();
+}
+
+void SegmentQueue::Append(EncodedSegment&& segment) {
+  const bool was_incoming = !segment.on_disk;
+  {
+    std::lock_guard lock(mutex_);
+    window_.Append(std::move(segment));
+    if (was_incoming) incoming_.Release();
+  }
+  changed_.notify_all();
+}
+
+void SegmentQueue::NoteSpooled(const SpoolReport& report) {
+  {
+    std::lock_guard lock(mutex_);
+    spool_ = report;
+    incoming_.Release();
+  }
+  changed_.notify_all();
+}
+
+void SegmentQueue::NoteRefused() {
+  {
+    std::lock_guard lock(mutex_);
+    incoming_.Release();
+    Count(Acknowledgement::Verdict::kRejected, &statistics_);
+    ++callbacks_due_;
+  }
+  changed_.notify_all();
+}
+
+void SegmentQueue::NoteDropped() {
+  {
+    std::lock_guard lock(mutex_);
+    incoming_.Release();
+    ++statistics_.dropped;
+  }
+  changed_.notify_all();
+}
+
+std::vector<std::uint64_t> SegmentQueue::TakeFinishedFiles() {
+  std::lock_guard lock(mutex_);
+  return std::exchange(finished_files_, {});
+}
+
+void SegmentQueue::ReportSpool(const SpoolReport& report) {
+  {
+    std::lock_guard lock(mutex_);
+    spool_ = report;
+  }
+  changed_.notify_all();
+}
+
+void SegmentQueue::Finish() {
+  {
+    std::lock_guard lock(mutex_);
+    stop_ = true;
+    finish_ = true;
+  }
+  work_.notify_one();
+}
+
+std::optional<EncodedSegment> SegmentQueue::TakeOldest() {
+  std::lock_guard lock(mutex_);
+  return window_.TakeOldest();
+}
+
+SegmentQueue::State SegmentQueue::StateLocked() const {
+  return {incoming_.waiting(), window_.size(), finished_files_.size(), finish_};
 }
 
 }  // namespace selfcal::client

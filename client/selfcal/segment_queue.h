@@ -1,17 +1,19 @@
-// The queue of a stream: it accepts segments from the SLAM system, encodes them
-// as messages, spools them to disk while the daemon is unreachable, hands them
-// to the sender, and removes them when they are acknowledged.
+// The queue of a stream: it passes segments from the SLAM system to the sender,
+// and forgets them when they are acknowledged.
 //
-//   Push -> incoming -> [spool on disk] -> head -> Next ... Acknowledge
+//   Push -> incoming -> keeper -> window -> Next ... Acknowledge
+//                        |   ^
+//                        v   |
+//                        spool
 //
-// `head` has the segments that the sender works on, oldest first; the first
-// in_flight of them have been sent on this connection. A thread of the queue,
-// the keeper, does everything that takes time: it assembles and encodes
-// segments, writes those that do not fit into the head to the spool, and reads
-// them back when there is room.
+// It is a monitor: every function may be called from any thread, and holds the
+// mutex only to move or count segments. None but those whose comment says so
+// waits for anything else; what takes time, encoding and the disk, is done by
+// the keeper (segment_keeper.h) without the mutex.
 //
-// Push, the sender's functions and the statistics may be called from any
-// thread; they wait only for each other.
+// It holds at most max_queue segments: those that wait for the keeper, the one
+// that the keeper works on, and those in the window. While the keeper works on
+// a segment, it counts as unacknowledged, so that WaitUntilDone misses none.
 #pragma once
 
 #include <absl/status/status.h>
@@ -19,40 +21,40 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <thread>
-#include <variant>
 #include <vector>
 
 #include "client/selfcal/client.h"
-#include "client/selfcal/closed_segment.h"
-#include "client/selfcal/spool.h"
+#include "client/selfcal/encoded_segment.h"
+#include "client/selfcal/incoming_segments.h"
+#include "client/selfcal/send_window.h"
+#include "client/selfcal/spooled_segments.h"
 #include "selfcal/v1/segment.pb.h"
 
 namespace selfcal::client {
 
 class SegmentQueue {
  public:
-  using Request = v1::StreamSegmentsRequest;
-  using Material = std::variant<MotionSegment, ClosedSegment>;
-  // The keeper calls it for segments that do not fit into a message.
-  using Refuse = std::function<void(const Acknowledgement&)>;
+  using Clock = std::chrono::steady_clock;
 
-  // Throws std::system_error if no thread can be started, and std::bad_alloc.
-  SegmentQueue(const ClientOptions& options, Refuse refuse);
-  // Writes unacknowledged segments to the spool, if there is one, as far as
-  // they fit. Before, call Stop and wait until the sender has ended.
-  ~SegmentQueue();
+  // What the keeper decides by.
+  struct State {
+    std::size_t incoming = 0;        // segments that wait for the keeper
+    std::size_t in_window = 0;       // segments
+    std::size_t finished_files = 0;  // of the spool
+    bool finishing = false;
+    friend bool operator==(const State&, const State&) = default;
+  };
+
+  explicit SegmentQueue(const ClientOptions& options);
   SegmentQueue(const SegmentQueue&) = delete;
   SegmentQueue& operator=(const SegmentQueue&) = delete;
 
   // Returns false and counts the segment as dropped if the queue is full,
   // memory runs out, or sending has ended.
-  bool Push(Material segment) noexcept;
+  bool Push(UnencodedSegment segment) noexcept;
   // Waits until everything is acknowledged or sending has ended; false after
   // the timeout.
   bool WaitUntilDone(std::chrono::milliseconds timeout);
@@ -67,7 +69,7 @@ class SegmentQueue {
   void Open();
   // Returns the next request. Waits until there is one and the number of
   // unacknowledged segments allows it; null after Close.
-  std::shared_ptr<const Request> Next();
+  std::shared_ptr<const v1::StreamSegmentsRequest> Next();
   void Close();
   // Waits for this time; false if stopped meanwhile.
   bool Pause(std::chrono::milliseconds time);
@@ -81,65 +83,50 @@ class SegmentQueue {
   void Stop();
   bool stopped() const;
 
+  // The functions from here on are for the keeper.
+  State state() const;
+  // Waits until the state differs from `seen`, at most until then.
+  State WaitForChange(const State& seen,
+                      std::optional<Clock::time_point> until);
+  // Hands the oldest incoming segment to the keeper, which must end with it by
+  // one of the next four functions before it takes another.
+  std::optional<UnencodedSegment> TakeIncoming();
+  // Appends the segment to the window: the one that the keeper was handed, or,
+  // if it is on disk, one that was read from there. If it throws
+  // std::bad_alloc, the segment is unchanged.
+  void Append(EncodedSegment&& segment);
+  // The segment is on disk, as the report states.
+  void NoteSpooled(const SpoolReport& report);
+  // The segment does not fit into a message: counts it as rejected, and one
+  // callback as due.
+  void NoteRefused();
+  // Memory ran out for the segment: counts it as dropped.
+  void NoteDropped();
+  // Returns the numbers of acknowledged segments that have a file, once.
+  std::vector<std::uint64_t> TakeFinishedFiles();
+  // Publishes the state of the spool. The first call ends the opening.
+  void ReportSpool(const SpoolReport& report);
+  // Ends the keeper's work, and sending with it.
+  void Finish();
+  // Takes the oldest segment out of the window, after Finish.
+  std::optional<EncodedSegment> TakeOldest();
+
  private:
-  struct Entry {
-    std::uint64_t number = 0;  // defines the order and the name in the spool
-    SegmentKey key;
-    std::shared_ptr<const Request> request;
-    bool on_disk = false;
-    bool was_sent = false;
-  };
-
-  // Functions of the keeper's thread (segment_keeper.cc).
-  using Lock = std::unique_lock<std::mutex>;
-  void Keep();
-  void OpenSpool();
-  bool HasPending() const;
-  bool CanLoad() const;
-  bool CanAdmit() const;
-  bool HeadIsNext() const;
-  void ProcessPending(Lock& lock);
-  void RemoveFiles(Lock& lock);
-  void Load(Lock& lock);
-  void Admit(Lock& lock);
-  std::optional<Entry> Prepare(Material material, Lock& lock);
-  void Write(Lock& lock);
-  void NoteSpool();
-  void SpoolRest(Lock& lock);
-
-  std::size_t Held() const;
-  void Count(Acknowledgement::Verdict verdict);
-
-  const ClientOptions options_;
-  const Refuse refuse_;
-  const std::size_t max_held_;
-  const std::size_t max_head_;
-
-  // Used by the keeper only.
-  std::unique_ptr<Spool> spool_;
-  std::uint64_t next_number_ = 1;
-  std::uint64_t loaded_ = 0;      // files up to this number are in the head
-  std::optional<Entry> pending_;  // admitted, waits for room
+  std::size_t InMemory() const { return incoming_.size() + window_.size(); }
+  State StateLocked() const;
 
   mutable std::mutex mutex_;         // guards all below
   std::condition_variable work_;     // only the keeper waits for it, so that
   std::condition_variable changed_;  // Push wakes no other thread
-  std::deque<Material> incoming_;
-  bool admitting_ = false;  // the keeper holds a segment that is nowhere else
-  std::deque<Entry> head_;
-  std::size_t in_flight_ = 0;
+  IncomingSegments incoming_;
+  SendWindow window_;
   std::vector<std::uint64_t> finished_files_;
-  bool spool_ready_ = false;    // opened, or there is none
-  bool spool_blocked_ = false;  // full or failing; retried after kSpoolRetry
-  absl::Status spool_status_;
+  std::optional<SpoolReport> spool_;  // once it has been opened
   int callbacks_due_ = 0;
-  StreamStatistics statistics_;
-  absl::Status end_;  // if not OK, nothing is sent any more
-  bool open_ = false;
+  StreamStatistics statistics_;  // without the spool's
+  absl::Status end_;             // if not OK, nothing is sent any more
   bool stop_ = false;
   bool finish_ = false;
-
-  std::thread keeper_;  // last: it uses all of the above
 };
 
 }  // namespace selfcal::client

@@ -1,6 +1,6 @@
-// A stream has two threads besides that of the queue: `sender_` connects, sends
-// and waits for the backoff; while a connection lasts, a reader receives the
-// acknowledgements.
+// A stream has three threads: `keeper_` encodes segments and uses the disk;
+// `sender_` connects, sends and waits for the backoff; while a connection
+// lasts, a reader receives the acknowledgements.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 #include "client/selfcal/backoff.h"
 #include "client/selfcal/client.h"
 #include "client/selfcal/connection.h"
+#include "client/selfcal/keeper_thread.h"
 #include "client/selfcal/segment_messages.h"
 #include "client/selfcal/segment_queue.h"
 #include "selfcal/v1/segment.grpc.pb.h"
@@ -43,7 +44,10 @@ class SegmentStream::Impl {
   Impl(const ClientOptions& options, AckCallback on_ack)
       : options_(options),
         on_ack_(std::move(on_ack)),
-        queue_(options_, [this](const Acknowledgement& ack) { CallBack(ack); }),
+        queue_(options_),
+        keeper_(options_,
+                &queue_,
+                [this](const Acknowledgement& ack) { CallBack(ack); }),
         sender_([this] { Run(); }) {}
 
   ~Impl() {
@@ -208,8 +212,9 @@ class SegmentStream::Impl {
   // the sender reads it when the reader has ended.
   bool answered_ = false;
 
-  SegmentQueue queue_;  // its thread uses all of the above
-  std::thread sender_;  // last: it uses all of the above
+  SegmentQueue queue_;
+  KeeperThread keeper_;  // it uses all of the above
+  std::thread sender_;   // last: it uses all of the above
 };
 
 SegmentStream::SegmentStream(const ClientOptions& options,

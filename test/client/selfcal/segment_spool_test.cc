@@ -16,6 +16,7 @@
 #include "client/selfcal/client.h"
 #include "test/client/selfcal/fake_daemon.h"
 #include "test/client/selfcal/test_folder.h"
+#include "test/client/selfcal/test_segments.h"
 #include "test/promise.h"
 #include "test/support/eventually.h"
 
@@ -23,20 +24,6 @@ namespace selfcal::client {
 namespace {
 
 constexpr std::chrono::seconds kLong{60};  // for what must happen
-
-MotionSegment Segment(std::int64_t index) {
-  MotionSegment segment;
-  segment.key = {"walk", index};
-  segment.keyframes.resize(3);
-  segment.imu.resize(100);
-  return segment;
-}
-
-std::vector<SegmentKey> Keys(std::int64_t begin, std::int64_t end) {
-  std::vector<SegmentKey> keys;
-  for (std::int64_t i = begin; i < end; ++i) keys.push_back({"walk", i});
-  return keys;
-}
 
 class SegmentSpoolTest : public ::testing::Test {
  protected:

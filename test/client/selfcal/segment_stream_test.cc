@@ -11,6 +11,7 @@
 
 #include "client/selfcal/client.h"
 #include "test/client/selfcal/fake_daemon.h"
+#include "test/client/selfcal/test_segments.h"
 #include "test/support/eventually.h"
 
 namespace selfcal::client {
@@ -20,17 +21,6 @@ using Mishap = FakeDaemon::Mishap;
 using Verdict = Acknowledgement::Verdict;
 
 constexpr std::chrono::seconds kLong{60};  // for what must happen
-
-MotionSegment Segment(std::int64_t index, const std::string& session = "walk") {
-  MotionSegment segment;
-  segment.key = {session, index};
-  segment.keyframes.resize(3);
-  for (std::size_t k = 0; k < 3; ++k) {
-    segment.keyframes[k].t_ns = static_cast<std::int64_t>(k);
-  }
-  segment.imu.resize(100);
-  return segment;
-}
 
 // Acknowledgements in the order of their coming.
 class Acks {
@@ -56,12 +46,6 @@ class Acks {
   std::vector<Acknowledgement> acks_;
 };
 
-std::vector<SegmentKey> Keys(std::int64_t count) {
-  std::vector<SegmentKey> keys;
-  for (std::int64_t i = 0; i < count; ++i) keys.push_back({"walk", i});
-  return keys;
-}
-
 class SegmentStreamTest : public ::testing::Test {
  protected:
   ClientOptions Options() const {
@@ -84,8 +68,8 @@ TEST_F(SegmentStreamTest, AcknowledgesEverySegmentInOrder) {
   for (int i = 0; i < 50; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
   ASSERT_TRUE(stream.Drain(kLong).ok());
 
-  EXPECT_EQ(acks_.keys(), Keys(50));
-  EXPECT_THAT(daemon_.connections(), testing::ElementsAre(Keys(50)));
+  EXPECT_EQ(acks_.keys(), Keys(0, 50));
+  EXPECT_THAT(daemon_.connections(), testing::ElementsAre(Keys(0, 50)));
   const StreamStatistics statistics = stream.statistics();
   EXPECT_EQ(statistics.queued, 50u);
   EXPECT_EQ(statistics.stored, 50u);
@@ -123,7 +107,7 @@ TEST_F(SegmentStreamTest, SendsAgainInOrderWhatWasNotAcknowledged) {
     for (int i = 0; i < 40; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
     ASSERT_TRUE(stream.Drain(kLong).ok());
 
-    EXPECT_EQ(acks.keys(), Keys(40)) << "each exactly once, and in order";
+    EXPECT_EQ(acks.keys(), Keys(0, 40)) << "each exactly once, and in order";
     EXPECT_EQ(daemon.stored().size(), 40u);
     std::size_t sent = 0;
     for (const auto& connection : daemon.connections()) {
@@ -160,7 +144,7 @@ TEST_F(SegmentStreamTest, SurvivesRestartsOfTheDaemon) {
   daemon_.Start();
   daemon_.Hold(false);
   ASSERT_TRUE(stream.Drain(kLong).ok());
-  EXPECT_EQ(acks_.keys(), Keys(next));
+  EXPECT_EQ(acks_.keys(), Keys(0, next));
   EXPECT_GT(stream.statistics().resent, 0u);
 }
 
@@ -171,7 +155,7 @@ TEST_F(SegmentStreamTest, ReportsARejectionAndGoesOn) {
   for (int i = 0; i < 8; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
   ASSERT_TRUE(stream.Drain(kLong).ok());
   const auto acks = acks_.all();
-  ASSERT_EQ(acks_.keys(), Keys(8));
+  ASSERT_EQ(acks_.keys(), Keys(0, 8));
   for (std::size_t i = 0; i < 8; ++i) {
     EXPECT_EQ(acks[i].verdict, i == 3 ? Verdict::kRejected : Verdict::kStored);
   }
@@ -204,7 +188,7 @@ TEST_F(SegmentStreamTest, DropsAndCountsWhatTheQueueHasNoRoomFor) {
             absl::StatusCode::kDeadlineExceeded);
   daemon_.Start();
   ASSERT_TRUE(stream.Drain(kLong).ok());
-  EXPECT_EQ(acks_.keys(), Keys(16));
+  EXPECT_EQ(acks_.keys(), Keys(0, 16));
   EXPECT_TRUE(stream.Send(Segment(16)));
 }
 
@@ -333,7 +317,7 @@ TEST_F(SegmentStreamTest, LeavesADaemonThatAnswersForAnotherSegment) {
   SegmentStream stream(Options(), acks_.Callback());
   for (int i = 0; i < 5; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
   ASSERT_TRUE(stream.Drain(kLong).ok());
-  EXPECT_EQ(acks_.keys(), Keys(5));
+  EXPECT_EQ(acks_.keys(), Keys(0, 5));
   EXPECT_GE(daemon_.connections().size(), 2u);
 }
 
