@@ -25,8 +25,8 @@ using InertialResidual = Eigen::Matrix<double, 15, 1>;
 using InertialMatrix = Eigen::Matrix<double, 15, 15>;
 
 struct InertialJacobians {
-  InertialMatrix x0;     // with respect to the first state, 15
-  InertialMatrix x1;     // to the second
+  InertialMatrix x0;  // with respect to the first state, 15
+  InertialMatrix x1;  // to the second
   Eigen::Matrix<double, 15, kImuTangentSize> theta;  // to theta_i
 };
 
