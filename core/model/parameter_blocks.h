@@ -194,10 +194,18 @@ consteval int OffsetOf(const Block<Sensor> (&blocks)[count],
                        Member value = nullptr) {
   int offset = 0;
   for (const Block<Sensor>& block : blocks) {
-    if constexpr (!std::is_same_v<Member, std::nullptr_t>) {
-      const Member* member = std::get_if<Member>(&block.value);
-      if (member != nullptr && *member == value) break;
-    }
+    // Not by std::get_if, whose test of a pointer is not constant under
+    // UndefinedBehaviorSanitizer.
+    const bool found = std::visit(
+        [&]<class Each>(Each member) {
+          if constexpr (std::is_same_v<Each, Member>) {
+            return member == value;
+          } else {
+            return false;
+          }
+        },
+        block.value);
+    if (found) break;
     offset += std::visit(
         []<class Value>(Value Sensor::*) {
           if constexpr (std::is_same_v<Value, double>) {
