@@ -39,8 +39,9 @@ namespace selfcal::client {
 struct ClientOptions {
   // Address of the daemon, in the syntax of gRPC.
   std::string target = "unix:/run/selfcal/selfcald.sock";
-  std::string rig;     // {rig}, without "rigs/"
-  int max_queue = 16;  // segments in memory, waiting or unacknowledged
+  std::string rig;  // {rig}, without "rigs/"
+  // Segments in memory, waiting or unacknowledged; with a spool at least 2.
+  int max_queue = 16;
   // Segments that are sent before the first of them is acknowledged.
   int max_unacknowledged = 4;
   std::chrono::milliseconds min_backoff{100};

@@ -8,7 +8,7 @@ namespace selfcal::client {
 
 bool IncomingSegments::Push(UnencodedSegment&& segment,
                             std::size_t elsewhere) noexcept {
-  if (size() + elsewhere >= max_in_memory_) return false;
+  if (!HasRoom(elsewhere)) return false;
   try {
     waiting_.push_back(std::move(segment));
   } catch (const std::exception&) {  // no memory

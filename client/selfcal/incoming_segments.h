@@ -22,6 +22,10 @@ class IncomingSegments {
   // Returns false, and leaves the segment as it is, if there is no room besides
   // the `elsewhere` segments in other places of the queue, or no memory.
   bool Push(UnencodedSegment&& segment, std::size_t elsewhere) noexcept;
+  // True if there is room for one more segment besides those `elsewhere`.
+  bool HasRoom(std::size_t elsewhere) const {
+    return size() + elsewhere < max_in_memory_;
+  }
 
   // Hands out the oldest segment. It counts until Release; only one is handed
   // out at a time. nullopt if there is none.

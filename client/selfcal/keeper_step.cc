@@ -5,8 +5,8 @@ namespace selfcal::client {
 KeeperStep NextStep(const KeeperSituation& now) {
   if (now.has_finished_files) return KeeperStep::kRemoveFiles;
   const bool can_append = now.window_has_room && !now.has_unloaded;
-  const bool can_load =
-      now.window_has_room && now.has_unloaded && now.spool_is_usable;
+  const bool can_load = now.window_has_room && now.memory_has_room &&
+                        now.has_unloaded && now.spool_is_usable;
   // Loading comes first only if the sender has nothing to do, because the SLAM
   // system does not wait.
   if (now.window_is_empty && can_load) return KeeperStep::kLoad;

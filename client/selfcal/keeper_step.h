@@ -22,6 +22,7 @@ struct KeeperSituation {
   bool has_encoded = false;         // the keeper holds an encoded segment
   bool window_is_empty = true;
   bool window_has_room = true;
+  bool memory_has_room = true;   // for one more segment
   bool has_unloaded = false;     // segments on disk that are not in the window
   bool spool_is_usable = false;  // there is one, and it is not blocked
 };

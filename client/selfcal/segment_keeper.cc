@@ -43,6 +43,7 @@ KeeperStep SegmentKeeper::ProcessNext(const SegmentQueue::State& state,
     TakeStep(step);
   } catch (const std::exception&) {  // out of memory
     spool_.Block();
+    queue_->ReportSpool(spool_.report());
   }
   return step;
 }
@@ -71,7 +72,8 @@ KeeperSituation SegmentKeeper::SituationOf(
   now.window_is_empty = state.in_window == 0;
   now.window_has_room =
       state.in_window < MaxInWindow(options_, spool_.exists());
-  now.has_unloaded = spool_.HasUnloaded();
+  now.memory_has_room = state.in_memory < MaxInMemory(options_);
+  now.has_unloaded = spool_.report().has_unloaded;
   now.spool_is_usable = spool_.exists() && !spool_.blocked();
   return now;
 }
@@ -135,6 +137,7 @@ bool SegmentKeeper::WriteToSpool() {
 }
 
 void SegmentKeeper::Load() {
+  if (!queue_->ReserveRoom()) return;  // a segment has come meanwhile
   auto loaded = spool_.ReadUnloaded();
   if (loaded.has_value()) {
     const std::uint64_t number = loaded->number;

@@ -1,5 +1,6 @@
 #include "client/selfcal/segment_queue.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "client/selfcal/queue_limits.h"
@@ -24,13 +25,15 @@ void Count(Acknowledgement::Verdict verdict, StreamStatistics* statistics) {
 }  // namespace
 
 SegmentQueue::SegmentQueue(const ClientOptions& options)
-    : incoming_(MaxInMemory(options)), window_(MaxInFlight(options)) {}
+    : incoming_(MaxInMemory(options)), window_(MaxInFlight(options)) {
+  spool_.has_unloaded = !options.spool_dir.empty();  // until it is opened
+}
 
 bool SegmentQueue::Push(UnencodedSegment segment) noexcept {
   {
     std::lock_guard lock(mutex_);
     const bool accepted = end_.ok() && !stop_ &&
-                          incoming_.Push(std::move(segment), window_.size());
+                          incoming_.Push(std::move(segment), KeptFromPush());
     ++(accepted ? statistics_.queued : statistics_.dropped);
     if (!accepted) return false;
   }
@@ -41,35 +44,32 @@ bool SegmentQueue::Push(UnencodedSegment segment) noexcept {
 bool SegmentQueue::WaitUntilDone(std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
   return changed_.wait_for(lock, timeout, [this] {
-    const bool empty =
-        spool_.has_value() && spool_->segments == 0 && InMemory() == 0;
-    return !end_.ok() || (empty && callbacks_due_ == 0);
+    const bool empty = InMemory() == 0 && spool_.segments == 0;
+    return !end_.ok() || (spool_.opened && empty && callbacks_due_ == 0);
   });
 }
 
 std::size_t SegmentQueue::unacknowledged() const {
   std::lock_guard lock(mutex_);
-  const std::size_t on_disk = spool_.has_value() ? spool_->segments : 0;
-  return InMemory() - window_.on_disk() + on_disk;
+  return InMemory() - window_.on_disk() + spool_.segments;
 }
 
 StreamStatistics SegmentQueue::statistics() const {
   std::lock_guard lock(mutex_);
   StreamStatistics all = statistics_;
   all.resent = window_.resent();
-  if (!spool_.has_value()) return all;
-  all.spooled = spool_->spooled;
-  all.spool_recovered = spool_->recovered;
-  all.spool_damaged = spool_->damaged;
-  all.spool_failures = spool_->failures;
-  all.spool_segments = spool_->segments;
-  all.spool_bytes = spool_->bytes;
+  all.spooled = spool_.spooled;
+  all.spool_recovered = spool_.recovered;
+  all.spool_damaged = spool_.damaged;
+  all.spool_failures = spool_.failures;
+  all.spool_segments = spool_.segments;
+  all.spool_bytes = spool_.bytes;
   return all;
 }
 
 absl::Status SegmentQueue::spool_status() const {
   std::lock_guard lock(mutex_);
-  return spool_.has_value() ? spool_->status : absl::OkStatus();
+  return spool_.status;
 }
 
 bool SegmentQueue::WaitForWork() {
@@ -184,12 +184,22 @@ std::optional<UnencodedSegment> SegmentQueue::TakeIncoming() {
   return incoming_.Take();
 }
 
+bool SegmentQueue::ReserveRoom() {
+  std::lock_guard lock(mutex_);
+  reserved_ = incoming_.HasRoom(window_.size());
+  return reserved_;
+}
+
 void SegmentQueue::Append(EncodedSegment&& segment) {
-  const bool was_incoming = !segment.on_disk;
+  const bool was_on_disk = segment.on_disk;
   {
     std::lock_guard lock(mutex_);
     window_.Append(std::move(segment));
-    if (was_incoming) incoming_.Release();
+    if (was_on_disk) {
+      reserved_ = false;
+    } else {
+      incoming_.Release();
+    }
   }
   changed_.notify_all();
 }
@@ -231,6 +241,7 @@ void SegmentQueue::ReportSpool(const SpoolReport& report) {
   {
     std::lock_guard lock(mutex_);
     spool_ = report;
+    reserved_ = false;
   }
   changed_.notify_all();
 }
@@ -249,8 +260,19 @@ std::optional<EncodedSegment> SegmentQueue::TakeOldest() {
   return window_.TakeOldest();
 }
 
+// Number of segments for which Push leaves room: those in the window, and one
+// that is read from disk now or later.
+std::size_t SegmentQueue::KeptFromPush() const {
+  const std::size_t kept = window_.size() + (reserved_ ? 1 : 0);
+  return std::max<std::size_t>(kept, spool_.has_unloaded ? 1 : 0);
+}
+
 SegmentQueue::State SegmentQueue::StateLocked() const {
-  return {incoming_.waiting(), window_.size(), finished_files_.size(), finish_};
+  return {incoming_.waiting(),
+          window_.size(),
+          InMemory(),
+          finished_files_.size(),
+          finish_};
 }
 
 }  // namespace selfcal::client

@@ -12,8 +12,10 @@
 // the keeper (segment_keeper.h) without the mutex.
 //
 // It holds at most max_queue segments: those that wait for the keeper, the one
-// that the keeper works on, and those in the window. While the keeper works on
-// a segment, it counts as unacknowledged, so that WaitUntilDone misses none.
+// that the keeper encodes or writes, the one that it reads, and those in the
+// window. While segments are on disk only, Push leaves room for one of them, so
+// that the sender never runs out of work. While the keeper works on a segment,
+// it counts as unacknowledged, so that WaitUntilDone misses none.
 #pragma once
 
 #include <absl/status/status.h>
@@ -43,6 +45,7 @@ class SegmentQueue {
   struct State {
     std::size_t incoming = 0;        // segments that wait for the keeper
     std::size_t in_window = 0;       // segments
+    std::size_t in_memory = 0;       // segments: all that the queue holds
     std::size_t finished_files = 0;  // of the spool
     bool finishing = false;
     friend bool operator==(const State&, const State&) = default;
@@ -91,8 +94,11 @@ class SegmentQueue {
   // Hands the oldest incoming segment to the keeper, which must end with it by
   // one of the next four functions before it takes another.
   std::optional<UnencodedSegment> TakeIncoming();
+  // Reserves room for a segment that is read from disk, until Append or
+  // ReportSpool. Returns false if there is none.
+  bool ReserveRoom();
   // Appends the segment to the window: the one that the keeper was handed, or,
-  // if it is on disk, one that was read from there. If it throws
+  // if it is on disk, the one for which it has reserved room. If it throws
   // std::bad_alloc, the segment is unchanged.
   void Append(EncodedSegment&& segment);
   // The segment is on disk, as the report states.
@@ -104,7 +110,7 @@ class SegmentQueue {
   void NoteDropped();
   // Returns the numbers of acknowledged segments that have a file, once.
   std::vector<std::uint64_t> TakeFinishedFiles();
-  // Publishes the state of the spool. The first call ends the opening.
+  // Publishes the state of the spool, and releases room that is reserved.
   void ReportSpool(const SpoolReport& report);
   // Ends the keeper's work, and sending with it.
   void Finish();
@@ -113,6 +119,7 @@ class SegmentQueue {
 
  private:
   std::size_t InMemory() const { return incoming_.size() + window_.size(); }
+  std::size_t KeptFromPush() const;
   State StateLocked() const;
 
   mutable std::mutex mutex_;         // guards all below
@@ -120,8 +127,9 @@ class SegmentQueue {
   std::condition_variable changed_;  // Push wakes no other thread
   IncomingSegments incoming_;
   SendWindow window_;
+  bool reserved_ = false;  // room for one more in the window
   std::vector<std::uint64_t> finished_files_;
-  std::optional<SpoolReport> spool_;  // once it has been opened
+  SpoolReport spool_;
   int callbacks_due_ = 0;
   StreamStatistics statistics_;  // without the spool's
   absl::Status end_;             // if not OK, nothing is sent any more

@@ -24,6 +24,7 @@ absl::StatusOr<std::unique_ptr<Spool>> OpenFolder(const ClientOptions& options,
 
 SpooledSegments SpooledSegments::Open(const ClientOptions& options) {
   SpooledSegments opened;
+  opened.report_.opened = true;
   if (options.spool_dir.empty()) return opened;
   try {
     opened.parent_ = RigName(options.rig);
@@ -39,13 +40,9 @@ SpooledSegments SpooledSegments::Open(const ClientOptions& options) {
     return opened;
   }
   opened.next_number_ = opened.spool_->next_number();
-  opened.CountContent();
+  opened.UpdateReport();
   opened.report_.recovered = opened.report_.segments;
   return opened;
-}
-
-bool SpooledSegments::HasUnloaded() const {
-  return exists() && spool_->FirstFrom(loaded_ + 1).has_value();
 }
 
 bool SpooledSegments::Write(const EncodedSegment& segment) {
@@ -58,7 +55,7 @@ bool SpooledSegments::Write(const EncodedSegment& segment) {
     if (!absl::IsResourceExhausted(status)) ++report_.failures;
     Block();
   }
-  CountContent();
+  UpdateReport();
   return status.ok();
 }
 
@@ -83,21 +80,27 @@ std::optional<EncodedSegment> SpooledSegments::ReadUnloaded() {
     ++report_.failures;
     Block();
   }
-  CountContent();
+  UpdateReport();
   return std::nullopt;
+}
+
+void SpooledSegments::MarkLoaded(std::uint64_t number) {
+  loaded_ = number;
+  UpdateReport();
 }
 
 void SpooledSegments::Remove(const std::vector<std::uint64_t>& numbers) {
   for (const std::uint64_t number : numbers) spool_->Remove(number);
   retry_at_.reset();  // there is room again
-  CountContent();
+  UpdateReport();
 }
 
 void SpooledSegments::RetryIfDue(Clock::time_point now) {
   if (retry_at_.has_value() && now >= *retry_at_) retry_at_.reset();
 }
 
-void SpooledSegments::CountContent() {
+void SpooledSegments::UpdateReport() {
+  report_.has_unloaded = spool_->FirstFrom(loaded_ + 1).has_value();
   report_.segments = spool_->size();
   report_.bytes = spool_->bytes();
 }

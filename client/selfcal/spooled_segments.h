@@ -25,9 +25,11 @@
 
 namespace selfcal::client {
 
-// The members are those of StreamStatistics.
+// State of the spool; the counts are those of StreamStatistics.
 struct SpoolReport {
-  absl::Status status;  // of the last attempt to use the spool
+  bool opened = false;        // or it is known that there is none
+  bool has_unloaded = false;  // segments are on disk, but not in the window
+  absl::Status status;        // of the last attempt to use the spool
   std::uint64_t segments = 0;
   std::uint64_t bytes = 0;
   std::uint64_t spooled = 0;
@@ -49,8 +51,6 @@ class SpooledSegments {
   // False if there is no spool, or it could not be opened.
   bool exists() const { return spool_ != nullptr; }
   bool blocked() const { return retry_at_.has_value(); }
-  // True if segments are on disk that are not in the window.
-  bool HasUnloaded() const;
 
   // Returns the number of the next segment that the stream accepts: larger than
   // those of all before, in this process and on disk.
@@ -64,9 +64,9 @@ class SpooledSegments {
   bool Write(const EncodedSegment& segment);
   // Reads the oldest unloaded segment; it remains unloaded until MarkLoaded. If
   // it returns nullopt, the segment was damaged and is quarantined, or could
-  // not be read and the spool is blocked. Needs HasUnloaded.
+  // not be read and the spool is blocked. Needs report().has_unloaded.
   std::optional<EncodedSegment> ReadUnloaded();
-  void MarkLoaded(std::uint64_t number) { loaded_ = number; }
+  void MarkLoaded(std::uint64_t number);
   // Removes segments that are acknowledged; the spool is no longer blocked.
   void Remove(const std::vector<std::uint64_t>& numbers);
 
@@ -80,7 +80,7 @@ class SpooledSegments {
   const SpoolReport& report() const { return report_; }
 
  private:
-  void CountContent();
+  void UpdateReport();
 
   std::string parent_;  // resource name of the rig
   std::unique_ptr<Spool> spool_;

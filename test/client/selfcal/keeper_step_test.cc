@@ -10,7 +10,7 @@ namespace {
 // Every situation that can occur.
 std::vector<KeeperSituation> AllSituations() {
   std::vector<KeeperSituation> all;
-  for (unsigned bits = 0; bits < 1u << 7; ++bits) {
+  for (unsigned bits = 0; bits < 1u << 8; ++bits) {
     const auto bit = [&](unsigned n) { return (bits >> n & 1) != 0; };
     KeeperSituation now;
     now.has_finished_files = bit(0);
@@ -20,8 +20,14 @@ std::vector<KeeperSituation> AllSituations() {
     now.window_has_room = bit(4);
     now.has_unloaded = bit(5);
     now.spool_is_usable = bit(6);
+    now.memory_has_room = bit(7);
     // The window has room for at least one segment.
     if (now.window_is_empty && !now.window_has_room) continue;
+    // What fills the memory is in the window or new.
+    if (now.window_is_empty && !now.has_incoming && !now.has_encoded &&
+        !now.memory_has_room) {
+      continue;
+    }
     all.push_back(now);
   }
   return all;
@@ -47,6 +53,7 @@ TEST(KeeperStep, IsAlwaysPossible) {
         break;
       case KeeperStep::kLoad:
         EXPECT_TRUE(now.has_unloaded && now.window_has_room);
+        EXPECT_TRUE(now.memory_has_room);
         EXPECT_TRUE(now.spool_is_usable);
         break;
     }
@@ -67,7 +74,8 @@ TEST(KeeperStep, WaitsOnlyIfNothingIsPossible) {
     const bool has_new = now.has_incoming || now.has_encoded;
     if (now.spool_is_usable) {
       EXPECT_FALSE(has_new) << "it could be encoded and go to disk";
-      EXPECT_FALSE(now.has_unloaded && now.window_has_room);
+      EXPECT_FALSE(now.has_unloaded && now.window_has_room &&
+                   now.memory_has_room);
     } else if (has_new) {
       EXPECT_TRUE(now.has_unloaded || !now.window_has_room);
     }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "client/selfcal/queue_limits.h"
 #include "test/client/selfcal/test_folder.h"
 #include "test/client/selfcal/test_segments.h"
 
@@ -175,6 +176,48 @@ TEST_F(SegmentKeeperTest, KeepsOneEncodedSegmentWhileTheSpoolIsFull) {
   EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
 }
 
+TEST_F(SegmentKeeperTest, ReadsNothingBackThatMemoryHasNoRoomFor) {
+  Process process(Options(true));
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(process.queue().Push(Segment(i)));
+  process.Work();  // 0 and 1 are in the window, 2 and 3 on disk
+  process.Connect();
+  process.Send();
+  EXPECT_EQ(process.Acknowledge(), 0);
+  EXPECT_EQ(process.Acknowledge(), 1);
+  for (int i = 4; i < 7; ++i) ASSERT_TRUE(process.queue().Push(Segment(i)));
+  EXPECT_FALSE(process.queue().Push(Segment(7))) << "room for one on disk";
+  EXPECT_EQ(process.Step(), KeeperStep::kLoad) << "the sender has no work";
+  EXPECT_EQ(process.queue().state().in_memory, 4u);
+  EXPECT_FALSE(process.queue().Push(Segment(7)));
+  EXPECT_EQ(process.Step(), KeeperStep::kEncode) << "there is no room to read";
+  process.Work();
+  for (int i = 2; i < 7; ++i) {
+    process.Send();
+    EXPECT_EQ(process.Acknowledge(), i);
+    process.Work();
+  }
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
+}
+
+TEST_F(SegmentKeeperTest, SpoolsWithTheSmallestQueue) {
+  ClientOptions options = Options(true);
+  options.max_queue = 1;  // taken as 2
+  Process process(options);
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(process.queue().Push(Segment(i)));
+    process.Work();
+    EXPECT_LE(process.queue().state().in_memory, 2u);
+  }
+  EXPECT_EQ(process.queue().statistics().spooled, 4u);
+  process.Connect();
+  for (int i = 0; i < 5; ++i) {
+    process.Send();
+    EXPECT_EQ(process.Acknowledge(), i);
+    process.Work();
+  }
+  EXPECT_TRUE(process.queue().WaitUntilDone(kNow));
+}
+
 TEST_F(SegmentKeeperTest, RefusesWhatNoMessageCanContain) {
   Process process(Options(false));
   ASSERT_TRUE(process.queue().Push(Segment(0, "not\xff utf-8")));
@@ -217,7 +260,7 @@ TEST_F(SegmentKeeperTest, LeavesEverythingToTheNextProcess) {
 
 // The SLAM system, the keeper, the sender and the device's owner act in random
 // order. Each accepted segment must be acknowledged once, in order, whatever
-// happens in between.
+// happens in between, and the queue may never hold more than it is allowed to.
 TEST_F(SegmentKeeperTest, DeliversAllOnceAndInOrderInAnyInterleaving) {
   std::int64_t total = 0;
   for (unsigned seed = 0; seed < 40; ++seed) {
@@ -258,6 +301,7 @@ TEST_F(SegmentKeeperTest, DeliversAllOnceAndInOrderInAnyInterleaving) {
       ASSERT_EQ(process->queue().unacknowledged(),
                 static_cast<std::size_t>(accepted - acknowledged) +
                     state.finished_files);
+      ASSERT_LE(state.in_memory, MaxInMemory(options));
       ASSERT_LE(statistics.spool_bytes, options.max_spool_bytes);
     }
     process->Connect();

@@ -56,9 +56,44 @@ TEST_F(SegmentQueueTest, HoldsNoMoreSegmentsThanItMay) {
   EXPECT_EQ(queue_.statistics().dropped, 3u);
 }
 
+TEST_F(SegmentQueueTest, LeavesRoomForASegmentThatIsReadFromDisk) {
+  SpoolReport report;
+  report.opened = true;
+  report.has_unloaded = true;
+  queue_.ReportSpool(report);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(queue_.Push(Segment(i)));
+  EXPECT_FALSE(queue_.Push(Segment(3))) << "the sender would have no work";
+  ASSERT_TRUE(queue_.ReserveRoom());
+  EXPECT_FALSE(queue_.Push(Segment(3))) << "it is being read";
+  queue_.Append(Encoded(9, /*on_disk=*/true));
+  EXPECT_EQ(queue_.state().in_memory, 4u);
+  EXPECT_FALSE(queue_.ReserveRoom());
+  EXPECT_FALSE(queue_.Push(Segment(3)));
+  // It was the last on disk.
+  report.has_unloaded = false;
+  queue_.ReportSpool(report);
+  queue_.Open();
+  ASSERT_NE(queue_.Next(), nullptr);
+  ASSERT_TRUE(Acknowledge(9));
+  EXPECT_TRUE(queue_.Push(Segment(3)));
+}
+
+TEST_F(SegmentQueueTest, ReleasesTheRoomForASegmentThatCouldNotBeRead) {
+  SpoolReport report;
+  report.opened = true;
+  queue_.ReportSpool(report);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(queue_.Push(Segment(i)));
+  ASSERT_TRUE(queue_.ReserveRoom());
+  EXPECT_FALSE(queue_.Push(Segment(3)));
+  queue_.ReportSpool(report);
+  EXPECT_TRUE(queue_.Push(Segment(3)));
+}
+
 TEST_F(SegmentQueueTest, IsDoneWhenAllIsAcknowledgedAndCalledBack) {
+  SpoolReport opened;
+  opened.opened = true;
   EXPECT_FALSE(queue_.WaitUntilDone(kNow)) << "the spool may hold something";
-  queue_.ReportSpool({});
+  queue_.ReportSpool(opened);
   EXPECT_TRUE(queue_.WaitUntilDone(kNow));
   ASSERT_TRUE(queue_.Push(Segment(0)));
   EXPECT_FALSE(queue_.WaitUntilDone(kNow)) << "it is incoming";
@@ -78,11 +113,13 @@ TEST_F(SegmentQueueTest, IsDoneWhenAllIsAcknowledgedAndCalledBack) {
 }
 
 TEST_F(SegmentQueueTest, CountsASegmentOnDiskOnceWhereverElseItIs) {
-  queue_.ReportSpool({});
+  SpoolReport opened;
+  opened.opened = true;
+  queue_.ReportSpool(opened);
   ASSERT_TRUE(queue_.Push(Segment(0)));
   ASSERT_TRUE(queue_.TakeIncoming().has_value());
   EXPECT_EQ(queue_.unacknowledged(), 1u);
-  SpoolReport one;
+  SpoolReport one = opened;
   one.segments = 1;
   queue_.NoteSpooled(one);
   EXPECT_EQ(queue_.unacknowledged(), 1u) << "on disk";
@@ -96,7 +133,7 @@ TEST_F(SegmentQueueTest, CountsASegmentOnDiskOnceWhereverElseItIs) {
   EXPECT_EQ(queue_.state().finished_files, 1u);
   EXPECT_EQ(queue_.TakeFinishedFiles(), std::vector<std::uint64_t>{0});
   EXPECT_TRUE(queue_.TakeFinishedFiles().empty()) << "each once";
-  queue_.ReportSpool({});
+  queue_.ReportSpool(opened);
   EXPECT_TRUE(queue_.WaitUntilDone(kNow));
 }
 

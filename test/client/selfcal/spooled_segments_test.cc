@@ -30,7 +30,7 @@ TEST_F(SpooledSegmentsTest, HoldsNothingWithoutAFolder) {
   options_.spool_dir.clear();
   SpooledSegments spool = SpooledSegments::Open(options_);
   EXPECT_FALSE(spool.exists());
-  EXPECT_FALSE(spool.HasUnloaded());
+  EXPECT_FALSE(spool.report().has_unloaded);
   EXPECT_TRUE(spool.report().status.ok());
   EXPECT_EQ(spool.report().failures, 0u);
   EXPECT_EQ(spool.NextNumber(), 1u);
@@ -63,7 +63,7 @@ TEST_F(SpooledSegmentsTest, ReturnsWhatWasWrittenOldestFirstAndOnce) {
   EXPECT_EQ(spool.report().segments, 3u);
   EXPECT_EQ(spool.report().recovered, 0u);
   for (const std::uint64_t number : {4u, 5u, 9u}) {
-    ASSERT_TRUE(spool.HasUnloaded());
+    ASSERT_TRUE(spool.report().has_unloaded);
     for (int reading = 0; reading < 2; ++reading) {  // until it is loaded
       const auto read = spool.ReadUnloaded();
       ASSERT_TRUE(read.has_value());
@@ -75,7 +75,7 @@ TEST_F(SpooledSegmentsTest, ReturnsWhatWasWrittenOldestFirstAndOnce) {
     }
     spool.MarkLoaded(number);
   }
-  EXPECT_FALSE(spool.HasUnloaded());
+  EXPECT_FALSE(spool.report().has_unloaded);
   EXPECT_EQ(spool.report().segments, 3u) << "until they are removed";
   spool.Remove({4, 9});
   EXPECT_EQ(spool.report().segments, 1u);
@@ -94,7 +94,7 @@ TEST_F(SpooledSegmentsTest, NumbersOnFromWhatAnEarlierProcessLeft) {
   EXPECT_EQ(spool.report().spooled, 0u);
   EXPECT_GT(spool.report().bytes, 0u);
   EXPECT_EQ(spool.NextNumber(), 42u);
-  EXPECT_TRUE(spool.HasUnloaded());
+  EXPECT_TRUE(spool.report().has_unloaded);
 }
 
 TEST_F(SpooledSegmentsTest, IsBlockedWhenItIsFullUntilLaterOrThereIsRoom) {
@@ -137,7 +137,7 @@ TEST_F(SpooledSegmentsTest, QuarantinesWhatIsDamagedOrOfAnotherRig) {
   ASSERT_TRUE(spool.Write(Encoded(3)));
   std::filesystem::resize_file(File(1), 10);
   for (std::uint64_t damaged = 1; damaged <= 2; ++damaged) {
-    ASSERT_TRUE(spool.HasUnloaded());
+    ASSERT_TRUE(spool.report().has_unloaded);
     EXPECT_FALSE(spool.ReadUnloaded().has_value());
     EXPECT_EQ(spool.report().damaged, damaged);
     EXPECT_TRUE(absl::IsDataLoss(spool.report().status));
