@@ -130,23 +130,28 @@ TEST_F(SegmentSpoolTest, DropsTheNewestWhenItIsFull) {
   ClientOptions options = Options();
   options.max_spool_bytes = 60'000;
   SegmentStream stream(options, Callback());
-  // Segments take some 6 kB each: these do not fit.
   std::int64_t taken = 0;
-  for (int idle = 0; idle < 2000;) {
+  std::uint64_t refused = 0;
+  // Until memory is full behind a spool that is full.
+  ASSERT_TRUE(Eventually([&] {
     if (stream.Send(Segment(taken))) {
       ++taken;
-      idle = 0;
-    } else {
-      ++idle;
-      std::this_thread::sleep_for(std::chrono::microseconds(100));
+      return false;
     }
+    ++refused;
+    return absl::IsResourceExhausted(stream.spool_status());
+  }));
+  for (int i = 0; i < 20; ++i, ++refused) {
+    EXPECT_FALSE(stream.Send(Segment(taken)));
   }
-  EXPECT_GT(taken, 8);
-  EXPECT_LT(taken, 20);
-  EXPECT_TRUE(absl::IsResourceExhausted(stream.spool_status()));
-  EXPECT_LE(stream.statistics().spool_bytes, 60'000u);
-  EXPECT_GE(stream.statistics().dropped, 2000u);
-  EXPECT_EQ(stream.statistics().queued, static_cast<std::uint64_t>(taken));
+  const StreamStatistics full = stream.statistics();
+  EXPECT_EQ(full.spool_segments + 4, static_cast<std::uint64_t>(taken));
+  EXPECT_LE(full.spool_bytes, 60'000u);
+  const std::uint64_t one = full.spool_bytes / full.spool_segments;
+  EXPECT_GT(full.spool_bytes + one + 1, 60'000u)
+      << "one more would have fitted";
+  EXPECT_EQ(full.dropped, refused);
+  EXPECT_EQ(full.queued, static_cast<std::uint64_t>(taken));
 
   daemon_.Start();
   ASSERT_TRUE(stream.Drain(kLong).ok());
