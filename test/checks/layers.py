@@ -284,8 +284,8 @@ def cycles(project: Project) -> list:
 
 def tracked_files(root: pathlib.Path) -> list:
     listed = subprocess.run(
-        ["git", "-c", "safe.directory=*", "-C", root, "ls-files", "--cached", "--others",
-         "--exclude-standard"],
+        ["git", "-c", "safe.directory=*", "-C", root,
+         "ls-files", "--cached", "--others", "--exclude-standard"],
         check=True, capture_output=True, text=True,
     ).stdout.splitlines()  # fmt: skip
     return [file for file in listed if (root / file).is_file()]
