@@ -2,6 +2,7 @@
 
 #include <future>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -20,6 +21,23 @@
 #include "server/store/transact.h"
 
 namespace selfcal::server {
+namespace {
+
+// A rule about time, which may create a run of a rig with a policy to which it
+// applies.
+struct TimeTrigger {
+  bool (*applies)(const RigPolicy& policy);
+  absl::StatusOr<std::optional<StoredRun>> (*create_run)(UnitOfWork* tx,
+                                                         const StoredRig& rig,
+                                                         std::int64_t now_ns);
+};
+
+constexpr TimeTrigger kTimeTriggers[] = {
+    {[](const RigPolicy& policy) { return policy.calibration_max_age_ns > 0; },
+     CreateAgedRun},
+};
+
+}  // namespace
 
 absl::StatusOr<StoredRig> Domain::CreateRig(const StoredRig& rig) {
   StoredRig stored = rig;
@@ -176,7 +194,7 @@ absl::StatusOr<StoredRun> Domain::CreateManualRun(const std::string& rig,
   });
 }
 
-absl::StatusOr<std::vector<StoredRun>> Domain::StartAgedRuns(
+absl::StatusOr<std::vector<StoredRun>> Domain::StartTimedRuns(
     std::int64_t now_ns) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> names,
                            store_->ListRigNames());
@@ -184,12 +202,15 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartAgedRuns(
   for (const std::string& name : names) {
     const auto rig = store_->GetRig(name);
     // A damaged rig must not hold up the others.
-    if (!rig.ok() || rig->policy.calibration_max_age_ns <= 0) continue;
-    SELFCAL_ASSIGN_OR_RETURN(
-        auto run, TransactFor(store_, name, clock_(), [&](UnitOfWork* tx) {
-          return CreateAgedRun(tx, *rig, now_ns);
-        }));
-    if (run) started.push_back(*std::move(run));
+    if (!rig.ok()) continue;
+    for (const TimeTrigger& trigger : kTimeTriggers) {
+      if (!trigger.applies(rig->policy)) continue;
+      SELFCAL_ASSIGN_OR_RETURN(
+          auto run, TransactFor(store_, name, clock_(), [&](UnitOfWork* tx) {
+            return trigger.create_run(tx, *rig, now_ns);
+          }));
+      if (run) started.push_back(*std::move(run));
+    }
   }
   return started;
 }

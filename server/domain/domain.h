@@ -156,9 +156,9 @@ class Domain {
   // the active version or is the active one.
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
                                             bool force = false);
-  // Creates the runs of all rigs whose calibration is older than their policy
-  // allows (age_trigger.h).
-  absl::StatusOr<std::vector<StoredRun>> StartAgedRuns(std::int64_t now_ns);
+  // Creates the runs that the rules about time start (age_trigger.h), of all
+  // rigs.
+  absl::StatusOr<std::vector<StoredRun>> StartTimedRuns(std::int64_t now_ns);
   // Creates the runs of all rigs whose session has ended (session_trigger.h):
   // the rig is one of `ended`, or none of its segments arrived after
   // `idle_since_ns`.

@@ -159,7 +159,7 @@ absl::StatusOr<Execution> Recalibrator::ExecuteAll() {
   for (bool any = true; any && worst != Execution::kTryLater;) {
     any = false;
     SELFCAL_RETURN_IF_ERROR(
-        context_.domain->StartAgedRuns(context_.options.now_ns()).status());
+        context_.domain->StartTimedRuns(context_.options.now_ns()).status());
     SELFCAL_RETURN_IF_ERROR(StartSessionRuns());
     SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredRun> runs,
                              context_.store()->ListUnfinishedRuns());

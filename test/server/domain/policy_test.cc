@@ -109,28 +109,28 @@ TEST_P(PolicyTest, OldCalibrationStartsOneRunOnNewSegments) {
     Score(rig, k, 10 + k);
   }
   // While the run is unfinished, and before the calibration came from a run.
-  EXPECT_THAT(*domain_->StartAgedRuns(later), IsEmpty());
+  EXPECT_THAT(*domain_->StartTimedRuns(later), IsEmpty());
   ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
   ASSERT_TRUE(domain_->FinishRun("a", 1, Found(rig)).ok());
   // Nothing new.
-  EXPECT_THAT(*domain_->StartAgedRuns(later), IsEmpty());
+  EXPECT_THAT(*domain_->StartTimedRuns(later), IsEmpty());
   Put("a", 4);
   Score(rig, 4, 1);
   // Not old.
-  EXPECT_THAT(*domain_->StartAgedRuns(NowNs()), IsEmpty());
-  const auto started = domain_->StartAgedRuns(later);
+  EXPECT_THAT(*domain_->StartTimedRuns(NowNs()), IsEmpty());
+  const auto started = domain_->StartTimedRuns(later);
   ASSERT_TRUE(started.ok()) << started.status();
   ASSERT_EQ(started->size(), 1u);
   EXPECT_EQ(started->front().trigger, RunTrigger::kCalibrationAged);
   Reopen();
   EXPECT_EQ(store_->GetRun("a", 2)->trigger, RunTrigger::kCalibrationAged);
-  EXPECT_THAT(*domain_->StartAgedRuns(later), IsEmpty());
+  EXPECT_THAT(*domain_->StartTimedRuns(later), IsEmpty());
   // A failure is not repeated before as much time has passed again.
   ASSERT_TRUE(domain_->EndRun("a", 2, RunState::kFailed, "broke").ok());
   Put("a", 5);
   Score(rig, 5, 0);
-  EXPECT_THAT(*domain_->StartAgedRuns(NowNs() + 50 * kSecond), IsEmpty());
-  EXPECT_EQ(domain_->StartAgedRuns(later)->size(), 1u);
+  EXPECT_THAT(*domain_->StartTimedRuns(NowNs() + 50 * kSecond), IsEmpty());
+  EXPECT_EQ(domain_->StartTimedRuns(later)->size(), 1u);
 }
 
 TEST_P(PolicyTest, DeferredRunSaysWhyAndIsLoggedOnce) {
