@@ -26,8 +26,9 @@ enum class Accepted {
   kCoefficients,  // what the camera's model accepts
 };
 
-// When data began to have a block: data from before gets its default.
-enum class StoredSince { kBegin, kTimeOffset };
+// When data began to have a block: data from before gets its default. Of
+// kNames are all later blocks: since then, records name their components.
+enum class StoredSince { kBegin, kTimeOffset, kNames };
 
 // Standard deviations by grade of IMU (imu_grades.h).
 struct GradeTolerance {
@@ -51,9 +52,9 @@ struct BlockInfo {
   std::string_view group = {};  // of a camera's block; an IMU's is in "imu"
   std::string_view words;       // before the name of a component, for people
   GradeTolerance tolerance = {};
-  // If false, it is held constant unless the rig estimates it.
+  // If false, it is held constant unless the rig estimates it (BlockSetting).
   bool estimated = true;
-  StoredSince since = StoredSince::kBegin;
+  StoredSince since = StoredSince::kNames;
 };
 
 inline constexpr int kReferenceWidth_px = 640;
@@ -82,7 +83,8 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
       .accepted = Accepted::kPositive,
       .limit = 10,
       .words = "the gyroscope's scale on ",
-      .tolerance = {2e-2, 3e-3}},
+      .tolerance = {2e-2, 3e-3},
+      .since = StoredSince::kBegin},
      &ImuCalibration::s_g},
     {{.name = "gyro.misalignment",
       .field = "m_g",
@@ -90,7 +92,8 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
       .sigma_ref = 7e-3,
       .limit = 10,
       .words = "the gyroscope's misalignment ",
-      .tolerance = {2e-2, 2e-3}},
+      .tolerance = {2e-2, 2e-3},
+      .since = StoredSince::kBegin},
      &ImuCalibration::m_g},
     {{.name = "accel.scale",
       .field = "s_a",
@@ -99,7 +102,8 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
       .accepted = Accepted::kPositive,
       .limit = 10,
       .words = "the accelerometer's scale on ",
-      .tolerance = {2e-2, 3e-3}},
+      .tolerance = {2e-2, 3e-3},
+      .since = StoredSince::kBegin},
      &ImuCalibration::s_a},
     {{.name = "accel.misalignment",
       .field = "m_a",
@@ -107,7 +111,8 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
       .sigma_ref = 4e-2,
       .limit = 10,
       .words = "the accelerometer's misalignment ",
-      .tolerance = {2e-2, 2e-3}},
+      .tolerance = {2e-2, 2e-3},
+      .since = StoredSince::kBegin},
      &ImuCalibration::m_a},
     {{.name = "q_AI",
       .field = "q_AI",
@@ -117,7 +122,8 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
       .limit = 1e-6,
       .words =
           "the rotation of the accelerometer relative to the gyroscope about ",
-      .tolerance = {2e-2, 2e-3}},
+      .tolerance = {2e-2, 2e-3},
+      .since = StoredSince::kBegin},
      &ImuCalibration::q_AI},
 };
 
@@ -129,7 +135,8 @@ inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
       .accepted = Accepted::kUnit,
       .limit = 1e-6,
       .group = "extrinsics",
-      .words = "the rotation relative to the IMU about "},
+      .words = "the rotation relative to the IMU about ",
+      .since = StoredSince::kBegin},
      &CameraCalibration::q_CI},
     {{.name = "p_CI",
       .field = "p_CI",
@@ -138,7 +145,8 @@ inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
       .accepted = Accepted::kLength,
       .limit = 1e3,
       .group = "extrinsics",
-      .words = "the distance from the IMU along "},
+      .words = "the distance from the IMU along ",
+      .since = StoredSince::kBegin},
      &CameraCalibration::p_CI},
     {{.name = "focal",
       .field = "f",
@@ -147,7 +155,8 @@ inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
       .accepted = Accepted::kPositive,
       .limit = 1e6,
       .group = "camera",
-      .words = "the focal length in "},
+      .words = "the focal length in ",
+      .since = StoredSince::kBegin},
      &CameraCalibration::f},
     {{.name = "principal",
       .field = "c",
@@ -155,14 +164,16 @@ inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
       .sigma_ref = 1.5,
       .limit = 1e6,
       .group = "camera",
-      .words = "the principal point in "},
+      .words = "the principal point in ",
+      .since = StoredSince::kBegin},
      &CameraCalibration::c},
     {{.name = "distortion",
       .field = "distortion",
       .unit = "-",
       .accepted = Accepted::kCoefficients,
       .group = "camera",
-      .words = "the distortion "},
+      .words = "the distortion ",
+      .since = StoredSince::kBegin},
      &CameraCalibration::distortion},
     {{.name = "time_offset",
       .field = "time_offset_s",

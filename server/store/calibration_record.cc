@@ -14,6 +14,9 @@ std::string SerializeCalibration(const StoredCalibration& calibration) {
   record.set_version(calibration.version);
   *record.mutable_theta() = ToProto(calibration.theta);
   PutMatrix(calibration.covariance, record.mutable_covariance());
+  PutComponents(calibration.theta,
+                calibration.covariance.rows(),
+                record.mutable_components());
   record.set_base_version(calibration.base_version);
   record.set_program_version(calibration.program_version);
   if (calibration.report) {
@@ -39,10 +42,11 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
   StoredCalibration calibration;
   if (!record.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
       !FromProto(record.theta(), "", &calibration.theta).empty() ||
-      !GetMatrix(record.covariance(), &calibration.covariance)) {
+      !GetMatrix(record.covariance(), &calibration.covariance) ||
+      !ToTangent(
+          calibration.theta, record.components(), &calibration.covariance)) {
     return DamagedRecord(what);
   }
-  AddTimeOffsets(calibration.theta, &calibration.covariance);
   calibration.rig = record.rig();
   calibration.version = record.version();
   calibration.reasons.assign(record.reasons().begin(), record.reasons().end());
@@ -55,6 +59,11 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
     calibration.report = FromProto(record.report());
     calibration.report->theta = calibration.theta;
     calibration.report->covariance = calibration.covariance;
+    if (!ToTangent(calibration.theta,
+                   record.components(),
+                   &calibration.report->remembered.change_sigmas)) {
+      return DamagedRecord(what);
+    }
   }
   calibration.seconds = record.seconds();
   calibration.schema_version = record.schema_version();
@@ -62,7 +71,8 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
     calibration.settings.emplace_back(setting.name(), setting.value());
   }
   for (const store::StepRecord& step : record.steps()) {
-    if (!GetStep(step, &calibration.steps.emplace_back())) {
+    if (!GetStep(
+            step, record.components(), &calibration.steps.emplace_back())) {
       return DamagedRecord(what);
     }
   }

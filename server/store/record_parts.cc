@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <utility>
 #include <vector>
 
+#include "core/model/parameter_blocks.h"
 #include "proto/convert.h"
 #include "server/convert/convert.h"
 
@@ -15,37 +18,104 @@ namespace {
 using RowMajor =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Indices of all components but the time offsets; empty if `size` is not that
-// of a tangent space without time offsets.
-std::vector<int> WithoutTimeOffsets(const Calibration& theta,
-                                    Eigen::Index size) {
-  const int cameras = static_cast<int>(theta.cameras.size());
+// Indices of the components of the blocks that records had at a time.
+std::vector<int> StoredComponents(const Calibration& theta, StoredSince time) {
   std::vector<int> places;
-  if (size != TangentSize(theta) - cameras) return places;
-  for (int i = 0; i < TangentSize(theta); ++i) places.push_back(i);
-  for (int j = cameras; j-- > 0;) {
-    places.erase(places.begin() + TimeOffsetComponent(theta, j));
+  VisitBlocks(
+      [&](const BlockPlace& place, const auto& value) {
+        if (place.info.since > time) return;
+        for (int i = 0; i < TangentDimension(value); ++i) {
+          places.push_back(place.offset + i);
+        }
+      },
+      theta);
+  return places;
+}
+
+// Indices of the components with these names; empty if theta lacks one.
+std::vector<int> NamedComponents(const Calibration& theta,
+                                 const ComponentNames& names) {
+  const std::vector<TangentComponent> components = TangentComponents(theta);
+  std::vector<int> places;
+  for (const std::string& name : names) {
+    const auto found = std::find_if(
+        components.begin(), components.end(), [&](const auto& component) {
+          return component.name == name;
+        });
+    if (found == components.end()) return {};
+    places.push_back(static_cast<int>(found - components.begin()));
   }
   return places;
 }
 
-}  // namespace
-
-void AddTimeOffsets(const Calibration& theta, Eigen::MatrixXd* matrix) {
-  const std::vector<int> places = WithoutTimeOffsets(theta, matrix->rows());
-  if (places.empty() || matrix->cols() != matrix->rows()) return;
-  const int size = TangentSize(theta);
-  Eigen::MatrixXd larger = Eigen::MatrixXd::Zero(size, size);
-  larger(places, places) = *matrix;
-  *matrix = std::move(larger);
+// Where `size` entries of a record belong, and in `all` how many there are
+// with those that it lacks.
+bool FindPlaces(const Calibration& theta,
+                const ComponentNames& names,
+                Eigen::Index size,
+                int more,
+                std::vector<int>* places,
+                int* all) {
+  places->clear();
+  const auto fits = [&] {
+    return static_cast<Eigen::Index>(places->size()) + more == size;
+  };
+  if (!names.empty()) {
+    *places = NamedComponents(theta, names);
+    if (!fits()) return false;
+  } else {
+    for (const auto time : {StoredSince::kTimeOffset, StoredSince::kBegin}) {
+      *places = StoredComponents(theta, time);
+      if (fits()) break;
+    }
+  }
+  *all = TangentSize(theta) + more;
+  for (int i = 0; i < more; ++i) places->push_back(*all - more + i);
+  return true;
 }
 
-void AddTimeOffsets(const Calibration& theta, Eigen::VectorXd* vector) {
-  const std::vector<int> places = WithoutTimeOffsets(theta, vector->size());
-  if (places.empty()) return;
-  Eigen::VectorXd larger = Eigen::VectorXd::Zero(TangentSize(theta));
+}  // namespace
+
+void PutComponents(const Calibration& theta,
+                   Eigen::Index size,
+                   ComponentNames* names) {
+  if (size != TangentSize(theta)) return;
+  for (TangentComponent& component : TangentComponents(theta)) {
+    *names->Add() = std::move(component.name);
+  }
+}
+
+bool ToTangent(const Calibration& theta,
+               const ComponentNames& names,
+               Eigen::MatrixXd* matrix,
+               int more) {
+  const Eigen::Index size = matrix->rows();
+  if (size == 0 && matrix->cols() == 0) return true;
+  std::vector<int> places;
+  int all = 0;
+  if (!FindPlaces(theta, names, size, more, &places, &all)) return false;
+  if (matrix->cols() != size) return names.empty();
+  if (std::ssize(places) != size) return true;
+  Eigen::MatrixXd larger = Eigen::MatrixXd::Zero(all, all);
+  larger(places, places) = *matrix;
+  *matrix = std::move(larger);
+  return true;
+}
+
+bool ToTangent(const Calibration& theta,
+               const ComponentNames& names,
+               Eigen::VectorXd* vector,
+               int more) {
+  const Eigen::Index size = vector->size();
+  if (size == 0) return true;
+  std::vector<int> places;
+  int all = 0;
+  if (!FindPlaces(theta, names, size, more, &places, &all)) return false;
+  if (std::ssize(places) != size) return true;
+  Eigen::VectorXd larger = Eigen::VectorXd::Zero(all);
   larger(places) = *vector;
   *vector = std::move(larger);
+  return true;
 }
 
 void PutMatrix(const Eigen::MatrixXd& matrix, store::MatrixRecord* record) {
@@ -78,18 +148,21 @@ void PutStep(const CalibrateProgress& step, store::StepRecord* record) {
   ToProto(step.sigmas, record->mutable_sigmas());
 }
 
-bool GetStep(const store::StepRecord& record, CalibrateProgress* step) {
+bool GetStep(const store::StepRecord& record,
+             const ComponentNames& names,
+             CalibrateProgress* step) {
   step->iteration = record.iteration();
   step->max_iterations = record.max_iterations();
   step->cost = record.cost();
   step->step_sigmas = record.step_sigmas();
   if (record.sigmas().empty()) return true;
   if (!FromProto(record.theta(), "", &step->theta).empty()) return false;
-  const int size = TangentSize(step->theta);
-  if (record.moved_size() != size || record.sigmas_size() != size) return false;
   step->moved = FromProto(record.moved());
   step->sigmas = FromProto(record.sigmas());
-  return true;
+  const int size = TangentSize(step->theta);
+  return ToTangent(step->theta, names, &step->moved) &&
+         ToTangent(step->theta, names, &step->sigmas) &&
+         step->moved.size() == size && step->sigmas.size() == size;
 }
 
 absl::Status DamagedRecord(const std::string& what) {

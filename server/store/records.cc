@@ -68,6 +68,8 @@ std::string SerializeInformation(const SegmentInformation& information) {
   *record.mutable_theta0() = ToProto(information.theta0);
   PutMatrix(information.Lambda, record.mutable_lambda());
   ToProto(information.eta, record.mutable_eta());
+  PutComponents(
+      information.theta0, information.eta.size(), record.mutable_components());
   record.set_rank(information.rank);
   ToProto(information.unobserved, record.mutable_unobserved());
   for (const GroupScore& score : information.groups) {
@@ -83,14 +85,15 @@ absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
   store::SegmentInformationRecord record;
   SELFCAL_RETURN_IF_ERROR(ParseMessage(bytes, what, &record));
   SegmentInformation information;
+  information.eta = FromProto(record.eta());
+  const ComponentNames& names = record.components();
   if (!FromProto(record.theta0(), "", &information.theta0).empty() ||
       !GetMatrix(record.lambda(), &information.Lambda) ||
+      !ToTangent(information.theta0, names, &information.Lambda) ||
+      !ToTangent(information.theta0, names, &information.eta) ||
       !GetLandmarks(record.landmarks(), &information.landmarks)) {
     return DamagedRecord(what);
   }
-  information.eta = FromProto(record.eta());
-  AddTimeOffsets(information.theta0, &information.Lambda);
-  AddTimeOffsets(information.theta0, &information.eta);
   information.rank = record.rank();
   information.unobserved = FromProto(record.unobserved());
   for (const v1::GroupScore& group : record.groups()) {

@@ -59,6 +59,8 @@ std::string SerializeEnds(const SegmentEnds& ends) {
     }
   }
   ToProto(ends.eta, record.mutable_eta());
+  PutComponents(
+      ends.theta0, ends.eta.size() - kEndUnknowns, record.mutable_components());
   return record.SerializeAsString();
 }
 
@@ -66,19 +68,24 @@ absl::StatusOr<SegmentEnds> ParseEnds(std::string_view bytes) {
   store::SegmentEndsRecord record;
   SegmentEnds ends;
   MotionSegment states;
+  const ComponentNames& names = record.components();
   if (!record.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
       !FromProto(record.theta0(), "", &ends.theta0).empty() ||
       !FromProto(record.states(), "", &states).empty() ||
       states.keyframes.size() != 2 ||
-      record.eta_size() != TangentSize(ends.theta0) + kEndUnknowns ||
       !GetTriangle(record.lambda(), record.eta_size(), &ends.Lambda)) {
+    return DamagedRecord(kWhat);
+  }
+  ends.eta = FromProto(record.eta());
+  if (!ToTangent(ends.theta0, names, &ends.Lambda, kEndUnknowns) ||
+      !ToTangent(ends.theta0, names, &ends.eta, kEndUnknowns) ||
+      ends.eta.size() != TangentSize(ends.theta0) + kEndUnknowns) {
     return DamagedRecord(kWhat);
   }
   ends.key = states.key;
   ends.first = states.keyframes[0];
   ends.last = states.keyframes[1];
   ends.tail = std::move(states.imu);
-  ends.eta = FromProto(record.eta());
   return ends;
 }
 

@@ -185,7 +185,7 @@ std::optional<CalibrateProgress> DecodeProgress(std::string_view bytes) {
   store::StepRecord record;
   CalibrateProgress progress;
   if (!Parse(bytes, &record) || record.sigmas().empty() ||
-      !GetStep(record, &progress)) {
+      !GetStep(record, {}, &progress)) {
     return std::nullopt;
   }
   return progress;
