@@ -72,8 +72,18 @@ const Vector3<T>& ForceWeights(const Reading<T>& reading) {
   return reading.h_A;
 }
 
-// The three rows of derivatives from `row` on, with respect to all that changes
-// rates.
+// Responses of the motion to changes of rates and forces; forces do not change
+// the rotation.
+template <typename T>
+struct MotionResponses {
+  RateColumns<T> psi_by_rates = RateColumns<T>::Zero();
+  RateColumns<T> v_by_rates = RateColumns<T>::Zero();
+  RateColumns<T> p_by_rates = RateColumns<T>::Zero();
+  ForceIntegrals<T> v_by_forces = ZeroForceIntegrals<T>();
+  ForceIntegrals<T> p_by_forces = ZeroForceIntegrals<T>();
+};
+
+// The three rows of derivatives from `row` on, by what changes rates.
 template <typename T>
 void WriteByRates(const RateColumns<T>& J,
                   const ImuModel<T>& imu,
@@ -92,8 +102,7 @@ void WriteByRates(const RateColumns<T>& J,
   theta.col(kGyroMisalignment + 2) = -B(0, 1) * J.col(7) - B(1, 1) * J.col(8);
 }
 
-// The same for what changes forces, which the rotation does not depend on.
-// `force_by_accel` is ImuModel::ForceByAccel.
+// The same by what changes forces.
 template <typename T>
 void WriteByForces(const ForceIntegrals<T>& M,
                    const ImuModel<T>& imu,
@@ -118,10 +127,20 @@ void WriteByForces(const ForceIntegrals<T>& M,
       TimesSkew<T>(M[2], imu.R_IA.col(1)) + TimesSkew<T>(M[3], imu.R_IA.col(2));
 }
 
+// `force_by_accel` is ImuModel::ForceByAccel.
 template <typename T>
-void WriteRotationByForces(MotionDerivatives<T>* result) {
-  result->bias.template topLeftCorner<3, 3>().setZero();
-  result->theta.template block<3, 9>(0, kAccelScale).setZero();
+MotionDerivatives<T> DerivativesOf(const MotionResponses<T>& responses,
+                                   const ImuModel<T>& imu,
+                                   const Matrix3<T>& force_by_accel) {
+  MotionDerivatives<T> result;
+  WriteByRates<T>(responses.psi_by_rates, imu, 0, &result);
+  WriteByRates<T>(responses.v_by_rates, imu, 3, &result);
+  WriteByRates<T>(responses.p_by_rates, imu, 6, &result);
+  result.bias.template topLeftCorner<3, 3>().setZero();
+  result.theta.template block<3, 9>(0, kAccelScale).setZero();
+  WriteByForces<T>(responses.v_by_forces, imu, force_by_accel, 3, &result);
+  WriteByForces<T>(responses.p_by_forces, imu, force_by_accel, 6, &result);
+  return result;
 }
 
 }  // namespace selfcal::preintegration

@@ -86,7 +86,7 @@ class Integrator {
   const Motion<T>& motion() const { return motion_; }
   const Matrix3<T>& Delta_R() const { return R_; }
   MotionDerivatives<T> Derivatives() const {
-    return jacobians_.Result(imu_, force_by_accel_);
+    return DerivativesOf(jacobians_.responses(), imu_, force_by_accel_);
   }
   const MotionCovariance<T>& covariance() const { return covariance_; }
   const BiasWalk<T>& walk() const { return walk_; }
