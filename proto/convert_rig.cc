@@ -13,9 +13,50 @@ ImuNoise Value(const v1::ImuNoise& message) {
           message.accel_bias_random_walk()};
 }
 
-std::vector<ParameterGroup> ReadGroups(const v1::Rig& message) {
+std::string TimeOffsetOf(int camera) {
+  return "cam" + std::to_string(camera) + ".time_offset";
+}
+
+// Camera whose time offset is not estimated; none: the number of cameras.
+int FirstWithoutTimeOffset(const std::vector<BlockSetting>& blocks,
+                           int cameras) {
+  int camera = 0;
+  while (camera < cameras && IsEstimated(blocks, TimeOffsetOf(camera))) {
+    ++camera;
+  }
+  return camera;
+}
+
+// Reads the blocks, with the older flag for time offsets in the same form.
+void ReadBlocks(const v1::Rig& message,
+                const std::string& prefix,
+                Rig* rig,
+                std::vector<Violation>* violations) {
+  for (const v1::BlockSetting& setting : message.blocks()) {
+    if (setting.state() != v1::BlockSetting::ON &&
+        setting.state() != v1::BlockSetting::OFF) {
+      violations->push_back(
+          {prefix + "blocks[" + std::to_string(rig->blocks.size()) + "].state",
+           "is missing or unknown; send ON or OFF"});
+    }
+    rig->blocks.push_back(
+        {setting.pattern(), setting.state() == v1::BlockSetting::ON});
+  }
+  if (!message.estimate_time_offset()) return;
+  const int cameras = static_cast<int>(rig->factory.cameras.size());
+  if (FirstWithoutTimeOffset(rig->blocks, cameras) == cameras) return;
+  rig->blocks.insert(rig->blocks.begin(), {"*.time_offset", true});
+  const int off = FirstWithoutTimeOffset(rig->blocks, cameras);
+  if (off == cameras) return;
+  violations->push_back({prefix + "estimate_time_offset",
+                         "contradicts blocks, which switch " +
+                             TimeOffsetOf(off) + " off; send blocks alone"});
+}
+
+std::vector<ParameterGroup> ReadGroups(const v1::Rig& message, const Rig& rig) {
   if (message.groups().empty()) {
-    return DefaultGroups(message.estimate_time_offset());
+    return DefaultGroups(rig.blocks,
+                         static_cast<int>(rig.factory.cameras.size()));
   }
   std::vector<ParameterGroup> groups;
   for (const v1::ParameterGroup& group : message.groups()) {
@@ -81,7 +122,6 @@ void ReadSettings(const v1::Rig& message, Rig* rig) {
   if (message.has_retrigger_fraction()) {
     rig->retrigger_fraction = message.retrigger_fraction();
   }
-  rig->estimate_time_offset = message.estimate_time_offset();
 }
 
 }  // namespace
@@ -113,7 +153,15 @@ v1::Rig ToProto(const Rig& rig) {
   message.set_table_size(rig.table_size);
   message.set_min_gain_nats(rig.min_gain_nats);
   message.set_retrigger_fraction(rig.retrigger_fraction);
-  message.set_estimate_time_offset(rig.estimate_time_offset);
+  for (const BlockSetting& setting : rig.blocks) {
+    v1::BlockSetting* added = message.add_blocks();
+    added->set_pattern(setting.pattern);
+    added->set_state(setting.estimated ? v1::BlockSetting::ON
+                                       : v1::BlockSetting::OFF);
+  }
+  const int cameras = static_cast<int>(rig.factory.cameras.size());
+  message.set_estimate_time_offset(
+      cameras > 0 && FirstWithoutTimeOffset(rig.blocks, cameras) == cameras);
   message.set_reweight_noise(rig.reweight_noise);
   return message;
 }
@@ -149,7 +197,8 @@ std::vector<Violation> FromProto(const v1::Rig& message,
              " is unknown; send TABLES, JOINT_D, JOINT_A or JOINT_E"});
   }
   ReadSettings(message, &read);
-  read.groups = ReadGroups(message);
+  ReadBlocks(message, prefix, &read, &violations);
+  read.groups = ReadGroups(message, read);
   read.prior_sigmas = ReadPriorSigmas(message);
   read.fixed.assign(message.fixed().begin(), message.fixed().end());
   if (violations.empty()) *rig = std::move(read);

@@ -86,6 +86,13 @@ Facts Describe(const v1::Rig& rig) {
         fmt::format("{}: {:g} / sqrt(day)", walk.pattern(), walk.value()));
   }
   for (const auto& pattern : rig.fixed()) facts.Add("fixed", pattern);
+  for (const auto& block : rig.blocks()) {
+    facts.Add(
+        "block",
+        fmt::format("{}: {}",
+                    block.pattern(),
+                    block.state() == v1::BlockSetting::ON ? "on" : "off"));
+  }
   facts.Add("time offset", rig.estimate_time_offset() ? "estimated" : "known");
   facts.Add("selection", SelectionText(rig.selection()));
   facts.Add("table size", fmt::format("{}", rig.table_size()));
@@ -239,10 +246,14 @@ void AddOverrides(CLI::App* create, RigInput* input) {
                      input->fixed,
                      "Never estimate components with this name; a '*' at "
                      "either end matches anything; repeatable");
+  create->add_option("--block",
+                     input->blocks,
+                     "NAME=on to estimate the parameter blocks with this name, "
+                     "NAME=off to hold them at their factory value; a '*' at "
+                     "either end matches anything; repeatable");
   create->add_flag("--estimate-time-offset",
                    input->estimate_time_offset,
-                   "Estimate the time offset of each camera, instead of "
-                   "holding it at its factory value");
+                   "The same as --block '*.time_offset=on'");
 }
 
 }  // namespace

@@ -123,6 +123,23 @@ google::protobuf::Duration Seconds(double seconds) {
   return duration;
 }
 
+absl::Status AddBlocks(const std::vector<std::string>& settings, v1::Rig* rig) {
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.rfind('=');
+    const std::string state =
+        equals == setting.npos ? "" : setting.substr(equals + 1);
+    if (state != "on" && state != "off") {
+      return absl::InvalidArgumentError(
+          fmt::format("--block {} must be NAME=on or NAME=off", setting));
+    }
+    v1::BlockSetting* added = rig->add_blocks();
+    added->set_pattern(setting.substr(0, equals));
+    added->set_state(state == "on" ? v1::BlockSetting::ON
+                                   : v1::BlockSetting::OFF);
+  }
+  return absl::OkStatus();
+}
+
 void SetPolicy(const RigInput& input, v1::Rig* rig) {
   if (input.table_max_age_s) {
     *rig->mutable_table_max_age() = Seconds(*input.table_max_age_s);
@@ -188,6 +205,8 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
                          input.gyro_bias_walk || input.accel_bias_walk;
   if (any_noise) *rig->mutable_imu_noise() = noise;
   rig->mutable_fixed()->Add(input.fixed.begin(), input.fixed.end());
+  const absl::Status status = AddBlocks(input.blocks, &*rig);
+  if (!status.ok()) return status;
   if (input.estimate_time_offset) rig->set_estimate_time_offset(true);
   return rig;
 }

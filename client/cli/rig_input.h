@@ -38,6 +38,7 @@ struct RigInput {
   std::optional<double> min_interval_s;
   std::optional<double> calibration_max_age_s;
   std::vector<std::string> fixed;
+  std::vector<std::string> blocks;  // NAME=on or NAME=off
   bool estimate_time_offset = false;
 };
 

@@ -9,7 +9,7 @@ RigComponents::RigComponents(const Rig& rig)
     : group_settings_(rig.groups),
       prior_sigmas_(rig.prior_sigmas),
       fixed_(rig.fixed),
-      estimate_time_offset_(rig.estimate_time_offset),
+      blocks_(rig.blocks),
       free_(FreeComponents(rig)),
       prior_(PriorSigmas(rig)),
       estimated_time_offsets_(EstimatedTimeOffsets(rig)) {
@@ -45,8 +45,7 @@ bool RigComponents::Fits(const Rig& rig) const {
                              const CameraCalibration& camera) {
     return model == camera.model;
   };
-  return !models_.empty() && fixed_ == rig.fixed &&
-         estimate_time_offset_ == rig.estimate_time_offset &&
+  return !models_.empty() && fixed_ == rig.fixed && blocks_ == rig.blocks &&
          std::equal(models_.begin(),
                     models_.end(),
                     rig.factory.cameras.begin(),

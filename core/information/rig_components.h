@@ -41,7 +41,7 @@ class RigComponents {
   std::vector<ParameterGroup> group_settings_;
   std::vector<ComponentSetting> prior_sigmas_;
   std::vector<std::string> fixed_;
-  bool estimate_time_offset_ = false;
+  std::vector<BlockSetting> blocks_;
 
   std::vector<int> free_;
   std::vector<std::string> free_names_;

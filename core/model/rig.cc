@@ -11,8 +11,6 @@
 namespace selfcal {
 namespace {
 
-constexpr std::string_view kTimeOffset = "time_offset";
-
 // Matches the components of a block; `sensor` is "imu", or "*" for all cameras.
 template <class Sensor>
 std::string Pattern(const std::string& sensor, const Block<Sensor>& block) {
@@ -44,33 +42,74 @@ std::vector<int> Without(const std::vector<int>& all,
 
 std::vector<int> HeldComponents(
     const Rig& rig, const std::vector<TangentComponent>& components) {
-  std::vector<std::string> patterns = rig.fixed;
-  for (const auto& block : kImuBlocks) {
-    if (!block.info.estimated) patterns.push_back(Pattern("imu", block));
+  std::vector<int> held = MatchComponents(components, rig.fixed);
+  VisitBlocks(
+      [&](const BlockPlace& place, const auto& value) {
+        if (IsEstimated(rig.blocks, place.Name())) return;
+        for (int i = 0; i < TangentDimension(value); ++i) {
+          held.push_back(place.offset + i);
+        }
+      },
+      rig.factory);
+  std::sort(held.begin(), held.end());
+  held.erase(std::unique(held.begin(), held.end()), held.end());
+  return held;
+}
+
+// Whether a block is estimated unless a rig states otherwise.
+bool IsDeclaredEstimated(std::string_view block) {
+  const std::size_t dot = block.find('.');
+  const std::string_view name = block.substr(dot + 1);
+  const auto has_name = [&](const auto& one) { return one.info.name == name; };
+  if (block.substr(0, dot) == "imu") {
+    const auto* const found =
+        std::find_if(std::begin(kImuBlocks), std::end(kImuBlocks), has_name);
+    return found != std::end(kImuBlocks) && found->info.estimated;
   }
-  for (const auto& block : kCameraBlocks) {
-    const bool asked =
-        rig.estimate_time_offset && block.info.name == kTimeOffset;
-    if (!block.info.estimated && !asked) {
-      patterns.push_back(Pattern("*", block));
-    }
-  }
-  return MatchComponents(components, patterns);
+  const auto* const found = std::find_if(
+      std::begin(kCameraBlocks), std::end(kCameraBlocks), has_name);
+  return found != std::end(kCameraBlocks) && found->info.estimated;
 }
 
 }  // namespace
 
-std::vector<ParameterGroup> DefaultGroups(bool estimate_time_offset) {
+bool IsEstimated(const std::vector<BlockSetting>& settings,
+                 const std::string& block) {
+  const auto last = std::find_if(
+      settings.rbegin(), settings.rend(), [&](const BlockSetting& setting) {
+        return Matches(block, setting.pattern);
+      });
+  return last != settings.rend() ? last->estimated : IsDeclaredEstimated(block);
+}
+
+std::vector<ParameterGroup> DefaultGroups(
+    const std::vector<BlockSetting>& blocks, int cameras) {
   std::vector<ParameterGroup> groups = {
-      {"imu", {"imu.*"}}, {"camera", {}}, {"extrinsics", {}}};
-  if (estimate_time_offset) groups.push_back({"time", {}});
-  for (const auto& block : kCameraBlocks) {
-    for (ParameterGroup& group : groups) {
-      if (group.name == block.info.group) {
-        group.patterns.push_back(Pattern("*", block));
-      }
-    }
+      {"imu", {}}, {"camera", {}}, {"extrinsics", {}}};
+  const auto estimated = [&](const std::string& sensor, const auto& block) {
+    return IsEstimated(blocks, sensor + "." + std::string(block.info.name));
+  };
+  for (const auto& block : kImuBlocks) {
+    if (estimated("imu", block)) groups[0].patterns = {"imu.*"};
   }
+  for (const auto& block : kCameraBlocks) {
+    bool any = false;
+    for (int j = 0; j < cameras; ++j) {
+      any = any || estimated("cam" + std::to_string(j), block);
+    }
+    if (!any) continue;
+    const auto has_name = [&](const ParameterGroup& group) {
+      return group.name == block.info.group;
+    };
+    auto group = std::find_if(groups.begin(), groups.end(), has_name);
+    if (group == groups.end()) {
+      group = groups.insert(group, {std::string(block.info.group), {}});
+    }
+    group->patterns.push_back(Pattern("*", block));
+  }
+  std::erase_if(groups, [](const ParameterGroup& group) {
+    return group.patterns.empty();
+  });
   return groups;
 }
 

@@ -28,10 +28,27 @@ struct ParameterGroup {
   std::vector<std::string> patterns;
 };
 
+// Whether the parameter blocks with a name that matches the pattern are
+// estimated; if not, they are held constant at their value. "imu.gyro.scale",
+// "*.time_offset"; '*' as in a ParameterGroup.
+struct BlockSetting {
+  std::string pattern;
+  bool estimated = true;
+
+  bool operator==(const BlockSetting&) const = default;
+};
+
+// Whether a block ("cam0.time_offset") is estimated: as the last setting that
+// matches it states, or as it is declared (parameter_blocks.h).
+bool IsEstimated(const std::vector<BlockSetting>& settings,
+                 const std::string& block);
+
 // The three groups of the paper: "imu", "camera" (f, c, distortion of every
-// camera) and "extrinsics" (q_CI, p_CI of every camera); with
-// estimate_time_offset also "time" (the time offset of every camera).
-std::vector<ParameterGroup> DefaultGroups(bool estimate_time_offset = false);
+// camera) and "extrinsics" (q_CI, p_CI of every camera); and "time" (the time
+// offset of every camera). Only those of which a block is estimated, in a rig
+// with this number of cameras.
+std::vector<ParameterGroup> DefaultGroups(
+    const std::vector<BlockSetting>& blocks = {}, int cameras = 1);
 
 // A value for all components that match a pattern.
 struct ComponentSetting {
@@ -63,9 +80,8 @@ struct Rig {
   std::vector<ComponentSetting> prior_sigmas;
   // Patterns of components that are never estimated.
   std::vector<std::string> fixed;
-  // If false, the time offset of every camera is held constant, as if it were
-  // fixed.
-  bool estimate_time_offset = false;
+  // Later ones take precedence. Default: as the blocks are declared.
+  std::vector<BlockSetting> blocks;
   Selection selection = Selection::kTables;
   // N: the number of segments of a table. A joint set holds N for each group.
   int table_size = 8;
@@ -101,10 +117,10 @@ Eigen::VectorXd ReferenceSigmas(const Rig& rig);
 
 // Returns every violation: id, positive and finite numbers, unit quaternions,
 // at least one camera, image sizes, distortion in range, groups that match
-// nothing or share a name, patterns that match nothing, everything fixed. Names
-// of groups follow the rules of the id, and a group has at least one component
-// that is not fixed; with a joint selection, no group has the name of its
-// table. Paths of the calibration begin with "factory".
+// nothing or share a name, patterns that match nothing, nothing estimated.
+// Names of groups follow the rules of the id, and a group has at least one
+// component that is not fixed; with a joint selection, no group has the name of
+// its table. Paths of the calibration begin with "factory".
 std::vector<Violation> Validate(const Rig& rig);
 
 // Applies the same rules to a calibration alone; paths begin with `prefix` and

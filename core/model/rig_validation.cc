@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/parameter_blocks.h"
 #include "core/model/rig.h"
 #include "core/model/violation_list.h"
 
@@ -78,13 +79,29 @@ void CheckPatterns(const std::vector<TangentComponent>& components,
   }
 }
 
-// Hint for a group of time offsets in a rig that does not estimate them.
-std::string TimeOffsetHint(const Rig& rig, const ParameterGroup& group) {
+// Hint for a group of blocks that the rig does not estimate.
+std::string BlocksHint(const Rig& rig, const ParameterGroup& group) {
   Rig estimating = rig;
-  estimating.estimate_time_offset = true;
+  estimating.blocks = {{"*", true}};
   return GroupComponents(estimating, group).empty()
              ? ""
-             : ", or set estimate_time_offset";
+             : ", or switch its blocks on with blocks (or, for time offsets, "
+               "estimate_time_offset)";
+}
+
+void CheckBlocks(const Rig& rig, ViolationList* list) {
+  if (!CheckCount("blocks", rig.blocks.size(), kMaxPatterns, list)) return;
+  std::vector<TangentComponent> names;
+  for (const std::string& block : ComponentBlocks(rig.factory)) {
+    names.push_back({block, "", 0});
+  }
+  for (std::size_t i = 0; i < rig.blocks.size(); ++i) {
+    const std::string& pattern = rig.blocks[i].pattern;
+    if (!MatchComponents(names, {pattern}).empty()) continue;
+    list->Add(ElementPath("blocks", i, "pattern"),
+              "'" + pattern + "' matches no block; use a name such as '" +
+                  names.front().name + "', or '*' at its begin or end");
+  }
 }
 
 void CheckGroups(const Rig& rig,
@@ -116,7 +133,7 @@ void CheckGroups(const Rig& rig,
                GroupComponents(rig, group).empty()) {
       list->Add(patterns_field,
                 "all components of the group are held fixed; drop the group" +
-                    TimeOffsetHint(rig, group));
+                    BlocksHint(rig, group));
     }
   }
 }
@@ -173,6 +190,7 @@ std::vector<Violation> Validate(const Rig& rig) {
     CheckGroups(rig, components, &list);
     CheckPriorSigmas(rig, components, &list);
     CheckPatterns(components, "fixed", rig.fixed, &list);
+    CheckBlocks(rig, &list);
     if (FreeComponents(rig).empty()) {
       list.Add("fixed", "holds every component; nothing would be estimated");
     }

@@ -75,7 +75,8 @@ std::string WhyNot(const std::string& field) {
                                   "fixed",
                                   "table_size",
                                   "selection",
-                                  "estimate_time_offset"}) {
+                                  "estimate_time_offset",
+                                  "blocks"}) {
     if (field == fixed) return kStored;
   }
   return v1::Rig::descriptor()->FindFieldByName(field) == nullptr

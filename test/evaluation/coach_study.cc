@@ -143,8 +143,8 @@ CoachedDevice MakeCoachedDevice(int rig, std::uint64_t seed) {
   }
   if (rig == 2) {
     device.name = "one camera, time offset";
-    device.rig.estimate_time_offset = true;
-    device.rig.groups = DefaultGroups(true);
+    device.rig.blocks = {{"*.time_offset", true}};
+    device.rig.groups = DefaultGroups(device.rig.blocks);
     device.rig.factory.cameras[0].time_offset_s = 0.004;
   }
   device.truth = device.rig.factory;

@@ -90,8 +90,8 @@ Rig TrueRig() {
   rig.imu_noise.gyro_bias_random_walk = 1.9393e-5;
   rig.imu_noise.accel_bias_random_walk = 3e-3;
   rig.pixel_sigma_px = 1;
-  rig.estimate_time_offset = true;
-  rig.groups = DefaultGroups(true);
+  rig.blocks = {{"*.time_offset", true}};
+  rig.groups = DefaultGroups(rig.blocks);
   rig.prior_sigmas = {{"imu.gyro.*", 5e-3},
                       {"imu.accel.*", 8e-3},
                       {"imu.q_AI.*", 5e-3},

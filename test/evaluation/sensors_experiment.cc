@@ -49,8 +49,9 @@ Device DeviceOf(const Setting& setting, std::uint64_t seed) {
       setting.offsets == Offsets::kKnown ? device.truth : device.rig.factory,
       {},
       seed);
-  device.rig.estimate_time_offset = setting.offsets == Offsets::kEstimated;
-  device.rig.groups = DefaultGroups(device.rig.estimate_time_offset);
+  device.rig.blocks = {
+      {"*.time_offset", setting.offsets == Offsets::kEstimated}};
+  device.rig.groups = DefaultGroups(device.rig.blocks);
   return device;
 }
 

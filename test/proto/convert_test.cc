@@ -80,7 +80,7 @@ void ExpectSame(const Rig& a, const Rig& b) {
   EXPECT_EQ(a.table_size, b.table_size);
   EXPECT_TRUE(SameBits(a.min_gain_nats, b.min_gain_nats));
   EXPECT_TRUE(SameBits(a.retrigger_fraction, b.retrigger_fraction));
-  EXPECT_EQ(a.estimate_time_offset, b.estimate_time_offset);
+  EXPECT_EQ(a.blocks, b.blocks);
   EXPECT_EQ(a.reweight_noise, b.reweight_noise);
 }
 
@@ -272,6 +272,7 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   message.clear_min_gain_nats();
   message.clear_retrigger_fraction();
   message.clear_estimate_time_offset();
+  message.clear_blocks();
   Rig rig;
   ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
   const Rig defaults;
@@ -280,7 +281,7 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   EXPECT_EQ(rig.table_size, defaults.table_size);
   EXPECT_EQ(rig.min_gain_nats, defaults.min_gain_nats);
   EXPECT_EQ(rig.retrigger_fraction, defaults.retrigger_fraction);
-  EXPECT_FALSE(rig.estimate_time_offset);
+  EXPECT_TRUE(rig.blocks.empty());
   EXPECT_EQ(rig.groups.size(), DefaultGroups().size());
   message.set_estimate_time_offset(true);
   ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
@@ -289,6 +290,49 @@ TEST(Convert, UnsetSettingsOfARigTakeTheirDefaults) {
   message.set_min_gain_nats(0);
   ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
   EXPECT_EQ(rig.min_gain_nats, 0);
+}
+
+TEST(Convert, FlagForTimeOffsetsIsABlockThatIsOn) {
+  RandomValues random(11);
+  Rig rig = random.RigValue();
+  rig.factory.cameras.resize(2, random.Camera());
+  rig.blocks.clear();
+  v1::Rig message = ToProto(rig);
+  EXPECT_FALSE(message.estimate_time_offset());
+  message.set_estimate_time_offset(true);
+  ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
+  EXPECT_EQ(rig.blocks, (std::vector<BlockSetting>{{"*.time_offset", true}}));
+  // Both forms are answered, and mean the same when they are sent again.
+  message = ToProto(rig);
+  EXPECT_TRUE(message.estimate_time_offset());
+  ASSERT_EQ(message.blocks_size(), 1);
+  ASSERT_THAT(FromProto(message, "", &rig), IsEmpty());
+  EXPECT_EQ(rig.blocks.size(), 1u);
+  // Of one camera only: there is no flag for that.
+  rig.blocks = {{"cam1.time_offset", true}};
+  EXPECT_FALSE(ToProto(rig).estimate_time_offset());
+}
+
+TEST(Convert, FlagForTimeOffsetsMustNotContradictTheBlocks) {
+  RandomValues random(12);
+  Rig rig = random.RigValue();
+  rig.factory.cameras.resize(2, random.Camera());
+  rig.blocks = {{"cam1.time_offset", false}};
+  v1::Rig message = ToProto(rig);
+  message.set_estimate_time_offset(true);
+  const std::vector<Violation> violations = FromProto(message, "x.", &rig);
+  ASSERT_EQ(violations.size(), 1u);
+  EXPECT_EQ(violations[0].field, "x.estimate_time_offset");
+  EXPECT_THAT(violations[0].message, testing::HasSubstr("cam1.time_offset"));
+}
+
+TEST(Convert, BlockWithoutAStateIsRefused) {
+  RandomValues random(13);
+  Rig rig = random.RigValue();
+  rig.blocks = {{"imu.*", false}, {"imu.gyro.scale", true}};
+  v1::Rig message = ToProto(rig);
+  message.mutable_blocks(1)->clear_state();
+  EXPECT_THAT(FaultyFields(message, Rig()), ElementsAre("x.blocks[1].state"));
 }
 
 TEST(Convert, AnUnknownSelectionIsRefused) {

@@ -85,7 +85,10 @@ class RandomValues {
     rig.table_size = Int(1, 100);
     rig.min_gain_nats = Double();
     rig.retrigger_fraction = Double();
-    rig.estimate_time_offset = Int(0, 1) == 1;
+    if (Int(0, 1) == 1) rig.blocks.push_back({"*.time_offset", true});
+    for (int i = Int(0, 2); i > 0; --i) {
+      rig.blocks.push_back({Text(6), Int(0, 1) == 1});
+    }
     rig.reweight_noise = Int(0, 1) == 1;
     return rig;
   }

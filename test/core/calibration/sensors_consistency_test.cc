@@ -106,8 +106,8 @@ TEST_P(Cameras, AreFoundWithTheirTimeOffsets) {
   ExpectConsistent(4, [&](std::uint64_t seed) {
     Rig rig = RigOfCameras(GetParam());
     rig.factory = PerturbCalibration(rig.factory, {}, seed);
-    rig.estimate_time_offset = true;
-    rig.groups = DefaultGroups(true);
+    rig.blocks = {{"*.time_offset", true}};
+    rig.groups = DefaultGroups(rig.blocks);
     const Errors errors = CalibrateSimulated(rig, truth, seed);
     const std::vector<int> free = FreeComponents(rig);
     for (int j = 0; j < GetParam(); ++j) {
@@ -142,8 +142,8 @@ TEST(FreeParameters, AreThoseThatTheRigChooses) {
 
 TEST(Groups, OfFourCamerasHaveAllTheirParts) {
   Rig rig = LateRig(4);
-  rig.estimate_time_offset = true;
-  rig.groups = DefaultGroups(true);
+  rig.blocks = {{"*.time_offset", true}};
+  rig.groups = DefaultGroups(rig.blocks);
   SimulationOptions options;
   options.landmarks_in_view = 60;
   const SimulatedSession session = Simulate(

@@ -341,7 +341,7 @@ TEST(Solvers, AgreeWithKnownTimeOffsets) {
 
 TEST(Solvers, AgreeWithEstimatedTimeOffsets) {
   Rig rig = TwoCameraRig();
-  rig.estimate_time_offset = true;
+  rig.blocks = {{"*.time_offset", true}};
   rig.factory.cameras[0].time_offset_s = 0.02;
   // The first is known, the second estimated, starting without a motion.
   rig.fixed = {"cam0.time_offset"};

@@ -59,7 +59,7 @@ TEST(Predict, GivesTheSameBitsAgain) {
 
 TEST(Predict, AllowsADelayOfTheImages) {
   Rig rig = HandheldRig("r");
-  rig.estimate_time_offset = true;
+  rig.blocks = {{"*.time_offset", true}};
   for (const double delay_s : {-0.3, 0.3}) {
     rig.factory.cameras[0].time_offset_s = delay_s;
     for (const MotionPrediction& motion : Predict(rig, rig.factory).motions) {

@@ -72,7 +72,7 @@ Scene MakeScene(const Rig& rig) {
 
 TEST(SegmentScorer, AllocatesNothingInSteadyState) {
   Rig moving = TwoCameraRig();
-  moving.estimate_time_offset = true;
+  moving.blocks = {{"*.time_offset", true}};
   moving.factory.cameras[0].time_offset_s = 0.01;
   for (const Rig& rig : {HandheldRig("handheld"), TwoCameraRig(), moving}) {
     const Scene scene = MakeScene(rig);

@@ -22,7 +22,7 @@ Eigen::VectorXd Normal(int size, std::mt19937* random) {
 
 // The rig with estimated time offsets: nothing is held.
 Rig AllEstimated(Rig rig) {
-  rig.estimate_time_offset = true;
+  rig.blocks = {{"*.time_offset", true}};
   return rig;
 }
 

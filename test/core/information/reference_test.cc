@@ -35,8 +35,8 @@ std::vector<Case> TimeOffsetCases() {
     c.rig.factory.cameras[0].time_offset_s = 0.02;
     c.rig.factory.cameras[1].time_offset_s = seed == 7 ? 0 : -0.013;
     if (seed > 5) {
-      c.rig.estimate_time_offset = true;
-      c.rig.groups = DefaultGroups(true);
+      c.rig.blocks = {{"*.time_offset", true}};
+      c.rig.groups = DefaultGroups(c.rig.blocks);
     }
     if (seed == 7) c.rig.fixed = {"cam0.time_offset"};
     c.theta0 = PerturbCalibration(c.rig.factory, {}, seed);
@@ -154,7 +154,7 @@ TEST(ScoreAgainstReference, EqualsCeresCovariance) {
 // (which is not zero: the IMU is sampled, its integral is not exact).
 TEST(ScoreAgainstReference, TheStepFromEtaTakesBackAnErrorOfTheta) {
   Rig rig = HandheldRig("handheld");
-  rig.estimate_time_offset = true;
+  rig.blocks = {{"*.time_offset", true}};
   const Eigen::VectorXd sigma = ReferenceSigmas(rig);
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0, 1e-3);

@@ -20,8 +20,8 @@ void ScalePixels(double factor, Calibration* theta) {
 TEST(Resolution, ScoresAreThoseOfTheSceneAtAnyResolution) {
   for (int seed = 1; seed <= 3; ++seed) {
     Rig rig = HandheldRig("a");
-    rig.estimate_time_offset = seed == 2;
-    rig.groups = DefaultGroups(rig.estimate_time_offset);
+    rig.blocks = {{"*.time_offset", seed == 2}};
+    rig.groups = DefaultGroups(rig.blocks);
     SimulationOptions options;
     options.seed = seed;
     const MotionSegment segment = Simulate(rig,

@@ -25,7 +25,7 @@ constexpr int kSize = 27;
 // The rig with estimated time offset, so that nothing is held fixed.
 Rig EstimatingAll() {
   Rig rig = HandheldRig("handheld");
-  rig.estimate_time_offset = true;
+  rig.blocks = {{"*.time_offset", true}};
   return rig;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/parameter_blocks.h"
 #include "test/core/model/random_values.h"
 
 namespace selfcal {
@@ -91,8 +92,8 @@ TEST(DefaultGroups, CoverAllThatIsEstimatedExactlyOnce) {
 
 TEST(DefaultGroups, HaveTimeOffsetsInOneOfTheirOwnWhereTheyAreEstimated) {
   Rig rig = RandomRig();
-  rig.estimate_time_offset = true;
-  rig.groups = DefaultGroups(true);
+  rig.blocks = {{"*.time_offset", true}};
+  rig.groups = DefaultGroups(rig.blocks);
   const AllGroups groups(rig);
   EXPECT_THAT(groups.names, ElementsAre("imu", "camera", "extrinsics", "time"));
   EXPECT_EQ(groups.components, FreeComponents(rig));
@@ -113,13 +114,46 @@ TEST(TimeOffsets, AreKnownUnlessTheRigEstimatesThem) {
   };
   for (int j = 0; j < 3; ++j) EXPECT_FALSE(free(j));
   EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(0, 0, 0));
-  rig.estimate_time_offset = true;
+  rig.blocks = {{"*.time_offset", true}};
   EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(1, 1, 1));
   // Time offset of the camera relative to which the others are estimated.
   rig.fixed = {"cam0.time_offset"};
   EXPECT_FALSE(free(0));
   EXPECT_TRUE(free(1));
   EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(0, 1, 1));
+}
+
+// Names of the blocks with a free component.
+std::vector<std::string> FreeBlocks(const Rig& rig) {
+  const std::vector<std::string> blocks = ComponentBlocks(rig.factory);
+  std::vector<std::string> free;
+  for (const int i : FreeComponents(rig)) {
+    if (free.empty() || free.back() != blocks[i]) free.push_back(blocks[i]);
+  }
+  return free;
+}
+
+TEST(Blocks, AreEstimatedAsTheLastSettingThatMatchesStates) {
+  Rig rig = RandomRig();
+  rig.blocks = {{"*", false},
+                {"imu.accel.*", true},
+                {"imu.accel.scale", false},
+                {"cam2.time_offset", true}};
+  EXPECT_THAT(FreeBlocks(rig),
+              ElementsAre("imu.accel.misalignment", "cam2.time_offset"));
+  EXPECT_THAT(EstimatedTimeOffsets(rig), ElementsAre(0, 0, 1));
+  rig.fixed = {"imu.accel.misalignment.*"};
+  EXPECT_THAT(FreeBlocks(rig), ElementsAre("cam2.time_offset"));
+}
+
+TEST(DefaultGroups, LeaveOutWhatHasNoEstimatedBlock) {
+  Rig rig = RandomRig();
+  rig.blocks = {{"imu.*", false}, {"*CI", false}, {"cam2.time_offset", true}};
+  rig.groups = DefaultGroups(rig.blocks, 3);
+  const AllGroups groups(rig);
+  EXPECT_THAT(groups.names, ElementsAre("camera", "time"));
+  EXPECT_EQ(groups.components, FreeComponents(rig));
+  EXPECT_EQ(DefaultGroups(rig.blocks, 2).size(), 1u);
 }
 
 TEST(FixedComponents, AreInNoGroupAndNotFree) {

@@ -178,13 +178,19 @@ TEST(ValidateRig, NoGroupIsNamedAsTheTableOfAJointSelection) {
 
 TEST(ValidateRig, GroupOfTimeOffsetsThatAreKnownIsRefusedWithAHint) {
   Rig rig = ValidRig();
-  rig.groups = DefaultGroups(true);
+  rig.groups = DefaultGroups({{"*.time_offset", true}});
   const std::vector<Violation> violations = Validate(rig);
   ASSERT_THAT(Fields(violations), ElementsAre("groups[3].patterns"));
   EXPECT_THAT(violations[0].message,
               testing::HasSubstr("estimate_time_offset"));
-  rig.estimate_time_offset = true;
+  rig.blocks = {{"*.time_offset", true}};
   EXPECT_THAT(Validate(rig), IsEmpty());
+}
+
+TEST(ValidateRig, BlockSettingThatMatchesNothingIsRefused) {
+  Rig rig = ValidRig();
+  rig.blocks = {{"imu.gyro.scale", false}, {"imu.gyro.scale.x", false}};
+  EXPECT_THAT(Fields(Validate(rig)), ElementsAre("blocks[1].pattern"));
 }
 
 TEST(ValidateRig, NeedsAGroup) {

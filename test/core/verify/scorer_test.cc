@@ -74,8 +74,8 @@ TEST(Scorers, AgreeOnEveryLensWithTimeOffsetsAndHeldComponents) {
   Rig rig = TwoCameraRig();
   rig.factory.cameras[0].time_offset_s = 0.02;
   rig.factory.cameras[1].time_offset_s = -0.013;
-  rig.estimate_time_offset = true;
-  rig.groups = DefaultGroups(true);
+  rig.blocks = {{"*.time_offset", true}};
+  rig.groups = DefaultGroups(rig.blocks);
   rig.fixed = {"cam0.distortion.*", "imu.q_AI.y"};
   const Calibration theta0 = PerturbCalibration(rig.factory, {}, 3);
   SimulationOptions options;

@@ -145,7 +145,7 @@ TEST_F(CandidateTest, AFindingOfThePreflightRejectsWithItsRemedy) {
   EXPECT_THAT(Problem("preflight"),
               AllOf(HasSubstr("19 ms early"), HasSubstr("add 19 ms")));
   // Unless the rig estimates it.
-  rig_.estimate_time_offset = true;
+  rig_.blocks = {{"*.time_offset", true}};
   EXPECT_EQ(OutcomeOf("preflight"), CheckOutcome::kPassed);
 }
 

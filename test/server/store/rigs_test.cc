@@ -14,7 +14,7 @@ TEST_P(RigsTest, RigComesBackToTheBitAfterReopening) {
   rig.min_gain_nats = 0.3;
   rig.retrigger_fraction = 0.7;
   rig.factory.cameras[0].time_offset_s = 1.0 / 77;
-  rig.estimate_time_offset = true;
+  rig.blocks = {{"*.time_offset", true}};
   const auto created = domain_->CreateRig(rig);
   ASSERT_TRUE(created.ok()) << created.status();
   Reopen();
@@ -28,7 +28,7 @@ TEST_P(RigsTest, RigComesBackToTheBitAfterReopening) {
   EXPECT_EQ(stored->rig.fixed, rig.fixed);
   EXPECT_EQ(stored->rig.min_gain_nats, 0.3);
   EXPECT_EQ(stored->rig.retrigger_fraction, 0.7);
-  EXPECT_TRUE(stored->rig.estimate_time_offset);
+  EXPECT_EQ(stored->rig.blocks, rig.blocks);
   EXPECT_EQ(stored->rig.table_size, rig.table_size);
   EXPECT_EQ(stored->rig.groups.size(), rig.groups.size());
 }
