@@ -40,7 +40,7 @@ int Find(const Calibration& theta, const std::string& name) {
 void Remove(int component, ComponentNames* names) {
   names->DeleteSubrange(component, 1);
 }
-void Remove(int component, VectorMessage* values) {
+void Remove(int component, google::protobuf::RepeatedField<double>* values) {
   values->erase(values->begin() + component);
 }
 
@@ -126,7 +126,7 @@ TEST(Components, OneThatALaterVersionLacksWasKnown) {
   step.moved = Eigen::VectorXd::LinSpaced(size, 0, 1);
   step.sigmas = Eigen::VectorXd::LinSpaced(size, 1, 2);
   version.steps = {step};
-  version.report.emplace().evicted.change_sigmas = step.sigmas;
+  version.report.emplace().remembered.change_sigmas = step.sigmas;
   store::CalibrationRecord record;
   ASSERT_TRUE(record.ParseFromString(SerializeCalibration(version)));
   PutMatrix(version.covariance(rest, rest), record.mutable_covariance());
@@ -134,9 +134,7 @@ TEST(Components, OneThatALaterVersionLacksWasKnown) {
   Remove(lacking, record.mutable_steps(0)->mutable_moved());
   Remove(lacking, record.mutable_steps(0)->mutable_sigmas());
   Remove(lacking,
-         record.mutable_report()
-             ->mutable_evicted_segments()
-             ->mutable_change_sigmas());
+         record.mutable_report()->mutable_evicted()->mutable_change_sigmas());
 
   const auto read = ParseCalibration(record.SerializeAsString(), "it");
   ASSERT_TRUE(read.ok()) << read.status();
@@ -145,7 +143,7 @@ TEST(Components, OneThatALaterVersionLacksWasKnown) {
   EXPECT_EQ(read->covariance, version.covariance);
   EXPECT_EQ(read->steps[0].moved, step.moved);
   EXPECT_EQ(read->steps[0].sigmas, step.sigmas);
-  EXPECT_EQ(read->report->evicted.change_sigmas, step.sigmas);
+  EXPECT_EQ(read->report->remembered.change_sigmas, step.sigmas);
 }
 
 TEST(Components, RecordWithAnUnknownOneCannotBeRead) {
