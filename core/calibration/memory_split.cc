@@ -9,7 +9,7 @@
 #include "core/change/concerned.h"
 #include "core/change/course.h"
 #include "core/change/group_concern.h"
-#include "core/change/parameter_blocks.h"
+#include "core/change/theta_parts.h"
 
 namespace selfcal {
 namespace {
@@ -116,7 +116,7 @@ class SplitSearch {
         excess_(excess),
         segments_(segments),
         options_(options),
-        blocks_(ParameterBlocks(rig)),
+        theta_parts_(ThetaParts(rig)),
         parts_(Cut(segments)) {
     for (const Part& part : parts_) {
       shown_.push_back(
@@ -130,12 +130,12 @@ class SplitSearch {
     const std::vector<Trial> trials = Trials(segments_, parts_);
     if (trials.empty() || onto_.rows() == 0) return findings;
     const Trial* trial = nullptr;
-    const ParameterBlock* block = nullptr;
+    const ThetaPart* theta_part = nullptr;
     ChangeMixture mixture;
     const double others = AddContinuing(&mixture);
     for (const Trial& tried : trials) {
       const CourseInformation seen = InformationOf(tried.weights);
-      for (const ParameterBlock& one : blocks_) {
+      for (const ThetaPart& one : theta_parts_) {
         const double share = tried.share * one.share;
         AddTo(&mixture, seen, one, others * share);
         const double probability =
@@ -143,21 +143,21 @@ class SplitSearch {
         if (probability < best.probability) {
           best.probability = probability;
           trial = &tried;
-          block = &one;
+          theta_part = &one;
         }
       }
     }
     findings.doubt = mixture.Doubt();
     if (trial == nullptr) return findings;
     best.kind = trial->kind;
-    best.block = block->name;
+    best.block = theta_part->name;
     const int first = FirstSince(trial->weights);
     best.first = segments_[first].ends->key;
     best.newer = static_cast<int>(segments_.size()) - first;
     if (best.probability < kRareSplit) {
-      best.without_one = WithoutOne(*trial, *block);
+      best.without_one = WithoutOne(*trial, *theta_part);
       best.concerned = ConcernedNames(FindConcerned(
-          GroupBlocks(rig_), Change(shown_, trial->weights), kConcerned));
+          GroupParts(rig_), Change(shown_, trial->weights), kConcerned));
     }
     return findings;
   }
@@ -187,39 +187,40 @@ class SplitSearch {
   }
   static void AddTo(ChangeMixture* mixture,
                     const CourseInformation& seen,
-                    const ParameterBlock& block,
+                    const ThetaPart& theta_part,
                     double prior) {
-    mixture->Add(block.basis.transpose() * seen.change.Lambda * block.basis,
-                 block.basis.transpose() * seen.change.eta,
-                 seen.by_change * block.basis,
-                 prior);
+    mixture->Add(
+        theta_part.basis.transpose() * seen.change.Lambda * theta_part.basis,
+        theta_part.basis.transpose() * seen.change.eta,
+        seen.by_change * theta_part.basis,
+        prior);
   }
 
   // Adds the hypotheses that groups which have changed before continue to
   // change, evenly over all segments. Returns the prior of other changes.
   double AddContinuing(ChangeMixture* mixture) const {
-    const auto of = BlocksOf(options_.changing);
+    const auto of = PartsOf(options_.changing);
     if (of.empty()) return kChanged;
     double shares = 0;
-    for (const ParameterBlock* one : of) shares += one->share;
+    for (const ThetaPart* one : of) shares += one->share;
     const auto parts = static_cast<int>(parts_.size());
     const CourseInformation seen = InformationOf(RampCourse(parts, parts));
-    for (const ParameterBlock* one : of) {
+    for (const ThetaPart* one : of) {
       AddTo(mixture, seen, *one, kContinues * one->share / shares);
     }
     return (1 - kContinues) * kChanged;
   }
 
-  // Blocks whose components all belong to these groups.
-  std::vector<const ParameterBlock*> BlocksOf(
+  // Parts whose components all belong to these groups.
+  std::vector<const ThetaPart*> PartsOf(
       const std::vector<std::string>& groups) const {
-    std::vector<const ParameterBlock*> found;
+    std::vector<const ThetaPart*> found;
     const std::vector<int> of = ConcernedComponents(rig_, groups);
-    for (const ParameterBlock& block : blocks_) {
-      if (std::all_of(block.at.begin(), block.at.end(), [&](int k) {
+    for (const ThetaPart& theta_part : theta_parts_) {
+      if (std::all_of(theta_part.at.begin(), theta_part.at.end(), [&](int k) {
             return std::binary_search(of.begin(), of.end(), free_[k]);
           })) {
-        found.push_back(&block);
+        found.push_back(&theta_part);
       }
     }
     return found;
@@ -246,7 +247,7 @@ class SplitSearch {
     return parts_[part].first;
   }
 
-  double WithoutOne(const Trial& trial, const ParameterBlock& block) const {
+  double WithoutOne(const Trial& trial, const ThetaPart& theta_part) const {
     double largest = 0;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       const auto part = segments_.subspan(parts_[i].first, parts_[i].count);
@@ -255,12 +256,13 @@ class SplitSearch {
         rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(k));
         std::vector<OffsetInformation> shown = shown_;
         shown[i] = InformationAboutOffset(rest);
-        largest = std::max(
-            largest,
-            TestSpan(Change(shown, trial.weights), block.basis).probability);
+        largest =
+            std::max(largest,
+                     TestSpan(Change(shown, trial.weights), theta_part.basis)
+                         .probability);
       }
     }
-    return std::min(1.0, largest / (trial.share * block.share));
+    return std::min(1.0, largest / (trial.share * theta_part.share));
   }
 
   const Rig& rig_;
@@ -272,7 +274,7 @@ class SplitSearch {
   const double excess_;
   const std::span<const JoinedSegment> segments_;
   const RememberedOptions& options_;
-  const std::vector<ParameterBlock> blocks_;
+  const std::vector<ThetaPart> theta_parts_;
   const std::vector<Part> parts_;
   std::vector<OffsetInformation> shown_;  // by part
 };

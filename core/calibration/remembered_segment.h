@@ -39,8 +39,8 @@ struct DeviceSplit {
   // Number of segments from `first` on; for a drift, those that are near the
   // present state of the device.
   int newer = 0;
-  SegmentKey first;   // the oldest of these
-  std::string block;  // parameters that differ (parameter_blocks.h)
+  SegmentKey first;                    // the oldest of these
+  std::string block;                   // parameters that differ (theta_parts.h)
   std::vector<std::string> concerned;  // groups, in the order of the rig
 };
 

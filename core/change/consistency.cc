@@ -71,8 +71,8 @@ ConsistencyTester::ConsistencyTester(const Rig& rig,
       free_(FreeComponents(rig)),
       prior_(PriorSigmas(rig)(free_)),
       reference_(ReferenceSigmas(rig)(free_)),
-      blocks_(ParameterBlocks(rig)),
-      groups_(GroupBlocks(rig)) {
+      parts_(ThetaParts(rig)),
+      groups_(GroupParts(rig)) {
   const Eigen::VectorXd scale = prior_.cwiseInverse();
   Sigma_ =
       scale.asDiagonal() * active.covariance(free_, free_) * scale.asDiagonal();
@@ -144,7 +144,7 @@ std::vector<GroupConsistency> ConsistencyTester::TestGroups(
   const Eigen::MatrixXd covariance =
       K * (Lambda + Lambda * Covariance(offset) * Lambda) * K.transpose();
   std::vector<GroupConsistency> tests;
-  for (const ParameterBlock& group : groups_) {
+  for (const ThetaPart& group : groups_) {
     const auto k = static_cast<Eigen::Index>(group.at.size());
     const Eigen::MatrixXd posterior = K(group.at, group.at);
     const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(k, k);

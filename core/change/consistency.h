@@ -26,7 +26,7 @@
 #include <string>
 #include <vector>
 
-#include "core/change/parameter_blocks.h"
+#include "core/change/theta_parts.h"
 #include "core/information/segment_information.h"
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
@@ -99,9 +99,9 @@ class ConsistencyTester {
   // The covariance of the active calibration is root root^T, of the free
   // components in units of the prior's sigmas.
   const Eigen::MatrixXd& root() const { return root_; }
-  const std::vector<ParameterBlock>& blocks() const { return blocks_; }
-  // Blocks of rig.groups, in their order.
-  const std::vector<ParameterBlock>& groups() const { return groups_; }
+  const std::vector<ThetaPart>& parts() const { return parts_; }
+  // Parts for rig.groups, in their order.
+  const std::vector<ThetaPart>& groups() const { return groups_; }
 
  private:
   // Covariance including the reach of segments.
@@ -114,8 +114,8 @@ class ConsistencyTester {
   const Eigen::VectorXd reference_;  // sigmas of the free components
   Eigen::MatrixXd Sigma_;            // of the free components, in prior units
   Eigen::MatrixXd root_;             // of Sigma_
-  const std::vector<ParameterBlock> blocks_;
-  const std::vector<ParameterBlock> groups_;
+  const std::vector<ThetaPart> parts_;
+  const std::vector<ThetaPart> groups_;
 };
 
 }  // namespace selfcal

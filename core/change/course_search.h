@@ -1,4 +1,4 @@
-// Searches for a change over courses and blocks of parameters. Detection
+// Searches for a change over courses and parts of parameters. Detection
 // (detect_change.h) and the test of a set (core/calibration/memory_split.h)
 // share it.
 #pragma once
@@ -15,7 +15,7 @@ namespace selfcal {
 
 struct FoundCourse {
   Eigen::VectorXd weights;  // of the segments
-  const ParameterBlock* block = nullptr;
+  const ThetaPart* part = nullptr;
   ConsistencyTest
       test;  // with the noise estimated from differences of segments
   double without_one = 1;  // largest probability with one segment excluded
@@ -26,7 +26,7 @@ struct FoundCourse {
 // Not thread-safe. Tester and segments must outlive it.
 class CourseSearch {
  public:
-  // A test must be less probable than the share of its block in `level`, with
+  // A test must be less probable than the share of its part in `level`, with
   // the noise estimated from the differences among the segments, and with any
   // one of them excluded.
   CourseSearch(const ConsistencyTester& tester,
@@ -37,13 +37,13 @@ class CourseSearch {
   // Tests a course; `course` is that of the segments with these weights.
   void Try(const Eigen::VectorXd& weights, const Course& course);
 
-  // The course and block with the most evidence so far.
+  // The course and part with the most evidence so far.
   const std::optional<FoundCourse>& best() const { return best_; }
 
  private:
   double ProbabilityWithoutOne(const Eigen::VectorXd& weights,
                                const Course& course,
-                               const ParameterBlock& block,
+                               const ThetaPart& part,
                                double heterogeneity);
 
   const ConsistencyTester& tester_;

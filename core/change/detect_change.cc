@@ -55,7 +55,7 @@ Evidence EvidenceOfAll(const ConsistencyTester& tester,
   const int count = static_cast<int>(segments.size());
   const auto of = [&](const Eigen::VectorXd& weights) {
     const Course course = MakeCourse(segments, weights, tester.root());
-    return LogEvidence(course.Change(), found.block->basis) /
+    return LogEvidence(course.Change(), found.part->basis) /
            found.heterogeneity;
   };
   Evidence evidence;
@@ -90,7 +90,7 @@ Change Describe(const ConsistencyTester& tester,
                 const ChangeOptions& options) {
   Change change;
   change.window = static_cast<int>((found.weights.array() > 0).count());
-  change.block = found.block->name;
+  change.block = found.part->name;
   change.test = found.test;
   const Evidence evidence = EvidenceOfAll(tester, segments, found);
   const std::size_t step = Largest(evidence.step);

@@ -3,7 +3,7 @@
 // A course (course.h) is tested for each possible extent of a change: a step
 // before the newest n segments, or a ramp over them, for several n up to
 // max_window; and for each, every part of theta that may have changed alone
-// (parameter_blocks.h). Short courses find a shock, long ones a slow drift that
+// (theta_parts.h). Short courses find a shock, long ones a slow drift that
 // no single segment reveals. A change is detected only if the evidence holds
 // with any one of the segments excluded: a single inconsistent segment is no
 // change; and if it holds with the noise estimated from the differences among

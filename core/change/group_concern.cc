@@ -38,15 +38,15 @@ std::vector<int> Union(std::vector<int> a, const std::vector<int>& b) {
   return a;
 }
 
-// Directions of the block outside of the components `at`.
-MatrixXd Without(const ParameterBlock& block, const std::vector<int>& at) {
+// Directions of the part outside of the components `at`.
+MatrixXd Without(const ThetaPart& part, const std::vector<int>& at) {
   std::vector<Eigen::Index> rest;
-  for (std::size_t k = 0; k < block.at.size(); ++k) {
-    if (!std::binary_search(at.begin(), at.end(), block.at[k])) {
+  for (std::size_t k = 0; k < part.at.size(); ++k) {
+    if (!std::binary_search(at.begin(), at.end(), part.at[k])) {
       rest.push_back(static_cast<Eigen::Index>(k));
     }
   }
-  return block.basis(Eigen::all, rest);
+  return part.basis(Eigen::all, rest);
 }
 
 // E[y y^T] of a possible change B y, given L and s along B.
@@ -68,13 +68,11 @@ double LogEvidence(const OffsetInformation& change,
       .log_evidence;
 }
 
-std::vector<GroupConcern> FindConcerned(
-    const std::vector<ParameterBlock>& groups,
-    const OffsetInformation& change,
-    double level) {
+std::vector<GroupConcern> FindConcerned(const std::vector<ThetaPart>& groups,
+                                        const OffsetInformation& change,
+                                        double level) {
   std::vector<GroupConcern> concerns;
-  for (const ParameterBlock& group : groups)
-    concerns.push_back({group.name, {}});
+  for (const ThetaPart& group : groups) concerns.push_back({group.name, {}});
   std::vector<int> found;
   for (std::size_t round = 0; round < groups.size(); ++round) {
     const OffsetInformation rest = Eliminate(change, found);
@@ -126,7 +124,7 @@ MatrixXd DoubtOfUnconcerned(const Rig& rig,
   OffsetInformation change{MatrixXd::Zero(size, size), VectorXd::Zero(size)};
   if (any) change = course.Change();
   std::vector<int> changed;
-  for (const ParameterBlock& group : tester.groups()) {
+  for (const ThetaPart& group : tester.groups()) {
     if (std::count(concerned.begin(), concerned.end(), group.name) > 0) {
       changed = Union(changed, group.at);
     }
@@ -134,7 +132,7 @@ MatrixXd DoubtOfUnconcerned(const Rig& rig,
   const OffsetInformation rest = Eliminate(change, changed);
   MatrixXd doubt = MatrixXd::Zero(size, size);
   std::vector<int> done = changed;
-  for (const ParameterBlock& group : tester.groups()) {
+  for (const ThetaPart& group : tester.groups()) {
     const MatrixXd B = Without(group, done);
     if (B.cols() == 0) continue;
     doubt += B *

@@ -28,14 +28,13 @@ struct GroupConcern {
   bool concerned = false;
 };
 
-// The result is in the order of the groups (GroupBlocks). The group that
+// The result is in the order of the groups (GroupParts). The group that
 // explains the change best is concerned if its probability is below `level`;
 // then each of the others for which that holds with these eliminated. There may
 // be none.
-std::vector<GroupConcern> FindConcerned(
-    const std::vector<ParameterBlock>& groups,
-    const OffsetInformation& change,
-    double level);
+std::vector<GroupConcern> FindConcerned(const std::vector<ThetaPart>& groups,
+                                        const OffsetInformation& change,
+                                        double level);
 
 // Names of the concerned groups. If none is significant, the names of all: the
 // change is in one of them.

@@ -82,9 +82,9 @@ TEST_F(CourseTest, WeightsAreThoseOfTheNewest) {
 TEST_F(CourseTest, EveryBlockIsChiSquareDistributedWithoutAChange) {
   constexpr int kTrials = 600;
   const KnownCalibration active = FactoryKnownTo(rig_, 0.3);
-  const auto& blocks = tester_.blocks();
-  std::vector<double> statistic(blocks.size());
-  std::vector<int> rare(blocks.size());
+  const auto& parts = tester_.parts();
+  std::vector<double> statistic(parts.size());
+  std::vector<int> rare(parts.size());
   for (int trial = 0; trial < kTrials; ++trial) {
     const Eigen::VectorXd error = random_.Noise(active.covariance);
     std::vector<OffsetInformation> segments;
@@ -94,21 +94,21 @@ TEST_F(CourseTest, EveryBlockIsChiSquareDistributedWithoutAChange) {
     }
     const OffsetInformation change =
         MakeCourse(segments, RampCourse(6, 4), tester_.root()).Change();
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      const ConsistencyTest test = TestSpan(change, blocks[b].basis);
-      ASSERT_EQ(test.degrees, blocks[b].basis.cols());
+    for (std::size_t b = 0; b < parts.size(); ++b) {
+      const ConsistencyTest test = TestSpan(change, parts[b].basis);
+      ASSERT_EQ(test.degrees, parts[b].basis.cols());
       statistic[b] += test.statistic / test.degrees;
       rare[b] += test.probability < 0.05;
     }
   }
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const auto degrees = static_cast<double>(blocks[b].basis.cols());
+  for (std::size_t b = 0; b < parts.size(); ++b) {
+    const auto degrees = static_cast<double>(parts[b].basis.cols());
     // Four standard deviations.
     EXPECT_NEAR(
         statistic[b] / kTrials, 1, 4 * std::sqrt(2 / (degrees * kTrials)))
-        << blocks[b].name;
+        << parts[b].name;
     EXPECT_NEAR(rare[b], 0.05 * kTrials, 4 * std::sqrt(0.05 * 0.95 * kTrials))
-        << blocks[b].name;
+        << parts[b].name;
   }
 }
 

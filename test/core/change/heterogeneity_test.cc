@@ -25,7 +25,7 @@ class HeterogeneityTest : public ::testing::Test {
 TEST_F(HeterogeneityTest, IsTheOverconfidenceOfSegments) {
   std::vector<OffsetInformation> segments;
   for (int i = 0; i < 20; ++i) segments.push_back(Segment());
-  const Eigen::MatrixXd& all = tester_.blocks().front().basis;
+  const Eigen::MatrixXd& all = tester_.parts().front().basis;
   const auto heterogeneity = [&] {
     const Course course =
         MakeCourse(segments, StepCourse(20, 20), tester_.root());

@@ -1,4 +1,4 @@
-#include "core/change/parameter_blocks.h"
+#include "core/change/theta_parts.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,16 +12,16 @@
 namespace selfcal {
 namespace {
 
-TEST(ParameterBlocks, AreAllGroupsAndTheirParts) {
+TEST(ThetaParts, AreAllGroupsAndTheirParts) {
   std::vector<std::string> names;
-  for (const ParameterBlock& block : ParameterBlocks(HandheldRig("a"))) {
-    names.push_back(block.name);
-    const auto k = block.basis.cols();
-    EXPECT_LT((block.basis.transpose() * block.basis -
-               Eigen::MatrixXd::Identity(k, k))
-                  .norm(),
-              1e-12)
-        << block.name;
+  for (const ThetaPart& part : ThetaParts(HandheldRig("a"))) {
+    names.push_back(part.name);
+    const auto k = part.basis.cols();
+    EXPECT_LT(
+        (part.basis.transpose() * part.basis - Eigen::MatrixXd::Identity(k, k))
+            .norm(),
+        1e-12)
+        << part.name;
   }
   EXPECT_THAT(names,
               ::testing::UnorderedElementsAre("all",
@@ -41,16 +41,16 @@ TEST(ParameterBlocks, AreAllGroupsAndTheirParts) {
                                               "cam0.distortion"));
 }
 
-TEST(ParameterBlocks, ExcludeFixedComponentsAndDuplicates) {
+TEST(ThetaParts, ExcludeFixedComponentsAndDuplicates) {
   Rig rig = HandheldRig("a");
   rig.fixed = {"imu.*", "cam0.p_CI.*", "cam0.focal.x"};
   std::vector<std::string> names;
   rig.groups = {{"camera", {"cam0.focal.*", "cam0.principal.*"}},
                 {"turn", {"cam0.q_CI.*"}}};
-  for (const ParameterBlock& block : ParameterBlocks(rig)) {
-    names.push_back(block.name);
+  for (const ThetaPart& part : ThetaParts(rig)) {
+    names.push_back(part.name);
   }
-  // The block cam0.q_CI is the group "turn"; one focal length is not a zoom.
+  // The part cam0.q_CI is the group "turn"; one focal length is not a zoom.
   EXPECT_THAT(names,
               ::testing::UnorderedElementsAre("all",
                                               "camera",
@@ -62,13 +62,13 @@ TEST(ParameterBlocks, ExcludeFixedComponentsAndDuplicates) {
 
 std::map<std::string, double> Shares(const Rig& rig) {
   std::map<std::string, double> shares;
-  for (const ParameterBlock& block : ParameterBlocks(rig)) {
-    shares[block.name] = block.share;
+  for (const ThetaPart& part : ThetaParts(rig)) {
+    shares[part.name] = part.share;
   }
   return shares;
 }
 
-TEST(ParameterBlocks, HalfIsForTheMostFrequentChanges) {
+TEST(ThetaParts, HalfIsForTheMostFrequentChanges) {
   std::map<std::string, double> shares = Shares(HandheldRig("a"));
   ASSERT_EQ(shares.size(), 15u);
   EXPECT_DOUBLE_EQ(shares["cam0.q_CI"], 0.25);

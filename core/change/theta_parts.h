@@ -13,7 +13,7 @@
 
 namespace selfcal {
 
-struct ParameterBlock {
+struct ThetaPart {
   // "all", the name of a group, or that of the components without their axis:
   // "cam0.q_CI", "imu.gyro.scale"; "cam0.zoom" is a common relative change of
   // both focal lengths.
@@ -23,17 +23,17 @@ struct ParameterBlock {
   // Indices of its free components, ascending.
   std::vector<int> at;
   // Its share of the level of tests and of the prior of a change; those of all
-  // ParameterBlocks sum to 1.
+  // ThetaParts sum to 1.
   double share = 0;
 };
 
 // The groups of the rig, in their order.
-std::vector<ParameterBlock> GroupBlocks(const Rig& rig);
+std::vector<ThetaPart> GroupParts(const Rig& rig);
 
 // All of theta first, then the groups of the rig in their order, then their
-// parts. Of blocks with the same components, only the first. Half of all shares
+// parts. Of parts with the same components, only the first. Half of all shares
 // is for the most frequent isolated changes: the attitude of a camera, which a
 // knock rotates, and its zoom, which grows with temperature.
-std::vector<ParameterBlock> ParameterBlocks(const Rig& rig);
+std::vector<ThetaPart> ThetaParts(const Rig& rig);
 
 }  // namespace selfcal
