@@ -2,12 +2,17 @@
 // all of them share (section IV-A of the paper, step 2): from whitened,
 // linearised factors to Lambda and eta of those parameters; and
 // back-substitutes a step of those parameters to the steps of all other
-// unknowns. The meaning of the parameters is irrelevant here.
+// unknowns.
+//
+// The shared parameters, in this order: link parameters (the tangent of the
+// IMU), camera parameters (the tangent of each camera), kept unknowns. A score
+// (SegmentLineariser, core/information) and a recalibration (LinearSystem,
+// core/calibration) use it alike.
 //
 // It minimises the sum of |r + J d|^2 over all factors plus the priors, in the
 // order of chain_structure.h. At any time the remaining system is one dense
 // symmetric front
-//   [link parameters | motion of a keyframe | kept | landmark parameters | 1 |
+//   [link parameters | motion of a keyframe | kept | camera parameters | 1 |
 //    poses]
 // where the motion (velocity and biases) is that of the current keyframe, and
 // the kept unknowns are shared with other chains: landmarks that they observe
@@ -63,7 +68,7 @@ struct KeptBiasRows {
 // Information of the chain about the shared parameters: minimising over all
 // other unknowns gives d^T Lambda d - 2 eta^T d + constant + r, with r the
 // squares of the residuals of all factors but transitions, and the constant at
-// most theirs.
+// most the squares of the whitened residuals of the transitions.
 struct SharedInformation {
   Eigen::MatrixXd Lambda;  // symmetric
   Eigen::VectorXd eta;
@@ -85,9 +90,9 @@ class ChainElimination {
 
   using PoseRotation = ChainPoseRotation;
 
-  // First, in any order: the factors of one keyframe and camera, as rows of
-  // landmark_rows.h; `observations` are indices into track_keyframes. The
-  // matrix is B of these rows; null: [1; 0].
+  // First, in any order: the factors of one keyframe and camera, two whitened
+  // rows of landmark_rows.h for each observation; `observations` are indices
+  // into track_keyframes. The matrix is B of these rows; null: [1; 0].
   void AddObservations(int keyframe,
                        int camera,
                        const double* rows,
@@ -109,7 +114,8 @@ class ChainElimination {
   void Finish(SharedInformation* result);
 
   // After Finish(), with Record::kSteps: the minimising steps for a given step
-  // of the shared parameters. 15 for each keyframe, 3 for each landmark.
+  // of the shared parameters. 15 for each keyframe, 3 for each landmark (p_G,
+  // [m]).
   void FindSteps(const Eigen::VectorXd& shared,
                  std::vector<ChainStateVector>* states,
                  std::vector<Eigen::Vector3d>* landmarks) const;
@@ -121,7 +127,7 @@ class ChainElimination {
                      const std::vector<ChainStateVector>& states,
                      ChainPosterior* posterior) const;
 
-  // Link parameters, landmark parameters and kept unknowns.
+  // Link parameters, camera parameters and kept unknowns.
   int shared_size() const { return layout_.shared_size(); }
 
  private:

@@ -10,34 +10,33 @@
 namespace selfcal {
 
 // The front begins with `fixed` places for everything but poses: link
-// parameters, motion, kept unknowns, landmark parameters, the constant, padded
+// parameters, motion, kept unknowns, camera parameters, the constant, padded
 // to whole vectors.
 struct ChainLayout {
   ChainLayout() = default;
   explicit ChainLayout(const ChainShape& shape)
-      : landmark_shared(std::accumulate(
+      : camera_shared(std::accumulate(
             shape.camera_sizes.begin(), shape.camera_sizes.end(), 0)),
         kept(shape.kept),
-        landmark_place(chain::kKeptPlace + WholeVectors(kept)),
-        constant(landmark_place + landmark_shared),
+        camera_place(chain::kKeptPlace + WholeVectors(kept)),
+        constant(camera_place + camera_shared),
         fixed(WholeVectors(constant + 1)) {}
 
-  // Link parameters, landmark parameters and kept unknowns.
-  int shared_size() const { return kChainLinkShared + landmark_shared + kept; }
+  // Link parameters, camera parameters and kept unknowns.
+  int shared_size() const { return kChainLinkShared + camera_shared + kept; }
 
   // Place of a shared parameter.
   int Place(int shared) const {
     if (shared < kChainLinkShared) return shared;
-    const int landmark = shared - kChainLinkShared;
-    return landmark < landmark_shared
-               ? landmark_place + landmark
-               : chain::kKeptPlace + landmark - landmark_shared;
+    const int camera = shared - kChainLinkShared;
+    return camera < camera_shared ? camera_place + camera
+                                  : chain::kKeptPlace + camera - camera_shared;
   }
 
-  int landmark_shared = 0;  // number of landmark parameters
-  int kept = 0;             // number of kept unknowns
-  int landmark_place = 0;   // of the first landmark parameter
-  int constant = 0;         // place of the constant
+  int camera_shared = 0;  // number of camera parameters
+  int kept = 0;           // number of kept unknowns
+  int camera_place = 0;   // of the first camera parameter
+  int constant = 0;       // place of the constant
   int fixed = 0;
 };
 

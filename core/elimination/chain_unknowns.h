@@ -8,7 +8,9 @@
 
 namespace selfcal {
 
-// Unknowns of a keyframe: pose 6, then velocity and biases 9.
+// Unknowns of a keyframe, as KeyframeState orders them (core/model/segment.h):
+// rotation 3 [rad, right perturbation], position 3 [m, in G]; then velocity 3
+// [m/s, in G], b_a 3 [m/s^2, in A], b_g 3 [rad/s, in I].
 inline constexpr int kChainPoseSize = 6;
 inline constexpr int kChainMotionSize = 9;
 inline constexpr int kChainStateSize = kChainPoseSize + kChainMotionSize;

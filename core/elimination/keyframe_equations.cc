@@ -9,10 +9,10 @@ using namespace chain;
 
 void KeyframeEquations::Start(const ChainLayout& layout, int keyframes) {
   layout_ = layout;
-  stride_ = kPose + layout.landmark_shared + 1;
+  stride_ = kPose + layout.camera_shared + 1;
   sums_.assign(static_cast<std::size_t>(keyframes) * kPose * stride_, 0);
-  shared_sums_.assign(
-      (layout.landmark_shared + 1) * (layout.landmark_shared + 1), 0);
+  shared_sums_.assign((layout.camera_shared + 1) * (layout.camera_shared + 1),
+                      0);
 }
 
 void KeyframeEquations::Add(int keyframe,
@@ -30,7 +30,7 @@ void KeyframeEquations::Add(int keyframe,
       for (int c = 3; c < camera.size; ++c) {
         shared[c] += by_pose(i, kRowsOwn + c - 3);
       }
-      row[kPose + layout_.landmark_shared] += by_pose(i, residual);
+      row[kPose + layout_.camera_shared] += by_pose(i, residual);
     }
   };
   if (by_rotation == nullptr) {
@@ -55,7 +55,7 @@ void KeyframeEquations::Add(int keyframe,
 
 void KeyframeEquations::AddShared(const CameraColumns& camera,
                                   const RowProducts& products) {
-  const int rows = layout_.landmark_shared + 1;
+  const int rows = layout_.camera_shared + 1;
   const int residual = RowsResidual(camera.size);
   const auto column = [](int c) {
     return c < 3 ? kRowsTurn + c : kRowsOwn + c - 3;
@@ -67,7 +67,7 @@ void KeyframeEquations::AddShared(const CameraColumns& camera,
       to[camera.offset + i] += (i < 3) == (j < 3) ? product : -product;
     }
     const double product = products(residual, column(j));
-    to[layout_.landmark_shared] += j < 3 ? -product : product;
+    to[layout_.camera_shared] += j < 3 ? -product : product;
   }
 }
 
@@ -76,17 +76,17 @@ void KeyframeEquations::AddKeyframeTo(ChainFront* front, int keyframe) const {
   for (int i = 0; i < kPose; ++i) {
     const double* row = &sums_[(keyframe * kPose + i) * stride_];
     for (int j = 0; j <= i; ++j) (*front)(pose + i, pose + j) += row[j];
-    for (int c = 0; c <= layout_.landmark_shared; ++c) {
-      (*front)(pose + i, layout_.landmark_place + c) += row[kPose + c];
+    for (int c = 0; c <= layout_.camera_shared; ++c) {
+      (*front)(pose + i, layout_.camera_place + c) += row[kPose + c];
     }
   }
 }
 
 void KeyframeEquations::AddSharedTo(ChainFront* front) const {
-  const int rows = layout_.landmark_shared + 1;
-  for (int j = 0; j < layout_.landmark_shared; ++j) {
+  const int rows = layout_.camera_shared + 1;
+  for (int j = 0; j < layout_.camera_shared; ++j) {
     for (int i = j; i < rows; ++i) {
-      (*front)(layout_.landmark_place + i, layout_.landmark_place + j) +=
+      (*front)(layout_.camera_place + i, layout_.camera_place + j) +=
           shared_sums_[j * rows + i];
     }
   }

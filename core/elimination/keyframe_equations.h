@@ -39,17 +39,17 @@ class KeyframeEquations {
 
   // Adds the sums of a keyframe to the front, where it has slot 0.
   void AddKeyframeTo(ChainFront* front, int keyframe) const;
-  // Adds the sums among landmark parameters and constant.
+  // Adds the sums among camera parameters and constant.
   void AddSharedTo(ChainFront* front) const;
 
  private:
   void AddShared(const CameraColumns& camera, const RowProducts& products);
 
   ChainLayout layout_;
-  // For each keyframe 6 rows over its pose, landmark parameters and constant.
+  // For each keyframe 6 rows over its pose, camera parameters and constant.
   std::vector<double> sums_;
   int stride_ = 0;
-  // Over landmark parameters and constant, lower triangle by columns.
+  // Over camera parameters and constant, lower triangle by columns.
   std::vector<double> shared_sums_;
 };
 

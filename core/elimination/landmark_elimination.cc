@@ -40,15 +40,15 @@ void LandmarkElimination::KeepLandmark(int landmark,
                                        int stride,
                                        ChainFront* front) {
   const int place = kKeptPlace + kept_[landmark];
-  const int shared = layout_.fixed - layout_.landmark_place;
+  const int shared = layout_.fixed - layout_.camera_place;
   const int poses = slots * kPose;
   for (int j = 0; j < 3; ++j) {
     double* row = panel + j * stride;
     for (int i = j; i < 3; ++i) {
       (*front)(place + i, place + j) += information(i, j);
     }
-    for (int c = 0; c <= layout_.landmark_shared; ++c) {
-      (*front)(layout_.landmark_place + c, place + j) += row[c];
+    for (int c = 0; c <= layout_.camera_shared; ++c) {
+      (*front)(layout_.camera_place + c, place + j) += row[c];
     }
     for (int i = 0; i < poses; ++i) {
       (*front)(front->Pose(0) + i, place + j) += row[shared + i];
@@ -74,8 +74,8 @@ void LandmarkElimination::Eliminate(const ChainStructure& structure,
                                     ChainFront* front) {
   const std::span<const int> group = structure.Landmarks(k);
   if (group.empty()) return;
-  const int landmark_place = layout_.landmark_place;
-  const int shared = layout_.fixed - landmark_place;
+  const int camera_place = layout_.camera_place;
+  const int shared = layout_.fixed - camera_place;
   const int slots = structure.Slots(group.front());
   const int stride = shared + WholeVectors(slots * kPose) + kZeros;
   const int depth = 3 * static_cast<int>(group.size());
@@ -104,19 +104,16 @@ void LandmarkElimination::Eliminate(const ChainStructure& structure,
                              stride,
                              shared + structure.Slots(group[i]) * kPose);
     }
-    kernels.AddSquare(-1,
-                      by_shared,
-                      shared,
-                      depth,
-                      front->At(landmark_place, landmark_place));
+    kernels.AddSquare(
+        -1, by_shared, shared, depth, front->At(camera_place, camera_place));
     const Depth stairs(depths_.data(), kPose);
     kernels.AddProduct(-1,
                        by_pose,
                        slots * kPose,
                        by_shared,
-                       layout_.landmark_shared + 1,
+                       layout_.camera_shared + 1,
                        stairs,
-                       front->At(pose, landmark_place));
+                       front->At(pose, camera_place));
     kernels.AddSquare(
         -1, by_pose, slots * kPose, stairs, front->At(pose, pose));
   });

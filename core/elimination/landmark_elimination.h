@@ -58,7 +58,7 @@ class LandmarkElimination {
   // The Cholesky factor of the information of each, with inverse diagonal.
   std::vector<double> roots_;
   // Panels of the landmarks that are eliminated together, 3 rows each over the
-  // front from the landmark parameters on.
+  // front from the camera parameters on.
   std::vector<double> panels_;
   std::vector<int> depths_;  // rows of the panels in each slot
 };

@@ -63,8 +63,8 @@ Eigen::Matrix3d LandmarkEquations::PreparePanel(int landmark,
                                                 double* panel,
                                                 int stride) const {
   const double* prior = &priors_[9 * landmark];
-  const int landmark_shared = layout_.landmark_shared;
-  const int shared_places = layout_.fixed - layout_.landmark_place;
+  const int camera_shared = layout_.camera_shared;
+  const int shared_places = layout_.fixed - layout_.camera_place;
   Eigen::Matrix3d H;
   for (int j = 0; j < 3; ++j) {
     double* row = panel + j * stride;
@@ -75,7 +75,7 @@ Eigen::Matrix3d LandmarkEquations::PreparePanel(int landmark,
       by_pose += kPose;
     }
     for (int i = 0; i <= j; ++i) H(j, i) = prior[j * (j + 1) / 2 + i];
-    row[landmark_shared] = prior[6 + j];
+    row[camera_shared] = prior[6 + j];
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       const int size = cameras_[c].size;
       const double* sums = &sums_[landmark * sums_size_ + sums_offsets_[c] +
@@ -83,7 +83,7 @@ Eigen::Matrix3d LandmarkEquations::PreparePanel(int landmark,
       double* shared = row + cameras_[c].offset;
       for (int i = 0; i < 3; ++i) shared[i] = -sums[kRowsTurn + i];
       for (int i = 3; i < size; ++i) shared[i] = sums[kRowsOwn + i - 3];
-      row[landmark_shared] += sums[RowsResidual(size)];
+      row[camera_shared] += sums[RowsResidual(size)];
       for (int i = 0; i <= j; ++i) H(j, i) -= sums[kRowsPosition + i];
     }
   }
@@ -97,8 +97,8 @@ void LandmarkEquations::RecordPanel(int landmark,
   double* shared = &sums_[landmark * sums_size_];
   for (int j = 0; j < 3; ++j) {
     const double* row = panel + j * stride;
-    shared = std::copy_n(row, layout_.landmark_shared + 1, shared);
-    row += layout_.fixed - layout_.landmark_place;
+    shared = std::copy_n(row, layout_.camera_shared + 1, shared);
+    row += layout_.fixed - layout_.camera_place;
     double* by_pose = &pose_rows_[PoseRow(landmark, j)];
     for (const LandmarkViews::View& view : views_.Of(landmark)) {
       by_pose = std::copy_n(row + view.slot * kPose, kPose, by_pose);
@@ -118,9 +118,9 @@ Eigen::Vector3d LandmarkEquations::ByRecordedPanel(
   const std::span<const LandmarkViews::View> views = views_.Of(landmark);
   const auto by_pose =
       rows(&pose_rows_[PoseRow(landmark, 0)], PosesOf(landmark));
-  const Eigen::Index shared_places = layout_.landmark_shared + 1;
+  const Eigen::Index shared_places = layout_.camera_shared + 1;
   Eigen::Vector3d y = rows(&sums_[landmark * sums_size_], shared_places) *
-                      z.segment(layout_.landmark_place, shared_places);
+                      z.segment(layout_.camera_place, shared_places);
   for (std::size_t v = 0; v < views.size(); ++v) {
     y += by_pose.middleCols<kPose>(static_cast<Eigen::Index>(v) * kPose) *
          states[views[v].keyframe].head<kPose>();

@@ -40,7 +40,7 @@ class LandmarkEquations {
                 const Eigen::Vector3d& g);
 
   // Fills the panel of a landmark, 3 rows `stride` apart over the front from
-  // the landmark parameters on, from its sums. Returns its information.
+  // the camera parameters on, from its sums. Returns its information.
   Eigen::Matrix3d PreparePanel(int landmark, double* panel, int stride) const;
   // The inverse of PreparePanel, for the back-substitution: replaces the sums
   // by the panel.
@@ -61,7 +61,7 @@ class LandmarkEquations {
   LandmarkViews views_;
   // For each landmark: for each camera 3 rows of sums, and 3 rows over the
   // poses that observe it. After RecordPanel, the rows over poses are those of
-  // its panel, and the first 3 rows of the sums those over landmark parameters
+  // its panel, and the first 3 rows of the sums those over camera parameters
   // and constant.
   std::vector<double> sums_, pose_rows_, priors_;
   std::vector<int> sums_offsets_;  // of each camera

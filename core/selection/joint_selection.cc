@@ -219,11 +219,11 @@ JointChange Offer(const JointSettings& settings,
   return change;
 }
 
-TableChange Offer(const Rig& rig,
+TableUpdate Offer(const Rig& rig,
                   const Candidate& candidate,
                   std::span<const Candidate> set,
                   Table* table) {
-  TableChange result;
+  TableUpdate result;
   std::vector<TableEntry>& entries = table->entries;
   const auto find = [&](const SegmentKey& key) {
     return std::find_if(entries.begin(), entries.end(), [&](const auto& e) {

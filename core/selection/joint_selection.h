@@ -75,7 +75,7 @@ JointChange Offer(const JointSettings& settings,
 // its entries in order of arrival. The entropy of an entry is that of all of
 // theta after its segment alone; its gain is relative to the set that it
 // entered.
-TableChange Offer(const Rig& rig,
+TableUpdate Offer(const Rig& rig,
                   const Candidate& candidate,
                   std::span<const Candidate> set,
                   Table* table);

@@ -50,10 +50,10 @@ std::vector<Table> MakeTables(const Rig& rig) {
   return tables;
 }
 
-TableChange Offer(const TableEntry& candidate,
+TableUpdate Offer(const TableEntry& candidate,
                   double min_gain_nats,
                   Table* table) {
-  TableChange change;
+  TableUpdate change;
   std::vector<TableEntry>& entries = table->entries;
   for (const TableEntry& entry : entries) {
     if (entry.key == candidate.key) {

@@ -44,7 +44,7 @@ struct Table {
 // with the entropy of all of theta.
 std::vector<Table> MakeTables(const Rig& rig);
 
-struct TableChange {
+struct TableUpdate {
   bool inserted = false;
   std::optional<TableEntry> evicted;
 };
@@ -54,7 +54,7 @@ struct TableChange {
 // the table changes nothing and is not counted. A segment with an entropy or
 // gain that is not finite is counted and never enters. An evicted segment
 // cannot return: the entries that displaced it are better, or equal and older.
-TableChange Offer(const TableEntry& candidate,
+TableUpdate Offer(const TableEntry& candidate,
                   double min_gain_nats,
                   Table* table);
 

@@ -112,7 +112,7 @@ absl::StatusOr<std::shared_ptr<void>> WatchChanges(
   });
   // Sent at once, so that the reader knows that its watch stands.
   put(v1::Change::EVERYTHING, "");
-  return context.changes->Subscribe(rig, put);
+  return context.feed->Subscribe(rig, put);
 }
 
 absl::StatusOr<v1::Caller> GetCaller(const ApiContext& context,

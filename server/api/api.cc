@@ -8,12 +8,12 @@ namespace selfcal::server {
 
 Api::Api(Domain* domain,
          Pipeline* pipeline,
-         EventFeed* changes,
+         EventFeed* feed,
          ApiOptions options) {
   Methods methods({domain,
                    domain->store(),
                    pipeline,
-                   changes,
+                   feed,
                    &watches_,
                    &traffic_,
                    &stopping_,

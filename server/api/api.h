@@ -27,11 +27,11 @@ struct ApiOptions {
 
 class Api {
  public:
-  // All three outlive it. `changes` may be null: then no change is reported to
+  // All three outlive it. `feed` may be null: then no change is reported to
   // watchers.
   Api(Domain* domain,
       Pipeline* pipeline,
-      EventFeed* changes,
+      EventFeed* feed,
       ApiOptions options = {});
   Api(const Api&) = delete;
   Api& operator=(const Api&) = delete;

@@ -18,7 +18,7 @@ struct ApiContext {
   Domain* domain = nullptr;
   Store* store = nullptr;  // of `domain`
   Pipeline* pipeline = nullptr;
-  EventFeed* changes = nullptr;
+  EventFeed* feed = nullptr;
   RigWatches* watches = nullptr;
   Traffic* traffic = nullptr;  // of segments
   // True once the daemon is stopping: watches and streams end with UNAVAILABLE.

@@ -45,12 +45,12 @@ void FillVerdict(const SubmitResult& result,
   }
 }
 
-class SegmentStream final : public Exchange {
+class SegmentExchange final : public Exchange {
  public:
-  SegmentStream(const ApiContext& context, const Call& call)
+  SegmentExchange(const ApiContext& context, const Call& call)
       : context_(context), call_(call) {}
 
-  ~SegmentStream() override {
+  ~SegmentExchange() override {
     if (parent_.empty()) return;
     context_.traffic->Closed(rig_);
     if (stored_ && !stopped()) context_.pipeline->EndSession(rig_);
@@ -135,7 +135,7 @@ class SegmentStream final : public Exchange {
 
 std::unique_ptr<Exchange> MakeSegmentStream(const ApiContext& context,
                                             const Call& call) {
-  return std::make_unique<SegmentStream>(context, call);
+  return std::make_unique<SegmentExchange>(context, call);
 }
 
 }  // namespace selfcal::server

@@ -1,6 +1,6 @@
 // Device changes: the device has another theta than before. They are detected
 // among the newest segments, or among the segments of a run. Afterwards the
-// tables and the memory start again with the segments after the change.
+// tables and the remembered segments start again with those after the change.
 #pragma once
 
 #include <absl/status/status.h>

@@ -236,11 +236,11 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
   return started;
 }
 
-absl::Status Domain::HoldRun(const std::string& rig,
-                             std::int64_t run,
-                             const std::string& reason) {
+absl::Status Domain::DeferRun(const std::string& rig,
+                              std::int64_t run,
+                              const std::string& reason) {
   return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
-    return server::HoldRun(tx, run, reason);
+    return server::DeferRun(tx, run, reason);
   });
 }
 

@@ -74,13 +74,13 @@ class Domain {
                        PutDone done);
 
   // Commits the score of one stored segment: writes its information, and its
-  // ends if given; removes entries from the tables that were too old when it
-  // arrived; offers it to the tables; tests the newest segments for a device
-  // change (core/change); deletes data that is no longer needed; and creates
-  // the run that the tables call for, if no run is unfinished. Changes nothing
-  // if the segment is scored already. After a device change the segments from
-  // before it leave all tables, and a run that was created before it ends with
-  // a rejected calibration.
+  // ends if given; removes misfits, and entries that were too old when it
+  // arrived, from the tables; offers it to them if its fit admits it; tests the
+  // newest segments for a device change (core/change); creates the run that the
+  // tables call for, if no run is unfinished; and deletes data that is no
+  // longer needed. Changes nothing if the segment is scored already. After a
+  // device change the segments from before it leave all tables, and a run that
+  // was created before it ends with a rejected calibration.
   absl::StatusOr<ScoreCommit> CommitScore(
       const std::string& rig,
       const SegmentKey& key,
@@ -94,8 +94,8 @@ class Domain {
                             const SegmentInformation& information,
                             const SegmentEnds& ends);
 
-  // Quarantines a segment that cannot be used: removes it from the queue and
-  // from the tables for good, and deletes its data unless an unfinished run
+  // Marks a segment that cannot be used as unusable: removes it from the queue
+  // and from the tables for good, and deletes its data unless an unfinished run
   // references it. An event records the problem. Changes nothing if the segment
   // is unusable already.
   absl::Status MarkUnusable(const std::string& rig,
@@ -165,9 +165,10 @@ class Domain {
   absl::StatusOr<std::vector<StoredRun>> StartSessionRuns(
       const std::vector<std::string>& ended, std::int64_t idle_since_ns);
   // Records why a pending run is deferred; the first time also in an event.
-  absl::Status HoldRun(const std::string& rig,
-                       std::int64_t run,
-                       const std::string& reason);
+  // FAILED_PRECONDITION if it is not pending.
+  absl::Status DeferRun(const std::string& rig,
+                        std::int64_t run,
+                        const std::string& reason);
   // Pending or running -> running, with one attempt more.
   absl::StatusOr<StoredRun> BeginRun(const std::string& rig, std::int64_t run);
   // Running -> pending at an orderly stop; the attempt is not counted.

@@ -14,7 +14,7 @@
 namespace selfcal::server {
 namespace {
 
-std::optional<TableChange> OfferToGroup(const Rig& rig,
+std::optional<TableUpdate> OfferToGroup(const Rig& rig,
                                         const SegmentRow& segment,
                                         const SegmentInformation& information,
                                         Table* table) {
@@ -65,7 +65,7 @@ const TableEntry& EntryOf(const Table& table, const SegmentKey& key) {
 // Writes the table update of an offer.
 absl::Status WriteOffer(UnitOfWork* tx,
                         const SegmentRow& segment,
-                        const TableChange& change,
+                        const TableUpdate& change,
                         const Table& table) {
   SELFCAL_RETURN_IF_ERROR(WriteScored(tx, table.group, table.scored));
   if (change.evicted) {
@@ -129,7 +129,7 @@ absl::StatusOr<std::vector<std::string>> OfferToTables(
     std::vector<Table>* tables) {
   std::vector<std::string> entered;
   for (Table& table : *tables) {
-    std::optional<TableChange> change;
+    std::optional<TableUpdate> change;
     if (rig.selection == Selection::kTables) {
       change = OfferToGroup(rig, segment, information, &table);
     } else {

@@ -1,5 +1,11 @@
-// Quarantine: segments that are not used any more, because they are damaged,
-// contradict the others, or were named by an operator.
+// Quarantine: segments that are not used any more. It is final: nothing undoes
+// it, but the data can be sent again under another session.
+//
+// Decided by FindContradictions and FindMisfits (core/calibration/
+// segment_agreement.h) for the segments of a run, by FindIsolated
+// (core/change/isolated.h) for the newest ones, or by an operator. Segments
+// that are damaged or cannot be scored are unusable like them
+// (Domain::MarkUnusable).
 #pragma once
 
 #include <absl/status/status.h>
@@ -27,8 +33,8 @@ struct QuarantineCommit {
 
 // Any state -> unusable; removes the segment from all tables and appends an
 // event: kSegmentUnusable if it is damaged or cannot be scored,
-// kSegmentQuarantined if it contradicts others. Its data stays until
-// DropUnneededData.
+// kSegmentQuarantined if it contradicts others or an operator named it. Its
+// data stays until DropUnneededData.
 absl::Status Quarantine(UnitOfWork* tx,
                         const SegmentRow& segment,
                         EventKind event,

@@ -50,9 +50,9 @@ std::string EndText(const StoredRun& run) {
 
 }  // namespace
 
-absl::Status HoldRun(UnitOfWork* tx,
-                     std::int64_t run_number,
-                     const std::string& reason) {
+absl::Status DeferRun(UnitOfWork* tx,
+                      std::int64_t run_number,
+                      const std::string& reason) {
   SELFCAL_ASSIGN_OR_RETURN(StoredRun run, ReadRun(tx, run_number));
   if (run.state != RunState::kPending) {
     return absl::FailedPreconditionError(fmt::format(

@@ -13,9 +13,9 @@
 namespace selfcal::server {
 
 // As the methods of Domain.
-absl::Status HoldRun(UnitOfWork* tx,
-                     std::int64_t run,
-                     const std::string& reason);
+absl::Status DeferRun(UnitOfWork* tx,
+                      std::int64_t run,
+                      const std::string& reason);
 absl::StatusOr<StoredRun> BeginRun(UnitOfWork* tx, std::int64_t run);
 absl::StatusOr<StoredRun> ReleaseRun(UnitOfWork* tx, std::int64_t run);
 absl::StatusOr<StoredRun> EndRun(UnitOfWork* tx,

@@ -1,6 +1,6 @@
 // The trigger at the end of a session. The active version is to be computed on
 // the tables as the session leaves them, however little they have changed since
-// the last run, and again once the memory has grown by half.
+// the last run, and again once the remembered segments have grown by half.
 #pragma once
 
 #include <absl/status/statusor.h>

@@ -41,7 +41,7 @@ class HostConditions : public Conditions {
   HostConditions(const HostLimits& limits, const HostFiles& files)
       : limits_(limits), files_(files) {}
 
-  std::string HoldReason() override {
+  std::string DeferReason() override {
     if (limits_.only_on_external_power && OnBattery(files_.power_supplies)) {
       return "the machine runs on its battery";
     }

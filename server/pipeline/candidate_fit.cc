@@ -120,13 +120,16 @@ void CheckSegmentResiduals(const CheckContext& context,
   }
   std::string failure;
   if (!(largest <= limit)) {
+    const bool inertial = worst->inertial_ratio >= worst->pixel_ratio;
     failure = fmt::format(
-        "The {} residuals of segment {} are {:.1f} times what the noise that "
-        "was used predicts, at most {:.1f} times are plausible: one sensor "
-        "contradicts the others. Look at it (selfcal segments show).",
-        worst->inertial_ratio >= worst->pixel_ratio ? "inertial" : "pixel",
+        "The {} residuals of segment {} are {:.1f} times {}, at most {:.1f} "
+        "times are plausible: one sensor contradicts the others. Look at it "
+        "(selfcal segments show).",
+        inertial ? "inertial" : "pixel",
         SegmentText(worst->key),
         largest,
+        inertial ? "those of the median segment"
+                 : "what the noise that was used predicts",
         limit);
   }
   AddResult("segment_residuals", largest, limit, failure, checks);

@@ -4,6 +4,9 @@
 // Each check passes, fails, or cannot be made. One that fails rejects the
 // candidate, with a sentence that has the value, what it means and what to do;
 // one that cannot be made is never treated as passed, and weakens the verdict.
+// run_validation.cc gathers the evidence. Domain::FinishRun may still reject a
+// candidate that passes: if the device has changed, or a segment of the run was
+// quarantined, since the run was created (server/domain/run_results.cc).
 #pragma once
 
 #include <optional>
@@ -18,6 +21,10 @@
 
 namespace selfcal::server {
 
+// Tolerances of the checks. Further constants: kOffSigmas and Biases
+// (candidate_fit.cc), the latter with the findings that do not reject;
+// kLeastDegrees and the level of LargestByChance (candidate_confirmation.cc);
+// kHeldOut and kMaxNoiseOff (run_validation.cc).
 struct CandidateLimits {
   // At least this share of the observations must have been used. Observations
   // are left out because they are outliers, near the border of the image, or of
@@ -87,8 +94,9 @@ struct CandidateValidation {
 //   proper shape, finite numbers and variances, no further check is made;
 // - observations_used, segments_used: their shares;
 // - pixel_residuals: their root mean square over the prediction of the noise
-//   that was used; segment_residuals: the largest such ratio of a segment, of
-//   its pixel or of its inertial residuals;
+//   that was used; segment_residuals: the largest ratio of a segment, that of
+//   its pixel residuals to the prediction of the noise, or that of its inertial
+//   residuals to the median of all segments;
 // - noise: no noise scale contradicts the one that was used, and none is beyond
 //   what noise can be;
 // - preflight: the segments show none of the common mistakes (core/preflight)

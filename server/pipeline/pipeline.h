@@ -38,7 +38,7 @@ class Conditions {
   // Why such a run is deferred now, in words that stay the same while the
   // reason does; empty if it is not. Called often, from the pipeline's threads:
   // must return at once.
-  virtual std::string HoldReason() = 0;
+  virtual std::string DeferReason() = 0;
 };
 
 struct PipelineOptions {

@@ -29,8 +29,8 @@ Execution AfterFailure(const absl::Status& failure) {
 }
 
 // Why the run does not begin yet; empty if it may.
-absl::StatusOr<std::string> HoldReason(const RunContext& context,
-                                       const StoredRun& run) {
+absl::StatusOr<std::string> DeferReason(const RunContext& context,
+                                        const StoredRun& run) {
   if (run.trigger == RunTrigger::kManual) {
     return "";
   }
@@ -52,7 +52,7 @@ absl::StatusOr<std::string> HoldReason(const RunContext& context,
     }
   }
   Conditions* const conditions = context.options.conditions;
-  return conditions == nullptr ? "" : conditions->HoldReason();
+  return conditions == nullptr ? "" : conditions->DeferReason();
 }
 
 Execution Hold(const RunContext& context,
@@ -61,7 +61,7 @@ Execution Hold(const RunContext& context,
   if (run.message == reason) {
     return Execution::kDeferred;
   }
-  const absl::Status held = context.domain->HoldRun(run.rig, run.run, reason);
+  const absl::Status held = context.domain->DeferRun(run.rig, run.run, reason);
   if (!held.ok()) return AfterFailure(held);
   spdlog::info("run {} of rig {} is deferred: {}", run.run, run.rig, reason);
   StoredRun now = run;
@@ -112,8 +112,9 @@ absl::Status EndWith(const RunContext& context,
                      Watchers<StoredCalibration>* calibration_watchers,
                      const StoredRun& run,
                      const StoredCalibration& candidate) {
-  const auto finished = RetryUnlessInterrupted(
-      context.current, [&] { return FinishRun(context, run, candidate); });
+  const auto finished = RetryUnlessInterrupted(context.current, [&] {
+    return ValidateAndFinish(context, run, candidate);
+  });
   if (IsTransient(finished.status())) {
     return finished.status();
   }
@@ -178,7 +179,7 @@ Execution ExecuteRun(const RunContext& context,
                                pending.attempts));
     return ended.ok() ? Execution::kDone : Execution::kTryLater;
   }
-  const auto hold = HoldReason(context, pending);
+  const auto hold = DeferReason(context, pending);
   if (!hold.ok()) {
     spdlog::error("cannot tell whether run {} of rig {} may begin: {}",
                   pending.run,

@@ -180,9 +180,10 @@ absl::Status Validate(const RunContext& context,
 
 }  // namespace
 
-absl::StatusOr<StoredCalibration> FinishRun(const RunContext& context,
-                                            const StoredRun& run,
-                                            StoredCalibration candidate) {
+absl::StatusOr<StoredCalibration> ValidateAndFinish(
+    const RunContext& context,
+    const StoredRun& run,
+    StoredCalibration candidate) {
   for (;;) {
     SELFCAL_RETURN_IF_ERROR(Validate(context, run, &candidate));
     // Before the run ends, so that a crash between the two repeats it, and

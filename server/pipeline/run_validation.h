@@ -11,8 +11,9 @@ namespace selfcal::server {
 // Ends the run with the candidate, which becomes the active version or is
 // rejected. Validates again if another version becomes active meanwhile. Before
 // a version becomes active, the kept segments are scored at it.
-absl::StatusOr<StoredCalibration> FinishRun(const RunContext& context,
-                                            const StoredRun& run,
-                                            StoredCalibration candidate);
+absl::StatusOr<StoredCalibration> ValidateAndFinish(
+    const RunContext& context,
+    const StoredRun& run,
+    StoredCalibration candidate);
 
 }  // namespace selfcal::server

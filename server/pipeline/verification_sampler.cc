@@ -100,7 +100,7 @@ void VerificationSampler::Loop() {
 bool VerificationSampler::WaitUntilIdle() {
   std::unique_lock lock(mutex_);
   while (running_ && options_.conditions != nullptr &&
-         !options_.conditions->HoldReason().empty()) {
+         !options_.conditions->DeferReason().empty()) {
     changed_.wait_for(lock, options_.recheck, [this] { return !running_; });
   }
   return running_;

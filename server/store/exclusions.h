@@ -1,4 +1,5 @@
-// Records of exclusions: why a table does not hold a scored segment.
+// Records of exclusions: why a table does not hold a scored segment. Exclusion
+// and its causes are in session.h.
 #pragma once
 
 #include <absl/status/status.h>

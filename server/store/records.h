@@ -33,7 +33,7 @@ absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,
                                                    const std::string& what);
 
 // Reasons, validation and verdict of a candidate.
-std::string SerializeValidation(const StoredCalibration& judged);
+std::string SerializeValidation(const StoredCalibration& validated);
 absl::Status ParseValidation(std::string_view bytes,
                              const std::string& what,
                              StoredCalibration* calibration);

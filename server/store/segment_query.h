@@ -1,4 +1,4 @@
-// Filter and order of a list of the segments of a rig.
+// State of a segment; filter and order of a list of the segments of a rig.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,10 @@
 
 namespace selfcal::server {
 
-enum class SegmentState;
+// kUnusable: its data is damaged or cannot be scored, or it is quarantined
+// (server/domain/quarantine.h). Its problem says why; its information is not
+// used any more.
+enum class SegmentState { kStored, kScored, kUnusable };
 
 // A closed interval; nullopt means no bound.
 template <typename T>

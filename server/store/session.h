@@ -9,13 +9,9 @@
 #include <vector>
 
 #include "core/model/segment.h"
+#include "server/store/segment_query.h"
 
 namespace selfcal::server {
-
-// kUnusable: quarantined, since its data is damaged or cannot be scored, it
-// contradicts other segments, or an operator chose so. Its problem says why;
-// its information is not used any more.
-enum class SegmentState { kStored, kScored, kUnusable };
 
 struct SessionSummary {
   std::string session;

@@ -118,17 +118,17 @@ v1::Verdict VerdictMessage(const Verdict& verdict) {
   return message;
 }
 
-std::string SerializeValidation(const StoredCalibration& judged) {
+std::string SerializeValidation(const StoredCalibration& validated) {
   store::ValidationRecord record;
-  record.set_rig(judged.rig);
-  record.set_version(judged.version);
-  record.mutable_reasons()->Assign(judged.reasons.begin(),
-                                   judged.reasons.end());
-  if (judged.validation) {
+  record.set_rig(validated.rig);
+  record.set_version(validated.version);
+  record.mutable_reasons()->Assign(validated.reasons.begin(),
+                                   validated.reasons.end());
+  if (validated.validation) {
     *record.mutable_validation() = ValidationMessage(
-        *judged.validation, judged.state != CalibrationState::kRejected);
+        *validated.validation, validated.state != CalibrationState::kRejected);
   }
-  *record.mutable_verdict() = VerdictMessage(judged.verdict);
+  *record.mutable_verdict() = VerdictMessage(validated.verdict);
   return record.SerializeAsString();
 }
 

@@ -319,7 +319,7 @@ TEST(JointTable, HoldsTheSelectedSegments) {
     std::vector<Candidate> set;
     int offered = 0;
     for (const Candidate& candidate : candidates) {
-      const TableChange change = Offer(rig, candidate, set, &tables[0]);
+      const TableUpdate change = Offer(rig, candidate, set, &tables[0]);
       EXPECT_EQ(tables[0].scored, ++offered);
       if (change.evicted) {
         std::erase_if(set, [&](const Candidate& kept) {

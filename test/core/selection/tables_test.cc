@@ -75,7 +75,7 @@ TEST(Tables, HoldTheBestOfAllOffersAsSortingThemWould) {
     for (int i = 0; i < 60; ++i) {
       offers.push_back(Entry(i, entropy(random), gain(random)));
       const Table before = table;
-      const TableChange change = Offer(offers.back(), 1.0, &table);
+      const TableUpdate change = Offer(offers.back(), 1.0, &table);
       const std::vector<TableEntry> expected =
           BruteForce(offers, 1.0, capacity);
       ASSERT_EQ(table.entries, expected);
@@ -90,7 +90,7 @@ TEST(Tables, HoldTheBestOfAllOffersAsSortingThemWould) {
         TableEntry again = offers.back();
         again.entropy -= 1;
         again.sequence += 1000;
-        const TableChange repeat = Offer(again, 1.0, &table);
+        const TableUpdate repeat = Offer(again, 1.0, &table);
         ASSERT_FALSE(repeat.inserted);
         ASSERT_FALSE(repeat.evicted.has_value());
         ASSERT_EQ(table.entries, expected);
@@ -107,7 +107,7 @@ TEST(Tables, OfTwoEquallyRichTheOlderStays) {
   EXPECT_FALSE(Offer(Entry(2, 1.0), 1, &table).inserted);
   EXPECT_EQ(table.entries[0].sequence, 0);
   EXPECT_EQ(table.entries[1].sequence, 1);
-  const TableChange change = Offer(Entry(3, 0.5), 1, &table);
+  const TableUpdate change = Offer(Entry(3, 0.5), 1, &table);
   ASSERT_TRUE(change.evicted.has_value());
   EXPECT_EQ(change.evicted->sequence, 1);
 }

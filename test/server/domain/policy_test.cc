@@ -138,9 +138,9 @@ TEST_P(PolicyTest, DeferredRunSaysWhyAndIsLoggedOnce) {
   Put("a", 0);
   Score(rig, 0, 1);
   ASSERT_TRUE(domain_->CreateManualRun("a").ok());
-  ASSERT_TRUE(domain_->HoldRun("a", 1, "on battery").ok());
-  ASSERT_TRUE(domain_->HoldRun("a", 1, "on battery").ok());
-  ASSERT_TRUE(domain_->HoldRun("a", 1, "the load is high").ok());
+  ASSERT_TRUE(domain_->DeferRun("a", 1, "on battery").ok());
+  ASSERT_TRUE(domain_->DeferRun("a", 1, "on battery").ok());
+  ASSERT_TRUE(domain_->DeferRun("a", 1, "the load is high").ok());
   EXPECT_EQ(store_->GetRun("a", 1)->state, RunState::kPending);
   EXPECT_EQ(store_->GetRun("a", 1)->message, "the load is high");
   int held = 0;
@@ -153,7 +153,7 @@ TEST_P(PolicyTest, DeferredRunSaysWhyAndIsLoggedOnce) {
   EXPECT_EQ(held, 1);
   ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
   EXPECT_EQ(store_->GetRun("a", 1)->message, "");
-  EXPECT_TRUE(absl::IsFailedPrecondition(domain_->HoldRun("a", 1, "late")));
+  EXPECT_TRUE(absl::IsFailedPrecondition(domain_->DeferRun("a", 1, "late")));
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ class HostConditionsTest : public ::testing::Test {
         << " 0.50 0.40 2/345 6789\n";
   }
   std::string Reason() {
-    return MakeHostConditions(limits_, files_)->HoldReason();
+    return MakeHostConditions(limits_, files_)->DeferReason();
   }
 
   const TempFolder folder_;

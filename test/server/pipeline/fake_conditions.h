@@ -10,7 +10,7 @@ namespace selfcal::server {
 
 class FakeConditions final : public Conditions {
  public:
-  std::string HoldReason() override {
+  std::string DeferReason() override {
     const std::lock_guard lock(mutex_);
     return reason_;
   }

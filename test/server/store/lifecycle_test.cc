@@ -134,8 +134,8 @@ TEST_P(LifecycleTest, CandidateOfARunThatEndsOtherwiseIsRejected) {
 
 TEST_P(LifecycleTest, RejectedOneKeepsReasonsAndFigures) {
   const StoredRun run = Begin();
-  StoredCalibration judged = Found(CalibrationState::kRejected);
-  judged.reasons = {"does not fit"};
+  StoredCalibration validated = Found(CalibrationState::kRejected);
+  validated.reasons = {"does not fit"};
   StoredValidation validation;
   validation.active_version = 1;
   validation.checks = {
@@ -143,9 +143,9 @@ TEST_P(LifecycleTest, RejectedOneKeepsReasonsAndFigures) {
       {"halves", 0, 1e-4, CheckOutcome::kNotTested, "too few segments"},
       {"held_out_probability", 1e-9, 1e-4, CheckOutcome::kFailed, "no fit"}};
   validation.held_out = {5, 3, {123.5, 26, 1e-9}, {21.5, 26, 0.7}, 2};
-  judged.verdict = {VerdictKind::kNotTrustworthy, {"does not fit"}};
-  judged.validation = validation;
-  ASSERT_TRUE(domain_->FinishRun("a", run.run, judged).ok());
+  validated.verdict = {VerdictKind::kNotTrustworthy, {"does not fit"}};
+  validated.validation = validation;
+  ASSERT_TRUE(domain_->FinishRun("a", run.run, validated).ok());
   Reopen();
   const auto kept = store_->GetCalibration("a", 2);
   EXPECT_EQ(kept->state, CalibrationState::kRejected);
@@ -171,15 +171,15 @@ TEST_P(LifecycleTest, RejectedOneKeepsReasonsAndFigures) {
 TEST_P(LifecycleTest, OneJudgedAgainstAnotherThanTheActiveIsJudgedAgain) {
   Finish(CalibrationState::kActive);
   const StoredRun run = Begin();
-  StoredCalibration judged = Found(CalibrationState::kActive);
-  judged.validation = StoredValidation();
-  judged.validation->active_version = 2;
+  StoredCalibration validated = Found(CalibrationState::kActive);
+  validated.validation = StoredValidation();
+  validated.validation->active_version = 2;
   ASSERT_TRUE(domain_->ActivateCalibration("a", 1, "me", "drifts").ok());
   EXPECT_TRUE(
-      absl::IsAborted(domain_->FinishRun("a", run.run, judged).status()));
+      absl::IsAborted(domain_->FinishRun("a", run.run, validated).status()));
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
-  judged.validation->active_version = 1;
-  ASSERT_TRUE(domain_->FinishRun("a", run.run, judged).ok());
+  validated.validation->active_version = 1;
+  ASSERT_TRUE(domain_->FinishRun("a", run.run, validated).ok());
   EXPECT_EQ(store_->GetActiveCalibration("a")->version, 3);
 }
 
