@@ -27,6 +27,7 @@ struct KeeperSituation {
   bool spool_is_usable = false;  // there is one, and it is not blocked
 };
 
+// Files are removed first, as that frees the disk.
 KeeperStep NextStep(const KeeperSituation& now);
 
 }  // namespace selfcal::client

@@ -16,10 +16,13 @@
 // tangent. It has no prior on theta: the caller adds one to Lambda, chooses the
 // step, within a subspace or shortened, and requests the other steps.
 //
-// The phases: observations are collected and weighted (LinearObservations,
-// LinearViews), the elimination is planned (EliminationPlan), inertial factors
-// are linearised (LinearMotion), each chain is eliminated, and the interface at
-// last (LinearInterface).
+// The phases of Linearise: observations are collected and weighted
+// (LinearObservations, LinearViews); the elimination is planned
+// (EliminationPlan); inertial factors are linearised (LinearMotion) and priors
+// set (KeyframePriors); the reprojections of each chain are linearised
+// (LinearViews), and it is eliminated down to the interface, the unknowns that
+// chains share (LinearInterface); the priors of kept landmarks are added; the
+// interface is eliminated.
 #pragma once
 
 #include <Eigen/Core>
@@ -74,8 +77,8 @@ class LinearSystem {
   double decrease() const { return decrease_; }
 
   // Back-substitution: the steps that minimise F for a step of theta, of the
-  // keyframes and of the landmarks by (alpha, beta, rho); zero for excluded
-  // landmarks.
+  // keyframes (chain_unknowns.h) and of the landmarks by (alpha, beta, rho) of
+  // landmark_position.h; zero for excluded landmarks.
   void FindSteps(const Eigen::VectorXd& theta_step,
                  std::vector<ChainStateVector>* keyframes,
                  std::vector<Eigen::Vector3d>* landmarks) const;

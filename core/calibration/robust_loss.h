@@ -27,6 +27,7 @@ struct RobustLoss {
   // residual, averaged over its direction in the plane. Equal to Weight(s) for
   // small s.
   double Curvature(double s) const;
+  // rho(s) [sigma^2].
   double Value(double s) const;
 };
 

@@ -29,8 +29,8 @@ struct SegmentEvidence {
 };
 
 // `rig` has the noise by which the calibration was weighted; `segments` are
-// those of its problem; then the expected squares of the two rows of a
-// reprojection, 0 if unknown.
+// those of its problem; `squares_of_a_reprojection` is the expected sum of
+// squares of its two whitened rows, 0 if unknown.
 std::vector<SegmentEvidence> CollectEvidence(
     const Rig& rig,
     const Calibration& theta,

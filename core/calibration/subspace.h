@@ -1,7 +1,7 @@
 // Directions of theta that the data of a calibration determines, and the
 // resulting covariance. Directions are separated in units of the prior: one
 // with less information from the data than from the prior is treated as
-// unobserved (section IV-A of the method). Pure, callable from any thread.
+// unobserved (section IV-A of the paper). Pure, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>

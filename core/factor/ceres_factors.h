@@ -51,7 +51,8 @@ std::unique_ptr<ceres::CostFunction> MakeInertialCost(
     double gravity_mps2,
     const InertialMatrix& square_root_information);
 
-// Blocks (vb0, vb1); 6 residuals divided by sigmas (BiasWalkSigmas).
+// Blocks (vb0, vb1); 6 residuals: the biases (b_a, b_g) of vb1 minus those of
+// vb0, divided by sigmas (BiasWalkSigmas).
 std::unique_ptr<ceres::CostFunction> MakeBiasWalkCost(
     const Eigen::Matrix<double, 6, 1>& sigmas);
 

@@ -35,7 +35,8 @@ inline constexpr int kRateChanges = 9;
 template <typename T>
 using RateColumns = Eigen::Matrix<T, 3, kRateChanges>;
 
-// A dphi for these changes, for a matrix A that is applied afterwards. With dw
+// A dphi for these changes (3 x 9, in the order of RateColumns, per rad/s), for
+// a matrix A that is applied afterwards. With dw
 // = e_r w_c,
 //   dphi = alpha_c e_r + coning (w_0c e_r x w_1 + w_1c w_0 x e_r)
 //        = alpha_c e_r + e_r x (kappa x e_c)

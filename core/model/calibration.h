@@ -55,8 +55,8 @@ struct Calibration {
   std::vector<CameraCalibration> cameras;
 };
 
-// One component of the tangent. TangentComponents is the only list of names
-// and units in the project: every table, message and export uses it.
+// One component of the tangent. The names and units come from
+// parameter_blocks.h; every table, message and export uses this list.
 struct TangentComponent {
   std::string name;  // "imu.gyro.scale.x", "cam0.focal.x", "cam0.p_CI.x"
   std::string unit;  // "-", "rad", "m", "px", "s"

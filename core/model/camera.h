@@ -15,8 +15,8 @@
 
 namespace selfcal {
 
-// A registered model: its index in the list of camera_models.h. Those that code
-// refers to have an enumerator.
+// A registered model, projection included: its index in the list of
+// camera_models.h. Those that code refers to have an enumerator.
 enum class DistortionModel : int {
   kFov,               // w: Devernay and Faugeras 2001
   kRadialTangential,  // k1 k2 p1 p2: Brown
@@ -41,7 +41,7 @@ using DistortionVector =
 struct CameraCalibration {
   // T_CI: takes a point from the body frame I to the camera frame C.
   Eigen::Quaterniond q_CI = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d p_CI = Eigen::Vector3d::Zero();  // [m]
+  Eigen::Vector3d p_CI = Eigen::Vector3d::Zero();  // [m], origin of I in C
   Eigen::Vector2d f = Eigen::Vector2d::Ones();     // [px]
   Eigen::Vector2d c = Eigen::Vector2d::Zero();     // [px]
   DistortionModel model = DistortionModel::kFov;

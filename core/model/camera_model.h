@@ -3,10 +3,16 @@
 //
 // A model is a class with the static members
 //   kName, kCoefficients, kTools   see CameraModelInfo; kSize coefficients,
-// that is constructed from the values of its coefficients and has
-//   Project    the pixel of a point, whether it is valid, and derivatives,
-//   Unproject  the ray of a pixel, and whether there is one,
-// as pinhole.h has them. Internal to the project: not an installed header.
+// that is constructed from the values of its coefficients and has, with the
+// signatures of pinhole.h,
+//   Project    a template over the scalar (double or Lanes): the pixel of p_C
+//   at
+//              any positive scale, its ProjectionParts unless null, and whether
+//              p_C is where the model is one-to-one,
+//   Unproject  a ray in C, of any length, of the coordinates d = (z - c) / f,
+//              and whether there is one.
+// Its coefficients need not be those of a distortion. Internal to the project:
+// not an installed header.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +28,7 @@ struct Interval {
   double high;
 };
 
-// A coefficient of a model. Coefficients have no unit.
+// A coefficient of a model. Coefficients are shown without a unit.
 struct CameraCoefficient {
   std::string_view name;  // "k1": the component is cam0.distortion.k1
   // Expected standard deviation after one reference segment: see

@@ -26,7 +26,10 @@ struct RateFit {
   double share() const { return turn_rad > 0 ? error_rad / turn_rad : 1; }
 };
 
-// Integrates the readings minus the biases that the SLAM system states.
+// Integrates the readings, corrected by `imu` and by the biases of the
+// keyframes and mapped by the hypothesis, between keyframes. The residual is
+// the rotation left between this and the stated one [rad], trimmed over all
+// intervals.
 RateFit FitRates(const MotionData& data,
                  const ImuCalibration& imu,
                  const RateHypothesis& hypothesis);

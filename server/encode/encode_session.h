@@ -20,8 +20,8 @@ v1::TrajectorySegment Encode(const std::string& rig,
                              const SessionSegment& segment,
                              int max_points);
 
-// What one segment tells, given the prior of the rig
-// (core/information/fusion.h).
+// Standard deviation of each component without and with the segment, given the
+// prior of the rig (core/information/fusion.h).
 v1::SegmentInformation Encode(const Rig& rig,
                               const SegmentInformation& information);
 
