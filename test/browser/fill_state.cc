@@ -17,6 +17,7 @@
 #include "server/status/status_macros.h"
 #include "test/browser/simulated_device.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 namespace {
@@ -25,13 +26,24 @@ constexpr int kIdleRigs = 70;
 constexpr double kSeconds = 60;
 constexpr std::uint64_t kSeed = 1;
 
-absl::Status Settled(Store* store) {
-  for (;;) {
-    SELFCAL_ASSIGN_OR_RETURN(const auto unscored, store->ListUnscored(1));
-    SELFCAL_ASSIGN_OR_RETURN(const auto runs, store->ListUnfinishedRuns());
-    if (unscored.empty() && runs.empty()) return absl::OkStatus();
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
+absl::StatusOr<bool> IsSettled(Store* store) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto unscored, store->ListUnscored(1));
+  SELFCAL_ASSIGN_OR_RETURN(const auto runs, store->ListUnfinishedRuns());
+  return unscored.empty() && runs.empty();
+}
+
+// Waits until all is scored and no run is unfinished.
+absl::Status Settle(Store* store) {
+  absl::StatusOr<bool> settled = false;
+  const bool in_time = Eventually(
+      [&] {
+        settled = IsSettled(store);
+        return !settled.ok() || *settled;
+      },
+      10 * kLongWait,
+      std::chrono::milliseconds(20));
+  if (!in_time) return absl::DeadlineExceededError("a run does not end");
+  return settled.status();
 }
 
 // Scored and calibrated on as the daemon does it.
@@ -47,9 +59,9 @@ absl::Status AddDevice(Domain* domain, const std::string& id) {
     SELFCAL_RETURN_IF_ERROR(
         pipeline->Submit(id, segment, [] { return false; }).status());
   }
-  SELFCAL_RETURN_IF_ERROR(Settled(domain->store()));
+  SELFCAL_RETURN_IF_ERROR(Settle(domain->store()));
   SELFCAL_RETURN_IF_ERROR(pipeline->StartRecalibration(id, true).status());
-  SELFCAL_RETURN_IF_ERROR(Settled(domain->store()));
+  SELFCAL_RETURN_IF_ERROR(Settle(domain->store()));
   pipeline->Stop();
   return absl::OkStatus();
 }

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
@@ -16,6 +14,7 @@
 #include "test/fuzz/seeds.h"
 #include "test/fuzz/targets.h"
 #include "test/promise.h"
+#include "test/support/files.h"
 
 namespace selfcal {
 namespace {
@@ -33,9 +32,7 @@ std::vector<std::string> Corpus(const std::string& target) {
   std::sort(paths.begin(), paths.end());
   std::vector<std::string> inputs;
   for (const fs::path& path : paths) {
-    std::ifstream file(path, std::ios::binary);
-    inputs.emplace_back(std::istreambuf_iterator<char>(file),
-                        std::istreambuf_iterator<char>());
+    inputs.push_back(ReadBytes(path));
   }
   for (const FuzzSeed& seed : FuzzSeeds()) {
     if (seed.target == target) inputs.push_back(seed.bytes);

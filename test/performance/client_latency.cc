@@ -7,12 +7,10 @@
 //   selfcal_client_latency --daemon build/release/server/daemon/selfcald
 #include <fmt/format.h>
 #include <signal.h>
-#include <stdlib.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -25,6 +23,7 @@
 #include "client/selfcal/client.h"
 #include "client/selfcal/segment_builder.h"
 #include "core/simulation/simulate.h"
+#include "test/support/temp_folder.h"
 #include "test/system/looped_session.h"
 
 namespace selfcal::client {
@@ -112,31 +111,16 @@ Measured Run(const Options& options,
   return measured;
 }
 
-class Scratch {
- public:
-  Scratch() {
-    std::string pattern = "/tmp/selfcal-latency-XXXXXX";
-    path_ = mkdtemp(pattern.data()) == nullptr ? "" : pattern;
-  }
-  ~Scratch() { std::filesystem::remove_all(path_); }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  std::string path(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
 absl::Status Report(const Options& options, Daemon state, bool with_spool) {
-  const Scratch scratch;
+  const TempFolder scratch;
   Rig rig = HandheldRig("latency");
   ClientOptions client;
   client.rig = rig.id;
-  client.target = "unix:" + scratch.path("state/selfcald.sock");
-  if (with_spool) client.spool_dir = scratch.path("spool");
+  client.target = "unix:" + scratch.File("state/selfcald.sock");
+  if (with_spool) client.spool_dir = scratch.File("spool");
   std::unique_ptr<DaemonProcess> daemon;
   if (state != Daemon::kAbsent) {
-    auto started = DaemonProcess::Start(options.daemon, scratch.path("state"));
+    auto started = DaemonProcess::Start(options.daemon, scratch.File("state"));
     if (!started.ok()) return started.status();
     daemon = *std::move(started);
     const absl::Status created =

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "client/selfcal/client.h"
+#include "test/client/selfcal/drain.h"
 #include "test/support/eventually.h"
 #include "test/system/running_daemon.h"
 #include "test/system/simulated_walk.h"
@@ -77,7 +78,7 @@ Outcome Import(const Device& device,
     daemon = folder.StartDaemon();
   }
   send_until(device.segments.size());
-  EXPECT_TRUE(stream.Drain(milliseconds(120'000)).ok());
+  EXPECT_TRUE(DrainFully(&stream, 2 * kLongWait).ok());
   for (int kill = 0; kill < kills_in_run; ++kill) {
     EXPECT_TRUE(Eventually(
         [&] { return IsRunning(view); }, 2 * kLongWait, kDaemonInterval));

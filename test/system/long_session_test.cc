@@ -14,6 +14,7 @@
 #include "client/selfcal/client.h"
 #include "client/selfcal/segment_builder.h"
 #include "core/simulation/simulate.h"
+#include "test/client/selfcal/drain.h"
 #include "test/support/eventually.h"
 #include "test/system/looped_session.h"
 #include "test/system/running_daemon.h"
@@ -123,7 +124,7 @@ TEST(LongSession, AnHourGoesThroughAtConstantMemory) {
   builder.Flush(kSegmentKeyframes);
   ASSERT_NO_FATAL_FAILURE(send_complete());
   ASSERT_EQ(sent, kSegments);
-  ASSERT_TRUE(stream.Drain(std::chrono::milliseconds(60'000)).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
 
   ASSERT_TRUE(Eventually([&] { return CountScored(view) == kSegments; },
                          2 * kLongWait,

@@ -36,21 +36,6 @@ bool IsIdle(DaemonView& view, std::size_t segments) {
 
 }  // namespace
 
-ScratchFolder::ScratchFolder() {
-  std::string pattern = ::testing::TempDir() + "/selfcal_XXXXXX";
-  if (mkdtemp(pattern.data()) == nullptr) {
-    std::perror("mkdtemp");
-    std::abort();
-  }
-  root_ = pattern;
-  state_dir_ = root_ / "state";
-}
-
-ScratchFolder::~ScratchFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(root_, ignored);
-}
-
 std::string ScratchFolder::target() const {
   return "unix:" + state_dir_ + "/selfcald.sock";
 }

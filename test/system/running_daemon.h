@@ -3,7 +3,6 @@
 
 #include <absl/status/status.h>
 
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -11,6 +10,7 @@
 
 #include "client/demo/daemon_process.h"
 #include "client/demo/daemon_view.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 
@@ -18,11 +18,6 @@ namespace selfcal::client {
 // daemon before it.
 class ScratchFolder {
  public:
-  ScratchFolder();
-  ~ScratchFolder();
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
   const std::string& state_dir() const { return state_dir_; }
   std::string target() const;  // of a daemon on it, as gRPC names it
 
@@ -31,8 +26,8 @@ class ScratchFolder {
   std::unique_ptr<DaemonProcess> StartDaemon() const;
 
  private:
-  std::filesystem::path root_;
-  std::string state_dir_;
+  const TempFolder folder_;
+  const std::string state_dir_ = folder_.File("state");
 };
 
 // Waits until `segments` are scored and no run is unfinished.

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "client/selfcal/client.h"
+#include "test/client/selfcal/drain.h"
 #include "test/system/running_daemon.h"
 #include "test/system/simulated_walk.h"
 
@@ -44,7 +45,7 @@ TEST_F(StandingDaemon, AStreamInTheMiddleOfAMessageLeaves) {
       DaemonView(folder_.target(), "walker").CreateRig(device_.rig).ok());
   auto stream = Stream();
   ASSERT_TRUE(stream->Send(device_.segments[0]));
-  ASSERT_TRUE(stream->Drain(seconds(60)).ok());
+  ASSERT_TRUE(DrainFully(stream.get()).ok());
   kill(daemon_->pid(), SIGSTOP);
   // More than what the connection holds.
   for (int i = 1; i < 30; ++i) stream->Send(device_.segments[i]);

@@ -7,6 +7,7 @@
 
 #include "client/demo/device.h"
 #include "client/selfcal/client.h"
+#include "test/client/selfcal/drain.h"
 #include "test/recordings.h"
 #include "test/system/running_daemon.h"
 
@@ -28,7 +29,7 @@ DaemonState ImportedState(const Device& device, const ScratchFolder& folder) {
   for (const MotionSegment& segment : device.segments) {
     EXPECT_TRUE(stream.Send(segment));
   }
-  EXPECT_TRUE(stream.Drain(std::chrono::seconds(60)).ok());
+  EXPECT_TRUE(DrainFully(&stream).ok());
   EXPECT_TRUE(WaitUntilIdle(view, device.segments.size(), kLimit).ok());
   return view.GetState().value_or(DaemonState());
 }

@@ -3,9 +3,7 @@
 
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <string>
@@ -17,6 +15,8 @@
 #include "selfcal/v1/recalibration.grpc.pb.h"
 #include "selfcal/v1/rig.grpc.pb.h"
 #include "selfcal/v1/segment.grpc.pb.h"
+#include "test/client/cli/canned_page.h"
+#include "test/support/grpc_server.h"
 
 namespace selfcal::client {
 
@@ -66,44 +66,14 @@ struct CannedDaemon final : v1::RigService::Service,
   // On a unix socket, or with credentials on a port.
   explicit CannedDaemon(
       const std::shared_ptr<grpc::ServerCredentials>& credentials = nullptr) {
-    static std::atomic<int> count{0};
-    int port = 0;
-    target = "unix:" + ::testing::TempDir() + "selfcal-canned-" +
-             std::to_string(getpid()) + "-" + std::to_string(count++) + ".sock";
-    grpc::ServerBuilder builder;
     if (credentials == nullptr) {
-      builder.AddListeningPort(target, grpc::InsecureServerCredentials());
+      server.Start();
     } else {
-      builder.AddListeningPort("127.0.0.1:0", credentials, &port);
+      server.StartOnPort(credentials);
     }
-    builder.RegisterService(static_cast<v1::RigService::Service*>(this));
-    builder.RegisterService(static_cast<v1::SegmentService::Service*>(this));
-    builder.RegisterService(
-        static_cast<v1::CalibrationService::Service*>(this));
-    builder.RegisterService(
-        static_cast<v1::RecalibrationService::Service*>(this));
-    server = builder.BuildAndStart();
-    if (port != 0) target = "127.0.0.1:" + std::to_string(port);
+    target = server.target();
   }
-  ~CannedDaemon() override {
-    server->Shutdown(std::chrono::system_clock::now());
-    server->Wait();
-  }
-
-  // Pages of two, whatever was asked for.
-  template <typename Request, typename Items, typename Response, typename Add>
-  static void Page(const Request& request,
-                   const Items& items,
-                   Response* response,
-                   const Add& add) {
-    const std::size_t begin =
-        request.page_token().empty() ? 0 : std::stoul(request.page_token());
-    const std::size_t end = std::min(begin + 2, items.size());
-    for (std::size_t i = begin; i < end; ++i) add(items[i]);
-    if (end < items.size()) {
-      response->set_next_page_token(std::to_string(end));
-    }
-  }
+  ~CannedDaemon() override { server.Stop(); }
 
   grpc::Status CreateRig(grpc::ServerContext*,
                          const v1::CreateRigRequest* request,
@@ -126,7 +96,7 @@ struct CannedDaemon final : v1::RigService::Service,
   grpc::Status ListRigs(grpc::ServerContext*,
                         const v1::ListRigsRequest* request,
                         v1::ListRigsResponse* response) override {
-    Page(*request, rigs, response, [&](const v1::Rig& rig) {
+    FillCannedPage(*request, rigs, response, [&](const v1::Rig& rig) {
       *response->add_rigs() = rig;
     });
     return grpc::Status::OK;
@@ -160,9 +130,10 @@ struct CannedDaemon final : v1::RigService::Service,
     last_name = request->parent();
     last_filter = request->filter();
     last_order = request->order_by();
-    Page(*request, segments, response, [&](const v1::Segment& segment) {
-      *response->add_segments() = segment;
-    });
+    FillCannedPage(
+        *request, segments, response, [&](const v1::Segment& segment) {
+          *response->add_segments() = segment;
+        });
     return grpc::Status::OK;
   }
   grpc::Status GetSegmentData(grpc::ServerContext*,
@@ -219,9 +190,10 @@ struct CannedDaemon final : v1::RigService::Service,
       grpc::ServerContext*,
       const v1::ListCalibrationsRequest* request,
       v1::ListCalibrationsResponse* response) override {
-    Page(*request, calibrations, response, [&](const v1::Calibration& one) {
-      *response->add_calibrations() = one;
-    });
+    FillCannedPage(
+        *request, calibrations, response, [&](const v1::Calibration& one) {
+          *response->add_calibrations() = one;
+        });
     return grpc::Status::OK;
   }
   grpc::Status ActivateCalibration(
@@ -312,7 +284,7 @@ struct CannedDaemon final : v1::RigService::Service,
       const v1::ListRecalibrationsRequest* request,
       v1::ListRecalibrationsResponse* response) override {
     last_name = request->parent();
-    Page(*request, run, response, [&](const v1::Recalibration& one) {
+    FillCannedPage(*request, run, response, [&](const v1::Recalibration& one) {
       *response->add_recalibrations() = one;
     });
     return grpc::Status::OK;
@@ -337,7 +309,10 @@ struct CannedDaemon final : v1::RigService::Service,
   }
 
   std::string target;
-  std::unique_ptr<grpc::Server> server;
+  GrpcServer server{{static_cast<v1::RigService::Service*>(this),
+                     static_cast<v1::SegmentService::Service*>(this),
+                     static_cast<v1::CalibrationService::Service*>(this),
+                     static_cast<v1::RecalibrationService::Service*>(this)}};
 };
 
 }  // namespace selfcal::client

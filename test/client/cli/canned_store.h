@@ -3,17 +3,16 @@
 
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "client/cli/sha256.h"
 #include "selfcal/v1/store_service.grpc.pb.h"
+#include "test/client/cli/canned_page.h"
+#include "test/support/grpc_server.h"
 
 namespace selfcal::client {
 
@@ -32,14 +31,12 @@ struct CannedStore final : v1::StoreService::Service {
   std::string target;
 
   CannedStore() {
-    static std::atomic<int> count{0};
-    target = "unix:" + ::testing::TempDir() + "selfcal-store-" +
-             std::to_string(getpid()) + "-" + std::to_string(count++) + ".sock";
+    target = server_.target();
     Start();
   }
   ~CannedStore() override {
     if (restart_.joinable()) restart_.join();
-    server_->Shutdown(std::chrono::system_clock::now());
+    server_.Stop();
   }
 
   static std::string Checksum(const std::string& bytes) {
@@ -112,35 +109,24 @@ struct CannedStore final : v1::StoreService::Service {
                           const v1::ListEventsRequest* request,
                           v1::ListEventsResponse* response) override {
     parent = request->parent();
-    const std::size_t begin =
-        request->page_token().empty() ? 0 : std::stoul(request->page_token());
-    const std::size_t end = std::min(begin + 2, events.size());
-    for (std::size_t i = begin; i < end; ++i) {
-      *response->add_events() = events[i];
-    }
-    if (end < events.size()) {
-      response->set_next_page_token(std::to_string(end));
-    }
+    FillCannedPage(*request, events, response, [&](const v1::Event& event) {
+      *response->add_events() = event;
+    });
     return grpc::Status::OK;
   }
 
  private:
   void Start() {
     ++starts;
-    grpc::ServerBuilder builder;
-    builder.AddListeningPort(target, grpc::InsecureServerCredentials());
-    builder.RegisterService(this);
-    server_ = builder.BuildAndStart();
+    server_.Start();
   }
-  // Answers what is under way first.
   void Restart() {
-    server_->Shutdown();
-    server_.reset();
+    server_.FinishAndStop();
     Start();
   }
 
   std::thread restart_;
-  std::unique_ptr<grpc::Server> server_;
+  GrpcServer server_{{this}};
 };
 
 }  // namespace selfcal::client

@@ -4,7 +4,6 @@
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +12,8 @@
 #include "core/model/rig.h"
 #include "proto/convert.h"
 #include "test/client/cli/canned_daemon.h"
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 
@@ -94,12 +95,13 @@ class Commands : public ::testing::Test {
     EXPECT_TRUE(status.ok()) << status.ToString() << json;
     return message;
   }
-  static std::string WriteFile(const std::string& text) {
-    const std::string name = testing::TempDir() + "selfcal-cli-rig.json";
-    std::ofstream(name) << text;
+  std::string WriteFile(const std::string& text) const {
+    std::string name = temp_folder_.File("rig.json");
+    WriteBytes(name, text);
     return name;
   }
 
+  const TempFolder temp_folder_;
   CannedDaemon daemon_;
 };
 

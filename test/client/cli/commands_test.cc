@@ -157,7 +157,7 @@ TEST_F(Commands, NamesTheFieldOfAFileThatItCannotRead) {
       Selfcal({"rig", "create", WriteFile(R"({"factroy": {}})")});
   EXPECT_EQ(unknown.code, 2);
   EXPECT_THAT(unknown.err, HasSubstr("factroy"));
-  EXPECT_THAT(unknown.err, HasSubstr("selfcal-cli-rig.json"));
+  EXPECT_THAT(unknown.err, HasSubstr("rig.json"));
   EXPECT_EQ(Selfcal({"rig", "create", WriteFile("{")}).code, 2);
   EXPECT_TRUE(daemon_.rigs.empty());
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "test/client/cli/commands_fixture.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
@@ -18,8 +19,8 @@ using testing::HasSubstr;
 
 // What bash offers for the last of the words, one a line.
 std::vector<std::string> Offered(const std::vector<std::string>& words) {
-  const std::string script =
-      testing::TempDir() + "selfcal-completion-" + std::to_string(getpid());
+  const TempFolder folder;
+  const std::string script = folder.File("script");
   {
     std::ofstream file(script);
     file << Selfcal({"completion", "bash"}).out << "COMP_WORDS=(selfcal";
@@ -36,7 +37,6 @@ std::vector<std::string> Offered(const std::vector<std::string>& words) {
     offered.emplace_back(line.data());
     offered.back().pop_back();
   }
-  std::remove(script.c_str());
   return offered;
 }
 

@@ -16,15 +16,9 @@ using testing::Not;
 
 namespace fs = std::filesystem;
 
-std::string ReadAll(const fs::path& path) {
-  std::ifstream file(path);
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
-
 class CalibrationExport : public Commands {
  protected:
   CalibrationExport() {
-    fs::remove_all(folder_);
     Rig rig = ARig("device");
     rig.factory.imu.s_g = {1.01, 0.99, 1.02};
     daemon_.rigs.push_back(ToProto(rig));
@@ -34,7 +28,6 @@ class CalibrationExport : public Commands {
     *version.mutable_parameters() = ToProto(rig.factory);
     daemon_.calibrations.push_back(version);
   }
-  ~CalibrationExport() override { fs::remove_all(folder_); }
 
   std::vector<std::string> Line(const std::string& format) const {
     return {"calibrations",
@@ -49,7 +42,7 @@ class CalibrationExport : public Commands {
             "200"};
   }
 
-  const fs::path folder_ = fs::path(testing::TempDir()) / "selfcal-cli-export";
+  const fs::path folder_ = temp_folder_.path() / "exported";
 };
 
 TEST_F(CalibrationExport, WritesTheVersionAndNamesWhatIsLost) {
@@ -57,7 +50,7 @@ TEST_F(CalibrationExport, WritesTheVersionAndNamesWhatIsLost) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/2");
   EXPECT_EQ(outcome.out, (folder_ / "sensors.yaml").string() + "\n");
-  EXPECT_THAT(ReadAll(folder_ / "sensors.yaml"), HasSubstr("[257.5, 258.5,"));
+  EXPECT_THAT(ReadBytes(folder_ / "sensors.yaml"), HasSubstr("[257.5, 258.5,"));
   EXPECT_THAT(outcome.err, HasSubstr("lost: imu: maplab uses the readings"));
   EXPECT_THAT(outcome.err, HasSubstr("note: sigmas: "));
 }
@@ -175,7 +168,7 @@ TEST_F(CalibrationExport, FilesThatCannotBeReadAreUnusableInput) {
 TEST_F(CalibrationExport, WhatARigCannotTakeIsNamedAndStrictRefusesIt) {
   ASSERT_EQ(Selfcal(Line("kalibr")).code, 0);
   const fs::path imu = folder_ / "imu.yaml";
-  std::string text = ReadAll(imu);
+  std::string text = ReadBytes(imu);
   const std::string zeros = "A:\n    - [0.0,";
   text.replace(text.find(zeros), zeros.size(), "A:\n    - [0.1,");
   std::ofstream(imu) << text;

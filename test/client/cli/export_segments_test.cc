@@ -47,17 +47,13 @@ class SegmentExport : public Commands {
       data.mutable_observations()->add_z_px(240);
       daemon_.data.push_back(data);
     }
-    std::filesystem::remove_all(folder_);
   }
-  ~SegmentExport() override { std::filesystem::remove_all(folder_); }
 
   std::string Read(const std::string& name) const {
-    std::ifstream file(folder_ + name);
-    return {std::istreambuf_iterator<char>(file), {}};
+    return ReadBytes(folder_ + name);
   }
 
-  const std::string folder_ =
-      testing::TempDir() + "selfcal-export-" + std::to_string(getpid());
+  const std::string folder_ = temp_folder_.File("exported");
 };
 
 TEST_F(SegmentExport, WritesTablesOfAllThatHaveData) {

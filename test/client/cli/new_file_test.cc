@@ -9,6 +9,9 @@
 #include <iterator>
 #include <string>
 
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
+
 namespace selfcal::client {
 namespace {
 
@@ -16,23 +19,14 @@ namespace fs = std::filesystem;
 
 class NewFileTest : public ::testing::Test {
  protected:
-  NewFileTest() {
-    std::string folder = fs::temp_directory_path() / "new-file-XXXXXX";
-    folder_ = mkdtemp(folder.data());
-    path_ = folder_ / "file";
-  }
-  ~NewFileTest() override { fs::remove_all(folder_); }
-
-  std::string Content() const {
-    std::ifstream stream(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
+  std::string Content() const { return ReadBytes(path_); }
   int Files() const {
     return static_cast<int>(std::distance(fs::directory_iterator(folder_), {}));
   }
 
-  fs::path folder_;
-  fs::path path_;
+  const TempFolder temp_folder_;
+  const fs::path folder_ = temp_folder_.path();
+  const fs::path path_ = folder_ / "file";
 };
 
 TEST_F(NewFileTest, HasItsNameOnceItIsWhole) {

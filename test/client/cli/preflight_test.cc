@@ -32,7 +32,7 @@ Rig DoubleSize(const std::string& map) {
 
 class PreflightCommand : public Commands {
  protected:
-  static std::string WriteRig(const Rig& rig) {
+  std::string WriteRig(const Rig& rig) const {
     std::string json;
     EXPECT_TRUE(
         google::protobuf::util::MessageToJsonString(ToProto(rig), &json).ok());

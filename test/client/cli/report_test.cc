@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <string>
 
 #include "test/client/cli/commands_fixture.h"
@@ -19,17 +17,11 @@ class ReportCommand : public Commands {
   ReportCommand() {
     daemon_.rigs.push_back(ToProto(ARig("device")));
     daemon_.calibrations = {Version(1), Version(2)};
-    std::remove(path_.c_str());
-  }
-  ~ReportCommand() override { std::remove(path_.c_str()); }
-
-  std::string File() const {
-    std::ifstream file(path_);
-    return {std::istreambuf_iterator<char>(file), {}};
   }
 
-  const std::string path_ =
-      testing::TempDir() + "selfcal-report-" + std::to_string(getpid());
+  std::string File() const { return ReadBytes(path_); }
+
+  const std::string path_ = temp_folder_.File("report.html");
 };
 
 TEST_F(ReportCommand, WritesOneFile) {

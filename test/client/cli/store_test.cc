@@ -15,6 +15,8 @@
 
 #include "test/client/cli/canned_store.h"
 #include "test/client/cli/commands_fixture.h"
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
@@ -26,13 +28,6 @@ using ::testing::Not;
 
 class StoreCommands : public ::testing::Test {
  protected:
-  StoreCommands() {
-    std::string folder = fs::temp_directory_path() / "store-cli-XXXXXX";
-    folder_ = mkdtemp(folder.data());
-    file_ = folder_ / "backup.db";
-  }
-  ~StoreCommands() override { fs::remove_all(folder_); }
-
   int Selfcal(std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--target", daemon_.target});
     Outcome outcome = client::Selfcal(arguments);
@@ -58,10 +53,7 @@ class StoreCommands : public ::testing::Test {
     close(ends[0]);
     return code;
   }
-  std::string Content() const {
-    std::ifstream stream(file_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
+  std::string Content() const { return ReadBytes(file_); }
   int Files() const {
     return static_cast<int>(std::distance(fs::directory_iterator(folder_), {}));
   }
@@ -70,13 +62,14 @@ class StoreCommands : public ::testing::Test {
     std::string bytes("SQLite format 3\0", 16);
     bytes.resize(68, 'x');
     bytes += "SCAL" + std::string(3'000'000, 'b');
-    std::ofstream(file_, std::ios::binary) << bytes;
+    WriteBytes(file_, bytes);
     return bytes;
   }
 
   CannedStore daemon_;
-  fs::path folder_;
-  fs::path file_;
+  const TempFolder temp_folder_;
+  const fs::path folder_ = temp_folder_.path();
+  const fs::path file_ = folder_ / "backup.db";
   std::string out_;
   std::string err_;
 };

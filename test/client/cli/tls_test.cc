@@ -7,7 +7,7 @@
 
 #include "test/client/cli/commands_fixture.h"
 #include "test/recordings.h"
-#include "test/server/certificates.h"
+#include "test/support/certificates.h"
 
 namespace selfcal::client {
 namespace {
@@ -16,22 +16,11 @@ using ::testing::HasSubstr;
 
 class TlsCommands : public ::testing::Test {
  protected:
-  TlsCommands() : daemon_(Credentials(&certificates_)) {
+  TlsCommands() : daemon_(certificates_.Server()) {
     certificates_.Add("operator", "ca", "URI:selfcal://role/administer");
     daemon_.rigs.emplace_back().set_name("rigs/device");
   }
 
-  static std::shared_ptr<grpc::ServerCredentials> Credentials(
-      server::Certificates* certificates) {
-    grpc::SslServerCredentialsOptions tls(
-        GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
-    using server::Certificates;
-    tls.pem_root_certs = Certificates::Read(certificates->Pem("ca"));
-    tls.pem_key_cert_pairs.push_back(
-        {Certificates::Read(certificates->Key("server")),
-         Certificates::Read(certificates->Pem("server"))});
-    return grpc::SslServerCredentials(tls);
-  }
   std::vector<std::string> As(const std::string& name,
                               const std::string& authority = "ca") const {
     return {"--ca",
@@ -52,7 +41,7 @@ class TlsCommands : public ::testing::Test {
     return outcome.code;
   }
 
-  server::Certificates certificates_;
+  Certificates certificates_;
   CannedDaemon daemon_;
   std::string target_ = daemon_.target;
   std::string out_;

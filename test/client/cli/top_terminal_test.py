@@ -23,7 +23,7 @@ SELFCAL, SELFCALD = sys.argv[1:3]
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
 
 from device import RIG
-from running_daemon import RunningDaemon
+from running_daemon import PATIENCE_S, RunningDaemon
 
 ENTER, LEAVE, HOME = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l", "\x1b[H"
 
@@ -55,7 +55,16 @@ class Terminal:
                         raise AssertionError(f"ended: {self.text!r}") from None
 
     def wait(self) -> int:
-        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+        limit = time.monotonic() + PATIENCE_S
+        while True:
+            ended, status = os.waitpid(self.pid, os.WNOHANG)
+            if ended:
+                return os.waitstatus_to_exitcode(status)
+            if time.monotonic() > limit:
+                os.kill(self.pid, signal.SIGKILL)
+                os.waitpid(self.pid, 0)
+                raise AssertionError(f"does not end: {self.text!r}")
+            time.sleep(0.01)
 
 
 def screens(text: str) -> list:
@@ -86,6 +95,7 @@ class TopTest(unittest.TestCase):
             capture_output=True,
             text=True,
             check=False,
+            timeout=PATIENCE_S,
         )
 
     def top(self, *arguments) -> Terminal:

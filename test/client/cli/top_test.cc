@@ -3,7 +3,6 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
-#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "client/cli/top_view.h"
 #include "selfcal/v1/activity_service.grpc.pb.h"
 #include "test/client/cli/commands_fixture.h"
+#include "test/support/grpc_server.h"
 
 namespace selfcal::client {
 namespace {
@@ -99,20 +99,12 @@ TEST(ActivityScreen, FitsTheTerminal) {
 class TopCommand : public ::testing::Test,
                    private v1::ActivityService::Service {
  protected:
-  TopCommand() {
-    grpc::ServerBuilder builder;
-    builder.AddListeningPort(target_, grpc::InsecureServerCredentials());
-    builder.RegisterService(this);
-    server_ = builder.BuildAndStart();
-  }
-  ~TopCommand() override {
-    server_->Shutdown(std::chrono::system_clock::now());
-    server_->Wait();
-  }
+  TopCommand() { server_.Start(); }
+  ~TopCommand() override { server_.Stop(); }
 
   Outcome Top(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), "top");
-    arguments.insert(arguments.end(), {"--target", target_});
+    arguments.insert(arguments.end(), {"--target", server_.target()});
     return Selfcal(arguments);
   }
 
@@ -127,9 +119,7 @@ class TopCommand : public ::testing::Test,
     return grpc::Status::OK;
   }
 
-  const std::string target_ = "unix:" + testing::TempDir() + "selfcal-top-" +
-                              std::to_string(getpid()) + ".sock";
-  std::unique_ptr<grpc::Server> server_;
+  GrpcServer server_{{this}};
 };
 
 TEST_F(TopCommand, IsOneRecordALineInAPipe) {

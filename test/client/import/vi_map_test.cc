@@ -15,6 +15,7 @@
 #include "core/model/so3.h"
 #include "selfcal/vi_map/vi_map.pb.h"
 #include "test/recordings.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
@@ -52,18 +53,12 @@ class DamagedMap : public ::testing::Test {
  protected:
   void SetUp() override {
     SELFCAL_NEED_RECORDING(source, "equidistant_room");
-    folder_ = fs::path(::testing::TempDir()) /
-              ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    fs::remove_all(folder_);
     fs::copy(source, folder_, fs::copy_options::recursive);
     fs::permissions(
         folder_ / "vi_map", fs::perms::owner_all, fs::perm_options::add);
     for (const auto& file : fs::directory_iterator(folder_ / "vi_map")) {
       fs::permissions(file, fs::perms::owner_write, fs::perm_options::add);
     }
-  }
-  void TearDown() override {
-    if (!folder_.empty()) fs::remove_all(folder_);
   }
 
   absl::Status ReadError() { return ReadViMap(folder_.string(), {}).status(); }
@@ -91,7 +86,8 @@ class DamagedMap : public ::testing::Test {
     return map;
   }
 
-  fs::path folder_;
+  const TempFolder temp_folder_;
+  const fs::path folder_ = temp_folder_.path() / "map";
 };
 
 TEST(ReadViMap, TangoRecordingHasItsKnownFigures) {

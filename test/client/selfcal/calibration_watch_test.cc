@@ -1,7 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <condition_variable>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
@@ -15,8 +14,6 @@
 
 namespace selfcal::client {
 namespace {
-
-constexpr std::chrono::seconds kLong{60};  // for what must happen
 
 // One camera whose focal length tells the version.
 v1::Calibration Version(std::int64_t version) {
@@ -40,17 +37,12 @@ class Told {
  public:
   CalibrationWatch::Callback Callback() {
     return [this](const CalibrationVersion& version) {
-      {
-        std::lock_guard lock(mutex_);
-        told_.push_back(version);
-      }
-      changed_.notify_all();
+      std::lock_guard lock(mutex_);
+      told_.push_back(version);
     };
   }
-  bool WaitFor(std::size_t count) {
-    std::unique_lock lock(mutex_);
-    return changed_.wait_for(
-        lock, kLong, [&] { return told_.size() >= count; });
+  bool WaitFor(std::size_t count) const {
+    return Eventually([&] { return versions().size() >= count; });
   }
   std::vector<std::int64_t> versions() const {
     std::lock_guard lock(mutex_);
@@ -65,7 +57,6 @@ class Told {
 
  private:
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
   std::vector<CalibrationVersion> told_;
 };
 

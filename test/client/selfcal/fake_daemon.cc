@@ -1,28 +1,16 @@
 #include "test/client/selfcal/fake_daemon.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <deque>
 #include <thread>
 #include <utility>
 
+#include "test/support/eventually.h"
+
 namespace selfcal::client {
-namespace {
-
-constexpr std::chrono::seconds kLong{60};  // for what must happen
-
-std::string NewSocket() {
-  static std::atomic<int> count{0};
-  return ::testing::TempDir() + "selfcal-fake-" + std::to_string(getpid()) +
-         "-" + std::to_string(count++) + ".sock";
-}
-
-}  // namespace
-
 // Requests of one connection that wait for their answer.
 struct FakeDaemon::Inbox {
   std::size_t connection = 0;
@@ -30,39 +18,7 @@ struct FakeDaemon::Inbox {
   bool ended = false;
 };
 
-FakeDaemon::FakeDaemon() : target_("unix:" + NewSocket()) {}
-
 FakeDaemon::~FakeDaemon() { Stop(); }
-
-void FakeDaemon::Start() {
-  Listen(target_, grpc::InsecureServerCredentials(), nullptr);
-}
-
-void FakeDaemon::StartOnTcp(
-    const std::shared_ptr<grpc::ServerCredentials>& credentials) {
-  int port = 0;
-  Listen("localhost:0", credentials, &port);
-  target_ = "localhost:" + std::to_string(port);
-}
-
-void FakeDaemon::Listen(
-    const std::string& address,
-    const std::shared_ptr<grpc::ServerCredentials>& credentials,
-    int* port) {
-  grpc::ServerBuilder builder;
-  builder.AddListeningPort(address, credentials, port);
-  builder.RegisterService(static_cast<v1::SegmentService::Service*>(this));
-  builder.RegisterService(static_cast<v1::CalibrationService::Service*>(this));
-  server_ = builder.BuildAndStart();
-  ASSERT_NE(server_, nullptr);
-}
-
-void FakeDaemon::Stop() {
-  if (server_ == nullptr) return;
-  server_->Shutdown(std::chrono::system_clock::now());
-  server_->Wait();
-  server_.reset();
-}
 
 void FakeDaemon::SetMishaps(std::function<Mishap(const SegmentKey&)> mishaps) {
   std::lock_guard lock(mutex_);
@@ -96,14 +52,14 @@ void FakeDaemon::Publish(const v1::Calibration& calibration) {
 }
 
 bool FakeDaemon::WaitForRequests(std::size_t count) {
-  std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, kLong, [&] { return requests_ >= count; });
+  return Eventually([&] { return requests() >= count; });
 }
 
 bool FakeDaemon::WaitForWatcher(std::int64_t version) {
-  std::unique_lock lock(mutex_);
-  return changed_.wait_for(
-      lock, kLong, [&] { return watched_.count(version) > 0; });
+  return Eventually([&] {
+    std::lock_guard lock(mutex_);
+    return watched_.count(version) > 0;
+  });
 }
 
 std::vector<std::vector<SegmentKey>> FakeDaemon::connections() const {

@@ -18,6 +18,7 @@
 #include "core/model/segment.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 #include "selfcal/v1/segment.grpc.pb.h"
+#include "test/support/grpc_server.h"
 
 namespace selfcal::client {
 
@@ -34,14 +35,17 @@ class FakeDaemon final : private v1::SegmentService::Service,
     kUnknownVerdict,
   };
 
-  FakeDaemon();  // not started
+  FakeDaemon() = default;  // not started
   ~FakeDaemon() override;
 
-  std::string target() const { return target_; }
-  void Start();
-  // On a port of localhost that is free; target() names it from now on.
-  void StartOnTcp(const std::shared_ptr<grpc::ServerCredentials>& credentials);
-  void Stop();  // streams that are open are cancelled
+  std::string target() const { return server_.target(); }
+  void Start() { server_.Start(); }
+  // On a free port, which target() names from now on.
+  void StartOnPort(
+      const std::shared_ptr<grpc::ServerCredentials>& credentials) {
+    server_.StartOnPort(credentials);
+  }
+  void Stop() { server_.Stop(); }  // streams that are open are cancelled
 
   // Settings; may be changed at any time.
   void SetMishaps(std::function<Mishap(const SegmentKey&)> mishaps);
@@ -78,13 +82,6 @@ class FakeDaemon final : private v1::SegmentService::Service,
   // The verdict, or nothing if the connection is to break.
   std::optional<v1::StreamSegmentsResponse> Answer(const SegmentKey& key);
 
-  void Listen(const std::string& address,
-              const std::shared_ptr<grpc::ServerCredentials>& credentials,
-              int* port);
-
-  std::string target_;
-  std::unique_ptr<grpc::Server> server_;
-
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
   std::function<Mishap(const SegmentKey&)> mishaps_;
@@ -97,6 +94,9 @@ class FakeDaemon final : private v1::SegmentService::Service,
   bool hold_ = false;
   std::optional<v1::Calibration> active_;
   std::set<std::int64_t> watched_;
+
+  GrpcServer server_{{static_cast<v1::SegmentService::Service*>(this),
+                      static_cast<v1::CalibrationService::Service*>(this)}};
 };
 
 }  // namespace selfcal::client

@@ -171,7 +171,9 @@ TEST(SegmentBuilder, BuildsSegmentsThatAreValid) {
     options.keyframes = 2 + static_cast<int>(random() % 40);
     options.min_observations = static_cast<int>(random() % 6);
     const std::int64_t delay = (static_cast<int>(random() % 600) - 300) * kMs;
-    for (const MotionSegment& segment : Build(session, options, delay)) {
+    const auto segments = Build(session, options, delay);
+    EXPECT_FALSE(segments.empty());
+    for (const MotionSegment& segment : segments) {
       const auto violations = Validate(segment, theta);
       EXPECT_TRUE(violations.empty())
           << violations.front().field << " " << violations.front().message;
@@ -204,6 +206,7 @@ TEST(SegmentBuilder, DoesNotDependOnWhetherTheImuLagsOrLeads) {
     const Session session = RandomSession(random, 100);
     const auto leading = Build(session, Options(), -300 * kMs);
     const auto lagging = Build(session, Options(), 300 * kMs);
+    ASSERT_GT(leading.size(), 0u);
     ASSERT_EQ(leading.size(), lagging.size());
     for (std::size_t s = 0; s < leading.size(); ++s) {
       EXPECT_EQ(leading[s].keyframes.size(), lagging[s].keyframes.size());

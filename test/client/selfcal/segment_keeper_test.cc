@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/selfcal/queue_limits.h"
-#include "test/client/selfcal/test_folder.h"
 #include "test/client/selfcal/test_segments.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
@@ -107,7 +107,8 @@ class SegmentKeeperTest : public ::testing::Test {
     return files;
   }
 
-  TestFolder folder_;
+  // In memory, because the interleavings sync thousands of files.
+  TempFolder folder_{FolderInMemory()};
 };
 
 TEST_F(SegmentKeeperTest, FillsTheWindowWithoutASpool) {

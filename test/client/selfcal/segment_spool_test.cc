@@ -14,16 +14,15 @@
 #include <vector>
 
 #include "client/selfcal/client.h"
+#include "test/client/selfcal/drain.h"
 #include "test/client/selfcal/fake_daemon.h"
-#include "test/client/selfcal/test_folder.h"
 #include "test/client/selfcal/test_segments.h"
 #include "test/promise.h"
 #include "test/support/eventually.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
-
-constexpr std::chrono::seconds kLong{60};  // for what must happen
 
 class SegmentSpoolTest : public ::testing::Test {
  protected:
@@ -65,7 +64,7 @@ class SegmentSpoolTest : public ::testing::Test {
     return files;
   }
 
-  TestFolder folder_;
+  TempFolder folder_;
   FakeDaemon daemon_;
   std::uint64_t refused_ = 0;
 
@@ -84,7 +83,7 @@ TEST_F(SegmentSpoolTest, HoldsOnDiskWhatMemoryHasNoRoomFor) {
   EXPECT_TRUE(stream.spool_status().ok());
 
   daemon_.Start();
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(acks(), Keys(0, 50)) << "each once, and in order";
   EXPECT_EQ(stream.statistics().stored, 50u);
   EXPECT_EQ(stream.statistics().spool_segments, 0u);
@@ -102,7 +101,7 @@ TEST_F(SegmentSpoolTest, KeepsTheOrderWhileTheDaemonComesAndGoes) {
     daemon_.Stop();
   }
   daemon_.Start();
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(acks(), Keys(0, 120));
   EXPECT_GT(stream.statistics().spooled, 0u);
 }
@@ -120,7 +119,7 @@ TEST_F(SegmentSpoolTest, GivesAllToTheNextProcess) {
   daemon_.Start();
   SegmentStream stream(Options(), Callback());
   Send(&stream, 25, 30);
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(acks(), Keys(0, 30));
   EXPECT_EQ(stream.statistics().spool_recovered, 25u);
   EXPECT_EQ(stream.statistics().stored, 30u);
@@ -154,7 +153,7 @@ TEST_F(SegmentSpoolTest, DropsTheNewestWhenItIsFull) {
   EXPECT_EQ(full.queued, static_cast<std::uint64_t>(taken));
 
   daemon_.Start();
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(acks(), Keys(0, taken)) << "what was taken is not lost";
   EXPECT_TRUE(stream.Send(Segment(taken)));
 }
@@ -173,7 +172,7 @@ TEST_F(SegmentSpoolTest, SetsDamagedFilesAsideAndGoesOn) {
   flip.close();
   daemon_.Start();
   SegmentStream stream(Options(), Callback());
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   auto expected = Keys(0, 10);
   expected.erase(expected.begin() + 6);
   expected.erase(expected.begin() + 3);
@@ -185,11 +184,11 @@ TEST_F(SegmentSpoolTest, SetsDamagedFilesAsideAndGoesOn) {
 
 TEST_F(SegmentSpoolTest, WorksWithoutTheSpoolWhenItCannotBeUsed) {
   SegmentStream holder(Options(), nullptr);
-  ASSERT_TRUE(holder.Drain(kLong).ok());  // it has the spool now
+  ASSERT_TRUE(DrainFully(&holder).ok());  // it has the spool now
   daemon_.Start();
   SegmentStream stream(Options(), Callback());
   Send(&stream, 0, 20);
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(acks(), Keys(0, 20));
   EXPECT_TRUE(absl::IsAlreadyExists(stream.spool_status()));
   EXPECT_EQ(stream.statistics().spool_failures, 1u);
@@ -243,7 +242,7 @@ TEST_F(SegmentSpoolTest, SpooledSegmentsSurviveAKillAtAnyInstant) {
     ClientOptions options = Options();
     options.target = daemon.target();
     SegmentStream stream(options, nullptr);
-    ASSERT_TRUE(stream.Drain(kLong).ok());
+    ASSERT_TRUE(DrainFully(&stream).ok());
     const auto stored = daemon.stored();
     for (std::int64_t i = 1; i <= fed.spooled; ++i) {
       if (stored.count({"walk", i}) == 0) ++promise.lost;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/selfcal/client.h"
+#include "test/client/selfcal/drain.h"
 #include "test/client/selfcal/fake_daemon.h"
 #include "test/client/selfcal/test_segments.h"
 #include "test/support/eventually.h"
@@ -19,8 +20,6 @@ namespace {
 
 using Mishap = FakeDaemon::Mishap;
 using Verdict = Acknowledgement::Verdict;
-
-constexpr std::chrono::seconds kLong{60};  // for what must happen
 
 // Acknowledgements in the order of their coming.
 class Acks {
@@ -66,7 +65,7 @@ TEST_F(SegmentStreamTest, AcknowledgesEverySegmentInOrder) {
   daemon_.Start();
   SegmentStream stream(Options(), acks_.Callback());
   for (int i = 0; i < 50; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
 
   EXPECT_EQ(acks_.keys(), Keys(0, 50));
   EXPECT_THAT(daemon_.connections(), testing::ElementsAre(Keys(0, 50)));
@@ -80,7 +79,7 @@ TEST_F(SegmentStreamTest, AcknowledgesEverySegmentInOrder) {
 
 TEST_F(SegmentStreamTest, ConnectsOnlyWhenThereIsSomethingToSend) {
   SegmentStream stream(Options(), acks_.Callback());
-  EXPECT_TRUE(stream.Drain(kLong).ok());
+  EXPECT_TRUE(DrainFully(&stream).ok());
   EXPECT_TRUE(stream.connection_status().ok());
 }
 
@@ -105,7 +104,7 @@ TEST_F(SegmentStreamTest, SendsAgainInOrderWhatWasNotAcknowledged) {
     Acks acks;
     SegmentStream stream(options, acks.Callback());
     for (int i = 0; i < 40; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
-    ASSERT_TRUE(stream.Drain(kLong).ok());
+    ASSERT_TRUE(DrainFully(&stream).ok());
 
     EXPECT_EQ(acks.keys(), Keys(0, 40)) << "each exactly once, and in order";
     EXPECT_EQ(daemon.stored().size(), 40u);
@@ -136,14 +135,14 @@ TEST_F(SegmentStreamTest, SurvivesRestartsOfTheDaemon) {
     ASSERT_TRUE(daemon_.WaitForRequests(before + 1));
     if (restart % 2 == 1) {
       daemon_.Hold(false);
-      ASSERT_TRUE(stream.Drain(kLong).ok());
+      ASSERT_TRUE(DrainFully(&stream).ok());
       daemon_.Hold(true);
     }
     daemon_.Stop();
   }
   daemon_.Start();
   daemon_.Hold(false);
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(acks_.keys(), Keys(0, next));
   EXPECT_GT(stream.statistics().resent, 0u);
 }
@@ -153,7 +152,7 @@ TEST_F(SegmentStreamTest, ReportsARejectionAndGoesOn) {
   daemon_.Start();
   SegmentStream stream(Options(), acks_.Callback());
   for (int i = 0; i < 8; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   const auto acks = acks_.all();
   ASSERT_EQ(acks_.keys(), Keys(0, 8));
   for (std::size_t i = 0; i < 8; ++i) {
@@ -171,7 +170,7 @@ TEST_F(SegmentStreamTest, ReportsADuplicateAsSuch) {
   SegmentStream stream(Options(), acks_.Callback());
   ASSERT_TRUE(stream.Send(Segment(0)));
   ASSERT_TRUE(stream.Send(Segment(0)));
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   ASSERT_EQ(acks_.all().size(), 2u);
   EXPECT_EQ(acks_.all()[0].verdict, Verdict::kStored);
   EXPECT_EQ(acks_.all()[1].verdict, Verdict::kDuplicate);
@@ -187,7 +186,7 @@ TEST_F(SegmentStreamTest, DropsAndCountsWhatTheQueueHasNoRoomFor) {
   EXPECT_EQ(stream.Drain(std::chrono::milliseconds(1)).code(),
             absl::StatusCode::kDeadlineExceeded);
   daemon_.Start();
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(acks_.keys(), Keys(0, 16));
   EXPECT_TRUE(stream.Send(Segment(16)));
 }
@@ -201,7 +200,7 @@ TEST_F(SegmentStreamTest, SendsNoMoreThanTheWindowWithoutAnAnswer) {
   for (int i = 0; i < 30; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
   ASSERT_TRUE(daemon_.WaitForRequests(3));
   daemon_.Hold(false);
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(daemon_.max_unanswered(), 3);
 }
 
@@ -214,7 +213,7 @@ TEST_F(SegmentStreamTest, EndsAtAnErrorThatWouldComeAgain) {
     daemon_.FailStreamsWith({code, "rigs/device does not exist"});
     SegmentStream stream(Options(), acks_.Callback());
     ASSERT_TRUE(stream.Send(Segment(0)));
-    const absl::Status status = stream.Drain(kLong);
+    const absl::Status status = DrainFully(&stream);
     EXPECT_EQ(static_cast<int>(status.code()), static_cast<int>(code));
     EXPECT_EQ(status.message(), "rigs/device does not exist");
     EXPECT_EQ(stream.connection_status(), status);
@@ -236,7 +235,7 @@ TEST_F(SegmentStreamTest, ConnectsAgainAfterAnyOtherError) {
     ASSERT_TRUE(Eventually([&] { return !stream.connection_status().ok(); }));
     EXPECT_EQ(stream.connection_status().message(), "the disk is full");
     daemon_.FailStreamsWith(grpc::Status::OK);
-    EXPECT_TRUE(stream.Drain(kLong).ok());
+    EXPECT_TRUE(DrainFully(&stream).ok());
     EXPECT_TRUE(stream.connection_status().ok());
   }
 }
@@ -273,7 +272,7 @@ TEST_F(SegmentStreamTest, CountsCallbacksThatThrowAndGoesOn) {
     if (ack.key.index == 5) throw 5;
   });
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(stream.statistics().stored, 10u);
   EXPECT_EQ(stream.statistics().callback_failures, 6u);
 }
@@ -288,7 +287,7 @@ TEST_F(SegmentStreamTest, RefusesWhatNoMessageCanCarry) {
   ASSERT_TRUE(stream.Send(std::move(large)));
   ASSERT_TRUE(stream.Send(Segment(3)));
   ASSERT_TRUE(stream.Send(Segment(4, std::string(300, 'x'))));
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(daemon_.stored(), (std::set<SegmentKey>{{"walk", 0}, {"walk", 3}}));
   EXPECT_EQ(stream.statistics().rejected, 3u);
   for (const Acknowledgement& ack : acks_.all()) {
@@ -303,7 +302,7 @@ TEST_F(SegmentStreamTest, DoesNotTakeAnUnknownVerdictForStored) {
   daemon_.Start();
   SegmentStream stream(Options(), acks_.Callback());
   ASSERT_TRUE(stream.Send(Segment(0)));
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   ASSERT_EQ(acks_.all().size(), 1u);
   EXPECT_EQ(acks_.all()[0].verdict, Verdict::kRejected);
 }
@@ -316,7 +315,7 @@ TEST_F(SegmentStreamTest, LeavesADaemonThatAnswersForAnotherSegment) {
   daemon_.Start();
   SegmentStream stream(Options(), acks_.Callback());
   for (int i = 0; i < 5; ++i) ASSERT_TRUE(stream.Send(Segment(i)));
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(acks_.keys(), Keys(0, 5));
   EXPECT_GE(daemon_.connections().size(), 2u);
 }
@@ -336,7 +335,7 @@ TEST_F(SegmentStreamTest, TakesSegmentsFromManyThreads) {
     });
   }
   for (std::thread& thread : threads) thread.join();
-  ASSERT_TRUE(stream.Drain(kLong).ok());
+  ASSERT_TRUE(DrainFully(&stream).ok());
   std::map<std::string, std::int64_t> next;
   for (const SegmentKey& key : acks_.keys()) {
     EXPECT_EQ(key.index, next[key.session]++);

@@ -7,7 +7,8 @@
 #include <string>
 
 #include "client/selfcal/spool_file.h"
-#include "test/client/selfcal/test_folder.h"
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
@@ -27,7 +28,7 @@ class SpoolTest : public ::testing::Test {
     return folder_.path() / "rig" / (name + ".segment");
   }
 
-  TestFolder folder_;
+  TempFolder folder_;
 };
 
 TEST_F(SpoolTest, GivesBackWhatWasWrittenInItsOrderAlsoToTheNextProcess) {
@@ -59,14 +60,10 @@ TEST_F(SpoolTest, NoticesEveryDamage) {
   std::string payload(30, '\0');
   for (char& c : payload) c = static_cast<char>(random());
   ASSERT_TRUE(WriteSpoolFile(File(1), payload).ok());
-  std::string bytes;
-  {
-    std::ifstream file(File(1), std::ios::binary);
-    bytes.assign(std::istreambuf_iterator<char>(file), {});
-  }
+  const std::string bytes = ReadBytes(File(1));
   ASSERT_EQ(bytes.size(), payload.size() + kSpoolHeaderBytes);
   const auto expect_loss = [&](const std::string& damaged) {
-    std::ofstream(File(1), std::ios::binary) << damaged;
+    WriteBytes(File(1), damaged);
     EXPECT_EQ(ReadSpoolFile(File(1)).status().code(),
               absl::StatusCode::kDataLoss);
   };
@@ -79,7 +76,7 @@ TEST_F(SpoolTest, NoticesEveryDamage) {
     expect_loss(bytes.substr(0, size));
   }
   expect_loss(bytes + "x");
-  std::ofstream(File(1), std::ios::binary) << bytes;
+  WriteBytes(File(1), bytes);
   EXPECT_EQ(*ReadSpoolFile(File(1)), payload);
 }
 

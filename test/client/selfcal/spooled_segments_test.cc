@@ -4,8 +4,8 @@
 
 #include <fstream>
 
-#include "test/client/selfcal/test_folder.h"
 #include "test/client/selfcal/test_segments.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::client {
 namespace {
@@ -22,7 +22,7 @@ class SpooledSegmentsTest : public ::testing::Test {
     return folder_.path() / "device" / (name + ".segment");
   }
 
-  TestFolder folder_;
+  TempFolder folder_;
   ClientOptions options_;
 };
 

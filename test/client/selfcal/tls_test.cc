@@ -1,65 +1,25 @@
 // Mutual TLS of the client, against certificates made on the spot.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <fstream>
-#include <sstream>
-#include <thread>
+#include <filesystem>
+#include <string>
 
 #include "client/selfcal/client.h"
+#include "test/client/selfcal/drain.h"
 #include "test/client/selfcal/fake_daemon.h"
-#include "test/client/selfcal/test_folder.h"
+#include "test/support/certificates.h"
 #include "test/support/eventually.h"
 
 namespace selfcal::client {
 namespace {
 
-constexpr std::chrono::seconds kLong{60};  // for what must happen
-
-std::string ReadAll(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 class TlsTest : public ::testing::Test {
  protected:
   TlsTest() {
-    MakeAuthority("ca");
-    MakeAuthority("other");
-    MakeCertificate("ca", "daemon");
-    MakeCertificate("ca", "device");
-    MakeCertificate("other", "stranger");
-    grpc::SslServerCredentialsOptions tls(
-        GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
-    tls.pem_root_certs = ReadAll(Path("ca.pem"));
-    tls.pem_key_cert_pairs.push_back(
-        {ReadAll(Path("daemon.key")), ReadAll(Path("daemon.pem"))});
-    daemon_.StartOnTcp(grpc::SslServerCredentials(tls));
-  }
-
-  std::string Path(const std::string& name) const {
-    return folder_.path() / name;
-  }
-  void Run(const std::string& command) {
-    const std::string line =
-        "cd '" + folder_.path().string() + "' && " + command + " 2>log";
-    ASSERT_EQ(std::system(line.c_str()), 0) << ReadAll(Path("log"));
-  }
-  void MakeAuthority(const std::string& name) {
-    Run("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes "
-        "-days 2 -subj /CN=" +
-        name + " -keyout " + name + ".key -out " + name + ".pem");
-  }
-  void MakeCertificate(const std::string& authority, const std::string& name) {
-    Run("openssl req -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes "
-        "-subj /CN=" +
-        name + " -addext subjectAltName=DNS:localhost -keyout " + name +
-        ".key -out " + name + ".csr");
-    Run("openssl x509 -req -copy_extensions copy -days 1 -CAcreateserial -in " +
-        name + ".csr -CA " + authority + ".pem -CAkey " + authority +
-        ".key -out " + name + ".pem");
+    certificates_.AddAuthority("other");
+    certificates_.Add("device", "ca", "DNS:device");
+    certificates_.Add("stranger", "other", "DNS:stranger");
+    daemon_.StartOnPort(certificates_.Server());
   }
 
   ClientOptions Options(const std::string& authority,
@@ -67,10 +27,10 @@ class TlsTest : public ::testing::Test {
     ClientOptions options;
     options.target = daemon_.target();
     options.rig = "device";
-    if (!authority.empty()) options.ca_file = Path(authority + ".pem");
+    if (!authority.empty()) options.ca_file = certificates_.Pem(authority);
     if (!name.empty()) {
-      options.certificate_file = Path(name + ".pem");
-      options.key_file = Path(name + ".key");
+      options.certificate_file = certificates_.Pem(name);
+      options.key_file = certificates_.Key(name);
     }
     options.min_backoff = std::chrono::milliseconds(1);
     return options;
@@ -89,7 +49,7 @@ class TlsTest : public ::testing::Test {
                                           : stream.connection_status();
   }
 
-  TestFolder folder_;
+  Certificates certificates_;
   FakeDaemon daemon_;
 };
 
@@ -98,7 +58,7 @@ TEST_F(TlsTest, StreamsWithACertificateOfTheAuthority) {
   MotionSegment segment;
   segment.key = {"walk", 0};
   ASSERT_TRUE(stream.Send(segment));
-  EXPECT_TRUE(stream.Drain(kLong).ok());
+  EXPECT_TRUE(DrainFully(&stream).ok());
   EXPECT_EQ(stream.statistics().stored, 1u);
 }
 
@@ -113,7 +73,8 @@ TEST_F(TlsTest, RefusesADaemonOfAnotherAuthority) {
 }
 
 TEST_F(TlsTest, TakesCertificatesThatComeLater) {
-  std::filesystem::rename(Path("device.pem"), Path("later.pem"));
+  const std::string certificate = certificates_.Pem("device");
+  std::filesystem::rename(certificate, certificates_.Pem("later"));
   SegmentStream stream(Options("ca", "device"), nullptr);
   MotionSegment segment;
   segment.key = {"walk", 0};
@@ -123,8 +84,8 @@ TEST_F(TlsTest, TakesCertificatesThatComeLater) {
   EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
   EXPECT_NE(std::string(status.message()).find("device.pem"),
             std::string::npos);
-  std::filesystem::rename(Path("later.pem"), Path("device.pem"));
-  EXPECT_TRUE(stream.Drain(kLong).ok());
+  std::filesystem::rename(certificates_.Pem("later"), certificate);
+  EXPECT_TRUE(DrainFully(&stream).ok());
 }
 
 TEST_F(TlsTest, WantsCertificateAndKeyTogether) {

@@ -99,6 +99,7 @@ TEST(Advise, AMotionHasLessGainOnceItWasDone) {
   const Rig rig = HandheldRig("r");
   const Predictions predictions = Predict(rig, rig.factory);
   const Eigen::MatrixXd known = PriorInformation(rig);
+  ASSERT_FALSE(predictions.motions.empty());
   for (const MotionPrediction& motion : predictions.motions) {
     const double before =
         AdviceOf(Advise(rig, predictions, known), motion.motion).gain_nats;

@@ -43,7 +43,9 @@ TEST(Predict, HasInformationForEveryMotion) {
 TEST(Predict, HasNoInformationAboutFixedComponents) {
   Rig rig = HandheldRig("r");
   rig.fixed = {"imu.gyro.*"};
-  for (const MotionPrediction& motion : Predict(rig, rig.factory).motions) {
+  const Predictions predictions = Predict(rig, rig.factory);
+  ASSERT_FALSE(predictions.motions.empty());
+  for (const MotionPrediction& motion : predictions.motions) {
     EXPECT_EQ(motion.Lambda.topRows(kAccelScale).norm(), 0);
   }
 }
@@ -62,7 +64,9 @@ TEST(Predict, AllowsADelayOfTheImages) {
   rig.blocks = {{"*.time_offset", true}};
   for (const double delay_s : {-0.3, 0.3}) {
     rig.factory.cameras[0].time_offset_s = delay_s;
-    for (const MotionPrediction& motion : Predict(rig, rig.factory).motions) {
+    const Predictions predictions = Predict(rig, rig.factory);
+    ASSERT_FALSE(predictions.motions.empty());
+    for (const MotionPrediction& motion : predictions.motions) {
       EXPECT_TRUE(motion.Lambda.allFinite());
     }
   }

@@ -115,6 +115,7 @@ TEST_F(BaselinesTest, AllKeepTheMinimumGain) {
   for (const Table& table : {LeastInformativeTables(rig_, segments_)[0],
                              SingleGroupTable(rig_, kCount, segments_),
                              RandomTable(rig_, kCount, 1, segments_)}) {
+    EXPECT_FALSE(table.entries.empty());
     for (const TableEntry& entry : table.entries) {
       EXPECT_NE(entry.sequence, 3);
     }

@@ -158,6 +158,7 @@ TEST(FeatureTracksTest, EveryPixelLiesInsideTheImageOutliersToo) {
   options.outlier_fraction = 0.1;
   const FeatureTracks tracks =
       Tracks(rig, 3, Keyframes(*MakeHandheld(20, 1, 4)), options);
+  ASSERT_FALSE(tracks.observations.empty());
   for (const FeatureObservation& z : tracks.observations) {
     const CameraCalibration& camera = rig.factory.cameras[z.camera];
     for (const Eigen::Vector2d& z_px : {z.true_px, z.measured_px}) {

@@ -223,6 +223,7 @@ TEST_F(RecordedMotionTest, SegmentsOnARecordingKeepAllRules) {
                  *spline,
                  "recorded",
                  {});
+    EXPECT_FALSE(session.segments.empty()) << path;
     for (const MotionSegment& segment : session.segments) {
       EXPECT_TRUE(Validate(segment, rig.factory).empty()) << path;
       EXPECT_GT(segment.landmarks.size(), 200u) << path;

@@ -6,12 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
-#include <stdlib.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 #include <unistd.h>
 
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -19,12 +17,8 @@
 #include <string>
 
 #include "server/api/api.h"
-#include "server/api/event_feed.h"
 #include "server/console/console.h"
-#include "test/server/grpc/fake_pipeline.h"
-#include "test/server/store/sqlite/open_sqlite_store.h"
-#include "test/server/test_records.h"
-#include "test/server/test_segments.h"
+#include "test/server/served_store.h"
 
 namespace selfcal::server {
 
@@ -78,32 +72,17 @@ struct Reply {
   std::string code() const { return json().value("code", "none"); }
 };
 
-class ConsoleTest : public ::testing::Test {
+class ConsoleTest : public ServedStore {
  protected:
   static constexpr char kConsoleHeader[] = "X-Selfcal-Console: 1\r\n";
 
   ConsoleTest() {
-    std::string folder = std::filesystem::temp_directory_path() / "scw-XXXXXX";
-    folder_ = mkdtemp(folder.data());
-    auto store = OpenSqliteStore(folder_ / "test.db");
-    if (!store.ok()) throw std::runtime_error(store.status().ToString());
-    store_ = *std::move(store);
-    domain_.emplace(store_.get());
-    pipeline_ = std::make_unique<FakePipeline>(&*domain_);
-    feed_ = std::make_unique<EventFeed>(store_.get(), nullptr);
     api_.emplace(&*domain_,
                  pipeline_.get(),
-                 feed_.get(),
+                 &feed_,
                  ApiOptions{.program_version = "test"});
     Open(Role::kRead);
   }
-  ~ConsoleTest() override {
-    console_.reset();
-    api_.reset();
-    feed_.reset();
-    std::filesystem::remove_all(folder_);
-  }
-
   void Open(Role role) {
     console_.reset();
     auto console = MakeConsole(&*api_, {"127.0.0.1:0", role, {}});
@@ -155,13 +134,6 @@ class ConsoleTest : public ::testing::Test {
                     "\r\n\r\n" + body);
   }
 
-  Rig AddRig(const std::string& id) {
-    const Rig rig = TestRig(id);
-    const auto created = domain_->CreateRig(rig);
-    EXPECT_TRUE(created.ok()) << created.status();
-    return rig;
-  }
-
   // A second version of the rig, active.
   void AddVersion(const Rig& rig) {
     const MotionSegment segment = TestSegments(rig, 1)[0];
@@ -178,11 +150,6 @@ class ConsoleTest : public ::testing::Test {
     ASSERT_TRUE(finished.ok()) << finished.status();
   }
 
-  std::filesystem::path folder_;
-  std::unique_ptr<Store> store_;
-  std::optional<Domain> domain_;
-  std::unique_ptr<FakePipeline> pipeline_;
-  std::unique_ptr<EventFeed> feed_;
   std::optional<Api> api_;
   std::unique_ptr<Console> console_;
 };

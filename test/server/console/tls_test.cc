@@ -1,8 +1,8 @@
 // Off the loopback: certificates say who calls and what it may do.
 #include <stdio.h>
 
-#include "test/server/certificates.h"
 #include "test/server/console/console_test.h"
+#include "test/support/certificates.h"
 
 namespace selfcal::server {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "test/server/certificates.h"
 #include "test/server/daemon/daemon_fixture.h"
+#include "test/support/certificates.h"
 
 namespace selfcal::server {
 namespace {

@@ -20,18 +20,12 @@
 #include "test/server/daemon/process.h"
 #include "test/server/test_segments.h"
 #include "test/support/eventually.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 
 class DaemonTest : public ::testing::Test {
  protected:
-  DaemonTest() {
-    std::string folder = std::filesystem::temp_directory_path() / "scd-XXXXXX";
-    folder_ = mkdtemp(folder.data());
-    state_ = folder_ / "state";
-  }
-  ~DaemonTest() override { std::filesystem::remove_all(folder_); }
-
   std::unique_ptr<Process> Start(std::vector<std::string> more = {}) {
     std::vector<std::string> arguments = {
         SELFCALD_PATH, "--state-dir", state_.string()};
@@ -135,8 +129,9 @@ class DaemonTest : public ::testing::Test {
     return run;
   }
 
-  std::filesystem::path folder_;
-  std::filesystem::path state_;
+  const TempFolder temp_folder_;
+  const std::filesystem::path folder_ = temp_folder_.path();
+  const std::filesystem::path state_ = folder_ / "state";
   std::shared_ptr<grpc::Channel> channel_;
 
  private:

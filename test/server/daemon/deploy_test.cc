@@ -8,11 +8,13 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <regex>
 #include <set>
 #include <sstream>
 #include <string>
+
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 namespace {
@@ -40,11 +42,6 @@ std::string Deployed(const std::string& name) {
   return std::string(SELFCAL_DEPLOY) + "/" + name;
 }
 
-std::string Read(const std::string& path) {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 TEST(Unit, IsHardened) {
   if (!Has("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze";
   const std::string report = Output("systemd-analyze security --offline=true " +
@@ -59,45 +56,40 @@ TEST(Unit, IsHardened) {
 
 TEST(Unit, HasNoMistake) {
   if (!Has("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze";
-  const auto folder =
-      std::filesystem::path(::testing::TempDir()) / "selfcal-unit";
-  std::filesystem::create_directories(folder);
-  std::string unit = Read(Deployed("systemd/selfcald.service"));
+  const TempFolder folder;
+  std::string unit = ReadBytes(Deployed("systemd/selfcald.service"));
   const std::string program = "/usr/bin/selfcald";
   ASSERT_THAT(unit, HasSubstr("ExecStart=" + program));
   // verify looks whether the program is there.
   unit.replace(unit.find(program), program.size(), SELFCALD_PATH);
-  std::ofstream(folder / "selfcald.service") << unit;
-  EXPECT_EQ(Output("systemd-analyze --man=no verify " +
-                   (folder / "selfcald.service").string()),
-            "");
-  std::filesystem::remove_all(folder);
+  const std::string file = folder.File("selfcald.service");
+  WriteBytes(file, unit);
+  EXPECT_EQ(Output("systemd-analyze --man=no verify " + file), "");
 }
 
 TEST(Unit, UserAndFoldersAreMade) {
   if (!Has("systemd-sysusers") || !Has("systemd-tmpfiles")) {
     GTEST_SKIP() << "no systemd-sysusers or systemd-tmpfiles";
   }
-  std::string pattern = ::testing::TempDir() + "selfcal-root-XXXXXX";
-  const std::string root = mkdtemp(pattern.data());
+  const TempFolder folder;
+  const std::string root = folder.path();
   std::filesystem::create_directories(root + "/etc");
   Output("systemd-sysusers --root=" + root + " " +
          Deployed("systemd/selfcal.sysusers.conf"));
-  EXPECT_THAT(Read(root + "/etc/passwd"), HasSubstr("selfcal:x:"));
-  EXPECT_THAT(Read(root + "/etc/group"), HasSubstr("selfcal:x:"));
+  EXPECT_THAT(ReadBytes(root + "/etc/passwd"), HasSubstr("selfcal:x:"));
+  EXPECT_THAT(ReadBytes(root + "/etc/group"), HasSubstr("selfcal:x:"));
   if (geteuid() == 0) {
     Output("systemd-tmpfiles --create --root=" + root + " " +
            Deployed("systemd/selfcal.tmpfiles.conf"));
-    for (const std::string folder :
+    for (const std::string made :
          {"/etc/selfcal", "/var/lib/selfcal", "/run/selfcal"}) {
-      EXPECT_TRUE(std::filesystem::is_directory(root + folder)) << folder;
-      EXPECT_EQ(std::filesystem::status(root + folder).permissions() &
+      EXPECT_TRUE(std::filesystem::is_directory(root + made)) << made;
+      EXPECT_EQ(std::filesystem::status(root + made).permissions() &
                     std::filesystem::perms::others_all,
                 std::filesystem::perms::none)
-          << folder;
+          << made;
     }
   }
-  std::filesystem::remove_all(root);
 }
 
 // The libraries that the program loads come with the packages of the image.
@@ -122,7 +114,7 @@ TEST(Image, InstallsWhatTheProgramLoads) {
     packages.insert(line.substr(0, line.find(':')));
   }
   EXPECT_GT(packages.size(), 5u);
-  const std::string image = Read(Deployed("Containerfile"));
+  const std::string image = ReadBytes(Deployed("Containerfile"));
   const std::string installed = image.substr(image.rfind("apt-get install"));
   for (const std::string& package : packages) {
     // Part of every Debian image.

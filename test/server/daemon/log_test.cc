@@ -3,11 +3,12 @@
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
 
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 namespace {
@@ -34,10 +35,10 @@ bool LogsJson(const std::string& file) {
 
 // In a process of its own: the log is global.
 TEST(LogDeathTest, JsonIsAnObjectOnEachLineWhateverIsLogged) {
-  const std::string file = ::testing::TempDir() + "selfcal_json_log";
+  const TempFolder folder;
+  const std::string file = folder.File("log");
   EXPECT_EXIT(
       std::_Exit(LogsJson(file) ? 3 : 4), ::testing::ExitedWithCode(3), "");
-  std::remove(file.c_str());
 }
 
 TEST(LogDeathTest, TextShowsLevelAndMessage) {

@@ -3,13 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <regex>
 #include <set>
 
 #include "server/daemon/settings.h"
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 namespace {
@@ -33,9 +34,8 @@ class OptionsTest : public ::testing::Test {
   }
 
   std::string File(const std::string& text) {
-    const std::string file =
-        ::testing::TempDir() + "selfcald_" + std::to_string(getpid()) + ".toml";
-    std::ofstream(file) << text;
+    std::string file = folder_.File("selfcald.toml");
+    WriteBytes(file, text);
     return file;
   }
 
@@ -54,6 +54,7 @@ class OptionsTest : public ::testing::Test {
     return ParseOptions(static_cast<int>(argv.size()), argv.data(), &options_);
   }
 
+  const TempFolder folder_;
   DaemonOptions options_;
 };
 

@@ -10,8 +10,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -19,6 +17,7 @@
 #include <vector>
 
 #include "test/support/eventually.h"
+#include "test/support/files.h"
 
 namespace selfcal::server {
 
@@ -62,10 +61,7 @@ class Process {
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
   }
 
-  std::string Log() const {
-    std::ifstream file(log_);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string Log() const { return ReadBytes(log_); }
 
   // Whether the log shows the text within a minute; after `first`, if given.
   bool Says(const std::string& text, const std::string& first = "") const {

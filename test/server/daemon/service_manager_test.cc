@@ -2,16 +2,16 @@
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 #include "test/server/daemon/notify_socket.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 namespace {
 
 TEST(ServiceManager, IsToldOfEachTurn) {
-  const std::string path =
-      ::testing::TempDir() + "sd" + std::to_string(getpid());
+  const TempFolder folder;
+  const std::string path = folder.File("socket");
   NotifySocket manager(path);
   setenv("NOTIFY_SOCKET", path.c_str(), 1);
   NotifyStatus("migrating");
@@ -23,7 +23,6 @@ TEST(ServiceManager, IsToldOfEachTurn) {
   NotifyStopping();
   EXPECT_TRUE(manager.Hears("STOPPING=1"));
   unsetenv("NOTIFY_SOCKET");
-  unlink(path.c_str());
   NotifyReady();  // to nobody
 }
 

@@ -8,6 +8,8 @@
 
 #include <string>
 
+#include "test/support/temp_folder.h"
+
 namespace selfcal::server {
 namespace {
 
@@ -15,13 +17,8 @@ using ::testing::HasSubstr;
 
 class StateLockTest : public ::testing::Test {
  protected:
-  StateLockTest() {
-    std::string folder = std::filesystem::temp_directory_path() / "scl-XXXXXX";
-    folder_ = mkdtemp(folder.data());
-  }
-  ~StateLockTest() override { std::filesystem::remove_all(folder_); }
-
-  std::filesystem::path folder_;
+  const TempFolder temp_folder_;
+  const std::filesystem::path folder_ = temp_folder_.path();
 };
 
 TEST_F(StateLockTest, CreatesTheFolderForItsOwnerAlone) {

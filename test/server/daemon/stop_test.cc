@@ -6,17 +6,19 @@
 #include <cstdlib>
 #include <thread>
 
+#include "test/support/eventually.h"
+
 namespace selfcal::server {
 namespace {
 
-using std::chrono::hours;
 using std::chrono::milliseconds;
 
 TEST(StopDeathTest, DeadlineEndsAStopThatHangs) {
   EXPECT_EXIT(
       {
         const StopDeadline deadline(milliseconds(20));
-        std::this_thread::sleep_for(hours(1));
+        std::this_thread::sleep_for(kLongWait);
+        std::_Exit(3);
       },
       ::testing::ExitedWithCode(EXIT_FAILURE),
       "");
@@ -39,7 +41,7 @@ TEST(StopDeathTest, BlockedSignalIsReceivedInsteadOfEndingTheProcess) {
         {
           BlockSignals();
           raise(signal);
-          std::_Exit(WaitForSignal(hours(1)) == signal ? 3 : 4);
+          std::_Exit(WaitForSignal(kLongWait) == signal ? 3 : 4);
         },
         ::testing::ExitedWithCode(3),
         "");

@@ -9,9 +9,9 @@
 
 #include "server/access/rules.h"
 #include "test/promise.h"
-#include "test/server/certificates.h"
 #include "test/server/grpc/methods.h"
 #include "test/server/grpc/service_test.h"
+#include "test/support/certificates.h"
 
 namespace selfcal::server {
 namespace {

@@ -89,8 +89,11 @@ TEST_F(SegmentStreamTest, EverySegmentIsAnsweredInOrderAndStored) {
 TEST_F(SegmentStreamTest, ItsEndIsTheEndOfASessionIfItStoredAnything) {
   const Rig rig = AddRig();
   const MotionSegment segment = TestSegments(rig, 1)[0];
-  const auto ended = [&] {
-    EXPECT_TRUE(Eventually([&] { return !pipeline_->ended().empty(); }));
+  const auto ended = [&](const std::string& last) {
+    EXPECT_TRUE(Eventually([&] {
+      const std::vector<std::string> rigs = pipeline_->ended();
+      return !rigs.empty() && rigs.back() == last;
+    }));
     return pipeline_->ended();
   };
   {
@@ -99,14 +102,19 @@ TEST_F(SegmentStreamTest, ItsEndIsTheEndOfASessionIfItStoredAnything) {
     EXPECT_TRUE(pipeline_->ended().empty());
     EXPECT_TRUE(stream.Finish().ok());
   }
-  EXPECT_THAT(ended(), ::testing::ElementsAre("r"));
+  EXPECT_THAT(ended("r"), ::testing::ElementsAre("r"));
   {
     Stream stream(segments_.get());
     EXPECT_EQ(stream.Send(segment).verdict(), Response::DUPLICATE);
     EXPECT_TRUE(stream.Finish().ok());
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_THAT(ended(), ::testing::ElementsAre("r"));
+  {
+    AddRig("next");
+    Stream stream(segments_.get());
+    EXPECT_EQ(stream.Send(segment, "rigs/next").verdict(), Response::STORED);
+    EXPECT_TRUE(stream.Finish().ok());
+  }
+  EXPECT_THAT(ended("next"), ::testing::ElementsAre("r", "next"));
 }
 
 TEST_F(SegmentStreamTest, SecondTimeIsADuplicate) {

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <chrono>
 #include <filesystem>
@@ -24,12 +23,8 @@
 #include "selfcal/v1/rig.grpc.pb.h"
 #include "selfcal/v1/segment.grpc.pb.h"
 #include "server/api/api.h"
-#include "server/api/event_feed.h"
 #include "server/grpc/server.h"
-#include "test/server/grpc/fake_pipeline.h"
-#include "test/server/store/sqlite/open_sqlite_store.h"
-#include "test/server/test_records.h"
-#include "test/server/test_segments.h"
+#include "test/server/served_store.h"
 #include "test/support/eventually.h"
 
 namespace selfcal::server {
@@ -68,27 +63,11 @@ inline void ExpectNotFound(const grpc::Status& status,
   EXPECT_EQ(DetailOf<google::rpc::ResourceInfo>(status).resource_name(), name);
 }
 
-class ServiceTest : public ::testing::Test {
+class ServiceTest : public ServedStore {
  protected:
   using Context = grpc::ClientContext;
 
-  ServiceTest()
-      : folder_(NewFolder()),
-        store_(NewStore(folder_)),
-        feed_(store_.get(), nullptr) {
-    OpenDomain({});
-    StartServer(ServerOptions());
-  }
-
-  ~ServiceTest() override {
-    server_.reset();
-    std::filesystem::remove_all(folder_);
-  }
-
-  void OpenDomain(const DomainOptions& options) {
-    domain_.emplace(store_.get(), options);
-    pipeline_ = std::make_unique<FakePipeline>(&*domain_);
-  }
+  ServiceTest() { StartServer(ServerOptions()); }
 
   // A server with an API of its own.
   absl::StatusOr<std::unique_ptr<Server>> NewServer(
@@ -112,14 +91,6 @@ class ServiceTest : public ::testing::Test {
     segments_ = v1::SegmentService::NewStub(channel_);
     calibrations_ = v1::CalibrationService::NewStub(channel_);
     recalibrations_ = v1::RecalibrationService::NewStub(channel_);
-  }
-
-  // Creates rigs/{id} in the store.
-  Rig AddRig(const std::string& id = "r") {
-    const Rig rig = TestRig(id);
-    const auto created = domain_->CreateRig(rig);
-    EXPECT_TRUE(created.ok()) << created.status();
-    return rig;
   }
 
   // Puts a score with this information gain for every group.
@@ -155,11 +126,6 @@ class ServiceTest : public ::testing::Test {
     return *finished;
   }
 
-  std::filesystem::path folder_;
-  std::unique_ptr<Store> store_;
-  std::optional<Domain> domain_;
-  std::unique_ptr<FakePipeline> pipeline_;
-  EventFeed feed_;
   std::list<Api> apis_;
   std::unique_ptr<Server> server_;
   std::shared_ptr<grpc::Channel> channel_;
@@ -169,16 +135,6 @@ class ServiceTest : public ::testing::Test {
   std::unique_ptr<v1::RecalibrationService::Stub> recalibrations_;
 
  private:
-  static std::filesystem::path NewFolder() {
-    std::string folder = std::filesystem::temp_directory_path() / "sc-XXXXXX";
-    return mkdtemp(folder.data());
-  }
-  static std::unique_ptr<Store> NewStore(const std::filesystem::path& folder) {
-    auto store = OpenSqliteStore(folder / "test.db");
-    if (!store.ok()) throw std::runtime_error(store.status().ToString());
-    return std::move(*store);
-  }
-
   int generation_ = 0;
 };
 

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <thread>
 
-#include "test/server/store/temp_folder.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 namespace {

@@ -54,6 +54,7 @@ TEST_F(DeletionTest, RigIsDeletedOnceNothingOfItIsScoredAndCanBeMadeAgain) {
             std::future_status::timeout);
   EXPECT_TRUE(store_->GetRig("a").ok());
   blocked_ = false;
+  ASSERT_EQ(deleted.wait_for(kLongWait), std::future_status::ready);
   const absl::Status status = deleted.get();
   ASSERT_TRUE(status.ok()) << status;
   EXPECT_TRUE(absl::IsNotFound(store_->GetRig("a").status()));
@@ -77,6 +78,7 @@ TEST_F(DeletionTest, SegmentThatWaitsForItsScoreGivesItsPlaceBack) {
   EXPECT_EQ(deleted.wait_for(std::chrono::milliseconds(100)),
             std::future_status::timeout);
   blocked_ = false;
+  ASSERT_EQ(deleted.wait_for(kLongWait), std::future_status::ready);
   EXPECT_TRUE(deleted.get().ok());
   for (int k = 2; k < 5; ++k) Submit(k);
   ASSERT_TRUE(AllScored());

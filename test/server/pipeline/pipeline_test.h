@@ -18,9 +18,9 @@
 #include "server/pipeline/pipeline.h"
 #include "test/server/store/fake_information.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
-#include "test/server/store/temp_folder.h"
 #include "test/server/test_segments.h"
 #include "test/support/eventually.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 

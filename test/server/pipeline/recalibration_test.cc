@@ -4,6 +4,7 @@
 
 #include "test/server/pipeline/pipeline_test.h"
 #include "test/server/store/sqlite/tamper.h"
+#include "test/support/eventually.h"
 
 namespace selfcal::server {
 namespace {
@@ -20,11 +21,13 @@ class RecalibrationTest : public PipelineTest {
                                    const auto&) {
       ++solves_;
       segments_ = segments.size();
-      for (int k = 1; !finish_; ++k) {
-        if (!progress({k, 100, 1.0, 1.0})) return Cancelled(start);
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      }
-      return Converged(rig, start);
+      bool stopped = false;
+      int k = 0;
+      EXPECT_TRUE(Eventually([&] {
+        stopped = !finish_ && !progress({++k, 100, 1.0, 1.0});
+        return stopped || finish_;
+      }));
+      return stopped ? Cancelled(start) : Converged(rig, start);
     };
   }
 

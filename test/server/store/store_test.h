@@ -18,8 +18,8 @@
 #include "test/server/store/fake_information.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/store/sqlite/tamper.h"
-#include "test/server/store/temp_folder.h"
 #include "test/server/test_segments.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 

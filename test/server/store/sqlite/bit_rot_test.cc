@@ -7,6 +7,7 @@
 #include "test/promise.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite/sqlite_test.h"
+#include "test/support/files.h"
 
 namespace selfcal::server {
 namespace {

@@ -8,6 +8,7 @@
 #include "test/promise.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite/sqlite_test.h"
+#include "test/support/files.h"
 
 namespace selfcal::server {
 namespace {
@@ -90,7 +91,8 @@ TEST_F(CopiesTest, ABackupIsOneInstantWhileOthersWrite) {
     const std::string path = folder_.File("copy.db");
     WriteBytes(path, bytes);
     const auto copy = OpenSqliteStore(path);
-    ASSERT_TRUE(copy.ok()) << copy.status();
+    EXPECT_TRUE(copy.ok()) << copy.status();
+    if (!copy.ok()) break;  // the writer has to be stopped
     for (int k = 100; k <= before; ++k) {
       EXPECT_TRUE((*copy)->GetSegmentData("a", {"s", k}).ok()) << k;
     }

@@ -10,6 +10,7 @@
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite/fault_vfs.h"
 #include "test/server/store/sqlite/sqlite_test.h"
+#include "test/support/files.h"
 
 namespace selfcal::server {
 namespace {

@@ -4,14 +4,14 @@
 
 #include <atomic>
 #include <filesystem>
-#include <future>
 #include <thread>
 
 #include "server/store/driver/statement.h"
 #include "server/store/driver/transaction.h"
 #include "server/store/sqlite/open_database.h"
 #include "server/store/sqlite/sqlite_database.h"
-#include "test/server/store/temp_folder.h"
+#include "test/support/eventually.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 namespace {
@@ -60,18 +60,18 @@ class GroupCommitTest : public Test {
   void Hold() {
     db_->BeginWrite(
         [this](Connection*) {
-          held_.set_value();
-          release_.get_future().wait();
+          held_ = true;
+          EXPECT_TRUE(Eventually([this] { return released_.load(); }));
           return absl::OkStatus();
         },
         [](const absl::Status&) {});
-    held_.get_future().wait();
+    EXPECT_TRUE(Eventually([this] { return held_.load(); }));
   }
-  void Release() { release_.set_value(); }
+  void Release() { released_ = true; }
 
   TempFolder folder_;
-  std::promise<void> held_;
-  std::promise<void> release_;
+  std::atomic<bool> held_ = false;
+  std::atomic<bool> released_ = false;
   std::unique_ptr<SqliteDatabase> db_;  // goes first: its thread uses the rest
 };
 

@@ -9,7 +9,8 @@
 #include "server/store/sqlite/database_file.h"
 #include "server/store/sqlite/sqlite.h"
 #include "test/server/store/sqlite/tamper.h"
-#include "test/server/store/temp_folder.h"
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 namespace {

@@ -7,34 +7,9 @@
 #include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/store/sqlite/tamper.h"
 #include "test/server/store/store_test.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
-
-// A folder in memory, where syncs are free: for tests that simulate the disk
-// themselves.
-class MemoryFolder {
- public:
-  MemoryFolder() {
-    const std::string parent =
-        std::filesystem::exists("/dev/shm") ? "/dev/shm" : ::testing::TempDir();
-    std::string pattern = parent + "/selfcal-XXXXXX";
-    path_ = mkdtemp(pattern.data());
-  }
-  ~MemoryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  MemoryFolder(const MemoryFolder&) = delete;
-  MemoryFolder& operator=(const MemoryFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-  std::string File(const std::string& name) const {
-    return (path_ / name).string();
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 // A rig and segments whose answers a test keeps.
 class SqliteTest : public ::testing::Test {
@@ -57,7 +32,8 @@ class SqliteTest : public ::testing::Test {
 
   std::string Path() const { return folder_.File("selfcal.db"); }
 
-  MemoryFolder folder_;
+  // In memory: the tests simulate the disk themselves.
+  TempFolder folder_{FolderInMemory()};
   const Rig rig_ = TestRig("a");
   std::unique_ptr<Store> store_;
   std::optional<Domain> domain_;

@@ -5,7 +5,7 @@
 
 #include "server/store/driver/transaction.h"
 #include "server/store/sqlite/sqlite_connection.h"
-#include "test/server/store/temp_folder.h"
+#include "test/support/temp_folder.h"
 
 namespace selfcal::server {
 namespace {

@@ -3,29 +3,25 @@
 #pragma once
 
 #include <grpcpp/security/credentials.h>
-#include <stdlib.h>
+#include <grpcpp/security/server_credentials.h>
 
-#include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <cstdlib>
 #include <memory>
 #include <stdexcept>
 #include <string>
 
-namespace selfcal::server {
+#include "test/support/files.h"
+#include "test/support/temp_folder.h"
+
+namespace selfcal {
 
 class Certificates {
  public:
   // With the authority "ca" and the certificate "server" for 127.0.0.1.
   Certificates() {
-    std::string folder = std::filesystem::temp_directory_path() / "scc-XXXXXX";
-    folder_ = mkdtemp(folder.data());
     AddAuthority("ca");
     Add("server", "ca", "IP:127.0.0.1");
   }
-  ~Certificates() { std::filesystem::remove_all(folder_); }
-  Certificates(const Certificates&) = delete;
-  Certificates& operator=(const Certificates&) = delete;
 
   void AddAuthority(const std::string& name) {
     Run("openssl req -x509 " + NewKey(name) + " -out " + Pem(name) +
@@ -37,7 +33,7 @@ class Certificates {
            const std::string& authority,
            const std::string& names,
            int days = 2) {
-    const std::string request = folder_ / (name + ".csr");
+    const std::string request = folder_.File(name + ".csr");
     Run("openssl req -new " + NewKey(name) + " -out " + request +
         " -subj /CN=" + name + " -addext 'subjectAltName=" + names + "'");
     Run("openssl x509 -req -in " + request + " -CA " + Pem(authority) +
@@ -46,15 +42,10 @@ class Certificates {
   }
 
   std::string Pem(const std::string& name) const {
-    return folder_ / (name + ".pem");
+    return folder_.File(name + ".pem");
   }
   std::string Key(const std::string& name) const {
-    return folder_ / (name + ".key");
-  }
-
-  static std::string Read(const std::string& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
+    return folder_.File(name + ".key");
   }
 
   // A client that trusts `root` and shows the certificate `name`; none if it
@@ -62,12 +53,22 @@ class Certificates {
   std::shared_ptr<grpc::ChannelCredentials> Client(
       const std::string& name, const std::string& root = "ca") const {
     grpc::SslCredentialsOptions options;
-    options.pem_root_certs = Read(Pem(root));
+    options.pem_root_certs = ReadBytes(Pem(root));
     if (!name.empty()) {
-      options.pem_private_key = Read(Key(name));
-      options.pem_cert_chain = Read(Pem(name));
+      options.pem_private_key = ReadBytes(Key(name));
+      options.pem_cert_chain = ReadBytes(Pem(name));
     }
     return grpc::SslCredentials(options);
+  }
+
+  // The server "server", which demands a certificate of the authority "ca".
+  std::shared_ptr<grpc::ServerCredentials> Server() const {
+    grpc::SslServerCredentialsOptions options(
+        GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
+    options.pem_root_certs = ReadBytes(Pem("ca"));
+    options.pem_key_cert_pairs.push_back(
+        {ReadBytes(Key("server")), ReadBytes(Pem("server"))});
+    return grpc::SslServerCredentials(options);
   }
 
  private:
@@ -82,7 +83,7 @@ class Certificates {
     }
   }
 
-  std::filesystem::path folder_;
+  TempFolder folder_;
 };
 
-}  // namespace selfcal::server
+}  // namespace selfcal
