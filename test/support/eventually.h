@@ -18,8 +18,8 @@ inline constexpr std::chrono::milliseconds kShortInterval{1};
 inline constexpr std::chrono::milliseconds kDaemonInterval{50};
 
 // Returns whether the condition comes true within the limit, of which each look
-// at it uses up no more than a second; a condition that is already true costs no
-// time.
+// at it uses up no more than a second; a condition that is already true costs
+// no time.
 template <typename Condition>
 bool Eventually(const Condition& condition,
                 std::chrono::nanoseconds limit = kLongWait,
