@@ -87,11 +87,6 @@ void SetBasaltResolution(const Json& size, CameraCalibration* camera) {
 
 Json BasaltCameraJson(const CameraCalibration& camera, std::size_t number) {
   const ToolModel& model = ToolModelOf("basalt", number, camera.model);
-  constexpr double kLeastFov = 1e-4;  // below it Basalt's equations fail
-  if (camera.model == DistortionModel::kFov &&
-      !(camera.distortion[0] > kLeastFov)) {
-    throw FormatError("basalt's fov needs a w above 0");
-  }
   Json values = {{"fx", camera.f.x()},
                  {"fy", camera.f.y()},
                  {"cx", camera.c.x()},

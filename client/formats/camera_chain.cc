@@ -113,15 +113,18 @@ ImuNoise ReadChainNoise(const YAML::Node& imu) {
       .accel_bias_random_walk = GetDouble(imu, "accelerometer_random_walk")};
 }
 
-std::string ChainNoiseText(const ImuNoise& noise, double rate_hz) {
+std::string ChainNoiseText(const ImuNoise& noise,
+                           double rate_hz,
+                           const std::string& indent) {
   return fmt::format(
-      "  accelerometer_noise_density: {}\n"
-      "  accelerometer_random_walk: {}\n"
-      "  gyroscope_noise_density: {}\n"
-      "  gyroscope_random_walk: {}\n"
-      "  update_rate: {}\n"
-      "  time_offset: 0.0\n"
-      "  rostopic: /imu0\n",
+      "{0}accelerometer_noise_density: {1}\n"
+      "{0}accelerometer_random_walk: {2}\n"
+      "{0}gyroscope_noise_density: {3}\n"
+      "{0}gyroscope_random_walk: {4}\n"
+      "{0}update_rate: {5}\n"
+      "{0}time_offset: 0.0\n"
+      "{0}rostopic: /imu0\n",
+      indent,
       NumberText(noise.accel_noise_density),
       NumberText(noise.accel_bias_random_walk),
       NumberText(noise.gyro_noise_density),

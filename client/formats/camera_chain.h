@@ -25,8 +25,11 @@ ChainFiles ReadChainFiles(const std::vector<TextFile>& files);
 CameraCalibration ReadChainCamera(const YAML::Node& node);
 std::string ChainCameraText(const CameraCalibration& camera);
 
-// Reads and writes continuous-time noise densities, as selfcal has them.
+// Reads and writes continuous-time noise densities, as selfcal has them; the
+// text has rate and topic as well, and `indent` before each line.
 ImuNoise ReadChainNoise(const YAML::Node& imu);
-std::string ChainNoiseText(const ImuNoise& noise, double rate_hz);
+std::string ChainNoiseText(const ImuNoise& noise,
+                           double rate_hz,
+                           const std::string& indent);
 
 }  // namespace selfcal::client

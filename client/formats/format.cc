@@ -69,7 +69,7 @@ absl::Status Check(const Rig& rig, const std::string& files) {
       fmt::format("{}: {} {}", files, faults[0].field, faults[0].message));
 }
 
-// Makes w of FOV models positive, as tools require; the model is even in w.
+// Makes w of FOV models positive, as maplab requires; the model is even in w.
 Calibration WithPositiveFov(Calibration theta) {
   for (CameraCalibration& camera : theta.cameras) {
     if (camera.model != DistortionModel::kFov) continue;

@@ -22,10 +22,14 @@ void CheckReference(const YAML::Node& imu) {
   }
 }
 
-// Reads the IMU's matrices; without them, readings are used as they are.
+// Reads the IMU's matrices; without them, readings are used as they are. A
+// result of the model "calibrated" repeats those of its input, unused.
 ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
   ImuMatrices result{Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};
-  if (!Has(imu, "gyroscopes")) return result;
+  if (!Has(imu, "gyroscopes") ||
+      (Has(imu, "model") && GetText(imu, "model") == "calibrated")) {
+    return result;
+  }
   const YAML::Node gyro = Get(imu, "gyroscopes");
   const YAML::Node accel = Get(imu, "accelerometers");
   result.G = GetMatrix(gyro, "M", 3, 3) * GetMatrix(gyro, "C_gyro_i", 3, 3);
@@ -43,6 +47,29 @@ ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
                        true});
   }
   return result;
+}
+
+// Kalibr's loader stops at a principal point with a coordinate below 0.
+void CheckCamera(std::size_t number, const CameraCalibration& camera) {
+  ToolModelOf("kalibr", number, camera.model);
+  if (camera.c.minCoeff() >= 0) return;
+  throw FormatError(
+      fmt::format("cam{} has a principal point at {}, {} px, which kalibr does "
+                  "not accept: it must not be below 0",
+                  number,
+                  camera.c.x(),
+                  camera.c.y()));
+}
+
+void AddMatricesLoss(const ImuCalibration& imu, std::vector<Loss>* losses) {
+  if (IsNominal(imu)) return;
+  losses->push_back(
+      {"imu_matrices",
+       "kalibr writes accelerometers.M, gyroscopes.M and C_gyro_i, but does "
+       "not "
+       "read them: as its input, imu.yaml states the noise alone, and "
+       "--imu-models scale-misalignment estimates them from the identity",
+       false});
 }
 
 }  // namespace
@@ -83,7 +110,7 @@ ExportedFiles ExportKalibr(const Rig& rig,
   Eigen::Matrix4d before;
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
     const CameraCalibration& camera = theta.cameras[j];
-    ToolModelOf("kalibr", j, camera.model);
+    CheckCamera(j, camera);
     const Eigen::Matrix4d T_CB = TransformFromBody(camera, body.R_BI);
     chain += fmt::format("cam{}:\n  T_cam_imu:\n{}", j, RowsText(T_CB, "  "));
     if (j > 0) {
@@ -96,19 +123,17 @@ ExportedFiles ExportKalibr(const Rig& rig,
   }
   const Factors gyro = LowerFactors(body.matrices.G);
   const std::string imu = fmt::format(
-      "imu0:\n"
-      "  T_i_b:\n{}"
       "{}"
-      "  model: scale-misalignment\n"
-      "  accelerometers:\n    M:\n{}"
-      "  gyroscopes:\n    M:\n{}    A:\n{}    C_gyro_i:\n{}",
-      RowsText(Eigen::Matrix4d::Identity(), "  "),
-      ChainNoiseText(rig.imu_noise,
-                     ImuRate(options, "update_rate", &result.losses)),
-      RowsText(body.matrices.A, "    "),
-      RowsText(gyro.triangular, "    "),
-      RowsText(Eigen::Matrix3d::Zero(), "    "),
-      RowsText(gyro.R, "    "));
+      "model: scale-misalignment\n"
+      "accelerometers:\n  M:\n{}"
+      "gyroscopes:\n  M:\n{}  A:\n{}  C_gyro_i:\n{}",
+      ChainNoiseText(
+          rig.imu_noise, ImuRate(options, "update_rate", &result.losses), ""),
+      RowsText(body.matrices.A, "  "),
+      RowsText(gyro.triangular, "  "),
+      RowsText(Eigen::Matrix3d::Zero(), "  "),
+      RowsText(gyro.R, "  "));
+  AddMatricesLoss(theta.imu, &result.losses);
   AddGravityLoss("kalibr", rig, &result.losses);
   result.files = {{"camchain-imucam.yaml", chain}, {"imu.yaml", imu}};
   return result;

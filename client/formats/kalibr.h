@@ -1,12 +1,14 @@
-// Kalibr: camchain-imucam.yaml and imu.yaml.
+// Kalibr: camchain-imucam.yaml and imu.yaml, in the form in which Kalibr takes
+// them as --cams and --imu. The IMU of a result, below imu0, is read as well.
 //
 // T_cam_imu takes a point from the IMU's frame to the camera's, and
 // t_imu = t_cam + timeshift_cam_imu. The IMU's frame is that in which the
 // accelerometer's matrix is lower triangular:
 //   accel = M_a f + b_a,   gyro = M_g C_gyro_i w + A_g C_gyro_i f + b_g,
 // with M_g lower triangular, too. The format can express everything that
-// selfcal has. Reading ignores A_g, the gyroscope's sensitivity to
-// acceleration, and the lever arms of the accelerometer's axes.
+// selfcal has, but Kalibr reads no matrices. Reading ignores A_g, the
+// gyroscope's sensitivity to acceleration, and the lever arms of the
+// accelerometer's axes.
 #pragma once
 
 #include <vector>

@@ -4,11 +4,15 @@
 
 namespace selfcal::client {
 
+bool IsNominal(const ImuCalibration& imu) {
+  const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
+  return imu.T_g() == one && imu.T_a() == one && imu.q_AI.vec().isZero(0);
+}
+
 void AddImuLoss(const std::string& tool,
                 const ImuCalibration& imu,
                 std::vector<Loss>* losses) {
-  const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
-  if (imu.T_g() == one && imu.T_a() == one && imu.q_AI.vec().isZero(0)) return;
+  if (IsNominal(imu)) return;
   losses->push_back(
       {"imu",
        fmt::format("{} uses the readings as they are: give it those that "

@@ -9,6 +9,9 @@
 
 namespace selfcal::client {
 
+// Whether readings need no correction.
+bool IsNominal(const ImuCalibration& imu);
+
 // For tools that use readings as they are: a loss unless the IMU is nominal.
 void AddImuLoss(const std::string& tool,
                 const ImuCalibration& imu,

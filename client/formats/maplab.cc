@@ -155,6 +155,32 @@ std::string PlaceText(const std::string& sensor, const std::string& base) {
       RowsText(Eigen::Matrix4d::Identity(), "        "));
 }
 
+// Values at which maplab's loader stops.
+void CheckValues(const Rig& rig, const Calibration& theta) {
+  if (!(rig.gravity_mps2 >= 9 && rig.gravity_mps2 <= 10)) {
+    throw FormatError(fmt::format(
+        "the rig has a gravity of {} m/s^2, and maplab accepts 9 to 10",
+        rig.gravity_mps2));
+  }
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    const CameraCalibration& camera = theta.cameras[j];
+    if (!(camera.c.minCoeff() > 0)) {
+      throw FormatError(
+          fmt::format("cam{} has a principal point at {}, {} px, which maplab "
+                      "does not accept: it must be above 0",
+                      j,
+                      camera.c.x(),
+                      camera.c.y()));
+    }
+    const double w = camera.distortion[0];
+    if (camera.model != DistortionModel::kFov || (w >= 0.5 && w <= 1.5)) {
+      continue;
+    }
+    throw FormatError(fmt::format(
+        "cam{} has w = {}, and maplab's fisheye accepts 0.5 to 1.5", j, w));
+  }
+}
+
 }  // namespace
 
 ImportedRig ImportMaplab(const std::vector<TextFile>& files,
@@ -185,6 +211,7 @@ ImportedRig ImportMaplab(const std::vector<TextFile>& files,
 ExportedFiles ExportMaplab(const Rig& rig,
                            const Calibration& theta,
                            const FormatOptions&) {
+  CheckValues(rig, theta);
   ExportedFiles result;
   const std::string imu = SensorId(rig.id + "/imu");
   const std::string system = SensorId(rig.id + "/cameras");

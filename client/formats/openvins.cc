@@ -119,8 +119,8 @@ ExportedFiles ExportOpenVins(const Rig& rig,
       "  model: \"rpng\"\n"
       "  Tw:\n{}  R_IMUtoGYRO:\n{}  Ta:\n{}  R_IMUtoACC:\n{}  Tg:\n{}",
       RowsText(Eigen::Matrix4d::Identity(), "    "),
-      ChainNoiseText(rig.imu_noise,
-                     ImuRate(options, "update_rate", &result.losses)),
+      ChainNoiseText(
+          rig.imu_noise, ImuRate(options, "update_rate", &result.losses), "  "),
       RowsText(theta.imu.T_g(), "    "),
       RowsText(Eigen::Matrix3d::Identity(), "    "),
       RowsText(theta.imu.T_a(), "    "),

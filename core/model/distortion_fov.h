@@ -47,7 +47,6 @@ class DistortionFov {
        .usual = {-1.3, 1.3}}};
   static constexpr ToolModel kTools[] = {
       {.tool = "kalibr", .name = "pinhole", .distortion = "fov"},
-      {.tool = "basalt", .name = "fov", .coefficients = "w"},
       {.tool = "maplab", .name = "pinhole", .distortion = "fisheye"}};
   static constexpr int kSize = std::size(kCoefficients);
 

@@ -59,17 +59,17 @@ TEST_F(CalibrationExport, SeveralFilesOrOneByItsName) {
   EXPECT_EQ(Selfcal(Line("kalibr")).out,
             (folder_ / "camchain-imucam.yaml").string() + "\n" +
                 (folder_ / "imu.yaml").string() + "\n");
-  const std::string file = (folder_ / "mine.json").string();
+  const std::string file = (folder_ / "mine.yaml").string();
   const Outcome outcome = Selfcal({"calibrations",
                                    "export",
                                    "device",
                                    "--format",
-                                   "basalt",
+                                   "maplab",
                                    "--output",
                                    file});
   EXPECT_EQ(outcome.out, file + "\n");
   EXPECT_EQ(daemon_.last_name, "rigs/device/calibrations/active");
-  EXPECT_THAT(outcome.err, HasSubstr("note: imu_rate: "));
+  EXPECT_THAT(outcome.err, HasSubstr("note: saturation: "));
   EXPECT_TRUE(fs::exists(file));
 }
 
@@ -115,9 +115,11 @@ TEST_F(CalibrationExport, JsonHasFilesAndLosses) {
 }
 
 TEST_F(CalibrationExport, AModelThatTheToolLacksIsAnError) {
-  const Outcome outcome = Selfcal(Line("openvins"));
-  EXPECT_EQ(outcome.code, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("distortion model fov"));
+  for (const char* tool : {"openvins", "basalt"}) {
+    const Outcome outcome = Selfcal(Line(tool));
+    EXPECT_EQ(outcome.code, 1);
+    EXPECT_THAT(outcome.err, HasSubstr("distortion model fov"));
+  }
   EXPECT_FALSE(fs::exists(folder_));
   EXPECT_EQ(Selfcal(Line("okvis")).code, 2);
   daemon_.rigs.clear();
@@ -169,8 +171,8 @@ TEST_F(CalibrationExport, WhatARigCannotTakeIsNamedAndStrictRefusesIt) {
   ASSERT_EQ(Selfcal(Line("kalibr")).code, 0);
   const fs::path imu = folder_ / "imu.yaml";
   std::string text = ReadBytes(imu);
-  const std::string zeros = "A:\n    - [0.0,";
-  text.replace(text.find(zeros), zeros.size(), "A:\n    - [0.1,");
+  const std::string zeros = "A:\n  - [0.0,";
+  text.replace(text.find(zeros), zeros.size(), "A:\n  - [0.1,");
   std::ofstream(imu) << text;
   std::vector<std::string> line = {"rig",
                                    "create",

@@ -3,15 +3,19 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <regex>
 
+#include "test/client/formats/loaders.h"
 #include "test/client/formats/predictions.h"
 
 namespace selfcal::client {
 namespace {
 
+using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using Model = DistortionModel;
 
 constexpr double kRate_hz = 250;
@@ -21,10 +25,11 @@ struct Expressible {
   const char* format;
   std::vector<Model> models;
   std::size_t cameras;
-  bool same_model;    // of all cameras
-  bool imu;           // its scales, misalignments, rotation
-  bool time_offset;   // any
-  bool time_offsets;  // one for each camera
+  bool same_model;     // of all cameras
+  bool imu;            // its scales, misalignments, rotation
+  bool time_offset;    // any
+  bool time_offsets;   // one for each camera
+  double least_w = 0;  // of a FOV camera, in magnitude
 };
 
 const Expressible kExpressible[] = {
@@ -57,7 +62,7 @@ const Expressible kExpressible[] = {
      true,
      false},
     {"basalt",
-     {Model::kFov, Model::kRadialTangential, Model::kEquidistant},
+     {Model::kRadialTangential, Model::kEquidistant},
      4,
      false,
      true,
@@ -69,7 +74,8 @@ const Expressible kExpressible[] = {
      false,
      false,
      false,
-     false}};
+     false,
+     0.5}};
 
 std::size_t Pick(std::size_t count, RandomValues* random) {
   return std::min(count - 1,
@@ -93,6 +99,11 @@ Rig RandomRig(const Expressible& format, RandomValues* random) {
     CameraCalibration camera = random->Camera(
         format.same_model ? model
                           : format.models[Pick(format.models.size(), random)]);
+    if (camera.model == Model::kFov) {
+      camera.distortion[0] = std::copysign(
+          std::max(std::abs(camera.distortion[0]), format.least_w),
+          camera.distortion[0]);
+    }
     if (format.time_offset) {
       // Basalt has whole nanoseconds.
       camera.time_offset_s = std::round(random->Uniform(-3e7, 3e7)) / 1e9;
@@ -123,6 +134,16 @@ TEST_P(Export, TheToolPredictsTheSamePixelsRatesAndTimes) {
     EXPECT_EQ(tool.has_imu_model, GetParam().imu);
     ExpectSamePredictions(rig.factory, tool, &random);
     ExpectSameNoise(tool.noise, rig.imu_noise);
+  }
+}
+
+TEST_P(Export, TheLoaderOfTheToolReadsEveryKey) {
+  RandomValues random(13);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Rig rig = RandomRig(GetParam(), &random);
+    const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
+    ASSERT_TRUE(files.ok()) << files.status();
+    EXPECT_THAT(LoaderFaults(GetParam().format, files->files), IsEmpty());
   }
 }
 
@@ -201,8 +222,10 @@ TEST_P(Export, AModelWithoutWordsIsRefused) {
   EXPECT_EQ(files.ok(), has);
   if (has) return;
   EXPECT_EQ(files.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(std::string(files.status().message()),
-              HasSubstr("cam0 has the distortion model fov"));
+  const std::string message(files.status().message());
+  EXPECT_THAT(message, HasSubstr("cam0 has the distortion model fov, but"));
+  EXPECT_THAT(message, HasSubstr(GetParam().format));
+  EXPECT_THAT(message, HasSubstr("; kalibr and maplab have it"));
 }
 
 // OpenCV and YAML 1.1 tell an integer from a number, and want an exponent to
@@ -228,6 +251,80 @@ INSTANTIATE_TEST_SUITE_P(Formats,
                          [](const auto& info) {
                            return std::string(info.param.format);
                          });
+
+// The comparison with the table of a loader sees what it must.
+TEST(LoaderTables, FindWhatIsMissingOfAnotherTypeOrUnknown) {
+  RandomValues random(16);
+  Rig rig;
+  rig.factory.cameras = {random.Camera(Model::kEquidistant)};
+  const auto files = ExportRig("kalibr", rig, rig.factory, kOptions);
+  ASSERT_TRUE(files.ok()) << files.status();
+  for (const auto& [from, to, fault] :
+       std::initializer_list<std::array<std::string, 3>>{
+           {"update_rate: 250.0", "", "update_rate is missing"},
+           {"update_rate: 250.0", "update_rate: -1.0", "update_rate does not"},
+           {"rostopic: /imu0", "rostopic: 0", "rostopic does not"},
+           {"rostopic: /imu0", "rostopics: /imu0", "rostopics is not in the"},
+           {"model: scale", "imu1: {}\nmodel: scale", "imu1 is not in the"},
+           {"[640, 480]", "[640.0, 480]", "resolution does not"},
+           {"timeshift_cam_imu: 0.0", "timeshift_cam_imu: 0", "timeshift"},
+           {"cam0:", "camera:", "camera is counted as a camera"}}) {
+    std::vector<TextFile> changed = files->files;
+    for (TextFile& file : changed) {
+      const std::size_t at = file.text.find(from);
+      if (at != std::string::npos) file.text.replace(at, from.size(), to);
+    }
+    EXPECT_THAT(LoaderFaults("kalibr", changed), Contains(HasSubstr(fault)));
+  }
+}
+
+struct Refused {
+  const char* format;
+  void (*change)(Rig* rig);
+  const char* message;
+};
+
+// Values at which the loader of a tool stops.
+TEST(Formats, AValueThatTheToolRefusesIsNotWritten) {
+  for (const Refused& refused : std::initializer_list<Refused>{
+           {"kalibr",
+            [](Rig* rig) { rig->factory.cameras[1].c.x() = -1; },
+            "cam1 has a principal point at -1"},
+           {"maplab",
+            [](Rig* rig) { rig->factory.cameras[1].c.y() = 0; },
+            "cam1 has a principal point at"},
+           {"maplab",
+            [](Rig* rig) { rig->factory.cameras[0].distortion[0] = 0.3; },
+            "cam0 has w = 0.3"},
+           {"maplab",
+            [](Rig* rig) { rig->gravity_mps2 = 1.62; },
+            "gravity of 1.62 m/s^2"}}) {
+    RandomValues random(14);
+    Rig rig;
+    rig.factory.cameras = {random.Camera(Model::kFov),
+                           random.Camera(Model::kEquidistant)};
+    rig.factory.cameras[0].distortion[0] = 0.9;
+    ASSERT_TRUE(ExportRig(refused.format, rig, rig.factory, kOptions).ok());
+    refused.change(&rig);
+    const auto files = ExportRig(refused.format, rig, rig.factory, kOptions);
+    EXPECT_EQ(files.status().code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_THAT(std::string(files.status().message()),
+                HasSubstr(refused.message));
+  }
+}
+
+TEST(Formats, KalibrIsNotSaidToReadTheMatricesOfAnImu) {
+  RandomValues random(15);
+  Rig rig;
+  rig.factory.cameras = {random.Camera(Model::kEquidistant)};
+  const auto nominal = ExportRig("kalibr", rig, rig.factory, kOptions);
+  ASSERT_TRUE(nominal.ok()) << nominal.status();
+  EXPECT_THAT(Names(nominal->losses), Not(Contains("imu_matrices")));
+  rig.factory.imu.s_g.x() = 1.01;
+  const auto files = ExportRig("kalibr", rig, rig.factory, kOptions);
+  ASSERT_TRUE(files.ok()) << files.status();
+  EXPECT_THAT(Names(files->losses), Contains("imu_matrices"));
+}
 
 TEST(Formats, AllAreTested) {
   std::vector<std::string> tested;

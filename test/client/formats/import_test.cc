@@ -322,6 +322,7 @@ TEST(ImportErrors, NameTheFieldAndWhatToDo) {
            {"vins_fusion", "KANNALA_BRANDT", "MEI", "model_type 'MEI'"},
            {"vins_fusion", "num_of_cam: 2", "num_of_cam: 3", "not 1 or 2"},
            {"basalt", "kb4", "ds", "camera_type \"ds\""},
+           {"basalt", "kb4", "fov", "one of pinhole-radtan8 and kb4"},
            {"basalt", "value0", "value1", "'value0' is missing"},
            {"basalt", "\"qw\": ", "\"qw\": 1", "norm"},
            {"basalt", "[848, 800]", "[848.5, 800]", "resolution"},
@@ -356,6 +357,30 @@ TEST(ImportLosses, HaveAName) {
     ASSERT_EQ(rig->losses.size(), 1u) << change.answer;
     EXPECT_EQ(rig->losses[0].name, change.answer);
   }
+}
+
+// The input of a calibration without an IMU model is in its result, whatever
+// matrices it had.
+TEST(ImportKalibr, IgnoresMatricesThatTheModelDoesNotHave) {
+  const auto rig =
+      Changed({"kalibr", "model: scale-misalignment", "model: calibrated", ""});
+  ASSERT_TRUE(rig.ok()) << rig.status();
+  const ImuCalibration& imu = rig->rig.factory.imu;
+  EXPECT_TRUE(imu.T_g().isIdentity(0));
+  EXPECT_TRUE(imu.T_a().isIdentity(0));
+  EXPECT_TRUE(imu.q_AI.vec().isZero(0));
+}
+
+// Kalibr's input names no imu0.
+TEST(ImportKalibr, ReadsTheImuOfAnInputAsWell) {
+  RandomValues random(7);
+  std::vector<TextFile> files = KalibrFiles(&random);
+  const auto result = ImportRig("kalibr", files, {});
+  ASSERT_TRUE(result.ok()) << result.status();
+  files[1].text.replace(0, std::string("imu0:\n").size(), "");
+  const auto input = ImportRig("kalibr", files, {});
+  ASSERT_TRUE(input.ok()) << input.status();
+  EXPECT_TRUE(BoxMinus(input->rig.factory, result->rig.factory).isZero(0));
 }
 
 // Basalt's constant bias, in terms of the readings, makes the same rates.

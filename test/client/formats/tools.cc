@@ -90,7 +90,9 @@ Tool Kalibr(const std::vector<TextFile>& files) {
   Tool tool;
   tool.has_imu_model = true;
   const YAML::Node chain = Yaml(files[0].text);
-  const YAML::Node imu = Yaml(files[1].text)["imu0"];
+  // The input of Kalibr is the content of imu0 in its result.
+  const YAML::Node root = Yaml(files[1].text);
+  const YAML::Node imu = root["imu0"] ? root["imu0"] : root;
   const Matrix3d Ma = Mat<3>(imu["accelerometers"]["M"]);
   const Matrix3d Mg = Mat<3>(imu["gyroscopes"]["M"]);
   const Matrix3d C = Mat<3>(imu["gyroscopes"]["C_gyro_i"]);
@@ -274,10 +276,6 @@ Tool Basalt(const std::vector<TextFile>& files) {
     if (type == "kb4") {
       model = "equidistant";
       k = {p["k1"], p["k2"], p["k3"], p["k4"]};
-    } else if (type == "fov") {
-      model = "fov";
-      k = {p["w"]};
-      if (!(k[0] > 1e-5)) throw std::runtime_error("takes w for 0");
     } else if (type == "pinhole-radtan8") {
       // The rational model with a denominator of 1 and no third coefficient.
       for (const char* zero : {"k3", "k4", "k5", "k6", "rpmax"}) {
