@@ -112,6 +112,17 @@ Json GyroJson(const Eigen::Matrix3d& G) {
   return list;
 }
 
+void AddOdometryLoss(double time_offset_s, std::vector<Loss>* losses) {
+  if (time_offset_s == 0) return;
+  losses->push_back(
+      {"cam_time_offset_ns",
+       fmt::format(
+           "Basalt's calibration applies it, its odometry does not: for "
+           "the odometry, add {} s to the timestamps of the images",
+           time_offset_s),
+       true});
+}
+
 void ReadCameras(const Json& root,
                  const Eigen::Matrix3d& R_BI,
                  ImportedRig* result) {
@@ -183,6 +194,7 @@ ExportedFiles ExportBasalt(const Rig& rig,
   root["cam_time_offset_ns"] = static_cast<std::int64_t>(
       std::llround(theta.cameras[0].time_offset_s * kNsPerS));
   root["vignette"] = Json::array();
+  AddOdometryLoss(theta.cameras[0].time_offset_s, &result.losses);
   AddSharedOffsetLosses("basalt", theta, &result.losses);
   AddGravityLoss("basalt", rig, &result.losses);
   result.files = {{"calibration.json", Json{{"value0", root}}.dump(2) + "\n"}};

@@ -252,6 +252,20 @@ INSTANTIATE_TEST_SUITE_P(Formats,
                            return std::string(info.param.format);
                          });
 
+TEST(Formats, BasaltsOdometryIsNotSaidToApplyATimeOffset) {
+  RandomValues random(17);
+  Rig rig;
+  rig.factory.cameras = {random.Camera(Model::kEquidistant)};
+  const auto without = ExportRig("basalt", rig, rig.factory, kOptions);
+  ASSERT_TRUE(without.ok()) << without.status();
+  EXPECT_THAT(Names(without->losses), Not(Contains("cam_time_offset_ns")));
+  rig.factory.cameras[0].time_offset_s = -0.004;
+  const auto files = ExportRig("basalt", rig, rig.factory, kOptions);
+  ASSERT_TRUE(files.ok()) << files.status();
+  EXPECT_EQ(files->losses[0].name, "cam_time_offset_ns");
+  EXPECT_THAT(files->losses[0].text, HasSubstr("add -0.004 s"));
+}
+
 // The comparison with the table of a loader sees what it must.
 TEST(LoaderTables, FindWhatIsMissingOfAnotherTypeOrUnknown) {
   RandomValues random(16);
