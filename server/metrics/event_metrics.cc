@@ -1,5 +1,7 @@
 #include "server/metrics/event_metrics.h"
 
+#include "server/pipeline/verdict.h"
+
 namespace selfcal::server {
 namespace {
 
@@ -71,6 +73,10 @@ EventMetrics::EventMetrics(Store* store,
                 .Name("selfcal_runs_total")
                 .Help("Runs that ended, by outcome.")
                 .Register(*registry)),
+      verdicts_(prometheus::BuildCounter()
+                    .Name("selfcal_verdicts_total")
+                    .Help("Versions that runs gave, by verdict.")
+                    .Register(*registry)),
       run_seconds_(prometheus::BuildHistogram()
                        .Name("selfcal_run_seconds")
                        .Help("Time from the start of a run to its end.")
@@ -91,6 +97,10 @@ EventMetrics::EventMetrics(Store* store,
   }
   for (const char* outcome : {"activated", "rejected", "failed", "cancelled"}) {
     runs_.Add({{"outcome", outcome}});
+  }
+  for (const VerdictKind kind :
+       {VerdictKind::kGood, VerdictKind::kWeak, VerdictKind::kNotTrustworthy}) {
+    verdicts_.Add({{"verdict", VerdictText(kind)}});
   }
   for (const CheckSubject subject :
        {CheckSubject::kScore, CheckSubject::kCalibration}) {
@@ -136,21 +146,27 @@ void EventMetrics::OnRun(const StoredRun& run) {
       started_.erase(started);
     }
   }
-  runs_.Add({{"outcome", Outcome(run)}}).Increment();
+  CountEnd(run);
 }
 
 void EventMetrics::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
   checks_.Add(CheckLabels(subject, outcome)).Increment();
 }
 
-std::string EventMetrics::Outcome(const StoredRun& run) const {
-  if (run.state == RunState::kCancelled) return "cancelled";
-  if (run.state == RunState::kFailed) return "failed";
+void EventMetrics::CountEnd(const StoredRun& run) {
+  const auto count = [this](const char* outcome) {
+    runs_.Add({{"outcome", outcome}}).Increment();
+  };
+  if (run.state == RunState::kCancelled) return count("cancelled");
+  if (run.state == RunState::kFailed) return count("failed");
   const auto calibration =
       store_->GetCalibration(run.rig, run.calibration_version);
   const bool rejected =
       !calibration.ok() || calibration->state == CalibrationState::kRejected;
-  return rejected ? "rejected" : "activated";
+  count(rejected ? "rejected" : "activated");
+  if (!calibration.ok()) return;
+  verdicts_.Add({{"verdict", VerdictText(VerdictOf(*calibration).kind)}})
+      .Increment();
 }
 
 }  // namespace selfcal::server

@@ -31,8 +31,8 @@ class EventMetrics final : public PipelineObserver {
  private:
   using RunId = std::pair<std::string, std::int64_t>;
 
-  // The outcome of a run that has ended.
-  std::string Outcome(const StoredRun& run) const;
+  // Counts the outcome of a run that has ended, and the verdict on its version.
+  void CountEnd(const StoredRun& run);
 
   Store* const store_;
   RecentRigs* const rigs_;
@@ -40,6 +40,7 @@ class EventMetrics final : public PipelineObserver {
   prometheus::Histogram& scoring_;
   prometheus::Family<prometheus::Histogram>& entropy_;
   prometheus::Family<prometheus::Counter>& runs_;
+  prometheus::Family<prometheus::Counter>& verdicts_;
   prometheus::Histogram& run_seconds_;
   prometheus::Family<prometheus::Counter>& checks_;
   std::mutex mutex_;  // guards the members below

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 #include <future>
 #include <limits>
@@ -75,6 +76,40 @@ void AddTables(Store* store,
   families->push_back(verdict.Take());
 }
 
+// Seconds since the Unix epoch; 0 stays 0.
+double Timestamp(std::int64_t time_ns) {
+  constexpr double kNsPerS = 1e9;
+  return static_cast<double>(time_ns) / kNsPerS;
+}
+
+void AddTimes(Store* store,
+              const std::vector<std::string>& rigs,
+              std::vector<MetricFamily>* families) {
+  Gauge active("selfcal_active_since_timestamp_seconds",
+               "When the active calibration became active.");
+  Gauge change("selfcal_device_change_timestamp_seconds",
+               "When the newest device change was detected; 0: none.");
+  Gauge segment("selfcal_last_segment_timestamp_seconds",
+                "When the newest segment arrived; 0: none.");
+  RigQuery newest;
+  newest.order = RigQuery::Order::kLastSeen;
+  newest.descending = true;
+  const auto summaries = store->ListRigSummaries(
+      newest,
+      {.size = std::max(1, static_cast<int>(rigs.size())), .token = ""});
+  if (summaries.ok()) {
+    for (const RigSummary& rig : summaries->items) {
+      if (!std::binary_search(rigs.begin(), rigs.end(), rig.rig)) continue;
+      active.Add({{"rig", rig.rig}}, Timestamp(rig.active_since_ns));
+      change.Add({{"rig", rig.rig}}, Timestamp(rig.newest_change_ns));
+      segment.Add({{"rig", rig.rig}}, Timestamp(rig.last_seen_ns));
+    }
+  }
+  families->push_back(active.Take());
+  families->push_back(change.Take());
+  families->push_back(segment.Take());
+}
+
 void AddQueue(Store* store, std::vector<MetricFamily>* families) {
   Gauge queue("selfcal_queue_length", "Segments that wait to be scored.");
   const auto unscored = store->ListUnscored(std::numeric_limits<int>::max());
@@ -128,7 +163,9 @@ std::vector<MetricFamily> StateMetrics::Collect() const {
   return std::async(std::launch::async,
                     [this] {
                       std::vector<MetricFamily> families;
-                      AddTables(store_, rigs_->List(), &families);
+                      const std::vector<std::string> rigs = rigs_->List();
+                      AddTables(store_, rigs, &families);
+                      AddTimes(store_, rigs, &families);
                       AddQueue(store_, &families);
                       AddDisk(database_, &families);
                       AddMemory(&families);

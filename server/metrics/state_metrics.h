@@ -1,5 +1,5 @@
-// Metrics of the present state, when Prometheus reads them: tables and versions
-// of the rigs that sent last, the queue, disk and memory.
+// Metrics of the present state, when Prometheus reads them: tables, versions
+// and times of the rigs that sent last, the queue, disk and memory.
 #pragma once
 
 #include <prometheus/collectable.h>

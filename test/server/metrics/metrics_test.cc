@@ -3,10 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <ctime>
+
 #include "server/domain/domain.h"
+#include "server/store/change_rows.h"
 #include "test/server/http_get.h"
 #include "test/server/store/fake_information.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
+#include "test/server/test_records.h"
 #include "test/server/test_segments.h"
 #include "test/support/temp_folder.h"
 
@@ -45,6 +49,7 @@ TEST_F(MetricsTest, SeriesAreThereBeforeTheFirstEvent) {
   for (const std::string line : {"selfcal_build_info{version=\"1.2.3\"} 1",
                                  "selfcal_segments_total{verdict=\"stored\"} 0",
                                  "selfcal_runs_total{outcome=\"activated\"} 0",
+                                 "selfcal_verdicts_total{verdict=\"weak\"} 0",
                                  ("selfcal_checks_total{outcome=\"differs\","
                                   "subject=\"calibration\"} 0"),
                                  "selfcal_queue_length 0",
@@ -88,6 +93,67 @@ TEST_F(MetricsTest, EventsAreCounted) {
         "selfcal_active_verdict{rig=\"a\",verdict=\"factory\"} 1"}) {
     EXPECT_THAT(series, HasSubstr(line));
   }
+}
+
+// The value of a series, or -1.
+double ValueOf(const std::string& series, const std::string& name) {
+  const std::size_t at = series.find("\n" + name + " ");
+  return at == series.npos ? -1
+                           : std::stod(series.substr(at + name.size() + 2));
+}
+
+TEST_F(MetricsTest, VersionsAreCountedByVerdict) {
+  const Rig rig = TestRig("a");
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  for (const MotionSegment& segment : TestSegments(rig, 2)) {
+    ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
+    ASSERT_TRUE(
+        domain_->CommitScore("a", segment.key, FakeInformation(rig, -12)).ok());
+  }
+  ASSERT_TRUE(domain_->BeginRun("a", 1).ok());
+  StoredCalibration result = TestCalibration(rig, *store_->GetRun("a", 1));
+  result.verdict.kind = VerdictKind::kWeak;
+  ASSERT_TRUE(domain_->FinishRun("a", 1, result).ok());
+  metrics_->observer()->OnRun(*store_->GetRun("a", 1));
+  const std::string series = Scrape();
+  EXPECT_THAT(series, HasSubstr("selfcal_verdicts_total{verdict=\"weak\"} 1"));
+  EXPECT_THAT(series, HasSubstr("selfcal_verdicts_total{verdict=\"good\"} 0"));
+  EXPECT_THAT(series, HasSubstr("selfcal_runs_total{outcome=\"activated\"} 1"));
+}
+
+TEST_F(MetricsTest, TimesOfTheActiveVersionTheLastSegmentAndTheDeviceChange) {
+  const double before = static_cast<double>(std::time(nullptr));
+  const Rig rig = TestRig("a");
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  ASSERT_TRUE(domain_->PutSegment("a", TestSegments(rig, 1)[0]).ok());
+  metrics_->observer()->OnVerdict("a", Verdict::kStored);
+  const std::string active =
+      "selfcal_active_since_timestamp_seconds{rig=\"a\"}";
+  const std::string change =
+      "selfcal_device_change_timestamp_seconds{rig=\"a\"}";
+  const std::string segment =
+      "selfcal_last_segment_timestamp_seconds{rig=\"a\"}";
+  std::string series = Scrape();
+  const double after = static_cast<double>(std::time(nullptr)) + 1;
+  for (const std::string& name : {active, segment}) {
+    EXPECT_GE(ValueOf(series, name), before) << name;
+    EXPECT_LE(ValueOf(series, name), after) << name;
+  }
+  EXPECT_EQ(ValueOf(series, change), 0);
+  constexpr std::int64_t kTime_ns = 1'700'000'000'500'000'000;
+  StoredChange detected;
+  detected.rig = "a";
+  detected.change = 1;
+  detected.time_ns = kTime_ns;
+  detected.base_version = 1;
+  detected.groups = {"extrinsics"};
+  ASSERT_TRUE(
+      store_
+          ->Transact("a",
+                     kTime_ns,
+                     [&](UnitOfWork* tx) { return InsertChange(tx, detected); })
+          .ok());
+  EXPECT_EQ(ValueOf(Scrape(), change), 1'700'000'000.5);
 }
 
 TEST_F(MetricsTest, SeriesDoNotGrowWithTheRigs) {
