@@ -4,6 +4,7 @@
 
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -94,6 +95,42 @@ void CheckPayloads(Connection* db, Findings* findings) {
   }
 }
 
+// What the program relies on and no constraint of the schema states. `sql`
+// selects the places that break the rule.
+struct Rule {
+  std::string_view sql;
+  std::string_view description;
+};
+
+constexpr Rule kRules[] = {
+    {"SELECT 'rig ' || r.id FROM rigs r WHERE 1 <> (SELECT count(*) "
+     "FROM calibrations c WHERE c.rig = r.rig AND c.state = 1)",
+     "does not have one active calibration"},
+    {"SELECT 'rig ' || r.id FROM rigs r WHERE NOT EXISTS (SELECT 1 "
+     "FROM calibrations c WHERE c.rig = r.rig AND c.version = 1)",
+     "has no factory calibration"},
+    {"SELECT 'rig ' || r.id || ', table ' || t.group_name FROM tables t "
+     "JOIN rigs r ON r.rig = t.rig WHERE t.capacity < (SELECT count(*) "
+     "FROM table_entries e WHERE e.rig = t.rig "
+     "AND e.group_name = t.group_name)",
+     "holds more segments than its capacity"},
+    {"SELECT 'rig ' || r.id || ', table ' || e.group_name || ', segment ' || "
+     "s.session || '~' || s.session_index FROM table_entries e "
+     "JOIN rigs r ON r.rig = e.rig JOIN segments s ON s.segment = e.segment "
+     "WHERE s.rig <> e.rig OR s.state <> 2",
+     "is not a scored segment of this rig"},
+};
+
+void CheckRule(Connection* db, const Rule& rule, Findings* findings) {
+  Statement read(db, rule.sql);
+  while (!findings->cancelled() && read.Next()) {
+    findings->Add(read.Text(0), std::string(rule.description));
+  }
+  if (!read.status().ok()) {
+    findings->Add("records", std::string(read.status().message()));
+  }
+}
+
 }  // namespace
 
 absl::StatusOr<CheckSummary> CheckDatabase(
@@ -110,6 +147,7 @@ absl::StatusOr<CheckSummary> CheckDatabase(
     CheckBlobs(db, what, &findings);
   }
   CheckPayloads(db, &findings);
+  for (const Rule& rule : kRules) CheckRule(db, rule, &findings);
   if (findings.cancelled()) {
     return absl::CancelledError("the check was not waited for");
   }

@@ -23,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kWaiting = ".restore-";
+constexpr std::string_view kBefore = ".before-restore-";
 
 // The time in the name of the database that waits; nullopt if there is none.
 absl::StatusOr<std::optional<std::string>> WaitingTime(
@@ -40,6 +41,19 @@ absl::StatusOr<std::optional<std::string>> WaitingTime(
     if (time.find_first_not_of("0123456789") == std::string::npos) return time;
   }
   return std::nullopt;
+}
+
+// The time in seconds for names of files, later if a database from before a
+// restore has that name: none is ever overwritten.
+std::string FreeTime(const std::string& path, std::int64_t time_ns) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  std::int64_t time = time_ns / kSecond;
+  std::error_code ignored;
+  while (
+      fs::exists(path + std::string(kBefore) + std::to_string(time), ignored)) {
+    ++time;
+  }
+  return std::to_string(time);
 }
 
 absl::Status MoveIfThere(const std::string& from, const std::string& to) {
@@ -101,11 +115,10 @@ class FileRestoration final : public ArrivingCopy {
     file_.close();
     SELFCAL_RETURN_IF_ERROR(Written());
     SELFCAL_RETURN_IF_ERROR(VerifyApart(arriving_, verify));
-    constexpr std::int64_t kSecond = 1'000'000'000;
-    const std::string time = std::to_string(time_ns / kSecond);
+    const std::string time = FreeTime(path_, time_ns);
     SELFCAL_RETURN_IF_ERROR(
         RenameDurably(arriving_, path_ + std::string(kWaiting) + time));
-    return path_ + ".before-restore-" + time;
+    return path_ + std::string(kBefore) + time;
   }
 
  private:
@@ -128,7 +141,7 @@ class FileRestoration final : public ArrivingCopy {
 absl::Status TakeOverRestored(const std::string& path) {
   SELFCAL_ASSIGN_OR_RETURN(const auto time, WaitingTime(path));
   if (!time) return absl::OkStatus();
-  const std::string before = path + ".before-restore-" + *time;
+  const std::string before = path + std::string(kBefore) + *time;
   // The log first: beside another database it would be lost.
   SELFCAL_RETURN_IF_ERROR(MoveIfThere(path + "-wal", before + "-wal"));
   SELFCAL_RETURN_IF_ERROR(MoveIfThere(path, before));

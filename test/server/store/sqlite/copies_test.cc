@@ -1,7 +1,9 @@
 // Backup and restore of an SQLite file beside a store that is in use.
 #include <atomic>
 #include <filesystem>
+#include <set>
 #include <thread>
+#include <utility>
 
 #include "server/store/checksum.h"
 #include "server/store/maintenance.h"
@@ -75,6 +77,79 @@ TEST_F(CopiesTest, ADamagedNameInTheSchemaIsFound) {
   EXPECT_THAT(found,
               ::testing::ElementsAre("schema: table segments, imu_samples of "
                                      "type INTEGER is not there"));
+}
+
+// Each: what is done to the file, and what the check says.
+const std::pair<const char*, const char*> kDamages[] = {
+    {"DROP TRIGGER calibration_transitions",
+     "schema: trigger calibration_transitions is not there"},
+    {"DROP INDEX one_active_calibration",
+     "schema: index one_active_calibration is not there"},
+    {"DROP TRIGGER calibrations_stay; CREATE TRIGGER calibrations_stay BEFORE "
+     "DELETE ON calibrations BEGIN SELECT 1; END",
+     "schema: trigger calibrations_stay is not that of this program"},
+    {"CREATE TRIGGER more AFTER INSERT ON segments BEGIN "
+     "DELETE FROM payloads; END",
+     "schema: trigger more does not belong there"},
+    {"CREATE TABLE more (x)", "schema: table more does not belong there"},
+    {"CREATE VIEW more AS SELECT 1", "schema: view more does not belong there"},
+    {"DELETE FROM table_entries; UPDATE tables SET capacity = -1",
+     "holds more segments than its capacity"},
+    {"UPDATE segments SET state = 3", "is not a scored segment of this rig"},
+};
+
+TEST_F(CopiesTest, WhatTheSchemaAndTheProgramRelyOnIsChecked) {
+  Promise promise("a damaged schema or a broken rule is found");
+  const std::string sound = BackUp();
+  store_.reset();
+  for (const auto& [damage, said] : kDamages) {
+    SCOPED_TRACE(damage);
+    const std::string path = folder_.File("damaged.db");
+    WriteBytes(path, sound);
+    ASSERT_TRUE(ExecuteInFile(path, damage).ok());
+    const std::string bytes = ReadBytes(path);
+    Reopen();
+    const absl::Status refused = Restore(bytes, Sha256(bytes)).status();
+    EXPECT_THAT(std::string(refused.message()), ::testing::HasSubstr(said));
+    ++promise.trials;
+    promise.lost += refused.ok();
+  }
+}
+
+TEST_F(CopiesTest, SeveralActiveCalibrationsAreFound) {
+  const std::string path = folder_.File("damaged.db");
+  WriteBytes(path, BackUp());
+  ASSERT_TRUE(ExecuteInFile(path,
+                            "DROP INDEX one_active_calibration;"
+                            "DROP TRIGGER calibration_transitions;"
+                            "DROP TRIGGER calibrations_never_change;"
+                            "UPDATE calibrations SET state = 1")
+                  .ok());
+  const auto damaged = OpenSqliteStore(path);
+  ASSERT_TRUE(damaged.ok()) << damaged.status();
+  std::vector<std::string> found;
+  ASSERT_TRUE((*damaged)
+                  ->maintenance()
+                  ->Check([&](const StoreProblem& problem) {
+                    found.push_back(problem.place + " " + problem.description);
+                    return true;
+                  })
+                  .ok());
+  EXPECT_THAT(
+      found, ::testing::Contains("rig a does not have one active calibration"));
+}
+
+TEST_F(CopiesTest, RestoresInOneSecondKeepEveryDatabase) {
+  const std::string bytes = BackUp();
+  std::set<std::string> kept;
+  for (int k = 0; k < 3; ++k) {
+    const auto previous = Restore(bytes, Sha256(bytes));
+    ASSERT_TRUE(previous.ok()) << previous.status();
+    kept.insert(*previous);
+    Reopen();
+  }
+  EXPECT_EQ(kept.size(), 3u);
+  for (const std::string& path : kept) EXPECT_TRUE(fs::exists(path)) << path;
 }
 
 TEST_F(CopiesTest, ABackupIsOneInstantWhileOthersWrite) {

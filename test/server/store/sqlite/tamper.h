@@ -37,16 +37,21 @@ inline absl::StatusOr<std::string> ReadTextInFile(const std::string& path,
   return read.status().ok() ? absl::NotFoundError(sql) : read.status();
 }
 
-// Changes one byte in each blob of a column, around the triggers.
+// Changes one byte in each blob of a column, around the trigger that forbids
+// it.
 inline absl::Status DamageColumn(const std::string& path,
                                  const std::string& table,
                                  const std::string& column) {
+  const auto trigger = ReadTextInFile(
+      path,
+      "SELECT sql FROM sqlite_schema WHERE name = 'calibrations_never_change'");
+  if (!trigger.ok()) return trigger.status();
   return ExecuteInFile(path,
-                       "DROP TRIGGER IF EXISTS calibrations_never_change;"
+                       "DROP TRIGGER calibrations_never_change;"
                        "UPDATE " +
                            table + " SET " + column + " = CAST(substr(" +
                            column + ", 1, 20) || x'5a' || substr(" + column +
-                           ", 22) AS BLOB)");
+                           ", 22) AS BLOB);" + *trigger);
 }
 
 // The same, for the data of the segments with this index in their session.
