@@ -1,11 +1,12 @@
 // The convergence of a run over its iterations: the cost, and each parameter with
 // its sigma, relative to its start value.
-import { useMemo } from 'preact/hooks';
+import { useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
 import type { ComponentProgress } from './contract';
-import { component, number, quantity } from './format';
-import { DataTable } from './parts';
+import { component, estimateText, heading, number, shownUnit, valueText } from './format';
+import { Choice } from './parts';
 import { kColours, Plot } from './plot';
+import { DataTable, type Column } from './table';
 
 export interface Step {
   iteration: number;
@@ -43,51 +44,124 @@ function Course(props: { of: ComponentProgress[]; label: string }) {
   );
 }
 
-function stillMoves(course: ComponentProgress[]): string {
-  if (course.length < 2) return '';
+// The last step, in sigmas.
+function lastStep(course: ComponentProgress[]): number | undefined {
+  if (course.length < 2) return undefined;
   const [before, now] = course.slice(-2);
-  const sigmas = Math.abs(now.moved - before.moved) / now.sigma;
+  return Math.abs(now.moved - before.moved) / now.sigma;
+}
+
+function stepText(sigmas: number | undefined): string {
+  if (sigmas === undefined) return '';
   return sigmas < kStill ? `less than ${kStill}` : number(sigmas, 2);
 }
 
-function Parameters(props: { steps: Step[] }) {
+interface ParameterCourse {
+  name: string; // of the component
+  course: ComponentProgress[];
+  now: ComponentProgress;
+  // In the unit in which the parameter is shown.
+  unit: string;
+  factor: number;
+}
+
+function coursesOf(steps: Step[]): ParameterCourse[] {
   const courses = new Map<string, ComponentProgress[]>();
-  for (const { parameters } of props.steps) {
+  for (const { parameters } of steps) {
     for (const parameter of parameters) {
-      courses.set(parameter.component, [...(courses.get(parameter.component) ?? []), parameter]);
+      const course = courses.get(parameter.component);
+      if (course) course.push(parameter);
+      else courses.set(parameter.component, [parameter]);
     }
   }
-  const rows = [...courses].map(([name, course]) => {
+  return [...courses].map(([name, course]) => {
     const now = course[course.length - 1];
-    const moved = quantity(now.moved, now.unit, 3);
-    const sigma = quantity(now.sigma, now.unit, 3);
-    return [
-      component(name),
-      quantity(now.value, now.unit),
-      moved,
-      sigma,
-      stillMoves(course),
-      <Course of={course} label={`${component(name)} has moved by ${moved}, sigma ${sigma}`} />,
-    ];
+    return { name, course, now, ...shownUnit(now.unit) };
   });
+}
+
+function changeText(of: ParameterCourse): string {
+  return estimateText(of.factor * of.now.moved, of.factor * of.now.sigma, of.unit);
+}
+
+const kColumns: Column<ParameterCourse>[] = [
+  {
+    head: 'Parameter',
+    cell: (of) => component(of.name),
+    value: (of) => component(of.name),
+  },
+  {
+    head: 'Value',
+    cell: ({ now, factor, unit }) =>
+      valueText(factor * now.value, factor * now.sigma) + (unit === '-' ? '' : ' ' + unit),
+  },
+  { head: 'Change since the start', cell: changeText },
+  {
+    head: 'Last step [standard deviations]',
+    cell: ({ course }) => stepText(lastStep(course)),
+    value: ({ course }) => lastStep(course),
+  },
+  {
+    head: 'Over the iterations',
+    cell: (of) => (
+      <Course of={of.course} label={`${component(of.name)} has changed by ${changeText(of)}`} />
+    ),
+  },
+];
+
+// One parameter over the iterations, with axes.
+function ParameterPlot(props: { steps: Step[]; of: ParameterCourse }) {
+  const { steps } = props;
+  const { name, factor, unit } = props.of;
+  const data = useMemo(() => {
+    const at = steps.map((step) => step.parameters.find((p) => p.component === name));
+    const values = (value: (p: ComponentProgress) => number) =>
+      at.map((p) => (p ? factor * value(p) : null));
+    return [
+      steps.map((step) => step.iteration),
+      values((p) => p.moved),
+      values((p) => p.moved + p.sigma),
+      values((p) => p.moved - p.sigma),
+    ] as uPlot.AlignedData;
+  }, [steps, name, factor]);
+  const bound = { stroke: kColours[0] + '66', width: 1, points: { show: false } };
+  return (
+    <Plot
+      label={`Change of the ${component(name)} by iteration, with a band of one standard deviation`}
+      data={data}
+      x={{ label: 'iteration', integers: true }}
+      y={heading('change', unit)}
+      series={[
+        { label: component(name), stroke: kColours[0], width: 2 },
+        { label: 'plus one standard deviation', ...bound },
+        { label: 'minus one standard deviation', ...bound },
+      ]}
+      bands={[{ series: [2, 3], fill: kColours[0] + '22' }]}
+    />
+  );
+}
+
+function Parameters(props: { steps: Step[] }) {
+  const courses = useMemo(() => coursesOf(props.steps), [props.steps]);
+  const [name, setName] = useState(courses[0].name);
+  const chosen = courses.find((one) => one.name === name) ?? courses[0];
   return (
     <>
       <h2>Parameters</h2>
       <p class="quiet">
-        Each relative to its start value (dashed), with a band of one sigma at that iteration.
+        Each relative to its start value (dashed), with a band of one standard deviation at that
+        iteration.
       </p>
-      <DataTable
-        caption="Parameters by iteration"
-        head={[
-          'Parameter',
-          'Now',
-          'Moved by',
-          'Sigma',
-          'Last step [sigmas]',
-          'Over the iterations',
-        ]}
-        rows={rows}
-      />
+      <div class="bar">
+        <Choice
+          label="Parameter"
+          value={chosen.name}
+          of={courses.map((one) => [one.name, component(one.name)])}
+          onChoice={setName}
+        />
+      </div>
+      <ParameterPlot steps={props.steps} of={chosen} />
+      <DataTable caption="Parameters by iteration" columns={kColumns} items={courses} />
     </>
   );
 }
@@ -114,10 +188,10 @@ export function Convergence(props: { steps: Step[] }) {
           series={[{ label: 'cost', stroke: kColours[0], width: 2 }]}
         />
         <Plot
-          label="Largest step of a parameter by iteration"
+          label="Largest step of a parameter by iteration, in standard deviations"
           data={step}
           x={x}
-          y="step [sigmas]"
+          y="step [standard deviations]"
           series={[{ label: 'step', stroke: kColours[1], width: 2 }]}
         />
       </div>

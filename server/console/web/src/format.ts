@@ -82,6 +82,41 @@ export function quantity(value: number, unit: string, digits = 6): string {
   return number(value, digits) + (unit === '-' ? '' : ' ' + unit);
 }
 
+// 'angle [°]'; a quantity without a unit has none in its heading.
+export function heading(name: string, unit: string): string {
+  return unit === '-' ? name : `${name} [${unit}]`;
+}
+
+const kMostDecimals = 9;
+
+// The decimals of a standard deviation with two significant digits, to which its
+// value is rounded, too.
+function decimalsOf(sigma: number): number {
+  return Math.min(kMostDecimals, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
+}
+
+const isUsable = (sigma: number) => Number.isFinite(sigma) && sigma > 0;
+
+// A value, with as many digits as its standard deviation justifies.
+export function valueText(value: number, sigma: number): string {
+  return isUsable(sigma) && Number.isFinite(value)
+    ? value.toFixed(decimalsOf(sigma))
+    : number(value, 6);
+}
+
+// A standard deviation with two significant digits.
+export function sigmaText(sigma: number): string {
+  if (!isUsable(sigma)) return '';
+  const text = sigma.toFixed(decimalsOf(sigma));
+  return Number(text) > 0 ? text : sigma.toExponential(1);
+}
+
+// A value with its standard deviation and its unit.
+export function estimateText(value: number, sigma: number, unit: string): string {
+  const both = `${valueText(value, sigma)} ± ${sigmaText(sigma)}`;
+  return unit === '-' ? both : `${both} ${unit}`;
+}
+
 // Matches a pattern, which may have a '*' at either end.
 export function matches(pattern: string, name: string): boolean {
   const text = pattern.replace(/^\*|\*$/g, '');
@@ -93,21 +128,29 @@ export function matches(pattern: string, name: string): boolean {
   return name === pattern;
 }
 
-const kDegrees = 180 / Math.PI;
+// Degrees in a radian.
+export const kDegrees = 180 / Math.PI;
 
-// Shows a rotation as its difference from the factory value, in degrees: a
-// rotation vector near pi can change its sign although nothing has moved.
+// The unit in which the pages show a quantity, and its size: angles in degrees.
+export function shownUnit(unit: string): { unit: string; factor: number } {
+  if (unit === 'rad') return { unit: '°', factor: kDegrees };
+  return { unit, factor: 1 };
+}
+
+// An estimate in the unit in which it is shown. A rotation is shown as its
+// difference from the factory value: a rotation vector near pi can change its
+// sign although nothing has moved.
 export function shown(estimate: {
   unit: string;
   value: number;
   sigma: number;
   fromFactory?: number;
 }): { value: number; sigma: number; unit: string } {
-  const { unit, value, sigma, fromFactory } = estimate;
-  if (unit !== 'rad' || fromFactory === undefined) return { value, sigma, unit };
+  const { unit, factor } = shownUnit(estimate.unit);
+  const relative = estimate.unit === 'rad' && estimate.fromFactory !== undefined;
   return {
-    value: kDegrees * fromFactory,
-    sigma: kDegrees * sigma,
-    unit: 'deg from factory',
+    value: factor * (relative ? estimate.fromFactory! : estimate.value),
+    sigma: factor * estimate.sigma,
+    unit: relative ? unit + ' from the factory value' : unit,
   };
 }

@@ -1,17 +1,16 @@
 // A list that the daemon returns in pages. The address has the position in the
 // list and the query.
 import type { ComponentChildren } from 'preact';
+import { useMemo } from 'preact/hooks';
 import type { ApiError } from './api';
-import { DataTable, Empty, Link, Loaded, Title } from './parts';
+import { Empty, Link, Loaded, Title } from './parts';
 import { useAddress, useRead, withQuery } from './state';
+import { DataTable, type Column, type OrderLink } from './table';
 
 type SortDirection = 'asc' | 'desc';
 
-export interface Column<T> {
-  head: string;
-  cell: (item: T) => ComponentChildren;
-  order?: string; // its name in order_by, if the list can be sorted by it
-}
+// Items that are read at a time, unless the address has page_size.
+const kPageSize = '500';
 
 interface Listing<R, T> {
   path: string;
@@ -38,22 +37,19 @@ export function orderOf(
   return [field, direction === 'asc' || direction === 'desc' ? direction : without[1]];
 }
 
-// A link that sorts by the column; reverses the order if it is the present one.
-function SortBy(props: {
-  column: string;
-  head: string;
-  now: [string, SortDirection];
-  first: SortDirection;
-}) {
-  const [field, direction] = props.now;
-  const current = field === props.column;
-  const next = !current ? props.first : direction === 'asc' ? 'desc' : 'asc';
-  return (
-    <Link to={withQuery({ order_by: `${props.column} ${next}`, page_token: '' })}>
-      {props.head}
-      <span aria-hidden="true">{current ? (direction === 'asc' ? ' ▲' : ' ▼') : ''}</span>
-    </Link>
-  );
+// Sorts by the column; reverses the order if it is the present one.
+function linkOf(
+  column: string,
+  now: [string, SortDirection],
+  first: SortDirection,
+): OrderLink {
+  const [field, direction] = now;
+  const current = field === column;
+  const next = !current ? first : direction === 'asc' ? 'desc' : 'asc';
+  return {
+    to: withQuery({ order_by: `${column} ${next}`, page_token: '' }),
+    sorted: !current ? 'none' : direction === 'asc' ? 'ascending' : 'descending',
+  };
 }
 
 // Links to the next page and to the first page.
@@ -67,29 +63,31 @@ function Pager(props: { next: string; token: string; more: string }) {
   );
 }
 
-function Items<R, T>(props: Listing<R, T> & { title: string; of: T[] }) {
+function Items<R, T extends object>(
+  props: Listing<R, T> & { title: string; response: R; whole: boolean },
+) {
   const address = useAddress().searchParams;
-  const heads = props.columns.map(({ head, order }) => {
-    if (!order || !props.order) return { text: head };
-    const now = orderOf(address, props.order);
-    const sorted: 'ascending' | 'descending' | 'none' =
-      now[0] === order ? (now[1] === 'asc' ? 'ascending' : 'descending') : 'none';
-    return {
-      text: <SortBy column={order} head={head} now={now} first={props.order[1]} />,
-      sorted,
-    };
-  });
+  const { response, items: itemsOf } = props;
+  // The response is what changes; callers pass new but equal functions.
+  // eslint-disable-next-line react-hooks/exhaustive-deps
+  const items = useMemo(() => itemsOf(response), [response]);
+  const orders = props.columns.map(({ order }) =>
+    order && props.order
+      ? linkOf(order, orderOf(address, props.order), props.order[1])
+      : undefined,
+  );
   return (
     <DataTable
       caption={props.title}
-      head={heads.map((head) => head.text)}
-      sorted={heads.map((head) => head.sorted)}
-      rows={props.of.map((item) => props.columns.map((column) => column.cell(item)))}
+      columns={props.columns}
+      items={items}
+      orders={orders}
+      whole={props.whole}
     />
   );
 }
 
-export function ListPage<R extends { nextPageToken: string }, T>(
+export function ListPage<R extends { nextPageToken: string }, T extends object>(
   props: Listing<R, T> & { title: string },
 ) {
   const address = useAddress().searchParams;
@@ -97,10 +95,12 @@ export function ListPage<R extends { nextPageToken: string }, T>(
   for (const key of ['page_token', ...(props.query ?? [])]) {
     query.set(key, address.get(key) ?? '');
   }
+  query.set('page_size', address.get('page_size') ?? kPageSize);
   if (props.order) {
     query.set('order_by', address.get('order_by') || props.order.join(' '));
   }
   const read = useRead<R>(`${props.path}?${query}`, props.version);
+  const token = address.get('page_token') ?? '';
   const mistake = props.above && read.error?.code === 'INVALID_ARGUMENT' ? read.error : null;
   return (
     <>
@@ -109,16 +109,11 @@ export function ListPage<R extends { nextPageToken: string }, T>(
       {!mistake && (
         <Loaded read={read}>
           {(listed) => {
-            const items = props.items(listed);
-            if (items.length === 0) return <Empty>{props.empty}</Empty>;
+            if (props.items(listed).length === 0) return <Empty>{props.empty}</Empty>;
             return (
               <>
-                <Items {...props} of={items} />
-                <Pager
-                  next={props.next}
-                  token={address.get('page_token') ?? ''}
-                  more={listed.nextPageToken}
-                />
+                <Items {...props} response={listed} whole={!token && !listed.nextPageToken} />
+                <Pager next={props.next} token={token} more={listed.nextPageToken} />
               </>
             );
           }}

@@ -4,6 +4,7 @@ import './style.css';
 import { render } from 'preact';
 import { useEffect } from 'preact/hooks';
 import type { Caller } from './contract';
+import { ShortcutHelp } from './shortcuts';
 import { Empty, Link, Problem, Title } from './parts';
 import { useAddress, useLive, useRead } from './state';
 import { Calibrations } from './pages/calibrations';
@@ -140,7 +141,8 @@ function App() {
         )}
       </main>
       <footer class="quiet">
-        {caller.value && `selfcald ${caller.value.programVersion}, as ${caller.value.name}`}
+        {caller.value && `selfcald ${caller.value.programVersion}, as ${caller.value.name}. `}
+        <ShortcutHelp />
       </footer>
     </>
   );

@@ -2,7 +2,7 @@
 import type { ComponentChildren, JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import { idOf, pageOf, type ApiError } from './api';
-import type { SolverReport } from './contract';
+import type { Calibration, SolverReport } from './contract';
 import { ago, clock, number } from './format';
 import { go } from './state';
 
@@ -106,6 +106,34 @@ export function Badge(props: { state: string }) {
   );
 }
 
+const kVerdictTones: Record<string, string> = {
+  GOOD: 'good',
+  WEAK: 'weak',
+  NOT_TRUSTWORTHY: 'bad',
+};
+
+// The verdict on a version, with its reasons.
+export function VerdictBox(props: { of: Calibration; children?: ComponentChildren }) {
+  const { kind, text, sentences } = props.of.verdict ?? {
+    kind: 'UNKNOWN',
+    text: 'unknown',
+    sentences: [],
+  };
+  return (
+    <section class={'box verdict ' + (kVerdictTones[kind] ?? '')}>
+      <h2>Verdict: {text}</h2>
+      {props.children}
+      {sentences.length > 0 && (
+        <ul>
+          {sentences.map((sentence) => (
+            <li key={sentence}>{sentence}</li>
+          ))}
+        </ul>
+      )}
+    </section>
+  );
+}
+
 // A meter that also shows the value and the total as numbers.
 export function Meter(props: { value: number; of: number; label: string }) {
   return (
@@ -121,7 +149,7 @@ export const kWell = 0.1;
 export const kWeak = 0.5;
 
 // Shows a sigma as a fraction of the factory tolerance.
-export function Unknown(props: { ratio: number; of: string }) {
+export function Remaining(props: { ratio: number; of: string }) {
   return (
     <span class="meter">
       <meter
@@ -163,15 +191,28 @@ export function solverFigures(
   return {
     iterations: ['Iterations', solver.iterations],
     reprojection: [
-      'Reprojection rms',
+      'Reprojection error (root mean square)',
       `${number(solver.reprojectionRmsBeforePx)} to ${number(solver.reprojectionRmsAfterPx)} px`,
     ],
-    rank: ['Rank', `${solver.rank} of ${solver.components}`],
+    rank: ['Observable directions', `${solver.rank} of ${solver.components}`],
   };
 }
 
 export function SegmentLink(props: { name: string }) {
-  return <Link to={pageOf(props.name)}>{decodeURIComponent(idOf(props.name))}</Link>;
+  return (
+    <Link to={pageOf(props.name)} class="name">
+      {decodeURIComponent(idOf(props.name))}
+    </Link>
+  );
+}
+
+// A rig or a session.
+export function NameLink(props: { name: string; children: ComponentChildren }) {
+  return (
+    <Link to={pageOf(props.name)} class="name">
+      {props.children}
+    </Link>
+  );
 }
 
 export function SegmentLinks(props: { names: string[] }) {
@@ -204,38 +245,5 @@ export function Choice(props: {
         ))}
       </select>
     </label>
-  );
-}
-
-export function DataTable(props: {
-  caption: string;
-  head: ComponentChildren[];
-  sorted?: ('ascending' | 'descending' | 'none' | undefined)[]; // each column
-  rows: ComponentChildren[][];
-}) {
-  return (
-    <div class="scroll" tabIndex={0} role="region" aria-label={props.caption}>
-      <table>
-        <caption>{props.caption}</caption>
-        <thead>
-          <tr>
-            {props.head.map((cell, column) => (
-              <th scope="col" aria-sort={props.sorted?.[column]}>
-                {cell}
-              </th>
-            ))}
-          </tr>
-        </thead>
-        <tbody>
-          {props.rows.map((row) => (
-            <tr>
-              {row.map((cell, column) =>
-                column === 0 ? <th scope="row">{cell}</th> : <td>{cell}</td>,
-              )}
-            </tr>
-          ))}
-        </tbody>
-      </table>
-    </div>
   );
 }

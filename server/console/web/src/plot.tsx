@@ -1,10 +1,14 @@
 // A plot, drawn by uPlot, that adapts to the width and the colours of the page.
-import { useEffect, useRef } from 'preact/hooks';
+// The pointer or the arrow keys choose a value, which is shown below it.
+import type { JSX } from 'preact';
+import { useEffect, useRef, useState } from 'preact/hooks';
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 import { number } from './format';
 
 export const kColours = ['#2f6fdb', '#d9822b', '#2a9d6f', '#a64ac9'];
+const kFont = '12px system-ui, sans-serif';
+const kCharacter = 7; // width, about
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
 function ink(name: string): string {
@@ -15,14 +19,23 @@ export interface PlotProps {
   label: string; // a description of the plot
   data: uPlot.AlignedData;
   series: uPlot.Series[];
-  x?: { label?: string; integers?: boolean; range?: [number, number] };
-  y?: string;
+  x: {
+    label: string; // with the unit
+    integers?: boolean;
+    time?: boolean; // in seconds since 1970, shown in UTC
+    range?: [number, number];
+  };
+  y: string; // with the unit
   log?: boolean; // logarithmic y axis; needs values above 0
   bands?: uPlot.Band[];
   height?: number;
   cursor?: number; // index of the value under the cursor
   onCursor?: (index: number) => void;
+  // The values at an index in words; by default those of all series.
+  describe?: (index: number) => string;
 }
+
+// ------------------------------------------------------------- ticks
 
 // Labels only the powers of ten on a logarithmic axis over several decades.
 function powers(_: uPlot, values: number[]): (number | null)[] {
@@ -35,30 +48,111 @@ function powers(_: uPlot, values: number[]): (number | null)[] {
     : values.map((value) => (isPower(value) ? value : null));
 }
 
-function axis(label: string | undefined, integers = false, log = false): uPlot.Axis {
+const kMostDecimals = 7;
+
+// All ticks of an axis with the same decimals.
+function decimalTicks(values: number[], step: number): string[] {
+  let decimals = 0;
+  const isWhole = (x: number) => Math.abs(x - Math.round(x)) < 1e-6 * Math.max(1, Math.abs(x));
+  while (decimals < kMostDecimals && !isWhole(step * 10 ** decimals)) ++decimals;
+  const size = Math.max(...values.map(Math.abs));
+  if (size >= 1e6 || decimals === kMostDecimals) {
+    const digits = Math.ceil(Math.log10(size / step));
+    return values.map((value) => (value === 0 ? '0' : value.toExponential(Math.max(0, digits))));
+  }
+  return values.map((value) => value.toFixed(decimals));
+}
+
+const kDay = 86400;
+
+// Times in UTC; the date stands where it changes.
+function timeTicks(values: number[], step: number): string[] {
+  let before = '';
+  return values.map((value) => {
+    const [date, clock] = new Date(1000 * value).toISOString().split('T');
+    const changed = date !== before;
+    before = date;
+    if (step >= kDay) return date;
+    const time = step >= 60 ? clock.slice(0, 5) : clock.slice(0, 8);
+    return changed ? `${time}\n${date}` : time;
+  });
+}
+
+function axis(props: PlotProps, which: 'x' | 'y', element: HTMLElement): uPlot.Axis {
+  const isX = which === 'x';
+  const log = !isX && props.log === true;
   const shown = log ? { filter: powers } : {};
+  const format = (values: (number | null)[], step: number): string[] => {
+    if (log) return values.map((value) => (value === null ? '' : number(value, 1)));
+    const numbers = values as number[];
+    return isX && props.x.time ? timeTicks(numbers, step) : decimalTicks(numbers, step);
+  };
   return {
-    label,
-    labelSize: label ? 22 : 0,
+    label: isX ? props.x.label : props.y,
+    labelSize: 22,
+    font: kFont,
+    labelFont: kFont,
     stroke: () => ink('--quiet'),
     grid: { stroke: () => ink('--line'), width: 1, ...shown },
-    ticks: { stroke: () => ink('--line'), width: 1, ...shown },
-    ...(log
-      ? {
-          ...shown,
-          values: (_: uPlot, values: number[]) =>
-            values.map((value) => (value === null ? '' : number(value, 1))),
-        }
-      : {}),
-    ...(integers ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] } : {}),
+    ticks: { stroke: () => ink('--quiet'), width: 1, size: 6, ...shown },
+    ...shown,
+    // A canvas has no text that can be read: the labels are an attribute, too.
+    values: (_, values, __, ___, step) => {
+      const labels = format(values as (number | null)[], step);
+      element.dataset[which + 'Ticks'] = labels.filter(Boolean).join('|').replaceAll('\n', ' ');
+      return labels;
+    },
+    ...(isX
+      ? { size: props.x.time ? 44 : 32 }
+      : {
+          size: (_, labels) =>
+            18 + kCharacter * Math.max(3, ...(labels ?? []).map((label) => label.length)),
+        }),
+    ...(isX && props.x.integers ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] } : {}),
+    ...(isX && props.x.time ? { space: 80 } : {}),
   };
 }
+
+// ------------------------------------------------------------- values
+
+function valuesAt(props: PlotProps, index: number): string {
+  const { data, x, series } = props;
+  const at = data[0][index];
+  const values = series.flatMap((one, i) => {
+    const value = data[i + 1][index];
+    return value == null ? [] : [`${String(one.label)} ${number(value, 4)}`];
+  });
+  return `${x.label} ${number(at, 4)}: ${values.join(', ')}`;
+}
+
+// Where a key moves the cursor.
+function moved(key: string, from: number, count: number): number | null {
+  const large = Math.max(1, Math.round(count / 10));
+  const to: Record<string, number> = {
+    ArrowRight: from + 1,
+    ArrowLeft: from - 1,
+    PageDown: from + large,
+    PageUp: from - large,
+    Home: 0,
+    End: count - 1,
+  };
+  return key in to ? Math.min(count - 1, Math.max(0, to[key])) : null;
+}
+
+// ------------------------------------------------------------- the plot
 
 export function Plot(props: PlotProps) {
   const holder = useRef<HTMLDivElement>(null);
   const plot = useRef<uPlot | null>(null);
-  const onCursor = useRef(props.onCursor);
-  onCursor.current = props.onCursor;
+  const [chosen, setChosen] = useState<number | null>(null);
+  const count = props.data[0].length;
+  const at = props.cursor ?? (chosen !== null && chosen < count ? chosen : null);
+  const choose = (index: number) => {
+    setChosen(index);
+    props.onCursor?.(index);
+  };
+  const onPoint = useRef(choose);
+  onPoint.current = choose;
   // The cursor is moved by the page or by the pointer.
   const moving = useRef(false);
 
@@ -66,19 +160,17 @@ export function Plot(props: PlotProps) {
     const element = holder.current!;
     const size = () => ({
       width: Math.max(200, element.clientWidth),
-      height: props.height ?? 220,
+      height: props.height ?? 240,
     });
     const made = new uPlot(
       {
         ...size(),
+        tzDate: (seconds) => uPlot.tzDate(new Date(1000 * seconds), 'Etc/UTC'),
         scales: {
-          x: { time: false, range: props.x?.range },
+          x: { time: props.x.time === true, range: props.x.range },
           y: props.log ? { distr: 3 } : {},
         },
-        axes: [
-          axis(props.x?.label, props.x?.integers),
-          { ...axis(props.y, false, props.log), size: 64 },
-        ],
+        axes: [axis(props, 'x', element), axis(props, 'y', element)],
         series: [{}, ...props.series],
         bands: props.bands,
         legend: { show: props.series.length > 1, live: false },
@@ -88,9 +180,7 @@ export function Plot(props: PlotProps) {
             (u) => {
               // uPlot also calls this when the size of the plot changes.
               const pointed = !moving.current && u.over.matches(':hover');
-              if (pointed && u.cursor.idx != null) {
-                onCursor.current?.(u.cursor.idx);
-              }
+              if (pointed && u.cursor.idx != null) onPoint.current(u.cursor.idx);
             },
           ],
         },
@@ -115,14 +205,34 @@ export function Plot(props: PlotProps) {
 
   useEffect(() => {
     const made = plot.current;
-    if (!made || props.cursor === undefined) return;
+    if (!made || at === null) return;
     moving.current = true;
-    made.setCursor({
-      left: made.valToPos(props.data[0][props.cursor], 'x'),
-      top: 10,
-    });
+    made.setCursor({ left: made.valToPos(props.data[0][at], 'x'), top: 10 });
     moving.current = false;
-  }, [props.cursor, props.data]);
+  }, [at, props.data]);
 
-  return <div ref={holder} class="plot" role="img" aria-label={props.label} />;
+  const onKey = (event: JSX.TargetedKeyboardEvent<HTMLDivElement>) => {
+    const to = moved(event.key, at ?? -1, count);
+    if (to === null || count === 0) return;
+    event.preventDefault();
+    choose(to);
+  };
+  const values = at === null ? '' : (props.describe?.(at) ?? valuesAt(props, at));
+  return (
+    <div class="plot">
+      <div
+        ref={holder}
+        class="canvas"
+        role="slider"
+        tabIndex={0}
+        aria-label={props.label}
+        aria-valuemin={0}
+        aria-valuemax={count - 1}
+        aria-valuenow={at ?? 0}
+        aria-valuetext={values || `${count} values; the arrow keys choose one`}
+        onKeyDown={onKey}
+      />
+      <p class="values quiet">{values || ' '}</p>
+    </div>
+  );
 }

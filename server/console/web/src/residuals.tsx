@@ -3,7 +3,7 @@ import { useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
 import type { SegmentResiduals } from './contract';
 import type { SegmentData } from './segment_data';
-import { number } from './format';
+import { kDegrees, number } from './format';
 import { Choice } from './parts';
 import { kColours, Plot } from './plot';
 
@@ -59,7 +59,7 @@ function Reprojections(props: Shown & { camera: number }) {
       label={`Reprojection residuals of camera ${props.camera} in pixels, by time`}
       data={data}
       series={kObservations}
-      x={{ label: 'seconds', range: [0, props.end] }}
+      x={{ label: 'time [s]', range: [0, props.end] }}
       y="residual [px]"
       log
       height={220}
@@ -71,11 +71,11 @@ function Reprojections(props: Shown & { camera: number }) {
 
 // The parts of the residual of an interval, in their order.
 const kParts = [
-  { name: 'rotation', unit: 'rad' },
-  { name: 'velocity', unit: 'm/s' },
-  { name: 'position', unit: 'm' },
-  { name: 'change of the accelerometer bias', unit: 'm/s²' },
-  { name: 'change of the gyroscope bias', unit: 'rad/s' },
+  { name: 'rotation', unit: '°', factor: kDegrees },
+  { name: 'velocity', unit: 'm/s', factor: 1 },
+  { name: 'position', unit: 'm', factor: 1 },
+  { name: 'change of the accelerometer bias', unit: 'm/s²', factor: 1 },
+  { name: 'change of the gyroscope bias', unit: '°/s', factor: kDegrees },
 ];
 const kSize = 15;
 const kWhitened = 'whitened';
@@ -108,9 +108,10 @@ function intervalsOf(
     ] as uPlot.AlignedData;
   }
   const kind = Number(part);
+  const { factor } = kParts[kind];
   return [
     seconds,
-    ...[0, 1, 2].map((axis) => seconds.map((_, k) => three(residual, k, kind)[axis])),
+    ...[0, 1, 2].map((axis) => seconds.map((_, k) => factor * three(residual, k, kind)[axis])),
   ] as uPlot.AlignedData;
 }
 
@@ -120,7 +121,7 @@ function Intervals(props: Shown) {
   const data = useMemo(() => intervalsOf(segment, residuals, part), [segment, residuals, part]);
   const whitened = part === kWhitened;
   const { name, unit } = whitened
-    ? { name: 'all, in standard deviations', unit: 'sigma' }
+    ? { name: 'all, in standard deviations', unit: 'sigmas' }
     : kParts[Number(part)];
   return (
     <>
@@ -140,8 +141,8 @@ function Intervals(props: Shown) {
         label={`IMU residuals of each interval between keyframes: ${name}`}
         data={data}
         series={whitened ? kKinds : kAxes}
-        x={{ label: 'seconds', range: [0, props.end] }}
-        y={whitened ? 'rms [sigma]' : `residual [${unit}]`}
+        x={{ label: 'time [s]', range: [0, props.end] }}
+        y={whitened ? 'root mean square [sigmas]' : `residual [${unit}]`}
         height={220}
         cursor={Math.min(props.keyframe, data[0].length - 1)}
         onCursor={props.onKeyframe}
@@ -158,7 +159,7 @@ function InWords(props: { of: SegmentResiduals }) {
       <ul>
         {cameras.map((c) => (
           <li key={c.camera}>
-            Camera {c.camera}: {number(c.inlierRmsPx)} px rms over the {c.inliers} of{' '}
+            Camera {c.camera}: {number(c.inlierRmsPx)} px root mean square over the {c.inliers} of{' '}
             {c.observations} observations that a score uses
             {c.observations > c.inliers && `; ${c.observations - c.inliers} are excluded`}.
           </li>
@@ -166,7 +167,7 @@ function InWords(props: { of: SegmentResiduals }) {
         {notProjectable.length > 0 && (
           <li>{notProjectable.length} observations do not project and have no residual.</li>
         )}
-        {inertialRms.length > 0 && <li>IMU, rms in standard deviations: {kinds}.</li>}
+        {inertialRms.length > 0 && <li>IMU, root mean square in standard deviations: {kinds}.</li>}
       </ul>
       <p class="quiet">
         At version {calibrationVersion}, with the states that the client's SLAM system sent;

@@ -113,7 +113,7 @@ function Legend(props: { scale: Scale; counts: number[]; unknown: number }) {
     <ul class="legend" aria-label="Entropy by colour">
       {Array.from({ length: kSteps }, (_, i) => kSteps - 1 - i).map((step) => (
         <li key={step}>
-          {sample('info-' + step)} {range(step)} nats: {props.counts[step]}
+          {sample('info-' + step)} {range(step)} nat: {props.counts[step]}
           {step === kSteps - 1 ? ', most informative' : step === 0 ? ', least informative' : ''}
         </li>
       ))}
@@ -140,17 +140,17 @@ function nameOf(segment: TrajectorySegment): string {
   return decodeURIComponent(idOf(segment.segment));
 }
 
-function say(segment: TrajectorySegment, group: string): string {
+function describe(segment: TrajectorySegment, group: string): string {
   const entropy = entropyOf(segment, group);
   return (
     nameOf(segment) +
-    (Number.isNaN(entropy) ? ': no score' : `: entropy ${number(entropy, 4)} nats`) +
+    (Number.isNaN(entropy) ? ': no score' : `: entropy ${number(entropy, 4)} nat`) +
     (isKept(segment) ? `, kept for ${segment.tables.join(', ')}` : ', not kept')
   );
 }
 
 // Consecutive segments are joined if the gap between them is small.
-function wayOf(segment: TrajectorySegment, next: TrajectorySegment | undefined): number[] {
+function lineOf(segment: TrajectorySegment, next: TrajectorySegment | undefined): number[] {
   const close = next && next.positionsM.length > 0 && joins(segment, next);
   return close ? [...segment.positionsM, ...next.positionsM.slice(0, 3)] : segment.positionsM;
 }
@@ -162,7 +162,7 @@ function joins(segment: TrajectorySegment, next: TrajectorySegment): boolean {
 
 function strandsOf(drawn: TrajectorySegment[], group: string, scale: Scale): Strand[] {
   const lines = (of: (segment: TrajectorySegment) => boolean) =>
-    drawn.flatMap((segment, i) => (of(segment) ? [wayOf(segment, drawn[i + 1])] : []));
+    drawn.flatMap((segment, i) => (of(segment) ? [lineOf(segment, drawn[i + 1])] : []));
   const stepOf = (segment: TrajectorySegment) => {
     const entropy = entropyOf(segment, group);
     return Number.isNaN(entropy) ? -1 : scale.stepOf(entropy);
@@ -199,7 +199,7 @@ function Picture(props: { sessionPath: SessionPath; group: string; scale: Scale 
         at: middle(segment),
         class: segment.tables.includes(group) ? 'kept own' : 'kept',
         radius: 4.5,
-        title: say(segment, group),
+        title: describe(segment, group),
       })),
     [drawn, group],
   );
@@ -217,21 +217,19 @@ function Picture(props: { sessionPath: SessionPath; group: string; scale: Scale 
     <>
       <div class="wide">
         <Scene
-          label={`Path of the device through session ${sessionPath.session.session}, coloured by the entropy of group ${group}; the tables below have the numbers`}
+          label={`Path of the IMU through session ${sessionPath.session.session}, coloured by the entropy of group ${group}; the tables below have the numbers`}
           strands={strands}
           marks={marks}
-          width={720}
-          height={400}
           targets={targets}
           onPoint={setPointed}
           onPick={() => now && go(pageOf(now.segment))}
         >
-          Path of the IMU
+          Path of the IMU in the frame of the session.
         </Scene>
       </div>
       <p class="quiet">
         {now
-          ? say(now, group) + '; click to open it'
+          ? describe(now, group) + '; click to open it'
           : 'Point at the path to see the segment. Thick segments with a mark are kept; a filled mark means kept for this group.'}
       </p>
       {drawn.length < sessionPath.segments.length && (

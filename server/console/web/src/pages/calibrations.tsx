@@ -1,19 +1,21 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import type uPlot from 'uplot';
 import { ActionDialog, mayAdminister } from '../action';
 import { idOf, pageOf, post, rigPath } from '../api';
+import { Comparison } from '../comparison';
 import type {
   Calibration,
   Caller,
-  CompareCalibrationsResponse,
+  ComponentEstimate,
   ListCalibrationsResponse,
+  NoiseFactor,
+  SegmentFit,
   SolverReport,
+  Validation_Check,
 } from '../contract';
-import { component, number, quantity, shown, words } from '../format';
+import { component, heading, number, shown, sigmaText, valueText, words } from '../format';
+import { History } from '../history';
 import {
   Badge,
-  Choice,
-  DataTable,
   Figures,
   Link,
   Loaded,
@@ -22,151 +24,11 @@ import {
   SegmentLinks,
   solverFigures,
   Title,
+  VerdictBox,
   When,
 } from '../parts';
-import { kColours, Plot } from '../plot';
-import { go, useAddress, useRead, withQuery } from '../state';
-
-const kBand = 2; // half width of the band, in sigmas
-
-// The estimate in the unit in which it is shown.
-function estimateOf(version: Calibration, name: string) {
-  const estimate = version.estimates.find((e) => e.component === name);
-  return estimate && shown(estimate);
-}
-
-function History(props: { of: Calibration[] }) {
-  const query = useAddress().searchParams;
-  const [factory, setFactory] = useState(props.of.length === 1);
-  // The factory's sigmas are so large that later versions would look flat.
-  const versions = useMemo(
-    () => [...props.of].reverse().filter((v) => factory || v.version !== '1'),
-    [props.of, factory],
-  );
-  const names = versions[0].estimates.filter((e) => e.sigma > 0).map((e) => e.component);
-  const chosen = query.get('parameter') ?? names[0];
-  const data = useMemo(() => {
-    const at = versions.map((v) => estimateOf(v, chosen));
-    return [
-      versions.map((v) => Number(v.version)),
-      at.map((e) => e?.value ?? null),
-      at.map((e) => (e ? e.value + kBand * e.sigma : null)),
-      at.map((e) => (e ? e.value - kBand * e.sigma : null)),
-    ] as uPlot.AlignedData;
-  }, [versions, chosen]);
-  const unit = estimateOf(versions[0], chosen)?.unit ?? '';
-  const bound = { stroke: kColours[0] + '66', width: 1, points: { show: false } };
-  return (
-    <>
-      <div class="bar">
-        <Choice
-          label="Parameter"
-          value={chosen}
-          of={names.map((name) => [name, component(name)])}
-          onChoice={(parameter) => go(withQuery({ parameter }), true)}
-        />
-        {props.of.length > 1 && (
-          <label>
-            <input
-              type="checkbox"
-              checked={factory}
-              onChange={(event) => setFactory(event.currentTarget.checked)}
-            />
-            with the factory calibration
-          </label>
-        )}
-      </div>
-      <Plot
-        label={`${component(chosen)} over the versions, with a band of two sigmas`}
-        data={data}
-        x={{ label: 'version', integers: true }}
-        y={unit === '-' ? 'value' : unit}
-        series={[
-          {
-            label: component(chosen),
-            stroke: kColours[0],
-            width: 2,
-            points: { show: true, size: 7 },
-          },
-          { label: 'plus two sigmas', ...bound },
-          { label: 'minus two sigmas', ...bound },
-        ]}
-        bands={[{ series: [2, 3], fill: kColours[0] + '22' }]}
-      />
-    </>
-  );
-}
-
-function Difference(props: { rig: string; of: Calibration[] }) {
-  const query = useAddress().searchParams;
-  const newest = props.of[0].version;
-  const a = query.get('a') ?? props.of[1]?.version ?? newest;
-  const b = query.get('b') ?? newest;
-  const other = new URLSearchParams({ b: `rigs/${props.rig}/calibrations/${b}` });
-  const read = useRead<CompareCalibrationsResponse>(
-    `${rigPath(props.rig)}/calibrations/${encodeURIComponent(a)}:compare?${other}`,
-  );
-  const choose = (which: 'a' | 'b', value: string, name: string) => (
-    <Choice
-      label={name}
-      value={value}
-      of={props.of.map((c) => [c.version, c.version])}
-      onChoice={(version) => go(withQuery({ a, b, [which]: version }), true)}
-    />
-  );
-  return (
-    <>
-      <h2>Difference of two versions</h2>
-      <div class="bar">
-        {choose('a', a, 'From version')}
-        {choose('b', b, 'to version')}
-      </div>
-      <Loaded read={read}>
-        {(compared) => (
-          <>
-            <p>
-              {compared.degrees === 0
-                ? 'Neither version determines a direction clearly better than the factory: nothing can be compared.'
-                : `Together they differ by ${compared.significant ? 'more' : 'no more'} than their uncertainty explains: chi-square ${number(compared.chiSquare)} with ${compared.degrees} degrees of freedom, probability ${number(compared.probability)}.`}
-            </p>
-            <DataTable
-              caption={`Version ${compared.versionB} minus version ${compared.versionA}`}
-              head={[
-                'Parameter',
-                `Version ${compared.versionA}`,
-                `Version ${compared.versionB}`,
-                'Difference',
-                'Sigma',
-                'In sigmas',
-              ]}
-              rows={compared.differences.map((d) => {
-                const sigmas = Math.abs(d.difference) / d.sigma;
-                const side = (value: number, fromFactory?: number) =>
-                  shown({ ...d, value, fromFactory });
-                const a = side(d.valueA, d.fromFactoryA);
-                const b = side(d.valueB, d.fromFactoryB);
-                const by = side(
-                  d.difference,
-                  d.fromFactoryA === undefined ? undefined : d.difference,
-                );
-                return [
-                  component(d.component),
-                  quantity(a.value, a.unit),
-                  quantity(b.value, b.unit),
-                  number(by.value),
-                  number(by.sigma),
-                  <span class={sigmas > 3 ? 'strong' : ''}>
-                    {d.sigma > 0 ? number(sigmas, 2) : ''}
-                  </span>,
-                ];
-              })}
-            />
-          </>
-        )}
-      </Loaded>
-    </>
-  );
-}
+import { useAddress, useRead } from '../state';
+import { DataTable, type Column } from '../table';
 
 function Activate(props: { calibration: Calibration; active: string; onEnd: () => void }) {
   const { calibration } = props;
@@ -194,22 +56,30 @@ const kOutcomes: Record<string, string> = {
   NOT_TESTED: 'not tested',
 };
 
-function Verdict(props: { of: Calibration }) {
-  const verdict = props.of.verdict;
-  if (!verdict) return null;
-  return (
-    <>
-      <p>
-        Verdict: <Badge state={verdict.kind} />
-      </p>
-      {verdict.sentences.map((sentence) => (
-        <p class={verdict.kind === 'NOT_TRUSTWORTHY' ? 'warning' : 'quiet'} key={sentence}>
-          {sentence}
-        </p>
-      ))}
-    </>
-  );
+function outcomeOf(check: Validation_Check): string {
+  return kOutcomes[check.outcome] ?? (check.passed ? 'passed' : 'failed');
 }
+
+const kChecks: Column<Validation_Check>[] = [
+  { head: 'Check', cell: (check) => words(check.name), value: (check) => words(check.name) },
+  {
+    head: 'Outcome',
+    cell: (check) => {
+      const outcome = outcomeOf(check);
+      return outcome === 'failed' ? <strong>{outcome}</strong> : outcome;
+    },
+    value: outcomeOf,
+  },
+  {
+    head: 'Value',
+    cell: (check) => (outcomeOf(check) === 'not tested' ? '' : number(check.value)),
+  },
+  {
+    head: 'Limit',
+    cell: (check) => (outcomeOf(check) === 'not tested' ? '' : number(check.limit)),
+  },
+  { head: 'Meaning', cell: (check) => check.sentence, wide: true },
+];
 
 function Validation(props: { of: Calibration }) {
   const validation = props.of.validation;
@@ -221,20 +91,7 @@ function Validation(props: { of: Calibration }) {
         Validation <Badge state={validation.verdict} />
       </h3>
       <p class="quiet">Validated against version {validation.activeVersion}.</p>
-      <DataTable
-        caption="Checks"
-        head={['Check', 'Value', 'Limit', 'Outcome']}
-        rows={validation.checks.map((check) => {
-          const outcome = kOutcomes[check.outcome] ?? (check.passed ? 'passed' : 'failed');
-          const made = outcome !== 'not tested';
-          return [
-            words(check.name),
-            made ? number(check.value) : '',
-            made ? number(check.limit) : '',
-            outcome === 'failed' ? <strong>{outcome}</strong> : outcome,
-          ];
-        })}
-      />
+      <DataTable caption="Checks" columns={kChecks} items={validation.checks} />
       {held && held.degrees > 0 && (
         <p>
           On {held.segments} held-out segments ({held.rescored} rescored): chi-square{' '}
@@ -261,39 +118,79 @@ function Origin(props: { of: Calibration }) {
   );
 }
 
+const kNoise: Column<NoiseFactor>[] = [
+  { head: 'Kind of noise', cell: (factor) => words(factor.kind) },
+  {
+    head: 'Estimated from the residuals',
+    cell: (factor) =>
+      factor.determined
+        ? `${number(factor.factor)} ± ${number(100 * factor.logSigma, 2)} %`
+        : 'not determined',
+  },
+  {
+    head: 'Used',
+    cell: (factor) =>
+      factor.used === 0 ? '' : number(factor.used) + (factor.converged ? '' : ' (not converged)'),
+  },
+];
+
 function Noise(props: { of: SolverReport }) {
   if (props.of.noiseFactors.length === 0) return null;
   return (
-    <DataTable
-      caption="Noise scales, relative to what the rig states"
-      head={['Kind', 'Residuals suggest', 'Used']}
-      rows={props.of.noiseFactors.map((factor) => [
-        words(factor.kind),
-        factor.determined
-          ? `${number(factor.factor)} (+- ${number(100 * factor.logSigma, 2)} %)`
-          : 'not determined',
-        factor.used === 0 ? '' : number(factor.used) + (factor.converged ? '' : ' (not converged)'),
-      ])}
-    />
+    <>
+      <h3>Noise scales</h3>
+      <p class="quiet">The actual noise, relative to the noise that the rig states.</p>
+      <DataTable caption="Noise scales" columns={kNoise} items={props.of.noiseFactors} />
+    </>
   );
 }
+
+const kFits: Column<SegmentFit>[] = [
+  {
+    head: 'Segment',
+    cell: (fit) => <SegmentLink name={fit.segment} />,
+    value: (fit) => fit.segment,
+  },
+  {
+    head: 'Pixel residuals',
+    cell: (fit) => (fit.pixelRatio > 0 ? number(fit.pixelRatio) : ''),
+    value: (fit) => fit.pixelRatio || undefined,
+  },
+  {
+    head: 'IMU residuals',
+    cell: (fit) => (fit.inertialRatio > 0 ? number(fit.inertialRatio) : ''),
+    value: (fit) => fit.inertialRatio || undefined,
+  },
+  { head: 'Reason of an exclusion', cell: (fit) => fit.excluded, wide: true },
+];
 
 // The fit of each segment, where it was measured.
 function Fits(props: { of: SolverReport }) {
   if (props.of.segmentFits.length === 0) return null;
   return (
-    <DataTable
-      caption="Residuals of each segment, relative to what the noise predicts"
-      head={['Segment', 'Pixels', 'IMU', 'Excluded']}
-      rows={props.of.segmentFits.map((fit) => [
-        <SegmentLink name={fit.segment} />,
-        fit.pixelRatio > 0 ? number(fit.pixelRatio) : '',
-        fit.inertialRatio > 0 ? number(fit.inertialRatio) : '',
-        fit.excluded,
-      ])}
-    />
+    <>
+      <h3>Fit of each segment</h3>
+      <p class="quiet">Residuals relative to what the noise predicts; 1 is as expected.</p>
+      <DataTable caption="Fit of each segment" columns={kFits} items={props.of.segmentFits} />
+    </>
   );
 }
+
+const kParameters: Column<ComponentEstimate>[] = [
+  {
+    head: 'Parameter',
+    cell: (e) => heading(component(e.component), shown(e).unit),
+    value: (e) => component(e.component),
+  },
+  {
+    head: 'Value',
+    cell: (e) => valueText(shown(e).value, shown(e).sigma),
+  },
+  {
+    head: 'Standard deviation',
+    cell: (e) => (e.sigma > 0 ? sigmaText(shown(e).sigma) : 'held constant'),
+  },
+];
 
 function Version(props: { of: Calibration }) {
   const heading = useRef<HTMLHeadingElement>(null);
@@ -304,7 +201,7 @@ function Version(props: { of: Calibration }) {
       <h2 ref={heading}>
         Version {props.of.version} <Badge state={props.of.state} />
       </h2>
-      <Verdict of={props.of} />
+      <VerdictBox of={props.of} />
       <Origin of={props.of} />
       {solver && (
         <Figures
@@ -324,18 +221,80 @@ function Version(props: { of: Calibration }) {
       <h3>Parameters</h3>
       <DataTable
         caption={'Parameters of version ' + props.of.version}
-        head={['Parameter', 'Value', 'Sigma']}
-        rows={props.of.estimates.map((e) => {
-          const { value, sigma, unit } = shown(e);
-          return [
-            component(e.component),
-            quantity(value, unit),
-            sigma > 0 ? number(sigma) : 'held',
-          ];
-        })}
+        columns={kParameters}
+        items={props.of.estimates}
       />
     </section>
   );
+}
+
+function versionColumns(
+  shown: string | undefined,
+  active: string,
+  onActivate: ((asked: Calibration) => void) | null,
+): Column<Calibration>[] {
+  const columns: Column<Calibration>[] = [
+    {
+      head: 'Version',
+      cell: (c) => (
+        <Link to={pageOf(c.name)} current={c.version === shown}>
+          {c.version === '1' ? '1 (factory)' : c.version}
+        </Link>
+      ),
+      value: (c) => Number(c.version),
+    },
+    { head: 'State', cell: (c) => <Badge state={c.state} />, value: (c) => words(c.state) },
+    {
+      head: 'Verdict',
+      cell: (c) => (c.verdict ? <Badge state={c.verdict.kind} /> : ''),
+      value: (c) => c.verdict?.text ?? '',
+    },
+    {
+      head: 'Created',
+      cell: (c) => <When time={c.createTime} />,
+      value: (c) => Date.parse(c.createTime ?? ''),
+    },
+    {
+      head: 'Segments',
+      cell: (c) => c.provenance?.segments.length ?? '',
+      value: (c) => c.provenance?.segments.length,
+    },
+    {
+      head: 'Reprojection error [px]',
+      cell: (c) => (c.solver ? number(c.solver.reprojectionRmsAfterPx) : ''),
+      value: (c) => c.solver?.reprojectionRmsAfterPx,
+    },
+  ];
+  if (!onActivate) return columns;
+  const button = (c: Calibration) => (
+    <button type="button" onClick={() => onActivate(c)}>
+      {Number(c.version) < Number(active) ? 'Roll back to it' : 'Activate'}
+    </button>
+  );
+  return [
+    ...columns,
+    {
+      head: 'Activation',
+      cell: (c) => (['SUPERSEDED', 'ROLLED_BACK'].includes(c.state) ? button(c) : ''),
+    },
+  ];
+}
+
+function Versions(props: {
+  of: Calibration[];
+  shown: string | undefined;
+  onActivate: ((asked: Calibration) => void) | null;
+  active: string;
+}) {
+  const { of, shown, active, onActivate } = props;
+  const may = onActivate !== null;
+  const columns = useMemo(
+    () => versionColumns(shown, active, onActivate),
+    // Callers pass new but equal functions.
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+    [shown, active, may],
+  );
+  return <DataTable caption="Versions" columns={columns} items={of} />;
 }
 
 export function Calibrations(props: { rig: string; caller: Caller | null; version: number }) {
@@ -357,38 +316,11 @@ export function Calibrations(props: { rig: string; caller: Caller | null; versio
           return (
             <>
               {nextPageToken && <p class="quiet">The newest 100 versions.</p>}
-              <DataTable
-                caption="Versions"
-                head={[
-                  'Version',
-                  'State',
-                  'Verdict',
-                  'Created',
-                  'Segments',
-                  'Reprojection rms [px]',
-                  ...(may ? ['Change'] : []),
-                ]}
-                rows={calibrations.map((c) => [
-                  <Link to={pageOf(c.name)} current={c.version === shown}>
-                    {c.version === '1' ? '1 (factory)' : c.version}
-                  </Link>,
-                  <Badge state={c.state} />,
-                  c.verdict ? <Badge state={c.verdict.kind} /> : '',
-                  <When time={c.createTime} />,
-                  c.provenance?.segments.length ?? '',
-                  c.solver ? number(c.solver.reprojectionRmsAfterPx) : '',
-                  ...(may
-                    ? [
-                        ['SUPERSEDED', 'ROLLED_BACK'].includes(c.state) ? (
-                          <button type="button" onClick={() => setAsked(c)}>
-                            {Number(c.version) < Number(active) ? 'Roll back to it' : 'Activate'}
-                          </button>
-                        ) : (
-                          ''
-                        ),
-                      ]
-                    : []),
-                ])}
+              <Versions
+                of={calibrations}
+                shown={shown}
+                active={active}
+                onActivate={may ? setAsked : null}
               />
               {shown && !one && (
                 <Problem
@@ -400,9 +332,8 @@ export function Calibrations(props: { rig: string; caller: Caller | null; versio
                 />
               )}
               {one && <Version of={one} />}
-              <h2>History</h2>
               <History of={calibrations} />
-              <Difference rig={props.rig} of={calibrations} />
+              <Comparison rig={props.rig} of={calibrations} />
               {asked && (
                 <Activate
                   calibration={asked}

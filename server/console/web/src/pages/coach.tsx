@@ -6,9 +6,10 @@ import type {
   AdviseMotionResponse_Advice,
   AdviseMotionResponse_WeakDirection,
 } from '../contract';
-import { component, number, quantity, words } from '../format';
-import { DataTable, Link, Problem, Title } from '../parts';
+import { component, number, shownUnit, sigmaText, words } from '../format';
+import { Link, Problem, Title } from '../parts';
 import { useCalm, useRead } from '../state';
+import { DataTable, type Column } from '../table';
 
 const kAll = 100; // more than there are motions
 // Minimum time between updates; recording a segment takes longer.
@@ -21,15 +22,16 @@ function shrink(advice: AdviseMotionResponse_Advice): number {
   return 1 - Math.exp(-advice.gainNats / Math.max(1, advice.sigmaChanges.length));
 }
 
-function Sharpens(props: { of: AdviseMotionResponse_Advice }) {
+function LargestImprovement(props: { of: AdviseMotionResponse_Advice }) {
   const changes = props.of.sigmaChanges;
   if (changes.length === 0) return null;
   const ratio = (c: (typeof changes)[number]) => c.sigmaAfter / c.sigmaNow;
   const best = changes.reduce((a, b) => (ratio(b) < ratio(a) ? b : a));
+  const { unit, factor } = shownUnit(best.unit);
   return (
     <>
-      {component(best.component)}: sigma {number(best.sigmaNow)} to{' '}
-      {quantity(best.sigmaAfter, best.unit, 3)}
+      {component(best.component)}: standard deviation {sigmaText(factor * best.sigmaNow)} to{' '}
+      {sigmaText(factor * best.sigmaAfter)} {unit === '-' ? '' : unit}
     </>
   );
 }
@@ -48,12 +50,47 @@ function Best(props: { of: AdviseMotionResponse_Advice; seconds: number }) {
         <p>
           Expected from {number(props.seconds)} s: the uncertainty becomes{' '}
           <strong>{number(100 * part, 2)} % smaller</strong> in the mean over all directions (gain{' '}
-          {number(props.of.gainNats)} nats). Largest improvement: <Sharpens of={props.of} />.
+          {number(props.of.gainNats)} nat). Largest improvement: <LargestImprovement of={props.of} />.
         </p>
       )}
     </div>
   );
 }
+
+const kMotions: Column<AdviseMotionResponse_Advice>[] = [
+  {
+    head: 'Motion',
+    cell: (advice) => words(advice.motion),
+    value: (advice) => words(advice.motion),
+  },
+  {
+    head: 'Instruction',
+    cell: (advice) => advice.instruction,
+    value: (advice) => advice.instruction,
+    wide: true,
+  },
+  {
+    head: 'Uncertainty smaller by',
+    cell: (advice) => number(100 * shrink(advice), 2) + ' %',
+    value: shrink,
+  },
+  {
+    head: 'Gain [nat]',
+    cell: (advice) => number(advice.gainNats),
+    value: (advice) => advice.gainNats,
+  },
+  {
+    head: 'Gain of each group [nat]',
+    cell: (advice) =>
+      advice.groupGains.map((g) => `${g.group} ${number(g.gainNats, 2)}`).join(', '),
+    wide: true,
+  },
+  {
+    head: 'Largest improvement',
+    cell: (advice) => <LargestImprovement of={advice} />,
+    wide: true,
+  },
+];
 
 function Motions(props: { of: AdviseMotionResponse }) {
   return (
@@ -61,22 +98,8 @@ function Motions(props: { of: AdviseMotionResponse }) {
       <h2>All motions</h2>
       <DataTable
         caption={`Predicted gain of a segment of ${number(props.of.segmentSeconds)} s`}
-        head={[
-          'Motion',
-          'What to do',
-          'Smaller by',
-          'Gain [nats]',
-          'By group [nats]',
-          'Largest improvement',
-        ]}
-        rows={props.of.advice.map((advice) => [
-          words(advice.motion),
-          advice.instruction,
-          number(100 * shrink(advice), 2) + ' %',
-          number(advice.gainNats),
-          advice.groupGains.map((g) => `${g.group} ${number(g.gainNats, 2)}`).join(', '),
-          <Sharpens of={advice} />,
-        ])}
+        columns={kMotions}
+        items={props.of.advice}
       />
     </>
   );
@@ -85,9 +108,10 @@ function Motions(props: { of: AdviseMotionResponse }) {
 function Weakest(props: { of: AdviseMotionResponse_WeakDirection[] }) {
   return (
     <>
-      <h2>Least known</h2>
+      <h2>Least certain directions</h2>
       <p class="quiet">
-        In reference sigmas: one usual segment reaches about 1, a new device starts at about 10.
+        Standard deviations in reference sigmas: one usual segment reaches about 1, a new device
+        starts at about 10.
       </p>
       <ol>
         {props.of.map((weak) => (

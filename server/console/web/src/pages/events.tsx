@@ -1,18 +1,24 @@
-import { idOf, pageOf, rigPath } from '../api';
+import { idOf, rigPath } from '../api';
 import type { Event, ListEventsResponse } from '../contract';
 import { clock, words } from '../format';
-import { ListPage, type Column } from '../list';
-import { Link } from '../parts';
+import { ListPage } from '../list';
+import { NameLink } from '../parts';
+import type { Column } from '../table';
 
 const kColumns: Column<Event>[] = [
-  { head: 'Number', cell: (event) => event.number },
+  { head: 'Number', cell: (event) => event.number, value: (event) => Number(event.number) },
   {
     head: 'Time',
     cell: (event) => <time dateTime={event.time}>{clock(event.time)}</time>,
+    value: (event) => Date.parse(event.time ?? ''),
   },
-  { head: 'Rig', cell: (event) => <Link to={pageOf(event.rig)}>{idOf(event.rig)}</Link> },
-  { head: 'What', cell: (event) => words(event.kind) },
-  { head: 'Detail', cell: (event) => event.detail },
+  {
+    head: 'Rig',
+    cell: (event) => <NameLink name={event.rig}>{idOf(event.rig)}</NameLink>,
+    value: (event) => idOf(event.rig),
+  },
+  { head: 'Event', cell: (event) => words(event.kind), value: (event) => words(event.kind) },
+  { head: 'Detail', cell: (event) => event.detail, value: (event) => event.detail, wide: true },
 ];
 
 // The events of one rig, or of all rigs if `rig` is ''.

@@ -4,6 +4,7 @@ import { useMemo, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
 import { rigPath } from '../api';
 import type { Calibration, MotionSegment, Rig, Segment, SegmentResiduals } from '../contract';
+import { kDegrees } from '../format';
 import { Choice, Empty, Loaded } from '../parts';
 import { kColours, Plot } from '../plot';
 import { Residuals } from '../residuals';
@@ -27,11 +28,11 @@ function Trajectory(props: { positions: number[]; at: number }) {
   );
   return (
     <Scene
-      label="Trajectory of the IMU"
+      label="Path of the IMU through the segment"
       strands={strands}
       marks={[...keyframes, { at: place(positions, props.at), class: 'now', radius: 6 }]}
     >
-      Trajectory
+      Path of the IMU.
     </Scene>
   );
 }
@@ -170,9 +171,9 @@ function Tracks(props: {
 }
 
 // Vectors of one kind, one per sample, over time in seconds.
-function triple(t: string[], values: number[]): uPlot.AlignedData {
+function triple(t: string[], values: number[], factor = 1): uPlot.AlignedData {
   const start = BigInt(t[0]);
-  const at = (offset: number) => t.map((_, i) => values[3 * i + offset]);
+  const at = (offset: number) => t.map((_, i) => factor * values[3 * i + offset]);
   return [
     t.map((time) => Number(BigInt(time) - start) / 1e9),
     at(0),
@@ -247,7 +248,7 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
   const residuals = useRead<SegmentResiduals>(
     `${props.path}/residuals?calibration_version=${version}`,
   );
-  const gyro = useMemo(() => triple(imu.tNs, imu.gyro), [imu]);
+  const gyro = useMemo(() => triple(imu.tNs, imu.gyro, kDegrees), [imu]);
   const accel = useMemo(() => triple(imu.tNs, imu.accel), [imu]);
   const keyframe = nearest(keyframes.tNs, BigInt(imu.tNs[at]));
   const toKeyframe = (k: number) => setAt(nearest(imu.tNs, BigInt(keyframes.tNs[k])));
@@ -290,8 +291,8 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
         label="Angular rates of the gyroscope"
         data={gyro}
         series={kAxes}
-        x={{ label: 'seconds' }}
-        y="gyro [rad/s]"
+        x={{ label: 'time [s]' }}
+        y="angular rate [°/s]"
         cursor={at}
         onCursor={setAt}
         height={200}
@@ -300,8 +301,8 @@ function Motion(props: { rig: string; path: string; data: SegmentData; segment: 
         label="Readings of the accelerometer"
         data={accel}
         series={kAxes}
-        x={{ label: 'seconds' }}
-        y="accel [m/s²]"
+        x={{ label: 'time [s]' }}
+        y="acceleration [m/s²]"
         cursor={at}
         onCursor={setAt}
         height={200}

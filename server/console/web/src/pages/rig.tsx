@@ -1,131 +1,50 @@
 import { useMemo, useState } from 'preact/hooks';
 import uPlot from 'uplot';
 import { ActionDialog, mayAdminister } from '../action';
-import { idOf, pageOf, remove, rigPath } from '../api';
+import { idOf, remove, rigPath } from '../api';
 import type {
   Calibration,
   Caller,
-  ComponentEstimate,
   ListSegmentsResponse,
   ListTablesResponse,
   Rig,
   Segment,
   Table,
+  Table_Entry,
 } from '../contract';
-import { component, matches, number, quantity } from '../format';
+import { number } from '../format';
 import { EditLabels, Labels } from '../labels';
-import {
-  Badge,
-  Choice,
-  DataTable,
-  Empty,
-  Figures,
-  Link,
-  Loaded,
-  Meter,
-  Problem,
-  SegmentLink,
-  Title,
-  Unknown,
-  When,
-  kWeak,
-  kWell,
-} from '../parts';
+import { Certainty, knownOf } from '../parameters';
+import { Choice, Empty, Loaded, Meter, Problem, SegmentLink, Title } from '../parts';
 import { kColours, Plot } from '../plot';
+import { RigVerdict, WhatChanged, WhatToDo } from './rig_summary';
 import { NewestSession } from './session';
 import { go, useRead } from '../state';
+import { DataTable, type Column } from '../table';
 
-interface Known extends ComponentEstimate {
-  tolerance: number;
-  ratio: number; // sigma as a fraction of the factory tolerance
-}
-
-function known(active: Calibration, factory: Calibration): Known[] {
-  const tolerances = new Map(factory.estimates.map((e) => [e.component, e.sigma]));
-  return active.estimates
-    .map((estimate) => {
-      const tolerance = tolerances.get(estimate.component) ?? 0;
-      return { ...estimate, tolerance, ratio: estimate.sigma / tolerance };
-    })
-    .filter((estimate) => estimate.tolerance > 0);
-}
-
-function verdict(ratio: number): string {
-  if (ratio <= kWell) return 'well known';
-  return ratio <= kWeak ? 'better than the factory' : 'hardly better than the factory';
-}
-
-function Group(props: { name: string; of: Known[] }) {
-  const mean = Math.exp(props.of.reduce((sum, e) => sum + Math.log(e.ratio), 0) / props.of.length);
-  return (
-    <section>
-      <h3>
-        {props.name}: {verdict(mean)}
-      </h3>
-      <DataTable
-        caption={'Uncertainty of the group ' + props.name}
-        head={['Parameter', 'Value', 'Sigma', 'Factory tolerance', 'Still unknown']}
-        rows={props.of.map((e) => [
-          component(e.component),
-          quantity(e.value, e.unit),
-          number(e.sigma),
-          number(e.tolerance),
-          <Unknown ratio={e.ratio} of={component(e.component)} />,
-        ])}
-      />
-    </section>
-  );
-}
-
-function Weak(props: { of: Known[] }) {
-  const weak = props.of.filter((e) => e.ratio > kWeak).sort((a, b) => b.ratio - a.ratio);
-  if (weak.length === 0) {
-    return <p>Every parameter is known at least twice as well as from the factory.</p>;
-  }
-  return (
-    <>
-      <p>
-        {weak.length} of {props.of.length} parameters are hardly better known than from the factory.
-        The recordings so far do not determine:
-      </p>
-      <ul>
-        {weak.slice(0, 8).map((e) => (
-          <li key={e.component}>
-            {component(e.component)} <span class="quiet">({e.component})</span>
-          </li>
-        ))}
-        {weak.length > 8 && <li>and {weak.length - 8} more, in the tables below</li>}
-      </ul>
-    </>
-  );
-}
-
-function Knowledge(props: { rig: Rig; of: Known[] }) {
-  return (
-    <>
-      <h2>Weak parameters</h2>
-      <Weak of={props.of} />
-      <p>
-        <Link to={pageOf(props.rig.name) + '/coach'}>The coach</Link> recommends the motion with the
-        largest gain.
-      </p>
-      <h2>Uncertainty by group</h2>
-      {props.rig.groups.map((group) => {
-        const members = props.of.filter((e) =>
-          group.patterns.some((pattern) => matches(pattern, e.component)),
-        );
-        return members.length === 0 ? null : (
-          <Group key={group.group} name={group.group} of={members} />
-        );
-      })}
-    </>
-  );
-}
+const kEntries: Column<Table_Entry>[] = [
+  {
+    head: 'Segment',
+    cell: (entry) => <SegmentLink name={entry.segment} />,
+    value: (entry) => entry.segment,
+  },
+  {
+    head: 'Entropy [nat]',
+    cell: (entry) => number(entry.entropyNats, 4),
+    value: (entry) => entry.entropyNats,
+  },
+  {
+    head: 'Gain [nat]',
+    cell: (entry) => number(entry.gainNats, 4),
+    value: (entry) => entry.gainNats,
+  },
+];
 
 function Tables(props: { of: Table[] }) {
   return (
     <>
       <h2>Tables</h2>
+      <div class="side tables">
       {props.of.map((table) => (
         <section key={table.name}>
           <h3>
@@ -147,16 +66,13 @@ function Tables(props: { of: Table[] }) {
           ) : (
             <DataTable
               caption={'Segments in the table ' + idOf(table.name)}
-              head={['Segment', 'Entropy [nats]', 'Gain [nats]']}
-              rows={table.entries.map((entry) => [
-                <SegmentLink name={entry.segment} />,
-                number(entry.entropyNats, 4),
-                number(entry.gainNats, 4),
-              ])}
+              columns={kEntries}
+              items={table.entries}
             />
           )}
         </section>
       ))}
+      </div>
     </>
   );
 }
@@ -191,8 +107,8 @@ function Histogram(props: { segments: Segment[]; group: string }) {
     <Plot
       label={`Histogram of the entropy of segments for the group ${props.group}`}
       data={data}
-      x={{ label: 'entropy [nats], lower is more informative', range: [low, high] }}
-      y="segments"
+      x={{ label: 'entropy [nat]; lower is more informative', range: [low, high] }}
+      y="number of segments"
       series={[
         {
           label: 'all',
@@ -298,6 +214,24 @@ function Administration(props: { rig: string; of: Rig; onChange: () => void }) {
   );
 }
 
+// Labels, and what an administrator may change.
+function Settings(props: {
+  rig: string;
+  of: Rig;
+  caller: Caller | null;
+  onChange: () => void;
+}) {
+  return (
+    <section>
+      <h2>Labels</h2>
+      <Labels of={props.of.labels} />
+      {mayAdminister(props.caller, props.of.name) && (
+        <Administration rig={props.rig} of={props.of} onChange={props.onChange} />
+      )}
+    </section>
+  );
+}
+
 export function RigPage(props: { rig: string; caller: Caller | null; version: number }) {
   const base = rigPath(props.rig);
   const [changed, setChanged] = useState(0);
@@ -305,8 +239,8 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
   const active = useRead<Calibration>(base + '/calibrations/active', props.version);
   const factory = useRead<Calibration>(base + '/calibrations/1');
   const tables = useRead<ListTablesResponse>(base + '/tables', props.version);
-  const both = useMemo(
-    () => (active.value && factory.value ? known(active.value, factory.value) : null),
+  const known = useMemo(
+    () => (active.value && factory.value ? knownOf(active.value, factory.value) : null),
     [active.value, factory.value],
   );
   // An error is shown once, not for each part of the page.
@@ -319,50 +253,53 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
       </>
     );
   }
+  const read = {
+    value:
+      rig.value && active.value && known
+        ? { rig: rig.value, calibration: active.value, known }
+        : null,
+    error: null,
+  };
   return (
     <>
       <Title text={props.rig}>{props.rig}</Title>
-      <Loaded read={active}>
-        {(calibration) => (
-          <Figures
-            of={[
-              ['Active version', <Link to={pageOf(calibration.name)}>{calibration.version}</Link>],
-              ['State', <Badge state={calibration.state} />],
-              ['Created', <When time={calibration.createTime} />],
-              [
-                'From',
-                calibration.provenance
-                  ? `${calibration.provenance.segments.length} segments`
-                  : 'the factory',
-              ],
-            ]}
-          />
+      <Loaded read={read}>
+        {(value) => (
+          <>
+            <RigVerdict of={value.calibration} />
+            <div class="side">
+              <WhatChanged
+                rig={props.rig}
+                active={value.calibration}
+                version={props.version}
+              />
+              <WhatToDo
+                rig={props.rig}
+                active={value.calibration}
+                known={value.known}
+                version={props.version}
+              />
+            </div>
+            <Certainty rig={value.rig} of={value.known} />
+          </>
         )}
-      </Loaded>
-      {rig.value && (
-        <>
-          <h2>Labels</h2>
-          <Labels of={rig.value.labels} />
-          {mayAdminister(props.caller, rig.value.name) && (
-            <Administration
-              rig={props.rig}
-              of={rig.value}
-              onChange={() => setChanged(changed + 1)}
-            />
-          )}
-        </>
-      )}
-      <Loaded read={{ value: rig.value && both && { rig: rig.value, both }, error: null }}>
-        {(value) => <Knowledge rig={value.rig} of={value.both} />}
       </Loaded>
       <NewestSession rig={props.rig} version={props.version} />
       <Loaded read={tables}>{(value) => <Tables of={value.tables} />}</Loaded>
       {rig.value && (
-        <Entropies
-          rig={props.rig}
-          groups={rig.value.groups.map((g) => g.group)}
-          version={props.version}
-        />
+        <>
+          <Entropies
+            rig={props.rig}
+            groups={rig.value.groups.map((g) => g.group)}
+            version={props.version}
+          />
+          <Settings
+            rig={props.rig}
+            of={rig.value}
+            caller={props.caller}
+            onChange={() => setChanged(changed + 1)}
+          />
+        </>
       )}
     </>
   );

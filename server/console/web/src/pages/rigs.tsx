@@ -2,9 +2,10 @@ import type { JSX } from 'preact';
 import { idOf, pageOf } from '../api';
 import type { ListActivityResponse, RigActivity } from '../contract';
 import { Labels } from '../labels';
-import { ListPage, type Column } from '../list';
-import { Link, Meter, Problem, When } from '../parts';
+import { ListPage } from '../list';
+import { Link, Meter, NameLink, Problem, When } from '../parts';
 import { go, useAddress, withQuery } from '../state';
+import type { Column } from '../table';
 
 function Alarms(props: { of: string[] }) {
   if (props.of.length === 0) return <span class="quiet">none</span>;
@@ -20,7 +21,7 @@ function Alarms(props: { of: string[] }) {
 const kColumns: Column<RigActivity>[] = [
   {
     head: 'Rig',
-    cell: (rig) => <Link to={pageOf(rig.name)}>{idOf(rig.name)}</Link>,
+    cell: (rig) => <NameLink name={rig.name}>{idOf(rig.name)}</NameLink>,
     order: 'name',
   },
   { head: 'Last seen', cell: (rig) => <When time={rig.lastSeen} />, order: 'last_seen' },
@@ -31,10 +32,15 @@ const kColumns: Column<RigActivity>[] = [
         {rig.activeVersion === '1' ? '1 (factory)' : rig.activeVersion}
       </Link>
     ),
+    value: (rig) => Number(rig.activeVersion),
   },
-  { head: 'Since', cell: (rig) => <When time={rig.activeSince} /> },
   {
-    head: 'Tables',
+    head: 'Active since',
+    cell: (rig) => <When time={rig.activeSince} />,
+    value: (rig) => Date.parse(rig.activeSince ?? ''),
+  },
+  {
+    head: 'Segments in tables',
     cell: (rig) => (
       <Meter
         value={rig.tableEntries}
@@ -42,9 +48,15 @@ const kColumns: Column<RigActivity>[] = [
         label={'table fill of ' + idOf(rig.name)}
       />
     ),
+    value: (rig) => rig.tableEntries / rig.tableCapacity,
   },
-  { head: 'Labels', cell: (rig) => <Labels of={rig.labels} /> },
-  { head: 'Alarms', cell: (rig) => <Alarms of={rig.alarms} /> },
+  { head: 'Labels', cell: (rig) => <Labels of={rig.labels} />, wide: true },
+  {
+    head: 'Alarms',
+    cell: (rig) => <Alarms of={rig.alarms} />,
+    value: (rig) => rig.alarms.length,
+    wide: true,
+  },
 ];
 
 function Nothing(props: { filter: string }) {

@@ -1,8 +1,9 @@
 import { idOf, pageOf, rigPath } from '../api';
 import type { ListRecalibrationsResponse, Recalibration, SolverReport } from '../contract';
 import { number, words } from '../format';
-import { ListPage, type Column } from '../list';
+import { ListPage } from '../list';
 import { Badge, Link, When } from '../parts';
+import type { Column } from '../table';
 
 export function costs(solver: SolverReport): string {
   return `${number(solver.initialCost)} to ${number(solver.finalCost)}`;
@@ -14,14 +15,34 @@ export function Result(props: { of: Recalibration }) {
 }
 
 const kColumns: Column<Recalibration>[] = [
-  { head: 'Run', cell: (run) => <Link to={pageOf(run.name)}>{idOf(run.name)}</Link> },
-  { head: 'State', cell: (run) => <Badge state={run.state} /> },
-  { head: 'Trigger', cell: (run) => words(run.trigger) },
-  { head: 'Created', cell: (run) => <When time={run.createTime} /> },
-  { head: 'Segments', cell: (run) => run.segments.length },
-  { head: 'Cost', cell: (run) => run.solver && costs(run.solver) },
-  { head: 'Result', cell: (run) => run.calibration && <Result of={run} /> },
-  { head: 'Message', cell: (run) => run.message },
+  {
+    head: 'Run',
+    cell: (run) => <Link to={pageOf(run.name)}>{idOf(run.name)}</Link>,
+    value: (run) => Number(idOf(run.name)),
+  },
+  { head: 'State', cell: (run) => <Badge state={run.state} />, value: (run) => words(run.state) },
+  { head: 'Trigger', cell: (run) => words(run.trigger), value: (run) => words(run.trigger) },
+  {
+    head: 'Created',
+    cell: (run) => <When time={run.createTime} />,
+    value: (run) => Date.parse(run.createTime ?? ''),
+  },
+  {
+    head: 'Segments',
+    cell: (run) => run.segments.length,
+    value: (run) => run.segments.length,
+  },
+  {
+    head: 'Cost',
+    cell: (run) => run.solver && costs(run.solver),
+    value: (run) => run.solver?.finalCost,
+  },
+  {
+    head: 'Result',
+    cell: (run) => run.calibration && <Result of={run} />,
+    value: (run) => (run.calibration ? Number(idOf(run.calibration)) : undefined),
+  },
+  { head: 'Message', cell: (run) => run.message, value: (run) => run.message, wide: true },
 ];
 
 export function Runs(props: { rig: string; version: number }) {

@@ -1,4 +1,4 @@
-import { useState } from 'preact/hooks';
+import { useMemo, useState } from 'preact/hooks';
 import { ActionDialog, mayAdminister } from '../action';
 import { idOf, pageOf, post, remove, rigPath } from '../api';
 import type {
@@ -13,22 +13,23 @@ import type {
   TableExclusion,
   UnobservedDirection,
 } from '../contract';
-import { bytes, clock, component, number } from '../format';
+import { bytes, clock, component, heading, number, shownUnit, sigmaText } from '../format';
 import {
   Badge,
-  DataTable,
   Empty,
   Figures,
   Link,
   Loaded,
+  NameLink,
+  Remaining,
   SegmentLink,
   Title,
-  Unknown,
   When,
 } from '../parts';
 import { go, useRead } from '../state';
 import { Data } from './motion';
 import { sessionOf } from './session';
+import { DataTable, type Column } from '../table';
 
 // The name of the table that is for all groups together.
 const kJoint = 'joint';
@@ -161,45 +162,76 @@ function Information(props: { of: Segment; tables: Table[] }) {
       entropy={entropy}
     />
   );
-  const row = (score: GroupScore) => [
-    score.group,
-    number(score.gainNats, 4),
-    number(score.entropyNats, 4),
-    `${score.rank} of ${score.size}`,
-    reason(score.group, score.entropyNats),
-    directions(score.unobserved) || 'none',
+  const columns: Column<GroupScore>[] = [
+    { head: 'Group', cell: (score) => score.group, value: (score) => score.group },
+    {
+      head: 'Gain [nat]',
+      cell: (score) => number(score.gainNats, 4),
+      value: (score) => score.gainNats,
+    },
+    {
+      head: 'Entropy [nat]',
+      cell: (score) => number(score.entropyNats, 4),
+      value: (score) => score.entropyNats,
+    },
+    { head: 'Observable directions', cell: (score) => `${score.rank} of ${score.size}` },
+    {
+      head: 'In the table of the group',
+      cell: (score) => reason(score.group, score.entropyNats),
+      wide: true,
+    },
+    {
+      head: 'Unobservable directions',
+      cell: (score) => directions(score.unobserved) || 'none',
+      wide: true,
+    },
   ];
   return (
     <>
       <DataTable
         caption="Information about each group"
-        head={['Group', 'Gain [nats]', 'Entropy [nats]', 'Rank', 'Kept?', 'Unobservable']}
-        rows={props.of.scores.map(row)}
+        columns={columns}
+        items={props.of.scores}
       />
       {tables.has(kJoint) && <p>For all groups together: {reason(kJoint)}.</p>}
     </>
   );
 }
 
+const ratio = (c: SegmentInformation_Component) => c.sigma / c.priorSigma;
+
+const kParameters: Column<SegmentInformation_Component>[] = [
+  {
+    head: 'Parameter',
+    cell: (c) => heading(component(c.component), shownUnit(c.unit).unit),
+    value: (c) => component(c.component),
+  },
+  {
+    head: 'Factory tolerance',
+    cell: (c) => sigmaText(shownUnit(c.unit).factor * c.priorSigma),
+  },
+  {
+    head: 'Standard deviation with this segment',
+    cell: (c) => sigmaText(shownUnit(c.unit).factor * c.sigma),
+  },
+  {
+    head: 'Remaining uncertainty',
+    cell: (c) => <Remaining ratio={ratio(c)} of={component(c.component)} />,
+    value: ratio,
+  },
+];
+
 // Information by parameter, the best determined first.
 function Parameters(props: { of: SegmentInformation_Component[] }) {
+  const sorted = useMemo(() => [...props.of].sort((a, b) => ratio(a) - ratio(b)), [props.of]);
   if (props.of.length === 0) return null;
-  const ratio = (c: SegmentInformation_Component) => c.sigma / c.priorSigma;
-  const unit = (c: SegmentInformation_Component) => (c.unit === '-' ? '' : ` [${c.unit}]`);
   return (
     <details>
       <summary>Information of this segment alone about each parameter</summary>
       <DataTable
         caption="Parameters, by the information of this segment alone"
-        head={['Parameter', 'Factory tolerance', 'Sigma with it', 'Still unknown']}
-        rows={[...props.of]
-          .sort((a, b) => ratio(a) - ratio(b))
-          .map((c) => [
-            component(c.component) + unit(c),
-            number(c.priorSigma),
-            number(c.sigma),
-            <Unknown ratio={ratio(c)} of={component(c.component)} />,
-          ])}
+        columns={kParameters}
+        items={sorted}
       />
     </details>
   );
@@ -281,7 +313,7 @@ export function SegmentPage(props: {
                 ['State', <Badge state={segment.state} />],
                 ['Received', <When time={segment.receiveTime} />],
                 [
-                  'Length',
+                  'Duration',
                   number(Number(BigInt(segment.endNs) - BigInt(segment.startNs)) / 1e9) + ' s',
                 ],
                 ['Keyframes', segment.keyframes],
@@ -301,8 +333,8 @@ export function SegmentPage(props: {
             {segment.residuals && (
               <Figures
                 of={[
-                  ['Reprojection rms', number(segment.residuals.reprojectionRmsPx) + ' px'],
-                  ['Median', number(segment.residuals.reprojectionMedianPx) + ' px'],
+                  ['Reprojection error (root mean square)', number(segment.residuals.reprojectionRmsPx) + ' px'],
+                  ['Reprojection error (median)', number(segment.residuals.reprojectionMedianPx) + ' px'],
                   ['Inliers', `${segment.residuals.inliers} of ${segment.residuals.observations}`],
                   ['Outliers', segment.residuals.outliers],
                 ]}
@@ -314,9 +346,9 @@ export function SegmentPage(props: {
             <p>
               Segment number {segment.sequence} of{' '}
               <Link to={'/rigs/' + props.rig}>{props.rig}</Link>, from the session{' '}
-              <Link to={pageOf(`rigs/${props.rig}/sessions/${sessionOf(segment.name)}`)}>
+              <NameLink name={`rigs/${props.rig}/sessions/${sessionOf(segment.name)}`}>
                 {decodeURIComponent(sessionOf(segment.name))}
-              </Link>
+              </NameLink>
               , estimated with{' '}
               <Link to={pageOf(`rigs/${props.rig}/calibrations/${segment.calibrationVersion}`)}>
                 version {segment.calibrationVersion}

@@ -1,12 +1,13 @@
 // The segments of a rig, filtered and sorted.
 import type { JSX } from 'preact';
-import { useEffect, useState } from 'preact/hooks';
-import { rigPath, type ApiError } from '../api';
+import { useEffect, useMemo, useState } from 'preact/hooks';
+import { idOf, rigPath, type ApiError } from '../api';
 import type { GroupScore, ListSegmentsResponse, Rig, Segment } from '../contract';
-import { bytes, number } from '../format';
-import { ListPage, orderOf, type Column } from '../list';
+import { bytes, number, words } from '../format';
+import { ListPage, orderOf } from '../list';
 import { Badge, Choice, Link, SegmentLink, When } from '../parts';
 import { go, useAddress, useRead, withQuery } from '../state';
+import type { Column } from '../table';
 
 function kept(segment: Segment): string {
   const tables = segment.scores.filter((s) => s.inTable).map((s) => s.group);
@@ -20,7 +21,11 @@ function columns(group: string): Column<Segment>[] {
     return score ? show(score) : '';
   };
   return [
-    { head: 'Segment', cell: (segment) => <SegmentLink name={segment.name} /> },
+    {
+      head: 'Segment',
+      cell: (segment) => <SegmentLink name={segment.name} />,
+      value: (segment) => decodeURIComponent(idOf(segment.name)),
+    },
     {
       head: 'Received',
       cell: (segment) => <When time={segment.receiveTime} />,
@@ -34,32 +39,35 @@ function columns(group: string): Column<Segment>[] {
           {segment.state === 'UNUSABLE' && <> {segment.problem}</>}
         </>
       ),
+      value: (segment) => words(segment.state),
     },
-    { head: 'In tables', cell: kept },
+    { head: 'Kept in tables', cell: kept, value: kept },
     {
-      head: 'Gain [nats]',
+      head: 'Gain [nat]',
       cell: (segment) => of(segment, (score) => number(score.gainNats)),
       order: 'gain.' + group,
     },
     {
-      head: 'Entropy [nats]',
+      head: 'Entropy [nat]',
       cell: (segment) => of(segment, (score) => number(score.entropyNats, 4)),
       order: 'entropy.' + group,
     },
     { head: 'Landmarks', cell: (segment) => segment.landmarks, order: 'landmarks' },
     { head: 'Observations', cell: (segment) => segment.observations, order: 'observations' },
     {
-      head: 'Rms [px]',
+      head: 'Reprojection error [px]',
       cell: (segment) => (segment.residuals ? number(segment.residuals.reprojectionRmsPx) : ''),
+      value: (segment) => segment.residuals?.reprojectionRmsPx,
     },
     {
-      head: '°C',
+      head: 'Temperature [°C]',
       cell: (segment) => (segment.temperatureC === undefined ? '' : number(segment.temperatureC)),
       order: 'temperature_c',
     },
     {
       head: 'Data',
       cell: (segment) => (segment.hasData ? bytes(segment.payloadBytes) : 'dropped'),
+      value: (segment) => (segment.hasData ? Number(segment.payloadBytes) : undefined),
     },
   ];
 }
@@ -190,6 +198,7 @@ export function Segments(props: { rig: string; version: number }) {
   const groups = rig.value?.groups.map((g) => g.group) ?? [];
   const group = address.get('group') ?? groups[0] ?? '';
   const [order] = orderOf(address, kNewestFirst);
+  const shown = useMemo(() => columns(group), [group]);
   return (
     <ListPage
       title={'Segments of ' + props.rig}
@@ -199,7 +208,7 @@ export function Segments(props: { rig: string; version: number }) {
       fixed={{ view: 'BASIC' }}
       order={kNewestFirst}
       version={props.version}
-      columns={columns(group)}
+      columns={shown}
       next="Next segments"
       empty={<Nothing rig={props.rig} filter={address.get('filter') ?? ''} order={order} />}
       above={(mistake) => (

@@ -1,11 +1,18 @@
 // The list of sessions, and the page of one session with the device's path.
 import { useState } from 'preact/hooks';
-import { idOf, pageOf, rigPath } from '../api';
-import type { ListSegmentsResponse, ListSessionsResponse, Rig, Session } from '../contract';
+import { idOf, rigPath } from '../api';
+import type {
+  ListSegmentsResponse,
+  ListSessionsResponse,
+  Rig,
+  Session,
+  TrajectorySegment,
+} from '../contract';
 import { number } from '../format';
-import { ListPage, type Column } from '../list';
-import { DataTable, Figures, Link, Loaded, SegmentLink, Title, When } from '../parts';
+import { ListPage } from '../list';
+import { Figures, Link, Loaded, NameLink, SegmentLink, Title, When } from '../parts';
 import { useRead } from '../state';
+import { DataTable, type Column } from '../table';
 import { ColouredPath, entropyOf, isKept, useSessionPath, type SessionPath } from '../session_path';
 
 function Kept(props: { sessionPath: SessionPath; group: string }) {
@@ -17,16 +24,34 @@ function Kept(props: { sessionPath: SessionPath; group: string }) {
     return <p>No segment of this session is in a table now.</p>;
   }
   const start = BigInt(segments[0].startNs);
+  const startOf = (segment: TrajectorySegment) => Number(BigInt(segment.startNs) - start) / 1e9;
+  const columns: Column<TrajectorySegment>[] = [
+    {
+      head: 'Segment',
+      cell: (segment) => <SegmentLink name={segment.segment} />,
+      value: (segment) => decodeURIComponent(idOf(segment.segment)),
+    },
+    {
+      head: `Entropy of ${props.group} [nat]`,
+      cell: (segment) => number(entropyOf(segment, props.group), 4),
+      value: (segment) => entropyOf(segment, props.group),
+    },
+    {
+      head: 'Kept for',
+      cell: (segment) => segment.tables.join(', '),
+      value: (segment) => segment.tables.join(', '),
+    },
+    {
+      head: 'Start [s]',
+      cell: (segment) => number(startOf(segment), 4),
+      value: startOf,
+    },
+  ];
   return (
     <DataTable
       caption="Segments of this session that are kept, most informative first"
-      head={['Segment', `Entropy of ${props.group} [nats]`, 'Kept for', 'Starts at [s]']}
-      rows={kept.map((segment) => [
-        <SegmentLink name={segment.segment} />,
-        number(entropyOf(segment, props.group), 4),
-        segment.tables.join(', '),
-        number(Number(BigInt(segment.startNs) - start) / 1e9, 4),
-      ])}
+      columns={columns}
+      items={kept}
     />
   );
 }
@@ -75,8 +100,8 @@ export function SessionPage(props: { rig: string; session: string; version: numb
               of={[
                 ['Segments', sessionPath.session.segments],
                 ['Kept', sessionPath.segments.filter(isKept).length],
-                ['Started', <When time={sessionPath.session.firstReceiveTime} />],
-                ['Newest', <When time={sessionPath.session.lastReceiveTime} />],
+                ['Oldest segment', <When time={sessionPath.session.firstReceiveTime} />],
+                ['Newest segment', <When time={sessionPath.session.lastReceiveTime} />],
               ]}
             />
             <PathAndKept sessionPath={sessionPath} groups={groups} />
@@ -96,7 +121,7 @@ function Newest(props: { rig: string; session: string; version: number }) {
       {({ sessionPath, groups }) => (
         <>
           <p>
-            <Link to={pageOf(sessionPath.session.name)}>{sessionPath.session.session}</Link>:{' '}
+            <NameLink name={sessionPath.session.name}>{sessionPath.session.session}</NameLink>:{' '}
             {sessionPath.session.segments} segments, of which{' '}
             {sessionPath.segments.filter(isKept).length} are kept.
           </p>
@@ -140,10 +165,22 @@ export function NewestSession(props: { rig: string; version: number }) {
 }
 
 const kColumns: Column<Session>[] = [
-  { head: 'Session', cell: (s) => <Link to={pageOf(s.name)}>{s.session}</Link> },
-  { head: 'Segments', cell: (s) => s.segments },
-  { head: 'Started', cell: (s) => <When time={s.firstReceiveTime} /> },
-  { head: 'Newest segment', cell: (s) => <When time={s.lastReceiveTime} /> },
+  {
+    head: 'Session',
+    cell: (s) => <NameLink name={s.name}>{s.session}</NameLink>,
+    value: (s) => s.session,
+  },
+  { head: 'Segments', cell: (s) => s.segments, value: (s) => Number(s.segments) },
+  {
+    head: 'Oldest segment',
+    cell: (s) => <When time={s.firstReceiveTime} />,
+    value: (s) => Date.parse(s.firstReceiveTime ?? ''),
+  },
+  {
+    head: 'Newest segment',
+    cell: (s) => <When time={s.lastReceiveTime} />,
+    value: (s) => Date.parse(s.lastReceiveTime ?? ''),
+  },
 ];
 
 export function Sessions(props: { rig: string; version: number }) {
