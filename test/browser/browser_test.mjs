@@ -13,6 +13,8 @@ import { join } from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
 import { promisify } from 'node:util';
 import { startDaemon, workerOf } from './daemon.mjs';
+import { interactionTests } from './interaction_tests.mjs';
+import { layoutTests } from './layout_tests.mjs';
 import { kPatience, Reader, until } from './reader.mjs';
 
 const [, , selfcald, selfcal, fillState, sendSegments, web, screenshots] = process.argv;
@@ -29,7 +31,8 @@ const start = promisify(execFile);
 
 const tests = {
   async 'rigs are listed, filtered, sorted and paged by their address'(r) {
-    await r.open('/', 'Rigs');
+    await r.open('/?page_size=50', 'Rigs');
+    await r.page.locator('tbody tr').first().waitFor();
     assert.equal(await r.page.locator('tbody tr').count(), 50);
     await r.picture('rigs');
     await r.page.getByRole('link', { name: 'Next rigs' }).click();
@@ -53,7 +56,7 @@ const tests = {
   },
 
   async 'a rig tells how well it is known'(r) {
-    await r.shows('/rigs/tablet', 'tablet', ['Weak parameters', 'focal length of camera 0, x']);
+    await r.shows('/rigs/tablet', 'tablet', ['Uncertainty by group', 'focal length of camera 0, x']);
     await r.page.locator('.uplot canvas').first().waitFor();
     await r.picture('rig');
     await r.detail('rig');
@@ -61,7 +64,7 @@ const tests = {
 
   async 'a rig without segments says what to do'(r) {
     const rig = '/rigs/phone-001';
-    await r.shows(rig, 'phone-001', ['No segment is scored yet']);
+    await r.shows(rig, 'phone-001', ['No segment is scored yet', 'none has arrived yet'], 'rig-idle');
     await r.shows(rig + '/segments', 'Segments of phone-001', ['No segment has arrived yet']);
     await r.shows(rig + '/recalibrations', 'Runs of phone-001', ['There are no runs yet'], 'runs-none');
   },
@@ -81,7 +84,7 @@ const tests = {
     assert.ok(kept.length > 0 && kept.length < all.length, kept);
     await r.rows((names) => names.join() === kept);
     await r.page.getByLabel('Scores of').selectOption('camera');
-    await r.page.getByRole('link', { name: 'Gain [nats]' }).click();
+    await r.page.getByRole('link', { name: 'Gain [nat]' }).click();
     const sorted = await expected(filter, 'gain.camera desc');
     await r.rows((names) => names.join() === sorted);
     await r.page.reload();
@@ -131,7 +134,7 @@ const tests = {
     await r.page.getByText('Information of this segment alone about each parameter').click();
     await r.page.getByRole('row', { name: /focal length of camera 0, x \[px\]/ }).waitFor();
     // Residuals depend on the time and on the version.
-    await r.sees(/Camera 0: .* px rms over the/);
+    await r.sees(/Camera 0: .* px root mean square over the/);
     await r.sees('At version 1,');
     assert.ok((await r.page.locator('g.observation line').count()) > 0);
     await r.picture('segment');
@@ -139,12 +142,12 @@ const tests = {
     await r.page.getByLabel('Residuals at').selectOption(version);
     await r.sees(/^At version [2-9],/);
     await r.page.getByLabel('IMU residuals between keyframes').selectOption('0');
-    await r.page.getByRole('img', { name: /between keyframes: rotation/ }).waitFor();
+    await r.page.getByRole('slider', { name: /between keyframes: rotation/ }).waitFor();
     await r.page.setViewportSize({ width: 1000, height: 800 });
     await r.page.waitForTimeout(300);
     await r.page.setViewportSize({ width: 1200, height: 800 });
     await r.sees('keyframe 20 of 20');
-    const plot = r.page.getByRole('img', { name: /^Reprojection residuals/ });
+    const plot = r.page.getByRole('slider', { name: /^Reprojection residuals/ });
     await plot.scrollIntoViewIfNeeded();
     await plot.hover();
     await r.sees(/keyframe ([2-9]|1\d) of 20/);
@@ -180,7 +183,7 @@ const tests = {
     assert.notEqual(await r.page.locator('thead').textContent(), before);
     assert.ok((await own()) > 0);
     // A point on the path links to its segment.
-    const picture = r.page.locator('.wide svg');
+    const picture = r.page.locator('.orbit');
     await picture.hover();
     await r.sees('click to open it');
     await picture.click();
@@ -213,7 +216,7 @@ const tests = {
   async 'the history compares versions and shows their origin'(r) {
     await r.open('/rigs/tablet/calibrations', 'Calibrations of tablet');
     await r.page.locator('.uplot canvas').waitFor();
-    await r.sees('Difference of two versions');
+    await r.sees('Comparison of two versions');
     await r.page.getByLabel('From version').selectOption('1');
     await r.sees('Version 1');
     assert.match(r.page.url(), /a=1/);
@@ -292,9 +295,9 @@ const tests = {
     await r.shows('/events', 'Events', ['rig created'], 'all-events');
   },
 
-  async 'the coach follows the segments as they come'(r, other, daemon) {
+  async 'the coach follows the segments as they come'(r, other, daemon, send) {
     await r.open('/rigs/headset', 'headset');
-    await r.page.getByRole('link', { name: 'The coach' }).click();
+    await r.page.getByRole('link', { name: 'Coach' }).click();
     await r.heading('Coach of headset');
     await r.sees('and 0 segments in the tables');
     const expected = () => r.page.locator('.advice').textContent();
@@ -304,10 +307,10 @@ const tests = {
     assert.equal(await r.page.locator('tbody tr').count(), 14);
     await r.picture('coach');
     await r.detail('coach');
-    await start(sendSegments, [daemon.address, 'headset', 'carried', '6']);
+    await send([daemon.address, 'headset', 'carried', '6']);
     await r.sees(/and [1-9] segments? in the tables/);
     assert.notEqual(await expected(), before);
-    await r.shows('/rigs/tablet/coach', 'Coach of tablet', ['Least known']);
+    await r.shows('/rigs/tablet/coach', 'Coach of tablet', ['Least certain directions']);
   },
 
   async 'a run is drawn while it computes'(r, other, daemon) {
@@ -378,14 +381,16 @@ try {
   browser.setDefaultTimeout(kPatience);
   const reader = new Reader(await browser.newPage(), base, screenshots);
   const other = new Reader(await browser.newPage(), base, screenshots);
-  for (const [name, run] of Object.entries(tests)) {
+  const send = (args) => start(sendSegments, args);
+  const all = { ...interactionTests, ...tests, ...layoutTests };
+  for (const [name, run] of Object.entries(all)) {
     console.log(name);
-    await run(reader, other, daemon);
+    await run(reader, other, daemon, send);
     assert.deepEqual([...reader.problems, ...other.problems], [], name);
   }
   console.log('a daemon that has stopped');
   reader.expectProblems = other.expectProblems = true;
-  await reader.shows('/rigs/tablet', 'tablet', ['Weak parameters']);
+  await reader.shows('/rigs/tablet', 'tablet', ['Uncertainty by group']);
   await daemon.stop();
   await reader.page.getByText('not live').waitFor();
   await reader.page.getByRole('link', { name: 'Segments', exact: true }).click();

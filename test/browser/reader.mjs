@@ -57,7 +57,12 @@ export class Reader {
       .waitFor({ timeout: kPatience });
   }
   async sees(text) {
-    await this.page.getByText(text).first().waitFor({ timeout: kPatience });
+    await this.page.getByText(text).filter({ visible: true }).first().waitFor({ timeout: kPatience });
+  }
+  // Until nothing is being read.
+  async settled() {
+    const reads = this.page.getByText(/^(Loading|Simulating)/);
+    await until('the whole page', async () => (await reads.count()) === 0);
   }
   // Until what stands first in each row is as it should be.
   async rows(areRight) {

@@ -96,14 +96,23 @@ function Interval(props: { of: Difference; range: number }) {
           class={tick === 0 ? 'zero' : 'tick'}
         />
       ))}
-      <line x1={clamped(sigmas - 2)} x2={clamped(sigmas + 2)} y1={middle} y2={middle} class="span" />
+      <line
+        x1={clamped(sigmas - 2)}
+        x2={clamped(sigmas + 2)}
+        y1={middle}
+        y2={middle}
+        class="span"
+      />
       <circle cx={clamped(sigmas)} cy={middle} r={4} class="estimate" />
     </svg>
   );
 }
 
 function columnsOf(compared: CompareCalibrationsResponse): Column<Difference>[] {
-  const range = Math.max(kLeastRange, ...compared.differences.map((d) => Math.abs(sigmasOf(d)) + 2));
+  const range = Math.max(
+    kLeastRange,
+    ...compared.differences.map((d) => Math.abs(sigmasOf(d)) + 2),
+  );
   return [
     {
       head: 'Parameter',
@@ -181,8 +190,18 @@ export function Comparison(props: { rig: string; of: Calibration[] }) {
     <section id="comparison">
       <h2>Comparison of two versions</h2>
       <div class="bar">
-        <Choice label="From version" value={a} of={versions} onChoice={(to) => choose({ a: to, b })} />
-        <Choice label="to version" value={b} of={versions} onChoice={(to) => choose({ a, b: to })} />
+        <Choice
+          label="From version"
+          value={a}
+          of={versions}
+          onChoice={(to) => choose({ a: to, b })}
+        />
+        <Choice
+          label="to version"
+          value={b}
+          of={versions}
+          onChoice={(to) => choose({ a, b: to })}
+        />
         <button type="button" onClick={() => choose({ a: b, b: a })}>
           Exchange
         </button>

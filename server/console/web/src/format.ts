@@ -99,9 +99,9 @@ const isUsable = (sigma: number) => Number.isFinite(sigma) && sigma > 0;
 
 // A value, with as many digits as its standard deviation justifies.
 export function valueText(value: number, sigma: number): string {
-  return isUsable(sigma) && Number.isFinite(value)
-    ? value.toFixed(decimalsOf(sigma))
-    : number(value, 6);
+  if (!isUsable(sigma) || !Number.isFinite(value)) return number(value, 6);
+  const text = value.toFixed(decimalsOf(sigma));
+  return Number(text) === 0 ? text.replace('-', '') : text;
 }
 
 // A standard deviation with two significant digits.

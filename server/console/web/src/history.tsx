@@ -4,7 +4,7 @@ import type uPlot from 'uplot';
 import type { Calibration } from './contract';
 import { clock, component, estimateText, heading, shown, words } from './format';
 import { Choice } from './parts';
-import { kColours, Plot } from './plot';
+import { kColours, Plot, type PlotSeries } from './plot';
 import { go, useAddress, withQuery } from './state';
 
 const kBand = 2; // half width of the band, in sigmas
@@ -18,12 +18,19 @@ function estimateOf(version: Calibration, name: string) {
 const wasUsed = (version: Calibration) =>
   version.state !== 'REJECTED' && version.state !== 'CANDIDATE';
 
-const bound = (label: string): uPlot.Series => ({
+const bound = (label: string): PlotSeries => ({
   label,
   stroke: kColours[0] + '66',
   width: 1,
   points: { show: false },
 });
+
+const kRejected: PlotSeries = {
+  label: 'rejected, not used',
+  stroke: kColours[1],
+  paths: () => null,
+  points: { show: true, size: 8, stroke: kColours[1], fill: kColours[1] },
+};
 
 export function History(props: { of: Calibration[] }) {
   const query = useAddress().searchParams;
@@ -43,7 +50,7 @@ export function History(props: { of: Calibration[] }) {
       at.map((e, i) => (used(i) ? (e?.value ?? null) : null)),
       at.map((e, i) => (e && used(i) ? e.value + kBand * e.sigma : null)),
       at.map((e, i) => (e && used(i) ? e.value - kBand * e.sigma : null)),
-      at.map((e, i) => (used(i) ? null : (e?.value ?? null))),
+      ...(versions.every(wasUsed) ? [] : [at.map((e, i) => (used(i) ? null : (e?.value ?? null)))]),
     ] as uPlot.AlignedData;
   }, [versions, chosen]);
   const describe = (index: number) => {
@@ -85,16 +92,11 @@ export function History(props: { of: Calibration[] }) {
             stroke: kColours[0],
             width: 2,
             spanGaps: true,
-            points: { show: true, size: 7 },
+            points: { show: true, size: 7, fill: kColours[0] },
           },
           { ...bound('plus two standard deviations'), spanGaps: true },
           { ...bound('minus two standard deviations'), spanGaps: true },
-          {
-            label: 'rejected, not used',
-            stroke: kColours[1],
-            paths: () => null,
-            points: { show: true, size: 8, stroke: kColours[1] },
-          },
+          ...(versions.every(wasUsed) ? [] : [kRejected]),
         ]}
         bands={[{ series: [2, 3], fill: kColours[0] + '22' }]}
         describe={describe}

@@ -38,11 +38,7 @@ export function orderOf(
 }
 
 // Sorts by the column; reverses the order if it is the present one.
-function linkOf(
-  column: string,
-  now: [string, SortDirection],
-  first: SortDirection,
-): OrderLink {
+function linkOf(column: string, now: [string, SortDirection], first: SortDirection): OrderLink {
   const [field, direction] = now;
   const current = field === column;
   const next = !current ? first : direction === 'asc' ? 'desc' : 'asc';
@@ -72,9 +68,7 @@ function Items<R, T extends object>(
   // eslint-disable-next-line react-hooks/exhaustive-deps
   const items = useMemo(() => itemsOf(response), [response]);
   const orders = props.columns.map(({ order }) =>
-    order && props.order
-      ? linkOf(order, orderOf(address, props.order), props.order[1])
-      : undefined,
+    order && props.order ? linkOf(order, orderOf(address, props.order), props.order[1]) : undefined,
   );
   return (
     <DataTable

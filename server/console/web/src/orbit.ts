@@ -32,7 +32,18 @@ const kDirections: Record<Direction, [number, number, number]> = {
 const kFieldOfView = 35; // degrees, vertical
 const kTurn = MathUtils.degToRad(10); // for each key
 const kZoom = 0.85;
-const kMargin = 1.12; // between the box and the edge of the picture
+const kSteps = 4; // until the box fills the picture
+const kFilled = 0.86; // part of the picture that the box takes
+
+function cornersOf({ least, most }: Box): Vector3[] {
+  const ends = [least, most];
+  return [0, 1, 2, 3, 4, 5, 6, 7].map(
+    (i) => new Vector3(ends[i & 1][0], ends[(i >> 1) & 1][1], ends[i >> 2][2]),
+  );
+}
+
+// The larger distance from the middle of the picture, of which 1 is the edge.
+const extent = (place: Vector3) => Math.max(Math.abs(place.x), Math.abs(place.y));
 
 function placeCamera(camera: PerspectiveCamera, controls: OrbitControls, box: Box, at: Direction) {
   const least = new Vector3().fromArray(box.least);
@@ -40,7 +51,7 @@ function placeCamera(camera: PerspectiveCamera, controls: OrbitControls, box: Bo
   const radius = Math.max(1e-3, most.distanceTo(least) / 2);
   const vertical = MathUtils.degToRad(kFieldOfView) / 2;
   const narrow = Math.min(vertical, Math.atan(Math.tan(vertical) * camera.aspect));
-  const distance = (kMargin * radius) / Math.sin(narrow);
+  const distance = radius / Math.sin(narrow);
   controls.target.copy(least).add(most).multiplyScalar(0.5);
   camera.position
     .fromArray(kDirections[at])
@@ -51,6 +62,17 @@ function placeCamera(camera: PerspectiveCamera, controls: OrbitControls, box: Bo
   camera.far = 100 * distance;
   camera.updateProjectionMatrix();
   controls.update();
+  // The sphere around the box is in the picture; closer, until a corner is at its
+  // edge.
+  for (let i = 0; i < kSteps; ++i) {
+    camera.updateMatrixWorld();
+    const size = Math.max(...cornersOf(box).map((corner) => extent(corner.project(camera))));
+    camera.position
+      .sub(controls.target)
+      .multiplyScalar(size / kFilled)
+      .add(controls.target);
+    controls.update();
+  }
 }
 
 function projection(camera: PerspectiveCamera, width: number, height: number): Project {

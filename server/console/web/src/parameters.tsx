@@ -1,6 +1,6 @@
 // The certainty of parameters, relative to the factory calibration.
 import type { Calibration, ComponentEstimate, Rig } from './contract';
-import { component, estimateText, matches, shown, shownUnit, sigmaText } from './format';
+import { component, estimateText, heading, matches, shown, shownUnit, sigmaText } from './format';
 import { kWeak, kWell, Remaining } from './parts';
 import { DataTable, type Column } from './table';
 
@@ -27,28 +27,22 @@ export function weakOf(known: Known[]): Known[] {
 
 function certainty(ratio: number): string {
   if (ratio <= kWell) return 'well known';
-  return ratio <= kWeak ? 'better known than from the factory' : 'little more is known than from the factory';
-}
-
-function tolerance(e: Known): string {
-  const { unit, factor } = shownUnit(e.unit);
-  return `${sigmaText(factor * e.tolerance)}${unit === '-' ? '' : ' ' + unit}`;
+  return ratio <= kWeak
+    ? 'better known than from the factory'
+    : 'little more is known than from the factory';
 }
 
 const kColumns: Column<Known>[] = [
   {
     head: 'Parameter',
-    cell: (e) => component(e.component),
+    cell: (e) => heading(component(e.component), shown(e).unit),
     value: (e) => component(e.component),
   },
   {
     head: 'Value ± standard deviation',
-    cell: (e) => {
-      const { value, sigma, unit } = shown(e);
-      return estimateText(value, sigma, unit);
-    },
+    cell: (e) => estimateText(shown(e).value, shown(e).sigma, '-'),
   },
-  { head: 'Factory tolerance', cell: tolerance },
+  { head: 'Factory tolerance', cell: (e) => sigmaText(shownUnit(e.unit).factor * e.tolerance) },
   {
     head: 'Remaining uncertainty',
     cell: (e) => <Remaining ratio={e.ratio} of={component(e.component)} />,

@@ -11,6 +11,7 @@ export function Link(props: {
   children: ComponentChildren;
   current?: boolean;
   class?: string;
+  title?: string;
 }) {
   const open = (event: JSX.TargetedMouseEvent<HTMLAnchorElement>) => {
     if (event.metaKey || event.ctrlKey || event.shiftKey || event.button) return;
@@ -22,6 +23,7 @@ export function Link(props: {
       href={props.to}
       onClick={open}
       class={props.class}
+      title={props.title}
       aria-current={props.current ? 'page' : undefined}
     >
       {props.children}
@@ -198,21 +200,31 @@ export function solverFigures(
   };
 }
 
-export function SegmentLink(props: { name: string }) {
+// Long names are shortened in the middle, where there is no room for them: their
+// ends are what distinguishes segments.
+const kLong = 24;
+const kEnd = 10;
+
+// The link of a rig, session or segment, by the name of the resource.
+export function NameLink(props: { name: string; children: string }) {
+  const { name, children: text } = props;
+  const cut = text.length - kEnd;
   return (
-    <Link to={pageOf(props.name)} class="name">
-      {decodeURIComponent(idOf(props.name))}
+    <Link to={pageOf(name)} class="name" title={text.length > kLong ? text : undefined}>
+      {text.length > kLong ? (
+        <>
+          <span class="start">{text.slice(0, cut)}</span>
+          <span>{text.slice(cut)}</span>
+        </>
+      ) : (
+        text
+      )}
     </Link>
   );
 }
 
-// A rig or a session.
-export function NameLink(props: { name: string; children: ComponentChildren }) {
-  return (
-    <Link to={pageOf(props.name)} class="name">
-      {props.children}
-    </Link>
-  );
+export function SegmentLink(props: { name: string }) {
+  return <NameLink name={props.name}>{decodeURIComponent(idOf(props.name))}</NameLink>;
 }
 
 export function SegmentLinks(props: { names: string[] }) {

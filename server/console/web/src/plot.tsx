@@ -9,16 +9,21 @@ import { number } from './format';
 export const kColours = ['#2f6fdb', '#d9822b', '#2a9d6f', '#a64ac9'];
 const kFont = '12px system-ui, sans-serif';
 const kCharacter = 7; // width, about
+const kTimePadding = 48; // to the right, for half of the label of the last tick
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
 function ink(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
+export interface PlotSeries extends uPlot.Series {
+  label: string;
+}
+
 export interface PlotProps {
   label: string; // a description of the plot
   data: uPlot.AlignedData;
-  series: uPlot.Series[];
+  series: PlotSeries[];
   x: {
     label: string; // with the unit
     integers?: boolean;
@@ -73,7 +78,7 @@ function timeTicks(values: number[], step: number): string[] {
     const changed = date !== before;
     before = date;
     if (step >= kDay) return date;
-    const time = step >= 60 ? clock.slice(0, 5) : clock.slice(0, 8);
+    const time = clock.slice(0, step >= 60 ? 5 : step >= 1 ? 8 : -1);
     return changed ? `${time}\n${date}` : time;
   });
 }
@@ -98,7 +103,7 @@ function axis(props: PlotProps, which: 'x' | 'y', element: HTMLElement): uPlot.A
     ...shown,
     // A canvas has no text that can be read: the labels are an attribute, too.
     values: (_, values, __, ___, step) => {
-      const labels = format(values as (number | null)[], step);
+      const labels = format(values, step);
       element.dataset[which + 'Ticks'] = labels.filter(Boolean).join('|').replaceAll('\n', ' ');
       return labels;
     },
@@ -120,7 +125,7 @@ function valuesAt(props: PlotProps, index: number): string {
   const at = data[0][index];
   const values = series.flatMap((one, i) => {
     const value = data[i + 1][index];
-    return value == null ? [] : [`${String(one.label)} ${number(value, 4)}`];
+    return value == null ? [] : [`${one.label} ${number(value, 4)}`];
   });
   return `${x.label} ${number(at, 4)}: ${values.join(', ')}`;
 }
@@ -165,6 +170,7 @@ export function Plot(props: PlotProps) {
     const made = new uPlot(
       {
         ...size(),
+        padding: [null, props.x.time ? kTimePadding : null, null, null],
         tzDate: (seconds) => uPlot.tzDate(new Date(1000 * seconds), 'Etc/UTC'),
         scales: {
           x: { time: props.x.time === true, range: props.x.range },

@@ -5,7 +5,7 @@ import type { SegmentResiduals } from './contract';
 import type { SegmentData } from './segment_data';
 import { kDegrees, number } from './format';
 import { Choice } from './parts';
-import { kColours, Plot } from './plot';
+import { kColours, Plot, type PlotSeries } from './plot';
 
 // A logarithmic axis has no zero.
 const kLeast = 1e-3;
@@ -23,7 +23,7 @@ function secondsOf(times: string[]): number[] {
   return times.map((time) => Number(BigInt(time) - start) / 1e9);
 }
 
-const points = (label: string, stroke: string): uPlot.Series => ({
+const points = (label: string, stroke: string): PlotSeries => ({
   label,
   stroke,
   paths: () => null,
@@ -82,7 +82,7 @@ const kWhitened = 'whitened';
 
 // The lines of biases are dashed.
 const kGrey = '#8a929c';
-const kKinds: uPlot.Series[] = kParts.map((part, i) => ({
+const kKinds: PlotSeries[] = kParts.map((part, i) => ({
   label: part.name,
   stroke: kColours[i] ?? kGrey,
   width: 1.2,

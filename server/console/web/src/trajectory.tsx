@@ -85,7 +85,7 @@ function gridLabels({ step, ticks: [xs, ys, zs] }: Grid): Label[] {
     }));
   return [
     ...named(xs, 'x', (x) => [x, y0, z0]),
-    ...named(ys, 'y', (y) => [x1, y, z0]),
+    ...named(ys.slice(1), 'y', (y) => [x1, y, z0]),
     ...named(zs.slice(1), 'z', (z) => [x0, y1, z]),
   ];
 }

@@ -50,7 +50,8 @@ function Best(props: { of: AdviseMotionResponse_Advice; seconds: number }) {
         <p>
           Expected from {number(props.seconds)} s: the uncertainty becomes{' '}
           <strong>{number(100 * part, 2)} % smaller</strong> in the mean over all directions (gain{' '}
-          {number(props.of.gainNats)} nat). Largest improvement: <LargestImprovement of={props.of} />.
+          {number(props.of.gainNats)} nat). Largest improvement:{' '}
+          <LargestImprovement of={props.of} />.
         </p>
       )}
     </div>

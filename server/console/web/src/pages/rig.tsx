@@ -45,33 +45,33 @@ function Tables(props: { of: Table[] }) {
     <>
       <h2>Tables</h2>
       <div class="side tables">
-      {props.of.map((table) => (
-        <section key={table.name}>
-          <h3>
-            {idOf(table.name)}{' '}
-            <Meter
-              value={table.entries.length}
-              of={table.capacity}
-              label={'fill of the table ' + idOf(table.name)}
-            />
-          </h3>
-          {table.starved && (
-            <p class="warning">
-              The table does not fill: {table.scored} segments were offered. Move the device in more
-              directions, and closer to what it sees.
-            </p>
-          )}
-          {table.entries.length === 0 ? (
-            <p class="quiet">Empty: no segment has enough information about this group yet.</p>
-          ) : (
-            <DataTable
-              caption={'Segments in the table ' + idOf(table.name)}
-              columns={kEntries}
-              items={table.entries}
-            />
-          )}
-        </section>
-      ))}
+        {props.of.map((table) => (
+          <section key={table.name}>
+            <h3>
+              {idOf(table.name)}{' '}
+              <Meter
+                value={table.entries.length}
+                of={table.capacity}
+                label={'fill of the table ' + idOf(table.name)}
+              />
+            </h3>
+            {table.starved && (
+              <p class="warning">
+                The table does not fill: {table.scored} segments were offered. Move the device in
+                more directions, and closer to what it sees.
+              </p>
+            )}
+            {table.entries.length === 0 ? (
+              <p class="quiet">Empty: no segment has enough information about this group yet.</p>
+            ) : (
+              <DataTable
+                caption={'Segments in the table ' + idOf(table.name)}
+                columns={kEntries}
+                items={table.entries}
+              />
+            )}
+          </section>
+        ))}
       </div>
     </>
   );
@@ -215,12 +215,7 @@ function Administration(props: { rig: string; of: Rig; onChange: () => void }) {
 }
 
 // Labels, and what an administrator may change.
-function Settings(props: {
-  rig: string;
-  of: Rig;
-  caller: Caller | null;
-  onChange: () => void;
-}) {
+function Settings(props: { rig: string; of: Rig; caller: Caller | null; onChange: () => void }) {
   return (
     <section>
       <h2>Labels</h2>
@@ -268,11 +263,7 @@ export function RigPage(props: { rig: string; caller: Caller | null; version: nu
           <>
             <RigVerdict of={value.calibration} />
             <div class="side">
-              <WhatChanged
-                rig={props.rig}
-                active={value.calibration}
-                version={props.version}
-              />
+              <WhatChanged rig={props.rig} active={value.calibration} version={props.version} />
               <WhatToDo
                 rig={props.rig}
                 active={value.calibration}

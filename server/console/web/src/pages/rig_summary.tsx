@@ -7,6 +7,7 @@ import type {
   AdviseMotionResponse,
   Calibration,
   CompareCalibrationsResponse,
+  CompareCalibrationsResponse_Difference as Difference,
   ListActivityResponse,
   ListCalibrationsResponse,
   ListEventsResponse,
@@ -22,6 +23,7 @@ import { agreement, largestOf, shownDifference } from '../comparison';
 
 const kEvents = 5;
 const kLargest = 3;
+const kNotable = 1; // change of a parameter, in sigmas
 const kMostWeak = 4; // named in a sentence
 const kAll = 1000; // rigs whose name contains that of this one
 
@@ -45,6 +47,27 @@ export function RigVerdict(props: { of: Calibration }) {
 
 // ------------------------------------------------------------- what changed
 
+// The parameters that changed most.
+function Largest(props: { of: Difference[] }) {
+  const changed = props.of.filter((d) => Math.abs(d.difference) > kNotable * d.sigma);
+  if (changed.length === 0) {
+    return <p>No parameter changed by more than {kNotable} standard deviation.</p>;
+  }
+  return (
+    <ul>
+      {changed.map((d) => {
+        const { difference, sigma, unit } = shownDifference(d);
+        return (
+          <li key={d.component}>
+            {component(d.component)}: by {estimateText(difference, sigma, unit)} (
+            {number(Math.abs(difference) / sigma, 2)} standard deviations)
+          </li>
+        );
+      })}
+    </ul>
+  );
+}
+
 function Replaced(props: { rig: string; active: string; before: string }) {
   const base = `${rigPath(props.rig)}/calibrations`;
   const other = new URLSearchParams({ b: `rigs/${props.rig}/calibrations/${props.active}` });
@@ -57,17 +80,7 @@ function Replaced(props: { rig: string; active: string; before: string }) {
           <p>
             Version {props.active} replaced version {props.before}. {agreement(compared)}
           </p>
-          <ul>
-            {largestOf(compared, kLargest).map((d) => {
-              const { difference, sigma, unit } = shownDifference(d);
-              return (
-                <li key={d.component}>
-                  {component(d.component)}: by {estimateText(difference, sigma, unit)} (
-                  {number(Math.abs(difference) / sigma, 2)} standard deviations)
-                </li>
-              );
-            })}
-          </ul>
+          <Largest of={largestOf(compared, kLargest)} />
           <p>
             <Link to={`${pageOf('rigs/' + props.rig)}/calibrations?${query}#comparison`}>
               Compare all parameters
@@ -93,7 +106,7 @@ function Events(props: { rig: string; version: number }) {
                   {clock(event.time)}
                 </time>{' '}
                 {words(event.kind)}
-                {event.detail && <span class="name">: {event.detail}</span>}
+                {event.detail && <span>: {event.detail}</span>}
               </li>
             ))}
           </ul>
@@ -167,7 +180,8 @@ function actionsOf(facts: Facts): ComponentChildren[] {
   if (activity?.run) {
     actions.push(
       <>
-        A recalibration is computing: <Link to={pageOf(activity.run.name)}>follow its progress</Link>.
+        A recalibration is computing:{' '}
+        <Link to={pageOf(activity.run.name)}>follow its progress</Link>.
       </>,
     );
   }

@@ -38,7 +38,7 @@ const kJoint = 'joint';
 function worstOf(table: Table): string {
   const last = table.entries[table.entries.length - 1] as Table_Entry | undefined;
   if (!last) return 'the table is empty now';
-  return `its worst entry now has ${number(last.entropyNats, 4)}`;
+  return `the entropy of its worst entry is now ${number(last.entropyNats, 4)}`;
 }
 
 function Rival(props: { of: TableExclusion; none: string }) {
@@ -188,11 +188,7 @@ function Information(props: { of: Segment; tables: Table[] }) {
   ];
   return (
     <>
-      <DataTable
-        caption="Information about each group"
-        columns={columns}
-        items={props.of.scores}
-      />
+      <DataTable caption="Information about each group" columns={columns} items={props.of.scores} />
       {tables.has(kJoint) && <p>For all groups together: {reason(kJoint)}.</p>}
     </>
   );
@@ -333,8 +329,14 @@ export function SegmentPage(props: {
             {segment.residuals && (
               <Figures
                 of={[
-                  ['Reprojection error (root mean square)', number(segment.residuals.reprojectionRmsPx) + ' px'],
-                  ['Reprojection error (median)', number(segment.residuals.reprojectionMedianPx) + ' px'],
+                  [
+                    'Reprojection error (root mean square)',
+                    number(segment.residuals.reprojectionRmsPx) + ' px',
+                  ],
+                  [
+                    'Reprojection error (median)',
+                    number(segment.residuals.reprojectionMedianPx) + ' px',
+                  ],
                   ['Inliers', `${segment.residuals.inliers} of ${segment.residuals.observations}`],
                   ['Outliers', segment.residuals.outliers],
                 ]}

@@ -36,7 +36,7 @@ function columns(group: string): Column<Segment>[] {
       cell: (segment) => (
         <>
           <Badge state={segment.state} />
-          {segment.state === 'UNUSABLE' && <> {segment.problem}</>}
+          {segment.state === 'UNUSABLE' && <span class="reason">{segment.problem}</span>}
         </>
       ),
       value: (segment) => words(segment.state),
