@@ -12,6 +12,7 @@ import {
   tableFeatures,
   useTable,
   type ColumnDef,
+  type SortingState,
 } from '@tanstack/preact-table';
 import {
   elementScroll,
@@ -148,6 +149,7 @@ export function DataTable<T extends object>(props: {
   const whole = props.whole ?? true;
   const scroll = useRef<HTMLDivElement>(null);
   const [filter, setFilter] = useState('');
+  const [sorting, setSorting] = useState<SortingState>([]);
   const definitions = useMemo(
     () => columns.map((column, i) => definitionOf(column, i, items)),
     [columns, items],
@@ -156,14 +158,15 @@ export function DataTable<T extends object>(props: {
     features,
     columns: definitions,
     data: items,
-    state: { globalFilter: filter },
+    state: { globalFilter: filter, sorting },
+    onSortingChange: setSorting,
     globalFilterFn: 'includesString',
     getColumnCanGlobalFilter: (column) => isText(columns[Number(column.id)], items),
     enableMultiSort: false,
   });
   // The order of the daemon replaces that of the page.
   const order = props.orders?.map((link) => link?.to).join(' ');
-  useEffect(() => table.resetSorting(true), [table, order]);
+  useEffect(() => setSorting([]), [order]);
   const rows = table.getRowModel().rows;
   const long = rows.length > kMostWhole;
   const virtualizer = useVirtualRows(rows.length, scroll, long);
@@ -189,7 +192,7 @@ export function DataTable<T extends object>(props: {
   const headOf = (index: number): { content: ComponentChildren; sorted?: Sorted } => {
     const order = props.orders?.[index];
     if (order) {
-      const sorted = table.state.sorting.length > 0 ? 'none' : order.sorted;
+      const sorted = sorting.length > 0 ? 'none' : order.sorted;
       return {
         content: (
           <Link to={order.to}>
