@@ -1,4 +1,5 @@
-// Small SVG charts in the colours of the page.
+// Static SVG charts in the colours of the page, with the ticks and bands of the
+// charts of the web console.
 #pragma once
 
 #include <string>
@@ -14,15 +15,21 @@ struct ChartPoint {
   std::string title;    // tooltip
 };
 
-// A chart of points over x with a y axis, for a page. `name` is its label for
-// screen readers. Points that are not numbers are skipped; the result is empty
-// if none is left.
+// Charts skip points that are not numbers, and are empty if none is left.
+// `name` is the label for screen readers, `y_label` has the unit.
+
+// Points over consecutive numbers, e.g. of segments.
 std::string PointChart(const std::vector<ChartPoint>& points,
                        const std::string& name,
                        const std::string& x_label,
                        const std::string& y_label);
 
-// A line with a band of one sigma, for a cell of a table.
+// A line over time with a band of two sigmas; x is in seconds since 1970.
+std::string HistoryChart(const std::vector<ChartPoint>& points,
+                         const std::string& name,
+                         const std::string& y_label);
+
+// The line and the band of a history chart, for a cell of a table.
 std::string Sparkline(const std::vector<ChartPoint>& points,
                       const std::string& name);
 

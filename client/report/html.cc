@@ -8,28 +8,37 @@ namespace selfcal::client {
 namespace {
 
 constexpr std::string_view kStyle = R"(
-:root { color-scheme: light dark; --ink: #1c2126; --paper: #fff;
-  --faint: #6b747d; --line: #d8dde2; --accent: #0b62a8; --band: #0b62a826;
-  --good: #1d7a3a; --weak: #9a6200; --bad: #b3261e; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e4e8ec;
-  --paper: #14181c; --faint: #98a2ac; --line: #333a41; --accent: #62b0f0;
-  --band: #62b0f033; --good: #5fce86; --weak: #e5b35a; --bad: #ff8a80; } }
-body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink);
-  background: var(--paper); max-width: 72rem; margin: 0 auto; padding: 1.5rem; }
+:root { color-scheme: light dark; --ink: #1d2126; --paper: #fbfbfa;
+  --faint: #5c6570; --line: #dde1e6; --accent: #2f6fdb; --band: #2f6fdb22;
+  --good: #17703f; --weak: #8a5a00; --bad: #b3261e; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6e9ed;
+  --paper: #15181c; --faint: #a0a9b4; --line: #343b44; --band: #2f6fdb33;
+  --good: #6fd39b; --weak: #f0c069; --bad: #ff8a80; } }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink);
+  background: var(--paper); margin: 0; padding: 1.5rem clamp(12px, 2.5vw, 48px);
+  overflow-wrap: anywhere; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
+p, li { max-width: 100ch; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums;
-  font-size: .92rem; display: block; overflow-x: auto; }
+  display: block; overflow-x: auto; overflow-wrap: normal; }
 th, td { text-align: left; padding: .25rem .8rem .25rem 0;
   border-bottom: 1px solid var(--line); vertical-align: middle; }
+td:first-child, td:last-child { min-width: 16ch; max-width: 64ch;
+  overflow-wrap: anywhere; }
 .number { text-align: right; } .faint { color: var(--faint); }
+.charts { display: grid; gap: 1rem 1.5rem;
+  grid-template-columns: repeat(auto-fill, minmax(min(100%, 480px), 1fr)); }
 .verdict { border-left: .4rem solid; padding: .2rem 1rem; font-size: 1.1rem; }
 .good { border-color: var(--good); } .weak { border-color: var(--weak); }
-.bad { border-color: var(--bad); }
-svg text { fill: var(--faint); font-size: 11px; }
-svg .axis { stroke: var(--line); fill: none; }
+.bad { border-color: var(--bad); } summary { cursor: pointer; }
+svg { max-width: 100%; } .charts svg { width: 100%; height: auto;
+  max-width: 750px; }
+svg text { fill: var(--faint); font-size: 12px; }
+svg .axis, svg .grid { stroke: var(--line); fill: none; }
+svg .tick { stroke: var(--faint); fill: none; }
 svg .mark { fill: var(--accent); } svg .hollow { fill: none;
   stroke: var(--faint); } svg .trace { stroke: var(--accent); fill: none;
-  stroke-width: 1.5; } svg .band { fill: var(--band); stroke: none; }
+  stroke-width: 2; } svg .band { fill: var(--band); stroke: none; }
 )";
 
 }  // namespace

@@ -52,25 +52,42 @@ std::set<std::string> UsedSegments(const v1::Calibration& calibration) {
   return {used.begin(), used.end()};
 }
 
-std::string Course(const ReportData& data, const std::string& component) {
-  std::vector<ChartPoint> points;
+struct Course {
+  std::vector<ChartPoint> points;  // over time
+  std::string unit;
+};
+
+// A component over time, from version to version.
+Course CourseOf(const ReportData& data, const std::string& component) {
+  Course course;
   for (const v1::Calibration& version : data.versions) {
     if (version.state() == v1::Calibration::REJECTED) continue;
     for (const auto& estimate : version.estimates()) {
       if (estimate.component() != component) continue;
       // The band of the factory calibration would dwarf all others.
       const ShownEstimate shown = Shown(estimate);
-      points.push_back({static_cast<double>(version.version()),
-                        shown.value,
-                        version.version() == 1 ? 0 : shown.sigma,
-                        false,
-                        ""});
+      course.unit = shown.unit;
+      course.points.push_back(
+          {static_cast<double>(version.create_time().seconds()),
+           shown.value,
+           version.version() == 1 ? 0 : shown.sigma,
+           version.version() == data.calibration.version(),
+           fmt::format("version {}, {} UTC: {} +- {} {}",
+                       version.version(),
+                       TimeText(version.create_time()),
+                       ValueText(shown.value, shown.sigma),
+                       SigmaText(shown.sigma),
+                       shown.unit)});
     }
   }
-  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
-    return a.x < b.x;
-  });
-  return Sparkline(points, component + " over the versions");
+  std::stable_sort(course.points.begin(),
+                   course.points.end(),
+                   [](const auto& a, const auto& b) { return a.x < b.x; });
+  return course;
+}
+
+std::string Charts(const std::string& charts) {
+  return "<div class=\"charts\">\n" + charts + "</div>\n";
 }
 
 }  // namespace
@@ -98,8 +115,8 @@ std::string ParameterSection(const ReportData& data) {
                    {"unit"},
                    {"sigma before", true},
                    {"learned [nat]", true},
-                   {"observability"},
-                   {"over the versions"}});
+                   {"learned"},
+                   {"over time"}});
   for (const auto& estimate : data.calibration.estimates()) {
     const ShownEstimate shown = Shown(estimate);
     const double before = SigmaBefore(Factory(data), estimate.component());
@@ -113,13 +130,14 @@ std::string ParameterSection(const ReportData& data) {
                SigmaText(before),
                known ? fmt::format("{:.2f}", std::max(nats, 0.0)) : "held",
                known ? Bar(nats / 5, estimate.component() + ": learned") : "",
-               Course(data, estimate.component())});
+               Sparkline(CourseOf(data, estimate.component()).points,
+                         estimate.component() + " over time")});
   }
   return Section("parameters",
                  "Parameters",
                  "<p class=\"faint\">Learned is the logarithm of the ratio of "
-                 "sigma before to sigma now. A held component is not "
-                 "estimated.</p>\n" +
+                 "sigma before to sigma now. A component that is held "
+                 "constant is not estimated.</p>\n" +
                      table.Html());
 }
 
@@ -153,19 +171,19 @@ std::string ResidualSection(const ReportData& data) {
   std::string body =
       "<p class=\"faint\">Residuals of each segment when it was scored, with "
       "the calibration of that time; filled: this version was computed from it."
-      "</p>\n" +
-      PointChart(pixels,
-                 "Reprojection error of each segment",
-                 "segment",
-                 "camera: rms [px]");
+      "</p>\n";
+  std::string charts = PointChart(pixels,
+                                  "Reprojection error of each segment",
+                                  "segment",
+                                  "camera: root mean square [px]");
   for (std::size_t k = 0; k < std::size(kInertial); ++k) {
-    body += PointChart(
+    charts += PointChart(
         inertial[k],
         fmt::format("IMU residual of {} of each segment", kInertial[k]),
         "segment",
-        fmt::format("IMU, {}: rms [sigma]", kInertial[k]));
+        fmt::format("IMU, {}: root mean square [sigmas]", kInertial[k]));
   }
-  return Section("residuals", "Residuals by sensor", body);
+  return Section("residuals", "Residuals by sensor", body + Charts(charts));
 }
 
 std::string EntropySection(const ReportData& data) {
@@ -173,6 +191,7 @@ std::string EntropySection(const ReportData& data) {
       "<p class=\"faint\">Differential entropy of each group after one "
       "segment alone; lower is more informative. Filled: a table keeps it."
       "</p>\n";
+  std::string charts;
   for (const v1::Table& table : data.tables) {
     const std::string group = LastPart(table.name());
     std::vector<ChartPoint> points;
@@ -188,12 +207,12 @@ std::string EntropySection(const ReportData& data) {
                                       score.entropy_nats())});
       }
     }
-    body += PointChart(points,
-                       "Entropy of " + group + " over the segments",
-                       "segment",
-                       group + " [nat]");
+    charts += PointChart(points,
+                         "Entropy of " + group + " over the segments",
+                         "segment",
+                         group + " [nat]");
   }
-  return Section("entropy", "Entropy over time", body);
+  return Section("entropy", "Entropy over time", body + Charts(charts));
 }
 
 std::string SegmentSection(const ReportData& data) {
@@ -252,7 +271,23 @@ std::string HistorySection(const ReportData& data) {
                    : "factory",
                Escaped(fmt::format("{}", fmt::join(version.reasons(), " ")))});
   }
-  return Section("history", "History", table.Html());
+  std::string charts;
+  for (const auto& estimate : data.calibration.estimates()) {
+    if (estimate.sigma() <= 0) continue;
+    const Course course = CourseOf(data, estimate.component());
+    charts += HistoryChart(
+        course.points,
+        estimate.component() + " over time",
+        course.unit == "-"
+            ? estimate.component()
+            : fmt::format("{} [{}]", estimate.component(), course.unit));
+  }
+  return Section("history",
+                 "History",
+                 table.Html() +
+                     "<details><summary>Each parameter over time, with a band "
+                     "of two standard deviations</summary>\n" +
+                     Charts(charts) + "</details>\n");
 }
 
 }  // namespace selfcal::client
