@@ -77,11 +77,6 @@ export function component(name: string): string {
   return name;
 }
 
-// A number with its unit, if it has one.
-export function quantity(value: number, unit: string, digits = 6): string {
-  return number(value, digits) + (unit === '-' ? '' : ' ' + unit);
-}
-
 // 'angle [°]'; a quantity without a unit has none in its heading.
 export function heading(name: string, unit: string): string {
   return unit === '-' ? name : `${name} [${unit}]`;
