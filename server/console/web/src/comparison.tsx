@@ -13,6 +13,8 @@ import { DataTable, type Column } from './table';
 
 // Differences above are not explained by chance.
 const kSignificant = 3;
+// A difference in standard deviations has two decimals.
+const kSigmaDigit = 0.1;
 
 // Both values and their difference in the unit in which they are shown.
 export function shownDifference(d: Difference) {
@@ -50,6 +52,7 @@ export function agreement(compared: CompareCalibrationsResponse): string {
 
 const kWidth = 180;
 const kHeight = 20;
+const kEdge = 12; // for the labels of the outer ticks
 const kLeastRange = 4; // sigmas
 
 // A tick at each of these, of which the chart has at most seven.
@@ -59,7 +62,8 @@ function ticksOf(range: number): number[] {
   return Array.from({ length: 2 * most + 1 }, (_, i) => (i - most) * step);
 }
 
-const place = (sigmas: number, range: number) => (kWidth * (1 + sigmas / range)) / 2;
+const place = (sigmas: number, range: number) =>
+  kWidth / 2 + (kWidth / 2 - kEdge) * (sigmas / range);
 
 function Ticks(props: { range: number }) {
   return (
@@ -84,7 +88,7 @@ function Interval(props: { of: Difference; range: number }) {
       class={Math.abs(sigmas) > kSignificant ? 'interval significant' : 'interval'}
       viewBox={`0 0 ${kWidth} ${kHeight}`}
       role="img"
-      aria-label={`${component(props.of.component)}: ${number(sigmas, 2)} standard deviations`}
+      aria-label={`${component(props.of.component)}: ${valueText(sigmas, kSigmaDigit)} standard deviations`}
     >
       {ticksOf(range).map((tick) => (
         <line
@@ -138,7 +142,7 @@ function columnsOf(compared: CompareCalibrationsResponse): Column<Difference>[] 
       head: 'In standard deviations',
       cell: (d) => (
         <span class={Math.abs(sigmasOf(d)) > kSignificant ? 'strong' : ''}>
-          {number(sigmasOf(d), 2)}
+          {valueText(sigmasOf(d), kSigmaDigit)}
         </span>
       ),
       value: (d) => Math.abs(sigmasOf(d)),

@@ -9,7 +9,7 @@ import { number } from './format';
 export const kColours = ['#2f6fdb', '#d9822b', '#2a9d6f', '#a64ac9'];
 const kFont = '12px system-ui, sans-serif';
 const kCharacter = 7; // width, about
-const kTimePadding = 48; // to the right, for half of the label of the last tick
+const kTimePadding = 36; // to the right, for half of the label of the last tick
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
 function ink(name: string): string {
@@ -68,7 +68,26 @@ function decimalTicks(values: number[], step: number): string[] {
   return values.map((value) => value.toFixed(decimals));
 }
 
-const kDay = 86400;
+const kMinute = 60;
+const kHour = 60 * kMinute;
+const kDay = 24 * kHour;
+const kMonth = 30 * kDay; // uPlot begins these steps at the first of a month
+const kYear = 365 * kDay;
+const kTimeSteps = [
+  ...[0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30],
+  ...[1, 2, 5, 10, 15, 30].map((k) => k * kMinute),
+  ...[1, 2, 3, 6, 12].map((k) => k * kHour),
+  ...[1, 2, 5, 10].map((k) => k * kDay),
+  ...[1, 2, 3, 6].map((k) => k * kMonth),
+  ...[1, 2, 5, 10].map((k) => k * kYear),
+];
+const kTimeSpace = 90; // pixels, if that leaves two ticks
+
+function timeStep(range: number, pixels: number): number {
+  const wide = kTimeSteps.find((step) => (step * pixels) / range >= kTimeSpace) ?? range;
+  const few = kTimeSteps.filter((step) => step <= range / 2).pop() ?? kTimeSteps[0];
+  return Math.min(wide, few);
+}
 
 // Times in UTC; the date stands where it changes.
 function timeTicks(values: number[], step: number): string[] {
@@ -78,7 +97,7 @@ function timeTicks(values: number[], step: number): string[] {
     const changed = date !== before;
     before = date;
     if (step >= kDay) return date;
-    const time = clock.slice(0, step >= 60 ? 5 : step >= 1 ? 8 : -1);
+    const time = clock.slice(0, step >= kMinute ? 5 : step >= 1 ? 8 : -2);
     return changed ? `${time}\n${date}` : time;
   });
 }
@@ -114,7 +133,9 @@ function axis(props: PlotProps, which: 'x' | 'y', element: HTMLElement): uPlot.A
             18 + kCharacter * Math.max(3, ...(labels ?? []).map((label) => label.length)),
         }),
     ...(isX && props.x.integers ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] } : {}),
-    ...(isX && props.x.time ? { space: 80 } : {}),
+    ...(isX && props.x.time
+      ? { space: 1, incrs: (_, __, least, most, pixels) => [timeStep(most - least, pixels)] }
+      : {}),
   };
 }
 
