@@ -7,6 +7,7 @@
 #include "client/text/calibration_facts.h"
 #include "client/text/estimate_text.h"
 #include "client/text/text.h"
+#include "proto/safe_text.h"
 
 namespace selfcal::client {
 
@@ -84,8 +85,8 @@ std::string CalibrationLine(const v1::Calibration& calibration) {
                      calibration.version(),
                      StateText(calibration.state()),
                      TimeText(calibration.create_time()),
-                     OriginText(calibration),
-                     VerdictText(calibration));
+                     SafeLine(OriginText(calibration)),
+                     SafeLine(VerdictText(calibration)));
 }
 
 }  // namespace selfcal::client

@@ -9,6 +9,7 @@
 #include "client/selfcal/connection.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
+#include "proto/safe_text.h"
 
 namespace selfcal::client {
 namespace {
@@ -26,14 +27,19 @@ std::string Violations(const grpc::Status& status) {
       continue;
     }
     for (const auto& violation : request.field_violations()) {
-      lines +=
-          violation.field().empty()
-              ? fmt::format("\n  {}", violation.description())
-              : fmt::format(
-                    "\n  {}: {}", violation.field(), violation.description());
+      lines += violation.field().empty()
+                   ? fmt::format("\n  {}", SafeLine(violation.description()))
+                   : fmt::format("\n  {}: {}",
+                                 SafeLine(violation.field()),
+                                 SafeLine(violation.description()));
     }
   }
   return lines;
+}
+
+void Write(const std::string& text) {
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  std::fflush(stdout);
 }
 
 }  // namespace
@@ -58,7 +64,7 @@ void Context::Print(const Facts& facts) const {
 
 void Context::PrintJson(const google::protobuf::Message& message,
                         bool line) const {
-  PrintText(ToJson(message, line));
+  Write(ToJson(message, line));
 }
 
 std::string ToJson(const google::protobuf::Message& message, bool line) {
@@ -76,13 +82,10 @@ std::string ToJson(const google::protobuf::Message& message, bool line) {
   return json;
 }
 
-void PrintText(std::string_view text) {
-  std::fwrite(text.data(), 1, text.size(), stdout);
-  std::fflush(stdout);
-}
+void PrintText(std::string_view text) { Write(SafeLines(text)); }
 
 void PrintError(std::string_view text) {
-  const std::string line = fmt::format("selfcal: {}\n", text);
+  const std::string line = fmt::format("selfcal: {}\n", SafeLines(text));
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
@@ -98,7 +101,7 @@ int Fail(const Context& context, const grpc::Status& status) {
   }
   const std::string violations = Violations(status);
   PrintError(violations.empty()
-                 ? status.error_message()
+                 ? SafeLine(status.error_message())
                  : "the daemon refused the request:" + violations);
   return kFailed;
 }

@@ -59,6 +59,7 @@ struct Context {
 // default values.
 std::string ToJson(const google::protobuf::Message& message, bool line);
 
+// Control characters other than line breaks and tabs become '?' in both.
 void PrintText(std::string_view text);
 void PrintError(std::string_view text);  // prints "selfcal: text"
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "proto/safe_text.h"
+
 namespace selfcal::client {
 namespace {
 
@@ -16,13 +18,13 @@ std::size_t Width(std::string_view text) {
       }));
 }
 
-std::string OneLine(std::string text) {
+std::string Cell(std::string text) {
   std::replace_if(
       text.begin(),
       text.end(),
       [](char c) { return c == '\t' || c == '\n' || c == '\r'; },
       ' ');
-  return text;
+  return SafeLine(text);
 }
 
 void AppendLine(const std::vector<Column>& columns,
@@ -45,7 +47,7 @@ Table::Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
 void Table::Add(std::vector<std::string> cells) {
   cells.resize(columns_.size());
-  for (std::string& cell : cells) cell = OneLine(std::move(cell));
+  for (std::string& cell : cells) cell = Cell(std::move(cell));
   rows_.push_back(std::move(cells));
 }
 

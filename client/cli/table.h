@@ -16,14 +16,14 @@ class Table {
  public:
   explicit Table(std::vector<Column> columns);
 
-  // Adds a row. Missing cells are empty, excess cells are dropped.
+  // Adds a row. Missing cells are empty, excess cells are dropped. Tabs and
+  // line breaks within a cell become spaces, other control characters '?'.
   void Add(std::vector<std::string> cells);
 
   // Aligned columns under their headers, for a terminal.
   std::string Aligned() const;
 
-  // One record per line, cells separated by tabs, without a header. Tabs and
-  // line breaks within a cell become spaces.
+  // One record per line, cells separated by tabs, without a header.
   std::string Tabbed() const;
 
  private:

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "google/rpc/error_details.pb.h"
-#include "server/encode/shortened.h"
+#include "proto/safe_text.h"
 
 namespace selfcal::server {
 namespace {
@@ -38,7 +38,7 @@ absl::Status About(const absl::Status& status, const Subject& subject) {
     case absl::StatusCode::kAlreadyExists: {
       google::rpc::ResourceInfo resource;
       resource.set_resource_type(subject.type);
-      resource.set_resource_name(Shortened(subject.name, kMaxTextBytes));
+      resource.set_resource_name(SafeLine(subject.name, kMaxTextBytes));
       return WithDetail(status, resource);
     }
     default:
@@ -50,8 +50,8 @@ absl::Status InvalidFields(const std::vector<Violation>& violations) {
   google::rpc::BadRequest request;
   std::size_t bytes = 0;
   for (const Violation& violation : violations) {
-    const std::string field = Shortened(violation.field, kMaxTextBytes);
-    const std::string text = Shortened(violation.message, kMaxTextBytes);
+    const std::string field = SafeLine(violation.field, kMaxTextBytes);
+    const std::string text = SafeLine(violation.message, kMaxTextBytes);
     bytes += field.size() + text.size();
     auto* added = request.add_field_violations();
     if (bytes > kMaxViolationBytes) {
@@ -86,7 +86,7 @@ absl::Status ShuttingDown() {
 absl::Status ForClient(const absl::Status& status) {
   if (status.ok()) return status;
   absl::Status bounded(status.code(),
-                       Shortened(Text(status.message()), kMaxMessageBytes));
+                       SafeLine(Text(status.message()), kMaxMessageBytes));
   status.ForEachPayload([&](absl::string_view type, const absl::Cord& detail) {
     bounded.SetPayload(type, detail);
   });

@@ -6,6 +6,7 @@
 #include "core/information/segment_residuals.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"
+#include "proto/safe_text.h"
 #include "selfcal/v1/segment.pb.h"
 #include "server/api/errors.h"
 #include "server/api/methods.h"
@@ -15,7 +16,6 @@
 #include "server/encode/encode_session.h"
 #include "server/encode/reason.h"
 #include "server/encode/segment_filter.h"
-#include "server/encode/shortened.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
@@ -175,7 +175,7 @@ absl::StatusOr<v1::Table> GetTable(const ApiContext& context,
       });
   if (table == tables->end()) {
     return About(absl::NotFoundError("the rig has no group of parameters '" +
-                                     Shortened(parts->id, 100) + "'"),
+                                     SafeLine(parts->id, 100) + "'"),
                  subject);
   }
   return Encode(parts->rig, *table);

@@ -8,10 +8,10 @@
 #include "proto/convert.h"
 #include "proto/field_paths.h"
 #include "proto/resource_names.h"
+#include "proto/safe_text.h"
 #include "selfcal/v1/segment.pb.h"
 #include "server/api/errors.h"
 #include "server/api/traffic.h"
-#include "server/encode/shortened.h"
 
 namespace selfcal::server {
 namespace {
@@ -26,7 +26,7 @@ void Reject(const std::vector<Violation>& violations,
   for (const Violation& violation : violations) {
     v1::FieldViolation* added = response->add_violations();
     added->set_field(SegmentFieldPath(violation.field));
-    added->set_description(Shortened(violation.message, kMaxDescription));
+    added->set_description(SafeLine(violation.message, kMaxDescription));
   }
 }
 
@@ -66,7 +66,7 @@ class SegmentExchange final : public Exchange {
       if (!open.ok()) return done(ForClient(open), response);
     }
     response.set_session(
-        Shortened(request.segment().session(), kMaxSessionEcho));
+        SafeLine(request.segment().session(), kMaxSessionEcho));
     response.set_index(request.segment().index());
     if (!request.parent().empty() && request.parent() != parent_) {
       Reject({{"parent",

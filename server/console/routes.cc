@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "google/api/annotations.pb.h"
+#include "proto/safe_text.h"
 #include "server/api/errors.h"
-#include "server/encode/shortened.h"
 
 namespace selfcal::server {
 namespace {
@@ -186,7 +186,7 @@ absl::StatusOr<Routes::Request> Routes::Find(const HttpRequest& request) const {
     for (const auto& [name, text] : request.query) {
       if (SetText(type, name, text, &values)) continue;
       return InvalidFields(
-          {{Shortened(name, kMaxEcho),
+          {{SafeLine(name, kMaxEcho),
             "is not a parameter of this address; docs/api.md lists them"}});
     }
     for (const auto& [name, text] : *fields) {
@@ -200,7 +200,7 @@ absl::StatusOr<Routes::Request> Routes::Find(const HttpRequest& request) const {
     if (!parsed.ok()) {
       return absl::InvalidArgumentError(
           "the request is no " + type.full_name() + ": " +
-          Shortened(std::string(parsed.message()), kMaxEcho));
+          SafeLine(std::string(parsed.message()), kMaxEcho));
     }
     return Request{route.method, std::move(message)};
   }

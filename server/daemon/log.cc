@@ -2,6 +2,7 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -9,9 +10,38 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string_view>
+#include <utility>
+
+#include "proto/safe_text.h"
 
 namespace selfcal::server {
 namespace {
+
+// Passes messages on as one line without control characters: what they quote
+// must not look like another message, or reach a terminal.
+class SafeFormatter final : public spdlog::formatter {
+ public:
+  explicit SafeFormatter(std::unique_ptr<spdlog::formatter> inner)
+      : inner_(std::move(inner)) {}
+
+  void format(const spdlog::details::log_msg& message,
+              spdlog::memory_buf_t& to) override {
+    const std::string text =
+        SafeLine({message.payload.data(), message.payload.size()});
+    spdlog::details::log_msg safe = message;
+    safe.payload = text;
+    inner_->format(safe, to);
+    message.color_range_start = safe.color_range_start;
+    message.color_range_end = safe.color_range_end;
+  }
+
+  std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<SafeFormatter>(inner_->clone());
+  }
+
+ private:
+  const std::unique_ptr<spdlog::formatter> inner_;
+};
 
 class JsonFormatter final : public spdlog::formatter {
  public:
@@ -28,9 +58,7 @@ class JsonFormatter final : public spdlog::formatter {
     line["level"] = std::string_view(level.data(), level.size());
     line["message"] =
         std::string_view(message.payload.data(), message.payload.size());
-    // File names may contain any bytes.
-    const std::string text = line.dump(
-        -1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    const std::string text = line.dump();
     to.append(text.data(), text.data() + text.size());
     to.push_back('\n');
   }
@@ -44,12 +72,14 @@ class JsonFormatter final : public spdlog::formatter {
 
 void SetUpLog(const std::string& level, const std::string& format) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("selfcald"));
+  std::unique_ptr<spdlog::formatter> formatter;
   if (format == "json") {
-    spdlog::set_formatter(std::make_unique<JsonFormatter>());
+    formatter = std::make_unique<JsonFormatter>();
   } else {
-    spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %^%l%$ %v",
-                        spdlog::pattern_time_type::utc);
+    formatter = std::make_unique<spdlog::pattern_formatter>(
+        "%Y-%m-%dT%H:%M:%S.%eZ %^%l%$ %v", spdlog::pattern_time_type::utc);
   }
+  spdlog::set_formatter(std::make_unique<SafeFormatter>(std::move(formatter)));
   spdlog::flush_on(spdlog::level::trace);
   SetLogLevel(level);
 }

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/encode/shortened.h"
+#include "proto/safe_text.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
@@ -99,7 +99,7 @@ absl::StatusOr<FilterTerm> NextTerm(Words* words, LoneTexts lone_texts) {
 absl::Status NotWhatIsExpected(std::string_view what,
                                std::string_view expected) {
   return absl::InvalidArgumentError(
-      fmt::format("'{}' is not {}", Shortened(what, kMaxTermShown), expected));
+      fmt::format("'{}' is not {}", SafeLine(what, kMaxTermShown), expected));
 }
 
 absl::Status ForEachTerm(

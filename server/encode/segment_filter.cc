@@ -10,8 +10,8 @@
 #include <limits>
 #include <string>
 
+#include "proto/safe_text.h"
 #include "server/encode/filter_terms.h"
-#include "server/encode/shortened.h"
 #include "server/status/status_macros.h"
 #include "server/store/store.h"
 
@@ -79,8 +79,8 @@ absl::Status NarrowByScore(const FilterTerm& term, SegmentQuery* query) {
     return absl::InvalidArgumentError(
         fmt::format("conditions on the scores of two groups, {} and {}: use "
                     "one group in a filter",
-                    Shortened(query->scored_group, kMaxTermShown),
-                    Shortened(term.group, kMaxTermShown)));
+                    SafeLine(query->scored_group, kMaxTermShown),
+                    SafeLine(term.group, kMaxTermShown)));
   }
   query->scored_group = term.group;
   return NarrowByNumber(

@@ -53,5 +53,16 @@ TEST(LogDeathTest, TextShowsLevelAndMessage) {
       "^[0-9T:.-]+Z warning shown\n$");
 }
 
+TEST(LogDeathTest, AMessageIsOneLineThatControlsNothing) {
+  EXPECT_EXIT(
+      {
+        SetUpLog("warning", "text");
+        spdlog::warn("of a caller: {}", "x\n2026-01-01 error forged\033[2J");
+        std::_Exit(3);
+      },
+      ::testing::ExitedWithCode(3),
+      "^[0-9T:.-]+Z warning of a caller: x.2026-01-01 error forged.\\[2J\n$");
+}
+
 }  // namespace
 }  // namespace selfcal::server
