@@ -29,21 +29,50 @@ std::string NameFault(const std::string& name) {
          " characters of a-z, 0-9, '_' and '-'";
 }
 
-void CheckPositive(const std::string& field,
-                   double value,
-                   ViolationList* list) {
-  if (std::isfinite(value) && value > 0) return;
-  list->Add(field, Readable(value) + " is not a positive number");
+// Values that no device has, and with which the arithmetic breaks down, are
+// typing errors or an attack. Wide: a hundred times beyond the best and the
+// worst sensors.
+struct PlausibleRange {
+  double low;
+  double high;
+};
+
+constexpr PlausibleRange kGyroNoise = {1e-7, 1};    // [rad/s/sqrt(Hz)]
+constexpr PlausibleRange kAccelNoise = {1e-6, 10};  // [m/s^2/sqrt(Hz)]
+constexpr PlausibleRange kGyroWalk = {1e-9, 1};     // [rad/s^2/sqrt(Hz)]
+constexpr PlausibleRange kAccelWalk = {1e-8, 10};   // [m/s^3/sqrt(Hz)]
+constexpr PlausibleRange kPixelSigma = {1e-3, 1e3};
+constexpr PlausibleRange kGravity = {0.1, 100};  // Ceres to Jupiter
+// A prior sigma, in reference sigmas of its component.
+constexpr PlausibleRange kPriorRatio = {1e-6, 1e6};
+
+void CheckRange(const std::string& field,
+                double value,
+                const PlausibleRange& range,
+                ViolationList* list) {
+  if (value >= range.low && value <= range.high) return;
+  list->Add(field,
+            Readable(value) + " is not between " + Readable(range.low) +
+                " and " + Readable(range.high));
 }
 
 void CheckImuNoise(const ImuNoise& noise, ViolationList* list) {
-  CheckPositive("imu_noise.gyro_noise_density", noise.gyro_noise_density, list);
-  CheckPositive(
-      "imu_noise.accel_noise_density", noise.accel_noise_density, list);
-  CheckPositive(
-      "imu_noise.gyro_bias_random_walk", noise.gyro_bias_random_walk, list);
-  CheckPositive(
-      "imu_noise.accel_bias_random_walk", noise.accel_bias_random_walk, list);
+  CheckRange("imu_noise.gyro_noise_density",
+             noise.gyro_noise_density,
+             kGyroNoise,
+             list);
+  CheckRange("imu_noise.accel_noise_density",
+             noise.accel_noise_density,
+             kAccelNoise,
+             list);
+  CheckRange("imu_noise.gyro_bias_random_walk",
+             noise.gyro_bias_random_walk,
+             kGyroWalk,
+             list);
+  CheckRange("imu_noise.accel_bias_random_walk",
+             noise.accel_bias_random_walk,
+             kAccelWalk,
+             list);
 }
 
 // Adds a violation and returns false for a list that is too long to inspect.
@@ -138,6 +167,23 @@ void CheckGroups(const Rig& rig,
   }
 }
 
+void CheckPriorSigma(const std::vector<TangentComponent>& components,
+                     const std::string& field,
+                     const ComponentSetting& setting,
+                     ViolationList* list) {
+  for (const int k : MatchComponents(components, {setting.pattern})) {
+    const TangentComponent& component = components[k];
+    const double low = kPriorRatio.low * component.sigma_ref;
+    const double high = kPriorRatio.high * component.sigma_ref;
+    if (setting.value >= low && setting.value <= high) continue;
+    list->Add(field,
+              Readable(setting.value) + " is not between " + Readable(low) +
+                  " and " + Readable(high) + " " + component.unit +
+                  ", the plausible range for " + component.name);
+    return;
+  }
+}
+
 void CheckPriorSigmas(const Rig& rig,
                       const std::vector<TangentComponent>& components,
                       ViolationList* list) {
@@ -151,7 +197,12 @@ void CheckPriorSigmas(const Rig& rig,
                  ElementPath("prior_sigmas", i, "pattern"),
                  setting.pattern,
                  list);
-    CheckPositive(ElementPath("prior_sigmas", i, "value"), setting.value, list);
+    const std::string field = ElementPath("prior_sigmas", i, "value");
+    if (!(std::isfinite(setting.value) && setting.value > 0)) {
+      list->Add(field, Readable(setting.value) + " is not a positive number");
+      continue;
+    }
+    CheckPriorSigma(components, field, setting, list);
   }
 }
 
@@ -181,8 +232,8 @@ std::vector<Violation> Validate(const Rig& rig) {
     list.Add(std::move(violation.field), std::move(violation.message));
   }
   CheckImuNoise(rig.imu_noise, &list);
-  CheckPositive("pixel_sigma_px", rig.pixel_sigma_px, &list);
-  CheckPositive("gravity_mps2", rig.gravity_mps2, &list);
+  CheckRange("pixel_sigma_px", rig.pixel_sigma_px, kPixelSigma, &list);
+  CheckRange("gravity_mps2", rig.gravity_mps2, kGravity, &list);
   // Patterns have no components to match unless the number of cameras is valid.
   const std::size_t cameras = rig.factory.cameras.size();
   if (cameras >= 1 && cameras <= static_cast<std::size_t>(kMaxCameras)) {

@@ -210,5 +210,30 @@ TEST(ValidateCalibration, PathsBeginWithThePrefix) {
               ElementsAre("imu.s_g", "cameras[2].f"));
 }
 
+// What no device has, and arithmetic does not survive.
+TEST(ValidateRig, ImplausibleValuesAreNamed) {
+  const std::vector<Corruption> implausible = {
+      {"imu_noise.gyro_noise_density",
+       [](Rig* r) { r->imu_noise.gyro_noise_density = 1e-300; }},
+      {"imu_noise.accel_noise_density",
+       [](Rig* r) { r->imu_noise.accel_noise_density = 1e155; }},
+      {"imu_noise.gyro_bias_random_walk",
+       [](Rig* r) { r->imu_noise.gyro_bias_random_walk = 1e20; }},
+      {"imu_noise.accel_bias_random_walk",
+       [](Rig* r) { r->imu_noise.accel_bias_random_walk = 1e-20; }},
+      {"pixel_sigma_px", [](Rig* r) { r->pixel_sigma_px = 1e-300; }},
+      {"gravity_mps2", [](Rig* r) { r->gravity_mps2 = 1e300; }},
+      {"prior_sigmas[0].value",
+       [](Rig* r) { r->prior_sigmas[0].value = 1e155; }},
+      {"prior_sigmas[0].value",
+       [](Rig* r) { r->prior_sigmas[0].value = 1e-300; }},
+  };
+  for (const Corruption& corruption : implausible) {
+    Rig rig = ValidRig();
+    corruption.apply(&rig);
+    EXPECT_THAT(Fields(Validate(rig)), ElementsAre(corruption.field));
+  }
+}
+
 }  // namespace
 }  // namespace selfcal
