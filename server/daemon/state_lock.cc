@@ -57,7 +57,7 @@ absl::StatusOr<StateLock> StateLock::Take(const std::filesystem::path& folder) {
   const int file =
       open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (file < 0) return SystemError("cannot open " + path, errno);
-  StateLock lock(file);
+  StateLock lock(path, file);
   if (flock(file, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) return SystemError("cannot lock " + path, errno);
     return absl::FailedPreconditionError(
@@ -70,7 +70,14 @@ absl::StatusOr<StateLock> StateLock::Take(const std::filesystem::path& folder) {
 }
 
 StateLock::StateLock(StateLock&& other) noexcept
-    : file_(std::exchange(other.file_, -1)) {}
+    : path_(std::move(other.path_)), file_(std::exchange(other.file_, -1)) {}
+
+bool StateLock::IsInPlace() const {
+  struct stat locked {};
+  struct stat named {};
+  return fstat(file_, &locked) == 0 && stat(path_.c_str(), &named) == 0 &&
+         locked.st_dev == named.st_dev && locked.st_ino == named.st_ino;
+}
 
 StateLock::~StateLock() {
   if (file_ >= 0) close(file_);

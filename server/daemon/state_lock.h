@@ -6,6 +6,8 @@
 #include <absl/status/statusor.h>
 
 #include <filesystem>
+#include <string>
+#include <utility>
 
 namespace selfcal::server {
 
@@ -17,13 +19,19 @@ class StateLock {
   // folder or the file cannot be created.
   static absl::StatusOr<StateLock> Take(const std::filesystem::path& folder);
 
+  // Whether <folder>/lock is still the file that is locked. If the folder was
+  // removed or replaced, another daemon could use it, and what this one writes
+  // is lost.
+  bool IsInPlace() const;
+
   StateLock(StateLock&& other) noexcept;
   StateLock& operator=(StateLock&&) = delete;
   ~StateLock();
 
  private:
-  explicit StateLock(int file) : file_(file) {}
+  StateLock(std::string path, int file) : path_(std::move(path)), file_(file) {}
 
+  std::string path_;
   int file_;  // -1 after a move
 };
 

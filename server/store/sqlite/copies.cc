@@ -17,6 +17,7 @@ namespace selfcal::server {
 namespace {
 
 constexpr std::size_t kPiece = 1 << 20;
+constexpr int kMaxExports = 4;
 
 // Removes its file when destroyed, however much of it was written.
 class TemporaryDatabase {
@@ -30,6 +31,21 @@ class TemporaryDatabase {
 
  private:
   const std::string path_;
+};
+
+// One of the exports that may be read at the same time: each occupies the disk.
+class Turn {
+ public:
+  explicit Turn(std::atomic<int>* taken) : taken_(taken), number_(++*taken) {}
+  ~Turn() { --*taken_; }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+  bool granted() const { return number_ <= kMaxExports; }
+
+ private:
+  std::atomic<int>* const taken_;
+  const int number_;
 };
 
 // Copies one state of `from` to a file that needs no log beside it.
@@ -54,14 +70,12 @@ class SqliteCopies final : public DatabaseCopies {
   explicit SqliteCopies(std::string path) : path_(std::move(path)) {}
 
   absl::Status Export(const OnBytes& on_bytes) override {
-    const std::lock_guard lock(export_mutex_);  // one copy at a time
-    const TemporaryDatabase copy(path_ + ".backup.new");
-    {
-      SELFCAL_ASSIGN_OR_RETURN(const auto db,
-                               SqliteConnection::OpenReader(path_));
-      SELFCAL_RETURN_IF_ERROR(Copy(db.get(), copy.path()));
+    const Turn turn(&exports_);
+    if (!turn.granted()) {
+      return absl::ResourceExhaustedError(
+          "other backups are being read: wait for their end");
     }
-    std::ifstream file(copy.path(), std::ios::binary);
+    SELFCAL_ASSIGN_OR_RETURN(std::ifstream file, OpenCopy());
     std::vector<char> piece(kPiece);
     while (file.read(piece.data(), kPiece), file.gcount() > 0) {
       if (!on_bytes({piece.data(), static_cast<std::size_t>(file.gcount())})) {
@@ -69,8 +83,7 @@ class SqliteCopies final : public DatabaseCopies {
       }
     }
     if (file.eof()) return absl::OkStatus();
-    return absl::UnavailableError(fmt::format(
-        "cannot read {}: check the disk and try again", copy.path()));
+    return Unreadable();
   }
 
   absl::StatusOr<std::unique_ptr<ArrivingCopy>> BeginImport() override {
@@ -78,8 +91,27 @@ class SqliteCopies final : public DatabaseCopies {
   }
 
  private:
+  // Copies to a file that is removed as soon as it is open, so that its reader
+  // may take any time without holding up another.
+  absl::StatusOr<std::ifstream> OpenCopy() {
+    const std::lock_guard lock(copy_mutex_);
+    const TemporaryDatabase copy(path_ + ".backup.new");
+    SELFCAL_ASSIGN_OR_RETURN(const auto db,
+                             SqliteConnection::OpenReader(path_));
+    SELFCAL_RETURN_IF_ERROR(Copy(db.get(), copy.path()));
+    std::ifstream file(copy.path(), std::ios::binary);
+    if (!file) return Unreadable();
+    return file;
+  }
+
+  static absl::Status Unreadable() {
+    return absl::UnavailableError(
+        "cannot read the copy of the database: check the disk and try again");
+  }
+
   const std::string path_;
-  std::mutex export_mutex_;
+  std::mutex copy_mutex_;
+  std::atomic<int> exports_ = 0;
   std::atomic<bool> restoring_ = false;
 };
 

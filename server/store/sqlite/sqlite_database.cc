@@ -34,6 +34,14 @@ absl::Status Checking() {
       "into the system's log");
 }
 
+absl::Status Moved(const std::string& path) {
+  return absl::FailedPreconditionError(
+      path +
+      " or its log was removed or replaced while it was in use: nothing is "
+      "accepted any more; stop the daemon, put the state directory back or "
+      "restore a backup, and start it again");
+}
+
 absl::Status QuickCheck(SqliteConnection* connection) {
   Statement check(connection, "PRAGMA quick_check(1)");
   if (!check.Next()) return check.status();
@@ -98,6 +106,8 @@ absl::Status SqliteDatabase::OpenConnections() {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t page_bytes,
                            ReadInt(writer_.get(), "PRAGMA page_size"));
   checkpoint_pages_ = kCheckpointBytes / std::max(page_bytes, kLeastPage);
+  SELFCAL_ASSIGN_OR_RETURN(file_, IdentityOf(path_));
+  log_.reset();
   log_pages_ = 0;
   sqlite3_wal_hook(writer_->handle(), NoteLogPages, &log_pages_);
   SELFCAL_ASSIGN_OR_RETURN(reader_, SqliteConnection::OpenReader(path_));
@@ -130,6 +140,7 @@ void SqliteDatabase::Failed(const absl::Status& status) {
 
 absl::Status SqliteDatabase::Read(const Work& query) {
   const std::lock_guard lock(read_mutex_);
+  if (moved_) return Moved(path_);
   if (failed_ || reader_ == nullptr) {
     WakeToRecover();
     return Checking();
@@ -197,7 +208,23 @@ void SqliteDatabase::Run() {
   }
 }
 
+// After a commit, and before it is answered: whether it is in the files that a
+// restart will find.
+absl::Status SqliteDatabase::CheckInPlace() {
+  const std::string log = path_ + "-wal";
+  if (!log_) {
+    const auto first = IdentityOf(log);
+    if (first.ok()) log_ = *first;
+  }
+  moved_ = !StillNames(path_, file_) || !log_ || !StillNames(log, *log_);
+  return moved_ ? Moved(path_) : absl::OkStatus();
+}
+
 void SqliteDatabase::Commit(std::span<Job> group) {
+  if (moved_) {
+    for (Job& job : group) job.status = Moved(path_);
+    return;
+  }
   if (failed_) {
     const absl::Status recovered = Recover();
     if (!recovered.ok()) {
@@ -240,6 +267,8 @@ bool SqliteDatabase::CommitTogether(std::span<Job> group) {
   const absl::Status committed = transaction.Commit();
   if (!committed.ok()) return fail(committed);
   ++commits_;
+  const absl::Status in_place = CheckInPlace();
+  for (Job& job : group) job.status.Update(in_place);
   return true;
 }
 

@@ -17,6 +17,9 @@
 // After a disk error nothing is served until the database has been closed,
 // reopened, checked (quick_check) and its log moved into the file: the system
 // may have dropped what it could not sync.
+//
+// If the file or its log was removed or replaced, nothing is served any more
+// (FAILED_PRECONDITION): what is written then is lost with the open files.
 #pragma once
 
 #include <absl/status/status.h>
@@ -29,12 +32,14 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "server/store/driver/driver.h"
+#include "server/store/sqlite/file_identity.h"
 #include "server/store/sqlite/sqlite_connection.h"
 
 namespace selfcal::server {
@@ -75,6 +80,7 @@ class SqliteDatabase final : public Database {
   void Run();
   void Commit(std::span<Job> group);
   bool CommitTogether(std::span<Job> group);
+  absl::Status CheckInPlace();
   void CheckpointIfLarge();
   void Failed(const absl::Status& status);
   void WakeToRecover();
@@ -84,11 +90,14 @@ class SqliteDatabase final : public Database {
   const std::unique_ptr<DatabaseCopies> copies_;
   // Used by the thread alone once it runs.
   std::unique_ptr<SqliteConnection> writer_;
-  int log_pages_ = 0;  // after the last commit
+  FileIdentity file_;
+  std::optional<FileIdentity> log_;  // of the file, since the first commit
+  int log_pages_ = 0;                // after the last commit
   std::int64_t checkpoint_pages_ = 0;
   std::mutex read_mutex_;
   std::unique_ptr<SqliteConnection> reader_;  // guarded by read_mutex_
   std::atomic<bool> failed_ = false;          // disk error: to be reopened
+  std::atomic<bool> moved_ = false;           // the files are not in place
   std::atomic<std::int64_t> commits_ = 0;
 
   std::mutex mutex_;  // guards what follows

@@ -29,6 +29,17 @@ TEST_F(StateLockTest, CreatesTheFolderForItsOwnerAlone) {
   EXPECT_EQ(status.st_mode & 0777, 0700u);
 }
 
+TEST_F(StateLockTest, NoticesThatItsFolderIsNotInPlace) {
+  const auto state = folder_ / "state";
+  const auto lock = StateLock::Take(state);
+  ASSERT_TRUE(lock.ok()) << lock.status();
+  EXPECT_TRUE(lock->IsInPlace());
+  std::filesystem::rename(state, folder_ / "away");
+  EXPECT_FALSE(lock->IsInPlace());
+  std::filesystem::copy(folder_ / "away", state);
+  EXPECT_FALSE(lock->IsInPlace());
+}
+
 TEST_F(StateLockTest, SecondIsToldWhoHoldsIt) {
   const auto first = StateLock::Take(folder_);
   ASSERT_TRUE(first.ok()) << first.status();
