@@ -5,8 +5,8 @@
 
 namespace selfcal::server {
 
-// PEM files for TCP addresses. They are reloaded when they change; if the new
-// files are unusable, the old ones stay in use.
+// PEM files for TCP addresses (tls_files.h). gRPC takes them up when they
+// change (tls_reload.h); the console reads them at its start.
 struct TlsOptions {
   std::string certificate;  // of the daemon, with intermediate certificates
   std::string key;          // of the certificate

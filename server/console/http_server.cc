@@ -14,6 +14,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <exception>
 #include <list>
 #include <mutex>
@@ -21,11 +22,11 @@
 #include <set>
 #include <utility>
 
+#include "server/access/tls_files.h"
 #include "server/console/address.h"
 #include "server/console/certificate.h"
 #include "server/console/json.h"
 #include "server/console/policy.h"
-#include "server/console/tls_files.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
@@ -156,6 +157,16 @@ MHD_Result Send(MHD_Connection* connection, HttpResponse answer) {
   return queued;
 }
 
+// They are read once, at the start.
+absl::StatusOr<TlsFiles> ReadFiles(const TlsOptions& options) {
+  auto files = ReadTlsFiles(options, std::time(nullptr));
+  if (files.ok() || !absl::IsInvalidArgument(files.status())) return files;
+  return absl::InvalidArgumentError(
+      "on an address that is not loopback, the console needs tls-certificate, "
+      "tls-key and tls-client-ca; or use a loopback address such as "
+      "127.0.0.1:7448");
+}
+
 class MicroServer final : public HttpServer {
  public:
   MicroServer(const HttpOptions& options,
@@ -181,7 +192,7 @@ class MicroServer final : public HttpServer {
     if (address.ipv6) flags |= MHD_USE_IPv6;
     std::vector<MHD_OptionItem> more;
     if (!address.loopback) {
-      SELFCAL_ASSIGN_OR_RETURN(files, ReadTlsFiles(tls));
+      SELFCAL_ASSIGN_OR_RETURN(files, ReadFiles(tls));
       flags |= MHD_USE_TLS;
       more = {{MHD_OPTION_HTTPS_MEM_CERT, 0, files.certificate.data()},
               {MHD_OPTION_HTTPS_MEM_KEY, 0, files.key.data()},
@@ -382,8 +393,7 @@ class MicroServer final : public HttpServer {
 absl::Status CheckHttpOptions(const HttpOptions& options) {
   SELFCAL_ASSIGN_OR_RETURN(const SocketAddress address,
                            ParseSocketAddress(options.address));
-  return address.loopback ? absl::OkStatus()
-                          : ReadTlsFiles(options.tls).status();
+  return address.loopback ? absl::OkStatus() : ReadFiles(options.tls).status();
 }
 
 absl::StatusOr<std::unique_ptr<HttpServer>> MakeHttpServer(

@@ -1,8 +1,8 @@
 #include "server/console/policy.h"
 
-#include <algorithm>
 #include <string>
-#include <string_view>
+
+#include "server/access/loopback_host.h"
 
 namespace selfcal::server {
 namespace {
@@ -10,18 +10,6 @@ namespace {
 std::string HeaderOf(const HttpRequest& request, const char* name) {
   const auto found = request.headers.find(name);
   return found == request.headers.end() ? "" : found->second;
-}
-
-// Returns the host without the port.
-std::string_view HostOf(std::string_view host) {
-  if (host.starts_with('[')) return host.substr(0, host.find(']') + 1);
-  return host.substr(0, host.find(':'));
-}
-
-bool IsLoopbackName(std::string_view host) {
-  constexpr std::string_view kNames[] = {"127.0.0.1", "localhost", "[::1]"};
-  return std::find(std::begin(kNames), std::end(kNames), HostOf(host)) !=
-         std::end(kNames);
 }
 
 }  // namespace
@@ -41,7 +29,7 @@ const std::array<Header, 6>& SecurityHeaders() {
 }
 
 absl::Status CheckOrigin(const HttpRequest& request, bool loopback) {
-  if (loopback && !IsLoopbackName(HeaderOf(request, "host"))) {
+  if (loopback && !IsLoopbackHost(HeaderOf(request, "host"))) {
     return absl::PermissionDeniedError(
         "on the loopback interface the console can only be opened as "
         "127.0.0.1, "

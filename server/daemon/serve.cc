@@ -26,6 +26,7 @@
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/make_store.h"
+#include "server/store/sqlite/file_identity.h"
 #include "server/store/sqlite/sqlite.h"
 #include "server/worker/worker.h"
 
@@ -57,6 +58,7 @@ PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
                                   PipelineObserver* observer) {
   PipelineOptions pipeline;
   pipeline.scoring_threads = options.scoring_threads;
+  pipeline.solver_processes = options.solver_processes;
   pipeline.max_backlog = options.max_backlog;
   pipeline.program_version = SELFCAL_VERSION;
   pipeline.calibrate.solver = options.solver;
@@ -130,15 +132,27 @@ absl::StatusOr<std::unique_ptr<Console>> OpenConsole(
   return opened;
 }
 
+// What the daemon has on disk, while it runs.
+struct State {
+  const StateLock& lock;
+  std::string database;
+  FileIdentity file;  // of the database
+
+  bool IsInPlace() const {
+    return lock.IsInPlace() && StillNames(database, file);
+  }
+};
+
 // Runs until a signal to stop, which it returns; nullopt if an address has
-// stopped accepting connections. If the store does not respond any more, the
-// watchdog is not notified.
+// stopped accepting connections, or the state directory is not in place. If the
+// store does not respond any more, the watchdog is not notified.
 std::optional<int> RunUntilStopped(
     Store* store,
+    const State& state,
     const std::function<std::optional<std::string>()>& read_log_level) {
   const auto watchdog = WatchdogInterval();
   const auto interval = std::min(watchdog.value_or(kLookAfter), kLookAfter);
-  while (!HasStoppedAccepting()) {
+  while (!HasStoppedAccepting() && state.IsInPlace()) {
     const auto signal = WaitForSignal(interval);
     TrimHeap();
     if (!signal && watchdog) {
@@ -175,6 +189,9 @@ std::optional<int> ServeOnce(
                   .max_bytes = options.domain.quotas.max_database_bytes,
                   .time_ns = NowNs()});
   if (!sqlite.ok()) return Failed("cannot open " + database, sqlite.status());
+  const auto file = IdentityOf(database);
+  if (!file.ok()) return Failed("cannot open " + database, file.status());
+  const State state{*lock, database, *file};
   const std::unique_ptr<Store> store = MakeStore(*std::move(sqlite));
   Domain domain(store.get(), options.domain);
   const auto metrics = OpenMetrics(options, database, store.get());
@@ -196,22 +213,34 @@ std::optional<int> ServeOnce(
     pipeline->Stop();
     return Failed("cannot open the console", console.status());
   }
-  const auto server = MakeServer(&api, options.server);
+  const auto server =
+      MakeServer(&api, options.server, [&domain](const std::string& reason) {
+        const absl::Status recorded =
+            domain.RecordEvent(EventKind::kTlsFilesRefused, reason);
+        if (!recorded.ok()) spdlog::error("event: {}", recorded.ToString());
+      });
   if (!server.ok()) {
     pipeline->Stop();
     return Failed("cannot serve", server.status());
   }
+  if (*metrics != nullptr) (*metrics)->AddTls((*server)->tls());
   spdlog::info("selfcald ready: listening on {}",
                fmt::join((*server)->addresses(), ", "));
   NotifyReady();
 
-  const auto signal = RunUntilStopped(store.get(), read_log_level);
+  const auto signal = RunUntilStopped(store.get(), state, read_log_level);
   deadline.emplace(kStopLimit);
   NotifyStopping();
   if (signal == kRestart) {
     spdlog::info("stopping, to restart with the restored database");
   } else if (signal) {
     spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
+  } else if (!state.IsInPlace()) {
+    spdlog::error(
+        "stopping: the state directory {} or its database was removed or "
+        "replaced while it was in use; put it back, or restore a backup, and "
+        "start selfcald again",
+        options.state_dir.string());
   } else {
     spdlog::error(
         "stopping, to be restarted: the limit of open files was reached, and "

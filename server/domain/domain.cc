@@ -285,4 +285,8 @@ absl::StatusOr<StoredRun> Domain::EndRun(const std::string& rig,
   });
 }
 
+absl::Status Domain::RecordEvent(EventKind kind, const std::string& detail) {
+  return store_->AppendEvent({0, clock_(), "", kind, detail});
+}
+
 }  // namespace selfcal::server

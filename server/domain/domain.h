@@ -207,6 +207,9 @@ class Domain {
                                    RunState state,
                                    const std::string& message);
 
+  // --- The daemon. Appends an event without a rig.
+  absl::Status RecordEvent(EventKind kind, const std::string& detail);
+
  private:
   Store* const store_;
   const DomainOptions options_;

@@ -8,7 +8,7 @@ v1::Event Encode(const StoredEvent& event) {
   v1::Event message;
   message.set_number(event.event);
   SetTime(event.time_ns, message.mutable_time());
-  message.set_rig(RigName(event.rig));
+  if (!event.rig.empty()) message.set_rig(RigName(event.rig));
   message.set_kind(
       static_cast<v1::Event::Kind>(static_cast<int>(event.kind) + 1));
   message.set_detail(event.detail);

@@ -11,6 +11,7 @@
 #include <grpcpp/support/server_callback.h>
 
 #include <atomic>
+#include <chrono>
 
 #include "server/access/grants.h"
 #include "server/api/api.h"
@@ -25,7 +26,8 @@ struct CallContext {
   Role local_role = Role::kAdminister;  // of callers without a certificate
   CallThreads* threads = nullptr;
   WatchSender* watches = nullptr;
-  int max_exchanges = 256;  // at once
+  std::chrono::milliseconds max_write_time{60'000};  // of one response
+  int max_exchanges = 256;                           // at once
   std::atomic<int>* exchanges = nullptr;
 };
 
@@ -42,6 +44,8 @@ grpc::ServerUnaryReactor* StartUnary(const CallContext& context,
                                      const grpc::ByteBuffer* request,
                                      grpc::ByteBuffer* response);
 
+// Cancels the call if the caller does not read a response for max_write_time:
+// the thread, and what the handler holds, are for others too.
 grpc::ServerWriteReactor<grpc::ByteBuffer>* StartStreaming(
     const CallContext& context,
     const Method& method,

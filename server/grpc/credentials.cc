@@ -1,18 +1,20 @@
 #include "server/grpc/credentials.h"
 
 #include <grp.h>
-#include <grpcpp/security/tls_certificate_provider.h>
-#include <grpcpp/security/tls_credentials_options.h>
-#include <openssl/err.h>
-#include <openssl/ssl.h>
+#include <grpc/grpc.h>
+#include <grpc/grpc_security.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <optional>
 #include <string_view>
+#include <utility>
 #include <vector>
+
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {
@@ -20,19 +22,6 @@ namespace {
 constexpr std::string_view kInsecure = "insecure:";
 constexpr std::string_view kUnix = "unix:";
 constexpr std::size_t kMaxGroupBuffer = 1 << 16;
-
-// An error with OpenSSL's message for the last failure, which never quotes the
-// file.
-absl::Status Unusable(const std::string& what, const std::string& path) {
-  const char* reason = ERR_reason_error_string(ERR_get_error());
-  ERR_clear_error();
-  return absl::FailedPreconditionError(
-      "cannot use the " + what + " " + path + ": " +
-      (reason == nullptr ? "it is not a PEM file" : reason));
-}
-
-// Prevents OpenSSL from prompting at the terminal for an encrypted key.
-int NoPassphrase(char*, int, int, void*) { return 0; }
 
 // Returns the number of a group; nullopt if no group has this name.
 std::optional<gid_t> FindGroup(const std::string& name) {
@@ -43,35 +32,53 @@ std::optional<gid_t> FindGroup(const std::string& name) {
   return found == nullptr ? std::nullopt : std::optional(found->gr_gid);
 }
 
-// Checks the TLS files. The messages do not reveal their content.
-absl::Status CheckTls(const TlsOptions& options) {
-  if (options.certificate.empty() || options.key.empty() ||
-      options.client_ca.empty()) {
-    return absl::InvalidArgumentError(
-        "a TCP address needs tls-certificate, tls-key and tls-client-ca; "
-        "without encryption and authentication it must be explicit: "
-        "insecure:host:port");
+// Gives each connection that begins the files that are in force. The interface
+// of gRPC in C++ only has files that it reads itself, and takes up whatever
+// they contain.
+class ReloadedCredentials final : public grpc::ServerCredentials {
+ public:
+  explicit ReloadedCredentials(std::shared_ptr<const TlsReload> tls)
+      : tls_(std::move(tls)),
+        credentials_(grpc_ssl_server_credentials_create_with_options(
+            grpc_ssl_server_credentials_create_options_using_config_fetcher(
+                GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY,
+                &ReloadedCredentials::Fetch,
+                this))) {}
+  ~ReloadedCredentials() override {
+    grpc_server_credentials_release(credentials_);
   }
-  const std::unique_ptr<SSL_CTX, void (*)(SSL_CTX*)> context(
-      SSL_CTX_new(TLS_server_method()), SSL_CTX_free);
-  if (context == nullptr) {
-    return absl::InternalError("OpenSSL cannot be initialised");
+
+  void SetAuthMetadataProcessor(
+      const std::shared_ptr<grpc::AuthMetadataProcessor>&) override {}
+
+ private:
+  int AddPortToServer(const std::string& address,
+                      grpc_server* server) override {
+    return grpc_server_add_http2_port(server, address.c_str(), credentials_);
   }
-  SSL_CTX_set_default_passwd_cb(context.get(), NoPassphrase);
-  ERR_clear_error();
-  if (SSL_CTX_use_certificate_chain_file(context.get(),
-                                         options.certificate.c_str()) != 1) {
-    return Unusable("certificate", options.certificate);
+
+  // Called by gRPC at the start and for each new connection, one at a time.
+  static grpc_ssl_certificate_config_reload_status Fetch(
+      void* self, grpc_ssl_server_certificate_config** config) {
+    return static_cast<ReloadedCredentials*>(self)->FetchNew(config);
   }
-  if (SSL_CTX_use_PrivateKey_file(
-          context.get(), options.key.c_str(), SSL_FILETYPE_PEM) != 1) {
-    return Unusable("key", options.key);
+
+  grpc_ssl_certificate_config_reload_status FetchNew(
+      grpc_ssl_server_certificate_config** config) {
+    const auto current = tls_->Current();
+    if (current == given_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
+    const grpc_ssl_pem_key_cert_pair pair = {current->key.c_str(),
+                                             current->certificate.c_str()};
+    *config = grpc_ssl_server_certificate_config_create(
+        current->client_ca.c_str(), &pair, 1);
+    given_ = current;
+    return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_NEW;
   }
-  if (SSL_CTX_load_verify_file(context.get(), options.client_ca.c_str()) != 1) {
-    return Unusable("client authority", options.client_ca);
-  }
-  return absl::OkStatus();
-}
+
+  const std::shared_ptr<const TlsReload> tls_;
+  std::shared_ptr<const TlsFiles> given_;  // to gRPC
+  grpc_server_credentials* const credentials_;
+};
 
 }  // namespace
 
@@ -86,19 +93,8 @@ Endpoint ParseEndpoint(const std::string& address) {
 }
 
 std::shared_ptr<grpc::ServerCredentials> TlsCredentials(
-    const TlsOptions& options) {
-  namespace tls = grpc::experimental;
-  tls::TlsServerCredentialsOptions credentials(
-      std::make_shared<tls::FileWatcherCertificateProvider>(
-          options.key,
-          options.certificate,
-          options.client_ca,
-          static_cast<unsigned>(options.refresh_s)));
-  credentials.watch_root_certs();
-  credentials.watch_identity_key_cert_pairs();
-  credentials.set_cert_request_type(
-      GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
-  return tls::TlsServerCredentials(credentials);
+    std::shared_ptr<const TlsReload> tls) {
+  return std::make_shared<ReloadedCredentials>(std::move(tls));
 }
 
 absl::Status SetPermissions(const std::string& path,
@@ -128,9 +124,14 @@ absl::Status CheckServerOptions(const ServerOptions& options) {
   }
   for (const std::string& address : options.listen) {
     if (!ParseEndpoint(address).tls) continue;
-    if (absl::Status checked = CheckTls(options.tls); !checked.ok()) {
-      return checked;
+    const TlsOptions& tls = options.tls;
+    if (tls.certificate.empty() || tls.key.empty() || tls.client_ca.empty()) {
+      return absl::InvalidArgumentError(
+          "a TCP address needs tls-certificate, tls-key and tls-client-ca; "
+          "without encryption and authentication it must be explicit: "
+          "insecure:host:port");
     }
+    SELFCAL_RETURN_IF_ERROR(ReadTlsFiles(tls, std::time(nullptr)).status());
   }
   return absl::OkStatus();
 }

@@ -12,6 +12,7 @@
 #include <memory>
 #include <string>
 
+#include "server/access/tls_reload.h"
 #include "server/grpc/server.h"
 
 namespace selfcal::server {
@@ -25,10 +26,11 @@ struct Endpoint {
 
 Endpoint ParseEndpoint(const std::string& address);
 
-// Returns credentials that reload the files when they change.
-// CheckServerOptions must have succeeded.
+// Returns credentials, which must outlive the server, that use the files in
+// force at the begin of a connection, and require a certificate of the client
+// authority.
 std::shared_ptr<grpc::ServerCredentials> TlsCredentials(
-    const TlsOptions& options);
+    std::shared_ptr<const TlsReload> tls);
 
 // Sets group and mode of an open socket.
 absl::Status SetPermissions(const std::string& path,

@@ -5,8 +5,12 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <atomic>
+#include <ctime>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <string>
@@ -37,6 +41,11 @@ void SetUpLibrary() {
 
 void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
   builder->SetMaxReceiveMessageSize(options.max_receive_bytes);
+  // gRPC inflates a message before it looks at its size: two megabytes become
+  // two gigabytes.
+  for (const auto algorithm : {GRPC_COMPRESS_DEFLATE, GRPC_COMPRESS_GZIP}) {
+    builder->SetCompressionAlgorithmSupportStatus(algorithm, false);
+  }
   grpc::ResourceQuota quota("selfcal");
   quota.Resize(static_cast<std::size_t>(options.max_memory_bytes));
   builder->SetResourceQuota(quota);
@@ -61,15 +70,45 @@ std::string BoundAddress(const std::string& address, int port) {
   return address.substr(0, address.rfind(':') + 1) + std::to_string(port);
 }
 
+// Null without an address that uses the files.
+absl::StatusOr<std::shared_ptr<const TlsReload>> StartTls(
+    const ServerOptions& options,
+    const std::function<void(const std::string&)>& refused) {
+  const bool any = std::any_of(
+      options.listen.begin(), options.listen.end(), [](const auto& address) {
+        return ParseEndpoint(address).tls;
+      });
+  if (!any) return nullptr;
+  SELFCAL_ASSIGN_OR_RETURN(
+      std::shared_ptr<const TlsReload> tls,
+      TlsReload::Start(
+          options.tls,
+          [] { return std::int64_t{std::time(nullptr)}; },
+          [refused](bool in_force, const std::string& text) {
+            if (in_force) {
+              spdlog::info("new TLS files are in force");
+              return;
+            }
+            spdlog::error(
+                "the TLS files on disk are not taken up, those in force stay: "
+                "{}",
+                text);
+            if (refused) refused(text);
+          }));
+  return tls;
+}
+
+// `tls` may be null if no address uses it.
 void AddAddresses(const ServerOptions& options,
+                  const std::shared_ptr<grpc::ServerCredentials>& tls,
                   grpc::ServerBuilder* builder,
                   std::vector<int>* ports) {
   for (std::size_t i = 0; i < ports->size(); ++i) {
     const Endpoint endpoint = ParseEndpoint(options.listen[i]);
-    builder->AddListeningPort(endpoint.address,
-                              endpoint.tls ? TlsCredentials(options.tls)
-                                           : grpc::InsecureServerCredentials(),
-                              &(*ports)[i]);
+    builder->AddListeningPort(
+        endpoint.address,
+        endpoint.tls ? tls : grpc::InsecureServerCredentials(),
+        &(*ports)[i]);
   }
 }
 
@@ -83,6 +122,7 @@ class GrpcServer final : public Server {
                               options.local_role,
                               &threads_,
                               &watches_,
+                              options.max_write_time,
                               options.max_segment_streams,
                               &exchanges_};
     for (const Method& method : api->methods()) {
@@ -95,12 +135,16 @@ class GrpcServer final : public Server {
 
   ~GrpcServer() override { Shutdown(std::chrono::milliseconds(0)); }
 
-  absl::Status Start(const ServerOptions& options) {
+  absl::Status Start(
+      const ServerOptions& options,
+      const std::function<void(const std::string&)>& tls_refused) {
     SetUpLibrary();
     grpc::ServerBuilder builder;
     SetLimits(options, &builder);
+    SELFCAL_ASSIGN_OR_RETURN(tls_, StartTls(options, tls_refused));
     std::vector<int> ports(options.listen.size(), 0);
-    AddAddresses(options, &builder, &ports);
+    if (tls_ != nullptr) credentials_ = TlsCredentials(tls_);
+    AddAddresses(options, credentials_, &builder, &ports);
     for (const auto& [name, service] : services_) {
       builder.RegisterService(service.get());
     }
@@ -130,6 +174,8 @@ class GrpcServer final : public Server {
     return addresses_;
   }
 
+  std::shared_ptr<const TlsReload> tls() const override { return tls_; }
+
   void Shutdown(std::chrono::milliseconds deadline) override {
     const std::lock_guard lock(shutdown_mutex_);
     if (server_ == nullptr || std::exchange(stopped_, true)) return;
@@ -156,6 +202,9 @@ class GrpcServer final : public Server {
   WatchSender watches_;
   std::atomic<int> exchanges_ = 0;
   std::map<std::string, std::unique_ptr<grpc::Service>> services_;  // by name
+  std::shared_ptr<const TlsReload> tls_;
+  // The server asks it for the files, and does not keep it.
+  std::shared_ptr<grpc::ServerCredentials> credentials_;
   std::unique_ptr<grpc::Server> server_;
   std::vector<std::string> addresses_;
   std::mutex shutdown_mutex_;
@@ -165,10 +214,13 @@ class GrpcServer final : public Server {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
-    Api* api, const ServerOptions& options) {
+    Api* api,
+    const ServerOptions& options,
+    std::function<void(const std::string&)> tls_refused) {
   SELFCAL_RETURN_IF_ERROR(CheckServerOptions(options));
   auto server = std::make_unique<GrpcServer>(api, options);
-  if (absl::Status started = server->Start(options); !started.ok()) {
+  if (absl::Status started = server->Start(options, tls_refused);
+      !started.ok()) {
     return started;
   }
   return server;

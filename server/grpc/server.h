@@ -15,6 +15,7 @@
 
 #include "server/access/grants.h"
 #include "server/access/tls_options.h"
+#include "server/access/tls_reload.h"
 #include "server/api/api.h"
 
 namespace selfcal::server {
@@ -36,7 +37,7 @@ struct ServerOptions {
   // Role of callers without a certificate, over unix sockets and insecure
   // ports.
   Role local_role = Role::kAdminister;
-  int max_receive_bytes = 64 << 20;  // for one message
+  int max_receive_bytes = 64 << 20;  // for one message; compressed: none
   // Calls that are being answered; each occupies a thread, but watches do not.
   // Calls, watches and streams of segments beyond their limits are refused with
   // RESOURCE_EXHAUSTED.
@@ -44,6 +45,8 @@ struct ServerOptions {
   int max_watches = 10'000;
   int max_segment_streams = 256;
   std::int64_t max_memory_bytes = 512 << 20;  // for all messages in flight
+  // A caller that does not read a response of a stream for so long is cut off.
+  std::chrono::milliseconds max_write_time{60'000};
   int max_streams = 100;  // concurrent calls on one connection; others wait
 
   friend bool operator==(const ServerOptions&, const ServerOptions&) = default;
@@ -61,6 +64,9 @@ class Server {
   // The addresses with the actual ports, in the form for a client.
   virtual const std::vector<std::string>& addresses() const = 0;
 
+  // The TLS files in force; null without a TCP address with TLS.
+  virtual std::shared_ptr<const TlsReload> tls() const = 0;
+
   // Stops the server and the API. Health becomes NOT_SERVING, and no new call
   // is accepted. Watches, and streams between segments, end with UNAVAILABLE
   // soon; calls that remain after the deadline are cancelled. When it returns,
@@ -70,7 +76,12 @@ class Server {
 
 // Starts a server; `api` must outlive it. Errors are those of
 // CheckServerOptions; UNAVAILABLE if it cannot listen on an address.
+//
+// `tls_refused` is called, on a thread of the server, with the reason why
+// changed TLS files are not taken up, once for each change.
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
-    Api* api, const ServerOptions& options);
+    Api* api,
+    const ServerOptions& options,
+    std::function<void(const std::string&)> tls_refused = {});
 
 }  // namespace selfcal::server

@@ -1,3 +1,4 @@
+#include <chrono>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -17,10 +18,12 @@ class StreamingCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
  public:
   StreamingCall(const CallContext& context,
                 const Method& method,
-                const Rpc& rpc,
+                Rpc* rpc,
                 const grpc::ByteBuffer& request)
       : method_(method),
-        call_{CallerOf(rpc, context.local_role),
+        rpc_(rpc),
+        max_write_time_(context.max_write_time),
+        call_{CallerOf(*rpc, context.local_role),
               [this] { return gone_.load(); }},
         request_(request) {}
 
@@ -45,17 +48,25 @@ class StreamingCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
   void OnDone() override { delete this; }
 
  private:
-  // Waits until the response is sent; false if the caller has disconnected.
+  // Waits until the response is sent; false if the caller has disconnected or
+  // does not read.
   bool Write(const Message& response) {
     if (gone_) return false;
     bytes_ = Serialise(response);
     StartWrite(&bytes_);
     std::unique_lock lock(mutex_);
-    done_.wait(lock, [this] { return written_.has_value(); });
+    const auto is_written = [this] { return written_.has_value(); };
+    if (!done_.wait_for(lock, max_write_time_, is_written)) {
+      gone_ = true;
+      rpc_->TryCancel();  // ends the write
+      done_.wait(lock, is_written);
+    }
     return *std::exchange(written_, std::nullopt);
   }
 
   const Method& method_;
+  Rpc* const rpc_;
+  const std::chrono::milliseconds max_write_time_;
   std::atomic<bool> gone_ = false;  // the caller has disconnected
   const Call call_;
   const grpc::ByteBuffer request_;
@@ -72,7 +83,7 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* StartStreaming(
     const Method& method,
     Rpc* rpc,
     const grpc::ByteBuffer* request) {
-  auto* call = new StreamingCall(context, method, *rpc, *request);
+  auto* call = new StreamingCall(context, method, rpc, *request);
   if (!context.threads->Run([call] { call->Run(); })) {
     call->Finish(ToGrpc(TooManyCalls()));
   }

@@ -1,5 +1,6 @@
 #include "server/metrics/metrics.h"
 
+#include <CivetServer.h>
 #include <prometheus/exposer.h>
 #include <prometheus/gauge.h>
 #include <prometheus/registry.h>
@@ -7,16 +8,20 @@
 #include <charconv>
 #include <exception>
 #include <string_view>
+#include <utility>
 
+#include "server/access/loopback_host.h"
 #include "server/metrics/event_metrics.h"
 #include "server/metrics/recent_rigs.h"
 #include "server/metrics/state_metrics.h"
+#include "server/metrics/tls_metrics.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {
 
 constexpr int kMaxPort = 65535;
+constexpr std::size_t kThreads = 2;
 
 // Returns the host of host:port; empty if there is no port.
 std::string_view HostOf(std::string_view address) {
@@ -31,6 +36,28 @@ std::string_view HostOf(std::string_view address) {
   return valid ? address.substr(0, colon) : std::string_view();
 }
 
+// Refuses requests under a name that is not of the loopback interface.
+int BeginRequest(mg_connection* connection) {
+  const char* host = mg_get_header(connection, "Host");
+  if (host != nullptr && IsLoopbackHost(host)) return 0;
+  constexpr int kForbidden = 403;
+  mg_send_http_error(connection,
+                     kForbidden,
+                     "%s",
+                     "the metrics can only be read as 127.0.0.1, localhost or "
+                     "[::1]; a proxy has to set the header Host");
+  return 1;
+}
+
+const CivetCallbacks& Callbacks() {
+  static const CivetCallbacks callbacks = [] {
+    CivetCallbacks result;
+    result.begin_request = BeginRequest;
+    return result;
+  }();
+  return callbacks;
+}
+
 class PrometheusMetrics final : public Metrics {
  public:
   PrometheusMetrics(Store* store, const MetricsOptions& options)
@@ -38,7 +65,7 @@ class PrometheusMetrics final : public Metrics {
         registry_(std::make_shared<prometheus::Registry>()),
         events_(store, &rigs_, registry_.get()),
         state_(std::make_shared<StateMetrics>(store, &rigs_, options.database)),
-        exposer_(options.address) {
+        exposer_(options.address, kThreads, &Callbacks()) {
     prometheus::BuildGauge()
         .Name("selfcal_build_info")
         .Help("Constant 1, with the version of the program as label.")
@@ -54,11 +81,18 @@ class PrometheusMetrics final : public Metrics {
   PipelineObserver* observer() override { return &events_; }
   const std::string& url() const override { return url_; }
 
+  void AddTls(std::shared_ptr<const TlsReload> tls) override {
+    if (tls == nullptr) return;
+    tls_ = std::make_shared<TlsMetrics>(std::move(tls));
+    exposer_.RegisterCollectable(tls_);
+  }
+
  private:
   RecentRigs rigs_;
   std::shared_ptr<prometheus::Registry> registry_;
   EventMetrics events_;
   std::shared_ptr<StateMetrics> state_;
+  std::shared_ptr<TlsMetrics> tls_;
   prometheus::Exposer exposer_;  // last: its threads use the others
   std::string url_;
 };

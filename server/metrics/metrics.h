@@ -13,6 +13,7 @@
 #include <memory>
 #include <string>
 
+#include "server/access/tls_reload.h"
 #include "server/pipeline/observer.h"
 #include "server/store/store.h"
 
@@ -33,6 +34,10 @@ class Metrics {
   virtual PipelineObserver* observer() = 0;
   // The URL, with the actual port.
   virtual const std::string& url() const = 0;
+
+  // From now on also reports the expiry of these files, and whether those on
+  // disk are in force. Null: there are none.
+  virtual void AddTls(std::shared_ptr<const TlsReload> tls) = 0;
 };
 
 // INVALID_ARGUMENT unless the address is a port of the loopback interface,

@@ -11,34 +11,13 @@
 #include <system_error>
 #include <utility>
 
+#include "server/metrics/gauge.h"
 #include "server/pipeline/verdict.h"
 
 namespace selfcal::server {
 namespace {
 
-using prometheus::ClientMetric;
 using prometheus::MetricFamily;
-
-class Gauge {
- public:
-  Gauge(const std::string& name, const std::string& help) {
-    family_.name = name;
-    family_.help = help;
-    family_.type = prometheus::MetricType::Gauge;
-  }
-
-  void Add(std::vector<ClientMetric::Label> labels, double value) {
-    ClientMetric metric;
-    metric.label = std::move(labels);
-    metric.gauge.value = value;
-    family_.metric.push_back(std::move(metric));
-  }
-
-  MetricFamily Take() { return std::move(family_); }
-
- private:
-  MetricFamily family_;
-};
 
 void AddTables(Store* store,
                const std::vector<std::string>& rigs,

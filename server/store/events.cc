@@ -41,13 +41,17 @@ absl::StatusOr<Listed<StoredEvent>> ReadPage(Connection* db,
 absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail) {
-  return Statement(tx->db(),
+  return InsertEvent(tx->db(), {0, tx->time_ns(), tx->rig(), kind, detail});
+}
+
+absl::Status InsertEvent(Connection* db, const StoredEvent& event) {
+  return Statement(db,
                    "INSERT INTO events (time_ns, rig, kind, detail) "
                    "VALUES (?1, ?2, ?3, ?4)",
-                   tx->time_ns(),
-                   tx->rig(),
-                   static_cast<int>(kind) + 1,
-                   detail)
+                   event.time_ns,
+                   event.rig,
+                   static_cast<int>(event.kind) + 1,
+                   event.detail)
       .Run();
 }
 

@@ -14,6 +14,8 @@ namespace selfcal::server {
 absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail);
+// An event whose number is the next one, whatever it states.
+absl::Status InsertEvent(Connection* db, const StoredEvent& event);
 
 // Events of one rig, or of all if `rig` is empty; oldest first.
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,

@@ -205,6 +205,10 @@ class DatabaseStore final : public Store {
         [&](Connection* db) { return ListNewestEventRows(db, page, rig); });
   }
 
+  absl::Status AppendEvent(const StoredEvent& event) override {
+    return db_->Write([&](Connection* db) { return InsertEvent(db, event); });
+  }
+
   StoreMaintenance* maintenance() override { return maintenance_.get(); }
 
  private:

@@ -353,6 +353,8 @@ class Store {
       const Page& page, const std::string& rig = "") = 0;
   virtual absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(
       const Page& page, const std::string& rig = "") = 0;
+  // Appends an event of the daemon (without a rig); its number is assigned.
+  virtual absl::Status AppendEvent(const StoredEvent& event) = 0;
 
   // Check, backup and restore. Lives as long as the store.
   virtual StoreMaintenance* maintenance() = 0;

@@ -1,4 +1,4 @@
-// Events: the log of what happened to rigs.
+// Events: the log of what happened to rigs and to the daemon.
 #pragma once
 
 #include <cstdint>
@@ -24,12 +24,13 @@ enum class EventKind {
   kRigUpdated,          // by hand, as the next two
   kRigDeleted,
   kSegmentDeleted,
+  kTlsFilesRefused,  // of the daemon, without a rig
 };
 
 struct StoredEvent {
   std::int64_t event = 0;  // counts from 1
   std::int64_t time_ns = 0;
-  std::string rig;
+  std::string rig;  // empty: of the daemon
   EventKind kind = EventKind::kRigCreated;
   std::string detail;
 };

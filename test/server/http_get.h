@@ -11,7 +11,8 @@
 namespace selfcal::server {
 
 // `url` is http://127.0.0.1:port/path; empty if nobody answers.
-inline std::string HttpGet(const std::string& url) {
+inline std::string HttpGet(const std::string& url,
+                           const std::string& host = "localhost") {
   const std::string prefix = "http://127.0.0.1:";
   if (url.compare(0, prefix.size(), prefix) != 0) return "";
   const auto slash = url.find('/', prefix.size());
@@ -25,7 +26,7 @@ inline std::string HttpGet(const std::string& url) {
   if (connect(file, reinterpret_cast<sockaddr*>(&address), sizeof(address)) ==
       0) {
     const std::string request =
-        "GET " + url.substr(slash) + " HTTP/1.0\r\nHost: localhost\r\n\r\n";
+        "GET " + url.substr(slash) + " HTTP/1.0\r\nHost: " + host + "\r\n\r\n";
     send(file, request.data(), request.size(), 0);
     char buffer[4096];
     for (ssize_t n = 0; (n = recv(file, buffer, sizeof(buffer), 0)) > 0;) {

@@ -41,6 +41,12 @@ class Certificates {
         Pem(name) + " -days " + std::to_string(days));
   }
 
+  // Writes the key of a certificate to a file, under a passphrase.
+  void Encrypt(const std::string& name, const std::string& path) const {
+    Run("openssl pkey -aes256 -passout pass:secret -in " + Key(name) +
+        " -out " + path);
+  }
+
   std::string Pem(const std::string& name) const {
     return folder_.File(name + ".pem");
   }

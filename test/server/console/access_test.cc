@@ -73,7 +73,13 @@ TEST_F(AccessTest, EachKindOfChangeNeedsRoleAndHeader) {
 
 TEST_F(AccessTest, NamesThatWereMadeToPointHereAreRefused) {
   AddRig("r");
-  for (const char* host : {"evil.example", "127.0.0.1.evil.example:80", ""}) {
+  for (const char* host : {"evil.example",
+                           "127.0.0.1.evil.example:80",
+                           "[::1].evil.example",
+                           "[::1]:80.evil.example",
+                           "localhost:evil.example",
+                           "[::1",
+                           ""}) {
     const Reply reply = Get("/api/v1/rigs", host);
     EXPECT_GE(reply.status, 400) << host;
     EXPECT_EQ(reply.body.find("rigs/r"), std::string::npos) << host;

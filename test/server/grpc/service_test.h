@@ -71,9 +71,11 @@ class ServiceTest : public ServedStore {
 
   // A server with an API of its own.
   absl::StatusOr<std::unique_ptr<Server>> NewServer(
-      const ServerOptions& options) {
+      const ServerOptions& options,
+      std::function<void(const std::string&)> tls_refused = {}) {
     return MakeServer(&apis_.emplace_back(&*domain_, pipeline_.get(), &feed_),
-                      options);
+                      options,
+                      std::move(tls_refused));
   }
 
   void StartServer(ServerOptions options) {

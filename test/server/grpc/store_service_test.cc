@@ -90,6 +90,21 @@ TEST_F(StoreServiceTest, ACheckTellsEachProblem) {
   EXPECT_FALSE(problems[0].description().empty());
 }
 
+TEST_F(StoreServiceTest, ABackupThatNobodyReadsHoldsUpNoOther) {
+  const Rig rig = AddRig("a");
+  for (const MotionSegment& segment : TestSegments(rig, 20)) {
+    ASSERT_TRUE(domain_->PutSegment("a", segment).ok());
+  }
+  Context idle;
+  const auto unread = stub_->BackupStore(&idle, v1::BackupStoreRequest());
+  v1::BackupStoreResponse first;
+  ASSERT_TRUE(unread->Read(&first));
+  EXPECT_FALSE(BackUp().first.empty());
+  EXPECT_FALSE(BackUp().first.empty());
+  idle.TryCancel();
+  EXPECT_FALSE(unread->Finish().ok());
+}
+
 TEST_F(StoreServiceTest, ABackupIsADatabaseAndCanBeRestored) {
   const Rig rig = AddScored(2);
   const auto [bytes, sha256] = BackUp();

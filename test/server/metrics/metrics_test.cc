@@ -60,6 +60,16 @@ TEST_F(MetricsTest, SeriesAreThereBeforeTheFirstEvent) {
   }
 }
 
+TEST_F(MetricsTest, AnotherNameThanThatOfTheLoopbackIsRefused) {
+  EXPECT_THAT(HttpGet(metrics_->url(), "127.0.0.1:9464"),
+              HasSubstr("selfcal_build_info"));
+  for (const char* host : {"evil.example", "[::1].evil.example", ""}) {
+    EXPECT_THAT(HttpGet(metrics_->url(), host),
+                Not(HasSubstr("selfcal_build_info")))
+        << host;
+  }
+}
+
 TEST_F(MetricsTest, EventsAreCounted) {
   PipelineObserver* const observer = metrics_->observer();
   const Rig rig = TestRig("a");
