@@ -49,9 +49,6 @@ pid_t Spawn(const std::string& binary,
         binary.c_str(),
         "--state-dir",
         state_dir.c_str(),
-        // The user waits for the result, and the machine may be busy.
-        "--run-priority",
-        "low",
         static_cast<char*>(nullptr));
   _exit(127);
 }

@@ -23,6 +23,7 @@ struct DaemonOptions {
   // RUNTIME_DIRECTORY or, without one, in the state folder.
   ServerOptions server;
   int scoring_threads = 1;
+  int solver_processes = 1;
   // Number of stored but unscored segments above which streams wait.
   int max_backlog = 64;
   SolverKind solver = SolverKind::kStructured;
@@ -31,7 +32,7 @@ struct DaemonOptions {
   double verify_share = 0;
   DomainOptions domain;
   HostLimits host;  // for automatic runs
-  bool idle_runs = true;
+  bool idle_runs = false;
   double max_run_minutes = 30;   // a run that takes longer fails
   int max_run_memory_mib = 512;  // limit for a run; 0: no limit
   double session_idle_s = 60;    // idle time that ends a session; 0: no limit

@@ -11,6 +11,7 @@ namespace selfcal::server {
 namespace {
 
 constexpr int kMaxScoringThreads = 256;
+constexpr int kMaxSolverProcesses = 64;
 constexpr double kMaxInflation = 1e4;
 constexpr int kMinMessageBytes = 1 << 20;
 constexpr std::int64_t kMinMemoryBytes = 16 << 20;
@@ -202,6 +203,12 @@ void DefineEstimation(Definer* define, DaemonOptions* options) {
       ->check(CLI::Range(1, kMaxScoringThreads))
       ->capture_default_str();
   define
+      ->Add("solver-processes",
+            &options->solver_processes,
+            "Runs of different rigs that are computed at once")
+      ->check(CLI::Range(1, kMaxSolverProcesses))
+      ->capture_default_str();
+  define
       ->Add("solver",
             &options->solver,
             "Solver of runs; both converge to the same minimum")
@@ -257,12 +264,12 @@ void DefineRuns(Definer* define, DaemonOptions* options) {
   define
       ->Add("run-priority",
             &options->idle_runs,
-            "idle: a run uses only idle resources, and makes no progress while "
-            "the machine is busy; low: it has a lower priority than everything "
-            "else")
+            "low: a run has a lower priority than everything else, a tenth of "
+            "the CPU time beside a busy process; idle: it uses only idle "
+            "resources, and makes no progress while the machine is busy")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, bool>{{"idle", true}, {"low", false}}))
-      ->default_str("idle");
+      ->default_str("low");
   define
       ->Add("max-run-minutes",
             &options->max_run_minutes,

@@ -166,11 +166,11 @@ class PipelineImpl : public Pipeline {
       return done(SubmitResult{SubmitResult::Verdict::kRejected,
                                *std::move(violations)});
     }
-    const absl::Status place = scoring_.TakePlace(cancelled);
+    const absl::Status place = scoring_.TakePlace(rig, cancelled);
     if (!place.ok()) return done(place);
     recalibrator_.ContinueSession(rig);
-    domain_->BeginPutSegment(rig, segment, [this, done](const auto& verdict) {
-      done(Settle(verdict));
+    domain_->BeginPutSegment(rig, segment, [this, rig, done](const auto& v) {
+      done(Settle(rig, v));
     });
   }
 
@@ -320,12 +320,12 @@ class PipelineImpl : public Pipeline {
   // Fills the place in the backlog with the segment that was stored, or returns
   // the place.
   absl::StatusOr<SubmitResult> Settle(
-      const absl::StatusOr<PutVerdict>& verdict) {
+      const std::string& rig, const absl::StatusOr<PutVerdict>& verdict) {
     if (verdict.ok() && *verdict == PutVerdict::kStored) {
       scoring_.FillPlace();
       return SubmitResult{SubmitResult::Verdict::kStored, {}};
     }
-    scoring_.ReturnPlace();
+    scoring_.ReturnPlace(rig);
     SELFCAL_RETURN_IF_ERROR(verdict.status());
     return SubmitResult{SubmitResult::Verdict::kDuplicate, {}};
   }

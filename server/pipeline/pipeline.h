@@ -1,11 +1,11 @@
 // receive -> score -> select -> trigger -> recalibrate -> validate -> publish.
 //
-// Owns the worker threads: `scoring_threads` that score, one that recalibrates,
-// and one that verifies a sample of the results. Scores are committed in the
-// order of arrival within a rig, so that tables do not depend on the number of
-// threads. Independent of gRPC. Any thread may call. Nothing is kept only in
-// memory: segments that are stored and unscored, and runs that are unfinished,
-// are resumed by Start().
+// Owns the worker threads: `scoring_threads` that score, `solver_processes`
+// that recalibrate, and one that verifies a sample of the results. Scores are
+// committed in the order of arrival within a rig, so that tables do not depend
+// on the number of threads; rigs take turns. Independent of gRPC. Any thread
+// may call. Nothing is kept only in memory: segments that are stored and
+// unscored, and runs that are unfinished, are resumed by Start().
 #pragma once
 
 #include <absl/status/status.h>
@@ -43,7 +43,10 @@ class Conditions {
 
 struct PipelineOptions {
   int scoring_threads = 1;
-  // Submit waits while more segments than this are stored and unscored.
+  // Runs of different rigs that are computed at once.
+  int solver_processes = 1;
+  // Submit waits while more segments than this are stored and unscored, unless
+  // none of them is of the same rig (backlog.h).
   int max_backlog = 64;
   std::string program_version;
   SegmentLimits limits;

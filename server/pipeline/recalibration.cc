@@ -13,13 +13,21 @@
 
 namespace selfcal::server {
 
+Recalibrator::Executor::Executor(const RunContext& shared) : context(shared) {
+  context.current = &current;
+}
+
 Recalibrator::Recalibrator(Domain* domain,
                            const PipelineOptions& options,
                            Estimators estimators,
                            Watchers<StoredCalibration>* calibration_watchers,
                            Watchers<RunUpdate>* run_watchers)
-    : context_{domain, options, std::move(estimators), run_watchers, &current_},
-      calibration_watchers_(calibration_watchers) {}
+    : shared_{domain, options, std::move(estimators), run_watchers, nullptr},
+      calibration_watchers_(calibration_watchers) {
+  for (int k = 0; k < std::max(1, options.solver_processes); ++k) {
+    executors_.push_back(std::make_unique<Executor>(shared_));
+  }
+}
 
 Recalibrator::~Recalibrator() { Stop(); }
 
@@ -30,22 +38,26 @@ absl::Status Recalibrator::Start() {
         "recalibration has been started already");
   }
   running_ = true;
-  current_.Open();
-  thread_ = std::thread([this] { Loop(); });
+  for (const auto& executor : executors_) {
+    executor->current.Open();
+    executor->thread = std::thread([this, e = executor.get()] { Loop(e); });
+  }
   return absl::OkStatus();
 }
 
 void Recalibrator::Stop() {
-  std::thread thread;
+  std::vector<std::thread> threads;
   {
     const std::lock_guard lock(mutex_);
     running_ = false;
-    thread.swap(thread_);
+    for (const auto& executor : executors_) {
+      threads.push_back(std::move(executor->thread));
+    }
   }
-  current_.Close();
+  for (const auto& executor : executors_) executor->current.Close();
   changed_.notify_all();
-  if (thread.joinable()) {
-    thread.join();
+  for (std::thread& thread : threads) {
+    if (thread.joinable()) thread.join();
   }
 }
 
@@ -59,7 +71,7 @@ void Recalibrator::Wake() {
 
 void Recalibrator::EndSession(const std::string& rig) {
   SessionEnds::Clock::duration grace = kSessionGrace;
-  const std::chrono::milliseconds idle = context_.options.session_idle;
+  const std::chrono::milliseconds idle = shared_.options.session_idle;
   if (idle.count() > 0) {
     grace = std::min<SessionEnds::Clock::duration>(grace, idle);
   }
@@ -78,15 +90,34 @@ void Recalibrator::NoteScore(const std::string& rig) {
 absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
                                                std::int64_t run) {
   absl::StatusOr<StoredRun> ended = absl::UnknownError("");
-  const bool was_current = current_.Cancel(rig, run, [&] {
-    ended = context_.domain->EndRun(
+  const auto end = [&] {
+    ended = shared_.domain->EndRun(
         rig, run, RunState::kCancelled, "cancelled on request");
-  });
+  };
+  bool was_current = false;
+  for (bool again = true; again;) {
+    again = false;
+    Executor* executor = nullptr;
+    {
+      const std::lock_guard lock(mutex_);
+      const auto claim = claims_.find(rig);
+      if (claim != claims_.end()) executor = claim->second;
+      if (executor == nullptr) end();  // under the lock nobody can begin it
+    }
+    if (executor == nullptr) break;
+    was_current = executor->current.Cancel(rig, run, [&] {
+      // It cannot begin it; another one can, once it has claimed the rig.
+      const std::lock_guard lock(mutex_);
+      const auto claim = claims_.find(rig);
+      again = claim == claims_.end() || claim->second != executor;
+      if (!again) end();
+    });
+  }
   if (!was_current) {
-    if (ended.ok()) PublishRun(context_, *ended);
+    if (ended.ok()) PublishRun(shared_, *ended);
     return ended;
   }
-  auto stored = context_.store()->GetRun(rig, run);
+  auto stored = shared_.store()->GetRun(rig, run);
   if (!stored.ok() || stored->state == RunState::kCancelled) {
     return stored;
   }
@@ -100,10 +131,14 @@ absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
 
 std::vector<CalibrateProgress> Recalibrator::StepsOf(const std::string& rig,
                                                      std::int64_t run) const {
-  return current_.StepsOf(rig, run);
+  for (const auto& executor : executors_) {
+    auto steps = executor->current.StepsOf(rig, run);
+    if (!steps.empty()) return steps;
+  }
+  return {};
 }
 
-void Recalibrator::Loop() {
+void Recalibrator::Loop(Executor* executor) {
   Backoff backoff;
   for (;;) {
     std::int64_t seen = 0;
@@ -114,14 +149,14 @@ void Recalibrator::Loop() {
       }
       seen = wakes_;
     }
-    const auto executed = ExecuteAll();
+    const auto executed = ExecuteAll(executor);
     if (!executed.ok()) {
       spdlog::error("cannot list runs: {}", executed.status().ToString());
     }
     // A session end that is due waits for scores or for a run, which wake the
     // thread.
     const auto now = SessionEnds::Clock::now();
-    const auto next = sessions_.NextDue(now, now + context_.options.recheck);
+    const auto next = sessions_.NextDue(now, now + shared_.options.recheck);
     std::unique_lock lock(mutex_);
     if (!executed.ok() || *executed == Execution::kTryLater) {
       changed_.wait_for(lock, backoff.Next(), [this] { return !running_; });
@@ -133,41 +168,69 @@ void Recalibrator::Loop() {
   }
 }
 
-absl::Status Recalibrator::StartSessionRuns() {
+absl::Status Recalibrator::StartDueRuns() {
+  const std::lock_guard lock(starting_);
+  SELFCAL_RETURN_IF_ERROR(
+      shared_.domain->StartTimedRuns(shared_.options.now_ns()).status());
   std::set<std::string> busy;
   SELFCAL_ASSIGN_OR_RETURN(
       const auto unscored,
-      context_.store()->ListUnscored(std::numeric_limits<int>::max()));
+      shared_.store()->ListUnscored(std::numeric_limits<int>::max()));
   for (const auto& segment : unscored) busy.insert(segment.rig);
   SELFCAL_ASSIGN_OR_RETURN(const auto runs,
-                           context_.store()->ListUnfinishedRuns());
+                           shared_.store()->ListUnfinishedRuns());
   for (const StoredRun& run : runs) busy.insert(run.rig);
   const std::vector<std::string> ended =
       sessions_.Due(SessionEnds::Clock::now(), busy);
 
-  const std::chrono::nanoseconds idle = context_.options.session_idle;
+  const std::chrono::nanoseconds idle = shared_.options.session_idle;
   const std::int64_t idle_since_ns =
-      idle.count() > 0 ? context_.options.now_ns() - idle.count() : 0;
+      idle.count() > 0 ? shared_.options.now_ns() - idle.count() : 0;
   SELFCAL_RETURN_IF_ERROR(
-      context_.domain->StartSessionRuns(ended, idle_since_ns).status());
+      shared_.domain->StartSessionRuns(ended, idle_since_ns).status());
   for (const std::string& rig : ended) sessions_.Remove(rig);
   return absl::OkStatus();
 }
 
-absl::StatusOr<Execution> Recalibrator::ExecuteAll() {
+Execution Recalibrator::ExecuteClaimed(Executor* executor,
+                                       const StoredRun& listed) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!claims_.emplace(listed.rig, executor).second) {
+      return Execution::kDeferred;
+    }
+  }
+  // Another thread may have ended it since it was listed.
+  const auto run = shared_.store()->GetRun(listed.rig, listed.run);
+  auto executed = Execution::kTryLater;
+  if (run.ok()) {
+    executed = run->end_time_ns != 0
+                   ? Execution::kDone
+                   : ExecuteRun(executor->context, calibration_watchers_, *run);
+  } else if (absl::IsNotFound(run.status())) {
+    executed = Execution::kDone;
+  } else {
+    spdlog::error("cannot read run {} of rig {}: {}",
+                  listed.run,
+                  listed.rig,
+                  run.status().ToString());
+  }
+  const std::lock_guard lock(mutex_);
+  claims_.erase(listed.rig);
+  return executed;
+}
+
+absl::StatusOr<Execution> Recalibrator::ExecuteAll(Executor* executor) {
   auto worst = Execution::kDone;
   for (bool any = true; any && worst != Execution::kTryLater;) {
     any = false;
-    SELFCAL_RETURN_IF_ERROR(
-        context_.domain->StartTimedRuns(context_.options.now_ns()).status());
-    SELFCAL_RETURN_IF_ERROR(StartSessionRuns());
+    SELFCAL_RETURN_IF_ERROR(StartDueRuns());
     SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredRun> runs,
-                             context_.store()->ListUnfinishedRuns());
+                             shared_.store()->ListUnfinishedRuns());
     for (const StoredRun& run : runs) {
-      const Execution executed =
-          ExecuteRun(context_, calibration_watchers_, run);
+      const Execution executed = ExecuteClaimed(executor, run);
       worst = std::max(worst, executed);
-      any |= executed == Execution::kDone && current_.open();
+      any |= executed == Execution::kDone && executor->current.open();
     }
   }
   return worst;

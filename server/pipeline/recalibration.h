@@ -1,5 +1,5 @@
-// The thread that recalibrates: takes the unfinished runs of the store, oldest
-// first, and executes each (run_execution.h).
+// The threads that recalibrate: each takes the oldest unfinished run of the
+// store whose rig no other one works for, and executes it (run_execution.h).
 //
 // A run is a record in the store from its trigger to its end. After a crash it
 // is still running and starts again, from its candidate if that was stored;
@@ -16,6 +16,8 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -41,7 +43,7 @@ class Recalibrator {
   ~Recalibrator();
 
   absl::Status Start();
-  // Returns when the thread has ended.
+  // Returns when the threads have ended.
   void Stop();
   // Looks for new runs in the store.
   void Wake();
@@ -60,22 +62,36 @@ class Recalibrator {
                                          std::int64_t run) const;
 
  private:
-  void Loop();
-  // Executes all unfinished runs; returns the worst result.
-  absl::StatusOr<Execution> ExecuteAll();
-  // Creates the runs of sessions that have ended.
-  absl::Status StartSessionRuns();
+  // One thread, and the run that it executes.
+  struct Executor {
+    Executor(const RunContext& shared);
 
-  CurrentRun current_;
-  const RunContext context_;
+    CurrentRun current;
+    RunContext context;
+    std::thread thread;
+  };
+
+  void Loop(Executor* executor);
+  // Executes unfinished runs until there are none that may begin and that no
+  // other thread has claimed; returns the worst result.
+  absl::StatusOr<Execution> ExecuteAll(Executor* executor);
+  // Creates the runs of times and of sessions that have ended.
+  absl::Status StartDueRuns();
+  // Executes the run, unless its rig is claimed by another thread.
+  Execution ExecuteClaimed(Executor* executor, const StoredRun& listed);
+
+  const RunContext shared_;  // without a current run
   Watchers<StoredCalibration>* const calibration_watchers_;
   SessionEnds sessions_;
+  std::mutex starting_;  // one thread at a time creates runs
+  std::vector<std::unique_ptr<Executor>> executors_;
 
-  std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
   bool running_ = false;
   std::int64_t wakes_ = 0;
-  std::thread thread_;
+  // By rig. Taken before a run begins, until after its end.
+  std::map<std::string, Executor*> claims_;
 };
 
 }  // namespace selfcal::server

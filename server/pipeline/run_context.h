@@ -13,7 +13,7 @@
 
 namespace selfcal::server {
 
-// What it points to must outlive it.
+// For one thread that executes runs. What it points to must outlive it.
 struct RunContext {
   Domain* domain;
   PipelineOptions options;

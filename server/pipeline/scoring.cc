@@ -13,9 +13,6 @@
 namespace selfcal::server {
 namespace {
 
-// Delay after which a waiting Submit notices that its caller has gone.
-constexpr std::chrono::milliseconds kCancelPoll{50};
-
 std::string Name(const Store::Unscored& claim) {
   return fmt::format(
       "segment {}~{} of rig {}", claim.key.session, claim.key.index, claim.rig);
@@ -41,7 +38,8 @@ ScoringWorkers::ScoringWorkers(Domain* domain,
       options_(options),
       estimators_(std::move(estimators)),
       on_run_(std::move(on_run)),
-      on_done_(std::move(on_done)) {}
+      on_done_(std::move(on_done)),
+      backlog_(options.max_backlog) {}
 
 ScoringWorkers::~ScoringWorkers() { Stop(); }
 
@@ -54,7 +52,9 @@ absl::Status ScoringWorkers::Start() {
     return absl::FailedPreconditionError("scoring has been started already");
   }
   running_ = true;
-  backlog_ = static_cast<int>(left.size());
+  std::map<std::string, int> taken;
+  for (const Claim& segment : left) ++taken[segment.rig];
+  backlog_.Open(std::move(taken));
   for (int k = 0; k < std::max(1, options_.scoring_threads); ++k) {
     threads_.emplace_back([this] { Run(); });
   }
@@ -68,34 +68,16 @@ void ScoringWorkers::Stop() {
     running_ = false;
     threads.swap(threads_);
   }
+  backlog_.Close();
   changed_.notify_all();
   for (std::thread& thread : threads) {
     thread.join();
   }
 }
 
-absl::Status ScoringWorkers::TakePlace(const std::function<bool()>& cancelled) {
-  std::unique_lock lock(mutex_);
-  const std::int64_t ticket = next_ticket_++;
-  waiting_.insert(ticket);
-  bool gone = false;
-  while (running_ && !gone &&
-         (backlog_ >= options_.max_backlog || *waiting_.begin() != ticket)) {
-    lock.unlock();
-    gone = cancelled && cancelled();
-    lock.lock();
-    if (!gone) changed_.wait_for(lock, kCancelPoll);
-  }
-  waiting_.erase(ticket);
-  changed_.notify_all();  // it is the next one's turn
-  if (gone) {
-    return absl::CancelledError("the caller has gone");
-  }
-  if (!running_) {
-    return absl::UnavailableError("the daemon is stopping; send again later");
-  }
-  ++backlog_;
-  return absl::OkStatus();
+absl::Status ScoringWorkers::TakePlace(const std::string& rig,
+                                       const std::function<bool()>& cancelled) {
+  return backlog_.Take(rig, cancelled);
 }
 
 void ScoringWorkers::FillPlace() {
@@ -106,12 +88,8 @@ void ScoringWorkers::FillPlace() {
   changed_.notify_all();
 }
 
-void ScoringWorkers::ReturnPlace() {
-  {
-    const std::lock_guard lock(mutex_);
-    --backlog_;
-  }
-  changed_.notify_all();
+void ScoringWorkers::ReturnPlace(const std::string& rig) {
+  backlog_.Return(rig);
 }
 
 absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
@@ -125,7 +103,7 @@ absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
     commit = change();
     if (!commit.ok()) return commit;
     for (const std::int64_t sequence : commit->unscored_sequences) {
-      if (!claimed_.contains({rig, sequence})) --backlog_;
+      if (!claimed_.contains({rig, sequence})) backlog_.Return(rig);
     }
   }
   changed_.notify_all();
@@ -145,7 +123,7 @@ absl::Status ScoringWorkers::Delete(
       return first == claimed_.end() || first->first != rig;
     });
     waiting = change();
-    if (waiting.ok()) backlog_ -= *waiting;
+    if (waiting.ok()) backlog_.Return(rig, *waiting);
     deleting_.erase(deleting);
     ++arrivals_;  // what was passed over meanwhile is looked at again
   }
@@ -166,24 +144,38 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
     // Under the lock, a segment is either in the list, or its FillPlace is
     // still to come and wakes this thread.
     const std::int64_t seen = arrivals_;
-    const auto unscored = store_->ListUnscored(
-        deleting_.empty() ? static_cast<int>(claimed_.size()) + 1
-                          : std::numeric_limits<int>::max());
+    const auto unscored = store_->ListUnscored(std::numeric_limits<int>::max());
     if (!unscored.ok()) {
       spdlog::error("cannot list what to score: {}",
                     unscored.status().ToString());
       changed_.wait_for(lock, backoff.Next(), [this] { return !running_; });
       continue;
     }
-    for (const Claim& candidate : *unscored) {
-      if (deleting_.contains(candidate.rig)) continue;
-      if (claimed_.emplace(candidate.rig, candidate.sequence).second) {
-        return candidate;
-      }
+    if (const Claim* next = Choose(*unscored); next != nullptr) {
+      claimed_.emplace(next->rig, next->sequence);
+      last_turn_[next->rig] = ++turns_;
+      return *next;
     }
+    last_turn_.clear();  // nobody waits
     changed_.wait(lock, [&] { return !running_ || arrivals_ != seen; });
   }
   return std::nullopt;
+}
+
+const ScoringWorkers::Claim* ScoringWorkers::Choose(
+    const std::vector<Claim>& unscored) const {
+  const Claim* next = nullptr;
+  std::int64_t next_turn = 0;
+  for (const Claim& candidate : unscored) {
+    if (deleting_.contains(candidate.rig)) continue;
+    const auto turn = last_turn_.find(candidate.rig);
+    const std::int64_t last = turn == last_turn_.end() ? 0 : turn->second;
+    if (next != nullptr && last >= next_turn) continue;
+    if (claimed_.contains({candidate.rig, candidate.sequence})) continue;
+    next = &candidate;
+    next_turn = last;
+  }
+  return next;
 }
 
 void ScoringWorkers::Process(const Claim& claim) {
@@ -194,8 +186,8 @@ void ScoringWorkers::Process(const Claim& claim) {
   {
     const std::lock_guard lock(mutex_);
     claimed_.erase({claim.rig, claim.sequence});
-    --backlog_;
   }
+  backlog_.Return(claim.rig);
   changed_.notify_all();
   on_done_(claim.rig);
 }

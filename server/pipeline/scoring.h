@@ -1,7 +1,9 @@
-// The threads that score: each claims the oldest segment that is not claimed,
-// scores it without a lock, and commits the score when all older ones of its
-// rig are committed. Claims are only in memory: after a crash the store still
-// lists the segment as unscored.
+// The threads that score: each claims the oldest segment that is not claimed of
+// the rig whose turn it is, scores it without a lock, and commits the score
+// when all older ones of its rig are committed. Rigs with unscored segments
+// take turns, so that none waits for the many or slow segments of another.
+// Claims are only in memory: after a crash the store still lists the segment as
+// unscored.
 //
 // A segment is scored at the active calibration, whatever version its states
 // were estimated with, so that scores refer to the present calibration even if
@@ -15,6 +17,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -24,6 +27,7 @@
 #include <vector>
 
 #include "server/domain/domain.h"
+#include "server/pipeline/backlog.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/store.h"
 
@@ -44,12 +48,12 @@ class ScoringWorkers {
   // Returns when every thread has ended, each after its current segment.
   void Stop();
 
-  // Waits for room in the backlog and takes one place, first come, first
-  // served. CANCELLED and UNAVAILABLE as for Pipeline::Submit.
-  absl::Status TakePlace(const std::function<bool()>& cancelled);
+  // A place for a segment of the rig in the backlog (Backlog::Take).
+  absl::Status TakePlace(const std::string& rig,
+                         const std::function<bool()>& cancelled);
   // The place is filled by a stored segment, or was not needed.
   void FillPlace();
-  void ReturnPlace();
+  void ReturnPlace(const std::string& rig);
 
   // Calls Domain::QuarantineSegments, and returns the places of the segments
   // that were waiting for their score.
@@ -73,6 +77,9 @@ class ScoringWorkers {
 
   void Run();
   std::optional<Claim> NextClaim();
+  // Of unscored segments, oldest first, the one to score next; with the lock
+  // held.
+  const Claim* Choose(const std::vector<Claim>& unscored) const;
   void Process(const Claim& claim);
   // The score, or what is wrong with the segment. nullopt when stopping.
   std::optional<absl::StatusOr<Score>> FindScore(const Claim& claim);
@@ -93,13 +100,13 @@ class ScoringWorkers {
   const std::function<void(const StoredRun&)> on_run_;
   const std::function<void(const std::string&)> on_done_;
 
+  Backlog backlog_;
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
   bool running_ = false;
-  int backlog_ = 0;  // places taken: stored and unscored, or about to
-  std::int64_t next_ticket_ = 0;
-  std::set<std::int64_t> waiting_;  // for a place; the lowest is next
-  std::int64_t arrivals_ = 0;       // segments stored since the start
+  std::int64_t arrivals_ = 0;  // segments stored since the start
+  std::int64_t turns_ = 0;     // claims since the start
+  std::map<std::string, std::int64_t> last_turn_;           // by rig, from 1
   std::set<std::pair<std::string, std::int64_t>> claimed_;  // rig, sequence
   std::multiset<std::string> deleting_;  // rigs of which no segment is claimed
   std::vector<std::thread> threads_;

@@ -19,6 +19,17 @@ TEST_F(DaemonTest, SecondDaemonOnTheSameFolderEndsAndTheFirstServesOn) {
   CreateRig();
 }
 
+TEST_F(DaemonTest, EndsWhenItsStateDirectoryIsRemoved) {
+  const auto daemon = StartAndWait();
+  CreateRig();
+  std::filesystem::rename(state_, folder_ / "away");
+  EXPECT_EQ(daemon->Wait(), 1);
+  EXPECT_THAT(daemon->Log(), HasSubstr("was removed or replaced"));
+  std::filesystem::rename(folder_ / "away", state_);
+  const auto next = StartAndWait();
+  EXPECT_EQ(Segments().segments_size(), 0);
+}
+
 TEST_F(DaemonTest, FolderIsForTheOwnerAndTheSocketForItsGroup) {
   const auto daemon = StartAndWait();
   for (const std::string name : {"", "lock", "selfcal.db"}) {

@@ -11,6 +11,7 @@
 #include <set>
 #include <sstream>
 
+#include "selfcal/v1/store_service.grpc.pb.h"
 #include "test/promise.h"
 #include "test/server/daemon/daemon_fixture.h"
 #include "test/server/daemon/notify_socket.h"
@@ -52,6 +53,39 @@ TEST_F(OperationTest, CheckLooksAtTheSettingsAndEnds) {
   const auto misspelt = Start({"--check", "--config", file});
   EXPECT_EQ(misspelt->Wait(), 2);
   EXPECT_THAT(misspelt->Log(), HasSubstr(file + ":2:1: "));
+}
+
+TEST_F(OperationTest, AStopDoesNotWaitForABackupThatNobodyReads) {
+  const auto daemon = StartAndWait();
+  Rig rig = TestRig("r");
+  rig.table_size = 100;  // keeps their data
+  Stream(TestSegments(CreateRig(rig), 40));
+  // A window that the backup does not fit into.
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 1 << 16);
+  const auto stub = v1::StoreService::NewStub(
+      grpc::CreateCustomChannel("unix:" + (state_ / "selfcald.sock").string(),
+                                grpc::InsecureChannelCredentials(),
+                                arguments));
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::BackupStoreResponse>>>
+      unread;
+  for (int k = 0; k < 3; ++k) {
+    contexts.push_back(std::make_unique<grpc::ClientContext>());
+    unread.push_back(
+        stub->BackupStore(contexts.back().get(), v1::BackupStoreRequest()));
+    v1::BackupStoreResponse first;
+    EXPECT_TRUE(unread.back()->Read(&first));
+  }
+  daemon->Signal(SIGTERM);
+  EXPECT_EQ(daemon->Wait(), 0) << daemon->Log();
+  for (const auto& reader : unread) {
+    v1::BackupStoreResponse rest;
+    while (reader->Read(&rest)) {
+    }
+    EXPECT_FALSE(reader->Finish().ok());
+  }
 }
 
 TEST_F(OperationTest, NoSecretReachesTheLog) {
@@ -290,7 +324,20 @@ std::vector<std::string> DeployedExpressions() {
 }
 
 TEST_F(OperationTest, AlertsAndDashboardShowSeriesThatThereAre) {
-  const auto daemon = StartAndWait({"--metrics", "127.0.0.1:0"});
+  const Certificates certificates;
+  const auto daemon =
+      StartAndWait({"--metrics",
+                    "127.0.0.1:0",
+                    "--listen",
+                    "unix:" + (state_ / "selfcald.sock").string(),
+                    "--listen",
+                    "127.0.0.1:0",
+                    "--tls-certificate",
+                    certificates.Pem("server"),
+                    "--tls-key",
+                    certificates.Key("server"),
+                    "--tls-client-ca",
+                    certificates.Pem("ca")});
   const Rig rig = CreateRig();
   Stream(TestSegments(rig, 4));
   ASSERT_TRUE(AllScored());

@@ -97,7 +97,7 @@ TEST_F(OptionsTest, RunsAreDeferredAndLimitedAsSet) {
   EXPECT_EQ(options_.max_run_minutes, 30);
   EXPECT_EQ(options_.max_run_memory_mib, 512);
   EXPECT_EQ(options_.session_idle_s, 60);
-  EXPECT_TRUE(options_.idle_runs);
+  EXPECT_FALSE(options_.idle_runs);
   EXPECT_EQ(Parse({"--state-dir",
                    "s",
                    "--only-on-external-power",
@@ -110,9 +110,9 @@ TEST_F(OptionsTest, RunsAreDeferredAndLimitedAsSet) {
                    "--session-idle",
                    "0.5",
                    "--run-priority",
-                   "low"}),
+                   "idle"}),
             std::nullopt);
-  EXPECT_FALSE(options_.idle_runs);
+  EXPECT_TRUE(options_.idle_runs);
   EXPECT_TRUE(options_.host.only_on_external_power);
   EXPECT_EQ(options_.host.max_load, 0.5);
   EXPECT_EQ(options_.max_run_minutes, 2.5);

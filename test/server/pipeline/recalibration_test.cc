@@ -182,6 +182,29 @@ TEST_F(RecalibrationTest, CancelEndsARunThatWaits) {
   EXPECT_EQ(store_->GetRun("b", 1)->state, RunState::kCancelled);
 }
 
+TEST_F(RecalibrationTest, RunsOfDifferentRigsAreComputedAtOnce) {
+  options_.solver_processes = 2;
+  MakeSolverWait();
+  for (const std::string rig : {"a", "b", "c"}) CreateRig(rig);
+  StartOne();
+  for (const std::string rig : {"a", "b", "c"}) {
+    Submit(0, rig);
+    Submit(1, rig);
+  }
+  ASSERT_TRUE(AllScored());
+  ASSERT_TRUE(Eventually([&] { return solves_ == 2; }));
+  EXPECT_EQ(store_->GetRun("c", 1)->state, RunState::kPending);
+  // One that is computed, and one that waits.
+  ASSERT_TRUE(pipeline_->CancelRecalibration("c", 1).ok());
+  ASSERT_TRUE(pipeline_->CancelRecalibration("b", 1).ok());
+  EXPECT_EQ(store_->GetRun("b", 1)->state, RunState::kCancelled);
+  EXPECT_EQ(store_->GetRun("c", 1)->state, RunState::kCancelled);
+  EXPECT_EQ(store_->GetRun("a", 1)->state, RunState::kRunning);
+  finish_ = true;
+  EXPECT_TRUE(RunIs(RunState::kSucceeded));
+  EXPECT_EQ(solves_, 2);
+}
+
 TEST_F(RecalibrationTest, FailureEndsTheRunWithItsMessage) {
   CreateRig();
   std::atomic<bool> throws{true};

@@ -31,6 +31,27 @@ TEST_F(ScoringTest, WhatWasStoredBeforeTheStartIsScored) {
   EXPECT_EQ((*store_->GetTables("b"))[0].scored, 5);
 }
 
+TEST_F(ScoringTest, RigsTakeTurns) {
+  CreateRig("busy");
+  CreateRig("quiet");
+  for (int k = 0; k < 20; ++k) {
+    ASSERT_TRUE(domain_->PutSegment("busy", Segment(k)).ok());
+  }
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE(domain_->PutSegment("quiet", Segment(k)).ok());
+  }
+  std::vector<std::string> order;
+  estimators_.score = [&](const Rig& rig, const auto&, const auto& segment) {
+    order.push_back(rig.id);
+    return FakeInformation(rig, EntropyOf(segment.key.index));
+  };
+  StartOne();
+  ASSERT_TRUE(AllScored());
+  pipeline_->Stop();
+  ASSERT_GE(order.size(), 23u);
+  EXPECT_EQ(std::count(order.begin(), order.begin() + 6, "quiet"), 3);
+}
+
 TEST_F(ScoringTest, StopInTheMiddleLosesNothing) {
   CreateRig();
   options_.scoring_threads = 2;
