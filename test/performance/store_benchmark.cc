@@ -2,7 +2,10 @@
 // own limit: the same bytes of compressed data, in as many commits of the same
 // size, written and synced one after the other. They are appended to a file,
 // which is what a store that grows asks of the disk, and then written over the
-// same place, which spares the disk finding room.
+// same place, which spares the disk finding room; and appended twice, the
+// second time in pieces of a checkpoint, which is what a write-ahead log asks
+// of it. The time of the store is divided among its log, its database and the
+// rest.
 //
 //   selfcal_store_benchmark --folder DIR [--streams N] [--segments N]
 #include <fcntl.h>
@@ -89,6 +92,8 @@ struct Measured {
   double cpu_seconds = 0;
   int commits = 0;
   std::int64_t bytes = 0;
+  DiskUse log;
+  DiskUse database;
 };
 
 double CpuSeconds() {
@@ -131,6 +136,8 @@ Measured MeasureStore(const Options& options, const MotionSegment& segment) {
   measured.seconds = Seconds(Clock::now() - start);
   measured.cpu_seconds = CpuSeconds() - cpu_before;
   measured.commits = Commits(vfs) - before;
+  measured.log = vfs.use("-wal");
+  measured.database = vfs.use("bench.db");
   if (failed > 0) throw std::runtime_error("a segment was refused");
   const auto stored = (*store)->GetSegment("bench", {"s0", 0});
   measured.bytes = stored->payload_bytes * each * options.streams;
@@ -138,37 +145,57 @@ Measured MeasureStore(const Options& options, const MotionSegment& segment) {
   return measured;
 }
 
-// Seconds of the disk for these commits, at the end of a file that grows and
-// once more over the same place.
+// Seconds of the disk for these commits: at the end of a file that grows, once
+// more over the same place, and for the second write, of as many bytes at the
+// end of another file with as many syncs as the database had.
 struct Disk {
   double append_s = 0;
   double overwrite_s = 0;
+  double second_s = 0;
 };
 
-Disk MeasureDisk(const Options& options, const Measured& of) {
-  const std::string path = options.folder + "/bench.raw";
-  const std::string commit(
-      static_cast<std::size_t>(of.bytes / std::max(1, of.commits)), 'x');
-  const int file = open(path.c_str(), O_CREAT | O_RDWR | O_TRUNC, 0600);
-  if (file < 0) throw std::runtime_error("cannot open " + path);
-  const auto write_all = [&] {
+class RawFile {
+ public:
+  explicit RawFile(const std::string& path)
+      : path_(path), file_(open(path.c_str(), O_CREAT | O_RDWR, 0600)) {
+    if (file_ < 0) throw std::runtime_error("cannot open " + path_);
+  }
+  ~RawFile() {
+    close(file_);
+    fs::remove(path_);
+  }
+  RawFile(const RawFile&) = delete;
+  RawFile& operator=(const RawFile&) = delete;
+
+  // Writes from the start of the file on; returns the seconds.
+  double Write(std::int64_t bytes, int syncs) {
+    const int pieces = std::max(1, syncs);
+    const std::string piece(static_cast<std::size_t>(bytes / pieces), 'x');
     const auto start = Clock::now();
-    for (int k = 0; k < of.commits; ++k) {
+    for (int k = 0; k < pieces; ++k) {
       const auto offset =
-          static_cast<off_t>(k) * static_cast<off_t>(commit.size());
-      if (pwrite(file, commit.data(), commit.size(), offset) !=
-              static_cast<ssize_t>(commit.size()) ||
-          fdatasync(file) != 0) {
-        throw std::runtime_error("cannot write " + path);
+          static_cast<off_t>(k) * static_cast<off_t>(piece.size());
+      if (pwrite(file_, piece.data(), piece.size(), offset) !=
+              static_cast<ssize_t>(piece.size()) ||
+          fdatasync(file_) != 0) {
+        throw std::runtime_error("cannot write " + path_);
       }
     }
     return Seconds(Clock::now() - start);
-  };
+  }
+
+ private:
+  const std::string path_;
+  const int file_;
+};
+
+Disk MeasureDisk(const Options& options, const Measured& of) {
   Disk disk;
-  disk.append_s = write_all();
-  disk.overwrite_s = write_all();
-  close(file);
-  fs::remove(path);
+  RawFile file(options.folder + "/bench.raw");
+  disk.append_s = file.Write(of.bytes, of.commits);
+  disk.overwrite_s = file.Write(of.bytes, of.commits);
+  RawFile second(options.folder + "/second.raw");
+  disk.second_s = second.Write(of.database.bytes, of.database.syncs);
   return disk;
 }
 
@@ -186,12 +213,14 @@ void Run(const Options& options) {
           .segments.front();
   std::vector<double> appending;
   std::vector<double> overwriting;
+  std::vector<double> twice;
   const int segments = options.segments / options.streams * options.streams;
   for (int round = 0; round < options.rounds; ++round) {
     const Measured store = MeasureStore(options, segment);
     const Disk disk = MeasureDisk(options, store);
     appending.push_back(disk.append_s / store.seconds);
     overwriting.push_back(disk.overwrite_s / store.seconds);
+    twice.push_back((disk.append_s + disk.second_s) / store.seconds);
     fmt::print(
         "streams {:3d}: {:7.1f} segments/s, {:.2f} ms of CPU each, {:6.1f} "
         "commits/s of {:5.1f} segments, {:.0f} kB; disk alone appends {:7.1f} "
@@ -206,14 +235,26 @@ void Run(const Options& options) {
         appending.back(),
         segments / disk.overwrite_s,
         overwriting.back());
+    fmt::print(
+        "  of its time: log {:.0f} %, its syncs {:.0f} %, database {:.0f} %, "
+        "its syncs {:.0f} %; wrote {:.2f} and {:.2f} times the bytes; the disk "
+        "alone writing twice: ratio {:.2f}\n",
+        100 * store.log.write_s / store.seconds,
+        100 * store.log.sync_s / store.seconds,
+        100 * store.database.write_s / store.seconds,
+        100 * store.database.sync_s / store.seconds,
+        static_cast<double>(store.log.bytes) / store.bytes,
+        static_cast<double>(store.database.bytes) / store.bytes,
+        twice.back());
     std::fflush(stdout);
   }
   fmt::print(
       "streams {:3d}: median ratio {:.2f} to appending, {:.2f} to "
-      "overwriting\n",
+      "overwriting, {:.2f} to appending twice\n",
       options.streams,
       Median(appending),
-      Median(overwriting));
+      Median(overwriting),
+      Median(twice));
 }
 
 }  // namespace

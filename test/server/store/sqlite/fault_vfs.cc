@@ -1,5 +1,6 @@
 #include "test/server/store/sqlite/fault_vfs.h"
 
+#include <chrono>
 #include <filesystem>
 #include <utility>
 
@@ -31,11 +32,20 @@ int Read(sqlite3_file* file, void* to, int size, sqlite3_int64 offset) {
   return Real(file)->pMethods->xRead(Real(file), to, size, offset);
 }
 
+double Now() {
+  return std::chrono::duration<double>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
 int Write(sqlite3_file* file, const void* from, int size, sqlite3_int64 at) {
   const int code =
       Shim(file)->vfs->Before(*Shim(file)->name, Kind::kWrite, at, from, size);
   if (code != SQLITE_OK) return code;
-  return Real(file)->pMethods->xWrite(Real(file), from, size, at);
+  const double start = Now();
+  const int done = Real(file)->pMethods->xWrite(Real(file), from, size, at);
+  Shim(file)->vfs->Used(*Shim(file)->name, {size, 0, Now() - start, 0});
+  return done;
 }
 
 int Truncate(sqlite3_file* file, sqlite3_int64 size) {
@@ -49,7 +59,10 @@ int Sync(sqlite3_file* file, int flags) {
   const int code =
       Shim(file)->vfs->Before(*Shim(file)->name, Kind::kSync, 0, nullptr, 0);
   if (code != SQLITE_OK) return code;
-  return Real(file)->pMethods->xSync(Real(file), flags);
+  const double start = Now();
+  const int done = Real(file)->pMethods->xSync(Real(file), flags);
+  Shim(file)->vfs->Used(*Shim(file)->name, {0, 1, 0, Now() - start});
+  return done;
 }
 
 int FileSize(sqlite3_file* file, sqlite3_int64* size) {
@@ -174,13 +187,26 @@ int FaultVfs::operations() const {
   return operations_;
 }
 
-int FaultVfs::syncs(const std::string& suffix) const {
+DiskUse& DiskUse::operator+=(const DiskUse& other) {
+  bytes += other.bytes;
+  syncs += other.syncs;
+  write_s += other.write_s;
+  sync_s += other.sync_s;
+  return *this;
+}
+
+DiskUse FaultVfs::use(const std::string& suffix) const {
   const std::lock_guard lock(mutex_);
-  int count = 0;
-  for (const auto& [file, syncs] : syncs_) {
-    if (file.ends_with(suffix)) count += syncs;
+  DiskUse sum;
+  for (const auto& [file, use] : use_) {
+    if (file.ends_with(suffix)) sum += use;
   }
-  return count;
+  return sum;
+}
+
+void FaultVfs::Used(const std::string& file, const DiskUse& use) {
+  const std::lock_guard lock(mutex_);
+  use_[file] += use;
 }
 
 void FaultVfs::StartRecording() {
@@ -215,7 +241,6 @@ int FaultVfs::Before(const std::string& file,
     const int code = fault_(operations_, kind);
     if (code != SQLITE_OK) return code;
   }
-  if (kind == Kind::kSync) ++syncs_[file];
   if (recording_) {
     recorded_.push_back(
         {kind,

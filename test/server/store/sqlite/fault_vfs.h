@@ -25,6 +25,16 @@ struct DiskOperation {
   int mark = 0;             // of the test
 };
 
+// What files took of the disk.
+struct DiskUse {
+  std::int64_t bytes = 0;  // written
+  int syncs = 0;
+  double write_s = 0;
+  double sync_s = 0;
+
+  DiskUse& operator+=(const DiskUse& other);
+};
+
 class FaultVfs {
  public:
   FaultVfs();
@@ -41,8 +51,10 @@ class FaultVfs {
   // No file grows beyond this; 0: no limit.
   void SetMaxFileBytes(std::int64_t bytes);
 
-  int operations() const;                      // since SetFault
-  int syncs(const std::string& suffix) const;  // of files of this ending
+  int operations() const;  // since SetFault
+  // Of files whose names end so, since this was made.
+  DiskUse use(const std::string& suffix) const;
+  int syncs(const std::string& suffix) const { return use(suffix).syncs; }
 
   void StartRecording();
   void Mark(int mark);
@@ -54,6 +66,7 @@ class FaultVfs {
              std::int64_t offset,
              const void* bytes,
              std::int64_t size);
+  void Used(const std::string& file, const DiskUse& use);
   void Deleted(const std::string& file);
   sqlite3_vfs* real() const { return real_; }
 
@@ -65,7 +78,7 @@ class FaultVfs {
   Fault fault_;
   int operations_ = 0;
   std::int64_t max_file_bytes_ = 0;
-  std::map<std::string, int> syncs_;
+  std::map<std::string, DiskUse> use_;
   bool recording_ = false;
   std::vector<DiskOperation> recorded_;
 };
