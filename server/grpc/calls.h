@@ -16,6 +16,8 @@
 #include "server/access/grants.h"
 #include "server/api/api.h"
 #include "server/grpc/call_threads.h"
+#include "server/grpc/memory_pool.h"
+#include "server/grpc/read_gate.h"
 
 namespace selfcal::server {
 
@@ -25,6 +27,8 @@ struct CallContext {
   const Api* api = nullptr;
   Role local_role = Role::kAdminister;  // of callers without a certificate
   CallThreads* threads = nullptr;
+  ReadGate* reads = nullptr;
+  MemoryPool* work = nullptr;  // for what requests become
   WatchSender* watches = nullptr;
   std::chrono::milliseconds max_write_time{60'000};  // of one response
   int max_exchanges = 256;                           // at once
@@ -34,6 +38,10 @@ struct CallContext {
 // Limit on the requests of one exchange that are read and not yet answered:
 // enough to fill a commit while another is being written to disk.
 inline constexpr int kReadAhead = 4;
+
+// What a request needs in bytes, for each of its own, while it is parsed,
+// converted, and packed to be stored.
+inline constexpr std::int64_t kWorkPerByte = 4;
 
 using Rpc = grpc::CallbackServerContext;
 

@@ -27,6 +27,8 @@ class ExchangeCall final : public Reactor {
  public:
   ExchangeCall(const CallContext& context, const Method& method, const Rpc& rpc)
       : method_(method),
+        reads_(context.reads),
+        work_(context.work),
         exchanges_(context.exchanges),
         call_{CallerOf(rpc, context.local_role),
               [this] { return gone_.load(); }},
@@ -68,6 +70,7 @@ class ExchangeCall final : public Reactor {
  private:
   struct Slot {
     bool filled = false;
+    MemoryPool::Share work;  // until it is filled
     absl::Status status;
     grpc::ByteBuffer response;
   };
@@ -83,12 +86,21 @@ class ExchangeCall final : public Reactor {
         lock.lock();
       } else if (!reading_ && !closed_ && !Ending() &&
                  answers_.size() < kReadAhead) {
+        lock.unlock();
+        auto admitted = reads_->Enter(last_bytes_, [this] { return !Goes(); });
+        lock.lock();
+        if (!admitted) continue;
+        admitted_ = *std::move(admitted);
         reading_ = true;
         lock.unlock();
         StartRead(&bytes_);
         lock.lock();
-      } else {
+      } else if (!admitted_.held()) {
         changed_.wait(lock);
+      } else if (changed_.wait_for(lock, ReadGate::kLook) ==
+                     std::cv_status::timeout &&
+                 !arrived_) {
+        admitted_.Look();
       }
     }
     const grpc::Status status = failed_        ? ToGrpc(failure_)
@@ -110,12 +122,22 @@ class ExchangeCall final : public Reactor {
 
   bool Ending() const { return failed_ || gone_; }
 
+  bool Goes() {
+    const std::lock_guard lock(mutex_);
+    return !Ending();
+  }
+
   void Take(Slot* slot) {
+    last_bytes_ = static_cast<std::int64_t>(bytes_.Length());
+    auto work =
+        work_->Acquire(kWorkPerByte * last_bytes_, [this] { return !Goes(); });
+    if (!work) return Fill(slot, absl::CancelledError(""), *method_.response);
     const std::unique_ptr<Message> request(method_.request->New());
-    if (const absl::Status parsed = Parse(bytes_, request.get());
-        !parsed.ok()) {
-      return Fill(slot, parsed, *method_.response);
-    }
+    const absl::Status parsed = Parse(bytes_, request.get());
+    bytes_.Clear();
+    admitted_.End();
+    if (!parsed.ok()) return Fill(slot, parsed, *method_.response);
+    slot->work = *std::move(work);
     exchange_->Take(
         *request,
         [this, slot](const absl::Status& status, const Message& response) {
@@ -134,6 +156,7 @@ class ExchangeCall final : public Reactor {
       slot->status = status;
       slot->response = std::move(bytes);
       slot->filled = true;
+      slot->work.Shrink(0);
       next = NextToWrite();
       changed_.notify_all();
     }
@@ -154,11 +177,15 @@ class ExchangeCall final : public Reactor {
   }
 
   const Method& method_;
+  ReadGate* const reads_;
+  MemoryPool* const work_;
   std::atomic<int>* const exchanges_;
   std::atomic<bool> gone_ = false;  // the caller has disconnected
   const Call call_;
   const std::unique_ptr<Exchange> exchange_;  // of the thread
   grpc::ByteBuffer bytes_;                    // being read
+  ReadGate::Admission admitted_;              // for it; of the thread
+  std::int64_t last_bytes_ = 0;  // of the last request; of the thread
 
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;

@@ -39,6 +39,22 @@ void SetUpLibrary() {
   });
 }
 
+// The memory of messages is divided: a half is for gRPC, which ends streams
+// beyond that, and most of this for reads that are admitted, so that it does
+// not; the other half is for what requests become. Two of the largest messages
+// have room.
+std::int64_t WorkBytes(const ServerOptions& options) {
+  return options.max_memory_bytes / 2;
+}
+std::int64_t ReadBytes(const ServerOptions& options) {
+  return std::max<std::int64_t>(options.max_memory_bytes * 3 / 8,
+                                options.max_receive_bytes);
+}
+std::int64_t QuotaBytes(const ServerOptions& options) {
+  return std::max<std::int64_t>(options.max_memory_bytes / 2,
+                                std::int64_t{2} * options.max_receive_bytes);
+}
+
 void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
   builder->SetMaxReceiveMessageSize(options.max_receive_bytes);
   // gRPC inflates a message before it looks at its size: two megabytes become
@@ -47,7 +63,7 @@ void SetLimits(const ServerOptions& options, grpc::ServerBuilder* builder) {
     builder->SetCompressionAlgorithmSupportStatus(algorithm, false);
   }
   grpc::ResourceQuota quota("selfcal");
-  quota.Resize(static_cast<std::size_t>(options.max_memory_bytes));
+  quota.Resize(static_cast<std::size_t>(QuotaBytes(options)));
   builder->SetResourceQuota(quota);
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
                               options.max_streams);
@@ -116,11 +132,15 @@ class GrpcServer final : public Server {
  public:
   GrpcServer(Api* api, const ServerOptions& options)
       : api_(api),
+        reads_(ReadBytes(options), options.max_receive_bytes),
+        work_(WorkBytes(options)),
         threads_(options.max_threads),
         watches_(options.max_watches) {
     const CallContext context{api,
                               options.local_role,
                               &threads_,
+                              &reads_,
+                              &work_,
                               &watches_,
                               options.max_write_time,
                               options.max_segment_streams,
@@ -198,6 +218,8 @@ class GrpcServer final : public Server {
   }
 
   Api* const api_;
+  ReadGate reads_;
+  MemoryPool work_;
   CallThreads threads_;
   WatchSender watches_;
   std::atomic<int> exchanges_ = 0;

@@ -20,13 +20,19 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
       : method_(method),
         call_{CallerOf(rpc, context.local_role),
               [this] { return gone_.load(); }},
+        work_(context.work),
         request_(request),
         response_(response) {}
 
   void Run() {
+    const auto work = work_->Acquire(
+        kWorkPerByte * static_cast<std::int64_t>(request_.Length()),
+        [this] { return gone_.load(); });
     const std::unique_ptr<Message> request(method_.request->New());
     const std::unique_ptr<Message> response(method_.response->New());
-    absl::Status status = Parse(request_, request.get());
+    absl::Status status = work ? Parse(request_, request.get())
+                               : absl::CancelledError("the caller has gone");
+    request_.Clear();
     if (status.ok()) {
       status = std::get<UnaryHandler>(method_.handler)(
           call_, *request, response.get());
@@ -42,7 +48,8 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   const Method& method_;
   std::atomic<bool> gone_ = false;  // the caller has disconnected
   const Call call_;
-  const grpc::ByteBuffer request_;
+  MemoryPool* const work_;
+  grpc::ByteBuffer request_;
   grpc::ByteBuffer* const response_;
 };
 

@@ -3,7 +3,6 @@
 #include <grpcpp/generic/generic_stub.h>
 
 #include <array>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -12,16 +11,6 @@
 
 namespace selfcal::server {
 namespace {
-
-// The most memory that the process has had resident [MiB].
-int PeakMiB(pid_t pid) {
-  std::ifstream status("/proc/" + std::to_string(pid) + "/status");
-  for (std::string word; status >> word;) {
-    int kib = 0;
-    if (word == "VmHWM:" && status >> kib) return kib >> 10;
-  }
-  return 0;
-}
 
 class CompressedMessages : public DaemonTest {
  protected:
@@ -54,7 +43,7 @@ TEST_F(CompressedMessages, AreRefusedBeforeTheyAreInflated) {
   constexpr int kAllowedMiB = 32;
   const auto daemon = StartAndWait();
   CreateRig();
-  const int before = PeakMiB(daemon->pid());
+  const int before = daemon->PeakMiB();
   Promise promise("a compressed message takes no more memory than its bytes");
   for (const char* method : {"/grpc.health.v1.Health/Check",
                              "/selfcal.v1.RigService/GetRig",
@@ -65,7 +54,7 @@ TEST_F(CompressedMessages, AreRefusedBeforeTheyAreInflated) {
       EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED)
           << method << ": " << status.error_message();
       ++promise.trials;
-      promise.lost += PeakMiB(daemon->pid()) - before > kAllowedMiB;
+      promise.lost += daemon->PeakMiB() - before > kAllowedMiB;
     }
   }
   CreateRig(TestRig("next"));

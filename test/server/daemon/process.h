@@ -10,6 +10,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -49,6 +50,16 @@ class Process {
 
   pid_t pid() const { return pid_; }
   void Signal(int signal) const { kill(pid_, signal); }
+
+  // The most memory that it has had resident [MiB].
+  int PeakMiB() const {
+    std::ifstream status("/proc/" + std::to_string(pid_) + "/status");
+    for (std::string word; status >> word;) {
+      int kib = 0;
+      if (word == "VmHWM:" && status >> kib) return kib >> 10;
+    }
+    return 0;
+  }
 
   // The exit code, or minus the signal that ended it; nothing if it still runs
   // after a minute.
