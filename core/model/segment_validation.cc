@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/model/calibration.h"
+#include "core/model/image_bounds.h"
 #include "core/model/segment.h"
 #include "core/model/violation_list.h"
 
@@ -261,10 +262,7 @@ std::string PixelFault(const Eigen::Vector2d& z_px,
                        const CameraCalibration& camera,
                        double margin_px) {
   if (!z_px.allFinite()) return "is not finite";
-  const bool inside = z_px.x() >= -margin_px && z_px.y() >= -margin_px &&
-                      z_px.x() <= camera.width_px + margin_px &&
-                      z_px.y() <= camera.height_px + margin_px;
-  if (inside) return "";
+  if (IsInImage(camera, z_px, margin_px)) return "";
   return "(" + Readable(z_px.x()) + ", " + Readable(z_px.y()) +
          ") is outside the image of " + std::to_string(camera.width_px) +
          " x " + std::to_string(camera.height_px) + " px";

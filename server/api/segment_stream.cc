@@ -1,6 +1,7 @@
 #include "server/api/segment_stream.h"
 
 #include <atomic>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +36,8 @@ void FillVerdict(const SubmitResult& result,
   switch (result.verdict) {
     case SubmitResult::Verdict::kStored:
       response->set_verdict(v1::StreamSegmentsResponse::STORED);
+      response->set_observations_dropped(
+          static_cast<std::int32_t>(result.observations_dropped));
       return;
     case SubmitResult::Verdict::kDuplicate:
       response->set_verdict(v1::StreamSegmentsResponse::DUPLICATE);

@@ -12,6 +12,7 @@
 
 #include "core/calibration/settled_ends.h"
 #include "core/information/segment_scorer.h"
+#include "core/model/image_bounds.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/rescoring.h"
 #include "server/pipeline/scoring.h"
@@ -160,18 +161,25 @@ class PipelineImpl : public Pipeline {
                    const std::function<bool()>& cancelled,
                    const SubmitDone& submitted) override {
     const SubmitDone done = Observed(rig, submitted);
-    auto violations = Check(rig, segment);
-    if (!violations.ok()) return done(violations.status());
-    if (!violations->empty()) {
-      return done(SubmitResult{SubmitResult::Verdict::kRejected,
-                               *std::move(violations)});
-    }
-    const absl::Status place = scoring_.TakePlace(rig, cancelled);
-    if (!place.ok()) return done(place);
-    recalibrator_.ContinueSession(rig);
-    domain_->BeginPutSegment(rig, segment, [this, rig, done](const auto& v) {
-      done(Settle(rig, v));
-    });
+    const absl::StatusOr<StoredRig> stored_rig = store_->GetRig(rig);
+    if (!stored_rig.ok()) return done(stored_rig.status());
+    const Calibration& factory = stored_rig->rig.factory;
+    const std::size_t stray =
+        CountStrayObservations(segment, factory, options_.limits);
+    if (stray == 0) return BeginStore(rig, factory, segment, cancelled, done);
+    MotionSegment rest = segment;
+    RemoveStrayObservations(factory, options_.limits, &rest);
+    BeginStore(rig,
+               factory,
+               rest,
+               cancelled,
+               [done, stray](absl::StatusOr<SubmitResult> result) {
+                 const bool stored =
+                     result.ok() &&
+                     result->verdict == SubmitResult::Verdict::kStored;
+                 if (stored) result->observations_dropped = stray;
+                 done(result);
+               });
   }
 
   void EndSession(const std::string& rig) override {
@@ -317,6 +325,27 @@ class PipelineImpl : public Pipeline {
     };
   }
 
+  // BeginSubmit of a segment without stray observations, to a rig with this
+  // factory calibration.
+  void BeginStore(const std::string& rig,
+                  const Calibration& factory,
+                  const MotionSegment& segment,
+                  const std::function<bool()>& cancelled,
+                  const SubmitDone& done) {
+    auto violations = Check(rig, factory, segment);
+    if (!violations.ok()) return done(violations.status());
+    if (!violations->empty()) {
+      return done(SubmitResult{SubmitResult::Verdict::kRejected,
+                               *std::move(violations)});
+    }
+    const absl::Status place = scoring_.TakePlace(rig, cancelled);
+    if (!place.ok()) return done(place);
+    recalibrator_.ContinueSession(rig);
+    domain_->BeginPutSegment(rig, segment, [this, rig, done](const auto& v) {
+      done(Settle(rig, v));
+    });
+  }
+
   // Fills the place in the backlog with the segment that was stored, or returns
   // the place.
   absl::StatusOr<SubmitResult> Settle(
@@ -333,10 +362,10 @@ class PipelineImpl : public Pipeline {
   // Every violation of a segment: those of its values, and of the version that
   // it names, which only the store knows.
   absl::StatusOr<std::vector<Violation>> Check(const std::string& rig_name,
+                                               const Calibration& factory,
                                                const MotionSegment& segment) {
-    SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store_->GetRig(rig_name));
     std::vector<Violation> violations =
-        Validate(segment, rig.rig.factory, options_.limits);
+        Validate(segment, factory, options_.limits);
     const bool names_version =
         std::none_of(violations.begin(), violations.end(), [](const auto& v) {
           return v.field == kVersionField;

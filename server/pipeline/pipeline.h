@@ -105,6 +105,8 @@ struct SubmitResult {
   enum class Verdict { kStored, kDuplicate, kRejected };
   Verdict verdict = Verdict::kRejected;
   std::vector<Violation> violations;  // if rejected
+  // Observations outside the image that were left out of what is stored.
+  std::size_t observations_dropped = 0;
 };
 
 // An update to the watchers of a run.
@@ -139,7 +141,8 @@ class Pipeline {
   // unknown rig; errors of the store are passed on. Blocks while the backlog is
   // full, until `cancelled` returns true (then CANCELLED). UNAVAILABLE while
   // the pipeline is not started. The segment must have been estimated with a
-  // published version of the rig, or it is rejected.
+  // published version of the rig, or it is rejected. A few observations outside
+  // the image do not reject it: they are not stored (image_bounds.h).
   virtual absl::StatusOr<SubmitResult> Submit(
       const std::string& rig,
       const MotionSegment& segment,

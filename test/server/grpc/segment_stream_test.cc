@@ -86,6 +86,15 @@ TEST_F(SegmentStreamTest, EverySegmentIsAnsweredInOrderAndStored) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
+TEST_F(SegmentStreamTest, StatesHowManyObservationsWereLeftOut) {
+  const Rig rig = AddRig();
+  Stream stream(segments_.get());
+  pipeline_->submit_hook = [](const auto&) {
+    return SubmitResult{SubmitResult::Verdict::kStored, {}, 6};
+  };
+  EXPECT_EQ(stream.Send(TestSegments(rig, 1)[0]).observations_dropped(), 6);
+}
+
 TEST_F(SegmentStreamTest, ItsEndIsTheEndOfASessionIfItStoredAnything) {
   const Rig rig = AddRig();
   const MotionSegment segment = TestSegments(rig, 1)[0];

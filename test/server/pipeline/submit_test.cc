@@ -48,6 +48,53 @@ TEST_F(SubmitTest, RejectionNamesEveryFieldAndStoresNothing) {
   EXPECT_TRUE(store_->ListSegments("a", {})->items.empty());
 }
 
+TEST_F(SubmitTest, AFewObservationsOutsideTheImageAreLeftOutAndCounted) {
+  CreateRig();
+  // The data remains until the score needs it no more.
+  std::mutex gate;
+  std::unique_lock hold(gate);
+  estimators_.score = [&](const Rig& rig, const auto&, const auto& segment) {
+    const std::lock_guard wait(gate);
+    return FakeInformation(rig, EntropyOf(segment.key.index));
+  };
+  StartOne();
+  MotionSegment segment = Segment(0);
+  const std::size_t count = segment.observations.size();
+  ASSERT_GT(count, 150u);
+  segment.observations[7].z_px.x() = -3;
+  segment.observations[120].z_px.y() = 1e4;
+  const auto result = pipeline_->Submit("a", segment, nullptr);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->verdict, SubmitVerdict::kStored);
+  EXPECT_EQ(result->observations_dropped, 2u);
+  const auto stored = store_->GetSegmentData("a", segment.key);
+  EXPECT_TRUE(stored.ok()) << stored.status();
+  if (stored.ok()) {
+    EXPECT_EQ(stored->observations.size(), count - 2);
+    EXPECT_EQ(stored->landmarks.size(), segment.landmarks.size());
+  }
+  const auto again = pipeline_->Submit("a", segment, nullptr);
+  hold.unlock();
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->verdict, SubmitVerdict::kDuplicate);
+  EXPECT_EQ(again->observations_dropped, 0u);
+}
+
+TEST_F(SubmitTest, ManyObservationsOutsideTheImageRejectTheSegment) {
+  CreateRig();
+  StartOne();
+  MotionSegment segment = Segment(0);
+  for (std::size_t i = 0; i < segment.observations.size(); i += 20) {
+    segment.observations[i].z_px.x() = 5000;
+  }
+  const auto result = pipeline_->Submit("a", segment, nullptr);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->verdict, SubmitVerdict::kRejected);
+  EXPECT_EQ(result->observations_dropped, 0u);
+  ASSERT_FALSE(result->violations.empty());
+  EXPECT_EQ(result->violations[0].field, "observations[0].z_px");
+}
+
 TEST_F(SubmitTest, VersionBelowOneIsNamedOnce) {
   CreateRig();
   StartOne();

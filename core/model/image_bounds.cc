@@ -1,0 +1,52 @@
+#include "core/model/image_bounds.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace selfcal {
+namespace {
+
+bool IsOutside(const Observation& observation,
+               const Calibration& theta,
+               const SegmentLimits& limits) {
+  return observation.camera >= 0 &&
+         static_cast<std::size_t>(observation.camera) < theta.cameras.size() &&
+         observation.z_px.allFinite() &&
+         !IsInImage(theta.cameras[observation.camera],
+                    observation.z_px,
+                    limits.pixel_margin_px);
+}
+
+}  // namespace
+
+bool IsInImage(const CameraCalibration& camera,
+               const Eigen::Vector2d& z_px,
+               double margin_px) {
+  // Each comparison is false for NaN.
+  return z_px.x() >= -margin_px && z_px.y() >= -margin_px &&
+         z_px.x() <= camera.width_px + margin_px &&
+         z_px.y() <= camera.height_px + margin_px;
+}
+
+std::size_t CountStrayObservations(const MotionSegment& segment,
+                                   const Calibration& theta,
+                                   const SegmentLimits& limits) {
+  const auto& all = segment.observations;
+  const auto outside = static_cast<std::size_t>(
+      std::count_if(all.begin(), all.end(), [&](const Observation& o) {
+        return IsOutside(o, theta, limits);
+      }));
+  const double most = kMaxOutsideFraction * static_cast<double>(all.size());
+  return static_cast<double>(outside) <= most ? outside : 0;
+}
+
+void RemoveStrayObservations(const Calibration& theta,
+                             const SegmentLimits& limits,
+                             MotionSegment* segment) {
+  if (CountStrayObservations(*segment, theta, limits) == 0) return;
+  std::erase_if(segment->observations, [&](const Observation& o) {
+    return IsOutside(o, theta, limits);
+  });
+}
+
+}  // namespace selfcal
