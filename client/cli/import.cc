@@ -45,6 +45,8 @@ v1::StreamSegmentsResponse ToResponse(const Acknowledgement& ack) {
       message.set_verdict(v1::StreamSegmentsResponse::REJECTED);
       break;
   }
+  message.set_observations_dropped(
+      static_cast<std::int32_t>(ack.observations_dropped));
   for (const Violation& violation : ack.violations) {
     v1::FieldViolation* added = message.add_violations();
     added->set_field(violation.field);

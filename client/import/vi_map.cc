@@ -339,7 +339,10 @@ absl::StatusOr<ViMapRecording> ReadViMap(const std::string& folder,
 }
 
 std::vector<MotionSegment> BuildSegments(const ViMapRecording& recording,
-                                         const SegmentBuilderOptions& options) {
+                                         const SegmentBuilderOptions& given) {
+  // The map recognises landmarks after a gap.
+  SegmentBuilderOptions options = given;
+  options.new_ids_after_gap = false;
   SegmentBuilder builder(options);
   std::vector<MotionSegment> segments;
   const auto take = [&] {

@@ -68,6 +68,9 @@ struct Acknowledgement {
   SegmentKey key;
   Verdict verdict = Verdict::kStored;
   std::vector<Violation> violations;  // the reasons for a rejection
+  // Observations outside the image that the daemon has left out of a segment
+  // that it stored.
+  std::uint64_t observations_dropped = 0;
 };
 
 // Counts of segments unless stated otherwise.
@@ -80,8 +83,13 @@ struct StreamStatistics {
   std::uint64_t resent = 0;             // sent again after a reconnection
   std::uint64_t connections = 0;        // connections that the daemon answered
   std::uint64_t callback_failures = 0;  // callbacks that threw
-  std::uint64_t spooled = 0;            // written to the spool
-  std::uint64_t spool_recovered = 0;    // found in the spool at the start
+  // Tracks in the closed segments that were assembled (AssemblyStatistics).
+  std::uint64_t tracks_triangulated = 0;
+  std::uint64_t tracks_dropped = 0;
+  // Observations that the daemon has left out (Acknowledgement).
+  std::uint64_t observations_dropped = 0;
+  std::uint64_t spooled = 0;          // written to the spool
+  std::uint64_t spool_recovered = 0;  // found in the spool at the start
   // Quarantined in the spool, because the file differs from what was written.
   std::uint64_t spool_damaged = 0;
   std::uint64_t spool_failures = 0;  // disk errors

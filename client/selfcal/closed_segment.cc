@@ -1,10 +1,13 @@
 #include "client/selfcal/closed_segment.h"
 
 #include <algorithm>
-#include <span>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
+
+#include "client/selfcal/state_time.h"
+#include "client/selfcal/track_positions.h"
+#include "core/calibration/problem.h"
 
 namespace selfcal::client {
 namespace {
@@ -43,31 +46,142 @@ std::vector<std::vector<const KeyframeObservation*>> WithoutDuplicates(
   return all;
 }
 
-// Adds the landmarks that are seen often enough, in the order of their first
-// observation, and their observations.
-void AddLandmarks(const ClosedSegment& closed, MotionSegment* segment) {
-  const auto keyframes = WithoutDuplicates(closed.keyframes);
-  std::unordered_map<std::uint64_t, int> count;
-  for (const auto& observations : keyframes) {
-    for (const KeyframeObservation* seen : observations) {
-      ++count[seen->landmark_id];
+// What the segment knows of one landmark.
+struct LandmarkRecord {
+  int observations = 0;
+  std::optional<Eigen::Vector3d> p_G;  // the last one
+  std::int32_t index = -1;             // in the segment
+};
+
+bool IsPosition(const Eigen::Vector3d& p_G) {
+  constexpr SegmentLimits kLimits;
+  // The comparison is false for NaN.
+  return p_G.cwiseAbs().maxCoeff() <= kLimits.max_position_m;
+}
+
+using KeyframeSightings = std::vector<std::vector<const KeyframeObservation*>>;
+
+// The landmarks of a segment, by the id of the SLAM system.
+class Landmarks {
+ public:
+  Landmarks(const KeyframeSightings& keyframes, int min_observations)
+      : keyframes_(keyframes) {
+    for (const auto& observations : keyframes) {
+      for (const KeyframeObservation* seen : observations) {
+        LandmarkRecord& record = records_[seen->landmark_id];
+        ++record.observations;
+        if (IsPosition(seen->p_G)) record.p_G = seen->p_G;
+      }
+    }
+    std::erase_if(records_, [&](const auto& entry) {
+      return entry.second.observations < min_observations;
+    });
+  }
+
+  // Triangulates the landmarks without a position, and removes those that have
+  // none then.
+  void CompletePositions(const ClosedSegment& closed,
+                         const std::vector<KeyframeState>& states,
+                         AssemblyStatistics* statistics) {
+    const auto lacks_position = [](const auto& entry) {
+      return !entry.second.p_G.has_value();
+    };
+    const auto count = static_cast<std::uint64_t>(
+        std::count_if(records_.begin(), records_.end(), lacks_position));
+    if (count == 0) return;
+    if (closed.theta != nullptr) Triangulate(closed, states);
+    const std::uint64_t dropped = std::erase_if(records_, lacks_position);
+    statistics->tracks_dropped += dropped;
+    statistics->tracks_triangulated += count - dropped;
+  }
+
+  // Adds the landmarks, in the order of their first observation, and their
+  // observations.
+  void AddTo(MotionSegment* segment) {
+    for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+      for (const KeyframeObservation* seen : keyframes_[k]) {
+        const auto found = records_.find(seen->landmark_id);
+        if (found == records_.end()) continue;
+        LandmarkRecord& record = found->second;
+        if (record.index < 0) {
+          record.index = static_cast<std::int32_t>(segment->landmarks.size());
+          segment->landmarks.push_back({seen->landmark_id, *record.p_G});
+        }
+        segment->observations.push_back({static_cast<std::int32_t>(k),
+                                         seen->camera,
+                                         record.index,
+                                         seen->z_px});
+      }
     }
   }
-  std::unordered_map<std::uint64_t, std::int32_t> index;
-  for (std::size_t k = 0; k < keyframes.size(); ++k) {
-    for (const KeyframeObservation* seen : keyframes[k]) {
-      if (count[seen->landmark_id] < closed.min_observations) continue;
-      const auto next = static_cast<std::int32_t>(segment->landmarks.size());
-      const auto [entry, is_new] = index.emplace(seen->landmark_id, next);
-      if (is_new) segment->landmarks.push_back({seen->landmark_id, seen->p_G});
-      segment->landmarks[static_cast<std::size_t>(entry->second)].p_G =
-          seen->p_G;
-      segment->observations.push_back({static_cast<std::int32_t>(k),
-                                       seen->camera,
-                                       entry->second,
-                                       seen->z_px});
+
+ private:
+  void Triangulate(const ClosedSegment& closed,
+                   const std::vector<KeyframeState>& states) {
+    const std::vector<Track> tracks =
+        TracksWithoutPosition(closed.theta->cameras.size());
+    const auto positions = TriangulateTracks(*closed.theta,
+                                             states,
+                                             closed.imu,
+                                             tracks,
+                                             closed.pixel_sigma_px,
+                                             closed.gravity_mps2);
+    for (std::size_t t = 0; t < tracks.size(); ++t) {
+      if (positions[t] && IsPosition(*positions[t])) {
+        records_[tracks[t].id].p_G = positions[t];
+      }
     }
   }
+
+  std::vector<Track> TracksWithoutPosition(std::size_t cameras) const {
+    std::vector<Track> tracks;
+    std::unordered_map<std::uint64_t, std::size_t> index;
+    for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+      for (const KeyframeObservation* seen : keyframes_[k]) {
+        const auto found = records_.find(seen->landmark_id);
+        if (found == records_.end() || found->second.p_G) continue;
+        // The daemon refuses such a camera; here it must not be used.
+        const auto camera = static_cast<std::size_t>(seen->camera);
+        if (seen->camera < 0 || camera >= cameras) continue;
+        const auto [entry, is_new] =
+            index.emplace(seen->landmark_id, tracks.size());
+        if (is_new) tracks.push_back({seen->landmark_id});
+        tracks[entry->second].observations.push_back(
+            {static_cast<int>(k), seen->camera, seen->z_px});
+      }
+    }
+    for (Track& track : tracks) {
+      std::stable_sort(track.observations.begin(),
+                       track.observations.end(),
+                       [](const auto& a, const auto& b) {
+                         return a.keyframe != b.keyframe
+                                    ? a.keyframe < b.keyframe
+                                    : a.camera < b.camera;
+                       });
+    }
+    return tracks;
+  }
+
+  const KeyframeSightings& keyframes_;
+  std::unordered_map<std::uint64_t, LandmarkRecord> records_;
+};
+
+// The states at the timestamps of their images.
+std::vector<KeyframeState> StatesAtImages(const ClosedSegment& closed) {
+  const ImuCalibration imu =
+      closed.theta == nullptr ? ImuCalibration{} : closed.theta->imu;
+  std::vector<KeyframeState> states;
+  states.reserve(closed.keyframes.size());
+  for (const ObservedKeyframe& keyframe : closed.keyframes) {
+    KeyframeState state = keyframe.state;
+    if (keyframe.state_offset_ns != 0) {
+      state.t_ns += keyframe.state_offset_ns;
+      state = MoveState(
+          state, keyframe.state.t_ns, closed.imu, imu, closed.gravity_mps2);
+    }
+    states.push_back(state);
+  }
+  return states;
 }
 
 // Returns the samples from the last at or before `begin_ns` to the first at or
@@ -89,20 +203,26 @@ std::vector<ImuSample> ImuBetween(const std::vector<ImuSample>& imu,
 
 }  // namespace
 
-MotionSegment Assemble(const ClosedSegment& closed) {
+MotionSegment Assemble(const ClosedSegment& closed,
+                       AssemblyStatistics* statistics) {
+  AssemblyStatistics unused;
   MotionSegment segment;
   segment.key = closed.key;
   segment.calibration_version = closed.calibration_version;
   segment.temperature_c = closed.temperature_c;
-  segment.keyframes.reserve(closed.keyframes.size());
-  for (const ObservedKeyframe& keyframe : closed.keyframes) {
-    segment.keyframes.push_back(keyframe.state);
-  }
+  segment.keyframes = StatesAtImages(closed);
   if (!closed.keyframes.empty()) {
+    const ObservedKeyframe& first = closed.keyframes.front();
     segment.imu = ImuBetween(
-        closed.imu, closed.keyframes.front().state.t_ns, closed.end_ns);
+        closed.imu,
+        first.state.t_ns + std::min<std::int64_t>(first.state_offset_ns, 0),
+        closed.end_ns);
   }
-  AddLandmarks(closed, &segment);
+  const KeyframeSightings sightings = WithoutDuplicates(closed.keyframes);
+  Landmarks landmarks(sightings, closed.min_observations);
+  landmarks.CompletePositions(
+      closed, segment.keyframes, statistics == nullptr ? &unused : statistics);
+  landmarks.AddTo(&segment);
   return segment;
 }
 

@@ -6,10 +6,12 @@
 
 namespace selfcal::client {
 
-std::variant<EncodedSegment, Acknowledgement> Encode(const std::string& rig,
-                                                     UnencodedSegment segment) {
+std::variant<EncodedSegment, Acknowledgement> Encode(
+    const std::string& rig,
+    UnencodedSegment segment,
+    AssemblyStatistics* statistics) {
   if (const auto* closed = std::get_if<ClosedSegment>(&segment)) {
-    segment = Assemble(*closed);
+    segment = Assemble(*closed, statistics);
   }
   const auto& assembled = std::get<MotionSegment>(segment);
   auto request = std::make_shared<v1::StreamSegmentsRequest>();

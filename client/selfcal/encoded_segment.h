@@ -24,8 +24,11 @@ struct EncodedSegment {
 };
 
 // Assembles and encodes a segment; the number is left 0. Returns a rejection if
-// the segment does not fit into a message. Throws std::bad_alloc.
-std::variant<EncodedSegment, Acknowledgement> Encode(const std::string& rig,
-                                                     UnencodedSegment segment);
+// the segment does not fit into a message. Adds to *statistics unless it is
+// null. Throws std::bad_alloc.
+std::variant<EncodedSegment, Acknowledgement> Encode(
+    const std::string& rig,
+    UnencodedSegment segment,
+    AssemblyStatistics* statistics = nullptr);
 
 }  // namespace selfcal::client

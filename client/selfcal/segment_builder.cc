@@ -4,16 +4,24 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <memory>
 #include <new>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "client/selfcal/observation_filter.h"
+#include "client/selfcal/pending_keyframe.h"
+#include "core/model/rig.h"
+
 namespace selfcal::client {
 namespace {
 
+// Largest time between a state and its images.
+constexpr std::uint64_t kMaxStateOffset_ns = 500'000'000;
+
 // Without these, a vector that grows would copy every observation.
-static_assert(std::is_nothrow_move_constructible_v<ObservedKeyframe>);
+static_assert(std::is_nothrow_move_constructible_v<PendingKeyframe>);
 static_assert(std::is_nothrow_move_constructible_v<ClosedSegment>);
 
 std::int64_t Nanoseconds(double seconds) {
@@ -38,9 +46,12 @@ struct SegmentBuilder::State {
   std::uint64_t max_gap_ns;
   std::uint64_t seconds_ns;
   std::int64_t next_index;
+  Estimation estimation;
+  bool healthy = true;
+  ObservationFilter filter;
   // Keyframes of the current segment and, while IMU samples lag behind, of
   // later ones.
-  std::vector<ObservedKeyframe> keyframes;
+  std::vector<PendingKeyframe> keyframes;
   // Samples from the last one at or before the first keyframe.
   std::vector<ImuSample> imu;
   std::optional<std::int64_t> last_keyframe_ns;
@@ -52,23 +63,46 @@ struct SegmentBuilder::State {
       : options(given),
         max_gap_ns(static_cast<std::uint64_t>(Nanoseconds(given.max_gap_s))),
         seconds_ns(static_cast<std::uint64_t>(Nanoseconds(given.seconds))),
-        next_index(given.first_index) {}
+        next_index(given.first_index) {
+    estimation.version = given.calibration_version;
+    if (given.theta) SetTheta(*given.theta);
+  }
+
+  bool SetTheta(const Calibration& theta) {
+    if (!Validate(theta, "").empty()) return false;
+    estimation.theta = std::make_shared<const Calibration>(theta);
+    return true;
+  }
+
+  void SetHealthy(bool now) {
+    if (now == healthy) return;
+    healthy = now;
+    if (healthy) {
+      filter.StartNewIds();
+    } else {
+      statistics.keyframes_unhealthy += keyframes.size();
+      keyframes.clear();
+    }
+  }
 
   // Number of keyframes of the segment that starts with the first keyframe, if
-  // the keyframe after the segment has arrived.
+  // the keyframe after the segment has arrived. 1 if that has another version.
   std::optional<std::size_t> ClosedSize() const {
-    if (options.seconds > 0) {
-      for (std::size_t n = 2; n < keyframes.size(); ++n) {
-        if (Elapsed(keyframes[n].state.t_ns, keyframes[0].state.t_ns) >=
-            seconds_ns) {
-          return n;
-        }
-      }
-      return std::nullopt;
+    if (keyframes.empty()) return std::nullopt;
+    for (std::size_t n = 1; n < keyframes.size(); ++n) {
+      const bool same_version =
+          keyframes[n].estimation.version == keyframes[0].estimation.version;
+      if (!same_version || (n >= 2 && IsFull(n))) return n;
     }
-    const auto full = static_cast<std::size_t>(std::max(options.keyframes, 2));
-    if (keyframes.size() > full) return full;
     return std::nullopt;
+  }
+
+  // True if the first n keyframes make a segment, given the one after them.
+  bool IsFull(std::size_t n) const {
+    if (options.seconds > 0) {
+      return Elapsed(keyframes[n].t_ns(), keyframes[0].t_ns()) >= seconds_ns;
+    }
+    return n >= static_cast<std::size_t>(std::max(options.keyframes, 2));
   }
 
   bool ImuReaches(std::int64_t t_ns) const {
@@ -88,24 +122,27 @@ struct SegmentBuilder::State {
     // Allocations come first: if one fails, nothing has changed.
     ClosedSegment segment;
     segment.key = {options.session, next_index};
-    segment.calibration_version = options.calibration_version;
+    segment.calibration_version = keyframes.front().estimation.version;
     segment.min_observations = options.min_observations;
     segment.temperature_c = temperature_c;
     segment.end_ns = end_ns;
-    std::vector<ObservedKeyframe> next_keyframes;
-    next_keyframes.reserve(keyframes.size());
+    segment.theta = keyframes[size - 1].estimation.theta;
+    segment.pixel_sigma_px = options.pixel_sigma_px;
+    segment.gravity_mps2 = options.gravity_mps2;
+    segment.keyframes.reserve(size);
     std::vector<ImuSample> next_imu;
     next_imu.reserve(imu.size() + imu.size() / 8);
     closed.push_back(std::move(segment));
 
     const auto middle = keyframes.begin() + static_cast<std::ptrdiff_t>(size);
-    next_keyframes.insert(next_keyframes.end(),
-                          std::move_iterator(middle),
-                          std::move_iterator(keyframes.end()));
-    keyframes.erase(middle, keyframes.end());
-    next_imu.insert(next_imu.end(), SampleBefore(end_ns), imu.end());
-    closed.back().keyframes =
-        std::exchange(keyframes, std::move(next_keyframes));
+    for (auto it = keyframes.begin(); it != middle; ++it) {
+      closed.back().keyframes.push_back(std::move(it->observed));
+    }
+    keyframes.erase(keyframes.begin(), middle);
+    const std::int64_t next_begin_ns =
+        keyframes.empty() ? end_ns
+                          : std::min(end_ns, keyframes.front().begin_ns());
+    next_imu.insert(next_imu.end(), SampleBefore(next_begin_ns), imu.end());
     closed.back().imu = std::exchange(imu, std::move(next_imu));
     ++next_index;
     ++statistics.segments;
@@ -116,17 +153,26 @@ struct SegmentBuilder::State {
     if (imu.empty()) return;
     const auto first =
         std::find_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {
-          return k.state.t_ns >= imu.front().t_ns;
+          return k.begin_ns() >= imu.front().t_ns;
         });
+    DropBefore(first);
+  }
+
+  void DropBefore(std::vector<PendingKeyframe>::iterator end) {
     statistics.keyframes_dropped +=
-        static_cast<std::uint64_t>(first - keyframes.begin());
-    keyframes.erase(keyframes.begin(), first);
+        static_cast<std::uint64_t>(end - keyframes.begin());
+    keyframes.erase(keyframes.begin(), end);
   }
 
   void CloseWhatIs() {
     DropUncovered();
     while (const auto size = ClosedSize()) {
-      const std::int64_t end_ns = keyframes[*size].state.t_ns;
+      if (*size < 2) {
+        DropBefore(keyframes.begin() + 1);
+        continue;
+      }
+      const std::int64_t end_ns =
+          std::max(keyframes[*size].t_ns(), keyframes[*size - 1].end_ns());
       if (!ImuReaches(end_ns)) return;
       Close(*size, end_ns);
     }
@@ -135,18 +181,18 @@ struct SegmentBuilder::State {
   void Flush(int min_keyframes) {
     CloseWhatIs();
     std::size_t covered = keyframes.size();
-    while (covered > 0 && !ImuReaches(keyframes[covered - 1].state.t_ns)) {
+    while (covered > 0 && !ImuReaches(keyframes[covered - 1].end_ns())) {
       --covered;
     }
     if (covered >= static_cast<std::size_t>(std::max(min_keyframes, 2))) {
-      Close(covered, keyframes[covered - 1].state.t_ns);
+      Close(covered, keyframes[covered - 1].end_ns());
     }
-    statistics.keyframes_dropped += keyframes.size();
-    keyframes.clear();
+    DropBefore(keyframes.end());
   }
 
   bool AddImu(const ImuSample& sample);
   bool AddKeyframe(const KeyframeState& state,
+                   std::int64_t image_t_ns,
                    std::span<const KeyframeObservation> observations);
   // True if samples that have not arrived by this time will not arrive.
   bool IsStarved(std::int64_t t_ns) const;
@@ -162,8 +208,8 @@ bool SegmentBuilder::State::AddImu(const ImuSample& sample) {
   CloseWhatIs();
   // A keyframe may lag by max_gap. A keyframe that lags more cannot continue
   // the current segment, so that older samples are not needed.
-  if (!keyframes.empty() && sample.t_ns > keyframes.back().state.t_ns &&
-      Elapsed(sample.t_ns, keyframes.back().state.t_ns) > 2 * max_gap_ns) {
+  if (!keyframes.empty() && sample.t_ns > keyframes.back().t_ns() &&
+      Elapsed(sample.t_ns, keyframes.back().t_ns()) > 2 * max_gap_ns) {
     Flush(options.min_keyframes);
   }
   const auto lowest = std::numeric_limits<std::int64_t>::min();
@@ -178,23 +224,39 @@ bool SegmentBuilder::State::AddImu(const ImuSample& sample) {
 bool SegmentBuilder::State::IsStarved(std::int64_t t_ns) const {
   if (keyframes.empty()) return false;
   const std::int64_t since =
-      imu.empty() ? keyframes.front().state.t_ns
-                  : std::max(imu.back().t_ns, keyframes.front().state.t_ns);
+      imu.empty() ? keyframes.front().t_ns()
+                  : std::max(imu.back().t_ns, keyframes.front().t_ns());
   return t_ns > since && Elapsed(t_ns, since) > 2 * max_gap_ns;
 }
 
 bool SegmentBuilder::State::AddKeyframe(
     const KeyframeState& state,
+    std::int64_t image_t_ns,
     std::span<const KeyframeObservation> observations) {
-  if (last_keyframe_ns.has_value() && state.t_ns <= *last_keyframe_ns) {
+  if (!healthy) {
+    ++statistics.keyframes_unhealthy;
+    return false;
+  }
+  const bool is_later = !last_keyframe_ns || image_t_ns > *last_keyframe_ns;
+  const std::uint64_t apart = Elapsed(std::max(state.t_ns, image_t_ns),
+                                      std::min(state.t_ns, image_t_ns));
+  if (!is_later || apart > kMaxStateOffset_ns) {
     ++statistics.keyframes_refused;
     return false;
   }
   const bool gap =
-      !keyframes.empty() && Elapsed(state.t_ns, *last_keyframe_ns) > max_gap_ns;
-  if (gap || IsStarved(state.t_ns)) Flush(options.min_keyframes);
-  keyframes.push_back({state, {observations.begin(), observations.end()}});
-  last_keyframe_ns = state.t_ns;
+      last_keyframe_ns && Elapsed(image_t_ns, *last_keyframe_ns) > max_gap_ns;
+  if ((gap && !keyframes.empty()) || IsStarved(image_t_ns)) {
+    Flush(options.min_keyframes);
+  }
+  if (gap && options.new_ids_after_gap) filter.StartNewIds();
+  PendingKeyframe added{{state,
+                         filter.Filter(observations, estimation.theta.get()),
+                         state.t_ns - image_t_ns},
+                        estimation};
+  added.observed.state.t_ns = image_t_ns;
+  keyframes.push_back(std::move(added));
+  last_keyframe_ns = image_t_ns;
   CloseWhatIs();
   return true;
 }
@@ -203,7 +265,7 @@ bool SegmentBuilder::State::AddKeyframe(
 void SegmentBuilder::State::GiveUp() {
   ++statistics.out_of_memory;
   statistics.keyframes_dropped += keyframes.size();
-  std::vector<ObservedKeyframe>().swap(keyframes);
+  std::vector<PendingKeyframe>().swap(keyframes);
   std::vector<ImuSample>().swap(imu);
 }
 
@@ -231,13 +293,38 @@ bool SegmentBuilder::AddImu(const ImuSample& sample) noexcept {
 bool SegmentBuilder::AddKeyframe(
     const KeyframeState& state,
     std::span<const KeyframeObservation> observations) noexcept {
+  return AddKeyframe(state, state.t_ns, observations);
+}
+
+bool SegmentBuilder::AddKeyframe(
+    const KeyframeState& state,
+    std::int64_t image_t_ns,
+    std::span<const KeyframeObservation> observations) noexcept {
   if (state_ == nullptr) return false;
   try {
-    return state_->AddKeyframe(state, observations);
+    return state_->AddKeyframe(state, image_t_ns, observations);
   } catch (...) {
     state_->GiveUp();
     return false;
   }
+}
+
+void SegmentBuilder::SetCalibrationVersion(std::int64_t version) noexcept {
+  if (state_ != nullptr) state_->estimation.version = version;
+}
+
+bool SegmentBuilder::SetTheta(const Calibration& theta) noexcept {
+  if (state_ == nullptr) return false;
+  try {
+    return state_->SetTheta(theta);
+  } catch (...) {
+    ++state_->statistics.out_of_memory;
+    return false;
+  }
+}
+
+void SegmentBuilder::SetHealthy(bool healthy) noexcept {
+  if (state_ != nullptr) state_->SetHealthy(healthy);
 }
 
 bool SegmentBuilder::SetTemperature(
@@ -261,7 +348,11 @@ std::optional<ClosedSegment> SegmentBuilder::TakeClosed() noexcept {
 std::optional<MotionSegment> SegmentBuilder::Take() noexcept {
   while (const auto closed = TakeClosed()) {
     try {
-      return Assemble(*closed);
+      AssemblyStatistics counts;
+      MotionSegment segment = Assemble(*closed, &counts);
+      state_->statistics.tracks_triangulated += counts.tracks_triangulated;
+      state_->statistics.tracks_dropped += counts.tracks_dropped;
+      return segment;
     } catch (...) {
       ++state_->statistics.out_of_memory;
       --state_->statistics.segments;
@@ -285,7 +376,10 @@ std::int64_t SegmentBuilder::next_index() const noexcept {
 }
 
 SegmentBuilderStatistics SegmentBuilder::statistics() const noexcept {
-  return state_ == nullptr ? SegmentBuilderStatistics{} : state_->statistics;
+  if (state_ == nullptr) return {};
+  SegmentBuilderStatistics statistics = state_->statistics;
+  statistics.observations_dropped = state_->filter.dropped();
+  return statistics;
 }
 
 }  // namespace selfcal::client

@@ -111,7 +111,9 @@ void SegmentKeeper::EncodeIncoming() {
   if (!incoming.has_value()) return;
   std::variant<EncodedSegment, Acknowledgement> result;
   try {
-    result = Encode(options_.rig, *std::move(incoming));
+    AssemblyStatistics counts;
+    result = Encode(options_.rig, *std::move(incoming), &counts);
+    queue_->NoteAssembled(counts);
   } catch (const std::exception&) {
     queue_->NoteDropped();
     throw;

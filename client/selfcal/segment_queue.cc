@@ -115,6 +115,7 @@ bool SegmentQueue::Acknowledge(const Acknowledgement& ack) {
     if (!segment.has_value()) return false;
     if (segment->on_disk) finished_files_.push_back(segment->number);
     Count(ack.verdict, &statistics_);
+    statistics_.observations_dropped += ack.observations_dropped;
     ++callbacks_due_;
   }
   work_.notify_one();
@@ -182,6 +183,12 @@ SegmentQueue::State SegmentQueue::WaitForChange(
 std::optional<UnencodedSegment> SegmentQueue::TakeIncoming() {
   std::lock_guard lock(mutex_);
   return incoming_.Take();
+}
+
+void SegmentQueue::NoteAssembled(const AssemblyStatistics& counts) {
+  std::lock_guard lock(mutex_);
+  statistics_.tracks_triangulated += counts.tracks_triangulated;
+  statistics_.tracks_dropped += counts.tracks_dropped;
 }
 
 bool SegmentQueue::ReserveRoom() {

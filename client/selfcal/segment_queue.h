@@ -94,6 +94,8 @@ class SegmentQueue {
   // Hands the oldest incoming segment to the keeper, which must end with it by
   // one of the next four functions before it takes another.
   std::optional<UnencodedSegment> TakeIncoming();
+  // Counts what the assembly of the incoming segment did.
+  void NoteAssembled(const AssemblyStatistics& counts);
   // Reserves room for a segment that is read from disk, until Append or
   // ReportSpool. Returns false if there is none.
   bool ReserveRoom();

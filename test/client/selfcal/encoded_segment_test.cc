@@ -24,7 +24,7 @@ TEST(EncodedSegment, IsAssembledFirstIfItIsNot) {
   closed.min_observations = 2;
   closed.keyframes.resize(2);
   for (ObservedKeyframe& keyframe : closed.keyframes) {
-    keyframe.observations.push_back({0, 11});
+    keyframe.observations.push_back({0, 11, {5, 5}, {0, 0, 1}});
   }
   closed.keyframes[0].observations.push_back({0, 12});  // too few of these
   const auto result = Encode("device", std::move(closed));
@@ -33,6 +33,20 @@ TEST(EncodedSegment, IsAssembledFirstIfItIsNot) {
   EXPECT_EQ(encoded->key.index, 3);
   EXPECT_EQ(encoded->request->segment().keyframes().t_ns_size(), 2);
   EXPECT_EQ(encoded->request->segment().landmarks().id_size(), 1);
+}
+
+TEST(EncodedSegment, CountsTheTracksThatItsAssemblyDropped) {
+  ClosedSegment closed;
+  closed.min_observations = 2;
+  closed.keyframes.resize(2);
+  for (ObservedKeyframe& keyframe : closed.keyframes) {
+    keyframe.observations.push_back({0, 11, {5, 5}});
+  }
+  AssemblyStatistics counts;
+  const auto result = Encode("device", std::move(closed), &counts);
+  EXPECT_TRUE(std::holds_alternative<EncodedSegment>(result));
+  EXPECT_EQ(counts.tracks_triangulated, 0u);
+  EXPECT_EQ(counts.tracks_dropped, 1u);
 }
 
 TEST(EncodedSegment, IsARejectionIfNoMessageCanContainIt) {

@@ -423,6 +423,180 @@ TEST_F(RegularStream, EndsASegmentAtAGapBetweenKeyframes) {
   EXPECT_EQ(next->imu.front().t_ns, 58'000 * kMs);
 }
 
+TEST_F(RegularStream, ASwitchOfTheVersionEndsTheSegmentAndLosesNothing) {
+  AddImuUntil(350);  // the IMU lags behind
+  for (int k = 0; k < 3; ++k) AddKeyframe(100 * k);
+  builder_.SetCalibrationVersion(2);
+  EXPECT_FALSE(builder_.Take().has_value()) << "its end has not arrived";
+  for (int k = 3; k < 9; ++k) AddKeyframe(100 * k);
+  AddImuUntil(1000);
+  const auto before = builder_.Take();
+  ASSERT_TRUE(before.has_value());
+  EXPECT_EQ(before->calibration_version, 1);
+  EXPECT_EQ(before->key.index, 0);
+  EXPECT_EQ(before->keyframes.size(), 3u);
+  EXPECT_EQ(before->imu.back().t_ns, 300 * kMs) << "joined with the next";
+  const auto after = builder_.Take();
+  ASSERT_TRUE(after.has_value());
+  EXPECT_EQ(after->calibration_version, 2);
+  EXPECT_EQ(after->key.index, 1);
+  EXPECT_EQ(after->keyframes.size(), 5u);
+  EXPECT_EQ(after->keyframes.front().t_ns, 300 * kMs);
+  builder_.SetCalibrationVersion(2);
+  AddKeyframe(900);
+  AddKeyframe(1000);
+  builder_.Flush(2);
+  EXPECT_EQ(builder_.Take()->keyframes.size(), 3u) << "not a switch";
+  EXPECT_EQ(builder_.statistics().keyframes_dropped, 0u);
+}
+
+TEST_F(RegularStream, AVersionOfASingleKeyframeIsDroppedAndCounted) {
+  AddImuUntil(2000);
+  AddKeyframe(0);
+  builder_.SetCalibrationVersion(2);
+  for (int k = 1; k < 7; ++k) AddKeyframe(100 * k);
+  const auto segment = builder_.Take();
+  ASSERT_TRUE(segment.has_value());
+  EXPECT_EQ(segment->keyframes.front().t_ns, 100 * kMs);
+  EXPECT_EQ(segment->key.index, 0);
+  EXPECT_EQ(builder_.statistics().keyframes_dropped, 1u);
+}
+
+TEST_F(RegularStream, SendsNothingOfAnUnhealthyFilter) {
+  AddImuUntil(3000);
+  for (int k = 0; k < 9; ++k) AddKeyframe(100 * k);
+  builder_.SetHealthy(false);
+  builder_.SetHealthy(false);
+  EXPECT_EQ(builder_.Take()->keyframes.size(), 5u) << "complete before";
+  EXPECT_FALSE(AddKeyframe(900));
+  builder_.Flush(2);
+  EXPECT_FALSE(builder_.Take().has_value());
+  EXPECT_EQ(builder_.statistics().keyframes_unhealthy, 5u);
+  builder_.SetHealthy(true);
+  for (int k = 15; k < 21; ++k) EXPECT_TRUE(AddKeyframe(100 * k));
+  const auto next = builder_.Take();
+  ASSERT_TRUE(next.has_value());
+  EXPECT_EQ(next->key.index, 1);
+  EXPECT_EQ(next->keyframes.front().t_ns, 1500 * kMs);
+  EXPECT_EQ(next->imu.front().t_ns, 1500 * kMs);
+  EXPECT_EQ(builder_.statistics().keyframes_dropped, 0u);
+}
+
+// Ids of the landmarks of the next segment.
+std::set<std::uint64_t> LandmarkIds(SegmentBuilder& builder) {
+  std::set<std::uint64_t> ids;
+  const auto segment = builder.Take();
+  EXPECT_TRUE(segment.has_value());
+  if (!segment) return ids;
+  for (const Landmark& landmark : segment->landmarks) ids.insert(landmark.id);
+  return ids;
+}
+
+TEST_F(RegularStream, IdsThatStartAgainAfterABreakAreOtherLandmarks) {
+  AddImuUntil(17'000);
+  const std::vector<KeyframeObservation> seen = {{0, 1, {5, 5}, {0, 0, 1}},
+                                                 {0, 2, {6, 5}, {0, 1, 1}}};
+  for (int k = 0; k < 11; ++k) AddKeyframe(100 * k, seen);
+  const auto first = LandmarkIds(builder_);
+  EXPECT_EQ(first, (std::set<std::uint64_t>{1, 2}));
+  EXPECT_EQ(LandmarkIds(builder_), first) << "no break";
+
+  builder_.SetHealthy(false);
+  builder_.SetHealthy(true);
+  for (int k = 11; k < 17; ++k) AddKeyframe(100 * k, seen);
+  const auto second = LandmarkIds(builder_);
+  EXPECT_EQ(second.size(), 2u);
+  EXPECT_FALSE(second.contains(1) || second.contains(2));
+
+  builder_.Flush(2);
+  for (int k = 150; k < 156; ++k) AddKeyframe(100 * k, seen);
+  const auto third = LandmarkIds(builder_);
+  EXPECT_EQ(third.size(), 2u);
+  for (const std::uint64_t id : third) {
+    EXPECT_FALSE(first.contains(id) || second.contains(id)) << "a gap of 13 s";
+  }
+}
+
+TEST_F(RegularStream, KeepsIdsOverAGapForASystemWithAMap) {
+  SegmentBuilderOptions options = FiveKeyframes();
+  options.new_ids_after_gap = false;
+  builder_ = SegmentBuilder(options);
+  AddImuUntil(17'000);
+  const std::vector<KeyframeObservation> seen = {{0, 1, {5, 5}, {0, 0, 1}}};
+  for (int k = 0; k < 6; ++k) AddKeyframe(100 * k, seen);
+  for (int k = 150; k < 156; ++k) AddKeyframe(100 * k, seen);
+  EXPECT_EQ(LandmarkIds(builder_), LandmarkIds(builder_));
+}
+
+TEST_F(RegularStream, DropsAndCountsObservationsOutsideTheImage) {
+  ASSERT_TRUE(builder_.SetTheta(TwoCameras()));
+  AddImuUntil(1000);
+  for (int k = 0; k < 6; ++k) {
+    AddKeyframe(100 * k,
+                {{0, 1, {5, 5}, {0, 0, 1}}, {1, 2, {-4, 5}, {0, 0, 1}}});
+  }
+  const auto segment = builder_.Take();
+  ASSERT_TRUE(segment.has_value());
+  EXPECT_EQ(segment->observations.size(), 5u);
+  EXPECT_EQ(segment->landmarks.size(), 1u);
+  EXPECT_EQ(builder_.statistics().observations_dropped, 6u);
+}
+
+TEST_F(RegularStream, IgnoresAThetaThatIsNotValid) {
+  Calibration theta = TwoCameras();
+  theta.cameras[1].f.x() = -1;
+  EXPECT_FALSE(builder_.SetTheta(theta));
+  EXPECT_FALSE(builder_.SetTheta({})) << "no camera";
+  SegmentBuilderOptions options = FiveKeyframes();
+  options.theta = theta;
+  builder_ = SegmentBuilder(options);
+  AddImuUntil(1000);
+  for (int k = 0; k < 6; ++k) AddKeyframe(100 * k, {{0, 1, {-9, 5}}});
+  EXPECT_EQ(builder_.statistics().observations_dropped, 0u);
+  EXPECT_TRUE(builder_.Take()->landmarks.empty());
+  EXPECT_EQ(builder_.statistics().tracks_dropped, 1u);
+}
+
+TEST_F(RegularStream, WaitsForTheSamplesThatMoveAState) {
+  for (int k = 0; k < 5; ++k) {
+    KeyframeState state;
+    state.t_ns = (100 * k + 30) * kMs;
+    ASSERT_TRUE(builder_.AddKeyframe(state, 100 * k * kMs, {}));
+  }
+  AddImuUntil(400);
+  builder_.Flush(2);
+  const auto covered = builder_.Take();
+  ASSERT_TRUE(covered.has_value());
+  EXPECT_EQ(covered->keyframes.size(), 4u) << "the state of the fifth is later";
+  EXPECT_EQ(covered->keyframes.back().t_ns, 300 * kMs);
+  EXPECT_EQ(covered->imu.back().t_ns, 350 * kMs);
+}
+
+TEST_F(RegularStream, SendsTheSamplesFromAStateBeforeItsImageOn) {
+  AddImuUntil(3000);
+  for (int k = 1; k < 12; ++k) {
+    KeyframeState state;
+    state.t_ns = (100 * k - 30) * kMs;
+    ASSERT_TRUE(builder_.AddKeyframe(state, 100 * k * kMs, {}));
+  }
+  for (const std::int64_t begin_ms : {50, 550}) {
+    const auto segment = builder_.Take();
+    ASSERT_TRUE(segment.has_value());
+    EXPECT_EQ(segment->keyframes.front().t_ns, (begin_ms + 50) * kMs);
+    EXPECT_EQ(segment->imu.front().t_ns, begin_ms * kMs);
+  }
+}
+
+TEST_F(RegularStream, RefusesAStateFarFromItsImage) {
+  KeyframeState state;
+  state.t_ns = 2000 * kMs;
+  EXPECT_FALSE(builder_.AddKeyframe(state, 1000 * kMs, {}));
+  EXPECT_FALSE(builder_.AddKeyframe(
+      state, std::numeric_limits<std::int64_t>::min(), {}));
+  EXPECT_EQ(builder_.statistics().keyframes_refused, 2u);
+  EXPECT_TRUE(builder_.AddKeyframe(state, 1600 * kMs, {}));
+}
+
 TEST_F(RegularStream, IsBoundedWhenTheImuIsSilent) {
   for (int k = 0; k < 5000; ++k) AddKeyframe(100 * k);
   EXPECT_FALSE(builder_.Take().has_value());

@@ -56,6 +56,19 @@ TEST_F(SegmentQueueTest, HoldsNoMoreSegmentsThanItMay) {
   EXPECT_EQ(queue_.statistics().dropped, 3u);
 }
 
+TEST_F(SegmentQueueTest, CountsWhatAssemblyAndDaemonHaveDropped) {
+  queue_.NoteAssembled({.tracks_triangulated = 40, .tracks_dropped = 3});
+  queue_.NoteAssembled({.tracks_triangulated = 50, .tracks_dropped = 4});
+  ASSERT_TRUE(queue_.Push(Segment(0)));
+  MoveToWindow(0);
+  queue_.Open();
+  ASSERT_NE(queue_.Next(), nullptr);
+  ASSERT_TRUE(queue_.Acknowledge({{"walk", 0}, Verdict::kStored, {}, 6}));
+  EXPECT_EQ(queue_.statistics().tracks_triangulated, 90u);
+  EXPECT_EQ(queue_.statistics().tracks_dropped, 7u);
+  EXPECT_EQ(queue_.statistics().observations_dropped, 6u);
+}
+
 TEST_F(SegmentQueueTest, LeavesRoomForASegmentThatIsReadFromDisk) {
   SpoolReport report;
   report.opened = true;
