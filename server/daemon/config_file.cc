@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "proto/nearest_word.h"
 #include "server/daemon/settings.h"
 
 namespace selfcal::server {
@@ -53,6 +54,14 @@ std::string WrongKind(const std::string& name) {
   return "'" + name + "' must be a string, a number or a list of strings";
 }
 
+std::vector<std::string> SettingsOf(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    names.push_back(option->get_single_name());
+  }
+  return names;
+}
+
 // Applies a value; returns an error message, or nullopt if it is valid.
 std::optional<std::string> Set(const std::string& name,
                                bool is_flag,
@@ -62,7 +71,9 @@ std::optional<std::string> Set(const std::string& name,
   app.set_help_flag();  // the help flag is not a setting
   DefineSettings(&app, Environment::kIgnore, options);
   if (app.get_option_no_throw("--" + name) == nullptr) {
-    return "there is no setting '" + name + "'; selfcald --help lists them";
+    const std::string meant = DidYouMean(name, SettingsOf(app));
+    return "there is no setting '" + name + "'" +
+           (meant.empty() ? ";" : meant) + " selfcald --help lists them";
   }
   const bool takes_flag =
       app.get_option("--" + name)->get_items_expected_max() == 0;

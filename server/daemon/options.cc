@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <vector>
 
+#include "proto/nearest_word.h"
 #include "server/daemon/config_file.h"
 #include "server/daemon/settings.h"
 
@@ -30,7 +32,10 @@ class CommandLine {
     try {
       app_.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-      return app_.exit(error) == 0 ? 0 : kUsageError;
+      const int code = app_.exit(error);
+      if (code == 0) return 0;
+      SuggestFlags();
+      return kUsageError;
     }
     return std::nullopt;
   }
@@ -38,6 +43,23 @@ class CommandLine {
   const std::string& file() const { return file_; }
 
  private:
+  // For each word that is unknown, the flag that was meant.
+  void SuggestFlags() const {
+    std::vector<std::string> known;
+    for (const CLI::Option* option : app_.get_options()) {
+      known.push_back("--" + option->get_single_name());
+    }
+    for (const std::string& word : app_.remaining()) {
+      const std::string flag = word.substr(0, word.find('='));
+      const std::string nearest = NearestWord(flag, known);
+      if (nearest.empty()) continue;
+      std::fprintf(stderr,
+                   "there is no flag '%s'; did you mean '%s'?\n",
+                   flag.c_str(),
+                   nearest.c_str());
+    }
+  }
+
   CLI::App app_{
       "selfcald scores motion segments, keeps the most informative ones and "
       "calibrates cameras and IMU with them."};

@@ -18,6 +18,7 @@
 #include "server/daemon/heap.h"
 #include "server/daemon/log.h"
 #include "server/daemon/service_manager.h"
+#include "server/daemon/startable.h"
 #include "server/daemon/state_lock.h"
 #include "server/daemon/stop.h"
 #include "server/domain/domain.h"
@@ -267,6 +268,14 @@ int Check(const DaemonOptions& options) {
     status = CheckConsole(OptionsOfConsole(options));
   }
   if (!status.ok()) return Failed("the settings are invalid", status);
+  status = CheckStateFolder(options.state_dir);
+  if (status.ok()) {
+    std::vector<std::string> ports;
+    if (options.metrics != "off") ports.push_back(options.metrics);
+    if (options.console != "off") ports.push_back(options.console);
+    status = CheckAddresses(options.state_dir, options.server.listen, ports);
+  }
+  if (!status.ok()) return Failed("the daemon cannot start", status);
   spdlog::info("the settings are valid; state-dir {}, listening on {}",
                options.state_dir.string(),
                fmt::join(options.server.listen, ", "));

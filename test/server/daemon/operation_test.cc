@@ -34,6 +34,18 @@ class OperationTest : public DaemonTest {
     std::ofstream(folder_ / name) << text;
     return folder_ / name;
   }
+
+  std::unique_ptr<Process> Check(const std::filesystem::path& state,
+                                 const std::vector<std::string>& settings) {
+    std::vector<std::string> arguments = {
+        SELFCALD_PATH, "--state-dir", state.string(), "--check"};
+    arguments.insert(arguments.end(), settings.begin(), settings.end());
+    const std::string log = "check" + std::to_string(++checks_);
+    return std::make_unique<Process>(arguments, folder_ / log);
+  }
+
+ private:
+  int checks_ = 0;
 };
 
 TEST_F(OperationTest, CheckLooksAtTheSettingsAndEnds) {
@@ -86,6 +98,95 @@ TEST_F(OperationTest, AStopDoesNotWaitForABackupThatNobodyReads) {
     }
     EXPECT_FALSE(reader->Finish().ok());
   }
+}
+
+TEST_F(OperationTest, CheckRefusesWhatCannotStart) {
+  const auto refuses = [this](const std::vector<std::string>& settings,
+                              const std::string& why) {
+    const auto check = Check(state_, settings);
+    EXPECT_EQ(check->Wait(), 1) << why;
+    EXPECT_THAT(check->Log(), HasSubstr(why));
+  };
+  const std::string file = File("file", "not a folder");
+  for (const std::string& state : {file, file + "/below"}) {
+    const auto check = Check(state, {"--listen", "insecure:127.0.0.1:0"});
+    EXPECT_EQ(check->Wait(), 1);
+    EXPECT_THAT(check->Log(), HasSubstr("is not a folder"));
+  }
+  refuses({"--listen", "insecure:127.0.0.1:99999"}, "from 0 to 65535");
+  refuses({"--listen", "insecure:127.0.0.1"}, "host:port");
+  refuses({"--listen", "insecure:no.such.host.invalid:7447"},
+          "the host is unknown");
+  refuses({"--listen", "insecure:203.0.113.1:7447"}, "cannot listen on");
+  refuses({"--listen", "unix:" + std::string(200, 'x')}, "1 to 107 characters");
+  refuses({"--listen", "unix:" + (folder_ / "none" / "socket").string()},
+          "there is no folder");
+  refuses({"--listen", "unix:" + file}, "is not a socket");
+  refuses({"--listen",
+           "insecure:127.0.0.1:7447",
+           "--listen",
+           "insecure:127.0.0.1:7447"},
+          "is given twice");
+  refuses({"--socket-group", "no-such-group"}, "there is no group");
+  EXPECT_FALSE(std::filesystem::exists(state_));
+}
+
+TEST_F(OperationTest, CheckRefusesWhatAnotherUses) {
+  const auto daemon =
+      StartAndWait({"--listen",
+                    "unix:" + (state_ / "selfcald.sock").string(),
+                    "--listen",
+                    "insecure:127.0.0.1:0"});
+  const std::string log = daemon->Log();
+  std::smatch port;
+  ASSERT_TRUE(std::regex_search(log, port, std::regex("127.0.0.1:([0-9]+)")));
+  const auto same_state = Start({"--check"});
+  EXPECT_EQ(same_state->Wait(), 1);
+  EXPECT_THAT(same_state->Log(), HasSubstr("in use by another selfcald"));
+  const std::filesystem::path other = folder_ / "other";
+  const auto same_port =
+      Check(other, {"--listen", "insecure:127.0.0.1:" + port[1].str()});
+  EXPECT_EQ(same_port->Wait(), 1);
+  EXPECT_THAT(same_port->Log(), HasSubstr("cannot listen on"));
+  const auto same_socket =
+      Check(other, {"--listen", "unix:" + (state_ / "selfcald.sock").string()});
+  EXPECT_EQ(same_socket->Wait(), 1);
+  EXPECT_THAT(same_socket->Log(), HasSubstr("another program listens"));
+  daemon->Signal(SIGTERM);
+  EXPECT_EQ(daemon->Wait(), 0);
+}
+
+TEST_F(OperationTest, CheckLooksAtTheDatabaseWithoutChangingIt) {
+  {
+    const auto daemon = StartAndWait();
+    daemon->Signal(SIGTERM);
+    EXPECT_EQ(daemon->Wait(), 0);
+  }
+  const std::string database = (state_ / "selfcal.db").string();
+  const std::string before = ReadBytes(database);
+  const auto good = Start({"--check"});
+  EXPECT_EQ(good->Wait(), 0) << good->Log();
+  EXPECT_EQ(ReadBytes(database), before);
+  std::string later = before;
+  later[63] = static_cast<char>(0x7f);  // the schema version
+  WriteBytes(database, later);
+  const auto newer = Start({"--check"});
+  EXPECT_EQ(newer->Wait(), 1);
+  EXPECT_THAT(newer->Log(), HasSubstr("has schema version 127"));
+  WriteBytes(database, "something else");
+  const auto foreign = Start({"--check"});
+  EXPECT_EQ(foreign->Wait(), 1);
+  EXPECT_THAT(foreign->Log(), HasSubstr("is not an SQLite database"));
+}
+
+TEST_F(OperationTest, UnknownSettingsAreAnsweredWithTheNearest) {
+  const auto flag = Start({"--check", "--max-rig=5"});
+  EXPECT_EQ(flag->Wait(), 2);
+  EXPECT_THAT(flag->Log(), HasSubstr("did you mean '--max-rigs'?"));
+  const auto key =
+      Start({"--check", "--config", File("c.toml", "scoring-treads = 2\n")});
+  EXPECT_EQ(key->Wait(), 2);
+  EXPECT_THAT(key->Log(), HasSubstr("did you mean 'scoring-threads'?"));
 }
 
 TEST_F(OperationTest, NoSecretReachesTheLog) {
