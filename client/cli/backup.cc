@@ -1,5 +1,6 @@
 // backup: copies the daemon's database to a file, atomically.
 #include <fmt/format.h>
+#include <google/protobuf/struct.pb.h>
 
 #include <memory>
 #include <string>
@@ -64,23 +65,31 @@ int Backup(Context* context, const std::string& path, bool force) {
     PrintError(std::string(written.message()));
     return kFailed;
   }
+  const std::string sha256 = HexText(arrived.sha256());
   if (context->json) {
-    context->PrintJson(arrived);
+    // The form of sha256sum, instead of base64.
+    google::protobuf::Struct document;
+    auto& fields = *document.mutable_fields();
+    fields["bytes"].set_string_value(fmt::format("{}", arrived.bytes()));
+    fields["sha256"].set_string_value(sha256);
+    context->PrintJson(document);
     return kDone;
   }
   Facts facts;
   facts.Add("backup", path);
   facts.Add("size", BytesText(arrived.bytes()));
-  facts.Add("sha256", HexText(arrived.sha256()));
+  facts.Add("sha256", sha256);
   context->Print(facts);
   return kDone;
 }
 
 }  // namespace
 
-void AddBackupCommand(CLI::App* app, Context* context) {
-  CLI::App* backup = app->add_subcommand(
-      "backup",
+CLI::App* AddBackup(CLI::App* parent,
+                    const std::string& name,
+                    Context* context) {
+  CLI::App* backup = parent->add_subcommand(
+      name,
       "Copy the daemon's database to a file; the copy is consistent, and the "
       "daemon continues to serve");
   const auto path = std::make_shared<std::string>();
@@ -92,6 +101,7 @@ void AddBackupCommand(CLI::App* app, Context* context) {
       return Backup(context, *path, *force);
     };
   });
+  return backup;
 }
 
 }  // namespace selfcal::client

@@ -6,6 +6,8 @@
 
 #include "client/cli/calibration_report.h"
 #include "client/cli/commands.h"
+#include "client/cli/filter_command.h"
+#include "client/cli/list_options.h"
 #include "client/text/estimate_text.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
@@ -16,16 +18,42 @@ namespace {
 
 using CalibrationService = v1::CalibrationService::StubInterface;
 
-int ListCalibrations(Context* context, const std::string& rig) {
+std::vector<FilterField> CalibrationFields() {
+  using Kind = FilterField::Kind;
+  return {{"version", Kind::kNumber},
+          {"state",
+           Kind::kText,
+           WordsOf<v1::Calibration::State>(v1::Calibration::State_descriptor(),
+                                           StateText)},
+          {"created", Kind::kTime},
+          {"verdict"}};
+}
+
+FieldValue ValueOf(const v1::Calibration& calibration, std::string_view field) {
+  if (field == "state") return StateText(calibration.state());
+  if (field == "created") return FilterTime(calibration.create_time());
+  if (field == "verdict") return VerdictText(calibration);
+  return static_cast<double>(calibration.version());
+}
+
+int ListCalibrations(Context* context,
+                     const std::string& rig,
+                     const ListOptions& options) {
+  const auto wanted =
+      Wanted<v1::Calibration>(options, CalibrationFields(), ValueOf);
+  if (!wanted.ok()) return FailInput(wanted.status());
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::ListCalibrationsRequest request;
   request.set_parent(RigName(rig));
   v1::ListCalibrationsResponse calibrations;
-  const auto status =
-      CallForAllPages<CalibrationService>(stub.get(),
-                                          &CalibrationService::ListCalibrations,
-                                          request,
-                                          &calibrations);
+  const auto status = CallForItems<CalibrationService>(
+      stub.get(),
+      &CalibrationService::ListCalibrations,
+      request,
+      &v1::ListCalibrationsResponse::mutable_calibrations,
+      options.limit,
+      *wanted,
+      &calibrations);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(calibrations);
@@ -36,7 +64,7 @@ int ListCalibrations(Context* context, const std::string& rig) {
                {"created"},
                {"origin"},
                {"verdict"},
-               {"reasons"}});
+               {"reasons", false, true}});
   for (const v1::Calibration& calibration : calibrations.calibrations()) {
     table.Add({fmt::format("{}", calibration.version()),
                StateText(calibration.state()),
@@ -92,10 +120,10 @@ int Activate(Context* context,
   return kDone;
 }
 
-int Diff(Context* context,
-         const std::string& rig,
-         const std::string& a,
-         const std::string& b) {
+int Compare(Context* context,
+            const std::string& rig,
+            const std::string& a,
+            const std::string& b) {
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::CompareCalibrationsRequest request;
   request.set_a(ChildName(rig, "calibrations", a));
@@ -150,16 +178,23 @@ int WatchCalibrations(Context* context,
 
 void AddCalibrationCommands(CLI::App* app, Context* context) {
   CLI::App* calibrations =
-      app->add_subcommand("calibrations", "Show versions of the calibration");
+      app->add_subcommand("calibration", "Show versions of the calibration")
+          ->alias("calibrations");
   calibrations->require_subcommand(1);
   const auto rig = std::make_shared<std::string>();
 
   CLI::App* list =
       calibrations->add_subcommand("list", "List the versions, newest first");
   list->add_option("RIG", *rig)->required();
-  list->callback([context, rig] {
-    context->command = [context, rig] {
-      return ListCalibrations(context, *rig);
+  const auto options = std::make_shared<ListOptions>();
+  AddListOptions(
+      list,
+      "the newest",
+      FilterHelp("state = rejected AND created >= 30d", CalibrationFields()),
+      options.get());
+  list->callback([context, rig, options] {
+    context->command = [context, rig, options] {
+      return ListCalibrations(context, *rig, *options);
     };
   });
 
@@ -193,18 +228,23 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   });
 
   const auto other = std::make_shared<std::string>("active");
-  CLI::App* diff = calibrations->add_subcommand(
-      "diff", "Compare two versions, given their uncertainty");
-  diff->add_option("RIG", *rig)->required();
-  diff->add_option("A", *version, "A number, or active")->required();
-  diff->add_option("B", *other, "A number, or active")->capture_default_str();
-  diff->callback([context, rig, version, other] {
+  CLI::App* compare =
+      calibrations
+          ->add_subcommand("compare",
+                           "Compare two versions, given their uncertainty")
+          ->alias("diff");
+  compare->add_option("RIG", *rig)->required();
+  compare->add_option("A", *version, "A number, or active")->required();
+  compare->add_option("B", *other, "A number, or active")
+      ->capture_default_str();
+  compare->callback([context, rig, version, other] {
     context->command = [context, rig, version, other] {
-      return Diff(context, *rig, *version, *other);
+      return Compare(context, *rig, *version, *other);
     };
   });
 
   AddCalibrationExport(calibrations, context);
+  AddCalibrationReport(calibrations, "report", context);
 
   const auto count = std::make_shared<std::int64_t>(0);
   CLI::App* watch = calibrations->add_subcommand(

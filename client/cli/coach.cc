@@ -68,7 +68,7 @@ Table AdviceTable(const AdviceResponse& response) {
                {"gain [nat]", true},
                {"by group"},
                {"largest improvement"},
-               {"what to do"}});
+               {"what to do", false, true}});
   int rank = 0;
   for (const auto& advice : response.advice()) {
     table.Add({fmt::format("{}", ++rank),
@@ -164,9 +164,11 @@ int WatchAdvice(Context* context,
 
 }  // namespace
 
-void AddCoachCommand(CLI::App* app, Context* context) {
-  CLI::App* coach = app->add_subcommand(
-      "coach", "Recommend the motions with the largest predicted gain");
+CLI::App* AddCoach(CLI::App* parent,
+                   const std::string& name,
+                   Context* context) {
+  CLI::App* coach = parent->add_subcommand(
+      name, "Recommend the motions with the largest predicted gain");
   const auto rig = std::make_shared<std::string>();
   const auto top = std::make_shared<int>(3);
   const auto watch = std::make_shared<bool>(false);
@@ -186,6 +188,7 @@ void AddCoachCommand(CLI::App* app, Context* context) {
                     : Coach(context, *rig, *top);
     };
   });
+  return coach;
 }
 
 }  // namespace selfcal::client

@@ -2,31 +2,50 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
 #include <functional>
 #include <memory>
+#include <set>
 #include <vector>
 
+#include "client/cli/choice.h"
 #include "client/cli/commands.h"
 #include "client/cli/context.h"
+#include "client/cli/missing_rig.h"
+#include "client/cli/usage_errors.h"
 
 namespace selfcal::client {
 namespace {
 
-std::vector<const CLI::App*> CommandsOf(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App*) { return true; });
-}
+// A person waits for the names of the rigs.
+constexpr std::chrono::milliseconds kRigTime{700};
 
-// Returns the flags of a command, without those of the program, e.g.
-// "--json --target ...".
-std::vector<std::string> FlagsOf(const CLI::App& app) {
-  std::vector<std::string> flags;
+// A flag, and whether a value follows it.
+struct Flag {
+  std::string name;  // "--target"
+  bool takes_value = false;
+};
+
+// Returns the flags of a command, without those of the program.
+std::vector<Flag> FlagsOf(const CLI::App& app) {
+  std::vector<Flag> flags;
   for (const CLI::Option* option :
        app.get_options([](const CLI::Option*) { return true; })) {
     for (const std::string& name : option->get_lnames()) {
-      flags.push_back("--" + name);
+      flags.push_back({"--" + name, option->get_items_expected_max() > 0});
     }
   }
   return flags;
+}
+
+// True if the first argument of a command is a rig.
+bool TakesRig(const CLI::App& command) {
+  for (const CLI::Option* option :
+       command.get_options([](const CLI::Option*) { return true; })) {
+    if (option->get_positional()) return option->get_single_name() == "RIG";
+  }
+  return false;
 }
 
 // Callback for each command, with the words that lead to it.
@@ -36,7 +55,7 @@ void ForEachCommand(const CLI::App& app,
                     const std::string& path,
                     const Visit& visit) {
   visit(path, app);
-  for (const CLI::App* command : CommandsOf(app)) {
+  for (const CLI::App* command : ShownCommands(app)) {
     ForEachCommand(
         *command,
         path.empty() ? command->get_name() : path + " " + command->get_name(),
@@ -53,40 +72,78 @@ std::string Quoted(const std::string& text) {
 
 }  // namespace
 
+// The names of rigs come from the daemon, with the connection that the line
+// names.
 std::string BashCompletion(const CLI::App& app) {
   std::string paths;
   std::string words;
+  std::string rigs;
+  std::set<std::string> with_value;
   ForEachCommand(app, "", [&](const std::string& path, const CLI::App& at) {
     std::string here;
-    for (const CLI::App* command : CommandsOf(at)) {
+    for (const CLI::App* command : ShownCommands(at)) {
       here += command->get_name() + " ";
       paths += fmt::format("      '{} {}') path=\"$path $word\" ;;\n",
                            path.empty() ? "" : " " + path,
                            command->get_name());
+      for (const std::string& alias : command->get_aliases()) {
+        paths += fmt::format("      '{} {}') path=\"$path {}\" ;;\n",
+                             path.empty() ? "" : " " + path,
+                             alias,
+                             command->get_name());
+      }
     }
-    for (const std::string& flag : FlagsOf(at)) here += flag + " ";
+    for (const Flag& flag : FlagsOf(at)) {
+      here += flag.name + " ";
+      if (flag.takes_value) with_value.insert(flag.name);
+    }
     words += fmt::format("    '{}') words={} ;;\n",
                          path.empty() ? "" : " " + path,
                          Quoted(here));
+    if (TakesRig(at)) rigs += (rigs.empty() ? "' " : "|' ") + path + "'";
   });
   std::string global;
-  for (const std::string& flag : FlagsOf(app)) global += flag + " ";
+  for (const Flag& flag : FlagsOf(app)) global += flag.name + " ";
   return fmt::format(
-      R"(_selfcal() {{
-  local path='' word words=''
+      R"sh(_selfcal() {{
+  local path='' word words='' flag='' arguments=0
+  local -a daemon=()
   for word in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
+    if [[ $word == = ]]; then continue; fi
+    if [[ -n $flag ]]; then
+      case "$flag" in
+        --target|--ca|--cert|--key) daemon+=("$flag" "$word") ;;
+      esac
+      flag=''
+      continue
+    fi
+    case "$word" in
+      {}) flag=$word; continue ;;
+      -*) continue ;;
+    esac
     case "$path $word" in
-{}    esac
+{}      *) arguments=$((arguments + 1)) ;;
+    esac
   done
   case "$path" in
 {}  esac
-  COMPREPLY=($(compgen -W "$words {}" -- "${{COMP_WORDS[COMP_CWORD]}}"))
+  words="$words {}"
+  if [[ $flag == --device ]]; then
+    words=$(selfcal completion rigs "${{daemon[@]}}" 2>/dev/null)
+  elif [[ $arguments == 0 && ${{COMP_WORDS[COMP_CWORD]}} != -* ]]; then
+    case "$path" in
+      {}) words="$words $(selfcal completion rigs "${{daemon[@]}}" 2>/dev/null)" ;;
+    esac
+  fi
+  COMPREPLY=($(compgen -W "$words" -- "${{COMP_WORDS[COMP_CWORD]}}"))
 }}
 complete -o default -F _selfcal selfcal
-)",
+)sh",
+      fmt::join(with_value, "|"),
       paths,
       words,
-      global);
+      global,
+      rigs);
 }
 
 // Sourced, or from a file _selfcal in the fpath: then it is the function of its
@@ -116,11 +173,17 @@ std::string FishCompletion(const CLI::App& app) {
         begin = end + 1;
       }
     }
-    for (const CLI::App* command : CommandsOf(at)) {
+    for (const CLI::App* command : ShownCommands(at)) {
       script += fmt::format("complete -c selfcal -n {} -a {} -d {}\n",
                             Quoted(condition),
                             command->get_name(),
                             Quoted(command->get_description()));
+    }
+    if (TakesRig(at)) {
+      script += fmt::format(
+          "complete -c selfcal -f -n {} -a '(selfcal completion rigs "
+          "2>/dev/null)' -d rig\n",
+          Quoted(condition));
     }
     for (const CLI::Option* option :
          at.get_options([](const CLI::Option*) { return true; })) {
@@ -141,11 +204,22 @@ void AddCompletionCommand(CLI::App* app, Context* context) {
       "Print a script that completes the command line in a shell: source "
       "<(selfcal completion bash)");
   const auto shell = std::make_shared<std::string>();
-  completion->add_option("SHELL", *shell, "bash, zsh or fish")
+  completion
+      ->add_option("SHELL",
+                   *shell,
+                   "bash, zsh or fish; or rigs, for the names of the rigs, "
+                   "which the scripts ask for")
       ->required()
-      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+      ->check(OneOf({"bash", "zsh", "fish", "rigs"}));
   completion->callback([app, context, shell] {
-    context->command = [app, shell] {
+    context->command = [app, context, shell] {
+      if (*shell == "rigs") {
+        // At once and without errors, in the midst of a line.
+        for (const std::string& rig : ReadRigNames(*context, kRigTime)) {
+          PrintText(rig + "\n");
+        }
+        return kDone;
+      }
       PrintText(*shell == "bash"  ? BashCompletion(*app)
                 : *shell == "zsh" ? ZshCompletion(*app)
                                   : FishCompletion(*app));

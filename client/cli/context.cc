@@ -5,7 +5,9 @@
 
 #include <cstdio>
 #include <utility>
+#include <vector>
 
+#include "client/cli/missing_rig.h"
 #include "client/selfcal/connection.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
@@ -17,29 +19,41 @@ namespace {
 constexpr std::chrono::seconds kDeadline{30};
 
 // Returns the violated fields from the error's details, a line each.
-std::string Violations(const grpc::Status& status) {
+std::string Violations(const grpc::Status& status, const FlagNames& flags) {
   google::rpc::Status details;
   if (!details.ParseFromString(status.error_details())) return "";
-  std::string lines;
+  std::vector<Violation> violations;
+  std::size_t more = 0;
   for (const auto& detail : details.details()) {
     google::rpc::BadRequest request;
     if (!detail.Is<google::rpc::BadRequest>() || !detail.UnpackTo(&request)) {
       continue;
     }
     for (const auto& violation : request.field_violations()) {
-      lines += violation.field().empty()
-                   ? fmt::format("\n  {}", SafeLine(violation.description()))
-                   : fmt::format("\n  {}: {}",
-                                 SafeLine(violation.field()),
-                                 SafeLine(violation.description()));
+      // The daemon ends a long list with a number.
+      std::size_t count = 0;
+      if (violation.field().empty() &&
+          std::sscanf(
+              violation.description().c_str(), "and %zu more;", &count) == 1) {
+        more += count;
+      } else {
+        violations.push_back({SafeLine(violation.field()),
+                                SafeLine(violation.description())});
+      }
     }
   }
-  return lines;
+  return ErrorLines(violations, flags, more);
 }
 
 void Write(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
   std::fflush(stdout);
+}
+
+// For a table on a terminal.
+Layout TerminalLayout(ColorMode color) {
+  return {static_cast<std::size_t>(CurrentTerminalSize().columns),
+          UsesColor(color, true)};
 }
 
 }  // namespace
@@ -54,12 +68,15 @@ absl::Status Context::Connect() {
   return absl::OkStatus();
 }
 
+// The cells are safe; colours are not text.
 void Context::Print(const Table& table) const {
-  PrintText(terminal ? table.Aligned() : table.Tabbed());
+  Write(terminal ? table.Aligned(TerminalLayout(color))
+                 : table.Tabbed(UsesColor(color, false)));
 }
 
 void Context::Print(const Facts& facts) const {
-  PrintText(terminal ? facts.Aligned() : facts.Tabbed());
+  Write(terminal ? facts.Aligned(TerminalLayout(color))
+                 : facts.Tabbed(UsesColor(color, false)));
 }
 
 void Context::PrintJson(const google::protobuf::Message& message,
@@ -99,9 +116,9 @@ int Fail(const Context& context, const grpc::Status& status) {
                     status.error_message()));
     return kUnreachable;
   }
-  const std::string violations = Violations(status);
+  const std::string violations = Violations(status, context.flags);
   PrintError(violations.empty()
-                 ? SafeLine(status.error_message())
+                 ? SafeLine(status.error_message()) + MissingRigHint(context, status)
                  : "the daemon refused the request:" + violations);
   return kFailed;
 }

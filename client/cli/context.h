@@ -16,8 +16,10 @@
 #include <string>
 #include <string_view>
 
+#include "client/cli/error_lines.h"
 #include "client/cli/table.h"
 #include "client/cli/target.h"
+#include "client/cli/terminal.h"
 #include "client/selfcal/client.h"
 
 namespace selfcal::client {
@@ -32,6 +34,12 @@ struct Context {
   Target target;
   bool json = false;
   bool terminal = false;  // true if stdout is a terminal
+  ColorMode color = ColorMode::kAuto;
+  // What the command line sets of the request, for errors of the daemon.
+  FlagNames flags = {{"filter", "--filter"},
+                     {"order_by", "--order-by"},
+                     {"parent", "RIG"},
+                     {"reason", "--reason"}};
   // The command to run; set while the command line is parsed.
   std::function<int()> command;
 

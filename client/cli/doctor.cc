@@ -62,15 +62,18 @@ int Doctor(Context* context) {
 
 }  // namespace
 
-void AddDoctorCommand(CLI::App* app, Context* context) {
-  CLI::App* doctor = app->add_subcommand(
-      "doctor",
+CLI::App* AddDoctor(CLI::App* parent,
+                    const std::string& name,
+                    Context* context) {
+  CLI::App* doctor = parent->add_subcommand(
+      name,
       "Check the daemon's database while the daemon runs: structure, "
       "references, every checksum, the data of every segment. Exits with 0 if "
       "it is intact, with 4 if it is damaged, with another code if the check "
       "failed");
   doctor->callback(
       [context] { context->command = [context] { return Doctor(context); }; });
+  return doctor;
 }
 
 }  // namespace selfcal::client

@@ -1,15 +1,19 @@
-// events: lists the event log.
+// event list: lists the event log.
 #include <fmt/format.h>
 #include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "client/cli/choice.h"
 #include "client/cli/commands.h"
+#include "client/cli/filter_command.h"
+#include "client/cli/list_options.h"
 #include "client/cli/time_input.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
@@ -28,8 +32,10 @@ struct EventOptions {
   std::string rig;                 // empty: all rigs
   std::vector<std::string> kinds;  // as KindName returns them; empty: all
   std::string since;
-  std::size_t limit = 0;  // 0: no limit
+  ListOptions list;
 };
+
+using EventTest = std::function<bool(const v1::Event&)>;
 
 // Returns e.g. "data-evicted".
 std::string KindName(v1::Event::Kind kind) {
@@ -39,19 +45,32 @@ std::string KindName(v1::Event::Kind kind) {
 }
 
 std::vector<std::string> KindNames() {
-  const auto* kinds = v1::Event::Kind_descriptor();
-  std::vector<std::string> names;
-  for (int k = 0; k < kinds->value_count(); ++k) {
-    const auto kind = static_cast<v1::Event::Kind>(kinds->value(k)->number());
-    if (kind != v1::Event::KIND_UNSPECIFIED) names.push_back(KindName(kind));
-  }
-  return names;
+  return WordsOf<v1::Event::Kind>(v1::Event::Kind_descriptor(), KindText);
+}
+
+std::vector<FilterField> EventFields() {
+  using Kind = FilterField::Kind;
+  return {{"event", Kind::kNumber},
+          {"time", Kind::kTime},
+          {"rig"},
+          {"kind", Kind::kText, KindNames()},
+          {"detail"}};
+}
+
+FieldValue ValueOf(const v1::Event& event, std::string_view field) {
+  if (field == "event") return static_cast<double>(event.number());
+  if (field == "time") return FilterTime(event.time());
+  if (field == "rig") return LastPart(event.rig());
+  if (field == "kind") return KindName(event.kind());
+  return event.detail();
 }
 
 bool IsWanted(const v1::Event& event,
               const EventOptions& options,
-              const std::optional<Timestamp>& since) {
+              const std::optional<Timestamp>& since,
+              const EventTest& meets_filter) {
   if (since && event.time() < *since) return false;
+  if (meets_filter && !meets_filter(event)) return false;
   return options.kinds.empty() ||
          std::find(options.kinds.begin(),
                    options.kinds.end(),
@@ -63,6 +82,7 @@ bool IsWanted(const v1::Event& event,
 grpc::Status Read(Context* context,
                   const EventOptions& options,
                   const std::optional<Timestamp>& since,
+                  const EventTest& meets_filter,
                   std::deque<v1::Event>* events) {
   const auto stub = v1::StoreService::NewStub(context->Channel());
   v1::ListEventsRequest request;
@@ -74,8 +94,10 @@ grpc::Status Read(Context* context,
         stub.get(), &StoreService::ListEvents, request, &page);
     if (!status.ok()) return status;
     for (const v1::Event& event : page.events()) {
-      if (IsWanted(event, options, since)) events->push_back(event);
-      if (options.limit > 0 && events->size() > options.limit) {
+      if (IsWanted(event, options, since, meets_filter)) {
+        events->push_back(event);
+      }
+      if (options.list.limit > 0 && events->size() > options.list.limit) {
         events->pop_front();
       }
     }
@@ -91,7 +113,8 @@ void PrintEvents(const Context& context, const std::deque<v1::Event>& events) {
     context.PrintJson(document);
     return;
   }
-  Table table({{"event", true}, {"time"}, {"rig"}, {"kind"}, {"detail"}});
+  Table table(
+      {{"event", true}, {"time"}, {"rig"}, {"kind"}, {"detail", false, true}});
   for (const v1::Event& event : events) {
     table.Add({fmt::format("{}", event.number()),
                TimeText(event.time()),
@@ -106,11 +129,18 @@ int ListEvents(Context* context, const EventOptions& options) {
   std::optional<Timestamp> since;
   if (!options.since.empty()) {
     const auto time = ParseTime(options.since, TimeUtil::GetCurrentTime());
-    if (!time.ok()) return FailInput(time.status());
+    if (!time.ok()) {
+      return FailInput(absl::InvalidArgumentError(
+          "--since: " + std::string(time.status().message())));
+    }
     since = *time;
   }
+  const auto meets_filter =
+      Wanted<v1::Event>(options.list, EventFields(), ValueOf);
+  if (!meets_filter.ok()) return FailInput(meets_filter.status());
   std::deque<v1::Event> events;
-  const grpc::Status status = Read(context, options, since, &events);
+  const grpc::Status status =
+      Read(context, options, since, *meets_filter, &events);
   if (!status.ok()) return Fail(*context, status);
   PrintEvents(*context, events);
   return kDone;
@@ -118,24 +148,36 @@ int ListEvents(Context* context, const EventOptions& options) {
 
 }  // namespace
 
-void AddEventsCommand(CLI::App* app, Context* context) {
-  CLI::App* events = app->add_subcommand(
-      "events", "List the events of one rig or of all, oldest first");
+CLI::App* AddEventList(CLI::App* parent,
+                       const std::string& name,
+                       Context* context) {
+  CLI::App* events = parent->add_subcommand(
+      name, "List the events of one rig or of all, oldest first");
   const auto options = std::make_shared<EventOptions>();
   events->add_option("RIG", options->rig);
   events->add_option("--kind", options->kinds, "Only this kind; repeatable")
-      ->check(CLI::IsMember(KindNames()));
+      ->check(OneOf(KindNames()));
   events->add_option("--since",
                      options->since,
                      "Only since 2026-11-21, '2026-11-21 04:10:03' (UTC), or "
                      "30s, 15m, 2h, 7d ago");
-  events->add_option("--limit", options->limit, "Only this many, the newest")
-      ->check(CLI::PositiveNumber);
+  AddListOptions(
+      events,
+      "the newest",
+      FilterHelp("kind = data-evicted AND rig != tablet-7", EventFields()),
+      &options->list);
   events->callback([context, options] {
     context->command = [context, options] {
       return ListEvents(context, *options);
     };
   });
+  return events;
+}
+
+void AddEventCommands(CLI::App* app, Context* context) {
+  CLI::App* event = app->add_subcommand("event", "Show the event log");
+  event->require_subcommand(1);
+  AddEventList(event, "list", context);
 }
 
 }  // namespace selfcal::client

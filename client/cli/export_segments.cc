@@ -1,4 +1,4 @@
-// segments export: writes the data of segments to files for other tools.
+// segment export: writes the data of segments to files for other tools.
 #include <fmt/format.h>
 
 #include <array>
@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/choice.h"
 #include "client/cli/commands.h"
+#include "client/cli/group_check.h"
 #include "client/cli/new_file.h"
 #include "client/cli/progress.h"
 #include "client/cli/segment_csv.h"
@@ -135,6 +137,9 @@ grpc::Status ReadAll(SegmentService* stub,
 
 int ExportSegments(Context* context, const ExportOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
+  const absl::Status known =
+      CheckGroups(*context, options.rig, {{"--filter", options.filter}});
+  if (!known.ok()) return FailInput(known);
   auto sink = options.format == "csv" ? OpenSink<CsvFolder>(options)
                                       : OpenSink<JsonLines>(options);
   if (!sink.ok()) return FailInput(sink.status());
@@ -172,13 +177,12 @@ void AddSegmentExport(CLI::App* segments, Context* context) {
   command->add_option("SEGMENT",
                       options->segments,
                       "session~index, as in the list [all with data]");
-  command->add_option(
-      "--filter", options->filter, "Conditions, as for the list");
+  command->add_option("--filter", options->filter, kSegmentFilterHelp);
   command
       ->add_option("--format",
                    options->format,
                    "csv: four tables in a folder; jsonl: one message per line")
-      ->check(CLI::IsMember({"csv", "jsonl"}))
+      ->check(OneOf({"csv", "jsonl"}))
       ->capture_default_str();
   command->add_option("--output", options->output, "A folder or a file")
       ->required();

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "client/cli/choice.h"
 #include "client/cli/new_file.h"
 
 namespace selfcal::client {
@@ -18,10 +19,10 @@ namespace fs = std::filesystem;
 
 }  // namespace
 
-CLI::IsMember FormatNames() {
+CLI::Validator FormatNames() {
   std::vector<std::string> names;
   for (const FormatInfo& format : Formats()) names.push_back(format.name);
-  return CLI::IsMember(names);
+  return OneOf(names);
 }
 
 absl::StatusOr<std::vector<TextFile>> ReadTextFiles(

@@ -14,7 +14,7 @@
 namespace selfcal::client {
 
 // Validator of an option whose value is the name of a format.
-CLI::IsMember FormatNames();
+CLI::Validator FormatNames();
 
 // Reads files. NOT_FOUND if one cannot be read.
 absl::StatusOr<std::vector<TextFile>> ReadTextFiles(

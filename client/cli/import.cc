@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -12,6 +14,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/device_data.h"
 #include "client/cli/diagnosis_text.h"
+#include "client/cli/error_lines.h"
 #include "client/cli/progress.h"
 #include "client/cli/recording_input.h"
 #include "client/selfcal/client.h"
@@ -88,16 +91,27 @@ class Reporter {
   void Finish() {
     const std::lock_guard lock(mutex_);
     progress_.Clear();
+    if (not_shown_ == 0) return;
+    PrintError(fmt::format("and {} more segments were rejected: {} in all",
+                           not_shown_,
+                           rejected_));
   }
 
  private:
+  // Prints errors until they fill a screen.
   void Complain(const Acknowledgement& ack) {
-    progress_.Clear();
-    std::string text = fmt::format(
-        "segment {}~{} was rejected:", ack.key.session, ack.key.index);
-    for (const Violation& violation : ack.violations) {
-      text += fmt::format("\n  {}: {}", violation.field, violation.message);
+    ++rejected_;
+    if (lines_ >= kMostErrorLines) {
+      ++not_shown_;
+      return;
     }
+    progress_.Clear();
+    const std::string text = fmt::format("segment {}~{} was rejected:{}",
+                                         ack.key.session,
+                                         ack.key.index,
+                                         ErrorLines(ack.violations));
+    lines_ += 1 + static_cast<std::size_t>(
+                      std::count(text.begin(), text.end(), '\n'));
     PrintError(text);
   }
 
@@ -105,6 +119,9 @@ class Reporter {
   const std::size_t total_;
   mutable std::mutex mutex_;  // guards all below
   std::size_t done_ = 0;
+  std::size_t rejected_ = 0;
+  std::size_t not_shown_ = 0;  // of the rejected
+  std::size_t lines_ = 0;      // of errors
   Progress progress_;
 };
 
@@ -170,7 +187,26 @@ int SendSegments(Context* context,
   return statistics.rejected == 0 ? kDone : kFailed;
 }
 
+// A folder in place of the rig is a mistake, unless there is such a rig, too.
+absl::Status CheckOrder(const ImportOptions& options) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const std::string& folder = options.recording.folders.front();
+  if (!fs::is_directory(options.rig, error) || fs::exists(folder, error)) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      fmt::format("'{}' is a folder, and '{}' is none: the rig comes first\n"
+                  "  selfcal segment import {} {}",
+                  options.rig,
+                  folder,
+                  folder,
+                  options.rig));
+}
+
 int Import(Context* context, const ImportOptions& options) {
+  const absl::Status ordered = CheckOrder(options);
+  if (!ordered.ok()) return FailInput(ordered);
   auto recording = ReadRecording(options.recording);
   if (!recording.ok()) return FailInput(recording.status());
   for (MotionSegment& segment : recording->segments) {
@@ -187,9 +223,11 @@ int Import(Context* context, const ImportOptions& options) {
 
 }  // namespace
 
-void AddImportCommand(CLI::App* app, Context* context) {
-  CLI::App* import = app->add_subcommand(
-      "import",
+CLI::App* AddImport(CLI::App* parent,
+                    const std::string& name,
+                    Context* context) {
+  CLI::App* import = parent->add_subcommand(
+      name,
       "Cut maplab VI-maps into segments and send them; returns when all are "
       "acknowledged");
   const auto options = std::make_shared<ImportOptions>();
@@ -221,6 +259,7 @@ void AddImportCommand(CLI::App* app, Context* context) {
 };
 }  // namespace selfcal::client
 );
+return import;
 }
 
 }  // namespace selfcal::client

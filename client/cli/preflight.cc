@@ -11,6 +11,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/device_data.h"
 #include "client/cli/diagnosis_text.h"
+#include "client/cli/error_lines.h"
 #include "client/cli/recording_input.h"
 #include "client/cli/rig_input.h"
 #include "core/preflight/diagnose.h"
@@ -35,11 +36,8 @@ struct Subject {
 
 absl::Status Invalid(const std::string& source,
                      const std::vector<Violation>& violations) {
-  std::string text = source + " is not valid:";
-  for (const Violation& violation : violations) {
-    text += fmt::format("\n  {}: {}", violation.field, violation.message);
-  }
-  return absl::InvalidArgumentError(text);
+  return absl::InvalidArgumentError(source +
+                                    " is not valid:" + ErrorLines(violations));
 }
 
 absl::StatusOr<Rig> ReadRigFile(const std::string& file) {
@@ -125,9 +123,11 @@ int Preflight(Context* context, const PreflightOptions& options) {
 
 }  // namespace
 
-void AddPreflightCommand(CLI::App* app, Context* context) {
-  CLI::App* preflight = app->add_subcommand(
-      "preflight",
+CLI::App* AddPreflight(CLI::App* parent,
+                       const std::string& name,
+                       Context* context) {
+  CLI::App* preflight = parent->add_subcommand(
+      name,
       "Check VI-maps, or the segments that a device has sent, for the usual "
       "mistakes: axes, units, gravity, time offset, lost samples, saturation, "
       "extrinsics, focal length, landmarks. Exits with 0 if nothing is found, "
@@ -164,6 +164,7 @@ void AddPreflightCommand(CLI::App* app, Context* context) {
       return Preflight(context, *options);
     };
   });
+  return preflight;
 }
 
 }  // namespace selfcal::client

@@ -34,9 +34,11 @@ int Recalibrate(Context* context, const RecalibrateOptions& options) {
 
 }  // namespace
 
-void AddRecalibrateCommand(CLI::App* app, Context* context) {
-  CLI::App* recalibrate = app->add_subcommand(
-      "recalibrate",
+CLI::App* AddRunStart(CLI::App* parent,
+                      const std::string& name,
+                      Context* context) {
+  CLI::App* recalibrate = parent->add_subcommand(
+      name,
       "Calibrate on the segments of the tables; exits with 1 if the result was "
       "rejected");
   const auto options = std::make_shared<RecalibrateOptions>();
@@ -51,6 +53,7 @@ void AddRecalibrateCommand(CLI::App* app, Context* context) {
       return Recalibrate(context, *options);
     };
   });
+  return recalibrate;
 }
 
 }  // namespace selfcal::client

@@ -84,9 +84,11 @@ int WriteReportFile(Context* context, const ReportOptions& options) {
 
 }  // namespace
 
-void AddReportCommand(CLI::App* app, Context* context) {
-  CLI::App* report = app->add_subcommand(
-      "report", "Write a report on a calibration as one HTML file");
+CLI::App* AddCalibrationReport(CLI::App* parent,
+                               const std::string& name,
+                               Context* context) {
+  CLI::App* report = parent->add_subcommand(
+      name, "Write a report on a calibration as one HTML file");
   const auto options = std::make_shared<ReportOptions>();
   report->add_option("RIG", options->rig)->required();
   report->add_option("VERSION", options->version, "A number, or active")
@@ -99,6 +101,7 @@ void AddReportCommand(CLI::App* app, Context* context) {
       return WriteReportFile(context, *options);
     };
   });
+  return report;
 }
 
 }  // namespace selfcal::client

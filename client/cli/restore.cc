@@ -172,9 +172,11 @@ int Restore(Context* context, const RestoreOptions& options) {
 
 }  // namespace
 
-void AddRestoreCommand(CLI::App* app, Context* context) {
-  CLI::App* restore = app->add_subcommand(
-      "restore",
+CLI::App* AddRestore(CLI::App* parent,
+                     const std::string& name,
+                     Context* context) {
+  CLI::App* restore = parent->add_subcommand(
+      name,
       "Replace the daemon's database by a backup: the daemon verifies the "
       "backup, keeps the present database under another name and restarts");
   const auto options = std::make_shared<RestoreOptions>();
@@ -192,6 +194,7 @@ void AddRestoreCommand(CLI::App* app, Context* context) {
       return Restore(context, *options);
     };
   });
+  return restore;
 }
 
 }  // namespace selfcal::client

@@ -1,15 +1,14 @@
 // rig update, rig delete.
-#include <absl/strings/numbers.h>
 #include <fmt/format.h>
 #include <google/protobuf/util/time_util.h>
 
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/component_settings.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/rig.grpc.pb.h"
 
@@ -32,35 +31,6 @@ struct UpdateOptions {
   std::optional<double> calibration_max_age_s;
 };
 
-// Splits at the first '=', since a name has none.
-std::optional<std::pair<std::string, std::string>> SplitPair(
-    const std::string& text) {
-  const auto equals = text.find('=');
-  if (equals == text.npos || equals == 0) return std::nullopt;
-  return std::pair(text.substr(0, equals), text.substr(equals + 1));
-}
-
-absl::Status NotAPair(const std::string& text, const char* form) {
-  return absl::InvalidArgumentError(
-      fmt::format("'{}' is not of the form {}", text, form));
-}
-
-absl::Status ReadSettings(
-    const std::vector<std::string>& texts,
-    google::protobuf::RepeatedPtrField<v1::ComponentSetting>* settings) {
-  for (const std::string& text : texts) {
-    const auto pair = SplitPair(text);
-    double value = 0;
-    if (!pair || !absl::SimpleAtod(pair->second, &value)) {
-      return NotAPair(text, "COMPONENT=NUMBER");
-    }
-    v1::ComponentSetting* added = settings->Add();
-    added->set_pattern(pair->first);
-    added->set_value(value);
-  }
-  return absl::OkStatus();
-}
-
 void SetSeconds(const std::optional<double>& seconds,
                 const char* field,
                 google::protobuf::Duration* duration,
@@ -82,12 +52,21 @@ absl::Status ReadLabels(const UpdateOptions& options,
   labels = rig.labels();
   for (const std::string& text : options.labels) {
     const auto pair = SplitPair(text);
-    if (!pair) return NotAPair(text, "NAME=VALUE");
+    if (!pair) return NotAPair("--label", text, "NAME=VALUE");
     labels[pair->first] = pair->second;
   }
   for (const std::string& name : options.removed_labels) labels.erase(name);
   request->mutable_update_mask()->add_paths("labels");
   return absl::OkStatus();
+}
+
+absl::Status ReadComponents(
+    const std::string& flag,
+    const std::vector<std::string>& texts,
+    const v1::Rig& rig,
+    google::protobuf::RepeatedPtrField<v1::ComponentSetting>* settings) {
+  const absl::Status status = ReadSettings(flag, texts, settings);
+  return status.ok() ? NameComponents(flag, rig, settings) : status;
 }
 
 absl::Status ReadRequest(const UpdateOptions& options,
@@ -99,11 +78,16 @@ absl::Status ReadRequest(const UpdateOptions& options,
   absl::Status status = ReadLabels(options, rig, request);
   if (!status.ok()) return status;
   if (!options.prior_sigmas.empty()) mask->add_paths("prior_sigmas");
-  status = ReadSettings(options.prior_sigmas, update->mutable_prior_sigmas());
+  status = ReadComponents("--prior-sigma",
+                          options.prior_sigmas,
+                          rig,
+                          update->mutable_prior_sigmas());
   if (!status.ok()) return status;
   if (!options.walk_densities.empty()) mask->add_paths("walk_densities");
-  status =
-      ReadSettings(options.walk_densities, update->mutable_walk_densities());
+  status = ReadComponents("--walk-density",
+                          options.walk_densities,
+                          rig,
+                          update->mutable_walk_densities());
   if (!status.ok()) return status;
   if (options.min_gain_nats) {
     update->set_min_gain_nats(*options.min_gain_nats);
@@ -142,6 +126,16 @@ int Update(Context* context, const UpdateOptions& options) {
   v1::UpdateRigRequest request;
   const absl::Status read = ReadRequest(options, rig, &request);
   if (!read.ok()) return FailInput(read);
+  context->flags.merge(
+      FlagNames{{"rig.name", "RIG"},
+                {"rig.labels", "--label"},
+                {"rig.prior_sigmas", "--prior-sigma"},
+                {"rig.walk_densities", "--walk-density"},
+                {"rig.min_gain_nats", "--min-gain"},
+                {"rig.retrigger_fraction", "--retrigger-fraction"},
+                {"rig.table_max_age", "--table-max-age"},
+                {"rig.recalibration_min_interval", "--min-interval"},
+                {"rig.calibration_max_age", "--calibration-max-age"}});
   status = Call<RigService>(stub.get(), &RigService::UpdateRig, request, &rig);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {

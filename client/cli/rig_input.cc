@@ -11,10 +11,13 @@
 #include <iterator>
 #include <utility>
 
+#include "client/cli/camera_choice.h"
+#include "client/cli/component_settings.h"
 #include "client/cli/foreign_files.h"
 #include "client/import/vi_map.h"
 #include "core/model/imu_grades.h"
 #include "proto/convert.h"
+#include "proto/nearest_word.h"
 #include "proto/resource_names.h"
 
 namespace selfcal::client {
@@ -36,10 +39,15 @@ absl::StatusOr<v1::Rig> ReadForeign(const RigInput& input,
                                     std::vector<Loss>* losses) {
   const auto files = ReadTextFiles(input.files);
   if (!files.ok()) return files.status();
-  const auto imported =
+  auto imported =
       ImportRig(input.from, *files, {.imu_rate_hz = input.imu_rate_hz});
   if (!imported.ok()) return imported.status();
   *losses = imported->losses;
+  if (!input.cameras.empty()) {
+    const absl::Status kept =
+        KeepCameras(input.cameras, &imported->rig, losses);
+    if (!kept.ok()) return kept;
+  }
   if (input.strict && ChangesPrediction(*losses)) {
     return absl::InvalidArgumentError(
         "no rig was created: --strict is set, and the conversion has losses");
@@ -55,9 +63,19 @@ absl::StatusOr<v1::Rig> ReadBase(const RigInput& input,
   if (!input.vi_map.empty()) {
     absl::StatusOr<ViMapRecording> recording = ReadViMap(input.vi_map, {});
     if (!recording.ok()) return recording.status();
+    if (!input.cameras.empty()) {
+      const absl::Status kept =
+          KeepCameras(input.cameras, &recording->rig, losses);
+      if (!kept.ok()) return kept;
+    }
     v1::Rig rig = ToProto(recording->rig);
     rig.clear_groups();  // a VI-map has no groups: the daemon sets the default
     return rig;
+  }
+  if (!input.cameras.empty()) {
+    return absl::InvalidArgumentError(
+        "--cameras: is for --from and --vi-map; a file of selfcal has its "
+        "cameras as they are");
   }
   if (input.files.size() != 1) {
     return absl::InvalidArgumentError(
@@ -90,8 +108,11 @@ absl::Status SetSelection(const std::string& text, v1::Rig* rig) {
     }
     known.push_back(SelectionText(selection));
   }
-  return absl::InvalidArgumentError(fmt::format(
-      "--selection {} must be one of {}", text, fmt::join(known, ", ")));
+  return absl::InvalidArgumentError(
+      fmt::format("--selection: '{}' must be one of {}{}",
+                  text,
+                  fmt::join(known, ", "),
+                  DidYouMean(text, known)));
 }
 
 // Puts the tolerances before those of the file, which are of single components
@@ -100,7 +121,9 @@ absl::Status SetImuTolerances(const std::string& text, v1::Rig* rig) {
   const auto grade = ParseImuGrade(text);
   if (!grade) {
     return absl::InvalidArgumentError(fmt::format(
-        "--imu {} must be one of consumer, factory-calibrated, unknown", text));
+        "--imu: '{}' must be one of consumer, factory-calibrated, unknown{}",
+        text,
+        DidYouMean(text, {"consumer", "factory-calibrated", "unknown"})));
   }
   google::protobuf::RepeatedPtrField<v1::ComponentSetting> settings;
   for (const ComponentSetting& tolerance : ImuTolerances(*grade)) {
@@ -111,6 +134,16 @@ absl::Status SetImuTolerances(const std::string& text, v1::Rig* rig) {
   settings.MergeFrom(rig->prior_sigmas());
   *rig->mutable_prior_sigmas() = std::move(settings);
   return absl::OkStatus();
+}
+
+// Puts the sigmas after those of the file and the grade: they take precedence.
+absl::Status AddPriorSigmas(const RigInput& input, v1::Rig* rig) {
+  constexpr char kFlag[] = "--prior-sigma";
+  google::protobuf::RepeatedPtrField<v1::ComponentSetting> settings;
+  absl::Status status = ReadSettings(kFlag, input.prior_sigmas, &settings);
+  if (status.ok()) status = NameComponents(kFlag, *rig, &settings);
+  if (status.ok()) rig->mutable_prior_sigmas()->MergeFrom(settings);
+  return status;
 }
 
 google::protobuf::Duration Seconds(double seconds) {
@@ -130,7 +163,7 @@ absl::Status AddBlocks(const std::vector<std::string>& settings, v1::Rig* rig) {
         equals == setting.npos ? "" : setting.substr(equals + 1);
     if (state != "on" && state != "off") {
       return absl::InvalidArgumentError(
-          fmt::format("--block {} must be NAME=on or NAME=off", setting));
+          fmt::format("--block: '{}' must be NAME=on or NAME=off", setting));
     }
     v1::BlockSetting* added = rig->add_blocks();
     added->set_pattern(setting.substr(0, equals));
@@ -185,6 +218,8 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
     const absl::Status status = SetImuTolerances(*input.imu, &*rig);
     if (!status.ok()) return status;
   }
+  const absl::Status sigmas = AddPriorSigmas(input, &*rig);
+  if (!sigmas.ok()) return sigmas;
   if (input.table_size) rig->set_table_size(*input.table_size);
   if (input.min_gain_nats) rig->set_min_gain_nats(*input.min_gain_nats);
   if (input.retrigger_fraction) {

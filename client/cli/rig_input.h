@@ -21,6 +21,8 @@ struct RigInput {
   std::string vi_map;  // folder of a VI-map, instead of files
   std::optional<double> imu_rate_hz;
   bool strict = false;  // fail if reading `from` has losses
+  // With `from` or `vi_map`, only these cameras: cam0, ...; empty: all.
+  std::vector<std::string> cameras;
   std::optional<std::string> id;
   std::optional<double> pixel_sigma_px;
   std::optional<double> gyro_noise;
@@ -37,14 +39,15 @@ struct RigInput {
   std::optional<double> table_max_age_s;
   std::optional<double> min_interval_s;
   std::optional<double> calibration_max_age_s;
+  std::vector<std::string> prior_sigmas;  // COMPONENT=VALUE
   std::vector<std::string> fixed;
   std::vector<std::string> blocks;  // NAME=on or NAME=off
   bool estimate_time_offset = false;
 };
 
-// Reads the rig. INVALID_ARGUMENT or NOT_FOUND, with the name of the file, if
-// it cannot be read. The daemon validates the values. Appends to *losses what
-// the files of another tool have and selfcal cannot express.
+// Reads the rig. INVALID_ARGUMENT or NOT_FOUND, with the name of the file or of
+// the flag, if it cannot be read. The daemon validates the values. Appends to
+// *losses what the files of another tool have and selfcal cannot express.
 absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
                                 std::vector<Loss>* losses);
 

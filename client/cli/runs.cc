@@ -1,9 +1,13 @@
+#include <absl/strings/numbers.h>
 #include <fmt/format.h>
 
+#include <limits>
 #include <memory>
 #include <string>
 
 #include "client/cli/commands.h"
+#include "client/cli/filter_command.h"
+#include "client/cli/list_options.h"
 #include "client/cli/run_following.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
@@ -19,13 +23,59 @@ struct RunOptions {
   std::string run;
 };
 
-int ListRuns(Context* context, const RunOptions& options) {
+std::vector<FilterField> RunFields() {
+  using Kind = FilterField::Kind;
+  return {{"run", Kind::kNumber},
+          {"state",
+           Kind::kText,
+           WordsOf<v1::Recalibration::State>(
+               v1::Recalibration::State_descriptor(), StateText)},
+          {"trigger",
+           Kind::kText,
+           WordsOf<v1::Recalibration::Trigger>(
+               v1::Recalibration::Trigger_descriptor(), TriggerText)},
+          {"created", Kind::kTime},
+          {"ended", Kind::kTime},
+          {"segments", Kind::kNumber},
+          {"calibration", Kind::kNumber}};
+}
+
+// The number at the end of a name; NaN if there is none.
+double NumberOf(const std::string& name) {
+  double number = std::numeric_limits<double>::quiet_NaN();
+  if (!absl::SimpleAtod(LastPart(name), &number)) {
+    number = std::numeric_limits<double>::quiet_NaN();
+  }
+  return number;
+}
+
+FieldValue ValueOf(const v1::Recalibration& run, std::string_view field) {
+  if (field == "run") return NumberOf(run.name());
+  if (field == "state") return StateText(run.state());
+  if (field == "trigger") return TriggerText(run.trigger());
+  if (field == "created") return FilterTime(run.create_time());
+  if (field == "ended") return FilterTime(run.end_time());
+  if (field == "calibration") return NumberOf(run.calibration());
+  return static_cast<double>(run.segments_size());
+}
+
+int ListRuns(Context* context,
+             const std::string& rig,
+             const ListOptions& options) {
+  const auto wanted = Wanted<v1::Recalibration>(options, RunFields(), ValueOf);
+  if (!wanted.ok()) return FailInput(wanted.status());
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::ListRecalibrationsRequest request;
-  request.set_parent(RigName(options.rig));
+  request.set_parent(RigName(rig));
   v1::ListRecalibrationsResponse runs;
-  const auto status = CallForAllPages<RecalibrationService>(
-      stub.get(), &RecalibrationService::ListRecalibrations, request, &runs);
+  const auto status = CallForItems<RecalibrationService>(
+      stub.get(),
+      &RecalibrationService::ListRecalibrations,
+      request,
+      &v1::ListRecalibrationsResponse::mutable_recalibrations,
+      options.limit,
+      *wanted,
+      &runs);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(runs);
@@ -38,7 +88,7 @@ int ListRuns(Context* context, const RunOptions& options) {
                {"ended"},
                {"segments", true},
                {"calibration", true},
-               {"message"}});
+               {"message", false, true}});
   for (const v1::Recalibration& run : runs.recalibrations()) {
     table.Add({LastPart(run.name()),
                StateText(run.state()),
@@ -121,16 +171,22 @@ int ShowConvergence(Context* context, const RunOptions& options) {
 
 void AddRunCommands(CLI::App* app, Context* context) {
   CLI::App* runs =
-      app->add_subcommand("runs", "Show and cancel recalibrations");
+      app->add_subcommand("run", "Start, show and cancel recalibrations")
+          ->alias("runs");
   runs->require_subcommand(1);
   const auto options = std::make_shared<RunOptions>();
 
   CLI::App* list =
       runs->add_subcommand("list", "List the runs of a rig, newest first");
   list->add_option("RIG", options->rig)->required();
-  list->callback([context, options] {
-    context->command = [context, options] {
-      return ListRuns(context, *options);
+  const auto list_options = std::make_shared<ListOptions>();
+  AddListOptions(list,
+                 "the newest",
+                 FilterHelp("state = failed AND created >= 7d", RunFields()),
+                 list_options.get());
+  list->callback([context, options, list_options] {
+    context->command = [context, options, list_options] {
+      return ListRuns(context, options->rig, *list_options);
     };
   });
 
@@ -145,6 +201,7 @@ void AddRunCommands(CLI::App* app, Context* context) {
     });
   };
   add("show", "Show a run", ShowRun);
+  AddRunStart(runs, "start", context);
   add("watch",
       "Wait for the end of a run and show the result; exits with 1 if the "
       "result was rejected. With --json, prints a line for each iteration",

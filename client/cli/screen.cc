@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -53,15 +52,6 @@ Screen::~Screen() {
   }
   close(signal_pipe[0]);
   close(signal_pipe[1]);
-}
-
-Screen::Size Screen::size() const {
-  winsize size{};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 ||
-      size.ws_row == 0) {
-    return {};
-  }
-  return {size.ws_col, size.ws_row};
 }
 
 bool Screen::Show(const std::string& lines) {

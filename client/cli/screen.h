@@ -18,13 +18,6 @@ class Screen {
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  // Present size of the terminal; 80 x 24 if it is unknown.
-  struct Size {
-    int columns = 80;
-    int rows = 24;
-  };
-  Size size() const;
-
   // Replaces the content of the screen. Returns false if writing fails.
   bool Show(const std::string& lines);
 

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/group_check.h"
+#include "client/cli/list_options.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
@@ -58,7 +60,7 @@ std::string TablesText(const v1::Segment& segment) {
 }
 
 Table UnusableTable(const v1::ListSegmentsResponse& segments) {
-  Table table({{"segment"}, {"received"}, {"problem"}});
+  Table table({{"segment"}, {"received"}, {"problem", false, true}});
   for (const v1::Segment& segment : segments.segments()) {
     table.Add({LastPart(segment.name()),
                TimeText(segment.receive_time()),
@@ -166,7 +168,7 @@ Table Scores(const v1::Segment& segment) {
 
 struct SegmentListOptions {
   std::string rig;
-  std::string filter;
+  ListOptions list;
   std::string order_by;
   bool quarantined = false;
 };
@@ -174,9 +176,9 @@ struct SegmentListOptions {
 // Returns the conditions of the list, with that of the flag --quarantined.
 std::string FilterOf(const SegmentListOptions& options) {
   constexpr char kUnusable[] = "state = UNUSABLE";
-  if (!options.quarantined) return options.filter;
-  return options.filter.empty() ? kUnusable
-                                : options.filter + " AND " + kUnusable;
+  const std::string& filter = options.list.filter;
+  if (!options.quarantined) return filter;
+  return filter.empty() ? kUnusable : filter + " AND " + kUnusable;
 }
 
 int ListSegments(Context* context, const SegmentListOptions& options) {
@@ -185,9 +187,20 @@ int ListSegments(Context* context, const SegmentListOptions& options) {
   request.set_parent(RigName(options.rig));
   request.set_filter(FilterOf(options));
   request.set_order_by(options.order_by);
+  const absl::Status known = CheckGroups(
+      *context,
+      options.rig,
+      {{"--filter", options.list.filter}, {"--order-by", options.order_by}});
+  if (!known.ok()) return FailInput(known);
   v1::ListSegmentsResponse segments;
-  const auto status = CallForAllPages<SegmentService>(
-      stub.get(), &SegmentService::ListSegments, request, &segments);
+  const auto status =
+      CallForItems<SegmentService>(stub.get(),
+                                   &SegmentService::ListSegments,
+                                   request,
+                                   &v1::ListSegmentsResponse::mutable_segments,
+                                   options.list.limit,
+                                   nullptr,
+                                   &segments);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(segments);
@@ -249,7 +262,7 @@ int Quarantine(Context* context, const QuarantineOptions& options) {
   v1::QuarantineSegmentsRequest request;
   if (!NameSegments(options, &request)) {
     return FailInput(absl::InvalidArgumentError(fmt::format(
-        "'{}' is neither a session nor a segment; `selfcal segments list {}` "
+        "'{}' is neither a session nor a segment; `selfcal segment list {}` "
         "lists segments as session~index",
         options.segments,
         options.rig)));
@@ -340,7 +353,9 @@ void AddQuarantine(CLI::App* segments, Context* context) {
 }  // namespace
 
 void AddSegmentCommands(CLI::App* app, Context* context) {
-  CLI::App* segments = app->add_subcommand("segments", "Show segments");
+  CLI::App* segments =
+      app->add_subcommand("segment", "Send, check, show and export segments")
+          ->alias("segments");
   segments->require_subcommand(1);
 
   const auto options = std::make_shared<SegmentListOptions>();
@@ -349,10 +364,8 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
       "List the segments of a rig, newest first, with the entropy of each "
       "group [nat] (lower is more informative) and the tables that hold it");
   list->add_option("RIG", options->rig)->required();
-  list->add_option("--filter",
-                   options->filter,
-                   "Conditions joined by AND, e.g. 'state = SCORED AND "
-                   "gain.camera >= 2'");
+  AddListOptions(
+      list, "the first of the list", kSegmentFilterHelp, &options->list);
   list->add_option("--order-by",
                    options->order_by,
                    "A field, then asc or desc, e.g. 'entropy.camera asc'");
@@ -377,6 +390,8 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
     };
   });
 
+  AddImport(segments, "import", context);
+  AddPreflight(segments, "preflight", context);
   AddSegmentDetails(segments, context);
   AddDelete(segments, context);
   AddQuarantine(segments, context);

@@ -5,6 +5,8 @@
 #include <string>
 
 #include "client/cli/commands.h"
+#include "client/cli/filter_command.h"
+#include "client/cli/list_options.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/session.grpc.pb.h"
@@ -14,13 +16,38 @@ namespace {
 
 using SessionService = v1::SessionService::StubInterface;
 
-int ListSessions(Context* context, const std::string& rig) {
+std::vector<FilterField> SessionFields() {
+  using Kind = FilterField::Kind;
+  return {{"session"},
+          {"segments", Kind::kNumber},
+          {"first", Kind::kTime},
+          {"last", Kind::kTime}};
+}
+
+FieldValue ValueOf(const v1::Session& session, std::string_view field) {
+  if (field == "session") return LastPart(session.name());
+  if (field == "first") return FilterTime(session.first_receive_time());
+  if (field == "last") return FilterTime(session.last_receive_time());
+  return static_cast<double>(session.segments());
+}
+
+int ListSessions(Context* context,
+                 const std::string& rig,
+                 const ListOptions& options) {
+  const auto wanted = Wanted<v1::Session>(options, SessionFields(), ValueOf);
+  if (!wanted.ok()) return FailInput(wanted.status());
   const auto stub = v1::SessionService::NewStub(context->Channel());
   v1::ListSessionsRequest request;
   request.set_parent(RigName(rig));
   v1::ListSessionsResponse sessions;
-  const auto status = CallForAllPages<SessionService>(
-      stub.get(), &SessionService::ListSessions, request, &sessions);
+  const auto status =
+      CallForItems<SessionService>(stub.get(),
+                                   &SessionService::ListSessions,
+                                   request,
+                                   &v1::ListSessionsResponse::mutable_sessions,
+                                   options.limit,
+                                   *wanted,
+                                   &sessions);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
     context->PrintJson(sessions);
@@ -80,15 +107,23 @@ int ShowSession(Context* context,
 }  // namespace
 
 void AddSessionCommands(CLI::App* app, Context* context) {
-  CLI::App* sessions = app->add_subcommand("sessions", "Show sessions");
+  CLI::App* sessions =
+      app->add_subcommand("session", "Show sessions")->alias("sessions");
   sessions->require_subcommand(1);
   const auto rig = std::make_shared<std::string>();
   const auto session = std::make_shared<std::string>();
   CLI::App* list = sessions->add_subcommand(
       "list", "List the sessions of a rig of which segments are stored");
   list->add_option("RIG", *rig)->required();
-  list->callback([context, rig] {
-    context->command = [context, rig] { return ListSessions(context, *rig); };
+  const auto options = std::make_shared<ListOptions>();
+  AddListOptions(list,
+                 "the first of the list",
+                 FilterHelp("last >= 2d AND segments > 3", SessionFields()),
+                 options.get());
+  list->callback([context, rig, options] {
+    context->command = [context, rig, options] {
+      return ListSessions(context, *rig, *options);
+    };
   });
   CLI::App* show = sessions->add_subcommand(
       "show", "Show the path of a session, in its frame and by its clock");

@@ -6,6 +6,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/screen.h"
+#include "client/cli/terminal.h"
 #include "client/cli/top_view.h"
 #include "selfcal/v1/activity_service.grpc.pb.h"
 
@@ -50,7 +51,7 @@ grpc::Status Draw(Context* context, const TopOptions& options, Screen* screen) {
   const std::chrono::milliseconds interval(
       static_cast<std::int64_t>(1000 * options.interval_s));
   do {
-    const Screen::Size size = screen->size();
+    const TerminalSize size = CurrentTerminalSize();
     v1::ListActivityResponse activity;
     const grpc::Status status = ReadActivity(
         context, std::min(RigsOnScreen(size.rows), kMostRigs), &activity);
@@ -76,9 +77,9 @@ int Top(Context* context, const TopOptions& options) {
 
 }  // namespace
 
-void AddTopCommand(CLI::App* app, Context* context) {
-  CLI::App* top = app->add_subcommand(
-      "top",
+CLI::App* AddTop(CLI::App* parent, const std::string& name, Context* context) {
+  CLI::App* top = parent->add_subcommand(
+      name,
       "Show the current activity: the rigs that sent last, streams, tables and "
       "runs. Updates until Ctrl-C on a terminal, prints once into a pipe");
   const auto options = std::make_shared<TopOptions>();
@@ -95,6 +96,7 @@ void AddTopCommand(CLI::App* app, Context* context) {
   top->callback([context, options] {
     context->command = [context, options] { return Top(context, *options); };
   });
+  return top;
 }
 
 }  // namespace selfcal::client

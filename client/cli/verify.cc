@@ -151,9 +151,11 @@ int Verify(Context* context, const std::string& rig) {
 
 }  // namespace
 
-void AddVerifyCommand(CLI::App* app, Context* context) {
-  CLI::App* verify = app->add_subcommand(
-      "verify",
+CLI::App* AddVerify(CLI::App* parent,
+                    const std::string& name,
+                    Context* context) {
+  CLI::App* verify = parent->add_subcommand(
+      name,
       "Compute the scores of all segments whose data is kept, and the active "
       "version, with both estimation cores, and compare them; takes minutes. "
       "Exits with 1 if they differ by more than rounding or convergence "
@@ -163,6 +165,7 @@ void AddVerifyCommand(CLI::App* app, Context* context) {
   verify->callback([context, rig] {
     context->command = [context, rig] { return Verify(context, *rig); };
   });
+  return verify;
 }
 
 }  // namespace selfcal::client

@@ -123,9 +123,8 @@ absl::StatusOr<ExportedFiles> ExportRig(const std::string& format,
         (*found)->write(rig, WithPositiveFov(theta), options);
     result.losses.push_back(
         {"sigmas",
-         fmt::format(
-             "{} has no uncertainty: `selfcal calibrations show` has it",
-             format),
+         fmt::format("{} has no uncertainty: `selfcal calibration show` has it",
+                     format),
          false});
     return result;
   } catch (const std::exception& error) {

@@ -35,7 +35,7 @@ Kind KindOf(absl::StatusCode code) {
     case absl::StatusCode::kUnimplemented:
       return {405, "Use a method that this address supports."};
     case absl::StatusCode::kDataLoss:
-      return {500, "Run 'selfcal doctor', and restore a backup."};
+      return {500, "Run 'selfcal daemon doctor', and restore a backup."};
     default:
       return {500, "See the log of selfcald, and report this."};
   }

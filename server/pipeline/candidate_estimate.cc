@@ -59,7 +59,7 @@ void CheckRank(const CheckContext& context,
     failure = fmt::format(
         "It estimates {} directions, and active version {} estimates {}: the "
         "segments show less than was known before. Send richer motion "
-        "(selfcal coach says which).",
+        "(selfcal rig coach says which).",
         rank,
         active.version,
         before);
@@ -111,7 +111,7 @@ void CheckCertainty(const CheckContext& context,
     failure = fmt::format(
         "The sigma of {} is {:.3g} {}, that of active version {} is {:.3g}{}: "
         "at most {:.1f} times as much may become active. Send richer motion "
-        "(selfcal coach says which).",
+        "(selfcal rig coach says which).",
         components[worst].name,
         after[worst],
         components[worst].unit,

@@ -28,7 +28,7 @@ void CheckObservations(const CheckContext& context,
         "{} of {} observations were used ({:.1f} %, at least {:.0f} % are "
         "required): the result is based on the few that happened to fit. Check "
         "tracks, "
-        "landmarks and timestamps of what is sent (selfcal preflight).",
+        "landmarks and timestamps of what is sent (selfcal segment preflight).",
         result.observations,
         all,
         100 * share,
@@ -59,7 +59,7 @@ void CheckSegments(const CheckContext& context,
     failure = fmt::format(
         "{} of {} segments contradict the others: where the majority does, "
         "none of them can be told to be right. Check what the SLAM system "
-        "sends (selfcal preflight), and send new motion.",
+        "sends (selfcal segment preflight), and send new motion.",
         excluded,
         all);
   }
@@ -83,7 +83,7 @@ void CheckPixels(const CheckContext& context,
         "The reprojection error of {:.3g} px (rms) is {:.1f} times what the "
         "noise predicts, at most {:.1f} times are plausible: the model does "
         "not explain what was seen. Check the pixel sigma of the rig, the "
-        "tracks and the timestamps (selfcal preflight).",
+        "tracks and the timestamps (selfcal segment preflight).",
         result.reprojection_rms_after_px,
         ratio,
         limit);
@@ -124,7 +124,7 @@ void CheckSegmentResiduals(const CheckContext& context,
     failure = fmt::format(
         "The {} residuals of segment {} are {:.1f} times {}, at most {:.1f} "
         "times are plausible: one sensor contradicts the others. Look at it "
-        "(selfcal segments show).",
+        "(selfcal segment show).",
         inertial ? "inertial" : "pixel",
         SegmentText(worst->key),
         largest,
@@ -159,7 +159,8 @@ std::string NoiseFailure(const CheckContext& context, const NoiseScale& scale) {
     return fmt::format(
         "The {} noise was taken for {:.1f} times what the rig states, at most "
         "{:.0f} times can be noise: the data or the model is wrong, or the "
-        "noise of the rig is. Check both (selfcal preflight, data sheet).",
+        "noise of the rig is. Check both (selfcal segment preflight, data "
+        "sheet).",
         NoiseKindName(scale.kind),
         scale.used,
         most);

@@ -36,7 +36,7 @@ std::string SolverFailure(const CalibrationResult& result) {
       return fmt::format(
           "The solver stalled after {} iterations{}: no step lowers the cost, "
           "yet the estimate is not settled, so that its sigmas mean nothing. "
-          "Look for segments with large residuals (selfcal segments list), "
+          "Look for segments with large residuals (selfcal segment list), "
           "and send richer motion.",
           result.iterations,
           message);
@@ -44,7 +44,7 @@ std::string SolverFailure(const CalibrationResult& result) {
       return fmt::format(
           "The solver did not converge in {} iterations{}: the estimate still "
           "moves, so that its sigmas mean nothing. Look for segments with "
-          "large residuals (selfcal segments list), and send richer motion.",
+          "large residuals (selfcal segment list), and send richer motion.",
           result.iterations,
           message);
   }

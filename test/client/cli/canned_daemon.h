@@ -35,6 +35,18 @@ inline grpc::Status BadField(const std::string& field,
           status.SerializeAsString()};
 }
 
+// NOT_FOUND with details, as the daemon sends it.
+inline grpc::Status Missing(const std::string& name) {
+  google::rpc::ResourceInfo resource;
+  resource.set_resource_name(name);
+  google::rpc::Status status;
+  status.set_code(5);
+  status.add_details()->PackFrom(resource);
+  return {grpc::StatusCode::NOT_FOUND,
+          name + " does not exist",
+          status.SerializeAsString()};
+}
+
 struct CannedDaemon final : v1::RigService::Service,
                             v1::SegmentService::Service,
                             v1::CalibrationService::Service,
@@ -59,8 +71,9 @@ struct CannedDaemon final : v1::RigService::Service,
   std::string last_order;
   v1::MotionSegment last_segment;  // that was sent
   v1::QuarantineSegmentsRequest last_quarantine;
-  bool last_force = false;             // of a recalibration
-  std::int64_t reject_index = -1;      // of the segments that are sent
+  bool last_force = false;         // of a recalibration
+  std::int64_t reject_index = -1;  // of the segments that are sent
+  bool reject_all = false;
   std::atomic<int> broken_watches{0};  // that many end before the run does
 
   // On a unix socket, or with credentials on a port.
@@ -91,7 +104,7 @@ struct CannedDaemon final : v1::RigService::Service,
       *response = rig;
       return grpc::Status::OK;
     }
-    return {grpc::StatusCode::NOT_FOUND, request->name() + " does not exist"};
+    return Missing(request->name());
   }
   grpc::Status ListRigs(grpc::ServerContext*,
                         const v1::ListRigsRequest* request,
@@ -113,7 +126,7 @@ struct CannedDaemon final : v1::RigService::Service,
       response.set_session(segment.session());
       response.set_index(segment.index());
       response.set_verdict(v1::StreamSegmentsResponse::STORED);
-      if (segment.index() == reject_index) {
+      if (reject_all || segment.index() == reject_index) {
         response.set_verdict(v1::StreamSegmentsResponse::REJECTED);
         auto* violation = response.add_violations();
         violation->set_field("keyframes[3].q_gi");

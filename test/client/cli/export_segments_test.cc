@@ -1,4 +1,4 @@
-// selfcal segments export.
+// selfcal segment export.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

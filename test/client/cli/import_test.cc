@@ -1,7 +1,8 @@
-// selfcal import.
+// selfcal segment import.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <sstream>
 #include <string>
 
@@ -59,6 +60,17 @@ TEST_F(ImportCommand, ReportsARejectionAndExitsWithOne) {
               i == 2 ? v1::StreamSegmentsResponse::REJECTED
                      : v1::StreamSegmentsResponse::STORED);
   }
+}
+
+TEST_F(ImportCommand, OfManyRejectionsAScreenIsShownAndTheirNumber) {
+  SELFCAL_NEED_RECORDING(map, "tango_handheld");
+  daemon_.reject_all = true;
+  const Outcome outcome = Selfcal({"segment", "import", "device", map});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 22)
+      << "with a warning about the data";
+  EXPECT_THAT(outcome.err,
+              HasSubstr("and 4 more segments were rejected: 14 in all\n"));
 }
 
 TEST_F(ImportCommand, ExitsWithOneForARigThatDoesNotExist) {

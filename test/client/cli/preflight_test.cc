@@ -1,4 +1,4 @@
-// selfcal preflight, and what import says of it.
+// selfcal segment preflight, and what segment import says of it.
 #include <gmock/gmock.h>
 #include <google/protobuf/struct.pb.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// selfcal recalibrate.
+// selfcal run start.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

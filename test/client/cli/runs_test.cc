@@ -1,4 +1,4 @@
-// selfcal runs.
+// selfcal run.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

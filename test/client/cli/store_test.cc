@@ -114,6 +114,13 @@ TEST_F(StoreCommands, BackupWritesTheWholeFile) {
                         "895421358c945b0431f85d66977bd3d2\n"));
 }
 
+TEST_F(StoreCommands, JsonHasTheSameFormOfTheChecksum) {
+  EXPECT_EQ(Selfcal({"daemon", "backup", file_, "--json"}), 0) << err_;
+  EXPECT_THAT(out_,
+              HasSubstr("\"sha256\": \"8ab63e29a4ba14e4e1688f9c15e5af90"
+                        "895421358c945b0431f85d66977bd3d2\""));
+}
+
 TEST_F(StoreCommands, BackupOverwritesOnlyWithForce) {
   std::ofstream(file_) << "precious";
   EXPECT_EQ(Selfcal({"backup", file_}), 2);

@@ -140,7 +140,7 @@ class TopTest(unittest.TestCase):
         self.assertEqual(top.wait(), 3, top.text.split(LEAVE)[-1])
 
     def test_once_is_a_table_and_no_screen(self) -> None:
-        top = self.top("--once", "--rigs", "3")
+        top = self.top("--once", "--color", "never", "--rigs", "3")
         top.read_until(lambda text: text.count("phone-") == 3)
         self.assertEqual(top.wait(), 0)
         self.assertNotIn("\x1b", top.text)

@@ -1,0 +1,120 @@
+// selfcal rig create: priors, and some of the cameras of a file.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "client/cli/camera_choice.h"
+#include "client/formats/format.h"
+#include "test/client/cli/commands_fixture.h"
+
+namespace selfcal::client {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+class RigCreate : public Commands {
+ protected:
+  // The files of kalibr for a rig with so many cameras, as arguments.
+  std::vector<std::string> FromKalibr(int cameras) const {
+    Rig rig = ARig("device");
+    CameraCalibration camera = rig.factory.cameras[0];
+    camera.model = DistortionModel::kEquidistant;
+    camera.distortion = Eigen::Vector4d(0.1, 0.01, 0.001, 0.0001);
+    rig.factory.cameras.clear();
+    for (int i = 0; i < cameras; ++i) {
+      camera.f = {255.0 + i, 256.0 + i};
+      camera.p_CI.x() = 0.1 * i;
+      rig.factory.cameras.push_back(camera);
+    }
+    const auto exported = ExportRig("kalibr", rig, rig.factory, {});
+    EXPECT_TRUE(exported.ok()) << exported.status();
+    std::vector<std::string> arguments = {
+        "rig", "create", "--id", "device", "--from", "kalibr"};
+    for (const TextFile& file : exported->files) {
+      arguments.push_back(temp_folder_.File(file.name));
+      WriteBytes(arguments.back(), file.text);
+    }
+    return arguments;
+  }
+  static std::vector<std::string> With(std::vector<std::string> arguments,
+                                       const std::vector<std::string>& more) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+};
+
+TEST_F(RigCreate, TakesPriorsFromTheCommandLine) {
+  const Outcome outcome = Selfcal(With(FromKalibr(1),
+                                       {"--imu",
+                                        "consumer",
+                                        "--prior-sigma",
+                                        "cam0.focal.x=2.5",
+                                        "--prior-sigma",
+                                        "imu.gyro.scale=0.03"}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto& sigmas = daemon_.rigs.back().prior_sigmas();
+  ASSERT_GT(sigmas.size(), 2);
+  EXPECT_EQ(sigmas[sigmas.size() - 2].pattern(), "cam0.focal.x");
+  EXPECT_EQ(sigmas[sigmas.size() - 2].value(), 2.5);
+  EXPECT_EQ(sigmas[sigmas.size() - 1].pattern(), "imu.gyro.scale.*");
+  EXPECT_EQ(sigmas[sigmas.size() - 1].value(), 0.03);
+}
+
+TEST_F(RigCreate, RefusesPriorsOfComponentsThatAreNotThere) {
+  const Outcome outcome =
+      Selfcal(With(FromKalibr(1), {"--prior-sigma", "cam0.fcal.x=2"}));
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("--prior-sigma: the rig has no component"),
+                    HasSubstr("did you mean 'cam0.focal.x'?"),
+                    HasSubstr("imu.gyro.scale, ")));
+  EXPECT_THAT(
+      Selfcal(With(FromKalibr(1), {"--prior-sigma", "cam0.focal.x"})).err,
+      HasSubstr("'cam0.focal.x' is not of the form COMPONENT=NUMBER"));
+  EXPECT_TRUE(daemon_.rigs.empty());
+}
+
+TEST_F(RigCreate, UsesSomeOfTheCameras) {
+  const Outcome outcome =
+      Selfcal(With(FromKalibr(3), {"--cameras", "cam0,cam2"}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto& cameras = daemon_.rigs.back().factory().cameras();
+  ASSERT_EQ(cameras.size(), 2);
+  EXPECT_NEAR(cameras[0].f().x(), 255, 1e-9);
+  EXPECT_NEAR(cameras[1].f().x(), 257, 1e-9);
+  EXPECT_THAT(outcome.err, HasSubstr("note: cam2: is cam1 of the rig\n"));
+}
+
+TEST_F(RigCreate, NamesTheCamerasThatThereAre) {
+  const Outcome unknown = Selfcal(With(FromKalibr(2), {"--cameras", "cam7"}));
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err,
+              AllOf(HasSubstr("--cameras: there is no camera 'cam7'"),
+                    HasSubstr("Known: cam0, cam1")));
+  EXPECT_THAT(Selfcal(With(FromKalibr(2), {"--cameras", "cam1,cam1"})).err,
+              HasSubstr("cam1 is given twice"));
+  EXPECT_THAT(
+      Selfcal({"rig", "create", WriteFile("{}"), "--cameras", "cam0"}).err,
+      HasSubstr("--from and --vi-map"));
+  EXPECT_TRUE(daemon_.rigs.empty());
+}
+
+TEST(KeepCameras, DropsTheLossesOfOthers) {
+  Rig rig = ARig("device");
+  rig.factory.cameras.push_back(rig.factory.cameras[0]);
+  std::vector<Loss> losses = {{"cam0.time_offset", "lost", true},
+                              {"cam1", "lost", true},
+                              {"imu", "lost", true}};
+  ASSERT_TRUE(KeepCameras({"cam1"}, &rig, &losses).ok());
+  ASSERT_EQ(losses.size(), 3u);
+  EXPECT_EQ(losses[0].name, "cam1");
+  EXPECT_EQ(losses[1].name, "imu");
+  EXPECT_EQ(losses[2].text, "is cam0 of the rig");
+}
+
+}  // namespace
+}  // namespace selfcal::client
