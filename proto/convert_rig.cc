@@ -118,6 +118,12 @@ void ReadSettings(const v1::Rig& message, Rig* rig) {
   if (message.gravity_mps2() != 0) rig->gravity_mps2 = message.gravity_mps2();
   if (message.table_size() != 0) rig->table_size = message.table_size();
   rig->reweight_noise = message.reweight_noise();
+  if (message.imu().gyro_max() != 0) {
+    rig->imu_full_scale.gyro_radps = message.imu().gyro_max();
+  }
+  if (message.imu().accel_max() != 0) {
+    rig->imu_full_scale.accel_mps2 = message.imu().accel_max();
+  }
   if (message.has_min_gain_nats()) rig->min_gain_nats = message.min_gain_nats();
   if (message.has_retrigger_fraction()) {
     rig->retrigger_fraction = message.retrigger_fraction();
@@ -135,6 +141,8 @@ v1::Rig ToProto(const Rig& rig) {
   noise->set_accel_noise_density(rig.imu_noise.accel_noise_density);
   noise->set_gyro_bias_random_walk(rig.imu_noise.gyro_bias_random_walk);
   noise->set_accel_bias_random_walk(rig.imu_noise.accel_bias_random_walk);
+  message.mutable_imu()->set_gyro_max(rig.imu_full_scale.gyro_radps);
+  message.mutable_imu()->set_accel_max(rig.imu_full_scale.accel_mps2);
   message.set_pixel_sigma_px(rig.pixel_sigma_px);
   message.set_gravity_mps2(rig.gravity_mps2);
   for (const ParameterGroup& group : rig.groups) {

@@ -74,6 +74,9 @@ Facts Describe(const v1::Rig& rig) {
       fmt::format("{:g} rad/s^2/sqrt(Hz)", noise.gyro_bias_random_walk()));
   facts.Add("accel bias walk",
             fmt::format("{:g} m/s^3/sqrt(Hz)", noise.accel_bias_random_walk()));
+  facts.Add("gyro full scale", fmt::format("{:g} rad/s", rig.imu().gyro_max()));
+  facts.Add("accel full scale",
+            fmt::format("{:g} m/s^2", rig.imu().accel_max()));
   facts.Add("pixel sigma", fmt::format("{:g} px", rig.pixel_sigma_px()));
   facts.Add("gravity", fmt::format("{:g} m/s^2", rig.gravity_mps2()));
   for (const auto& group : rig.groups()) {
@@ -254,6 +257,16 @@ std::vector<FieldOption> AddNoiseOptions(CLI::App* create, RigInput* input) {
       {"rig.imu_noise.accel_bias_random_walk",
        create->add_option(
            "--accel-bias-walk", input->accel_bias_walk, "[m/s^3/sqrt(Hz)]")},
+      {"rig.imu.gyro_max",
+       create->add_option("--gyro-max",
+                          input->gyro_max,
+                          "Full scale of the gyroscope, beyond which readings "
+                          "are left out [rad/s]; 2000 deg/s by default")},
+      {"rig.imu.accel_max",
+       create->add_option("--accel-max",
+                          input->accel_max,
+                          "Full scale of the accelerometer [m/s^2]; 16 g by "
+                          "default")},
       {"rig.gravity_mps2",
        create->add_option("--gravity", input->gravity_mps2, "[m/s^2]")}};
 }

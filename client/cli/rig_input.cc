@@ -239,6 +239,8 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
   const bool any_noise = input.gyro_noise || input.accel_noise ||
                          input.gyro_bias_walk || input.accel_bias_walk;
   if (any_noise) *rig->mutable_imu_noise() = noise;
+  if (input.gyro_max) rig->mutable_imu()->set_gyro_max(*input.gyro_max);
+  if (input.accel_max) rig->mutable_imu()->set_accel_max(*input.accel_max);
   rig->mutable_fixed()->Add(input.fixed.begin(), input.fixed.end());
   const absl::Status status = AddBlocks(input.blocks, &*rig);
   if (!status.ok()) return status;

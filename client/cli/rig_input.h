@@ -29,6 +29,8 @@ struct RigInput {
   std::optional<double> accel_noise;
   std::optional<double> gyro_bias_walk;
   std::optional<double> accel_bias_walk;
+  std::optional<double> gyro_max;   // [rad/s]
+  std::optional<double> accel_max;  // [m/s^2]
   std::optional<double> gravity_mps2;
   std::optional<std::string> imu;        // a grade, as ParseImuGrade() reads it
   std::optional<std::string> selection;  // as SelectionText()

@@ -68,10 +68,18 @@ enum class Selection {
 // Name of the only table of a rig with a joint selection.
 inline constexpr char kJointTable[] = "joint";
 
+// Limits of an IMU's readings on each axis, in both directions; the defaults
+// are 2000 deg/s and 16 g.
+struct ImuFullScale {
+  double gyro_radps = 34.9065850;
+  double accel_mps2 = 156.9064;
+};
+
 struct Rig {
   std::string id;  // [a-z0-9_-]{1,63}
   Calibration factory;
   ImuNoise imu_noise;
+  ImuFullScale imu_full_scale;
   double pixel_sigma_px = 1.0;
   double gravity_mps2 = 9.81;  // g = (0, 0, -gravity) in G
   std::vector<ParameterGroup> groups = DefaultGroups();

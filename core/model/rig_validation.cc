@@ -37,10 +37,12 @@ struct PlausibleRange {
   double high;
 };
 
-constexpr PlausibleRange kGyroNoise = {1e-7, 1};    // [rad/s/sqrt(Hz)]
-constexpr PlausibleRange kAccelNoise = {1e-6, 10};  // [m/s^2/sqrt(Hz)]
-constexpr PlausibleRange kGyroWalk = {1e-9, 1};     // [rad/s^2/sqrt(Hz)]
-constexpr PlausibleRange kAccelWalk = {1e-8, 10};   // [m/s^3/sqrt(Hz)]
+constexpr PlausibleRange kGyroNoise = {1e-7, 1};       // [rad/s/sqrt(Hz)]
+constexpr PlausibleRange kAccelNoise = {1e-6, 10};     // [m/s^2/sqrt(Hz)]
+constexpr PlausibleRange kGyroWalk = {1e-9, 1};        // [rad/s^2/sqrt(Hz)]
+constexpr PlausibleRange kAccelWalk = {1e-8, 10};      // [m/s^3/sqrt(Hz)]
+constexpr PlausibleRange kGyroFullScale = {0.1, 1e3};  // [rad/s]
+constexpr PlausibleRange kAccelFullScale = {1, 1e4};   // [m/s^2]
 constexpr PlausibleRange kPixelSigma = {1e-3, 1e3};
 constexpr PlausibleRange kGravity = {0.1, 100};  // Ceres to Jupiter
 // A prior sigma, in reference sigmas of its component.
@@ -73,6 +75,11 @@ void CheckImuNoise(const ImuNoise& noise, ViolationList* list) {
              noise.accel_bias_random_walk,
              kAccelWalk,
              list);
+}
+
+void CheckImuFullScale(const ImuFullScale& full_scale, ViolationList* list) {
+  CheckRange("imu.gyro_max", full_scale.gyro_radps, kGyroFullScale, list);
+  CheckRange("imu.accel_max", full_scale.accel_mps2, kAccelFullScale, list);
 }
 
 // Adds a violation and returns false for a list that is too long to inspect.
@@ -232,6 +239,7 @@ std::vector<Violation> Validate(const Rig& rig) {
     list.Add(std::move(violation.field), std::move(violation.message));
   }
   CheckImuNoise(rig.imu_noise, &list);
+  CheckImuFullScale(rig.imu_full_scale, &list);
   CheckRange("pixel_sigma_px", rig.pixel_sigma_px, kPixelSigma, &list);
   CheckRange("gravity_mps2", rig.gravity_mps2, kGravity, &list);
   // Patterns have no components to match unless the number of cameras is valid.

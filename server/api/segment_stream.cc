@@ -38,6 +38,8 @@ void FillVerdict(const SubmitResult& result,
       response->set_verdict(v1::StreamSegmentsResponse::STORED);
       response->set_observations_dropped(
           static_cast<std::int32_t>(result.observations_dropped));
+      response->set_readings_dropped(
+          static_cast<std::int32_t>(result.readings_dropped));
       return;
     case SubmitResult::Verdict::kDuplicate:
       response->set_verdict(v1::StreamSegmentsResponse::DUPLICATE);

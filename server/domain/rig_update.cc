@@ -20,6 +20,7 @@ std::string Unchanging(StoredRig rig) {
   rig.rig.min_gain_nats = 0;
   rig.rig.retrigger_fraction = 0;
   rig.rig.reweight_noise = false;
+  rig.rig.imu_full_scale = {};
   return SerializeRig(rig);
 }
 
@@ -33,8 +34,9 @@ absl::StatusOr<RigUpdate> UpdateRig(UnitOfWork* tx,
   after.create_time_ns = before.create_time_ns;
   if (Unchanging(before) != Unchanging(after)) {
     return absl::InvalidArgumentError(
-        "only labels, prior_sigmas, thresholds, ages and reweight_noise of a "
-        "rig can change: what is stored was computed with the rest; create "
+        "only labels, prior_sigmas, thresholds, ages, reweight_noise and imu "
+        "of "
+        "a rig can change: what is stored was computed with the rest; create "
         "another rig");
   }
   if (SerializeRig(before) == SerializeRig(after)) {

@@ -13,6 +13,7 @@
 #include "core/calibration/settled_ends.h"
 #include "core/information/segment_scorer.h"
 #include "core/model/image_bounds.h"
+#include "core/model/saturation.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/rescoring.h"
 #include "server/pipeline/scoring.h"
@@ -92,6 +93,16 @@ absl::StatusOr<SegmentInformation> ScoreByCore(
   }
 }
 
+SubmitResult TooSaturated(const MotionSegment& segment, std::size_t saturated) {
+  return {SubmitResult::Verdict::kRejected,
+          {{"imu",
+            fmt::format("{} of {} readings are at or beyond the full scale; "
+                        "send rad/s and m/s^2, and state the range of the "
+                        "sensors as imu.gyro_max and imu.accel_max of the rig",
+                        saturated,
+                        segment.imu.size())}}};
+}
+
 // Connects the three kinds of threads, and does on the caller's thread what
 // comes before them.
 class PipelineImpl : public Pipeline {
@@ -164,20 +175,31 @@ class PipelineImpl : public Pipeline {
     const absl::StatusOr<StoredRig> stored_rig = store_->GetRig(rig);
     if (!stored_rig.ok()) return done(stored_rig.status());
     const Calibration& factory = stored_rig->rig.factory;
+    const ImuFullScale& full_scale = stored_rig->rig.imu_full_scale;
     const std::size_t stray =
         CountStrayObservations(segment, factory, options_.limits);
-    if (stray == 0) return BeginStore(rig, factory, segment, cancelled, done);
+    const std::size_t saturated = CountSaturatedReadings(segment, full_scale);
+    if (IsTooSaturated(segment, saturated)) {
+      return done(TooSaturated(segment, saturated));
+    }
+    if (stray == 0 && saturated == 0) {
+      return BeginStore(rig, factory, segment, cancelled, done);
+    }
     MotionSegment rest = segment;
     RemoveStrayObservations(factory, options_.limits, &rest);
+    RemoveSaturatedReadings(full_scale, &rest);
     BeginStore(rig,
                factory,
                rest,
                cancelled,
-               [done, stray](absl::StatusOr<SubmitResult> result) {
+               [=](absl::StatusOr<SubmitResult> result) {
                  const bool stored =
                      result.ok() &&
                      result->verdict == SubmitResult::Verdict::kStored;
-                 if (stored) result->observations_dropped = stray;
+                 if (stored) {
+                   result->observations_dropped = stray;
+                   result->readings_dropped = saturated;
+                 }
                  done(result);
                });
   }

@@ -107,6 +107,8 @@ struct SubmitResult {
   std::vector<Violation> violations;  // if rejected
   // Observations outside the image that were left out of what is stored.
   std::size_t observations_dropped = 0;
+  // Saturated readings of the IMU that were left out.
+  std::size_t readings_dropped = 0;
 };
 
 // An update to the watchers of a run.

@@ -82,6 +82,8 @@ void ExpectSame(const Rig& a, const Rig& b) {
   EXPECT_TRUE(SameBits(a.retrigger_fraction, b.retrigger_fraction));
   EXPECT_EQ(a.blocks, b.blocks);
   EXPECT_EQ(a.reweight_noise, b.reweight_noise);
+  EXPECT_EQ(a.imu_full_scale.gyro_radps, b.imu_full_scale.gyro_radps);
+  EXPECT_EQ(a.imu_full_scale.accel_mps2, b.imu_full_scale.accel_mps2);
 }
 
 void ExpectSame(const MotionSegment& a, const MotionSegment& b) {

@@ -80,6 +80,46 @@ TEST_F(SubmitTest, AFewObservationsOutsideTheImageAreLeftOutAndCounted) {
   EXPECT_EQ(again->observations_dropped, 0u);
 }
 
+TEST_F(SubmitTest, SaturatedReadingsAreLeftOutAndCounted) {
+  CreateRig();
+  std::mutex gate;
+  std::unique_lock hold(gate);
+  estimators_.score = [&](const Rig& rig, const auto&, const auto& segment) {
+    const std::lock_guard wait(gate);
+    return FakeInformation(rig, EntropyOf(segment.key.index));
+  };
+  StartOne();
+  MotionSegment segment = Segment(0);
+  const std::size_t count = segment.imu.size();
+  ASSERT_GT(count, 150u);
+  segment.imu[count / 2].gyro.x() = 999;
+  const auto result = pipeline_->Submit("a", segment, nullptr);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->verdict, SubmitVerdict::kStored);
+  EXPECT_EQ(result->readings_dropped, 1u);
+  const auto stored = store_->GetSegmentData("a", segment.key);
+  hold.unlock();
+  ASSERT_TRUE(stored.ok()) << stored.status();
+  EXPECT_EQ(stored->imu.size(), count - 1);
+}
+
+TEST_F(SubmitTest, ManySaturatedReadingsRejectTheSegment) {
+  CreateRig();
+  StartOne();
+  MotionSegment segment = Segment(0);
+  // Degrees taken for radians.
+  for (std::size_t k = 0; k < segment.imu.size(); k += 10) {
+    segment.imu[k].gyro.x() = 90;
+  }
+  const auto result = pipeline_->Submit("a", segment, nullptr);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->verdict, SubmitVerdict::kRejected);
+  ASSERT_EQ(result->violations.size(), 1u);
+  EXPECT_EQ(result->violations[0].field, "imu");
+  EXPECT_NE(result->violations[0].message.find("imu.gyro_max"),
+            std::string::npos);
+}
+
 TEST_F(SubmitTest, ManyObservationsOutsideTheImageRejectTheSegment) {
   CreateRig();
   StartOne();

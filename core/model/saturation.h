@@ -1,0 +1,27 @@
+// Readings of an IMU at or beyond its full scale: the motion was faster than
+// the sensor can tell, or the reading is corrupt. They are left out, so that
+// the time around them is a gap of the IMU.
+#pragma once
+
+#include <cstddef>
+
+#include "core/model/rig.h"
+#include "core/model/segment.h"
+
+namespace selfcal {
+
+// A larger part of the readings is not due to single shocks: it stems from a
+// wrong unit, or from a full scale that the rig does not state.
+inline constexpr double kMaxSaturatedFraction = 0.02;
+
+std::size_t CountSaturatedReadings(const MotionSegment& segment,
+                                   const ImuFullScale& full_scale);
+
+// True if `count` of the segment's readings are more than
+// kMaxSaturatedFraction.
+bool IsTooSaturated(const MotionSegment& segment, std::size_t count);
+
+void RemoveSaturatedReadings(const ImuFullScale& full_scale,
+                             MotionSegment* segment);
+
+}  // namespace selfcal
