@@ -15,6 +15,7 @@ import xml.etree.ElementTree as ElementTree
 from markdown_lines import escaped
 
 _DIRECTIVES = {
+    "define": "doxygendefine",
     "function": "doxygenfunction",
     "enum": "doxygenenum",
     "typedef": "doxygentypedef",
@@ -48,15 +49,17 @@ def page(compound: ElementTree.Element, header: pathlib.Path) -> list[str]:
             continue
         classes.append(inner.text)
         kind = "struct" if inner.get("refid").startswith("struct") else "class"
-        out += ["", f"## {inner.text.rsplit('::', 1)[1]}"]
+        out += ["", f"## {inner.text.rsplit('::', 1)[-1]}"]
         out += directive(
             f"doxygen{kind}", inner.text, ":members:", ":undoc-members:"
         )
     others = []
     for member in compound.iter("memberdef"):
-        name = member.findtext("qualifiedname")
-        if member.get("kind") == "function":
-            # The types, for a function that has overloads.
+        name = member.findtext("qualifiedname") or member.findtext("name")
+        if member.get("kind") == "typedef" and name in classes:
+            continue  # typedef struct name {...} name, in C
+        if member.get("kind") == "function" and "::" in name:
+            # The types, for a function that has overloads, as C has none.
             types = ", ".join(
                 "".join(p.find("type").itertext()) for p in member.iter("param")
             )
@@ -69,16 +72,16 @@ def main() -> None:
     xml, headers, out = (pathlib.Path(arg) for arg in sys.argv[1:4])
     out.mkdir(parents=True, exist_ok=True)
     names = []
-    for path in sorted(xml.glob("*_8h.xml")):
+    for path in sorted([*xml.glob("*_8h.xml"), *xml.glob("*_8hpp.xml")]):
         compound = ElementTree.parse(path).find("compounddef")
         header = headers / compound.find("location").get("file")
         names.append(path.stem)
         text = "\n".join(page(compound, header))
         (out / f"{path.stem}.md").write_text(text + "\n")
     (out / "index.md").write_text(
-        "# C++\n\nThe client library, by its headers as they are installed; "
-        "[the API](../../api.md#the-client-library) explains how they are "
-        "linked, and what may run at the same time.\n\n"
+        "# C and C++\n\nThe client library, by its headers as they are "
+        "installed; [the API](../../api.md#the-client-library) explains how "
+        "they are linked, and what may run at the same time.\n\n"
         "```{toctree}\n" + "\n".join(names) + "\n```\n"
     )
 

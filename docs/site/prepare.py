@@ -26,7 +26,7 @@ _LANGUAGES = {
     ".json": "json", ".yml": "yaml", ".proto": "protobuf", ".service": "ini",
 }  # fmt: skip
 REFERENCE = """
-- [C++](reference/cpp/index.md): the client library
+- [C and C++](reference/cpp/index.md): the client library
 - [Python](reference/python.rst): the package `selfcal`
 - [gRPC](reference/grpc/index.md): the contract
 """

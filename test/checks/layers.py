@@ -208,7 +208,7 @@ def undeclared_includes(project: Project) -> list:
     findings = []
     for file in sorted(project.files):
         if file.split("/")[0] not in FOLDERS or not file.endswith(
-            (".cc", ".h")
+            (".cc", ".h", ".hpp")
         ):
             continue
         owners = project.owners(file)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs the client library into a folder of its own, builds the example
+# Installs the client library into a folder of its own, builds the examples
 # outside the tree with nothing but that, by CMake and by pkg-config, and
-# streams a recording with it to a daemon.
+# streams a recording with them to a daemon.
 #
 #   installed_package_test.sh BUILD_DIR SOURCE_DIR SELFCALD SELFCAL WRITER
 set -euo pipefail
@@ -31,12 +31,27 @@ if grep -rnE '#include [<"](grpc|google|client/|core/|proto/|server/)' \
 fi
 library=$(find "$work/prefix" -name 'libselfcal.so')
 foreign=$(nm -DC --defined-only "$library" |
-  grep -vE ' selfcal::(client::(SegmentBuilder::|SegmentStream::|CalibrationWatch::|Assemble)|[A-Z])' ||
+  grep -vE ' selfcal::(client::(SegmentBuilder::|SegmentStream::|CalibrationWatch::|Assemble)|[A-Z])|@SELFCAL_C_[0-9]+$| SELFCAL_(CXX_0|C_1)(@|$)' ||
   true)
 if [[ -n $foreign ]]; then
   echo "FAILED: libselfcal shows more than its interface: $foreign" >&2
   exit 1
 fi
+
+echo 'library: the C interface is what it was, and all that its header declares'
+nm -D --defined-only --with-symbol-versions "$library" |
+  awk '$3 ~ /@SELFCAL_C_/ { print $3 }' | sort >"$work/symbols"
+diff "$source/test/client/package/c_symbols.txt" "$work/symbols" || {
+  echo 'FAILED: a function of the C interface may be added, never changed' >&2
+  exit 1
+}
+header=$work/prefix/include/selfcal/selfcal.h
+sed 's://.*::' "$header" | grep -oE '\bselfcal_\w+\(' | tr -d '(' |
+  sort -u >"$work/declared"
+diff <(sed 's/@.*//' "$work/symbols") "$work/declared" || {
+  echo 'FAILED: selfcal.h declares something else' >&2
+  exit 1
+}
 
 echo 'library: what applies a calibration is in it'
 for function in CorrectImu Project Unproject; do
@@ -57,12 +72,38 @@ if ! {
   exit 1
 fi
 
+echo 'example: with CMake, without C++20'
+# No Eigen and no Abseil may be found.
+if ! {
+  cmake -S "$work/example" -B "$work/legacy" -DCXX20=OFF \
+    -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON \
+    -DCMAKE_DISABLE_FIND_PACKAGE_absl=ON &&
+    cmake --build "$work/legacy"
+} >"$work/log" 2>&1; then
+  cat "$work/log" >&2
+  exit 1
+fi
+
 echo 'example: with pkg-config'
 PKG_CONFIG_PATH=$(dirname "$(find "$work/prefix" -name selfcal.pc)")
 export PKG_CONFIG_PATH
 # shellcheck disable=SC2046
 c++ -std=c++20 "$work/example/stream_recording.cc" -o "$work/by_pkg_config" \
   $(pkg-config --cflags --libs selfcal)
+strict=(-Wall -Wextra -Wpedantic -Werror -O2 -MMD -MF "$work/includes")
+[[ $(uname -m) != x86_64 ]] || strict+=(-march=native)
+for example in stream_recording_c.c stream_recording_cxx11.cc; do
+  compiler=(c++ -std=c++11)
+  [[ $example != *.c ]] || compiler=(cc -std=c99)
+  echo "example: $example, by ${compiler[*]} ${strict[*]:0:4}"
+  # shellcheck disable=SC2046
+  "${compiler[@]}" "${strict[@]}" "$work/example/$example" \
+    -o "$work/${example%.*}" $(pkg-config --cflags --libs selfcal-c)
+  if grep -iE '/(eigen3|absl)/' "$work/includes"; then
+    echo "FAILED: $example needs Eigen or Abseil" >&2
+    exit 1
+  fi
+done
 export LD_LIBRARY_PATH
 LD_LIBRARY_PATH=$(dirname "$library")
 
@@ -84,4 +125,16 @@ listed=$("$selfcal" segments list packaged | wc -l)
 [[ $first == 'segments: 4 stored, 0 known already, 0 rejected' ]]
 [[ $again == 'segments: 0 stored, 4 known already, 0 rejected' ]]
 [[ $listed == 4 ]]
+
+for program in stream_recording_c stream_recording_cxx11 \
+  legacy/stream_recording_c legacy/stream_recording_cxx11; do
+  echo "example: $program"
+  rig=$(tr _/ -- <<<"$program")
+  sed "s/packaged/$rig/g" "$work/rig.json" >"$work/$rig.json"
+  "$selfcal" rig create "$work/$rig.json" >/dev/null
+  shown=$("$work/$program" "$SELFCAL_TARGET" "$rig" "$work" "$work/spool" |
+    tee /dev/stderr)
+  [[ $shown == *'calibration 1 is active'* ]]
+  [[ $shown == *'segments: 4 stored, 0 known already, 0 rejected' ]]
+done
 echo 'passed'

@@ -2,53 +2,17 @@
 // program by itself, since it replaces the global operator new.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <new>
+#include <optional>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "client/selfcal/client.h"
 #include "client/selfcal/segment_builder.h"
-
-namespace {
-
-// Allocations of this thread until one fails; below 0 none does.
-thread_local int until_failure = -1;
-
-void* Allocate(std::size_t size) {
-  if (until_failure == 0) {
-    until_failure = -1;
-    throw std::bad_alloc();
-  }
-  if (until_failure > 0) --until_failure;
-  void* memory = std::malloc(size == 0 ? 1 : size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) { return Allocate(size); }
-void* operator new[](std::size_t size) { return Allocate(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
+#include "test/support/failing_new.h"
 
 namespace selfcal::client {
 namespace {
-
-// True if the call met the failure.
-template <typename Call>
-bool Fails(int allocation, const Call& call) {
-  until_failure = allocation;
-  call();
-  const bool failed = until_failure < 0;
-  until_failure = -1;
-  return failed;
-}
 
 // 30 keyframes, 6 to a segment, with ten samples and three landmarks each.
 void Feed(const std::vector<KeyframeObservation>& seen,

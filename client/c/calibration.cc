@@ -1,0 +1,290 @@
+#include "client/c/calibration.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "client/c/boundary.h"
+#include "core/model/camera.h"
+#include "core/model/imu.h"
+
+namespace selfcal::c {
+
+std::shared_ptr<const PublishedVersion> Publish(
+    const client::CalibrationVersion& version) {
+  return std::make_shared<const PublishedVersion>(
+      PublishedVersion{version,
+                       TangentComponents(version.theta),
+                       ReadableValues(version.theta)});
+}
+
+namespace {
+
+// The calibration behind a handle that is not null.
+const Calibration& ThetaOf(const selfcal_calibration* calibration) {
+  return calibration->published->version.theta;
+}
+
+// OUT_OF_RANGE for an index that is not below the count.
+absl::Status CheckIndex(std::int32_t index,
+                        std::size_t count,
+                        const char* name) {
+  if (index >= 0 && static_cast<std::size_t>(index) < count) {
+    return absl::OkStatus();
+  }
+  return absl::OutOfRangeError(
+      fmt::format("{}: is {}, there are {}", name, index, count));
+}
+
+// Checks the handle and the index of a camera.
+absl::Status CheckCamera(const selfcal_calibration* calibration,
+                         std::int32_t index) {
+  if (auto s = RequireNotNull(calibration, "calibration"); !s.ok()) return s;
+  return CheckIndex(index, ThetaOf(calibration).cameras.size(), "camera");
+}
+
+absl::Status CheckAllNotNull(
+    std::initializer_list<std::pair<const void*, const char*>> arguments) {
+  for (const auto& [pointer, name] : arguments) {
+    if (auto s = RequireNotNull(pointer, name); !s.ok()) return s;
+  }
+  return absl::OkStatus();
+}
+
+template <typename Vector>
+void Copy(const Vector& from, double* to) {
+  std::copy_n(from.data(), from.size(), to);
+}
+
+selfcal_quaternion ToQuaternion(const Eigen::Quaterniond& q) {
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+selfcal_imu ToImu(const ImuCalibration& given) {
+  selfcal_imu imu = {};
+  Copy(given.s_g, imu.gyro_scale);
+  Copy(given.m_g, imu.gyro_misalignment);
+  Copy(given.s_a, imu.accel_scale);
+  Copy(given.m_a, imu.accel_misalignment);
+  imu.q_AI = ToQuaternion(given.q_AI);
+  return imu;
+}
+
+static_assert(kMaxDistortion <= SELFCAL_MAX_DISTORTION);
+
+selfcal_camera ToCamera(const CameraCalibration& given) {
+  selfcal_camera camera = {};
+  camera.width_px = given.width_px;
+  camera.height_px = given.height_px;
+  camera.distortion_size = static_cast<std::int32_t>(given.distortion.size());
+  camera.model = DistortionName(given.model).data();  // of a literal
+  Copy(given.distortion, camera.distortion);
+  Copy(given.f, camera.f);
+  Copy(given.c, camera.c);
+  camera.q_CI = ToQuaternion(given.q_CI);
+  Copy(given.p_CI, camera.p_CI);
+  camera.time_offset_s = given.time_offset_s;
+  return camera;
+}
+
+selfcal_component ToComponent(const PublishedVersion& published,
+                              std::int32_t index) {
+  const TangentComponent& given =
+      published.components[static_cast<std::size_t>(index)];
+  const Eigen::MatrixXd& covariance = published.version.covariance;
+  selfcal_component component = {};
+  component.name = given.name.c_str();
+  component.unit = given.unit.c_str();
+  component.value = published.values[index];
+  component.sigma = covariance.size() == 0
+                        ? std::numeric_limits<double>::quiet_NaN()
+                        : std::sqrt(covariance(index, index));
+  return component;
+}
+
+}  // namespace
+}  // namespace selfcal::c
+
+using selfcal::c::Guarded;
+using selfcal::c::RequireNotNull;
+
+selfcal_calibration* selfcal_calibration_copy(
+    const selfcal_calibration* calibration) {
+  if (calibration == nullptr) return nullptr;
+  return selfcal::c::OrNull(
+      [&] { return new selfcal_calibration(*calibration); });
+}
+
+void selfcal_calibration_destroy(selfcal_calibration* calibration) {
+  delete calibration;
+}
+
+int64_t selfcal_calibration_version(const selfcal_calibration* calibration) {
+  return calibration == nullptr ? 0 : calibration->published->version.version;
+}
+
+int32_t selfcal_calibration_camera_count(
+    const selfcal_calibration* calibration) {
+  return calibration == nullptr
+             ? 0
+             : static_cast<int32_t>(
+                   selfcal::c::ThetaOf(calibration).cameras.size());
+}
+
+int32_t selfcal_calibration_component_count(
+    const selfcal_calibration* calibration) {
+  return calibration == nullptr
+             ? 0
+             : static_cast<int32_t>(calibration->published->components.size());
+}
+
+int32_t selfcal_calibration_get_imu(const selfcal_calibration* calibration,
+                                    selfcal_imu* imu,
+                                    selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = RequireNotNull(calibration, "calibration");
+    if (!status.ok()) return status;
+    return selfcal::c::Write(
+        selfcal::c::ToImu(selfcal::c::ThetaOf(calibration).imu),
+        selfcal::c::kImuSize,
+        "imu",
+        imu);
+  });
+}
+
+int32_t selfcal_calibration_get_camera(const selfcal_calibration* calibration,
+                                       int32_t index,
+                                       selfcal_camera* camera,
+                                       selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = selfcal::c::CheckCamera(calibration, index);
+    if (!status.ok()) return status;
+    const auto at = static_cast<std::size_t>(index);
+    return selfcal::c::Write(
+        selfcal::c::ToCamera(selfcal::c::ThetaOf(calibration).cameras[at]),
+        selfcal::c::kCameraSize,
+        "camera",
+        camera);
+  });
+}
+
+int32_t selfcal_calibration_get_component(
+    const selfcal_calibration* calibration,
+    int32_t index,
+    selfcal_component* component,
+    selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = RequireNotNull(calibration, "calibration");
+    if (!status.ok()) return status;
+    const auto& published = *calibration->published;
+    status =
+        selfcal::c::CheckIndex(index, published.components.size(), "component");
+    if (!status.ok()) return status;
+    return selfcal::c::Write(selfcal::c::ToComponent(published, index),
+                             selfcal::c::kComponentSize,
+                             "component",
+                             component);
+  });
+}
+
+int32_t selfcal_calibration_get_covariance(
+    const selfcal_calibration* calibration,
+    double* covariance,
+    uint64_t size,
+    selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = selfcal::c::CheckAllNotNull(
+        {{calibration, "calibration"}, {covariance, "covariance"}});
+    if (!status.ok()) return status;
+    const auto& published = *calibration->published;
+    const std::uint64_t count = published.components.size();
+    if (size != count * count) {
+      return absl::InvalidArgumentError(
+          fmt::format("size: is {}, must be {} x {}", size, count, count));
+    }
+    if (published.version.covariance.size() == 0) {
+      return absl::FailedPreconditionError(fmt::format(
+          "version {} has no covariance", published.version.version));
+    }
+    // Symmetric: rows and columns are the same.
+    selfcal::c::Copy(published.version.covariance, covariance);
+    return absl::OkStatus();
+  });
+}
+
+int32_t selfcal_calibration_correct_imu(const selfcal_calibration* calibration,
+                                        const double gyro[3],
+                                        const double accel[3],
+                                        const double b_g[3],
+                                        const double b_a[3],
+                                        double w_I[3],
+                                        double f_I[3],
+                                        selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = selfcal::c::CheckAllNotNull({{calibration, "calibration"},
+                                               {gyro, "gyro"},
+                                               {accel, "accel"},
+                                               {b_g, "b_g"},
+                                               {b_a, "b_a"},
+                                               {w_I, "w_I"},
+                                               {f_I, "f_I"}});
+    if (!status.ok()) return status;
+    const selfcal::BodyRates rates =
+        selfcal::CorrectImu(selfcal::c::ThetaOf(calibration).imu,
+                            Eigen::Vector3d(gyro),
+                            Eigen::Vector3d(accel),
+                            Eigen::Vector3d(b_g),
+                            Eigen::Vector3d(b_a));
+    selfcal::c::Copy(rates.w_I, w_I);
+    selfcal::c::Copy(rates.f_I, f_I);
+    return absl::OkStatus();
+  });
+}
+
+int32_t selfcal_calibration_project(const selfcal_calibration* calibration,
+                                    int32_t camera,
+                                    const double p_C[3],
+                                    double z_px[2],
+                                    selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = selfcal::c::CheckCamera(calibration, camera);
+    if (!status.ok()) return status;
+    status = selfcal::c::CheckAllNotNull({{p_C, "p_C"}, {z_px, "z_px"}});
+    if (!status.ok()) return status;
+    const auto at = static_cast<std::size_t>(camera);
+    Eigen::Vector2d projected;
+    if (!selfcal::Project(selfcal::c::ThetaOf(calibration).cameras[at],
+                          Eigen::Vector3d(p_C),
+                          &projected,
+                          nullptr)) {
+      return absl::OutOfRangeError("p_C: the model does not project it");
+    }
+    selfcal::c::Copy(projected, z_px);
+    return absl::OkStatus();
+  });
+}
+
+int32_t selfcal_calibration_unproject(const selfcal_calibration* calibration,
+                                      int32_t camera,
+                                      const double z_px[2],
+                                      double bearing_C[3],
+                                      selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = selfcal::c::CheckCamera(calibration, camera);
+    if (!status.ok()) return status;
+    status =
+        selfcal::c::CheckAllNotNull({{z_px, "z_px"}, {bearing_C, "bearing_C"}});
+    if (!status.ok()) return status;
+    const auto at = static_cast<std::size_t>(camera);
+    Eigen::Vector3d bearing;
+    if (!selfcal::Unproject(selfcal::c::ThetaOf(calibration).cameras[at],
+                            Eigen::Vector2d(z_px),
+                            &bearing)) {
+      return absl::OutOfRangeError("z_px: no point projects to it");
+    }
+    selfcal::c::Copy(bearing, bearing_C);
+    return absl::OkStatus();
+  });
+}

@@ -1,0 +1,264 @@
+// Calibrations of the C interface, and how they come.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "client/c/selfcal.h"
+#include "core/model/camera.h"
+#include "core/model/imu.h"
+#include "proto/convert.h"
+#include "test/client/c/cxx11_session.h"
+#include "test/client/selfcal/fake_daemon.h"
+#include "test/support/eventually.h"
+
+namespace selfcal::testing_c {
+namespace {
+
+// Two cameras, with numbers that differ everywhere.
+Calibration Theta() {
+  Calibration theta;
+  theta.imu.s_g = {1.01, 1.02, 1.03};
+  theta.imu.m_g = {0.01, 0.02, 0.03};
+  theta.imu.s_a = {0.99, 0.98, 0.97};
+  theta.imu.m_a = {-0.01, -0.02, -0.03};
+  theta.imu.q_AI = Eigen::Quaterniond(0.9, 0.1, -0.3, 0.3).normalized();
+  theta.cameras.resize(2);
+  for (CameraCalibration& camera : theta.cameras) {
+    camera.q_CI = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+    camera.p_CI = {0.1, -0.2, 0.3};
+    camera.f = {400, 410};
+    camera.c = {320, 240};
+    camera.distortion << 0.9;
+    camera.time_offset_s = 0.004;
+    camera.width_px = 640;
+    camera.height_px = 480;
+  }
+  CameraCalibration& second = theta.cameras[1];
+  second.model = DistortionModel::kRadialTangential;
+  second.distortion = Eigen::Vector4d(0.1, -0.05, 0.001, 0.002);
+  second.f = {500, 510};
+  return theta;
+}
+
+v1::Calibration Message(std::int64_t version, bool with_covariance) {
+  v1::Calibration message;
+  message.set_version(version);
+  *message.mutable_parameters() = ToProto(Theta());
+  const int size = TangentSize(Theta());
+  for (int i = 0; with_covariance && i < size * (size + 1) / 2; ++i) {
+    message.add_covariance(1 + i);
+  }
+  return message;
+}
+
+void Count(const selfcal_calibration* calibration, void* user) {
+  EXPECT_GT(selfcal_calibration_version(calibration), 0);
+  ++*static_cast<std::atomic<int>*>(user);
+}
+
+class CalibrationTest : public ::testing::Test {
+ protected:
+  CalibrationTest() { daemon_.Start(); }
+  ~CalibrationTest() override {
+    selfcal_watch_destroy(watch_);
+    selfcal_calibration_destroy(calibration_);
+  }
+
+  void Receive(const v1::Calibration& message) {
+    daemon_.Publish(message);
+    const std::string target = daemon_.target();
+    selfcal_client_options options = {};
+    options.struct_size = sizeof(options);
+    options.target = target.c_str();
+    options.rig = "device";
+    options.min_backoff_ms = 1;
+    ASSERT_EQ(selfcal_watch_create(&options, &Count, &count_, &watch_, nullptr),
+              SELFCAL_OK);
+    ASSERT_TRUE(Eventually([&] { return count_ > 0; }));
+    calibration_ = selfcal_watch_newest(watch_);
+    ASSERT_NE(calibration_, nullptr);
+  }
+
+  client::FakeDaemon daemon_;
+  std::atomic<int> count_ = 0;
+  selfcal_watch* watch_ = nullptr;
+  selfcal_calibration* calibration_ = nullptr;
+  selfcal_error error_ = {};
+};
+
+TEST_F(CalibrationTest, HasTheValuesThatWerePublished) {
+  const Calibration theta = Theta();
+  Receive(Message(7, true));
+  EXPECT_EQ(selfcal_calibration_version(calibration_), 7);
+  EXPECT_EQ(selfcal_calibration_camera_count(calibration_), 2);
+
+  selfcal_imu imu = {};
+  imu.struct_size = sizeof(imu);
+  ASSERT_EQ(selfcal_calibration_get_imu(calibration_, &imu, nullptr), 0);
+  EXPECT_EQ(Eigen::Vector3d(imu.gyro_scale), theta.imu.s_g);
+  EXPECT_EQ(Eigen::Vector3d(imu.gyro_misalignment), theta.imu.m_g);
+  EXPECT_EQ(Eigen::Vector3d(imu.accel_scale), theta.imu.s_a);
+  EXPECT_EQ(Eigen::Vector3d(imu.accel_misalignment), theta.imu.m_a);
+  EXPECT_EQ(imu.q_AI.w, theta.imu.q_AI.w());
+  EXPECT_EQ(imu.q_AI.x, theta.imu.q_AI.x());
+  EXPECT_EQ(imu.q_AI.y, theta.imu.q_AI.y());
+  EXPECT_EQ(imu.q_AI.z, theta.imu.q_AI.z());
+
+  for (std::int32_t j = 0; j < 2; ++j) {
+    const CameraCalibration& expected =
+        theta.cameras[static_cast<std::size_t>(j)];
+    selfcal_camera camera = {};
+    camera.struct_size = sizeof(camera);
+    ASSERT_EQ(selfcal_calibration_get_camera(calibration_, j, &camera, nullptr),
+              0);
+    EXPECT_EQ(camera.width_px, 640);
+    EXPECT_EQ(camera.height_px, 480);
+    EXPECT_EQ(std::string(camera.model), DistortionName(expected.model));
+    ASSERT_EQ(camera.distortion_size, expected.distortion.size());
+    for (int i = 0; i < SELFCAL_MAX_DISTORTION; ++i) {
+      EXPECT_EQ(camera.distortion[i],
+                i < expected.distortion.size() ? expected.distortion[i] : 0);
+    }
+    EXPECT_EQ(Eigen::Vector2d(camera.f), expected.f);
+    EXPECT_EQ(Eigen::Vector2d(camera.c), expected.c);
+    EXPECT_EQ(camera.q_CI.w, 0.5);
+    EXPECT_EQ(camera.q_CI.x, -0.5);
+    EXPECT_EQ(camera.q_CI.y, 0.5);
+    EXPECT_EQ(camera.q_CI.z, -0.5);
+    EXPECT_EQ(Eigen::Vector3d(camera.p_CI), expected.p_CI);
+    EXPECT_EQ(camera.time_offset_s, 0.004);
+  }
+}
+
+TEST_F(CalibrationTest, NamesEachComponentWithItsSigma) {
+  Receive(Message(1, true));
+  const auto components = TangentComponents(Theta());
+  const Eigen::VectorXd values = ReadableValues(Theta());
+  const auto size = static_cast<std::int32_t>(components.size());
+  ASSERT_EQ(selfcal_calibration_component_count(calibration_), size);
+  std::vector<double> covariance(components.size() * components.size());
+  ASSERT_EQ(selfcal_calibration_get_covariance(
+                calibration_, covariance.data(), covariance.size(), nullptr),
+            0);
+  // Published as a lower triangle, row by row, from 1.
+  EXPECT_EQ(covariance[0], 1);
+  EXPECT_EQ(covariance[1], 2);
+  EXPECT_EQ(covariance[components.size()], 2);
+  EXPECT_EQ(covariance[components.size() + 1], 3);
+  for (std::int32_t i = 0; i < size; ++i) {
+    selfcal_component component = {};
+    component.struct_size = sizeof(component);
+    ASSERT_EQ(
+        selfcal_calibration_get_component(calibration_, i, &component, nullptr),
+        0);
+    const auto at = static_cast<std::size_t>(i);
+    EXPECT_EQ(component.name, components[at].name);
+    EXPECT_EQ(component.unit, components[at].unit);
+    EXPECT_EQ(component.value, values[i]);
+    EXPECT_EQ(component.sigma,
+              std::sqrt((i + 1.0) * (i + 2.0) / 2));  // of that triangle
+  }
+}
+
+TEST_F(CalibrationTest, StatesThatThereIsNoCovariance) {
+  Receive(Message(1, false));
+  selfcal_component component = {};
+  component.struct_size = sizeof(component);
+  ASSERT_EQ(
+      selfcal_calibration_get_component(calibration_, 0, &component, nullptr),
+      0);
+  EXPECT_TRUE(std::isnan(component.sigma));
+  const auto size = static_cast<std::uint64_t>(
+      selfcal_calibration_component_count(calibration_));
+  std::vector<double> covariance(size * size, 5.0);
+  EXPECT_EQ(selfcal_calibration_get_covariance(
+                calibration_, covariance.data(), size * size, &error_),
+            SELFCAL_FAILED_PRECONDITION);
+  EXPECT_EQ(covariance[0], 5.0);
+  EXPECT_EQ(selfcal_calibration_get_covariance(
+                calibration_, covariance.data(), size, &error_),
+            SELFCAL_INVALID_ARGUMENT);
+}
+
+TEST_F(CalibrationTest, AppliesItselfAsTheLibraryDoes) {
+  const Calibration theta = Theta();
+  Receive(Message(1, true));
+  const double gyro[3] = {0.1, -0.2, 0.3};
+  const double accel[3] = {1, 2, 9};
+  const double b_g[3] = {0.01, 0.02, 0.03};
+  const double b_a[3] = {0.1, 0.2, 0.3};
+  double w_I[3];
+  double f_I[3];
+  ASSERT_EQ(selfcal_calibration_correct_imu(
+                calibration_, gyro, accel, b_g, b_a, w_I, f_I, nullptr),
+            0);
+  const BodyRates rates = CorrectImu(theta.imu,
+                                     Eigen::Vector3d(gyro),
+                                     Eigen::Vector3d(accel),
+                                     Eigen::Vector3d(b_g),
+                                     Eigen::Vector3d(b_a));
+  EXPECT_EQ(Eigen::Vector3d(w_I), rates.w_I);
+  EXPECT_EQ(Eigen::Vector3d(f_I), rates.f_I);
+
+  const double p_C[3] = {0.1, 0.2, 1};
+  double z_px[2];
+  double bearing_C[3];
+  ASSERT_EQ(selfcal_calibration_project(calibration_, 1, p_C, z_px, nullptr),
+            0);
+  Eigen::Vector2d expected;
+  ASSERT_TRUE(
+      Project(theta.cameras[1], Eigen::Vector3d(p_C), &expected, nullptr));
+  EXPECT_EQ(Eigen::Vector2d(z_px), expected);
+  ASSERT_EQ(
+      selfcal_calibration_unproject(calibration_, 1, z_px, bearing_C, nullptr),
+      0);
+  EXPECT_LT(
+      (Eigen::Vector3d(bearing_C) - Eigen::Vector3d(p_C).normalized()).norm(),
+      1e-9);
+  const double behind[3] = {0, 0, -1};
+  EXPECT_EQ(selfcal_calibration_project(calibration_, 0, behind, z_px, nullptr),
+            SELFCAL_OUT_OF_RANGE);
+  EXPECT_EQ(selfcal_calibration_project(calibration_, 2, p_C, z_px, nullptr),
+            SELFCAL_OUT_OF_RANGE);
+}
+
+TEST_F(CalibrationTest, ACopyOutlivesTheWatch) {
+  Receive(Message(3, true));
+  selfcal_calibration* const copy = selfcal_calibration_copy(calibration_);
+  selfcal_calibration_destroy(calibration_);
+  calibration_ = nullptr;
+  selfcal_watch_destroy(watch_);
+  watch_ = nullptr;
+  EXPECT_EQ(selfcal_calibration_version(copy), 3);
+  selfcal_calibration_destroy(copy);
+}
+
+TEST_F(CalibrationTest, ReachesAProgramInCxx11) {
+  daemon_.Publish(Message(5, true));
+  const Cxx11Calibration seen = WatchInCxx11(daemon_.target());
+  EXPECT_EQ(seen.version, 5);
+  EXPECT_EQ(seen.callbacks, 1u);
+  EXPECT_EQ(seen.focal_x, 400);
+  EXPECT_EQ(seen.model, "fov");
+  const auto size = static_cast<std::size_t>(TangentSize(Theta()));
+  ASSERT_EQ(seen.sigmas.size(), size);
+  EXPECT_EQ(seen.sigmas[1], std::sqrt(3.0));
+  ASSERT_EQ(seen.covariance.size(), size * size);
+  Eigen::Vector2d expected;
+  ASSERT_TRUE(Project(Theta().cameras[0], {0.1, 0.2, 1}, &expected, nullptr));
+  EXPECT_EQ(Eigen::Vector2d(seen.z_px), expected);
+  EXPECT_FALSE(seen.behind);
+  EXPECT_EQ(seen.code, SELFCAL_OUT_OF_RANGE);
+}
+
+TEST(CalibrationCxx11, ThrowsWhatIsWrongWithTheOptions) {
+  EXPECT_EQ(ErrorInCxx11(), "options.rig: is required");
+}
+
+}  // namespace
+}  // namespace selfcal::testing_c
