@@ -3,6 +3,8 @@
 # what they depend on, and runs the programs from an unpacked copy.
 #
 #   debian_packages_test.sh BUILD_DIR VERSION CERES     CERES: ON or OFF
+#
+# lintian checks the packages, too, where it is installed.
 set -euo pipefail
 build=$1 version=$2 ceres=$3
 
@@ -19,10 +21,13 @@ fail() {
   exit 1
 }
 arch=$(dpkg --print-architecture)
-for package in selfcald selfcal libselfcal0 libselfcal-dev; do
+for package in selfcald selfcal libselfcal0 libselfcal-dev python3-selfcal; do
+  [[ $package != python3-* ]] || arch=all
   deb=$work/packs/${package}_$version-1_$arch.deb
   [[ -f $deb ]] || fail "$package is missing"
   dpkg-deb -f "$deb" Package Version Depends Description
+  [[ $(dpkg-deb -f "$deb" Homepage) == https://* ]] ||
+    fail "$package has no address of the project"
   files=$(dpkg-deb -c "$deb" | awk '{print $6}')
   grep -qx "./usr/share/doc/$package/copyright" <<<"$files" ||
     fail "$package has no licence"
@@ -30,8 +35,24 @@ for package in selfcald selfcal libselfcal0 libselfcal-dev; do
   [[ $package == selfcald ]] || [[ -z $elsewhere ]] ||
     fail "$package puts files outside of /usr"
   dpkg-deb -x "$deb" "$work/root"
+  doc=$work/root/usr/share/doc/$package
+  zcat "$doc/changelog.Debian.gz" >"$work/changelog" ||
+    fail "$package has no changelog"
+  [[ $(dpkg-parsechangelog -l "$work/changelog" -S Version 2>&1) == \
+    "$version-1" ]] || fail "the changelog of $package is not of $version"
 done
+arch=$(dpkg --print-architecture)
+# The maintainer of a build that is not released is a placeholder.
+if command -v lintian >/dev/null; then
+  lintian --allow-root --fail-on error --suppress-tags \
+    bogus-mail-host,bogus-mail-host-in-debian-changelog "$work"/packs/*.deb ||
+    fail 'lintian finds mistakes'
+fi
 [[ -f $work/root/etc/selfcal/selfcald.toml ]] || fail 'no settings'
+for file in alerts.yml client_alerts.yml dashboard.json; do
+  [[ -f $work/root/usr/share/selfcald/monitoring/$file ]] ||
+    fail "selfcald has no $file"
+done
 for file in systemd/system/selfcald.service sysusers.d/selfcal.conf \
   tmpfiles.d/selfcal.conf; do
   [[ -f $work/root/usr/lib/$file ]] || fail "selfcald has no $file"
@@ -86,6 +107,10 @@ bash -n "$completion" || fail 'the completion is no script'
 [[ -f $share/zsh/vendor-completions/_selfcal ]] || fail 'nothing for zsh'
 [[ -f $share/fish/vendor_completions.d/selfcal.fish ]] ||
   fail 'nothing for fish'
+
+PYTHONPATH=$work/root/usr/lib/python3/dist-packages /usr/bin/python3 -B -c \
+  'import selfcal; import selfcal.v1.rig_pb2; selfcal.connect' ||
+  fail 'the Python package cannot be imported'
 
 "$work/root/usr/bin/selfcald" --version | grep -qF "$version" ||
   fail 'selfcald --version'
