@@ -101,10 +101,10 @@ absl::Status Write(const Struct& value,
 }
 
 // Size of the first version of each struct that may grow.
-inline constexpr std::size_t kBuilderOptionsSize = 56;
-inline constexpr std::size_t kBuilderStatisticsSize = 48;
+inline constexpr std::size_t kBuilderOptionsSize = 80;
+inline constexpr std::size_t kBuilderStatisticsSize = 64;
 inline constexpr std::size_t kClientOptionsSize = 88;
-inline constexpr std::size_t kStreamStatisticsSize = 120;
+inline constexpr std::size_t kStreamStatisticsSize = 144;
 inline constexpr std::size_t kImuSize = 136;
 inline constexpr std::size_t kCameraSize = 184;
 inline constexpr std::size_t kComponentSize = 40;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/c/boundary.h"
+#include "client/c/calibration.h"
 #include "client/c/options.h"
 #include "client/c/segment.h"
 #include "client/c/selfcal.h"
@@ -114,6 +115,21 @@ int32_t selfcal_builder_add_keyframe(selfcal_builder* builder,
                                      const selfcal_observation* observations,
                                      uint64_t count,
                                      selfcal_error* error) {
+  // Without a state the time does not matter: that is an error.
+  return selfcal_builder_add_keyframe_at(builder,
+                                         state,
+                                         state == nullptr ? 0 : state->t_ns,
+                                         observations,
+                                         count,
+                                         error);
+}
+
+int32_t selfcal_builder_add_keyframe_at(selfcal_builder* builder,
+                                        const selfcal_keyframe_state* state,
+                                        int64_t image_t_ns,
+                                        const selfcal_observation* observations,
+                                        uint64_t count,
+                                        selfcal_error* error) {
   return Guarded(error, [&] {
     if (auto s = RequireNotNull(builder, "builder"); !s.ok()) return s;
     if (auto s = RequireNotNull(state, "state"); !s.ok()) return s;
@@ -130,11 +146,50 @@ int32_t selfcal_builder_add_keyframe(selfcal_builder* builder,
     auto status = ToObservations(observations, count, &builder->observations);
     if (!status.ok()) return status;
     return Run(&builder->builder,
-               "state.t_ns: is not later than that of the keyframe before it",
+               "the keyframe is refused: it is not later than the keyframe "
+               "before it, its state is more than 0.5 s from its images, or "
+               "the SLAM system is not healthy",
                [&] {
-                 return builder->builder.AddKeyframe(ToState(*state),
-                                                     builder->observations);
+                 return builder->builder.AddKeyframe(
+                     ToState(*state), image_t_ns, builder->observations);
                });
+  });
+}
+
+int32_t selfcal_builder_set_calibration_version(selfcal_builder* builder,
+                                                int64_t version,
+                                                selfcal_error* error) {
+  return Guarded(error, [&] {
+    if (auto s = RequireNotNull(builder, "builder"); !s.ok()) return s;
+    return Run(&builder->builder, "", [&] {
+      builder->builder.SetCalibrationVersion(version);
+      return true;
+    });
+  });
+}
+
+int32_t selfcal_builder_set_theta(selfcal_builder* builder,
+                                  const selfcal_calibration* calibration,
+                                  selfcal_error* error) {
+  return Guarded(error, [&] {
+    if (auto s = RequireNotNull(builder, "builder"); !s.ok()) return s;
+    auto status = RequireNotNull(calibration, "calibration");
+    if (!status.ok()) return status;
+    // A calibration is valid, so that only missing memory is left.
+    const bool set =
+        builder->builder.SetTheta(calibration->published->version.theta);
+    if (!set) throw std::bad_alloc();
+    return status;
+  });
+}
+
+int32_t selfcal_builder_set_healthy(selfcal_builder* builder,
+                                    int32_t healthy,
+                                    selfcal_error* error) {
+  return Guarded(error, [&] {
+    auto status = RequireNotNull(builder, "builder");
+    if (status.ok()) builder->builder.SetHealthy(healthy != 0);
+    return status;
   });
 }
 
@@ -196,7 +251,9 @@ int32_t selfcal_builder_get_statistics(const selfcal_builder* builder,
     value.segments = counts.segments;
     value.keyframes_refused = counts.keyframes_refused;
     value.keyframes_dropped = counts.keyframes_dropped;
+    value.keyframes_unhealthy = counts.keyframes_unhealthy;
     value.imu_ignored = counts.imu_ignored;
+    value.observations_dropped = counts.observations_dropped;
     value.out_of_memory = counts.out_of_memory;
     return selfcal::c::Write(
         value, selfcal::c::kBuilderStatisticsSize, "statistics", statistics);

@@ -1,14 +1,18 @@
 #include "client/c/calibration.h"
 
+#include <absl/status/statusor.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "client/c/boundary.h"
 #include "core/model/camera.h"
+#include "core/model/camera_model.h"
 #include "core/model/imu.h"
+#include "core/model/rig.h"
 
 namespace selfcal::c {
 
@@ -89,6 +93,84 @@ selfcal_camera ToCamera(const CameraCalibration& given) {
   return camera;
 }
 
+Eigen::Quaterniond FromQuaternion(const selfcal_quaternion& q) {
+  return {q.w, q.x, q.y, q.z};
+}
+
+// INVALID_ARGUMENT for a struct of the wrong size.
+absl::Status FromImu(const selfcal_imu* given, ImuCalibration* imu) {
+  selfcal_imu read;
+  auto status = Read(given, kImuSize, "imu", &read);
+  if (!status.ok()) return status;
+  imu->s_g = Eigen::Vector3d(read.gyro_scale);
+  imu->m_g = Eigen::Vector3d(read.gyro_misalignment);
+  imu->s_a = Eigen::Vector3d(read.accel_scale);
+  imu->m_a = Eigen::Vector3d(read.accel_misalignment);
+  imu->q_AI = FromQuaternion(read.q_AI);
+  return status;
+}
+
+// INVALID_ARGUMENT for a struct of the wrong size, and for a model that is not
+// known or has another number of coefficients.
+absl::Status FromCamera(const selfcal_camera* given,
+                        const std::string& name,
+                        CameraCalibration* camera) {
+  selfcal_camera read;
+  auto status = Read(given, kCameraSize, name.c_str(), &read);
+  if (!status.ok()) return status;
+  const std::string model = read.model == nullptr ? "" : read.model;
+  const auto models = DistortionModels();
+  const auto found = std::find_if(
+      models.begin(), models.end(), [&](DistortionModel candidate) {
+        return DistortionName(candidate) == model;
+      });
+  if (found == models.end()) {
+    return absl::InvalidArgumentError(
+        fmt::format("{}.model: '{}' is not known", name, model));
+  }
+  if (read.distortion_size != DistortionSize(*found)) {
+    return absl::InvalidArgumentError(
+        fmt::format("{}.distortion_size: is {}, the model {} has {}",
+                    name,
+                    read.distortion_size,
+                    model,
+                    DistortionSize(*found)));
+  }
+  camera->model = *found;
+  camera->distortion =
+      Eigen::Map<Eigen::VectorXd>(read.distortion, read.distortion_size);
+  camera->f = Eigen::Vector2d(read.f);
+  camera->c = Eigen::Vector2d(read.c);
+  camera->q_CI = FromQuaternion(read.q_CI);
+  camera->p_CI = Eigen::Vector3d(read.p_CI);
+  camera->time_offset_s = read.time_offset_s;
+  camera->width_px = read.width_px;
+  camera->height_px = read.height_px;
+  return status;
+}
+
+absl::StatusOr<Calibration> ToCalibration(const selfcal_imu* imu,
+                                          const selfcal_camera* const* cameras,
+                                          std::int32_t count) {
+  if (count < 0 || count > kMaxCameras) {
+    return absl::InvalidArgumentError(
+        fmt::format("count: is {}, must be from 0 to {}", count, kMaxCameras));
+  }
+  Calibration theta;
+  auto status = FromImu(imu, &theta.imu);
+  if (status.ok() && count > 0) status = RequireNotNull(cameras, "cameras");
+  theta.cameras.resize(static_cast<std::size_t>(count));
+  for (std::size_t j = 0; status.ok() && j < theta.cameras.size(); ++j) {
+    status = FromCamera(
+        cameras[j], fmt::format("cameras[{}]", j), &theta.cameras[j]);
+  }
+  if (!status.ok()) return status;
+  const auto violations = Validate(theta, "calibration");
+  if (violations.empty()) return theta;
+  return absl::InvalidArgumentError(fmt::format(
+      "{}: {}", violations.front().field, violations.front().message));
+}
+
 selfcal_component ToComponent(const PublishedVersion& published,
                               std::int32_t index) {
   const TangentComponent& given =
@@ -109,6 +191,24 @@ selfcal_component ToComponent(const PublishedVersion& published,
 
 using selfcal::c::Guarded;
 using selfcal::c::RequireNotNull;
+
+int32_t selfcal_calibration_create(const selfcal_imu* imu,
+                                   const selfcal_camera* const* cameras,
+                                   int32_t count,
+                                   selfcal_calibration** calibration,
+                                   selfcal_error* error) {
+  if (calibration != nullptr) *calibration = nullptr;
+  return Guarded(error, [&] {
+    const auto theta = selfcal::c::ToCalibration(imu, cameras, count);
+    if (!theta.ok()) return theta.status();
+    auto status = RequireNotNull(calibration, "calibration");
+    if (!status.ok()) return status;
+    selfcal::client::CalibrationVersion version;
+    version.theta = *theta;
+    *calibration = new selfcal_calibration{selfcal::c::Publish(version)};
+    return status;
+  });
+}
 
 selfcal_calibration* selfcal_calibration_copy(
     const selfcal_calibration* calibration) {

@@ -90,7 +90,10 @@ absl::StatusOr<client::SegmentBuilderOptions> ToOptions(
                   CheckNumber(read.first_index, "first_index"),
                   CheckNumber(read.calibration_version, "calibration_version"),
                   CheckNumber(read.seconds, "seconds"),
-                  CheckNumber(read.max_gap_s, "max_gap_s")});
+                  CheckNumber(read.max_gap_s, "max_gap_s"),
+                  CheckNumber(read.pixel_sigma_px, "pixel_sigma_px"),
+                  CheckNumber(read.gravity_mps2, "gravity_mps2"),
+                  CheckReserved(read.reserved)});
   if (!status.ok()) return status;
   client::SegmentBuilderOptions options;
   Set(read.session, &options.session);
@@ -101,6 +104,9 @@ absl::StatusOr<client::SegmentBuilderOptions> ToOptions(
   Set(read.min_observations, &options.min_observations);
   Set(read.max_gap_s, &options.max_gap_s);
   Set(read.min_keyframes, &options.min_keyframes);
+  Set(read.pixel_sigma_px, &options.pixel_sigma_px);
+  Set(read.gravity_mps2, &options.gravity_mps2);
+  options.new_ids_after_gap = read.same_ids_after_gap == 0;
   return options;
 }
 

@@ -90,6 +90,8 @@ typedef struct selfcal_imu_sample {
 } selfcal_imu_sample;
 
 // State of the body at the time of a keyframe, as the SLAM system estimated it.
+// t_ns is the timestamp of the images; selfcal_builder_add_keyframe_at takes
+// states of other times.
 typedef struct selfcal_keyframe_state {
   int64_t t_ns;
   selfcal_quaternion q_GI;
@@ -101,12 +103,21 @@ typedef struct selfcal_keyframe_state {
 
 // One observation of a landmark in a keyframe.
 typedef struct selfcal_observation {
-  uint64_t landmark_id;  // unique within a session
-  int32_t camera;        // index into the rig's cameras
+  // Of the landmark, or of the track if the SLAM system has no landmark; ids
+  // may start again after a break (selfcal_builder).
+  uint64_t landmark_id;
+  int32_t camera;  // index into the rig's cameras
   uint32_t reserved;
   double z_px[2];  // pixel in the image as it was taken, with its distortion
-  double p_G[3];   // estimated position of the landmark [m]
+  // Estimated position of the landmark [m]; not finite (NaN) if there is none.
+  // A landmark that has a position in no keyframe of a segment is triangulated,
+  // if the builder knows the calibration (selfcal_builder_set_theta), and left
+  // out otherwise.
+  double p_G[3];
 } selfcal_observation;
+
+// One version of a rig's calibration. It never changes.
+typedef struct selfcal_calibration selfcal_calibration;
 
 // ------------------------------------------------------------------- Builder
 
@@ -122,6 +133,10 @@ typedef struct selfcal_observation {
 //   }
 // Each call takes microseconds. When memory runs out, the current segment is
 // dropped and counted.
+//
+// Ids of landmarks may denote other landmarks, and G may be another frame,
+// after a break: after selfcal_builder_set_healthy, and after a time without
+// keyframes of over max_gap_s, unless same_ids_after_gap is set.
 typedef struct selfcal_builder selfcal_builder;
 
 // A complete segment.
@@ -144,19 +159,33 @@ typedef struct selfcal_builder_options {
   int64_t calibration_version;
   double seconds;    // if > 0, duration of a segment, instead of keyframes
   double max_gap_s;  // largest time between keyframes of a segment; default 10
+  // For the triangulation: standard deviation of an observation; default 1.
+  double pixel_sigma_px;
+  double gravity_mps2;  // of the SLAM system, along -z of G; default 9.81
+  // Not 0: ids of landmarks after a gap denote the same landmarks as before it,
+  // as those of a SLAM system with a map do.
+  int32_t same_ids_after_gap;
+  uint32_t reserved;
 } selfcal_builder_options;
 
 typedef struct selfcal_builder_statistics {
   uint32_t struct_size;
   uint32_t reserved;
   uint64_t segments;  // completed
-  // Keyframes that were not later than the keyframe before them.
+  // Keyframes that were not later than the keyframe before them, or with a
+  // state too far from its images.
   uint64_t keyframes_refused;
   // Keyframes that were accepted but are in no segment: no IMU sample covers
-  // them, their segment was too short when it was flushed, or memory ran out.
+  // them, their segment was too short when it was flushed, only one came
+  // between two versions, or memory ran out.
   uint64_t keyframes_dropped;
+  // Keyframes that were in the current segment when the SLAM system became
+  // unhealthy, or came while it was.
+  uint64_t keyframes_unhealthy;
   // IMU samples that were not later than the sample before them.
   uint64_t imu_ignored;
+  // Observations outside the image, or not finite.
+  uint64_t observations_dropped;
   // Calls that ran out of memory; each dropped the current segment.
   uint64_t out_of_memory;
 } selfcal_builder_statistics;
@@ -176,13 +205,48 @@ int32_t selfcal_builder_add_imu(selfcal_builder* builder,
 // Adds a keyframe with `count` observations, which may be NULL if there are
 // none. If a camera observes a landmark several times, the first observation is
 // used; the last p_G of a landmark within the segment is sent.
-// SELFCAL_OUT_OF_RANGE: the keyframe is not later than the one before it, and
-// is refused.
+// SELFCAL_OUT_OF_RANGE: the keyframe is refused, because it is not later than
+// the one before it, or the SLAM system is not healthy.
 int32_t selfcal_builder_add_keyframe(selfcal_builder* builder,
                                      const selfcal_keyframe_state* state,
                                      const selfcal_observation* observations,
                                      uint64_t count,
                                      selfcal_error* error);
+
+// Adds a keyframe whose images have the timestamp image_t_ns and whose state
+// holds at another time, state->t_ns: for a filter that estimates its state at
+// the exposure. The state is moved along the IMU samples to image_t_ns.
+// SELFCAL_OUT_OF_RANGE: as above, or the times are more than 0.5 s apart.
+int32_t selfcal_builder_add_keyframe_at(selfcal_builder* builder,
+                                        const selfcal_keyframe_state* state,
+                                        int64_t image_t_ns,
+                                        const selfcal_observation* observations,
+                                        uint64_t count,
+                                        selfcal_error* error);
+
+// Sets the version of the calibration with which the states from the next
+// keyframe on are estimated. The current segment ends before that keyframe, as
+// if it had all its keyframes, however few (but at least 2).
+int32_t selfcal_builder_set_calibration_version(selfcal_builder* builder,
+                                                int64_t version,
+                                                selfcal_error* error);
+
+// Sets the calibration with which the SLAM system estimates the states from the
+// next keyframe on: that of its version (selfcal_watch_newest), or its own, if
+// it calibrates itself (selfcal_calibration_create). May be called for every
+// keyframe; a segment uses that of its last one. With it, tracks are
+// triangulated, states are moved with corrected readings, and observations
+// outside the image are dropped. It does not set the version.
+int32_t selfcal_builder_set_theta(selfcal_builder* builder,
+                                  const selfcal_calibration* calibration,
+                                  selfcal_error* error);
+
+// States whether the SLAM system is to be trusted, as it is at first. 0 drops
+// the current segment and refuses keyframes until it is not 0 again; then a new
+// segment begins, with new landmarks. Complete segments remain.
+int32_t selfcal_builder_set_healthy(selfcal_builder* builder,
+                                    int32_t healthy,
+                                    selfcal_error* error);
 
 // Sets the temperature of the device [degrees Celsius] from now on. A segment
 // carries the temperature that was set last when it was completed.
@@ -274,6 +338,9 @@ typedef struct selfcal_acknowledgement {
   int64_t index;
   const selfcal_violation* violations;  // the reasons for a rejection
   uint64_t violation_count;
+  // Observations outside the image that the daemon has left out of a segment
+  // that it stored.
+  uint64_t observations_dropped;
 } selfcal_acknowledgement;
 
 typedef void (*selfcal_ack_callback)(const selfcal_acknowledgement* ack,
@@ -291,8 +358,14 @@ typedef struct selfcal_stream_statistics {
   uint64_t resent;             // sent again after a reconnection
   uint64_t connections;        // connections that the daemon answered
   uint64_t callback_failures;  // callbacks that failed
-  uint64_t spooled;            // written to the spool
-  uint64_t spool_recovered;    // found in the spool at the start
+  // Landmarks that are seen often enough and came without a position.
+  uint64_t tracks_triangulated;
+  // Left out: too little parallax, not consistent, or no calibration is known.
+  uint64_t tracks_dropped;
+  // Observations that the daemon has left out (selfcal_acknowledgement).
+  uint64_t observations_dropped;
+  uint64_t spooled;          // written to the spool
+  uint64_t spool_recovered;  // found in the spool at the start
   // Quarantined in the spool, because the file differs from what was written.
   uint64_t spool_damaged;
   uint64_t spool_failures;  // disk errors
@@ -346,9 +419,6 @@ int32_t selfcal_stream_spool_status(const selfcal_stream* stream,
 
 // --------------------------------------------------------------- Calibration
 
-// One version of a rig's calibration, as published. It never changes.
-typedef struct selfcal_calibration selfcal_calibration;
-
 // The gyroscope reads T_g w + b_g, the accelerometer T_a R_AI f_I + b_a, where
 // R_AI is the rotation of q_AI. T_g and T_a are upper triangular, with the
 // scales on the diagonal and the misalignments (x, y, z) at (0,1), (0,2),
@@ -398,6 +468,15 @@ typedef struct selfcal_component {
   double sigma;  // its standard deviation; NaN if it is not known
 } selfcal_component;
 
+// Creates a calibration from values, with version 0 and without covariance. For
+// each camera there is a pointer; `count` is at most 16. Only the first
+// distortion_size coefficients are used, and their number must be that of the
+// model. SELFCAL_INVALID_ARGUMENT names the value that is not valid.
+int32_t selfcal_calibration_create(const selfcal_imu* imu,
+                                   const selfcal_camera* const* cameras,
+                                   int32_t count,
+                                   selfcal_calibration** calibration,
+                                   selfcal_error* error);
 // A second owner of the same calibration, e.g. to keep what a callback was
 // given; NULL for NULL, or if there is no memory.
 selfcal_calibration* selfcal_calibration_copy(

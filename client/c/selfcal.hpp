@@ -100,280 +100,6 @@ inline const char* OrDefault(const std::string& text) {
 
 }  // namespace internal
 
-// A complete segment, or none.
-class Segment {
- public:
-  Segment() : handle_(nullptr, &selfcal_segment_destroy) {}
-  // Takes over the handle, which may be null.
-  explicit Segment(selfcal_segment* handle)
-      : handle_(handle, &selfcal_segment_destroy) {}
-
-  explicit operator bool() const { return handle_ != nullptr; }
-  // Index within its session.
-  std::int64_t index() const { return selfcal_segment_index(handle_.get()); }
-  selfcal_segment* release() { return handle_.release(); }
-
- private:
-  std::unique_ptr<selfcal_segment, void (*)(selfcal_segment*)> handle_;
-};
-
-// 0 and an empty string mean the default, which selfcal_builder_options states.
-struct BuilderOptions {
-  std::string session;  // required
-  std::int64_t first_index = 0;
-  std::int64_t calibration_version = 0;
-  std::int32_t keyframes = 0;
-  double seconds = 0;
-  std::int32_t min_observations = 0;
-  double max_gap_s = 0;
-  std::int32_t min_keyframes = 0;
-};
-
-// Builds motion segments from keyframes (selfcal_builder). Send what is
-// complete after each call:
-//   while (selfcal::Segment segment = builder.Take()) {
-//     stream.Send(std::move(segment));
-//   }
-class Builder {
- public:
-  explicit Builder(const BuilderOptions& options)
-      : handle_(Create(options), &selfcal_builder_destroy) {}
-
-  // Returns false and ignores a sample that is not later than the one before.
-  bool AddImu(const ImuSample& sample) {
-    selfcal_error error;
-    return internal::Accepted(
-        selfcal_builder_add_imu(handle_.get(), &sample, &error),
-        SELFCAL_OUT_OF_RANGE,
-        error);
-  }
-
-  // Returns false and refuses a keyframe that is not later than the one before.
-  bool AddKeyframe(const KeyframeState& state,
-                   const std::vector<Observation>& observations) {
-    selfcal_error error;
-    return internal::Accepted(selfcal_builder_add_keyframe(handle_.get(),
-                                                           &state,
-                                                           observations.data(),
-                                                           observations.size(),
-                                                           &error),
-                              SELFCAL_OUT_OF_RANGE,
-                              error);
-  }
-
-  // Temperature of the device [degrees Celsius] from now on. Returns false and
-  // ignores one that is not from -100 to 200.
-  bool SetTemperature(double celsius) {
-    selfcal_error error;
-    return internal::Accepted(
-        selfcal_builder_set_temperature(handle_.get(), celsius, &error),
-        SELFCAL_OUT_OF_RANGE,
-        error);
-  }
-  // The temperature is unknown from now on, as it is at first.
-  void ClearTemperature() {
-    selfcal_error error;
-    internal::Check(selfcal_builder_clear_temperature(handle_.get(), &error),
-                    error);
-  }
-
-  // Ends the current segment, at the end of a session or where tracking was
-  // lost; with fewer keyframes than max(2, min_keyframes) it is dropped.
-  void Flush(std::int32_t min_keyframes) {
-    selfcal_error error;
-    internal::Check(selfcal_builder_flush(handle_.get(), min_keyframes, &error),
-                    error);
-  }
-
-  // The oldest complete segment, or none.
-  Segment Take() { return Segment(selfcal_builder_take(handle_.get())); }
-
-  // Index of the next segment.
-  std::int64_t next_index() const {
-    return selfcal_builder_next_index(handle_.get());
-  }
-
-  selfcal_builder_statistics statistics() const {
-    auto statistics = internal::Sized<selfcal_builder_statistics>();
-    selfcal_error error;
-    internal::Check(
-        selfcal_builder_get_statistics(handle_.get(), &statistics, &error),
-        error);
-    return statistics;
-  }
-
- private:
-  static selfcal_builder* Create(const BuilderOptions& given) {
-    auto options = internal::Sized<selfcal_builder_options>();
-    options.session = internal::OrDefault(given.session);
-    options.first_index = given.first_index;
-    options.calibration_version = given.calibration_version;
-    options.keyframes = given.keyframes;
-    options.seconds = given.seconds;
-    options.min_observations = given.min_observations;
-    options.max_gap_s = given.max_gap_s;
-    options.min_keyframes = given.min_keyframes;
-    selfcal_builder* builder = nullptr;
-    selfcal_error error;
-    internal::Check(selfcal_builder_create(&options, &builder, &error), error);
-    return builder;
-  }
-
-  std::unique_ptr<selfcal_builder, void (*)(selfcal_builder*)> handle_;
-};
-
-// 0 and an empty string mean the default, which selfcal_client_options states.
-struct ClientOptions {
-  std::string target;
-  std::string rig;  // required
-  std::int32_t max_queue = 0;
-  std::int32_t max_unacknowledged = 0;
-  std::chrono::milliseconds min_backoff{0};
-  std::chrono::milliseconds max_backoff{0};
-  std::string ca_file;
-  std::string certificate_file;
-  std::string key_file;
-  std::string spool_dir;
-  std::uint64_t max_spool_bytes = 0;
-};
-
-// One violated rule: the field, and what to do.
-struct Violation {
-  std::string field;
-  std::string message;
-};
-
-// The daemon's verdict on one segment.
-struct Acknowledgement {
-  std::string session;
-  std::int64_t index = 0;
-  selfcal_verdict verdict = SELFCAL_REJECTED;
-  std::vector<Violation> violations;  // the reasons for a rejection
-};
-
-namespace internal {
-
-// Valid as long as the given options.
-inline selfcal_client_options ToC(const ClientOptions& given) {
-  auto options = Sized<selfcal_client_options>();
-  options.target = OrDefault(given.target);
-  options.rig = OrDefault(given.rig);
-  options.max_queue = given.max_queue;
-  options.max_unacknowledged = given.max_unacknowledged;
-  options.min_backoff_ms = given.min_backoff.count();
-  options.max_backoff_ms = given.max_backoff.count();
-  options.ca_file = OrDefault(given.ca_file);
-  options.certificate_file = OrDefault(given.certificate_file);
-  options.key_file = OrDefault(given.key_file);
-  options.spool_dir = OrDefault(given.spool_dir);
-  options.max_spool_bytes = given.max_spool_bytes;
-  return options;
-}
-
-inline Acknowledgement FromC(const selfcal_acknowledgement& given) {
-  Acknowledgement ack;
-  ack.session = given.session;
-  ack.index = given.index;
-  ack.verdict = static_cast<selfcal_verdict>(given.verdict);
-  for (std::uint64_t i = 0; i < given.violation_count; ++i) {
-    ack.violations.push_back(
-        {given.violations[i].field, given.violations[i].message});
-  }
-  return ack;
-}
-
-}  // namespace internal
-
-// Sends segments to the daemon, in order and at least once (selfcal_stream).
-class Stream {
- public:
-  using AckCallback = std::function<void(const Acknowledgement&)>;
-
-  explicit Stream(const ClientOptions& options,
-                  AckCallback on_ack = AckCallback())
-      : state_(new State(std::move(on_ack))) {
-    const selfcal_client_options given = internal::ToC(options);
-    selfcal_stream* stream = nullptr;
-    selfcal_error error;
-    internal::Check(
-        selfcal_stream_create(&given,
-                              state_->on_ack ? &Stream::CallBack : nullptr,
-                              state_.get(),
-                              &stream,
-                              &error),
-        error);
-    state_->handle.reset(stream);
-  }
-
-  // Queues a segment and takes it over; an empty one is an error. Returns false
-  // if memory and spool are full or the stream has ended: the segment is then
-  // dropped and counted.
-  bool Send(Segment segment) {
-    selfcal_error error;
-    return internal::Accepted(
-        selfcal_stream_send(handle(), segment.release(), &error),
-        SELFCAL_RESOURCE_EXHAUSTED,
-        error);
-  }
-
-  // Waits until all segments are acknowledged; the only function that waits.
-  // Must not be called from a callback. For the codes see selfcal_stream_drain.
-  Status Drain(std::chrono::milliseconds timeout) {
-    selfcal_error error;
-    selfcal_stream_drain(handle(), timeout.count(), &error);
-    return Status(error);
-  }
-
-  selfcal_stream_statistics statistics() const {
-    auto statistics = internal::Sized<selfcal_stream_statistics>();
-    selfcal_error error;
-    internal::Check(
-        selfcal_stream_get_statistics(handle(), &statistics, &error), error);
-    statistics.callback_failures += state_->failures;
-    return statistics;
-  }
-
-  // OK, or the last error while the connection is down.
-  Status connection_status() const {
-    selfcal_error error;
-    selfcal_stream_connection_status(handle(), &error);
-    return Status(error);
-  }
-
-  // OK, or the error of the last attempt to use the spool.
-  Status spool_status() const {
-    selfcal_error error;
-    selfcal_stream_spool_status(handle(), &error);
-    return Status(error);
-  }
-
- private:
-  // Stays where it is when the stream is moved.
-  struct State {
-    explicit State(AckCallback callback)
-        : on_ack(std::move(callback)),
-          failures(0),
-          handle(nullptr, &selfcal_stream_destroy) {}
-    const AckCallback on_ack;
-    std::atomic<std::uint64_t> failures;
-    // Last: it calls back until it is destroyed.
-    std::unique_ptr<selfcal_stream, void (*)(selfcal_stream*)> handle;
-  };
-
-  static void CallBack(const selfcal_acknowledgement* ack, void* user) {
-    auto* const state = static_cast<State*>(user);
-    try {
-      state->on_ack(internal::FromC(*ack));
-    } catch (...) {
-      ++state->failures;
-    }
-  }
-
-  selfcal_stream* handle() const { return state_->handle.get(); }
-
-  std::unique_ptr<State> state_;
-};
-
 // One version of a rig's calibration, or none.
 class Calibration {
  public:
@@ -382,8 +108,29 @@ class Calibration {
   explicit Calibration(selfcal_calibration* handle) {
     if (handle != nullptr) handle_.reset(handle, &selfcal_calibration_destroy);
   }
+  // A calibration of the SLAM system's own (selfcal_calibration_create).
+  // Structs without struct_size get theirs.
+  Calibration(selfcal_imu imu, std::vector<selfcal_camera> cameras) {
+    imu.struct_size = static_cast<std::uint32_t>(sizeof(imu));
+    std::vector<const selfcal_camera*> pointers;
+    for (selfcal_camera& camera : cameras) {
+      camera.struct_size = static_cast<std::uint32_t>(sizeof(camera));
+      pointers.push_back(&camera);
+    }
+    selfcal_calibration* made = nullptr;
+    selfcal_error error;
+    internal::Check(
+        selfcal_calibration_create(&imu,
+                                   pointers.data(),
+                                   static_cast<std::int32_t>(pointers.size()),
+                                   &made,
+                                   &error),
+        error);
+    handle_.reset(made, &selfcal_calibration_destroy);
+  }
 
   explicit operator bool() const { return handle_ != nullptr; }
+  const selfcal_calibration* get() const { return handle_.get(); }
   std::int64_t version() const {
     return selfcal_calibration_version(handle_.get());
   }
@@ -482,6 +229,326 @@ class Calibration {
 
  private:
   std::shared_ptr<const selfcal_calibration> handle_;
+};
+
+// A complete segment, or none.
+class Segment {
+ public:
+  Segment() : handle_(nullptr, &selfcal_segment_destroy) {}
+  // Takes over the handle, which may be null.
+  explicit Segment(selfcal_segment* handle)
+      : handle_(handle, &selfcal_segment_destroy) {}
+
+  explicit operator bool() const { return handle_ != nullptr; }
+  // Index within its session.
+  std::int64_t index() const { return selfcal_segment_index(handle_.get()); }
+  selfcal_segment* release() { return handle_.release(); }
+
+ private:
+  std::unique_ptr<selfcal_segment, void (*)(selfcal_segment*)> handle_;
+};
+
+// 0 and an empty string mean the default, which selfcal_builder_options states.
+struct BuilderOptions {
+  std::string session;  // required
+  std::int64_t first_index = 0;
+  std::int64_t calibration_version = 0;
+  std::int32_t keyframes = 0;
+  double seconds = 0;
+  std::int32_t min_observations = 0;
+  double max_gap_s = 0;
+  std::int32_t min_keyframes = 0;
+  double pixel_sigma_px = 0;
+  double gravity_mps2 = 0;
+  bool same_ids_after_gap = false;
+};
+
+// Builds motion segments from keyframes (selfcal_builder). Send what is
+// complete after each call:
+//   while (selfcal::Segment segment = builder.Take()) {
+//     stream.Send(std::move(segment));
+//   }
+class Builder {
+ public:
+  explicit Builder(const BuilderOptions& options)
+      : handle_(Create(options), &selfcal_builder_destroy) {}
+
+  // Returns false and ignores a sample that is not later than the one before.
+  bool AddImu(const ImuSample& sample) {
+    selfcal_error error;
+    return internal::Accepted(
+        selfcal_builder_add_imu(handle_.get(), &sample, &error),
+        SELFCAL_OUT_OF_RANGE,
+        error);
+  }
+
+  // Returns false and refuses a keyframe that is not later than the one before,
+  // or comes while the SLAM system is not healthy.
+  bool AddKeyframe(const KeyframeState& state,
+                   const std::vector<Observation>& observations) {
+    return AddKeyframe(state, state.t_ns, observations);
+  }
+  // The same for a state that holds at another time than its images, which have
+  // the timestamp image_t_ns (selfcal_builder_add_keyframe_at).
+  bool AddKeyframe(const KeyframeState& state,
+                   std::int64_t image_t_ns,
+                   const std::vector<Observation>& observations) {
+    selfcal_error error;
+    return internal::Accepted(
+        selfcal_builder_add_keyframe_at(handle_.get(),
+                                        &state,
+                                        image_t_ns,
+                                        observations.data(),
+                                        observations.size(),
+                                        &error),
+        SELFCAL_OUT_OF_RANGE,
+        error);
+  }
+
+  // Version of the calibration with which the states from the next keyframe on
+  // are estimated (selfcal_builder_set_calibration_version).
+  void SetCalibrationVersion(std::int64_t version) {
+    selfcal_error error;
+    internal::Check(
+        selfcal_builder_set_calibration_version(handle_.get(), version, &error),
+        error);
+  }
+
+  // Values of that calibration, or of the SLAM system's own
+  // (selfcal_builder_set_theta); an empty one is an error.
+  void SetTheta(const Calibration& calibration) {
+    selfcal_error error;
+    internal::Check(
+        selfcal_builder_set_theta(handle_.get(), calibration.get(), &error),
+        error);
+  }
+
+  // False drops the current segment and refuses keyframes until it is true
+  // again (selfcal_builder_set_healthy).
+  void SetHealthy(bool healthy) {
+    selfcal_error error;
+    internal::Check(
+        selfcal_builder_set_healthy(handle_.get(), healthy ? 1 : 0, &error),
+        error);
+  }
+
+  // Temperature of the device [degrees Celsius] from now on. Returns false and
+  // ignores one that is not from -100 to 200.
+  bool SetTemperature(double celsius) {
+    selfcal_error error;
+    return internal::Accepted(
+        selfcal_builder_set_temperature(handle_.get(), celsius, &error),
+        SELFCAL_OUT_OF_RANGE,
+        error);
+  }
+  // The temperature is unknown from now on, as it is at first.
+  void ClearTemperature() {
+    selfcal_error error;
+    internal::Check(selfcal_builder_clear_temperature(handle_.get(), &error),
+                    error);
+  }
+
+  // Ends the current segment, at the end of a session or where tracking was
+  // lost; with fewer keyframes than max(2, min_keyframes) it is dropped.
+  void Flush(std::int32_t min_keyframes) {
+    selfcal_error error;
+    internal::Check(selfcal_builder_flush(handle_.get(), min_keyframes, &error),
+                    error);
+  }
+
+  // The oldest complete segment, or none.
+  Segment Take() { return Segment(selfcal_builder_take(handle_.get())); }
+
+  // Index of the next segment.
+  std::int64_t next_index() const {
+    return selfcal_builder_next_index(handle_.get());
+  }
+
+  selfcal_builder_statistics statistics() const {
+    auto statistics = internal::Sized<selfcal_builder_statistics>();
+    selfcal_error error;
+    internal::Check(
+        selfcal_builder_get_statistics(handle_.get(), &statistics, &error),
+        error);
+    return statistics;
+  }
+
+ private:
+  static selfcal_builder* Create(const BuilderOptions& given) {
+    auto options = internal::Sized<selfcal_builder_options>();
+    options.session = internal::OrDefault(given.session);
+    options.first_index = given.first_index;
+    options.calibration_version = given.calibration_version;
+    options.keyframes = given.keyframes;
+    options.seconds = given.seconds;
+    options.min_observations = given.min_observations;
+    options.max_gap_s = given.max_gap_s;
+    options.min_keyframes = given.min_keyframes;
+    options.pixel_sigma_px = given.pixel_sigma_px;
+    options.gravity_mps2 = given.gravity_mps2;
+    options.same_ids_after_gap = given.same_ids_after_gap ? 1 : 0;
+    selfcal_builder* builder = nullptr;
+    selfcal_error error;
+    internal::Check(selfcal_builder_create(&options, &builder, &error), error);
+    return builder;
+  }
+
+  std::unique_ptr<selfcal_builder, void (*)(selfcal_builder*)> handle_;
+};
+
+// 0 and an empty string mean the default, which selfcal_client_options states.
+struct ClientOptions {
+  std::string target;
+  std::string rig;  // required
+  std::int32_t max_queue = 0;
+  std::int32_t max_unacknowledged = 0;
+  std::chrono::milliseconds min_backoff{0};
+  std::chrono::milliseconds max_backoff{0};
+  std::string ca_file;
+  std::string certificate_file;
+  std::string key_file;
+  std::string spool_dir;
+  std::uint64_t max_spool_bytes = 0;
+};
+
+// One violated rule: the field, and what to do.
+struct Violation {
+  std::string field;
+  std::string message;
+};
+
+// The daemon's verdict on one segment.
+struct Acknowledgement {
+  std::string session;
+  std::int64_t index = 0;
+  selfcal_verdict verdict = SELFCAL_REJECTED;
+  std::vector<Violation> violations;  // the reasons for a rejection
+  // Observations outside the image that were left out of a stored segment.
+  std::uint64_t observations_dropped = 0;
+};
+
+namespace internal {
+
+// Valid as long as the given options.
+inline selfcal_client_options ToC(const ClientOptions& given) {
+  auto options = Sized<selfcal_client_options>();
+  options.target = OrDefault(given.target);
+  options.rig = OrDefault(given.rig);
+  options.max_queue = given.max_queue;
+  options.max_unacknowledged = given.max_unacknowledged;
+  options.min_backoff_ms = given.min_backoff.count();
+  options.max_backoff_ms = given.max_backoff.count();
+  options.ca_file = OrDefault(given.ca_file);
+  options.certificate_file = OrDefault(given.certificate_file);
+  options.key_file = OrDefault(given.key_file);
+  options.spool_dir = OrDefault(given.spool_dir);
+  options.max_spool_bytes = given.max_spool_bytes;
+  return options;
+}
+
+inline Acknowledgement FromC(const selfcal_acknowledgement& given) {
+  Acknowledgement ack;
+  ack.session = given.session;
+  ack.index = given.index;
+  ack.verdict = static_cast<selfcal_verdict>(given.verdict);
+  ack.observations_dropped = given.observations_dropped;
+  for (std::uint64_t i = 0; i < given.violation_count; ++i) {
+    ack.violations.push_back(
+        {given.violations[i].field, given.violations[i].message});
+  }
+  return ack;
+}
+
+}  // namespace internal
+
+// Sends segments to the daemon, in order and at least once (selfcal_stream).
+class Stream {
+ public:
+  using AckCallback = std::function<void(const Acknowledgement&)>;
+
+  explicit Stream(const ClientOptions& options,
+                  AckCallback on_ack = AckCallback())
+      : state_(new State(std::move(on_ack))) {
+    const selfcal_client_options given = internal::ToC(options);
+    selfcal_stream* stream = nullptr;
+    selfcal_error error;
+    internal::Check(
+        selfcal_stream_create(&given,
+                              state_->on_ack ? &Stream::CallBack : nullptr,
+                              state_.get(),
+                              &stream,
+                              &error),
+        error);
+    state_->handle.reset(stream);
+  }
+
+  // Queues a segment and takes it over; an empty one is an error. Returns false
+  // if memory and spool are full or the stream has ended: the segment is then
+  // dropped and counted.
+  bool Send(Segment segment) {
+    selfcal_error error;
+    return internal::Accepted(
+        selfcal_stream_send(handle(), segment.release(), &error),
+        SELFCAL_RESOURCE_EXHAUSTED,
+        error);
+  }
+
+  // Waits until all segments are acknowledged; the only function that waits.
+  // Must not be called from a callback. For the codes see selfcal_stream_drain.
+  Status Drain(std::chrono::milliseconds timeout) {
+    selfcal_error error;
+    selfcal_stream_drain(handle(), timeout.count(), &error);
+    return Status(error);
+  }
+
+  selfcal_stream_statistics statistics() const {
+    auto statistics = internal::Sized<selfcal_stream_statistics>();
+    selfcal_error error;
+    internal::Check(
+        selfcal_stream_get_statistics(handle(), &statistics, &error), error);
+    statistics.callback_failures += state_->failures;
+    return statistics;
+  }
+
+  // OK, or the last error while the connection is down.
+  Status connection_status() const {
+    selfcal_error error;
+    selfcal_stream_connection_status(handle(), &error);
+    return Status(error);
+  }
+
+  // OK, or the error of the last attempt to use the spool.
+  Status spool_status() const {
+    selfcal_error error;
+    selfcal_stream_spool_status(handle(), &error);
+    return Status(error);
+  }
+
+ private:
+  // Stays where it is when the stream is moved.
+  struct State {
+    explicit State(AckCallback callback)
+        : on_ack(std::move(callback)),
+          failures(0),
+          handle(nullptr, &selfcal_stream_destroy) {}
+    const AckCallback on_ack;
+    std::atomic<std::uint64_t> failures;
+    // Last: it calls back until it is destroyed.
+    std::unique_ptr<selfcal_stream, void (*)(selfcal_stream*)> handle;
+  };
+
+  static void CallBack(const selfcal_acknowledgement* ack, void* user) {
+    auto* const state = static_cast<State*>(user);
+    try {
+      state->on_ack(internal::FromC(*ack));
+    } catch (...) {
+      ++state->failures;
+    }
+  }
+
+  selfcal_stream* handle() const { return state_->handle.get(); }
+
+  std::unique_ptr<State> state_;
 };
 
 // Watches the active calibration of a rig (selfcal_watch).

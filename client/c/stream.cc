@@ -46,7 +46,8 @@ void CallBack(const Acknowledgement& ack,
       ack.key.session.c_str(),
       ack.key.index,
       violations.data(),
-      violations.size()};
+      violations.size(),
+      ack.observations_dropped};
   on_ack(&given, user);
 }
 
@@ -126,6 +127,9 @@ int32_t selfcal_stream_get_statistics(const selfcal_stream* stream,
     value.resent = counts.resent;
     value.connections = counts.connections;
     value.callback_failures = counts.callback_failures;
+    value.tracks_triangulated = counts.tracks_triangulated;
+    value.tracks_dropped = counts.tracks_dropped;
+    value.observations_dropped = counts.observations_dropped;
     value.spooled = counts.spooled;
     value.spool_recovered = counts.spool_recovered;
     value.spool_damaged = counts.spool_damaged;

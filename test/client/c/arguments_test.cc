@@ -88,6 +88,8 @@ TEST_F(ArgumentsTest, NullIsAnErrorOfEachFunctionThatHasErrors) {
   selfcal_imu imu = {};
   selfcal_camera camera = {};
   selfcal_component component = {};
+  const selfcal_imu no_size = {};
+  selfcal_calibration* calibration = nullptr;
   selfcal_builder* builder = nullptr;
   selfcal_stream* stream = nullptr;
   selfcal_watch* watch = nullptr;
@@ -101,6 +103,13 @@ TEST_F(ArgumentsTest, NullIsAnErrorOfEachFunctionThatHasErrors) {
       selfcal_builder_add_keyframe(nullptr, &state, nullptr, 0, e),
       selfcal_builder_add_keyframe(builder_, nullptr, nullptr, 0, e),
       selfcal_builder_add_keyframe(builder_, &state, nullptr, 1, e),
+      selfcal_builder_add_keyframe_at(nullptr, &state, 0, nullptr, 0, e),
+      selfcal_builder_set_calibration_version(nullptr, 2, e),
+      selfcal_builder_set_theta(nullptr, nullptr, e),
+      selfcal_builder_set_theta(builder_, nullptr, e),
+      selfcal_builder_set_healthy(nullptr, 1, e),
+      selfcal_calibration_create(nullptr, nullptr, 0, &calibration, e),
+      selfcal_calibration_create(&no_size, nullptr, 0, &calibration, e),
       selfcal_builder_set_temperature(nullptr, 20, e),
       selfcal_builder_clear_temperature(nullptr, e),
       selfcal_builder_flush(nullptr, 10, e),
@@ -153,7 +162,7 @@ TEST_F(ArgumentsTest, NullIsAcceptedWhereItIsStated) {
 
 TEST_F(ArgumentsTest, ASizeThatIsNoneOfTheStructIsRefused) {
   selfcal_builder_options options = Walk();
-  for (const std::uint32_t size : {0u, 3u, 55u, 0xffffffffu}) {
+  for (const std::uint32_t size : {0u, 3u, 79u, 0xffffffffu}) {
     options.struct_size = size;
     EXPECT_THAT(Refusal(options), HasSubstr("options: struct_size is "))
         << size;

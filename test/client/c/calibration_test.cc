@@ -227,6 +227,51 @@ TEST_F(CalibrationTest, AppliesItselfAsTheLibraryDoes) {
             SELFCAL_OUT_OF_RANGE);
 }
 
+TEST_F(CalibrationTest, CanBeMadeOfTheSameValues) {
+  Receive(Message(1, true));
+  selfcal_imu imu = {};
+  imu.struct_size = sizeof(imu);
+  selfcal_camera cameras[2] = {};
+  const selfcal_camera* const pointers[2] = {&cameras[0], &cameras[1]};
+  ASSERT_EQ(selfcal_calibration_get_imu(calibration_, &imu, nullptr), 0);
+  for (std::int32_t j = 0; j < 2; ++j) {
+    cameras[j].struct_size = sizeof(cameras[j]);
+    ASSERT_EQ(
+        selfcal_calibration_get_camera(calibration_, j, &cameras[j], nullptr),
+        0);
+  }
+  selfcal_calibration* made = nullptr;
+  ASSERT_EQ(selfcal_calibration_create(&imu, pointers, 2, &made, &error_), 0)
+      << error_.message;
+  EXPECT_EQ(selfcal_calibration_version(made), 0);
+  const std::int32_t size = selfcal_calibration_component_count(made);
+  EXPECT_EQ(size, selfcal_calibration_component_count(calibration_));
+  for (std::int32_t i = 0; i < size; ++i) {
+    selfcal_component one = {};
+    one.struct_size = sizeof(one);
+    selfcal_component other = one;
+    selfcal_calibration_get_component(made, i, &one, nullptr);
+    selfcal_calibration_get_component(calibration_, i, &other, nullptr);
+    EXPECT_EQ(one.value, other.value) << one.name;
+  }
+  selfcal_calibration_destroy(made);
+
+  cameras[1].model = "pinhole";
+  EXPECT_EQ(selfcal_calibration_create(&imu, pointers, 2, &made, &error_),
+            SELFCAL_INVALID_ARGUMENT);
+  EXPECT_STREQ(error_.message, "cameras[1].model: 'pinhole' is not known");
+  EXPECT_EQ(made, nullptr);
+  cameras[1].model = "equidistant";
+  cameras[1].distortion_size = 9;
+  EXPECT_EQ(selfcal_calibration_create(&imu, pointers, 2, &made, &error_),
+            SELFCAL_INVALID_ARGUMENT);
+  cameras[1].distortion_size = 4;
+  cameras[1].f[0] = -1;
+  EXPECT_EQ(selfcal_calibration_create(&imu, pointers, 2, &made, &error_),
+            SELFCAL_INVALID_ARGUMENT);
+  EXPECT_THAT(error_.message, testing::HasSubstr("cameras[1].f"));
+}
+
 TEST_F(CalibrationTest, ACopyOutlivesTheWatch) {
   Receive(Message(3, true));
   selfcal_calibration* const copy = selfcal_calibration_copy(calibration_);

@@ -61,7 +61,11 @@ TEST(Layout, OfOptions) {
   EXPECT_MEMBER(selfcal_builder_options, calibration_version, 32, 8);
   EXPECT_MEMBER(selfcal_builder_options, seconds, 40, 8);
   EXPECT_MEMBER(selfcal_builder_options, max_gap_s, 48, 8);
-  EXPECT_EQ(c::kBuilderOptionsSize, 56u);
+  EXPECT_MEMBER(selfcal_builder_options, pixel_sigma_px, 56, 8);
+  EXPECT_MEMBER(selfcal_builder_options, gravity_mps2, 64, 8);
+  EXPECT_MEMBER(selfcal_builder_options, same_ids_after_gap, 72, 4);
+  EXPECT_MEMBER(selfcal_builder_options, reserved, 76, 4);
+  EXPECT_EQ(c::kBuilderOptionsSize, 80u);
 
   EXPECT_MEMBER(selfcal_client_options, struct_size, 0, 4);
   EXPECT_MEMBER(selfcal_client_options, max_queue, 4, 4);
@@ -84,9 +88,11 @@ TEST(Layout, OfStatisticsAndAcknowledgements) {
   EXPECT_MEMBER(selfcal_builder_statistics, segments, 8, 8);
   EXPECT_MEMBER(selfcal_builder_statistics, keyframes_refused, 16, 8);
   EXPECT_MEMBER(selfcal_builder_statistics, keyframes_dropped, 24, 8);
-  EXPECT_MEMBER(selfcal_builder_statistics, imu_ignored, 32, 8);
-  EXPECT_MEMBER(selfcal_builder_statistics, out_of_memory, 40, 8);
-  EXPECT_EQ(c::kBuilderStatisticsSize, 48u);
+  EXPECT_MEMBER(selfcal_builder_statistics, keyframes_unhealthy, 32, 8);
+  EXPECT_MEMBER(selfcal_builder_statistics, imu_ignored, 40, 8);
+  EXPECT_MEMBER(selfcal_builder_statistics, observations_dropped, 48, 8);
+  EXPECT_MEMBER(selfcal_builder_statistics, out_of_memory, 56, 8);
+  EXPECT_EQ(c::kBuilderStatisticsSize, 64u);
 
   EXPECT_MEMBER(selfcal_stream_statistics, struct_size, 0, 4);
   EXPECT_MEMBER(selfcal_stream_statistics, queued, 8, 8);
@@ -97,13 +103,16 @@ TEST(Layout, OfStatisticsAndAcknowledgements) {
   EXPECT_MEMBER(selfcal_stream_statistics, resent, 48, 8);
   EXPECT_MEMBER(selfcal_stream_statistics, connections, 56, 8);
   EXPECT_MEMBER(selfcal_stream_statistics, callback_failures, 64, 8);
-  EXPECT_MEMBER(selfcal_stream_statistics, spooled, 72, 8);
-  EXPECT_MEMBER(selfcal_stream_statistics, spool_recovered, 80, 8);
-  EXPECT_MEMBER(selfcal_stream_statistics, spool_damaged, 88, 8);
-  EXPECT_MEMBER(selfcal_stream_statistics, spool_failures, 96, 8);
-  EXPECT_MEMBER(selfcal_stream_statistics, spool_segments, 104, 8);
-  EXPECT_MEMBER(selfcal_stream_statistics, spool_bytes, 112, 8);
-  EXPECT_EQ(c::kStreamStatisticsSize, 120u);
+  EXPECT_MEMBER(selfcal_stream_statistics, tracks_triangulated, 72, 8);
+  EXPECT_MEMBER(selfcal_stream_statistics, tracks_dropped, 80, 8);
+  EXPECT_MEMBER(selfcal_stream_statistics, observations_dropped, 88, 8);
+  EXPECT_MEMBER(selfcal_stream_statistics, spooled, 96, 8);
+  EXPECT_MEMBER(selfcal_stream_statistics, spool_recovered, 104, 8);
+  EXPECT_MEMBER(selfcal_stream_statistics, spool_damaged, 112, 8);
+  EXPECT_MEMBER(selfcal_stream_statistics, spool_failures, 120, 8);
+  EXPECT_MEMBER(selfcal_stream_statistics, spool_segments, 128, 8);
+  EXPECT_MEMBER(selfcal_stream_statistics, spool_bytes, 136, 8);
+  EXPECT_EQ(c::kStreamStatisticsSize, 144u);
 
   EXPECT_MEMBER(selfcal_acknowledgement, struct_size, 0, 4);
   EXPECT_MEMBER(selfcal_acknowledgement, verdict, 4, 4);
@@ -111,6 +120,7 @@ TEST(Layout, OfStatisticsAndAcknowledgements) {
   EXPECT_MEMBER(selfcal_acknowledgement, index, 16, 8);
   EXPECT_MEMBER(selfcal_acknowledgement, violations, 24, 8);
   EXPECT_MEMBER(selfcal_acknowledgement, violation_count, 32, 8);
+  EXPECT_MEMBER(selfcal_acknowledgement, observations_dropped, 40, 8);
 }
 
 TEST(Layout, OfTheCalibration) {
