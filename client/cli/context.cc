@@ -37,8 +37,8 @@ std::string Violations(const grpc::Status& status, const FlagNames& flags) {
               violation.description().c_str(), "and %zu more;", &count) == 1) {
         more += count;
       } else {
-        violations.push_back({SafeLine(violation.field()),
-                                SafeLine(violation.description())});
+        violations.push_back(
+            {SafeLine(violation.field()), SafeLine(violation.description())});
       }
     }
   }
@@ -118,7 +118,8 @@ int Fail(const Context& context, const grpc::Status& status) {
   }
   const std::string violations = Violations(status, context.flags);
   PrintError(violations.empty()
-                 ? SafeLine(status.error_message()) + MissingRigHint(context, status)
+                 ? SafeLine(status.error_message()) +
+                       MissingRigHint(context, status)
                  : "the daemon refused the request:" + violations);
   return kFailed;
 }

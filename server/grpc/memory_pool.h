@@ -12,8 +12,9 @@
 namespace selfcal::server {
 
 // Small shares, of up to a 16th of the pool, never wait for large ones: an 8th
-// of the pool is for them alone. Large ones are given in the order in which they
-// are wanted; one that is larger than the pool when no other large one is held.
+// of the pool is for them alone. Large ones are given in the order in which
+// they are wanted; one that is larger than the pool when no other large one is
+// held.
 class MemoryPool {
  public:
   explicit MemoryPool(std::int64_t bytes) : bytes_(bytes) {}

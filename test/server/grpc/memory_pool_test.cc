@@ -84,8 +84,7 @@ TEST(MemoryPool, LargeSharesAreGivenInTheirOrderAndUrgentOnesFirst) {
   }
   held.reset();
   for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(order,
-            (std::vector<std::string>{"urgent", "first", "second"}));
+  EXPECT_EQ(order, (std::vector<std::string>{"urgent", "first", "second"}));
 }
 
 TEST(ReadGate, AnIdleStreamHoldsUpNobody) {
