@@ -60,7 +60,7 @@ std::vector<FilterField> EventFields() {
 FieldValue ValueOf(const v1::Event& event, std::string_view field) {
   if (field == "event") return static_cast<double>(event.number());
   if (field == "time") return FilterTime(event.time());
-  if (field == "rig") return LastPart(event.rig());
+  if (field == "rig") return event.rig().empty() ? "-" : LastPart(event.rig());
   if (field == "kind") return KindName(event.kind());
   return event.detail();
 }

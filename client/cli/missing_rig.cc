@@ -7,6 +7,7 @@
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "proto/nearest_word.h"
+#include "proto/safe_text.h"
 #include "selfcal/v1/rig.grpc.pb.h"
 
 namespace selfcal::client {
@@ -59,7 +60,7 @@ std::string MissingRigHint(const Context& context, const grpc::Status& status) {
     return "";
   }
   const std::string nearest = NearestWord(rig, names);
-  if (!nearest.empty()) return "\n  Did you mean '" + nearest + "'?";
+  if (!nearest.empty()) return "\n  Did you mean '" + SafeLine(nearest) + "'?";
   return "\n  'selfcal rig list' lists the rigs.";
 }
 

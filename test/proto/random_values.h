@@ -90,7 +90,7 @@ class RandomValues {
       rig.blocks.push_back({Text(6), Int(0, 1) == 1});
     }
     rig.reweight_noise = Int(0, 1) == 1;
-    rig.imu_full_scale = {1 + Int(0, 99), 1 + Int(0, 999)};
+    rig.imu_full_scale = {1.0 + Int(0, 99), 1.0 + Int(0, 999)};
     return rig;
   }
 

@@ -14,8 +14,9 @@ const kColumns: Column<Event>[] = [
   },
   {
     head: 'Rig',
-    cell: (event) => <NameLink name={event.rig}>{idOf(event.rig)}</NameLink>,
-    value: (event) => idOf(event.rig),
+    cell: (event) =>
+      event.rig ? <NameLink name={event.rig}>{idOf(event.rig)}</NameLink> : 'the daemon',
+    value: (event) => (event.rig ? idOf(event.rig) : ''),
   },
   { head: 'Event', cell: (event) => words(event.kind), value: (event) => words(event.kind) },
   { head: 'Detail', cell: (event) => event.detail, value: (event) => event.detail, wide: true },
