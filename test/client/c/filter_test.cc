@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::int64_t kExposureNs = 3'000'000;  // after the timestamp
 
-Calibration Theta() {
+Calibration FilterTheta() {
   Calibration theta;
   theta.imu.s_g = {1.01, 1.02, 1.03};
   theta.cameras.resize(2);
@@ -31,10 +31,10 @@ Calibration Theta() {
   return theta;
 }
 
-// Owns what Theta() is in the C interface.
+// Owns what FilterTheta() is in the C interface.
 std::unique_ptr<selfcal_calibration, decltype(&selfcal_calibration_destroy)>
 MakeCalibration() {
-  const Calibration theta = Theta();
+  const Calibration theta = FilterTheta();
   selfcal_imu imu = {};
   imu.struct_size = sizeof(imu);
   selfcal_camera camera = {};
@@ -97,7 +97,7 @@ Messages InCxx20(const Session& session) {
                                   .pixel_sigma_px = 0.5,
                                   .gravity_mps2 = 9.8});
   Messages messages;
-  EXPECT_TRUE(builder.SetTheta(Theta()));
+  EXPECT_TRUE(builder.SetTheta(FilterTheta()));
   for (const selfcal_imu_sample& s : session.imu) {
     builder.AddImu({s.t_ns, Eigen::Vector3d(s.gyro), Eigen::Vector3d(s.accel)});
   }
