@@ -154,7 +154,7 @@ class ExchangeCall final : public Reactor {
     {
       const std::lock_guard lock(mutex_);
       slot->status = status;
-      slot->response = std::move(bytes);
+      slot->response.Swap(&bytes);
       slot->filled = true;
       slot->work.Shrink(0);
       next = NextToWrite();

@@ -238,7 +238,7 @@ class GrpcServer final : public Server {
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
     Api* api,
     const ServerOptions& options,
-    std::function<void(const std::string&)> tls_refused) {
+    const std::function<void(const std::string&)>& tls_refused) {
   SELFCAL_RETURN_IF_ERROR(CheckServerOptions(options));
   auto server = std::make_unique<GrpcServer>(api, options);
   if (absl::Status started = server->Start(options, tls_refused);

@@ -82,6 +82,6 @@ class Server {
 absl::StatusOr<std::unique_ptr<Server>> MakeServer(
     Api* api,
     const ServerOptions& options,
-    std::function<void(const std::string&)> tls_refused = {});
+    const std::function<void(const std::string&)>& tls_refused = {});
 
 }  // namespace selfcal::server

@@ -64,7 +64,7 @@ class Recalibrator {
  private:
   // One thread, and the run that it executes.
   struct Executor {
-    Executor(const RunContext& shared);
+    explicit Executor(const RunContext& shared);
 
     CurrentRun current;
     RunContext context;
