@@ -13,7 +13,7 @@ namespace {
 
 #define EXPECT_MEMBER(type, member, offset, size) \
   EXPECT_EQ(offsetof(type, member), offset##u);   \
-  EXPECT_EQ(sizeof(type::member), size##u) << #type "." #member
+  EXPECT_EQ(sizeof(decltype(type::member)), size##u) << #type "." #member
 
 TEST(Layout, OfStructsThatNeverChange) {
   EXPECT_MEMBER(selfcal_error, code, 0, 4);
