@@ -14,7 +14,6 @@ namespace selfcal {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::Field;
 using ::testing::IsEmpty;
 
 constexpr int kTrials = 500;

@@ -25,7 +25,6 @@ namespace {
 
 using std::chrono::steady_clock;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::Not;
 
 class OperationTest : public DaemonTest {
