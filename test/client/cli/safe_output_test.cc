@@ -18,7 +18,7 @@ namespace {
 using google::protobuf::FieldDescriptor;
 
 // A forged line, an escape sequence, NUL, and an override of the direction.
-const std::string kHostile("!\nforged\r\033[2J\0\xe2\x80\xae\xc2\x9b", 21);
+const std::string kHostile("!\nforged\r\033[2J\0\xe2\x80\xae\xc2\x9b", 19);
 
 // Appends it to each string of the message, and of those in it.
 void Poison(google::protobuf::Message* message) {
