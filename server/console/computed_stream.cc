@@ -9,6 +9,7 @@
 
 #include "server/api/errors.h"
 #include "server/console/json.h"
+#include "server/http/error_response.h"
 
 namespace selfcal::server {
 namespace {

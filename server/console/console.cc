@@ -4,16 +4,36 @@
 #include <utility>
 
 #include "server/console/assets.h"
-#include "server/console/http_server.h"
-#include "server/console/json.h"
 #include "server/console/transcoding.h"
+#include "server/http/error_response.h"
+#include "server/http/http_server.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
 namespace {
 
 HttpOptions HttpOf(const ConsoleOptions& options) {
-  return {options.address, options.tls, options.local_role};
+  return {"console", options.address, options.tls, options.local_role};
+}
+
+// PERMISSION_DENIED for a change without the header X-Selfcal-Console, which
+// pages of other sites cannot send. UNIMPLEMENTED for methods other than GET,
+// HEAD, POST, PATCH and DELETE.
+absl::Status CheckMethod(const HttpRequest& request) {
+  if (request.method == "GET" || request.method == "HEAD") {
+    return absl::OkStatus();
+  }
+  if (request.method != "POST" && request.method != "PATCH" &&
+      request.method != "DELETE") {
+    return absl::UnimplementedError(
+        "only GET, HEAD, POST, PATCH and DELETE are supported");
+  }
+  if (!request.headers.contains("x-selfcal-console")) {
+    return absl::PermissionDeniedError(
+        "a change requires the header X-Selfcal-Console: 1, which the pages of "
+        "the console send");
+  }
+  return absl::OkStatus();
 }
 
 HttpResponse AnswerPage(const HttpRequest& request) {
@@ -43,6 +63,8 @@ class HttpConsole final : public Console {
   absl::Status Start(const HttpOptions& options) {
     SELFCAL_ASSIGN_OR_RETURN(
         server_, MakeHttpServer(options, [this](const HttpRequest& request) {
+          const absl::Status allowed = CheckMethod(request);
+          if (!allowed.ok()) return ErrorResponse(allowed);
           return request.path.starts_with("/api/")
                      ? transcoding_.Answer(request)
                      : AnswerPage(request);

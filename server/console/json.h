@@ -1,12 +1,11 @@
-// Responses in JSON: messages of the contract, and errors.
+// Messages of the contract as responses in JSON.
 #pragma once
 
-#include <absl/status/status.h>
 #include <google/protobuf/message.h>
 
 #include <string>
 
-#include "server/console/http.h"
+#include "server/http/http.h"
 
 namespace selfcal::server {
 
@@ -14,11 +13,7 @@ namespace selfcal::server {
 // integers are strings.
 HttpResponse JsonResponse(const google::protobuf::Message& message);
 
-// A response {"code": "NOT_FOUND", "message": ..., "whatToDo": ...}.
-HttpResponse ErrorResponse(const absl::Status& status);
-
-// The same as server-sent events.
+// The same as a server-sent event.
 std::string MessageEvent(const google::protobuf::Message& message);
-std::string ErrorEvent(const absl::Status& status);
 
 }  // namespace selfcal::server

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "server/api/api.h"
-#include "server/console/http.h"
+#include "server/http/http.h"
 
 namespace selfcal::server {
 

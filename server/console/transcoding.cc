@@ -12,6 +12,7 @@
 #include "server/console/computed_stream.h"
 #include "server/console/json.h"
 #include "server/console/watch_stream.h"
+#include "server/http/error_response.h"
 
 namespace selfcal::server {
 namespace {

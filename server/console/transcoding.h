@@ -4,8 +4,8 @@
 #pragma once
 
 #include "server/api/api.h"
-#include "server/console/http.h"
 #include "server/console/routes.h"
+#include "server/http/http.h"
 
 namespace selfcal::server {
 

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/console/json.h"
+#include "server/http/error_response.h"
 
 namespace selfcal::server {
 namespace {

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "server/api/method.h"
-#include "server/console/http.h"
+#include "server/http/http.h"
 
 namespace selfcal::server {
 

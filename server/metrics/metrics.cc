@@ -1,16 +1,17 @@
 #include "server/metrics/metrics.h"
 
-#include <CivetServer.h>
-#include <prometheus/exposer.h>
+#include <prometheus/collectable.h>
 #include <prometheus/gauge.h>
 #include <prometheus/registry.h>
+#include <prometheus/text_serializer.h>
 
-#include <charconv>
-#include <exception>
-#include <string_view>
+#include <mutex>
 #include <utility>
+#include <vector>
 
-#include "server/access/loopback_host.h"
+#include "server/http/address.h"
+#include "server/http/error_response.h"
+#include "server/http/http_server.h"
 #include "server/metrics/event_metrics.h"
 #include "server/metrics/recent_rigs.h"
 #include "server/metrics/state_metrics.h"
@@ -20,43 +21,7 @@
 namespace selfcal::server {
 namespace {
 
-constexpr int kMaxPort = 65535;
-constexpr std::size_t kThreads = 2;
-
-// Returns the host of host:port; empty if there is no port.
-std::string_view HostOf(std::string_view address) {
-  const std::size_t colon = address.rfind(':');
-  if (colon == address.npos) return {};
-  int port = -1;
-  const char* end = address.data() + address.size();
-  const auto [rest, error] =
-      std::from_chars(address.data() + colon + 1, end, port);
-  const bool valid =
-      error == std::errc() && rest == end && port >= 0 && port <= kMaxPort;
-  return valid ? address.substr(0, colon) : std::string_view();
-}
-
-// Refuses requests under a name that is not of the loopback interface.
-int BeginRequest(mg_connection* connection) {
-  const char* host = mg_get_header(connection, "Host");
-  if (host != nullptr && IsLoopbackHost(host)) return 0;
-  constexpr int kForbidden = 403;
-  mg_send_http_error(connection,
-                     kForbidden,
-                     "%s",
-                     "the metrics can only be read as 127.0.0.1, localhost or "
-                     "[::1]; a proxy has to set the header Host");
-  return 1;
-}
-
-const CivetCallbacks& Callbacks() {
-  static const CivetCallbacks callbacks = [] {
-    CivetCallbacks result;
-    result.begin_request = BeginRequest;
-    return result;
-  }();
-  return callbacks;
-}
+constexpr char kPath[] = "/metrics";
 
 class PrometheusMetrics final : public Metrics {
  public:
@@ -64,18 +29,24 @@ class PrometheusMetrics final : public Metrics {
       : rigs_(options.rigs),
         registry_(std::make_shared<prometheus::Registry>()),
         events_(store, &rigs_, registry_.get()),
-        state_(std::make_shared<StateMetrics>(store, &rigs_, options.database)),
-        exposer_(options.address, kThreads, &Callbacks()) {
+        sources_{
+            registry_,
+            std::make_shared<StateMetrics>(store, &rigs_, options.database)} {
     prometheus::BuildGauge()
         .Name("selfcal_build_info")
         .Help("Constant 1, with the version of the program as label.")
         .Register(*registry_)
         .Add({{"version", options.program_version}})
         .Set(1);
-    exposer_.RegisterCollectable(registry_);
-    exposer_.RegisterCollectable(state_);
-    url_ = "http://" + std::string(HostOf(options.address)) + ":" +
-           std::to_string(exposer_.GetListeningPorts().at(0)) + "/metrics";
+  }
+
+  absl::Status Start(const HttpOptions& options) {
+    SELFCAL_ASSIGN_OR_RETURN(
+        server_, MakeHttpServer(options, [this](const HttpRequest& request) {
+          return Answer(request);
+        }));
+    url_ = server_->url() + kPath;
+    return absl::OkStatus();
   }
 
   PipelineObserver* observer() override { return &events_; }
@@ -83,27 +54,58 @@ class PrometheusMetrics final : public Metrics {
 
   void AddTls(std::shared_ptr<const TlsReload> tls) override {
     if (tls == nullptr) return;
-    tls_ = std::make_shared<TlsMetrics>(std::move(tls));
-    exposer_.RegisterCollectable(tls_);
+    const std::lock_guard lock(mutex_);
+    sources_.push_back(std::make_shared<TlsMetrics>(std::move(tls)));
   }
 
  private:
+  HttpResponse Answer(const HttpRequest& request) {
+    if (request.method != "GET" && request.method != "HEAD") {
+      return ErrorResponse(
+          absl::UnimplementedError("metrics can only be read, with GET"));
+    }
+    if (request.path != kPath) {
+      return ErrorResponse(
+          absl::NotFoundError(std::string("the metrics are at ") + kPath));
+    }
+    HttpResponse response;
+    response.type = "text/plain; version=0.0.4; charset=utf-8";
+    response.body = prometheus::TextSerializer().Serialize(Collect());
+    return response;
+  }
+
+  std::vector<prometheus::MetricFamily> Collect() {
+    const std::lock_guard lock(mutex_);
+    std::vector<prometheus::MetricFamily> families;
+    for (const auto& source : sources_) {
+      for (prometheus::MetricFamily& family : source->Collect()) {
+        families.push_back(std::move(family));
+      }
+    }
+    return families;
+  }
+
   RecentRigs rigs_;
   std::shared_ptr<prometheus::Registry> registry_;
   EventMetrics events_;
-  std::shared_ptr<StateMetrics> state_;
-  std::shared_ptr<TlsMetrics> tls_;
-  prometheus::Exposer exposer_;  // last: its threads use the others
+  std::mutex mutex_;  // guards the sources, and collects one scrape at a time
+  std::vector<std::shared_ptr<prometheus::Collectable>> sources_;
   std::string url_;
+  std::unique_ptr<HttpServer> server_;  // last: its threads use the others
 };
+
+HttpOptions HttpOf(const std::string& address) {
+  HttpOptions options;
+  options.name = "metrics";
+  options.address = address;
+  return options;
+}
 
 }  // namespace
 
 absl::Status CheckMetricsAddress(const std::string& address) {
-  const std::string_view host = HostOf(address);
-  if (host == "127.0.0.1" || host == "[::1]") {
-    return absl::OkStatus();
-  }
+  const auto parsed = ParseSocketAddress(address);
+  if (parsed.ok() && parsed->loopback) return absl::OkStatus();
   return absl::InvalidArgumentError(
       "metrics: '" + address +
       "' is not a loopback address such as 127.0.0.1:9464; there is no "
@@ -113,13 +115,9 @@ absl::Status CheckMetricsAddress(const std::string& address) {
 absl::StatusOr<std::unique_ptr<Metrics>> MakeMetrics(
     Store* store, const MetricsOptions& options) {
   SELFCAL_RETURN_IF_ERROR(CheckMetricsAddress(options.address));
-  try {
-    return std::make_unique<PrometheusMetrics>(store, options);
-  } catch (const std::exception& error) {
-    return absl::UnavailableError("cannot open " + options.address +
-                                  " for metrics; check that it is free (" +
-                                  error.what() + ")");
-  }
+  auto metrics = std::make_unique<PrometheusMetrics>(store, options);
+  SELFCAL_RETURN_IF_ERROR(metrics->Start(HttpOf(options.address)));
+  return metrics;
 }
 
 }  // namespace selfcal::server

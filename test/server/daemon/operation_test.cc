@@ -423,6 +423,15 @@ std::vector<std::string> DeployedExpressions() {
   return expressions;
 }
 
+TEST_F(OperationTest, RequestsThatTheMetricsRefuseDoNotEndTheDaemon) {
+  const auto daemon = StartAndWait({"--metrics", "127.0.0.1:0"});
+  const std::string url = daemon->Word("metrics: ");
+  HttpGet(url + "/other");
+  HttpGet(url, "evil.example");
+  HttpGet(url, "localhost\r\nContent-Length: -1");
+  EXPECT_THAT(HttpGet(url), HasSubstr("selfcal_build_info"));
+}
+
 TEST_F(OperationTest, AlertsAndDashboardShowSeriesThatThereAre) {
   const Certificates certificates;
   const auto daemon =

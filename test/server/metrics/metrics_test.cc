@@ -70,6 +70,16 @@ TEST_F(MetricsTest, AnotherNameThanThatOfTheLoopbackIsRefused) {
   }
 }
 
+TEST_F(MetricsTest, OtherPathsAreErrorsThatNameTheRightOne) {
+  const std::string root = metrics_->url().substr(
+      0, metrics_->url().size() - std::string("/metrics").size());
+  for (const char* path : {"/", "/metric", "/metrics/", "/%00", "/../etc"}) {
+    EXPECT_THAT(HttpGet(root + path), HasSubstr("the metrics are at /metrics"))
+        << path;
+  }
+  EXPECT_THAT(Scrape(), HasSubstr("selfcal_build_info"));
+}
+
 TEST_F(MetricsTest, EventsAreCounted) {
   PipelineObserver* const observer = metrics_->observer();
   const Rig rig = TestRig("a");

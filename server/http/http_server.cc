@@ -1,4 +1,4 @@
-#include "server/console/http_server.h"
+#include "server/http/http_server.h"
 
 #include <microhttpd.h>
 #include <poll.h>
@@ -23,10 +23,10 @@
 #include <utility>
 
 #include "server/access/tls_files.h"
-#include "server/console/address.h"
-#include "server/console/certificate.h"
-#include "server/console/json.h"
-#include "server/console/policy.h"
+#include "server/http/address.h"
+#include "server/http/certificate.h"
+#include "server/http/error_response.h"
+#include "server/http/policy.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
@@ -64,7 +64,7 @@ struct Sending {
 void Log(void*, const char* format, va_list arguments) {
   std::array<char, kMaxLogBytes> line{};
   std::vsnprintf(line.data(), line.size(), format, arguments);
-  spdlog::debug("console: {}", line.data());
+  spdlog::debug("HTTP: {}", line.data());
 }
 
 MHD_Result AddQuery(void* to,
@@ -162,9 +162,14 @@ absl::StatusOr<TlsFiles> ReadFiles(const TlsOptions& options) {
   auto files = ReadTlsFiles(options, std::time(nullptr));
   if (files.ok() || !absl::IsInvalidArgument(files.status())) return files;
   return absl::InvalidArgumentError(
-      "on an address that is not loopback, the console needs tls-certificate, "
-      "tls-key and tls-client-ca; or use a loopback address such as "
-      "127.0.0.1:7448");
+      "an address that is not loopback needs tls-certificate, tls-key and "
+      "tls-client-ca; or use a loopback address such as 127.0.0.1:7448");
+}
+
+// The same status with the name of the setting that it is about.
+absl::Status Named(const std::string& setting, const absl::Status& status) {
+  if (status.ok()) return status;
+  return {status.code(), setting + ": " + std::string(status.message())};
 }
 
 class MicroServer final : public HttpServer {
@@ -172,7 +177,8 @@ class MicroServer final : public HttpServer {
   MicroServer(const HttpOptions& options,
               const SocketAddress& address,
               HttpHandler handler)
-      : handler_(std::move(handler)),
+      : name_(options.name),
+        handler_(std::move(handler)),
         local_role_(options.local_role),
         loopback_(address.loopback) {}
 
@@ -229,9 +235,8 @@ class MicroServer final : public HttpServer {
                                MHD_OPTION_END);
     if (daemon_ == nullptr) {
       return absl::UnavailableError(
-          "cannot open the port of the console; check that it is free, and "
-          "that "
-          "the TLS files are a certificate with its key");
+          "cannot open the port; check that it is free, and that the TLS files "
+          "are a certificate with its key");
     }
     const MHD_DaemonInfo* info =
         MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT);
@@ -283,7 +288,7 @@ class MicroServer final : public HttpServer {
           connection,
           static_cast<MicroServer*>(self)->Answer(connection, exchange));
     } catch (const std::exception& error) {
-      spdlog::error("console: {}", error.what());
+      spdlog::error("HTTP: {}", error.what());
       return MHD_NO;  // ends this connection
     }
   }
@@ -305,10 +310,10 @@ class MicroServer final : public HttpServer {
         connection, MHD_GET_ARGUMENT_KIND, &AddQuery, &request.query);
     MHD_get_connection_values(
         connection, MHD_HEADER_KIND, &AddHeader, &request.headers);
-    const absl::Status allowed = CheckOrigin(request, loopback_);
+    const absl::Status allowed = CheckHost(request, loopback_);
     if (!allowed.ok()) return ErrorResponse(allowed);
     if (loopback_) {
-      request.caller = {"console on the loopback", {{local_role_, ""}}};
+      request.caller = {name_ + " on the loopback", {{local_role_, ""}}};
     } else {
       auto caller = Peer(connection);
       if (!caller.ok()) return ErrorResponse(caller.status());
@@ -375,6 +380,7 @@ class MicroServer final : public HttpServer {
     return true;
   }
 
+  const std::string name_;
   const HttpHandler handler_;
   const Role local_role_;
   const bool loopback_;
@@ -391,9 +397,11 @@ class MicroServer final : public HttpServer {
 }  // namespace
 
 absl::Status CheckHttpOptions(const HttpOptions& options) {
-  SELFCAL_ASSIGN_OR_RETURN(const SocketAddress address,
-                           ParseSocketAddress(options.address));
-  return address.loopback ? absl::OkStatus() : ReadFiles(options.tls).status();
+  const auto address = ParseSocketAddress(options.address);
+  if (!address.ok()) return Named(options.name, address.status());
+  return address->loopback
+             ? absl::OkStatus()
+             : Named(options.name, ReadFiles(options.tls).status());
 }
 
 absl::StatusOr<std::unique_ptr<HttpServer>> MakeHttpServer(
@@ -403,7 +411,8 @@ absl::StatusOr<std::unique_ptr<HttpServer>> MakeHttpServer(
                            ParseSocketAddress(options.address));
   auto server =
       std::make_unique<MicroServer>(options, address, std::move(handler));
-  SELFCAL_RETURN_IF_ERROR(server->Start(address, options.tls));
+  SELFCAL_RETURN_IF_ERROR(
+      Named(options.name, server->Start(address, options.tls)));
   return server;
 }
 

@@ -1,4 +1,4 @@
-#include "server/console/policy.h"
+#include "server/http/policy.h"
 
 #include <string>
 
@@ -28,27 +28,13 @@ const std::array<Header, 6>& SecurityHeaders() {
   return kHeaders;
 }
 
-absl::Status CheckOrigin(const HttpRequest& request, bool loopback) {
-  if (loopback && !IsLoopbackHost(HeaderOf(request, "host"))) {
-    return absl::PermissionDeniedError(
-        "on the loopback interface the console can only be opened as "
-        "127.0.0.1, "
-        "localhost or [::1]");
-  }
-  if (request.method == "GET" || request.method == "HEAD") {
+absl::Status CheckHost(const HttpRequest& request, bool loopback) {
+  if (!loopback || IsLoopbackHost(HeaderOf(request, "host"))) {
     return absl::OkStatus();
   }
-  if (request.method != "POST" && request.method != "PATCH" &&
-      request.method != "DELETE") {
-    return absl::UnimplementedError(
-        "the console supports only GET, HEAD, POST, PATCH and DELETE");
-  }
-  if (HeaderOf(request, "x-selfcal-console").empty()) {
-    return absl::PermissionDeniedError(
-        "a change requires the header X-Selfcal-Console: 1, which the pages of "
-        "the console send");
-  }
-  return absl::OkStatus();
+  return absl::PermissionDeniedError(
+      "on the loopback interface this can only be opened as 127.0.0.1, "
+      "localhost or [::1]; a proxy has to set the header Host");
 }
 
 }  // namespace selfcal::server

@@ -1,4 +1,4 @@
-#include "server/console/address.h"
+#include "server/http/address.h"
 
 #include <arpa/inet.h>
 
@@ -13,8 +13,9 @@ constexpr std::uint8_t kLoopbackNet = 127;
 
 absl::Status Bad(const std::string& text) {
   return absl::InvalidArgumentError(
-      "console: '" + text +
-      "' is not an address such as 127.0.0.1:7448 or [::1]:7448, or off");
+      "'" + text +
+      "' is not a numeric address with a port, such as 127.0.0.1:7448 or "
+      "[::1]:7448");
 }
 
 }  // namespace

@@ -3,10 +3,6 @@
 // time; an invalid request ends at most its own connection. On interfaces other
 // than the loopback, TLS is required, with certificates of the client
 // authority, whose names state the rights of a caller, as over gRPC.
-//
-// The server is not based on civetweb, which comes with prometheus-cpp: the
-// version of Debian 12 needs a function that OpenSSL 3 does not have, and
-// therefore has no TLS.
 #pragma once
 
 #include <absl/status/status.h>
@@ -16,11 +12,12 @@
 #include <string>
 
 #include "server/access/tls_options.h"
-#include "server/console/http.h"
+#include "server/http/http.h"
 
 namespace selfcal::server {
 
 struct HttpOptions {
+  std::string name;               // of the setting, in messages: "console"
   std::string address;            // host:port; port 0 selects a free one
   TlsOptions tls;                 // for interfaces other than the loopback
   Role local_role = Role::kRead;  // of callers on the loopback interface

@@ -1,4 +1,4 @@
-// A request to the console and its response.
+// An HTTP request and its response.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-#include "server/console/certificate.h"
+#include "server/http/certificate.h"
 
 #include <gnutls/x509.h>
 
@@ -22,7 +22,7 @@ using Certificate =
 
 absl::Status Unknown() {
   return absl::UnauthenticatedError(
-      "the console needs a client certificate here; import one that the "
+      "this address needs a client certificate; import one that the "
       "operator's client authority signed into the browser");
 }
 
