@@ -1,6 +1,6 @@
-// What every function of the C interface does at its boundary: exceptions and
-// statuses become codes and messages, and structs of another version of the
-// header become those of this one.
+// The boundary of the C interface: exceptions and statuses become codes and
+// messages, and structs of another version of the header become those of this
+// one.
 #pragma once
 
 #include <absl/status/status.h>
@@ -89,7 +89,7 @@ absl::Status Write(const Struct& value,
   static_assert(std::is_trivially_copyable_v<Struct>);
   if (auto status = RequireNotNull(filled, name); !status.ok()) return status;
   const std::uint32_t size = filled->struct_size;
-  // What the caller's struct contains does not matter: nothing is read.
+  // The contents of the caller's struct are not read.
   auto status = CheckSize(nullptr, size, least, sizeof(Struct), name);
   if (!status.ok()) return status;
   auto* bytes = reinterpret_cast<unsigned char*>(filled);

@@ -115,7 +115,7 @@ int32_t selfcal_builder_add_keyframe(selfcal_builder* builder,
                                      const selfcal_observation* observations,
                                      uint64_t count,
                                      selfcal_error* error) {
-  // Without a state the time does not matter: that is an error.
+  // Any time will do if there is no state: that is an error.
   return selfcal_builder_add_keyframe_at(builder,
                                          state,
                                          state == nullptr ? 0 : state->t_ns,

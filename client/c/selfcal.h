@@ -103,7 +103,7 @@ typedef struct selfcal_keyframe_state {
 
 // One observation of a landmark in a keyframe.
 typedef struct selfcal_observation {
-  // Of the landmark, or of the track if the SLAM system has no landmark; ids
+  // Id of the landmark, or of the track if the SLAM system has no landmark; ids
   // may start again after a break (selfcal_builder).
   uint64_t landmark_id;
   int32_t camera;  // index into the rig's cameras
@@ -159,7 +159,7 @@ typedef struct selfcal_builder_options {
   int64_t calibration_version;
   double seconds;    // if > 0, duration of a segment, instead of keyframes
   double max_gap_s;  // largest time between keyframes of a segment; default 10
-  // For the triangulation: standard deviation of an observation; default 1.
+  // Standard deviation of an observation, used in triangulation; default 1.
   double pixel_sigma_px;
   double gravity_mps2;  // of the SLAM system, along -z of G; default 9.81
   // Not 0: ids of landmarks after a gap denote the same landmarks as before it,

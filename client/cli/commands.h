@@ -21,6 +21,7 @@ void AddDaemonCommands(CLI::App* app, Context* context);
 void AddCompletionCommand(CLI::App* app, Context* context);
 
 // Verbs of rig.
+void AddRigCreation(CLI::App* rig, Context* context);
 void AddRigChanges(CLI::App* rig, Context* context);
 CLI::App* AddCoach(CLI::App* parent, const std::string& name, Context* context);
 CLI::App* AddVerify(CLI::App* parent,

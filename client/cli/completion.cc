@@ -214,7 +214,7 @@ void AddCompletionCommand(CLI::App* app, Context* context) {
   completion->callback([app, context, shell] {
     context->command = [app, context, shell] {
       if (*shell == "rigs") {
-        // At once and without errors, in the midst of a line.
+        // The user is typing a command: prints no errors, and does not wait.
         for (const std::string& rig : ReadRigNames(*context, kRigTime)) {
           PrintText(rig + "\n");
         }

@@ -35,7 +35,7 @@ struct Context {
   bool json = false;
   bool terminal = false;  // true if stdout is a terminal
   ColorMode color = ColorMode::kAuto;
-  // What the command line sets of the request, for errors of the daemon.
+  // Names of fields of the request in errors of the daemon.
   FlagNames flags = {{"filter", "--filter"},
                      {"order_by", "--order-by"},
                      {"parent", "RIG"},

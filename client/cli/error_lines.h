@@ -12,8 +12,8 @@ namespace selfcal::client {
 
 inline constexpr std::size_t kMostErrorLines = 20;
 
-// What set a field of a request, e.g. "--id" for "rig.name"; fields within a
-// field are set by the same.
+// The flag or argument that sets a field of a request, e.g. "--id" for
+// "rig.name"; it also sets the fields within the field.
 using FlagNames = std::map<std::string, std::string>;
 
 // Returns the name under which a user knows the field.

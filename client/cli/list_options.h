@@ -1,4 +1,4 @@
-// What a list command shows: --limit and --filter, and the calls for it.
+// Options of the list commands, --limit and --filter, and the calls with them.
 #pragma once
 
 #include <google/protobuf/repeated_field.h>

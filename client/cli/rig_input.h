@@ -21,7 +21,7 @@ struct RigInput {
   std::string vi_map;  // folder of a VI-map, instead of files
   std::optional<double> imu_rate_hz;
   bool strict = false;  // fail if reading `from` has losses
-  // With `from` or `vi_map`, only these cameras: cam0, ...; empty: all.
+  // The cameras to take from `from` or `vi_map`: cam0, ...; empty: all.
   std::vector<std::string> cameras;
   std::optional<std::string> id;
   std::optional<double> pixel_sigma_px;

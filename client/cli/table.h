@@ -16,7 +16,7 @@ struct Column {
   bool text = false;
 };
 
-// How a table is laid out.
+// Layout of a table.
 struct Layout {
   std::size_t columns = 0;  // width of the terminal; 0: unlimited
   bool color = false;

@@ -13,8 +13,8 @@ TerminalSize CurrentTerminalSize();
 // When the output has colours.
 enum class ColorMode { kAuto, kAlways, kNever };
 
-// With kAuto: on a terminal, unless the environment variable NO_COLOR is set or
-// TERM is "dumb".
+// True if the output has colours. kAuto stands for a terminal, unless the
+// environment variable NO_COLOR is set or TERM is "dumb".
 bool UsesColor(ColorMode mode, bool terminal);
 
 }  // namespace selfcal::client

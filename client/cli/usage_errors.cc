@@ -78,7 +78,7 @@ std::vector<std::string> WithVerb(const CLI::App& app,
   return paths;
 }
 
-// What was meant by a word that is no noun; empty if unknown.
+// Returns the commands that a word which is no noun may mean; empty if unknown.
 std::vector<std::string> MeantByNoun(const CLI::App& app,
                                      const std::string& word) {
   const auto other = OtherWords().find(word);
@@ -160,7 +160,7 @@ std::string UnknownWord(const CLI::App& command,
   return fmt::format("'{}' was not expected", word) + UsageLine(command);
 }
 
-// What an error of the parser, other than unknown words, leads on with.
+// Returns the message for an error of the parser other than an unknown word.
 std::string OtherMistake(const CLI::App& command,
                          const CLI::ParseError& error) {
   const auto commands = NamesOf(command);

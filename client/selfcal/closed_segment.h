@@ -20,7 +20,7 @@ namespace selfcal::client {
 // One observation of a landmark in a keyframe, as the SLAM system reports it.
 struct KeyframeObservation {
   std::int32_t camera = 0;
-  // Of the landmark, or of the track if the SLAM system has no landmark.
+  // Id of the landmark, or of the track if the SLAM system has no landmark.
   std::uint64_t landmark_id = 0;
   Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
   // Estimated position of the landmark [m]; not finite if there is none (yet).

@@ -11,7 +11,7 @@
 //   builder.AddKeyframe(state, observations);
 //   while (auto closed = builder.TakeClosed()) stream.Send(*std::move(closed));
 //
-// What SLAM systems differ in:
+// Differences between SLAM systems:
 //
 //  - Tracks without a position (KeyframeObservation::p_G) are triangulated when
 //    the segment is assembled, with the theta of the SLAM system.
@@ -56,13 +56,13 @@ struct SegmentBuilderOptions {
   double max_gap_s = 10;
   // Segments with fewer keyframes are dropped when they end at such a gap.
   int min_keyframes = 10;
-  // Whether ids of landmarks after such a gap denote other landmarks than
-  // before it. False for a SLAM system with a map, which recognises them.
+  // True if ids of landmarks after such a gap denote other landmarks than
+  // before it; false for a SLAM system with a map, which recognises them.
   bool new_ids_after_gap = true;
   // The calibration that the SLAM system uses (SetTheta); one that is not valid
   // is ignored.
   std::optional<Calibration> theta = std::nullopt;
-  // For the triangulation: standard deviation of an observation.
+  // Standard deviation of an observation, used in triangulation.
   double pixel_sigma_px = 1;
   double gravity_mps2 = 9.81;  // of the SLAM system, along -z of G
 };

@@ -18,8 +18,8 @@ namespace selfcal::server {
 
 class TlsReload {
  public:
-  // What happened to the files, for the log: true if new ones are in force,
-  // false if they cannot be used, with the reason.
+  // Receives a text for the log: true if new files are in force, false if they
+  // cannot be used, with the reason.
   using Report = std::function<void(bool in_force, const std::string& text)>;
 
   // Looks at the files every options.refresh_s. Errors are those of
@@ -33,7 +33,7 @@ class TlsReload {
   TlsReload& operator=(const TlsReload&) = delete;
 
   std::shared_ptr<const TlsFiles> Current() const;
-  // Why the files on disk are not in force; empty if they are.
+  // The reason why the files on disk are not in force; empty if they are.
   std::string Problem() const;
 
  private:

@@ -43,7 +43,7 @@ class CommandLine {
   const std::string& file() const { return file_; }
 
  private:
-  // For each word that is unknown, the flag that was meant.
+  // Suggests a flag for each unknown word.
   void SuggestFlags() const {
     std::vector<std::string> known;
     for (const CLI::Option* option : app_.get_options()) {

@@ -19,7 +19,7 @@ class StateLock {
   // folder or the file cannot be created.
   static absl::StatusOr<StateLock> Take(const std::filesystem::path& folder);
 
-  // Whether <folder>/lock is still the file that is locked. If the folder was
+  // True if <folder>/lock is still the file that is locked. If the folder was
   // removed or replaced, another daemon could use it, and what this one writes
   // is lost.
   bool IsInPlace() const;

@@ -58,7 +58,7 @@ class MemoryPool {
   std::int64_t large_bytes_ = 0;
   int large_shares_ = 0;
   std::int64_t next_ticket_ = 0;
-  // For large shares; the lowest is next.
+  // Requests for large shares; the lowest is next.
   std::set<std::pair<bool, std::int64_t>> waiting_;  // not urgent, ticket
 };
 

@@ -17,7 +17,7 @@ namespace selfcal::server {
 
 class ReadGate {
  public:
-  // How often a read that goes on is to be looked at.
+  // Interval at which a read in progress is to be checked.
   static constexpr std::chrono::milliseconds kLook{30};
 
   // A reservation for one read.

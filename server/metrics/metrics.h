@@ -35,8 +35,8 @@ class Metrics {
   // The URL, with the actual port.
   virtual const std::string& url() const = 0;
 
-  // From now on also reports the expiry of these files, and whether those on
-  // disk are in force. Null: there are none.
+  // Adds the expiry of these files, and whether those on disk are in force.
+  // Null: there are none.
   virtual void AddTls(std::shared_ptr<const TlsReload> tls) = 0;
 };
 

@@ -90,7 +90,7 @@ class Recalibrator {
   std::condition_variable changed_;
   bool running_ = false;
   std::int64_t wakes_ = 0;
-  // By rig. Taken before a run begins, until after its end.
+  // The executor of each rig's run, from before it begins until after its end.
   std::map<std::string, Executor*> claims_;
 };
 

@@ -77,8 +77,8 @@ class ScoringWorkers {
 
   void Run();
   std::optional<Claim> NextClaim();
-  // Of unscored segments, oldest first, the one to score next; with the lock
-  // held.
+  // Returns which of the unscored segments, oldest first, to score next. The
+  // lock must be held.
   const Claim* Choose(const std::vector<Claim>& unscored) const;
   void Process(const Claim& claim);
   // The score, or what is wrong with the segment. nullopt when stopping.

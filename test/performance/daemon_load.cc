@@ -10,9 +10,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <string>
@@ -20,42 +17,23 @@
 #include <utility>
 #include <vector>
 
-#include "client/demo/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
 #include "proto/convert.h"
 #include "selfcal/v1/segment.grpc.pb.h"
+#include "test/performance/load.h"
 
 namespace selfcal::client {
 namespace {
 
-namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 using std::chrono::seconds;
 
-struct Options {
-  std::string daemon;
-  std::string folder;
+struct Options : LoadOptions {
   int clients = 200;
   int seconds = 60;
   int unacknowledged = 4;  // of one client, as the library's default
 };
-
-double Seconds(Clock::duration time) {
-  return std::chrono::duration<double>(time).count();
-}
-
-// MiB, of a line of /proc/PID/status.
-double Memory(pid_t pid, const std::string& name) {
-  std::ifstream file(fmt::format("/proc/{}/status", pid));
-  for (std::string line; std::getline(file, line);) {
-    if (line.starts_with(name + ":")) {
-      return std::stod(line.substr(name.size() + 1)) / 1024;
-    }
-  }
-  throw std::runtime_error("the daemon has ended");
-}
 
 // A device with a connection and a rig of its own; its recording restarts
 // as another session.
@@ -194,11 +172,7 @@ std::vector<MotionSegment> Record() {
 }
 
 void Run(const Options& options) {
-  const std::string state = options.folder + "/load";
-  fs::remove_all(state);
-  auto started = DaemonProcess::Start(options.daemon, state);
-  if (!started.ok()) throw std::runtime_error(started.status().ToString());
-  const std::unique_ptr<DaemonProcess> daemon = *std::move(started);
+  const std::unique_ptr<DaemonProcess> daemon = StartDaemon(options);
   std::this_thread::sleep_for(seconds(2));
   const double idle = Memory(daemon->pid(), "VmRSS");
 
@@ -232,20 +206,9 @@ void Run(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app("The daemon under many clients, and its memory");
   selfcal::client::Options options;
-  app.add_option("--daemon", options.daemon, "selfcald")
-      ->required()
-      ->check(CLI::ExistingFile);
-  app.add_option("--folder", options.folder, "For the daemon's state")
-      ->required()
-      ->check(CLI::ExistingDirectory);
+  selfcal::client::AddLoadOptions(&app, &options);
   app.add_option("--clients", options.clients)->check(CLI::Range(1, 1000));
   app.add_option("--seconds", options.seconds)->check(CLI::Range(1, 86'400));
   CLI11_PARSE(app, argc, argv);
-  try {
-    selfcal::client::Run(options);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 1;
-  }
-  return 0;
+  return selfcal::client::RunLoad([&] { selfcal::client::Run(options); });
 }

@@ -11,51 +11,27 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
-#include "client/demo/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
 #include "proto/convert.h"
 #include "selfcal/v1/segment.grpc.pb.h"
+#include "test/performance/load.h"
 #include "test/server/large_segment.h"
 
 namespace selfcal::client {
 namespace {
 
-namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
-struct Options {
-  std::string daemon;
-  std::string folder;
+struct Options : LoadOptions {
   int clients = 48;
   int megabytes = 48;  // of a segment on the wire
   int seconds = 60;
 };
-
-double Seconds(Clock::duration time) {
-  return std::chrono::duration<double>(time).count();
-}
-
-// MiB, of a line of /proc/PID/status.
-double Memory(pid_t pid, const std::string& name) {
-  std::ifstream file(fmt::format("/proc/{}/status", pid));
-  for (std::string line; std::getline(file, line);) {
-    if (line.starts_with(name + ":")) {
-      return std::stod(line.substr(name.size() + 1)) / 1024;
-    }
-  }
-  throw std::runtime_error("the daemon has ended");
-}
 
 class Device {
  public:
@@ -136,11 +112,7 @@ std::string Quantiles(std::vector<double> waits) {
 }
 
 void Run(const Options& options) {
-  const std::string state = options.folder + "/load";
-  fs::remove_all(state);
-  auto started = DaemonProcess::Start(options.daemon, state);
-  if (!started.ok()) throw std::runtime_error(started.status().ToString());
-  const std::unique_ptr<DaemonProcess> daemon = *std::move(started);
+  const std::unique_ptr<DaemonProcess> daemon = StartDaemon(options);
 
   const Rig simulated = HandheldRig("load");
   const auto trajectory = MakeHandheld(30.0, 1.0, 1);
@@ -211,22 +183,11 @@ void Run(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app("The daemon's memory under large segments");
   selfcal::client::Options options;
-  app.add_option("--daemon", options.daemon, "selfcald")
-      ->required()
-      ->check(CLI::ExistingFile);
-  app.add_option("--folder", options.folder, "For the daemon's state")
-      ->required()
-      ->check(CLI::ExistingDirectory);
+  selfcal::client::AddLoadOptions(&app, &options);
   app.add_option("--clients", options.clients, "With large segments")
       ->check(CLI::Range(0, 1000));
   app.add_option("--megabytes", options.megabytes)->check(CLI::Range(1, 60));
   app.add_option("--seconds", options.seconds)->check(CLI::Range(1, 86'400));
   CLI11_PARSE(app, argc, argv);
-  try {
-    selfcal::client::Run(options);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 1;
-  }
-  return 0;
+  return selfcal::client::RunLoad([&] { selfcal::client::Run(options); });
 }

@@ -10,9 +10,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <memory>
 #include <stdexcept>
@@ -20,39 +17,23 @@
 #include <thread>
 #include <vector>
 
-#include "client/demo/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
 #include "proto/convert.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
 #include "selfcal/v1/segment.grpc.pb.h"
+#include "test/performance/load.h"
 
 namespace selfcal::client {
 namespace {
 
-namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
 constexpr int kWatchesOfAConnection = 100;
 
-struct Options {
-  std::string daemon;
-  std::string folder;
+struct Options : LoadOptions {
   int watches = 10'000;
   int activations = 5;
 };
-
-// The number on a line of /proc/PID/status: KiB, or a count.
-double StatusOf(pid_t pid, const std::string& name) {
-  std::ifstream file(fmt::format("/proc/{}/status", pid));
-  for (std::string line; std::getline(file, line);) {
-    if (line.starts_with(name + ":")) {
-      return std::stod(line.substr(name.size() + 1));
-    }
-  }
-  throw std::runtime_error("the daemon has ended");
-}
 
 // One watch; counts the versions that it has been sent.
 class Watcher final : public grpc::ClientReadReactor<v1::Calibration> {
@@ -146,11 +127,7 @@ void MakeTwoVersions(const std::string& target, const std::string& id) {
 }
 
 void Run(const Options& options) {
-  const std::string state = options.folder + "/watches";
-  fs::remove_all(state);
-  auto started = DaemonProcess::Start(options.daemon, state);
-  if (!started.ok()) throw std::runtime_error(started.status().ToString());
-  const std::unique_ptr<DaemonProcess> daemon = *std::move(started);
+  const std::unique_ptr<DaemonProcess> daemon = StartDaemon(options);
   const std::string rig = "watched";
   MakeTwoVersions(daemon->target(), rig);
   // Its memory settles, and no run is under way any more.
@@ -217,21 +194,10 @@ void Run(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app("The daemon with many watches");
   selfcal::client::Options options;
-  app.add_option("--daemon", options.daemon, "selfcald")
-      ->required()
-      ->check(CLI::ExistingFile);
-  app.add_option("--folder", options.folder, "For the daemon's state")
-      ->required()
-      ->check(CLI::ExistingDirectory);
+  selfcal::client::AddLoadOptions(&app, &options);
   app.add_option("--watches", options.watches)->check(CLI::Range(1, 1'000'000));
   app.add_option("--activations", options.activations)
       ->check(CLI::Range(1, 1000));
   CLI11_PARSE(app, argc, argv);
-  try {
-    selfcal::client::Run(options);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 1;
-  }
-  return 0;
+  return selfcal::client::RunLoad([&] { selfcal::client::Run(options); });
 }

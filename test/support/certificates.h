@@ -9,6 +9,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "test/support/files.h"
 #include "test/support/temp_folder.h"
@@ -52,6 +53,18 @@ class Certificates {
   }
   std::string Key(const std::string& name) const {
     return folder_.File(name + ".key");
+  }
+
+  // The settings of a daemon that listens with the certificate "server".
+  std::vector<std::string> DaemonArguments() const {
+    return {"--listen",
+            "127.0.0.1:0",
+            "--tls-certificate",
+            Pem("server"),
+            "--tls-key",
+            Key("server"),
+            "--tls-client-ca",
+            Pem("ca")};
   }
 
   // A client that trusts `root` and shows the certificate `name`; none if it

@@ -17,8 +17,8 @@ namespace {
 
 using testing::HasSubstr;
 
-// What bash offers for the last of the words, one a line. `selfcal` is a
-// function with this body.
+// Returns the completions of the last word by bash. `selfcal` is a function
+// with this body.
 std::vector<std::string> Offered(const std::vector<std::string>& words,
                                  const std::string& answer = "false") {
   const TempFolder folder;
@@ -69,7 +69,7 @@ TEST(Completion, OffersTheRigsOfTheDaemon) {
               testing::ElementsAre(""))
       << "a second argument is no rig";
   EXPECT_THAT(Offered({"rig", "list", "tab"}, rigs), testing::ElementsAre(""));
-  // With the connection of the line.
+  // The connection is that of the line.
   EXPECT_THAT(
       Offered({"--target", "unix:/x", "rig", "show", "unix"}, R"(echo "$@")"),
       testing::ElementsAre("unix:/x"));

@@ -21,7 +21,7 @@ using testing::Not;
 struct Mistake {
   std::vector<std::string> line;
   int code = 2;
-  std::string answer;  // leads on
+  std::string answer;  // part of it
 };
 
 class Usage : public Commands {
@@ -32,6 +32,15 @@ class Usage : public Commands {
     EXPECT_NE(begin, help.npos) << help;
     return std::regex_replace(
         help.substr(begin), std::regex(" Excludes: [^\n]*"), "");
+  }
+
+  void ExpectAnswer(const Mistake& mistake) {
+    const Outcome outcome = Selfcal(mistake.line);
+    EXPECT_EQ(outcome.code, mistake.code)
+        << testing::PrintToString(mistake.line);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_THAT(outcome.err, HasSubstr(mistake.answer));
+    EXPECT_THAT(outcome.err, testing::StartsWith("selfcal: "));
   }
 };
 
@@ -53,14 +62,7 @@ TEST_F(Usage, TheTwelveMostFrequentMistakesAreLedOn) {
       {{"rig", "show"}, 2, "'selfcal rig list' lists the rigs"},
       {{"rig", "list", "--limt", "3"}, 2, "did you mean '--limit'?"}};
   ASSERT_EQ(mistakes.size(), 12u);
-  for (const Mistake& mistake : mistakes) {
-    const Outcome outcome = Selfcal(mistake.line);
-    EXPECT_EQ(outcome.code, mistake.code)
-        << testing::PrintToString(mistake.line);
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_THAT(outcome.err, HasSubstr(mistake.answer));
-    EXPECT_THAT(outcome.err, testing::StartsWith("selfcal: "));
-  }
+  for (const Mistake& mistake : mistakes) ExpectAnswer(mistake);
 }
 
 TEST_F(Usage, HelpAndVersionHaveTheUsualSpellings) {
@@ -102,13 +104,7 @@ TEST_F(Usage, UnknownWordsAreNamedWithTheNearest) {
       {{"rig", "create", "x", "--from", "kalib"}, 2, "did you mean 'kalibr'?"},
       {{"completion", "zhs"}, 2, "did you mean 'zsh'?"},
       {{"rig", "list", "--color", "alwayz"}, 2, "did you mean 'always'?"}};
-  for (const Mistake& mistake : mistakes) {
-    const Outcome outcome = Selfcal(mistake.line);
-    EXPECT_EQ(outcome.code, mistake.code)
-        << testing::PrintToString(mistake.line);
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_THAT(outcome.err, HasSubstr(mistake.answer));
-  }
+  for (const Mistake& mistake : mistakes) ExpectAnswer(mistake);
 }
 
 TEST_F(Usage, EveryOldSpellingStillWorksAndHelpShowsTheNewAlone) {

@@ -79,18 +79,7 @@ TEST_F(CommandLineTest, DoesOverMutualTlsWhatItsCertificateSays) {
   Certificates certificates;
   certificates.Add("operator", "ca", "URI:selfcal://role/administer");
   certificates.Add("device", "ca", "URI:selfcal://role/produce/rigs/r");
-  // The fixture's client creates the rig, on the socket.
-  const std::string socket = "unix:" + (state_ / "selfcald.sock").string();
-  const auto daemon = StartAndWait({"--listen",
-                                    socket,
-                                    "--listen",
-                                    "127.0.0.1:0",
-                                    "--tls-certificate",
-                                    certificates.Pem("server"),
-                                    "--tls-key",
-                                    certificates.Key("server"),
-                                    "--tls-client-ca",
-                                    certificates.Pem("ca")});
+  const auto daemon = StartWithTls(certificates);
   CreateRig();
   const std::string address = "127.0.0.1:" + daemon->Word("127.0.0.1:");
   const auto as = [&](const std::string& name) {

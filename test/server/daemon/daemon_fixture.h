@@ -19,6 +19,7 @@
 #include "selfcal/v1/segment.grpc.pb.h"
 #include "test/server/daemon/process.h"
 #include "test/server/test_segments.h"
+#include "test/support/certificates.h"
 #include "test/support/eventually.h"
 #include "test/support/temp_folder.h"
 
@@ -40,6 +41,16 @@ class DaemonTest : public ::testing::Test {
         << daemon->Log();
     Connect();
     return daemon;
+  }
+
+  // The same with a socket, for the fixture's client, and with TLS.
+  std::unique_ptr<Process> StartWithTls(const Certificates& certificates,
+                                        std::vector<std::string> more = {}) {
+    more.insert(more.end(),
+                {"--listen", "unix:" + (state_ / "selfcald.sock").string()});
+    const auto tls = certificates.DaemonArguments();
+    more.insert(more.end(), tls.begin(), tls.end());
+    return StartAndWait(std::move(more));
   }
 
   // A channel of its own for each start: no backoff from the one before.

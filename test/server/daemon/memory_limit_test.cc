@@ -15,14 +15,16 @@ namespace selfcal::server {
 namespace {
 
 constexpr int kSettingMiB = 128;
-// What the largest message takes while it is received, converted and stored,
-// and that of the segment which is scored, beyond the setting (operations.md).
+// The memory that the largest message takes while it is received, converted and
+// stored, and that of the segment which is scored, beyond the setting
+// (operations.md).
 constexpr int kConstantMiB = 512;
 constexpr std::size_t kLargeBytes = 48'000'000;
 
 class MemoryLimit : public DaemonTest {
  protected:
-  // On a connection of its own; again while the daemon has no room.
+  // Stores on a connection of its own, and repeats while the daemon has no
+  // room.
   bool Store(const std::string& rig, const MotionSegment& segment) {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);

@@ -193,18 +193,10 @@ TEST_F(OperationTest, NoSecretReachesTheLog) {
   certificates.Add("admin", "ca", "URI:selfcal://role/administer");
   certificates.AddAuthority("other");
   certificates.Add("stranger", "other", "URI:selfcal://role/administer");
-  const auto daemon = Start({"--log-level",
-                             "trace",
-                             "--listen",
-                             "127.0.0.1:0",
-                             "--tls-certificate",
-                             certificates.Pem("server"),
-                             "--tls-key",
-                             certificates.Key("server"),
-                             "--tls-client-ca",
-                             certificates.Pem("ca"),
-                             "--tls-refresh",
-                             "1"});
+  auto arguments = certificates.DaemonArguments();
+  arguments.insert(arguments.end(),
+                   {"--log-level", "trace", "--tls-refresh", "1"});
+  const auto daemon = Start(arguments);
   const std::string address = daemon->Word("ready: listening on ");
   for (const std::string name : {"admin", "stranger", ""}) {
     const auto stub = v1::RigService::NewStub(
@@ -434,19 +426,7 @@ TEST_F(OperationTest, RequestsThatTheMetricsRefuseDoNotEndTheDaemon) {
 
 TEST_F(OperationTest, AlertsAndDashboardShowSeriesThatThereAre) {
   const Certificates certificates;
-  const auto daemon =
-      StartAndWait({"--metrics",
-                    "127.0.0.1:0",
-                    "--listen",
-                    "unix:" + (state_ / "selfcald.sock").string(),
-                    "--listen",
-                    "127.0.0.1:0",
-                    "--tls-certificate",
-                    certificates.Pem("server"),
-                    "--tls-key",
-                    certificates.Key("server"),
-                    "--tls-client-ca",
-                    certificates.Pem("ca")});
+  const auto daemon = StartWithTls(certificates, {"--metrics", "127.0.0.1:0"});
   const Rig rig = CreateRig();
   Stream(TestSegments(rig, 4));
   ASSERT_TRUE(AllScored());

@@ -11,7 +11,18 @@
 namespace selfcal::server {
 namespace {
 
-using SubmitTest = PipelineTest;
+class SubmitTest : public PipelineTest {
+ protected:
+  // Scores wait for the gate: the data of a segment remains until then.
+  void ScoreBehind(std::mutex* gate) {
+    estimators_.score = [gate](
+                            const Rig& rig, const auto&, const auto& segment) {
+      const std::lock_guard wait(*gate);
+      return FakeInformation(rig, EntropyOf(segment.key.index));
+    };
+  }
+};
+
 using SubmitVerdict = SubmitResult::Verdict;
 
 TEST_F(SubmitTest, StoredThenDuplicate) {
@@ -50,13 +61,9 @@ TEST_F(SubmitTest, RejectionNamesEveryFieldAndStoresNothing) {
 
 TEST_F(SubmitTest, AFewObservationsOutsideTheImageAreLeftOutAndCounted) {
   CreateRig();
-  // The data remains until the score needs it no more.
   std::mutex gate;
   std::unique_lock hold(gate);
-  estimators_.score = [&](const Rig& rig, const auto&, const auto& segment) {
-    const std::lock_guard wait(gate);
-    return FakeInformation(rig, EntropyOf(segment.key.index));
-  };
+  ScoreBehind(&gate);
   StartOne();
   MotionSegment segment = Segment(0);
   const std::size_t count = segment.observations.size();
@@ -84,10 +91,7 @@ TEST_F(SubmitTest, SaturatedReadingsAreLeftOutAndCounted) {
   CreateRig();
   std::mutex gate;
   std::unique_lock hold(gate);
-  estimators_.score = [&](const Rig& rig, const auto&, const auto& segment) {
-    const std::lock_guard wait(gate);
-    return FakeInformation(rig, EntropyOf(segment.key.index));
-  };
+  ScoreBehind(&gate);
   StartOne();
   MotionSegment segment = Segment(0);
   const std::size_t count = segment.imu.size();

@@ -60,7 +60,7 @@ interface ParameterCourse {
   name: string; // of the component
   course: ComponentProgress[];
   now: ComponentProgress;
-  // In the unit in which the parameter is shown.
+  // The unit in which the parameter is shown, and the factor to it.
   unit: string;
   factor: number;
 }

@@ -27,7 +27,7 @@ import { Link } from './parts';
 export interface Column<T> {
   head: string;
   cell: (item: T) => ComponentChildren;
-  // What the column is sorted by; texts are also searched by the filter.
+  // The key by which the column is sorted; texts are also searched by the filter.
   value?: (item: T) => string | number | undefined;
   wide?: boolean; // long texts
   below?: ComponentChildren; // below the head

@@ -68,7 +68,7 @@ function gridLines({ ticks: [xs, ys, zs] }: Grid): number[][] {
 interface Label {
   at: number[];
   text: string;
-  // Where the text is drawn relative to its place: away from this point.
+  // The point from which the text is moved away.
   from: number[];
 }
 

@@ -25,7 +25,7 @@ struct DiskOperation {
   int mark = 0;             // of the test
 };
 
-// What files took of the disk.
+// Use of the disk by files.
 struct DiskUse {
   std::int64_t bytes = 0;  // written
   int syncs = 0;
@@ -52,7 +52,7 @@ class FaultVfs {
   void SetMaxFileBytes(std::int64_t bytes);
 
   int operations() const;  // since SetFault
-  // Of files whose names end so, since this was made.
+  // Use by the files whose names end so, since this was made.
   DiskUse use(const std::string& suffix) const;
   int syncs(const std::string& suffix) const { return use(suffix).syncs; }
 
