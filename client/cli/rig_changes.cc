@@ -29,6 +29,8 @@ struct UpdateOptions {
   std::optional<double> table_max_age_s;
   std::optional<double> min_interval_s;
   std::optional<double> calibration_max_age_s;
+  std::optional<double> gyro_max;
+  std::optional<double> accel_max;
 };
 
 void SetSeconds(const std::optional<double>& seconds,
@@ -109,6 +111,13 @@ absl::Status ReadRequest(const UpdateOptions& options,
              "calibration_max_age",
              update->mutable_calibration_max_age(),
              request);
+  if (options.gyro_max || options.accel_max) {
+    v1::ImuFullScale* const imu = update->mutable_imu();
+    *imu = rig.imu();
+    if (options.gyro_max) imu->set_gyro_max(*options.gyro_max);
+    if (options.accel_max) imu->set_accel_max(*options.accel_max);
+    mask->add_paths("imu");
+  }
   if (mask->paths().empty()) {
     return absl::InvalidArgumentError(
         "nothing to change; `selfcal rig update --help` lists what can be");
@@ -135,7 +144,9 @@ int Update(Context* context, const UpdateOptions& options) {
                 {"rig.retrigger_fraction", "--retrigger-fraction"},
                 {"rig.table_max_age", "--table-max-age"},
                 {"rig.recalibration_min_interval", "--min-interval"},
-                {"rig.calibration_max_age", "--calibration-max-age"}});
+                {"rig.calibration_max_age", "--calibration-max-age"},
+                {"rig.imu.gyro_max", "--gyro-max"},
+                {"rig.imu.accel_max", "--accel-max"}});
   status = Call<RigService>(stub.get(), &RigService::UpdateRig, request, &rig);
   if (!status.ok()) return Fail(*context, status);
   if (context->json) {
@@ -200,6 +211,12 @@ void AddUpdate(CLI::App* rig, Context* context) {
                      options->calibration_max_age_s,
                      "Age of the active version that triggers a run [s]; 0: "
                      "none");
+  update->add_option("--gyro-max",
+                     options->gyro_max,
+                     "Full scale of the gyroscope [rad/s]; 0: the default");
+  update->add_option("--accel-max",
+                     options->accel_max,
+                     "Full scale of the accelerometer [m/s^2]; 0: the default");
   update->callback([context, options] {
     context->command = [context, options] { return Update(context, *options); };
   });

@@ -115,5 +115,23 @@ TEST_F(CommandLineTest, DoesOverMutualTlsWhatItsCertificateSays) {
   EXPECT_EQ(daemon->Wait(), 0);
 }
 
+TEST_F(CommandLineTest, ChangesTheFullScaleOfOneSensorAlone) {
+  const auto daemon = StartAndWait();
+  CreateRig();
+  Outcome outcome = Selfcal({"rig", "update", "r", "--accel-max", "78.5"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_EQ(outcome.text, "changed\timu\n");
+  outcome = Selfcal({"rig", "update", "r", "--gyro-max", "8.75"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  outcome = Selfcal({"rig", "show", "r", "--json"});
+  EXPECT_THAT(
+      outcome.text,
+      AllOf(HasSubstr("\"gyro_max\": 8.75"), HasSubstr("\"accel_max\": 78.5")));
+  // The message names the flag.
+  outcome = Selfcal({"rig", "update", "r", "--gyro-max", "-1"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.text, HasSubstr("--gyro-max"));
+}
+
 }  // namespace
 }  // namespace selfcal::server
