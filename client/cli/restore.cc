@@ -50,9 +50,10 @@ absl::Status OpenBackup(const std::string& path, std::ifstream* file) {
     return absl::NotFoundError(fmt::format("cannot read {}", path));
   }
   if (!IsBackup(file)) {
-    return absl::InvalidArgumentError(fmt::format(
-        "{} is not a backup of selfcald: name a file written by selfcal backup",
-        path));
+    return absl::InvalidArgumentError(
+        fmt::format("{} is not a backup of selfcald: name a file written by "
+                    "`selfcal daemon backup`",
+                    path));
   }
   file->seekg(0);
   return absl::OkStatus();
@@ -180,7 +181,9 @@ CLI::App* AddRestore(CLI::App* parent,
       "Replace the daemon's database by a backup: the daemon verifies the "
       "backup, keeps the present database under another name and restarts");
   const auto options = std::make_shared<RestoreOptions>();
-  restore->add_option("FILE", options->path, "A file written by selfcal backup")
+  restore
+      ->add_option(
+          "FILE", options->path, "A file written by `selfcal daemon backup`")
       ->required();
   restore->add_flag("--yes", options->yes, "Do not ask for confirmation");
   restore

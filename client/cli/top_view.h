@@ -1,4 +1,4 @@
-// The output of `selfcal top` for a response of ActivityService. Pure
+// The output of `selfcal daemon top` for a response of ActivityService. Pure
 // functions.
 #pragma once
 

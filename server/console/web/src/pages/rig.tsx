@@ -145,7 +145,7 @@ function Entropies(props: { rig: string; groups: string[]; version: number }) {
             return (
               <Empty>
                 No segment is scored yet. Send some with the client library or{' '}
-                <code>selfcal import</code>.
+                <code>selfcal segment import</code>.
               </Empty>
             );
           }

@@ -197,8 +197,8 @@ function actionsOf(facts: Facts): ComponentChildren[] {
   if (activity && !activity.lastSeen) {
     actions.push(
       <>
-        Send segments with the client library or <code>selfcal import {rig} DIR</code>: none has
-        arrived yet.
+        Send segments with the client library or <code>selfcal segment import {rig} DIR</code>: none
+        has arrived yet.
       </>,
     );
   } else if (entries < capacity) {

@@ -65,7 +65,7 @@ function Nothing(props: { filter: string }) {
   ) : (
     <p>
       There is no rig yet. Create one with <code>selfcal rig create</code>, then send segments with
-      the client library or <code>selfcal import</code>.
+      the client library or <code>selfcal segment import</code>.
     </p>
   );
 }

@@ -57,7 +57,7 @@ export function Runs(props: { rig: string; version: number }) {
       empty={
         <>
           There are no runs yet. A run starts when the tables are full;{' '}
-          <code>selfcal recalibrate {props.rig}</code> starts one manually.
+          <code>selfcal run start {props.rig}</code> starts one manually.
         </>
       }
     />

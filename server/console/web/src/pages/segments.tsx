@@ -187,7 +187,7 @@ function Nothing(props: { rig: string; filter: string; order: string }) {
   return (
     <p>
       No segment has arrived yet. Send some with the client library, or{' '}
-      <code>selfcal import {props.rig} DIR</code>.
+      <code>selfcal segment import {props.rig} DIR</code>.
     </p>
   );
 }

@@ -192,7 +192,7 @@ export function Sessions(props: { rig: string; version: number }) {
       version={props.version}
       columns={kColumns}
       next="Next sessions"
-      empty="No segment has arrived yet. Send some with the client library or with selfcal import."
+      empty="No segment has arrived yet. Send some with the client library or with selfcal segment import."
     />
   );
 }
