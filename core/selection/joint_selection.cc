@@ -219,9 +219,19 @@ JointChange Offer(const JointSettings& settings,
   return change;
 }
 
-TableUpdate Offer(const Rig& rig,
+JointChange Decide(const Rig& rig,
+                   const Candidate& candidate,
+                   std::span<const Candidate> set,
+                   const Table& table) {
+  JointSettings settings = MakeJointSettings(rig, CriterionOf(rig.selection));
+  settings.capacity = table.capacity;
+  return Offer(settings, candidate, set);
+}
+
+TableUpdate Apply(const Rig& rig,
                   const Candidate& candidate,
-                  std::span<const Candidate> set,
+                  const JointChange& change,
+                  std::span<const SegmentKey> set,
                   Table* table) {
   TableUpdate result;
   std::vector<TableEntry>& entries = table->entries;
@@ -232,16 +242,15 @@ TableUpdate Offer(const Rig& rig,
   };
   if (find(candidate.key) != entries.end()) return result;
   ++table->scored;
-  JointSettings settings = MakeJointSettings(rig, CriterionOf(rig.selection));
-  settings.capacity = table->capacity;
-  const JointChange change = Offer(settings, candidate, set);
   if (!change.inserted) return result;
   if (change.evicted) {
-    const auto evicted = find(set[*change.evicted].key);
+    const auto evicted = find(set[*change.evicted]);
     result.evicted = *evicted;
     entries.erase(evicted);
   }
   result.inserted = true;
+  const JointSettings settings =
+      MakeJointSettings(rig, CriterionOf(rig.selection));
   entries.push_back({candidate.key,
                      candidate.sequence,
                      JointEntropy(settings, candidate),

@@ -70,14 +70,21 @@ JointChange Offer(const JointSettings& settings,
                   const Candidate& candidate,
                   std::span<const Candidate> set);
 
-// The same as an update of the table of a rig with a joint selection; it is
-// applied, and counted as Offer() of tables.h does. `set` are the candidates of
-// its entries in order of arrival. The entropy of an entry is that of all of
-// theta after its segment alone; its gain is relative to the set that it
-// entered.
-TableUpdate Offer(const Rig& rig,
+// The same for the table of a rig with a joint selection; `set` are the
+// candidates of its entries in order of arrival.
+JointChange Decide(const Rig& rig,
+                   const Candidate& candidate,
+                   std::span<const Candidate> set,
+                   const Table& table);
+
+// Applies to the table what was decided on its entries, whose keys are `set`,
+// in order of arrival, and counts it as Offer() of tables.h does. The entropy
+// of an entry is that of all of theta after its segment alone; its gain is
+// relative to the set that it entered.
+TableUpdate Apply(const Rig& rig,
                   const Candidate& candidate,
-                  std::span<const Candidate> set,
+                  const JointChange& change,
+                  std::span<const SegmentKey> set,
                   Table* table);
 
 // Offers all candidates in order of arrival and returns the resulting set:

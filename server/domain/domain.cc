@@ -10,6 +10,7 @@
 #include "server/domain/calibration_life.h"
 #include "server/domain/deletion.h"
 #include "server/domain/intake.h"
+#include "server/domain/offers.h"
 #include "server/domain/quotas.h"
 #include "server/domain/run_creation.h"
 #include "server/domain/run_life.h"
@@ -112,8 +113,13 @@ absl::StatusOr<ScoreCommit> Domain::CommitScore(
     const SegmentKey& key,
     const SegmentInformation& information,
     const std::optional<SegmentEnds>& ends) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto decided,
+                           InspectFor(store_, rig, [&](UnitOfWork* tx) {
+                             return DecideJointly(tx, key, information);
+                           }));
   return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
-    return server::CommitScore(tx, key, information, ends, options_.change);
+    return server::CommitScore(
+        tx, key, information, ends, decided, options_.change);
   });
 }
 

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <span>
 #include <utility>
 
-#include "core/selection/joint_selection.h"
 #include "server/domain/quarantine.h"
 #include "server/status/status_macros.h"
 #include "server/store/exclusions.h"
+#include "server/store/rigs.h"
 #include "server/store/table_rows.h"
 
 namespace selfcal::server {
@@ -25,35 +25,84 @@ std::optional<TableUpdate> OfferToGroup(const Rig& rig,
                table);
 }
 
+std::vector<SegmentKey> KeysOf(std::span<const Candidate> candidates) {
+  std::vector<SegmentKey> keys;
+  for (const Candidate& candidate : candidates) keys.push_back(candidate.key);
+  return keys;
+}
+
+std::vector<TableEntry> InOrderOfArrival(std::vector<TableEntry> entries) {
+  std::sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) {
+    return a.sequence < b.sequence;
+  });
+  return entries;
+}
+
+absl::StatusOr<Candidate> ReadCandidate(UnitOfWork* tx,
+                                        const Rig& rig,
+                                        const TableEntry& entry) {
+  SELFCAL_ASSIGN_OR_RETURN(const StoredSegment segment,
+                           ReadSegment(tx, entry.key));
+  return MakeCandidate(
+      rig, entry.key, entry.sequence, segment.information.value());
+}
+
 // The kept segments of a joint selection, in order of arrival. A segment whose
 // information is damaged cannot be compared with others and becomes unusable.
 absl::StatusOr<std::vector<Candidate>> ReadKept(UnitOfWork* tx,
                                                 const Rig& rig,
                                                 Table* table) {
   std::vector<Candidate> kept;
-  std::vector<TableEntry> readable;
-  for (const TableEntry& entry : table->entries) {
-    const auto segment = ReadSegment(tx, entry.key);
-    if (absl::IsDataLoss(segment.status())) {
+  for (const TableEntry& entry : InOrderOfArrival(table->entries)) {
+    auto candidate = ReadCandidate(tx, rig, entry);
+    if (absl::IsDataLoss(candidate.status())) {
       SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row,
                                FindSegment(tx, entry.key));
       SELFCAL_RETURN_IF_ERROR(
           Quarantine(tx,
                      row,
                      EventKind::kSegmentUnusable,
-                     std::string(segment.status().message())));
+                     std::string(candidate.status().message())));
+      std::erase_if(table->entries,
+                    [&](const TableEntry& e) { return e.key == entry.key; });
       continue;
     }
-    SELFCAL_RETURN_IF_ERROR(segment.status());
-    kept.push_back(MakeCandidate(
-        rig, entry.key, entry.sequence, segment->information.value()));
-    readable.push_back(entry);
+    SELFCAL_RETURN_IF_ERROR(candidate.status());
+    kept.push_back(*std::move(candidate));
   }
-  table->entries = std::move(readable);
-  std::sort(kept.begin(), kept.end(), [](const auto& a, const auto& b) {
-    return a.sequence < b.sequence;
-  });
   return kept;
+}
+
+bool HoldsWhatItHeld(const Table& table, const JointDecision& decided) {
+  const std::vector<TableEntry> entries = InOrderOfArrival(table.entries);
+  return std::equal(entries.begin(),
+                    entries.end(),
+                    decided.kept.begin(),
+                    decided.kept.end(),
+                    [](const TableEntry& entry, const SegmentKey& key) {
+                      return entry.key == key;
+                    });
+}
+
+absl::StatusOr<TableUpdate> OfferJointly(
+    UnitOfWork* tx,
+    const Rig& rig,
+    const SegmentRow& segment,
+    const SegmentInformation& information,
+    const std::optional<JointDecision>& decided,
+    Table* table) {
+  const Candidate candidate =
+      MakeCandidate(rig, segment.key, segment.sequence, information);
+  if (decided && HoldsWhatItHeld(*table, *decided)) {
+    return Apply(rig, candidate, decided->change, decided->kept, table);
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Candidate> kept,
+                           ReadKept(tx, rig, table));
+  return Apply(rig,
+               candidate,
+               Decide(rig, candidate, kept, *table),
+               KeysOf(kept),
+               table);
 }
 
 const TableEntry& EntryOf(const Table& table, const SegmentKey& key) {
@@ -121,11 +170,37 @@ const GroupScore* FindGroup(const SegmentInformation& information,
   return nullptr;
 }
 
+absl::StatusOr<std::optional<JointDecision>> DecideJointly(
+    UnitOfWork* tx,
+    const SegmentKey& key,
+    const SegmentInformation& information) {
+  std::optional<JointDecision> decided;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig stored, ReadRig(tx));
+  const Rig& rig = stored.rig;
+  if (rig.selection == Selection::kTables) return decided;
+  SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables, ReadTables(tx));
+  const Table& table = tables.at(0);
+  std::vector<Candidate> kept;
+  for (const TableEntry& entry : InOrderOfArrival(table.entries)) {
+    auto candidate = ReadCandidate(tx, rig, entry);
+    if (absl::IsDataLoss(candidate.status())) return decided;
+    SELFCAL_RETURN_IF_ERROR(candidate.status());
+    kept.push_back(*std::move(candidate));
+  }
+  const Candidate candidate =
+      MakeCandidate(rig, segment.key, segment.sequence, information);
+  decided = {.kept = KeysOf(kept),
+             .change = Decide(rig, candidate, kept, table)};
+  return decided;
+}
+
 absl::StatusOr<std::vector<std::string>> OfferToTables(
     UnitOfWork* tx,
     const Rig& rig,
     const SegmentRow& segment,
     const SegmentInformation& information,
+    const std::optional<JointDecision>& decided,
     std::vector<Table>* tables) {
   std::vector<std::string> entered;
   for (Table& table : *tables) {
@@ -133,13 +208,8 @@ absl::StatusOr<std::vector<std::string>> OfferToTables(
     if (rig.selection == Selection::kTables) {
       change = OfferToGroup(rig, segment, information, &table);
     } else {
-      SELFCAL_ASSIGN_OR_RETURN(const std::vector<Candidate> kept,
-                               ReadKept(tx, rig, &table));
-      change =
-          Offer(rig,
-                MakeCandidate(rig, segment.key, segment.sequence, information),
-                kept,
-                &table);
+      SELFCAL_ASSIGN_OR_RETURN(
+          change, OfferJointly(tx, rig, segment, information, decided, &table));
     }
     if (!change) continue;
     SELFCAL_RETURN_IF_ERROR(WriteOffer(tx, segment, *change, table));

@@ -4,7 +4,6 @@
 
 #include "server/domain/admission.h"
 #include "server/domain/device_change.h"
-#include "server/domain/offers.h"
 #include "server/domain/remembered.h"
 #include "server/domain/retention.h"
 #include "server/domain/run_creation.h"
@@ -15,11 +14,13 @@
 
 namespace selfcal::server {
 
-absl::StatusOr<ScoreCommit> CommitScore(UnitOfWork* tx,
-                                        const SegmentKey& key,
-                                        const SegmentInformation& information,
-                                        const std::optional<SegmentEnds>& ends,
-                                        const ChangeOptions& options) {
+absl::StatusOr<ScoreCommit> CommitScore(
+    UnitOfWork* tx,
+    const SegmentKey& key,
+    const SegmentInformation& information,
+    const std::optional<SegmentEnds>& ends,
+    const std::optional<JointDecision>& decided,
+    const ChangeOptions& options) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
   ScoreCommit commit;
@@ -49,7 +50,7 @@ absl::StatusOr<ScoreCommit> CommitScore(UnitOfWork* tx,
   if (admitted) {
     SELFCAL_ASSIGN_OR_RETURN(
         commit.tables,
-        OfferToTables(tx, rig.rig, segment, information, &tables));
+        OfferToTables(tx, rig.rig, segment, information, decided, &tables));
   }
   SELFCAL_ASSIGN_OR_RETURN(const NewestExamined examined,
                            ExamineNewest(tx, rig, options));

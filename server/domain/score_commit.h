@@ -12,6 +12,7 @@
 #include "core/change/detect_change.h"
 #include "core/information/segment_ends.h"
 #include "core/information/segment_information.h"
+#include "server/domain/offers.h"
 #include "server/store/store.h"
 #include "server/store/unit_of_work.h"
 
@@ -25,11 +26,13 @@ struct ScoreCommit {
 };
 
 // Domain::CommitScore.
-absl::StatusOr<ScoreCommit> CommitScore(UnitOfWork* tx,
-                                        const SegmentKey& key,
-                                        const SegmentInformation& information,
-                                        const std::optional<SegmentEnds>& ends,
-                                        const ChangeOptions& options);
+absl::StatusOr<ScoreCommit> CommitScore(
+    UnitOfWork* tx,
+    const SegmentKey& key,
+    const SegmentInformation& information,
+    const std::optional<SegmentEnds>& ends,
+    const std::optional<JointDecision>& decided,
+    const ChangeOptions& options);
 
 // Domain::ReplaceScore.
 absl::Status ReplaceScore(UnitOfWork* tx,

@@ -304,6 +304,16 @@ Rig SmallRig(Selection selection) {
   return rig;
 }
 
+TableUpdate DecideAndApply(const Rig& rig,
+                           const Candidate& candidate,
+                           const std::vector<Candidate>& set,
+                           Table* table) {
+  std::vector<SegmentKey> keys;
+  for (const Candidate& kept : set) keys.push_back(kept.key);
+  return Apply(
+      rig, candidate, Decide(rig, candidate, set, *table), keys, table);
+}
+
 TEST(JointTable, HoldsTheSelectedSegments) {
   std::mt19937 random(10);
   for (const auto& [selection, criterion] :
@@ -319,7 +329,8 @@ TEST(JointTable, HoldsTheSelectedSegments) {
     std::vector<Candidate> set;
     int offered = 0;
     for (const Candidate& candidate : candidates) {
-      const TableUpdate change = Offer(rig, candidate, set, &tables[0]);
+      const TableUpdate change =
+          DecideAndApply(rig, candidate, set, &tables[0]);
       EXPECT_EQ(tables[0].scored, ++offered);
       if (change.evicted) {
         std::erase_if(set, [&](const Candidate& kept) {
@@ -329,7 +340,7 @@ TEST(JointTable, HoldsTheSelectedSegments) {
       if (!change.inserted) continue;
       set.push_back(candidate);
       // Again: not even counted.
-      EXPECT_FALSE(Offer(rig, candidate, set, &tables[0]).inserted);
+      EXPECT_FALSE(DecideAndApply(rig, candidate, set, &tables[0]).inserted);
       EXPECT_EQ(tables[0].scored, offered);
     }
     std::vector<SegmentKey> expected;
@@ -358,7 +369,7 @@ TEST(JointTable, HasTheEntropyOfAllOfThetaByTheSegmentAlone) {
   information.Lambda.topLeftCorner<kSize, kSize>() =
       RandomInformation(kSize, kSize, 3, &random);
   const Candidate candidate = MakeCandidate(rig, {"s", 1}, 7, information);
-  ASSERT_TRUE(Offer(rig, candidate, {}, &table).inserted);
+  ASSERT_TRUE(DecideAndApply(rig, candidate, {}, &table).inserted);
   rig.groups = {{"all", {"*"}}};
   const GroupScore expected = ScoreGroups(rig, information.Lambda)[0];
   EXPECT_NEAR(table.entries[0].entropy, expected.entropy, 1e-9);

@@ -7,7 +7,9 @@
 #include "core/selection/joint_selection.h"
 #include "proto/convert.h"
 #include "selfcal/store/records.pb.h"
+#include "server/domain/score_commit.h"
 #include "server/store/records.h"
+#include "server/store/transact.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -134,6 +136,44 @@ TEST_P(JointTest, TableHoldsTheChoiceAndItsDataAlways) {
     }
     EXPECT_EQ(static_cast<int>(TableIndices(id, 0).size()), settings.capacity);
   }
+}
+
+// A decision is made before the transaction that uses it: by then another
+// segment may have changed the table.
+TEST_P(JointTest, ADecisionOnAnotherTableIsMadeAgain) {
+  const std::optional<JointDecision> none;
+  std::vector<std::vector<TableEntry>> entries;
+  for (const bool early : {false, true}) {
+    const std::string id = early ? "early" : "late";
+    const Rig rig = CreateJointRig(id, Selection::kJointD);
+    for (int k = 0; k < 8; ++k) Commit(rig, k);
+    Put(id, 8);
+    const SegmentInformation information = Information(rig, 8);
+    const auto decide = [&] {
+      return InspectFor(store_.get(), id, [&](UnitOfWork* tx) {
+        return DecideJointly(tx, {"s", 8}, information);
+      });
+    };
+    const auto before = decide();
+    ASSERT_TRUE(before.ok() && before->has_value());
+    Commit(rig, 9);
+    const auto after = decide();
+    ASSERT_TRUE(after.ok() && after->has_value());
+    ASSERT_NE((*before)->kept, (*after)->kept);
+    const auto commit =
+        TransactFor(store_.get(), id, NowNs(), [&](UnitOfWork* tx) {
+          return CommitScore(tx,
+                             {"s", 8},
+                             information,
+                             std::nullopt,
+                             early ? *before : none,
+                             ChangeOptions());
+        });
+    ASSERT_TRUE(commit.ok()) << commit.status();
+    EXPECT_THAT(commit->tables, ElementsAre("joint"));
+    entries.push_back((*store_->GetTables(id))[0].entries);
+  }
+  EXPECT_EQ(entries[0], entries[1]);
 }
 
 TEST_P(JointTest, ARunStartsWithAsManyAsOneGroupNeeds) {
