@@ -21,9 +21,11 @@
 #include "server/daemon/startable.h"
 #include "server/daemon/state_lock.h"
 #include "server/daemon/stop.h"
+#include "server/domain/device_clock.h"
 #include "server/domain/domain.h"
 #include "server/grpc/grpc_log.h"
 #include "server/host/host_conditions.h"
+#include "server/host/machine_clocks.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
 #include "server/store/make_store.h"
@@ -55,9 +57,11 @@ void RaiseFileLimit() {
 }
 
 PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
+                                  const DeviceClock* clock,
                                   Conditions* conditions,
                                   PipelineObserver* observer) {
   PipelineOptions pipeline;
+  pipeline.now_ns = [clock] { return clock->Now().steady_ns; };
   pipeline.scoring_threads = options.scoring_threads;
   pipeline.solver_processes = options.solver_processes;
   pipeline.max_backlog = options.max_backlog;
@@ -144,11 +148,21 @@ struct State {
   }
 };
 
+void LookAtClock(DeviceClock* clock) {
+  const auto step = clock->Observe();
+  if (!step.ok()) {
+    spdlog::error("cannot store the clock: {}", step.status().ToString());
+  } else if (*step) {
+    spdlog::warn("{}", **step);
+  }
+}
+
 // Runs until a signal to stop, which it returns; nullopt if an address has
 // stopped accepting connections, or the state directory is not in place. If the
 // store does not respond any more, the watchdog is not notified.
 std::optional<int> RunUntilStopped(
     Store* store,
+    DeviceClock* clock,
     const State& state,
     const std::function<std::optional<std::string>()>& read_log_level) {
   const auto watchdog = WatchdogInterval();
@@ -156,6 +170,7 @@ std::optional<int> RunUntilStopped(
   while (!HasStoppedAccepting() && state.IsInPlace()) {
     const auto signal = WaitForSignal(interval);
     TrimHeap();
+    LookAtClock(clock);
     if (!signal && watchdog) {
       store->ListRigs({1, ""}).IgnoreError();
       NotifyAlive();
@@ -194,17 +209,19 @@ std::optional<int> ServeOnce(
   if (!file.ok()) return Failed("cannot open " + database, file.status());
   const State state{*lock, database, *file};
   const std::unique_ptr<Store> store = MakeStore(*std::move(sqlite));
-  Domain domain(store.get(), options.domain);
+  const auto clock = DeviceClock::Open(store.get(), MachineClocks());
+  if (!clock.ok()) return Failed("cannot start", clock.status());
+  Domain domain(store.get(), options.domain, [&] { return (*clock)->Now(); });
   const auto metrics = OpenMetrics(options, database, store.get());
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
   EventFeed changes(store.get(),
                     *metrics == nullptr ? nullptr : (*metrics)->observer());
   const auto conditions = MakeHostConditions(options.host);
-  const auto pipeline =
-      MakePipeline(&domain,
-                   OptionsOfPipeline(options, conditions.get(), &changes),
-                   EstimatorsOfPipeline(options));
+  const auto pipeline = MakePipeline(
+      &domain,
+      OptionsOfPipeline(options, clock->get(), conditions.get(), &changes),
+      EstimatorsOfPipeline(options));
   if (absl::Status started = pipeline->Start(); !started.ok()) {
     return Failed("cannot start the pipeline", started);
   }
@@ -229,7 +246,8 @@ std::optional<int> ServeOnce(
                fmt::join((*server)->addresses(), ", "));
   NotifyReady();
 
-  const auto signal = RunUntilStopped(store.get(), state, read_log_level);
+  const auto signal =
+      RunUntilStopped(store.get(), clock->get(), state, read_log_level);
   deadline.emplace(kStopLimit);
   NotifyStopping();
   if (signal == kRestart) {

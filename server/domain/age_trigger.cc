@@ -25,7 +25,7 @@ absl::StatusOr<std::optional<StoredRun>> CreateAgedRun(UnitOfWork* tx,
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestRun(tx));
   if (since > before || newest == 0) return none;
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun last, ReadRun(tx, newest));
-  if (last.end_time_ns == 0 || last.create_time_ns > before) return none;
+  if (last.end_time_ns == 0 || last.create_steady_ns > before) return none;
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
                            RemoveAgedEntries(tx, rig, now_ns));
   if (!HoldAnother(tables, last)) return none;

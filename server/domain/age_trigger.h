@@ -14,7 +14,7 @@ namespace selfcal::server {
 // Creates a run if the active calibration is the result of a run and has been
 // active for longer than the policy of the rig allows, the tables hold a
 // segment that the last run was not created with, no run is unfinished, and the
-// last one was created as long ago.
+// last one was created as long ago, at the steady time `now_ns`.
 absl::StatusOr<std::optional<StoredRun>> CreateAgedRun(UnitOfWork* tx,
                                                        const StoredRig& rig,
                                                        std::int64_t now_ns);

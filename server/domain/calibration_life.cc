@@ -106,6 +106,7 @@ absl::Status StoreFactoryCalibration(UnitOfWork* tx, const StoredRig& rig) {
   factory.version = 1;
   factory.state = CalibrationState::kActive;
   factory.create_time_ns = rig.create_time_ns;
+  factory.create_steady_ns = tx->now().steady_ns;
   factory.theta = rig.rig.factory;
   factory.covariance = variances.asDiagonal();
   SELFCAL_RETURN_IF_ERROR(InsertCalibration(tx, factory));

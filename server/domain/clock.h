@@ -1,9 +1,11 @@
-// The clock that gives the time of what is stored.
+// The clock that gives the time of what is stored (Moment).
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <functional>
+
+#include "server/store/moment.h"
 
 namespace selfcal::server {
 
@@ -14,6 +16,6 @@ inline std::int64_t NowNs() {
       .count();
 }
 
-using Clock = std::function<std::int64_t()>;
+using Clock = std::function<Moment()>;
 
 }  // namespace selfcal::server

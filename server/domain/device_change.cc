@@ -148,8 +148,9 @@ absl::Status StartAfter(UnitOfWork* tx,
 
 Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
                              const StoredCalibration& calibration,
-                             std::int64_t time_ns) {
-  const auto age_ns = static_cast<double>(time_ns - calibration.create_time_ns);
+                             std::int64_t now_ns) {
+  const auto age_ns =
+      static_cast<double>(now_ns - calibration.create_steady_ns);
   return AgedCovariance(rig.rig,
                         WalkDensities(rig.rig, rig.policy.walk_densities),
                         calibration.covariance,
@@ -180,11 +181,12 @@ absl::StatusOr<NewestExamined> ExamineNewest(UnitOfWork* tx,
   }
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t first_sequence,
                            FirstSequenceSince(tx, newest_change));
-  const ConsistencyTester tester(rig.rig,
-                                 {active->theta,
-                                  CovarianceAt(rig, *active, tx->time_ns()),
-                                  active->report->track_noise_factor},
-                                 options.inflation);
+  const ConsistencyTester tester(
+      rig.rig,
+      {active->theta,
+       CovarianceAt(rig, *active, tx->now().steady_ns),
+       active->report->track_noise_factor},
+      options.inflation);
   SELFCAL_ASSIGN_OR_RETURN(
       const Newest newest,
       ReadNewest(tx, *active, first_sequence, tester, options.max_window));

@@ -15,8 +15,8 @@
 
 namespace selfcal::server {
 
-// Covariance of a calibration at a later time: increased by the random walk of
-// the rig since the calibration was computed.
+// Covariance of a calibration at the steady time `now_ns`: increased by the
+// random walk of the rig since the calibration was computed.
 Eigen::MatrixXd CovarianceAt(const StoredRig& rig,
                              const StoredCalibration& calibration,
                              std::int64_t time_ns);

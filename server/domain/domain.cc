@@ -42,8 +42,9 @@ constexpr TimeTrigger kTimeTriggers[] = {
 
 absl::StatusOr<StoredRig> Domain::CreateRig(const StoredRig& rig) {
   StoredRig stored = rig;
-  stored.create_time_ns = clock_();
-  SELFCAL_RETURN_IF_ERROR(store_->InsertRig(stored, [&](UnitOfWork* tx) {
+  const Moment now = clock_();
+  stored.create_time_ns = now.time_ns;
+  SELFCAL_RETURN_IF_ERROR(store_->InsertRig(stored, now, [&](UnitOfWork* tx) {
     SELFCAL_RETURN_IF_ERROR(CheckRigQuota(tx, options_.quotas));
     SELFCAL_RETURN_IF_ERROR(InsertTables(tx, MakeTables(rig.rig)));
     SELFCAL_RETURN_IF_ERROR(AppendEvent(tx, EventKind::kRigCreated, "created"));
@@ -292,7 +293,7 @@ absl::StatusOr<StoredRun> Domain::EndRun(const std::string& rig,
 }
 
 absl::Status Domain::RecordEvent(EventKind kind, const std::string& detail) {
-  return store_->AppendEvent({0, clock_(), "", kind, detail});
+  return store_->AppendEvent({0, clock_().time_ns, "", kind, detail});
 }
 
 }  // namespace selfcal::server

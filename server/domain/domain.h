@@ -157,11 +157,11 @@ class Domain {
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
                                             bool force = false);
   // Creates the runs that the rules about time start (age_trigger.h), of all
-  // rigs.
+  // rigs, at the steady time `now_ns`.
   absl::StatusOr<std::vector<StoredRun>> StartTimedRuns(std::int64_t now_ns);
   // Creates the runs of all rigs whose session has ended (session_trigger.h):
-  // the rig is one of `ended`, or none of its segments arrived after
-  // `idle_since_ns`.
+  // the rig is one of `ended`, or none of its segments arrived after the steady
+  // time `idle_since_ns`.
   absl::StatusOr<std::vector<StoredRun>> StartSessionRuns(
       const std::vector<std::string>& ended, std::int64_t idle_since_ns);
   // Records why a pending run is deferred; the first time also in an event.

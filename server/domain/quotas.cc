@@ -125,9 +125,10 @@ absl::Status DropOldSegments(UnitOfWork* tx, const Quotas& quotas) {
     const bool too_many =
         quotas.max_segments_per_rig > 0 &&
         segment.sequence <= newest - quotas.max_segments_per_rig;
+    const std::int64_t age_ns = tx->now().steady_ns - segment.receive_steady_ns;
     const bool too_old = quotas.max_segment_age_s > 0 &&
-                         segment.receive_time_ns <
-                             tx->time_ns() - quotas.max_segment_age_s * kSecond;
+                         !tx->now().keeps_aged &&
+                         age_ns > quotas.max_segment_age_s * kSecond;
     if (!too_many && !too_old) continue;
     SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, segment.rowid));
     ++dropped;

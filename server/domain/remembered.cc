@@ -37,7 +37,7 @@ absl::StatusOr<std::vector<RememberedSegment>> ListRemembered(
     remembered.push_back({.key = row.segment.key,
                           .ends = std::move(row.ends),
                           .fit = row.segment.fit,
-                          .time_ns = row.segment.receive_time_ns});
+                          .time_ns = row.segment.receive_steady_ns});
   }
   return remembered;
 }

@@ -13,8 +13,8 @@
 
 namespace selfcal::server {
 
-// Removes segments from the tables that are too old at `now_ns` by the policy
-// of the rig, and returns the tables.
+// Removes segments from the tables that are too old at the steady time `now_ns`
+// by the policy of the rig, unless Moment::keeps_aged, and returns the tables.
 absl::StatusOr<std::vector<Table>> RemoveAgedEntries(UnitOfWork* tx,
                                                      const StoredRig& rig,
                                                      std::int64_t now_ns);

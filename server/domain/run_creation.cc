@@ -122,6 +122,7 @@ absl::StatusOr<StoredRun> CreateRun(UnitOfWork* tx,
                     ? RunTrigger::kChangeDetected
                     : trigger;
   run.create_time_ns = tx->time_ns();
+  run.create_steady_ns = tx->now().steady_ns;
   SELFCAL_RETURN_IF_ERROR(InsertRun(tx, run));
   SELFCAL_RETURN_IF_ERROR(AppendEvent(tx,
                                       EventKind::kRunStarted,
@@ -156,7 +157,7 @@ absl::StatusOr<std::optional<StoredRun>> CreateRunOfTables(
 absl::StatusOr<StoredRun> CreateManualRun(UnitOfWork* tx, bool force) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
-                           RemoveAgedEntries(tx, rig, tx->time_ns()));
+                           RemoveAgedEntries(tx, rig, tx->now().steady_ns));
   if (!force) {
     SELFCAL_RETURN_IF_ERROR(CheckThatTablesChanged(tx, tables));
   }

@@ -115,6 +115,7 @@ absl::StatusOr<StoredRun> EndRun(UnitOfWork* tx,
   run.state = state;
   run.message = message;
   run.end_time_ns = tx->time_ns();
+  run.end_steady_ns = tx->now().steady_ns;
   SELFCAL_RETURN_IF_ERROR(RejectCandidate(tx, run));
   SELFCAL_RETURN_IF_ERROR(WriteEnd(tx, run));
   SELFCAL_RETURN_IF_ERROR(DropUnneededData(tx));

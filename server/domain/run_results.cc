@@ -46,6 +46,7 @@ absl::StatusOr<StoredCalibration> EnsureCandidate(
   stored.rig = run.rig;
   stored.state = CalibrationState::kCandidate;
   stored.create_time_ns = tx->time_ns();
+  stored.create_steady_ns = tx->now().steady_ns;
   stored.run = run.run;
   stored.base_version = run.base_version;
   stored.segments = run.segments;
@@ -139,10 +140,11 @@ absl::StatusOr<StoredCalibration> FinishRun(
   }
   run.state = RunState::kSucceeded;
   run.end_time_ns = tx->time_ns();
+  run.end_steady_ns = tx->now().steady_ns;
   run.calibration_version = validated.version;
   SELFCAL_RETURN_IF_ERROR(WriteEnd(tx, run));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
-                           RemoveAgedEntries(tx, rig, tx->time_ns()));
+                           RemoveAgedEntries(tx, rig, tx->now().steady_ns));
   SELFCAL_RETURN_IF_ERROR(CreateRunOfTables(tx, rig, tables).status());
   SELFCAL_RETURN_IF_ERROR(DropUnneededData(tx));
   return ReadCalibration(tx, validated.version);

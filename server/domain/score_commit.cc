@@ -42,8 +42,9 @@ absl::StatusOr<ScoreCommit> CommitScore(
                            LargestFitOfRig(tx));
   SELFCAL_RETURN_IF_ERROR(RemoveMisfits(tx, largest_fit));
   // At the time of its arrival, however long it waited for its score.
-  SELFCAL_ASSIGN_OR_RETURN(std::vector<Table> tables,
-                           RemoveAgedEntries(tx, rig, segment.receive_time_ns));
+  SELFCAL_ASSIGN_OR_RETURN(
+      std::vector<Table> tables,
+      RemoveAgedEntries(tx, rig, segment.receive_steady_ns));
   SELFCAL_ASSIGN_OR_RETURN(
       const bool admitted,
       AdmitByFit(tx, segment.rowid, information.residuals, largest_fit));

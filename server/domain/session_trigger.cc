@@ -24,8 +24,8 @@ absl::StatusOr<bool> MemoryHasGrown(UnitOfWork* tx, const StoredRun& run) {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::int64_t> arrivals,
                            ArrivalsOfEnds(tx));
   const auto newer =
-      std::count_if(arrivals.begin(), arrivals.end(), [&](auto time_ns) {
-        return time_ns > run.create_time_ns;
+      std::count_if(arrivals.begin(), arrivals.end(), [&](auto steady_ns) {
+        return steady_ns > run.create_steady_ns;
       });
   return newer > 0 && kOneOf * newer >= std::ssize(arrivals);
 }
@@ -55,7 +55,7 @@ absl::StatusOr<std::optional<StoredRun>> CreateSessionRun(UnitOfWork* tx) {
   if (!due) return started;
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<Table> tables,
-                           RemoveAgedEntries(tx, rig, tx->time_ns()));
+                           RemoveAgedEntries(tx, rig, tx->now().steady_ns));
   if (UnionOfTables(tables).empty()) return started;
   SELFCAL_ASSIGN_OR_RETURN(started,
                            CreateRun(tx, tables, RunTrigger::kSessionEnded));

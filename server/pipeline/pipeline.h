@@ -65,7 +65,7 @@ struct PipelineOptions {
   std::chrono::milliseconds session_idle = std::chrono::minutes(1);
   // A run that takes longer fails.
   std::chrono::milliseconds max_run_time = std::chrono::minutes(30);
-  // Nanoseconds since the Unix epoch.
+  // Steady time (Moment), for ages.
   std::function<std::int64_t()> now_ns = NowNs;
 };
 

@@ -43,7 +43,7 @@ absl::StatusOr<std::string> DeferReason(const RunContext& context,
                              store->ListRuns(run.rig, {2, ""}));
     const bool too_early =
         newest.items.size() > 1 &&
-        context.options.now_ns() - newest.items[1].end_time_ns < interval_ns;
+        context.options.now_ns() - newest.items[1].end_steady_ns < interval_ns;
     if (too_early) {
       return fmt::format(
           "the minimum interval of {:g} s since recalibration {} is not over",

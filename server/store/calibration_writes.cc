@@ -15,15 +15,16 @@ absl::Status InsertContent(UnitOfWork* tx,
   return Statement(
              tx->db(),
              "INSERT INTO calibrations (rig, version, state, create_time_ns, "
-             "  run, content, sha256) "
-             "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+             "  run, content, sha256, create_steady_ns) "
+             "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
              tx->rig_row(),
              calibration.version,
              static_cast<int>(calibration.state) + 1,
              calibration.create_time_ns,
              calibration.run,
              BlobView{content},
-             BlobView{sha256})
+             BlobView{sha256},
+             calibration.create_steady_ns)
       .Run();
 }
 
@@ -77,11 +78,12 @@ absl::Status WriteState(UnitOfWork* tx,
 
 absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version) {
   return Statement(tx->db(),
-                   "INSERT INTO activations (rig, version, time_ns) "
-                   "VALUES (?1, ?2, ?3)",
+                   "INSERT INTO activations (rig, version, time_ns, steady_ns) "
+                   "VALUES (?1, ?2, ?3, ?4)",
                    tx->rig_row(),
                    version,
-                   tx->time_ns())
+                   tx->time_ns(),
+                   tx->now().steady_ns)
       .Run();
 }
 

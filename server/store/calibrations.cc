@@ -20,7 +20,8 @@ constexpr char kCalibrationColumns[] =
     "  (SELECT coalesce(max(a.activation), 0) FROM activations a "
     "   WHERE a.rig = c.rig AND a.version = c.version), "
     "  (SELECT coalesce(max(d.finding), '') FROM disagreements d "
-    "   WHERE d.rig = c.rig AND d.version = c.version) "
+    "   WHERE d.rig = c.rig AND d.version = c.version), "
+    "  c.create_steady_ns "
     "FROM calibrations c LEFT JOIN validations v USING (rig, version) ";
 
 absl::Status ReadSegmentKeys(Connection* db,
@@ -86,6 +87,7 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
   }
   calibration.activation = row.Int(8);
   calibration.disagreement = row.Text(9);
+  calibration.create_steady_ns = row.Int(10);
   SELFCAL_RETURN_IF_ERROR(ReadSegmentKeys(db, rig_id, &calibration));
   SELFCAL_RETURN_IF_ERROR(ReadTemperatures(db, rig_id, &calibration));
   return calibration;
@@ -213,7 +215,7 @@ absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(UnitOfWork* tx,
 absl::StatusOr<std::int64_t> ActivationTime(UnitOfWork* tx,
                                             std::int64_t activation) {
   return ReadInt(tx->db(),
-                 "SELECT time_ns FROM activations WHERE activation = ?1",
+                 "SELECT steady_ns FROM activations WHERE activation = ?1",
                  activation);
 }
 

@@ -45,8 +45,7 @@ absl::StatusOr<std::int64_t> ActiveVersion(UnitOfWork* tx);
 absl::StatusOr<std::int64_t> NextVersion(UnitOfWork* tx);
 absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(UnitOfWork* tx,
                                                            std::int64_t run);
-// Time of an activation (StoredCalibration::activation), in ns since the Unix
-// epoch.
+// Steady time of an activation (StoredCalibration::activation).
 absl::StatusOr<std::int64_t> ActivationTime(UnitOfWork* tx,
                                             std::int64_t activation);
 // Schema version of the database.

@@ -7,6 +7,7 @@
 #include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
+#include "server/store/clock_record.h"
 #include "server/store/driver/transaction.h"
 #include "server/store/events.h"
 #include "server/store/exclusions.h"
@@ -30,30 +31,32 @@ class DatabaseStore final : public Store {
       : db_(std::move(db)), maintenance_(MakeMaintenance(db_.get())) {}
 
   absl::Status Transact(const std::string& rig,
-                        std::int64_t time_ns,
+                        const Moment& now,
                         const Work& work) override {
     return db_->Write(
-        [&](Connection* db) { return CarryOut(db, rig, time_ns, work); });
+        [&](Connection* db) { return CarryOut(db, rig, now, work); });
   }
 
   void BeginTransaction(const std::string& rig,
-                        std::int64_t time_ns,
+                        const Moment& now,
                         Work work,
                         Done done) override {
     db_->BeginWrite(
-        [rig, time_ns, work = std::move(work)](Connection* db) {
-          return CarryOut(db, rig, time_ns, work);
+        [rig, now, work = std::move(work)](Connection* db) {
+          return CarryOut(db, rig, now, work);
         },
         std::move(done));
   }
 
-  absl::Status InsertRig(const StoredRig& rig, const Work& work) override {
+  absl::Status InsertRig(const StoredRig& rig,
+                         const Moment& now,
+                         const Work& work) override {
     return db_->Write([&](Connection* db) -> absl::Status {
       Transaction transaction(db);
       SELFCAL_RETURN_IF_ERROR(transaction.status());
       SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row,
                                server::InsertRig(db, rig));
-      UnitOfWork tx(db, rig.rig.id, row, rig.create_time_ns);
+      UnitOfWork tx(db, rig.rig.id, row, now);
       SELFCAL_RETURN_IF_ERROR(work(&tx));
       return transaction.Commit();
     });
@@ -209,6 +212,21 @@ class DatabaseStore final : public Store {
     return db_->Write([&](Connection* db) { return InsertEvent(db, event); });
   }
 
+  absl::StatusOr<std::optional<ClockRecord>> ReadClock() override {
+    return Read([&](Connection* db) { return ReadClockRecord(db); });
+  }
+
+  absl::Status WriteClock(const ClockRecord& clock,
+                          const std::optional<StoredEvent>& event) override {
+    return db_->Write([&](Connection* db) -> absl::Status {
+      Transaction transaction(db);
+      SELFCAL_RETURN_IF_ERROR(transaction.status());
+      SELFCAL_RETURN_IF_ERROR(WriteClockRecord(db, clock));
+      if (event) SELFCAL_RETURN_IF_ERROR(InsertEvent(db, *event));
+      return transaction.Commit();
+    });
+  }
+
   StoreMaintenance* maintenance() override { return maintenance_.get(); }
 
  private:
@@ -226,12 +244,12 @@ class DatabaseStore final : public Store {
 
   static absl::Status CarryOut(Connection* db,
                                const std::string& rig,
-                               std::int64_t time_ns,
+                               const Moment& now,
                                const Work& work) {
     Transaction transaction(db);
     SELFCAL_RETURN_IF_ERROR(transaction.status());
     SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, rig));
-    UnitOfWork tx(db, rig, row, time_ns);
+    UnitOfWork tx(db, rig, row, now);
     SELFCAL_RETURN_IF_ERROR(work(&tx));
     return transaction.Commit();
   }

@@ -26,7 +26,7 @@ std::string SerializeInformation(const SegmentInformation& information);
 absl::StatusOr<SegmentInformation> ParseInformation(std::string_view bytes,
                                                     const std::string& what);
 
-// Everything but state, create_time_ns, run and segments, which are columns,
+// Everything but state, time of creation, run and segments, which are columns,
 // and the validation of a candidate.
 std::string SerializeCalibration(const StoredCalibration& calibration);
 absl::StatusOr<StoredCalibration> ParseCalibration(std::string_view bytes,

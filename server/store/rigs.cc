@@ -180,8 +180,9 @@ absl::StatusOr<std::vector<std::string>> RigNames(Connection* db) {
 absl::StatusOr<std::vector<std::string>> IdleRigNames(
     Connection* db, std::int64_t idle_since_ns) {
   Statement read(db,
-                 "SELECT id FROM rigs WHERE last_seen_ns > 0 "
-                 "AND last_seen_ns <= ?1 ORDER BY rig",
+                 "SELECT id FROM rigs r WHERE (SELECT s.steady_ns "
+                 "  FROM segments s WHERE s.rig = r.rig "
+                 "  ORDER BY s.sequence DESC LIMIT 1) <= ?1 ORDER BY rig",
                  idle_since_ns);
   return ReadNames(&read);
 }

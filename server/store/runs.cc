@@ -15,7 +15,7 @@ namespace {
 constexpr char kRunColumns[] =
     "SELECT g.id, r.run, r.state, r.cause, r.create_time_ns, r.end_time_ns, "
     "  r.base_version, r.attempts, r.calibration_version, r.message, r.rig, "
-    "  r.change, r.session_ended "
+    "  r.change, r.session_ended, r.create_steady_ns, r.end_steady_ns "
     "FROM runs r JOIN rigs g USING (rig) ";
 
 absl::StatusOr<std::vector<SegmentKey>> ReadKeys(Statement* read) {
@@ -67,6 +67,8 @@ absl::StatusOr<StoredRun> RunFromRow(Connection* db, const Statement& row) {
   run.calibration_version = row.Int(8);
   run.message = row.Text(9);
   run.change = row.Int(11);
+  run.create_steady_ns = row.Int(13);
+  run.end_steady_ns = row.Int(14);
   SELFCAL_ASSIGN_OR_RETURN(run.segments,
                            ReadSnapshot(db, row.Int(10), run.run));
   return run;
@@ -195,15 +197,16 @@ absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
                 "INSERT INTO runs (rig, run, state, cause, create_time_ns, "
-                "  base_version, change, session_ended) "
-                "VALUES (?1, ?2, 1, ?3, ?4, ?5, ?6, ?7)",
+                "  base_version, change, session_ended, create_steady_ns) "
+                "VALUES (?1, ?2, 1, ?3, ?4, ?5, ?6, ?7, ?8)",
                 tx->rig_row(),
                 run.run,
                 CauseOf(run.trigger),
                 run.create_time_ns,
                 run.base_version,
                 run.change,
-                EndsSession(run.trigger))
+                EndsSession(run.trigger),
+                run.create_steady_ns)
           .Run());
   for (const SegmentKey& key : run.segments) {
     SELFCAL_RETURN_IF_ERROR(
@@ -224,14 +227,16 @@ absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run) {
   return Statement(tx->db(),
                    "UPDATE runs SET state = ?3, attempts = ?4, "
                    "  end_time_ns = ?5, calibration_version = ?6, "
-                   "  message = ?7 WHERE rig = ?1 AND run = ?2",
+                   "  message = ?7, end_steady_ns = ?8 "
+                   "WHERE rig = ?1 AND run = ?2",
                    tx->rig_row(),
                    run.run,
                    static_cast<int>(run.state) + 1,
                    run.attempts,
                    run.end_time_ns,
                    run.calibration_version,
-                   run.message)
+                   run.message,
+                   run.end_steady_ns)
       .Run();
 }
 

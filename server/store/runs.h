@@ -43,7 +43,7 @@ absl::StatusOr<std::int64_t> NewestRunOf(
 
 // Writes a pending run with its snapshot of segments.
 absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run);
-// Writes state, attempts, end_time_ns, calibration_version and message.
+// Writes state, attempts, end (by both clocks), calibration_version, message.
 absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run);
 // Records that the result of the run does not use this segment of its snapshot.
 absl::Status MarkExcluded(UnitOfWork* tx,

@@ -96,7 +96,7 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(
   Statement read(
       tx->db(),
       fmt::format("SELECT s.segment, s.session, s.session_index, s.sequence, "
-                  "  s.receive_time_ns, s.fit, e.ends, e.sha256, "
+                  "  s.steady_ns, s.fit, e.ends, e.sha256, "
                   "  EXISTS (SELECT 1 FROM payloads p "
                   "    WHERE p.segment = s.segment) "
                   "FROM segment_ends e JOIN segments s USING (segment) "
@@ -114,7 +114,7 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(
                             .key = {read.Text(1), read.Int(2)},
                             .sequence = read.Int(3),
                             .state = SegmentState::kScored,
-                            .receive_time_ns = read.Int(4),
+                            .receive_steady_ns = read.Int(4),
                             .fit = read.Double(5)},
                 .has_data = read.Int(8) != 0};
     const std::string bytes = row.has_data ? "" : read.Text(6);
@@ -130,7 +130,7 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(
 
 absl::StatusOr<std::vector<std::int64_t>> ArrivalsOfEnds(UnitOfWork* tx) {
   Statement read(tx->db(),
-                 "SELECT s.receive_time_ns FROM segment_ends e "
+                 "SELECT s.steady_ns FROM segment_ends e "
                  "JOIN segments s USING (segment) "
                  "WHERE e.rig = ?1 AND s.state = 2",
                  tx->rig_row());

@@ -173,7 +173,7 @@ absl::Status VisitScored(
   Statement read(
       tx->db(),
       fmt::format("SELECT s.segment, s.session, s.session_index, s.sequence, "
-                  "  s.receive_time_ns, s.fit, i.information, i.sha256, "
+                  "  s.steady_ns, s.fit, i.information, i.sha256, "
                   "  EXISTS (SELECT 1 FROM payloads p "
                   "    WHERE p.segment = s.segment) AS has_data "
                   "FROM segments s JOIN segment_information i USING (segment) "
@@ -202,7 +202,7 @@ absl::Status VisitScored(
                     .key = {read.Text(1), read.Int(2)},
                     .sequence = read.Int(3),
                     .state = SegmentState::kScored,
-                    .receive_time_ns = read.Int(4),
+                    .receive_steady_ns = read.Int(4),
                     .fit = read.Double(5)},
         .has_data = read.Int(8) != 0,
         .information = intact.ok()

@@ -13,14 +13,14 @@ namespace {
 
 constexpr char kColumns[] =
     "s.segment, s.session, s.session_index, s.sequence, s.state, "
-    "s.receive_time_ns, s.fit";
+    "s.steady_ns, s.fit";
 
 SegmentRow RowOf(const Statement& row) {
   return {.rowid = row.Int(0),
           .key = {row.Text(1), row.Int(2)},
           .sequence = row.Int(3),
           .state = static_cast<SegmentState>(row.Int(4) - 1),
-          .receive_time_ns = row.Int(5),
+          .receive_steady_ns = row.Int(5),
           .fit = row.Double(6)};
 }
 
@@ -161,10 +161,11 @@ absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
           "INSERT INTO segments (rig, session, session_index, sequence, "
           "  state, receive_time_ns, calibration_version, start_ns, end_ns, "
           "  keyframes, imu_samples, landmarks, observations, "
-          "  temperature_c) "
+          "  temperature_c, steady_ns) "
           "VALUES (?1, ?2, ?3, (SELECT coalesce(max(sequence), 0) + 1 "
           "    FROM segments WHERE rig = ?1), "
-          "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) RETURNING segment",
+          "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) "
+          "RETURNING segment",
           tx->rig_row(),
           segment.key.session,
           segment.key.index,
@@ -176,7 +177,8 @@ absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
           segment.imu_samples,
           segment.landmarks,
           segment.observations,
-          segment.temperature_c));
+          segment.temperature_c,
+          tx->now().steady_ns));
   SELFCAL_RETURN_IF_ERROR(InsertPath(tx, row, segment.path));
   return Statement(tx->db(),
                    "INSERT INTO payloads (segment, rig, data, raw_bytes, "

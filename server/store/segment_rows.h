@@ -22,7 +22,7 @@ struct SegmentRow {
   SegmentKey key;
   std::int64_t sequence = 0;
   SegmentState state = SegmentState::kStored;
-  std::int64_t receive_time_ns = 0;
+  std::int64_t receive_steady_ns = 0;  // when it arrived, by steady time
   double fit = 0;  // ResidualStatistics::fit; 0: not measured
 };
 

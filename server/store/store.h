@@ -32,6 +32,8 @@
 #include "core/model/rig.h"
 #include "core/model/segment.h"
 #include "core/selection/tables.h"
+#include "server/store/clock_record.h"
+#include "server/store/moment.h"
 #include "server/store/rig_query.h"
 #include "server/store/segment_query.h"
 #include "server/store/session.h"
@@ -161,6 +163,7 @@ struct StoredCalibration {
   std::int64_t version = 0;  // 1 is the factory calibration
   CalibrationState state = CalibrationState::kActive;
   std::int64_t create_time_ns = 0;
+  std::int64_t create_steady_ns = 0;  // the same by steady time (Moment)
   Calibration theta;
   Eigen::MatrixXd covariance;        // D x D
   std::vector<std::string> reasons;  // why it was rejected
@@ -202,7 +205,10 @@ struct StoredRun {
   RunState state = RunState::kPending;
   RunTrigger trigger = RunTrigger::kManual;
   std::int64_t create_time_ns = 0;
-  std::int64_t end_time_ns = 0;      // 0 until it has ended
+  std::int64_t end_time_ns = 0;  // 0 until it has ended
+  // The same by steady time (Moment).
+  std::int64_t create_steady_ns = 0;
+  std::int64_t end_steady_ns = 0;
   std::int64_t base_version = 0;     // active when it was created
   std::int64_t change = 0;           // the newest when it was created; 0: none
   std::vector<SegmentKey> segments;  // the snapshot of the tables
@@ -256,21 +262,22 @@ class Store {
   using Work = std::function<absl::Status(UnitOfWork*)>;
   using Done = std::function<void(const absl::Status&)>;
 
-  // Commits what `work` writes, unless it returns an error. `time_ns` is the
-  // time of all that it writes. NOT_FOUND if there is no such rig.
+  // Commits what `work` writes, unless it returns an error. `now` is the time
+  // of all that it writes. NOT_FOUND if there is no such rig.
   virtual absl::Status Transact(const std::string& rig,
-                                std::int64_t time_ns,
+                                const Moment& now,
                                 const Work& work) = 0;
   // Transact without waiting. Transactions of one thread are carried out in the
   // order in which they begin. `done` is called once, on a thread of the store;
   // it must be short and must not call the store.
   virtual void BeginTransaction(const std::string& rig,
-                                std::int64_t time_ns,
+                                const Moment& now,
                                 Work work,
                                 Done done) = 0;
-  // Transact for a rig that is inserted first, at its creation time.
-  // ALREADY_EXISTS.
-  virtual absl::Status InsertRig(const StoredRig& rig, const Work& work) = 0;
+  // Transact for a rig that is inserted first. ALREADY_EXISTS.
+  virtual absl::Status InsertRig(const StoredRig& rig,
+                                 const Moment& now,
+                                 const Work& work) = 0;
   // Runs `work`, which only reads, on one state of the database.
   virtual absl::Status Inspect(const std::string& rig, const Work& work) = 0;
 
@@ -286,7 +293,8 @@ class Store {
   virtual absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
       const RigQuery& query, const Page& page) = 0;
   virtual absl::StatusOr<std::vector<std::string>> ListRigNames() = 0;
-  // Names of rigs that have received segments, but none after this time.
+  // Names of rigs that have received segments, but none after this steady time
+  // (Moment).
   virtual absl::StatusOr<std::vector<std::string>> ListIdleRigs(
       std::int64_t idle_since_ns) = 0;
 
@@ -355,6 +363,13 @@ class Store {
       const Page& page, const std::string& rig = "") = 0;
   // Appends an event of the daemon (without a rig); its number is assigned.
   virtual absl::Status AppendEvent(const StoredEvent& event) = 0;
+
+  // --- The clock of the device, of which there is one record.
+  // nullopt before the first is written.
+  virtual absl::StatusOr<std::optional<ClockRecord>> ReadClock() = 0;
+  // Replaces the record and, if there is an event, appends it.
+  virtual absl::Status WriteClock(const ClockRecord& clock,
+                                  const std::optional<StoredEvent>& event) = 0;
 
   // Check, backup and restore. Lives as long as the store.
   virtual StoreMaintenance* maintenance() = 0;

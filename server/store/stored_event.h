@@ -25,6 +25,7 @@ enum class EventKind {
   kRigDeleted,
   kSegmentDeleted,
   kTlsFilesRefused,  // of the daemon, without a rig
+  kClockStepped,     // likewise
 };
 
 struct StoredEvent {

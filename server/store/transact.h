@@ -4,10 +4,10 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include <cstdint>
 #include <string>
 #include <type_traits>
 
+#include "server/store/moment.h"
 #include "server/store/store.h"
 #include "server/store/unit_of_work.h"
 
@@ -18,10 +18,10 @@ namespace selfcal::server {
 template <typename Work>
 auto TransactFor(Store* store,
                  const std::string& rig,
-                 std::int64_t time_ns,
+                 const Moment& now,
                  const Work& work) -> std::invoke_result_t<Work, UnitOfWork*> {
   std::invoke_result_t<Work, UnitOfWork*> result = absl::UnknownError("");
-  const absl::Status status = store->Transact(rig, time_ns, [&](auto* tx) {
+  const absl::Status status = store->Transact(rig, now, [&](auto* tx) {
     result = work(tx);
     return result.status();
   });

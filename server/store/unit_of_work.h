@@ -11,6 +11,8 @@
 #include <string>
 #include <utility>
 
+#include "server/store/moment.h"
+
 namespace selfcal::server {
 
 class Connection;  // driver/driver.h
@@ -20,15 +22,16 @@ class UnitOfWork {
   UnitOfWork(Connection* db,
              std::string rig,
              std::int64_t rig_row,
-             std::int64_t time_ns)
-      : db_(db), rig_(std::move(rig)), rig_row_(rig_row), time_ns_(time_ns) {}
+             const Moment& now)
+      : db_(db), rig_(std::move(rig)), rig_row_(rig_row), now_(now) {}
   UnitOfWork(const UnitOfWork&) = delete;
   UnitOfWork& operator=(const UnitOfWork&) = delete;
 
   // Name of the rig, which exists.
   const std::string& rig() const { return rig_; }
-  // The time of what is written [ns since the Unix epoch].
-  std::int64_t time_ns() const { return time_ns_; }
+  // The time of what is written.
+  const Moment& now() const { return now_; }
+  std::int64_t time_ns() const { return now_.time_ns; }
 
   // For the statements of this module.
   Connection* db() const { return db_; }
@@ -38,7 +41,7 @@ class UnitOfWork {
   Connection* db_;
   std::string rig_;
   std::int64_t rig_row_;
-  std::int64_t time_ns_;
+  Moment now_;
 };
 
 }  // namespace selfcal::server

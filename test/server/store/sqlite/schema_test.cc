@@ -84,7 +84,8 @@ TEST_F(SchemaTest, DatabaseLetsOnlyCandidatesAndTheFactorysBegin) {
     const std::string sql =
         "INSERT INTO calibrations SELECT rig, 9, " +
         std::to_string(static_cast<int>(state) + 1) +
-        ", create_time_ns, run, content, sha256 FROM calibrations";
+        ", create_time_ns, run, content, sha256, create_steady_ns "
+        "FROM calibrations";
     EXPECT_EQ(Execute("BEGIN;" + sql + ";ROLLBACK").ok(),
               state == CalibrationState::kCandidate)
         << StateName(state);
