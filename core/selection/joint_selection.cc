@@ -51,6 +51,20 @@ class Subsets {
   double Value(const std::vector<int>& members) const {
     return JointValue(settings_, Information(members));
   }
+  // The allocation of landmarks to these members.
+  SharedLandmarks::Allocation Allocate(const std::vector<int>& members) const {
+    SharedLandmarks::Allocation parts = shared_.Uniform();
+    if (settings_.share_landmarks) shared_.Information(members, &parts);
+    return parts;
+  }
+  // The same for a set of almost the members that `parts` were allocated to.
+  double Value(const std::vector<int>& members,
+               SharedLandmarks::Allocation parts) const {
+    return JointValue(settings_,
+                      settings_.share_landmarks
+                          ? shared_.Information(members, &parts)
+                          : shared_.Sum(members));
+  }
   double HalfLogDetOf(const std::vector<int>& members) const {
     return HalfLogDet(Information(members));
   }
@@ -91,12 +105,14 @@ struct Removal {
 };
 
 // The best removal among `removable`, ascending; of equal ones the last.
+// `parts` are allocated to the members.
 Removal CheapestRemoval(const Subsets& subsets,
                         const std::vector<int>& members,
-                        const std::vector<int>& removable) {
+                        const std::vector<int>& removable,
+                        const SharedLandmarks::Allocation& parts) {
   Removal best;
   for (auto it = removable.rbegin(); it != removable.rend(); ++it) {
-    const double value = subsets.Value(Without(members, *it));
+    const double value = subsets.Value(Without(members, *it), parts);
     if (best.member < 0 || value > best.value + kTie_nats) best = {*it, value};
   }
   return best;
@@ -211,8 +227,9 @@ JointChange Offer(const JointSettings& settings,
     change.inserted = true;
     return change;
   }
-  const Removal removal = CheapestRemoval(subsets, all, kept);
-  if (removal.value >= subsets.Value(kept) + subsets.MinGainOfOne()) {
+  const SharedLandmarks::Allocation parts = subsets.Allocate(all);
+  const Removal removal = CheapestRemoval(subsets, all, kept, parts);
+  if (removal.value >= subsets.Value(kept, parts) + subsets.MinGainOfOne()) {
     change.inserted = true;
     change.evicted = removal.member;
   }
@@ -287,14 +304,16 @@ std::vector<int> SelectGreedily(const JointSettings& settings,
   // Each exchange is that of a full set in Offer(), with the new candidate that
   // helps most.
   for (int exchange = 0; exchange < kMaxExchanges; ++exchange) {
-    const double value = subsets.Value(kept);
     Removal best;
     int newcomer = -1;
     for (const int i : usable) {
       if (std::binary_search(kept.begin(), kept.end(), i)) continue;
-      const Removal removal = CheapestRemoval(subsets, With(kept, i), kept);
+      const std::vector<int> with = With(kept, i);
+      const SharedLandmarks::Allocation parts = subsets.Allocate(with);
+      const Removal removal = CheapestRemoval(subsets, with, kept, parts);
       if (removal.member >= 0 &&
-          removal.value >= value + subsets.MinGainOfOne() &&
+          removal.value >=
+              subsets.Value(kept, parts) + subsets.MinGainOfOne() &&
           (newcomer < 0 || removal.value > best.value + kTie_nats)) {
         best = removal;
         newcomer = i;

@@ -84,12 +84,11 @@ SharedLandmarks::SharedLandmarks(std::span<const Candidate* const> candidates)
       return e.session != begin->session || e.id != begin->id;
     });
     if (end - begin > 1) {
-      Sights sights;
       for (auto it = begin; it != end; ++it) {
-        sights.push_back({it->candidate, it->share});
+        sights_.push_back({it->candidate, it->share});
         alone_[it->candidate] -= it->share;
       }
-      shared_.push_back(std::move(sights));
+      ends_.push_back(sights_.size());
     }
     begin = end;
   }
@@ -112,41 +111,58 @@ Eigen::MatrixXd SharedLandmarks::Sum(std::span<const int> members) const {
   return Weighted(members, std::vector<double>(candidates_.size(), 1));
 }
 
+SharedLandmarks::Allocation SharedLandmarks::Uniform() const {
+  return Allocation(sights_.size(), 1);
+}
+
+bool SharedLandmarks::Restrict(std::span<const char> is_member,
+                               Allocation* parts) const {
+  bool contested = false;
+  std::size_t begin = 0;
+  for (const std::size_t end : ends_) {
+    int members = 0;
+    double sum = 0;
+    for (std::size_t k = begin; k < end; ++k) {
+      const bool sees = is_member[sights_[k].candidate] != 0;
+      members += sees ? 1 : 0;
+      sum += sees ? (*parts)[k] : 0;
+    }
+    for (std::size_t k = begin; k < end; ++k) {
+      if (is_member[sights_[k].candidate] == 0) {
+        (*parts)[k] = 0;
+      } else {
+        (*parts)[k] = sum > 0 ? (*parts)[k] / sum : 1.0 / members;
+      }
+    }
+    contested = contested || members > 1;
+    begin = end;
+  }
+  return contested;
+}
+
 Eigen::MatrixXd SharedLandmarks::Information(
     std::span<const int> members) const {
+  Allocation parts = Uniform();
+  return Information(members, &parts);
+}
+
+Eigen::MatrixXd SharedLandmarks::Information(std::span<const int> members,
+                                             Allocation* parts) const {
   std::vector<char> is_member(candidates_.size(), 0);
   for (const int i : members) is_member[i] = 1;
-  std::vector<double> base = alone_;
-  // Landmarks that several members observe: parts a_im in addition to the
-  // shares.
-  std::vector<Sights> contested;
-  std::vector<std::vector<double>> parts;
-  for (const Sights& sights : shared_) {
-    Sights seen;
-    std::copy_if(sights.begin(),
-                 sights.end(),
-                 std::back_inserter(seen),
-                 [&](const Sight& s) { return is_member[s.candidate] != 0; });
-    if (seen.size() == 1) base[seen[0].candidate] += seen[0].share;
-    if (seen.size() < 2) continue;
-    parts.emplace_back(seen.size(), 1.0 / static_cast<double>(seen.size()));
-    contested.push_back(std::move(seen));
-  }
+  const bool contested = Restrict(is_member, parts);
 
   // The determinant is a polynomial in the parts with nonnegative coefficients,
   // so that the growth transform of Baum and Eagon (1967) increases it in every
   // round: each part times its derivative, rescaled to a sum of one.
   std::vector<double> weights, slopes(candidates_.size());
   for (int round = 0;; ++round) {
-    weights = base;
-    for (std::size_t m = 0; m < contested.size(); ++m) {
-      for (std::size_t k = 0; k < contested[m].size(); ++k) {
-        weights[contested[m][k].candidate] +=
-            parts[m][k] * contested[m][k].share;
-      }
+    weights = alone_;
+    for (std::size_t k = 0; k < sights_.size(); ++k) {
+      weights[sights_[k].candidate] += (*parts)[k] * sights_[k].share;
     }
     Eigen::MatrixXd information = Weighted(members, weights);
-    if (contested.empty() || round == kMaxRounds) return information;
+    if (!contested || round == kMaxRounds) return information;
     const Eigen::MatrixXd covariance = information.llt().solve(
         Eigen::MatrixXd::Identity(information.rows(), information.cols()));
     for (const int i : members) {
@@ -156,24 +172,28 @@ Eigen::MatrixXd SharedLandmarks::Information(
     // 1/2 ln det is concave: no allocation exceeds this one by more than the
     // gap.
     double gap = 0;
-    for (std::size_t m = 0; m < contested.size(); ++m) {
+    Allocation next = *parts;
+    std::size_t begin = 0;
+    for (const std::size_t end : ends_) {
       double best = 0;
       double now = 0;
-      for (std::size_t k = 0; k < contested[m].size(); ++k) {
-        const Sight& sight = contested[m][k];
+      for (std::size_t k = begin; k < end; ++k) {
+        const Sight& sight = sights_[k];
+        if (is_member[sight.candidate] == 0) continue;
         const double slope = slopes[sight.candidate] * sight.share;
         best = std::max(best, slope);
-        parts[m][k] *= slope;
-        now += parts[m][k];
+        next[k] *= slope;
+        now += next[k];
       }
       gap += best - now;
       // If no member gains by it, its allocation does not matter.
-      for (double& part : parts[m]) {
-        part =
-            now > 0 ? part / now : 1.0 / static_cast<double>(parts[m].size());
+      for (std::size_t k = begin; k < end; ++k) {
+        next[k] = now > 0 ? next[k] / now : (*parts)[k];
       }
+      begin = end;
     }
     if (gap < kGap_nats) return information;
+    *parts = std::move(next);
   }
 }
 

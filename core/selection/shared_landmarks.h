@@ -22,6 +22,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -34,9 +35,18 @@ class SharedLandmarks {
   // The candidates are referenced, in their order, not copied.
   explicit SharedLandmarks(std::span<const Candidate* const> candidates);
 
+  // The parts a_im of all candidates that observe a landmark with others.
+  using Allocation = std::vector<double>;
+  // In equal parts.
+  Allocation Uniform() const;
+
   // I + sum_i c_i L_i over the members (indices of candidates, distinct). Its
   // 1/2 ln det is within 0.005 nat of that of the best allocation.
   Eigen::MatrixXd Information(std::span<const int> members) const;
+  // The same, from an allocation to start with, which becomes the result's:
+  // that of a set with almost the same members saves most of the time.
+  Eigen::MatrixXd Information(std::span<const int> members,
+                              Allocation* parts) const;
   // The same with c_i = 1: as if segments shared nothing.
   Eigen::MatrixXd Sum(std::span<const int> members) const;
 
@@ -46,14 +56,18 @@ class SharedLandmarks {
     int candidate;
     double share;
   };
-  using Sights = std::vector<Sight>;
 
+  // Limits the parts to members, with a sum of one for each landmark that one
+  // observes. Returns true if several observe one.
+  bool Restrict(std::span<const char> is_member, Allocation* parts) const;
   Eigen::MatrixXd Weighted(std::span<const int> members,
                            std::span<const double> weights) const;
 
   std::vector<const Candidate*> candidates_;
-  std::vector<double> alone_;   // share that no other candidate observes
-  std::vector<Sights> shared_;  // one for each landmark observed by several
+  std::vector<double> alone_;  // share that no other candidate observes
+  // By landmark, of those that several observe; where each landmark ends.
+  std::vector<Sight> sights_;
+  std::vector<std::size_t> ends_;
 };
 
 }  // namespace selfcal
