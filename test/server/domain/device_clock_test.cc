@@ -1,8 +1,10 @@
 // Ages on a device whose wall clock is set while it runs, or while it is off.
 #include "server/domain/device_clock.h"
 
+#include <algorithm>
 #include <random>
 
+#include "test/promise.h"
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
@@ -261,6 +263,64 @@ TEST_P(DeviceClockTest, ContinuesAfterARestart) {
   EXPECT_THAT(Steps(), SizeIs(2));
   Arrive(1);
   EXPECT_THAT(TableIndices("a", 0), ElementsAre(0, 1));
+}
+
+// At random: what is in fact younger than the limit is in the table, and
+// nothing is for longer than a day too old.
+TEST_P(DeviceClockTest, TablesHoldWhatIsYoungWhateverTheWallClockDoes) {
+  constexpr std::int64_t kMaxAge_ns = 7 * kDay_ns;
+  Promise promise("a wall clock that is set removes nothing");
+  std::mt19937 random(5);
+  const auto draw = [&](std::int64_t least, std::int64_t most) {
+    return std::uniform_int_distribution<std::int64_t>(least, most)(random);
+  };
+  Start();
+  CreateRig(kMaxAge_ns);
+  std::int64_t elapsed_ns = 0;  // in fact
+  // When the wall clock was last set, and each segment arrived, by that.
+  std::int64_t set_ns = -kDay_ns;
+  struct Arrival {
+    std::int64_t time_ns;
+    int boots;
+  };
+  std::vector<Arrival> arrivals;
+  int boots = 0;  // without a believable clock
+  for (; promise.trials < Trials(60); ++promise.trials) {
+    const std::int64_t dt_ns = draw(0, kDay_ns);
+    elapsed_ns += dt_ns;
+    switch (draw(0, 4)) {
+      case 0:  // is set, in any direction
+        Pass(dt_ns);
+        SetWallClock(draw(0, 2 * kToday_ns));
+        set_ns = elapsed_ns;
+        break;
+      case 1:  // the device is off
+        Boot(reading_.time_ns + dt_ns);
+        Start();
+        break;
+      case 2:  // its clock forgets the time while it is booted
+        Pass(dt_ns);
+        Boot(reading_.time_ns - draw(2 * kHour_ns, kToday_ns));
+        Start();
+        set_ns = elapsed_ns;
+        ++boots;
+        break;
+      default:
+        Pass(dt_ns);
+    }
+    Arrive(std::ssize(arrivals));
+    arrivals.push_back({elapsed_ns, boots});
+    const std::vector<std::int64_t> held = TableIndices("a", 0);
+    for (std::int64_t k = 0; k < std::ssize(arrivals); ++k) {
+      const bool is_held = std::find(held.begin(), held.end(), k) != held.end();
+      const std::int64_t age_ns = elapsed_ns - arrivals[k].time_ns;
+      const std::int64_t lost_ns = (boots - arrivals[k].boots) * kHour_ns;
+      const bool must = age_ns <= kMaxAge_ns;
+      const bool may = age_ns <= kMaxAge_ns + lost_ns ||
+                       elapsed_ns - set_ns < kDay_ns + lost_ns;
+      if ((must && !is_held) || (!may && is_held)) ++promise.lost;
+    }
+  }
 }
 
 // The certainty of a calibration decreases with the time that has passed.
