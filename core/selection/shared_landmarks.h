@@ -65,9 +65,8 @@ class SharedLandmarks {
 
   std::vector<const Candidate*> candidates_;
   std::vector<double> alone_;  // share that no other candidate observes
-  // By landmark, of those that several observe; where each landmark ends.
-  std::vector<Sight> sights_;
-  std::vector<std::size_t> ends_;
+  std::vector<Sight> sights_;  // of landmarks that several observe, by landmark
+  std::vector<std::size_t> ends_;  // of each landmark in sights_
 };
 
 }  // namespace selfcal

@@ -21,7 +21,7 @@ absl::StatusOr<std::optional<StoredRun>> CreateAgedRun(UnitOfWork* tx,
   SELFCAL_RETURN_IF_ERROR(active.status());
   if (!active->run) return none;
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t since,
-                           ActivationTime(tx, active->activation));
+                           ActivationSteadyTime(tx, active->activation));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestRun(tx));
   if (since > before || newest == 0) return none;
   SELFCAL_ASSIGN_OR_RETURN(const StoredRun last, ReadRun(tx, newest));

@@ -11,6 +11,11 @@
 namespace selfcal::server {
 namespace {
 
+constexpr std::int64_t kRecordInterval_ns =
+    std::chrono::nanoseconds(std::chrono::hours(1)).count();
+constexpr std::int64_t kRetry_ns =
+    std::chrono::nanoseconds(std::chrono::minutes(1)).count();
+
 bool IsSameBoot(const ClockRecord& last, const ClockReading& reading) {
   return reading.boot == last.boot &&
          reading.since_boot_ns >= last.since_boot_ns;
@@ -68,7 +73,7 @@ absl::StatusOr<std::unique_ptr<DeviceClock>> DeviceClock::Open(
     Store* store, std::function<ClockReading()> read) {
   SELFCAL_ASSIGN_OR_RETURN(const auto stored, store->ReadClock());
   const ClockReading now = read();
-  // At first, steady time is that of the wall clock.
+  // Steady time begins as that of the wall clock.
   const ClockRecord last =
       stored.value_or(ClockRecord{.boot = now.boot,
                                   .since_boot_ns = now.since_boot_ns,
@@ -90,10 +95,17 @@ Moment DeviceClock::Now() const {
 
 absl::StatusOr<std::optional<std::string>> DeviceClock::Observe() {
   const std::lock_guard lock(mutex_);
-  const ClockAdvance advance = AdvanceClock(last_, read_());
+  const ClockReading reading = read_();
+  const ClockAdvance advance = AdvanceClock(last_, reading);
   const bool is_due =
-      advance.clock.steady_ns - last_.steady_ns >= kClockStep_ns;
-  if (advance.step || is_due) SELFCAL_RETURN_IF_ERROR(Write(advance));
+      advance.step ||
+      advance.clock.steady_ns - last_.steady_ns >= kRecordInterval_ns;
+  if (!is_due || reading.since_boot_ns < retry_at_ns_) return std::nullopt;
+  const absl::Status written = Write(advance);
+  if (!written.ok()) {
+    retry_at_ns_ = reading.since_boot_ns + kRetry_ns;
+    return written;
+  }
   return advance.step;
 }
 

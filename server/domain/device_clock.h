@@ -11,6 +11,7 @@
 
 #include <absl/status/status.h>
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -25,10 +26,12 @@
 namespace selfcal::server {
 
 // A wall clock that jumps by more has stepped.
-constexpr std::int64_t kClockStep_ns = 3'600'000'000'000;  // an hour
-// After a step nothing is removed for its age for so long.
-constexpr std::int64_t kKeepAfterStep_ns = 24 * kClockStep_ns;
-// How long a device may have been off, at most.
+constexpr std::int64_t kClockStep_ns =
+    std::chrono::nanoseconds(std::chrono::hours(1)).count();
+// Nothing is removed for its age for so long after a step.
+constexpr std::int64_t kKeepAfterStep_ns =
+    std::chrono::nanoseconds(std::chrono::hours(24)).count();
+// A device is believed to have been off for no longer.
 constexpr std::int64_t kMaxTimeOff_ns = 366 * kKeepAfterStep_ns;
 
 // The clocks of the machine at one moment.
@@ -40,7 +43,7 @@ struct ClockReading {
 
 struct ClockAdvance {
   ClockRecord clock;
-  // What the wall clock did, in a sentence, if it has stepped.
+  // A sentence about the step of the wall clock, if there was one.
   std::optional<std::string> step;
 };
 
@@ -57,7 +60,8 @@ class DeviceClock {
   Moment Now() const;
 
   // Looks whether the wall clock has stepped, which becomes an event, and
-  // returns what it did. Writes the record after a step, and once an hour.
+  // returns what it did. Writes the record after a step, and once an hour;
+  // after an error no more often than once a minute.
   absl::StatusOr<std::optional<std::string>> Observe();
 
  private:
@@ -69,7 +73,8 @@ class DeviceClock {
   Store* const store_;
   const std::function<ClockReading()> read_;
   mutable std::mutex mutex_;
-  ClockRecord last_;  // as it is in the store
+  ClockRecord last_;              // as it is in the store
+  std::int64_t retry_at_ns_ = 0;  // since the boot, after an error
 };
 
 }  // namespace selfcal::server

@@ -11,7 +11,7 @@
 namespace selfcal::server {
 namespace {
 
-// With the time that the machine slept.
+// Includes the time that the machine slept.
 std::int64_t SinceBootNs() {
   timespec time{};
   clock_gettime(CLOCK_BOOTTIME, &time);

@@ -212,8 +212,8 @@ absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(UnitOfWork* tx,
   return CandidateOfRun(tx->db(), tx->rig_row(), run);
 }
 
-absl::StatusOr<std::int64_t> ActivationTime(UnitOfWork* tx,
-                                            std::int64_t activation) {
+absl::StatusOr<std::int64_t> ActivationSteadyTime(UnitOfWork* tx,
+                                                  std::int64_t activation) {
   return ReadInt(tx->db(),
                  "SELECT steady_ns FROM activations WHERE activation = ?1",
                  activation);

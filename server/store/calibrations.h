@@ -46,8 +46,8 @@ absl::StatusOr<std::int64_t> NextVersion(UnitOfWork* tx);
 absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(UnitOfWork* tx,
                                                            std::int64_t run);
 // Steady time of an activation (StoredCalibration::activation).
-absl::StatusOr<std::int64_t> ActivationTime(UnitOfWork* tx,
-                                            std::int64_t activation);
+absl::StatusOr<std::int64_t> ActivationSteadyTime(UnitOfWork* tx,
+                                                  std::int64_t activation);
 // Schema version of the database.
 absl::StatusOr<std::int64_t> SchemaVersion(UnitOfWork* tx);
 

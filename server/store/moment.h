@@ -6,16 +6,16 @@
 namespace selfcal::server {
 
 struct Moment {
-  // By a wall clock that never jumps.
+  // The wall clock never jumps.
   // NOLINTNEXTLINE(google-explicit-constructor)
   Moment(std::int64_t ns) : time_ns(ns), steady_ns(ns) {}
   Moment(std::int64_t time_ns, std::int64_t steady_ns, bool keeps_aged)
       : time_ns(time_ns), steady_ns(steady_ns), keeps_aged(keeps_aged) {}
 
-  // By the wall clock, since the Unix epoch: this is shown.
+  // Wall clock, since the Unix epoch: this is shown.
   std::int64_t time_ns;
-  // By the steady time of the device (server/domain/device_clock.h): ages are
-  // differences of this.
+  // Steady time of the device (server/domain/device_clock.h): ages are
+  // differences of it.
   std::int64_t steady_ns;
   // Nothing is removed for its age at present.
   bool keeps_aged = false;

@@ -158,7 +158,7 @@ absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(Connection* db) {
   Statement read(db,
                  std::string(kRunColumns) +
                      "WHERE r.state IN (1, 2) "
-                     "ORDER BY r.create_time_ns, r.rig, r.run");
+                     "ORDER BY r.create_steady_ns, r.rig, r.run");
   return ReadAll(db, &read);
 }
 

@@ -32,7 +32,8 @@ class ClockStepTest : public DaemonTest {
     if (library_.empty()) GTEST_SKIP() << "libfaketime is not installed";
   }
 
-  // By a clock that `offset` shifts, as libfaketime reads it: "+300d".
+  // Starts it with a clock that `offset` shifts, as libfaketime reads it:
+  // "+300d".
   std::unique_ptr<Process> StartShifted(const std::string& offset) {
     SetClock(offset);
     auto daemon = std::make_unique<Process>(

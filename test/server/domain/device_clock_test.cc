@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <random>
 
+#include "server/domain/device_change.h"
 #include "test/promise.h"
 #include "test/server/store/store_test.h"
 
@@ -67,7 +68,7 @@ TEST(AdvanceClock, DoesNotBelieveAClockThatNoBootExplains) {
   }
 }
 
-// Of one boot by its name, but the time since is less than it was.
+// The name of the boot is the same, but the time since is less than it was.
 TEST(AdvanceClock, TakesATimeSinceTheBootThatWentBackForAnotherBoot) {
   const ClockAdvance advance = AdvanceClock(kLast,
                                             {.boot = "first",
@@ -176,7 +177,7 @@ TEST_P(DeviceClockTest, ASetWallClockEmptiesNoTable) {
   Arrive(1);
   EXPECT_THAT(TableIndices("a", 0), ElementsAre(0, 1));
   EXPECT_THAT(Steps(), ElementsAre(HasSubstr("1970-01-01T00:02:00Z to 2026")));
-  // What is shown is by the wall clock.
+  // The wall clock is what is shown.
   EXPECT_EQ(store_->GetSegment("a", {"s", 1})->receive_time_ns, kToday_ns);
   EXPECT_EQ(store_->GetSegment("a", {"s", 0})->receive_time_ns, kMinute_ns);
   // They leave when they are older than that.
@@ -228,7 +229,7 @@ TEST_P(DeviceClockTest, MetadataIsNotDeletedForAStep) {
   EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("a", {"s", 0}).status()));
 }
 
-// Of a session that began before the step.
+// The session began before the step.
 TEST_P(DeviceClockTest, RigsBecomeIdleByTheTimeThatHasPassed) {
   Start();
   CreateRig(0);
@@ -327,12 +328,14 @@ TEST_P(DeviceClockTest, TablesHoldWhatIsYoungWhateverTheWallClockDoes) {
 TEST_P(DeviceClockTest, CalibrationsDoNotAgeByAStep) {
   Start();
   CreateRig(0);
-  const std::int64_t created =
-      store_->GetActiveCalibration("a")->create_steady_ns;
-  EXPECT_EQ(created, kToday_ns);
+  const StoredRig rig = *store_->GetRig("a");
+  const StoredCalibration factory = *store_->GetActiveCalibration("a");
+  const Eigen::MatrixXd after_a_day =
+      CovarianceAt(rig, factory, kToday_ns + kDay_ns);
+  ASSERT_NE(after_a_day, factory.covariance);
   SetWallClock(kToday_ns + 300 * kDay_ns);
   Pass(kDay_ns);
-  EXPECT_EQ(clock_->Now().steady_ns - created, kDay_ns);
+  EXPECT_EQ(CovarianceAt(rig, factory, clock_->Now().steady_ns), after_a_day);
 }
 
 }  // namespace
