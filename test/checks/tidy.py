@@ -51,8 +51,9 @@ def compile_commands(build: pathlib.Path) -> dict:
         if name in commands or name.split("/")[0] not in FOLDERS:
             continue  # one vector width is enough
         arguments = shlex.split(entry["command"])
-        if os.path.basename(arguments[0]) == "ccache":
-            del arguments[0]
+        names = [os.path.basename(argument) for argument in arguments]
+        if "ccache" in names:
+            del arguments[: names.index("ccache") + 1]
         commands[name] = {
             "directory": entry["directory"],
             "file": str(file),
