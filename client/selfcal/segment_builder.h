@@ -16,13 +16,12 @@
 //  - Tracks without a position (KeyframeObservation::p_G) are triangulated when
 //    the segment is assembled, with the theta of the SLAM system.
 //  - States that hold at the exposure and not at the timestamp of the images
-//    are moved, if AddKeyframe is told the timestamp.
+//    are moved, if AddKeyframe gets the timestamp.
 //  - Observations outside the image are dropped, if theta is known.
 //  - SetHealthy(false) drops what a diverging filter has estimated.
 //  - Ids of landmarks may start again after a break: after SetHealthy(true),
-//  and
-//    after a time without keyframes of over max_gap_s. G may be another one,
-//    too.
+//    and after a time without keyframes of over max_gap_s. G may be another
+//    one, too.
 //
 // Each call takes microseconds: input is copied once, and a segment is moved
 // out. Memory is bounded by one segment plus the segments that the caller has

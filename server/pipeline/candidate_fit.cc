@@ -57,9 +57,9 @@ void CheckSegments(const CheckContext& context,
   std::string failure;
   if (!(share >= limit)) {
     failure = fmt::format(
-        "{} of {} segments contradict the others: where the majority does, "
-        "none of them can be told to be right. Check what the SLAM system "
-        "sends (selfcal segment preflight), and send new motion.",
+        "{} of {} segments contradict the others; if most do, it is unknown "
+        "which of them are right. Check what the SLAM system sends (selfcal "
+        "segment preflight), and send new motion.",
         excluded,
         all);
   }
@@ -157,10 +157,10 @@ std::string NoiseFailure(const CheckContext& context, const NoiseScale& scale) {
                                                       : limits.max_imu_noise;
   if (scale.used > most) {
     return fmt::format(
-        "The {} noise was taken for {:.1f} times what the rig states, at most "
-        "{:.0f} times can be noise: the data or the model is wrong, or the "
-        "noise of the rig is. Check both (selfcal segment preflight, data "
-        "sheet).",
+        "The {} noise used is {:.1f} times what the rig states; more than "
+        "{:.0f} times cannot be noise: the data, the model, or the noise "
+        "stated by the rig is wrong. Check them (selfcal segment preflight, "
+        "data sheet).",
         NoiseKindName(scale.kind),
         scale.used,
         most);

@@ -58,7 +58,7 @@ class Watchers {
       watcher->ended = true;
       return first.status();
     }
-    watcher->Tell(*first);
+    watcher->Notify(*first);
     return std::unique_ptr<Subscription>(new Handle(watcher));
   }
 
@@ -67,7 +67,7 @@ class Watchers {
     for (const std::shared_ptr<Watcher>& watcher : Living()) {
       const std::lock_guard lock(watcher->mutex);
       if (!watcher->ended && watcher->topic == topic) {
-        watcher->Tell(update);
+        watcher->Notify(update);
       }
     }
   }
@@ -80,7 +80,7 @@ class Watchers {
     std::optional<Update> last;
     bool ended = false;
 
-    void Tell(const Update& update) {
+    void Notify(const Update& update) {
       if (!last || Follows(*last, update)) {
         last = update;
         callback(update);

@@ -196,9 +196,9 @@ bool Follow(int socket,
     if (size <= 0) {
       return true;
     }
-    const auto told =
+    const auto received =
         DecodeProgress({buffer.data(), static_cast<std::size_t>(size)});
-    if (told && progress && !progress(*told)) {
+    if (received && progress && !progress(*received)) {
       return false;
     }
   }

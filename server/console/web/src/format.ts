@@ -44,7 +44,7 @@ export function clock(time: string | undefined): string {
   return time ? time.replace('T', ' ').replace(/\.\d+Z$|Z$/, ' UTC') : '';
 }
 
-// RUN_HELD_BACK -> run held back
+// RUN_DEFERRED -> run deferred
 export function words(name: string): string {
   return name.toLowerCase().replaceAll('_', ' ');
 }
