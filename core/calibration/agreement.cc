@@ -1,9 +1,9 @@
 #include "core/calibration/agreement.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include "core/change/chi_square.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -25,8 +25,7 @@ AgreementTest TestAgreement(const Eigen::MatrixXd& Lambda,
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(all);
   const Eigen::VectorXd score = eta - Lambda * ldlt.solve(eta + rest_eta);
   const Eigen::MatrixXd covariance = Lambda - Lambda * ldlt.solve(Lambda);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      (covariance + covariance.transpose()) / 2);
+  const SymmetricEigen eigen((covariance + covariance.transpose()) / 2);
   const Eigen::VectorXd along = eigen.eigenvectors().transpose() * score;
   for (Eigen::Index i = 0; i < along.size(); ++i) {
     if (!(eigen.eigenvalues()(i) > kObserved)) continue;

@@ -2,7 +2,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <memory>
 
 #include "core/factor/ceres_factors.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -62,8 +62,8 @@ class CeresLoss final : public ceres::LossFunction {
 Eigen::MatrixXd PriorWeights(const Rig& rig,
                              const Eigen::MatrixXd& information) {
   const Eigen::VectorXd sigmas = PriorSigmas(rig);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      sigmas.asDiagonal() * information * sigmas.asDiagonal());
+  const SymmetricEigen eigen(sigmas.asDiagonal() * information *
+                             sigmas.asDiagonal());
   return eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
          eigen.eigenvectors().transpose() * sigmas.cwiseInverse().asDiagonal();
 }

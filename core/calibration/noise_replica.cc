@@ -1,12 +1,12 @@
 #include "core/calibration/noise_replica.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "core/calibration/linear_range.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -72,8 +72,7 @@ Eigen::MatrixXd FindSpurious(const Rig& rig,
   }
   Eigen::MatrixXd spurious(subspace.estimated.rows(), 0);
   if (under_noise.empty()) return spurious;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      Reduced(rig, subspace, Lambda));
+  const SymmetricEigen eigen(Reduced(rig, subspace, Lambda));
   const Eigen::LLT<Eigen::MatrixXd> noisy(mean);
   for (Eigen::Index j = 0; j < size; ++j) {
     const Eigen::VectorXd u = eigen.eigenvectors().col(j);

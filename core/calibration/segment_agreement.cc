@@ -1,7 +1,6 @@
 #include "core/calibration/segment_agreement.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

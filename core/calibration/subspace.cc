@@ -1,13 +1,13 @@
 #include "core/calibration/subspace.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "core/information/unobserved.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -50,7 +50,7 @@ Spectrum Decompose(const Eigen::MatrixXd& information) {
   if (information.size() == 0) {
     return {Eigen::VectorXd(0), information};
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  const SymmetricEigen eigen(information);
   return {eigen.eigenvalues(), eigen.eigenvectors()};
 }
 

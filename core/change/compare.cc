@@ -1,11 +1,11 @@
 #include "core/change/compare.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "core/change/chi_square.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -22,7 +22,7 @@ constexpr double kTolerance = 0.05;
 // Removes directions of negative information, which occur since the shared
 // information is an approximation and may exceed that of one of the two.
 MatrixXd Positive(const MatrixXd& information) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(information);
+  const SymmetricEigen eigen(information);
   const VectorXd values = eigen.eigenvalues().cwiseMax(0);
   return eigen.eigenvectors() * values.asDiagonal() *
          eigen.eigenvectors().transpose();
@@ -67,7 +67,7 @@ MatrixXd DifferenceCovariance(const MatrixXd& Sigma_a,
 ConsistencyTest TestDifference(const VectorXd& delta,
                                const MatrixXd& covariance,
                                const MatrixXd& alone) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(alone);
+  const SymmetricEigen eigen(alone);
   const auto known = (eigen.eigenvalues().array() < kKnown).count();
   ConsistencyTest test;
   test.degrees = static_cast<int>(known);

@@ -1,11 +1,11 @@
 #include "core/change/consistency.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "core/change/chi_square.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -22,7 +22,7 @@ constexpr double kReachError = 2.0;
 // Observed eigenvectors of a symmetric matrix, with their eigenvalues.
 struct Observed {
   explicit Observed(const Eigen::MatrixXd& information) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+    const SymmetricEigen eigen(information);
     const auto count = (eigen.eigenvalues().array() >= kObserved).count();
     values = eigen.eigenvalues().tail(count);
     directions = eigen.eigenvectors().rightCols(count);
@@ -76,7 +76,7 @@ ConsistencyTester::ConsistencyTester(const Rig& rig,
   const Eigen::VectorXd scale = prior_.cwiseInverse();
   Sigma_ =
       scale.asDiagonal() * active.covariance(free_, free_) * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Sigma_);
+  const SymmetricEigen eigen(Sigma_);
   root_ = eigen.eigenvectors() *
           eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
 }

@@ -1,12 +1,12 @@
 #include "core/change/course.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <utility>
 #include <vector>
 
 #include "core/change/chi_square.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -131,7 +131,7 @@ ConsistencyTest TestSpan(const OffsetInformation& change, const MatrixXd& B) {
     test.statistic = s.dot(L.llt().solve(s));
     test.degrees = static_cast<int>(s.size());
   } else {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(L);
+    const SymmetricEigen eigen(L);
     for (Eigen::Index k = 0; k < s.size(); ++k) {
       const double information = eigen.eigenvalues()(k);
       if (information < kObserved) continue;

@@ -1,8 +1,9 @@
 #include "core/change/heterogeneity.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -22,7 +23,7 @@ double UpperMedian(std::vector<double> values) {
 
 Heterogeneity::Heterogeneity(std::span<const OffsetInformation> segments) {
   for (const OffsetInformation& segment : segments) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(segment.Lambda);
+    const SymmetricEigen eigen(segment.Lambda);
     const auto count = (eigen.eigenvalues().array() >= kObserved).count();
     const Eigen::MatrixXd U = eigen.eigenvectors().rightCols(count);
     const Eigen::VectorXd sigmas =

@@ -1,7 +1,6 @@
 #include "core/coach/advise.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +9,7 @@
 #include "core/coach/words.h"
 #include "core/information/rig_components.h"
 #include "core/information/unobserved.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -89,7 +89,7 @@ class Coach {
   }
 
   std::vector<WeakDirection> Weakest(const Knowledge& now) const {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(now.covariance);
+    const SymmetricEigen eigen(now.covariance);
     std::vector<WeakDirection> weakest;
     const auto size = now.covariance.rows();
     const auto count = std::min<Eigen::Index>(size, kWeakestDirections);

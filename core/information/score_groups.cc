@@ -1,11 +1,11 @@
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "core/information/group_scorer.h"
 #include "core/information/segment_information.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -119,8 +119,7 @@ std::vector<GroupScore> ScoreGroups(const Rig& rig,
 std::vector<std::optional<double>> EntropiesWithoutPrior(
     const Rig& rig, const Eigen::MatrixXd& Lambda) {
   const RigComponents components(rig);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      Normalise(components, Lambda));
+  const SymmetricEigen eigen(Normalise(components, Lambda));
   const auto null = (eigen.eigenvalues().array() < kUndetermined).count();
   const auto seen = eigen.eigenvalues().size() - null;
   std::vector<std::optional<double>> entropies;

@@ -1,10 +1,10 @@
 #include "core/information/segment_scorer.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "core/factor/sampling.h"
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -32,7 +32,7 @@ double Redundancy(const MotionSegment& segment,
 // Information is never negative; negative eigenvalues after the elimination are
 // rounding errors.
 Eigen::MatrixXd WithoutNegativePart(const Eigen::MatrixXd& Lambda) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Lambda);
+  const SymmetricEigen eigen(Lambda);
   if (eigen.eigenvalues().minCoeff() >= 0) return Lambda;
   const Eigen::MatrixXd root =
       eigen.eigenvectors() *

@@ -1,9 +1,10 @@
 #include "core/information/unobserved.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -60,7 +61,7 @@ UnobservedDirection DescribeDirection(const Eigen::VectorXd& direction,
 
 Observability AnalyseObservability(const Eigen::MatrixXd& information,
                                    std::span<const std::string> names) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  const SymmetricEigen eigen(information);
   const auto weak = (eigen.eigenvalues().array() < kObserved).count();
   Observability result;
   result.rank = static_cast<int>(information.rows() - weak);

@@ -1,11 +1,11 @@
 #include "core/selection/joint_selection.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "core/model/symmetric_eigen.h"
 #include "core/selection/shared_landmarks.h"
 
 namespace selfcal {
@@ -184,9 +184,7 @@ double JointValue(const JointSettings& settings,
       return -half * std::log(root.squaredNorm() / static_cast<double>(size));
     }
     case Criterion::kE: {
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-          information, Eigen::EigenvaluesOnly);
-      return half * std::log(eigen.eigenvalues().minCoeff());
+      return half * std::log(SymmetricEigenvalues(information).minCoeff());
     }
   }
   return HalfLogDet(information);

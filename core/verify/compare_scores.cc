@@ -1,10 +1,11 @@
 #include "core/verify/compare_scores.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 namespace {
@@ -60,11 +61,7 @@ ScoreDifference CompareScores(const Rig& rig,
   Eigen::MatrixXd by = root.matrixL().solve(B - A);
   by = root.matrixL().solve(by.transpose().eval());
   difference.information =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
-          0.5 * (by + by.transpose()), Eigen::EigenvaluesOnly)
-          .eigenvalues()
-          .cwiseAbs()
-          .maxCoeff();
+      SymmetricEigenvalues(0.5 * (by + by.transpose())).cwiseAbs().maxCoeff();
   const Eigen::VectorXd step = root.solve(unit.cwiseProduct(a.eta(free)));
   const Eigen::VectorXd other = B.ldlt().solve(unit.cwiseProduct(b.eta(free)));
   difference.estimate_sigmas =

@@ -2,7 +2,6 @@
 // else estimated as well as if that were known, and does no sigma claim more
 // than the error keeps to?
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/model/symmetric_eigen.h"
 #include "core/simulation/simulate.h"
 #include "test/core/information/simple_motions.h"
 #include "test/evaluation/context.h"
@@ -85,7 +85,7 @@ Run RunOne(const Motion& motion, std::uint64_t seed) {
                       .cwiseQuotient(covariance.diagonal().cwiseSqrt())
                       .maxCoeff();
   // What is held has the variance of the prior, 1, and comes last.
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
+  const SymmetricEigen eigen(covariance);
   const auto squares = [&](const Eigen::VectorXd& of) {
     const Eigen::VectorXd along =
         eigen.eigenvectors().leftCols(run.rank).transpose() * of;

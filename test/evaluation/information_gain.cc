@@ -1,8 +1,9 @@
 #include "test/evaluation/information_gain.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <cmath>
+
+#include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
 
@@ -25,7 +26,7 @@ TruncatedQr TruncateInformation(const Rig& rig,
   const Eigen::VectorXd prior = PriorSigmas(rig);
   const Eigen::MatrixXd normalised =
       (prior.asDiagonal() * Lambda * prior.asDiagonal())(free, free);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normalised);
+  const SymmetricEigen eigen(normalised);
   const Eigen::VectorXd roots = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
   return TruncateRoot(roots.asDiagonal() * eigen.eigenvectors().transpose(),
                       truncation);

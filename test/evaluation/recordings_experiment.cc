@@ -3,7 +3,6 @@
 // say; and whether white noise leaves sigmas as they are.
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/model/symmetric_eigen.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/datasets.h"
 #include "test/evaluation/estimators.h"
@@ -169,11 +169,8 @@ Difference Compare(const RecordedDevice& device,
   const Eigen::VectorXd z =
       BoxMinus(a.theta, b.theta)(free).cwiseQuotient(sigma);
   const Eigen::VectorXd variances =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
-          sigma.cwiseInverse().asDiagonal() * joint *
-              sigma.cwiseInverse().asDiagonal(),
-          Eigen::EigenvaluesOnly)
-          .eigenvalues();
+      SymmetricEigenvalues(sigma.cwiseInverse().asDiagonal() * joint *
+                           sigma.cwiseInverse().asDiagonal());
   std::mt19937_64 engine(1);
   std::normal_distribution<double> normal;
   const auto count = static_cast<double>(free.size());

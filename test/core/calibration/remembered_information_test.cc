@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <vector>
 
+#include "core/model/symmetric_eigen.h"
 #include "core/simulation/simulate.h"
 
 namespace selfcal {
@@ -52,10 +52,8 @@ class RememberedInformationTest : public ::testing::Test {
   double InPriorUnits(const Eigen::MatrixXd& information, bool smallest) const {
     const std::vector<int> free = FreeComponents(rig_);
     const Eigen::VectorXd scale = PriorSigmas(rig_)(free);
-    const Eigen::VectorXd values =
-        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
-            scale.asDiagonal() * information(free, free) * scale.asDiagonal())
-            .eigenvalues();
+    const Eigen::VectorXd values = SymmetricEigenvalues(
+        scale.asDiagonal() * information(free, free) * scale.asDiagonal());
     return smallest ? values.minCoeff() : values.maxCoeff();
   }
 

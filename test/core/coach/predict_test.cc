@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <string>
 
 #include "core/information/segment_information.h"
+#include "core/model/symmetric_eigen.h"
 #include "test/core/simulation/rigs.h"
 
 namespace selfcal {
@@ -18,8 +18,7 @@ double GainOf(const Rig& rig, const Eigen::MatrixXd& Lambda) {
   const Eigen::VectorXd prior = PriorSigmas(rig)(free);
   const Eigen::MatrixXd normalised =
       prior.asDiagonal() * Lambda(free, free) * prior.asDiagonal();
-  const Eigen::VectorXd eigenvalues =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(normalised).eigenvalues();
+  const Eigen::VectorXd eigenvalues = SymmetricEigenvalues(normalised);
   return 0.5 * eigenvalues.cwiseMax(0).array().log1p().sum();
 }
 
