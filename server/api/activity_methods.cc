@@ -18,7 +18,7 @@
 namespace selfcal::server {
 namespace {
 
-v1::SegmentTraffic Encode(const TrafficCounts& counts) {
+v1::SegmentTraffic EncodeTraffic(const TrafficCounts& counts) {
   v1::SegmentTraffic message;
   message.set_streams(counts.streams);
   message.set_stored(counts.stored);
@@ -45,12 +45,11 @@ std::optional<RunUpdate> CurrentRun(const ApiContext& context,
 }
 
 v1::RigActivity EncodeRig(const ApiContext& context, const RigSummary& rig) {
-  v1::RigActivity message = server::Encode(rig);
-  *message.mutable_traffic() = Encode(context.traffic->Of(rig.rig));
+  v1::RigActivity message = Encode(rig);
+  *message.mutable_traffic() = EncodeTraffic(context.traffic->Of(rig.rig));
   if (rig.newest_run != 0 && IsUnfinished(rig.run_state)) {
     if (const auto update = CurrentRun(context, rig.rig, rig.newest_run)) {
-      *message.mutable_run() =
-          server::Encode(update->run, update->progress, nullptr);
+      *message.mutable_run() = Encode(update->run, update->progress, nullptr);
     }
   }
   return message;
@@ -79,7 +78,7 @@ absl::StatusOr<v1::ListActivityResponse> ListActivity(
           }));
   SetTime(NowNs(), response.mutable_time());
   SetTime(context.traffic->start_time_ns(), response.mutable_start_time());
-  *response.mutable_traffic() = Encode(context.traffic->OfAll());
+  *response.mutable_traffic() = EncodeTraffic(context.traffic->OfAll());
   return response;
 }
 
