@@ -151,6 +151,18 @@ absl::Status DrainPatiently(SegmentStream* stream,
   }
 }
 
+// A stream keeps retrying what the daemon may accept later, such as a segment
+// beyond a quota. After the timeout, the last error of the connection therefore
+// decides whether the daemon refused the segments or did not answer.
+grpc::StatusCode CodeOf(const absl::Status& drained,
+                        const absl::Status& connection) {
+  if (!absl::IsDeadlineExceeded(drained)) {
+    return static_cast<grpc::StatusCode>(drained.code());
+  }
+  return connection.ok() ? grpc::StatusCode::UNAVAILABLE
+                         : static_cast<grpc::StatusCode>(connection.code());
+}
+
 int SendSegments(Context* context,
                  const ImportOptions& options,
                  std::vector<MotionSegment> segments) {
@@ -169,12 +181,10 @@ int SendSegments(Context* context,
                          static_cast<std::int64_t>(options.timeout_s * 1e3)));
   reporter.Finish();
   if (!status.ok()) {
-    const auto code = absl::IsDeadlineExceeded(status)
-                          ? grpc::StatusCode::UNAVAILABLE
-                          : static_cast<grpc::StatusCode>(status.code());
     return Fail(
         *context,
-        {code, std::string(status.message().data(), status.message().size())});
+        {CodeOf(status, stream.connection_status()),
+         std::string(status.message().data(), status.message().size())});
   }
   const StreamStatistics statistics = stream.statistics();
   if (context->terminal && !context->json) {
@@ -226,40 +236,38 @@ int Import(Context* context, const ImportOptions& options) {
 CLI::App* AddImport(CLI::App* parent,
                     const std::string& name,
                     Context* context) {
-  CLI::App* import = parent->add_subcommand(
+  CLI::App* command = parent->add_subcommand(
       name,
       "Cut maplab VI-maps into segments and send them; returns when all are "
       "acknowledged");
   const auto options = std::make_shared<ImportOptions>();
   SegmentBuilderOptions& builder = options->recording.builder;
-  import->add_option("RIG", options->rig)->required();
-  AddRecordingOptions(import, &options->recording);
-  import->add_option(
+  command->add_option("RIG", options->rig)->required();
+  AddRecordingOptions(command, &options->recording);
+  command->add_option(
       "--session", builder.session, "Name of the session [the mission's id]");
-  import
+  command
       ->add_option("--calibration-version",
                    builder.calibration_version,
                    "The version with which the map was estimated")
       ->capture_default_str();
-  import
+  command
       ->add_option("--temperature",
                    options->temperature_c,
                    "Temperature of the device during the recording [degrees "
                    "Celsius]")
       ->check(CLI::Range(SegmentLimits{}.min_temperature_c,
                          SegmentLimits{}.max_temperature_c));
-  import
+  command
       ->add_option("--timeout",
                    options->timeout_s,
-                   "Give up after this long without an answer [s]")
+                   "Give up after this long without an acknowledgement [s]")
       ->check(CLI::Range(0.001, 1e6))
       ->capture_default_str();
-  import->callback([context, options] {
-    context->command = [context, options] { return Import(context, *options);
-};
-}  // namespace selfcal::client
-);
-return import;
+  command->callback([context, options] {
+    context->command = [context, options] { return Import(context, *options); };
+  });
+  return command;
 }
 
 }  // namespace selfcal::client

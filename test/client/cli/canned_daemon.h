@@ -74,6 +74,7 @@ struct CannedDaemon final : v1::RigService::Service,
   bool last_force = false;         // of a recalibration
   std::int64_t reject_index = -1;  // of the segments that are sent
   bool reject_all = false;
+  grpc::Status stream_refusal;         // of every stream of segments
   std::atomic<int> broken_watches{0};  // that many end before the run does
 
   // On a unix socket, or with credentials on a port.
@@ -119,6 +120,7 @@ struct CannedDaemon final : v1::RigService::Service,
       grpc::ServerContext*,
       grpc::ServerReaderWriter<v1::StreamSegmentsResponse,
                                v1::StreamSegmentsRequest>* stream) override {
+    if (!stream_refusal.ok()) return stream_refusal;
     v1::StreamSegmentsRequest request;
     while (stream->Read(&request)) {
       const v1::MotionSegment& segment = request.segment();

@@ -12,7 +12,9 @@
 namespace selfcal::client {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 class ImportCommand : public Commands {
  protected:
@@ -71,6 +73,34 @@ TEST_F(ImportCommand, OfManyRejectionsAScreenIsShownAndTheirNumber) {
       << "with a warning about the data";
   EXPECT_THAT(outcome.err,
               HasSubstr("and 4 more segments were rejected: 14 in all\n"));
+}
+
+TEST_F(ImportCommand, NamesTheReasonOfTheDaemonAndExitsWithOneIfItRefuses) {
+  SELFCAL_NEED_RECORDING(map, "tango_handheld");
+  daemon_.stream_refusal = {
+      grpc::StatusCode::RESOURCE_EXHAUSTED,
+      "the database holds 95 of at most 100 bytes: raise max-database-bytes"};
+  const Outcome outcome =
+      Selfcal({"segment", "import", "device", map, "--timeout", "1"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(outcome.err,
+              HasSubstr("selfcal: 14 segments are not acknowledged: "
+                        "RESOURCE_EXHAUSTED: the database holds 95 of at most "
+                        "100 bytes: raise max-database-bytes\n"));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("Is selfcald running?")));
+}
+
+TEST_F(ImportCommand, ExitsWithThreeIfTheDaemonIsUnavailable) {
+  SELFCAL_NEED_RECORDING(map, "tango_handheld");
+  daemon_.stream_refusal = {grpc::StatusCode::UNAVAILABLE,
+                            "the daemon is stopping"};
+  const Outcome outcome =
+      Selfcal({"segment", "import", "device", map, "--timeout", "1"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(
+      outcome.err,
+      AllOf(HasSubstr("does not answer"), HasSubstr("the daemon is stopping")));
 }
 
 TEST_F(ImportCommand, ExitsWithOneForARigThatDoesNotExist) {
