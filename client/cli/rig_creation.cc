@@ -219,6 +219,12 @@ void AddRigCreation(CLI::App* rig, Context* context) {
     if (input->files.empty() && input->vi_map.empty()) {
       throw CLI::RequiredError("FILE, --from FORMAT FILE... or --vi-map DIR");
     }
+    if (!input->id && !(input->from.empty() && input->vi_map.empty())) {
+      throw CLI::ValidationError(
+          "--id",
+          fmt::format("is required with {}, whose files do not name the rig",
+                      input->from.empty() ? "--vi-map" : "--from"));
+    }
     NameFlags(options, context);
     context->command = [context, input] { return Create(context, *input); };
   });

@@ -14,6 +14,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 class RigCreate : public Commands {
  protected:
@@ -99,6 +100,19 @@ TEST_F(RigCreate, NamesTheCamerasThatThereAre) {
   EXPECT_THAT(
       Selfcal({"rig", "create", WriteFile("{}"), "--cameras", "cam0"}).err,
       HasSubstr("--from and --vi-map"));
+  EXPECT_TRUE(daemon_.rigs.empty());
+}
+
+TEST_F(RigCreate, NeedsAnIdForWhatNamesNoRig) {
+  for (const std::vector<std::string>& line :
+       std::vector<std::vector<std::string>>{
+           {"rig", "create", "--from", "kalibr", WriteFile("")},
+           {"rig", "create", "--vi-map", temp_folder_.File("")}}) {
+    const Outcome outcome = Selfcal(line);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("--id: is required with " + line[2]));
+    EXPECT_THAT(outcome.err, Not(HasSubstr("rig.name")));
+  }
   EXPECT_TRUE(daemon_.rigs.empty());
 }
 
