@@ -8,6 +8,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/filter_command.h"
 #include "client/cli/list_options.h"
+#include "client/cli/positive_number.h"
 #include "client/text/estimate_text.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
@@ -251,7 +252,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
       "watch", "Print the active version at once, then each new one");
   watch->add_option("RIG", *rig)->required();
   watch->add_option("--count", *count, "Exit after this many versions")
-      ->check(CLI::PositiveNumber);
+      ->check(AtLeastOne());
   watch->callback([context, rig, count] {
     context->command = [context, rig, count] {
       return WatchCalibrations(context, *rig, *count);

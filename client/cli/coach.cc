@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/positive_number.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
@@ -175,13 +176,13 @@ CLI::App* AddCoach(CLI::App* parent,
   const auto count = std::make_shared<std::int64_t>(0);
   coach->add_option("RIG", *rig)->required();
   coach->add_option("--top", *top, "Number of motions to print")
-      ->check(CLI::PositiveNumber)
+      ->check(AtLeastOne())
       ->capture_default_str();
   CLI::Option* watching = coach->add_flag(
       "--watch", *watch, "Print a line now, and whenever the advice changes");
   coach->add_option("--count", *count, "With --watch: exit after this many")
       ->needs(watching)
-      ->check(CLI::PositiveNumber);
+      ->check(AtLeastOne());
   coach->callback([context, rig, top, watch, count] {
     context->command = [context, rig, top, watch, count] {
       return *watch ? WatchAdvice(context, *rig, *top, *count)

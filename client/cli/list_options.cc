@@ -1,5 +1,7 @@
 #include "client/cli/list_options.h"
 
+#include "client/cli/positive_number.h"
+
 namespace selfcal::client {
 
 void AddListOptions(CLI::App* list,
@@ -8,7 +10,7 @@ void AddListOptions(CLI::App* list,
                     ListOptions* options) {
   list->add_option(
           "--limit", options->limit, "Only this many, " + order + " [all]")
-      ->check(CLI::PositiveNumber);
+      ->check(AtLeastOne());
   list->add_option("--filter", options->filter, filter_help);
 }
 

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "client/cli/positive_number.h"
+
 namespace selfcal::client {
 
 void AddRecordingOptions(CLI::App* command, RecordingInput* input) {
@@ -18,7 +20,7 @@ void AddRecordingOptions(CLI::App* command, RecordingInput* input) {
   command
       ->add_option(
           "--seconds", builder.seconds, "Close segments by time instead [s]")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   command
       ->add_option("--min-observations",
                    builder.min_observations,

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "client/cli/commands.h"
+#include "client/cli/positive_number.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
@@ -123,7 +124,7 @@ void AddSegmentDetails(CLI::App* segments, Context* context) {
       ->add_option("--version",
                    options->version,
                    "Version of the calibration [that of the segment]")
-      ->check(CLI::PositiveNumber);
+      ->check(AtLeastOne());
   residuals->callback([context, options] {
     context->command = [context, options] {
       return Residuals(context, *options);

@@ -7,6 +7,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/group_check.h"
+#include "client/cli/positive_number.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/segment.grpc.pb.h"
@@ -114,7 +115,7 @@ CLI::App* AddTableShow(CLI::App* parent,
       ->add_option("--limit",
                    options->limit,
                    "Only this many entries of each table, the best [all]")
-      ->check(CLI::PositiveNumber);
+      ->check(AtLeastOne());
   tables->callback([context, options] {
     context->command = [context, options] {
       return ShowTables(context, *options);

@@ -107,6 +107,33 @@ TEST_F(Usage, UnknownWordsAreNamedWithTheNearest) {
   for (const Mistake& mistake : mistakes) ExpectAnswer(mistake);
 }
 
+TEST_F(Usage, ANumberOutOfRangeIsAnsweredWithTheRange) {
+  const std::string whole = "must be a whole number of at least 1";
+  const std::vector<Mistake> mistakes = {
+      {{"run", "list", "a", "--limit", "0"}, 2, "--limit: '0' " + whole},
+      {{"rig", "list", "--limit", "-3"}, 2, "--limit: '-3' " + whole},
+      {{"rig", "list", "--limit", "1.5"}, 2, "--limit: '1.5' " + whole},
+      {{"rig", "list", "--limit", "ten"}, 2, "--limit: 'ten' " + whole},
+      {{"table", "show", "a", "--limit", "0"}, 2, "--limit: '0' " + whole},
+      {{"calibration", "watch", "a", "--count", "0"},
+       2,
+       "--count: '0' " + whole},
+      {{"rig", "coach", "a", "--top", "0"}, 2, "--top: '0' " + whole},
+      {{"rig", "coach", "a", "--watch", "--count", "0"},
+       2,
+       "--count: '0' " + whole},
+      {{"segment", "residuals", "a", "s~0", "--version", "0"},
+       2,
+       "--version: '0' " + whole},
+      {{"segment", "import", "a", "b", "--seconds", "0"},
+       2,
+       "--seconds: '0' must be a number greater than 0"},
+      {{"segment", "import", "a", "b", "--seconds", "nan"},
+       2,
+       "--seconds: 'nan' must be a number greater than 0"}};
+  for (const Mistake& mistake : mistakes) ExpectAnswer(mistake);
+}
+
 TEST_F(Usage, EveryOldSpellingStillWorksAndHelpShowsTheNewAlone) {
   const std::string help = Selfcal({"--help"}).out;
   for (const auto& [old, present] : OldSpellings()) {
