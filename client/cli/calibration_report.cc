@@ -73,9 +73,9 @@ Table DifferenceValues(const v1::CompareCalibrationsResponse& differences) {
 std::string OriginText(const v1::Calibration& calibration) {
   if (!calibration.has_provenance()) return "factory";
   const v1::SolverReport& solver = calibration.solver();
-  return fmt::format("{}, {} segments, rms {:.3f} -> {:.3f} px",
+  return fmt::format("{}, {}, rms {:.3f} -> {:.3f} px",
                      solver.status(),
-                     solver.segments(),
+                     CountText(solver.segments(), "segment"),
                      solver.reprojection_rms_before_px(),
                      solver.reprojection_rms_after_px());
 }

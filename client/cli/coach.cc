@@ -58,9 +58,9 @@ std::string SharpestText(const AdviceResponse::Advice& advice) {
 }
 
 std::string KnownText(const AdviceResponse& response) {
-  return fmt::format("version {} and {} segments since",
+  return fmt::format("version {} and {} since",
                      response.calibration_version(),
-                     response.segments_since());
+                     CountText(response.segments_since(), "segment"));
 }
 
 Table AdviceTable(const AdviceResponse& response) {

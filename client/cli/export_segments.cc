@@ -144,10 +144,10 @@ int ExportSegments(Context* context, const ExportOptions& options) {
                                       : OpenSink<JsonLines>(options);
   if (!sink.ok()) return FailInput(sink.status());
   Progress progress("export");
-  std::size_t segments = 0;
+  std::int64_t segments = 0;
   const auto add = [&](const std::string& name,
                        const v1::MotionSegment& segment) {
-    progress.Say(fmt::format("{} segments, {}", ++segments, LastPart(name)));
+    progress.Say(CountText(++segments, "segment") + ", " + LastPart(name));
     return (*sink)->Add(segment);
   };
   absl::Status written;

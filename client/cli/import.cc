@@ -18,6 +18,7 @@
 #include "client/cli/progress.h"
 #include "client/cli/recording_input.h"
 #include "client/selfcal/client.h"
+#include "client/text/text.h"
 #include "core/preflight/diagnose.h"
 #include "proto/convert.h"
 #include "proto/resource_names.h"
@@ -92,8 +93,9 @@ class Reporter {
     const std::lock_guard lock(mutex_);
     progress_.Clear();
     if (not_shown_ == 0) return;
-    PrintError(fmt::format("and {} more segments were rejected: {} in all",
+    PrintError(fmt::format("and {} more {} rejected: {} in all",
                            not_shown_,
+                           not_shown_ == 1 ? "segment was" : "segments were",
                            rejected_));
   }
 
@@ -188,8 +190,8 @@ int SendSegments(Context* context,
   }
   const StreamStatistics statistics = stream.statistics();
   if (context->terminal && !context->json) {
-    PrintText(fmt::format("{} segments: {} stored, {} duplicate, {} rejected\n",
-                          statistics.queued,
+    PrintText(fmt::format("{}: {} stored, {} duplicate, {} rejected\n",
+                          CountText(statistics.queued, "segment"),
                           statistics.stored,
                           statistics.duplicates,
                           statistics.rejected));

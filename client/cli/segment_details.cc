@@ -75,10 +75,10 @@ int Residuals(Context* context, const SegmentOptions& options) {
   facts.Add("version", fmt::format("{}", residuals.calibration_version()));
   for (const auto& camera : residuals.cameras()) {
     facts.Add(fmt::format("camera {}", camera.camera()),
-              fmt::format("{:.3f} px rms over {} of {} observations",
+              fmt::format("{:.3f} px rms over {} of {}",
                           camera.inlier_rms_px(),
                           camera.inliers(),
-                          camera.observations()));
+                          CountText(camera.observations(), "observation")));
   }
   facts.Add("median",
             fmt::format("{:.3f} px", residuals.reprojection_median_px()));

@@ -24,11 +24,11 @@ struct TableOptions {
 };
 
 void PrintTable(const Context& context, const v1::Table& table) {
-  PrintText(fmt::format("{}: {} of {} entries, {} segments offered{}\n",
+  PrintText(fmt::format("{}: {} of {}, {} offered{}\n",
                         LastPart(table.name()),
                         table.entries_size(),
-                        table.capacity(),
-                        table.scored(),
+                        CountText(table.capacity(), "entry", "entries"),
+                        CountText(table.scored(), "segment"),
                         table.starved() ? ", starved" : ""));
   Table rows({{"  #", true}, {"segment"}, {"H [nat]", true}, {"gain", true}});
   int rank = 0;

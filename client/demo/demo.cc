@@ -14,6 +14,7 @@
 #include "client/demo/daemon_process.h"
 #include "client/demo/daemon_view.h"
 #include "client/selfcal/client.h"
+#include "client/text/text.h"
 
 namespace selfcal::client {
 namespace {
@@ -230,10 +231,10 @@ absl::Status KillAndCompare(const DemoOptions& options,
 absl::Status RunDemo(const DemoOptions& options,
                      const Device& device,
                      Report* report) {
-  report->Step(
-      "device",
-      fmt::format(
-          "{}; {} segments", device.description, device.segments.size()));
+  report->Step("device",
+               fmt::format("{}; {}",
+                           device.description,
+                           CountText(device.segments.size(), "segment")));
   auto daemon = DaemonProcess::Start(options.daemon, options.state_dir);
   if (!daemon.ok()) return daemon.status();
   report->Step("daemon",

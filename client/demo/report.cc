@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "client/text/estimate_text.h"
+#include "client/text/text.h"
 #include "proto/convert.h"
 
 namespace selfcal::client {
@@ -164,24 +165,22 @@ void Report::Tables(const std::vector<v1::Table>& tables) {
 
 void Report::Run(const v1::Recalibration& run) {
   const v1::SolverReport& s = run.solver();
-  Line(fmt::format("{} on {} segments: {}{}",
+  Line(fmt::format("{} on {}: {}{}",
                    LastPart(run.name()),
-                   run.segments_size(),
+                   CountText(run.segments_size(), "segment"),
                    v1::Recalibration::State_Name(run.state()),
                    run.message().empty() ? "" : ", " + run.message()));
   json_["recalibrations"].push_back(ToJson(run));
   if (run.state() != v1::Recalibration::SUCCEEDED) return;
-  Line(fmt::format(
-      "{} after {} iterations in {:.1f} s; {} partitions, {} keyframes, {} "
-      "landmarks, {} observations ({} left out)",
-      s.status(),
-      s.iterations(),
-      s.seconds(),
-      s.partitions(),
-      s.keyframes(),
-      s.landmarks(),
-      s.observations(),
-      s.observations_dropped()));
+  Line(fmt::format("{} after {} in {:.1f} s; {}, {}, {}, {} ({} left out)",
+                   s.status(),
+                   CountText(s.iterations(), "iteration"),
+                   s.seconds(),
+                   CountText(s.partitions(), "partition"),
+                   CountText(s.keyframes(), "keyframe"),
+                   CountText(s.landmarks(), "landmark"),
+                   CountText(s.observations(), "observation"),
+                   s.observations_dropped()));
   Line(fmt::format(
       "reprojection rms {:.3f} -> {:.3f} px, median {:.3f} -> {:.3f} px; "
       "{} of {} directions observed",

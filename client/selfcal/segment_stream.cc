@@ -69,8 +69,10 @@ class SegmentStream::Impl {
     const absl::Status end = queue_.end();
     if (!end.ok()) return end;
     if (done) return absl::OkStatus();
-    std::string message = std::to_string(queue_.unacknowledged()) +
-                          " segments are not acknowledged";
+    const std::size_t waiting = queue_.unacknowledged();
+    std::string message = std::to_string(waiting) +
+                          (waiting == 1 ? " segment is" : " segments are") +
+                          " not acknowledged";
     const absl::Status connection = connection_status();
     if (!connection.ok()) message += ": " + connection.ToString();
     return absl::DeadlineExceededError(message);

@@ -34,12 +34,12 @@ void AddProvenance(const v1::Calibration::Provenance& provenance,
     const auto& temperature = provenance.temperature();
     Add(facts,
         "temperature",
-        fmt::format("{:.1f} C, {:.1f} to {:.1f} C ({} of {} segments)",
+        fmt::format("{:.1f} C, {:.1f} to {:.1f} C ({} of {})",
                     temperature.mean_c(),
                     temperature.min_c(),
                     temperature.max_c(),
                     temperature.segments(),
-                    provenance.segments_size()));
+                    CountText(provenance.segments_size(), "segment")));
   }
   Add(facts, "program", provenance.program_version());
   std::string settings;
@@ -187,14 +187,13 @@ void AddSolver(const v1::SolverReport& solver, FactList* facts) {
                   solver.reprojection_rms_after_px()));
   Add(facts,
       "problem",
-      fmt::format("{} segments, {} partitions, {} keyframes, {} "
-                  "landmarks ({} dropped), {} observations ({} dropped)",
-                  solver.segments(),
-                  solver.partitions(),
-                  solver.keyframes(),
-                  solver.landmarks(),
+      fmt::format("{}, {}, {}, {} ({} dropped), {} ({} dropped)",
+                  CountText(solver.segments(), "segment"),
+                  CountText(solver.partitions(), "partition"),
+                  CountText(solver.keyframes(), "keyframe"),
+                  CountText(solver.landmarks(), "landmark"),
                   solver.landmarks_dropped(),
-                  solver.observations(),
+                  CountText(solver.observations(), "observation"),
                   solver.observations_dropped()));
   if (solver.track_noise_factor() > 1) {
     Add(facts,

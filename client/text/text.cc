@@ -40,6 +40,14 @@ std::string TimeText(const google::protobuf::Timestamp& time) {
                      fmt::gmtime(static_cast<std::time_t>(time.seconds())));
 }
 
+std::string CountText(std::int64_t count,
+                      std::string_view noun,
+                      std::string_view plural) {
+  if (count == 1) return fmt::format("1 {}", noun);
+  return plural.empty() ? fmt::format("{} {}s", count, noun)
+                        : fmt::format("{} {}", count, plural);
+}
+
 std::string BytesText(std::int64_t bytes) {
   if (bytes < 1000) return fmt::format("{} B", bytes);
   if (bytes < 1'000'000) {

@@ -18,6 +18,11 @@ namespace selfcal::client {
 // "2026-11-21 04:10:03" in UTC, or "-" without a time.
 std::string TimeText(const google::protobuf::Timestamp& time);
 
+// "1 segment", "2 segments"; `plural` for a noun that does not add an s.
+std::string CountText(std::int64_t count,
+                      std::string_view noun,
+                      std::string_view plural = "");
+
 // "1.4 MB".
 std::string BytesText(std::int64_t bytes);
 

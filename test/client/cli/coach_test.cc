@@ -71,12 +71,12 @@ TEST_F(Commands, CoachPrintsJson) {
 // The same answer again is not news; another motion or another segment is.
 TEST_F(Commands, CoachWatchPrintsALineWhenTheAdviceChanges) {
   daemon_.advice = {
-      Advice("pan", 5), Advice("pan", 5), Advice("pan", 6), Advice("nod", 6)};
+      Advice("pan", 1), Advice("pan", 1), Advice("pan", 6), Advice("nod", 6)};
   const Outcome outcome =
       Selfcal({"coach", "device", "--watch", "--count", "3"});
   EXPECT_EQ(outcome.code, kDone) << outcome.err;
   EXPECT_EQ(outcome.out,
-            "pan: Do pan. (+3.14 nat; version 2 and 5 segments since)\n"
+            "pan: Do pan. (+3.14 nat; version 2 and 1 segment since)\n"
             "pan: Do pan. (+3.14 nat; version 2 and 6 segments since)\n"
             "nod: Do nod. (+3.14 nat; version 2 and 6 segments since)\n");
 }

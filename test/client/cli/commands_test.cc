@@ -280,7 +280,7 @@ TEST_F(Commands, ShowsACalibrationWithItsOriginAndValues) {
   EXPECT_THAT(outcome.out, HasSubstr("started from\tversion 1\n"));
   EXPECT_THAT(outcome.out,
               HasSubstr("temperature\t21.5 C, 20.0 to 23.0 C (1 of 1 "
-                        "segments)\n"));
+                        "segment)\n"));
   EXPECT_THAT(outcome.out, HasSubstr("held constant\tcam0.p_CI.z"));
   EXPECT_THAT(outcome.out,
               HasSubstr("noise\tpixel sigma: residuals suggest 1.23 times what "
@@ -306,6 +306,13 @@ TEST_F(Commands, ShowsTheStoredVerdictWithEachVersion) {
   const Outcome listed = Selfcal({"calibrations", "list", "device"});
   EXPECT_THAT(listed.out, HasSubstr("\tweak\t"));
   EXPECT_THAT(listed.out, HasSubstr("\tunknown\t")) << "an older daemon's";
+}
+
+TEST_F(Commands, ListsAVersionOfOneSegmentInTheSingular) {
+  daemon_.calibrations = {Version(2)};
+  daemon_.calibrations[0].mutable_solver()->set_segments(1);
+  EXPECT_THAT(Selfcal({"calibration", "list", "device"}).out,
+              HasSubstr("\tconverged, 1 segment, rms "));
 }
 
 TEST_F(Commands, ShowsRotationsInDegreesFromTheFactorys) {

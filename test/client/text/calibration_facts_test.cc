@@ -47,6 +47,26 @@ TEST(CalibrationFacts, SayWhichNoiseWasUsed) {
                           "rig states (+- 5 %)"));
 }
 
+TEST(CalibrationFacts, CountOneOfAKindInTheSingular) {
+  v1::Calibration calibration;
+  calibration.mutable_provenance()->add_segments("rigs/a/segments/walk~0");
+  auto* temperature = calibration.mutable_provenance()->mutable_temperature();
+  temperature->set_mean_c(20);
+  temperature->set_min_c(19);
+  temperature->set_max_c(21);
+  v1::SolverReport* solver = calibration.mutable_solver();
+  solver->set_segments(1);
+  solver->set_partitions(1);
+  solver->set_keyframes(40);
+  solver->set_landmarks(1);
+  solver->set_observations(1);
+  EXPECT_THAT(Texts(calibration, "temperature"),
+              ElementsAre("20.0 C, 19.0 to 21.0 C (0 of 1 segment)"));
+  EXPECT_THAT(Texts(calibration, "problem"),
+              ElementsAre("1 segment, 1 partition, 40 keyframes, 1 landmark (0 "
+                          "dropped), 1 observation (0 dropped)"));
+}
+
 TEST(CalibrationFacts, GiveTheVerdictWithItsReasons) {
   v1::Calibration calibration;
   EXPECT_THAT(Texts(calibration, "verdict"), ElementsAre("unknown"));

@@ -26,6 +26,14 @@ TEST(SigmaText, HasTwoDigits) {
   EXPECT_EQ(SigmaText(0), "-") << "nothing was estimated";
 }
 
+TEST(CountText, HasThePluralForAllButOne) {
+  EXPECT_EQ(CountText(0, "segment"), "0 segments");
+  EXPECT_EQ(CountText(1, "segment"), "1 segment");
+  EXPECT_EQ(CountText(2, "segment"), "2 segments");
+  EXPECT_EQ(CountText(1, "entry", "entries"), "1 entry");
+  EXPECT_EQ(CountText(2, "entry", "entries"), "2 entries");
+}
+
 TEST(BytesText, HasAUnit) {
   EXPECT_EQ(BytesText(999), "999 B");
   EXPECT_EQ(BytesText(1234), "1.2 kB");
