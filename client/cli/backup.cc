@@ -61,10 +61,7 @@ int Backup(Context* context, const std::string& path, bool force) {
     }
     written = file.Commit();
   }
-  if (!written.ok()) {
-    PrintError(std::string(written.message()));
-    return kFailed;
-  }
+  if (!written.ok()) return FailInput(written);
   const std::string sha256 = HexText(arrived.sha256());
   if (context->json) {
     // The form of sha256sum, instead of base64.

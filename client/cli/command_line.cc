@@ -22,9 +22,10 @@ constexpr char kFooter[] =
     "or one line each for\nsegment import, calibration watch, run watch, "
     "rig coach --watch, rig verify and\ndaemon doctor.\n\n"
     "Exit codes: 0 success; 1 the daemon refused, the operation failed, or "
-    "segment\npreflight or rig verify found something; 2 wrong usage or "
-    "unusable input; 3 the\ndaemon cannot be reached; 4 daemon doctor found "
-    "damage.";
+    "segment\npreflight or rig verify found something; 2 wrong usage, unusable "
+    "input, or a file\nthat exists or cannot be written; 3 the daemon cannot "
+    "be "
+    "reached; 4 daemon doctor\nfound damage.";
 
 // Help shows a command under its name alone.
 class Formatter final : public CLI::Formatter {

@@ -2,8 +2,8 @@
 // and the conversion of errors into exit codes.
 //
 // Exit codes: 0 success; 1 the daemon refused the request, or the operation
-// failed; 2 wrong usage or unusable input; 3 the daemon cannot be reached; 4
-// its database is damaged.
+// failed; 2 wrong usage, unusable input, or an output file that exists or
+// cannot be written; 3 the daemon cannot be reached; 4 its database is damaged.
 #pragma once
 
 #include <absl/status/status.h>
@@ -74,7 +74,7 @@ void PrintError(std::string_view text);  // prints "selfcal: text"
 // Prints the error to stderr, with a line for each violated field; returns the
 // exit code.
 int Fail(const Context& context, const grpc::Status& status);
-// Does the same for input that could not be read.
+// Does the same for input that cannot be read and files that cannot be written.
 int FailInput(const absl::Status& status);
 
 // True for errors that may end when the daemon is back. CANCELLED is one of

@@ -102,10 +102,7 @@ int ExportCalibration(Context* context, const ExportInput& input) {
       OutputPaths(exported->files, input.output);
   const absl::Status written =
       WriteTextFiles(exported->files, paths, input.force);
-  if (!written.ok()) {
-    PrintError(std::string(written.message()));
-    return kFailed;
-  }
+  if (!written.ok()) return FailInput(written);
   if (context->json) {
     context->PrintJson(FilesMessage(paths, exported->losses));
     return kDone;

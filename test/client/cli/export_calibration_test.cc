@@ -92,7 +92,7 @@ TEST_F(CalibrationExport, OverwritesOnlyWhenTold) {
   EXPECT_EQ(Selfcal(line).code, 0);
   fs::remove(folder_ / "camchain-imucam.yaml");
   const Outcome refused = Selfcal(line);
-  EXPECT_EQ(refused.code, 1);
+  EXPECT_EQ(refused.code, 2) << "as for every other command that writes files";
   EXPECT_THAT(refused.err, HasSubstr("--force"));
   EXPECT_FALSE(fs::exists(folder_ / "camchain-imucam.yaml")) << "all or none";
   line.push_back("--force");

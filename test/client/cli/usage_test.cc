@@ -182,6 +182,15 @@ TEST_F(Usage, ExitCodesAreThoseOfTheDocumentation) {
   EXPECT_EQ(
       client::Selfcal({"rig", "list", "--target", "unix:/nowhere/at_all"}).code,
       3);
+  daemon_.calibrations = {Version(1)};
+  EXPECT_EQ(Selfcal({"calibration",
+                     "report",
+                     "device",
+                     "--output",
+                     WriteFile("precious")})
+                .code,
+            2)
+      << "a file is in the way";
   // 4, of `daemon doctor`, is in store_test.cc.
 }
 
