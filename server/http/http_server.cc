@@ -235,8 +235,10 @@ class MicroServer final : public HttpServer {
                                MHD_OPTION_END);
     if (daemon_ == nullptr) {
       return absl::UnavailableError(
-          "cannot open the port; check that it is free, and that the TLS files "
-          "are a certificate with its key");
+          address.loopback
+              ? "cannot open the port; check that it is free"
+              : "cannot open the port; check that it is free, and that the TLS "
+                "files are a certificate with its key");
     }
     const MHD_DaemonInfo* info =
         MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT);

@@ -211,7 +211,10 @@ TEST_F(MetricsTest, PortInUseIsAnError) {
   MetricsOptions options;
   const std::string url = metrics_->url();
   options.address = url.substr(7, url.find("/metrics") - 7);
-  EXPECT_TRUE(absl::IsUnavailable(MakeMetrics(store_.get(), options).status()));
+  const absl::Status status = MakeMetrics(store_.get(), options).status();
+  EXPECT_TRUE(absl::IsUnavailable(status));
+  EXPECT_EQ(status.message(),
+            "metrics: cannot open the port; check that it is free");
 }
 
 }  // namespace
