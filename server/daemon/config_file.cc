@@ -1,9 +1,15 @@
 #include "server/daemon/config_file.h"
 
+#include <absl/status/statusor.h>
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -18,6 +24,22 @@ absl::Status FileMistake(const std::string& path,
                          const std::string& what) {
   return absl::InvalidArgumentError(fmt::format(
       "{}:{}:{}: {}", path, where.begin.line, where.begin.column, what));
+}
+
+absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
+      std::fopen(path.c_str(), "rb"), std::fclose);
+  std::string text;
+  if (file != nullptr) {
+    std::array<char, 4096> buffer{};
+    while (const std::size_t size =
+               std::fread(buffer.data(), 1, buffer.size(), file.get())) {
+      text.append(buffer.data(), size);
+    }
+    if (std::ferror(file.get()) == 0) return text;
+  }
+  return absl::NotFoundError(
+      fmt::format("cannot read {}: {}", path, std::strerror(errno)));
 }
 
 // Converts a value to the text of a command line argument; nullopt for types
@@ -96,9 +118,11 @@ std::optional<std::string> Set(const std::string& name,
 }  // namespace
 
 absl::Status ApplyConfigFile(const std::string& path, DaemonOptions* options) {
+  const auto text = ReadFile(path);
+  if (!text.ok()) return text.status();
   toml::table table;
   try {
-    table = toml::parse_file(path);
+    table = toml::parse(*text, path);
   } catch (const toml::parse_error& error) {
     return FileMistake(path, error.source(), std::string(error.description()));
   }

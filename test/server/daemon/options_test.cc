@@ -225,6 +225,17 @@ TEST_F(OptionsTest, MistakesOfTheFileAreNamedWithTheirLine) {
   EXPECT_THAT(MistakeIn("help = \"me\"\n"), HasSubstr("no setting 'help'"));
 }
 
+TEST_F(OptionsTest, AFileThatCannotBeReadIsNamedWithTheReason) {
+  for (const auto& [path, reason] :
+       {std::pair("/nowhere/selfcald.toml", "No such file or directory"),
+        std::pair("/", "Is a directory")}) {
+    ::testing::internal::CaptureStderr();
+    EXPECT_EQ(Parse({"--state-dir", "s", "--config", path}), 2);
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(),
+              "cannot read " + std::string(path) + ": " + reason + "\n");
+  }
+}
+
 // The file that is installed: each setting is in it, what it shows as default
 // is the default, and its examples can be used.
 TEST_F(OptionsTest, ExampleFileShowsEverySettingAndItsDefault) {
