@@ -28,6 +28,7 @@
 #include "server/host/machine_clocks.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
+#include "server/status/status_macros.h"
 #include "server/store/make_store.h"
 #include "server/store/sqlite/file_identity.h"
 #include "server/store/sqlite/sqlite.h"
@@ -128,6 +129,17 @@ absl::Status CheckCeres(const DaemonOptions& options) {
                   scores ? "scorer" : "verify-share"));
 }
 
+// Checks what can be checked without the state directory and the addresses.
+absl::Status CheckSettings(const DaemonOptions& options) {
+  SELFCAL_RETURN_IF_ERROR(CheckCeres(options));
+  SELFCAL_RETURN_IF_ERROR(CheckServerOptions(options.server));
+  if (options.metrics != "off") {
+    SELFCAL_RETURN_IF_ERROR(CheckMetricsAddress(options.metrics));
+  }
+  if (options.console == "off") return absl::OkStatus();
+  return CheckConsole(OptionsOfConsole(options));
+}
+
 // Opens the console; null if it is off.
 absl::StatusOr<std::unique_ptr<Console>> OpenConsole(
     const DaemonOptions& options, const Api* api) {
@@ -193,8 +205,9 @@ std::optional<int> ServeOnce(
   // Declared first, so that it limits the time in which everything below ends.
   std::optional<StopDeadline> deadline;
   RaiseFileLimit();
-  if (absl::Status status = CheckCeres(options); !status.ok()) {
-    return Failed("cannot start", status);
+  // A start that the settings prevent leaves the state directory as it is.
+  if (absl::Status status = CheckSettings(options); !status.ok()) {
+    return Failed("the settings are invalid", status);
   }
   const auto lock = StateLock::Take(options.state_dir);
   if (!lock.ok()) return Failed("cannot start", lock.status());
@@ -277,14 +290,7 @@ std::optional<int> ServeOnce(
 }  // namespace
 
 int Check(const DaemonOptions& options) {
-  absl::Status status = CheckCeres(options);
-  if (status.ok()) status = CheckServerOptions(options.server);
-  if (status.ok() && options.metrics != "off") {
-    status = CheckMetricsAddress(options.metrics);
-  }
-  if (status.ok() && options.console != "off") {
-    status = CheckConsole(OptionsOfConsole(options));
-  }
+  absl::Status status = CheckSettings(options);
   if (!status.ok()) return Failed("the settings are invalid", status);
   status = CheckStateFolder(options.state_dir);
   if (status.ok()) {

@@ -66,6 +66,20 @@ TEST_F(OperationTest, CheckLooksAtTheSettingsAndEnds) {
   EXPECT_THAT(misspelt->Log(), HasSubstr(file + ":2:1: "));
 }
 
+TEST_F(OperationTest, AStartWithInvalidSettingsDoesNotTouchTheStateDirectory) {
+  for (const std::vector<std::string>& settings :
+       std::vector<std::vector<std::string>>{
+           {"--metrics", "0.0.0.0:9464"},
+           {"--console", "0.0.0.0:7448"},
+           {"--listen", "127.0.0.1:7447"},
+           {"--listen", "unix:/tmp/s", "--socket-group", "no such group"}}) {
+    const auto daemon = Start(settings);
+    EXPECT_EQ(daemon->Wait(), 1) << testing::PrintToString(settings);
+    EXPECT_FALSE(std::filesystem::exists(state_))
+        << testing::PrintToString(settings) << daemon->Log();
+  }
+}
+
 TEST_F(OperationTest, AStopDoesNotWaitForABackupThatNobodyReads) {
   const auto daemon = StartAndWait();
   Rig rig = TestRig("r");
