@@ -154,6 +154,9 @@ TEST_F(Usage, EveryOldSpellingStillWorksAndHelpShowsTheNewAlone) {
     EXPECT_THAT(help, Not(HasSubstr(noun + "s,")));
     EXPECT_THAT(help, HasSubstr("\n  " + noun + " "));
   }
+  EXPECT_EQ(Selfcal({"daemons", "top", "--help"}).out,
+            Selfcal({"daemon", "top", "--help"}).out);
+  EXPECT_THAT(help, Not(HasSubstr("daemons")));
   EXPECT_EQ(Selfcal({"calibrations", "diff", "--help"}).out,
             Selfcal({"calibration", "compare", "--help"}).out);
 }
