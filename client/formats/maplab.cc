@@ -24,6 +24,20 @@ ImuNoise ReadNoise(const YAML::Node& imu) {
               GetDouble(sigmas, "acc_bias_random_walk_noise_density")};
 }
 
+// maplab requires a range, and most files have its default, which says nothing
+// about the sensor.
+ImuFullScale ReadFullScale(const YAML::Node& imu) {
+  const auto read = [&](const char* key, double maplab, double selfcal) {
+    const double range = GetDouble(imu, key, maplab);
+    return range > 0 && range != maplab ? range : selfcal;
+  };
+  const ImuFullScale defaults;
+  return {
+      .gyro_radps = read("saturation_gyro_max_radps", 7.5, defaults.gyro_radps),
+      .accel_mps2 =
+          read("saturation_accel_max_mps2", 150, defaults.accel_mps2)};
+}
+
 CameraCalibration ReadCamera(const YAML::Node& entry,
                              std::vector<Loss>* losses) {
   const YAML::Node camera = Get(entry, "camera");
@@ -97,14 +111,16 @@ std::string ImuText(const Rig& rig, const std::string& id) {
       "      acc_bias_random_walk_noise_density: {}\n"
       "      gyro_noise_density: {}\n"
       "      gyro_bias_random_walk_noise_density: {}\n"
-      "    saturation_accel_max_mps2: 150.0\n"
-      "    saturation_gyro_max_radps: 7.5\n"
+      "    saturation_accel_max_mps2: {}\n"
+      "    saturation_gyro_max_radps: {}\n"
       "    gravity_magnitude_mps2: {}\n",
       id,
       NumberText(noise.accel_noise_density),
       NumberText(noise.accel_bias_random_walk),
       NumberText(noise.gyro_noise_density),
       NumberText(noise.gyro_bias_random_walk),
+      NumberText(rig.imu_full_scale.accel_mps2),
+      NumberText(rig.imu_full_scale.gyro_radps),
       NumberText(rig.gravity_mps2));
 }
 
@@ -200,6 +216,7 @@ ImportedRig ImportMaplab(const std::vector<TextFile>& files,
   }
   ImportedRig result;
   result.rig.imu_noise = ReadNoise(imu);
+  result.rig.imu_full_scale = ReadFullScale(imu);
   result.rig.gravity_mps2 = GetDouble(imu, "gravity_magnitude_mps2");
   AddExtrinsicsLoss(root, system, &result.losses);
   for (const YAML::Node& entry : Get(system, "cameras")) {
@@ -230,11 +247,6 @@ ExportedFiles ExportMaplab(const Rig& rig,
   text += "extrinsics:\n" + PlaceText(imu, imu) + PlaceText(system, imu);
   AddImuLoss("maplab", theta.imu, &result.losses);
   AddTimeOffsetLosses("maplab", theta, &result.losses);
-  result.losses.push_back({"saturation",
-                           "maplab needs the IMU's range, which selfcal does "
-                           "not know: its defaults are written, 150 m/s^2 and "
-                           "7.5 rad/s",
-                           false});
   result.files = {{"sensors.yaml", text}};
   return result;
 }

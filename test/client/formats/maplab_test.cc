@@ -8,6 +8,9 @@
 namespace selfcal::client {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::Field;
 using ::testing::HasSubstr;
 
 constexpr char kSensors[] = R"(
@@ -75,6 +78,43 @@ TEST(ImportMaplab, ReadsNoiseCameraAndInvertsExtrinsics) {
   EXPECT_LT((camera.q_CI * Eigen::Vector3d::UnitX() + Eigen::Vector3d::UnitY())
                 .norm(),
             1e-12);
+}
+
+TEST(ImportMaplab, ReadsTheRangeOfTheImu) {
+  const std::string gravity = "    gravity_magnitude_mps2: 9.80\n";
+  const auto imported =
+      Import(Replaced(gravity,
+                      gravity + "    saturation_accel_max_mps2: 78.5\n"
+                                "    saturation_gyro_max_radps: 17.5\n"));
+  ASSERT_TRUE(imported.ok()) << imported.status();
+  EXPECT_EQ(imported->rig.imu_full_scale.accel_mps2, 78.5);
+  EXPECT_EQ(imported->rig.imu_full_scale.gyro_radps, 17.5);
+}
+
+// 150 m/s^2 and 7.5 rad/s are in most files, whatever the sensor.
+TEST(ImportMaplab, TakesTheDefaultOfMaplabForNoRange) {
+  const std::string gravity = "    gravity_magnitude_mps2: 9.80\n";
+  for (const std::string range : {"",
+                                  "    saturation_accel_max_mps2: 150.0\n"
+                                  "    saturation_gyro_max_radps: 7.5\n",
+                                  "    saturation_accel_max_mps2: 0\n"
+                                  "    saturation_gyro_max_radps: 0\n"}) {
+    const auto imported = Import(Replaced(gravity, gravity + range));
+    ASSERT_TRUE(imported.ok()) << imported.status();
+    EXPECT_EQ(imported->rig.imu_full_scale.accel_mps2, 156.9064) << range;
+    EXPECT_EQ(imported->rig.imu_full_scale.gyro_radps, 34.9065850) << range;
+  }
+}
+
+TEST(ExportMaplab, WritesTheRangeOfTheImu) {
+  Rig rig = Import(kSensors)->rig;
+  rig.imu_full_scale = {.gyro_radps = 17.5, .accel_mps2 = 78.5};
+  const auto exported = ExportRig("maplab", rig, rig.factory, {});
+  ASSERT_TRUE(exported.ok()) << exported.status();
+  EXPECT_THAT(exported->files[0].text,
+              AllOf(HasSubstr("    saturation_accel_max_mps2: 78.5\n"),
+                    HasSubstr("    saturation_gyro_max_radps: 17.5\n")));
+  EXPECT_THAT(exported->losses, ElementsAre(Field(&Loss::name, "sigmas")));
 }
 
 TEST(ImportMaplab, EveryMistakeIsNamedWithTheFile) {
