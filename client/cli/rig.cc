@@ -93,7 +93,7 @@ void AddRigCommands(CLI::App* app, Context* context) {
   AddListOptions(list,
                  "the first of the list",
                  "Conditions joined by AND, e.g. 'phone AND labels.batch = 7': "
-                 "a text in the name; fields: labels.NAME",
+                 "a text in the name; fields: name, labels.NAME",
                  &list_options->list);
   list->add_option("--order-by",
                    list_options->order_by,

@@ -15,11 +15,21 @@ absl::Status ParseRigFilter(std::string_view filter, RigQuery* query) {
       query->text = term.value;
       return absl::OkStatus();
     }
-    if (term.field != "labels" || term.group.empty() || term.sign != "=") {
-      return NotWhatIsExpected(
-          term.field, "a condition: labels.NAME = VALUE, or a text alone");
+    const bool is_name = term.field == "name" && term.group.empty();
+    const bool is_label = term.field == "labels" && !term.group.empty();
+    if ((!is_name && !is_label) || term.sign != "=") {
+      return NotWhatIsExpected(term.field,
+                               "a condition: name = RIG, labels.NAME = VALUE, "
+                               "or a text alone");
     }
-    query->labels[term.group] = term.value;
+    if (is_label) {
+      query->labels[term.group] = term.value;
+      return absl::OkStatus();
+    }
+    if (term.value.empty() || !query->name.empty()) {
+      return NotWhatIsExpected(term.value, "a condition: give one name");
+    }
+    query->name = term.value;
     return absl::OkStatus();
   };
   return ForEachTerm(filter, LoneTexts::kAllowed, apply);

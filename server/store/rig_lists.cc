@@ -37,11 +37,12 @@ std::string LinesOf(const std::map<std::string, std::string>& labels) {
 }
 
 std::string ListOf(const RigQuery& query) {
-  return fmt::format("rigs by {}{} with {}{}",
+  return fmt::format("rigs by {}{} with {}{}{}",
                      query.order == RigQuery::Order::kName ? "name" : "seen",
                      query.descending ? " desc" : "",
                      query.text,
-                     LinesOf(query.labels));
+                     LinesOf(query.labels),
+                     query.name);
 }
 
 std::string KeyOf(const RigSummary& summary) {
@@ -91,6 +92,7 @@ std::string SqlOf(const RigQuery& query) {
       "  (SELECT count(*) FROM rig_labels l WHERE l.rig = rigs.rig "
       "   AND replace(?5, '\n' || l.name || '=' || l.value || '\n', '') "
       "     <> ?5)) "
+      "AND (?7 = '' OR id = ?7) "
       "ORDER BY {} LIMIT ?3",
       place,
       order);
@@ -107,7 +109,8 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
                  limit,
                  query.text,
                  LinesOf(query.labels),
-                 static_cast<std::int64_t>(query.labels.size()));
+                 static_cast<std::int64_t>(query.labels.size()),
+                 query.name);
   std::vector<Found> found;
   while (read.Next()) {
     Found rig;

@@ -11,6 +11,7 @@ struct RigQuery {
   std::map<std::string, std::string> labels;  // which the rig must have
   enum class Order { kName, kLastSeen } order = Order::kName;
   bool descending = false;
+  std::string name;  // the whole name; empty: every rig
 };
 
 }  // namespace selfcal::server

@@ -29,7 +29,7 @@ SELFCAL_STORE_TEST_SUITE(RigSummariesTest);
 TEST_P(RigSummariesTest, PagesGoByNameBothWays) {
   for (const char* id : {"c", "a", "e", "b", "d"}) CreateTestRig(id);
   EXPECT_THAT(Names({}), ElementsAre("a", "b", "c", "d", "e"));
-  EXPECT_THAT(Names({"", {}, RigOrder::kName, true}),
+  EXPECT_THAT(Names({"", {}, RigOrder::kName, true, ""}),
               ElementsAre("e", "d", "c", "b", "a"));
 }
 
@@ -40,17 +40,27 @@ TEST_P(RigSummariesTest, PagesGoByWhenARigWasSeen) {
   CreateTestRig("also-never");
   Put(b.id, 0);
   Put(a.id, 0);
-  EXPECT_THAT(Names({"", {}, RigOrder::kLastSeen, false}, 1),
+  EXPECT_THAT(Names({"", {}, RigOrder::kLastSeen, false, ""}, 1),
               ElementsAre("also-never", "never", "b", "a"));
-  EXPECT_THAT(Names({"", {}, RigOrder::kLastSeen, true}, 1),
+  EXPECT_THAT(Names({"", {}, RigOrder::kLastSeen, true, ""}, 1),
               ElementsAre("a", "b", "never", "also-never"));
 }
 
 TEST_P(RigSummariesTest, TextIsLookedForInTheName) {
   for (const char* id : {"tablet-1", "phone-1", "tablet-2"}) CreateTestRig(id);
-  EXPECT_THAT(Names({"tablet", {}, RigOrder::kName, false}, 1),
+  EXPECT_THAT(Names({"tablet", {}, RigOrder::kName, false, ""}, 1),
               ElementsAre("tablet-1", "tablet-2"));
-  EXPECT_THAT(Names({"%", {}, RigOrder::kName, false}), IsEmpty());
+  EXPECT_THAT(Names({"%", {}, RigOrder::kName, false, ""}), IsEmpty());
+}
+
+TEST_P(RigSummariesTest, ANameIsComparedAsAWhole) {
+  for (const char* id : {"tablet", "tablet-2", "my-tablet"}) CreateTestRig(id);
+  for (const RigOrder order : {RigOrder::kName, RigOrder::kLastSeen}) {
+    EXPECT_THAT(Names({"", {}, order, false, "tablet"}, 1),
+                ElementsAre("tablet"));
+    EXPECT_THAT(Names({"", {}, order, false, "table"}, 1), IsEmpty());
+  }
+  EXPECT_THAT(Names({"-2", {}, RigOrder::kName, false, "tablet"}), IsEmpty());
 }
 
 TEST_P(RigSummariesTest, TokenOfAnotherQueryIsRefused) {
@@ -59,7 +69,10 @@ TEST_P(RigSummariesTest, TokenOfAnotherQueryIsRefused) {
   ASSERT_TRUE(listed.ok());
   for (const Page& page : {Page{1, listed->next_token}, Page{1, "nonsense"}}) {
     EXPECT_TRUE(absl::IsInvalidArgument(
-        store_->ListRigSummaries({"a", {}, RigOrder::kName, false}, page)
+        store_->ListRigSummaries({"a", {}, RigOrder::kName, false, ""}, page)
+            .status()));
+    EXPECT_TRUE(absl::IsInvalidArgument(
+        store_->ListRigSummaries({"", {}, RigOrder::kName, false, "a"}, page)
             .status()));
   }
 }
