@@ -341,6 +341,8 @@ typedef struct selfcal_acknowledgement {
   // Observations outside the image that the daemon has left out of a segment
   // that it stored.
   uint64_t observations_dropped;
+  // Readings of the IMU beyond its full scale, left out likewise.
+  uint64_t readings_dropped;
 } selfcal_acknowledgement;
 
 typedef void (*selfcal_ack_callback)(const selfcal_acknowledgement* ack,
@@ -372,6 +374,8 @@ typedef struct selfcal_stream_statistics {
   // Present content of the spool.
   uint64_t spool_segments;
   uint64_t spool_bytes;
+  // Readings of the IMU that the daemon has left out (selfcal_acknowledgement).
+  uint64_t readings_dropped;
 } selfcal_stream_statistics;
 
 // Creates a stream. It connects when there is something to send, which includes

@@ -423,8 +423,10 @@ struct Acknowledgement {
   std::int64_t index = 0;
   selfcal_verdict verdict = SELFCAL_REJECTED;
   std::vector<Violation> violations;  // the reasons for a rejection
-  // Observations outside the image that were left out of a stored segment.
+  // Observations outside the image, and readings of the IMU beyond its full
+  // scale, that were left out of a stored segment.
   std::uint64_t observations_dropped = 0;
+  std::uint64_t readings_dropped = 0;
 };
 
 namespace internal {
@@ -452,6 +454,7 @@ inline Acknowledgement FromC(const selfcal_acknowledgement& given) {
   ack.index = given.index;
   ack.verdict = static_cast<selfcal_verdict>(given.verdict);
   ack.observations_dropped = given.observations_dropped;
+  ack.readings_dropped = given.readings_dropped;
   for (std::uint64_t i = 0; i < given.violation_count; ++i) {
     ack.violations.push_back(
         {given.violations[i].field, given.violations[i].message});

@@ -47,7 +47,8 @@ void CallBack(const Acknowledgement& ack,
       ack.key.index,
       violations.data(),
       violations.size(),
-      ack.observations_dropped};
+      ack.observations_dropped,
+      ack.readings_dropped};
   on_ack(&given, user);
 }
 
@@ -136,6 +137,7 @@ int32_t selfcal_stream_get_statistics(const selfcal_stream* stream,
     value.spool_failures = counts.spool_failures;
     value.spool_segments = counts.spool_segments;
     value.spool_bytes = counts.spool_bytes;
+    value.readings_dropped = counts.readings_dropped;
     return selfcal::c::Write(
         value, selfcal::c::kStreamStatisticsSize, "statistics", statistics);
   });

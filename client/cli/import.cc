@@ -51,6 +51,7 @@ v1::StreamSegmentsResponse ToResponse(const Acknowledgement& ack) {
   }
   message.set_observations_dropped(
       static_cast<std::int32_t>(ack.observations_dropped));
+  message.set_readings_dropped(static_cast<std::int32_t>(ack.readings_dropped));
   for (const Violation& violation : ack.violations) {
     v1::FieldViolation* added = message.add_violations();
     added->set_field(violation.field);

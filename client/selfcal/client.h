@@ -71,6 +71,8 @@ struct Acknowledgement {
   // Observations outside the image that the daemon has left out of a segment
   // that it stored.
   std::uint64_t observations_dropped = 0;
+  // Readings of the IMU beyond its full scale, left out likewise.
+  std::uint64_t readings_dropped = 0;
 };
 
 // Counts of segments unless stated otherwise.
@@ -96,6 +98,8 @@ struct StreamStatistics {
   // Present content of the spool.
   std::uint64_t spool_segments = 0;
   std::uint64_t spool_bytes = 0;
+  // Readings of the IMU that the daemon has left out (Acknowledgement).
+  std::uint64_t readings_dropped = 0;
 };
 
 // Sends segments to the daemon, in order and at least once.

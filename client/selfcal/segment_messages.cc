@@ -40,6 +40,8 @@ Acknowledgement ToAcknowledgement(const v1::StreamSegmentsResponse& response) {
   ack.key = {response.session(), response.index()};
   ack.observations_dropped =
       static_cast<std::uint64_t>(std::max(response.observations_dropped(), 0));
+  ack.readings_dropped =
+      static_cast<std::uint64_t>(std::max(response.readings_dropped(), 0));
   for (const v1::FieldViolation& violation : response.violations()) {
     ack.violations.push_back({violation.field(), violation.description()});
   }

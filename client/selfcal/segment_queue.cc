@@ -116,6 +116,7 @@ bool SegmentQueue::Acknowledge(const Acknowledgement& ack) {
     if (segment->on_disk) finished_files_.push_back(segment->number);
     Count(ack.verdict, &statistics_);
     statistics_.observations_dropped += ack.observations_dropped;
+    statistics_.readings_dropped += ack.readings_dropped;
     ++callbacks_due_;
   }
   work_.notify_one();

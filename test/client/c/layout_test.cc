@@ -113,6 +113,7 @@ TEST(Layout, OfStatisticsAndAcknowledgements) {
   EXPECT_MEMBER(selfcal_stream_statistics, spool_segments, 128, 8);
   EXPECT_MEMBER(selfcal_stream_statistics, spool_bytes, 136, 8);
   EXPECT_EQ(c::kStreamStatisticsSize, 144u);
+  EXPECT_MEMBER(selfcal_stream_statistics, readings_dropped, 144, 8);
 
   EXPECT_MEMBER(selfcal_acknowledgement, struct_size, 0, 4);
   EXPECT_MEMBER(selfcal_acknowledgement, verdict, 4, 4);
@@ -121,6 +122,7 @@ TEST(Layout, OfStatisticsAndAcknowledgements) {
   EXPECT_MEMBER(selfcal_acknowledgement, violations, 24, 8);
   EXPECT_MEMBER(selfcal_acknowledgement, violation_count, 32, 8);
   EXPECT_MEMBER(selfcal_acknowledgement, observations_dropped, 40, 8);
+  EXPECT_MEMBER(selfcal_acknowledgement, readings_dropped, 48, 8);
 }
 
 TEST(Layout, OfTheCalibration) {

@@ -18,5 +18,16 @@ TEST(SegmentMessages, AnAcknowledgementHasTheNumberOfDroppedObservations) {
   EXPECT_EQ(ToAcknowledgement(response).observations_dropped, 0u);
 }
 
+TEST(SegmentMessages, AnAcknowledgementHasTheNumberOfDroppedReadings) {
+  v1::StreamSegmentsResponse response;
+  response.set_verdict(v1::StreamSegmentsResponse::STORED);
+  EXPECT_EQ(ToAcknowledgement(response).readings_dropped, 0u);
+  response.set_readings_dropped(5);
+  EXPECT_EQ(ToAcknowledgement(response).readings_dropped, 5u);
+  EXPECT_EQ(ToAcknowledgement(response).observations_dropped, 0u);
+  response.set_readings_dropped(-1);
+  EXPECT_EQ(ToAcknowledgement(response).readings_dropped, 0u);
+}
+
 }  // namespace
 }  // namespace selfcal::client

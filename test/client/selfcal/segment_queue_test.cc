@@ -63,10 +63,11 @@ TEST_F(SegmentQueueTest, CountsWhatAssemblyAndDaemonHaveDropped) {
   MoveToWindow(0);
   queue_.Open();
   ASSERT_NE(queue_.Next(), nullptr);
-  ASSERT_TRUE(queue_.Acknowledge({{"walk", 0}, Verdict::kStored, {}, 6}));
+  ASSERT_TRUE(queue_.Acknowledge({{"walk", 0}, Verdict::kStored, {}, 6, 5}));
   EXPECT_EQ(queue_.statistics().tracks_triangulated, 90u);
   EXPECT_EQ(queue_.statistics().tracks_dropped, 7u);
   EXPECT_EQ(queue_.statistics().observations_dropped, 6u);
+  EXPECT_EQ(queue_.statistics().readings_dropped, 5u);
 }
 
 TEST_F(SegmentQueueTest, LeavesRoomForASegmentThatIsReadFromDisk) {
