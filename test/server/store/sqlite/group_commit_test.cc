@@ -18,7 +18,7 @@ namespace {
 
 using ::testing::Test;
 
-constexpr Migration kTable{
+constexpr Migration kNumbers{
     "0001.sql", "aa", "CREATE TABLE t (x INTEGER) STRICT;"};
 
 class GroupCommitTest : public Test {
@@ -26,7 +26,7 @@ class GroupCommitTest : public Test {
   GroupCommitTest() {
     const std::string path = folder_.File("test.db");
     auto opened = SqliteDatabase::Open(path, [path] {
-      return OpenDatabase(path, std::vector<Migration>{kTable}, 0);
+      return OpenDatabase(path, std::vector<Migration>{kNumbers}, 0);
     });
     EXPECT_TRUE(opened.ok()) << opened.status();
     db_ = *std::move(opened);
