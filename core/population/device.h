@@ -1,0 +1,25 @@
+// What the calibration of one device adds to the statistics of its cohort, the
+// devices of one model. Pure functions, callable from any thread.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/information/fusion.h"
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
+
+namespace selfcal {
+
+// The information of the data of a device about the offset of its theta from
+// `reference`, without the prior of its rig: Lambda (theta [-] reference) =
+// eta.
+// `covariance` (D x D, tangent at theta) is that of the calibration `theta`,
+// which started from the prior PriorSigmas(rig) about rig.factory. Components
+// that the rig holds fixed have no information. `theta` and `reference` must
+// have the shape of rig.factory.
+ThetaInformation DeviceInformation(const Rig& rig,
+                                   const Calibration& theta,
+                                   const Eigen::MatrixXd& covariance,
+                                   const Calibration& reference);
+
+}  // namespace selfcal
