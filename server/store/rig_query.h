@@ -7,11 +7,11 @@
 namespace selfcal::server {
 
 struct RigQuery {
-  std::string text;  // part of the name; empty: every rig
-  std::map<std::string, std::string> labels;  // which the rig must have
+  std::string text = {};  // part of the name; empty: every rig
+  std::map<std::string, std::string> labels = {};  // which the rig must have
   enum class Order { kName, kLastSeen } order = Order::kName;
   bool descending = false;
-  std::string name;  // the whole name; empty: every rig
+  std::string name = {};  // the whole name; empty: every rig
 };
 
 }  // namespace selfcal::server

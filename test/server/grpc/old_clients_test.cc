@@ -46,7 +46,7 @@ std::vector<Call> Recorded() {
   return calls;
 }
 
-const MethodDescriptor& Method(const std::string& name) {
+const MethodDescriptor& MethodNamed(const std::string& name) {
   const auto* method = DescriptorPool::generated_pool()->FindMethodByName(name);
   if (method == nullptr) throw std::runtime_error(name + " is gone");
   return *method;
@@ -123,7 +123,8 @@ TEST_F(OldClientsTest, RecordedRequestsAreAnsweredAsTheyWere) {
     SCOPED_TRACE(call.method);
     ++promise.trials;
     for (const std::string& request : call.requests) {
-      EXPECT_TRUE(IsUnderstood(*Method(call.method).input_type(), request));
+      EXPECT_TRUE(
+          IsUnderstood(*MethodNamed(call.method).input_type(), request));
     }
     std::vector<std::string> answers;
     const grpc::Status status = Replay(call, &answers);

@@ -8,11 +8,11 @@
 namespace selfcal::server {
 namespace {
 
-using Verdict = PipelineObserver::Verdict;
+using Observed = PipelineObserver::Verdict;
 
 class Recorder final : public PipelineObserver {
  public:
-  void OnVerdict(const std::string& rig, Verdict verdict) override {
+  void OnVerdict(const std::string& rig, Observed verdict) override {
     const std::lock_guard lock(mutex_);
     ++verdicts_[{rig, verdict}];
   }
@@ -26,7 +26,7 @@ class Recorder final : public PipelineObserver {
   }
   void OnCheck(CheckSubject, VerificationOutcome) override {}
 
-  int Count(const std::string& rig, Verdict verdict) {
+  int Count(const std::string& rig, Observed verdict) {
     const std::lock_guard lock(mutex_);
     return verdicts_[{rig, verdict}];
   }
@@ -41,7 +41,7 @@ class Recorder final : public PipelineObserver {
 
  private:
   std::mutex mutex_;
-  std::map<std::pair<std::string, Verdict>, int> verdicts_;
+  std::map<std::pair<std::string, Observed>, int> verdicts_;
   int scores_ = 0;
   std::vector<RunState> runs_;
 };
@@ -62,10 +62,10 @@ TEST_F(ObserverTest, IsToldOfVerdictsScoresAndRuns) {
   invalid.keyframes.clear();
   ASSERT_TRUE(pipeline_->Submit("a", invalid, nullptr).ok());
   ASSERT_FALSE(pipeline_->Submit("nobody", Segment(1), nullptr).ok());
-  EXPECT_EQ(recorder_.Count("a", Verdict::kStored), 1);
-  EXPECT_EQ(recorder_.Count("a", Verdict::kDuplicate), 1);
-  EXPECT_EQ(recorder_.Count("a", Verdict::kRejected), 1);
-  EXPECT_EQ(recorder_.Count("nobody", Verdict::kFailed), 1);
+  EXPECT_EQ(recorder_.Count("a", Observed::kStored), 1);
+  EXPECT_EQ(recorder_.Count("a", Observed::kDuplicate), 1);
+  EXPECT_EQ(recorder_.Count("a", Observed::kRejected), 1);
+  EXPECT_EQ(recorder_.Count("nobody", Observed::kFailed), 1);
   ASSERT_TRUE(AllScored());
   EXPECT_EQ(recorder_.scores(), 1);
   ASSERT_TRUE(pipeline_->StartRecalibration("a").ok());
