@@ -12,7 +12,7 @@ namespace selfcal::server {
 std::string ExcludedFor(std::string_view parameter) {
   return fmt::format(
       "EXISTS (SELECT 1 FROM table_absences a WHERE a.segment = s.segment "
-      "  AND (({} >> a.cause) & 1) = 1)",
+      "  AND ((CAST({} AS BIGINT) >> CAST(a.cause AS INTEGER)) & 1) = 1)",
       parameter);
 }
 

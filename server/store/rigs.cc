@@ -64,24 +64,23 @@ absl::Status InsertLabels(Connection* db,
 
 absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig) {
   const std::string& id = rig.rig.id;
-  Statement existing(db, "SELECT 1 FROM rigs WHERE id = ?1", id);
-  const bool exists = existing.Next();
-  SELFCAL_RETURN_IF_ERROR(existing.status());
-  if (exists) {
-    return absl::AlreadyExistsError(
-        fmt::format("rig {} exists; choose another name", id));
-  }
   const std::string bytes = SerializeRig(rig);
   const std::string sha256 = Sha256(bytes);
+  // In one statement: another transaction may create the same rig.
   SELFCAL_ASSIGN_OR_RETURN(
       const std::int64_t row,
       InsertReturning(db,
                       "INSERT INTO rigs (id, create_time_ns, definition, "
-                      "  sha256) VALUES (?1, ?2, ?3, ?4) RETURNING rig",
+                      "  sha256) VALUES (?1, ?2, ?3, ?4) "
+                      "ON CONFLICT (id) DO NOTHING RETURNING rig",
                       id,
                       rig.create_time_ns,
                       BlobView{bytes},
                       BlobView{sha256}));
+  if (row == 0) {
+    return absl::AlreadyExistsError(
+        fmt::format("rig {} exists; choose another name", id));
+  }
   SELFCAL_RETURN_IF_ERROR(InsertLabels(db, row, rig));
   return row;
 }

@@ -12,30 +12,34 @@
 namespace selfcal::server {
 namespace {
 
+// A cast states the type of a parameter that may be NULL.
 constexpr char kConditions[] =
     "WHERE s.rig = ?1 "
-    "AND (?2 IS NULL OR s.state = ?2) "
-    "AND (?3 IS NULL OR s.session = ?3) "
-    "AND (?4 IS NULL OR ?4 = EXISTS ("
+    "AND (CAST(?2 AS BIGINT) IS NULL OR s.state = ?2) "
+    "AND (CAST(?3 AS TEXT) IS NULL OR s.session = ?3) "
+    "AND (CAST(?4 AS BOOLEAN) IS NULL OR ?4 = EXISTS ("
     "  SELECT 1 FROM payloads p WHERE p.segment = s.segment)) "
-    "AND (?5 IS NULL OR EXISTS (SELECT 1 FROM table_entries e "
+    "AND (CAST(?5 AS TEXT) IS NULL OR EXISTS (SELECT 1 FROM table_entries e "
     "  WHERE e.segment = s.segment AND e.group_name = ?5)) "
-    "AND (?6 IS NULL OR s.receive_time_ns >= ?6) "
-    "AND (?7 IS NULL OR s.receive_time_ns <= ?7) "
-    "AND (?8 IS NULL OR s.calibration_version >= ?8) "
-    "AND (?9 IS NULL OR s.calibration_version <= ?9) "
-    "AND (?10 IS NULL OR s.landmarks >= ?10) "
-    "AND (?11 IS NULL OR s.landmarks <= ?11) "
-    "AND (?12 IS NULL OR s.observations >= ?12) "
-    "AND (?13 IS NULL OR s.observations <= ?13) "
-    "AND (?14 IS NULL OR s.temperature_c >= ?14) "
-    "AND (?15 IS NULL OR s.temperature_c <= ?15) "
+    "AND (CAST(?6 AS BIGINT) IS NULL OR s.receive_time_ns >= ?6) "
+    "AND (CAST(?7 AS BIGINT) IS NULL OR s.receive_time_ns <= ?7) "
+    "AND (CAST(?8 AS BIGINT) IS NULL OR s.calibration_version >= ?8) "
+    "AND (CAST(?9 AS BIGINT) IS NULL OR s.calibration_version <= ?9) "
+    "AND (CAST(?10 AS BIGINT) IS NULL OR s.landmarks >= ?10) "
+    "AND (CAST(?11 AS BIGINT) IS NULL OR s.landmarks <= ?11) "
+    "AND (CAST(?12 AS BIGINT) IS NULL OR s.observations >= ?12) "
+    "AND (CAST(?13 AS BIGINT) IS NULL OR s.observations <= ?13) "
+    "AND (CAST(?14 AS DOUBLE PRECISION) IS NULL OR s.temperature_c >= ?14) "
+    "AND (CAST(?15 AS DOUBLE PRECISION) IS NULL OR s.temperature_c <= ?15) "
     "AND (?16 = '' OR EXISTS (SELECT 1 FROM segment_scores c "
     "  WHERE c.segment = s.segment AND c.group_name = ?16 "
-    "  AND (?17 IS NULL OR c.entropy >= ?17) "
-    "  AND (?18 IS NULL OR c.entropy <= ?18) "
-    "  AND (?19 IS NULL OR c.gain >= ?19) "
-    "  AND (?20 IS NULL OR c.gain <= ?20))) ";
+    "  AND (CAST(?17 AS DOUBLE PRECISION) IS NULL OR c.entropy >= ?17) "
+    "  AND (CAST(?18 AS DOUBLE PRECISION) IS NULL OR c.entropy <= ?18) "
+    "  AND (CAST(?19 AS DOUBLE PRECISION) IS NULL OR c.gain >= ?19) "
+    "  AND (CAST(?20 AS DOUBLE PRECISION) IS NULL OR c.gain <= ?20))) "
+    // Not every order uses these, but every parameter is used.
+    "AND CAST(?21 AS TEXT) IS NOT NULL "
+    "AND CAST(?22 AS DOUBLE PRECISION) IS NOT NULL ";
 
 bool IsOfGroup(SegmentQuery::Order order) {
   return order == SegmentQuery::Order::kEntropy ||
@@ -80,7 +84,10 @@ std::string Sql(const std::string& columns, const SegmentQuery& query) {
                              : "",
       kConditions,
       by_arrival ? fmt::format("s.sequence {} ?23", beyond)
-                 : fmt::format("({}, s.sequence) {} (?22, ?23)", key, beyond),
+                 : fmt::format("(CAST({} AS DOUBLE PRECISION), s.sequence) {} "
+                               "(?22, ?23)",
+                               key,
+                               beyond),
       by_arrival ? "s.sequence" : fmt::format("{} {}, s.sequence", key, way),
       way,
       way,

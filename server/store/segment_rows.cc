@@ -83,7 +83,8 @@ absl::StatusOr<std::vector<SegmentRow>> SegmentsOfSession(
   Statement read(tx->db(),
                  fmt::format("SELECT {} FROM segments s WHERE s.rig = ?1 "
                              "AND s.session = ?2 "
-                             "AND (?3 IS NULL OR s.session_index = ?3) "
+                             "AND (CAST(?3 AS BIGINT) IS NULL "
+                             "  OR s.session_index = ?3) "
                              "ORDER BY s.sequence",
                              kColumns),
                  tx->rig_row(),
