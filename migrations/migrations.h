@@ -16,5 +16,6 @@ struct Migration {
 
 // In the order in which they are applied. Lives as long as the program.
 std::span<const Migration> SqliteMigrations();
+std::span<const Migration> PostgresMigrations();
 
 }  // namespace selfcal::server

@@ -1,6 +1,7 @@
 // What the store needs of a database engine. server/store contains the records
 // and their SQL; a driver contains everything that engines do differently.
-// server/store/sqlite is the driver for SQLite.
+// server/store/sqlite is the driver for SQLite, server/store/postgres that for
+// PostgreSQL.
 //
 // Another driver is a folder beside it, with a library of its own, and provides
 //
@@ -17,7 +18,9 @@
 //
 // The SQL of the store is what SQLite and PostgreSQL have in common, and
 //
-// - numbers its parameters ?1, ?2, ... and may use one several times;
+// - numbers its parameters ?1, ?2, ... without a gap, and may use one several
+//   times; one whose type does not follow from where it first stands has a
+//   cast;
 // - has parameters and results of four types: 64-bit integers, doubles, text in
 //   UTF-8, and bytes (Dialect::blob_type). The driver converts truth values: as
 //   parameters and results they are the integers 0 and 1;

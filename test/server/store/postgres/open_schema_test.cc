@@ -1,0 +1,136 @@
+// Creation and migration of the schema, also by several processes at once, and
+// what is refused.
+#include "server/store/postgres/open_schema.h"
+
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "server/store/postgres/postgres.h"
+#include "test/server/store/postgres/postgres_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr Migration kFirst{"0001.sql", "aa", "CREATE TABLE t (x BIGINT);"};
+constexpr Migration kSecond{
+    "0002.sql",
+    "bb",
+    "ALTER TABLE t ADD COLUMN y BIGINT; INSERT INTO t VALUES (1, 2);"};
+constexpr Migration kThird{"0003.sql", "cc", "CREATE TABLE u (x BIGINT);"};
+constexpr Migration kBroken{
+    "0003.sql", "dd", "CREATE TABLE u (x BIGINT); SELECT 1 / 0;"};
+
+class OpenSchemaTest : public PostgresTest {
+ protected:
+  absl::Status OpenWith(const std::vector<Migration>& migrations) {
+    return OpenSchema(db_.get(), migrations, 5);
+  }
+  std::int64_t Tables() {
+    return Number(
+        "SELECT count(*) FROM information_schema.tables "
+        "WHERE table_schema = 'public'");
+  }
+};
+
+TEST_F(OpenSchemaTest, EachMigrationIsAppliedOnceAndRecorded) {
+  ASSERT_TRUE(OpenWith({kFirst, kSecond}).ok());
+  ASSERT_TRUE(OpenWith({kFirst, kSecond}).ok());
+  ASSERT_TRUE(OpenWith({kFirst, kSecond, kThird}).ok());
+  EXPECT_EQ(Number("SELECT count(*) FROM t"), 1);
+  EXPECT_EQ(Number("SELECT count(*) FROM schema_migrations "
+                   "WHERE apply_time_ns = 5"),
+            3);
+}
+
+TEST_F(OpenSchemaTest, AFailedMigrationChangesNothing) {
+  ASSERT_TRUE(OpenWith({kFirst, kSecond}).ok());
+  const absl::Status status = OpenWith({kFirst, kSecond, kBroken});
+  EXPECT_FALSE(status.ok());
+  EXPECT_THAT(std::string(status.message()), HasSubstr("0003.sql"));
+  EXPECT_EQ(Tables(), 2);
+  EXPECT_TRUE(OpenWith({kFirst, kSecond}).ok());
+}
+
+TEST_F(OpenSchemaTest, ANewerSchemaIsRefused) {
+  ASSERT_TRUE(OpenWith({kFirst, kSecond}).ok());
+  const absl::Status status = OpenWith({kFirst});
+  EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("version 2"));
+  const absl::Status other =
+      OpenWith({{kFirst.name, "another", kFirst.sql}, kSecond});
+  EXPECT_TRUE(absl::IsFailedPrecondition(other)) << other;
+}
+
+TEST_F(OpenSchemaTest, TheDatabaseOfAnotherProgramIsRefused) {
+  for (const char* foreign :
+       {"CREATE TABLE customers (id BIGINT)",
+        "CREATE TABLE schema_migrations (version VARCHAR PRIMARY KEY)"}) {
+    ASSERT_TRUE(db_->Execute("DROP SCHEMA public CASCADE; CREATE SCHEMA "
+                             "public")
+                    .ok());
+    ASSERT_TRUE(db_->Execute(foreign).ok());
+    const absl::Status status = OpenWith({kFirst});
+    EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+    EXPECT_EQ(Tables(), 1);
+  }
+}
+
+TEST_F(OpenSchemaTest, AnotherEncodingIsRefused) {
+  ASSERT_TRUE(db_->Execute("CREATE DATABASE latin ENCODING 'LATIN1' "
+                           "LOCALE_PROVIDER libc LOCALE 'C' TEMPLATE template0")
+                  .ok());
+  const auto opened = OpenPostgres({.uri = SharedPostgres().Uri("latin")});
+  EXPECT_TRUE(absl::IsFailedPrecondition(opened.status())) << opened.status();
+  SharedPostgres().Drop("latin");
+}
+
+// Programs that start together: each migration is applied once, and all open.
+TEST_F(OpenSchemaTest, ProcessesThatStartTogetherDoNotRace) {
+  std::vector<pid_t> children;
+  for (int k = 0; k < 6; ++k) {
+    const pid_t child = fork();
+    if (child == 0) {
+      const auto opened = OpenPostgres({.uri = uri_, .time_ns = 1});
+      _exit(opened.ok() ? 0 : 1);
+    }
+    children.push_back(child);
+  }
+  for (const pid_t child : children) {
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0);
+  }
+  EXPECT_EQ(Number("SELECT count(*) FROM schema_migrations"),
+            static_cast<std::int64_t>(PostgresMigrations().size()));
+}
+
+TEST_F(OpenSchemaTest, AKilledCreationLeavesNothingOrAWholeSchema) {
+  std::mt19937 random(3);
+  std::uniform_int_distribution<int> delay_us(0, 150'000);
+  for (int trial = 0; trial < 10; ++trial) {
+    ASSERT_TRUE(db_->Execute("DROP SCHEMA public CASCADE; CREATE SCHEMA "
+                             "public")
+                    .ok());
+    const pid_t child = fork();
+    if (child == 0) {
+      const auto opened = OpenPostgres({.uri = uri_, .time_ns = 1});
+      for (;;) pause();
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(delay_us(random)));
+    kill(child, SIGKILL);
+    ASSERT_EQ(waitpid(child, nullptr, 0), child);
+    const auto opened = OpenPostgres({.uri = uri_, .time_ns = 1});
+    EXPECT_TRUE(opened.ok()) << opened.status();
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::server

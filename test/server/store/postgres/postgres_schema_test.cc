@@ -1,0 +1,147 @@
+// What the schema itself refuses, whoever writes, and what the check of it
+// finds.
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/domain/calibration_life.h"
+#include "server/store/make_store.h"
+#include "server/store/postgres/postgres.h"
+#include "test/server/store/fixture_content.h"
+#include "test/server/store/postgres/postgres_test.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr CalibrationState kStates[] = {CalibrationState::kActive,
+                                        CalibrationState::kSuperseded,
+                                        CalibrationState::kRejected,
+                                        CalibrationState::kCandidate,
+                                        CalibrationState::kRolledBack};
+
+class PostgresSchemaTest : public PostgresTest {
+ protected:
+  void SetUp() override {
+    PostgresTest::SetUp();
+    if (IsSkipped()) return;
+    auto opened = OpenPostgres({.uri = uri_});
+    ASSERT_TRUE(opened.ok()) << opened.status();
+    const auto store = MakeStore(*std::move(opened));
+    ASSERT_TRUE(WriteFixture(store.get()));
+  }
+
+  std::vector<std::string> Problems() {
+    std::vector<std::string> problems;
+    db_->CheckStructure([&](const StoreProblem& problem) {
+      problems.push_back(problem.place + ": " + problem.description);
+      return true;
+    });
+    return problems;
+  }
+};
+
+TEST_F(PostgresSchemaTest, RecordsThatNeverChangeCannotBeChangedOrDeleted) {
+  for (const char* sql : {"UPDATE calibrations SET content = '\\x00'",
+                          "UPDATE calibrations SET sha256 = '\\x00'",
+                          "UPDATE calibrations SET version = 5",
+                          "UPDATE calibrations SET create_time_ns = 5",
+                          "UPDATE calibrations SET create_steady_ns = 5",
+                          "UPDATE calibrations SET state = 3",
+                          "DELETE FROM calibrations",
+                          "TRUNCATE calibrations CASCADE",
+                          "UPDATE calibration_segments SET segment = 1",
+                          "DELETE FROM calibration_segments",
+                          "UPDATE activations SET time_ns = 0",
+                          "DELETE FROM activations",
+                          "UPDATE validations SET sha256 = '\\x00'",
+                          "DELETE FROM validations",
+                          "UPDATE events SET detail = ''",
+                          "DELETE FROM events",
+                          "TRUNCATE events"}) {
+    const absl::Status status = db_->Execute(sql);
+    EXPECT_TRUE(absl::IsInternal(status)) << sql << ": " << status;
+    EXPECT_THAT(std::string(status.message()),
+                ::testing::AnyOf(HasSubstr("never"), HasSubstr("does not")))
+        << sql;
+  }
+}
+
+TEST_F(PostgresSchemaTest, EveryTransitionThatIsNotInTheTableIsRefused) {
+  const auto set = [](CalibrationState state) {
+    return "UPDATE calibrations SET state = " +
+           std::to_string(static_cast<int>(state) + 1) + " WHERE version = 2";
+  };
+  ASSERT_TRUE(db_->Execute("DROP INDEX one_active_calibration").ok());
+  int allowed = 0;
+  for (const CalibrationState from : kStates) {
+    for (const CalibrationState to : kStates) {
+      ASSERT_TRUE(db_->Execute("SET session_replication_role = replica;" +
+                               set(from) +
+                               ";SET session_replication_role = origin")
+                      .ok());
+      EXPECT_EQ(db_->Execute(set(to)).ok(), MayBecome(from, to))
+          << StateName(from) << " -> " << StateName(to);
+      allowed += MayBecome(from, to) ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(allowed, 6);
+}
+
+TEST_F(PostgresSchemaTest, OnlyCandidatesAndTheFactorysBegin) {
+  for (const CalibrationState state : kStates) {
+    const std::string sql =
+        "INSERT INTO calibrations SELECT rig, 9, " +
+        std::to_string(static_cast<int>(state) + 1) +
+        ", create_time_ns, run, content, sha256, create_steady_ns "
+        "FROM calibrations WHERE version = 1";
+    EXPECT_EQ(db_->Execute("BEGIN;" + sql).ok(),
+              state == CalibrationState::kCandidate)
+        << StateName(state);
+    ASSERT_TRUE(db_->Execute("ROLLBACK").ok());
+  }
+}
+
+TEST_F(PostgresSchemaTest, ASoundSchemaHasNoProblems) {
+  EXPECT_THAT(Problems(), IsEmpty());
+}
+
+TEST_F(PostgresSchemaTest, EveryDifferenceFromTheMigrationsIsFound) {
+  const std::vector<std::pair<std::string, std::string>> changes = {
+      {"DROP TRIGGER events_stay ON events", "trigger events_stay"},
+      {"ALTER TABLE events DISABLE TRIGGER events_stay", "trigger events_stay"},
+      {"DROP INDEX one_candidate", "index one_candidate"},
+      {"ALTER TABLE segments DROP CONSTRAINT segments_state_check",
+       "constraint segments_state_check"},
+      {"ALTER TABLE runs ALTER COLUMN message DROP NOT NULL",
+       "column message of table runs"},
+      {"ALTER TABLE runs ALTER COLUMN attempts TYPE INTEGER",
+       "column attempts of table runs"},
+      {"CREATE OR REPLACE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql "
+       "AS $$ BEGIN RETURN NULL; END $$",
+       "function refuse"},
+      {"DROP TABLE disagreements", "table disagreements"},
+      {"CREATE TABLE more (x BIGINT)", "table more"},
+  };
+  for (const auto& [sql, name] : changes) {
+    ASSERT_TRUE(db_->Execute("BEGIN").ok());
+    ASSERT_TRUE(db_->Execute(sql).ok()) << sql;
+    EXPECT_THAT(Problems(), ::testing::Contains(HasSubstr(name))) << sql;
+    ASSERT_TRUE(db_->Execute("ROLLBACK").ok());
+  }
+}
+
+TEST_F(PostgresSchemaTest, ReferencesThatLeadNowhereAreFound) {
+  ASSERT_TRUE(db_->Execute("SET session_replication_role = replica;"
+                           "DELETE FROM segments WHERE state = 1")
+                  .ok());
+  EXPECT_THAT(
+      Problems(),
+      ::testing::Contains("payloads: 1 rows refer to segments that are not "
+                          "there"));
+}
+
+}  // namespace
+}  // namespace selfcal::server
