@@ -1,6 +1,6 @@
 // What every engine of the store must pass: tests take the fixture StoreTest
 // and name SELFCAL_STORE_TEST_SUITE once in their file. Another engine adds
-// itself to Engines().
+// itself to Engines(), if it is installed.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -16,6 +16,8 @@
 #include "server/domain/domain.h"
 #include "server/store/store.h"
 #include "test/server/store/fake_information.h"
+#include "test/server/store/postgres/postgres_cluster.h"
+#include "test/server/store/postgres/postgres_engine.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/store/sqlite/tamper.h"
 #include "test/server/test_segments.h"
@@ -26,8 +28,9 @@ namespace selfcal::server {
 struct Engine {
   std::string name;
   int schema_version = 0;  // the newest
+  bool limits_size = false;
   // The store that this folder stands for, empty the first time; of at most
-  // this many bytes, unless 0.
+  // this many bytes, unless 0, if the engine limits the size.
   std::function<absl::StatusOr<std::unique_ptr<Store>>(const TempFolder&,
                                                        std::int64_t max_bytes)>
       open;
@@ -38,16 +41,28 @@ struct Engine {
 };
 
 inline std::vector<Engine> Engines() {
-  return {{"Sqlite",
-           static_cast<int>(SqliteMigrations().size()),
-           [](const TempFolder& folder, std::int64_t max_bytes) {
-             return OpenSqliteStore(folder.File("selfcal.db"), max_bytes);
-           },
-           [](const TempFolder& folder,
-              const std::string& table,
-              const std::string& column) {
-             return DamageColumn(folder.File("selfcal.db"), table, column);
-           }}};
+  std::vector<Engine> engines = {
+      {"Sqlite",
+       static_cast<int>(SqliteMigrations().size()),
+       true,
+       [](const TempFolder& folder, std::int64_t max_bytes) {
+         return OpenSqliteStore(folder.File("selfcal.db"), max_bytes);
+       },
+       [](const TempFolder& folder,
+          const std::string& table,
+          const std::string& column) {
+         return DamageColumn(folder.File("selfcal.db"), table, column);
+       }}};
+  if (PostgresCluster::WhyNot().empty()) {
+    engines.push_back(
+        {.name = "Postgres",
+         .schema_version = static_cast<int>(PostgresMigrations().size()),
+         .limits_size = false,
+         .open = [](const TempFolder& folder,
+                    std::int64_t) { return OpenPostgresStore(folder); },
+         .damage = DamagePostgresColumn});
+  }
+  return engines;
 }
 
 class StoreTest : public ::testing::TestWithParam<Engine> {
