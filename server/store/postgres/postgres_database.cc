@@ -173,6 +173,8 @@ absl::Status PostgresDatabase::Read(const Work& query) {
 
 absl::StatusOr<std::unique_ptr<Connection>> PostgresDatabase::OpenReader() {
   SELFCAL_ASSIGN_OR_RETURN(std::unique_ptr<Connection> reader, Connect());
+  SELFCAL_RETURN_IF_ERROR(
+      reader->Execute("SET default_transaction_read_only = on"));
   return reader;
 }
 

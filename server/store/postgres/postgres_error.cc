@@ -79,6 +79,21 @@ constexpr Meaning kMeanings[] = {
      "database"},
 };
 
+// Messages of libpq have several lines, each for one host or a hint.
+std::string OnOneLine(std::string_view message) {
+  std::string line;
+  for (const char c : message) {
+    const bool blank = c == '\n' || c == '\t' || c == ' ';
+    if (!blank) {
+      line += c;
+    } else if (!line.ends_with(' ')) {
+      line += ' ';
+    }
+  }
+  while (line.ends_with(' ')) line.pop_back();
+  return line;
+}
+
 }  // namespace
 
 bool IsConflict(std::string_view sqlstate) {
@@ -109,12 +124,12 @@ absl::Status PostgresError(std::string_view sqlstate,
                                   sql.substr(0, kShownSql)));
 }
 
-absl::Status ConnectionError(std::string_view message) {
-  while (message.ends_with('\n')) message.remove_suffix(1);
+absl::Status ConnectionError(std::string_view libpq_message) {
+  const std::string message = OnOneLine(libpq_message);
   // libpq passes on no SQLSTATE of a server that refuses a connection.
   for (const std::string_view words :
        {"too many clients", "too many connections", "connection slots are"}) {
-    if (message.find(words) != std::string_view::npos) {
+    if (message.find(words) != std::string::npos) {
       return PostgresError("53300", message, "connect");
     }
   }

@@ -24,6 +24,6 @@ absl::Status PostgresError(std::string_view sqlstate,
 // The connection was lost or could not be opened, with libpq's message.
 // RESOURCE_EXHAUSTED if the server has too many connections, otherwise
 // UNAVAILABLE.
-absl::Status ConnectionError(std::string_view message);
+absl::Status ConnectionError(std::string_view libpq_message);
 
 }  // namespace selfcal::server

@@ -40,7 +40,11 @@ TEST(PostgresError, TooManyConnectionsAreARefusal) {
       ConnectionError("FATAL:  sorry, too many clients already\n")));
   EXPECT_TRUE(absl::IsResourceExhausted(ConnectionError(
       "FATAL:  remaining connection slots are reserved for superusers\n")));
-  EXPECT_TRUE(absl::IsUnavailable(ConnectionError("Connection refused\n")));
+  const absl::Status refused =
+      ConnectionError("Connection refused\n\tIs the server running?\n");
+  EXPECT_TRUE(absl::IsUnavailable(refused));
+  EXPECT_THAT(std::string(refused.message()),
+              HasSubstr("refused Is the server running?;"));
 }
 
 TEST(ShownUri, HasNeitherPasswordNorParameters) {
