@@ -19,6 +19,9 @@ namespace selfcal::server {
 struct DaemonOptions {
   // Default: the service manager's STATE_DIRECTORY.
   std::filesystem::path state_dir;
+  // Address of a PostgreSQL database, which may contain a password; empty: an
+  // SQLite file in the state folder.
+  std::string store;
   // The default address is the socket selfcald.sock in the service manager's
   // RUNTIME_DIRECTORY or, without one, in the state folder.
   ServerOptions server;

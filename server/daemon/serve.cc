@@ -17,6 +17,7 @@
 #include "server/console/console.h"
 #include "server/daemon/heap.h"
 #include "server/daemon/log.h"
+#include "server/daemon/open_store.h"
 #include "server/daemon/service_manager.h"
 #include "server/daemon/startable.h"
 #include "server/daemon/state_lock.h"
@@ -29,9 +30,6 @@
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
 #include "server/status/status_macros.h"
-#include "server/store/make_store.h"
-#include "server/store/sqlite/file_identity.h"
-#include "server/store/sqlite/sqlite.h"
 #include "server/worker/worker.h"
 
 namespace selfcal::server {
@@ -101,16 +99,16 @@ Estimators EstimatorsOfPipeline(const DaemonOptions& options) {
 }
 
 absl::StatusOr<std::unique_ptr<Metrics>> OpenMetrics(
-    const DaemonOptions& options, const std::string& database, Store* store) {
+    const DaemonOptions& options, const OpenedStore& opened) {
   if (options.metrics == "off") return nullptr;
   MetricsOptions metrics;
   metrics.address = options.metrics;
   metrics.rigs = options.metrics_rigs;
   metrics.program_version = SELFCAL_VERSION;
-  metrics.database = database;
-  auto opened = MakeMetrics(store, metrics);
-  if (opened.ok()) spdlog::info("metrics: {}", (*opened)->url());
-  return opened;
+  metrics.database = opened.file;
+  auto made = MakeMetrics(opened.store.get(), metrics);
+  if (made.ok()) spdlog::info("metrics: {}", (*made)->url());
+  return made;
 }
 
 ConsoleOptions OptionsOfConsole(const DaemonOptions& options) {
@@ -132,6 +130,7 @@ absl::Status CheckCeres(const DaemonOptions& options) {
 // Checks what can be checked without the state directory and the addresses.
 absl::Status CheckSettings(const DaemonOptions& options) {
   SELFCAL_RETURN_IF_ERROR(CheckCeres(options));
+  SELFCAL_RETURN_IF_ERROR(CheckStoreSettings(options));
   SELFCAL_RETURN_IF_ERROR(CheckServerOptions(options.server));
   if (options.metrics != "off") {
     SELFCAL_RETURN_IF_ERROR(CheckMetricsAddress(options.metrics));
@@ -152,12 +151,9 @@ absl::StatusOr<std::unique_ptr<Console>> OpenConsole(
 // What the daemon has on disk, while it runs.
 struct State {
   const StateLock& lock;
-  std::string database;
-  FileIdentity file;  // of the database
+  const OpenedStore& store;
 
-  bool IsInPlace() const {
-    return lock.IsInPlace() && StillNames(database, file);
-  }
+  bool IsInPlace() const { return lock.IsInPlace() && store.IsInPlace(); }
 };
 
 void LookAtClock(DeviceClock* clock) {
@@ -211,24 +207,23 @@ std::optional<int> ServeOnce(
   }
   const auto lock = StateLock::Take(options.state_dir);
   if (!lock.ok()) return Failed("cannot start", lock.status());
-  const std::string database = (options.state_dir / "selfcal.db").string();
   NotifyStatus("opening the database, with migrations if it is older");
-  auto sqlite =
-      OpenSqlite({.path = database,
-                  .max_bytes = options.domain.quotas.max_database_bytes,
-                  .time_ns = NowNs()});
-  if (!sqlite.ok()) return Failed("cannot open " + database, sqlite.status());
-  const auto file = IdentityOf(database);
-  if (!file.ok()) return Failed("cannot open " + database, file.status());
-  const State state{*lock, database, *file};
-  const std::unique_ptr<Store> store = MakeStore(*std::move(sqlite));
-  const auto clock = DeviceClock::Open(store.get(), MachineClocks());
+  const auto opened = OpenStore(options, NowNs());
+  if (!opened.ok()) {
+    return Failed("cannot open " + StoreName(options), opened.status());
+  }
+  if (!options.store.empty()) {
+    spdlog::info("database: {}", StoreName(options));
+  }
+  const State state{*lock, *opened};
+  Store* const store = opened->store.get();
+  const auto clock = DeviceClock::Open(store, MachineClocks());
   if (!clock.ok()) return Failed("cannot start", clock.status());
-  Domain domain(store.get(), options.domain, [&] { return (*clock)->Now(); });
-  const auto metrics = OpenMetrics(options, database, store.get());
+  Domain domain(store, options.domain, [&] { return (*clock)->Now(); });
+  const auto metrics = OpenMetrics(options, *opened);
   if (!metrics.ok()) return Failed("cannot start", metrics.status());
 
-  EventFeed changes(store.get(),
+  EventFeed changes(store,
                     *metrics == nullptr ? nullptr : (*metrics)->observer());
   const auto conditions = MakeHostConditions(options.host);
   const auto pipeline = MakePipeline(
@@ -260,7 +255,7 @@ std::optional<int> ServeOnce(
   NotifyReady();
 
   const auto signal =
-      RunUntilStopped(store.get(), clock->get(), state, read_log_level);
+      RunUntilStopped(store, clock->get(), state, read_log_level);
   deadline.emplace(kStopLimit);
   NotifyStopping();
   if (signal == kRestart) {
@@ -293,6 +288,7 @@ int Check(const DaemonOptions& options) {
   absl::Status status = CheckSettings(options);
   if (!status.ok()) return Failed("the settings are invalid", status);
   status = CheckStateFolder(options.state_dir);
+  if (status.ok()) status = CheckStoreServer(options);
   if (status.ok()) {
     std::vector<std::string> ports;
     if (options.metrics != "off") ports.push_back(options.metrics);

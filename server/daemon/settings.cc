@@ -7,6 +7,8 @@
 #include <map>
 #include <string>
 
+#include "server/store/postgres/store_uri.h"
+
 namespace selfcal::server {
 namespace {
 
@@ -67,6 +69,12 @@ std::string OctalMode(const std::string& text) {
   const bool octal = !text.empty() && text.size() <= 4 &&
                      text.find_first_not_of("01234567") == text.npos;
   return octal ? "" : "'" + text + "' is not an octal mode such as 0660";
+}
+
+// The message has no part of the text, which may contain a password.
+std::string StoreAddress(const std::string& text) {
+  if (text.empty()) return "";
+  return std::string(ShownUri(text).status().message());
 }
 
 void DefineAccess(Definer* define, ServerOptions* options) {
@@ -341,6 +349,13 @@ void DefineSettings(CLI::App* app,
              &options->state_dir,
              "Folder of the database and the lock; created if it does not "
              "exist [STATE_DIRECTORY]");
+  define
+      .Add("store",
+           &options->store,
+           "Address of a PostgreSQL database, "
+           "postgresql://user@host:port/database; better without a password, "
+           "see ~/.pgpass [an SQLite file in the state folder]")
+      ->check(StoreAddress);
   DefineAccess(&define, &options->server);
   DefineLimits(&define, options);
   DefineQuotas(&define, &options->domain.quotas);

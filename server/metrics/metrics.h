@@ -23,7 +23,8 @@ struct MetricsOptions {
   std::string address;  // host:port; port 0 selects a free one
   int rigs = 16;        // number of rigs with their own series
   std::string program_version;
-  std::filesystem::path database;  // its size and free space are reported
+  // The file whose size and free space are reported; empty: none.
+  std::filesystem::path database;
 };
 
 class Metrics {

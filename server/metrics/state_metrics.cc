@@ -146,7 +146,7 @@ std::vector<MetricFamily> StateMetrics::Collect() const {
                       AddTables(store_, rigs, &families);
                       AddTimes(store_, rigs, &families);
                       AddQueue(store_, &families);
-                      AddDisk(database_, &families);
+                      if (!database_.empty()) AddDisk(database_, &families);
                       AddMemory(&families);
                       return families;
                     })

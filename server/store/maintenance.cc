@@ -88,7 +88,8 @@ class DatabaseMaintenance final : public StoreMaintenance {
     DatabaseCopies* const copies = database_->copies();
     if (copies != nullptr) return copies;
     return absl::UnimplementedError(
-        "this database is backed up by the tools of its own engine");
+        "the database is that of a server: back it up and restore it with the "
+        "tools of its engine");
   }
 
   Database* const database_;

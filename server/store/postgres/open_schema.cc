@@ -1,6 +1,5 @@
 #include "server/store/postgres/open_schema.h"
 
-#include <absl/status/statusor.h>
 #include <fmt/format.h>
 
 #include <string>
@@ -43,9 +42,38 @@ absl::StatusOr<bool> IsEmpty(PostgresConnection* connection) {
   return relations == 0;
 }
 
-// Verifies the applied migrations, and returns their number.
-absl::StatusOr<int> AppliedVersion(PostgresConnection* connection,
-                                   std::span<const Migration> migrations) {
+absl::Status ApplyOne(PostgresConnection* connection,
+                      const Migration& migration,
+                      int version,
+                      std::int64_t time_ns) {
+  SELFCAL_RETURN_IF_ERROR(
+      connection->Execute("CREATE TABLE IF NOT EXISTS schema_migrations ("
+                          "  version BIGINT PRIMARY KEY,"
+                          "  name TEXT NOT NULL,"
+                          "  sha256 TEXT NOT NULL,"
+                          "  apply_time_ns BIGINT NOT NULL)"));
+  const absl::Status applied = connection->Execute(std::string(migration.sql));
+  if (!applied.ok()) {
+    return absl::Status(applied.code(),
+                        fmt::format("migration {} failed, the database is as "
+                                    "it was before it: {}",
+                                    migration.name,
+                                    std::string(applied.message())));
+  }
+  return Statement(connection,
+                   "INSERT INTO schema_migrations (version, name, sha256, "
+                   "  apply_time_ns) VALUES (?1, ?2, ?3, ?4)",
+                   version,
+                   migration.name,
+                   migration.sha256,
+                   time_ns)
+      .Run();
+}
+
+}  // namespace
+
+absl::StatusOr<int> AppliedMigrations(PostgresConnection* connection,
+                                      std::span<const Migration> migrations) {
   SELFCAL_ASSIGN_OR_RETURN(const bool has_record, HasRecord(connection));
   if (!has_record) {
     SELFCAL_ASSIGN_OR_RETURN(const bool is_empty, IsEmpty(connection));
@@ -80,36 +108,6 @@ absl::StatusOr<int> AppliedVersion(PostgresConnection* connection,
   return version;
 }
 
-absl::Status ApplyOne(PostgresConnection* connection,
-                      const Migration& migration,
-                      int version,
-                      std::int64_t time_ns) {
-  SELFCAL_RETURN_IF_ERROR(
-      connection->Execute("CREATE TABLE IF NOT EXISTS schema_migrations ("
-                          "  version BIGINT PRIMARY KEY,"
-                          "  name TEXT NOT NULL,"
-                          "  sha256 TEXT NOT NULL,"
-                          "  apply_time_ns BIGINT NOT NULL)"));
-  const absl::Status applied = connection->Execute(std::string(migration.sql));
-  if (!applied.ok()) {
-    return absl::Status(applied.code(),
-                        fmt::format("migration {} failed, the database is as "
-                                    "it was before it: {}",
-                                    migration.name,
-                                    std::string(applied.message())));
-  }
-  return Statement(connection,
-                   "INSERT INTO schema_migrations (version, name, sha256, "
-                   "  apply_time_ns) VALUES (?1, ?2, ?3, ?4)",
-                   version,
-                   migration.name,
-                   migration.sha256,
-                   time_ns)
-      .Run();
-}
-
-}  // namespace
-
 absl::Status OpenSchema(PostgresConnection* connection,
                         std::span<const Migration> migrations,
                         std::int64_t time_ns) {
@@ -122,7 +120,7 @@ absl::Status OpenSchema(PostgresConnection* connection,
                 kLock)
             .status());
     SELFCAL_ASSIGN_OR_RETURN(const int version,
-                             AppliedVersion(connection, migrations));
+                             AppliedMigrations(connection, migrations));
     if (version == static_cast<int>(migrations.size())) {
       return transaction.Commit();
     }

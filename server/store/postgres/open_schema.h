@@ -6,6 +6,7 @@
 #pragma once
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 #include <cstdint>
 #include <span>
@@ -22,5 +23,10 @@ namespace selfcal::server {
 absl::Status OpenSchema(PostgresConnection* connection,
                         std::span<const Migration> migrations,
                         std::int64_t time_ns);
+
+// The number of migrations that were applied. Changes nothing; errors as for
+// OpenSchema.
+absl::StatusOr<int> AppliedMigrations(PostgresConnection* connection,
+                                      std::span<const Migration> migrations);
 
 }  // namespace selfcal::server

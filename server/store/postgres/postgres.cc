@@ -20,4 +20,10 @@ absl::StatusOr<std::unique_ptr<Database>> OpenPostgres(
       options.uri, options.writers, options.readers);
 }
 
+absl::Status CheckPostgres(const std::string& uri) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto connection,
+                           PostgresConnection::Open(uri));
+  return AppliedMigrations(connection.get(), PostgresMigrations()).status();
+}
+
 }  // namespace selfcal::server

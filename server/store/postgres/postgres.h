@@ -2,6 +2,7 @@
 // its own replication, failover and backups.
 #pragma once
 
+#include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <cstdint>
@@ -27,5 +28,8 @@ struct PostgresOptions {
 // PostgresConnection::Open and OpenSchema (open_schema.h).
 absl::StatusOr<std::unique_ptr<Database>> OpenPostgres(
     const PostgresOptions& options);
+
+// Whether OpenPostgres would succeed; changes nothing.
+absl::Status CheckPostgres(const std::string& uri);
 
 }  // namespace selfcal::server
