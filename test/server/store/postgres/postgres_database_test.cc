@@ -285,15 +285,37 @@ class PostgresServerTest : public ::testing::Test {
     EXPECT_TRUE(
         db_->Execute("ALTER SYSTEM SET synchronous_standby_names = 'x'").ok());
     EXPECT_TRUE(db_->Execute("SELECT pg_reload_conf()").ok());
+    // The server takes the setting up a moment later: commits that leave no row
+    // show when it has.
+    EXPECT_TRUE(Eventually([&] {
+      auto probe = std::async(std::launch::async, [this] {
+        return database_->Write([](Connection* db) {
+          return db->Execute("SELECT pg_logical_emit_message(true, '', '')");
+        });
+      });
+      return InterruptCommit("pg_cancel_backend", &probe);
+    }));
     auto written = std::async(std::launch::async,
                               [this] { return database_->Write(Insert(1)); });
+    EXPECT_TRUE(InterruptCommit(function, &written));
+    return written.get();
+  }
+
+  // False if the write has ended without waiting for a standby.
+  bool InterruptCommit(const std::string& function,
+                       std::future<absl::Status>* written) {
     const std::string waiting =
         " FROM pg_stat_activity WHERE wait_event = 'SyncRep'";
+    bool found = false;
     EXPECT_TRUE(Eventually([&] {
-      return ReadInt(db_.get(), "SELECT count(*)" + waiting).value_or(0) == 1;
+      found = ReadInt(db_.get(), "SELECT count(*)" + waiting).value_or(0) == 1;
+      return found || written->wait_for(std::chrono::seconds(0)) ==
+                          std::future_status::ready;
     }));
+    if (!found) return false;
     EXPECT_TRUE(db_->Execute("SELECT " + function + "(pid)" + waiting).ok());
-    return written.get();
+    written->wait();
+    return true;
   }
 
   std::unique_ptr<PostgresCluster> cluster_;
