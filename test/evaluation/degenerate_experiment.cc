@@ -172,7 +172,7 @@ void RunDegenerate(Context* context) {
   for (const Motion& motion : kMotions) {
     std::vector<Run> all(runs);
     context->ForEach(runs, [&](int i) {
-      all[i] = RunOne(motion, static_cast<std::uint64_t>(i + 1));
+      all[i] = RunOne(motion, static_cast<std::uint64_t>(i) + 1);
     });
     context->Progress(motion.name);
     const Summary summary = Summarise(all);

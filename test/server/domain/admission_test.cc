@@ -5,7 +5,6 @@ namespace selfcal::server {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 class FitRowsTest : public StoreTest {

@@ -72,10 +72,10 @@ class ServiceTest : public ServedStore {
   // A server with an API of its own.
   absl::StatusOr<std::unique_ptr<Server>> NewServer(
       const ServerOptions& options,
-      std::function<void(const std::string&)> tls_refused = {}) {
+      const std::function<void(const std::string&)>& tls_refused = {}) {
     return MakeServer(&apis_.emplace_back(&*domain_, pipeline_.get(), &feed_),
                       options,
-                      std::move(tls_refused));
+                      tls_refused);
   }
 
   void StartServer(ServerOptions options) {
