@@ -27,6 +27,7 @@ void RunWrongNoise(Context* context);
 void RunDegenerate(Context* context);
 void RunTrust(Context* context);
 void RunOpenVinsScenario(Context* context);
+void RunPopulation(Context* context);
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> all = {
@@ -96,6 +97,10 @@ const std::vector<Experiment>& Experiments() {
       {"openvins_scenario",
        "tables and batch on the scenario of OpenVINS's simulator",
        RunOpenVinsScenario},
+      {"population",
+       "new devices of a cohort: segments to the target with its prior, and "
+       "devices that are not like it",
+       RunPopulation},
   };
   return all;
 }

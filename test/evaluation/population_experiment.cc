@@ -1,0 +1,305 @@
+// New devices of a cohort: how much sooner their calibration is certain with
+// the statistics of the devices before them as the prior, and whether it stays
+// honest, also for devices that are not like the cohort.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/population/consistency.h"
+#include "core/population/device.h"
+#include "core/population/estimate.h"
+#include "core/simulation/simulate.h"
+#include "test/evaluation/context.h"
+#include "test/evaluation/estimators.h"
+#include "test/evaluation/statistics.h"
+
+namespace selfcal {
+namespace {
+
+constexpr int kMostSegments = 8;
+constexpr double kSegment_s = 4;
+// Devices differ from their mean by this share of the factory's tolerances, and
+// the mean from the reference by the second.
+constexpr double kSpread = 0.2;
+constexpr double kMeanOffset = 0.5;
+// Excitation of the motion of the devices of the cohort, and of new ones.
+constexpr double kVigorous = 0.5;
+constexpr double kCalm = 0.1;
+// The mean of the other cohort differs by as many spreads in each component.
+constexpr double kOtherCohort = 3;
+// A new device takes the prior of its cohort unless its data is this unlikely.
+constexpr double kContradiction = 0.01;
+
+// As far as a factory's calibration is off (CalibrationError).
+Rig CohortRig() {
+  Rig rig = HandheldRig("device");
+  rig.prior_sigmas = {{"imu.*.scale.*", 0.01},
+                      {"imu.*.misalignment.*", 0.01},
+                      {"imu.q_AI.*", 0.0175},
+                      {"*.q_CI.*", 0.0175},
+                      {"*.p_CI.*", 0.01},
+                      {"*.focal.*", 5},
+                      {"*.principal.*", 5},
+                      {"*.distortion.*", 0.01}};
+  return rig;
+}
+
+struct Truths {
+  Eigen::VectorXd mu;     // of the cohort, from the reference
+  Eigen::VectorXd sigma;  // of devices about it
+};
+
+Truths CohortTruths(const Rig& rig) {
+  std::mt19937_64 random(2024);
+  std::normal_distribution<double> normal;
+  const Eigen::VectorXd tolerance = PriorSigmas(rig);
+  Truths truths{Eigen::VectorXd::Zero(tolerance.size()),
+                Eigen::VectorXd::Zero(tolerance.size())};
+  for (const int i : FreeComponents(rig)) {
+    truths.mu(i) = kMeanOffset * tolerance(i) * normal(random);
+    truths.sigma(i) = kSpread * tolerance(i);
+  }
+  return truths;
+}
+
+Eigen::VectorXd DrawDevice(const Truths& truths, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd offset = truths.mu;
+  for (Eigen::Index i = 0; i < offset.size(); ++i) {
+    offset(i) += truths.sigma(i) * normal(random);
+  }
+  return offset;
+}
+
+struct Device {
+  Calibration truth;
+  std::vector<MotionSegment> segments;
+};
+
+Device MakeDevice(const Rig& rig,
+                  const Eigen::VectorXd& offset,
+                  double excitation,
+                  std::uint64_t seed) {
+  Device device;
+  device.truth = BoxPlus(rig.factory, offset);
+  SimulationOptions options;
+  options.seed = seed;
+  options.landmarks_in_view = 60;
+  const double duration_s = kMostSegments * kSegment_s + 1;
+  device.segments = Simulate(rig,
+                             device.truth,
+                             rig.factory,
+                             *MakeHandheld(duration_s, excitation, seed),
+                             "session",
+                             options)
+                        .segments;
+  return device;
+}
+
+CalibrationResult CalibrateDevice(const Rig& rig,
+                                  const Device& device,
+                                  int segments,
+                                  const std::optional<ThetaPrior>& prior) {
+  CalibrateOptions options = ComparedOptions();
+  options.prior = prior;
+  const SegmentSet set = AllSegments(segments);
+  return CalibrateOn(rig, device.segments, set, options);
+}
+
+ThetaPrior CohortPrior(const Cohort& cohort) {
+  const DevicePrediction predicted = PredictDevice(cohort);
+  const auto size = predicted.mean.size();
+  return {
+      BoxPlus(cohort.reference, predicted.mean),
+      predicted.covariance.llt().solve(Eigen::MatrixXd::Identity(size, size))};
+}
+
+// Of a new device after each number of segments.
+struct Course {
+  std::vector<double> sigma;  // rms over components, in tolerances
+  std::vector<double> nees;
+  double probability = 1;  // of the cohort, with all segments
+  int contradicted = 0;    // number of segments that show it; 0: none does
+};
+
+double SigmaRms(const Rig& rig, const Eigen::MatrixXd& covariance) {
+  const Eigen::VectorXd relative =
+      covariance.diagonal().cwiseSqrt().cwiseQuotient(PriorSigmas(rig));
+  return std::sqrt(relative.squaredNorm() /
+                   static_cast<double>(relative.size()));
+}
+
+Course Follow(const Rig& rig, const Device& device, const Cohort* cohort) {
+  Course course;
+  for (int n = 1; n <= kMostSegments; ++n) {
+    CalibrationResult result = CalibrateDevice(rig, device, n, std::nullopt);
+    if (cohort != nullptr) {
+      const CohortConsistency consistency = CompareWithCohort(
+          *cohort,
+          DeviceInformation(
+              rig, result.theta, result.covariance, cohort->reference));
+      course.probability = consistency.probability;
+      if (consistency.probability >= kContradiction) {
+        result = CalibrateDevice(rig, device, n, CohortPrior(*cohort));
+      } else if (course.contradicted == 0) {
+        course.contradicted = n;
+      }
+    }
+    course.sigma.push_back(SigmaRms(rig, result.covariance));
+    course.nees.push_back(
+        NormalisedSquaredError(BoxMinus(result.theta, device.truth),
+                               result.covariance)
+            .nees);
+  }
+  return course;
+}
+
+// The number of segments until sigma is at most the target; one more than all
+// if it never is.
+int Until(const std::vector<double>& sigma, double target) {
+  const auto found = std::find_if(
+      sigma.begin(), sigma.end(), [&](double s) { return s <= target; });
+  return 1 + static_cast<int>(found - sigma.begin());
+}
+
+double MeanNees(const std::vector<Course>& courses, int segments) {
+  double sum = 0;
+  for (const Course& course : courses) sum += course.nees[segments - 1];
+  return sum / static_cast<double>(courses.size());
+}
+
+}  // namespace
+
+void RunPopulation(Context* context) {
+  const Rig rig = CohortRig();
+  const Truths truths = CohortTruths(rig);
+  const int size = static_cast<int>(FreeComponents(rig).size());
+  const int devices = context->quick() ? 8 : 50;
+  const int fresh = context->quick() ? 1 : 20;
+  const int foreign = context->quick() ? 1 : 10;
+
+  // The cohort, of which one device has a camera that was knocked by 5 cm.
+  std::vector<ThetaInformation> information(devices);
+  constexpr int kBroken = 3;
+  const auto knocked = [&](Eigen::VectorXd offset) {
+    offset(CameraTangentOffset(rig.factory, 0) + kCameraPosition) += 0.05;
+    return offset;
+  };
+  context->ForEach(devices, [&](int i) {
+    Eigen::VectorXd offset = DrawDevice(truths, 1000 + i);
+    if (i == kBroken) offset = knocked(offset);
+    const Device device = MakeDevice(rig, offset, kVigorous, 1000 + i);
+    const CalibrationResult result =
+        CalibrateDevice(rig, device, kMostSegments, std::nullopt);
+    information[i] =
+        DeviceInformation(rig, result.theta, result.covariance, rig.factory);
+  });
+  context->Progress(std::to_string(devices) + " devices calibrated");
+  const Cohort cohort =
+      EstimateCohort(rig.factory, PriorSigmas(rig), information);
+  const std::vector<int> expected_outliers = {kBroken};
+  context->AtLeast("population.broken_device_found",
+                   cohort.outliers == expected_outliers,
+                   1,
+                   {.robust = true});
+  const Eigen::VectorXd mu_error = cohort.mu - truths.mu;
+  context->AtMost(
+      "population.mean_nees",
+      mu_error.dot(cohort.mu_covariance.llt().solve(mu_error)) / size,
+      1.8);
+  Eigen::VectorXd spread_ratio =
+      cohort.S.diagonal().cwiseSqrt().cwiseQuotient(truths.sigma);
+  std::sort(spread_ratio.data(), spread_ratio.data() + spread_ratio.size());
+  context->Within("population.spread_median_ratio",
+                  spread_ratio(spread_ratio.size() / 2),
+                  0.8,
+                  1.3);
+
+  // New devices: with the factory's prior, and with that of the cohort.
+  std::vector<Course> factory(fresh), prior(fresh), other(foreign), broken(1);
+  context->ForEach(2 * fresh + foreign + 1, [&](int i) {
+    if (i < 2 * fresh) {
+      const std::uint64_t seed = 5000 + i / 2;
+      const Device device =
+          MakeDevice(rig, DrawDevice(truths, seed), kCalm, seed);
+      (i % 2 ? prior : factory)[i / 2] =
+          Follow(rig, device, i % 2 ? &cohort : nullptr);
+    } else if (i < 2 * fresh + foreign) {
+      Truths elsewhere = truths;
+      elsewhere.mu += kOtherCohort * truths.sigma;
+      const std::uint64_t seed = 7000 + i;
+      other[i - 2 * fresh] =
+          Follow(rig,
+                 MakeDevice(rig, DrawDevice(elsewhere, seed), kCalm, seed),
+                 &cohort);
+    } else {
+      broken[0] = Follow(
+          rig,
+          MakeDevice(rig, knocked(DrawDevice(truths, 9000)), kCalm, 9000),
+          &cohort);
+    }
+  });
+
+  ResultTable table({"segments",
+                     "sigma, factory's prior",
+                     "sigma, cohort's prior",
+                     "NEES, factory's prior",
+                     "NEES, cohort's prior",
+                     "NEES, other cohort"});
+  for (int n = 1; n <= kMostSegments; ++n) {
+    std::vector<double> with_factory, with_cohort;
+    for (int i = 0; i < fresh; ++i) {
+      with_factory.push_back(factory[i].sigma[n - 1]);
+      with_cohort.push_back(prior[i].sigma[n - 1]);
+    }
+    table.Add({long{n},
+               Rms(with_factory),
+               Rms(with_cohort),
+               MeanNees(factory, n),
+               MeanNees(prior, n),
+               MeanNees(other, n)});
+  }
+  context->WriteTable("new_devices", table);
+
+  double segments_factory = 0;
+  double segments_cohort = 0;
+  for (int i = 0; i < fresh; ++i) {
+    const double target = factory[i].sigma.back();
+    segments_factory += kMostSegments;
+    segments_cohort += Until(prior[i].sigma, target);
+  }
+  context->AtLeast(
+      "population.segments_saved", segments_factory / segments_cohort, 2);
+  // Mean NEES of new devices, over all numbers of segments: its 95 % bounds are
+  // those of as many independent devices.
+  const double bound = size + 1.96 * std::sqrt(2.0 * size / fresh);
+  const double other_bound = size + 1.96 * std::sqrt(2.0 * size / foreign);
+  double largest = 0;
+  double largest_other = 0;
+  int found = 0;
+  for (int n = 1; n <= kMostSegments; ++n) {
+    largest = std::max(largest, MeanNees(prior, n));
+    largest_other = std::max(largest_other, MeanNees(other, n));
+  }
+  for (const Course& course : other) found += course.contradicted > 0;
+  context->AtMost("population.nees", largest, bound);
+  context->AtMost("population.other_cohort_nees", largest_other, other_bound);
+  context->AtLeast("population.other_cohort_found",
+                   double(found) / foreign,
+                   1,
+                   {.robust = true});
+  context->AtLeast("population.knocked_found",
+                   broken[0].contradicted > 0,
+                   1,
+                   {.robust = true});
+}
+
+}  // namespace selfcal
