@@ -22,8 +22,8 @@ struct CohortConsistency {
   // that is less likely than the least likely one: the smaller one, for two
   // tests.
   double probability = 1;
-  // Of each component of which the device has at least as much information as
-  // its cohort, the least likely first.
+  // Components that the device knows at least as well as its cohort does, the
+  // least likely first.
   std::vector<CohortComponent> components;
 };
 

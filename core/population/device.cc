@@ -38,7 +38,7 @@ ThetaInformation DeviceInformation(const Rig& rig,
   const Eigen::MatrixXd& U = eigen.eigenvectors();
   const Eigen::MatrixXd Lambda =
       U * eigen.eigenvalues().cwiseMax(0).asDiagonal() * U.transpose();
-  // At the maximum of the posterior, data and prior balance.
+  // Data and prior balance at the maximum of the posterior.
   const Eigen::VectorXd from_factory =
       inverse_scale.cwiseProduct(BoxMinus(theta, rig.factory)(free));
   const Eigen::VectorXd eta = U * known.asDiagonal() * U.transpose() *

@@ -1,5 +1,5 @@
-// What the calibration of one device adds to the statistics of its cohort, the
-// devices of one model. Pure functions, callable from any thread.
+// The contribution of one device to the statistics of its cohort, the devices
+// of one model. Pure functions, callable from any thread.
 #pragma once
 
 #include <Eigen/Core>

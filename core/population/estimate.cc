@@ -59,7 +59,7 @@ class Estimation {
     return FitSpread(devices, cohort_.scale.size(), correlation);
   }
 
-  // What is not determined by devices is as the scale states.
+  // Pulls the spread towards the scale, the more the less devices determine it.
   static Spread Pooled(Spread spread) {
     const Eigen::ArrayXd share =
         spread.degrees.array() / (spread.degrees.array() + kScaleDegrees);

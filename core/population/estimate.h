@@ -35,7 +35,7 @@ struct Cohort {
   // Spread of the devices about the mean, D x D, positive definite. A component
   // without data has that of the scale.
   Eigen::MatrixXd S;
-  // Of each component of S: the degrees of freedom of its estimate, about the
+  // Degrees of freedom of the estimate of each component of S, about the
   // number of devices that determine it, less one. 0: not determined.
   Eigen::VectorXd degrees;
   // Share of the correlations of the devices that predicts devices best.

@@ -23,7 +23,7 @@ constexpr double kSmallestSigma = 1e-4;
 // A device determines a component if its data has more information than the
 // scale.
 constexpr double kDetermined = 0.5;
-// Of the normal distribution: standard deviation over median deviation, and the
+// Standard deviation over median deviation of the normal distribution, and the
 // efficiency of the latter.
 constexpr double kSigmaByDeviation = 1.4826;
 constexpr double kEfficiency = 0.37;
@@ -96,7 +96,7 @@ class Fit {
     spread_.degrees = (spread_.degrees.array() - 1).max(0);
   }
 
-  // With the prior on sigmas, as far as data determines them.
+  // Applies the prior on sigmas, as far as data determines them.
   void SetSpread(const MatrixXd& full) {
     const auto count = static_cast<double>(devices_.size());
     const VectorXd known = spread_.degrees / count;
@@ -152,7 +152,7 @@ Spread RobustSpread(std::span<const ThetaInformation> devices,
     for (double& value : values) value = std::abs(value - spread.mu(j));
     const double sigma = kSigmaByDeviation * Median(values);
     const double of_noise = Median(noise);
-    // Of few devices the median deviation is often too small.
+    // The median deviation of few devices is often too small.
     const double variance = (1 + kSmallSample / count) *
                             std::max(sigma * sigma - of_noise, of_noise);
     spread.S(j, j) = variance;

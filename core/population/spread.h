@@ -15,16 +15,16 @@ struct Spread {
   Eigen::VectorXd mu;
   Eigen::MatrixXd mu_covariance;
   Eigen::MatrixXd S;  // of devices about mu; positive definite
-  // Of each component: how many devices' worth of differences are known.
+  // How many devices' worth of differences are known, for each component.
   Eigen::VectorXd degrees;
 };
 
 // Nothing known: mu is 0 within the scale, as is each device.
 Spread InitialSpread(Eigen::Index size);
 
-// By medians, one component at a time, so that broken devices do not hide
-// themselves. A component that fewer than kLeastCohort devices determine stays
-// as in InitialSpread.
+// The spread by medians, one component at a time, so that broken devices do not
+// hide themselves. A component that fewer than kLeastCohort devices determine
+// stays as in InitialSpread.
 Spread RobustSpread(std::span<const ThetaInformation> devices,
                     Eigen::Index size);
 

@@ -1,4 +1,6 @@
 #include <cstddef>
+#include <exception>
+#include <new>
 #include <utility>
 
 #include "server/store/driver/driver.h"
@@ -30,6 +32,16 @@ void Connection::Keep(std::unique_ptr<PreparedStatement> prepared) {
   if (place == prepared_.end() || place->second != nullptr) return;
   prepared->Reset();
   place->second = std::move(prepared);
+}
+
+absl::Status RunGuarded(const Database::Work& work, Connection* connection) {
+  try {
+    return work(connection);
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError("memory is short: try again later");
+  } catch (const std::exception& error) {
+    return absl::InternalError(error.what());
+  }
 }
 
 }  // namespace selfcal::server

@@ -171,4 +171,8 @@ class Database {
   virtual DatabaseCopies* copies() { return nullptr; }
 };
 
+// Runs `work` for a Database: what it throws becomes its error,
+// RESOURCE_EXHAUSTED for a lack of memory.
+absl::Status RunGuarded(const Database::Work& work, Connection* connection);
+
 }  // namespace selfcal::server

@@ -1,9 +1,7 @@
 #include "server/store/postgres/postgres_database.h"
 
 #include <algorithm>
-#include <exception>
 #include <future>
-#include <new>
 #include <random>
 #include <utility>
 
@@ -29,17 +27,6 @@ std::size_t NumberOfThread() {
   static std::atomic<std::size_t> next = 0;
   thread_local const std::size_t number = next++;
   return number;
-}
-
-// Turns what a write throws into an error of that write alone.
-absl::Status RunGuarded(const Database::Work& work, Connection* connection) {
-  try {
-    return work(connection);
-  } catch (const std::bad_alloc&) {
-    return absl::ResourceExhaustedError("memory is short: try again later");
-  } catch (const std::exception& error) {
-    return absl::InternalError(error.what());
-  }
 }
 
 // Of a random length, so that two that conflicted do not meet again.

@@ -12,32 +12,13 @@
 
 #include "migrations/migrations.h"
 #include "server/status/status_macros.h"
+#include "server/store/driver/findings.h"
 #include "server/store/driver/statement.h"
 #include "server/store/driver/transaction.h"
 #include "server/store/postgres/postgres_connection.h"
 
 namespace selfcal::server {
 namespace {
-
-class SchemaFindings {
- public:
-  explicit SchemaFindings(
-      const std::function<bool(const StoreProblem&)>& on_problem)
-      : on_problem_(on_problem) {}
-
-  void Add(std::string place, std::string description) {
-    if (ended_) return;
-    ended_ = !on_problem_({std::move(place), std::move(description)});
-  }
-  void AddUnlessOk(const std::string& place, const absl::Status& status) {
-    if (!status.ok()) Add(place, std::string(status.message()));
-  }
-  bool ended() const { return ended_; }
-
- private:
-  const std::function<bool(const StoreProblem&)>& on_problem_;
-  bool ended_ = false;
-};
 
 // Everything in the current schema that a migration creates: a name for
 // messages, and a definition.
@@ -121,8 +102,7 @@ absl::StatusOr<std::map<std::string, std::string>> ExpectedDefinitions(
 
 // Without its triggers and constraints, a database accepts what must never be
 // in it, such as a second active calibration.
-absl::Status CompareDefinitions(PostgresConnection* db,
-                                SchemaFindings* findings) {
+absl::Status CompareDefinitions(PostgresConnection* db, Findings* findings) {
   SELFCAL_ASSIGN_OR_RETURN(
       const std::int64_t version,
       ReadInt(db, "SELECT max(version) FROM schema_migrations"));
@@ -173,7 +153,7 @@ struct Reference {
   std::string count_broken;
 };
 
-absl::Status CheckReferences(PostgresConnection* db, SchemaFindings* findings) {
+absl::Status CheckReferences(PostgresConnection* db, Findings* findings) {
   std::vector<Reference> references;
   {
     Statement read(db, kReferences);
@@ -200,7 +180,7 @@ absl::Status CheckReferences(PostgresConnection* db, SchemaFindings* findings) {
 void CheckPostgresStructure(
     PostgresConnection* db,
     const std::function<bool(const StoreProblem&)>& on_problem) {
-  SchemaFindings findings(on_problem);
+  Findings findings(on_problem);
   findings.AddUnlessOk("schema", CompareDefinitions(db, &findings));
   findings.AddUnlessOk("database", CheckReferences(db, &findings));
 }

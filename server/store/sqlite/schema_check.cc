@@ -12,30 +12,12 @@
 
 #include "migrations/migrations.h"
 #include "server/status/status_macros.h"
+#include "server/store/driver/findings.h"
 #include "server/store/driver/statement.h"
 #include "server/store/sqlite/sqlite_connection.h"
 
 namespace selfcal::server {
 namespace {
-
-class Findings {
- public:
-  explicit Findings(const std::function<bool(const StoreProblem&)>& on_problem)
-      : on_problem_(on_problem) {}
-
-  void Add(std::string place, std::string description) {
-    if (ended_) return;
-    ended_ = !on_problem_({std::move(place), std::move(description)});
-  }
-  void AddUnlessOk(const std::string& place, const absl::Status& status) {
-    if (!status.ok()) Add(place, std::string(status.message()));
-  }
-  bool ended() const { return ended_; }
-
- private:
-  const std::function<bool(const StoreProblem&)>& on_problem_;
-  bool ended_ = false;
-};
 
 std::vector<std::string> Describe(const std::vector<Column>& columns) {
   std::vector<std::string> descriptions;

@@ -1,10 +1,8 @@
 #include "server/store/sqlite/sqlite_database.h"
 
 #include <algorithm>
-#include <exception>
 #include <future>
 #include <iterator>
-#include <new>
 #include <utility>
 
 #include "server/status/status_macros.h"
@@ -51,17 +49,6 @@ absl::Status QuickCheck(SqliteConnection* connection) {
       "the database is damaged: stop the daemon, keep a copy of the file, and "
       "restore a backup (quick_check: " +
       words + ")");
-}
-
-// Turns what a write throws into an error of that write alone.
-absl::Status RunGuarded(const Database::Work& work, Connection* connection) {
-  try {
-    return work(connection);
-  } catch (const std::bad_alloc&) {
-    return absl::ResourceExhaustedError("memory is short: try again later");
-  } catch (const std::exception& error) {
-    return absl::InternalError(error.what());
-  }
 }
 
 // Replaces SQLite's automatic checkpoint, which is part of a commit.
