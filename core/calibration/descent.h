@@ -36,6 +36,8 @@ class Descent {
   // result: cancelled, or failed.
 
   bool Start();  // finds the directions that the data observes
+  // Descends to the minimum with the present weights and directions. True also
+  // if it stalls or runs out of iterations: see state().
   bool Descend();
   // Selects again and descends, after weights have changed.
   bool Repeat();

@@ -149,8 +149,8 @@ inline constexpr double kNotProjectedSigmas = 1e3;
 
 // Minimises the robust reprojection cost of the observations `used`, and the
 // prior on inverse depth, by damped Gauss-Newton, with the landmark in front of
-// its anchor camera. If the start is behind that camera, the search starts at
-// infinity.
+// its anchor camera. `*position` is the start, and then the minimum. If the
+// start is behind that camera, the search starts at infinity.
 RefinedPosition RefinePosition(const LandmarkScene& scene,
                                const Track& track,
                                std::span<const UsedObservation> used,

@@ -28,7 +28,8 @@ class LinearInterface {
 
   // The minimising step of the interface for a step of theta.
   Eigen::VectorXd Step(const Eigen::VectorXd& theta_step) const;
-  // Covariance of theta and the interface, for a covariance of theta.
+  // Covariance of (theta, interface), in this order, for a covariance of theta
+  // (D x D).
   Eigen::MatrixXd Covariance(const Eigen::MatrixXd& theta_covariance) const;
 
  private:

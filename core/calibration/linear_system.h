@@ -2,6 +2,10 @@
 // to theta, with the back-substitution from a step of theta to the steps of all
 // other unknowns. Deterministic.
 //
+// Only recalibrations use it; a score uses SegmentLineariser
+// (core/information). Lambda is D x D and eta has D entries, in the tangent
+// units of calibration.h; components that the rig holds fixed are not removed.
+//
 // Keyframes that are connected by IMU samples form a chain, eliminated by
 // ChainElimination. The unknowns that connect chains are kept: landmarks that
 // several of them observe and, for each gap over which biases walk, the biases

@@ -14,9 +14,9 @@ namespace {
 // the prior.
 constexpr double kObserved = 1.0;
 
-// Ratio of the reach of a segment, the sigma of its spurious information, to
-// the distance from the linearisation point. Errors of simulated rotations in
-// place are up to one and a half times this distance.
+// Ratio of the standard deviation of the unknown error of a segment to its
+// reach. Errors of simulated rotations in place are up to one and a half times
+// the reach.
 constexpr double kReachError = 2.0;
 
 // Observed eigenvectors of a symmetric matrix, with their eigenvalues.

@@ -13,9 +13,9 @@
 // If noise in these states looks like motion, the segment claims information
 // that the motion does not provide: that theta is equal to the linearisation
 // point. That is not evidence of a change. Therefore the segment is assumed to
-// have an additional unknown error, its reach: in each component, its standard
-// deviation is twice the distance from the linearisation point to the active
-// calibration. A segment that was linearised more than kMaxLinearisation
+// have an additional unknown error whose standard deviation, in each component,
+// is twice its reach (the distance from the linearisation point to the active
+// calibration). A segment that was linearised more than kMaxLinearisation
 // reference sigmas away is not tested at all.
 //
 // Pure, deterministic, callable from any thread.
@@ -60,8 +60,8 @@ struct GroupConsistency {
 struct OffsetInformation {
   Eigen::MatrixXd Lambda;
   Eigen::VectorXd eta;
-  // Largest reach over the segments, by component; empty: linearised at the
-  // active calibration.
+  // Largest standard deviation of the unknown error of a segment, by component;
+  // empty: linearised at the active calibration.
   Eigen::VectorXd reach = {};
 
   OffsetInformation& operator+=(const OffsetInformation& other);
@@ -104,7 +104,7 @@ class ConsistencyTester {
   const std::vector<ThetaPart>& groups() const { return groups_; }
 
  private:
-  // Covariance including the reach of segments.
+  // Covariance including the unknown error of segments.
   Eigen::MatrixXd Covariance(const OffsetInformation& offset) const;
 
   const Calibration theta_;

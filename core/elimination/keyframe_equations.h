@@ -1,6 +1,6 @@
-// The normal equations of the keyframes of a chain and of the landmark
-// parameters, as far as no landmark is involved, summed over all observations.
-// Internal to core/elimination.
+// The normal equations of the keyframes of a chain and of the camera
+// parameters, apart from the parts with landmarks, summed over all
+// observations. Internal to core/elimination.
 #pragma once
 
 #include <vector>
@@ -39,7 +39,8 @@ class KeyframeEquations {
 
   // Adds the sums of a keyframe to the front, where it has slot 0.
   void AddKeyframeTo(ChainFront* front, int keyframe) const;
-  // Adds the sums among camera parameters and constant.
+  // Adds the sums among camera parameters and constant to the front: once,
+  // after the last keyframe.
   void AddSharedTo(ChainFront* front) const;
 
  private:

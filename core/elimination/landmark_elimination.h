@@ -35,8 +35,9 @@ class LandmarkElimination {
                  LandmarkEquations* sums,
                  ChainFront* front);
 
-  // The minimising steps of all landmarks, whose panels are recorded, for a
-  // step: z of the fixed part of the front, and the states of all keyframes.
+  // The minimising step of each landmark (p_G [m]), for a step: z of the fixed
+  // part of the front, which contains the steps of kept landmarks, and the
+  // states of all keyframes. The panels must be recorded.
   void FindSteps(const LandmarkEquations& sums,
                  const Eigen::VectorXd& z,
                  const std::vector<ChainStateVector>& states,

@@ -42,8 +42,8 @@ class LandmarkEquations {
   // Fills the panel of a landmark, 3 rows `stride` apart over the front from
   // the camera parameters on, from its sums. Returns its information.
   Eigen::Matrix3d PreparePanel(int landmark, double* panel, int stride) const;
-  // The inverse of PreparePanel, for the back-substitution: replaces the sums
-  // by the panel.
+  // Keeps the panel after the elimination, in place of the sums, for
+  // ByRecordedPanel.
   void RecordPanel(int landmark, const double* panel, int stride);
   // The product of a recorded panel with a step: z of the fixed part of the
   // front, and the states of all keyframes.

@@ -77,10 +77,11 @@ struct ResidualStatistics {
 };
 
 struct SegmentInformation {
-  Calibration theta0;      // linearisation point
-  Eigen::MatrixXd Lambda;  // D x D, of the data alone, prior not included
-  Eigen::VectorXd eta;     // D: Lambda (theta [-] theta0) = eta
-  int rank = 0;            // of the free components together
+  Calibration theta0;  // linearisation point
+  // D x D, D = TangentSize(theta0): of the data alone, prior not included.
+  Eigen::MatrixXd Lambda;
+  Eigen::VectorXd eta;  // D: Lambda (theta [-] theta0) = eta
+  int rank = 0;         // of the free components together
   std::vector<UnobservedDirection> unobserved;
   std::vector<GroupScore> groups;  // in the order of rig.groups
   ResidualStatistics residuals;
@@ -100,6 +101,9 @@ struct ScoreOptions {
 // The segment must be valid for the rig. Rows of Lambda and eta are zero for
 // components that the rig holds fixed. If the fit of the segment exceeds
 // kOrdinaryFit, both are divided by the square of the excess.
+//
+// Implemented by SegmentScorer: inliers (InlierSelector), linearisation and
+// elimination (SegmentLineariser, over ChainElimination), scores (GroupScorer).
 SegmentInformation ScoreSegment(const Rig& rig,
                                 const Calibration& theta0,
                                 const MotionSegment& segment,

@@ -5,10 +5,9 @@
 //   kName, kCoefficients, kTools   see CameraModelInfo; kSize coefficients,
 // that is constructed from the values of its coefficients and has, with the
 // signatures of pinhole.h,
-//   Project    a template over the scalar (double or Lanes): the pixel of p_C
-//   at
-//              any positive scale, its ProjectionParts unless null, and whether
-//              p_C is where the model is one-to-one,
+//   Project    a template over the scalar (double or Lanes): the pixel of
+//              p_C at any positive scale, its ProjectionParts unless null, and
+//              whether p_C is where the model is one-to-one,
 //   Unproject  a ray in C, of any length, of the coordinates d = (z - c) / f,
 //              and whether there is one.
 // Its coefficients need not be those of a distortion. Internal to the project:

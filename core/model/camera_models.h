@@ -4,7 +4,8 @@
 //      declares.
 //   2. Include it here, and append it to CameraModels.
 //   3. Add its name to the enumeration DistortionModel of the contract.
-//   4. Add it to client/python/selfcal/cameras.py.
+//   4. Add it to client/python/selfcal/cameras.py, and its name to the comment
+//      of selfcal_camera in client/c/selfcal.h.
 // Everything else is derived, and its tests run over all of these models.
 // Internal to core/model and core/factor.
 #pragma once

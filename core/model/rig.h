@@ -98,8 +98,8 @@ struct Rig {
   // After the first run, the next one starts when at least this fraction of the
   // table entries is new since the last run.
   double retrigger_fraction = 0.5;
-  // If true, calibrations scale the noise as their residuals suggest, as far as
-  // the residuals determine it, instead of using the noise stated above.
+  // Has no effect, since CalibrateOptions::reweight_noise is on; kept for rigs
+  // that were stored with it.
   bool reweight_noise = false;
 };
 

@@ -67,13 +67,14 @@ enum class Trigger {
   kTablesChanged,  // enough entries since the last run
 };
 
-// Decides whether a run should start. `last_run` holds the keys that the last
-// run used, nullopt if there was none. Tables are ready when each is full or
-// starved, and at least one is full; the table of a joint selection, which is
-// as large as all tables of the groups together, is ready as soon as one of
-// those would be. Then the first run starts; a later one starts when, counted
-// over all tables, at least rig.retrigger_fraction of the entries (and at least
-// one) are of segments that the last run did not use.
+// Decides whether a run should start. `last_run` is the snapshot of the last
+// run, including the segments that its result excluded; nullopt if there was
+// none. Tables are ready when each is full or starved, and at least one is
+// full; the table of a joint selection, which is as large as all tables of the
+// groups together, is ready as soon as one of those would be. Then the first
+// run starts; a later one starts when, counted over all tables, at least
+// rig.retrigger_fraction of the entries (and at least one) are of segments that
+// the last run was not created with.
 Trigger EvaluateTrigger(const Rig& rig,
                         const std::vector<Table>& tables,
                         const std::optional<std::vector<SegmentKey>>& last_run);

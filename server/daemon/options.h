@@ -38,7 +38,7 @@ struct DaemonOptions {
   bool idle_runs = false;
   double max_run_minutes = 30;   // a run that takes longer fails
   int max_run_memory_mib = 512;  // limit for a run; 0: no limit
-  double session_idle_s = 60;    // idle time that ends a session; 0: no limit
+  double session_idle_s = 60;    // 0: only the end of a stream ends a session
   std::string metrics = "off";   // or host:port of the loopback interface
   int metrics_rigs = 16;         // number of rigs with their own series
   std::string console = "off";   // or host:port

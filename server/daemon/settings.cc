@@ -133,7 +133,7 @@ void DefineLimits(Definer* define, DaemonOptions* options) {
   define
       ->Add("max-memory-bytes",
             &server.max_memory_bytes,
-            "Limit on the bytes of all messages in flight")
+            "Limit on the bytes of messages in flight and of what they become")
       ->check(CLI::Range(kMinMemoryBytes, kMaxMemoryBytes))
       ->capture_default_str();
   define

@@ -44,7 +44,8 @@ struct ServerOptions {
   int max_threads = 128;
   int max_watches = 10'000;
   int max_segment_streams = 256;
-  std::int64_t max_memory_bytes = 512 << 20;  // for all messages in flight
+  // For messages in flight and for what they become.
+  std::int64_t max_memory_bytes = 512 << 20;
   // A caller that does not read a response of a stream for so long is cut off.
   std::chrono::milliseconds max_write_time{60'000};
   int max_streams = 100;  // concurrent calls on one connection; others wait

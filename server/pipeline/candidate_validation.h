@@ -4,9 +4,13 @@
 // Each check passes, fails, or cannot be made. One that fails rejects the
 // candidate, with a sentence that has the value, what it means and what to do;
 // one that cannot be made is never treated as passed, and weakens the verdict.
-// run_validation.cc gathers the evidence. Domain::FinishRun may still reject a
-// candidate that passes: if the device has changed, or a segment of the run was
-// quarantined, since the run was created (server/domain/run_results.cc).
+// run_validation.cc gathers the evidence. Then Domain::FinishRun ends the run
+// (server/domain/run_results.cc), in this order:
+// - ABORTED if another version is active by now: it is validated again;
+// - a device change among the segments is recorded (StoreSplit);
+// - a candidate that passes is still rejected if, since the run was created,
+//   the device has changed otherwise, or one of its segments became unusable
+//   (RejectIfOutdated).
 #pragma once
 
 #include <optional>
@@ -24,7 +28,8 @@ namespace selfcal::server {
 // Tolerances of the checks. Further constants: kOffSigmas and Biases
 // (candidate_fit.cc), the latter with the findings that do not reject;
 // kLeastDegrees and the level of LargestByChance (candidate_confirmation.cc);
-// kHeldOut and kMaxNoiseOff (run_validation.cc).
+// kHeldOut and kMaxNoiseOff (run_validation.cc); kMaxLinearisation
+// (core/change/consistency.h); kReserve (server/domain/remembered.h).
 struct CandidateLimits {
   // At least this share of the observations must have been used. Observations
   // are left out because they are outliers, near the border of the image, or of
@@ -46,19 +51,21 @@ struct CandidateLimits {
   // large again.
   double max_noise_ratio = 1.5;
   // A noise scale above this is not noise: the residuals contain errors of the
-  // model or of the data.
+  // model or of the data. Chosen, not measured.
   double max_pixel_noise = 10;
   double max_imu_noise = 20;
   // A component may lie this many prior sigmas from the factory's value.
+  // Chosen, not measured.
   double max_prior_sigmas = 10;
   // The sigma of a component that the active version observes may grow by at
-  // most this factor.
+  // most this factor. Chosen, not measured.
   double max_sigma_growth = 1.5;
   // A component is treated as observed if its sigma is below this part of the
-  // prior's.
+  // prior's. Chosen, not measured.
   double observed_below = 0.5;
   // For the agreement of the halves, and of held-out segments with the
-  // candidate.
+  // candidate. Chosen, not measured: each of the two tests rejects at most one
+  // sound candidate in 10,000, if the noise is as assumed.
   double min_probability = 1e-4;
   // Largest variance between segments over that which noise explains; more if
   // few degrees of freedom are tested, so that chance alone exceeds it once in
@@ -69,9 +76,9 @@ struct CandidateLimits {
 };
 
 struct CandidateEvidence {
-  // The active calibration. If it does not account for the last device change,
-  // its covariance is that of the prior for the components that `changed`
-  // lists.
+  // The active calibration, its covariance aged to now (CovarianceAt). If it
+  // does not account for the last device change, its covariance is that of the
+  // prior for the components that `changed` lists.
   StoredCalibration active;
   std::vector<int> changed;
   HeldOutSegments held_out;

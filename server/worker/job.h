@@ -41,6 +41,8 @@ std::string EncodeScoreJob(ScorerKind scorer,
                            const MotionSegment& segment,
                            const WorkerLimits& limits);
 std::string EncodeProgress(const CalibrateProgress& progress);
+// A failed result keeps only its message; any other keeps what the record of a
+// calibration has, and Lambda.
 std::string EncodeResult(const CalibrationResult& result);
 std::string EncodeScore(const SegmentInformation& information);
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/model/calibration.h"
+#include "core/model/camera_model.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
 
@@ -50,7 +51,8 @@ class RandomValues {
     camera.p_CI = Vector3();
     camera.f = Vector2();
     camera.c = Vector2();
-    camera.model = static_cast<DistortionModel>(Int(0, 2));
+    camera.model = static_cast<DistortionModel>(
+        Int(0, static_cast<int>(DistortionModels().size()) - 1));
     camera.distortion.resize(DistortionSize(camera.model));
     for (double& k : camera.distortion) k = Double();
     camera.width_px = Int(0, 10000);
