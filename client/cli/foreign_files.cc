@@ -6,11 +6,10 @@
 #include <cstdio>
 #include <deque>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "client/cli/choice.h"
 #include "client/cli/new_file.h"
+#include "client/import/read_file.h"
 
 namespace selfcal::client {
 namespace {
@@ -29,12 +28,9 @@ absl::StatusOr<std::vector<TextFile>> ReadTextFiles(
     const std::vector<std::string>& paths) {
   std::vector<TextFile> files;
   for (const std::string& path : paths) {
-    std::ifstream file(path, std::ios::binary);
-    std::string text(std::istreambuf_iterator<char>(file), {});
-    if (!file) {
-      return absl::NotFoundError(fmt::format("cannot read {}", path));
-    }
-    files.push_back({path, std::move(text)});
+    auto text = ReadFile(path);
+    if (!text.ok()) return text.status();
+    files.push_back({path, *std::move(text)});
   }
   return files;
 }

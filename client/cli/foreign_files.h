@@ -16,7 +16,7 @@ namespace selfcal::client {
 // Validator of an option whose value is the name of a format.
 CLI::Validator FormatNames();
 
-// Reads files. NOT_FOUND if one cannot be read.
+// Reads files, with the errors of ReadFile.
 absl::StatusOr<std::vector<TextFile>> ReadTextFiles(
     const std::vector<std::string>& paths);
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "client/cli/camera_choice.h"
 #include "client/cli/component_settings.h"
 #include "client/cli/foreign_files.h"
+#include "client/import/read_file.h"
 #include "client/import/vi_map.h"
 #include "core/model/imu_grades.h"
 #include "proto/convert.h"
@@ -23,16 +23,10 @@
 namespace selfcal::client {
 namespace {
 
-absl::StatusOr<std::string> ReadFile(const std::string& name) {
-  if (name == "-") {
-    return std::string(std::istreambuf_iterator<char>(std::cin), {});
-  }
-  std::ifstream file(name, std::ios::binary);
-  std::string text(std::istreambuf_iterator<char>(file), {});
-  if (!file) {
-    return absl::NotFoundError(fmt::format("cannot read {}", name));
-  }
-  return text;
+// Standard input is "-".
+absl::StatusOr<std::string> ReadInput(const std::string& name) {
+  if (name != "-") return ReadFile(name);
+  return std::string(std::istreambuf_iterator<char>(std::cin), {});
 }
 
 absl::StatusOr<v1::Rig> ReadForeign(const RigInput& input,
@@ -83,7 +77,7 @@ absl::StatusOr<v1::Rig> ReadBase(const RigInput& input,
         "--from");
   }
   const std::string& file = input.files[0];
-  const auto json = ReadFile(file);
+  const auto json = ReadInput(file);
   if (!json.ok()) return json.status();
   auto rig = ParseRig(*json);
   if (!rig.ok()) {

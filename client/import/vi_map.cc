@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -10,7 +9,9 @@
 #include <utility>
 
 #include "client/formats/format.h"
+#include "client/import/read_file.h"
 #include "client/import/vi_map_files.h"
+#include "core/model/median.h"
 
 namespace selfcal::client {
 namespace {
@@ -61,9 +62,7 @@ class MapReader {
       if (absl::Status status = (this->*step)(); !status.ok()) return status;
     }
     if (!sigmas_px_.empty()) {
-      const auto middle = sigmas_px_.begin() + sigmas_px_.size() / 2;
-      std::nth_element(sigmas_px_.begin(), middle, sigmas_px_.end());
-      recording_.rig.pixel_sigma_px = *middle;
+      recording_.rig.pixel_sigma_px = UpperMedian(sigmas_px_);
     }
     return std::move(recording_);
   }

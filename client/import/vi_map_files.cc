@@ -5,10 +5,10 @@
 #include <zlib.h>
 
 #include <array>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <utility>
+
+#include "client/import/read_file.h"
 
 namespace selfcal::client {
 namespace {
@@ -58,14 +58,6 @@ bool IsPlainName(const std::string& name) {
 }
 
 }  // namespace
-
-absl::StatusOr<std::string> ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    return absl::NotFoundError(fmt::format("{}: cannot be opened", path));
-  }
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
 
 absl::StatusOr<vi_map::ViMap> ReadViMapFiles(const std::string& folder) {
   const std::string base = folder + "/vi_map/";

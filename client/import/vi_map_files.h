@@ -10,9 +10,6 @@
 
 namespace selfcal::client {
 
-// Returns the content of a file. NOT_FOUND if it cannot be opened.
-absl::StatusOr<std::string> ReadFile(const std::string& path);
-
 // Merges all part files that `folder`/vi_map/vi_map_metadata lists. DATA_LOSS
 // for a truncated or damaged file, NOT_FOUND for a missing one, with its name.
 absl::StatusOr<vi_map::ViMap> ReadViMapFiles(const std::string& folder);

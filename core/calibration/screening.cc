@@ -8,19 +8,12 @@
 #include <optional>
 #include <utility>
 
+#include "core/model/median.h"
+
 namespace selfcal {
 namespace {
 
 constexpr double kMedianOfRayleigh = 1.1774100225154747;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) {
-    return 0;
-  }
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Observations of a track within the gate of its position, and away from the
 // border of the image.
@@ -111,13 +104,13 @@ Thresholds FindThresholds(const LandmarkScene& scene,
     }
     inverse_depths.push_back(std::abs(position.inverse_depth.z()));
   }
-  const double robust_sigmas =
-      Median(std::move(norms_px)) / kMedianOfRayleigh / scene.pixel_sigma_px();
+  const double robust_sigmas = UpperMedian(std::move(norms_px)) /
+                               kMedianOfRayleigh / scene.pixel_sigma_px();
   return {{.kind = options.loss,
            .scale = options.loss_scale,
            .gate = std::max(kOutlierGate * std::max(1.0, robust_sigmas),
                             2 * options.loss_scale)},
-          kMaxDepthUncertainty * Median(std::move(inverse_depths))};
+          kMaxDepthUncertainty * UpperMedian(std::move(inverse_depths))};
 }
 
 double InverseDepthSigma(const Eigen::Matrix3d& information) {
@@ -334,7 +327,7 @@ ReprojectionStatistics MeasureReprojection(
     }
   }
   return {used > 0 ? std::sqrt(sum_of_squares / used) : 0,
-          Median(std::move(projected_px))};
+          UpperMedian(std::move(projected_px))};
 }
 
 }  // namespace selfcal

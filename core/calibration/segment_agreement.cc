@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "core/change/chi_square.h"
 #include "core/information/segment_information.h"
+#include "core/model/median.h"
 
 namespace selfcal {
 namespace {
@@ -18,14 +20,6 @@ constexpr double kChance = 1e-5;
 // Residuals larger than those of the other segments by this factor are not
 // comparable.
 constexpr double kMaxRatio = 3;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // A segment at the estimate, with its used observations only.
 MotionSegment AtEstimate(const MotionSegment& segment,
@@ -76,7 +70,7 @@ void RelateInertial(std::vector<SegmentEvidence>* evidence) {
   for (const SegmentEvidence& one : *evidence) {
     values.push_back(one.fit.inertial_ratio);
   }
-  const double usual = Median(std::move(values));
+  const double usual = UpperMedian(std::move(values));
   for (SegmentEvidence& one : *evidence) {
     one.fit.inertial_ratio = usual > 0 ? one.fit.inertial_ratio / usual : 0;
   }
@@ -183,7 +177,7 @@ std::vector<Contradiction> FindContradictions(
   const auto usual = [&](double SegmentFit::*ratio) {
     std::vector<double> values;
     for (const int i : left) values.push_back(evidence[i].fit.*ratio);
-    return Median(std::move(values));
+    return UpperMedian(std::move(values));
   };
   const double pixels = usual(&SegmentFit::pixel_ratio);
   const double inertial = usual(&SegmentFit::inertial_ratio);
@@ -209,7 +203,7 @@ std::vector<Contradiction> FindContradictions(
       tests.push_back(TestOne(evidence[i], all));
       per_degree.push_back(PerDegree(tests.back()));
     }
-    const double scale = std::max(1.0, Median(per_degree));
+    const double scale = std::max(1.0, UpperMedian(per_degree));
     const auto worst = static_cast<int>(
         std::max_element(per_degree.begin(), per_degree.end()) -
         per_degree.begin());
@@ -239,7 +233,7 @@ std::vector<Contradiction> FindMisfits(const std::vector<double>& fits) {
         return fit > 0;
       });
   if (measured.size() < kLeastSegments) return found;
-  const double usual = std::max(1.0, Median(measured));
+  const double usual = std::max(1.0, UpperMedian(measured));
   for (std::size_t i = 0; i < fits.size(); ++i) {
     if (fits[i] > kMaxRatio * usual) {
       found.push_back({static_cast<int>(i), Percent("own", fits[i], usual)});

@@ -1,9 +1,9 @@
 #include "core/calibration/track_depth.h"
 
-#include <algorithm>
 #include <cstddef>
 
 #include "core/calibration/screening.h"
+#include "core/model/median.h"
 
 namespace selfcal {
 namespace {
@@ -62,9 +62,7 @@ std::vector<bool> TracksWithDepth(
   }
   std::vector<bool> with_depth;
   if (tracks.empty()) return with_depth;
-  const auto median = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), median, values.end());
-  const double sigma = kMaxDepthUncertainty * *median;
+  const double sigma = kMaxDepthUncertainty * UpperMedian(values);
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     with_depth.push_back(tracks[t].observations.size() >=
                              kMinTrackObservations &&

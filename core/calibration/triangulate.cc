@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/model/camera.h"
+#include "core/model/median.h"
 
 namespace selfcal {
 namespace {
@@ -43,12 +44,6 @@ std::vector<Ray> SpreadRays(const LandmarkScene& scene, const Track& track) {
   return rays;
 }
 
-double MedianNorm(std::vector<double> norms) {
-  const auto middle = norms.begin() + norms.size() / 2;
-  std::nth_element(norms.begin(), middle, norms.end());
-  return *middle;
-}
-
 // The point on ray a that is nearest in angle to ray b, homogeneous.
 std::optional<Eigen::Vector4d> IntersectRays(const Ray& a, const Ray& b) {
   const Eigen::Vector3d u = b.bearing_G.cross(a.center_G - b.center_G);
@@ -77,7 +72,7 @@ std::optional<LandmarkPosition> TriangulateTrack(const LandmarkScene& scene,
     if (!point_G) {
       return;
     }
-    const double median_px = MedianNorm(ResidualNorms(scene, track, *point_G));
+    const double median_px = UpperMedian(ResidualNorms(scene, track, *point_G));
     if (median_px < best_px) {
       best_px = median_px;
       best_G = *point_G;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "core/model/median.h"
 #include "core/model/symmetric_eigen.h"
 
 namespace selfcal {
@@ -11,13 +12,6 @@ namespace {
 // A direction is observed, as everywhere, if the data has more information than
 // the prior.
 constexpr double kObserved = 1.0;
-
-double UpperMedian(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/model/median.h"
+
 namespace selfcal {
 namespace {
 
@@ -79,12 +81,6 @@ StepDensities MissedByLine(std::span<const ImuSample> samples,
   return missed;
 }
 
-double Median(std::span<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 SampleGaps FindGaps(std::span<const ImuSample> samples) {
@@ -103,7 +99,7 @@ SampleGaps FindGaps(std::span<const ImuSample> samples) {
   for (std::size_t i = 1; i < samples.size(); ++i) {
     steps.push_back(Seconds(samples[i - 1], samples[i]));
   }
-  const double usual_s = Median(steps);
+  const double usual_s = UpperMedianInPlace(std::span(steps));
   for (const double step_s : steps) {
     if (step_s <= kGapRatio * usual_s) continue;
     ++gaps.count;
@@ -142,7 +138,7 @@ Sampling::Sampling(std::span<const ImuSample> samples,
   for (std::ptrdiff_t i = first; i < end && count < kMostSteps; ++i) {
     steps[count++] = Step(i);
   }
-  period_s_ = Median(std::span(steps).first(count));
+  period_s_ = UpperMedianInPlace(std::span(steps).first(count));
 }
 
 double Sampling::Step(std::size_t next) const {

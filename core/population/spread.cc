@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/model/median.h"
 #include "core/population/estimate.h"
 
 namespace selfcal {
@@ -28,12 +29,6 @@ constexpr double kDetermined = 0.5;
 constexpr double kSigmaByDeviation = 1.4826;
 constexpr double kEfficiency = 0.37;
 constexpr double kSmallSample = 4;
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 MatrixXd Identity(Eigen::Index size) { return MatrixXd::Identity(size, size); }
 
@@ -148,10 +143,10 @@ Spread RobustSpread(std::span<const ThetaInformation> devices,
     }
     if (values.size() < kLeastCohort) continue;
     const auto count = static_cast<double>(values.size());
-    spread.mu(j) = Median(values);
+    spread.mu(j) = UpperMedian(values);
     for (double& value : values) value = std::abs(value - spread.mu(j));
-    const double sigma = kSigmaByDeviation * Median(values);
-    const double of_noise = Median(noise);
+    const double sigma = kSigmaByDeviation * UpperMedian(values);
+    const double of_noise = UpperMedian(noise);
     // The median deviation of few devices is often too small.
     const double variance = (1 + kSmallSample / count) *
                             std::max(sigma * sigma - of_noise, of_noise);

@@ -7,9 +7,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/factor/sampling.h"
+#include "core/model/median.h"
 #include "core/preflight/checks.h"
 
 namespace selfcal {
@@ -38,11 +40,7 @@ std::int64_t MedianStep(std::span<const MotionSegment> segments) {
       if (step > 0) steps.push_back(step);
     }
   }
-  if (steps.empty()) return 0;
-  const auto middle =
-      steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return UpperMedian(std::move(steps));
 }
 
 Counts Count(std::span<const MotionSegment> segments, double usual_ns) {

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "core/model/imu_model.h"
+#include "core/model/median.h"
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -74,11 +76,7 @@ double MedianAcceleration(const MotionData& data) {
       norms.push_back(sample.accel.norm());
     }
   }
-  if (norms.empty()) return 0;
-  const auto middle =
-      norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
-  std::nth_element(norms.begin(), middle, norms.end());
-  return *middle;
+  return UpperMedian(std::move(norms));
 }
 
 }  // namespace selfcal

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/model/median.h"
+
 namespace selfcal {
 namespace {
 
@@ -95,10 +97,7 @@ ReprojectionError Summarise(std::vector<double> errors_px) {
   const auto finite = std::count_if(errors_px.begin(),
                                     errors_px.end(),
                                     [](double e) { return std::isfinite(e); });
-  const auto middle =
-      errors_px.begin() + static_cast<std::ptrdiff_t>(errors_px.size() / 2);
-  std::nth_element(errors_px.begin(), middle, errors_px.end());
-  return {*middle,
+  return {UpperMedian(errors_px),
           static_cast<double>(finite) / static_cast<double>(errors_px.size())};
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/median.h"
 #include "core/simulation/random.h"
 #include "core/simulation/streams.h"
 
@@ -83,10 +84,7 @@ bool IsConsistent(const std::vector<View>& views, const Eigen::Vector3d& p_G) {
     }
   }
   if (2 * norms.size() <= views.size()) return false;
-  const auto middle =
-      norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
-  std::nth_element(norms.begin(), middle, norms.end());
-  return *middle < kMaxMedian_px;
+  return UpperMedian(norms) < kMaxMedian_px;
 }
 
 // Gauss-Newton from the point of the map.

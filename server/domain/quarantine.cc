@@ -102,8 +102,9 @@ absl::StatusOr<QuarantineCommit> QuarantineSegments(
   if (commit.quarantined == 0) return commit;
   const std::string what =
       index ? SegmentText(tx->rig(), segments.front().key)
-            : fmt::format("{} segments of session {} of rig {}",
+            : fmt::format("{} {} of session {} of rig {}",
                           commit.quarantined,
+                          commit.quarantined == 1 ? "segment" : "segments",
                           session,
                           tx->rig());
   SELFCAL_RETURN_IF_ERROR(

@@ -103,6 +103,19 @@ TEST_F(RigCreate, NamesTheCamerasThatThereAre) {
   EXPECT_TRUE(daemon_.rigs.empty());
 }
 
+TEST_F(RigCreate, SaysThatAFolderIsNoFile) {
+  const std::string folder = temp_folder_.File("");
+  const std::string text =
+      "cannot read " + folder + ": it is a folder; name a file";
+  const Outcome own = Selfcal({"rig", "create", folder});
+  EXPECT_EQ(own.code, 2);
+  EXPECT_THAT(own.err, HasSubstr(text));
+  const Outcome foreign =
+      Selfcal({"rig", "create", "--from", "kalibr", folder, "--id", "a"});
+  EXPECT_EQ(foreign.code, 2);
+  EXPECT_THAT(foreign.err, HasSubstr(text));
+}
+
 TEST_F(RigCreate, NeedsAnIdForWhatNamesNoRig) {
   for (const std::vector<std::string>& line :
        std::vector<std::vector<std::string>>{
