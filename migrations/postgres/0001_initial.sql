@@ -404,6 +404,22 @@ CREATE TRIGGER events_are_not_truncated
 BEFORE TRUNCATE ON events
 EXECUTE FUNCTION refuse('an event is never deleted');
 
+-- The daemons that share the database, while they run.
+CREATE TABLE replicas (
+  replica TEXT COLLATE "C" PRIMARY KEY,
+  beat BIGINT NOT NULL  -- grows while it runs
+);
+
+-- Which of them scores the segments and executes the runs of a rig.
+CREATE TABLE claims (
+  rig BIGINT PRIMARY KEY REFERENCES rigs,
+  replica TEXT COLLATE "C" NOT NULL,  -- empty: none; it may be gone
+  number BIGINT NOT NULL  -- counts the claims of the rig: the newest one holds
+);
+
+-- The rigs of a replica.
+CREATE INDEX claims_of_replica ON claims (replica);
+
 -- One row: the clocks of the device at one moment, from which steady time
 -- continues.
 CREATE TABLE clock (

@@ -61,6 +61,7 @@ PipelineOptions OptionsOfPipeline(const DaemonOptions& options,
                                   PipelineObserver* observer) {
   PipelineOptions pipeline;
   pipeline.now_ns = [clock] { return clock->Now().steady_ns; };
+  pipeline.replica.shared = !options.store.empty();
   pipeline.scoring_threads = options.scoring_threads;
   pipeline.solver_processes = options.solver_processes;
   pipeline.max_backlog = options.max_backlog;

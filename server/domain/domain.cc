@@ -110,33 +110,33 @@ void Domain::BeginPutSegment(const std::string& rig,
 }
 
 absl::StatusOr<ScoreCommit> Domain::CommitScore(
-    const std::string& rig,
+    const RigClaim& claim,
     const SegmentKey& key,
     const SegmentInformation& information,
     const std::optional<SegmentEnds>& ends) {
   SELFCAL_ASSIGN_OR_RETURN(const auto decided,
-                           InspectFor(store_, rig, [&](UnitOfWork* tx) {
+                           InspectFor(store_, claim.rig, [&](UnitOfWork* tx) {
                              return DecideJointly(tx, key, information);
                            }));
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::CommitScore(
         tx, key, information, ends, decided, options_.change);
   });
 }
 
-absl::Status Domain::ReplaceScore(const std::string& rig,
+absl::Status Domain::ReplaceScore(const RigClaim& claim,
                                   const SegmentKey& key,
                                   const SegmentInformation& information,
                                   const SegmentEnds& ends) {
-  return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
+  return store_->Transact(claim, clock_(), [&](UnitOfWork* tx) {
     return server::ReplaceScore(tx, key, information, ends);
   });
 }
 
-absl::Status Domain::MarkUnusable(const std::string& rig,
+absl::Status Domain::MarkUnusable(const RigClaim& claim,
                                   const SegmentKey& key,
                                   const std::string& problem) {
-  return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
+  return store_->Transact(claim, clock_(), [&](UnitOfWork* tx) {
     return server::MarkUnusable(tx, key, problem);
   });
 }
@@ -243,51 +243,51 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
   return started;
 }
 
-absl::Status Domain::DeferRun(const std::string& rig,
+absl::Status Domain::DeferRun(const RigClaim& claim,
                               std::int64_t run,
                               const std::string& reason) {
-  return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
+  return store_->Transact(claim, clock_(), [&](UnitOfWork* tx) {
     return server::DeferRun(tx, run, reason);
   });
 }
 
-absl::StatusOr<StoredRun> Domain::BeginRun(const std::string& rig,
+absl::StatusOr<StoredRun> Domain::BeginRun(const RigClaim& claim,
                                            std::int64_t run) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::BeginRun(tx, run);
   });
 }
 
-absl::StatusOr<StoredRun> Domain::ReleaseRun(const std::string& rig,
+absl::StatusOr<StoredRun> Domain::ReleaseRun(const RigClaim& claim,
                                              std::int64_t run) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::ReleaseRun(tx, run);
   });
 }
 
 absl::StatusOr<StoredCalibration> Domain::StoreCandidate(
-    const std::string& rig,
+    const RigClaim& claim,
     std::int64_t run,
     const StoredCalibration& calibration) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::StoreCandidate(tx, run, calibration);
   });
 }
 
 absl::StatusOr<StoredCalibration> Domain::FinishRun(
-    const std::string& rig,
+    const RigClaim& claim,
     std::int64_t run,
     const StoredCalibration& calibration) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::FinishRun(tx, run, calibration, options_.change);
   });
 }
 
-absl::StatusOr<StoredRun> Domain::EndRun(const std::string& rig,
+absl::StatusOr<StoredRun> Domain::EndRun(const RigClaim& claim,
                                          std::int64_t run,
                                          RunState state,
                                          const std::string& message) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::EndRun(tx, run, state, message);
   });
 }

@@ -1,9 +1,12 @@
 // The rules of selfcald: what happens to rigs, segments, runs and calibrations,
-// and when. Each method is one transaction of the store (store.h), or reads one
-// state of it, by the functions of this module. Errors are those of the store.
+// and when. Each method writes in one transaction of the store (store.h), by the
+// functions of this module, or reads one state of it; CommitScore reads before
+// it writes, StartTimedRuns and StartSessionRuns write in one for each rig.
+// Errors are those of the store.
 //
 // Any thread may call. All methods that write return after the commit, but for
-// BeginPutSegment.
+// BeginPutSegment. Those that take a RigClaim are the work of the daemon that
+// has claimed the rig: ClaimLost if the claim does not hold any more.
 #pragma once
 
 #include <absl/status/status.h>
@@ -82,14 +85,14 @@ class Domain {
   // device change the segments from before it leave all tables, and a run that
   // was created before it ends with a rejected calibration.
   absl::StatusOr<ScoreCommit> CommitScore(
-      const std::string& rig,
+      const RigClaim& claim,
       const SegmentKey& key,
       const SegmentInformation& information,
       const std::optional<SegmentEnds>& ends = std::nullopt);
 
   // Replaces the score of a scored segment by a later one, also in the tables
   // that hold it. Changes nothing if its data is gone.
-  absl::Status ReplaceScore(const std::string& rig,
+  absl::Status ReplaceScore(const RigClaim& claim,
                             const SegmentKey& key,
                             const SegmentInformation& information,
                             const SegmentEnds& ends);
@@ -98,7 +101,7 @@ class Domain {
   // and from the tables for good, and deletes its data unless an unfinished run
   // references it. An event records the problem. Changes nothing if the segment
   // is unusable already.
-  absl::Status MarkUnusable(const std::string& rig,
+  absl::Status MarkUnusable(const RigClaim& claim,
                             const SegmentKey& key,
                             const std::string& problem);
 
@@ -166,19 +169,18 @@ class Domain {
       const std::vector<std::string>& ended, std::int64_t idle_since_ns);
   // Records why a pending run is deferred; the first time also in an event.
   // FAILED_PRECONDITION if it is not pending.
-  absl::Status DeferRun(const std::string& rig,
+  absl::Status DeferRun(const RigClaim& claim,
                         std::int64_t run,
                         const std::string& reason);
   // Pending or running -> running, with one attempt more.
-  absl::StatusOr<StoredRun> BeginRun(const std::string& rig, std::int64_t run);
+  absl::StatusOr<StoredRun> BeginRun(const RigClaim& claim, std::int64_t run);
   // Running -> pending at an orderly stop; the attempt is not counted.
-  absl::StatusOr<StoredRun> ReleaseRun(const std::string& rig,
-                                       std::int64_t run);
+  absl::StatusOr<StoredRun> ReleaseRun(const RigClaim& claim, std::int64_t run);
   // Stores the result of a running run as the next version, a candidate, whose
   // number is assigned here. If the run has a candidate already, changes
   // nothing and returns that.
   absl::StatusOr<StoredCalibration> StoreCandidate(
-      const std::string& rig,
+      const RigClaim& claim,
       std::int64_t run,
       const StoredCalibration& calibration);
   // Ends a running run with its calibration, which is stored as a candidate if
@@ -197,12 +199,12 @@ class Domain {
   // Deletes data that only the run referenced. May create the next run, as
   // CommitScore does.
   absl::StatusOr<StoredCalibration> FinishRun(
-      const std::string& rig,
+      const RigClaim& claim,
       std::int64_t run,
       const StoredCalibration& calibration);
   // Ends a run without a calibration: kFailed or kCancelled. Its candidate, if
   // it has one, is rejected with the message.
-  absl::StatusOr<StoredRun> EndRun(const std::string& rig,
+  absl::StatusOr<StoredRun> EndRun(const RigClaim& claim,
                                    std::int64_t run,
                                    RunState state,
                                    const std::string& message);

@@ -16,6 +16,7 @@
 #include "core/model/saturation.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/rescoring.h"
+#include "server/pipeline/rig_claims.h"
 #include "server/pipeline/scoring.h"
 #include "server/pipeline/verification_sampler.h"
 #include "server/pipeline/verifier.h"
@@ -118,13 +119,21 @@ class PipelineImpl : public Pipeline {
         verifier_(domain, options, estimators),
         sampler_(store_, options, &verifier_),
         run_watchers_(ObserveRuns(options.observer, &sampler_)),
+        claims_(store_,
+                options.replica,
+                [this] {
+                  scoring_.Wake();
+                  recalibrator_.Wake();
+                }),
         recalibrator_(domain,
+                      &claims_,
                       options,
                       estimators,
                       &calibration_watchers_,
                       &run_watchers_),
         scoring_(
             domain,
+            &claims_,
             options,
             SampleScores(ObserveScores(estimators, options.observer),
                          &sampler_),
@@ -139,12 +148,8 @@ class PipelineImpl : public Pipeline {
 
   absl::Status Start() override {
     SELFCAL_RETURN_IF_ERROR(recalibrator_.Start());
-    const absl::Status status = scoring_.Start();
-    if (!status.ok()) {
-      recalibrator_.Stop();
-      return status;
-    }
-    sampler_.Start();
+    const absl::Status status = StartScoring();
+    if (!status.ok()) Stop();
     return status;
   }
 
@@ -152,6 +157,7 @@ class PipelineImpl : public Pipeline {
     verifier_.Stop();
     scoring_.Stop();
     recalibrator_.Stop();
+    claims_.Stop();  // once there is no more to write on behalf of a claim
     sampler_.Stop();
   }
 
@@ -259,11 +265,11 @@ class PipelineImpl : public Pipeline {
       return domain_->QuarantineSegments(rig, session, index, caller, reason);
     });
     if (!commit.ok()) return commit;
-    spdlog::warn("{} quarantines {} segments of session {} of rig {}: {}",
+    spdlog::warn("{} quarantines segments of session {} of rig {} ({}): {}",
                  caller,
-                 commit->quarantined,
                  session,
                  rig,
+                 commit->quarantined,
                  reason);
     return commit;
   }
@@ -337,6 +343,13 @@ class PipelineImpl : public Pipeline {
   }
 
  private:
+  absl::Status StartScoring() {
+    SELFCAL_RETURN_IF_ERROR(scoring_.Start());
+    SELFCAL_RETURN_IF_ERROR(claims_.Start());
+    sampler_.Start();
+    return absl::OkStatus();
+  }
+
   // Notifies the observer, if there is one, before `done`.
   SubmitDone Observed(const std::string& rig, const SubmitDone& done) const {
     PipelineObserver* observer = options_.observer;
@@ -373,7 +386,7 @@ class PipelineImpl : public Pipeline {
   absl::StatusOr<SubmitResult> Settle(
       const std::string& rig, const absl::StatusOr<PutVerdict>& verdict) {
     if (verdict.ok() && *verdict == PutVerdict::kStored) {
-      scoring_.FillPlace();
+      scoring_.FillPlace(rig);
       return SubmitResult{SubmitResult::Verdict::kStored, {}};
     }
     scoring_.ReturnPlace(rig);
@@ -424,6 +437,7 @@ class PipelineImpl : public Pipeline {
   VerificationSampler sampler_;
   Watchers<StoredCalibration> calibration_watchers_;
   Watchers<RunUpdate> run_watchers_;
+  RigClaims claims_;
   Recalibrator recalibrator_;
   ScoringWorkers scoring_;
 };

@@ -3,7 +3,9 @@
 // Owns the worker threads: `scoring_threads` that score, `solver_processes`
 // that recalibrate, and one that verifies a sample of the results. Scores are
 // committed in the order of arrival within a rig, so that tables do not depend
-// on the number of threads; rigs take turns. Independent of gRPC. Any thread
+// on the number of threads; rigs take turns. Where several daemons share the
+// database, each does the work of the rigs that it has claimed, and all answer
+// for all rigs. Independent of gRPC. Any thread
 // may call. Nothing is kept only in memory: segments that are stored and
 // unscored, and runs that are unfinished, are resumed by Start().
 #pragma once
@@ -41,7 +43,18 @@ class Conditions {
   virtual std::string DeferReason() = 0;
 };
 
+// Of a daemon that shares its database with others (rig_claims.h).
+struct ReplicaOptions {
+  bool shared = false;
+  // Interval at which it shows the others that it runs, and looks for work that
+  // they leave to it.
+  std::chrono::milliseconds beat = std::chrono::seconds(1);
+  // What shows nothing for longer is taken for dead.
+  std::chrono::milliseconds lease = std::chrono::seconds(10);
+};
+
 struct PipelineOptions {
+  ReplicaOptions replica;
   int scoring_threads = 1;
   // Runs of different rigs that are computed at once.
   int solver_processes = 1;
@@ -144,7 +157,8 @@ class Pipeline {
   // full, until `cancelled` returns true (then CANCELLED). UNAVAILABLE while
   // the pipeline is not started. The segment must have been estimated with a
   // published version of the rig, or it is rejected. A few observations outside
-  // the image do not reject it: they are not stored (image_bounds.h).
+  // the image, and saturated readings of the IMU, do not reject it: they are not
+  // stored (image_bounds.h, saturation.h).
   virtual absl::StatusOr<SubmitResult> Submit(
       const std::string& rig,
       const MotionSegment& segment,

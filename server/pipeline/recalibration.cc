@@ -18,11 +18,18 @@ Recalibrator::Executor::Executor(const RunContext& shared) : context(shared) {
 }
 
 Recalibrator::Recalibrator(Domain* domain,
+                           RigClaims* claims,
                            const PipelineOptions& options,
                            Estimators estimators,
                            Watchers<StoredCalibration>* calibration_watchers,
                            Watchers<RunUpdate>* run_watchers)
-    : shared_{domain, options, std::move(estimators), run_watchers, nullptr},
+    : shared_{domain,
+              claims,
+              options,
+              std::move(estimators),
+              run_watchers,
+              nullptr,
+              ""},
       calibration_watchers_(calibration_watchers) {
   for (int k = 0; k < std::max(1, options.solver_processes); ++k) {
     executors_.push_back(std::make_unique<Executor>(shared_));
@@ -170,8 +177,13 @@ void Recalibrator::Loop(Executor* executor) {
 
 absl::Status Recalibrator::StartDueRuns() {
   const std::lock_guard lock(starting_);
-  SELFCAL_RETURN_IF_ERROR(
-      shared_.domain->StartTimedRuns(shared_.options.now_ns()).status());
+  // Of several daemons, each knows which sessions have ended at itself, and one
+  // looks at the times of all rigs.
+  const bool is_first = shared_.claims->IsFirst();
+  if (is_first) {
+    SELFCAL_RETURN_IF_ERROR(
+        shared_.domain->StartTimedRuns(shared_.options.now_ns()).status());
+  }
   std::set<std::string> busy;
   SELFCAL_ASSIGN_OR_RETURN(
       const auto unscored,
@@ -185,7 +197,8 @@ absl::Status Recalibrator::StartDueRuns() {
 
   const std::chrono::nanoseconds idle = shared_.options.session_idle;
   const std::int64_t idle_since_ns =
-      idle.count() > 0 ? shared_.options.now_ns() - idle.count() : 0;
+      idle.count() > 0 && is_first ? shared_.options.now_ns() - idle.count()
+                                   : 0;
   SELFCAL_RETURN_IF_ERROR(
       shared_.domain->StartSessionRuns(ended, idle_since_ns).status());
   for (const std::string& rig : ended) sessions_.Remove(rig);
@@ -194,12 +207,15 @@ absl::Status Recalibrator::StartDueRuns() {
 
 Execution Recalibrator::ExecuteClaimed(Executor* executor,
                                        const StoredRun& listed) {
+  const std::optional<RigClaim> claim = shared_.claims->Find(listed.rig);
+  if (!claim) return Execution::kDeferred;
   {
     const std::lock_guard lock(mutex_);
     if (!claims_.emplace(listed.rig, executor).second) {
       return Execution::kDeferred;
     }
   }
+  executor->context.claim = *claim;
   // Another thread may have ended it since it was listed.
   const auto run = shared_.store()->GetRun(listed.rig, listed.run);
   auto executed = Execution::kTryLater;
@@ -225,8 +241,9 @@ absl::StatusOr<Execution> Recalibrator::ExecuteAll(Executor* executor) {
   for (bool any = true; any && worst != Execution::kTryLater;) {
     any = false;
     SELFCAL_RETURN_IF_ERROR(StartDueRuns());
-    SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredRun> runs,
-                             shared_.store()->ListUnfinishedRuns());
+    SELFCAL_ASSIGN_OR_RETURN(
+        const std::vector<StoredRun> runs,
+        shared_.store()->ListUnfinishedRuns(shared_.claims->replica()));
     for (const StoredRun& run : runs) {
       const Execution executed = ExecuteClaimed(executor, run);
       worst = std::max(worst, executed);

@@ -34,8 +34,10 @@ class Recalibrator {
   // A client whose connection broke reconnects within a few seconds.
   static constexpr std::chrono::seconds kSessionGrace{5};
 
-  // The watchers must outlive it.
+  // Executes the runs of the rigs of `claims`, which must outlive it, as the
+  // watchers must.
   Recalibrator(Domain* domain,
+               RigClaims* claims,
                const PipelineOptions& options,
                Estimators estimators,
                Watchers<StoredCalibration>* calibration_watchers,

@@ -14,8 +14,9 @@ namespace {
 
 absl::Status TryRescore(Domain* domain,
                         const Estimators& estimators,
-                        const std::string& rig_id,
+                        const RigClaim& claim,
                         const Calibration& theta) {
+  const std::string& rig_id = claim.rig;
   Store* const store = domain->store();
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(rig_id));
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<StoredSegment> kept,
@@ -28,7 +29,7 @@ absl::Status TryRescore(Domain* domain,
     }
     SELFCAL_RETURN_IF_ERROR(segment.status());
     SELFCAL_RETURN_IF_ERROR(
-        domain->ReplaceScore(rig_id,
+        domain->ReplaceScore(claim,
                              stored.key,
                              estimators.score(rig.rig, theta, *segment),
                              estimators.ends(rig.rig, theta, *segment)));
@@ -40,18 +41,18 @@ absl::Status TryRescore(Domain* domain,
 
 void RescoreKept(Domain* domain,
                  const Estimators& estimators,
-                 const std::string& rig,
+                 const RigClaim& claim,
                  const Calibration& theta) {
   if (!estimators.ends) return;
   absl::Status status;
   try {
-    status = TryRescore(domain, estimators, rig, theta);
+    status = TryRescore(domain, estimators, claim, theta);
   } catch (const std::exception& error) {
     status = absl::InternalError(error.what());
   }
   if (!status.ok()) {
     spdlog::warn("not all kept segments of rig {} are rescored: {}",
-                 rig,
+                 claim.rig,
                  status.ToString());
   }
 }

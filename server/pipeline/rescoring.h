@@ -6,6 +6,7 @@
 #include "core/model/calibration.h"
 #include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
+#include "server/store/rig_claim.h"
 
 namespace selfcal::server {
 
@@ -17,7 +18,7 @@ namespace selfcal::server {
 // Does nothing if the estimators compute no ends.
 void RescoreKept(Domain* domain,
                  const Estimators& estimators,
-                 const std::string& rig,
+                 const RigClaim& claim,
                  const Calibration& theta);
 
 }  // namespace selfcal::server

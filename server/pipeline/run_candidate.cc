@@ -19,7 +19,7 @@ absl::StatusOr<std::vector<MotionSegment>> LoadSegments(
     std::optional<SegmentKey>* damaged) {
   std::vector<MotionSegment> segments;
   for (const SegmentKey& key : run.segments) {
-    if (context.current->interrupted()) {
+    if (context.interrupted()) {
       return absl::CancelledError("interrupted");
     }
     auto segment = context.store()->GetSegmentData(run.rig, key);
@@ -42,9 +42,7 @@ absl::StatusOr<CalibrationResult> RunSolver(
   const std::chrono::milliseconds limit = context.options.max_run_time;
   const auto deadline = std::chrono::steady_clock::now() + limit;
   const auto late = [&] { return std::chrono::steady_clock::now() > deadline; };
-  const auto unwanted = [&] {
-    return context.current->interrupted() || late();
-  };
+  const auto unwanted = [&] { return context.interrupted() || late(); };
   CalibrationResult result = context.estimators.calibrate(
       rig,
       start,
@@ -57,7 +55,7 @@ absl::StatusOr<CalibrationResult> RunSolver(
       },
       unwanted);
   if (result.status == CalibrateStatus::kCancelled && late() &&
-      !context.current->interrupted()) {
+      !context.interrupted()) {
     return absl::DeadlineExceededError(fmt::format(
         "it took longer than the {:g} s that a run may; smaller tables make it "
         "shorter",
@@ -117,7 +115,7 @@ absl::StatusOr<StoredCalibration> EnsureCandidate(
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration found,
                            ComputeCandidate(context, run, damaged));
   return RetryUnlessInterrupted(context.current, [&] {
-    return context.domain->StoreCandidate(run.rig, run.run, found);
+    return context.domain->StoreCandidate(context.claim, run.run, found);
   });
 }
 

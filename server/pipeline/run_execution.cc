@@ -22,10 +22,12 @@ struct Outcome {
   std::optional<SegmentKey> damaged;
 };
 
-// A run that was cancelled meanwhile is done.
+// A run that has ended meanwhile is done, and so is one that another daemon
+// executes.
 Execution AfterFailure(const absl::Status& failure) {
-  return absl::IsFailedPrecondition(failure) ? Execution::kDone
-                                             : Execution::kTryLater;
+  return absl::IsFailedPrecondition(failure) || IsClaimLost(failure)
+             ? Execution::kDone
+             : Execution::kTryLater;
 }
 
 // Why the run does not begin yet; empty if it may.
@@ -61,7 +63,8 @@ Execution Hold(const RunContext& context,
   if (run.message == reason) {
     return Execution::kDeferred;
   }
-  const absl::Status held = context.domain->DeferRun(run.rig, run.run, reason);
+  const absl::Status held =
+      context.domain->DeferRun(context.claim, run.run, reason);
   if (!held.ok()) return AfterFailure(held);
   spdlog::info("run {} of rig {} is deferred: {}", run.run, run.rig, reason);
   StoredRun now = run;
@@ -87,7 +90,7 @@ absl::Status EndWithout(const RunContext& context,
                message);
   SELFCAL_ASSIGN_OR_RETURN(
       const StoredRun ended,
-      context.domain->EndRun(run.rig, run.run, state, message));
+      context.domain->EndRun(context.claim, run.run, state, message));
   PublishEnd(context, ended);
   return absl::OkStatus();
 }
@@ -154,14 +157,14 @@ absl::Status Conclude(const RunContext& context,
   if (absl::IsCancelled(outcome.status) || IsTransient(outcome.status)) {
     // A stop, or the disk: the run is released and starts again later.
     SELFCAL_RETURN_IF_ERROR(
-        context.domain->ReleaseRun(run.rig, run.run).status());
+        context.domain->ReleaseRun(context.claim, run.run).status());
     return IsTransient(outcome.status) ? outcome.status : absl::OkStatus();
   }
   const std::string message(outcome.status.message());
   SELFCAL_RETURN_IF_ERROR(EndWithout(context, run, RunState::kFailed, message));
-  return outcome.damaged
-             ? context.domain->MarkUnusable(run.rig, *outcome.damaged, message)
-             : absl::OkStatus();
+  return outcome.damaged ? context.domain->MarkUnusable(
+                               context.claim, *outcome.damaged, message)
+                         : absl::OkStatus();
 }
 
 }  // namespace
@@ -177,7 +180,7 @@ Execution ExecuteRun(const RunContext& context,
                    fmt::format("the daemon ended {} times during this run; it "
                                "is not started again",
                                pending.attempts));
-    return ended.ok() ? Execution::kDone : Execution::kTryLater;
+    return ended.ok() ? Execution::kDone : AfterFailure(ended);
   }
   const auto hold = DeferReason(context, pending);
   if (!hold.ok()) {
@@ -191,7 +194,7 @@ Execution ExecuteRun(const RunContext& context,
     return Hold(context, pending, *hold);
   }
   const auto begun = context.current->Begin(
-      [&] { return context.domain->BeginRun(pending.rig, pending.run); });
+      [&] { return context.domain->BeginRun(context.claim, pending.run); });
   if (!begun) return Execution::kDone;
   if (!begun->ok()) {
     spdlog::warn("cannot begin run {} of rig {}: {}",
@@ -204,14 +207,13 @@ Execution ExecuteRun(const RunContext& context,
   PublishRun(context, run);
   const absl::Status status =
       Conclude(context, calibration_watchers, run, Solve(context, run));
-  if (!status.ok()) {
-    spdlog::error("cannot store the end of run {} of rig {}: {}",
-                  run.run,
-                  run.rig,
-                  status.ToString());
-  }
   context.current->End();
-  return status.ok() ? Execution::kDone : Execution::kTryLater;
+  if (status.ok()) return Execution::kDone;
+  spdlog::warn("run {} of rig {} does not end here: {}",
+               run.run,
+               run.rig,
+               status.ToString());
+  return AfterFailure(status);
 }
 
 }  // namespace selfcal::server

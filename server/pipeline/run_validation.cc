@@ -190,15 +190,18 @@ absl::StatusOr<StoredCalibration> ValidateAndFinish(
     // whoever sees the version sees the scores at it.
     const bool becomes_active = candidate.state == CalibrationState::kActive;
     if (becomes_active) {
-      RescoreKept(context.domain, context.estimators, run.rig, candidate.theta);
+      RescoreKept(
+          context.domain, context.estimators, context.claim, candidate.theta);
     }
-    auto finished = context.domain->FinishRun(run.rig, run.run, candidate);
+    auto finished =
+        context.domain->FinishRun(context.claim, run.run, candidate);
     if (absl::IsAborted(finished.status())) continue;
     if (becomes_active && finished.ok() &&
         finished->state != CalibrationState::kActive) {
       SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration active,
                                context.store()->GetActiveCalibration(run.rig));
-      RescoreKept(context.domain, context.estimators, run.rig, active.theta);
+      RescoreKept(
+          context.domain, context.estimators, context.claim, active.theta);
     }
     return finished;
   }

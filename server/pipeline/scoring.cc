@@ -13,9 +13,8 @@
 namespace selfcal::server {
 namespace {
 
-std::string Name(const Store::Unscored& claim) {
-  return fmt::format(
-      "segment {}~{} of rig {}", claim.key.session, claim.key.index, claim.rig);
+std::string Name(const std::string& rig, const SegmentKey& key) {
+  return fmt::format("segment {}~{} of rig {}", key.session, key.index, rig);
 }
 
 template <typename Score>
@@ -29,12 +28,14 @@ bool IsFinite(const Score& score) {
 }  // namespace
 
 ScoringWorkers::ScoringWorkers(Domain* domain,
+                               RigClaims* claims,
                                const PipelineOptions& options,
                                Estimators estimators,
                                std::function<void(const StoredRun&)> on_run,
                                std::function<void(const std::string&)> on_done)
     : domain_(domain),
       store_(domain->store()),
+      claims_(claims),
       options_(options),
       estimators_(std::move(estimators)),
       on_run_(std::move(on_run)),
@@ -44,16 +45,22 @@ ScoringWorkers::ScoringWorkers(Domain* domain,
 ScoringWorkers::~ScoringWorkers() { Stop(); }
 
 absl::Status ScoringWorkers::Start() {
-  SELFCAL_ASSIGN_OR_RETURN(
-      const std::vector<Store::Unscored> left,
-      store_->ListUnscored(std::numeric_limits<int>::max()));
+  // Of several daemons each counts what it has received itself.
+  std::vector<Store::Unscored> left;
+  if (!options_.replica.shared) {
+    SELFCAL_ASSIGN_OR_RETURN(
+        left, store_->ListUnscored(std::numeric_limits<int>::max()));
+  }
   const std::lock_guard lock(mutex_);
   if (running_) {
     return absl::FailedPreconditionError("scoring has been started already");
   }
   running_ = true;
   std::map<std::string, int> taken;
-  for (const Claim& segment : left) ++taken[segment.rig];
+  for (const Store::Unscored& segment : left) {
+    ++taken[segment.rig];
+    ++filled_[segment.rig];
+  }
   backlog_.Open(std::move(taken));
   for (int k = 0; k < std::max(1, options_.scoring_threads); ++k) {
     threads_.emplace_back([this] { Run(); });
@@ -80,12 +87,53 @@ absl::Status ScoringWorkers::TakePlace(const std::string& rig,
   return backlog_.Take(rig, cancelled);
 }
 
-void ScoringWorkers::FillPlace() {
+void ScoringWorkers::FillPlace(const std::string& rig) {
+  {
+    const std::lock_guard lock(mutex_);
+    ++filled_[rig];
+    ++arrivals_;
+  }
+  changed_.notify_all();
+  if (!claims_->Find(rig)) claims_->Wake();
+}
+
+void ScoringWorkers::Wake() {
   {
     const std::lock_guard lock(mutex_);
     ++arrivals_;
   }
   changed_.notify_all();
+  ReturnPlacesOfOthers();
+}
+
+void ScoringWorkers::ReturnPlacesOfOthers() {
+  std::vector<std::string> rigs;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [rig, places] : filled_) {
+      if (!claims_->Find(rig)) rigs.push_back(rig);
+    }
+  }
+  for (const std::string& rig : rigs) {
+    const auto unscored = store_->CountUnscored(rig);
+    if (!unscored.ok()) return;  // the next call tries again
+    const std::lock_guard lock(mutex_);
+    const auto filled = filled_.find(rig);
+    if (filled == filled_.end()) continue;
+    const std::int64_t scored =
+        std::max<std::int64_t>(0, filled->second - *unscored);
+    backlog_.Return(rig, static_cast<int>(scored));
+    filled->second -= scored;
+    if (filled->second == 0) filled_.erase(filled);
+  }
+}
+
+void ScoringWorkers::EmptyPlaces(const std::string& rig, int places) {
+  backlog_.Return(rig, places);
+  const auto filled = filled_.find(rig);
+  if (filled == filled_.end()) return;
+  filled->second -= places;
+  if (filled->second <= 0) filled_.erase(filled);
 }
 
 void ScoringWorkers::ReturnPlace(const std::string& rig) {
@@ -103,7 +151,7 @@ absl::StatusOr<QuarantineCommit> ScoringWorkers::Quarantine(
     commit = change();
     if (!commit.ok()) return commit;
     for (const std::int64_t sequence : commit->unscored_sequences) {
-      if (!claimed_.contains({rig, sequence})) backlog_.Return(rig);
+      if (!claimed_.contains({rig, sequence})) EmptyPlaces(rig, 1);
     }
   }
   changed_.notify_all();
@@ -123,7 +171,7 @@ absl::Status ScoringWorkers::Delete(
       return first == claimed_.end() || first->first != rig;
     });
     waiting = change();
-    if (waiting.ok()) backlog_.Return(rig, *waiting);
+    if (waiting.ok()) EmptyPlaces(rig, *waiting);
     deleting_.erase(deleting);
     ++arrivals_;  // what was passed over meanwhile is looked at again
   }
@@ -144,17 +192,18 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
     // Under the lock, a segment is either in the list, or its FillPlace is
     // still to come and wakes this thread.
     const std::int64_t seen = arrivals_;
-    const auto unscored = store_->ListUnscored(std::numeric_limits<int>::max());
+    const auto unscored = store_->ListUnscored(std::numeric_limits<int>::max(),
+                                               claims_->replica());
     if (!unscored.ok()) {
       spdlog::error("cannot list what to score: {}",
                     unscored.status().ToString());
       changed_.wait_for(lock, backoff.Next(), [this] { return !running_; });
       continue;
     }
-    if (const Claim* next = Choose(*unscored); next != nullptr) {
+    if (std::optional<Claim> next = Choose(*unscored)) {
       claimed_.emplace(next->rig, next->sequence);
       last_turn_[next->rig] = ++turns_;
-      return *next;
+      return next;
     }
     last_turn_.clear();  // nobody waits
     changed_.wait(lock, [&] { return !running_ || arrivals_ != seen; });
@@ -162,17 +211,19 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
   return std::nullopt;
 }
 
-const ScoringWorkers::Claim* ScoringWorkers::Choose(
-    const std::vector<Claim>& unscored) const {
-  const Claim* next = nullptr;
+std::optional<ScoringWorkers::Claim> ScoringWorkers::Choose(
+    const std::vector<Store::Unscored>& unscored) const {
+  std::optional<Claim> next;
   std::int64_t next_turn = 0;
-  for (const Claim& candidate : unscored) {
+  for (const Store::Unscored& candidate : unscored) {
     if (deleting_.contains(candidate.rig)) continue;
     const auto turn = last_turn_.find(candidate.rig);
     const std::int64_t last = turn == last_turn_.end() ? 0 : turn->second;
-    if (next != nullptr && last >= next_turn) continue;
+    if (next && last >= next_turn) continue;
     if (claimed_.contains({candidate.rig, candidate.sequence})) continue;
-    next = &candidate;
+    const std::optional<RigClaim> rig = claims_->Find(candidate.rig);
+    if (!rig) continue;
+    next = {candidate.rig, *rig, candidate.key, candidate.sequence};
     next_turn = last;
   }
   return next;
@@ -186,8 +237,8 @@ void ScoringWorkers::Process(const Claim& claim) {
   {
     const std::lock_guard lock(mutex_);
     claimed_.erase({claim.rig, claim.sequence});
+    EmptyPlaces(claim.rig, 1);
   }
-  backlog_.Return(claim.rig);
   changed_.notify_all();
   on_done_(claim.rig);
 }
@@ -242,7 +293,9 @@ void ScoringWorkers::Commit(const Claim& claim,
   const absl::Status status =
       score.ok() ? Retry([&] { return TryCommit(claim, *score); })
                  : score.status();
-  if (!status.ok() && !IsTransient(status)) {
+  if (IsClaimLost(status)) {
+    spdlog::info("{}: {}", Name(claim.rig, claim.key), status.ToString());
+  } else if (!status.ok() && !IsTransient(status)) {
     Quarantine(claim, status);
   }
 }
@@ -251,9 +304,9 @@ absl::Status ScoringWorkers::TryCommit(const Claim& claim, const Score& score) {
   SELFCAL_ASSIGN_OR_RETURN(
       const ScoreCommit commit,
       domain_->CommitScore(
-          claim.rig, claim.key, score.information, score.ends));
+          claim.of_rig, claim.key, score.information, score.ends));
   spdlog::info("{} is scored; tables: [{}]",
-               Name(claim),
+               Name(claim.rig, claim.key),
                fmt::join(commit.tables, ", "));
   if (commit.change) {
     spdlog::warn("rig {} has changed: [{}], from sequence {} on",
@@ -269,15 +322,17 @@ absl::Status ScoringWorkers::TryCommit(const Claim& claim, const Score& score) {
 
 void ScoringWorkers::Quarantine(const Claim& claim, const absl::Status& why) {
   const std::string problem(why.message());
-  spdlog::error("{} is quarantined: {}", Name(claim), problem);
+  spdlog::error("{} is quarantined: {}", Name(claim.rig, claim.key), problem);
   Backoff backoff;
   for (;;) {
     const absl::Status status =
-        domain_->MarkUnusable(claim.rig, claim.key, problem);
-    if (status.ok() || absl::IsNotFound(status)) {
+        domain_->MarkUnusable(claim.of_rig, claim.key, problem);
+    if (status.ok() || absl::IsNotFound(status) || IsClaimLost(status)) {
       return;
     }
-    spdlog::error("cannot quarantine {}: {}", Name(claim), status.ToString());
+    spdlog::error("cannot quarantine {}: {}",
+                  Name(claim.rig, claim.key),
+                  status.ToString());
     if (!Pause(backoff.Next())) {
       return;
     }

@@ -29,15 +29,18 @@
 #include "server/domain/domain.h"
 #include "server/pipeline/backlog.h"
 #include "server/pipeline/pipeline.h"
+#include "server/pipeline/rig_claims.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 
 class ScoringWorkers {
  public:
-  // `on_run` is called on a worker for each run that a commit creates,
-  // `on_done` with the rig of each segment that a worker is done with.
+  // Scores the segments of the rigs of `claims`. `on_run` is called on a worker
+  // for each run that a commit creates, `on_done` with the rig of each segment
+  // that a worker is done with.
   ScoringWorkers(Domain* domain,
+                 RigClaims* claims,
                  const PipelineOptions& options,
                  Estimators estimators,
                  std::function<void(const StoredRun&)> on_run,
@@ -52,8 +55,11 @@ class ScoringWorkers {
   absl::Status TakePlace(const std::string& rig,
                          const std::function<bool()>& cancelled);
   // The place is filled by a stored segment, or was not needed.
-  void FillPlace();
+  void FillPlace(const std::string& rig);
   void ReturnPlace(const std::string& rig);
+  // Looks for unscored segments in the store, and returns the places of those
+  // that other daemons have scored.
+  void Wake();
 
   // Calls Domain::QuarantineSegments, and returns the places of the segments
   // that were waiting for their score.
@@ -68,7 +74,12 @@ class ScoringWorkers {
                       const std::function<absl::StatusOr<int>()>& change);
 
  private:
-  using Claim = Store::Unscored;
+  struct Claim {
+    std::string rig;
+    RigClaim of_rig;
+    SegmentKey key;
+    std::int64_t sequence;
+  };
   // Results for a segment.
   struct Score {
     SegmentInformation information;
@@ -79,7 +90,11 @@ class ScoringWorkers {
   std::optional<Claim> NextClaim();
   // Returns which of the unscored segments, oldest first, to score next. The
   // lock must be held.
-  const Claim* Choose(const std::vector<Claim>& unscored) const;
+  std::optional<Claim> Choose(
+      const std::vector<Store::Unscored>& unscored) const;
+  void ReturnPlacesOfOthers();
+  // The lock must be held.
+  void EmptyPlaces(const std::string& rig, int places);
   void Process(const Claim& claim);
   // The score, or what is wrong with the segment. nullopt when stopping.
   std::optional<absl::StatusOr<Score>> FindScore(const Claim& claim);
@@ -95,6 +110,7 @@ class ScoringWorkers {
 
   Domain* const domain_;
   Store* const store_;
+  RigClaims* const claims_;
   const PipelineOptions options_;
   const Estimators estimators_;
   const std::function<void(const StoredRun&)> on_run_;
@@ -104,8 +120,9 @@ class ScoringWorkers {
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
   bool running_ = false;
-  std::int64_t arrivals_ = 0;  // segments stored since the start
-  std::int64_t turns_ = 0;     // claims since the start
+  std::int64_t arrivals_ = 0;  // reasons to look for segments, since the start
+  std::map<std::string, std::int64_t> filled_;  // places in the backlog, by rig
+  std::int64_t turns_ = 0;                      // claims since the start
   std::map<std::string, std::int64_t> last_turn_;           // by rig, from 1
   std::set<std::pair<std::string, std::int64_t>> claimed_;  // rig, sequence
   std::multiset<std::string> deleting_;  // rigs of which no segment is claimed

@@ -13,6 +13,7 @@
 #include "server/store/exclusions.h"
 #include "server/store/maintenance.h"
 #include "server/store/payload.h"
+#include "server/store/replicas.h"
 #include "server/store/rig_lists.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
@@ -28,13 +29,15 @@ namespace {
 class DatabaseStore final : public Store {
  public:
   explicit DatabaseStore(std::unique_ptr<Database> db)
-      : db_(std::move(db)), maintenance_(MakeMaintenance(db_.get())) {}
+      : db_(std::move(db)),
+        replicas_(MakeReplicas(db_.get())),
+        maintenance_(MakeMaintenance(db_.get())) {}
 
-  absl::Status Transact(const std::string& rig,
+  absl::Status Transact(const RigClaim& claim,
                         const Moment& now,
                         const Work& work) override {
     return db_->Write(
-        [&](Connection* db) { return CarryOut(db, rig, now, work); });
+        [&](Connection* db) { return CarryOut(db, claim, now, work); });
   }
 
   void BeginTransaction(const std::string& rig,
@@ -143,8 +146,14 @@ class DatabaseStore final : public Store {
         [&](Connection* db) { return ListExclusionRows(db, rig, key); });
   }
 
-  absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) override {
-    return Read([&](Connection* db) { return ListUnscoredRows(db, limit); });
+  absl::StatusOr<std::vector<Unscored>> ListUnscored(
+      int limit, const std::string& replica) override {
+    return Read(
+        [&](Connection* db) { return ListUnscoredRows(db, limit, replica); });
+  }
+
+  absl::StatusOr<std::int64_t> CountUnscored(const std::string& rig) override {
+    return Read([&](Connection* db) { return CountUnscoredRows(db, rig); });
   }
 
   absl::StatusOr<std::vector<Table>> GetTables(
@@ -187,8 +196,10 @@ class DatabaseStore final : public Store {
     return Read([&](Connection* db) { return ListRunRows(db, rig, page); });
   }
 
-  absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns() override {
-    return Read([&](Connection* db) { return ListUnfinishedRunRows(db); });
+  absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns(
+      const std::string& replica) override {
+    return Read(
+        [&](Connection* db) { return ListUnfinishedRunRows(db, replica); });
   }
 
   absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
@@ -227,6 +238,8 @@ class DatabaseStore final : public Store {
     });
   }
 
+  Replicas* replicas() override { return replicas_.get(); }
+
   StoreMaintenance* maintenance() override { return maintenance_.get(); }
 
  private:
@@ -243,13 +256,14 @@ class DatabaseStore final : public Store {
   }
 
   static absl::Status CarryOut(Connection* db,
-                               const std::string& rig,
+                               const RigClaim& claim,
                                const Moment& now,
                                const Work& work) {
     Transaction transaction(db);
     SELFCAL_RETURN_IF_ERROR(transaction.status());
-    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, rig));
-    UnitOfWork tx(db, rig, row, now);
+    SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, claim.rig));
+    SELFCAL_RETURN_IF_ERROR(CheckClaim(db, row, claim));
+    UnitOfWork tx(db, claim.rig, row, now);
     SELFCAL_RETURN_IF_ERROR(work(&tx));
     return transaction.Commit();
   }
@@ -261,6 +275,7 @@ class DatabaseStore final : public Store {
   }
 
   const std::unique_ptr<Database> db_;
+  const std::unique_ptr<Replicas> replicas_;
   const std::unique_ptr<StoreMaintenance> maintenance_;
 };
 

@@ -131,6 +131,7 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
                             "run_segments",
                             "runs",
                             "segments",
+                            "claims",
                             "rig_labels",
                             "rigs"}) {
     SELFCAL_RETURN_IF_ERROR(

@@ -154,11 +154,15 @@ absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
   return listed;
 }
 
-absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(Connection* db) {
+absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(
+    Connection* db, const std::string& replica) {
   Statement read(db,
                  std::string(kRunColumns) +
-                     "WHERE r.state IN (1, 2) "
-                     "ORDER BY r.create_steady_ns, r.rig, r.run");
+                     "WHERE r.state IN (1, 2) AND (?1 = '' OR EXISTS "
+                     "  (SELECT 1 FROM claims c "
+                     "   WHERE c.rig = r.rig AND c.replica = ?1)) "
+                     "ORDER BY r.create_steady_ns, r.rig, r.run",
+                 replica);
   return ReadAll(db, &read);
 }
 

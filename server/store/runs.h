@@ -23,8 +23,9 @@ absl::StatusOr<StoredRun> ReadRun(Connection* db,
 absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
                                               const std::string& rig,
                                               const Page& page);
-// Of all rigs, oldest first.
-absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(Connection* db);
+// Store::ListUnfinishedRuns.
+absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(
+    Connection* db, const std::string& replica);
 
 // --- Within a unit of work.
 

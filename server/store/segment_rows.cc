@@ -217,13 +217,17 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
   return Payload{read.Text(0), read.Int(1), read.Text(2)};
 }
 
-absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
-                                                              int limit) {
+absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
+    Connection* db, int limit, const std::string& replica) {
   Statement read(db,
                  "SELECT r.id, s.session, s.session_index, s.sequence "
                  "FROM segments s JOIN rigs r USING (rig) "
-                 "WHERE s.state = 1 ORDER BY s.segment LIMIT ?1",
-                 limit);
+                 "WHERE s.state = 1 AND (?2 = '' OR EXISTS "
+                 "  (SELECT 1 FROM claims c "
+                 "   WHERE c.rig = s.rig AND c.replica = ?2)) "
+                 "ORDER BY s.segment LIMIT ?1",
+                 limit,
+                 replica);
   std::vector<Store::Unscored> unscored;
   while (read.Next()) {
     unscored.push_back(
@@ -231,6 +235,14 @@ absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return unscored;
+}
+
+absl::StatusOr<std::int64_t> CountUnscoredRows(Connection* db,
+                                               const std::string& rig) {
+  return ReadInt(db,
+                 "SELECT COUNT(*) FROM segments WHERE state = 1 "
+                 "AND rig = (SELECT rig FROM rigs WHERE id = ?1)",
+                 rig);
 }
 
 absl::Status WriteUnusable(UnitOfWork* tx,

@@ -64,8 +64,12 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
                                     const std::string& rig,
                                     const SegmentKey& key);
 
-absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(Connection* db,
-                                                              int limit);
+// Store::ListUnscored.
+absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
+    Connection* db, int limit, const std::string& replica);
+// Store::CountUnscored.
+absl::StatusOr<std::int64_t> CountUnscoredRows(Connection* db,
+                                               const std::string& rig);
 
 // --- Within a unit of work.
 

@@ -6,10 +6,12 @@
 // A transaction happens as a whole or not at all: when Transact returns OK it
 // is committed and synced, when it returns an error nothing has changed.
 // Concurrent transactions may share one commit and its sync. Any thread may
-// call; writes are serialised inside. Errors caused by the caller: NOT_FOUND,
-// ALREADY_EXISTS, FAILED_PRECONDITION, and INVALID_ARGUMENT for a page token.
-// Errors of the environment: RESOURCE_EXHAUSTED (disk full), DATA_LOSS (a
-// checksum does not match), UNAVAILABLE.
+// call; writes to one rig exclude each other. SQLite carries out all writes one
+// after the other, PostgreSQL those of different rigs at the same time. Errors
+// caused by the caller: NOT_FOUND, ALREADY_EXISTS, FAILED_PRECONDITION, and
+// INVALID_ARGUMENT for a page token. Errors of the environment:
+// RESOURCE_EXHAUSTED (disk full), DATA_LOSS (a checksum does not match),
+// UNAVAILABLE.
 #pragma once
 
 #include <absl/status/status.h>
@@ -34,6 +36,7 @@
 #include "core/selection/tables.h"
 #include "server/store/clock_record.h"
 #include "server/store/moment.h"
+#include "server/store/rig_claim.h"
 #include "server/store/rig_query.h"
 #include "server/store/segment_query.h"
 #include "server/store/session.h"
@@ -249,6 +252,7 @@ struct RigSummary {
   std::int64_t newest_change_ns = 0;  // device change
 };
 
+class Replicas;          // replicas.h
 class StoreMaintenance;  // maintenance.h
 class UnitOfWork;        // unit_of_work.h
 
@@ -263,8 +267,9 @@ class Store {
   using Done = std::function<void(const absl::Status&)>;
 
   // Commits what `work` writes, unless it returns an error. `now` is the time
-  // of all that it writes. NOT_FOUND if there is no such rig.
-  virtual absl::Status Transact(const std::string& rig,
+  // of all that it writes. NOT_FOUND if there is no such rig, ClaimLost if the
+  // claim does not hold.
+  virtual absl::Status Transact(const RigClaim& claim,
                                 const Moment& now,
                                 const Work& work) = 0;
   // Transact without waiting. Transactions of one thread are carried out in the
@@ -322,13 +327,18 @@ class Store {
   // Exclusions of the segment, as far as they were recorded.
   virtual absl::StatusOr<std::vector<Exclusion>> ListExclusions(
       const std::string& rig, const SegmentKey& key) = 0;
-  // The oldest unscored segments of all rigs, in the order of their arrival.
+  // The oldest unscored segments of all rigs, or of those that a replica has
+  // claimed, in the order of their arrival.
   struct Unscored {
     std::string rig;
     SegmentKey key;
     std::int64_t sequence;
   };
-  virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(int limit) = 0;
+  virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(
+      int limit, const std::string& replica = "") = 0;
+  // How many segments of the rig are unscored.
+  virtual absl::StatusOr<std::int64_t> CountUnscored(
+      const std::string& rig) = 0;
   virtual absl::StatusOr<std::vector<Table>> GetTables(
       const std::string& rig) = 0;
 
@@ -351,9 +361,10 @@ class Store {
                                            std::int64_t run) = 0;
   virtual absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
                                                      const Page& page) = 0;
-  // Pending and running runs of all rigs, oldest first. After a restart, a
-  // running one starts again.
-  virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns() = 0;
+  // Pending and running runs of all rigs, or of those that a replica has
+  // claimed, oldest first. After a restart, a running one starts again.
+  virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns(
+      const std::string& replica = "") = 0;
 
   // --- Events, oldest or newest first, of one rig or, if `rig` is empty, of
   // all. They are only ever appended.
@@ -371,6 +382,8 @@ class Store {
   virtual absl::Status WriteClock(const ClockRecord& clock,
                                   const std::optional<StoredEvent>& event) = 0;
 
+  // The daemons that share the database. Lives as long as the store.
+  virtual Replicas* replicas() = 0;
   // Check, backup and restore. Lives as long as the store.
   virtual StoreMaintenance* maintenance() = 0;
 };

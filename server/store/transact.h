@@ -17,11 +17,11 @@ namespace selfcal::server {
 // here once it is committed. It may be called again (Store::Work).
 template <typename Work>
 auto TransactFor(Store* store,
-                 const std::string& rig,
+                 const RigClaim& claim,
                  const Moment& now,
                  const Work& work) -> std::invoke_result_t<Work, UnitOfWork*> {
   std::invoke_result_t<Work, UnitOfWork*> result = absl::UnknownError("");
-  const absl::Status status = store->Transact(rig, now, [&](auto* tx) {
+  const absl::Status status = store->Transact(claim, now, [&](auto* tx) {
     result = work(tx);
     return result.status();
   });

@@ -11,8 +11,8 @@
 //   tables, columns, constraints and triggers with the types of the engine;
 //   migrations/CMakeLists.txt embeds them, migrations.h gives access to them;
 // - the choice of the engine: a setting (server/daemon/settings.cc) by which
-//   serve.cc opens it, and the libraries in server/CMakeLists.txt and
-//   server/daemon/CMakeLists.txt;
+//   OpenStore (open_store.cc) opens it, and the libraries in
+//   server/CMakeLists.txt and server/daemon/CMakeLists.txt;
 // - an entry in Engines() of test/server/store/store_test.h, so that it passes
 //   the tests of the store, and tests of its own.
 //

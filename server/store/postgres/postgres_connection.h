@@ -69,7 +69,8 @@ class PostgresConnection final : public Connection {
   void BeginCommand(std::string_view sql);
   // `statement` streams from now on; null: none does.
   void SetStreaming(PostgresStatement* statement) { streaming_ = statement; }
-  // The error of a result, or of the connection if it is null.
+  // The error of a result, or of the connection if it is null; also notes it in
+  // failure(). In a transaction that has failed, the error that caused it.
   absl::Status ErrorOf(const PGresult* result, std::string_view sql);
   // For the result of COMMIT: an error if the server rolled back instead, or
   // warned that the commit is not as durable as it has to be.

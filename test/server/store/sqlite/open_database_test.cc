@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 12u);
+  ASSERT_EQ(migrations.size(), 13u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -107,6 +107,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[11].name, "0012_steady_time.sql");
   EXPECT_EQ(migrations[11].sha256,
             "9fdec3cd2a2aa5305e13eb8fdf4c9522a3755de4a1df1bb7e5d2cf56a3e00174");
+  EXPECT_EQ(migrations[12].name, "0013_replicas.sql");
+  EXPECT_EQ(migrations[12].sha256,
+            "c14b8d7afe3350ddbe2f82658c6a2eacb5ea9081bf117334b178c5a34e897091");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
