@@ -53,6 +53,15 @@ bool CurrentRun::Cancel(const std::string& rig,
   return true;
 }
 
+void CurrentRun::Interrupt(const std::string& rig, std::int64_t run) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!Is(rig, run)) return;
+    state_->cancelled = true;
+  }
+  changed_.notify_all();
+}
+
 bool CurrentRun::cancelled() const {
   const std::lock_guard lock(mutex_);
   return state_ && state_->cancelled;

@@ -38,6 +38,8 @@ class CurrentRun {
   bool Cancel(const std::string& rig,
               std::int64_t run,
               const std::function<void()>& otherwise);
+  // Interrupts the run if it is the current one, without waiting.
+  void Interrupt(const std::string& rig, std::int64_t run);
   bool cancelled() const;
   bool interrupted() const;  // cancelled, or closed
   // Waits; false if interrupted.

@@ -22,6 +22,7 @@
 #include "server/pipeline/verifier.h"
 #include "server/pipeline/watchers.h"
 #include "server/status/status_macros.h"
+#include "server/store/announcements.h"
 
 namespace selfcal::server {
 namespace {
@@ -154,6 +155,7 @@ class PipelineImpl : public Pipeline {
   }
 
   void Stop() override {
+    listener_.reset();
     verifier_.Stop();
     scoring_.Stop();
     recalibrator_.Stop();
@@ -343,9 +345,60 @@ class PipelineImpl : public Pipeline {
   }
 
  private:
+  // --- What other daemons announce (server/store/announcements.h).
+
+  void OnAnnouncement(const Announcement& announcement) {
+    switch (announcement.kind) {
+      case Announcement::Kind::kCalibration:
+        if (calibration_watchers_.Topics().contains(announcement.rig)) {
+          PassOnCalibration(announcement.rig);
+        }
+        break;
+      case Announcement::Kind::kRun:
+        OnRunElsewhere(announcement.rig, announcement.run);
+        break;
+      case Announcement::Kind::kMissed:
+        for (const std::string& rig : calibration_watchers_.Topics()) {
+          PassOnCalibration(rig);
+        }
+        for (const auto& [rig, run] : WatchedRuns()) OnRunElsewhere(rig, run);
+        break;
+    }
+  }
+
+  // If the store fails now, the listener reports that announcements may have
+  // been missed as soon as it responds again.
+  void PassOnCalibration(const std::string& rig) {
+    const auto active = store_->GetActiveCalibration(rig);
+    if (active.ok()) calibration_watchers_.PassOn(rig, *active);
+  }
+
+  void OnRunElsewhere(const std::string& rig, std::int64_t number) {
+    const auto run = store_->GetRun(rig, number);
+    if (!run.ok()) return;
+    if (run->end_time_ns != 0) {
+      recalibrator_.Interrupt(rig, number);
+    } else {
+      claims_.Wake();
+      recalibrator_.Wake();
+    }
+    run_watchers_.PassOn(RunTopic(rig, number), RunUpdate{*run});
+  }
+
+  std::vector<std::pair<std::string, std::int64_t>> WatchedRuns() {
+    std::vector<std::pair<std::string, std::int64_t>> runs;
+    for (const std::string& topic : run_watchers_.Topics()) {
+      runs.push_back(RunOfTopic(topic));
+    }
+    return runs;
+  }
+
   absl::Status StartScoring() {
     SELFCAL_RETURN_IF_ERROR(scoring_.Start());
     SELFCAL_RETURN_IF_ERROR(claims_.Start());
+    listener_ = store_->Listen([this](const Announcement& announcement) {
+      OnAnnouncement(announcement);
+    });
     sampler_.Start();
     return absl::OkStatus();
   }
@@ -440,6 +493,7 @@ class PipelineImpl : public Pipeline {
   RigClaims claims_;
   Recalibrator recalibrator_;
   ScoringWorkers scoring_;
+  std::shared_ptr<void> listener_;
 };
 
 }  // namespace

@@ -157,8 +157,8 @@ class Pipeline {
   // full, until `cancelled` returns true (then CANCELLED). UNAVAILABLE while
   // the pipeline is not started. The segment must have been estimated with a
   // published version of the rig, or it is rejected. A few observations outside
-  // the image, and saturated readings of the IMU, do not reject it: they are not
-  // stored (image_bounds.h, saturation.h).
+  // the image, and saturated readings of the IMU, do not reject it: they are
+  // not stored (image_bounds.h, saturation.h).
   virtual absl::StatusOr<SubmitResult> Submit(
       const std::string& rig,
       const MotionSegment& segment,

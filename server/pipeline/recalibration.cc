@@ -136,6 +136,12 @@ absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
       fmt::format("recalibration {} of rig {} has ended", run, rig));
 }
 
+void Recalibrator::Interrupt(const std::string& rig, std::int64_t run) {
+  for (const auto& executor : executors_) {
+    executor->current.Interrupt(rig, run);
+  }
+}
+
 std::vector<CalibrateProgress> Recalibrator::StepsOf(const std::string& rig,
                                                      std::int64_t run) const {
   for (const auto& executor : executors_) {

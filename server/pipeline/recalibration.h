@@ -59,6 +59,8 @@ class Recalibrator {
   void NoteScore(const std::string& rig);
   // As Pipeline::CancelRecalibration.
   absl::StatusOr<StoredRun> Cancel(const std::string& rig, std::int64_t run);
+  // Interrupts the run, which another daemon has ended, if it is executed here.
+  void Interrupt(const std::string& rig, std::int64_t run);
   // Each iteration of the run so far; empty unless it is being executed.
   std::vector<CalibrateProgress> StepsOf(const std::string& rig,
                                          std::int64_t run) const;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "server/domain/domain.h"
 #include "server/pipeline/current_run.h"
@@ -31,8 +32,9 @@ struct RunContext {
   }
 };
 
-// The topic of the watchers of a run.
+// The topic of the watchers of a run, and the run of a topic.
 std::string RunTopic(const std::string& rig, std::int64_t run);
+std::pair<std::string, std::int64_t> RunOfTopic(const std::string& topic);
 
 // Publishes a run without or with its newest iteration.
 void PublishRun(const RunContext& context, const StoredRun& run);

@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -64,12 +65,26 @@ class Watchers {
 
   void Publish(const std::string& topic, const Update& update) {
     if (every_) every_(update);
+    PassOn(topic, update);
+  }
+
+  // Publishes what has happened in another daemon: not to `every`.
+  void PassOn(const std::string& topic, const Update& update) {
     for (const std::shared_ptr<Watcher>& watcher : Living()) {
       const std::lock_guard lock(watcher->mutex);
       if (!watcher->ended && watcher->topic == topic) {
         watcher->Notify(update);
       }
     }
+  }
+
+  // Topics that have a watcher.
+  std::set<std::string> Topics() {
+    std::set<std::string> topics;
+    for (const std::shared_ptr<Watcher>& watcher : Living()) {
+      topics.insert(watcher->topic);
+    }
+    return topics;
   }
 
  private:

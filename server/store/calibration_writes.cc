@@ -1,5 +1,6 @@
 // Writes calibration versions.
 #include "server/status/status_macros.h"
+#include "server/store/announcements.h"
 #include "server/store/calibrations.h"
 #include "server/store/checksum.h"
 #include "server/store/driver/statement.h"
@@ -77,14 +78,16 @@ absl::Status WriteState(UnitOfWork* tx,
 }
 
 absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version) {
-  return Statement(tx->db(),
-                   "INSERT INTO activations (rig, version, time_ns, steady_ns) "
-                   "VALUES (?1, ?2, ?3, ?4)",
-                   tx->rig_row(),
-                   version,
-                   tx->time_ns(),
-                   tx->now().steady_ns)
-      .Run();
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(tx->db(),
+                "INSERT INTO activations (rig, version, time_ns, steady_ns) "
+                "VALUES (?1, ?2, ?3, ?4)",
+                tx->rig_row(),
+                version,
+                tx->time_ns(),
+                tx->now().steady_ns)
+          .Run());
+  return AnnounceCalibration(tx);
 }
 
 absl::Status InsertDisagreement(UnitOfWork* tx,

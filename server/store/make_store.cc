@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/status/status_macros.h"
+#include "server/store/announcements.h"
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
 #include "server/store/clock_record.h"
@@ -235,6 +236,13 @@ class DatabaseStore final : public Store {
       SELFCAL_RETURN_IF_ERROR(WriteClockRecord(db, clock));
       if (event) SELFCAL_RETURN_IF_ERROR(InsertEvent(db, *event));
       return transaction.Commit();
+    });
+  }
+
+  std::shared_ptr<void> Listen(OnAnnouncement heard) override {
+    return db_->Listen([heard = std::move(heard)](const auto& text) {
+      const auto announcement = ParseAnnouncement(text);
+      if (announcement) heard(*announcement);
     });
   }
 

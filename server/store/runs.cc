@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "server/status/status_macros.h"
+#include "server/store/announcements.h"
 #include "server/store/driver/statement.h"
 #include "server/store/paging.h"
 #include "server/store/rigs.h"
@@ -224,24 +225,26 @@ absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
                   key.index)
             .Run());
   }
-  return absl::OkStatus();
+  return AnnounceRun(tx, run.run);
 }
 
 absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run) {
-  return Statement(tx->db(),
-                   "UPDATE runs SET state = ?3, attempts = ?4, "
-                   "  end_time_ns = ?5, calibration_version = ?6, "
-                   "  message = ?7, end_steady_ns = ?8 "
-                   "WHERE rig = ?1 AND run = ?2",
-                   tx->rig_row(),
-                   run.run,
-                   static_cast<int>(run.state) + 1,
-                   run.attempts,
-                   run.end_time_ns,
-                   run.calibration_version,
-                   run.message,
-                   run.end_steady_ns)
-      .Run();
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(tx->db(),
+                "UPDATE runs SET state = ?3, attempts = ?4, "
+                "  end_time_ns = ?5, calibration_version = ?6, "
+                "  message = ?7, end_steady_ns = ?8 "
+                "WHERE rig = ?1 AND run = ?2",
+                tx->rig_row(),
+                run.run,
+                static_cast<int>(run.state) + 1,
+                run.attempts,
+                run.end_time_ns,
+                run.calibration_version,
+                run.message,
+                run.end_steady_ns)
+          .Run());
+  return AnnounceRun(tx, run.run);
 }
 
 absl::Status MarkExcluded(UnitOfWork* tx,

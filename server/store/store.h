@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -252,6 +253,7 @@ struct RigSummary {
   std::int64_t newest_change_ns = 0;  // device change
 };
 
+struct Announcement;     // announcements.h
 class Replicas;          // replicas.h
 class StoreMaintenance;  // maintenance.h
 class UnitOfWork;        // unit_of_work.h
@@ -382,6 +384,11 @@ class Store {
   virtual absl::Status WriteClock(const ClockRecord& clock,
                                   const std::optional<StoredEvent>& event) = 0;
 
+  // Passes on what other daemons announce, until the result is released; null if
+  // no other one can share the database. `heard` is called on a thread of the
+  // store, which it may hold up and from which it may read.
+  using OnAnnouncement = std::function<void(const Announcement&)>;
+  virtual std::shared_ptr<void> Listen(OnAnnouncement heard) = 0;
   // The daemons that share the database. Lives as long as the store.
   virtual Replicas* replicas() = 0;
   // Check, backup and restore. Lives as long as the store.

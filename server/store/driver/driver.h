@@ -38,6 +38,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -116,6 +117,13 @@ class Connection {
   virtual bool in_transaction() const = 0;
   virtual const Dialect& dialect() const = 0;
 
+  // Passes the text on to those who listen in other processes
+  // (Database::Listen), when the transaction that is open has committed. An
+  // engine of one process has none.
+  virtual absl::Status Announce(const std::string& /*text*/) {
+    return absl::OkStatus();
+  }
+
   virtual absl::StatusOr<DatabaseSize> Size() = 0;
   // Columns of all tables of the store.
   virtual absl::StatusOr<std::vector<Column>> Columns() = 0;
@@ -144,6 +152,16 @@ class Connection {
       prepared_;
 };
 
+// Listens until it is destroyed.
+class Listener {
+ public:
+  // Called on a thread of the listener with each text that another process
+  // announces, and with nullopt when some may have been missed, as after the
+  // connection was lost.
+  using Heard = std::function<void(const std::optional<std::string>& text)>;
+  virtual ~Listener() = default;
+};
+
 // An open database that any thread may use.
 class Database {
  public:
@@ -166,6 +184,11 @@ class Database {
   // A connection of the caller's own that only reads, for what takes long. The
   // database must outlive it.
   virtual absl::StatusOr<std::unique_ptr<Connection>> OpenReader() = 0;
+
+  // Null for an engine of one process.
+  virtual std::unique_ptr<Listener> Listen(Listener::Heard /*heard*/) {
+    return nullptr;
+  }
 
   // Null for an engine that has tools of its own to back up and restore.
   virtual DatabaseCopies* copies() { return nullptr; }

@@ -26,7 +26,7 @@ constexpr Dialect kDialect{
 
 // What the address does not state. A server that does not answer is noticed
 // within half a minute, and of several hosts the primary is found.
-constexpr const char* kDefaults[][2] = {{"connect_timeout", "10"},
+constexpr const char* kDefaults[][2] = {{"connect_timeout", "5"},
                                         {"keepalives_idle", "20"},
                                         {"keepalives_interval", "5"},
                                         {"keepalives_count", "2"},
@@ -170,6 +170,22 @@ absl::Status PostgresConnection::CheckCommitted(const PGresult* result) {
 }
 
 const Dialect& PostgresConnection::dialect() const { return kDialect; }
+
+absl::Status PostgresConnection::Announce(const std::string& text) {
+  return Statement(this,
+                   "SELECT CAST(pg_notify('selfcal_' || current_schema(), ?1) "
+                   "AS TEXT)",
+                   origin_ + " " + text)
+      .Run();
+}
+
+absl::StatusOr<std::string> PostgresConnection::Channel() {
+  Statement read(this, "SELECT quote_ident('selfcal_' || current_schema())");
+  std::string channel;
+  if (read.Next()) channel = read.Text(0);
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return channel;
+}
 
 absl::StatusOr<DatabaseSize> PostgresConnection::Size() {
   SELFCAL_ASSIGN_OR_RETURN(

@@ -48,10 +48,16 @@ class PostgresConnection final : public Connection {
   absl::Status Execute(const std::string& sql) override;
   bool in_transaction() const override;
   const Dialect& dialect() const override;
+  absl::Status Announce(const std::string& text) override;
   absl::StatusOr<DatabaseSize> Size() override;
   absl::StatusOr<std::vector<Column>> Columns() override;
   void CheckStructure(
       const std::function<bool(const StoreProblem&)>& on_problem) override;
+
+  // The channel of announcements about the tables of this schema, quoted.
+  absl::StatusOr<std::string> Channel();
+  // What it announces begins with this.
+  void SetOrigin(std::string origin) { origin_ = std::move(origin); }
 
   // The most serious failure since ClearFailure.
   Failure failure() const { return failure_; }
@@ -99,6 +105,7 @@ class PostgresConnection final : public Connection {
   bool commits_ = false;  // the command that runs ends a transaction
   bool warned_ = false;   // by the server, during that command
   bool standby_ = false;  // the server refuses to write
+  std::string origin_;
   std::int64_t names_ = 0;
   std::vector<std::string> discarded_;
 };

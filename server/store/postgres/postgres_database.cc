@@ -1,5 +1,7 @@
 #include "server/store/postgres/postgres_database.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <future>
 #include <random>
@@ -7,6 +9,7 @@
 
 #include "server/status/status_macros.h"
 #include "server/store/driver/transaction.h"
+#include "server/store/postgres/postgres_listener.h"
 
 namespace selfcal::server {
 namespace {
@@ -39,10 +42,17 @@ void SleepBeforeAttempt(int attempt) {
   std::this_thread::sleep_for(std::chrono::microseconds(delay_us(random)));
 }
 
+std::string NewOrigin() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
+}
+
 }  // namespace
 
 PostgresDatabase::PostgresDatabase(std::string uri, int writers, int readers)
-    : uri_(std::move(uri)), idle_readers_(static_cast<std::size_t>(readers)) {
+    : uri_(std::move(uri)),
+      origin_(NewOrigin()),
+      idle_readers_(static_cast<std::size_t>(readers)) {
   for (int k = 0; k < writers; ++k) {
     Writer* const writer =
         writers_.emplace_back(std::make_unique<Writer>()).get();
@@ -71,6 +81,7 @@ PostgresDatabase::Connect() {
     }
   }
   auto opened = PostgresConnection::Open(uri_);
+  if (opened.ok()) (*opened)->SetOrigin(origin_);
   const std::lock_guard lock(failure_mutex_);
   failure_ = opened.status();
   failed_at_ = std::chrono::steady_clock::now();
@@ -163,6 +174,10 @@ absl::StatusOr<std::unique_ptr<Connection>> PostgresDatabase::OpenReader() {
   SELFCAL_RETURN_IF_ERROR(
       reader->Execute("SET default_transaction_read_only = on"));
   return reader;
+}
+
+std::unique_ptr<Listener> PostgresDatabase::Listen(Listener::Heard heard) {
+  return std::make_unique<PostgresListener>(uri_, origin_, std::move(heard));
 }
 
 }  // namespace selfcal::server

@@ -48,6 +48,7 @@ class PostgresDatabase final : public Database {
   void BeginWrite(Work work, Done done) override;
   absl::Status Read(const Work& query) override;
   absl::StatusOr<std::unique_ptr<Connection>> OpenReader() override;
+  std::unique_ptr<Listener> Listen(Listener::Heard heard) override;
 
   // Transactions that were carried out again.
   std::int64_t retries() const { return retries_; }
@@ -76,6 +77,7 @@ class PostgresDatabase final : public Database {
                         std::unique_ptr<PostgresConnection>* connection);
 
   const std::string uri_;
+  const std::string origin_;  // of what its connections announce
   std::vector<std::unique_ptr<Writer>> writers_;
   std::atomic<std::int64_t> retries_ = 0;
 

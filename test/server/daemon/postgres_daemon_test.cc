@@ -122,6 +122,55 @@ TEST_F(PostgresDaemonTest, TheCheckOfTheSettingsReachesTheServer) {
   }
 }
 
+// Several daemons on one database, each with a state directory of its own.
+class ReplicaDaemonTest : public PostgresDaemonTest {
+ protected:
+  std::filesystem::path Socket(int replica) const {
+    return folder_ / ("socket" + std::to_string(replica));
+  }
+
+  std::unique_ptr<Process> StartReplica(int replica) {
+    std::vector<std::string> arguments = {
+        SELFCALD_PATH,
+        "--state-dir",
+        (folder_ / ("state" + std::to_string(replica))).string(),
+        "--listen",
+        "unix:" + Socket(replica).string()};
+    const auto store = Store();
+    arguments.insert(arguments.end(), store.begin(), store.end());
+    auto daemon = std::make_unique<Process>(
+        arguments, folder_ / ("replica" + std::to_string(++started_)));
+    EXPECT_TRUE(daemon->Says("selfcald ready: listening on unix:"))
+        << daemon->Log();
+    return daemon;
+  }
+
+  std::shared_ptr<grpc::Channel> ChannelTo(int replica) const {
+    return grpc::CreateChannel("unix:" + Socket(replica).string(),
+                               grpc::InsecureChannelCredentials());
+  }
+
+ private:
+  int started_ = 0;
+};
+
+TEST_F(ReplicaDaemonTest, WhatOneLeavesUndoneAnotherDoes) {
+  auto first = StartReplica(1);
+  channel_ = ChannelTo(1);
+  CreateRig();
+  const auto segments = TestSegments(TestRig("r"), 4);
+  Stream({segments[0], segments[1]});
+  ASSERT_TRUE(AllScored());
+  const auto second = StartReplica(2);
+  Stream({segments[2]});
+  first->Signal(SIGKILL);
+  EXPECT_EQ(first->Wait(), -SIGKILL);
+  channel_ = ChannelTo(2);
+  Stream({segments[3]});
+  EXPECT_EQ(Segments().segments_size(), 4);
+  EXPECT_TRUE(AllScored());
+}
+
 TEST_F(DaemonTest, SettingsOfTheStoreThatCannotBeUsedAreRefused) {
   const auto daemon = Start({"--store",
                              "postgresql://hub:secret@localhost/fleet",

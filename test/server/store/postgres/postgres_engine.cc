@@ -114,9 +114,13 @@ PostgresCluster& SharedPostgres() {
 
 absl::StatusOr<std::unique_ptr<Store>> OpenPostgresStore(
     const TempFolder& folder) {
-  const std::string name = DatabaseOf(folder);
-  WaitForOthersToEnd(name);
-  auto database = OpenPostgres({.uri = SharedPostgres().Uri(name),
+  WaitForOthersToEnd(DatabaseOf(folder));
+  return OpenSharedPostgresStore(folder);
+}
+
+absl::StatusOr<std::unique_ptr<Store>> OpenSharedPostgresStore(
+    const TempFolder& folder) {
+  auto database = OpenPostgres({.uri = SharedPostgres().Uri(DatabaseOf(folder)),
                                 .writers = 4,
                                 .readers = 4,
                                 .time_ns = NowNs()});

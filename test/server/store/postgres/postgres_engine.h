@@ -21,6 +21,9 @@ PostgresCluster& SharedPostgres();
 // folder has none yet.
 absl::StatusOr<std::unique_ptr<Store>> OpenPostgresStore(
     const TempFolder& folder);
+// The same while others are open, as by another daemon.
+absl::StatusOr<std::unique_ptr<Store>> OpenSharedPostgresStore(
+    const TempFolder& folder);
 
 // Changes one byte in each blob of a column, around the triggers that forbid
 // it.

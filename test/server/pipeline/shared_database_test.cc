@@ -1,0 +1,89 @@
+// Pipelines that share a PostgreSQL database, each with a store of its own:
+// what one does, the watchers of the others learn.
+#include <mutex>
+
+#include "test/server/pipeline/pipeline_test.h"
+#include "test/server/store/postgres/postgres_engine.h"
+
+namespace selfcal::server {
+namespace {
+
+class SharedDatabase : public PipelineTest {
+ protected:
+  // A daemon, as far as the pipeline goes.
+  struct Daemon {
+    std::unique_ptr<Store> store;
+    std::unique_ptr<Domain> domain;
+    std::unique_ptr<Pipeline> pipeline;
+  };
+
+  void SetUp() override {
+    const std::string why_not = PostgresCluster::WhyNot();
+    if (!why_not.empty()) GTEST_SKIP() << why_not;
+    options_.replica.shared = true;
+    options_.replica.beat = std::chrono::milliseconds(50);
+    for (Daemon* daemon : {&a_, &b_}) {
+      auto store = OpenSharedPostgresStore(database_);
+      ASSERT_TRUE(store.ok()) << store.status();
+      daemon->store = *std::move(store);
+      daemon->domain = std::make_unique<Domain>(daemon->store.get());
+      daemon->pipeline =
+          MakePipeline(daemon->domain.get(), options_, estimators_);
+      const absl::Status started = daemon->pipeline->Start();
+      ASSERT_TRUE(started.ok()) << started;
+    }
+    ASSERT_TRUE(a_.domain->CreateRig(TestRig("a")).ok());
+  }
+
+  void SubmitTo(const Daemon& daemon, std::int64_t index) {
+    const auto result =
+        daemon.pipeline->Submit("a", Segment(index), [] { return false; });
+    ASSERT_TRUE(result.ok()) << result.status();
+  }
+
+  const TempFolder database_;
+  Daemon a_;
+  Daemon b_;
+};
+
+TEST_F(SharedDatabase, AWatchSeesActivationsOfEveryDaemonOnceAndInOrder) {
+  std::mutex mutex;
+  std::vector<std::int64_t> seen;
+  const auto watch =
+      b_.pipeline->WatchCalibration("a", [&](const StoredCalibration& active) {
+        const std::lock_guard lock(mutex);
+        seen.push_back(active.version);
+      });
+  ASSERT_TRUE(watch.ok()) << watch.status();
+  const auto has_seen = [&](const std::vector<std::int64_t>& versions) {
+    return Eventually([&] {
+      const std::lock_guard lock(mutex);
+      return seen == versions;
+    });
+  };
+  ASSERT_TRUE(has_seen({1}));
+  SubmitTo(a_, 0);
+  SubmitTo(a_, 1);  // the tables are full
+  EXPECT_TRUE(has_seen({1, 2}));
+  ASSERT_TRUE(a_.pipeline->ActivateCalibration("a", 1, "test", "back").ok());
+  EXPECT_TRUE(has_seen({1, 2, 1}));
+  ASSERT_TRUE(b_.pipeline->ActivateCalibration("a", 2, "test", "forth").ok());
+  EXPECT_TRUE(has_seen({1, 2, 1, 2}));
+}
+
+TEST_F(SharedDatabase, AWatchSeesTheEndOfARunOfAnotherDaemon) {
+  SubmitTo(a_, 0);
+  ASSERT_TRUE(Eventually([&] { return a_.store->ListUnscored(1)->empty(); }));
+  const auto run = a_.pipeline->StartRecalibration("a");
+  ASSERT_TRUE(run.ok()) << run.status();
+  std::atomic<bool> has_ended = false;
+  const auto watch =
+      b_.pipeline->WatchRun("a", run->run, [&](const RunUpdate& update) {
+        if (update.run.end_time_ns != 0) has_ended = true;
+      });
+  ASSERT_TRUE(watch.ok()) << watch.status();
+  EXPECT_TRUE(Eventually([&] { return has_ended.load(); }));
+}
+
+}  // namespace
+}  // namespace selfcal::server
