@@ -1,8 +1,8 @@
 // The rules of selfcald: what happens to rigs, segments, runs and calibrations,
-// and when. Each method writes in one transaction of the store (store.h), by the
-// functions of this module, or reads one state of it; CommitScore reads before
-// it writes, StartTimedRuns and StartSessionRuns write in one for each rig.
-// Errors are those of the store.
+// and when. Each method writes in one transaction of the store (store.h), by
+// the functions of this module, or reads one state of it; CommitScore reads
+// before it writes, StartTimedRuns and StartSessionRuns write in one for each
+// rig. Errors are those of the store.
 //
 // Any thread may call. All methods that write return after the commit, but for
 // BeginPutSegment. Those that take a RigClaim are the work of the daemon that

@@ -384,9 +384,9 @@ class Store {
   virtual absl::Status WriteClock(const ClockRecord& clock,
                                   const std::optional<StoredEvent>& event) = 0;
 
-  // Passes on what other daemons announce, until the result is released; null if
-  // no other one can share the database. `heard` is called on a thread of the
-  // store, which it may hold up and from which it may read.
+  // Passes on what other daemons announce, until the result is released; null
+  // if no other one can share the database. `heard` is called on a thread of
+  // the store, which it may hold up and from which it may read.
   using OnAnnouncement = std::function<void(const Announcement&)>;
   virtual std::shared_ptr<void> Listen(OnAnnouncement heard) = 0;
   // The daemons that share the database. Lives as long as the store.

@@ -149,8 +149,7 @@ TEST_F(ReplicaTest, OneThatWasTakenForDeadBeginsAgain) {
   ASSERT_TRUE(AllScored());
   EXPECT_TRUE(Eventually([&] {
     const auto now = store_->replicas()->List();
-    return now->size() == 1 &&
-           now->front().replica != records->front().replica;
+    return now->size() == 1 && now->front().replica != records->front().replica;
   }));
 }
 
