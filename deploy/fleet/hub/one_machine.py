@@ -32,6 +32,11 @@ _SMALL = {
         "max_connections": 200,
         "shared_buffers": "64MB",
         "max_slot_wal_keep_size": "2GB",
+        "parameters": {
+            # What pg_rewind copies, and how long a recovery begins.
+            "min_wal_size": "32MB",
+            "recovery_init_sync_method": "syncfs",
+        },
     },
     "pooler": {"pool_size": 150, "max_client_conn": 400},
     "proxy": {"maxconn": 4000},

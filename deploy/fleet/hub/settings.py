@@ -17,6 +17,7 @@ DEFAULTS = {
         "max_connections": 300,
         "shared_buffers": "1GB",
         "max_slot_wal_keep_size": "16GB",
+        "parameters": {},  # any others
     },
     # A daemon has up to 18 connections.
     "pooler": {"pool_size": 200, "max_client_conn": 1000},
