@@ -9,9 +9,9 @@ _USER = "postgres"
 
 
 def leave_root(folder: pathlib.Path) -> None:
-    """Makes the folder; as root, gives it to the user postgres and becomes it.
+    """Makes the folder of a fleet, and as root becomes the user that owns it.
 
-    Only a folder that is new, empty or a fleet is given away.
+    A folder of root is given to the user postgres, if it is empty.
     """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -22,6 +22,11 @@ def leave_root(folder: pathlib.Path) -> None:
         sys.exit(f"fleet: {folder} contains something else than a fleet")
     if os.geteuid() != 0:
         return
+    if folder.stat().st_uid != 0:
+        become_owner(folder)
+        return
+    if entries:
+        sys.exit(f"fleet: {folder} belongs to root, which PostgreSQL refuses")
     try:
         user = pwd.getpwnam(_USER)
     except KeyError:
