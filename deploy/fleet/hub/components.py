@@ -81,15 +81,13 @@ def haproxy(fleet: Fleet) -> Iterator[Component]:
         ["/usr/sbin/haproxy", "-db", "-f", f"{fleet.folder}/etc/haproxy.cfg"],
         node["service_port"],
         lambda: (
-            "UP"
-            in {
+            [
                 state
                 for (proxy, server), state in cluster.checks(fleet).items()
                 if proxy == "database" and server.startswith("postgres-")
-            }
+            ].count("UP")
+            == 1
         ),
-        # At once, with its connections.
-        stop=signal.SIGTERM,
     )
 
 

@@ -1,7 +1,6 @@
 """The files of each machine of a fleet, and how they are installed there."""
 
 import pathlib
-import shlex
 from dataclasses import dataclass
 
 from hub import settings, templates
@@ -25,7 +24,7 @@ _FILES = {
 
 @dataclass
 class Installed:
-    """A file of a machine, from a template or as it is in the project."""
+    """A file of a machine, from a template or as it stands in deploy/fleet."""
 
     path: str
     source: str
@@ -68,10 +67,6 @@ _PARTS = {
         ),
     ],
 }
-
-# The users of the images (Containerfile).
-_NUMBERS = {"root": 0, "selfcal": 900, "postgres": 901, "etcd": 902}
-
 
 _PORTS = {
     "client_port": 2379,
@@ -128,17 +123,13 @@ def configure(inventory: dict, secrets: dict, out: pathlib.Path) -> None:
             for file in _PARTS[part]:
                 target = out / name / file.path.lstrip("/")
                 templates.write(target, _text(file.source, known), file.mode)
-                lines.append(
-                    f"put {file.owner} {file.mode:o} {shlex.quote(file.path)}"
-                )
-        templates.write(out / name / "install", _install_script(lines), 0o755)
+                lines.append(f"{file.owner} {file.mode:o} {file.path}\n")
+        templates.write(out / name / "files", "".join(lines), 0o644)
+        script = _FLEET / "install"
+        templates.write(out / name / "install", script.read_text(), 0o755)
 
 
 def _text(source: str, known: dict) -> str:
     if source.startswith("../"):
         return (_FLEET / source[3:]).read_text(encoding="utf-8")
     return templates.render(source, known)
-
-
-def _install_script(lines: list[str]) -> str:
-    return templates.render("install.sh", {"lines": lines, "numbers": _NUMBERS})
