@@ -81,11 +81,11 @@ def haproxy(fleet: Fleet) -> Iterator[Component]:
         ["/usr/sbin/haproxy", "-db", "-f", f"{fleet.folder}/etc/haproxy.cfg"],
         node["service_port"],
         lambda: (
-            [
-                state
+            sum(
+                state.startswith("UP")  # also "UP 1/2", one failed check
                 for (proxy, server), state in cluster.checks(fleet).items()
                 if proxy == "database" and server.startswith("postgres-")
-            ].count("UP")
+            )
             == 1
         ),
     )
