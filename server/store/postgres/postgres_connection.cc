@@ -104,9 +104,11 @@ void PostgresConnection::BeginCommand(std::string_view sql) {
   if (streaming_ != nullptr) streaming_->BufferRest();
   FreeDiscarded();
   warned_ = false;
-  // Outside a transaction, each statement commits by itself.
-  commits_ = sql == "COMMIT" ||
-             (!sql.empty() && !in_transaction() && !sql.starts_with("BEGIN"));
+  // Outside a transaction, each statement commits by itself. On a connection
+  // that is known to be lost, nothing is sent.
+  commits_ = PQstatus(handle()) == CONNECTION_OK &&
+             (sql == "COMMIT" ||
+              (!sql.empty() && !in_transaction() && !sql.starts_with("BEGIN")));
 }
 
 absl::Status PostgresConnection::Execute(const std::string& sql) {
