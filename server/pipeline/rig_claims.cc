@@ -203,6 +203,11 @@ absl::Status RigClaims::Review() {
     for (const RigClaim& claim : idle) held_.erase(claim.rig);
     busy_ = static_cast<int>(busy.size());
   }
+  // A claim, or its release, whose outcome was not known: with the number of
+  // another claim, nothing that was begun before is written.
+  for (const RigClaim& claim : listed) {
+    if (!Holds(claim)) SELFCAL_RETURN_IF_ERROR(Claim(claim.rig));
+  }
   for (const RigClaim& claim : idle) {
     const absl::Status released = store_->replicas()->Release(claim);
     // Of a rig that was deleted there is nothing to give up.
@@ -211,18 +216,23 @@ absl::Status RigClaims::Review() {
   return absl::OkStatus();
 }
 
+absl::Status RigClaims::Claim(const std::string& rig) {
+  const auto claim = store_->replicas()->Claim(rig, replica());
+  if (absl::IsNotFound(claim.status())) return absl::OkStatus();  // deleted
+  SELFCAL_RETURN_IF_ERROR(claim.status());
+  if (!*claim) return absl::OkStatus();
+  const std::lock_guard lock(mutex_);
+  held_.insert_or_assign(rig, Held{**claim, Clock::now()});
+  return absl::OkStatus();
+}
+
 absl::StatusOr<bool> RigClaims::ClaimMore() {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> unclaimed,
                            store_->replicas()->ListUnclaimed(kRigsAtATime + 1));
-  const std::string name = replica();
   for (std::size_t i = 0; i < unclaimed.size() && i < kRigsAtATime; ++i) {
-    auto claim = store_->replicas()->Claim(unclaimed[i], name);
-    if (absl::IsNotFound(claim.status())) continue;  // deleted since
-    SELFCAL_RETURN_IF_ERROR(claim.status());
-    if (!*claim) continue;
+    SELFCAL_RETURN_IF_ERROR(Claim(unclaimed[i]));
     const std::lock_guard lock(mutex_);
-    held_.insert_or_assign(unclaimed[i], Held{**claim, Clock::now()});
-    ++busy_;
+    if (held_.contains(unclaimed[i])) ++busy_;
   }
   return unclaimed.size() > kRigsAtATime;
 }

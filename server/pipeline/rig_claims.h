@@ -67,8 +67,11 @@ class RigClaims {
   absl::Status Begin();
   absl::Status Beat();
   absl::Status RemoveSilent();
-  // Notes which claims have work, and gives up the others.
+  // Notes which claims have work, gives up the others, and claims anew what the
+  // database holds for this daemon without its knowledge.
   absl::Status Review();
+  // Unless another daemon holds it, or it is gone.
+  absl::Status Claim(const std::string& rig);
   // Returns whether it has left rigs to others.
   absl::StatusOr<bool> ClaimMore();
 

@@ -137,6 +137,20 @@ TEST_F(ReplicaTest, OneThatRespondsKeepsItsRigs) {
   EXPECT_TRUE(domain_->MarkUnusable(claim, {"s", 0}, "unusable").ok());
 }
 
+// The answer to a claim, or to its release, can be lost with the connection.
+TEST_F(ReplicaTest, ARigThatItHoldsWithoutItsKnowledgeIsScored) {
+  CreateRig("a");
+  Pipeline* const replica = StartAnother();
+  const auto records = store_->replicas()->List();
+  ASSERT_EQ(records->size(), 1u);
+  const auto claim = store_->replicas()->Claim("a", records->front().replica);
+  ASSERT_TRUE(claim.ok() && *claim);
+  SubmitTo(replica, "a", 0);
+  ASSERT_TRUE(AllScored());
+  // What was begun under the earlier claim is refused.
+  EXPECT_TRUE(IsClaimLost(domain_->MarkUnusable(**claim, {"s", 0}, "late")));
+}
+
 TEST_F(ReplicaTest, OneThatWasTakenForDeadBeginsAgain) {
   CreateRig("a");
   Pipeline* const replica = StartAnother();
