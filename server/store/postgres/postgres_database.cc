@@ -25,6 +25,14 @@ constexpr std::chrono::milliseconds kMaxDelay{200};
 // each.
 constexpr std::chrono::milliseconds kFailFast{250};
 
+// A transaction that writes holds the lock on its rig. If its daemon is stopped
+// or cut off, it ends when others take over the work (ReplicaOptions::lease),
+// and those of its transactions that wait for the lock have ended before: each
+// would hold it for as long again.
+constexpr char kLimitWrites[] =
+    "SET idle_in_transaction_session_timeout = '10s';"
+    "SET lock_timeout = '5s'";
+
 // A number of its own for each thread that calls.
 std::size_t NumberOfThread() {
   static std::atomic<std::size_t> next = 0;
@@ -95,7 +103,9 @@ absl::Status PostgresDatabase::CarryOut(
   for (int attempt = 1;; ++attempt) {
     if (*connection == nullptr || (*connection)->lost()) {
       connection->reset();  // before the next one counts
-      SELFCAL_ASSIGN_OR_RETURN(*connection, Connect());
+      SELFCAL_ASSIGN_OR_RETURN(auto opened, Connect());
+      if (!is_read) SELFCAL_RETURN_IF_ERROR(opened->Execute(kLimitWrites));
+      *connection = std::move(opened);
     }
     PostgresConnection* const db = connection->get();
     db->ClearFailure();

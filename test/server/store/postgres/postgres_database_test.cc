@@ -79,6 +79,36 @@ class PostgresDatabaseTest : public PostgresTest {
   std::unique_ptr<PostgresDatabase> database_;
 };
 
+// While a daemon is stopped, others wait for the lock on a rig that it writes.
+TEST_F(PostgresDatabaseTest, AWriteThatStopsGivesUpItsLocksAfterTenSeconds) {
+  const auto limit_ms = [](std::int64_t* limit) {
+    return [limit](Connection* db) -> absl::Status {
+      const auto read =
+          ReadInt(db,
+                  "SELECT setting::bigint FROM pg_settings "
+                  "WHERE name = 'idle_in_transaction_session_timeout'");
+      *limit = read.value_or(0);
+      return read.status();
+    };
+  };
+  std::int64_t of_writes = 0;
+  std::int64_t of_reads = 0;
+  ASSERT_TRUE(database_->Write(limit_ms(&of_writes)).ok());
+  ASSERT_TRUE(database_->Read(limit_ms(&of_reads)).ok());
+  EXPECT_EQ(of_writes, 10'000);
+  EXPECT_EQ(of_reads, 60'000);  // a caller may read slowly
+}
+
+TEST_F(PostgresDatabaseTest, AWriteDoesNotWaitForALockForEver) {
+  ASSERT_TRUE(db_->Execute("BEGIN").ok());
+  ASSERT_TRUE(db_->Execute("LOCK TABLE t").ok());
+  const absl::Status refused = database_->Write(Insert(1));
+  EXPECT_EQ(refused.code(), absl::StatusCode::kUnavailable) << refused;
+  ASSERT_TRUE(db_->Execute("ROLLBACK").ok());
+  ASSERT_TRUE(database_->Write(Insert(2)).ok());
+  EXPECT_EQ(Stored(database_.get()), std::vector<int>{2});
+}
+
 TEST_F(PostgresDatabaseTest, WritesOfOneThreadAreCarriedOutInTheirOrder) {
   std::vector<int> expected;
   std::vector<int> answered;
