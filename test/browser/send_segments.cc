@@ -29,7 +29,9 @@ absl::Status Send(const std::string& address,
   }
   absl::Status sent = stream.Drain(kPatience);
   const auto statistics = stream.statistics();
-  if (sent.ok() && statistics.stored != statistics.queued) {
+  // One whose acknowledgement was lost is sent again.
+  const auto acknowledged = statistics.stored + statistics.duplicates;
+  if (sent.ok() && acknowledged != statistics.queued) {
     return absl::InternalError("not all segments were stored");
   }
   return sent;
