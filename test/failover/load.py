@@ -1,0 +1,135 @@
+"""A round of a test: devices that send while something fails, and what must
+hold afterwards.
+"""
+
+import time
+from typing import Optional
+
+from hub.one_machine import ADDRESS
+
+from failover import checks, recording
+from failover.device import Device
+from failover.running_fleet import RunningFleet
+from selfcal.v1 import rig_pb2
+
+# The rigs of a round, for what each of them shows.
+_KEPT = "kept"  # the data of all its segments stays
+_RANKED = "ranked"  # better segments replace others, and no run begins
+_RUNS = "runs"
+_KINDS = (_KEPT, _RANKED, _RUNS)
+_DRAIN_S = 120
+
+
+class Context:
+    """What the tests have in common."""
+
+    def __init__(
+        self,
+        fleet: RunningFleet,
+        source: recording.Recording,
+        reference: recording.Reference,
+        send_segments: Optional[str],
+    ) -> None:
+        self.fleet = fleet
+        self.source = source
+        self.reference = reference
+        self.send_segments = send_segments
+        self.sent_by_program: Optional[list] = None
+        self.rounds = 0
+
+
+class Load:
+    def __init__(self, context: Context, port: int, per_second: float) -> None:
+        context.rounds += 1
+        self._context = context
+        self.devices = []
+        self.attempts: list = []  # of each run
+        for number, kind in enumerate(_KINDS):
+            rig = self._rig(f"{kind}-{context.rounds}-{number}", kind)
+            # Beyond ten times its capacity a table counts as full.
+            limit = {_RANKED: 110, _KEPT: 400}.get(kind, 1_000_000)
+            pace = per_second / 2 if kind == _RANKED else per_second
+            self.devices.append(
+                Device(f"{ADDRESS}:{port}", rig, context.source, pace, limit)
+            )
+        for device in self.devices:
+            checks.create_rig(context.fleet, device.rig)
+        for device in self.devices:
+            device.start()
+
+    def _rig(self, rig_id: str, kind: str) -> rig_pb2.Rig:
+        rig = rig_pb2.Rig()
+        rig.CopyFrom(self._context.source.rig)
+        rig.ClearField("create_time")
+        rig.name = f"rigs/{rig_id}"
+        if kind == _KEPT:
+            rig.table_size = 1000
+            rig.min_gain_nats = 0
+        elif kind == _RANKED:
+            # The last table stays empty: one component gains less.
+            rig.table_size = 12
+            rig.min_gain_nats = 7
+            rig.groups.add(group="never", patterns=["imu.accel.scale.z"])
+        else:
+            rig.table_size = 4
+            rig.retrigger_fraction = 0.25
+        return rig
+
+    def acknowledged(self) -> int:
+        return sum(len(device.acknowledged) for device in self.devices)
+
+    def wait_for_more(self, count: int, seconds: float) -> bool:
+        """Waits until so many more segments are acknowledged."""
+        before = self.acknowledged()
+        deadline = time.monotonic() + seconds
+        while self.acknowledged() < before + count:
+            if time.monotonic() > deadline:
+                return False
+            time.sleep(0.02)
+        return True
+
+    def of_kind(self, kind: str) -> list:
+        return [d for d in self.devices if d.rig_id.startswith(kind)]
+
+    def abandon(self) -> None:
+        for device in self.devices:
+            device.abandon()
+
+    def finish(self) -> list:
+        """Ends the load; returns what does not hold, a sentence each."""
+        for device in self.devices:
+            device.close()
+        deadline = time.monotonic() + _DRAIN_S
+        wrong = []
+        for device in self.devices:
+            device.join(max(0, deadline - time.monotonic()))
+            if device.is_alive():
+                wrong.append(
+                    f"rig {device.rig_id}: {device.waiting()} segments are "
+                    f"not acknowledged after {_DRAIN_S} s"
+                )
+                device.abandon()
+        return wrong + self._check()
+
+    def _check(self) -> list:
+        context = self._context
+        fleet = context.fleet
+        wrong = checks.settled(fleet, [d.rig_id for d in self.devices])
+        with checks.connect(fleet) as daemon:
+            for device in self.devices:
+                kind = device.rig_id.partition("-")[0]
+                wrong += checks.segments(fleet, device)
+                wrong += checks.data(daemon, device, kind == _KEPT)
+                wrong += checks.scores(fleet, device.rig_id)
+                found, attempts = checks.runs(fleet, device.rig_id)
+                wrong += found
+                if kind == _RUNS:
+                    self.attempts += attempts
+                elif attempts:
+                    wrong.append(f"rig {device.rig_id}: a run began")
+                else:
+                    wrong += checks.tables(
+                        daemon, context.reference, fleet, device
+                    )
+            wrong += checks.store(daemon)
+        return wrong

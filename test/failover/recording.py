@@ -1,0 +1,127 @@
+"""What the devices of the test send: segments of one simulated device, which
+the demo makes. Copies differ from each other, and so do their scores.
+"""
+
+import dataclasses
+import hashlib
+import pathlib
+import subprocess
+import time
+
+import grpc
+from hub import processes
+
+import selfcal
+from selfcal.v1 import rig_pb2, segment_pb2
+
+_SECONDS = 120  # of the recording
+
+
+class Reference:
+    """One daemon on SQLite, in its own folder."""
+
+    def __init__(self, folder: pathlib.Path, name: str, daemon: str) -> None:
+        self._folder = folder
+        self._name = name
+        state = folder / name
+        state.mkdir(mode=0o700, exist_ok=True)
+        processes.launch(folder, name, [daemon, "--state-dir", str(state)])
+        self.target = f"unix:{state}/selfcald.sock"
+        self.daemon = selfcal.connect(self.target)
+        processes.wait_until(
+            self._serves, 60, lambda: processes.log_end(folder, name)
+        )
+
+    def _serves(self) -> bool:
+        try:
+            list(self.daemon.rigs())
+        except grpc.RpcError:
+            return False
+        return True
+
+    def stop(self) -> None:
+        self.daemon.close()
+        processes.end(self._folder, self._name, 15, 20)
+
+
+@dataclasses.dataclass
+class Recording:
+    rig: rig_pb2.Rig
+    segments: list
+
+    def segment(self, number: int) -> segment_pb2.MotionSegment:
+        """The `number`-th segment of a device that goes on for ever."""
+        copy = segment_pb2.MotionSegment()
+        copy.CopyFrom(self.segments[number % len(self.segments)])
+        shift_px = 0.01 * (number % 97 - 48)
+        z_px = copy.observations.z_px
+        for k in range(number % 7, len(z_px), 7):
+            z_px[k] += shift_px
+        copy.temperature_c = number % 50
+        copy.calibration_version = 1
+        return copy
+
+
+def record(folder: pathlib.Path, demo: str, daemon: str) -> Recording:
+    kept = folder / "recording"
+    subprocess.run(
+        [
+            *(demo, "--daemon", daemon, "--keep", kept),
+            *("--seconds", str(_SECONDS)),
+        ],
+        check=True,
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+    )
+    (kept / "state").rename(folder / "source")
+    source = Reference(folder, "source", daemon)
+    try:
+        rig = next(iter(source.daemon.rigs()))
+        request = segment_pb2.DownloadSegmentsRequest(parent=rig.name)
+        answers = source.daemon.segment_service.DownloadSegments(request)
+        segments = [answer.segment for answer in answers]
+    finally:
+        source.stop()
+    if len(segments) < 8:
+        raise processes.Failed(f"the demo left {len(segments)} segments")
+    return Recording(rig, segments)
+
+
+def digest(segment: segment_pb2.MotionSegment) -> str:
+    data = segment.SerializeToString(deterministic=True)
+    return hashlib.sha256(data).hexdigest()
+
+
+def replay(daemon: selfcal.Daemon, rig: rig_pb2.Rig, segments: list) -> dict:
+    """Sends segments, in their order, and returns the tables once they are
+    scored.
+    """
+    create = rig_pb2.CreateRigRequest(rig=rig)
+    daemon.rig_service.CreateRig(create, timeout=30)
+    rig_id = rig.name.rpartition("/")[2]
+    requests = (
+        segment_pb2.StreamSegmentsRequest(parent=rig.name, segment=segment)
+        for segment in segments
+    )
+    for answer in daemon.stream(requests):
+        if answer.verdict != segment_pb2.StreamSegmentsResponse.STORED:
+            raise processes.Failed(f"{rig.name}: the reference: {answer}")
+    deadline = time.monotonic() + 120
+    while any(t.scored < len(segments) for t in daemon.tables(rig_id)):
+        if time.monotonic() > deadline:
+            raise processes.Failed(f"{rig.name}: the reference is not done")
+        time.sleep(0.1)
+    return tables_of(daemon, rig_id)
+
+
+def tables_of(daemon: selfcal.Daemon, rig_id: str) -> dict:
+    return {
+        table.name: (
+            table.scored,
+            [
+                (e.segment, e.entropy_nats, e.gain_nats, e.sequence)
+                for e in table.entries
+            ],
+        )
+        for table in daemon.tables(rig_id)
+    }
