@@ -1,6 +1,7 @@
 """The guarantees of a replicated hub, each with what it is tried against."""
 
 import contextlib
+import os
 import random
 import re
 import signal
@@ -87,11 +88,25 @@ def lose_primary(context: Context, tried: Tried, trials: int) -> None:
             names = [primary]
             if whole:  # everything of its machine
                 names = [f"patroni-{index}", f"pgbouncer-{index}", primary]
+            what = f"{', '.join(names)} killed"
+            # What is acknowledged now must not be on the primary alone.
+            senders = fleet.senders(primary) if number % 2 == 0 else []
+            if senders:
+                what += " with the standby behind"
+                _signal(senders, signal.SIGSTOP)
+                time.sleep(random.uniform(0.5, 1.5))
             begin = time.monotonic()
             fleet.signal(signal.SIGKILL, *names)
-            _wait_until_back(tried, load, begin, f"{', '.join(names)} killed")
+            _signal(senders, signal.SIGKILL)
+            _wait_until_back(tried, load, begin, what)
             fleet.repair()
         tried.finish(load)
+
+
+def _signal(pids: list, number: signal.Signals) -> None:
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, number)
 
 
 def _wait_until_back(
@@ -101,7 +116,7 @@ def _wait_until_back(
     time.sleep(pause)  # what was under way is acknowledged
     since = time.monotonic()
     deadline = begin + _FAILOVER_S
-    late = load.of_kind("runs")
+    late = [device for device in load.devices if not device.has_ended()]
     while late and time.monotonic() < deadline:
         late = [d for d in late if d.last_acknowledgement < since]
         time.sleep(0.02)

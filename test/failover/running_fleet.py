@@ -1,5 +1,6 @@
 """A fleet (deploy/fleet) in a folder, and what the test does to it."""
 
+import contextlib
 import os
 import pathlib
 import re
@@ -76,6 +77,20 @@ class RunningFleet:
         """Sends a signal to those of the components that run, at once."""
         for pid in [pid for name in names if (pid := self.pid(name))]:
             os.kill(pid, number)
+
+    def senders(self, server: str) -> list:
+        """Processes of a server that send its write-ahead log to standbys."""
+        found = []
+        for entry in pathlib.Path("/proc").iterdir():
+            if not entry.name.isdigit():
+                continue
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                state = (entry / "stat").read_text().rpartition(")")[2]
+                command = (entry / "cmdline").read_bytes()
+                parent = int(state.split()[1])
+                if parent == self.pid(server) and b"walsender" in command:
+                    found.append(int(entry.name))
+        return found
 
     def connect_replicas(self, ports: dict) -> None:
         """Restarts the replicas, with their databases at other ports."""
