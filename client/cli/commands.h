@@ -16,6 +16,7 @@ void AddSessionCommands(CLI::App* app, Context* context);
 void AddTableCommands(CLI::App* app, Context* context);
 void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
+void AddCohortCommands(CLI::App* app, Context* context);
 void AddEventCommands(CLI::App* app, Context* context);
 void AddDaemonCommands(CLI::App* app, Context* context);
 void AddCompletionCommand(CLI::App* app, Context* context);
