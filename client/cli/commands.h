@@ -46,6 +46,7 @@ CLI::App* AddRunStart(CLI::App* parent,
                       const std::string& name,
                       Context* context);
 // Verbs of calibration.
+void AddCalibrationRollback(CLI::App* calibrations, Context* context);
 void AddCalibrationExport(CLI::App* calibrations, Context* context);
 CLI::App* AddCalibrationReport(CLI::App* parent,
                                const std::string& name,
