@@ -245,6 +245,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   });
 
   AddCalibrationExport(calibrations, context);
+  AddCalibrationRollback(calibrations, context);
   AddCalibrationReport(calibrations, "report", context);
 
   const auto count = std::make_shared<std::int64_t>(0);

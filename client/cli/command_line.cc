@@ -122,6 +122,7 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddTableCommands(&app, &context);
     AddRunCommands(&app, &context);
     AddCalibrationCommands(&app, &context);
+    AddCohortCommands(&app, &context);
     AddEventCommands(&app, &context);
     AddDaemonCommands(&app, &context);
     AddCompletionCommand(&app, &context);

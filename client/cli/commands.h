@@ -16,6 +16,7 @@ void AddSessionCommands(CLI::App* app, Context* context);
 void AddTableCommands(CLI::App* app, Context* context);
 void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
+void AddCohortCommands(CLI::App* app, Context* context);
 void AddEventCommands(CLI::App* app, Context* context);
 void AddDaemonCommands(CLI::App* app, Context* context);
 void AddCompletionCommand(CLI::App* app, Context* context);
@@ -45,6 +46,7 @@ CLI::App* AddRunStart(CLI::App* parent,
                       const std::string& name,
                       Context* context);
 // Verbs of calibration.
+void AddCalibrationRollback(CLI::App* calibrations, Context* context);
 void AddCalibrationExport(CLI::App* calibrations, Context* context);
 CLI::App* AddCalibrationReport(CLI::App* parent,
                                const std::string& name,

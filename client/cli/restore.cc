@@ -4,13 +4,13 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/confirmation.h"
 #include "client/cli/progress.h"
 #include "client/cli/sha256.h"
 #include "client/text/text.h"
@@ -59,17 +59,13 @@ absl::Status OpenBackup(const std::string& path, std::ifstream* file) {
   return absl::OkStatus();
 }
 
-bool Confirmed(const Context& context, const std::string& path) {
-  std::cerr << fmt::format(
-                   "Replace the database of the daemon at {1} by {0}?\n"
-                   "What was stored since the backup is only in the present "
-                   "database, which is kept under another name. [y/N] ",
-                   path,
-                   context.target.address)
-            << std::flush;
-  std::string answer;
-  std::getline(std::cin, answer);
-  return answer == "y" || answer == "Y" || answer == "yes";
+std::string Question(const Context& context, const std::string& path) {
+  return fmt::format(
+      "Replace the database of the daemon at {1} by {0}?\n"
+      "What was stored since the backup is only in the present database, which "
+      "is kept under another name.",
+      path,
+      context.target.address);
 }
 
 // Sends the file. Returns false if it could not be read to its end.
@@ -150,7 +146,7 @@ int Restore(Context* context, const RestoreOptions& options) {
   std::ifstream file;
   const absl::Status opened = OpenBackup(options.path, &file);
   if (!opened.ok()) return FailInput(opened);
-  if (!options.yes && !Confirmed(*context, options.path)) {
+  if (!options.yes && !Confirmed(Question(*context, options.path))) {
     PrintError("nothing was changed; use --yes to restore without a prompt");
     return kUsage;
   }

@@ -26,6 +26,7 @@ Api::Api(Domain* domain,
   AddRecalibrationMethods(&methods);
   AddStoreMethods(&methods);
   AddActivityMethods(&methods);
+  AddFleetMethods(&methods);
   methods_ = methods.Take();
 }
 

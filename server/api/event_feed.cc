@@ -7,7 +7,7 @@ namespace selfcal::server {
 namespace {
 
 constexpr std::chrono::milliseconds kPollInterval{500};
-constexpr std::size_t kEvents = 50;  // number of events that a poll reads
+constexpr int kEvents = 50;  // number of events that a poll reads
 
 }  // namespace
 
@@ -44,10 +44,11 @@ void EventFeed::OnCheck(CheckSubject subject, VerificationOutcome outcome) {
 
 std::shared_ptr<void> EventFeed::Subscribe(const std::string& rig,
                                            OnChange on_change) {
-  const auto events = store_->ListNewestEvents({1, ""});
-  const bool known = events.ok() && !events->items.empty();
+  const auto events = store_->ListNewestEvents({kEvents, ""}, rig);
+  auto known = std::make_shared<const EventIds>(
+      events.ok() ? IdsOf(events->items) : EventIds());
   auto reader = std::make_shared<Reader>(
-      Reader{rig, known ? events->items[0].event : 0, std::move(on_change)});
+      Reader{rig, std::move(known), std::move(on_change)});
   const std::lock_guard lock(mutex_);
   readers_.push_back(reader);
   return reader;
@@ -76,31 +77,44 @@ void EventFeed::Notify(v1::Change::What what, const std::string& rig) {
 void EventFeed::PollEvents() {
   std::unique_lock lock(mutex_);
   while (!stop_.wait_for(lock, kPollInterval, [this] { return stopping_; })) {
-    if (Readers().empty()) continue;
+    std::set<std::string> rigs;
+    for (const auto& reader : Readers()) rigs.insert(reader->rig);
     lock.unlock();
-    // If the store fails now, the next poll tries again.
-    const auto events =
-        store_->ListNewestEvents({static_cast<int>(kEvents), ""});
-    if (events.ok() && !events->items.empty()) NotifyOfEvents(events->items);
+    for (const std::string& rig : rigs) {
+      // If the store fails now, the next poll tries again.
+      const auto events = store_->ListNewestEvents({kEvents, ""}, rig);
+      if (events.ok()) NotifyOfEvents(rig, events->items);
+    }
     lock.lock();
   }
 }
 
-void EventFeed::NotifyOfEvents(const std::vector<StoredEvent>& newest) {
+EventFeed::EventId EventFeed::IdOf(const StoredEvent& event) {
+  return {event.steady_ns, event.rig, event.event};
+}
+
+EventFeed::EventIds EventFeed::IdsOf(const std::vector<StoredEvent>& events) {
+  EventIds ids;
+  for (const StoredEvent& event : events) ids.insert(IdOf(event));
+  return ids;
+}
+
+void EventFeed::NotifyOfEvents(const std::string& rig,
+                               const std::vector<StoredEvent>& newest) {
+  const auto ids = std::make_shared<const EventIds>(IdsOf(newest));
   const std::lock_guard lock(mutex_);
   for (const auto& reader : Readers()) {
-    const bool more = newest.size() == kEvents &&
-                      newest.back().event > reader->newest_event + 1;
-    if (more && reader->newest_event > 0) {
-      reader->on_change(v1::Change::EVERYTHING, "");
-    }
+    if (reader->rig != rig) continue;
+    // Between the events that are known and these there may be others.
+    const bool more = std::ssize(newest) == kEvents &&
+                      !reader->known->empty() &&
+                      !reader->known->contains(IdOf(newest.back()));
+    if (more) reader->on_change(v1::Change::EVERYTHING, "");
     for (const StoredEvent& event : newest) {
-      if (event.event <= reader->newest_event) break;
-      if (reader->rig.empty() || reader->rig == event.rig) {
-        reader->on_change(v1::Change::EVENTS, event.rig);
-      }
+      if (reader->known->contains(IdOf(event))) continue;
+      reader->on_change(v1::Change::EVENTS, event.rig);
     }
-    reader->newest_event = newest.front().event;
+    reader->known = ids;
   }
 }
 

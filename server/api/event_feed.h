@@ -10,8 +10,10 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "selfcal/v1/activity_service.pb.h"
@@ -40,17 +42,28 @@ class EventFeed final : public PipelineObserver {
   std::shared_ptr<void> Subscribe(const std::string& rig, OnChange on_change);
 
  private:
+  // Steady time, rig and number: identify an event.
+  using EventId = std::tuple<std::int64_t, std::string, std::int64_t>;
+  using EventIds = std::set<EventId>;
+
   struct Reader {
     std::string rig;
-    std::int64_t newest_event = 0;  // events up to this one are not reported
+    // Its newest events, when it was last looked for some: among those of all
+    // rigs, one may come before others that were committed earlier.
+    std::shared_ptr<const EventIds> known;
     OnChange on_change;
   };
+
+  static EventId IdOf(const StoredEvent& event);
+  static EventIds IdsOf(const std::vector<StoredEvent>& events);
 
   void Notify(v1::Change::What what, const std::string& rig);
   // The readers that exist; with the lock held.
   std::vector<std::shared_ptr<Reader>> Readers();
   void PollEvents();
-  void NotifyOfEvents(const std::vector<StoredEvent>& newest);
+  // `newest` are the newest events of the rig, or of all if it is empty.
+  void NotifyOfEvents(const std::string& rig,
+                      const std::vector<StoredEvent>& newest);
 
   Store* store_;
   PipelineObserver* next_;

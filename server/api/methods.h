@@ -153,5 +153,6 @@ void AddCalibrationMethods(Methods* methods);
 void AddRecalibrationMethods(Methods* methods);
 void AddStoreMethods(Methods* methods);
 void AddActivityMethods(Methods* methods);
+void AddFleetMethods(Methods* methods);
 
 }  // namespace selfcal::server

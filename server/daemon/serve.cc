@@ -166,11 +166,14 @@ void LookAtClock(DeviceClock* clock) {
   }
 }
 
-// Runs until a signal to stop, which it returns; nullopt if an address has
+// Runs until a signal to stop, which it returns, with a health that follows the
+// database; nullopt if an address has
 // stopped accepting connections, or the state directory is not in place. If the
 // store does not respond any more, the watchdog is not notified.
 std::optional<int> RunUntilStopped(
     Store* store,
+    Pipeline* pipeline,
+    Server* server,
     DeviceClock* clock,
     const State& state,
     const std::function<std::optional<std::string>()>& read_log_level) {
@@ -180,6 +183,7 @@ std::optional<int> RunUntilStopped(
     const auto signal = WaitForSignal(interval);
     TrimHeap();
     LookAtClock(clock);
+    server->SetServing(pipeline->StoreResponds());
     if (!signal && watchdog) {
       store->ListRigs({1, ""}).IgnoreError();
       NotifyAlive();
@@ -255,8 +259,12 @@ std::optional<int> ServeOnce(
                fmt::join((*server)->addresses(), ", "));
   NotifyReady();
 
-  const auto signal =
-      RunUntilStopped(store, clock->get(), state, read_log_level);
+  const auto signal = RunUntilStopped(store,
+                                      pipeline.get(),
+                                      server->get(),
+                                      clock->get(),
+                                      state,
+                                      read_log_level);
   deadline.emplace(kStopLimit);
   NotifyStopping();
   if (signal == kRestart) {

@@ -43,7 +43,7 @@ absl::Status RemoveMisfits(UnitOfWork* tx, std::optional<double> largest_fit) {
   for (const SegmentRow& segment : kept) {
     if (segment.fit <= *largest_fit) continue;
     SELFCAL_RETURN_IF_ERROR(LeaveTables(tx,
-                                        segment.rowid,
+                                        segment.sequence,
                                         {.cause = ExclusionCause::kDoesNotFit,
                                          .fit = segment.fit,
                                          .fit_limit = largest_fit}));

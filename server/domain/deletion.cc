@@ -16,7 +16,7 @@ absl::StatusOr<bool> DeleteSegment(UnitOfWork* tx,
                                    const std::string& reason) {
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
   SELFCAL_ASSIGN_OR_RETURN(const SegmentUsers users,
-                           UsersOf(tx, segment.rowid));
+                           UsersOf(tx, segment.sequence));
   const std::string text = SegmentText(tx->rig(), key);
   if (users.unfinished_run) {
     return absl::FailedPreconditionError(
@@ -32,7 +32,7 @@ absl::StatusOr<bool> DeleteSegment(UnitOfWork* tx,
         *users.version,
         text));
   }
-  SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, segment.rowid));
+  SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, segment.sequence));
   SELFCAL_RETURN_IF_ERROR(
       AppendEvent(tx,
                   EventKind::kSegmentDeleted,

@@ -112,8 +112,12 @@ absl::StatusOr<std::optional<std::string>> DeviceClock::Observe() {
 absl::Status DeviceClock::Write(const ClockAdvance& advance) {
   std::optional<StoredEvent> event;
   if (advance.step) {
-    event = {
-        0, advance.clock.time_ns, "", EventKind::kClockStepped, *advance.step};
+    event = {0,
+             advance.clock.time_ns,
+             "",
+             EventKind::kClockStepped,
+             *advance.step,
+             advance.clock.steady_ns};
   }
   SELFCAL_RETURN_IF_ERROR(store_->WriteClock(advance.clock, event));
   last_ = advance.clock;

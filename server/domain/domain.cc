@@ -293,7 +293,8 @@ absl::StatusOr<StoredRun> Domain::EndRun(const RigClaim& claim,
 }
 
 absl::Status Domain::RecordEvent(EventKind kind, const std::string& detail) {
-  return store_->AppendEvent({0, clock_().time_ns, "", kind, detail});
+  const Moment now = clock_();
+  return store_->AppendEvent({0, now.time_ns, "", kind, detail, now.steady_ns});
 }
 
 }  // namespace selfcal::server

@@ -32,8 +32,8 @@ absl::Status LeaveTablesIf(
       SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
                                FindSegment(tx, entry.key));
       SELFCAL_RETURN_IF_ERROR(
-          WriteExclusion(tx, segment.rowid, table.group, {.cause = cause}));
-      SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, segment.rowid));
+          WriteExclusion(tx, segment.sequence, table.group, {.cause = cause}));
+      SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, segment.sequence));
     }
   }
   return absl::OkStatus();

@@ -120,18 +120,19 @@ absl::Status WriteOffer(UnitOfWork* tx,
   if (change.evicted) {
     SELFCAL_ASSIGN_OR_RETURN(const SegmentRow evicted,
                              FindSegment(tx, change.evicted->key));
-    SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, evicted.rowid));
+    SELFCAL_RETURN_IF_ERROR(DeleteEntry(tx, table.group, evicted.sequence));
     SELFCAL_RETURN_IF_ERROR(
         WriteExclusion(tx,
-                       evicted.rowid,
+                       evicted.sequence,
                        table.group,
                        {.cause = ExclusionCause::kReplaced,
-                        .rival = segment.rowid,
+                        .rival = segment.sequence,
                         .rival_entropy = EntryOf(table, segment.key).entropy}));
   }
   if (!change.inserted) return absl::OkStatus();
   const TableEntry& entry = EntryOf(table, segment.key);
-  return InsertEntry(tx, table.group, segment.rowid, entry.entropy, entry.gain);
+  return InsertEntry(
+      tx, table.group, segment.sequence, entry.entropy, entry.gain);
 }
 
 // Records why a table refused the segment.
@@ -146,17 +147,17 @@ absl::Status ExplainRefusal(UnitOfWork* tx,
                          !table.entries.empty();
   if (!outranked) {
     return WriteExclusion(tx,
-                          segment.rowid,
+                          segment.sequence,
                           table.group,
                           {.cause = ExclusionCause::kInsufficientGain});
   }
   const TableEntry& worst = table.entries.back();
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow rival, FindSegment(tx, worst.key));
   return WriteExclusion(tx,
-                        segment.rowid,
+                        segment.sequence,
                         table.group,
                         {.cause = ExclusionCause::kOutranked,
-                         .rival = rival.rowid,
+                         .rival = rival.sequence,
                          .rival_entropy = worst.entropy});
 }
 

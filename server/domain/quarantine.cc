@@ -36,7 +36,7 @@ absl::Status Quarantine(UnitOfWork* tx,
                         const SegmentRow& segment,
                         EventKind event,
                         const std::string& problem) {
-  SELFCAL_RETURN_IF_ERROR(MakeUnusable(tx, segment.rowid, problem));
+  SELFCAL_RETURN_IF_ERROR(MakeUnusable(tx, segment.sequence, problem));
   return AppendEvent(
       tx,
       event,
@@ -52,7 +52,7 @@ absl::Status QuarantineExcluded(UnitOfWork* tx,
     // A segment without a record is not a reason to lose the calibration.
     if (absl::IsNotFound(found.status())) continue;
     SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, found);
-    SELFCAL_RETURN_IF_ERROR(MarkExcluded(tx, run, segment.rowid));
+    SELFCAL_RETURN_IF_ERROR(MarkExcluded(tx, run, segment.sequence));
     if (segment.state == SegmentState::kUnusable) continue;
     SELFCAL_RETURN_IF_ERROR(Quarantine(
         tx,
@@ -96,7 +96,7 @@ absl::StatusOr<QuarantineCommit> QuarantineSegments(
     }
     SELFCAL_RETURN_IF_ERROR(
         MakeUnusable(tx,
-                     segment.rowid,
+                     segment.sequence,
                      fmt::format("quarantined by {}: {}", caller, reason)));
   }
   if (commit.quarantined == 0) return commit;

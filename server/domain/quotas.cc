@@ -60,7 +60,7 @@ absl::Status Evict(UnitOfWork* tx,
       "is limited to {} bytes",
       holder.bytes,
       quotas.max_payload_bytes_per_rig);
-  const std::int64_t segment = holder.segment.rowid;
+  const std::int64_t segment = holder.segment.sequence;
   SELFCAL_RETURN_IF_ERROR(WriteProblem(tx, segment, why));
   SELFCAL_RETURN_IF_ERROR(
       LeaveTables(tx, segment, {.cause = ExclusionCause::kDataEvicted}));
@@ -130,7 +130,7 @@ absl::Status DropOldSegments(UnitOfWork* tx, const Quotas& quotas) {
                          !tx->now().keeps_aged &&
                          age_ns > quotas.max_segment_age_s * kSecond;
     if (!too_many && !too_old) continue;
-    SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, segment.rowid));
+    SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, segment.sequence));
     ++dropped;
   }
   if (dropped == 0) return absl::OkStatus();

@@ -45,8 +45,8 @@ absl::StatusOr<std::vector<Table>> RemoveAgedEntries(UnitOfWork* tx,
       SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment,
                                FindSegment(tx, entry.key));
       if (segment.receive_steady_ns >= now_ns - max_age_ns) continue;
-      SELFCAL_RETURN_IF_ERROR(
-          LeaveTables(tx, segment.rowid, {.cause = ExclusionCause::kTooOld}));
+      SELFCAL_RETURN_IF_ERROR(LeaveTables(
+          tx, segment.sequence, {.cause = ExclusionCause::kTooOld}));
     }
   }
   return ReadTables(tx);
@@ -64,7 +64,7 @@ absl::Status DropUnneededData(UnitOfWork* tx) {
                             !holder.excluded &&
                             holder.segment.sequence >= reserve;
     if (IsReferenced(holder) || in_reserve) continue;
-    SELFCAL_RETURN_IF_ERROR(DeleteData(tx, holder.segment.rowid));
+    SELFCAL_RETURN_IF_ERROR(DeleteData(tx, holder.segment.sequence));
   }
   return absl::OkStatus();
 }

@@ -25,7 +25,8 @@ absl::StatusOr<ScoreCommit> CommitScore(
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
   ScoreCommit commit;
   if (segment.state == SegmentState::kScored) {
-    SELFCAL_ASSIGN_OR_RETURN(commit.tables, TablesOfSegment(tx, segment.rowid));
+    SELFCAL_ASSIGN_OR_RETURN(commit.tables,
+                             TablesOfSegment(tx, segment.sequence));
     return commit;
   }
   if (segment.state == SegmentState::kUnusable) {
@@ -34,9 +35,9 @@ absl::StatusOr<ScoreCommit> CommitScore(
         " was found unusable; send it again under "
         "another session");
   }
-  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.rowid, information));
+  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.sequence, information));
   if (ends) {
-    SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.rowid, *ends));
+    SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.sequence, *ends));
   }
   SELFCAL_ASSIGN_OR_RETURN(const std::optional<double> largest_fit,
                            LargestFitOfRig(tx));
@@ -47,7 +48,7 @@ absl::StatusOr<ScoreCommit> CommitScore(
       RemoveAgedEntries(tx, rig, segment.receive_steady_ns));
   SELFCAL_ASSIGN_OR_RETURN(
       const bool admitted,
-      AdmitByFit(tx, segment.rowid, information.residuals, largest_fit));
+      AdmitByFit(tx, segment.sequence, information.residuals, largest_fit));
   if (admitted) {
     SELFCAL_ASSIGN_OR_RETURN(
         commit.tables,
@@ -58,7 +59,8 @@ absl::StatusOr<ScoreCommit> CommitScore(
   commit.change = examined.change;
   if (examined.change || examined.quarantined > 0) {
     SELFCAL_ASSIGN_OR_RETURN(tables, ReadTables(tx));
-    SELFCAL_ASSIGN_OR_RETURN(commit.tables, TablesOfSegment(tx, segment.rowid));
+    SELFCAL_ASSIGN_OR_RETURN(commit.tables,
+                             TablesOfSegment(tx, segment.sequence));
   }
   SELFCAL_ASSIGN_OR_RETURN(commit.started_run,
                            CreateRunOfTables(tx, rig, tables));
@@ -72,17 +74,17 @@ absl::Status ReplaceScore(UnitOfWork* tx,
                           const SegmentEnds& ends) {
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(tx));
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow segment, FindSegment(tx, key));
-  SELFCAL_ASSIGN_OR_RETURN(const bool has_data, HasData(tx, segment.rowid));
+  SELFCAL_ASSIGN_OR_RETURN(const bool has_data, HasData(tx, segment.sequence));
   if (segment.state != SegmentState::kScored || !has_data) {
     return absl::OkStatus();
   }
-  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.rowid, information));
-  SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.rowid, ends));
+  SELFCAL_RETURN_IF_ERROR(WriteScore(tx, segment.sequence, information));
+  SELFCAL_RETURN_IF_ERROR(Remember(tx, segment.sequence, ends));
   // Entries of a joint selection have the scores of all its segments together.
   const bool by_score = rig.rig.selection == Selection::kTables;
   for (const GroupScore& score : information.groups) {
     if (!by_score || !std::isfinite(score.entropy)) continue;
-    SELFCAL_RETURN_IF_ERROR(WriteEntryScore(tx, segment.rowid, score));
+    SELFCAL_RETURN_IF_ERROR(WriteEntryScore(tx, segment.sequence, score));
   }
   return absl::OkStatus();
 }

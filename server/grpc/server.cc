@@ -186,7 +186,7 @@ class GrpcServer final : public Server {
       if (socket.empty()) continue;
       SELFCAL_RETURN_IF_ERROR(SetPermissions(socket, options.socket));
     }
-    SetServing(true);
+    SetHealth(true);
     return absl::OkStatus();
   }
 
@@ -196,10 +196,15 @@ class GrpcServer final : public Server {
 
   std::shared_ptr<const TlsReload> tls() const override { return tls_; }
 
+  void SetServing(bool serving) override {
+    const std::lock_guard lock(shutdown_mutex_);
+    if (!stopped_) SetHealth(serving);
+  }
+
   void Shutdown(std::chrono::milliseconds deadline) override {
     const std::lock_guard lock(shutdown_mutex_);
     if (server_ == nullptr || std::exchange(stopped_, true)) return;
-    SetServing(false);
+    SetHealth(false);
     api_->Stop();
     watches_.ScheduleAll();
     server_->Shutdown(std::chrono::system_clock::now() + deadline);
@@ -207,7 +212,7 @@ class GrpcServer final : public Server {
   }
 
  private:
-  void SetServing(bool serving) {
+  void SetHealth(bool serving) {
     grpc::HealthCheckServiceInterface* health =
         server_->GetHealthCheckService();
     if (health == nullptr) return;

@@ -68,6 +68,10 @@ class Server {
   // The TLS files in force; null without a TCP address with TLS.
   virtual std::shared_ptr<const TlsReload> tls() const = 0;
 
+  // Health becomes SERVING, as it is at the start, or NOT_SERVING. Calls are
+  // answered all the same.
+  virtual void SetServing(bool serving) = 0;
+
   // Stops the server and the API. Health becomes NOT_SERVING, and no new call
   // is accepted. Watches, and streams between segments, end with UNAVAILABLE
   // soon; calls that remain after the deadline are cancelled. When it returns,

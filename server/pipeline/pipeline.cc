@@ -163,6 +163,8 @@ class PipelineImpl : public Pipeline {
     sampler_.Stop();
   }
 
+  bool StoreResponds() override { return claims_.Responds(); }
+
   absl::StatusOr<SubmitResult> Submit(
       const std::string& rig,
       const MotionSegment& segment,

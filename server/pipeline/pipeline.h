@@ -152,6 +152,9 @@ class Pipeline {
   // next start).
   virtual void Stop() = 0;
 
+  // False while a database that daemons share does not respond.
+  virtual bool StoreResponds() { return true; }
+
   // Validates and stores one segment and wakes a worker. NOT_FOUND for an
   // unknown rig; errors of the store are passed on. Blocks while the backlog is
   // full, until `cancelled` returns true (then CANCELLED). UNAVAILABLE while

@@ -22,6 +22,8 @@ constexpr std::chrono::milliseconds kPause{20};
 constexpr std::chrono::milliseconds kPauseForEach{10};
 // A rig without work stays claimed for so long: its device sends more.
 constexpr std::chrono::seconds kKeep{5};
+// Without a response for so many beats, the database is away.
+constexpr int kBeatsToRespond = 5;
 
 std::string NewName() {
   std::random_device random;
@@ -97,6 +99,12 @@ void RigClaims::Wake() {
   changed_.notify_all();
 }
 
+bool RigClaims::Responds() const {
+  if (!options_.shared) return true;
+  const std::lock_guard lock(mutex_);
+  return Clock::now() - responded_ < kBeatsToRespond * options_.beat;
+}
+
 void RigClaims::Run() {
   Backoff backoff;
   std::unique_lock lock(mutex_);
@@ -104,13 +112,15 @@ void RigClaims::Run() {
     woken_ = false;
     lock.unlock();
     auto pause = Pass();
-    if (pause.ok()) {
+    const bool responded = pause.ok();
+    if (responded) {
       backoff.Reset();
     } else {
       spdlog::warn("cannot claim rigs: {}", pause.status().ToString());
       pause = std::min(backoff.Next(), options_.beat);
     }
     lock.lock();
+    if (responded) responded_ = Clock::now();
     changed_.wait_for(lock, kPause, [this] { return !running_; });
     changed_.wait_for(lock, *pause, [this] { return !running_ || woken_; });
   }
@@ -143,6 +153,7 @@ absl::Status RigClaims::Begin() {
   held_.clear();
   busy_ = 0;
   is_first_ = false;
+  responded_ = Clock::now();
   return absl::OkStatus();
 }
 

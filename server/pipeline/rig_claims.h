@@ -48,6 +48,9 @@ class RigClaims {
   bool IsFirst() const;
   // A rig may have work and no daemon.
   void Wake();
+  // False while the database that is shared has not responded for several
+  // beats.
+  bool Responds() const;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -89,7 +92,8 @@ class RigClaims {
   bool running_ = false;
   bool woken_ = false;
   bool is_first_ = false;
-  int busy_ = 0;         // claims with work
+  int busy_ = 0;  // claims with work
+  Clock::time_point responded_;
   std::string replica_;  // empty while there is no record of it
   std::map<std::string, Held> held_;
 };

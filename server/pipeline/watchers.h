@@ -21,11 +21,12 @@
 
 namespace selfcal::server {
 
-// Each activation once, in order. The newest one need not have the highest
-// version: an older version may have been activated again.
+// Each activation of a rig once, in order. The newest one need not have the
+// highest version: an older version may have been activated again. A rig that
+// was deleted and created again counts its activations from 1.
 inline bool Follows(const StoredCalibration& last,
                     const StoredCalibration& next) {
-  return next.activation > last.activation;
+  return next.rig_key != last.rig_key || next.activation > last.activation;
 }
 
 // No update after the end of a run.

@@ -37,8 +37,8 @@ absl::Status InsertCalibration(UnitOfWork* tx,
   for (const SegmentKey& key : calibration.segments) {
     SELFCAL_RETURN_IF_ERROR(
         Statement(tx->db(),
-                  "INSERT INTO calibration_segments (rig, version, segment) "
-                  "SELECT ?1, ?2, segment FROM segments "
+                  "INSERT INTO calibration_segments (rig, version, sequence) "
+                  "SELECT rig, ?2, sequence FROM segments "
                   "WHERE rig = ?1 AND session = ?3 AND session_index = ?4",
                   tx->rig_row(),
                   calibration.version,
@@ -80,8 +80,10 @@ absl::Status WriteState(UnitOfWork* tx,
 absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version) {
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
-                "INSERT INTO activations (rig, version, time_ns, steady_ns) "
-                "VALUES (?1, ?2, ?3, ?4)",
+                "INSERT INTO activations (rig, activation, version, "
+                "  time_ns, steady_ns) "
+                "VALUES (?1, (SELECT coalesce(max(activation), 0) + 1 "
+                "  FROM activations WHERE rig = ?1), ?2, ?3, ?4)",
                 tx->rig_row(),
                 version,
                 tx->time_ns(),

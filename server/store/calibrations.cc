@@ -29,8 +29,9 @@ absl::Status ReadSegmentKeys(Connection* db,
                              StoredCalibration* calibration) {
   Statement read(db,
                  "SELECT s.session, s.session_index FROM calibration_segments "
-                 "c JOIN segments s USING (segment) "
-                 "WHERE c.rig = ?1 AND c.version = ?2 ORDER BY s.sequence",
+                 "c CROSS JOIN segments s "
+                 "WHERE s.rig = c.rig AND s.sequence = c.sequence "
+                 "AND c.rig = ?1 AND c.version = ?2 ORDER BY c.sequence",
                  rig,
                  calibration->version);
   while (read.Next()) {
@@ -45,8 +46,10 @@ absl::Status ReadTemperatures(Connection* db,
   Statement read(db,
                  "SELECT count(*), avg(s.temperature_c), min(s.temperature_c), "
                  "  max(s.temperature_c) FROM calibration_segments c "
-                 "JOIN segments s USING (segment) WHERE c.rig = ?1 "
-                 "AND c.version = ?2 AND s.temperature_c IS NOT NULL",
+                 "CROSS JOIN segments s "
+                 "WHERE s.rig = c.rig AND s.sequence = c.sequence "
+                 "AND c.rig = ?1 AND c.version = ?2 "
+                 "AND s.temperature_c IS NOT NULL",
                  rig,
                  calibration->version);
   if (read.Next() && read.Int(0) > 0) {
@@ -74,6 +77,7 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
     return absl::DataLossError(fmt::format(
         "{} holds the content of another version; restore a backup", what));
   }
+  calibration.rig_key = rig_id;
   calibration.state = static_cast<CalibrationState>(row.Int(1) - 1);
   calibration.create_time_ns = row.Int(2);
   if (!row.IsNull(3)) {
@@ -215,7 +219,9 @@ absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(UnitOfWork* tx,
 absl::StatusOr<std::int64_t> ActivationSteadyTime(UnitOfWork* tx,
                                                   std::int64_t activation) {
   return ReadInt(tx->db(),
-                 "SELECT steady_ns FROM activations WHERE activation = ?1",
+                 "SELECT steady_ns FROM activations "
+                 "WHERE rig = ?1 AND activation = ?2",
+                 tx->rig_row(),
                  activation);
 }
 

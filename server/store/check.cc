@@ -82,11 +82,12 @@ void CheckBlobs(Connection* db, const Checked& what, Findings* findings) {
 }
 
 void CheckPayloads(Connection* db, Findings* findings) {
-  Statement read(db, "SELECT segment, data, raw_bytes, sha256 FROM payloads");
-  while (!findings->cancelled() && read.Next()) {
+  Statement read(db, "SELECT data, raw_bytes, sha256 FROM payloads");
+  for (std::int64_t row = 1; !findings->cancelled() && read.Next(); ++row) {
     ++findings->summary.payloads;
-    const std::string what = fmt::format("the data of segment {}", read.Int(0));
-    const Payload payload{read.Text(1), read.Int(2), read.Text(3)};
+    const std::string what =
+        fmt::format("the data of the segment in row {}", row);
+    const Payload payload{read.Text(0), read.Int(1), read.Text(2)};
     const absl::Status status = UnpackSegment(payload, what).status();
     if (!status.ok()) findings->Add(what, std::string(status.message()));
   }
@@ -96,7 +97,8 @@ void CheckPayloads(Connection* db, Findings* findings) {
 }
 
 // What the program relies on and no constraint of the schema states. `sql`
-// selects the places that break the rule.
+// selects the places that break the rule, in a backup of an older schema as
+// well.
 struct Rule {
   std::string_view sql;
   std::string_view description;
@@ -114,10 +116,11 @@ constexpr Rule kRules[] = {
      "FROM table_entries e WHERE e.rig = t.rig "
      "AND e.group_name = t.group_name)",
      "holds more segments than its capacity"},
+    // By the key of a segment, whichever it is.
     {"SELECT 'rig ' || r.id || ', table ' || e.group_name || ', segment ' || "
-     "s.session || '~' || s.session_index FROM table_entries e "
-     "JOIN rigs r ON r.rig = e.rig JOIN segments s ON s.segment = e.segment "
-     "WHERE s.rig <> e.rig OR s.state <> 2",
+     "coalesce(s.session || '~' || s.session_index, '?') "
+     "FROM table_entries e NATURAL LEFT JOIN segments s "
+     "JOIN rigs r ON r.rig = e.rig WHERE coalesce(s.state, 0) <> 2",
      "is not a scored segment of this rig"},
 };
 

@@ -1,6 +1,10 @@
 #include "server/store/events.h"
 
+#include <fmt/format.h>
+
+#include <charconv>
 #include <limits>
+#include <string_view>
 
 #include "server/status/status_macros.h"
 #include "server/store/driver/statement.h"
@@ -9,30 +13,107 @@
 namespace selfcal::server {
 namespace {
 
-// `which` is the rest of the query: ?1 is an event's number, ?2 the limit, and
-// ?3 the rig, if any.
-absl::StatusOr<Listed<StoredEvent>> ReadPage(Connection* db,
-                                             const std::string& which,
-                                             const std::string& list,
-                                             std::int64_t number,
-                                             const Page& page,
-                                             const std::string& rig) {
-  const int size = PageSize(page);
-  const std::string sql =
-      "SELECT event, time_ns, rig, kind, detail FROM events " + which;
-  Statement read = rig.empty() ? Statement(db, sql, number, size + 1)
-                               : Statement(db, sql, number, size + 1, rig);
-  Listed<StoredEvent> listed;
-  while (read.Next()) {
-    listed.items.push_back({read.Int(0),
-                            read.Int(1),
-                            read.Text(2),
-                            static_cast<EventKind>(read.Int(3) - 1),
-                            read.Text(4)});
+constexpr std::string_view kEventColumns =
+    "SELECT event, time_ns, rig, kind, detail, steady_ns FROM events";
+
+// The events of all rigs are in this order.
+struct EventPlace {
+  std::int64_t steady_ns = 0;
+  std::string rig;
+  std::int64_t event = 0;
+};
+
+using Limits = std::numeric_limits<std::int64_t>;
+
+// The beginning of the list of all rigs.
+EventPlace Beginning(bool newest_first) {
+  return {newest_first ? Limits::max() : Limits::min(), "", 0};
+}
+
+std::string PlaceText(const StoredEvent& event) {
+  return fmt::format("{} {} {}", event.steady_ns, event.event, event.rig);
+}
+
+// The place after which a page begins.
+absl::StatusOr<EventPlace> PlaceOfPage(const std::string& list,
+                                       const Page& page,
+                                       bool newest_first) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto text, PageKey(list, page));
+  if (!text) return Beginning(newest_first);
+  EventPlace place;
+  const char* const end = text->data() + text->size();
+  const auto steady = std::from_chars(text->data(), end, place.steady_ns);
+  if (steady.ec == std::errc() && steady.ptr != end && *steady.ptr == ' ') {
+    const auto event = std::from_chars(steady.ptr + 1, end, place.event);
+    if (event.ec == std::errc() && event.ptr != end && *event.ptr == ' ') {
+      place.rig.assign(event.ptr + 1, end);
+      return place;
+    }
   }
-  SELFCAL_RETURN_IF_ERROR(read.status());
+  return BadPageToken();
+}
+
+// Reads one event beyond the page, if there is one.
+absl::StatusOr<Listed<StoredEvent>> ReadEvents(Statement* read) {
+  Listed<StoredEvent> listed;
+  while (read->Next()) {
+    listed.items.push_back({read->Int(0),
+                            read->Int(1),
+                            read->Text(2),
+                            static_cast<EventKind>(read->Int(3) - 1),
+                            read->Text(4),
+                            read->Int(5)});
+  }
+  SELFCAL_RETURN_IF_ERROR(read->status());
+  return listed;
+}
+
+absl::StatusOr<Listed<StoredEvent>> ListOfAll(Connection* db,
+                                              const Page& page,
+                                              bool newest_first) {
+  const std::string list = newest_first ? "newest-events" : "events";
+  SELFCAL_ASSIGN_OR_RETURN(const EventPlace place,
+                           PlaceOfPage(list, page, newest_first));
+  const int size = PageSize(page);
+  Statement read(
+      db,
+      fmt::format("{0} WHERE (steady_ns, rig, event) {1} (?1, ?2, ?3) "
+                  "ORDER BY steady_ns {2}, rig {2}, event {2} LIMIT ?4",
+                  kEventColumns,
+                  newest_first ? "<" : ">",
+                  newest_first ? "DESC" : "ASC"),
+      place.steady_ns,
+      place.rig,
+      place.event,
+      size + 1);
+  SELFCAL_ASSIGN_OR_RETURN(auto listed, ReadEvents(&read));
+  CutPage(list, size, PlaceText, &listed);
+  return listed;
+}
+
+absl::StatusOr<Listed<StoredEvent>> ListOfRig(Connection* db,
+                                              const Page& page,
+                                              const std::string& rig,
+                                              bool newest_first) {
+  const std::string list = (newest_first ? "newest-events/" : "events/") + rig;
+  SELFCAL_ASSIGN_OR_RETURN(const auto number, PageNumber(list, page));
+  const int size = PageSize(page);
+  Statement read(
+      db,
+      fmt::format("{} WHERE rig = ?1 AND event {} ?2 ORDER BY event {} "
+                  "LIMIT ?3",
+                  kEventColumns,
+                  newest_first ? "<" : ">",
+                  newest_first ? "DESC" : "ASC"),
+      rig,
+      number.value_or(newest_first ? Limits::max() : 0),
+      size + 1);
+  SELFCAL_ASSIGN_OR_RETURN(auto listed, ReadEvents(&read));
   CutPage(
-      list, size, [](const auto& e) { return e.event; }, &listed);
+      list,
+      size,
+      [](const StoredEvent& event) { return event.event; },
+      &listed);
   return listed;
 }
 
@@ -41,48 +122,43 @@ absl::StatusOr<Listed<StoredEvent>> ReadPage(Connection* db,
 absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail) {
-  return InsertEvent(tx->db(), {0, tx->time_ns(), tx->rig(), kind, detail});
+  return InsertEvent(
+      tx->db(),
+      {0, tx->time_ns(), tx->rig(), kind, detail, tx->now().steady_ns});
 }
 
 absl::Status InsertEvent(Connection* db, const StoredEvent& event) {
-  return Statement(db,
-                   "INSERT INTO events (time_ns, rig, kind, detail) "
-                   "VALUES (?1, ?2, ?3, ?4)",
-                   event.time_ns,
-                   event.rig,
-                   static_cast<int>(event.kind) + 1,
-                   event.detail)
-      .Run();
+  for (;;) {
+    SELFCAL_ASSIGN_OR_RETURN(
+        const std::int64_t number,
+        InsertReturning(db,
+                        "INSERT INTO events (rig, event, time_ns, steady_ns, "
+                        "  kind, detail) VALUES (?1, "
+                        "  (SELECT coalesce(max(event), 0) + 1 FROM events "
+                        "   WHERE rig = ?1), ?2, ?3, ?4, ?5) "
+                        "ON CONFLICT DO NOTHING RETURNING event",
+                        event.rig,
+                        event.time_ns,
+                        event.steady_ns,
+                        static_cast<int>(event.kind) + 1,
+                        event.detail));
+    if (number != 0) return absl::OkStatus();
+    // No lock protects the numbers of the daemon's events: another one has
+    // committed an event with this number since the statement began.
+  }
 }
 
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
                                                   const Page& page,
                                                   const std::string& rig) {
-  const std::string list = rig.empty() ? "events" : "events/" + rig;
-  SELFCAL_ASSIGN_OR_RETURN(const auto after, PageNumber(list, page));
-  return ReadPage(db,
-                  rig.empty() ? "WHERE event > ?1 ORDER BY event LIMIT ?2"
-                              : "WHERE event > ?1 AND rig = ?3 "
-                                "ORDER BY event LIMIT ?2",
-                  list,
-                  after.value_or(0),
-                  page,
-                  rig);
+  return rig.empty() ? ListOfAll(db, page, false)
+                     : ListOfRig(db, page, rig, false);
 }
 
 absl::StatusOr<Listed<StoredEvent>> ListNewestEventRows(
     Connection* db, const Page& page, const std::string& rig) {
-  const std::string list =
-      rig.empty() ? "newest-events" : "newest-events/" + rig;
-  SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
-  return ReadPage(db,
-                  rig.empty() ? "WHERE event < ?1 ORDER BY event DESC LIMIT ?2"
-                              : "WHERE event < ?1 AND rig = ?3 "
-                                "ORDER BY event DESC LIMIT ?2",
-                  list,
-                  before.value_or(std::numeric_limits<std::int64_t>::max()),
-                  page,
-                  rig);
+  return rig.empty() ? ListOfAll(db, page, true)
+                     : ListOfRig(db, page, rig, true);
 }
 
 }  // namespace selfcal::server

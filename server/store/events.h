@@ -14,10 +14,11 @@ namespace selfcal::server {
 absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail);
-// An event whose number is the next one, whatever it states.
+// An event whose number is the next one of its rig, whatever it states.
 absl::Status InsertEvent(Connection* db, const StoredEvent& event);
 
-// Events of one rig, or of all if `rig` is empty; oldest first.
+// Events of one rig by number, or of all by steady time if `rig` is empty;
+// oldest first.
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
                                                   const Page& page,
                                                   const std::string& rig);

@@ -11,7 +11,8 @@ namespace selfcal::server {
 
 std::string ExcludedFor(std::string_view parameter) {
   return fmt::format(
-      "EXISTS (SELECT 1 FROM table_absences a WHERE a.segment = s.segment "
+      "EXISTS (SELECT 1 FROM table_absences a "
+      "  WHERE a.rig = s.rig AND a.sequence = s.sequence "
       "  AND ((CAST({} AS BIGINT) >> CAST(a.cause AS INTEGER)) & 1) = 1)",
       parameter);
 }
@@ -25,11 +26,13 @@ absl::StatusOr<std::vector<Exclusion>> ListExclusionRows(
                  "SELECT a.group_name, a.cause, a.time_ns, r.session, "
                  "  r.session_index, a.rival_entropy, a.fit, a.fit_limit "
                  "FROM table_absences a "
-                 "JOIN tables t ON t.rig = ?1 AND t.group_name = a.group_name "
-                 "LEFT JOIN segments r ON r.segment = a.rival "
-                 "WHERE a.segment = ?2 ORDER BY t.position",
+                 "JOIN tables t ON t.rig = a.rig "
+                 "  AND t.group_name = a.group_name "
+                 "LEFT JOIN segments r ON r.rig = a.rig "
+                 "  AND r.sequence = a.rival "
+                 "WHERE a.rig = ?1 AND a.sequence = ?2 ORDER BY t.position",
                  rig_id,
-                 row.rowid);
+                 row.sequence);
   std::vector<Exclusion> exclusions;
   while (read.Next()) {
     Exclusion exclusion;
@@ -47,19 +50,20 @@ absl::StatusOr<std::vector<Exclusion>> ListExclusionRows(
 }
 
 absl::Status WriteExclusion(UnitOfWork* tx,
-                            std::int64_t segment,
+                            std::int64_t sequence,
                             const std::string& group,
                             const NewExclusion& exclusion) {
   return Statement(tx->db(),
-                   "INSERT INTO table_absences (segment, group_name, cause, "
-                   "  time_ns, rival, rival_entropy, fit, fit_limit) "
-                   "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) "
-                   "ON CONFLICT (segment, group_name) DO UPDATE SET "
+                   "INSERT INTO table_absences (rig, sequence, group_name, "
+                   "  cause, time_ns, rival, rival_entropy, fit, fit_limit) "
+                   "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) "
+                   "ON CONFLICT (rig, sequence, group_name) DO UPDATE SET "
                    "  cause = excluded.cause, time_ns = excluded.time_ns, "
                    "  rival = excluded.rival, "
                    "  rival_entropy = excluded.rival_entropy, "
                    "  fit = excluded.fit, fit_limit = excluded.fit_limit",
-                   segment,
+                   tx->rig_row(),
+                   sequence,
                    group,
                    static_cast<int>(exclusion.cause),
                    tx->time_ns(),

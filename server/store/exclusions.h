@@ -48,13 +48,13 @@ std::string ExcludedFor(std::string_view parameter);
 // group; its time is that of the unit of work.
 struct NewExclusion {
   ExclusionCause cause = ExclusionCause::kInsufficientGain;
-  std::optional<std::int64_t> rival = std::nullopt;  // row of a segment
+  std::optional<std::int64_t> rival = std::nullopt;  // its sequence
   std::optional<double> rival_entropy = std::nullopt;
   std::optional<double> fit = std::nullopt;
   std::optional<double> fit_limit = std::nullopt;
 };
 absl::Status WriteExclusion(UnitOfWork* tx,
-                            std::int64_t segment,
+                            std::int64_t sequence,
                             const std::string& group,
                             const NewExclusion& exclusion);
 

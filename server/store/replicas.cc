@@ -129,14 +129,14 @@ class ReplicasOfDatabase final : public Replicas {
     SELFCAL_RETURN_IF_ERROR(db_->Read([&](Connection* db) {
       busy.clear();
       Statement read(db,
-                     "SELECT r.id, c.number FROM claims c "
+                     "SELECT r.id, c.rig, c.number FROM claims c "
                      "JOIN rigs r ON r.rig = c.rig WHERE c.replica = ?1 "
                      "AND (EXISTS (SELECT 1 FROM segments s "
                      "       WHERE s.rig = c.rig AND s.state = 1) "
                      "  OR EXISTS (SELECT 1 FROM runs u "
                      "       WHERE u.rig = c.rig AND u.state IN (1, 2)))",
                      replica);
-      while (read.Next()) busy.emplace_back(read.Text(0), read.Int(1));
+      while (read.Next()) busy.emplace_back(read.Text(0), read.Int(1), read.Int(2));
       return read.status();
     }));
     return busy;
@@ -157,7 +157,7 @@ class ReplicasOfDatabase final : public Replicas {
       }
       claim = {replica, claim.number + 1};
       SELFCAL_RETURN_IF_ERROR(WriteClaim(db, row, claim));
-      claimed.emplace(rig, claim.number);
+      claimed.emplace(rig, row, claim.number);
       return absl::OkStatus();
     }));
     return claimed;
@@ -167,7 +167,9 @@ class ReplicasOfDatabase final : public Replicas {
     return Write([&](Connection* db) -> absl::Status {
       SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, claim.rig));
       SELFCAL_ASSIGN_OR_RETURN(const StoredClaim stored, ReadClaim(db, row));
-      if (stored.number != claim.number) return absl::OkStatus();
+      if (row != claim.key || stored.number != claim.number) {
+        return absl::OkStatus();
+      }
       return WriteClaim(db, row, {"", claim.number});
     });
   }
@@ -198,7 +200,9 @@ absl::Status CheckClaim(Connection* db,
                         const RigClaim& claim) {
   if (claim.number == 0) return absl::OkStatus();
   SELFCAL_ASSIGN_OR_RETURN(const StoredClaim stored, ReadClaim(db, rig_row));
-  return stored.number == claim.number ? absl::OkStatus() : ClaimLost(claim);
+  return rig_row == claim.key && stored.number == claim.number
+             ? absl::OkStatus()
+             : ClaimLost(claim);
 }
 
 }  // namespace selfcal::server

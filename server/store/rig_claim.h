@@ -20,10 +20,11 @@ struct RigClaim {
   // request, which any may.
   RigClaim(std::string name) : rig(std::move(name)) {}
   RigClaim(const char* name) : rig(name) {}
-  RigClaim(std::string name, std::int64_t its_number)
-      : rig(std::move(name)), number(its_number) {}
+  RigClaim(std::string name, std::int64_t its_key, std::int64_t its_number)
+      : rig(std::move(name)), key(its_key), number(its_number) {}
 
   std::string rig;
+  std::int64_t key = 0;     // of the rig: another one may get its name
   std::int64_t number = 0;  // from 1 in a rig; 0: none is needed
 
   friend bool operator==(const RigClaim&, const RigClaim&) = default;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <random>
+
 #include "server/status/status_macros.h"
 #include "server/store/checksum.h"
 #include "server/store/driver/statement.h"
@@ -44,6 +46,13 @@ absl::StatusOr<std::vector<std::string>> ReadNames(Statement* read) {
   return names;
 }
 
+// A positive key that no other daemon chooses: see decision 12.
+std::int64_t NewKey() {
+  std::random_device random;
+  std::uniform_int_distribution<std::int64_t> keys(1, INT64_MAX);
+  return keys(random);
+}
+
 absl::Status InsertLabels(Connection* db,
                           std::int64_t row,
                           const StoredRig& rig) {
@@ -66,23 +75,31 @@ absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig) {
   const std::string& id = rig.rig.id;
   const std::string bytes = SerializeRig(rig);
   const std::string sha256 = Sha256(bytes);
-  // In one statement: another transaction may create the same rig.
-  SELFCAL_ASSIGN_OR_RETURN(
-      const std::int64_t row,
-      InsertReturning(db,
-                      "INSERT INTO rigs (id, create_time_ns, definition, "
-                      "  sha256) VALUES (?1, ?2, ?3, ?4) "
-                      "ON CONFLICT (id) DO NOTHING RETURNING rig",
-                      id,
-                      rig.create_time_ns,
-                      BlobView{bytes},
-                      BlobView{sha256}));
-  if (row == 0) {
-    return absl::AlreadyExistsError(
-        fmt::format("rig {} exists; choose another name", id));
+  for (;;) {
+    // In one statement: another transaction may create the same rig.
+    SELFCAL_ASSIGN_OR_RETURN(
+        const std::int64_t row,
+        InsertReturning(db,
+                        "INSERT INTO rigs (rig, id, create_time_ns, "
+                        "  definition, sha256) VALUES (?1, ?2, ?3, ?4, ?5) "
+                        "ON CONFLICT DO NOTHING RETURNING rig",
+                        NewKey(),
+                        id,
+                        rig.create_time_ns,
+                        BlobView{bytes},
+                        BlobView{sha256}));
+    if (row != 0) {
+      SELFCAL_RETURN_IF_ERROR(InsertLabels(db, row, rig));
+      return row;
+    }
+    const absl::Status exists = FindRigId(db, id).status();
+    if (exists.ok()) {
+      return absl::AlreadyExistsError(
+          fmt::format("rig {} exists; choose another name", id));
+    }
+    // Otherwise another rig has the key.
+    if (!absl::IsNotFound(exists)) return exists;
   }
-  SELFCAL_RETURN_IF_ERROR(InsertLabels(db, row, rig));
-  return row;
 }
 
 absl::Status WriteRig(UnitOfWork* tx, const StoredRig& rig) {
@@ -111,13 +128,8 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
   for (const char* table : {"table_absences",
                             "segment_scores",
                             "segment_information",
-                            "segment_paths"}) {
-    SELFCAL_RETURN_IF_ERROR(
-        run(fmt::format("DELETE FROM {} WHERE segment IN "
-                        "(SELECT segment FROM segments WHERE rig = ?1)",
-                        table)));
-  }
-  for (const char* table : {"payloads",
+                            "segment_paths",
+                            "payloads",
                             "segment_ends",
                             "table_entries",
                             "tables",
@@ -173,7 +185,7 @@ absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx) {
 }
 
 absl::StatusOr<std::vector<std::string>> RigNames(Connection* db) {
-  Statement read(db, "SELECT id FROM rigs ORDER BY rig");
+  Statement read(db, "SELECT id FROM rigs ORDER BY id");
   return ReadNames(&read);
 }
 
@@ -182,7 +194,7 @@ absl::StatusOr<std::vector<std::string>> IdleRigNames(
   Statement read(db,
                  "SELECT id FROM rigs r WHERE (SELECT s.steady_ns "
                  "  FROM segments s WHERE s.rig = r.rig "
-                 "  ORDER BY s.sequence DESC LIMIT 1) <= ?1 ORDER BY rig",
+                 "  ORDER BY s.sequence DESC LIMIT 1) <= ?1 ORDER BY id",
                  idle_since_ns);
   return ReadNames(&read);
 }

@@ -12,7 +12,7 @@
 
 namespace selfcal::server {
 
-// Returns its row. ALREADY_EXISTS.
+// Returns its key. ALREADY_EXISTS.
 absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig);
 // Replaces the definition and the labels of the rig.
 absl::Status WriteRig(UnitOfWork* tx, const StoredRig& rig);
@@ -30,6 +30,7 @@ absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);
 // Number of rigs in the database.
 absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx);
 
+// In their order.
 absl::StatusOr<std::vector<std::string>> RigNames(Connection* db);
 // Store::ListIdleRigs.
 absl::StatusOr<std::vector<std::string>> IdleRigNames(

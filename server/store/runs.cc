@@ -31,8 +31,9 @@ absl::StatusOr<std::vector<SegmentKey>> ReadSnapshot(Connection* db,
                                                      std::int64_t run) {
   Statement read(db,
                  "SELECT s.session, s.session_index FROM run_segments x "
-                 "JOIN segments s USING (segment) "
-                 "WHERE x.rig = ?1 AND x.run = ?2 ORDER BY s.sequence",
+                 "CROSS JOIN segments s "
+                 "WHERE s.rig = x.rig AND s.sequence = x.sequence "
+                 "AND x.rig = ?1 AND x.run = ?2 ORDER BY x.sequence",
                  rig,
                  run);
   return ReadKeys(&read);
@@ -216,8 +217,8 @@ absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
   for (const SegmentKey& key : run.segments) {
     SELFCAL_RETURN_IF_ERROR(
         Statement(tx->db(),
-                  "INSERT INTO run_segments (rig, run, segment) "
-                  "SELECT ?1, ?2, segment FROM segments "
+                  "INSERT INTO run_segments (rig, run, sequence) "
+                  "SELECT rig, ?2, sequence FROM segments "
                   "WHERE rig = ?1 AND session = ?3 AND session_index = ?4",
                   tx->rig_row(),
                   run.run,
@@ -249,13 +250,13 @@ absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run) {
 
 absl::Status MarkExcluded(UnitOfWork* tx,
                           std::int64_t run,
-                          std::int64_t segment) {
+                          std::int64_t sequence) {
   return Statement(tx->db(),
                    "UPDATE run_segments SET excluded = 1 "
-                   "WHERE rig = ?1 AND run = ?2 AND segment = ?3",
+                   "WHERE rig = ?1 AND run = ?2 AND sequence = ?3",
                    tx->rig_row(),
                    run,
-                   segment)
+                   sequence)
       .Run();
 }
 
@@ -263,8 +264,9 @@ absl::StatusOr<std::vector<SegmentKey>> UsedSegments(UnitOfWork* tx,
                                                      std::int64_t run) {
   Statement read(tx->db(),
                  "SELECT s.session, s.session_index FROM run_segments x "
-                 "JOIN segments s USING (segment) "
-                 "WHERE x.rig = ?1 AND x.run = ?2 AND x.excluded = 0 "
+                 "CROSS JOIN segments s "
+                 "WHERE s.rig = x.rig AND s.sequence = x.sequence "
+                 "AND x.rig = ?1 AND x.run = ?2 AND x.excluded = 0 "
                  "ORDER BY s.session, s.session_index",
                  tx->rig_row(),
                  run);
@@ -276,9 +278,10 @@ absl::StatusOr<std::vector<SegmentKey>> UnusableSegments(UnitOfWork* tx,
                                                          bool only_used) {
   Statement read(tx->db(),
                  "SELECT s.session, s.session_index FROM run_segments x "
-                 "JOIN segments s USING (segment) "
-                 "WHERE x.rig = ?1 AND x.run = ?2 AND s.state = 3 "
-                 "AND (?3 = 0 OR x.excluded = 0) ORDER BY s.sequence",
+                 "CROSS JOIN segments s "
+                 "WHERE s.rig = x.rig AND s.sequence = x.sequence "
+                 "AND x.rig = ?1 AND x.run = ?2 AND s.state = 3 "
+                 "AND (?3 = 0 OR x.excluded = 0) ORDER BY x.sequence",
                  tx->rig_row(),
                  run,
                  only_used ? 1 : 0);

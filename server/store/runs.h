@@ -49,7 +49,7 @@ absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run);
 // Records that the result of the run does not use this segment of its snapshot.
 absl::Status MarkExcluded(UnitOfWork* tx,
                           std::int64_t run,
-                          std::int64_t segment);
+                          std::int64_t sequence);
 // Segments of the snapshot that the result uses, ordered by key.
 absl::StatusOr<std::vector<SegmentKey>> UsedSegments(UnitOfWork* tx,
                                                      std::int64_t run);

@@ -95,12 +95,13 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(
     ExclusionCauses not_excluded_for) {
   Statement read(
       tx->db(),
-      fmt::format("SELECT s.segment, s.session, s.session_index, s.sequence, "
+      fmt::format("SELECT s.session, s.session_index, s.sequence, "
                   "  s.steady_ns, s.fit, e.ends, e.sha256, "
                   "  EXISTS (SELECT 1 FROM payloads p "
-                  "    WHERE p.segment = s.segment) "
-                  "FROM segment_ends e JOIN segments s USING (segment) "
-                  "WHERE e.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
+                  "    WHERE p.rig = ?1 AND p.sequence = s.sequence) "
+                  "FROM segment_ends e CROSS JOIN segments s "
+                  "WHERE s.rig = e.rig AND s.sequence = e.sequence "
+                  "  AND e.rig = ?1 AND e.sequence >= ?2 AND s.state = 2 "
                   "  AND NOT {} "
                   "ORDER BY min(s.sequence) OVER (PARTITION BY s.session), "
                   "  s.session_index",
@@ -110,15 +111,14 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(
       not_excluded_for.bits());
   std::vector<EndsRow> rows;
   while (read.Next()) {
-    EndsRow row{.segment = {.rowid = read.Int(0),
-                            .key = {read.Text(1), read.Int(2)},
-                            .sequence = read.Int(3),
+    EndsRow row{.segment = {.key = {read.Text(0), read.Int(1)},
+                            .sequence = read.Int(2),
                             .state = SegmentState::kScored,
-                            .receive_steady_ns = read.Int(4),
-                            .fit = read.Double(5)},
-                .has_data = read.Int(8) != 0};
-    const std::string bytes = row.has_data ? "" : read.Text(6);
-    if (!row.has_data && VerifySha256(bytes, read.Text(7), kWhat).ok()) {
+                            .receive_steady_ns = read.Int(3),
+                            .fit = read.Double(4)},
+                .has_data = read.Int(7) != 0};
+    const std::string bytes = row.has_data ? "" : read.Text(5);
+    if (!row.has_data && VerifySha256(bytes, read.Text(6), kWhat).ok()) {
       auto ends = ParseEnds(bytes);
       if (ends.ok()) row.ends = *std::move(ends);
     }
@@ -131,49 +131,51 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(
 absl::StatusOr<std::vector<std::int64_t>> ArrivalsOfEnds(UnitOfWork* tx) {
   Statement read(tx->db(),
                  "SELECT s.steady_ns FROM segment_ends e "
-                 "JOIN segments s USING (segment) "
-                 "WHERE e.rig = ?1 AND s.state = 2",
+                 "CROSS JOIN segments s "
+                 "WHERE s.rig = e.rig AND s.sequence = e.sequence "
+                 "AND e.rig = ?1 AND s.state = 2",
                  tx->rig_row());
   return ReadInts(&read);
 }
 
 absl::StatusOr<std::vector<std::int64_t>> EndsWithoutData(UnitOfWork* tx) {
   Statement read(tx->db(),
-                 "SELECT e.segment FROM segment_ends e WHERE e.rig = ?1 "
+                 "SELECT e.sequence FROM segment_ends e WHERE e.rig = ?1 "
                  "AND NOT EXISTS (SELECT 1 FROM payloads p "
-                 "  WHERE p.segment = e.segment) ORDER BY e.segment DESC",
+                 "  WHERE p.rig = ?1 AND p.sequence = e.sequence) "
+                 "ORDER BY e.sequence DESC",
                  tx->rig_row());
   return ReadInts(&read);
 }
 
 absl::Status WriteEnds(UnitOfWork* tx,
-                       std::int64_t segment,
+                       std::int64_t sequence,
                        const SegmentEnds& ends) {
   const std::string bytes = SerializeEnds(ends);
   const std::string sha256 = Sha256(bytes);
   return Statement(tx->db(),
-                   "INSERT INTO segment_ends (segment, rig, ends, sha256) "
+                   "INSERT INTO segment_ends (rig, sequence, ends, sha256) "
                    "VALUES (?1, ?2, ?3, ?4) "
-                   "ON CONFLICT (segment) DO UPDATE SET "
+                   "ON CONFLICT (rig, sequence) DO UPDATE SET "
                    "  ends = excluded.ends, sha256 = excluded.sha256",
-                   segment,
                    tx->rig_row(),
+                   sequence,
                    BlobView{bytes},
                    BlobView{sha256})
       .Run();
 }
 
-absl::Status DeleteEnds(UnitOfWork* tx, std::int64_t segment) {
-  return Statement(
-             tx->db(), "DELETE FROM segment_ends WHERE segment = ?1", segment)
+absl::Status DeleteEnds(UnitOfWork* tx, std::int64_t sequence) {
+  return Statement(tx->db(),
+                   "DELETE FROM segment_ends WHERE rig = ?1 AND sequence = ?2",
+                   tx->rig_row(),
+                   sequence)
       .Run();
 }
 
 absl::Status DeleteEndsBefore(UnitOfWork* tx, std::int64_t first_sequence) {
   return Statement(tx->db(),
-                   "DELETE FROM segment_ends WHERE rig = ?1 AND segment IN "
-                   "  (SELECT segment FROM segments "
-                   "   WHERE rig = ?1 AND sequence < ?2)",
+                   "DELETE FROM segment_ends WHERE rig = ?1 AND sequence < ?2",
                    tx->rig_row(),
                    first_sequence)
       .Run();

@@ -40,14 +40,14 @@ absl::StatusOr<std::vector<EndsRow>> ReadEnds(UnitOfWork* tx,
 // Arrival times of the scored segments that have ends [ns since the Unix
 // epoch].
 absl::StatusOr<std::vector<std::int64_t>> ArrivalsOfEnds(UnitOfWork* tx);
-// Rows of the segments that have ends but no data, newest first.
+// Sequences of the segments that have ends but no data, newest first.
 absl::StatusOr<std::vector<std::int64_t>> EndsWithoutData(UnitOfWork* tx);
 
 // Replaces the ends that the segment had.
 absl::Status WriteEnds(UnitOfWork* tx,
-                       std::int64_t segment,
+                       std::int64_t sequence,
                        const SegmentEnds& ends);
-absl::Status DeleteEnds(UnitOfWork* tx, std::int64_t segment);
+absl::Status DeleteEnds(UnitOfWork* tx, std::int64_t sequence);
 absl::Status DeleteEndsBefore(UnitOfWork* tx, std::int64_t first_sequence);
 
 }  // namespace selfcal::server

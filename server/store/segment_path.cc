@@ -51,14 +51,15 @@ absl::StatusOr<std::vector<PathPoint>> ParsePath(std::string_view bytes,
 }
 
 absl::Status InsertPath(UnitOfWork* tx,
-                        std::int64_t segment,
+                        std::int64_t sequence,
                         const std::vector<PathPoint>& path) {
   const std::string bytes = SerializePath(path);
   const std::string sha256 = Sha256(bytes);
   return Statement(tx->db(),
-                   "INSERT INTO segment_paths (segment, path, sha256) "
-                   "VALUES (?1, ?2, ?3)",
-                   segment,
+                   "INSERT INTO segment_paths (rig, sequence, path, sha256) "
+                   "VALUES (?1, ?2, ?3, ?4)",
+                   tx->rig_row(),
+                   sequence,
                    BlobView{bytes},
                    BlobView{sha256})
       .Run();

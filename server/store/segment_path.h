@@ -25,7 +25,7 @@ absl::StatusOr<std::vector<PathPoint>> ParsePath(std::string_view bytes,
                                                  const std::string& what);
 
 absl::Status InsertPath(UnitOfWork* tx,
-                        std::int64_t segment,
+                        std::int64_t sequence,
                         const std::vector<PathPoint>& path);
 
 }  // namespace selfcal::server

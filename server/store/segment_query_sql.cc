@@ -18,9 +18,11 @@ constexpr char kConditions[] =
     "AND (CAST(?2 AS BIGINT) IS NULL OR s.state = ?2) "
     "AND (CAST(?3 AS TEXT) IS NULL OR s.session = ?3) "
     "AND (CAST(?4 AS BOOLEAN) IS NULL OR ?4 = EXISTS ("
-    "  SELECT 1 FROM payloads p WHERE p.segment = s.segment)) "
+    "  SELECT 1 FROM payloads p "
+    "  WHERE p.rig = ?1 AND p.sequence = s.sequence)) "
     "AND (CAST(?5 AS TEXT) IS NULL OR EXISTS (SELECT 1 FROM table_entries e "
-    "  WHERE e.segment = s.segment AND e.group_name = ?5)) "
+    "  WHERE e.rig = s.rig AND e.group_name = ?5 "
+    "  AND e.sequence = s.sequence)) "
     "AND (CAST(?6 AS BIGINT) IS NULL OR s.receive_time_ns >= ?6) "
     "AND (CAST(?7 AS BIGINT) IS NULL OR s.receive_time_ns <= ?7) "
     "AND (CAST(?8 AS BIGINT) IS NULL OR s.calibration_version >= ?8) "
@@ -32,7 +34,8 @@ constexpr char kConditions[] =
     "AND (CAST(?14 AS DOUBLE PRECISION) IS NULL OR s.temperature_c >= ?14) "
     "AND (CAST(?15 AS DOUBLE PRECISION) IS NULL OR s.temperature_c <= ?15) "
     "AND (?16 = '' OR EXISTS (SELECT 1 FROM segment_scores c "
-    "  WHERE c.segment = s.segment AND c.group_name = ?16 "
+    "  WHERE c.rig = s.rig AND c.sequence = s.sequence "
+    "  AND c.group_name = ?16 "
     "  AND (CAST(?17 AS DOUBLE PRECISION) IS NULL OR c.entropy >= ?17) "
     "  AND (CAST(?18 AS DOUBLE PRECISION) IS NULL OR c.entropy <= ?18) "
     "  AND (CAST(?19 AS DOUBLE PRECISION) IS NULL OR c.gain >= ?19) "
@@ -72,15 +75,16 @@ std::string Sql(const std::string& columns, const SegmentQuery& query) {
   const std::string_view beyond = query.descending ? "<" : ">";
   const std::string_view key = KeyColumn(query.order);
   return fmt::format(
-      "SELECT {}, page.key FROM (SELECT s.segment AS segment, {} AS key "
+      "SELECT {}, page.key FROM (SELECT s.rig, s.sequence, {} AS key "
       "FROM segments s {} {} AND {} ORDER BY {} {} LIMIT ?24) page "
-      "JOIN segments s USING (segment) "
-      "LEFT JOIN segment_information i USING (segment) "
+      "JOIN segments s USING (rig, sequence) "
+      "LEFT JOIN segment_information i USING (rig, sequence) "
       "ORDER BY page.key {}, s.sequence {}",
       columns,
       key,
       IsOfGroup(query.order) ? "JOIN segment_scores o "
-                               "ON o.segment = s.segment AND o.group_name = ?21"
+                               "ON o.rig = s.rig AND o.sequence = s.sequence "
+                               "AND o.group_name = ?21"
                              : "",
       kConditions,
       by_arrival ? fmt::format("s.sequence {} ?23", beyond)

@@ -19,49 +19,52 @@ namespace selfcal::server {
 namespace {
 
 constexpr char kSegmentColumns[] =
-    "s.segment, s.session, s.session_index, s.sequence, s.state, "
-    "  s.problem, s.receive_time_ns, s.calibration_version, s.start_ns, "
-    "  s.end_ns, s.keyframes, s.imu_samples, s.landmarks, s.observations, "
+    "s.session, s.session_index, s.sequence, s.state, s.problem, "
+    "  s.receive_time_ns, s.calibration_version, s.start_ns, s.end_ns, "
+    "  s.keyframes, s.imu_samples, s.landmarks, s.observations, "
     "  i.information, i.sha256, "
-    "  (SELECT length(p.data) FROM payloads p WHERE p.segment = s.segment), "
+    "  (SELECT length(p.data) FROM payloads p "
+    "    WHERE p.rig = ?1 AND p.sequence = s.sequence), "
     "  s.temperature_c";
-constexpr int kKeyColumn = 18;  // after the columns of a list
+constexpr int kKeyColumn = 17;  // after the columns of a list
 
 StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
   StoredSegment segment;
   segment.rig = rig;
-  segment.key = {row.Text(1), row.Int(2)};
-  segment.sequence = row.Int(3);
-  segment.state = static_cast<SegmentState>(row.Int(4) - 1);
-  segment.problem = row.Text(5);
-  segment.receive_time_ns = row.Int(6);
-  segment.calibration_version = row.Int(7);
-  segment.start_ns = row.Int(8);
-  segment.end_ns = row.Int(9);
-  segment.keyframes = static_cast<int>(row.Int(10));
-  segment.imu_samples = static_cast<int>(row.Int(11));
-  segment.landmarks = static_cast<int>(row.Int(12));
-  segment.observations = static_cast<int>(row.Int(13));
-  segment.has_data = !row.IsNull(16);
-  segment.payload_bytes = row.Int(16);
-  if (!row.IsNull(17)) segment.temperature_c = row.Double(17);
+  segment.key = {row.Text(0), row.Int(1)};
+  segment.sequence = row.Int(2);
+  segment.state = static_cast<SegmentState>(row.Int(3) - 1);
+  segment.problem = row.Text(4);
+  segment.receive_time_ns = row.Int(5);
+  segment.calibration_version = row.Int(6);
+  segment.start_ns = row.Int(7);
+  segment.end_ns = row.Int(8);
+  segment.keyframes = static_cast<int>(row.Int(9));
+  segment.imu_samples = static_cast<int>(row.Int(10));
+  segment.landmarks = static_cast<int>(row.Int(11));
+  segment.observations = static_cast<int>(row.Int(12));
+  segment.has_data = !row.IsNull(15);
+  segment.payload_bytes = row.Int(15);
+  if (!row.IsNull(16)) segment.temperature_c = row.Double(16);
   return segment;
 }
 
 // Fills what it can; the status is that of the information.
 absl::Status FillFromRow(Connection* db,
                          const Statement& row,
+                         std::int64_t rig_id,
                          const std::string& rig,
                          StoredSegment* segment) {
   *segment = MetadataFromRow(row, rig);
-  SELFCAL_ASSIGN_OR_RETURN(segment->tables, TablesOfSegment(db, row.Int(0)));
-  if (row.IsNull(14)) {
+  SELFCAL_ASSIGN_OR_RETURN(segment->tables,
+                           TablesOfSegment(db, rig_id, segment->sequence));
+  if (row.IsNull(13)) {
     return absl::OkStatus();
   }
   const std::string what =
       "the information of " + SegmentText(rig, segment->key);
-  const std::string bytes = row.Text(14);
-  SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(15), what));
+  const std::string bytes = row.Text(13);
+  SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(14), what));
   SELFCAL_ASSIGN_OR_RETURN(segment->information, ParseInformation(bytes, what));
   return absl::OkStatus();
 }
@@ -73,8 +76,8 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
                                           const SegmentKey& key) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   Statement read(db,
-                 fmt::format("SELECT {} FROM segments s "
-                             "LEFT JOIN segment_information i USING (segment) "
+                 fmt::format("SELECT {} FROM segments s LEFT JOIN "
+                             "segment_information i USING (rig, sequence) "
                              "WHERE s.rig = ?1 AND s.session = ?2 "
                              "AND s.session_index = ?3",
                              kSegmentColumns),
@@ -87,7 +90,7 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
     return absl::NotFoundError(SegmentText(rig, key) + " was never received");
   }
   StoredSegment segment;
-  SELFCAL_RETURN_IF_ERROR(FillFromRow(db, read, rig, &segment));
+  SELFCAL_RETURN_IF_ERROR(FillFromRow(db, read, rig_id, rig, &segment));
   return segment;
 }
 
@@ -110,7 +113,7 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
       break;
     }
     StoredSegment segment;
-    const absl::Status status = FillFromRow(db, read, rig, &segment);
+    const absl::Status status = FillFromRow(db, read, rig_id, rig, &segment);
     if (absl::IsDataLoss(status)) {
       segment.problem = std::string(status.message());
     } else if (!status.ok()) {
@@ -124,38 +127,41 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
 }
 
 absl::Status WriteScore(UnitOfWork* tx,
-                        std::int64_t segment,
+                        std::int64_t sequence,
                         const SegmentInformation& information) {
-  SELFCAL_RETURN_IF_ERROR(
-      Statement(tx->db(),
-                "UPDATE segments SET state = 2, fit = ?2 WHERE segment = ?1",
-                segment,
-                std::isnan(information.residuals.fit)
-                    ? 0.0
-                    : information.residuals.fit)
-          .Run());
+  SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
+                                    "UPDATE segments SET state = 2, fit = ?3 "
+                                    "WHERE rig = ?1 AND sequence = ?2",
+                                    tx->rig_row(),
+                                    sequence,
+                                    std::isnan(information.residuals.fit)
+                                        ? 0.0
+                                        : information.residuals.fit)
+                              .Run());
   const std::string bytes = SerializeInformation(information);
   const std::string sha256 = Sha256(bytes);
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
-                "INSERT INTO segment_information (segment, information, "
-                "  sha256) VALUES (?1, ?2, ?3) "
-                "ON CONFLICT (segment) DO UPDATE SET "
+                "INSERT INTO segment_information (rig, sequence, information, "
+                "  sha256) VALUES (?1, ?2, ?3, ?4) "
+                "ON CONFLICT (rig, sequence) DO UPDATE SET "
                 "  information = excluded.information, "
                 "  sha256 = excluded.sha256",
-                segment,
+                tx->rig_row(),
+                sequence,
                 BlobView{bytes},
                 BlobView{sha256})
           .Run());
   for (const GroupScore& score : information.groups) {
     SELFCAL_RETURN_IF_ERROR(
         Statement(tx->db(),
-                  "INSERT INTO segment_scores (segment, group_name, entropy, "
-                  "  gain, rank) VALUES (?1, ?2, ?3, ?4, ?5) "
-                  "ON CONFLICT (segment, group_name) DO UPDATE SET "
+                  "INSERT INTO segment_scores (rig, sequence, group_name, "
+                  "  entropy, gain, rank) VALUES (?1, ?2, ?3, ?4, ?5, ?6) "
+                  "ON CONFLICT (rig, sequence, group_name) DO UPDATE SET "
                   "  entropy = excluded.entropy, gain = excluded.gain, "
                   "  rank = excluded.rank",
-                  segment,
+                  tx->rig_row(),
+                  sequence,
                   score.group,
                   score.entropy,
                   score.gain,
@@ -172,19 +178,20 @@ absl::Status VisitScored(
   constexpr char kWhat[] = "the information of a segment";
   Statement read(
       tx->db(),
-      fmt::format("SELECT s.segment, s.session, s.session_index, s.sequence, "
+      fmt::format("SELECT s.session, s.session_index, s.sequence, "
                   "  s.steady_ns, s.fit, i.information, i.sha256, "
-                  "  EXISTS (SELECT 1 FROM payloads p "
-                  "    WHERE p.segment = s.segment) AS has_data "
-                  "FROM segments s JOIN segment_information i USING (segment) "
+                  "  EXISTS (SELECT 1 FROM payloads p WHERE p.rig = ?1 "
+                  "    AND p.sequence = s.sequence) AS has_data "
+                  "FROM segments s "
+                  "JOIN segment_information i USING (rig, sequence) "
                   "WHERE s.rig = ?1 AND s.state = 2 AND s.sequence >= ?2 "
                   "  AND NOT {} "
                   "  AND NOT EXISTS (SELECT 1 FROM run_segments x "
                   "    WHERE x.rig = ?1 AND x.run = ?3 "
-                  "      AND x.segment = s.segment) "
+                  "      AND x.sequence = s.sequence) "
                   "  AND NOT EXISTS (SELECT 1 FROM calibration_segments c "
                   "    WHERE c.rig = ?1 AND c.version = ?4 "
-                  "      AND c.segment = s.segment) "
+                  "      AND c.sequence = s.sequence) "
                   "ORDER BY {} s.sequence DESC LIMIT ?5",
                   ExcludedFor("?6"),
                   filter.with_data_first ? "has_data DESC," : ""),
@@ -195,16 +202,15 @@ absl::Status VisitScored(
       filter.limit,
       filter.not_excluded_for.bits());
   while (read.Next()) {
-    const std::string bytes = read.Text(6);
-    const absl::Status intact = VerifySha256(bytes, read.Text(7), kWhat);
+    const std::string bytes = read.Text(5);
+    const absl::Status intact = VerifySha256(bytes, read.Text(6), kWhat);
     const ScoredSegment scored{
-        .segment = {.rowid = read.Int(0),
-                    .key = {read.Text(1), read.Int(2)},
-                    .sequence = read.Int(3),
+        .segment = {.key = {read.Text(0), read.Int(1)},
+                    .sequence = read.Int(2),
                     .state = SegmentState::kScored,
-                    .receive_steady_ns = read.Int(4),
-                    .fit = read.Double(5)},
-        .has_data = read.Int(8) != 0,
+                    .receive_steady_ns = read.Int(3),
+                    .fit = read.Double(4)},
+        .has_data = read.Int(7) != 0,
         .information = intact.ok()
                            ? ParseInformation(bytes, kWhat)
                            : absl::StatusOr<SegmentInformation>(intact)};

@@ -12,16 +12,14 @@ namespace selfcal::server {
 namespace {
 
 constexpr char kColumns[] =
-    "s.segment, s.session, s.session_index, s.sequence, s.state, "
-    "s.steady_ns, s.fit";
+    "s.session, s.session_index, s.sequence, s.state, s.steady_ns, s.fit";
 
 SegmentRow RowOf(const Statement& row) {
-  return {.rowid = row.Int(0),
-          .key = {row.Text(1), row.Int(2)},
-          .sequence = row.Int(3),
-          .state = static_cast<SegmentState>(row.Int(4) - 1),
-          .receive_steady_ns = row.Int(5),
-          .fit = row.Double(6)};
+  return {.key = {row.Text(0), row.Int(1)},
+          .sequence = row.Int(2),
+          .state = static_cast<SegmentState>(row.Int(3) - 1),
+          .receive_steady_ns = row.Int(4),
+          .fit = row.Double(5)};
 }
 
 absl::StatusOr<std::vector<SegmentRow>> ReadRows(Statement* read) {
@@ -142,11 +140,11 @@ absl::StatusOr<std::vector<SegmentRow>> UnreferencedSegments(UnitOfWork* tx,
       fmt::format("SELECT {} FROM segments s "
                   "WHERE s.rig = ?1 AND s.state <> 1 "
                   "AND NOT EXISTS (SELECT 1 FROM table_entries e "
-                  "  WHERE e.segment = s.segment) "
+                  "  WHERE e.rig = s.rig AND e.sequence = s.sequence) "
                   "AND NOT EXISTS (SELECT 1 FROM run_segments x "
-                  "  WHERE x.segment = s.segment) "
+                  "  WHERE x.rig = s.rig AND x.sequence = s.sequence) "
                   "AND NOT EXISTS (SELECT 1 FROM calibration_segments c "
-                  "  WHERE c.segment = s.segment) "
+                  "  WHERE c.rig = s.rig AND c.sequence = s.sequence) "
                   "ORDER BY s.sequence LIMIT ?2",
                   kColumns),
       tx->rig_row(),
@@ -156,7 +154,7 @@ absl::StatusOr<std::vector<SegmentRow>> UnreferencedSegments(UnitOfWork* tx,
 
 absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
   SELFCAL_ASSIGN_OR_RETURN(
-      const std::int64_t row,
+      const std::int64_t sequence,
       InsertReturning(
           tx->db(),
           "INSERT INTO segments (rig, session, session_index, sequence, "
@@ -166,7 +164,7 @@ absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
           "VALUES (?1, ?2, ?3, (SELECT coalesce(max(sequence), 0) + 1 "
           "    FROM segments WHERE rig = ?1), "
           "  1, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) "
-          "RETURNING segment",
+          "RETURNING sequence",
           tx->rig_row(),
           segment.key.session,
           segment.key.index,
@@ -180,12 +178,18 @@ absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
           segment.observations,
           segment.temperature_c,
           tx->now().steady_ns));
-  SELFCAL_RETURN_IF_ERROR(InsertPath(tx, row, segment.path));
+  SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
+                                    "UPDATE rigs SET last_seen_ns = ?2 "
+                                    "WHERE rig = ?1 AND last_seen_ns < ?2",
+                                    tx->rig_row(),
+                                    tx->time_ns())
+                              .Run());
+  SELFCAL_RETURN_IF_ERROR(InsertPath(tx, sequence, segment.path));
   return Statement(tx->db(),
-                   "INSERT INTO payloads (segment, rig, data, raw_bytes, "
+                   "INSERT INTO payloads (rig, sequence, data, raw_bytes, "
                    "  sha256) VALUES (?1, ?2, ?3, ?4, ?5)",
-                   row,
                    tx->rig_row(),
+                   sequence,
                    BlobView{segment.payload.data},
                    segment.payload.raw_bytes,
                    BlobView{segment.payload.sha256})
@@ -198,15 +202,19 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   UnitOfWork tx(db, rig, rig_id, 0);
   SELFCAL_ASSIGN_OR_RETURN(const SegmentRow row, FindSegment(&tx, key));
-  Statement read(
-      db,
-      "SELECT data, raw_bytes, sha256 FROM payloads WHERE segment = ?1",
-      row.rowid);
+  Statement read(db,
+                 "SELECT data, raw_bytes, sha256 FROM payloads "
+                 "WHERE rig = ?1 AND sequence = ?2",
+                 rig_id,
+                 row.sequence);
   const bool found = read.Next();
   SELFCAL_RETURN_IF_ERROR(read.status());
   if (!found) {
-    Statement why(
-        db, "SELECT problem FROM segments WHERE segment = ?1", row.rowid);
+    Statement why(db,
+                  "SELECT problem FROM segments "
+                  "WHERE rig = ?1 AND sequence = ?2",
+                  rig_id,
+                  row.sequence);
     const std::string problem = why.Next() ? why.Text(0) : "";
     SELFCAL_RETURN_IF_ERROR(why.status());
     return absl::FailedPreconditionError(fmt::format(
@@ -225,7 +233,7 @@ absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
                  "WHERE s.state = 1 AND (?2 = '' OR EXISTS "
                  "  (SELECT 1 FROM claims c "
                  "   WHERE c.rig = s.rig AND c.replica = ?2)) "
-                 "ORDER BY s.segment LIMIT ?1",
+                 "ORDER BY s.rig, s.sequence LIMIT ?1",
                  limit,
                  replica);
   std::vector<Store::Unscored> unscored;
@@ -246,45 +254,60 @@ absl::StatusOr<std::int64_t> CountUnscoredRows(Connection* db,
 }
 
 absl::Status WriteUnusable(UnitOfWork* tx,
-                           std::int64_t segment,
+                           std::int64_t sequence,
                            const std::string& problem) {
   return Statement(tx->db(),
-                   "UPDATE segments SET state = 3, problem = ?2 "
-                   "WHERE segment = ?1",
-                   segment,
+                   "UPDATE segments SET state = 3, problem = ?3 "
+                   "WHERE rig = ?1 AND sequence = ?2",
+                   tx->rig_row(),
+                   sequence,
                    problem)
       .Run();
 }
 
 absl::Status WriteProblem(UnitOfWork* tx,
-                          std::int64_t segment,
+                          std::int64_t sequence,
                           const std::string& problem) {
   return Statement(tx->db(),
-                   "UPDATE segments SET problem = ?2 WHERE segment = ?1",
-                   segment,
+                   "UPDATE segments SET problem = ?3 "
+                   "WHERE rig = ?1 AND sequence = ?2",
+                   tx->rig_row(),
+                   sequence,
                    problem)
       .Run();
 }
 
-absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t segment) {
+absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t sequence) {
   SegmentUsers users;
   Statement version(tx->db(),
                     "SELECT max(version) FROM calibration_segments "
-                    "WHERE segment = ?1",
-                    segment);
+                    "WHERE rig = ?1 AND sequence = ?2",
+                    tx->rig_row(),
+                    sequence);
   if (version.Next() && !version.IsNull(0)) users.version = version.Int(0);
   SELFCAL_RETURN_IF_ERROR(version.status());
   Statement run(tx->db(),
                 "SELECT max(r.run) FROM run_segments x JOIN runs r "
                 "  ON r.rig = x.rig AND r.run = x.run "
-                "WHERE x.segment = ?1 AND r.state IN (1, 2)",
-                segment);
+                "WHERE x.rig = ?1 AND x.sequence = ?2 AND r.state IN (1, 2)",
+                tx->rig_row(),
+                sequence);
   if (run.Next() && !run.IsNull(0)) users.unfinished_run = run.Int(0);
   SELFCAL_RETURN_IF_ERROR(run.status());
   return users;
 }
 
-absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t segment) {
+absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t sequence) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestSequence(tx));
+  if (sequence == newest) {
+    // The next segment to arrive takes its number.
+    SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
+                                      "UPDATE table_absences SET rival = NULL "
+                                      "WHERE rig = ?1 AND rival = ?2",
+                                      tx->rig_row(),
+                                      sequence)
+                                .Run());
+  }
   for (const char* table : {"table_entries",
                             "run_segments",
                             "payloads",
@@ -296,8 +319,10 @@ absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t segment) {
                             "segments"}) {
     SELFCAL_RETURN_IF_ERROR(
         Statement(tx->db(),
-                  fmt::format("DELETE FROM {} WHERE segment = ?1", table),
-                  segment)
+                  fmt::format("DELETE FROM {} WHERE rig = ?1 AND sequence = ?2",
+                              table),
+                  tx->rig_row(),
+                  sequence)
             .Run());
   }
   return absl::OkStatus();
@@ -310,12 +335,14 @@ absl::StatusOr<std::vector<DataHolder>> DataHolders(
       fmt::format("SELECT {}, length(p.data), "
                   "  EXISTS (SELECT 1 FROM run_segments x JOIN runs r "
                   "    ON r.rig = x.rig AND r.run = x.run "
-                  "    WHERE x.segment = p.segment AND r.state IN (1, 2)), "
+                  "    WHERE x.rig = p.rig AND x.sequence = p.sequence "
+                  "      AND r.state IN (1, 2)), "
                   "  (SELECT max(e.gain) FROM table_entries e "
-                  "    WHERE e.segment = p.segment), "
+                  "    WHERE e.rig = p.rig AND e.sequence = p.sequence), "
                   "  {} "
-                  "FROM payloads p JOIN segments s USING (segment) "
-                  "WHERE p.rig = ?1 AND s.state <> 1 ORDER BY s.segment",
+                  "FROM payloads p CROSS JOIN segments s "
+                  "WHERE s.rig = p.rig AND s.sequence = p.sequence "
+                  "AND p.rig = ?1 AND s.state <> 1 ORDER BY p.sequence",
                   kColumns,
                   ExcludedFor("?2")),
       tx->rig_row(),
@@ -324,10 +351,10 @@ absl::StatusOr<std::vector<DataHolder>> DataHolders(
   while (read.Next()) {
     DataHolder& holder = holders.emplace_back();
     holder.segment = RowOf(read);
-    holder.bytes = read.Int(7);
-    holder.in_unfinished_run = read.Int(8) != 0;
-    if (!read.IsNull(9)) holder.gain = read.Double(9);
-    holder.excluded = read.Int(10) != 0;
+    holder.bytes = read.Int(6);
+    holder.in_unfinished_run = read.Int(7) != 0;
+    if (!read.IsNull(8)) holder.gain = read.Double(8);
+    holder.excluded = read.Int(9) != 0;
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return holders;
@@ -340,17 +367,21 @@ absl::StatusOr<std::int64_t> DataBytes(UnitOfWork* tx) {
                  tx->rig_row());
 }
 
-absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t segment) {
+absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t sequence) {
   SELFCAL_ASSIGN_OR_RETURN(
       const std::int64_t count,
       ReadInt(tx->db(),
-              "SELECT count(*) FROM payloads WHERE segment = ?1",
-              segment));
+              "SELECT count(*) FROM payloads WHERE rig = ?1 AND sequence = ?2",
+              tx->rig_row(),
+              sequence));
   return count > 0;
 }
 
-absl::Status DeleteData(UnitOfWork* tx, std::int64_t segment) {
-  return Statement(tx->db(), "DELETE FROM payloads WHERE segment = ?1", segment)
+absl::Status DeleteData(UnitOfWork* tx, std::int64_t sequence) {
+  return Statement(tx->db(),
+                   "DELETE FROM payloads WHERE rig = ?1 AND sequence = ?2",
+                   tx->rig_row(),
+                   sequence)
       .Run();
 }
 

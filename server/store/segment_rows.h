@@ -18,8 +18,9 @@
 namespace selfcal::server {
 
 struct SegmentRow {
-  std::int64_t rowid = 0;
   SegmentKey key;
+  // Order of arrival in the rig, from 1. The functions below take it as the
+  // number of a segment.
   std::int64_t sequence = 0;
   SegmentState state = SegmentState::kStored;
   std::int64_t receive_steady_ns = 0;  // when it arrived, by steady time
@@ -133,32 +134,32 @@ absl::StatusOr<std::vector<DataHolder>> DataHolders(
     UnitOfWork* tx, ExclusionCauses excluded_for = {});
 // Bytes of the data of all segments, compressed.
 absl::StatusOr<std::int64_t> DataBytes(UnitOfWork* tx);
-absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t segment);
-absl::Status DeleteData(UnitOfWork* tx, std::int64_t segment);
+absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t sequence);
+absl::Status DeleteData(UnitOfWork* tx, std::int64_t sequence);
 
 // Inserts a segment that waits for its score. The key must be new.
 absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment);
 // Stored or scored -> scored, with its information and the scores of its
 // groups; replaces earlier ones.
 absl::Status WriteScore(UnitOfWork* tx,
-                        std::int64_t segment,
+                        std::int64_t sequence,
                         const SegmentInformation& information);
 // Any state -> unusable.
 absl::Status WriteUnusable(UnitOfWork* tx,
-                           std::int64_t segment,
+                           std::int64_t sequence,
                            const std::string& problem);
 // Records why its data is gone.
 absl::Status WriteProblem(UnitOfWork* tx,
-                          std::int64_t segment,
+                          std::int64_t sequence,
                           const std::string& problem);
 // Who refers to a segment, so that it cannot be deleted.
 struct SegmentUsers {
   std::optional<std::int64_t> version;         // the newest computed from it
   std::optional<std::int64_t> unfinished_run;  // that has it in its snapshot
 };
-absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t segment);
+absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t sequence);
 // All that is known of it; it leaves the snapshots of runs that have ended, and
 // tables. Neither a calibration nor an unfinished run may refer to it.
-absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t segment);
+absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t sequence);
 
 }  // namespace selfcal::server

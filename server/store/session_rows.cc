@@ -54,11 +54,12 @@ absl::StatusOr<SessionSummary> Summarise(Connection* db,
 }
 
 absl::StatusOr<std::vector<SessionSegment::Score>> ReadScores(
-    Connection* db, std::int64_t segment) {
+    Connection* db, std::int64_t rig, std::int64_t sequence) {
   Statement read(db,
                  "SELECT group_name, entropy, gain FROM segment_scores "
-                 "WHERE segment = ?1 ORDER BY group_name",
-                 segment);
+                 "WHERE rig = ?1 AND sequence = ?2 ORDER BY group_name",
+                 rig,
+                 sequence);
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<SessionSegment::Score> scores;
   while (read.Next()) {
@@ -131,10 +132,12 @@ absl::StatusOr<Listed<SessionSegment>> ListSessionSegmentRows(
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
   const int size = PageSize(page);
   Statement read(db,
-                 "SELECT s.segment, s.session_index, s.state, s.start_ns, "
+                 "SELECT s.sequence, s.session_index, s.state, s.start_ns, "
                  "  s.end_ns, p.path, p.sha256, EXISTS (SELECT 1 "
-                 "    FROM payloads d WHERE d.segment = s.segment) "
-                 "FROM segments s LEFT JOIN segment_paths p USING (segment) "
+                 "    FROM payloads d "
+                 "    WHERE d.rig = ?1 AND d.sequence = s.sequence) "
+                 "FROM segments s "
+                 "LEFT JOIN segment_paths p USING (rig, sequence) "
                  "WHERE s.rig = ?1 AND s.session = ?2 AND s.session_index > ?3 "
                  "ORDER BY s.session_index LIMIT ?4",
                  rig_id,
@@ -150,8 +153,10 @@ absl::StatusOr<Listed<SessionSegment>> ListSessionSegmentRows(
     segment.end_ns = read.Int(4);
     segment.path = PathFromRow(read, 5, 6, SegmentText(rig, segment.key));
     segment.has_data = read.Int(7) != 0;
-    SELFCAL_ASSIGN_OR_RETURN(segment.scores, ReadScores(db, read.Int(0)));
-    SELFCAL_ASSIGN_OR_RETURN(segment.tables, TablesOfSegment(db, read.Int(0)));
+    const std::int64_t sequence = read.Int(0);
+    SELFCAL_ASSIGN_OR_RETURN(segment.scores, ReadScores(db, rig_id, sequence));
+    SELFCAL_ASSIGN_OR_RETURN(segment.tables,
+                             TablesOfSegment(db, rig_id, sequence));
     listed.items.push_back(std::move(segment));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());

@@ -188,9 +188,12 @@ struct StoredCalibration {
   // The finding of a verification by which the two cores disagree on what this
   // version rests on, so that it must not be trusted. Empty: none.
   std::string disagreement;
-  // Number of its newest activation, counted over all rigs; 0 if it never was
-  // active.
+  // Number of its newest activation, counted from 1 in its rig; 0 if it never
+  // was active.
   std::int64_t activation = 0;
+  // Of the rig in the database. A rig that was deleted and created again has
+  // another one.
+  std::int64_t rig_key = 0;
 };
 
 enum class RunState { kPending, kRunning, kSucceeded, kFailed, kCancelled };
@@ -329,8 +332,8 @@ class Store {
   // Exclusions of the segment, as far as they were recorded.
   virtual absl::StatusOr<std::vector<Exclusion>> ListExclusions(
       const std::string& rig, const SegmentKey& key) = 0;
-  // The oldest unscored segments of all rigs, or of those that a replica has
-  // claimed, in the order of their arrival.
+  // Unscored segments of all rigs, or of those that a replica has claimed.
+  // Those of one rig follow each other, in the order of their arrival.
   struct Unscored {
     std::string rig;
     SegmentKey key;
@@ -370,6 +373,13 @@ class Store {
 
   // --- Events, oldest or newest first, of one rig or, if `rig` is empty, of
   // all. They are only ever appended.
+  //
+  // Those of one rig are in the order of their numbers, in which they were
+  // committed: whoever reads on after the last one misses none. Those of all
+  // rigs are in the order of their steady time: pages show each event that was
+  // there when the first one was read, and later ones may come before what was
+  // read, by the duration of a transaction or by what the clocks of several
+  // daemons differ.
   virtual absl::StatusOr<Listed<StoredEvent>> ListEvents(
       const Page& page, const std::string& rig = "") = 0;
   virtual absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(

@@ -29,11 +29,14 @@ enum class EventKind {
 };
 
 struct StoredEvent {
-  std::int64_t event = 0;  // counts from 1
+  // Counts from 1 for each name of a rig, over its deletion as well, and for
+  // the daemon.
+  std::int64_t event = 0;
   std::int64_t time_ns = 0;
   std::string rig;  // empty: of the daemon
   EventKind kind = EventKind::kRigCreated;
   std::string detail;
+  std::int64_t steady_ns = 0;  // time_ns by steady time (Moment)
 };
 
 }  // namespace selfcal::server

@@ -12,8 +12,9 @@ absl::Status ReadEntries(Connection* db, std::int64_t rig, Table* table) {
   Statement read(db,
                  "SELECT s.session, s.session_index, s.sequence, e.entropy, "
                  "  e.gain "
-                 "FROM table_entries e JOIN segments s USING (segment) "
-                 "WHERE e.rig = ?1 AND e.group_name = ?2",
+                 "FROM table_entries e CROSS JOIN segments s "
+                 "WHERE s.rig = e.rig AND s.sequence = e.sequence "
+                 "AND e.rig = ?1 AND e.group_name = ?2",
                  rig,
                  table->group);
   while (read.Next()) {
@@ -47,14 +48,15 @@ absl::StatusOr<std::vector<Table>> ReadTables(Connection* db,
   return tables;
 }
 
-absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
-                                                         std::int64_t segment) {
+absl::StatusOr<std::vector<std::string>> TablesOfSegment(
+    Connection* db, std::int64_t rig, std::int64_t sequence) {
   Statement read(db,
                  "SELECT t.group_name FROM table_entries e "
                  "JOIN tables t ON t.rig = e.rig "
                  "  AND t.group_name = e.group_name "
-                 "WHERE e.segment = ?1 ORDER BY t.position",
-                 segment);
+                 "WHERE e.rig = ?1 AND e.sequence = ?2 ORDER BY t.position",
+                 rig,
+                 sequence);
   std::vector<std::string> groups;
   while (read.Next()) {
     groups.push_back(read.Text(0));
@@ -83,9 +85,9 @@ absl::StatusOr<std::vector<Table>> ReadTables(UnitOfWork* tx) {
   return ReadTables(tx->db(), tx->rig_row());
 }
 
-absl::StatusOr<std::vector<std::string>> TablesOfSegment(UnitOfWork* tx,
-                                                         std::int64_t segment) {
-  return TablesOfSegment(tx->db(), segment);
+absl::StatusOr<std::vector<std::string>> TablesOfSegment(
+    UnitOfWork* tx, std::int64_t sequence) {
+  return TablesOfSegment(tx->db(), tx->rig_row(), sequence);
 }
 
 absl::Status WriteScored(UnitOfWork* tx,
@@ -102,15 +104,15 @@ absl::Status WriteScored(UnitOfWork* tx,
 
 absl::Status InsertEntry(UnitOfWork* tx,
                          const std::string& group,
-                         std::int64_t segment,
+                         std::int64_t sequence,
                          double entropy,
                          double gain) {
   return Statement(tx->db(),
-                   "INSERT INTO table_entries (rig, group_name, segment, "
+                   "INSERT INTO table_entries (rig, group_name, sequence, "
                    "  entropy, gain) VALUES (?1, ?2, ?3, ?4, ?5)",
                    tx->rig_row(),
                    group,
-                   segment,
+                   sequence,
                    entropy,
                    gain)
       .Run();
@@ -118,24 +120,25 @@ absl::Status InsertEntry(UnitOfWork* tx,
 
 absl::Status DeleteEntry(UnitOfWork* tx,
                          const std::string& group,
-                         std::int64_t segment) {
+                         std::int64_t sequence) {
   return Statement(tx->db(),
                    "DELETE FROM table_entries "
-                   "WHERE rig = ?1 AND group_name = ?2 AND segment = ?3",
+                   "WHERE rig = ?1 AND group_name = ?2 AND sequence = ?3",
                    tx->rig_row(),
                    group,
-                   segment)
+                   sequence)
       .Run();
 }
 
 absl::Status WriteEntryScore(UnitOfWork* tx,
-                             std::int64_t segment,
+                             std::int64_t sequence,
                              const GroupScore& score) {
   return Statement(tx->db(),
-                   "UPDATE table_entries SET entropy = ?3, gain = ?4 "
-                   "WHERE segment = ?1 AND group_name = ?2",
-                   segment,
+                   "UPDATE table_entries SET entropy = ?4, gain = ?5 "
+                   "WHERE rig = ?1 AND group_name = ?2 AND sequence = ?3",
+                   tx->rig_row(),
                    score.group,
+                   sequence,
                    score.entropy,
                    score.gain)
       .Run();

@@ -19,7 +19,8 @@ namespace selfcal::server {
 absl::StatusOr<std::vector<Table>> ReadTables(Connection* db, std::int64_t rig);
 // Groups whose table holds the segment, in the order of the rig.
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
-                                                         std::int64_t segment);
+                                                         std::int64_t rig,
+                                                         std::int64_t sequence);
 
 // --- Within a unit of work.
 
@@ -27,22 +28,22 @@ absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
 absl::Status InsertTables(UnitOfWork* tx, const std::vector<Table>& tables);
 absl::StatusOr<std::vector<Table>> ReadTables(UnitOfWork* tx);
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(UnitOfWork* tx,
-                                                         std::int64_t segment);
+                                                         std::int64_t sequence);
 // Writes how many scored segments a table was offered.
 absl::Status WriteScored(UnitOfWork* tx,
                          const std::string& group,
                          std::int64_t scored);
 absl::Status InsertEntry(UnitOfWork* tx,
                          const std::string& group,
-                         std::int64_t segment,
+                         std::int64_t sequence,
                          double entropy,
                          double gain);
 absl::Status DeleteEntry(UnitOfWork* tx,
                          const std::string& group,
-                         std::int64_t segment);
+                         std::int64_t sequence);
 // Replaces the score of a segment in the table of its group, if that holds it.
 absl::Status WriteEntryScore(UnitOfWork* tx,
-                             std::int64_t segment,
+                             std::int64_t sequence,
                              const GroupScore& score);
 
 }  // namespace selfcal::server

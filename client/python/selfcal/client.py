@@ -14,6 +14,8 @@ from selfcal.v1 import (
     activity_service_pb2_grpc as activity_grpc,
     calibration_service_pb2 as calibration,
     calibration_service_pb2_grpc as calibration_grpc,
+    fleet_pb2 as fleet,
+    fleet_pb2_grpc as fleet_grpc,
     recalibration_pb2 as recalibration,
     recalibration_pb2_grpc as recalibration_grpc,
     rig_pb2 as rig,
@@ -69,6 +71,7 @@ class Daemon:
         )
 
         self.activity_service = activity_grpc.ActivityServiceStub(channel)
+        self.fleet_service = fleet_grpc.FleetServiceStub(channel)
         self.session_service = session_grpc.SessionServiceStub(channel)
         self.store_service = store_grpc.StoreServiceStub(channel)
 
@@ -140,6 +143,13 @@ class Daemon:
         """Yields the active version at once, then each new one."""
         return self.calibration_service.WatchCalibration(
             calibration.WatchCalibrationRequest(parent=f"rigs/{rig_id}")
+        )
+
+    def cohort(self, filter: str = "", max_rigs: int = 0) -> fleet.Cohort:
+        """What the calibrations of the rigs of a filter have in common."""
+        return self.fleet_service.DescribeCohort(
+            fleet.DescribeCohortRequest(filter=filter, max_rigs=max_rigs),
+            timeout=self._timeout_s,
         )
 
     def sessions(self, rig_id: str) -> Iterator[session.Session]:

@@ -24,7 +24,9 @@
 // - has parameters and results of four types: 64-bit integers, doubles, text in
 //   UTF-8, and bytes (Dialect::blob_type). The driver converts truth values: as
 //   parameters and results they are the integers 0 and 1;
-// - uses ON CONFLICT and RETURNING.
+// - uses ON CONFLICT and RETURNING;
+// - joins a few rows with segments by CROSS JOIN: SQLite reads the tables in
+//   that order. Without statistics it could read all segments of the rig first.
 //
 // Errors have canonical codes and say what to do: RESOURCE_EXHAUSTED (disk or
 // memory is full), UNAVAILABLE (the disk or the engine fails), DATA_LOSS (the

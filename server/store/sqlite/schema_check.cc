@@ -48,10 +48,13 @@ std::string Normalised(const std::string& sql) {
   return normalised;
 }
 
+// sqlite_sequence is SQLite's own: it is there once a table had AUTOINCREMENT,
+// but not in a copy by VACUUM from after that table was dropped.
 absl::StatusOr<std::vector<SchemaObject>> ReadObjects(SqliteConnection* db) {
   Statement read(db,
                  "SELECT type, name, sql FROM sqlite_schema "
-                 "WHERE sql IS NOT NULL AND name <> 'schema_migrations' "
+                 "WHERE sql IS NOT NULL "
+                 "AND name NOT IN ('schema_migrations', 'sqlite_sequence') "
                  "ORDER BY type, name");
   std::vector<SchemaObject> objects;
   while (read.Next()) {

@@ -12,6 +12,7 @@
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "selfcal/v1/calibration_service.grpc.pb.h"
+#include "selfcal/v1/fleet.grpc.pb.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
 #include "selfcal/v1/rig.grpc.pb.h"
 #include "selfcal/v1/segment.grpc.pb.h"
@@ -50,7 +51,8 @@ inline grpc::Status Missing(const std::string& name) {
 struct CannedDaemon final : v1::RigService::Service,
                             v1::SegmentService::Service,
                             v1::CalibrationService::Service,
-                            v1::RecalibrationService::Service {
+                            v1::RecalibrationService::Service,
+                            v1::FleetService::Service {
   // What it answers, and what it was asked.
   std::vector<v1::Rig> rigs;
   std::vector<v1::Segment> segments;
@@ -221,6 +223,13 @@ struct CannedDaemon final : v1::RigService::Service,
     *response = calibrations.back();
     return grpc::Status::OK;
   }
+  grpc::Status DescribeCohort(grpc::ServerContext*,
+                              const v1::DescribeCohortRequest* request,
+                              v1::Cohort* response) override {
+    cohort_request = *request;
+    *response = cohort;
+    return grpc::Status::OK;
+  }
   grpc::Status CompareCalibrations(
       grpc::ServerContext*,
       const v1::CompareCalibrationsRequest* request,
@@ -324,10 +333,13 @@ struct CannedDaemon final : v1::RigService::Service,
   }
 
   std::string target;
+  v1::Cohort cohort;
+  v1::DescribeCohortRequest cohort_request;
   GrpcServer server{{static_cast<v1::RigService::Service*>(this),
                      static_cast<v1::SegmentService::Service*>(this),
                      static_cast<v1::CalibrationService::Service*>(this),
-                     static_cast<v1::RecalibrationService::Service*>(this)}};
+                     static_cast<v1::RecalibrationService::Service*>(this),
+                     static_cast<v1::FleetService::Service*>(this)}};
 };
 
 }  // namespace selfcal::client

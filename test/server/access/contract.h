@@ -13,6 +13,7 @@
 #include "selfcal/v1/access.pb.h"
 #include "selfcal/v1/activity_service.pb.h"
 #include "selfcal/v1/calibration_service.pb.h"
+#include "selfcal/v1/fleet.pb.h"
 #include "selfcal/v1/recalibration.pb.h"
 #include "selfcal/v1/rig.pb.h"
 #include "selfcal/v1/segment.pb.h"
@@ -34,7 +35,8 @@ inline std::vector<const google::protobuf::ServiceDescriptor*> Services() {
                            v1::GetRecalibrationRequest::descriptor()->file(),
                            v1::ListEventsRequest::descriptor()->file(),
                            v1::ListSessionsRequest::descriptor()->file(),
-                           v1::ListActivityRequest::descriptor()->file()}) {
+                           v1::ListActivityRequest::descriptor()->file(),
+                           v1::DescribeCohortRequest::descriptor()->file()}) {
     for (int s = 0; s < file->service_count(); ++s) {
       services.push_back(file->service(s));
     }

@@ -9,6 +9,7 @@
 #include "selfcal/v1/store_service.grpc.pb.h"
 #include "test/server/daemon/daemon_fixture.h"
 #include "test/server/store/postgres/postgres_cluster.h"
+#include "test/support/grpc_health.h"
 
 namespace selfcal::server {
 namespace {
@@ -30,6 +31,12 @@ class PostgresDaemonTest : public DaemonTest {
     std::string uri = cluster_->Uri("fleet");
     uri.insert(uri.find('@'), ":secret");
     return {"--store", uri};
+  }
+
+  bool HealthBecomes(const std::string& health) const {
+    return Eventually([&] { return HealthOf(channel_.get(), "") == health; },
+                      kLongWait,
+                      kDaemonInterval);
   }
 
   std::unique_ptr<PostgresCluster> cluster_;
@@ -81,6 +88,15 @@ TEST_F(PostgresDaemonTest, WorkGoesOnAfterTheServerWasAway) {
       kDaemonInterval));
   Stream(TestSegments(rig, 2));
   EXPECT_TRUE(AllScored());
+}
+
+TEST_F(PostgresDaemonTest, HealthFollowsTheDatabase) {
+  const auto daemon = StartAndWait(Store());
+  EXPECT_TRUE(HealthBecomes(kServing));
+  cluster_->Stop(SIGINT);
+  EXPECT_TRUE(HealthBecomes(kNotServing));
+  cluster_->Start();
+  EXPECT_TRUE(HealthBecomes(kServing));
 }
 
 TEST_F(PostgresDaemonTest, BackupsAreLeftToTheEngineAndChecksAreNot) {

@@ -1,10 +1,10 @@
 #include "server/grpc/server.h"
 
-#include <grpcpp/impl/codegen/client_unary_call.h>
 #include <grpcpp/impl/codegen/sync_stream.h>
 
 #include "test/server/grpc/methods.h"
 #include "test/server/grpc/service_test.h"
+#include "test/support/grpc_health.h"
 
 namespace selfcal::server {
 namespace {
@@ -14,48 +14,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-grpc::ByteBuffer Buffer(const std::string& bytes) {
-  const grpc::Slice slice(bytes);
-  return grpc::ByteBuffer(&slice, 1);
-}
-
-std::string Bytes(const grpc::ByteBuffer& buffer) {
-  std::vector<grpc::Slice> slices;
-  buffer.Dump(&slices);
-  std::string bytes;
-  for (const grpc::Slice& slice : slices) {
-    bytes.append(slice.begin(), slice.end());
-  }
-  return bytes;
-}
-
-// A field of a message by hand: Debian packages no C++ code for the messages
-// of health and reflection. Texts are shorter than 128 bytes.
-std::string TextField(int number, const std::string& text) {
-  return std::string(1, static_cast<char>(number << 3 | 2)) +
-         static_cast<char>(text.size()) + text;
-}
-
-class ServerTest : public ServiceTest {
- protected:
-  // The bytes of a HealthCheckResponse, or the error code.
-  std::string Health(const std::string& service) {
-    Context context;
-    const grpc::internal::RpcMethod method(
-        "/grpc.health.v1.Health/Check", grpc::internal::RpcMethod::NORMAL_RPC);
-    grpc::ByteBuffer response;
-    const grpc::Status status = grpc::internal::BlockingUnaryCall(
-        channel_.get(),
-        method,
-        &context,
-        Buffer(service.empty() ? "" : TextField(1, service)),
-        &response);
-    if (!status.ok()) return std::to_string(status.error_code());
-    return Bytes(response);
-  }
-};
-
-const std::string kServing = {'\x08', '\x01'};
+using ServerTest = ServiceTest;
 
 TEST_F(ServerTest, HealthIsServingForAllAndEachService) {
   for (const std::string service : {"",
@@ -63,9 +22,9 @@ TEST_F(ServerTest, HealthIsServingForAllAndEachService) {
                                     "selfcal.v1.SegmentService",
                                     "selfcal.v1.CalibrationService",
                                     "selfcal.v1.RecalibrationService"}) {
-    EXPECT_EQ(Health(service), kServing) << service;
+    EXPECT_EQ(HealthOf(channel_.get(), service), kServing) << service;
   }
-  EXPECT_EQ(Health("no.such.Service"),
+  EXPECT_EQ(HealthOf(channel_.get(), "no.such.Service"),
             std::to_string(grpc::StatusCode::NOT_FOUND));
 }
 
@@ -113,7 +72,7 @@ TEST_F(ServerTest, FreePortIsTakenAndNamed) {
   EXPECT_NE((*server)->addresses()[0], "127.0.0.1:0");
   for (const std::string& address : (*server)->addresses()) {
     channel_ = grpc::CreateChannel(address, grpc::InsecureChannelCredentials());
-    EXPECT_EQ(Health(""), kServing) << address;
+    EXPECT_EQ(HealthOf(channel_.get(), ""), kServing) << address;
   }
 }
 
@@ -202,7 +161,7 @@ TEST_F(ServerTest, ManyWatchersDoNotKeepOthersOut) {
         calibrations_->WatchCalibration(contexts.back().get(), request));
     ASSERT_TRUE(readers.back()->Read(&seen));
   }
-  EXPECT_EQ(Health(""), kServing);
+  EXPECT_EQ(HealthOf(channel_.get(), ""), kServing);
   for (int i = 0; i < 50; ++i) {
     contexts[i]->TryCancel();
     readers[i]->Finish();

@@ -162,7 +162,7 @@ TEST_F(StoreServiceTest, EventsAreListedOldestFirstAndByRig) {
     }
     request.set_page_token(events.next_page_token());
   } while (!request.page_token().empty());
-  EXPECT_THAT(numbers, ElementsAre(3, 4, 5));
+  EXPECT_THAT(numbers, ElementsAre(1, 2, 3));
 }
 
 TEST_F(StoreServiceTest, EventsOfWhatIsNoRigAreRefused) {

@@ -1,6 +1,7 @@
 #include <atomic>
 #include <mutex>
 
+#include "server/pipeline/watchers.h"
 #include "test/server/pipeline/pipeline_test.h"
 
 namespace selfcal::server {
@@ -38,6 +39,22 @@ class WatchTest : public PipelineTest {
     ASSERT_TRUE(RunIs(RunState::kSucceeded, run));
   }
 };
+
+TEST(Follows, ActivationsOfARigCountAndThoseOfANewOneBeginAgain) {
+  StoredCalibration last;
+  last.rig_key = 7;
+  last.activation = 2;
+  StoredCalibration next = last;
+  EXPECT_FALSE(Follows(last, next));
+  next.activation = 1;
+  EXPECT_FALSE(Follows(last, next));
+  next.activation = 3;
+  EXPECT_TRUE(Follows(last, next));
+  // The rig was deleted and created again.
+  next.rig_key = 8;
+  next.activation = 1;
+  EXPECT_TRUE(Follows(last, next));
+}
 
 TEST_F(WatchTest, EachVersionIsToldOnceInOrder) {
   CreateRig();

@@ -193,8 +193,11 @@ TEST_P(ReplicasTest, ARigIsDeletedWithItsClaim) {
   ASSERT_TRUE(domain_->DeleteRig("a", "somebody", "sold").ok());
   CreateTestRig("a");
   Put("a", 0);
-  EXPECT_FALSE(Score(*claim, 0).ok());
-  EXPECT_TRUE(Claim("a", "one").has_value());
+  const auto anew = Claim("a", "one");
+  ASSERT_TRUE(anew.has_value());
+  EXPECT_EQ(anew->number, claim->number);
+  EXPECT_TRUE(IsClaimLost(Score(*claim, 0)));
+  EXPECT_TRUE(Score(*anew, 0).ok());
 }
 
 }  // namespace

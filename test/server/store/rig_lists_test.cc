@@ -111,19 +111,20 @@ TEST_P(RigSummariesTest, NewestEventsComeFirst) {
   for (const char* id : {"a", "b"}) CreateTestRig(id);
   const auto oldest = store_->ListEvents({});
   ASSERT_TRUE(oldest.ok());
-  std::vector<std::int64_t> numbers;
+  std::vector<std::pair<std::string, std::int64_t>> numbers;
   Page page{1, ""};
   do {
     const auto listed = store_->ListNewestEvents(page);
     ASSERT_TRUE(listed.ok()) << listed.status();
     ASSERT_EQ(listed->items.size(), 1u);
-    numbers.push_back(listed->items[0].event);
+    numbers.emplace_back(listed->items[0].rig, listed->items[0].event);
     page.token = listed->next_token;
   } while (!page.token.empty());
   std::reverse(numbers.begin(), numbers.end());
   ASSERT_EQ(numbers.size(), oldest->items.size());
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    EXPECT_EQ(numbers[i], oldest->items[i].event);
+    EXPECT_EQ(numbers[i],
+              std::pair(oldest->items[i].rig, oldest->items[i].event));
   }
   const auto of_b = store_->ListNewestEvents({}, "b");
   ASSERT_TRUE(of_b.ok());

@@ -1,7 +1,12 @@
+#include <map>
+#include <vector>
+
 #include "test/server/store/store_test.h"
 
 namespace selfcal::server {
 namespace {
+
+using ::testing::ElementsAre;
 
 using SegmentsTest = StoreTest;
 SELFCAL_STORE_TEST_SUITE(SegmentsTest);
@@ -94,7 +99,7 @@ TEST_P(SegmentsTest, KeysAreApartByRigAndSession) {
   EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("b", {"t", 0}).status()));
 }
 
-TEST_P(SegmentsTest, UnscoredAreListedInTheOrderOfArrival) {
+TEST_P(SegmentsTest, UnscoredOfARigAreListedInTheOrderOfArrival) {
   const Rig a = CreateTestRig("a");
   CreateTestRig("b");
   Put("a", 5);
@@ -106,12 +111,34 @@ TEST_P(SegmentsTest, UnscoredAreListedInTheOrderOfArrival) {
   const auto unscored = store_->ListUnscored(100);
   ASSERT_TRUE(unscored.ok());
   ASSERT_EQ(unscored->size(), 3u);
-  EXPECT_EQ((*unscored)[0].rig, "b");
-  EXPECT_EQ((*unscored)[0].key.index, 1);
-  EXPECT_EQ((*unscored)[1].rig, "a");
-  EXPECT_EQ((*unscored)[1].sequence, 2);
-  EXPECT_EQ((*unscored)[2].key.index, 0);
+  std::map<std::string, std::vector<std::int64_t>> indices;
+  for (const auto& segment : *unscored) {
+    indices[segment.rig].push_back(segment.key.index);
+  }
+  EXPECT_THAT(indices["a"], ElementsAre(2));
+  EXPECT_THAT(indices["b"], ElementsAre(1, 0));
   EXPECT_EQ(store_->ListUnscored(1)->size(), 1u);
+}
+
+// The next segment takes the number of the newest one.
+TEST_P(SegmentsTest, ARivalThatIsDeletedIsNotMistakenForTheNextSegment) {
+  Rig rig = TestRig("a");
+  rig.table_size = 1;
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  Put("a", 0);
+  Score(rig, 0, -10);
+  Put("a", 1);
+  Score(rig, 1, -20);
+  const auto before = store_->ListExclusions("a", {"s", 0});
+  ASSERT_TRUE(before.ok() && !before->empty()) << before.status();
+  EXPECT_EQ(before->front().rival, (SegmentKey{"s", 1}));
+  ASSERT_TRUE(domain_->DeleteSegment("a", {"s", 1}, "eve", "private").ok());
+  Put("a", 2);
+  EXPECT_EQ(store_->GetSegment("a", {"s", 2})->sequence, 2);
+  const auto after = store_->ListExclusions("a", {"s", 0});
+  ASSERT_TRUE(after.ok() && !after->empty()) << after.status();
+  EXPECT_EQ(after->front().cause, ExclusionCause::kReplaced);
+  EXPECT_FALSE(after->front().rival);
 }
 
 TEST_P(SegmentsTest, PagesShowEverySegmentOnceNewestFirst) {

@@ -236,8 +236,8 @@ absl::Status InsertScored(UnitOfWork* tx,
   if (!inserted.ok()) return inserted;
   const auto row = FindSegment(tx, segment.key);
   if (!row.ok()) return row.status();
-  const absl::Status scored = WriteScore(tx, row->rowid, information);
-  return scored.ok() ? DeleteData(tx, row->rowid) : scored;
+  const absl::Status scored = WriteScore(tx, row->sequence, information);
+  return scored.ok() ? DeleteData(tx, row->sequence) : scored;
 }
 
 TEST_P(SessionsTest, TenThousandSegmentsComeInTenPages) {

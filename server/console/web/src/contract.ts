@@ -3,6 +3,7 @@
 export type * from '../generated/selfcal/v1/activity_service';
 export type * from '../generated/selfcal/v1/calibration';
 export type * from '../generated/selfcal/v1/calibration_service';
+export type * from '../generated/selfcal/v1/fleet';
 export type * from '../generated/selfcal/v1/recalibration';
 export type * from '../generated/selfcal/v1/rig';
 export type * from '../generated/selfcal/v1/segment';

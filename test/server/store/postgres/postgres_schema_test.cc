@@ -13,6 +13,7 @@
 namespace selfcal::server {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -31,6 +32,14 @@ class PostgresSchemaTest : public PostgresTest {
     ASSERT_TRUE(opened.ok()) << opened.status();
     const auto store = MakeStore(*std::move(opened));
     ASSERT_TRUE(WriteFixture(store.get()));
+  }
+
+  std::vector<std::string> ReadTexts(const std::string& sql) {
+    std::vector<std::string> texts;
+    Statement read(db_.get(), sql);
+    while (read.Next()) texts.push_back(read.Text(0));
+    EXPECT_TRUE(read.status().ok()) << read.status();
+    return texts;
   }
 
   std::vector<std::string> Problems() {
@@ -52,7 +61,7 @@ TEST_F(PostgresSchemaTest, RecordsThatNeverChangeCannotBeChangedOrDeleted) {
                           "UPDATE calibrations SET state = 3",
                           "DELETE FROM calibrations",
                           "TRUNCATE calibrations CASCADE",
-                          "UPDATE calibration_segments SET segment = 1",
+                          "UPDATE calibration_segments SET sequence = 1",
                           "DELETE FROM calibration_segments",
                           "UPDATE activations SET time_ns = 0",
                           "DELETE FROM activations",
@@ -102,6 +111,26 @@ TEST_F(PostgresSchemaTest, OnlyCandidatesAndTheFactorysBegin) {
         << StateName(state);
     ASSERT_TRUE(db_->Execute("ROLLBACK").ok());
   }
+}
+
+// Tables can be distributed by rig: no number is shared between rigs. What has
+// no rig is exempt.
+TEST_F(PostgresSchemaTest, KeysBeginWithTheRig) {
+  const std::vector<std::string> others = ReadTexts(
+      "SELECT format('%s by %s', x.indrelid::regclass, a.attname) "
+      "FROM pg_index x JOIN pg_class t ON t.oid = x.indrelid "
+      "JOIN pg_attribute a ON a.attrelid = t.oid AND a.attnum = x.indkey[0] "
+      "WHERE t.relnamespace = current_schema()::regnamespace "
+      "  AND x.indisunique AND a.attname <> 'rig' ORDER BY 1");
+  EXPECT_THAT(others,
+              ElementsAre("clock by clock",
+                          "replicas by replica",
+                          "rigs by id",
+                          "schema_migrations by version"));
+  EXPECT_THAT(ReadTexts("SELECT CAST(relname AS TEXT) FROM pg_class "
+                        "WHERE relkind = 'S' "
+                        "AND relnamespace = current_schema()::regnamespace"),
+              IsEmpty());
 }
 
 TEST_F(PostgresSchemaTest, ASoundSchemaHasNoProblems) {

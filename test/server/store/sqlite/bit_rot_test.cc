@@ -135,8 +135,9 @@ TEST_F(BitRotTest, AFlipInTheDataOfASegmentIsFoundByTheDoctor) {
       });
   ASSERT_TRUE(summary.ok()) << summary.status();
   EXPECT_EQ(summary->problems, 2);  // the checksum, and the decoding
-  EXPECT_THAT(places,
-              ::testing::Contains(::testing::HasSubstr("the data of segment")));
+  EXPECT_THAT(
+      places,
+      ::testing::Contains(::testing::HasSubstr("the data of the segment")));
 }
 
 }  // namespace

@@ -116,6 +116,16 @@ TEST_F(CopiesTest, WhatTheSchemaAndTheProgramRelyOnIsChecked) {
   }
 }
 
+TEST_F(CopiesTest, ACopyByVacuumIsSound) {
+  const std::string path = folder_.File("vacuumed.db");
+  store_.reset();
+  ASSERT_TRUE(ExecuteInFile(Path(), "VACUUM INTO '" + path + "'").ok());
+  const std::string bytes = ReadBytes(path);
+  Reopen();
+  const auto previous = Restore(bytes, Sha256(bytes));
+  EXPECT_TRUE(previous.ok()) << previous.status();
+}
+
 TEST_F(CopiesTest, SeveralActiveCalibrationsAreFound) {
   const std::string path = folder_.File("damaged.db");
   WriteBytes(path, BackUp());

@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 13u);
+  ASSERT_EQ(migrations.size(), 14u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -110,6 +110,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[12].name, "0013_replicas.sql");
   EXPECT_EQ(migrations[12].sha256,
             "c14b8d7afe3350ddbe2f82658c6a2eacb5ea9081bf117334b178c5a34e897091");
+  EXPECT_EQ(migrations[13].name, "0014_keys_by_rig.sql");
+  EXPECT_EQ(migrations[13].sha256,
+            "a77ef8b991f12a5bef8255830c83ff41ba3e290a8ff6cd6d614dfad0abea5c12");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
@@ -184,11 +187,63 @@ TEST_F(OpenDatabaseTest, VersionsFromBeforeStatesWereExplicitKeepTheirLife) {
         // The rejected one never was active.
         "SELECT group_concat(version) = '1,3' FROM activations",
         "SELECT message = 'm' AND cause = 1 FROM runs",
-        "SELECT segment = 1 FROM run_segments",
+        "SELECT sequence = 1 FROM run_segments",
         "SELECT version = 3 FROM calibration_segments",
         "SELECT inflation = 1.5 FROM changes",
         "SELECT group_name = 'imu' FROM change_groups",
-        "SELECT event = 7 FROM events"}) {
+        "SELECT event = 1 AND steady_ns = 7 FROM events"}) {
+    EXPECT_EQ(ReadNumber(db->get(), sql), 1) << sql;
+  }
+}
+
+// Two rigs whose segments, activations and events took turns.
+constexpr char kTwoRigs[] =
+    "INSERT INTO rigs (rig, id, create_time_ns, definition, sha256) VALUES "
+    "  (1, 'a', 0, x'00', x'00'), (2, 'b', 0, x'00', x'00');"
+    "INSERT INTO segments (segment, rig, session, session_index, sequence, "
+    "  state, receive_time_ns, calibration_version, start_ns, end_ns, "
+    "  keyframes, imu_samples, landmarks, observations) VALUES "
+    "  (3, 1, 's', 0, 1, 2, 5, 1, 0, 1, 1, 1, 1, 1),"
+    "  (4, 2, 's', 0, 1, 2, 5, 1, 0, 1, 1, 1, 1, 1),"
+    "  (6, 2, 's', 1, 2, 1, 5, 1, 0, 1, 1, 1, 1, 1),"
+    "  (7, 1, 's', 1, 2, 1, 5, 1, 0, 1, 1, 1, 1, 1);"
+    "INSERT INTO payloads VALUES "
+    "  (4, 2, x'04', 4, x'00'), (6, 2, x'06', 6, x'00'), "
+    "  (7, 1, x'07', 7, x'00');"
+    "INSERT INTO table_absences (segment, group_name, cause, time_ns, rival) "
+    "  VALUES (4, 'imu', 3, 0, 6), (3, 'imu', 3, 0, 5);"
+    "INSERT INTO calibrations (rig, version, state, create_time_ns, content, "
+    "  sha256) VALUES (1, 1, 1, 0, x'00', x'00'), (2, 1, 1, 0, x'00', x'00');"
+    "INSERT INTO activations (activation, rig, version, time_ns) VALUES "
+    "  (2, 1, 1, 20), (3, 2, 1, 30), (5, 1, 1, 50);"
+    "INSERT INTO events VALUES (2, 20, 'a', 1, 'x'), (3, 30, '', 17, 'x'), "
+    "  (5, 50, 'b', 1, 'x'), (6, 10, 'a', 2, 'x');";
+
+TEST_F(OpenDatabaseTest, NumbersOfAllRigsBecomeNumbersOfEachInTheirOrder) {
+  const auto all = SqliteMigrations();
+  {
+    auto db = Open({all.begin(), all.begin() + 12});
+    ASSERT_TRUE(db.ok()) << db.status();
+    const absl::Status written = (*db)->Execute(kTwoRigs);
+    ASSERT_TRUE(written.ok()) << written;
+  }
+  auto db = Open({all.begin(), all.end()});
+  ASSERT_TRUE(db.ok()) << db.status();
+  EXPECT_EQ(
+      ReadNumber(db->get(), "SELECT count(*) FROM pragma_foreign_key_check"),
+      0);
+  for (const char* sql :
+       {"SELECT group_concat(rig || ':' || sequence || ':' || hex(data)) = "
+        "  '1:2:07,2:1:04,2:2:06' "
+        "  FROM (SELECT * FROM payloads ORDER BY rig, sequence)",
+        // The rival of the other is gone.
+        "SELECT rival = 2 FROM table_absences WHERE rig = 2 AND sequence = 1",
+        "SELECT rival IS NULL FROM table_absences WHERE rig = 1",
+        "SELECT group_concat(rig || ':' || activation || ':' || time_ns) = "
+        "  '1:1:20,1:2:50,2:1:30' FROM activations",
+        "SELECT group_concat(rig || ':' || event || ':' || time_ns) = "
+        "  'a:1:20,:1:30,b:1:50,a:2:10' "
+        "  FROM (SELECT * FROM events ORDER BY steady_ns)"}) {
     EXPECT_EQ(ReadNumber(db->get(), sql), 1) << sql;
   }
 }

@@ -1,4 +1,8 @@
 // What the schema itself refuses, whoever writes, and how it is searched.
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "server/domain/calibration_life.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite/sqlite_test.h"
@@ -40,13 +44,13 @@ TEST_F(SchemaTest, CalibrationInAnotherRowIsNoticed) {
   ASSERT_TRUE(domain_->CreateRig(rig_).ok());
   ASSERT_TRUE(domain_->CreateRig(TestRig("b")).ok());
   store_.reset();
-  ASSERT_TRUE(
-      Execute("DROP TRIGGER calibrations_never_change;"
-              "UPDATE calibrations SET "
-              "  content = (SELECT content FROM calibrations WHERE rig = 1), "
-              "  sha256 = (SELECT sha256 FROM calibrations WHERE rig = 1) "
-              "WHERE rig = 2")
-          .ok());
+  ASSERT_TRUE(Execute("DROP TRIGGER calibrations_never_change;"
+                      "UPDATE calibrations SET "
+                      "  (content, sha256) = (SELECT content, sha256 "
+                      "    FROM calibrations "
+                      "    WHERE rig = (SELECT rig FROM rigs WHERE id = 'a')) "
+                      "WHERE rig = (SELECT rig FROM rigs WHERE id = 'b')")
+                  .ok());
   ASSERT_TRUE(Open().ok());
   EXPECT_TRUE(store_->GetActiveCalibration("a").ok());
   EXPECT_TRUE(absl::IsDataLoss(store_->GetActiveCalibration("b").status()));
@@ -92,6 +96,33 @@ TEST_F(SchemaTest, DatabaseLetsOnlyCandidatesAndTheFactorysBegin) {
   }
 }
 
+// Tables can be distributed by rig: no number is shared between rigs. What has
+// no rig is exempt.
+TEST_F(SchemaTest, KeysBeginWithTheRig) {
+  store_.reset();
+  const auto others = ReadTextInFile(
+      Path(),
+      "SELECT group_concat(text) FROM (SELECT t.name || ' by ' || c.name text "
+      "FROM pragma_table_list t JOIN pragma_index_list(t.name) i "
+      "JOIN pragma_index_info(i.name) c "
+      "WHERE i.\"unique\" AND c.seqno = 0 AND c.name <> 'rig' ORDER BY text)");
+  ASSERT_TRUE(others.ok()) << others.status();
+  EXPECT_EQ(*others, "replicas by replica,rigs by id");
+  const auto rowids = ReadTextInFile(
+      Path(),
+      "SELECT group_concat(text) FROM (SELECT t.name || ' by ' || c.name text "
+      "FROM pragma_table_list t JOIN pragma_table_info(t.name) c "
+      "WHERE c.pk = 1 AND c.name <> 'rig' ORDER BY text)");
+  ASSERT_TRUE(rowids.ok()) << rowids.status();
+  EXPECT_EQ(*rowids,
+            "clock by clock,replicas by replica,schema_migrations by version");
+  EXPECT_EQ(ReadIntInFile(Path(),
+                          "SELECT count(*) FROM sqlite_schema "
+                          "WHERE sql LIKE '%AUTOINCREMENT%'")
+                .value_or(-1),
+            0);
+}
+
 // Each page of a session is found by an index, and nothing is sorted.
 TEST_F(SchemaTest, PagesOfASessionAreFoundInTheIndex) {
   store_.reset();
@@ -106,6 +137,37 @@ TEST_F(SchemaTest, PagesOfASessionAreFoundInTheIndex) {
     ASSERT_TRUE(plan.Next());
     EXPECT_THAT(plan.Text(3), ::testing::HasSubstr("SEARCH segments USING"));
     EXPECT_FALSE(plan.Next()) << plan.Text(3);
+  }
+}
+
+// Without statistics SQLite supposes that few rows have the same rig.
+TEST_F(SchemaTest, StatementsReadTheRowsThatTheyNeed) {
+  store_.reset();
+  const auto db = SqliteConnection::Open(Path(), SQLITE_OPEN_READWRITE);
+  ASSERT_TRUE(db.ok());
+  const std::pair<const char*, std::vector<std::string>> plans[] = {
+      {"SELECT s.session FROM run_segments x CROSS JOIN segments s "
+       "WHERE s.rig = x.rig AND s.sequence = x.sequence AND x.rig = 1 "
+       "AND x.run = 1 ORDER BY x.sequence",
+       {"SEARCH x USING PRIMARY KEY (rig=? AND run=?)",
+        "SEARCH s USING PRIMARY KEY (rig=? AND sequence=?)"}},
+      {"SELECT count(*) FROM segments WHERE rig = 1 AND state = 1",
+       {"SEARCH segments USING COVERING INDEX unscored_segments "
+        "(state=? AND rig=?)"}},
+      {"SELECT session FROM segments WHERE state = 1 ORDER BY rig, sequence",
+       {"SEARCH segments USING INDEX unscored_segments (state=?)"}},
+      {"SELECT max(gain) FROM table_entries WHERE rig = 1 AND sequence = 1",
+       {"SEARCH table_entries USING COVERING INDEX entries_of_segment "
+        "(rig=? AND sequence=?)"}},
+      {"SELECT event FROM events WHERE (steady_ns, rig, event) > (1, 'a', 1) "
+       "ORDER BY steady_ns, rig, event LIMIT 10",
+       {"SEARCH events USING COVERING INDEX events_by_time "
+        "((steady_ns,rig,event)>(?,?,?))"}}};
+  for (const auto& [sql, expected] : plans) {
+    Statement plan(db->get(), std::string("EXPLAIN QUERY PLAN ") + sql);
+    std::vector<std::string> steps;
+    while (plan.Next()) steps.push_back(plan.Text(3));
+    EXPECT_EQ(steps, expected) << sql;
   }
 }
 

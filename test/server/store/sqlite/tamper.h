@@ -58,8 +58,9 @@ inline absl::Status DamageColumn(const std::string& path,
 inline absl::Status DamageSegmentData(const std::string& path,
                                       std::int64_t index) {
   return ExecuteInFile(path,
-                       "UPDATE payloads SET data = x'00' WHERE segment IN "
-                       "(SELECT segment FROM segments WHERE session_index = " +
+                       "UPDATE payloads SET data = x'00' "
+                       "WHERE (rig, sequence) IN (SELECT rig, sequence "
+                       "FROM segments WHERE session_index = " +
                            std::to_string(index) + ")");
 }
 

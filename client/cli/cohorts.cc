@@ -1,0 +1,148 @@
+// cohort: what the devices of one model have in common.
+#include <fmt/format.h>
+
+#include <memory>
+#include <numbers>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/text/text.h"
+#include "selfcal/v1/fleet.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using FleetService = v1::FleetService::StubInterface;
+
+constexpr char kRotationUnit[] = "rad";
+
+// Rotations are shown in degrees.
+double Shown(double value, const std::string& unit) {
+  return unit == kRotationUnit ? value * 180 / std::numbers::pi : value;
+}
+std::string ShownUnit(const std::string& unit) {
+  return unit == kRotationUnit ? "deg" : unit;
+}
+
+void PrintComponents(const Context& context, const v1::Cohort& cohort) {
+  Table table({{"component"},
+               {"unit"},
+               {"mean", true},
+               {"sigma", true},
+               {"spread", true},
+               {"tolerance", true},
+               {"5 %", true},
+               {"50 %", true},
+               {"95 %", true}});
+  for (const v1::CohortComponent& component : cohort.components()) {
+    const auto shown = [&](double value) {
+      return Shown(value, component.unit());
+    };
+    const double spread = shown(component.spread());
+    const auto quantile = [&](int k) {
+      return k < component.quantile_offsets_size()
+                 ? ValueText(shown(component.quantile_offsets(k)), spread)
+                 : "";
+    };
+    const double sigma = shown(component.mean_offset_sigma());
+    const bool is_known = cohort.estimated() && component.spread_degrees() > 0;
+    table.Add({component.component(),
+               ShownUnit(component.unit()),
+               is_known ? ValueText(shown(component.mean_offset()), sigma) : "",
+               is_known ? SigmaText(sigma) : "",
+               is_known ? SigmaText(spread) : "",
+               SigmaText(shown(component.tolerance())),
+               quantile(0),
+               quantile(2),
+               quantile(4)});
+  }
+  context.Print(table);
+}
+
+void PrintOutliers(const Context& context, const v1::Cohort& cohort) {
+  Table table({{"rig"},
+               {"version", true},
+               {"probability", true},
+               {"differs in", false, true}});
+  for (const v1::CohortOutlier& outlier : cohort.outliers()) {
+    std::string differences;
+    for (const auto& component : outlier.components()) {
+      const double sigma = Shown(component.sigma(), component.unit());
+      differences += fmt::format(
+          "{}{} by {} +- {} {}",
+          differences.empty() ? "" : ", ",
+          component.component(),
+          ValueText(Shown(component.difference(), component.unit()), sigma),
+          SigmaText(sigma),
+          ShownUnit(component.unit()));
+    }
+    table.Add({LastPart(outlier.rig()),
+               std::to_string(outlier.version()),
+               fmt::format("{:.2g}", outlier.probability()),
+               differences});
+  }
+  context.Print(table);
+}
+
+int ShowCohort(Context* context, const v1::DescribeCohortRequest& request) {
+  const auto stub = v1::FleetService::NewStub(context->Channel());
+  v1::Cohort cohort;
+  const auto status = Call<FleetService>(
+      stub.get(), &FleetService::DescribeCohort, request, &cohort);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->json) {
+    context->PrintJson(cohort);
+    return kDone;
+  }
+  Facts facts;
+  facts.Add("rigs",
+            fmt::format("{} looked at{}, {} calibrated",
+                        cohort.rigs(),
+                        cohort.truncated() ? " (there are more)" : "",
+                        cohort.calibrated()));
+  facts.Add("offsets", "from the factory's of " + LastPart(cohort.reference()));
+  if (!cohort.estimated()) {
+    facts.Add("mean and spread", "too few devices are calibrated");
+  }
+  context->Print(facts);
+  PrintComponents(*context, cohort);
+  if (cohort.outliers_size() > 0) PrintOutliers(*context, cohort);
+  if (cohort.skipped_size() > 0) {
+    Table table({{"skipped"}, {"because", false, true}});
+    for (const v1::SkippedRig& rig : cohort.skipped()) {
+      table.Add({LastPart(rig.rig()), rig.reason()});
+    }
+    context->Print(table);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void AddCohortCommands(CLI::App* app, Context* context) {
+  CLI::App* cohorts =
+      app->add_subcommand("cohort", "Compare the devices of one model")
+          ->alias("cohorts");
+  cohorts->require_subcommand(1);
+  CLI::App* show = cohorts->add_subcommand(
+      "show",
+      "Show what the calibrations of many rigs have in common, how much they "
+      "differ, and which contradict the others");
+  const auto request = std::make_shared<v1::DescribeCohortRequest>();
+  show->add_option_function<std::string>(
+      "--filter",
+      [request](const std::string& filter) { request->set_filter(filter); },
+      "Which rigs, e.g. 'labels.model = \"t4\"'; all by default");
+  show->add_option_function<int>(
+          "--max-rigs",
+          [request](int rigs) { request->set_max_rigs(rigs); },
+          "Look at so many of them, the last seen first; 500 by default")
+      ->check(CLI::Range(1, 2000));
+  show->callback([context, request] {
+    context->command = [context, request] {
+      return ShowCohort(context, *request);
+    };
+  });
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,166 @@
+// calibration rollback: makes the version before the active one active again,
+// for all rigs of a filter.
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/commands.h"
+#include "client/cli/confirmation.h"
+#include "client/cli/time_input.h"
+#include "client/text/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/calibration_service.grpc.pb.h"
+#include "selfcal/v1/rig.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using google::protobuf::util::TimeUtil;
+using CalibrationService = v1::CalibrationService::StubInterface;
+using RigService = v1::RigService::StubInterface;
+
+struct Options {
+  std::string filter;
+  std::string reason;
+  std::string since;
+  bool dry_run = false;
+  bool yes = false;
+};
+
+struct Rollback {
+  std::string rig;
+  std::int64_t from = 0;
+  std::int64_t to = 0;
+};
+
+// The rollback of a rig whose active version was created at or after `since`;
+// nullopt if there is nothing to roll back.
+grpc::Status Plan(CalibrationService* stub,
+                  const std::string& rig,
+                  const std::optional<google::protobuf::Timestamp>& since,
+                  std::optional<Rollback>* plan) {
+  v1::ListCalibrationsRequest request;
+  request.set_parent(RigName(rig));
+  v1::ListCalibrationsResponse versions;
+  const grpc::Status status = CallForAllPages<CalibrationService>(
+      stub, &CalibrationService::ListCalibrations, request, &versions);
+  if (!status.ok()) return status;
+  Rollback found{rig};
+  for (const v1::Calibration& version : versions.calibrations()) {  // newest
+    if (version.state() == v1::Calibration::ACTIVE) {
+      if (since && version.create_time() < *since) return status;
+      found.from = version.version();
+    } else if (version.state() == v1::Calibration::SUPERSEDED &&
+               found.from != 0) {
+      found.to = version.version();
+      *plan = found;
+      return status;
+    }
+  }
+  return status;
+}
+
+void PrintPlans(const Context& context, const std::vector<Rollback>& plans) {
+  Table table({{"rig"}, {"active", true}, {"back to", true}});
+  for (const Rollback& plan : plans) {
+    table.Add({plan.rig, std::to_string(plan.from), std::to_string(plan.to)});
+  }
+  context.Print(table);
+}
+
+// Goes on after a rig that fails; returns the number of these.
+int CarryOut(CalibrationService* stub,
+             const std::vector<Rollback>& plans,
+             const std::string& reason) {
+  int failed = 0;
+  for (const Rollback& plan : plans) {
+    v1::ActivateCalibrationRequest request;
+    request.set_name(
+        ChildName(plan.rig, "calibrations", std::to_string(plan.to)));
+    request.set_reason(reason);
+    v1::Calibration calibration;
+    const grpc::Status status = Call<CalibrationService>(
+        stub, &CalibrationService::ActivateCalibration, request, &calibration);
+    if (status.ok()) continue;
+    ++failed;
+    PrintError(fmt::format(
+        "{} is not rolled back: {}", plan.rig, status.error_message()));
+  }
+  return failed;
+}
+
+int RollBack(Context* context, const Options& options) {
+  std::optional<google::protobuf::Timestamp> since;
+  if (!options.since.empty()) {
+    const auto time = ParseTime(options.since, TimeUtil::GetCurrentTime());
+    if (!time.ok()) return FailInput(time.status());
+    since = *time;
+  }
+  const auto rig_stub = v1::RigService::NewStub(context->Channel());
+  v1::ListRigsRequest request;
+  request.set_filter(options.filter);
+  v1::ListRigsResponse rigs;
+  grpc::Status status = CallForAllPages<RigService>(
+      rig_stub.get(), &RigService::ListRigs, request, &rigs);
+  if (!status.ok()) return Fail(*context, status);
+  const auto stub = v1::CalibrationService::NewStub(context->Channel());
+  std::vector<Rollback> plans;
+  for (const v1::Rig& rig : rigs.rigs()) {
+    std::optional<Rollback> plan;
+    status = Plan(stub.get(), LastPart(rig.name()), since, &plan);
+    if (!status.ok()) return Fail(*context, status);
+    if (plan) plans.push_back(*plan);
+  }
+  PrintPlans(*context, plans);
+  if (options.dry_run || plans.empty()) return kDone;
+  const std::string rig_count =
+      CountText(static_cast<std::int64_t>(plans.size()), "rig");
+  if (!options.yes && !Confirmed("Roll back " + rig_count + " at " +
+                                 context->target.address + "?")) {
+    PrintError("nothing was changed; use --yes to go on without a prompt");
+    return kUsage;
+  }
+  const int failed = CarryOut(stub.get(), plans, options.reason);
+  if (failed == 0) return kDone;
+  PrintError(fmt::format("{} of {} failed", failed, rig_count));
+  return kFailed;
+}
+
+}  // namespace
+
+void AddCalibrationRollback(CLI::App* calibrations, Context* context) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* rollback = calibrations->add_subcommand(
+      "rollback",
+      "Make the version before the active one active again, for all rigs of a "
+      "filter");
+  rollback
+      ->add_option("--filter",
+                   options->filter,
+                   "Which rigs, e.g. 'labels.batch = \"2026-10\"'")
+      ->required();
+  rollback
+      ->add_option("--reason",
+                   options->reason,
+                   "The reason; the event logs record it with your name")
+      ->required();
+  rollback->add_option("--since",
+                       options->since,
+                       "Only where the active version was created since then: "
+                       "a time in UTC, or 2d");
+  rollback->add_flag(
+      "--dry-run", options->dry_run, "Only show what would be rolled back");
+  rollback->add_flag("--yes", options->yes, "Do not ask for confirmation");
+  rollback->callback([context, options] {
+    context->command = [context, options] {
+      return RollBack(context, *options);
+    };
+  });
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,74 @@
+#include "server/encode/encode_cohort.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "proto/resource_names.h"
+
+namespace selfcal::server {
+namespace {
+
+constexpr std::size_t kMostComponents = 5;  // of an outlier
+
+double Sigma(const Eigen::MatrixXd& covariance, Eigen::Index j) {
+  return std::sqrt(std::max(covariance(j, j), 0.0));
+}
+
+void EncodeOutlier(const CohortReport::Outlier& outlier,
+                   const std::vector<TangentComponent>& components,
+                   v1::CohortOutlier* message) {
+  message->set_rig(RigName(outlier.rig));
+  message->set_version(outlier.version);
+  message->set_probability(outlier.consistency.probability);
+  const auto& found = outlier.consistency.components;
+  for (std::size_t k = 0; k < std::min(found.size(), kMostComponents); ++k) {
+    auto* component = message->add_components();
+    const TangentComponent& known =
+        components[static_cast<std::size_t>(found[k].component)];
+    component->set_component(known.name);
+    component->set_unit(known.unit);
+    component->set_difference(found[k].difference);
+    component->set_sigma(found[k].sigma);
+  }
+}
+
+}  // namespace
+
+v1::Cohort Encode(const CohortReport& report) {
+  v1::Cohort message;
+  const Cohort& cohort = report.cohort;
+  message.set_reference(RigName(report.reference));
+  message.set_rigs(report.rigs);
+  message.set_calibrated(report.calibrated);
+  message.set_truncated(report.truncated);
+  message.set_estimated(!cohort.devices.empty());
+  const auto components = TangentComponents(cohort.reference);
+  const Eigen::VectorXd values = ReadableValues(cohort.reference);
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    const auto j = static_cast<Eigen::Index>(k);
+    v1::CohortComponent* component = message.add_components();
+    component->set_component(components[k].name);
+    component->set_unit(components[k].unit);
+    component->set_reference(values(j));
+    component->set_tolerance(cohort.scale(j));
+    for (Eigen::Index q = 0; q < report.quantiles.cols(); ++q) {
+      component->add_quantile_offsets(report.quantiles(j, q));
+    }
+    if (!message.estimated()) continue;
+    component->set_mean_offset(cohort.mu(j));
+    component->set_mean_offset_sigma(Sigma(cohort.mu_covariance, j));
+    component->set_spread(Sigma(cohort.S, j));
+    component->set_spread_degrees(cohort.degrees(j));
+  }
+  for (const CohortReport::Outlier& outlier : report.outliers) {
+    EncodeOutlier(outlier, components, message.add_outliers());
+  }
+  for (const CohortReport::Skipped& skipped : report.skipped) {
+    v1::SkippedRig* rig = message.add_skipped();
+    rig->set_rig(RigName(skipped.rig));
+    rig->set_reason(skipped.reason);
+  }
+  return message;
+}
+
+}  // namespace selfcal::server
