@@ -222,6 +222,8 @@ def _stop_scorer(context: Context, tried: Tried, load: Load) -> bool:
 
 def _stop_executor(context: Context, tried: Tried, load: Load) -> bool:
     rig_id = load.of_kind("runs")[0].rig_id
+    # One that was stopped in each trial would not be started again.
+    _wait(lambda: not _unfinished(context.fleet, rig_id), 60)
     with checks.connect(context.fleet) as daemon:
         request = recalibration_pb2.StartRecalibrationRequest(
             parent=f"rigs/{rig_id}", force=True
@@ -283,6 +285,14 @@ def _stop(
         + ("a write of it was refused" if knows(lost) else "it wrote nothing")
     )
     return True
+
+
+def _unfinished(fleet, rig_id: str) -> int:
+    return fleet.query(
+        "SELECT count(*) FROM runs JOIN rigs USING (rig)"
+        " WHERE id = %s AND state IN (1, 2)",
+        rig_id,
+    )[0][0]
 
 
 def _claim(fleet, rig_id: str) -> int:
