@@ -39,12 +39,14 @@ Recalibrator::Recalibrator(Domain* domain,
 Recalibrator::~Recalibrator() { Stop(); }
 
 absl::Status Recalibrator::Start() {
-  const std::lock_guard lock(mutex_);
-  if (running_) {
-    return absl::FailedPreconditionError(
-        "recalibration has been started already");
+  {
+    const std::lock_guard lock(mutex_);
+    if (running_) {
+      return absl::FailedPreconditionError(
+          "recalibration has been started already");
+    }
+    running_ = true;
   }
-  running_ = true;
   for (const auto& executor : executors_) {
     executor->current.Open();
     executor->thread = std::thread([this, e = executor.get()] { Loop(e); });

@@ -136,7 +136,8 @@ class ReplicasOfDatabase final : public Replicas {
                      "  OR EXISTS (SELECT 1 FROM runs u "
                      "       WHERE u.rig = c.rig AND u.state IN (1, 2)))",
                      replica);
-      while (read.Next()) busy.emplace_back(read.Text(0), read.Int(1), read.Int(2));
+      while (read.Next())
+        busy.emplace_back(read.Text(0), read.Int(1), read.Int(2));
       return read.status();
     }));
     return busy;

@@ -191,14 +191,14 @@ TEST_F(ReplicaTest, TheBacklogIsThatOfTheSegmentsThatNobodyHasScored) {
 }
 
 TEST_F(ReplicaTest, ARunIsCancelledThroughAnyOfThem) {
-  std::atomic<bool> is_solving = false;
-  estimators_.calibrate = [&](const Rig&,
-                              const Calibration& start,
-                              const std::vector<MotionSegment>&,
-                              const CalibrateOptions&,
-                              const ProgressCallback& progress,
-                              const auto&) {
-    is_solving = true;
+  const auto is_solving = std::make_shared<std::atomic<bool>>(false);
+  estimators_.calibrate = [is_solving](const Rig&,
+                                       const Calibration& start,
+                                       const std::vector<MotionSegment>&,
+                                       const CalibrateOptions&,
+                                       const ProgressCallback& progress,
+                                       const auto&) {
+    *is_solving = true;
     int k = 0;
     EXPECT_TRUE(Eventually([&] { return !progress({++k, 100, 1.0, 1.0}); }));
     return Cancelled(start);
@@ -207,7 +207,7 @@ TEST_F(ReplicaTest, ARunIsCancelledThroughAnyOfThem) {
   Pipeline* const holder = StartAnother();
   SubmitTo(holder, "a", 0);
   SubmitTo(holder, "a", 1);
-  ASSERT_TRUE(Eventually([&] { return is_solving.load(); }));
+  ASSERT_TRUE(Eventually([&] { return is_solving->load(); }));
   Pipeline* const other = StartAnother();
   const auto cancelled = other->CancelRecalibration("a", 1);
   ASSERT_TRUE(cancelled.ok()) << cancelled.status();

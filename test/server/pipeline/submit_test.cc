@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -13,8 +14,9 @@ namespace {
 
 class SubmitTest : public PipelineTest {
  protected:
-  // Scores wait for the gate: the data of a segment remains until then.
-  void ScoreBehind(std::mutex* gate) {
+  // Scores wait for the gate, which they keep: the data of a segment remains
+  // until then.
+  void ScoreBehind(const std::shared_ptr<std::mutex>& gate) {
     estimators_.score = [gate](
                             const Rig& rig, const auto&, const auto& segment) {
       const std::lock_guard wait(*gate);
@@ -61,9 +63,9 @@ TEST_F(SubmitTest, RejectionNamesEveryFieldAndStoresNothing) {
 
 TEST_F(SubmitTest, AFewObservationsOutsideTheImageAreLeftOutAndCounted) {
   CreateRig();
-  std::mutex gate;
-  std::unique_lock hold(gate);
-  ScoreBehind(&gate);
+  const auto gate = std::make_shared<std::mutex>();
+  std::unique_lock hold(*gate);
+  ScoreBehind(gate);
   StartOne();
   MotionSegment segment = Segment(0);
   const std::size_t count = segment.observations.size();
@@ -89,9 +91,9 @@ TEST_F(SubmitTest, AFewObservationsOutsideTheImageAreLeftOutAndCounted) {
 
 TEST_F(SubmitTest, SaturatedReadingsAreLeftOutAndCounted) {
   CreateRig();
-  std::mutex gate;
-  std::unique_lock hold(gate);
-  ScoreBehind(&gate);
+  const auto gate = std::make_shared<std::mutex>();
+  std::unique_lock hold(*gate);
+  ScoreBehind(gate);
   StartOne();
   MotionSegment segment = Segment(0);
   const std::size_t count = segment.imu.size();
