@@ -18,8 +18,10 @@ namespace selfcal::server {
 struct RigClaim {
   // Of a caller that needs no claim: the only daemon, or one that answers a
   // request, which any may.
+  // NOLINTBEGIN(google-explicit-constructor): the name alone is such a claim
   RigClaim(std::string name) : rig(std::move(name)) {}
   RigClaim(const char* name) : rig(name) {}
+  // NOLINTEND(google-explicit-constructor)
   RigClaim(std::string name, std::int64_t its_key, std::int64_t its_number)
       : rig(std::move(name)), key(its_key), number(its_number) {}
 

@@ -188,7 +188,7 @@ class Database {
   virtual absl::StatusOr<std::unique_ptr<Connection>> OpenReader() = 0;
 
   // Null for an engine of one process.
-  virtual std::unique_ptr<Listener> Listen(Listener::Heard /*heard*/) {
+  virtual std::unique_ptr<Listener> Listen(const Listener::Heard& /*heard*/) {
     return nullptr;
   }
 

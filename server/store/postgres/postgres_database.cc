@@ -186,8 +186,9 @@ absl::StatusOr<std::unique_ptr<Connection>> PostgresDatabase::OpenReader() {
   return reader;
 }
 
-std::unique_ptr<Listener> PostgresDatabase::Listen(Listener::Heard heard) {
-  return std::make_unique<PostgresListener>(uri_, origin_, std::move(heard));
+std::unique_ptr<Listener> PostgresDatabase::Listen(
+    const Listener::Heard& heard) {
+  return std::make_unique<PostgresListener>(uri_, origin_, heard);
 }
 
 }  // namespace selfcal::server

@@ -48,7 +48,7 @@ class PostgresDatabase final : public Database {
   void BeginWrite(Work work, Done done) override;
   absl::Status Read(const Work& query) override;
   absl::StatusOr<std::unique_ptr<Connection>> OpenReader() override;
-  std::unique_ptr<Listener> Listen(Listener::Heard heard) override;
+  std::unique_ptr<Listener> Listen(const Listener::Heard& heard) override;
 
   // Transactions that were carried out again.
   std::int64_t retries() const { return retries_; }
