@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <numbers>
 #include <string>
 
 #include "client/cli/commands.h"
+#include "client/text/estimate_text.h"
 #include "client/text/text.h"
 #include "selfcal/v1/fleet.grpc.pb.h"
 
@@ -13,16 +13,6 @@ namespace selfcal::client {
 namespace {
 
 using FleetService = v1::FleetService::StubInterface;
-
-constexpr char kRotationUnit[] = "rad";
-
-// Rotations are shown in degrees.
-double Shown(double value, const std::string& unit) {
-  return unit == kRotationUnit ? value * 180 / std::numbers::pi : value;
-}
-std::string ShownUnit(const std::string& unit) {
-  return unit == kRotationUnit ? "deg" : unit;
-}
 
 void PrintComponents(const Context& context, const v1::Cohort& cohort) {
   Table table({{"component"},
@@ -36,7 +26,7 @@ void PrintComponents(const Context& context, const v1::Cohort& cohort) {
                {"95 %", true}});
   for (const v1::CohortComponent& component : cohort.components()) {
     const auto shown = [&](double value) {
-      return Shown(value, component.unit());
+      return ShownValue(value, component.unit());
     };
     const double spread = shown(component.spread());
     const auto quantile = [&](int k) {
@@ -67,12 +57,13 @@ void PrintOutliers(const Context& context, const v1::Cohort& cohort) {
   for (const v1::CohortOutlier& outlier : cohort.outliers()) {
     std::string differences;
     for (const auto& component : outlier.components()) {
-      const double sigma = Shown(component.sigma(), component.unit());
+      const double sigma = ShownValue(component.sigma(), component.unit());
       differences += fmt::format(
           "{}{} by {} +- {} {}",
           differences.empty() ? "" : ", ",
           component.component(),
-          ValueText(Shown(component.difference(), component.unit()), sigma),
+          ValueText(ShownValue(component.difference(), component.unit()),
+                    sigma),
           SigmaText(sigma),
           ShownUnit(component.unit()));
     }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/cli/commands.h"
@@ -35,7 +36,7 @@ struct Options {
 struct Rollback {
   std::string rig;
   std::int64_t from = 0;
-  std::int64_t to = 0;
+  v1::Calibration to = {};
 };
 
 // The rollback of a rig whose active version was created at or after `since`;
@@ -57,18 +58,25 @@ grpc::Status Plan(CalibrationService* stub,
       found.from = version.version();
     } else if (version.state() == v1::Calibration::SUPERSEDED &&
                found.from != 0) {
-      found.to = version.version();
-      *plan = found;
+      found.to = version;
+      *plan = std::move(found);
       return status;
     }
   }
   return status;
 }
 
+// With --json the versions alone, one by one.
 void PrintPlans(const Context& context, const std::vector<Rollback>& plans) {
+  if (context.json) {
+    for (const Rollback& plan : plans) context.PrintJson(plan.to);
+    return;
+  }
   Table table({{"rig"}, {"active", true}, {"back to", true}});
   for (const Rollback& plan : plans) {
-    table.Add({plan.rig, std::to_string(plan.from), std::to_string(plan.to)});
+    table.Add({plan.rig,
+               std::to_string(plan.from),
+               std::to_string(plan.to.version())});
   }
   context.Print(table);
 }
@@ -81,7 +89,7 @@ int CarryOut(CalibrationService* stub,
   for (const Rollback& plan : plans) {
     v1::ActivateCalibrationRequest request;
     request.set_name(
-        ChildName(plan.rig, "calibrations", std::to_string(plan.to)));
+        ChildName(plan.rig, "calibrations", std::to_string(plan.to.version())));
     request.set_reason(reason);
     v1::Calibration calibration;
     const grpc::Status status = Call<CalibrationService>(

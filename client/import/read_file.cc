@@ -24,7 +24,7 @@ absl::StatusOr<std::string> ReadFile(const std::string& path) {
         "cannot read {}: {}", path, std::generic_category().message(errno)));
   }
   std::ostringstream text;
-  // Of an empty file the insertion fails, although it was read.
+  // The insertion of an empty file fails, although it was read.
   if (file.peek() != std::ifstream::traits_type::eof()) text << file.rdbuf();
   if (file.bad() || !text) {
     return absl::UnknownError(fmt::format("cannot read {} to its end", path));

@@ -3,11 +3,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
 #include "core/calibration/landmark_position.h"
 #include "core/calibration/triangulate.h"
 #include "core/factor/keyframe_motion.h"
+#include "core/model/median.h"
 #include "core/model/rig.h"
 
 namespace selfcal::client {
@@ -20,20 +20,13 @@ constexpr double kMaxRelativeSigma = 0.25;
 constexpr double kMaxMedianSigmas = 10;
 constexpr double kMedianOfRayleigh = 1.1774100225154747;
 
-double Median(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::optional<Eigen::Vector3d> TriangulateOne(const LandmarkScene& scene,
                                               const Track& track) {
   if (track.observations.size() < 2) return std::nullopt;
   auto position = TriangulateTrack(scene, track);
   if (!position) return std::nullopt;
   const double median_px =
-      Median(ResidualNorms(scene, track, position->Homogeneous()));
+      UpperMedian(ResidualNorms(scene, track, position->Homogeneous()));
   const double sigmas = median_px / scene.pixel_sigma_px();
   if (!(sigmas <= kMaxMedianSigmas)) return std::nullopt;
   const Eigen::Matrix3d information =

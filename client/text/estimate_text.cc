@@ -7,17 +7,27 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr char kRotationUnit[] = "rad";
-constexpr char kShownRotationUnit[] = "deg from factory";
+constexpr char kShownRotationUnit[] = "deg";
+constexpr char kFromFactory[] = " from factory";
 
 }  // namespace
+
+double ShownValue(double value, const std::string& unit) {
+  return unit == kRotationUnit ? kDegrees * value : value;
+}
+
+std::string ShownUnit(const std::string& unit) {
+  return unit == kRotationUnit ? kShownRotationUnit : unit;
+}
 
 ShownEstimate Shown(const v1::ComponentEstimate& estimate) {
   if (estimate.unit() != kRotationUnit || !estimate.has_from_factory()) {
     return {estimate.value(), estimate.sigma(), estimate.unit()};
   }
-  return {kDegrees * estimate.from_factory(),
-          kDegrees * estimate.sigma(),
-          kShownRotationUnit};
+  const std::string& unit = estimate.unit();
+  return {ShownValue(estimate.from_factory(), unit),
+          ShownValue(estimate.sigma(), unit),
+          ShownUnit(unit) + kFromFactory};
 }
 
 ShownDifference Shown(
@@ -30,11 +40,12 @@ ShownDifference Shown(
             difference.sigma(),
             difference.unit()};
   }
-  return {kDegrees * difference.from_factory_a(),
-          kDegrees * difference.from_factory_b(),
-          kDegrees * difference.difference(),
-          kDegrees * difference.sigma(),
-          kShownRotationUnit};
+  const std::string& unit = difference.unit();
+  return {ShownValue(difference.from_factory_a(), unit),
+          ShownValue(difference.from_factory_b(), unit),
+          ShownValue(difference.difference(), unit),
+          ShownValue(difference.sigma(), unit),
+          ShownUnit(unit) + kFromFactory};
 }
 
 std::string VerdictText(const v1::Calibration& calibration) {

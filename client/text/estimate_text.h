@@ -9,6 +9,11 @@
 
 namespace selfcal::client {
 
+// A difference of estimates in the unit in which people read it: "deg" for
+// "rad", every other one as it is.
+double ShownValue(double value, const std::string& unit);
+std::string ShownUnit(const std::string& unit);
+
 struct ShownEstimate {
   double value = 0;
   double sigma = 0;

@@ -176,8 +176,8 @@ CREATE TABLE table_absences (
   -- this one; the segment may be gone since. NULL for other causes.
   rival BIGINT,
   rival_entropy DOUBLE PRECISION,
-  -- Of a segment that does not fit, and the largest that did; NULL for other
-  -- causes.
+  -- The fit of a segment that does not fit, and the largest fit of those that
+  -- do; NULL for other causes.
   fit DOUBLE PRECISION,
   fit_limit DOUBLE PRECISION,
   PRIMARY KEY (rig, sequence, group_name),
@@ -385,8 +385,8 @@ CREATE TABLE change_groups (
   FOREIGN KEY (rig, change) REFERENCES changes
 );
 
--- What happened, one row each. It stays when the rig is deleted, so its rig is
--- the name.
+-- The event log, one row each. An event stays when its rig is deleted, so the
+-- rig is its name.
 CREATE TABLE events (
   rig TEXT COLLATE "C" NOT NULL,  -- empty: of the daemon
   event BIGINT NOT NULL,  -- counts from 1 for each rig

@@ -1,5 +1,5 @@
--- What daemons that share a database have to tell each other. A file of SQLite
--- has one daemon, which needs none of it.
+-- Records by which daemons share a database. A file of SQLite has one daemon,
+-- which needs none of them.
 
 -- The daemons, while they run.
 CREATE TABLE replicas (

@@ -33,7 +33,7 @@ INSERT INTO new_segments
     imu_samples, landmarks, observations, temperature_c, fit, steady_ns
   FROM segments ORDER BY rig, sequence;
 
--- Of the tables of segments, those with large rows keep their rowid.
+-- Tables with large rows keep their rowid.
 CREATE TABLE new_payloads (
   rig INTEGER NOT NULL,
   sequence INTEGER NOT NULL,
@@ -129,8 +129,8 @@ CREATE TABLE new_table_absences (
   -- this one; the segment may be gone since. NULL for other causes.
   rival INTEGER,
   rival_entropy REAL,
-  -- Of a segment that does not fit, and the largest that did; NULL for other
-  -- causes.
+  -- The fit of a segment that does not fit, and the largest fit of those that
+  -- do; NULL for other causes.
   fit REAL,
   fit_limit REAL,
   PRIMARY KEY (rig, sequence, group_name),
@@ -190,7 +190,7 @@ CREATE TABLE new_events (
   rig TEXT NOT NULL,  -- empty: of the daemon
   event INTEGER NOT NULL,  -- counts from 1 for each rig
   time_ns INTEGER NOT NULL,
-  -- Of events from before, their number over all rigs: they come first, in
+  -- Older events have their number over all rigs instead: they come first, in
   -- their order.
   steady_ns INTEGER NOT NULL,
   kind INTEGER NOT NULL CHECK (kind >= 1),

@@ -87,7 +87,7 @@ v1::VerifyRigResponse Encode(const Verification& verification) {
     Put(*verification.calibration, summary.mutable_calibration());
   }
   summary.set_version(verification.version);
-  summary.set_finding(Finding(verification));
+  summary.set_finding(DisagreementText(verification));
   return response;
 }
 

@@ -117,7 +117,6 @@ absl::StatusOr<CohortReport> DescribeCohort(Store* store,
       SELFCAL_RETURN_IF_ERROR(reader.Read(rig));
     }
     page.token = rigs.next_token;
-    report.truncated |= !page.token.empty() && report.rigs == max_rigs;
   } while (!page.token.empty() && !report.truncated);
   if (report.rigs == 0) {
     return absl::NotFoundError("no rig is like that");

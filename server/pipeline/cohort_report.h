@@ -1,4 +1,4 @@
-// What the calibrations of many rigs say about devices of one model.
+// Statistics of devices of one model, from their calibrations.
 #pragma once
 
 #include <absl/status/statusor.h>

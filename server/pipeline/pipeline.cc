@@ -14,6 +14,7 @@
 #include "core/information/segment_scorer.h"
 #include "core/model/image_bounds.h"
 #include "core/model/saturation.h"
+#include "server/pipeline/announcement_relay.h"
 #include "server/pipeline/recalibration.h"
 #include "server/pipeline/rescoring.h"
 #include "server/pipeline/rig_claims.h"
@@ -22,7 +23,6 @@
 #include "server/pipeline/verifier.h"
 #include "server/pipeline/watchers.h"
 #include "server/status/status_macros.h"
-#include "server/store/announcements.h"
 
 namespace selfcal::server {
 namespace {
@@ -142,7 +142,12 @@ class PipelineImpl : public Pipeline {
               spdlog::info("run {} of rig {} is due", run.run, run.rig);
               recalibrator_.Wake();
             },
-            [this](const std::string& rig) { recalibrator_.NoteScore(rig); }) {}
+            [this](const std::string& rig) { recalibrator_.NoteScore(rig); }),
+        relay_(store_,
+               &claims_,
+               &recalibrator_,
+               &calibration_watchers_,
+               &run_watchers_) {}
 
   // Interrupts a verification that is in progress.
   ~PipelineImpl() override { Stop(); }
@@ -155,7 +160,7 @@ class PipelineImpl : public Pipeline {
   }
 
   void Stop() override {
-    listener_.reset();
+    relay_.Stop();
     verifier_.Stop();
     scoring_.Stop();
     recalibrator_.Stop();
@@ -305,7 +310,7 @@ class PipelineImpl : public Pipeline {
                  version,
                  rig,
                  reason);
-    calibration_watchers_.Publish(rig, active);
+    calibration_watchers_.Publish(active);
     RescoreKept(domain_, estimators_, rig, active.theta);
     return active;
   }
@@ -343,64 +348,14 @@ class PipelineImpl : public Pipeline {
       }
       return update;
     };
-    return run_watchers_.Watch(RunTopic(rig, run), std::move(callback), now);
+    return run_watchers_.Watch({rig, run}, std::move(callback), now);
   }
 
  private:
-  // --- What other daemons announce (server/store/announcements.h).
-
-  void OnAnnouncement(const Announcement& announcement) {
-    switch (announcement.kind) {
-      case Announcement::Kind::kCalibration:
-        if (calibration_watchers_.Topics().contains(announcement.rig)) {
-          PassOnCalibration(announcement.rig);
-        }
-        break;
-      case Announcement::Kind::kRun:
-        OnRunElsewhere(announcement.rig, announcement.run);
-        break;
-      case Announcement::Kind::kMissed:
-        for (const std::string& rig : calibration_watchers_.Topics()) {
-          PassOnCalibration(rig);
-        }
-        for (const auto& [rig, run] : WatchedRuns()) OnRunElsewhere(rig, run);
-        break;
-    }
-  }
-
-  // If the store fails now, the listener reports that announcements may have
-  // been missed as soon as it responds again.
-  void PassOnCalibration(const std::string& rig) {
-    const auto active = store_->GetActiveCalibration(rig);
-    if (active.ok()) calibration_watchers_.PassOn(rig, *active);
-  }
-
-  void OnRunElsewhere(const std::string& rig, std::int64_t number) {
-    const auto run = store_->GetRun(rig, number);
-    if (!run.ok()) return;
-    if (run->end_time_ns != 0) {
-      recalibrator_.Interrupt(rig, number);
-    } else {
-      claims_.Wake();
-      recalibrator_.Wake();
-    }
-    run_watchers_.PassOn(RunTopic(rig, number), RunUpdate{*run});
-  }
-
-  std::vector<std::pair<std::string, std::int64_t>> WatchedRuns() {
-    std::vector<std::pair<std::string, std::int64_t>> runs;
-    for (const std::string& topic : run_watchers_.Topics()) {
-      runs.push_back(RunOfTopic(topic));
-    }
-    return runs;
-  }
-
   absl::Status StartScoring() {
     SELFCAL_RETURN_IF_ERROR(scoring_.Start());
     SELFCAL_RETURN_IF_ERROR(claims_.Start());
-    listener_ = store_->Listen([this](const Announcement& announcement) {
-      OnAnnouncement(announcement);
-    });
+    relay_.Start();
     sampler_.Start();
     return absl::OkStatus();
   }
@@ -495,7 +450,7 @@ class PipelineImpl : public Pipeline {
   RigClaims claims_;
   Recalibrator recalibrator_;
   ScoringWorkers scoring_;
-  std::shared_ptr<void> listener_;
+  AnnouncementRelay relay_;
 };
 
 }  // namespace

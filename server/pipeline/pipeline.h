@@ -43,13 +43,13 @@ class Conditions {
   virtual std::string DeferReason() = 0;
 };
 
-// Of a daemon that shares its database with others (rig_claims.h).
+// Settings of a daemon that shares its database with others (rig_claims.h).
 struct ReplicaOptions {
   bool shared = false;
   // Interval at which it shows the others that it runs, and looks for work that
   // they leave to it.
   std::chrono::milliseconds beat = std::chrono::seconds(1);
-  // What shows nothing for longer is taken for dead.
+  // Another daemon that shows nothing for longer is taken for dead.
   std::chrono::milliseconds lease = std::chrono::seconds(10);
 };
 

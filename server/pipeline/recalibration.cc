@@ -109,16 +109,16 @@ absl::StatusOr<StoredRun> Recalibrator::Cancel(const std::string& rig,
     Executor* executor = nullptr;
     {
       const std::lock_guard lock(mutex_);
-      const auto claim = claims_.find(rig);
-      if (claim != claims_.end()) executor = claim->second;
+      const auto found = executing_.find(rig);
+      if (found != executing_.end()) executor = found->second;
       if (executor == nullptr) end();  // under the lock nobody can begin it
     }
     if (executor == nullptr) break;
     was_current = executor->current.Cancel(rig, run, [&] {
-      // It cannot begin it; another one can, once it has claimed the rig.
+      // It cannot begin it; another one can, once it executes for the rig.
       const std::lock_guard lock(mutex_);
-      const auto claim = claims_.find(rig);
-      again = claim == claims_.end() || claim->second != executor;
+      const auto found = executing_.find(rig);
+      again = found == executing_.end() || found->second != executor;
       if (!again) end();
     });
   }
@@ -185,8 +185,8 @@ void Recalibrator::Loop(Executor* executor) {
 
 absl::Status Recalibrator::StartDueRuns() {
   const std::lock_guard lock(starting_);
-  // Of several daemons, each knows which sessions have ended at itself, and one
-  // looks at the times of all rigs.
+  // Each of several daemons knows which sessions have ended at itself; one of
+  // them looks at the times of all rigs.
   const bool is_first = shared_.claims->IsFirst();
   if (is_first) {
     SELFCAL_RETURN_IF_ERROR(
@@ -213,13 +213,13 @@ absl::Status Recalibrator::StartDueRuns() {
   return absl::OkStatus();
 }
 
-Execution Recalibrator::ExecuteClaimed(Executor* executor,
-                                       const StoredRun& listed) {
+Execution Recalibrator::ExecuteOwn(Executor* executor,
+                                   const StoredRun& listed) {
   const std::optional<RigClaim> claim = shared_.claims->Find(listed.rig);
   if (!claim) return Execution::kDeferred;
   {
     const std::lock_guard lock(mutex_);
-    if (!claims_.emplace(listed.rig, executor).second) {
+    if (!executing_.emplace(listed.rig, executor).second) {
       return Execution::kDeferred;
     }
   }
@@ -240,7 +240,7 @@ Execution Recalibrator::ExecuteClaimed(Executor* executor,
                   run.status().ToString());
   }
   const std::lock_guard lock(mutex_);
-  claims_.erase(listed.rig);
+  executing_.erase(listed.rig);
   return executed;
 }
 
@@ -253,7 +253,7 @@ absl::StatusOr<Execution> Recalibrator::ExecuteAll(Executor* executor) {
         const std::vector<StoredRun> runs,
         shared_.store()->ListUnfinishedRuns(shared_.claims->replica()));
     for (const StoredRun& run : runs) {
-      const Execution executed = ExecuteClaimed(executor, run);
+      const Execution executed = ExecuteOwn(executor, run);
       worst = std::max(worst, executed);
       any |= executed == Execution::kDone && executor->current.open();
     }

@@ -76,13 +76,14 @@ class Recalibrator {
   };
 
   void Loop(Executor* executor);
-  // Executes unfinished runs until there are none that may begin and that no
-  // other thread has claimed; returns the worst result.
+  // Executes unfinished runs until there are none that may begin and whose rig
+  // no other thread executes a run of; returns the worst result.
   absl::StatusOr<Execution> ExecuteAll(Executor* executor);
   // Creates the runs of times and of sessions that have ended.
   absl::Status StartDueRuns();
-  // Executes the run, unless its rig is claimed by another thread.
-  Execution ExecuteClaimed(Executor* executor, const StoredRun& listed);
+  // Executes the run if the work of its rig is this daemon's, and no other
+  // thread does it.
+  Execution ExecuteOwn(Executor* executor, const StoredRun& listed);
 
   const RunContext shared_;  // without a current run
   Watchers<StoredCalibration>* const calibration_watchers_;
@@ -95,7 +96,7 @@ class Recalibrator {
   bool running_ = false;
   std::int64_t wakes_ = 0;
   // The executor of each rig's run, from before it begins until after its end.
-  std::map<std::string, Executor*> claims_;
+  std::map<std::string, Executor*> executing_;
 };
 
 }  // namespace selfcal::server

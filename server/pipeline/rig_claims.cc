@@ -22,7 +22,7 @@ constexpr std::chrono::milliseconds kPause{20};
 constexpr std::chrono::milliseconds kPauseForEach{10};
 // A rig without work stays claimed for so long: its device sends more.
 constexpr std::chrono::seconds kKeep{5};
-// Without a response for so many beats, the database is away.
+// The database is away if it has not responded for so many beats.
 constexpr int kBeatsToRespond = 5;
 
 std::string NewName() {
@@ -57,7 +57,7 @@ void RigClaims::Stop() {
   changed_.notify_all();
   if (!thread_.joinable()) return;
   thread_.join();
-  // Without a record its claims are free.
+  // Its claims are free once its record is gone.
   const absl::Status removed = store_->replicas()->Remove(replica_);
   if (!removed.ok()) {
     spdlog::warn("others wait for the claims of this daemon to expire: {}",
@@ -171,7 +171,7 @@ absl::Status RigClaims::RemoveSilent() {
   SELFCAL_ASSIGN_OR_RETURN(const std::vector<ReplicaRecord> records,
                            store_->replicas()->List());
   const Clock::time_point now = Clock::now();
-  // While the database did not respond, nobody could beat.
+  // Nobody could beat while the database did not respond.
   const bool missed = !looked_ || now - *looked_ > 3 * options_.beat;
   looked_ = now;
   std::map<std::string, Seen> seen;
@@ -221,7 +221,7 @@ absl::Status RigClaims::Review() {
   }
   for (const RigClaim& claim : idle) {
     const absl::Status released = store_->replicas()->Release(claim);
-    // Of a rig that was deleted there is nothing to give up.
+    // A rig that was deleted has no claim any more.
     if (!released.ok() && !absl::IsNotFound(released)) return released;
   }
   return absl::OkStatus();

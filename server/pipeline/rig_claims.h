@@ -36,8 +36,8 @@ class RigClaims {
   // Ends the thread, and leaves the rigs to the others.
   void Stop();
 
-  // Under which name the store knows the claims of this daemon; empty if it
-  // does the work of all rigs.
+  // Name of this daemon in the records of claims; empty if it does the work of
+  // all rigs.
   std::string replica() const;
   // nullopt if the work of the rig is not this daemon's.
   std::optional<RigClaim> Find(const std::string& rig) const;
@@ -82,7 +82,7 @@ class RigClaims {
   const ReplicaOptions options_;
   const std::function<void()> on_beat_;
   std::thread thread_;
-  // Of the thread alone.
+  // The next three are used by the thread alone.
   std::map<std::string, Seen> seen_;
   std::optional<Clock::time_point> looked_;  // at the others, the last time
   Clock::time_point next_beat_;

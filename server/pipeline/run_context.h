@@ -2,10 +2,6 @@
 // computations, and those who watch runs.
 #pragma once
 
-#include <cstdint>
-#include <string>
-#include <utility>
-
 #include "server/domain/domain.h"
 #include "server/pipeline/current_run.h"
 #include "server/pipeline/pipeline.h"
@@ -31,10 +27,6 @@ struct RunContext {
     return current->interrupted() || !claims->Holds(claim);
   }
 };
-
-// The topic of the watchers of a run, and the run of a topic.
-std::string RunTopic(const std::string& rig, std::int64_t run);
-std::pair<std::string, std::int64_t> RunOfTopic(const std::string& topic);
 
 // Publishes a run without or with its newest iteration.
 void PublishRun(const RunContext& context, const StoredRun& run);

@@ -130,7 +130,7 @@ absl::Status EndWith(const RunContext& context,
   const StoredCalibration& stored = *finished;
   if (stored.state == CalibrationState::kActive) {
     spdlog::info("rig {} has calibration {}", stored.rig, stored.version);
-    calibration_watchers->Publish(stored.rig, stored);
+    calibration_watchers->Publish(stored);
   } else {
     spdlog::warn("calibration {} of rig {} is rejected: {}",
                  stored.version,

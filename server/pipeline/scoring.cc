@@ -45,7 +45,7 @@ ScoringWorkers::ScoringWorkers(Domain* domain,
 ScoringWorkers::~ScoringWorkers() { Stop(); }
 
 absl::Status ScoringWorkers::Start() {
-  // Of several daemons each counts what it has received itself.
+  // Each of several daemons counts what it has received itself.
   std::vector<Store::Unscored> left;
   if (!options_.replica.shared) {
     SELFCAL_ASSIGN_OR_RETURN(

@@ -52,7 +52,7 @@ std::string FindingOf(const std::vector<ScoreCheck>& checks) {
 
 }  // namespace
 
-std::string Finding(const Verification& verification) {
+std::string DisagreementText(const Verification& verification) {
   std::string finding = FindingOf(verification.scores);
   const auto& calibration = verification.calibration;
   if (!calibration || calibration->outcome != VerificationOutcome::kDiffers) {

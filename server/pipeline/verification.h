@@ -53,8 +53,8 @@ struct VerificationStep {
 };
 using OnVerificationStep = std::function<void(const VerificationStep&)>;
 
-// Why the version must not be trusted, in a sentence: the calibration or scores
+// The reason not to trust the version, in a sentence: the calibration or scores
 // that differ, with the largest difference. Empty if none does.
-std::string Finding(const Verification& verification);
+std::string DisagreementText(const Verification& verification);
 
 }  // namespace selfcal::server

@@ -240,7 +240,7 @@ absl::Status Verifier::Conclude(const std::string& rig,
                                  verification.calibration->outcome);
     }
   }
-  const std::string finding = Finding(verification);
+  const std::string finding = DisagreementText(verification);
   if (finding.empty()) return absl::OkStatus();
   spdlog::error("rig {}, version {}: {}", rig, verification.version, finding);
   return domain_->ReportDisagreement(rig, verification.version, finding);

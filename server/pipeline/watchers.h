@@ -7,8 +7,9 @@
 
 #include <absl/status/statusor.h>
 
+#include <cstdint>
 #include <functional>
-#include <list>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -35,9 +36,18 @@ inline bool Follows(const RunUpdate& last, const RunUpdate& /*next*/) {
          last.run.state == RunState::kRunning;
 }
 
+// The topic of an update: a rig, or a run of a rig.
+inline std::string TopicOf(const StoredCalibration& update) {
+  return update.rig;
+}
+inline std::pair<std::string, std::int64_t> TopicOf(const RunUpdate& update) {
+  return {update.run.rig, update.run.run};
+}
+
 template <typename Update>
 class Watchers {
  public:
+  using Topic = decltype(TopicOf(std::declval<const Update&>()));
   using Callback = std::function<void(const Update&)>;
 
   // `every` receives each update of every topic before its watchers do; may be
@@ -47,14 +57,13 @@ class Watchers {
   // Subscribes to `topic`. `now` returns the present state; it is called once
   // the subscription exists, so that nothing is missed in between.
   absl::StatusOr<std::unique_ptr<Subscription>> Watch(
-      const std::string& topic,
+      const Topic& topic,
       Callback callback,
       const std::function<absl::StatusOr<Update>()>& now) {
     auto watcher = std::make_shared<Watcher>();
-    watcher->topic = topic;
     watcher->callback = std::move(callback);
     const std::lock_guard lock(watcher->mutex);
-    Add(watcher);
+    Add(topic, watcher);
     absl::StatusOr<Update> first = now();
     if (!first.ok()) {
       watcher->ended = true;
@@ -64,26 +73,26 @@ class Watchers {
     return std::unique_ptr<Subscription>(new Handle(watcher));
   }
 
-  void Publish(const std::string& topic, const Update& update) {
+  void Publish(const Update& update) {
     if (every_) every_(update);
-    PassOn(topic, update);
+    PassOn(update);
   }
 
   // Publishes what has happened in another daemon: not to `every`.
-  void PassOn(const std::string& topic, const Update& update) {
-    for (const std::shared_ptr<Watcher>& watcher : Living()) {
+  void PassOn(const Update& update) {
+    for (const std::shared_ptr<Watcher>& watcher : Living(TopicOf(update))) {
       const std::lock_guard lock(watcher->mutex);
-      if (!watcher->ended && watcher->topic == topic) {
-        watcher->Notify(update);
-      }
+      if (!watcher->ended) watcher->Notify(update);
     }
   }
 
+  bool IsWatched(const Topic& topic) const { return !Living(topic).empty(); }
   // Topics that have a watcher.
-  std::set<std::string> Topics() {
-    std::set<std::string> topics;
-    for (const std::shared_ptr<Watcher>& watcher : Living()) {
-      topics.insert(watcher->topic);
+  std::set<Topic> Topics() const {
+    std::set<Topic> topics;
+    const std::lock_guard lock(mutex_);
+    for (const auto& [topic, watcher] : watchers_) {
+      if (!watcher.expired()) topics.insert(topic);
     }
     return topics;
   }
@@ -91,7 +100,6 @@ class Watchers {
  private:
   struct Watcher {
     std::mutex mutex;  // held while the callback runs
-    std::string topic;
     Callback callback;
     std::optional<Update> last;
     bool ended = false;
@@ -118,17 +126,20 @@ class Watchers {
     std::shared_ptr<Watcher> watcher_;
   };
 
-  void Add(const std::shared_ptr<Watcher>& watcher) {
+  void Add(const Topic& topic, const std::shared_ptr<Watcher>& watcher) {
     const std::lock_guard lock(mutex_);
-    std::erase_if(watchers_, [](const auto& weak) { return weak.expired(); });
-    watchers_.push_back(watcher);
+    std::erase_if(watchers_,
+                  [](const auto& entry) { return entry.second.expired(); });
+    watchers_.emplace(topic, watcher);
   }
 
-  std::vector<std::shared_ptr<Watcher>> Living() {
+  // Those of the topic, in the order in which they came.
+  std::vector<std::shared_ptr<Watcher>> Living(const Topic& topic) const {
     const std::lock_guard lock(mutex_);
     std::vector<std::shared_ptr<Watcher>> living;
-    for (const std::weak_ptr<Watcher>& weak : watchers_) {
-      if (std::shared_ptr<Watcher> watcher = weak.lock()) {
+    const auto [begin, end] = watchers_.equal_range(topic);
+    for (auto entry = begin; entry != end; ++entry) {
+      if (std::shared_ptr<Watcher> watcher = entry->second.lock()) {
         living.push_back(std::move(watcher));
       }
     }
@@ -136,8 +147,9 @@ class Watchers {
   }
 
   const Callback every_;
-  std::mutex mutex_;
-  std::list<std::weak_ptr<Watcher>> watchers_;  // guarded by mutex_
+  mutable std::mutex mutex_;
+  // Guarded by mutex_; may have ended.
+  std::multimap<Topic, std::weak_ptr<Watcher>> watchers_;
 };
 
 }  // namespace selfcal::server

@@ -1,7 +1,7 @@
-// What a daemon tells the others that share its database: that something which
-// they may have to pass on has been committed. It is a hint to read the
-// records, and may come twice or late; where it may have been lost, the
-// listener is told.
+// Announcements of a daemon to the others that share its database: something
+// has been committed that they may have to pass on. One is a hint to read the
+// records, and may come twice or late; the listener is told when one may have
+// been lost.
 #pragma once
 
 #include <absl/status/status.h>

@@ -16,8 +16,8 @@
 namespace selfcal::server {
 
 struct RigClaim {
-  // Of a caller that needs no claim: the only daemon, or one that answers a
-  // request, which any may.
+  // The claim of a caller that needs none: the only daemon, or one that answers
+  // a request, which any may.
   // NOLINTBEGIN(google-explicit-constructor): the name alone is such a claim
   RigClaim(std::string name) : rig(std::move(name)) {}
   RigClaim(const char* name) : rig(name) {}

@@ -341,7 +341,7 @@ class Store {
   };
   virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(
       int limit, const std::string& replica = "") = 0;
-  // How many segments of the rig are unscored.
+  // Number of unscored segments of the rig.
   virtual absl::StatusOr<std::int64_t> CountUnscored(
       const std::string& rig) = 0;
   virtual absl::StatusOr<std::vector<Table>> GetTables(

@@ -32,7 +32,7 @@ class Installed:
     mode: int = 0o644
 
 
-# What each part of a machine consists of.
+# The components of each part of a machine.
 _PARTS = {
     "etcd": [
         Installed("/etc/etcd.yaml", "etcd.yaml", "etcd"),

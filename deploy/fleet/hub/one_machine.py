@@ -33,7 +33,7 @@ _SMALL = {
         "shared_buffers": "64MB",
         "max_slot_wal_keep_size": "2GB",
         "parameters": {
-            # What pg_rewind copies, and how long a recovery begins.
+            # Little for pg_rewind to copy, and a recovery that begins soon.
             "min_wal_size": "32MB",
             "recovery_init_sync_method": "syncfs",
         },

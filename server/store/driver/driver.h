@@ -158,8 +158,8 @@ class Connection {
 class Listener {
  public:
   // Called on a thread of the listener with each text that another process
-  // announces, and with nullopt when some may have been missed, as after the
-  // connection was lost.
+  // announces, and with nullopt when some may have been missed: after the
+  // connection was lost, and now and then, as a pooler may pass on none.
   using Heard = std::function<void(const std::optional<std::string>& text)>;
   virtual ~Listener() = default;
 };

@@ -56,7 +56,7 @@ class PostgresConnection final : public Connection {
 
   // The channel of announcements about the tables of this schema, quoted.
   absl::StatusOr<std::string> Channel();
-  // What it announces begins with this.
+  // Begins each announcement, so that its sender can be told.
   void SetOrigin(std::string origin) { origin_ = std::move(origin); }
 
   // The most serious failure since ClearFailure.

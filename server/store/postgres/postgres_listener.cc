@@ -18,7 +18,7 @@ namespace {
 constexpr int kFirstRetry_ms = 100;
 constexpr int kLastRetry_ms = 5000;
 // A connection that is silent for so long is asked whether it is alive.
-constexpr int kSilence_ms = 10'000;
+constexpr std::chrono::milliseconds kSilence = std::chrono::seconds(10);
 
 struct Free {
   void operator()(PGnotify* notice) const { PQfreemem(notice); }
@@ -28,10 +28,12 @@ struct Free {
 
 PostgresListener::PostgresListener(std::string uri,
                                    std::string origin,
-                                   Heard heard)
+                                   Heard heard,
+                                   std::chrono::milliseconds poll)
     : uri_(std::move(uri)),
       origin_(std::move(origin)),
       heard_(std::move(heard)),
+      poll_(poll),
       wake_(eventfd(0, EFD_CLOEXEC)),
       thread_([this] { Run(); }) {}
 
@@ -63,14 +65,20 @@ absl::Status PostgresListener::ListenOnce() {
                            PostgresConnection::Open(uri_));
   SELFCAL_ASSIGN_OR_RETURN(const std::string channel, connection->Channel());
   SELFCAL_RETURN_IF_ERROR(connection->Execute("LISTEN " + channel));
-  heard_(std::nullopt);
   PGconn* const handle = connection->handle();
-  while (Wait(PQsocket(handle), kSilence_ms)) {
-    if (PQconsumeInput(handle) == 0) return absl::OkStatus();
+  auto next_poll = std::chrono::steady_clock::now();
+  do {
+    const auto now = std::chrono::steady_clock::now();
+    if (now >= next_poll) {
+      heard_(std::nullopt);
+      next_poll = now + poll_;
+    }
+    // The answer also shows that the connection is alive, and brings what was
+    // announced.
+    if (!connection->Execute("SELECT 1").ok()) break;
     PassOn(handle);
-    if (!connection->Execute("SELECT 1").ok()) return absl::OkStatus();
-    PassOn(handle);
-  }
+  } while (Wait(PQsocket(handle),
+                static_cast<int>(std::min(kSilence, poll_).count())));
   return absl::OkStatus();
 }
 

@@ -2,8 +2,7 @@
 // of its own.
 #pragma once
 
-#include <atomic>
-#include <optional>
+#include <chrono>
 #include <string>
 #include <thread>
 
@@ -14,8 +13,15 @@ namespace selfcal::server {
 
 class PostgresListener final : public Listener {
  public:
+  // Announcements may be missed without a sign, as through a pooler that shares
+  // one connection among sessions: so they are supposed to be at this interval.
+  static constexpr std::chrono::milliseconds kPoll = std::chrono::minutes(1);
+
   // Leaves out what connections with this origin announce.
-  PostgresListener(std::string uri, std::string origin, Heard heard);
+  PostgresListener(std::string uri,
+                   std::string origin,
+                   Heard heard,
+                   std::chrono::milliseconds poll = kPoll);
   ~PostgresListener() override;
   PostgresListener(const PostgresListener&) = delete;
   PostgresListener& operator=(const PostgresListener&) = delete;
@@ -31,6 +37,7 @@ class PostgresListener final : public Listener {
   const std::string uri_;
   const std::string origin_;
   const Heard heard_;
+  const std::chrono::milliseconds poll_;
   const int wake_;  // an eventfd: the object ends
   std::thread thread_;
 };

@@ -61,6 +61,16 @@ TEST_F(Rollback, OnlyShowsWhatItWouldDo) {
   EXPECT_EQ(daemon_.last_reason, "");
 }
 
+TEST_F(Rollback, IsAListOfVersionsInJson) {
+  const Outcome outcome = RollBack({"--dry-run", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  v1::Calibration version;
+  ASSERT_TRUE(
+      google::protobuf::util::JsonStringToMessage(outcome.out, &version).ok())
+      << outcome.out;
+  EXPECT_EQ(version.version(), 2);
+}
+
 TEST_F(Rollback, LeavesWhatIsOlderThanTheTime) {
   const Outcome newer = RollBack({"--yes", "--since", "2h"});
   EXPECT_THAT(newer.out, HasSubstr("device"));

@@ -132,7 +132,7 @@ TEST_F(VerificationTest, BothCoresAgreeOnWhatIsKept) {
       << verification->calibration->message;
   EXPECT_EQ(verification->calibration->segments, kVerifiedSegments);
   EXPECT_EQ(verification->calibration->segments_gone, 0);
-  EXPECT_EQ(Finding(*verification), "");
+  EXPECT_EQ(DisagreementText(*verification), "");
   EXPECT_EQ(checked, kVerifiedSegments + 1);
   ASSERT_EQ(subjects.size(), static_cast<std::size_t>(kVerifiedSegments + 1));
   EXPECT_EQ(subjects.front(), "segment s~0");
@@ -174,7 +174,7 @@ TEST_F(VerificationTest, FindsAWrongJacobianOfEitherScorer) {
                 check.segment.index == 1 ? VerificationOutcome::kDiffers
                                          : VerificationOutcome::kAgrees);
     }
-    EXPECT_THAT(Finding(*verification),
+    EXPECT_THAT(DisagreementText(*verification),
                 HasSubstr("the score of 1 of 4 segments, most on that of s~1"));
   }
   EXPECT_EQ(Disagreements().size(), 2u);
@@ -228,7 +228,7 @@ TEST_F(VerificationTest, WhatCannotBeComputedIsNotComparedAndNoFinding) {
     EXPECT_EQ(check.outcome, VerificationOutcome::kNotCompared);
     EXPECT_EQ(check.message, "out of memory");
   }
-  EXPECT_EQ(Finding(*verification), "");
+  EXPECT_EQ(DisagreementText(*verification), "");
   EXPECT_TRUE(Disagreements().empty());
 }
 

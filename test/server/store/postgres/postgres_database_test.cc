@@ -8,10 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <future>
-#include <mutex>
-#include <optional>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -407,74 +404,6 @@ TEST_F(PostgresServerTest, AServerThatOnlyLetsReadIsUnavailable) {
     return absl::IsUnavailable(
         PostgresConnection::Open(cluster_->Uri("own")).status());
   }));
-}
-
-// What a listener has heard.
-class Ear {
- public:
-  Listener::Heard Hear() {
-    return [this](const std::optional<std::string>& text) {
-      const std::lock_guard lock(mutex_);
-      heard_.push_back(text.value_or("missed"));
-    };
-  }
-  std::vector<std::string> heard() const {
-    const std::lock_guard lock(mutex_);
-    return heard_;
-  }
-  bool Hears(const std::string& text) const {
-    return Eventually([&] {
-      const auto all = heard();
-      return std::find(all.begin(), all.end(), text) != all.end();
-    });
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::vector<std::string> heard_;
-};
-
-Database::Work Announce(const std::string& text,
-                        const absl::Status& then = {}) {
-  return [text, then](Connection* db) -> absl::Status {
-    Transaction transaction(db);
-    if (!transaction.status().ok()) return transaction.status();
-    const absl::Status announced = db->Announce(text);
-    if (!announced.ok()) return announced;
-    if (!then.ok()) return then;
-    return transaction.Commit();
-  };
-}
-
-TEST_F(PostgresDatabaseTest, WhatIsCommittedIsAnnouncedToOthersAlone) {
-  PostgresDatabase other(uri_, 1, 1);
-  Ear own_ear, others_ear;
-  const auto own = database_->Listen(own_ear.Hear());
-  const auto others = other.Listen(others_ear.Hear());
-  ASSERT_TRUE(own_ear.Hears("missed"));
-  ASSERT_TRUE(others_ear.Hears("missed"));
-  ASSERT_FALSE(
-      database_->Write(Announce("never", absl::InternalError("fails"))).ok());
-  ASSERT_TRUE(database_->Write(Announce("run a 1")).ok());
-  ASSERT_TRUE(database_->Write(Announce("run a 2")).ok());
-  ASSERT_TRUE(others_ear.Hears("run a 2"));
-  EXPECT_EQ(others_ear.heard(),
-            (std::vector<std::string>{"missed", "run a 1", "run a 2"}));
-  ASSERT_TRUE(other.Write(Announce("run b 1")).ok());
-  ASSERT_TRUE(own_ear.Hears("run b 1"));
-  EXPECT_EQ(own_ear.heard(), (std::vector<std::string>{"missed", "run b 1"}));
-}
-
-TEST_F(PostgresDatabaseTest, AListenerThatWasCutOffSaysSoAndGoesOn) {
-  PostgresDatabase other(uri_, 1, 1);
-  Ear ear;
-  const auto listener = database_->Listen(ear.Hear());
-  ASSERT_TRUE(ear.Hears("missed"));
-  TerminateOthers();
-  ASSERT_TRUE(Eventually([&] { return ear.heard().size() == 2; }));
-  EXPECT_EQ(ear.heard().back(), "missed");
-  ASSERT_TRUE(other.Write(Announce("run a 1")).ok());
-  EXPECT_TRUE(ear.Hears("run a 1"));
 }
 
 }  // namespace

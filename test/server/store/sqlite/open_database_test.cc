@@ -109,10 +109,10 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
             "9fdec3cd2a2aa5305e13eb8fdf4c9522a3755de4a1df1bb7e5d2cf56a3e00174");
   EXPECT_EQ(migrations[12].name, "0013_replicas.sql");
   EXPECT_EQ(migrations[12].sha256,
-            "c14b8d7afe3350ddbe2f82658c6a2eacb5ea9081bf117334b178c5a34e897091");
+            "4147355eec40da270f8e17b4e0a8d078020653b674c0b2793784048579288438");
   EXPECT_EQ(migrations[13].name, "0014_keys_by_rig.sql");
   EXPECT_EQ(migrations[13].sha256,
-            "a77ef8b991f12a5bef8255830c83ff41ba3e290a8ff6cd6d614dfad0abea5c12");
+            "63865eaac3862d8157738cfab94b77972faed78ff694de5e3f797b7ed9258add");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {
