@@ -456,35 +456,37 @@ class PipelineImpl : public Pipeline {
 }  // namespace
 
 Estimators CoreEstimators() {
-  return {[](const Rig& rig,
-             const Calibration& theta0,
-             const MotionSegment& segment) {
-            // The workspace of a very long segment is not kept.
-            constexpr std::size_t kMaxKeptKeyframes = 200;
-            if (segment.keyframes.size() > kMaxKeptKeyframes) {
-              return ScoreSegment(rig, theta0, segment);
-            }
-            // One workspace for each scoring thread, on the heap: in static
-            // storage every thread of the process would hold one.
-            thread_local const auto scorer = std::make_unique<SegmentScorer>();
-            SegmentInformation information;
-            scorer->Score(rig, theta0, segment, {}, &information);
-            return information;
-          },
-          [](const Rig& rig,
-             const Calibration& theta_start,
-             const std::vector<MotionSegment>& segments,
-             const CalibrateOptions& options,
-             const ProgressCallback& progress,
-             const std::function<bool()>&) {
-            return Calibrate(rig, theta_start, segments, options, progress);
-          },
-          ScoreByCore,
-          [](const Rig& rig,
-             const Calibration& theta0,
-             const MotionSegment& segment) {
-            return SummariseSettledEnds(rig, theta0, segment);
-          }};
+  return {
+      [](const Rig& rig,
+         const Calibration& theta0,
+         const MotionSegment& segment) {
+        // The workspace of a very long segment is not kept.
+        constexpr std::size_t kMaxKeptKeyframes = 200;
+        if (segment.keyframes.size() > kMaxKeptKeyframes) {
+          return ScoreSegment(rig, theta0, segment);
+        }
+        // One workspace for each scoring thread, on the heap: in static
+        // storage every thread of the process would hold one.
+        thread_local const auto scorer = std::make_unique<SegmentScorer>();
+        SegmentInformation information;
+        scorer->Score(rig, theta0, segment, {}, &information);
+        return information;
+      },
+      [](const Rig& rig,
+         const Calibration& theta_start,
+         const SegmentSource& segments,
+         const CalibrateOptions& options,
+         const ProgressCallback& progress,
+         const std::function<bool()>&) -> absl::StatusOr<CalibrationResult> {
+        SELFCAL_ASSIGN_OR_RETURN(const auto all, ReadAll(segments));
+        return Calibrate(rig, theta_start, all, options, progress);
+      },
+      ScoreByCore,
+      [](const Rig& rig,
+         const Calibration& theta0,
+         const MotionSegment& segment) {
+        return SummariseSettledEnds(rig, theta0, segment);
+      }};
 }
 
 std::unique_ptr<Pipeline> MakePipeline(Domain* domain,

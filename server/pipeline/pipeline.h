@@ -29,6 +29,7 @@
 #include "server/pipeline/coaching.h"
 #include "server/pipeline/observer.h"
 #include "server/pipeline/verification.h"
+#include "server/store/segment_source.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -88,12 +89,14 @@ struct Estimators {
   std::function<SegmentInformation(
       const Rig& rig, const Calibration& theta0, const MotionSegment& segment)>
       score;
-  std::function<CalibrationResult(const Rig& rig,
-                                  const Calibration& theta_start,
-                                  const std::vector<MotionSegment>& segments,
-                                  const CalibrateOptions& options,
-                                  const ProgressCallback& progress,
-                                  const std::function<bool()>& interrupted)>
+  // An error is that of `segments`.
+  std::function<absl::StatusOr<CalibrationResult>(
+      const Rig& rig,
+      const Calibration& theta_start,
+      const SegmentSource& segments,
+      const CalibrateOptions& options,
+      const ProgressCallback& progress,
+      const std::function<bool()>& interrupted)>
       calibrate;
   // Scores by either core, for a verification. CANCELLED if it was interrupted.
   std::function<absl::StatusOr<SegmentInformation>(

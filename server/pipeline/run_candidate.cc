@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <optional>
 #include <utility>
-#include <vector>
 
 #include "server/pipeline/run_options.h"
 #include "server/pipeline/run_settings.h"
@@ -13,47 +13,42 @@
 namespace selfcal::server {
 namespace {
 
-absl::StatusOr<std::vector<MotionSegment>> LoadSegments(
-    const RunContext& context,
-    const StoredRun& run,
-    std::optional<SegmentKey>* damaged) {
-  std::vector<MotionSegment> segments;
-  for (const SegmentKey& key : run.segments) {
-    if (context.interrupted()) {
-      return absl::CancelledError("interrupted");
-    }
+SegmentSource SegmentsOf(const RunContext& context,
+                         const StoredRun& run,
+                         std::optional<SegmentKey>* damaged) {
+  return [&context, &run, damaged, next = run.segments.begin()]() mutable
+         -> absl::StatusOr<std::optional<MotionSegment>> {
+    if (next == run.segments.end()) return std::nullopt;
+    if (context.interrupted()) return absl::CancelledError("interrupted");
+    const SegmentKey& key = *next++;
     auto segment = context.store()->GetSegmentData(run.rig, key);
-    if (absl::IsDataLoss(segment.status())) {
-      *damaged = key;
-    }
-    SELFCAL_RETURN_IF_ERROR(segment.status());
-    segments.push_back(*std::move(segment));
-  }
-  return segments;
+    if (absl::IsDataLoss(segment.status())) *damaged = key;
+    return segment;
+  };
 }
 
-absl::StatusOr<CalibrationResult> RunSolver(
-    const RunContext& context,
-    const StoredRun& run,
-    const Rig& rig,
-    const Calibration& start,
-    const std::vector<MotionSegment>& segments,
-    const CalibrateOptions& options) {
+absl::StatusOr<CalibrationResult> RunSolver(const RunContext& context,
+                                            const StoredRun& run,
+                                            const Rig& rig,
+                                            const Calibration& start,
+                                            const SegmentSource& segments,
+                                            const CalibrateOptions& options) {
   const std::chrono::milliseconds limit = context.options.max_run_time;
   const auto deadline = std::chrono::steady_clock::now() + limit;
   const auto late = [&] { return std::chrono::steady_clock::now() > deadline; };
   const auto unwanted = [&] { return context.interrupted() || late(); };
-  CalibrationResult result = context.estimators.calibrate(
-      rig,
-      start,
-      segments,
-      options,
-      [&](const CalibrateProgress& progress) {
-        context.current->AddStep(progress);
-        PublishStep(context, run, progress);
-        return !unwanted();
-      },
-      unwanted);
+  SELFCAL_ASSIGN_OR_RETURN(CalibrationResult result,
+                           context.estimators.calibrate(
+                               rig,
+                               start,
+                               segments,
+                               options,
+                               [&](const CalibrateProgress& progress) {
+                                 context.current->AddStep(progress);
+                                 PublishStep(context, run, progress);
+                                 return !unwanted();
+                               },
+                               unwanted));
   if (result.status == CalibrateStatus::kCancelled && late() &&
       !context.interrupted()) {
     return absl::DeadlineExceededError(fmt::format(
@@ -80,14 +75,16 @@ absl::StatusOr<StoredCalibration> ComputeCandidate(
   SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, store->GetRig(run.rig));
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration base,
                            store->GetCalibration(run.rig, run.base_version));
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<MotionSegment> segments,
-                           LoadSegments(context, run, damaged));
   SELFCAL_ASSIGN_OR_RETURN(
       const CalibrateOptions options,
       OptionsOfRun(context.domain, context.options.calibrate, rig, run));
-  SELFCAL_ASSIGN_OR_RETURN(
-      CalibrationResult result,
-      RunSolver(context, run, rig.rig, base.theta, segments, options));
+  SELFCAL_ASSIGN_OR_RETURN(CalibrationResult result,
+                           RunSolver(context,
+                                     run,
+                                     rig.rig,
+                                     base.theta,
+                                     SegmentsOf(context, run, damaged),
+                                     options));
   StoredCalibration candidate;
   candidate.state = CalibrationState::kCandidate;
   candidate.theta = result.theta;

@@ -154,15 +154,18 @@ absl::StatusOr<CalibrationCheck> Verifier::CheckCalibration(
                            OptionsOfRun(domain_, options_.calibrate, rig, run));
   CalibrationCheck check;
   check.version = version;
-  std::vector<MotionSegment> segments;
-  SELFCAL_RETURN_IF_ERROR(LoadSegments(calibration, &segments, &check));
-  if (segments.empty()) {
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<SegmentKey> keys,
+                           KeysWithData(calibration));
+  check.segments = static_cast<int>(keys.size());
+  check.segments_gone =
+      static_cast<int>(calibration.segments.size() - keys.size());
+  if (keys.empty()) {
     check.message = "the data of none of its segments is kept";
     return check;
   }
   const Interrupted stop = OrStopped(interrupted);
   const auto solve = [&](SolverKind solver) {
-    return Solve(solver, rig.rig, calibration.theta, segments, options, stop);
+    return Solve(solver, rig.rig, calibration.theta, keys, options, stop);
   };
   const auto structured = solve(SolverKind::kStructured);
   const auto ceres = structured.ok() ? solve(SolverKind::kCeres) : structured;
@@ -181,28 +184,25 @@ absl::StatusOr<CalibrationCheck> Verifier::CheckCalibration(
   return check;
 }
 
-absl::Status Verifier::LoadSegments(const StoredCalibration& version,
-                                    std::vector<MotionSegment>* segments,
-                                    CalibrationCheck* check) {
+absl::StatusOr<std::vector<SegmentKey>> Verifier::KeysWithData(
+    const StoredCalibration& version) {
+  std::vector<SegmentKey> keys;
   for (const SegmentKey& key : version.segments) {
-    auto segment = store_->GetSegmentData(version.rig, key);
-    if (segment.ok()) {
-      segments->push_back(*std::move(segment));
-    } else if (IsGone(segment.status())) {
-      ++check->segments_gone;
-    } else {
-      return segment.status();
+    const absl::Status read = store_->GetSegmentData(version.rig, key).status();
+    if (read.ok()) {
+      keys.push_back(key);
+    } else if (!IsGone(read)) {
+      return read;
     }
   }
-  check->segments = static_cast<int>(segments->size());
-  return absl::OkStatus();
+  return keys;
 }
 
 absl::StatusOr<CalibrationResult> Verifier::Solve(
     SolverKind solver,
     const Rig& rig,
     const Calibration& start,
-    const std::vector<MotionSegment>& segments,
+    const std::vector<SegmentKey>& keys,
     CalibrateOptions options,
     const Interrupted& interrupted) {
   options.solver = solver;
@@ -211,13 +211,21 @@ absl::StatusOr<CalibrationResult> Verifier::Solve(
   const auto unwanted = [&] {
     return interrupted() || std::chrono::steady_clock::now() > deadline;
   };
-  CalibrationResult result = estimators_.calibrate(
-      rig,
-      start,
-      segments,
-      options,
-      [&](const CalibrateProgress&) { return !unwanted(); },
-      unwanted);
+  const SegmentSource segments =
+      [this, &rig, next = keys.begin(), end = keys.end()]() mutable
+      -> absl::StatusOr<std::optional<MotionSegment>> {
+    if (next == end) return std::nullopt;
+    return store_->GetSegmentData(rig.id, *next++);
+  };
+  SELFCAL_ASSIGN_OR_RETURN(
+      CalibrationResult result,
+      estimators_.calibrate(
+          rig,
+          start,
+          segments,
+          options,
+          [&](const CalibrateProgress&) { return !unwanted(); },
+          unwanted));
   if (result.status == CalibrateStatus::kCancelled) {
     return absl::DeadlineExceededError(
         "a solver took longer than a run may (max-run-minutes)");

@@ -70,16 +70,15 @@ class Verifier {
   absl::StatusOr<ScoreCheck> CheckStored(const StoredRig& rig,
                                          const StoredSegment& segment,
                                          const Interrupted& interrupted);
-  absl::Status LoadSegments(const StoredCalibration& version,
-                            std::vector<MotionSegment>* segments,
-                            CalibrationCheck* check);
-  absl::StatusOr<CalibrationResult> Solve(
-      SolverKind solver,
-      const Rig& rig,
-      const Calibration& start,
-      const std::vector<MotionSegment>& segments,
-      CalibrateOptions options,
-      const Interrupted& interrupted);
+  // Those of its segments whose data can be read.
+  absl::StatusOr<std::vector<SegmentKey>> KeysWithData(
+      const StoredCalibration& version);
+  absl::StatusOr<CalibrationResult> Solve(SolverKind solver,
+                                          const Rig& rig,
+                                          const Calibration& start,
+                                          const std::vector<SegmentKey>& keys,
+                                          CalibrateOptions options,
+                                          const Interrupted& interrupted);
 
   Domain* const domain_;
   Store* const store_;

@@ -96,36 +96,21 @@ bool GetOptions(const worker::Options& message, CalibrateOptions* options) {
 
 }  // namespace
 
-std::string EncodeJob(const Rig& rig,
-                      const Calibration& theta_start,
-                      const std::vector<MotionSegment>& segments,
-                      const CalibrateOptions& options,
-                      const WorkerLimits& limits) {
-  worker::Job job;
-  *job.mutable_rig() = ToProto(rig);
-  *job.mutable_theta_start() = ToProto(theta_start);
-  for (const MotionSegment& segment : segments) {
-    *job.add_segments() = ToProto(segment);
+std::string EncodeJob(const Job& job) {
+  worker::Job message;
+  *message.mutable_rig() = ToProto(job.rig);
+  *message.mutable_theta_start() = ToProto(job.theta_start);
+  if (job.scorer) {
+    message.mutable_score()->set_scorer(static_cast<int>(*job.scorer));
+  } else {
+    PutOptions(job.options, message.mutable_options());
   }
-  PutOptions(options, job.mutable_options());
-  PutLimits(limits, job.mutable_limits());
-  std::string bytes;
-  return job.SerializeToString(&bytes) ? bytes : "";
+  PutLimits(job.limits, message.mutable_limits());
+  return message.SerializeAsString();
 }
 
-std::string EncodeScoreJob(ScorerKind scorer,
-                           const Rig& rig,
-                           const Calibration& theta0,
-                           const MotionSegment& segment,
-                           const WorkerLimits& limits) {
-  worker::Job job;
-  *job.mutable_rig() = ToProto(rig);
-  *job.mutable_theta_start() = ToProto(theta0);
-  *job.add_segments() = ToProto(segment);
-  job.mutable_score()->set_scorer(static_cast<int>(scorer));
-  PutLimits(limits, job.mutable_limits());
-  std::string bytes;
-  return job.SerializeToString(&bytes) ? bytes : "";
+std::string EncodeSegment(const MotionSegment& segment) {
+  return ToProto(segment).SerializeAsString();
 }
 
 std::string EncodeProgress(const CalibrateProgress& progress) {
@@ -165,20 +150,22 @@ std::optional<Job> DecodeJob(std::string_view bytes) {
     return std::nullopt;
   }
   if (message.has_score()) {
-    if (message.segments_size() != 1) return std::nullopt;
     job.scorer = static_cast<ScorerKind>(message.score().scorer());
   } else if (!GetOptions(message.options(), &job.options)) {
     return std::nullopt;
   }
-  job.segments.resize(message.segments_size());
-  for (int i = 0; i < message.segments_size(); ++i) {
-    if (!FromProto(message.segments(i), "", &job.segments[i]).empty()) {
-      return std::nullopt;
-    }
-  }
   job.limits.idle = message.limits().idle();
   job.limits.max_memory_bytes = message.limits().max_memory_bytes();
   return job;
+}
+
+std::optional<MotionSegment> DecodeSegment(std::string_view bytes) {
+  v1::MotionSegment message;
+  MotionSegment segment;
+  if (!Parse(bytes, &message) || !FromProto(message, "", &segment).empty()) {
+    return std::nullopt;
+  }
+  return segment;
 }
 
 std::optional<CalibrateProgress> DecodeProgress(std::string_view bytes) {

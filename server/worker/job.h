@@ -7,7 +7,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "core/calibration/calibrate.h"
 #include "core/model/calibration.h"
@@ -18,28 +17,19 @@
 
 namespace selfcal::server {
 
+// What is to be done with the segments, which follow one by one.
 struct Job {
   Rig rig;
   Calibration theta_start;
-  std::vector<MotionSegment> segments;
   CalibrateOptions options;
   WorkerLimits limits;
-  // If set, the job is to score the only segment at theta_start; otherwise it
+  // If set, the job is to score one segment at theta_start; otherwise it
   // is a calibration.
   std::optional<ScorerKind> scorer = std::nullopt;
 };
 
-// Returns an empty string if the job exceeds the size of a message (2 GiB).
-std::string EncodeJob(const Rig& rig,
-                      const Calibration& theta_start,
-                      const std::vector<MotionSegment>& segments,
-                      const CalibrateOptions& options,
-                      const WorkerLimits& limits);
-std::string EncodeScoreJob(ScorerKind scorer,
-                           const Rig& rig,
-                           const Calibration& theta0,
-                           const MotionSegment& segment,
-                           const WorkerLimits& limits);
+std::string EncodeJob(const Job& job);
+std::string EncodeSegment(const MotionSegment& segment);
 std::string EncodeProgress(const CalibrateProgress& progress);
 // A failed result keeps only its message; any other keeps what the record of a
 // calibration has, and Lambda.
@@ -48,6 +38,7 @@ std::string EncodeScore(const SegmentInformation& information);
 
 // Return nullopt if the bytes are not from the functions above.
 std::optional<Job> DecodeJob(std::string_view bytes);
+std::optional<MotionSegment> DecodeSegment(std::string_view bytes);
 std::optional<CalibrateProgress> DecodeProgress(std::string_view bytes);
 std::optional<CalibrationResult> DecodeResult(std::string_view bytes);
 

@@ -10,6 +10,9 @@
 #include <exception>
 #include <fstream>
 #include <new>
+#include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "server/worker/channel.h"
 #include "server/worker/idle_process.h"
@@ -59,13 +62,24 @@ CalibrationResult Failure(std::string message) {
   return result;
 }
 
+std::vector<MotionSegment> ReceiveSegments() {
+  std::vector<MotionSegment> segments;
+  while (const auto part = ReceivePart(kJobFile)) {
+    auto segment = DecodeSegment(*part);
+    if (!segment) throw std::runtime_error("a segment cannot be read");
+    segments.push_back(*std::move(segment));
+  }
+  return segments;
+}
+
 std::string Compute(const Job& job) {
+  const std::vector<MotionSegment> segments = ReceiveSegments();
   if (job.scorer) {
-    return EncodeScore(ScoreSegmentBy(
-        *job.scorer, job.rig, job.theta_start, job.segments.front()));
+    return EncodeScore(
+        ScoreSegmentBy(*job.scorer, job.rig, job.theta_start, segments.at(0)));
   }
   return EncodeResult(Calibrate(
-      job.rig, job.theta_start, job.segments, job.options, ReportProgress));
+      job.rig, job.theta_start, segments, job.options, ReportProgress));
 }
 
 // Computes the job and returns the bytes of the result.
@@ -88,7 +102,7 @@ std::string Solve(const Job& job) {
 int RunWorker() {
   IgnoreStopSignals();
   PreferOomKill();
-  const auto job = DecodeJob(ReadWhole(kJobFile));
+  const auto job = DecodeJob(ReceivePart(kJobFile).value_or(""));
   if (!job) {
     return EXIT_FAILURE;
   }

@@ -17,12 +17,12 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <stdexcept>
-#include <string_view>
+#include <optional>
 #include <system_error>
 #include <thread>
 #include <utility>
 
+#include "server/status/status_macros.h"
 #include "server/worker/channel.h"
 #include "server/worker/job.h"
 
@@ -30,9 +30,6 @@ extern char** environ;
 
 namespace selfcal::server {
 namespace {
-
-// Interval at which `interrupted` is called.
-constexpr int kPollMs = 20;
 
 std::system_error SystemError(const char* what) {
   return {errno, std::generic_category(), what};
@@ -68,13 +65,14 @@ Descriptor MakeFile(const char* name) {
 }
 
 struct Sockets {
-  Sockets() : Sockets(Pair()) {}
+  // SOCK_STREAM or SOCK_SEQPACKET
+  explicit Sockets(int type) : Sockets(Pair(type)) {}
   explicit Sockets(const std::array<int, 2>& pair)
       : ours(pair[0], "socketpair"), workers(pair[1], "socketpair") {}
 
-  static std::array<int, 2> Pair() {
+  static std::array<int, 2> Pair(int type) {
     std::array<int, 2> pair{-1, -1};
-    if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, pair.data())) {
+    if (socketpair(AF_UNIX, type | SOCK_CLOEXEC, 0, pair.data()) != 0) {
       throw SystemError("socketpair");
     }
     return pair;
@@ -204,46 +202,65 @@ bool Follow(int socket,
   }
 }
 
-Finished RunJob(const std::vector<std::string>& command,
-                std::string bytes,
-                const ProgressCallback& progress,
-                const std::function<bool()>& interrupted) {
-  if (bytes.empty()) {
-    return {CalibrateStatus::kFailed,
-            "its segments exceed 2 GiB; make the tables smaller",
-            ""};
+// Sends the job and its segments. Returns an error of `segments`.
+absl::StatusOr<Sending> SendJob(int socket,
+                                const Job& job,
+                                const SegmentSource& segments,
+                                const std::function<bool()>& interrupted) {
+  Sending sent = SendPart(socket, EncodeJob(job), interrupted);
+  while (sent == Sending::kDone) {
+    SELFCAL_ASSIGN_OR_RETURN(std::optional<MotionSegment> segment, segments());
+    if (!segment) return SendPart(socket, "", interrupted);
+    const std::string part = EncodeSegment(*segment);
+    segment.reset();  // not needed while the worker receives it
+    sent = SendPart(socket, part, interrupted);
   }
-  const Descriptor job = MakeFile("selfcal-job");
+  return sent;
+}
+
+// Returns an error of `segments`.
+absl::StatusOr<Finished> RunJob(const std::vector<std::string>& command,
+                                const Job& job,
+                                const SegmentSource& segments,
+                                const ProgressCallback& progress,
+                                const std::function<bool()>& interrupted) {
+  Sockets jobs(SOCK_STREAM);
+  Sockets reports(SOCK_SEQPACKET);
   const Descriptor result = MakeFile("selfcal-result");
-  WriteWhole(job.get(), bytes);
-  bytes = std::string();  // the worker has it
-  Sockets sockets;
-  Process process(command, job.get(), sockets.workers.get(), result.get());
-  sockets.workers.Close();
-  if (!Follow(sockets.ours.get(), progress, interrupted)) {
-    return {CalibrateStatus::kCancelled, "cancelled", ""};
+  Process process(
+      command, jobs.workers.get(), reports.workers.get(), result.get());
+  jobs.workers.Close();
+  reports.workers.Close();
+  SELFCAL_ASSIGN_OR_RETURN(
+      const Sending sent, SendJob(jobs.ours.get(), job, segments, interrupted));
+  // A worker that has not read all of it has ended, or is about to.
+  if (sent == Sending::kInterrupted ||
+      !Follow(reports.ours.get(), progress, interrupted)) {
+    return Finished{CalibrateStatus::kCancelled, "cancelled", ""};
   }
   if (const int status = process.Wait(); status != 0) {
-    return {CalibrateStatus::kFailed, WhyItEnded(status), ""};
+    return Finished{CalibrateStatus::kFailed, WhyItEnded(status), ""};
   }
-  return {CalibrateStatus::kConverged, "", ReadWhole(result.get())};
+  return Finished{CalibrateStatus::kConverged, "", ReadWhole(result.get())};
 }
 
 }  // namespace
 
-CalibrationResult CalibrateInWorker(const std::vector<std::string>& command,
-                                    const WorkerLimits& limits,
-                                    const Rig& rig,
-                                    const Calibration& theta_start,
-                                    const std::vector<MotionSegment>& segments,
-                                    const CalibrateOptions& options,
-                                    const ProgressCallback& progress,
-                                    const std::function<bool()>& interrupted) {
-  Finished finished =
-      RunJob(command,
-             EncodeJob(rig, theta_start, segments, options, limits),
-             progress,
-             interrupted);
+absl::StatusOr<CalibrationResult> CalibrateInWorker(
+    const std::vector<std::string>& command,
+    const WorkerLimits& limits,
+    const Rig& rig,
+    const Calibration& theta_start,
+    const SegmentSource& segments,
+    const CalibrateOptions& options,
+    const ProgressCallback& progress,
+    const std::function<bool()>& interrupted) {
+  SELFCAL_ASSIGN_OR_RETURN(Finished finished,
+                           RunJob(command,
+                                  {rig, theta_start, options, limits},
+                                  segments,
+                                  progress,
+                                  interrupted));
   if (finished.status == CalibrateStatus::kConverged) {
     auto read = DecodeResult(finished.result);
     if (read) return *std::move(read);
@@ -264,11 +281,19 @@ absl::StatusOr<SegmentInformation> ScoreInWorker(
     const Calibration& theta0,
     const MotionSegment& segment,
     const std::function<bool()>& interrupted) {
-  const Finished finished =
+  const SegmentSource once =
+      [&,
+       sent = false]() mutable -> absl::StatusOr<std::optional<MotionSegment>> {
+    if (std::exchange(sent, true)) return std::nullopt;
+    return segment;
+  };
+  SELFCAL_ASSIGN_OR_RETURN(
+      const Finished finished,
       RunJob(command,
-             EncodeScoreJob(scorer, rig, theta0, segment, limits),
+             {rig, theta0, CalibrateOptions(), limits, scorer},
+             once,
              nullptr,
-             interrupted);
+             interrupted));
   if (finished.status == CalibrateStatus::kConverged) {
     return DecodeScore(finished.result);
   }

@@ -13,6 +13,7 @@
 #include "core/simulation/simulate.h"
 #include "core/simulation/trajectory.h"
 #include "server/worker/worker.h"
+#include "test/server/segment_source_of.h"
 
 namespace selfcal::server {
 namespace {
@@ -62,22 +63,22 @@ void Measure(const std::string& selfcald, int trials) {
     here.push_back(MillisecondsSince(begin));
     begin = Clock::now();
     const auto result = CalibrateInWorker(
-        command, limits, rig, rig.factory, segments, {}, go_on, {});
+        command, limits, rig, rig.factory, SourceOf(segments), {}, go_on, {});
     apart.push_back(MillisecondsSince(begin));
-    if (result.status != CalibrateStatus::kConverged) {
-      throw std::runtime_error("the worker: " + result.message);
+    if (result->status != CalibrateStatus::kConverged) {
+      throw std::runtime_error("the worker: " + result->message);
     }
     // At a moment of its own each time.
     const double wanted_ms = here.back() * (k + 0.5) / trials;
     Clock::time_point asked;
     begin = Clock::now();
     const auto cancelled = CalibrateInWorker(
-        command, idle, rig, rig.factory, segments, {}, go_on, [&] {
+        command, idle, rig, rig.factory, SourceOf(segments), {}, go_on, [&] {
           if (MillisecondsSince(begin) < wanted_ms) return false;
           asked = Clock::now();
           return true;
         });
-    if (cancelled.status == CalibrateStatus::kCancelled) {
+    if (cancelled->status == CalibrateStatus::kCancelled) {
       gone.push_back(MillisecondsSince(asked));
     }
   }

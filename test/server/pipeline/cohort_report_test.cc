@@ -18,7 +18,7 @@ class CohortReportTest : public PipelineTest {
   CohortReportTest() {
     estimators_.calibrate = [this](const Rig& rig,
                                    const Calibration& start,
-                                   const std::vector<MotionSegment>&,
+                                   const SegmentSource&,
                                    const CalibrateOptions&,
                                    const ProgressCallback&,
                                    const auto&) {

@@ -60,7 +60,7 @@ TEST_F(MemoryTest, ARunStandsOnTheSegmentsWithoutDataToo) {
   estimators_.calibrate = [calibrate = estimators_.calibrate](
                               const Rig& rig,
                               const Calibration& start,
-                              const std::vector<MotionSegment>& segments,
+                              const SegmentSource& segments,
                               CalibrateOptions options,
                               const auto&... rest) {
     options.remembered.clear();

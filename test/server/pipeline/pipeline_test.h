@@ -16,6 +16,7 @@
 
 #include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
+#include "server/status/status_macros.h"
 #include "test/server/store/fake_information.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/test_segments.h"
@@ -31,12 +32,14 @@ class PipelineTest : public ::testing::Test {
         [](const Rig& rig, const Calibration&, const MotionSegment& segment) {
           return FakeInformation(rig, EntropyOf(segment.key.index));
         };
-    estimators_.calibrate = [](const Rig& rig,
-                               const Calibration& start,
-                               const std::vector<MotionSegment>&,
-                               const CalibrateOptions&,
-                               const ProgressCallback& progress,
-                               const auto&) {
+    estimators_.calibrate =
+        [](const Rig& rig,
+           const Calibration& start,
+           const SegmentSource& segments,
+           const CalibrateOptions&,
+           const ProgressCallback& progress,
+           const auto&) -> absl::StatusOr<CalibrationResult> {
+      SELFCAL_RETURN_IF_ERROR(ReadAll(segments).status());
       if (!progress({1, 2, 1.0, 1.0})) return Cancelled(start);
       return Converged(rig, start);
     };

@@ -13,14 +13,16 @@ class RecalibrationTest : public PipelineTest {
  protected:
   // The solver iterates until it is told to stop, or the test lets it end.
   void MakeSolverWait() {
-    estimators_.calibrate = [this](const Rig& rig,
-                                   const Calibration& start,
-                                   const std::vector<MotionSegment>& segments,
-                                   const CalibrateOptions&,
-                                   const ProgressCallback& progress,
-                                   const auto&) {
+    estimators_.calibrate =
+        [this](const Rig& rig,
+               const Calibration& start,
+               const SegmentSource& segments,
+               const CalibrateOptions&,
+               const ProgressCallback& progress,
+               const auto&) -> absl::StatusOr<CalibrationResult> {
       ++solves_;
-      segments_ = segments.size();
+      SELFCAL_ASSIGN_OR_RETURN(const auto read, ReadAll(segments));
+      segments_ = read.size();
       bool stopped = false;
       int k = 0;
       EXPECT_TRUE(Eventually([&] {
@@ -68,7 +70,7 @@ TEST_F(RecalibrationTest, NoiseIsReweightedWhereTheRigSaysSo) {
   std::map<std::string, bool> reweighted;
   estimators_.calibrate = [&](const Rig& rig,
                               const Calibration& start,
-                              const std::vector<MotionSegment>&,
+                              const SegmentSource&,
                               const CalibrateOptions& options,
                               const ProgressCallback&,
                               const auto&) {

@@ -17,7 +17,7 @@ class ReplicaTest : public PipelineTest {
     options_.recheck = std::chrono::milliseconds(50);
     estimators_.calibrate = [this](const Rig& rig,
                                    const Calibration& start,
-                                   const std::vector<MotionSegment>&,
+                                   const SegmentSource&,
                                    const CalibrateOptions&,
                                    const ProgressCallback&,
                                    const auto&) {
@@ -194,7 +194,7 @@ TEST_F(ReplicaTest, ARunIsCancelledThroughAnyOfThem) {
   const auto is_solving = std::make_shared<std::atomic<bool>>(false);
   estimators_.calibrate = [is_solving](const Rig&,
                                        const Calibration& start,
-                                       const std::vector<MotionSegment>&,
+                                       const SegmentSource&,
                                        const CalibrateOptions&,
                                        const ProgressCallback& progress,
                                        const auto&) {

@@ -190,11 +190,10 @@ TEST_F(VerificationTest, FindsASolverThatStopsElsewhere) {
                                          const auto& segments,
                                          const CalibrateOptions& options,
                                          const auto&... callbacks) {
-    CalibrationResult result =
-        calibrate(rig, start, segments, options, callbacks...);
+    auto result = calibrate(rig, start, segments, options, callbacks...);
     if (wrong && options.solver == SolverKind::kStructured) {
       // The first component of the gyroscope's scale.
-      result.theta.imu.s_g.x() += 0.3 * std::sqrt(result.covariance(0, 0));
+      result->theta.imu.s_g.x() += 0.3 * std::sqrt(result->covariance(0, 0));
     }
     return result;
   };

@@ -21,6 +21,7 @@
 #include "core/calibration/calibrate.h"
 #include "server/worker/channel.h"
 #include "server/worker/job.h"
+#include "test/server/segment_source_of.h"
 #include "test/server/test_segments.h"
 #include "test/support/eventually.h"
 
@@ -59,10 +60,11 @@ class WorkerTest : public ::testing::Test {
                              limits_,
                              rig_,
                              rig_.factory,
-                             segments_,
+                             SourceOf(segments_),
                              options_,
                              progress_,
-                             interrupted);
+                             interrupted)
+        .value();
   }
 
   const Rig rig_ = TestRig("a");
@@ -177,15 +179,10 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   options_.walk =
       Eigen::VectorXd::LinSpaced(TangentSize(rig_.factory), 0.1, 0.2);
   limits_ = {.idle = true, .max_memory_bytes = 123};
-  const std::string bytes =
-      EncodeJob(rig_, rig_.factory, segments_, options_, limits_);
+  const std::string bytes = EncodeJob({rig_, rig_.factory, options_, limits_});
   const auto job = DecodeJob(bytes);
   ASSERT_TRUE(job.has_value());
-  EXPECT_EQ(
-      EncodeJob(
-          job->rig, job->theta_start, job->segments, job->options, job->limits),
-      bytes);
-  EXPECT_EQ(job->segments.size(), segments_.size());
+  EXPECT_EQ(EncodeJob(*job), bytes);
   EXPECT_EQ(job->options.loss, LossKind::kCauchy);
   EXPECT_EQ(job->options.loss_scale, 1.25);
   EXPECT_EQ(job->options.prior->information, options_.prior->information);
@@ -208,7 +205,82 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
   EXPECT_EQ(job->options.changing, options_.changing);
   EXPECT_TRUE(job->limits.idle);
   EXPECT_EQ(job->limits.max_memory_bytes, 123);
+  EXPECT_FALSE(job->scorer);
   EXPECT_FALSE(DecodeJob("not a job").has_value());
+  const std::string segment = EncodeSegment(segments_[0]);
+  EXPECT_EQ(EncodeSegment(DecodeSegment(segment).value()), segment);
+  EXPECT_FALSE(DecodeSegment("not a segment").has_value());
+}
+
+TEST_F(WorkerTest, AnErrorOfTheSegmentsEndsIt) {
+  pid_t child = 0;
+  int read = 0;
+  const auto result = CalibrateInWorker(
+      kWorker,
+      limits_,
+      rig_,
+      rig_.factory,
+      [&]() -> absl::StatusOr<std::optional<MotionSegment>> {
+        if (++read == 3) {
+          child = Child();
+          return absl::DataLossError("the disk");
+        }
+        return segments_[0];
+      },
+      options_,
+      progress_,
+      nullptr);
+  EXPECT_EQ(result.status(), absl::DataLossError("the disk"));
+  EXPECT_EQ(read, 3);
+  ASSERT_NE(child, 0);
+  EXPECT_TRUE(Eventually([&] { return !IsAlive(child); }));
+}
+
+// It stops to read before it has all of them, and its message still arrives.
+TEST_F(WorkerTest, SegmentsCountForItsMemory) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "it ends the process where memory runs out";
+#endif
+  limits_.max_memory_bytes = 8 << 20;
+  constexpr int kMost = 10'000;  // some hundred megabytes
+  int read = 0;
+  const auto result = CalibrateInWorker(
+      kWorker,
+      limits_,
+      rig_,
+      rig_.factory,
+      [&]() -> absl::StatusOr<std::optional<MotionSegment>> {
+        if (++read > kMost) return std::nullopt;
+        return segments_[0];
+      },
+      options_,
+      progress_,
+      nullptr);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->status, CalibrateStatus::kFailed);
+  EXPECT_THAT(result->message, HasSubstr("memory limit of a run of 8 MiB"));
+  EXPECT_LT(read, kMost);
+}
+
+// One that never reads its job.
+TEST_F(WorkerTest, AnInterruptionEndsTheSendingOfAJob) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto result = CalibrateInWorker(
+      {"/bin/sleep", "100000"},
+      limits_,
+      rig_,
+      rig_.factory,
+      [&]() -> absl::StatusOr<std::optional<MotionSegment>> {
+        return segments_[0];  // without an end
+      },
+      options_,
+      progress_,
+      [&] {
+        return std::chrono::steady_clock::now() - begin >
+               std::chrono::milliseconds(300);
+      });
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->status, CalibrateStatus::kCancelled);
 }
 
 TEST_F(WorkerTest, AScoreIsThatOfItsScorerToTheBit) {
