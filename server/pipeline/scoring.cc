@@ -202,31 +202,33 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::NextClaim() {
     }
     if (std::optional<Claim> next = Choose(*unscored)) {
       claimed_.emplace(next->rig, next->sequence);
-      last_turn_[next->rig] = ++turns_;
       return next;
     }
-    last_turn_.clear();  // nobody waits
     changed_.wait(lock, [&] { return !running_ || arrivals_ != seen; });
   }
   return std::nullopt;
 }
 
 std::optional<ScoringWorkers::Claim> ScoringWorkers::Choose(
-    const std::vector<Store::Unscored>& unscored) const {
-  std::optional<Claim> next;
-  std::int64_t next_turn = 0;
+    const std::vector<Store::Unscored>& unscored) {
+  std::vector<Claim> claims;
+  std::vector<FairOrder::Piece> pieces;
   for (const Store::Unscored& candidate : unscored) {
-    if (deleting_.contains(candidate.rig)) continue;
-    const auto turn = last_turn_.find(candidate.rig);
-    const std::int64_t last = turn == last_turn_.end() ? 0 : turn->second;
-    if (next && last >= next_turn) continue;
-    if (claimed_.contains({candidate.rig, candidate.sequence})) continue;
+    // A rig's next is the oldest that nobody scores.
+    if ((!claims.empty() && claims.back().rig == candidate.rig) ||
+        deleting_.contains(candidate.rig) ||
+        claimed_.contains({candidate.rig, candidate.sequence})) {
+      continue;
+    }
     const std::optional<RigClaim> rig = claims_->Find(candidate.rig);
     if (!rig) continue;
-    next = {candidate.rig, *rig, candidate.key, candidate.sequence};
-    next_turn = last;
+    claims.push_back({candidate.rig, *rig, candidate.key, candidate.sequence});
+    // What it costs to score a segment grows with what was measured.
+    pieces.push_back({candidate.rig, static_cast<double>(candidate.readings)});
   }
-  return next;
+  const std::optional<std::size_t> next = order_.Take(pieces);
+  if (!next) return std::nullopt;
+  return claims[*next];
 }
 
 void ScoringWorkers::Process(const Claim& claim) {

@@ -28,6 +28,7 @@
 
 #include "server/domain/domain.h"
 #include "server/pipeline/backlog.h"
+#include "server/pipeline/fair_order.h"
 #include "server/pipeline/pipeline.h"
 #include "server/pipeline/rig_claims.h"
 #include "server/store/store.h"
@@ -90,8 +91,7 @@ class ScoringWorkers {
   std::optional<Claim> NextClaim();
   // Returns which of the unscored segments, oldest first, to score next. The
   // lock must be held.
-  std::optional<Claim> Choose(
-      const std::vector<Store::Unscored>& unscored) const;
+  std::optional<Claim> Choose(const std::vector<Store::Unscored>& unscored);
   void ReturnPlacesOfOthers();
   // The lock must be held.
   void EmptyPlaces(const std::string& rig, int places);
@@ -122,8 +122,7 @@ class ScoringWorkers {
   bool running_ = false;
   std::int64_t arrivals_ = 0;  // reasons to look for segments, since the start
   std::map<std::string, std::int64_t> filled_;  // places in the backlog, by rig
-  std::int64_t turns_ = 0;                      // claims since the start
-  std::map<std::string, std::int64_t> last_turn_;           // by rig, from 1
+  FairOrder order_;
   std::set<std::pair<std::string, std::int64_t>> claimed_;  // rig, sequence
   std::multiset<std::string> deleting_;  // rigs of which no segment is claimed
   std::vector<std::thread> threads_;

@@ -228,7 +228,8 @@ absl::StatusOr<Payload> ReadPayload(Connection* db,
 absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
     Connection* db, int limit, const std::string& replica) {
   Statement read(db,
-                 "SELECT r.id, s.session, s.session_index, s.sequence "
+                 "SELECT r.id, s.session, s.session_index, s.sequence, "
+                 "  s.observations + s.imu_samples "
                  "FROM segments s JOIN rigs r USING (rig) "
                  "WHERE s.state = 1 AND (?2 = '' OR EXISTS "
                  "  (SELECT 1 FROM claims c "
@@ -239,7 +240,7 @@ absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
   std::vector<Store::Unscored> unscored;
   while (read.Next()) {
     unscored.push_back(
-        {read.Text(0), {read.Text(1), read.Int(2)}, read.Int(3)});
+        {read.Text(0), {read.Text(1), read.Int(2)}, read.Int(3), read.Int(4)});
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return unscored;

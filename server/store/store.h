@@ -338,6 +338,7 @@ class Store {
     std::string rig;
     SegmentKey key;
     std::int64_t sequence;
+    std::int64_t readings = 0;  // observations and samples of the IMU
   };
   virtual absl::StatusOr<std::vector<Unscored>> ListUnscored(
       int limit, const std::string& replica = "") = 0;
