@@ -56,10 +56,7 @@ int ListCalibrations(Context* context,
       *wanted,
       &calibrations);
   if (!status.ok()) return Fail(*context, status);
-  if (context->json) {
-    context->PrintJson(calibrations);
-    return kDone;
-  }
+  if (context->PrintList(calibrations)) return kDone;
   Table table({{"version", true},
                {"state"},
                {"created"},
@@ -190,6 +187,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   const auto options = std::make_shared<ListOptions>();
   AddListOptions(
       list,
+      context,
       "the newest",
       FilterHelp("state = rejected AND created >= 30d", CalibrationFields()),
       options.get());

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "client/cli/commands.h"
+#include "client/cli/list_options.h"
 #include "client/text/estimate_text.h"
 #include "client/text/text.h"
 #include "selfcal/v1/fleet.grpc.pb.h"
@@ -81,10 +82,7 @@ int ShowCohort(Context* context, const v1::DescribeCohortRequest& request) {
   const auto status = Call<FleetService>(
       stub.get(), &FleetService::DescribeCohort, request, &cohort);
   if (!status.ok()) return Fail(*context, status);
-  if (context->json) {
-    context->PrintJson(cohort);
-    return kDone;
-  }
+  if (context->PrintList(cohort)) return kDone;
   Facts facts;
   facts.Add("rigs",
             fmt::format("{} looked at{}, {} calibrated",
@@ -129,6 +127,7 @@ void AddCohortCommands(CLI::App* app, Context* context) {
           [request](int rigs) { request->set_max_rigs(rigs); },
           "Look at so many of them, the last seen first; 500 by default")
       ->check(CLI::Range(1, 2000));
+  AddCsv(show, context);
   show->callback([context, request] {
     context->command = [context, request] {
       return ShowCohort(context, *request);

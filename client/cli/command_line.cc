@@ -20,7 +20,8 @@ constexpr char kFooter[] =
     "one record\nper line, its fields separated by tabs, without a header. "
     "With --json it is the\ncontract's message in proto3 JSON: one document, "
     "or one line each for\nsegment import, calibration watch, run watch, "
-    "rig coach --watch, rig verify and\ndaemon doctor.\n\n"
+    "rig coach --watch, rig verify and\ndaemon doctor. Lists are CSV with "
+    "--csv.\n\n"
     "Exit codes: 0 success; 1 the daemon refused, the operation failed, or "
     "segment\npreflight or rig verify found something; 2 wrong usage, unusable "
     "input, or a file\nthat exists or cannot be written; 3 the daemon cannot "
@@ -132,6 +133,10 @@ int RunCommandLine(int argc, const char* const* argv) {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
       return ReportUsage(&app, error);
+    }
+    if (context.csv && context.json) {
+      return FailInput(absl::InvalidArgumentError(
+          "--csv and --json exclude each other: give one of them"));
     }
     NameTheSubject(app, &context);
     const absl::Status connected = context.Connect();

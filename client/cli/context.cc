@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/cli/list_csv.h"
 #include "client/cli/missing_rig.h"
 #include "client/selfcal/connection.h"
 #include "google/rpc/error_details.pb.h"
@@ -77,6 +78,15 @@ void Context::Print(const Table& table) const {
 void Context::Print(const Facts& facts) const {
   Write(terminal ? facts.Aligned(TerminalLayout(color))
                  : facts.Tabbed(UsesColor(color, false)));
+}
+
+bool Context::PrintList(const google::protobuf::Message& list) const {
+  if (csv) {
+    Write(ListCsv(list));
+  } else if (json) {
+    PrintJson(list);
+  }
+  return csv || json;
 }
 
 void Context::PrintJson(const google::protobuf::Message& message,

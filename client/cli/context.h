@@ -33,6 +33,7 @@ inline constexpr int kDamaged = 4;
 struct Context {
   Target target;
   bool json = false;
+  bool csv = false;       // of a list
   bool terminal = false;  // true if stdout is a terminal
   ColorMode color = ColorMode::kAuto;
   // Names of fields of the request in errors of the daemon.
@@ -54,6 +55,8 @@ struct Context {
 
   void Print(const Table& table) const;
   void Print(const Facts& facts) const;
+  // Prints a list as JSON or as CSV; false if neither is wanted.
+  bool PrintList(const google::protobuf::Message& list) const;
   // Prints one document or, with `line`, one line.
   void PrintJson(const google::protobuf::Message& message,
                  bool line = false) const;

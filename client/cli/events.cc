@@ -107,12 +107,9 @@ grpc::Status Read(Context* context,
 }
 
 void PrintEvents(const Context& context, const std::deque<v1::Event>& events) {
-  if (context.json) {
-    v1::ListEventsResponse document;
-    for (const v1::Event& event : events) *document.add_events() = event;
-    context.PrintJson(document);
-    return;
-  }
+  v1::ListEventsResponse document;
+  for (const v1::Event& event : events) *document.add_events() = event;
+  if (context.PrintList(document)) return;
   Table table(
       {{"event", true}, {"time"}, {"rig"}, {"kind"}, {"detail", false, true}});
   for (const v1::Event& event : events) {
@@ -163,6 +160,7 @@ CLI::App* AddEventList(CLI::App* parent,
                      "30s, 15m, 2h, 7d ago");
   AddListOptions(
       events,
+      context,
       "the newest",
       FilterHelp("kind = data-evicted AND rig != tablet-7", EventFields()),
       &options->list);

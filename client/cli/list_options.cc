@@ -4,7 +4,13 @@
 
 namespace selfcal::client {
 
+void AddCsv(CLI::App* list, Context* context) {
+  list->add_flag(
+      "--csv", context->csv, "Print CSV, with all fields and exact values");
+}
+
 void AddListOptions(CLI::App* list,
+                    Context* context,
                     const std::string& order,
                     const std::string& filter_help,
                     ListOptions* options) {
@@ -12,6 +18,7 @@ void AddListOptions(CLI::App* list,
           "--limit", options->limit, "Only this many, " + order + " [all]")
       ->check(AtLeastOne());
   list->add_option("--filter", options->filter, filter_help);
+  AddCsv(list, context);
 }
 
 }  // namespace selfcal::client

@@ -20,9 +20,13 @@ struct ListOptions {
   std::string filter;
 };
 
-// Adds --limit, of which `order` says the items that remain ("the newest"), and
-// --filter.
+// Adds --csv, of a command that calls Context::PrintList.
+void AddCsv(CLI::App* list, Context* context);
+
+// Adds --limit, of which `order` says the items that remain ("the newest"),
+// --filter, and --csv.
 void AddListOptions(CLI::App* list,
+                    Context* context,
                     const std::string& order,
                     const std::string& filter_help,
                     ListOptions* options);

@@ -47,10 +47,7 @@ int ListRigs(Context* context, const RigListOptions& options) {
                                nullptr,
                                &rigs);
   if (!status.ok()) return Fail(*context, status);
-  if (context->json) {
-    context->PrintJson(rigs);
-    return kDone;
-  }
+  if (context->PrintList(rigs)) return kDone;
   Table table({{"rig"},
                {"cameras", true},
                {"table size", true},
@@ -91,6 +88,7 @@ void AddRigCommands(CLI::App* app, Context* context) {
   CLI::App* list = rig->add_subcommand("list", "List the rigs");
   const auto list_options = std::make_shared<RigListOptions>();
   AddListOptions(list,
+                 context,
                  "the first of the list",
                  "Conditions joined by AND, e.g. 'phone AND labels.batch = 7': "
                  "a text in the name; fields: name, labels.NAME",

@@ -77,10 +77,7 @@ int ListRuns(Context* context,
       *wanted,
       &runs);
   if (!status.ok()) return Fail(*context, status);
-  if (context->json) {
-    context->PrintJson(runs);
-    return kDone;
-  }
+  if (context->PrintList(runs)) return kDone;
   Table table({{"run", true},
                {"state"},
                {"trigger"},
@@ -181,6 +178,7 @@ void AddRunCommands(CLI::App* app, Context* context) {
   list->add_option("RIG", options->rig)->required();
   const auto list_options = std::make_shared<ListOptions>();
   AddListOptions(list,
+                 context,
                  "the newest",
                  FilterHelp("state = failed AND created >= 7d", RunFields()),
                  list_options.get());

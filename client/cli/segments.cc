@@ -202,12 +202,9 @@ int ListSegments(Context* context, const SegmentListOptions& options) {
                                    nullptr,
                                    &segments);
   if (!status.ok()) return Fail(*context, status);
-  if (context->json) {
-    context->PrintJson(segments);
-  } else {
-    context->Print(options.quarantined ? UnusableTable(segments)
-                                       : ListTable(segments));
-  }
+  if (context->PrintList(segments)) return kDone;
+  context->Print(options.quarantined ? UnusableTable(segments)
+                                     : ListTable(segments));
   return kDone;
 }
 
@@ -364,8 +361,11 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
       "List the segments of a rig, newest first, with the entropy of each "
       "group [nat] (lower is more informative) and the tables that hold it");
   list->add_option("RIG", options->rig)->required();
-  AddListOptions(
-      list, "the first of the list", kSegmentFilterHelp, &options->list);
+  AddListOptions(list,
+                 context,
+                 "the first of the list",
+                 kSegmentFilterHelp,
+                 &options->list);
   list->add_option("--order-by",
                    options->order_by,
                    "A field, then asc or desc, e.g. 'entropy.camera asc'");

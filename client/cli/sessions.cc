@@ -49,10 +49,7 @@ int ListSessions(Context* context,
                                    *wanted,
                                    &sessions);
   if (!status.ok()) return Fail(*context, status);
-  if (context->json) {
-    context->PrintJson(sessions);
-    return kDone;
-  }
+  if (context->PrintList(sessions)) return kDone;
   Table table({{"session"}, {"segments", true}, {"first"}, {"last"}});
   for (const v1::Session& session : sessions.sessions()) {
     table.Add({LastPart(session.name()),
@@ -117,6 +114,7 @@ void AddSessionCommands(CLI::App* app, Context* context) {
   list->add_option("RIG", *rig)->required();
   const auto options = std::make_shared<ListOptions>();
   AddListOptions(list,
+                 context,
                  "the first of the list",
                  FilterHelp("last >= 2d AND segments > 3", SessionFields()),
                  options.get());

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "client/cli/commands.h"
+#include "client/cli/list_options.h"
 #include "client/cli/screen.h"
 #include "client/cli/terminal.h"
 #include "client/cli/top_view.h"
@@ -38,9 +39,7 @@ int Snapshot(Context* context, const TopOptions& options) {
   v1::ListActivityResponse activity;
   const grpc::Status status = ReadActivity(context, options.rigs, &activity);
   if (!status.ok()) return Fail(*context, status);
-  if (context->json) {
-    context->PrintJson(activity);
-  } else {
+  if (!context->PrintList(activity)) {
     context->Print(ActivityTable(activity, context->terminal));
   }
   return kDone;
@@ -64,7 +63,7 @@ grpc::Status Draw(Context* context, const TopOptions& options, Screen* screen) {
 }
 
 int Top(Context* context, const TopOptions& options) {
-  if (options.once || context->json || !context->terminal) {
+  if (options.once || context->json || context->csv || !context->terminal) {
     return Snapshot(context, options);
   }
   grpc::Status status;
@@ -87,6 +86,7 @@ CLI::App* AddTop(CLI::App* parent, const std::string& name, Context* context) {
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
   top->add_flag("--once", options->once, "Print once, also on a terminal");
+  AddCsv(top, context);
   top->add_option("--rigs",
                   options->rigs,
                   "If printing once: show at most this many rigs, those that "
