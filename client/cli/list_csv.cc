@@ -24,8 +24,8 @@ using Row = std::vector<std::pair<std::string, std::string>>;  // column, cell
 
 std::string Text(std::string_view text) {
   std::string safe = SafeLine(text);
-  const bool is_formula = !safe.empty() && std::string_view("=+-@").find(
-                                               safe[0]) != std::string::npos;
+  const bool is_formula = safe.size() > 1 && std::string_view("=+-@").find(
+                                                 safe[0]) != std::string::npos;
   return is_formula ? "'" + safe : safe;
 }
 

@@ -120,7 +120,7 @@ TEST(ListCsv, HasAHeaderWithoutItems) {
 
 TEST(ListCsv, TextIsNoFormula) {
   v1::ListRecalibrationsResponse list;
-  for (const char* text : {"=1+1", "+1", "-1", "@sum", "1=1"}) {
+  for (const char* text : {"=1+1", "+1", "-1", "@sum", "1=1", "-"}) {
     list.add_recalibrations()->set_message(text);
   }
   list.mutable_recalibrations(0)->set_cost(-1);
@@ -129,6 +129,7 @@ TEST(ListCsv, TextIsNoFormula) {
     EXPECT_THAT(rows[k]["message"], StartsWith("'"));
   }
   EXPECT_EQ(rows[4]["message"], "1=1");
+  EXPECT_EQ(rows[5]["message"], "-");
   EXPECT_EQ(rows[0]["cost"], "-1");
 }
 

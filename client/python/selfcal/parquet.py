@@ -1,0 +1,221 @@
+"""Writes lists of the contract as Parquet, for data frames and databases::
+
+    python -m selfcal.parquet TARGET LIST [RIG] FILE
+
+where LIST is rigs, segments, calibrations, recalibrations, sessions, events,
+activity or cohort; or, with messages of one type from anywhere::
+
+    selfcal.parquet.write("runs.parquet", daemon.recalibrations("tablet"))
+
+Needs the extra ``parquet``: ``pip install 'selfcal[parquet]'``.
+
+The columns are those of ``selfcal ... --csv``: the fields of an item by their
+names in the contract, those of a message within it as ``field.name``, and of a
+map or of messages that begin with a name of their own as ``field.key`` and
+``field.key.name``. Values have their types; what is not set is null, times are
+in UTC, enums their names. Repeated numbers and texts are lists, other repeated
+fields JSON.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+from collections.abc import Iterable, Iterator
+from typing import IO, Any
+
+import grpc
+from google.protobuf import json_format
+from google.protobuf.descriptor import FieldDescriptor
+from google.protobuf.message import Message
+
+from selfcal.client import Daemon, connect
+
+try:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+except ImportError as error:
+    raise ImportError(
+        f"selfcal.parquet needs pyarrow ({error}): "
+        "pip install 'selfcal[parquet]'"
+    ) from error
+
+__all__ = ["table", "write"]
+
+_TYPES = {
+    FieldDescriptor.CPPTYPE_INT32: pa.int32(),
+    FieldDescriptor.CPPTYPE_INT64: pa.int64(),
+    FieldDescriptor.CPPTYPE_UINT32: pa.uint32(),
+    FieldDescriptor.CPPTYPE_UINT64: pa.uint64(),
+    FieldDescriptor.CPPTYPE_DOUBLE: pa.float64(),
+    FieldDescriptor.CPPTYPE_FLOAT: pa.float32(),
+    FieldDescriptor.CPPTYPE_BOOL: pa.bool_(),
+    FieldDescriptor.CPPTYPE_ENUM: pa.string(),
+    FieldDescriptor.CPPTYPE_STRING: pa.string(),
+}
+_TIME = pa.timestamp("ns", tz="UTC")
+_DURATION = pa.duration("ns")
+
+_Cell = tuple[str, pa.DataType, Any]  # column, its type, value
+
+
+def table(messages: Iterable[Message]) -> pa.Table:
+    """Returns messages of one type as a table. ValueError if there are none,
+    because their type is not known then."""
+    messages = iter(messages)
+    first = next(messages, None)
+    if first is None:
+        raise ValueError("there is nothing to write")
+    columns: list[str] = []
+    types: dict[str, pa.DataType] = {}
+    rows = []
+    empty = type(first)()
+    for message in itertools.chain([empty, first], messages):
+        cells = list(_fields(message, "", message is not empty))
+        _merge(columns, [name for name, _, _ in cells])
+        types.update({name: kind for name, kind, _ in cells})
+        rows.append({name: value for name, _, value in cells})
+    schema = pa.schema([(name, types[name]) for name in columns])
+    return pa.Table.from_pylist(rows[1:], schema=schema)
+
+
+def write(output: str | IO[bytes], messages: Iterable[Message]) -> None:
+    """Writes messages of one type; see `table`."""
+    pq.write_table(table(messages), output)
+
+
+def _merge(columns: list[str], row: list[str]) -> None:
+    """Adds those that are new, each after the one that it follows."""
+    after = 0
+    for name in row:
+        if name not in columns:
+            columns.insert(after, name)
+        after = columns.index(name) + 1
+
+
+def _is_repeated(field: FieldDescriptor) -> bool:
+    if hasattr(field, "is_repeated"):
+        return field.is_repeated
+    return field.label == FieldDescriptor.LABEL_REPEATED  # protobuf before 6
+
+
+def _json(message: Message) -> str:
+    return json_format.MessageToJson(
+        message, preserving_proto_field_name=True, indent=None
+    )
+
+
+def _scalar(field: FieldDescriptor, value: Any) -> Any:
+    if field.cpp_type != FieldDescriptor.CPPTYPE_ENUM:
+        return value
+    known = field.enum_type.values_by_number.get(value)
+    return known.name if known else str(value)
+
+
+def _fields(message: Message, prefix: str, is_set: bool) -> Iterator[_Cell]:
+    for field in message.DESCRIPTOR.fields:
+        yield from _field(message, field, prefix + field.name, is_set)
+
+
+def _field(
+    message: Message, field: FieldDescriptor, name: str, is_set: bool
+) -> Iterator[_Cell]:
+    value = getattr(message, field.name)
+    if _is_repeated(field):
+        yield from _repeated(field, value, name)
+        return
+    has = is_set and (not field.has_presence or message.HasField(field.name))
+    if field.message_type is None:
+        cell = _scalar(field, value) if has else None
+        yield name, _TYPES[field.cpp_type], cell
+    elif field.message_type.full_name == "google.protobuf.Timestamp":
+        yield name, _TIME, value.ToNanoseconds() if has else None
+    elif field.message_type.full_name == "google.protobuf.Duration":
+        yield name, _DURATION, value.ToNanoseconds() if has else None
+    elif field.message_type.full_name.startswith("google.protobuf."):
+        yield name, pa.string(), _json(value) if has else None
+    else:
+        yield from _fields(value, name + ".", has)
+
+
+def _repeated(
+    field: FieldDescriptor, values: Any, name: str
+) -> Iterator[_Cell]:
+    kind = field.message_type
+    if kind is None:
+        cells = [_scalar(field, value) for value in values]
+        yield name, pa.list_(_TYPES[field.cpp_type]), cells
+    elif kind.GetOptions().map_entry:
+        of = kind.fields_by_name["value"]
+        for key in sorted(values):
+            if of.message_type is None:
+                value = _scalar(of, values[key])
+                yield f"{name}.{key}", _TYPES[of.cpp_type], value
+            else:
+                yield f"{name}.{key}", pa.string(), _json(values[key])
+    elif keys := _keys(kind, values):
+        for key, value in zip(keys, values):
+            yield from _fields(value, f"{name}.{key}.", True)
+    elif values:
+        yield name, pa.string(), f"[{','.join(map(_json, values))}]"
+
+
+def _keys(kind: Any, values: Any) -> list[str]:
+    """The names with which messages begin; empty if these do not, or if two
+    have the same."""
+    key = kind.fields_by_number.get(1)
+    if (
+        key is None
+        or _is_repeated(key)
+        or key.type != FieldDescriptor.TYPE_STRING
+    ):
+        return []
+    keys = [getattr(value, key.name) for value in values]
+    return keys if all(keys) and len(set(keys)) == len(keys) else []
+
+
+_LISTS = {
+    "rigs": (Daemon.rigs, False),
+    "segments": (Daemon.segments, True),
+    "calibrations": (Daemon.calibrations, True),
+    "recalibrations": (Daemon.recalibrations, True),
+    "sessions": (Daemon.sessions, True),
+    "events": (Daemon.events, False),
+    "activity": (lambda daemon: daemon.activity(1000).rigs, False),
+    "cohort": (lambda daemon: daemon.cohort().components, False),
+}
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m selfcal.parquet",
+        description="Writes a list as Parquet.",
+    )
+    parser.add_argument("target", help="unix:/path or host:port")
+    parser.add_argument("list", choices=_LISTS)
+    parser.add_argument("rig", nargs="?", help="of a list of one rig")
+    parser.add_argument("file")
+    options = parser.parse_args(arguments)
+    read, of_rig = _LISTS[options.list]
+    if of_rig != (options.rig is not None):
+        parser.error(
+            f"{options.list}: name the rig"
+            if of_rig
+            else f"{options.list} are not of one rig"
+        )
+    with connect(options.target) as daemon:
+        try:
+            rig = [options.rig] if of_rig else []
+            write(options.file, read(daemon, *rig))
+        except (grpc.RpcError, OSError, ValueError) as error:
+            text = (
+                error.details() if isinstance(error, grpc.RpcError) else error
+            )
+            print(f"selfcal.parquet: {text}", file=sys.stderr)
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
