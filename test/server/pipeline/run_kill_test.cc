@@ -153,6 +153,9 @@ bool TryOnce(const Bomb& planted, Counts* counts) {
 }
 
 TEST(RunKillTest, OneRunForEachTriggerHoweverItIsKilled) {
+#if defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "ThreadSanitizer cannot start threads in a forked process";
+#endif
   Counts counts;
   const int rounds = Trials(1);
   for (int round = 0; round < rounds; ++round) {
