@@ -112,7 +112,7 @@ void PrintEvents(const Context& context, const std::deque<v1::Event>& events) {
   if (context.PrintList(document)) return;
   Table table(
       {{"event", true}, {"time"}, {"rig"}, {"kind"}, {"detail", false, true}});
-  for (const v1::Event& event : events) {
+  for (const v1::Event& event : document.events()) {
     table.Add({fmt::format("{}", event.number()),
                TimeText(event.time()),
                LastPart(event.rig()),

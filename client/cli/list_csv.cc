@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
-#include <google/protobuf/util/json_util.h>
-#include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "client/cli/context.h"
+#include "client/cli/csv_field.h"
 #include "proto/safe_text.h"
 
 namespace selfcal::client {
@@ -34,17 +34,13 @@ std::string Number(double value) {
 }
 
 std::string Json(const Message& message) {
-  google::protobuf::util::JsonPrintOptions options;
-  options.preserve_proto_field_names = true;
-  options.always_print_primitive_fields = true;
-  std::string json;
-  const auto status =
-      google::protobuf::util::MessageToJsonString(message, &json, options);
-  return status.ok() ? json : "";
+  std::string json = ToJson(message, /*line=*/true);
+  json.pop_back();  // the end of the line
+  return json;
 }
 
-// Of a field that is set and no message, or the element `index` of a repeated
-// one.
+// The cell of a field that is set and no message, or of the element `index` of
+// a repeated one.
 std::string Scalar(const Message& message,
                    const FieldDescriptor* field,
                    int index = -1) {
@@ -175,11 +171,10 @@ void AddField(const Message& message,
   }
   const Message& part = reflection->GetMessage(message, field);
   const std::string& type = field->message_type()->full_name();
-  if (type.starts_with("google.protobuf.")) {
-    // The JSON of a time or a duration is a text in quotes.
-    std::string json = has ? Json(part) : "";
-    std::erase(json, '"');
-    row->emplace_back(name, std::move(json));
+  if (type == "google.protobuf.Timestamp" ||
+      type == "google.protobuf.Duration") {
+    const std::string quoted = Json(part);
+    row->emplace_back(name, has ? quoted.substr(1, quoted.size() - 2) : "");
   } else {
     AddFields(part, name + ".", has, row);
   }
@@ -206,24 +201,11 @@ void MergeColumns(const Row& row, std::vector<std::string>* columns) {
   }
 }
 
-std::string Quoted(const std::string& cell) {
-  if (cell.find_first_of(",\"\r\n") == std::string::npos) return cell;
-  std::string quoted = "\"";
-  for (const char c : cell) {
-    if (c == '"') quoted += '"';
-    quoted += c;
-  }
-  return quoted + '"';
-}
-
-template <typename Cells, typename CellOf>
-std::string Line(const Cells& cells, const CellOf& cell_of) {
+std::string Line(const std::vector<std::string>& cells) {
   std::string line;
-  for (const auto& cell : cells) {
-    if (&cell != &cells.front()) line += ',';
-    line += Quoted(cell_of(cell));
-  }
-  return line + "\r\n";
+  for (const std::string& cell : cells) line += CsvField(cell) + ',';
+  line.back() = '\r';  // in place of the last comma
+  return line + '\n';
 }
 
 const FieldDescriptor* ItemsOf(const Message& list) {
@@ -257,12 +239,11 @@ std::string ListCsv(const Message& list) {
     MergeColumns(row, &columns);
     rows.emplace_back(row.begin(), row.end());
   }
-  std::string csv = Line(columns, [](const std::string& name) { return name; });
-  for (const auto& row : rows) {
-    csv += Line(columns, [&row](const std::string& name) {
-      const auto cell = row.find(name);
-      return cell == row.end() ? std::string() : cell->second;
-    });
+  std::string csv = Line(columns);
+  for (auto& row : rows) {
+    std::vector<std::string> cells;
+    for (const std::string& column : columns) cells.push_back(row[column]);
+    csv += Line(cells);
   }
   return csv;
 }

@@ -66,7 +66,7 @@ grpc::Status Plan(CalibrationService* stub,
   return status;
 }
 
-// With --json the versions alone, one by one.
+// Prints the versions alone with --json, one by one.
 void PrintPlans(const Context& context, const std::vector<Rollback>& plans) {
   if (context.json) {
     for (const Rollback& plan : plans) context.PrintJson(plan.to);

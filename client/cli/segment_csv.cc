@@ -2,16 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "client/cli/csv_field.h"
+
 namespace selfcal::client {
 namespace {
-
-// Adds quotes if CSV requires them.
-std::string Field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
-}
 
 // Appends element k of a column that has `width` numbers for each element.
 template <typename Column>
@@ -41,7 +35,7 @@ const std::array<CsvFile, 4>& SegmentCsvFiles() {
 
 std::array<std::string, 4> SegmentCsvRows(const v1::MotionSegment& segment) {
   const std::string key =
-      fmt::format("{},{}", Field(segment.session()), segment.index());
+      fmt::format("{},{}", CsvField(segment.session()), segment.index());
   std::array<std::string, 4> rows;
   const auto& keyframes = segment.keyframes();
   for (int k = 0; k < keyframes.t_ns_size(); ++k) {

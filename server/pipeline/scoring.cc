@@ -223,7 +223,7 @@ std::optional<ScoringWorkers::Claim> ScoringWorkers::Choose(
     const std::optional<RigClaim> rig = claims_->Find(candidate.rig);
     if (!rig) continue;
     claims.push_back({candidate.rig, *rig, candidate.key, candidate.sequence});
-    // What it costs to score a segment grows with what was measured.
+    // The time of a score grows with the number of readings.
     pieces.push_back({candidate.rig, static_cast<double>(candidate.readings)});
   }
   const std::optional<std::size_t> next = order_.Take(pieces);

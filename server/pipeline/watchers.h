@@ -7,6 +7,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -86,7 +87,12 @@ class Watchers {
     }
   }
 
-  bool IsWatched(const Topic& topic) const { return !Living(topic).empty(); }
+  bool IsWatched(const Topic& topic) const {
+    const std::lock_guard lock(mutex_);
+    const auto [begin, end] = watchers_.equal_range(topic);
+    return std::any_of(
+        begin, end, [](const auto& entry) { return !entry.second.expired(); });
+  }
   // Topics that have a watcher.
   std::set<Topic> Topics() const {
     std::set<Topic> topics;

@@ -84,7 +84,7 @@ void WriteWhole(int file, std::string_view bytes) {
     const ssize_t written = pwrite(file, bytes.data(), bytes.size(), at);
     if (written < 0) {
       if (errno == EINTR) continue;
-      Fail("cannot write a job or result");
+      Fail("cannot write a result");
     }
     bytes.remove_prefix(written);
     at += written;
@@ -93,7 +93,7 @@ void WriteWhole(int file, std::string_view bytes) {
 
 std::string ReadWhole(int file) {
   struct stat state {};
-  if (fstat(file, &state) != 0) Fail("cannot read a job or result");
+  if (fstat(file, &state) != 0) Fail("cannot read a result");
   std::string bytes(state.st_size, '\0');
   std::size_t done = 0;
   while (done < bytes.size()) {
@@ -102,7 +102,7 @@ std::string ReadWhole(int file) {
                                bytes.size() - done,
                                static_cast<off_t>(done));
     if (read < 0 && errno == EINTR) continue;
-    if (read <= 0) Fail("cannot read a job or result");
+    if (read <= 0) Fail("cannot read a result");
     done += read;
   }
   return bytes;

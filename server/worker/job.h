@@ -17,7 +17,7 @@
 
 namespace selfcal::server {
 
-// What is to be done with the segments, which follow one by one.
+// A task for the segments, which follow one by one.
 struct Job {
   Rig rig;
   Calibration theta_start;

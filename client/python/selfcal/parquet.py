@@ -133,8 +133,6 @@ def _field(
         yield name, _TIME, value.ToNanoseconds() if has else None
     elif field.message_type.full_name == "google.protobuf.Duration":
         yield name, _DURATION, value.ToNanoseconds() if has else None
-    elif field.message_type.full_name.startswith("google.protobuf."):
-        yield name, pa.string(), _json(value) if has else None
     else:
         yield from _fields(value, name + ".", has)
 

@@ -10,16 +10,15 @@ import pathlib
 import resource
 import subprocess
 import sys
-import tempfile
 import unittest
 
 PACKAGE, EXTRA, SELFCALD, DEMO = sys.argv[1:5]
-sys.path[:0] = [PACKAGE, EXTRA, str(pathlib.Path(__file__).parents[1])]
+sys.path[:0] = [PACKAGE, EXTRA]
 
 import numpy as np
+from demo_device import DemoDevice, run_module
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
-from running_daemon import RunningDaemon
 
 import selfcal
 from selfcal import apply, mcap
@@ -55,32 +54,16 @@ def matrix(q) -> np.ndarray:
 
 
 def run(arguments: list, **options) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        [sys.executable, "-m", "selfcal.mcap", *arguments],
-        env={**os.environ, "PYTHONPATH": f"{PACKAGE}:{EXTRA}"},
-        capture_output=True,
-        text=True,
-        check=False,
-        **options,
-    )
+    return run_module("selfcal.mcap", [PACKAGE, EXTRA], arguments, **options)
 
 
-class McapTest(unittest.TestCase):
+class McapTest(DemoDevice):
+    selfcald = SELFCALD
+    demo = DEMO
+
     @classmethod
     def setUpClass(cls) -> None:
-        folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = folder.name
-        subprocess.run(
-            [DEMO, "--daemon", SELFCALD, "--seconds", "40"]
-            + ["--keep", f"{cls.folder}/demo"],
-            check=True,
-            stdout=subprocess.DEVNULL,
-        )
-        state = f"{cls.folder}/demo/state"
-        running = RunningDaemon(SELFCALD, state)
-        cls.addClassCleanup(running.stop)
-        cls.target = running.target
+        super().setUpClass()
         done = run([cls.target, "simulated", f"{cls.folder}/out"])
         if done.returncode != 0:
             raise RuntimeError(done.stderr)

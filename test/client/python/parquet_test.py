@@ -7,31 +7,23 @@ import csv
 import datetime
 import io
 import os
-import pathlib
 import subprocess
 import sys
-import tempfile
 import unittest
 
 PACKAGE, EXTRA, SELFCALD, DEMO, SELFCAL = sys.argv[1:6]
-sys.path[:0] = [PACKAGE, EXTRA, str(pathlib.Path(__file__).parents[1])]
+sys.path[:0] = [PACKAGE, EXTRA]
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from running_daemon import RunningDaemon
+from demo_device import DemoDevice, run_module
 
 from selfcal import parquet
 from selfcal.v1 import recalibration_pb2, segment_pb2
 
 
 def run(arguments: list) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        [sys.executable, "-m", "selfcal.parquet", *arguments],
-        env={**os.environ, "PYTHONPATH": f"{PACKAGE}:{EXTRA}"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return run_module("selfcal.parquet", [PACKAGE, EXTRA], arguments)
 
 
 def nanoseconds(time: str) -> int:
@@ -41,21 +33,9 @@ def nanoseconds(time: str) -> int:
     return int(since) * 10**9 + int(fraction.ljust(9, "0") or 0)
 
 
-class ParquetTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls) -> None:
-        folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = folder.name
-        subprocess.run(
-            [DEMO, "--daemon", SELFCALD, "--seconds", "40"]
-            + ["--keep", f"{cls.folder}/demo"],
-            check=True,
-            stdout=subprocess.DEVNULL,
-        )
-        running = RunningDaemon(SELFCALD, f"{cls.folder}/demo/state")
-        cls.addClassCleanup(running.stop)
-        cls.target = running.target
+class ParquetTest(DemoDevice):
+    selfcald = SELFCALD
+    demo = DEMO
 
     def written(self, name: str, *rig: str) -> pa.Table:
         file = f"{self.folder}/{name}.parquet"

@@ -56,15 +56,20 @@ class WorkerTest : public ::testing::Test {
   CalibrationResult InWorker(
       const std::vector<std::string>& command = kWorker,
       const std::function<bool()>& interrupted = nullptr) {
+    return InWorkerFrom(SourceOf(segments_), command, interrupted).value();
+  }
+  absl::StatusOr<CalibrationResult> InWorkerFrom(
+      const SegmentSource& segments,
+      const std::vector<std::string>& command = kWorker,
+      const std::function<bool()>& interrupted = nullptr) {
     return CalibrateInWorker(command,
                              limits_,
                              rig_,
                              rig_.factory,
-                             SourceOf(segments_),
+                             segments,
                              options_,
                              progress_,
-                             interrupted)
-        .value();
+                             interrupted);
   }
 
   const Rig rig_ = TestRig("a");
@@ -215,21 +220,14 @@ TEST_F(WorkerTest, AllOfAJobArrives) {
 TEST_F(WorkerTest, AnErrorOfTheSegmentsEndsIt) {
   pid_t child = 0;
   int read = 0;
-  const auto result = CalibrateInWorker(
-      kWorker,
-      limits_,
-      rig_,
-      rig_.factory,
-      [&]() -> absl::StatusOr<std::optional<MotionSegment>> {
+  const auto result =
+      InWorkerFrom([&]() -> absl::StatusOr<std::optional<MotionSegment>> {
         if (++read == 3) {
           child = Child();
           return absl::DataLossError("the disk");
         }
         return segments_[0];
-      },
-      options_,
-      progress_,
-      nullptr);
+      });
   EXPECT_EQ(result.status(), absl::DataLossError("the disk"));
   EXPECT_EQ(read, 3);
   ASSERT_NE(child, 0);
@@ -244,18 +242,11 @@ TEST_F(WorkerTest, SegmentsCountForItsMemory) {
   limits_.max_memory_bytes = 8 << 20;
   constexpr int kMost = 10'000;  // some hundred megabytes
   int read = 0;
-  const auto result = CalibrateInWorker(
-      kWorker,
-      limits_,
-      rig_,
-      rig_.factory,
-      [&]() -> absl::StatusOr<std::optional<MotionSegment>> {
+  const auto result =
+      InWorkerFrom([&]() -> absl::StatusOr<std::optional<MotionSegment>> {
         if (++read > kMost) return std::nullopt;
         return segments_[0];
-      },
-      options_,
-      progress_,
-      nullptr);
+      });
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_EQ(result->status, CalibrateStatus::kFailed);
   EXPECT_THAT(result->message, HasSubstr("memory limit of a run of 8 MiB"));
@@ -265,16 +256,11 @@ TEST_F(WorkerTest, SegmentsCountForItsMemory) {
 // One that never reads its job.
 TEST_F(WorkerTest, AnInterruptionEndsTheSendingOfAJob) {
   const auto begin = std::chrono::steady_clock::now();
-  const auto result = CalibrateInWorker(
-      {"/bin/sleep", "100000"},
-      limits_,
-      rig_,
-      rig_.factory,
+  const auto result = InWorkerFrom(
       [&]() -> absl::StatusOr<std::optional<MotionSegment>> {
         return segments_[0];  // without an end
       },
-      options_,
-      progress_,
+      {"/bin/sleep", "100000"},
       [&] {
         return std::chrono::steady_clock::now() - begin >
                std::chrono::milliseconds(300);
