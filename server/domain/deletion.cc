@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "server/domain/reports.h"
 #include "server/status/status_macros.h"
 #include "server/store/events.h"
 #include "server/store/rigs.h"
@@ -43,18 +44,36 @@ absl::StatusOr<bool> DeleteSegment(UnitOfWork* tx,
 absl::StatusOr<int> DeleteRig(UnitOfWork* tx,
                               const std::string& caller,
                               const std::string& reason) {
+  // What a device reports is neither scored nor computed here.
+  const bool is_own = CheckOwnRig(tx).ok();
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t unfinished, UnfinishedRun(tx));
-  if (unfinished != 0) {
+  if (is_own && unfinished != 0) {
     return absl::FailedPreconditionError(
         fmt::format("run {} of rig {} has not ended; cancel it first",
                     unfinished,
                     tx->rig()));
   }
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t waiting, CountUnscored(tx));
-  SELFCAL_RETURN_IF_ERROR(AppendEvent(
-      tx, EventKind::kRigDeleted, fmt::format("by {}: {}", caller, reason)));
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t unscored, CountUnscored(tx));
+  if (is_own) {
+    SELFCAL_RETURN_IF_ERROR(AppendEvent(
+        tx, EventKind::kRigDeleted, fmt::format("by {}: {}", caller, reason)));
+  } else {
+    // The events of the rig are those of its device.
+    SELFCAL_RETURN_IF_ERROR(
+        InsertEvent(tx->db(),
+                    {0,
+                     tx->time_ns(),
+                     "",
+                     EventKind::kRigDeleted,
+                     fmt::format("rig {}, which its device reports, by {}: {}",
+                                 tx->rig(),
+                                 caller,
+                                 reason),
+                     tx->now().steady_ns})
+            .status());
+  }
   SELFCAL_RETURN_IF_ERROR(DeleteRigRows(tx));
-  return static_cast<int>(waiting);
+  return is_own ? static_cast<int>(unscored) : 0;
 }
 
 }  // namespace selfcal::server

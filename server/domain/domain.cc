@@ -12,12 +12,14 @@
 #include "server/domain/intake.h"
 #include "server/domain/offers.h"
 #include "server/domain/quotas.h"
+#include "server/domain/reports.h"
 #include "server/domain/run_creation.h"
 #include "server/domain/run_life.h"
 #include "server/domain/run_results.h"
 #include "server/domain/session_trigger.h"
 #include "server/status/status_macros.h"
 #include "server/store/events.h"
+#include "server/store/report.h"
 #include "server/store/table_rows.h"
 #include "server/store/transact.h"
 
@@ -38,6 +40,22 @@ constexpr TimeTrigger kTimeTriggers[] = {
      CreateAgedRun},
 };
 
+// TransactFor, unless a device reports the rig.
+template <typename Work>
+auto ChangeOwnRig(Store* store,
+                  const std::string& rig,
+                  const Moment& now,
+                  const Work& work) -> std::invoke_result_t<Work, UnitOfWork*> {
+  return TransactFor(
+      store,
+      rig,
+      now,
+      [&](UnitOfWork* tx) -> std::invoke_result_t<Work, UnitOfWork*> {
+        SELFCAL_RETURN_IF_ERROR(CheckOwnRig(tx));
+        return work(tx);
+      });
+}
+
 }  // namespace
 
 absl::StatusOr<StoredRig> Domain::CreateRig(const StoredRig& rig) {
@@ -56,7 +74,7 @@ absl::StatusOr<StoredRig> Domain::CreateRig(const StoredRig& rig) {
 absl::StatusOr<RigUpdate> Domain::UpdateRig(const std::string& rig,
                                             const RigChange& change,
                                             const std::string& caller) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::UpdateRig(tx, change, caller);
   });
 }
@@ -145,7 +163,7 @@ absl::StatusOr<bool> Domain::DeleteSegment(const std::string& rig,
                                            const SegmentKey& key,
                                            const std::string& caller,
                                            const std::string& reason) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::DeleteSegment(tx, key, caller, reason);
   });
 }
@@ -156,7 +174,7 @@ absl::StatusOr<QuarantineCommit> Domain::QuarantineSegments(
     std::optional<std::int64_t> index,
     const std::string& caller,
     const std::string& reason) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::QuarantineSegments(tx, session, index, caller, reason);
   });
 }
@@ -181,7 +199,7 @@ absl::StatusOr<StoredCalibration> Domain::ActivateCalibration(
     std::int64_t version,
     const std::string& caller,
     const std::string& reason) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::ActivateCalibration(tx, version, caller, reason);
   });
 }
@@ -196,7 +214,7 @@ absl::Status Domain::ReportDisagreement(const std::string& rig,
 
 absl::StatusOr<StoredRun> Domain::CreateManualRun(const std::string& rig,
                                                   bool force) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOwnRig(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::CreateManualRun(tx, force);
   });
 }
@@ -289,6 +307,39 @@ absl::StatusOr<StoredRun> Domain::EndRun(const RigClaim& claim,
                                          const std::string& message) {
   return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::EndRun(tx, run, state, message);
+  });
+}
+
+absl::StatusOr<ReportAnswer> Domain::TakeReport(const DeviceReport& report) {
+  const Moment now = clock_();
+  const auto taken = TransactFor(store_, report.rig, now, [&](UnitOfWork* tx) {
+    return server::TakeReport(tx, report, options_.quotas);
+  });
+  const bool is_first = report.number == 1;
+  ReportAnswer begin_anew;
+  begin_anew.begin_anew = true;
+  // Its records do not fit, unless it is of another device, of which the first
+  // report is told.
+  if (absl::IsFailedPrecondition(taken.status()) && !is_first) {
+    return begin_anew;
+  }
+  if (!absl::IsNotFound(taken.status())) return taken;
+  if (report.deleted) return ReportAnswer();
+  if (!is_first) return begin_anew;
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig,
+                           RigOfReport(report.records, report.rig));
+  SELFCAL_RETURN_IF_ERROR(store_->InsertRig(rig, now, [&](UnitOfWork* tx) {
+    return TakeFirstReport(tx, report, options_.quotas);
+  }));
+  return ReportAnswer();
+}
+
+absl::StatusOr<StoredInstruction> Domain::CreateInstruction(
+    const std::string& rig,
+    const std::string& caller,
+    const std::string& request) {
+  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+    return server::CreateInstruction(tx, caller, request);
   });
 }
 

@@ -5,8 +5,10 @@
 // rig. Errors are those of the store.
 //
 // Any thread may call. All methods that write return after the commit, but for
-// BeginPutSegment. Those that take a RigClaim are the work of the daemon that
-// has claimed the rig: ClaimLost if the claim does not hold any more.
+// BeginPutSegment. Of a rig that a device reports only a report, and DeleteRig,
+// change anything: FAILED_PRECONDITION for others. Those that take a RigClaim
+// are the work of the daemon that has claimed the rig: ClaimLost if the claim
+// does not hold any more.
 #pragma once
 
 #include <absl/status/status.h>
@@ -27,6 +29,7 @@
 #include "server/domain/domain_options.h"
 #include "server/domain/quarantine.h"
 #include "server/domain/remembered.h"
+#include "server/domain/reports.h"
 #include "server/domain/rig_update.h"
 #include "server/domain/score_commit.h"
 #include "server/store/store.h"
@@ -208,6 +211,17 @@ class Domain {
                                    std::int64_t run,
                                    RunState state,
                                    const std::string& message);
+
+  // --- Reports of devices. Takes what a device reports of one of its rigs, and
+  // creates the rig if it is new. INVALID_ARGUMENT for what is no report,
+  // FAILED_PRECONDITION if the rig is not the device's, RESOURCE_EXHAUSTED
+  // where the quota of rigs leaves no room.
+  absl::StatusOr<ReportAnswer> TakeReport(const DeviceReport& report);
+  // CreateInstruction of reports.h.
+  absl::StatusOr<StoredInstruction> CreateInstruction(
+      const std::string& rig,
+      const std::string& caller,
+      const std::string& request);
 
   // --- The daemon. Appends an event without a rig.
   absl::Status RecordEvent(EventKind kind, const std::string& detail);

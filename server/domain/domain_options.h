@@ -24,6 +24,9 @@ struct Quotas {
   // that those stored can still be scored.
   std::int64_t max_database_bytes = 0;
   std::int64_t max_rigs = 10'000;
+  // Compressed data of one rig's segments that stays only until it was reported
+  // to the hub. Beyond it, the oldest is not reported.
+  std::int64_t max_unreported_bytes_per_rig = std::int64_t{1} << 30;
 
   friend bool operator==(const Quotas&, const Quotas&) = default;
 };

@@ -10,7 +10,8 @@
 namespace selfcal::server {
 
 // False if a segment with this key is stored already. RESOURCE_EXHAUSTED,
-// naming the quota, if there is no room.
+// naming the quota, if there is no room. FAILED_PRECONDITION for a rig that a
+// device reports.
 absl::StatusOr<bool> StoreSegment(UnitOfWork* tx,
                                   const NewSegment& segment,
                                   const Quotas& quotas);

@@ -1,6 +1,5 @@
 #include "server/domain/quotas.h"
 
-#include <absl/status/statusor.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -108,6 +107,24 @@ absl::Status MakeRoom(UnitOfWork* tx,
     holders.erase(least);
   }
   return absl::OkStatus();
+}
+
+absl::StatusOr<bool> MakeRoomForReported(UnitOfWork* tx,
+                                         std::int64_t bytes,
+                                         const Quotas& quotas) {
+  const std::int64_t limit = quotas.max_payload_bytes_per_rig;
+  if (limit == 0) return true;
+  SELFCAL_ASSIGN_OR_RETURN(std::int64_t used, DataBytes(tx));
+  if (used + bytes <= limit) return true;
+  SELFCAL_ASSIGN_OR_RETURN(std::vector<DataHolder> holders, DataHolders(tx));
+  while (used + bytes > limit) {
+    const auto least = LeastInformative(&holders);
+    if (least == holders.end()) return false;
+    SELFCAL_RETURN_IF_ERROR(DeleteData(tx, least->segment.sequence));
+    used -= least->bytes;
+    holders.erase(least);
+  }
+  return true;
 }
 
 absl::Status DropOldSegments(UnitOfWork* tx, const Quotas& quotas) {

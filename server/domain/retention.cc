@@ -63,7 +63,7 @@ absl::Status DropUnneededData(UnitOfWork* tx) {
     const bool in_reserve = holder.segment.state == SegmentState::kScored &&
                             !holder.excluded &&
                             holder.segment.sequence >= reserve;
-    if (IsReferenced(holder) || in_reserve) continue;
+    if (IsReferenced(holder) || in_reserve || holder.to_report) continue;
     SELFCAL_RETURN_IF_ERROR(DeleteData(tx, holder.segment.sequence));
   }
   return absl::OkStatus();

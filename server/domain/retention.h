@@ -19,8 +19,9 @@ absl::StatusOr<std::vector<Table>> RemoveAgedEntries(UnitOfWork* tx,
                                                      const StoredRig& rig,
                                                      std::int64_t now_ns);
 
-// Deletes the data of each segment that is not waiting for its score and is in
-// no table, no unfinished run and not in the reserve. Segments from before the
+// Deletes the data of each segment that is not waiting for its score or for its
+// report to the hub, and is in no table, no unfinished run and not in the
+// reserve. Segments from before the
 // newest device change and misfits are never in the reserve.
 absl::Status DropUnneededData(UnitOfWork* tx);
 

@@ -5,6 +5,7 @@
 #include "server/domain/admission.h"
 #include "server/domain/device_change.h"
 #include "server/domain/remembered.h"
+#include "server/domain/report_data.h"
 #include "server/domain/retention.h"
 #include "server/domain/run_creation.h"
 #include "server/status/status_macros.h"
@@ -65,6 +66,7 @@ absl::StatusOr<ScoreCommit> CommitScore(
   SELFCAL_ASSIGN_OR_RETURN(commit.started_run,
                            CreateRunOfTables(tx, rig, tables));
   SELFCAL_RETURN_IF_ERROR(DropUnneededData(tx));
+  SELFCAL_RETURN_IF_ERROR(ReportKeptData(tx, segment.sequence));
   return commit;
 }
 

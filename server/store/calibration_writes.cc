@@ -33,6 +33,7 @@ absl::Status InsertContent(UnitOfWork* tx,
 
 absl::Status InsertCalibration(UnitOfWork* tx,
                                const StoredCalibration& calibration) {
+  tx->Changed(RecordKind::kCalibration, calibration.version);
   SELFCAL_RETURN_IF_ERROR(InsertContent(tx, calibration));
   for (const SegmentKey& key : calibration.segments) {
     SELFCAL_RETURN_IF_ERROR(
@@ -51,6 +52,7 @@ absl::Status InsertCalibration(UnitOfWork* tx,
 
 absl::Status InsertValidation(UnitOfWork* tx,
                               const StoredCalibration& calibration) {
+  tx->Changed(RecordKind::kCalibration, calibration.version);
   const std::string content = SerializeValidation(calibration);
   const std::string sha256 = Sha256(content);
   return Statement(tx->db(),
@@ -67,6 +69,7 @@ absl::Status WriteState(UnitOfWork* tx,
                         std::int64_t version,
                         CalibrationState from,
                         CalibrationState to) {
+  tx->Changed(RecordKind::kCalibration, version);
   return Statement(tx->db(),
                    "UPDATE calibrations SET state = ?4 "
                    "WHERE rig = ?1 AND version = ?2 AND state = ?3",
@@ -78,23 +81,26 @@ absl::Status WriteState(UnitOfWork* tx,
 }
 
 absl::Status InsertActivation(UnitOfWork* tx, std::int64_t version) {
-  SELFCAL_RETURN_IF_ERROR(
-      Statement(tx->db(),
-                "INSERT INTO activations (rig, activation, version, "
-                "  time_ns, steady_ns) "
-                "VALUES (?1, (SELECT coalesce(max(activation), 0) + 1 "
-                "  FROM activations WHERE rig = ?1), ?2, ?3, ?4)",
-                tx->rig_row(),
-                version,
-                tx->time_ns(),
-                tx->now().steady_ns)
-          .Run());
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t activation,
+      InsertReturning(tx->db(),
+                      "INSERT INTO activations (rig, activation, version, "
+                      "  time_ns, steady_ns) "
+                      "VALUES (?1, (SELECT coalesce(max(activation), 0) + 1 "
+                      "  FROM activations WHERE rig = ?1), ?2, ?3, ?4) "
+                      "RETURNING activation",
+                      tx->rig_row(),
+                      version,
+                      tx->time_ns(),
+                      tx->now().steady_ns));
+  tx->Changed(RecordKind::kActivation, activation);
   return AnnounceCalibration(tx);
 }
 
 absl::Status InsertDisagreement(UnitOfWork* tx,
                                 std::int64_t version,
                                 const std::string& finding) {
+  tx->Changed(RecordKind::kCalibration, version);
   return Statement(tx->db(),
                    "INSERT INTO disagreements (rig, version, time_ns, finding) "
                    "VALUES (?1, ?2, ?3, ?4) ON CONFLICT DO NOTHING",

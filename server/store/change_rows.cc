@@ -56,6 +56,7 @@ absl::StatusOr<StoredChange> ReadChange(UnitOfWork* tx, std::int64_t change) {
 }
 
 absl::Status InsertChange(UnitOfWork* tx, const StoredChange& change) {
+  tx->Changed(RecordKind::kChange, change.change);
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
                 "INSERT INTO changes (rig, change, time_ns, kind, "

@@ -122,12 +122,17 @@ absl::StatusOr<Listed<StoredEvent>> ListOfRig(Connection* db,
 absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail) {
-  return InsertEvent(
-      tx->db(),
-      {0, tx->time_ns(), tx->rig(), kind, detail, tx->now().steady_ns});
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t number,
+      InsertEvent(
+          tx->db(),
+          {0, tx->time_ns(), tx->rig(), kind, detail, tx->now().steady_ns}));
+  tx->Changed(RecordKind::kEvent, number);
+  return absl::OkStatus();
 }
 
-absl::Status InsertEvent(Connection* db, const StoredEvent& event) {
+absl::StatusOr<std::int64_t> InsertEvent(Connection* db,
+                                         const StoredEvent& event) {
   for (;;) {
     SELFCAL_ASSIGN_OR_RETURN(
         const std::int64_t number,
@@ -142,7 +147,7 @@ absl::Status InsertEvent(Connection* db, const StoredEvent& event) {
                         event.steady_ns,
                         static_cast<int>(event.kind) + 1,
                         event.detail));
-    if (number != 0) return absl::OkStatus();
+    if (number != 0) return number;
     // No lock protects the numbers of the daemon's events: another one has
     // committed an event with this number since the statement began.
   }

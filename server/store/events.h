@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <cstdint>
 #include <string>
 
 #include "server/store/store.h"
@@ -15,7 +16,9 @@ absl::Status AppendEvent(UnitOfWork* tx,
                          EventKind kind,
                          const std::string& detail);
 // An event whose number is the next one of its rig, whatever it states.
-absl::Status InsertEvent(Connection* db, const StoredEvent& event);
+// Returns the number.
+absl::StatusOr<std::int64_t> InsertEvent(Connection* db,
+                                         const StoredEvent& event);
 
 // Events of one rig by number, or of all by steady time if `rig` is empty;
 // oldest first.

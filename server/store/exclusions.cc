@@ -53,6 +53,7 @@ absl::Status WriteExclusion(UnitOfWork* tx,
                             std::int64_t sequence,
                             const std::string& group,
                             const NewExclusion& exclusion) {
+  tx->Changed(RecordKind::kSegment, sequence);
   return Statement(tx->db(),
                    "INSERT INTO table_absences (rig, sequence, group_name, "
                    "  cause, time_ns, rival, rival_entropy, fit, fit_limit) "

@@ -12,7 +12,9 @@
 #include "server/store/driver/transaction.h"
 #include "server/store/events.h"
 #include "server/store/exclusions.h"
+#include "server/store/instructions.h"
 #include "server/store/maintenance.h"
+#include "server/store/outbox.h"
 #include "server/store/payload.h"
 #include "server/store/replicas.h"
 #include "server/store/rig_lists.h"
@@ -32,6 +34,7 @@ class DatabaseStore final : public Store {
   explicit DatabaseStore(std::unique_ptr<Database> db)
       : db_(std::move(db)),
         replicas_(MakeReplicas(db_.get())),
+        outbox_(MakeOutbox(db_.get())),
         maintenance_(MakeMaintenance(db_.get())) {}
 
   absl::Status Transact(const RigClaim& claim,
@@ -62,6 +65,7 @@ class DatabaseStore final : public Store {
                                server::InsertRig(db, rig));
       UnitOfWork tx(db, rig.rig.id, row, now);
       SELFCAL_RETURN_IF_ERROR(work(&tx));
+      SELFCAL_RETURN_IF_ERROR(NoteChanges(&tx));
       return transaction.Commit();
     });
   }
@@ -209,6 +213,12 @@ class DatabaseStore final : public Store {
         [&](Connection* db) { return CandidateCalibration(db, rig, run); });
   }
 
+  absl::StatusOr<Listed<StoredInstruction>> ListInstructions(
+      const std::string& rig, const Page& page) override {
+    return Read(
+        [&](Connection* db) { return ListInstructionRows(db, rig, page); });
+  }
+
   absl::StatusOr<Listed<StoredEvent>> ListEvents(
       const Page& page, const std::string& rig) override {
     return Read([&](Connection* db) { return ListEventRows(db, page, rig); });
@@ -221,7 +231,8 @@ class DatabaseStore final : public Store {
   }
 
   absl::Status AppendEvent(const StoredEvent& event) override {
-    return db_->Write([&](Connection* db) { return InsertEvent(db, event); });
+    return db_->Write(
+        [&](Connection* db) { return InsertEvent(db, event).status(); });
   }
 
   absl::StatusOr<std::optional<ClockRecord>> ReadClock() override {
@@ -234,7 +245,7 @@ class DatabaseStore final : public Store {
       Transaction transaction(db);
       SELFCAL_RETURN_IF_ERROR(transaction.status());
       SELFCAL_RETURN_IF_ERROR(WriteClockRecord(db, clock));
-      if (event) SELFCAL_RETURN_IF_ERROR(InsertEvent(db, *event));
+      if (event) SELFCAL_RETURN_IF_ERROR(InsertEvent(db, *event).status());
       return transaction.Commit();
     });
   }
@@ -247,6 +258,8 @@ class DatabaseStore final : public Store {
   }
 
   Replicas* replicas() override { return replicas_.get(); }
+
+  Outbox* outbox() override { return outbox_.get(); }
 
   StoreMaintenance* maintenance() override { return maintenance_.get(); }
 
@@ -273,6 +286,7 @@ class DatabaseStore final : public Store {
     SELFCAL_RETURN_IF_ERROR(CheckClaim(db, row, claim));
     UnitOfWork tx(db, claim.rig, row, now);
     SELFCAL_RETURN_IF_ERROR(work(&tx));
+    SELFCAL_RETURN_IF_ERROR(NoteChanges(&tx));
     return transaction.Commit();
   }
 
@@ -284,6 +298,7 @@ class DatabaseStore final : public Store {
 
   const std::unique_ptr<Database> db_;
   const std::unique_ptr<Replicas> replicas_;
+  const std::unique_ptr<Outbox> outbox_;
   const std::unique_ptr<StoreMaintenance> maintenance_;
 };
 

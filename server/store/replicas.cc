@@ -113,6 +113,8 @@ class ReplicasOfDatabase final : public Replicas {
                      "SELECT id FROM rigs r WHERE rig IN "
                      "  (SELECT rig FROM segments WHERE state = 1 "
                      "   UNION SELECT rig FROM runs WHERE state IN (1, 2)) "
+                     "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
+                     "  WHERE p.rig = r.rig) "
                      "AND NOT EXISTS (SELECT 1 FROM claims c "
                      "  JOIN replicas USING (replica) WHERE c.rig = r.rig) "
                      "LIMIT ?1",
@@ -131,6 +133,8 @@ class ReplicasOfDatabase final : public Replicas {
       Statement read(db,
                      "SELECT r.id, c.rig, c.number FROM claims c "
                      "JOIN rigs r ON r.rig = c.rig WHERE c.replica = ?1 "
+                     "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
+                     "  WHERE p.rig = c.rig) "
                      "AND (EXISTS (SELECT 1 FROM segments s "
                      "       WHERE s.rig = c.rig AND s.state = 1) "
                      "  OR EXISTS (SELECT 1 FROM runs u "

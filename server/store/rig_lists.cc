@@ -155,6 +155,25 @@ absl::Status ReadLabels(Connection* db, std::int64_t rig, RigSummary* summary) {
   return read.status();
 }
 
+absl::Status ReadReports(Connection* db,
+                         std::int64_t rig,
+                         RigSummary* summary) {
+  Statement uplink(db,
+                   "SELECT time_ns, (SELECT count(*) FROM outbox o "
+                   "  WHERE o.rig = u.rig) FROM uplinks u WHERE rig = ?1",
+                   rig);
+  if (uplink.Next()) summary->uplink = {uplink.Int(0), uplink.Int(1), ""};
+  SELFCAL_RETURN_IF_ERROR(uplink.status());
+  Statement device(db,
+                   "SELECT time_ns, waiting, program_version "
+                   "FROM reported_rigs WHERE rig = ?1",
+                   rig);
+  if (device.Next()) {
+    summary->device = {device.Int(0), device.Int(1), device.Text(2)};
+  }
+  return device.status();
+}
+
 absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
   SELFCAL_RETURN_IF_ERROR(ReadLabels(db, rig, summary));
   SELFCAL_RETURN_IF_ERROR(ReadVersions(db, rig, summary));
@@ -173,7 +192,7 @@ absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
                                    "SELECT time_ns FROM changes WHERE rig = ?1 "
                                    "ORDER BY change DESC LIMIT 1",
                                    rig));
-  return absl::OkStatus();
+  return ReadReports(db, rig, summary);
 }
 
 // A page of what `read` makes of each rig that is found.

@@ -103,6 +103,7 @@ absl::StatusOr<std::int64_t> InsertRig(Connection* db, const StoredRig& rig) {
 }
 
 absl::Status WriteRig(UnitOfWork* tx, const StoredRig& rig) {
+  tx->Changed(RecordKind::kRig);
   const std::string bytes = SerializeRig(rig);
   const std::string sha256 = Sha256(bytes);
   SELFCAL_RETURN_IF_ERROR(
@@ -124,6 +125,11 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
     return Statement(tx->db(), sql, tx->rig_row()).Run();
   };
   SELFCAL_RETURN_IF_ERROR(run("UPDATE rigs SET deleting = 1 WHERE rig = ?1"));
+  // All that is left to report are its events, and that it is gone.
+  SELFCAL_RETURN_IF_ERROR(
+      run(fmt::format("DELETE FROM outbox WHERE rig = ?1 AND kind <> {}",
+                      static_cast<int>(RecordKind::kEvent))));
+  SELFCAL_RETURN_IF_ERROR(run("UPDATE uplinks SET deleted = 1 WHERE rig = ?1"));
   // Each before what it refers to.
   for (const char* table : {"table_absences",
                             "segment_scores",
@@ -145,6 +151,8 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
                             "segments",
                             "claims",
                             "rig_labels",
+                            "instructions",
+                            "reported_rigs",
                             "rigs"}) {
     SELFCAL_RETURN_IF_ERROR(
         run(fmt::format("DELETE FROM {} WHERE rig = ?1", table)));
@@ -185,7 +193,10 @@ absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx) {
 }
 
 absl::StatusOr<std::vector<std::string>> RigNames(Connection* db) {
-  Statement read(db, "SELECT id FROM rigs ORDER BY id");
+  Statement read(db,
+                 "SELECT id FROM rigs r WHERE NOT EXISTS "
+                 "  (SELECT 1 FROM reported_rigs p WHERE p.rig = r.rig) "
+                 "ORDER BY id");
   return ReadNames(&read);
 }
 
@@ -194,7 +205,9 @@ absl::StatusOr<std::vector<std::string>> IdleRigNames(
   Statement read(db,
                  "SELECT id FROM rigs r WHERE (SELECT s.steady_ns "
                  "  FROM segments s WHERE s.rig = r.rig "
-                 "  ORDER BY s.sequence DESC LIMIT 1) <= ?1 ORDER BY id",
+                 "  ORDER BY s.sequence DESC LIMIT 1) <= ?1 "
+                 "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
+                 "  WHERE p.rig = r.rig) ORDER BY id",
                  idle_since_ns);
   return ReadNames(&read);
 }

@@ -30,7 +30,7 @@ absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);
 // Number of rigs in the database.
 absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx);
 
-// In their order.
+// Store::ListRigNames.
 absl::StatusOr<std::vector<std::string>> RigNames(Connection* db);
 // Store::ListIdleRigs.
 absl::StatusOr<std::vector<std::string>> IdleRigNames(

@@ -163,6 +163,8 @@ absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(
                      "WHERE r.state IN (1, 2) AND (?1 = '' OR EXISTS "
                      "  (SELECT 1 FROM claims c "
                      "   WHERE c.rig = r.rig AND c.replica = ?1)) "
+                     "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
+                     "  WHERE p.rig = r.rig) "
                      "ORDER BY r.create_steady_ns, r.rig, r.run",
                  replica);
   return ReadAll(db, &read);
@@ -200,6 +202,7 @@ absl::StatusOr<std::int64_t> NewestRunOf(
 }
 
 absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
+  tx->Changed(RecordKind::kRun, run.run);
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
                 "INSERT INTO runs (rig, run, state, cause, create_time_ns, "
@@ -230,6 +233,7 @@ absl::Status InsertRun(UnitOfWork* tx, const StoredRun& run) {
 }
 
 absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run) {
+  tx->Changed(RecordKind::kRun, run.run);
   SELFCAL_RETURN_IF_ERROR(
       Statement(tx->db(),
                 "UPDATE runs SET state = ?3, attempts = ?4, "
@@ -251,6 +255,7 @@ absl::Status UpdateRun(UnitOfWork* tx, const StoredRun& run) {
 absl::Status MarkExcluded(UnitOfWork* tx,
                           std::int64_t run,
                           std::int64_t sequence) {
+  tx->Changed(RecordKind::kRun, run);
   return Statement(tx->db(),
                    "UPDATE run_segments SET excluded = 1 "
                    "WHERE rig = ?1 AND run = ?2 AND sequence = ?3",

@@ -129,6 +129,7 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
 absl::Status WriteScore(UnitOfWork* tx,
                         std::int64_t sequence,
                         const SegmentInformation& information) {
+  tx->Changed(RecordKind::kSegment, sequence);
   SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
                                     "UPDATE segments SET state = 2, fit = ?3 "
                                     "WHERE rig = ?1 AND sequence = ?2",

@@ -5,6 +5,7 @@
 #include "server/status/status_macros.h"
 #include "server/store/driver/statement.h"
 #include "server/store/exclusions.h"
+#include "server/store/outbox.h"
 #include "server/store/rigs.h"
 #include "server/store/segment_path.h"
 
@@ -152,7 +153,8 @@ absl::StatusOr<std::vector<SegmentRow>> UnreferencedSegments(UnitOfWork* tx,
   return ReadRows(&read);
 }
 
-absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
+absl::StatusOr<std::int64_t> InsertSegment(UnitOfWork* tx,
+                                           const NewSegment& segment) {
   SELFCAL_ASSIGN_OR_RETURN(
       const std::int64_t sequence,
       InsertReturning(
@@ -184,16 +186,19 @@ absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment) {
                                     tx->rig_row(),
                                     tx->time_ns())
                               .Run());
+  tx->Changed(RecordKind::kSegment, sequence);
   SELFCAL_RETURN_IF_ERROR(InsertPath(tx, sequence, segment.path));
-  return Statement(tx->db(),
-                   "INSERT INTO payloads (rig, sequence, data, raw_bytes, "
-                   "  sha256) VALUES (?1, ?2, ?3, ?4, ?5)",
-                   tx->rig_row(),
-                   sequence,
-                   BlobView{segment.payload.data},
-                   segment.payload.raw_bytes,
-                   BlobView{segment.payload.sha256})
-      .Run();
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(tx->db(),
+                "INSERT INTO payloads (rig, sequence, data, raw_bytes, "
+                "  sha256) VALUES (?1, ?2, ?3, ?4, ?5)",
+                tx->rig_row(),
+                sequence,
+                BlobView{segment.payload.data},
+                segment.payload.raw_bytes,
+                BlobView{segment.payload.sha256})
+          .Run());
+  return sequence;
 }
 
 absl::StatusOr<Payload> ReadPayload(Connection* db,
@@ -234,6 +239,8 @@ absl::StatusOr<std::vector<Store::Unscored>> ListUnscoredRows(
                  "WHERE s.state = 1 AND (?2 = '' OR EXISTS "
                  "  (SELECT 1 FROM claims c "
                  "   WHERE c.rig = s.rig AND c.replica = ?2)) "
+                 "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
+                 "  WHERE p.rig = s.rig) "
                  "ORDER BY s.rig, s.sequence LIMIT ?1",
                  limit,
                  replica);
@@ -257,6 +264,7 @@ absl::StatusOr<std::int64_t> CountUnscoredRows(Connection* db,
 absl::Status WriteUnusable(UnitOfWork* tx,
                            std::int64_t sequence,
                            const std::string& problem) {
+  tx->Changed(RecordKind::kSegment, sequence);
   return Statement(tx->db(),
                    "UPDATE segments SET state = 3, problem = ?3 "
                    "WHERE rig = ?1 AND sequence = ?2",
@@ -269,6 +277,7 @@ absl::Status WriteUnusable(UnitOfWork* tx,
 absl::Status WriteProblem(UnitOfWork* tx,
                           std::int64_t sequence,
                           const std::string& problem) {
+  tx->Changed(RecordKind::kSegment, sequence);
   return Statement(tx->db(),
                    "UPDATE segments SET problem = ?3 "
                    "WHERE rig = ?1 AND sequence = ?2",
@@ -299,16 +308,25 @@ absl::StatusOr<SegmentUsers> UsersOf(UnitOfWork* tx, std::int64_t sequence) {
 }
 
 absl::Status DeleteSegment(UnitOfWork* tx, std::int64_t sequence) {
+  tx->Changed(RecordKind::kSegment, sequence);
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestSequence(tx));
   if (sequence == newest) {
     // The next segment to arrive takes its number.
-    SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
-                                      "UPDATE table_absences SET rival = NULL "
-                                      "WHERE rig = ?1 AND rival = ?2",
-                                      tx->rig_row(),
-                                      sequence)
-                                .Run());
+    Statement forget(tx->db(),
+                     "UPDATE table_absences SET rival = NULL "
+                     "WHERE rig = ?1 AND rival = ?2 RETURNING sequence",
+                     tx->rig_row(),
+                     sequence);
+    while (forget.Next()) tx->Changed(RecordKind::kSegment, forget.Int(0));
+    SELFCAL_RETURN_IF_ERROR(forget.status());
   }
+  Statement runs(tx->db(),
+                 "SELECT run FROM run_segments "
+                 "WHERE rig = ?1 AND sequence = ?2",
+                 tx->rig_row(),
+                 sequence);
+  while (runs.Next()) tx->Changed(RecordKind::kRun, runs.Int(0));
+  SELFCAL_RETURN_IF_ERROR(runs.status());
   for (const char* table : {"table_entries",
                             "run_segments",
                             "payloads",
@@ -340,12 +358,17 @@ absl::StatusOr<std::vector<DataHolder>> DataHolders(
                   "      AND r.state IN (1, 2)), "
                   "  (SELECT max(e.gain) FROM table_entries e "
                   "    WHERE e.rig = p.rig AND e.sequence = p.sequence), "
-                  "  {} "
+                  "  {}, "
+                  "  EXISTS (SELECT 1 FROM outbox o JOIN uplinks u USING (rig) "
+                  "    WHERE o.rig = p.rig AND o.kind = {} "
+                  "      AND o.number = p.sequence AND u.data = {}) "
                   "FROM payloads p CROSS JOIN segments s "
                   "WHERE s.rig = p.rig AND s.sequence = p.sequence "
                   "AND p.rig = ?1 AND s.state <> 1 ORDER BY p.sequence",
                   kColumns,
-                  ExcludedFor("?2")),
+                  ExcludedFor("?2"),
+                  static_cast<int>(RecordKind::kData),
+                  static_cast<int>(ReportedData::kAll)),
       tx->rig_row(),
       excluded_for.bits());
   std::vector<DataHolder> holders;
@@ -356,6 +379,7 @@ absl::StatusOr<std::vector<DataHolder>> DataHolders(
     holder.in_unfinished_run = read.Int(7) != 0;
     if (!read.IsNull(8)) holder.gain = read.Double(8);
     holder.excluded = read.Int(9) != 0;
+    holder.to_report = read.Int(10) != 0;
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   return holders;

@@ -127,7 +127,8 @@ struct DataHolder {
   bool in_unfinished_run = false;
   // The largest gain in the tables that hold it; nullopt if none does.
   std::optional<double> gain;
-  bool excluded = false;  // from a table, for one of the causes asked for
+  bool excluded = false;   // from a table, for one of the causes asked for
+  bool to_report = false;  // it stays until it was reported to the hub
 };
 // In order of arrival.
 absl::StatusOr<std::vector<DataHolder>> DataHolders(
@@ -138,7 +139,9 @@ absl::StatusOr<bool> HasData(UnitOfWork* tx, std::int64_t sequence);
 absl::Status DeleteData(UnitOfWork* tx, std::int64_t sequence);
 
 // Inserts a segment that waits for its score. The key must be new.
-absl::Status InsertSegment(UnitOfWork* tx, const NewSegment& segment);
+// Returns its sequence.
+absl::StatusOr<std::int64_t> InsertSegment(UnitOfWork* tx,
+                                           const NewSegment& segment);
 // Stored or scored -> scored, with its information and the scores of its
 // groups; replaces earlier ones.
 absl::Status WriteScore(UnitOfWork* tx,

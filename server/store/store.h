@@ -240,6 +240,27 @@ struct StoredChange {
   double inflation = 1;             // factor on the variances of segments
 };
 
+enum class InstructionState { kPending, kDone, kRefused };
+
+// What a hub has the device of a rig do.
+struct StoredInstruction {
+  std::string rig;
+  std::int64_t instruction = 0;  // counts from 1 in a rig
+  std::int64_t create_time_ns = 0;
+  std::string caller;   // who gave it
+  std::string request;  // selfcal.v1.Instruction with its request, serialised
+  InstructionState state = InstructionState::kPending;
+  std::string message;           // why the device refused it
+  std::int64_t end_time_ns = 0;  // 0 while it is pending
+};
+
+// The state of the reports of a device to its hub, about one rig.
+struct ReportState {
+  std::int64_t time_ns = 0;     // of the last that was taken; 0: none
+  std::int64_t waiting = 0;     // records that are still to be reported
+  std::string program_version;  // of the device; empty on the device itself
+};
+
 // Summary of a rig, for lists.
 struct RigSummary {
   std::string rig;
@@ -254,9 +275,12 @@ struct RigSummary {
   std::int64_t newest_run = 0;  // 0: none, as for the change
   RunState run_state = RunState::kPending;
   std::int64_t newest_change_ns = 0;  // device change
+  std::optional<ReportState> uplink;  // on a device that has a hub
+  std::optional<ReportState> device;  // at the hub, if a device reports it
 };
 
 struct Announcement;     // announcements.h
+class Outbox;            // outbox.h
 class Replicas;          // replicas.h
 class StoreMaintenance;  // maintenance.h
 class UnitOfWork;        // unit_of_work.h
@@ -302,9 +326,10 @@ class Store {
   }
   virtual absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
       const RigQuery& query, const Page& page) = 0;
+  // Names of all rigs, in their order, but those that devices report.
   virtual absl::StatusOr<std::vector<std::string>> ListRigNames() = 0;
-  // Names of rigs that have received segments, but none after this steady time
-  // (Moment).
+  // Of these, the ones that have received segments, but none after this steady
+  // time (Moment).
   virtual absl::StatusOr<std::vector<std::string>> ListIdleRigs(
       std::int64_t idle_since_ns) = 0;
 
@@ -332,7 +357,7 @@ class Store {
   // Exclusions of the segment, as far as they were recorded.
   virtual absl::StatusOr<std::vector<Exclusion>> ListExclusions(
       const std::string& rig, const SegmentKey& key) = 0;
-  // Unscored segments of all rigs, or of those that a replica has claimed.
+  // Unscored segments of these rigs, or of those that a replica has claimed.
   // Those of one rig follow each other, in the order of their arrival.
   struct Unscored {
     std::string rig;
@@ -367,10 +392,14 @@ class Store {
                                            std::int64_t run) = 0;
   virtual absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
                                                      const Page& page) = 0;
-  // Pending and running runs of all rigs, or of those that a replica has
+  // Pending and running runs of these rigs, or of those that a replica has
   // claimed, oldest first. After a restart, a running one starts again.
   virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns(
       const std::string& replica = "") = 0;
+
+  // --- Instructions for the device of a rig, newest first.
+  virtual absl::StatusOr<Listed<StoredInstruction>> ListInstructions(
+      const std::string& rig, const Page& page) = 0;
 
   // --- Events, oldest or newest first, of one rig or, if `rig` is empty, of
   // all. They are only ever appended.
@@ -402,6 +431,8 @@ class Store {
   virtual std::shared_ptr<void> Listen(OnAnnouncement heard) = 0;
   // The daemons that share the database. Lives as long as the store.
   virtual Replicas* replicas() = 0;
+  // What a device has still to report to its hub. Lives as long as the store.
+  virtual Outbox* outbox() = 0;
   // Check, backup and restore. Lives as long as the store.
   virtual StoreMaintenance* maintenance() = 0;
 };

@@ -66,6 +66,7 @@ absl::StatusOr<std::vector<std::string>> TablesOfSegment(
 }
 
 absl::Status InsertTables(UnitOfWork* tx, const std::vector<Table>& tables) {
+  tx->Changed(RecordKind::kTables);
   int position = 0;
   for (const Table& table : tables) {
     SELFCAL_RETURN_IF_ERROR(
@@ -93,6 +94,7 @@ absl::StatusOr<std::vector<std::string>> TablesOfSegment(
 absl::Status WriteScored(UnitOfWork* tx,
                          const std::string& group,
                          std::int64_t scored) {
+  tx->Changed(RecordKind::kTables);
   return Statement(tx->db(),
                    "UPDATE tables SET scored = ?3 "
                    "WHERE rig = ?1 AND group_name = ?2",
@@ -107,6 +109,7 @@ absl::Status InsertEntry(UnitOfWork* tx,
                          std::int64_t sequence,
                          double entropy,
                          double gain) {
+  tx->Changed(RecordKind::kSegment, sequence);
   return Statement(tx->db(),
                    "INSERT INTO table_entries (rig, group_name, sequence, "
                    "  entropy, gain) VALUES (?1, ?2, ?3, ?4, ?5)",
@@ -121,6 +124,7 @@ absl::Status InsertEntry(UnitOfWork* tx,
 absl::Status DeleteEntry(UnitOfWork* tx,
                          const std::string& group,
                          std::int64_t sequence) {
+  tx->Changed(RecordKind::kSegment, sequence);
   return Statement(tx->db(),
                    "DELETE FROM table_entries "
                    "WHERE rig = ?1 AND group_name = ?2 AND sequence = ?3",
@@ -133,6 +137,7 @@ absl::Status DeleteEntry(UnitOfWork* tx,
 absl::Status WriteEntryScore(UnitOfWork* tx,
                              std::int64_t sequence,
                              const GroupScore& score) {
+  tx->Changed(RecordKind::kSegment, sequence);
   return Statement(tx->db(),
                    "UPDATE table_entries SET entropy = ?4, gain = ?5 "
                    "WHERE rig = ?1 AND group_name = ?2 AND sequence = ?3",

@@ -8,10 +8,12 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <utility>
 
 #include "server/store/moment.h"
+#include "server/store/record_kind.h"
 
 namespace selfcal::server {
 
@@ -33,6 +35,16 @@ class UnitOfWork {
   const Moment& now() const { return now_; }
   std::int64_t time_ns() const { return now_.time_ns; }
 
+  // Notes that a record has changed, which a device reports to its hub
+  // (outbox.h). Called by what writes the record.
+  void Changed(RecordKind kind, std::int64_t number = 0) {
+    changed_.emplace(kind, number);
+  }
+  // By kind and number.
+  const std::set<std::pair<RecordKind, std::int64_t>>& changed() const {
+    return changed_;
+  }
+
   // For the statements of this module.
   Connection* db() const { return db_; }
   std::int64_t rig_row() const { return rig_row_; }
@@ -42,6 +54,7 @@ class UnitOfWork {
   std::string rig_;
   std::int64_t rig_row_;
   Moment now_;
+  std::set<std::pair<RecordKind, std::int64_t>> changed_;
 };
 
 }  // namespace selfcal::server

@@ -31,12 +31,17 @@ class Statement {
   Statement(Connection* connection, std::string_view sql, const Args&... args)
       : connection_(connection) {
     Prepare(sql);
-    int index = 0;
-    (Bind(++index, args), ...);
+    (BindNext(args), ...);
   }
   ~Statement() { connection_->Keep(std::move(prepared_)); }
   Statement(const Statement&) = delete;
   Statement& operator=(const Statement&) = delete;
+
+  // Binds the parameter after those that are bound.
+  template <typename T>
+  void BindNext(const T& value) {
+    Bind(++bound_, value);
+  }
 
   // Steps to the next row. False at the end, or after an error.
   bool Next();
@@ -68,6 +73,7 @@ class Statement {
 
   Connection* connection_;
   std::unique_ptr<PreparedStatement> prepared_;  // null after an error
+  int bound_ = 0;                                // parameters
   absl::Status status_;
 };
 

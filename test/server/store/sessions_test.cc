@@ -232,12 +232,10 @@ TEST_P(SessionsTest, AQuarantinedSegmentIsExcludedAsUnusable) {
 absl::Status InsertScored(UnitOfWork* tx,
                           const NewSegment& segment,
                           const SegmentInformation& information) {
-  const absl::Status inserted = InsertSegment(tx, segment);
-  if (!inserted.ok()) return inserted;
-  const auto row = FindSegment(tx, segment.key);
-  if (!row.ok()) return row.status();
-  const absl::Status scored = WriteScore(tx, row->sequence, information);
-  return scored.ok() ? DeleteData(tx, row->sequence) : scored;
+  const auto sequence = InsertSegment(tx, segment);
+  if (!sequence.ok()) return sequence.status();
+  const absl::Status scored = WriteScore(tx, *sequence, information);
+  return scored.ok() ? DeleteData(tx, *sequence) : scored;
 }
 
 TEST_P(SessionsTest, TenThousandSegmentsComeInTenPages) {

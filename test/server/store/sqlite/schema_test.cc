@@ -1,9 +1,12 @@
 // What the schema itself refuses, whoever writes, and how it is searched.
+#include <set>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "server/domain/calibration_life.h"
+#include "server/store/reported_tables.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite/sqlite_test.h"
 
@@ -38,6 +41,54 @@ TEST_F(SchemaTest, CalibrationCannotBeChangedOrDeleted) {
                           "DELETE FROM events"}) {
     EXPECT_FALSE(Execute(sql).ok()) << sql;
   }
+}
+
+// A new column or table is reported to a hub, or listed here with the reason
+// why not.
+TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
+  std::set<std::string> expected = {
+      // Of the device alone: claims, clock, reports, and what is only used to
+      // compute.
+      "replicas",
+      "claims",
+      "clock",
+      "schema_migrations",
+      "segment_ends",
+      "uplinks",
+      "outbox",
+      "reported_rigs",
+      "instructions",
+      // The hub has its own key, and derives the last time from segments.
+      "rigs.rig",
+      "rigs.id",
+      "rigs.last_seen_ns",
+      "rigs.deleting"};
+  std::set<std::string> reported;
+  for (const ReportedTable& table : ReportedTables()) {
+    const std::string name(table.name);
+    if (name != "rigs") reported.insert(name + ".rig");
+    if (!table.number.empty()) {
+      reported.insert(name + "." + std::string(table.number));
+    }
+    for (const ReportedColumn& column : table.columns) {
+      reported.insert(name + "." + std::string(column.name));
+    }
+  }
+  store_.reset();
+  const auto columns =
+      ReadTextInFile(Path(),
+                     "SELECT group_concat(t.name || '.' || c.name, ' ') "
+                     "FROM sqlite_schema t JOIN pragma_table_info(t.name) c "
+                     "WHERE t.type = 'table'");
+  ASSERT_TRUE(columns.ok()) << columns.status();
+  std::istringstream words(*columns);
+  std::set<std::string> there;
+  for (std::string column; words >> column;) {
+    const std::string table = column.substr(0, column.find('.'));
+    if (expected.contains(table) || expected.contains(column)) continue;
+    there.insert(column);
+  }
+  EXPECT_EQ(there, reported);
 }
 
 TEST_F(SchemaTest, CalibrationInAnotherRowIsNoticed) {

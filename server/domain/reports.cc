@@ -1,0 +1,109 @@
+#include "server/domain/reports.h"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "server/domain/quotas.h"
+#include "server/status/status_macros.h"
+#include "server/store/instructions.h"
+#include "server/store/report.h"
+#include "server/store/rigs.h"
+
+namespace selfcal::server {
+namespace {
+
+// An answer has no more than this, and a device no more that wait.
+constexpr int kMaxInstructions = 20;
+constexpr int kMaxPending = 1000;
+
+absl::Status Take(UnitOfWork* tx,
+                  const DeviceReport& report,
+                  const Quotas& quotas) {
+  SELFCAL_RETURN_IF_ERROR(
+      ApplyReport(tx, report.records, [&](std::int64_t bytes) {
+        return MakeRoomForReported(tx, bytes, quotas);
+      }));
+  if (report.deleted) return DeleteRigRows(tx);
+  return WriteReportingDevice(tx,
+                              {.key = report.key,
+                               .report = report.number,
+                               .time_ns = tx->time_ns(),
+                               .waiting = report.waiting,
+                               .program_version = report.program_version});
+}
+
+}  // namespace
+
+absl::Status CheckOwnRig(UnitOfWork* tx) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto device, ReadReportingDevice(tx));
+  if (!device) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      fmt::format("rig {} is reported by its device, where it can be changed; "
+                  "this hub has a copy of its records",
+                  tx->rig()));
+}
+
+absl::StatusOr<ReportAnswer> TakeReport(UnitOfWork* tx,
+                                        const DeviceReport& report,
+                                        const Quotas& quotas) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto device, ReadReportingDevice(tx));
+  if (!device) {
+    return absl::FailedPreconditionError(fmt::format(
+        "the hub has a rig {} of its own: give the rig of the device another "
+        "name",
+        tx->rig()));
+  }
+  if (device->key != report.key) {
+    return absl::FailedPreconditionError(fmt::format(
+        "another device, or an earlier rig, was reported as {}: give the rig "
+        "another name or, if it replaces that one, delete {} at the hub first",
+        tx->rig(),
+        tx->rig()));
+  }
+  const bool follows = report.number == 1 || report.number == device->report ||
+                       report.number == device->report + 1;
+  ReportAnswer answer;
+  answer.begin_anew = !follows;
+  if (!follows) return answer;
+  SELFCAL_RETURN_IF_ERROR(Take(tx, report, quotas));
+  if (report.deleted) return answer;
+  for (const DeviceReport::Result& result : report.results) {
+    SELFCAL_RETURN_IF_ERROR(EndInstruction(
+        tx,
+        result.instruction,
+        result.refused ? InstructionState::kRefused : InstructionState::kDone,
+        result.message));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(answer.instructions,
+                           PendingInstructions(tx, kMaxInstructions));
+  return answer;
+}
+
+absl::Status TakeFirstReport(UnitOfWork* tx,
+                             const DeviceReport& report,
+                             const Quotas& quotas) {
+  SELFCAL_RETURN_IF_ERROR(CheckRigQuota(tx, quotas));
+  return Take(tx, report, quotas);
+}
+
+absl::StatusOr<StoredInstruction> CreateInstruction(
+    UnitOfWork* tx, const std::string& caller, const std::string& request) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto device, ReadReportingDevice(tx));
+  if (!device) {
+    return absl::FailedPreconditionError(fmt::format(
+        "no device reports rig {}: make the call itself", tx->rig()));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const auto pending,
+                           PendingInstructions(tx, kMaxPending));
+  if (pending.size() == kMaxPending) {
+    return absl::ResourceExhaustedError(fmt::format(
+        "{} instructions for rig {} are pending; its device has not reported "
+        "for too long",
+        kMaxPending,
+        tx->rig()));
+  }
+  return InsertInstruction(tx, caller, request);
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,63 @@
+// What a hub takes from the devices that report to it (server/store/outbox.h).
+// A rig that a device reports belongs to the device: the hub has its records
+// and changes none of them.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/domain/domain_options.h"
+#include "server/store/store.h"
+#include "server/store/unit_of_work.h"
+
+namespace selfcal::server {
+
+// A report as it arrived.
+struct DeviceReport {
+  std::string rig = {};
+  std::int64_t key = 0;  // of the rig in the database of the device
+  std::int64_t number = 0;
+  bool deleted = false;      // the device has deleted the rig
+  std::string records = {};  // Report::records
+  std::int64_t waiting = 0;
+  std::string program_version = {};
+  // Of instructions that the device has carried out or refused.
+  struct Result {
+    std::int64_t instruction = 0;
+    bool refused = false;
+    std::string message;
+  };
+  std::vector<Result> results = {};
+};
+
+struct ReportAnswer {
+  // The hub does not have what was reported before, e.g. since it was restored
+  // from a backup: the device must report all records anew.
+  bool begin_anew = false;
+  std::vector<StoredInstruction> instructions;  // pending ones, oldest first
+};
+
+// OK unless a device reports the rig: then FAILED_PRECONDITION, which says so.
+absl::Status CheckOwnRig(UnitOfWork* tx);
+
+// Takes a report about a rig that exists. FAILED_PRECONDITION for one of
+// another device, or about a rig of the hub's own.
+absl::StatusOr<ReportAnswer> TakeReport(UnitOfWork* tx,
+                                        const DeviceReport& report,
+                                        const Quotas& quotas);
+// Takes the first report of a rig that was inserted in this unit of work.
+absl::Status TakeFirstReport(UnitOfWork* tx,
+                             const DeviceReport& report,
+                             const Quotas& quotas);
+
+// Gives an instruction to the device of the rig. FAILED_PRECONDITION if none
+// reports it, RESOURCE_EXHAUSTED if too many are pending.
+absl::StatusOr<StoredInstruction> CreateInstruction(UnitOfWork* tx,
+                                                    const std::string& caller,
+                                                    const std::string& request);
+
+}  // namespace selfcal::server

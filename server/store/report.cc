@@ -1,0 +1,397 @@
+#include "server/store/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "selfcal/store/report.pb.h"
+#include "server/status/status_macros.h"
+#include "server/store/announcements.h"
+#include "server/store/calibrations.h"
+#include "server/store/change_rows.h"
+#include "server/store/driver/statement.h"
+#include "server/store/inventory.h"
+#include "server/store/records.h"
+#include "server/store/reported_tables.h"
+#include "server/store/rigs.h"
+#include "server/store/runs.h"
+#include "server/store/segment_rows.h"
+
+namespace selfcal::server {
+namespace {
+
+using Record = store::ReportedRecords::Record;
+using Rows = std::vector<ReportedRow>;
+
+// A message of data beyond this is not taken: it could not be read here.
+constexpr std::int64_t kMaxReportedBytes = std::int64_t{256} << 20;
+
+// The numbers of CalibrationState in the database.
+constexpr std::int64_t kActive = 1;
+constexpr std::int64_t kSuperseded = 2;
+constexpr std::int64_t kRejected = 3;
+constexpr std::int64_t kCandidate = 4;
+constexpr std::int64_t kRolledBack = 5;
+
+absl::Status BadReport(const std::string& why) {
+  return absl::InvalidArgumentError("the report cannot be read: " + why);
+}
+
+absl::Status Contradiction(const std::string& what) {
+  return absl::FailedPreconditionError(
+      fmt::format("the report contradicts the records of the hub: {}", what));
+}
+
+absl::StatusOr<store::ReportedRecords> Parse(const std::string& bytes) {
+  store::ReportedRecords records;
+  if (!records.ParseFromString(bytes)) {
+    return BadReport("its records are no message of this kind");
+  }
+  return records;
+}
+
+// The row of a table that has one for each record; null if it is not there.
+const ReportedRow* RowOf(const Rows& rows, std::string_view table) {
+  const auto found =
+      std::find_if(rows.begin(), rows.end(), [&](const ReportedRow& row) {
+        return row.table->name == table;
+      });
+  return found == rows.end() ? nullptr : &*found;
+}
+
+// Writes the rows, in place of those that the record had. The tables come in an
+// order in which none refers to a later one, and the first has one row for each
+// record: it is updated.
+absl::Status ReplaceRows(UnitOfWork* tx,
+                         const Record& record,
+                         const Rows& rows) {
+  bool is_first = true;
+  for (const ReportedTable& table : ReportedTables()) {
+    if (static_cast<int>(table.kind) != record.kind()) continue;
+    if (!is_first) {
+      SELFCAL_RETURN_IF_ERROR(DeleteRows(tx, table, record.number()));
+    }
+    is_first = false;
+  }
+  for (const ReportedRow& row : rows) {
+    SELFCAL_RETURN_IF_ERROR(
+        WriteRow(tx, row, record.number(), OnConflict::kUpdate));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ApplyRig(UnitOfWork* tx, const Rows& rows) {
+  const ReportedRow* row = RowOf(rows, "rigs");
+  if (row == nullptr) return BadReport("a rig has no definition");
+  SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
+                                    "UPDATE rigs SET create_time_ns = ?2, "
+                                    "  definition = ?3, sha256 = ?4 "
+                                    "WHERE rig = ?1",
+                                    tx->rig_row(),
+                                    row->Of("create_time_ns").integer(),
+                                    BlobView{row->Of("definition").blob()},
+                                    BlobView{row->Of("sha256").blob()})
+                              .Run());
+  SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
+                                    "DELETE FROM rig_labels WHERE rig = ?1",
+                                    tx->rig_row())
+                              .Run());
+  for (const ReportedRow& label : rows) {
+    if (&label == row) continue;
+    SELFCAL_RETURN_IF_ERROR(WriteRow(tx, label, 0, OnConflict::kUpdate));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig stored, ReadRig(tx));
+  if (stored.rig.id != tx->rig()) {
+    return BadReport(fmt::format("it defines the rig {}", stored.rig.id));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ApplySegment(UnitOfWork* tx,
+                          const Record& record,
+                          const Rows& rows) {
+  const ReportedRow* row = RowOf(rows, "segments");
+  if (row == nullptr) return DeleteSegment(tx, record.number());
+  const SegmentKey key{row->Of("session").text(),
+                       row->Of("session_index").integer()};
+  Statement before(tx->db(),
+                   "SELECT session, session_index FROM segments "
+                   "WHERE rig = ?1 AND sequence = ?2",
+                   tx->rig_row(),
+                   record.number());
+  const bool another =
+      before.Next() && SegmentKey{before.Text(0), before.Int(1)} != key;
+  SELFCAL_RETURN_IF_ERROR(before.status());
+  // The last segment was deleted, and another one took its number.
+  if (another) SELFCAL_RETURN_IF_ERROR(DeleteSegment(tx, record.number()));
+  SELFCAL_RETURN_IF_ERROR(ReplaceRows(tx, record, rows));
+  SELFCAL_RETURN_IF_ERROR(Statement(tx->db(),
+                                    "UPDATE rigs SET last_seen_ns = ?2 "
+                                    "WHERE rig = ?1 AND last_seen_ns < ?2",
+                                    tx->rig_row(),
+                                    row->Of("receive_time_ns").integer())
+                              .Run());
+  return ReadSegment(tx, key).status();
+}
+
+absl::Status ApplyRun(UnitOfWork* tx, const Record& record, const Rows& rows) {
+  if (rows.empty()) return BadReport("a run is gone");
+  SELFCAL_RETURN_IF_ERROR(ReplaceRows(tx, record, rows));
+  SELFCAL_RETURN_IF_ERROR(ReadRun(tx, record.number()).status());
+  return AnnounceRun(tx, record.number());
+}
+
+absl::Status SetState(UnitOfWork* tx,
+                      std::int64_t version,
+                      std::int64_t state) {
+  return Statement(tx->db(),
+                   "UPDATE calibrations SET state = ?3 "
+                   "WHERE rig = ?1 AND version = ?2 AND state <> ?3",
+                   tx->rig_row(),
+                   version,
+                   state)
+      .Run();
+}
+
+// Inserts a version as it began; what became of it follows from activations.
+absl::Status InsertVersion(UnitOfWork* tx,
+                           std::int64_t version,
+                           const ReportedRow& row,
+                           const Rows& rows) {
+  std::optional<std::int64_t> run;
+  if (row.Of("run").has_integer()) run = row.Of("run").integer();
+  SELFCAL_RETURN_IF_ERROR(
+      Statement(tx->db(),
+                "INSERT INTO calibrations (rig, version, state, "
+                "  create_time_ns, run, content, sha256, create_steady_ns) "
+                "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                tx->rig_row(),
+                version,
+                version == 1 ? kActive : kCandidate,
+                row.Of("create_time_ns").integer(),
+                run,
+                BlobView{row.Of("content").blob()},
+                BlobView{row.Of("sha256").blob()},
+                row.Of("create_steady_ns").integer())
+          .Run());
+  for (const ReportedRow& origin : rows) {
+    if (origin.table->name != "calibration_segments") continue;
+    SELFCAL_RETURN_IF_ERROR(WriteRow(tx, origin, version, OnConflict::kKeep));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ApplyCalibration(UnitOfWork* tx,
+                              const Record& record,
+                              const Rows& rows) {
+  const std::int64_t version = record.number();
+  const ReportedRow* row = RowOf(rows, "calibrations");
+  if (row == nullptr) return BadReport("a calibration is gone");
+  Statement before(tx->db(),
+                   "SELECT sha256, state FROM calibrations "
+                   "WHERE rig = ?1 AND version = ?2",
+                   tx->rig_row(),
+                   version);
+  const bool is_there = before.Next();
+  SELFCAL_RETURN_IF_ERROR(before.status());
+  if (!is_there) {
+    SELFCAL_RETURN_IF_ERROR(InsertVersion(tx, version, *row, rows));
+  } else if (before.Text(0) != row->Of("sha256").blob()) {
+    return Contradiction(fmt::format("version {} differs", version));
+  }
+  const bool is_candidate =
+      is_there ? before.Int(1) == kCandidate : version != 1;
+  if (is_candidate && row->Of("state").integer() == kRejected) {
+    SELFCAL_RETURN_IF_ERROR(SetState(tx, version, kRejected));
+  }
+  for (const ReportedRow& more : rows) {
+    if (more.table->name != "validations" &&
+        more.table->name != "disagreements") {
+      continue;
+    }
+    SELFCAL_RETURN_IF_ERROR(WriteRow(tx, more, version, OnConflict::kKeep));
+  }
+  return ReadCalibration(tx, version).status();
+}
+
+absl::Status ApplyActivation(UnitOfWork* tx,
+                             const Record& record,
+                             const Rows& rows) {
+  const ReportedRow* row = RowOf(rows, "activations");
+  if (row == nullptr) return BadReport("an activation is gone");
+  const std::int64_t version = row->Of("version").integer();
+  Statement before(tx->db(),
+                   "SELECT version FROM activations "
+                   "WHERE rig = ?1 AND activation = ?2",
+                   tx->rig_row(),
+                   record.number());
+  const bool is_there = before.Next();
+  SELFCAL_RETURN_IF_ERROR(before.status());
+  if (is_there) {
+    if (before.Int(0) == version) return absl::OkStatus();
+    return Contradiction(fmt::format("activation {} differs", record.number()));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::int64_t newest,
+      ReadInt(tx->db(),
+              "SELECT coalesce(max(activation), 0) FROM activations "
+              "WHERE rig = ?1",
+              tx->rig_row()));
+  if (record.number() != newest + 1) {
+    return Contradiction(fmt::format("activation {} is missing", newest + 1));
+  }
+  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t active, ActiveVersion(tx));
+  if (active != version) {
+    SELFCAL_RETURN_IF_ERROR(
+        SetState(tx, active, version < active ? kRolledBack : kSuperseded));
+    SELFCAL_RETURN_IF_ERROR(SetState(tx, version, kActive));
+  }
+  SELFCAL_RETURN_IF_ERROR(
+      WriteRow(tx, *row, record.number(), OnConflict::kKeep));
+  return AnnounceCalibration(tx);
+}
+
+// Data that the device does not have any more stays.
+absl::Status ApplyData(UnitOfWork* tx,
+                       const Record& record,
+                       const Rows& rows,
+                       const AdmitData& admit_data) {
+  for (const ReportedRow& row : rows) {
+    const std::string& data = row.Of("data").blob();
+    const std::int64_t raw_bytes = row.Of("raw_bytes").integer();
+    if (raw_bytes < 0 || raw_bytes > kMaxReportedBytes) {
+      return BadReport("the data of a segment is too large");
+    }
+    SELFCAL_ASSIGN_OR_RETURN(
+        const bool admitted,
+        admit_data(static_cast<std::int64_t>(data.size())));
+    if (!admitted) continue;
+    SELFCAL_RETURN_IF_ERROR(
+        WriteRow(tx, row, record.number(), OnConflict::kUpdate));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ApplyRecord(UnitOfWork* tx,
+                         const Record& record,
+                         const Rows& rows,
+                         const AdmitData& admit_data) {
+  switch (static_cast<RecordKind>(record.kind())) {
+    case RecordKind::kRig:
+      return ApplyRig(tx, rows);
+    case RecordKind::kTables:
+      return ReplaceRows(tx, record, rows);
+    case RecordKind::kSegment:
+      return ApplySegment(tx, record, rows);
+    case RecordKind::kRun:
+      return ApplyRun(tx, record, rows);
+    case RecordKind::kCalibration:
+      return ApplyCalibration(tx, record, rows);
+    case RecordKind::kActivation:
+      return ApplyActivation(tx, record, rows);
+    case RecordKind::kChange: {
+      if (rows.empty()) return BadReport("a device change is gone");
+      SELFCAL_RETURN_IF_ERROR(ReplaceRows(tx, record, rows));
+      return ReadChange(tx, record.number()).status();
+    }
+    case RecordKind::kEvent:
+      for (const ReportedRow& row : rows) {
+        SELFCAL_RETURN_IF_ERROR(
+            WriteRow(tx, row, record.number(), OnConflict::kKeep));
+      }
+      return absl::OkStatus();
+    case RecordKind::kData:
+      return ApplyData(tx, record, rows, admit_data);
+    case RecordKind::kInventory:
+      return ApplyInventory(tx, record);
+  }
+  return absl::InvalidArgumentError(
+      fmt::format("this hub does not know records of kind {}: upgrade the hub "
+                  "before its devices",
+                  record.kind()));
+}
+
+// What the device wrote is not what it should be, rather than the disk here; or
+// the schema refuses it.
+absl::Status FromDevice(const absl::Status& status) {
+  if (absl::IsDataLoss(status) || absl::IsNotFound(status)) {
+    return BadReport(std::string(status.message()));
+  }
+  if (absl::IsInternal(status)) {
+    return Contradiction(std::string(status.message()));
+  }
+  return status;
+}
+
+}  // namespace
+
+absl::StatusOr<StoredRig> RigOfReport(const std::string& bytes,
+                                      const std::string& rig) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto records, Parse(bytes));
+  for (const Record& record : records.records()) {
+    if (record.kind() != static_cast<int>(RecordKind::kRig)) continue;
+    SELFCAL_ASSIGN_OR_RETURN(const Rows rows, CheckRows(records, record));
+    const ReportedRow* row = RowOf(rows, "rigs");
+    if (row == nullptr) break;
+    auto stored = ParseRig(row->Of("definition").blob(), "the rig");
+    if (!stored.ok()) return FromDevice(stored.status());
+    if (stored->rig.id != rig) {
+      return BadReport(fmt::format("it defines the rig {}", stored->rig.id));
+    }
+    stored->create_time_ns = row->Of("create_time_ns").integer();
+    return stored;
+  }
+  return BadReport("it begins without the definition of the rig");
+}
+
+absl::StatusOr<std::optional<ReportingDevice>> ReadReportingDevice(
+    UnitOfWork* tx) {
+  Statement read(tx->db(),
+                 "SELECT device, report, time_ns, waiting, program_version "
+                 "FROM reported_rigs WHERE rig = ?1",
+                 tx->rig_row());
+  std::optional<ReportingDevice> device;
+  if (read.Next()) {
+    device = {read.Int(0), read.Int(1), read.Int(2), read.Int(3), read.Text(4)};
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return device;
+}
+
+absl::Status WriteReportingDevice(UnitOfWork* tx,
+                                  const ReportingDevice& device) {
+  return Statement(
+             tx->db(),
+             "INSERT INTO reported_rigs (rig, device, report, time_ns, "
+             "  waiting, program_version) VALUES (?1, ?2, ?3, ?4, ?5, ?6) "
+             "ON CONFLICT (rig) DO UPDATE SET device = ?2, report = ?3, "
+             "  time_ns = ?4, waiting = ?5, program_version = ?6",
+             tx->rig_row(),
+             device.key,
+             device.report,
+             device.time_ns,
+             device.waiting,
+             device.program_version)
+      .Run();
+}
+
+absl::Status ApplyReport(UnitOfWork* tx,
+                         const std::string& bytes,
+                         const AdmitData& admit_data) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto records, Parse(bytes));
+  for (const Record& record : records.records()) {
+    // The rows of an inventory are of no table.
+    Rows rows;
+    if (record.kind() != static_cast<int>(RecordKind::kInventory)) {
+      SELFCAL_ASSIGN_OR_RETURN(rows, CheckRows(records, record));
+    }
+    const absl::Status status = ApplyRecord(tx, record, rows, admit_data);
+    if (!status.ok()) return FromDevice(status);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace selfcal::server

@@ -1,0 +1,565 @@
+// Reports of a device to its hub: the hub has what the device has, whatever is
+// lost on the way; a rig that is reported belongs to its device.
+#include <random>
+
+#include "selfcal/store/report.pb.h"
+#include "server/store/outbox.h"
+#include "server/store/report.h"
+#include "test/promise.h"
+#include "test/server/store/store_test.h"
+#include "test/server/test_records.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr std::int64_t kLarge = std::int64_t{1} << 30;
+
+// The store of StoreTest is that of the hub, `device_` that of the device.
+class ReportsTest : public StoreTest {
+ protected:
+  ReportsTest() { OpenDevice(); }
+
+  void OpenDevice(const DomainOptions& options = {}) {
+    device_domain_.reset();
+    device_.reset();
+    auto opened = OpenSqliteStore(device_folder_.File("selfcal.db"), 0);
+    ASSERT_TRUE(opened.ok()) << opened.status();
+    device_ = *std::move(opened);
+    device_domain_.emplace(device_.get(), options);
+  }
+
+  // A rig of the device, with small tables.
+  Rig CreateDeviceRig(const std::string& id) {
+    Rig rig = TestRig(id);
+    rig.table_size = 3;
+    EXPECT_TRUE(device_domain_->CreateRig(rig).ok());
+    return rig;
+  }
+
+  void PutOnDevice(const Rig& rig, std::int64_t index) {
+    const auto put = device_domain_->PutSegment(rig.id, Segment(index));
+    ASSERT_TRUE(put.ok()) << put.status();
+  }
+
+  void ScoreOnDevice(const Rig& rig, std::int64_t index, double entropy) {
+    const auto scored = device_domain_->CommitScore(
+        rig.id,
+        {"s", index},
+        FakeInformation(rig, entropy, 5, static_cast<unsigned>(index)));
+    ASSERT_TRUE(scored.ok()) << scored.status();
+  }
+
+  void ReportNewRigs(ReportedData data) {
+    const auto rigs = device_->outbox()->ListUnreported();
+    ASSERT_TRUE(rigs.ok()) << rigs.status();
+    for (const std::string& rig : *rigs) {
+      ASSERT_TRUE(device_->outbox()->BeginAnew(rig, data).ok());
+    }
+  }
+
+  absl::StatusOr<ReportAnswer> Give(const Report& report) {
+    return domain_->TakeReport({.rig = report.rig,
+                                .key = report.key,
+                                .number = report.number,
+                                .deleted = report.deleted,
+                                .records = report.records,
+                                .waiting = report.waiting,
+                                .program_version = "test",
+                                .results = {}});
+  }
+
+  // One report of each rig that has something to report. Returns how many there
+  // were; `is_lost` decides whether the answer is.
+  int ReportOnce(ReportedData data,
+                 std::int64_t max_bytes,
+                 const std::function<bool()>& is_lost) {
+    ReportNewRigs(data);
+    int reports = 0;
+    const auto rigs = device_->outbox()->List();
+    EXPECT_TRUE(rigs.ok()) << rigs.status();
+    for (const ReportedRig& rig : *rigs) {
+      if (rig.waiting == 0 && !rig.deleted) continue;
+      ++reports;
+      const auto report = device_->outbox()->Next(rig, max_bytes);
+      EXPECT_TRUE(report.ok()) << report.status();
+      const auto answer = Give(*report);
+      EXPECT_TRUE(answer.ok()) << answer.status();
+      if (!answer.ok()) return 0;
+      if (answer->begin_anew) {
+        ++anew_;
+        EXPECT_TRUE(device_->outbox()->BeginAnew(rig.rig, data).ok());
+      } else if (!is_lost()) {
+        EXPECT_TRUE(device_->outbox()->Confirm(*report, 1).ok());
+      }
+    }
+    return reports;
+  }
+
+  void ReportAll(ReportedData data = ReportedData::kNone,
+                 std::int64_t max_bytes = kLarge) {
+    while (ReportOnce(data, max_bytes, [] { return false; }) > 0) {
+      if (HasFailure()) return;
+    }
+  }
+
+  // Everything that a store has of a rig, read as a report from the beginning.
+  static std::vector<std::string> Everything(Store* store,
+                                             const std::string& rig,
+                                             bool with_data) {
+    const auto begun = store->outbox()->BeginAnew(
+        rig, with_data ? ReportedData::kAll : ReportedData::kNone);
+    EXPECT_TRUE(begun.ok()) << begun;
+    std::vector<std::string> all;
+    for (;;) {
+      const auto rigs = store->outbox()->List();
+      EXPECT_TRUE(rigs.ok()) << rigs.status();
+      const auto found =
+          std::find_if(rigs->begin(), rigs->end(), [&](const auto& r) {
+            return r.rig == rig && !r.deleted;
+          });
+      if (found == rigs->end() || found->waiting == 0) return all;
+      const auto report = store->outbox()->Next(*found, kLarge);
+      EXPECT_TRUE(report.ok()) << report.status();
+      store::ReportedRecords records;
+      EXPECT_TRUE(records.ParseFromString(report->records));
+      for (const auto& record : records.records()) {
+        all.push_back(record.ShortDebugString());
+      }
+      EXPECT_TRUE(store->outbox()->Confirm(*report, 1).ok());
+    }
+  }
+
+  void ExpectSame(const std::string& rig, bool with_data = false) {
+    const auto device = Everything(device_.get(), rig, with_data);
+    const auto hub = Everything(store_.get(), rig, with_data);
+    ASSERT_EQ(device.size(), hub.size());
+    for (std::size_t k = 0; k < device.size(); ++k) {
+      ASSERT_EQ(device[k], hub[k]) << "record " << k;
+    }
+  }
+
+  TempFolder device_folder_;
+  std::unique_ptr<Store> device_;
+  std::optional<Domain> device_domain_;
+  int anew_ = 0;  // how often the device had to begin anew
+};
+SELFCAL_STORE_TEST_SUITE(ReportsTest);
+
+TEST_P(ReportsTest, HubHasWhatTheDeviceHas) {
+  const Rig rig = CreateDeviceRig("a");
+  for (int k = 0; k < 5; ++k) {
+    PutOnDevice(rig, k);
+    if (k < 4) ScoreOnDevice(rig, k, 3.0 - k);
+  }
+  ReportAll();
+  ExpectSame("a");
+  const auto tables = store_->GetTables("a");
+  ASSERT_TRUE(tables.ok()) << tables.status();
+  EXPECT_EQ((*tables)[0].entries.size(), 3u);
+  EXPECT_EQ(store_->GetActiveCalibration("a")->version, 1);
+  EXPECT_EQ(store_->GetRig("a")->create_time_ns,
+            device_->GetRig("a")->create_time_ns);
+  // The hub computes nothing of it.
+  EXPECT_THAT(*store_->ListUnscored(10), IsEmpty());
+  EXPECT_THAT(*store_->ListUnfinishedRuns(), IsEmpty());
+  EXPECT_THAT(*store_->ListRigNames(), IsEmpty());
+  EXPECT_FALSE(HasData("a", 4));
+}
+
+TEST_P(ReportsTest, WhatChangesLaterFollows) {
+  const Rig rig = CreateDeviceRig("a");
+  ReportAll();
+  PutOnDevice(rig, 0);
+  ScoreOnDevice(rig, 0, 1.0);
+  ASSERT_TRUE(device_domain_
+                  ->UpdateRig(
+                      "a",
+                      [](StoredRig stored) -> absl::StatusOr<StoredRig> {
+                        stored.labels["model"] = "t4";
+                        return stored;
+                      },
+                      "eve")
+                  .ok());
+  const auto before = device_->outbox()->List();
+  ASSERT_THAT(*before, SizeIs(1));
+  // The rig, its tables, a segment, an event: each once.
+  EXPECT_EQ(before->front().waiting, 4);
+  ReportAll();
+  EXPECT_EQ(store_->GetRig("a")->labels.at("model"), "t4");
+  ExpectSame("a");
+}
+
+TEST_P(ReportsTest, ReportThatComesTwiceChangesNothing) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  ReportNewRigs(ReportedData::kNone);
+  const auto report =
+      device_->outbox()->Next(device_->outbox()->List()->front(), kLarge);
+  ASSERT_TRUE(report.ok()) << report.status();
+  for (int k = 0; k < 2; ++k) {
+    const auto answer = Give(*report);
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    EXPECT_FALSE(answer->begin_anew);
+  }
+  ASSERT_TRUE(device_->outbox()->Confirm(*report, 1).ok());
+  ExpectSame("a");
+}
+
+TEST_P(ReportsTest, HubThatHasLostRecordsIsToldAllOfThem) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  ReportAll();
+  // As after a restore of an older backup.
+  ASSERT_TRUE(domain_->DeleteRig("a", "eve", "trial").ok());
+  PutOnDevice(rig, 1);
+  ReportAll();
+  EXPECT_EQ(anew_, 1);
+  // Its events outlive a rig, also that of this deletion.
+  EXPECT_THAT(store_->ListSegments("a", Page())->items, SizeIs(2));
+}
+
+TEST_P(ReportsTest, SegmentsDeletedWhileNothingWasReportedAreGoneAtTheHub) {
+  const Rig rig = CreateDeviceRig("a");
+  for (int k = 0; k < 4; ++k) PutOnDevice(rig, k);
+  ReportAll();
+  ASSERT_TRUE(device_->outbox()->Close().ok());
+  for (const int k : {1, 3}) {
+    ASSERT_TRUE(
+        device_domain_->DeleteSegment("a", {"s", k}, "eve", "private").ok());
+  }
+  ReportAll();
+  EXPECT_THAT(store_->ListSegments("a", Page())->items, SizeIs(2));
+  ExpectSame("a");
+}
+
+TEST_P(ReportsTest, NumberOfADeletedSegmentMayBeTakenByAnother) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  PutOnDevice(rig, 1);
+  ReportAll(ReportedData::kAll);
+  EXPECT_TRUE(HasData("a", 1));
+  ASSERT_TRUE(
+      device_domain_->DeleteSegment("a", {"s", 1}, "eve", "private").ok());
+  PutOnDevice(rig, 2);
+  ReportAll(ReportedData::kAll);
+  EXPECT_TRUE(absl::IsNotFound(store_->GetSegment("a", {"s", 1}).status()));
+  EXPECT_TRUE(HasData("a", 2));
+  ExpectSame("a", true);
+}
+
+TEST_P(ReportsTest, DeletedRigIsDeletedAtTheHubAndItsEventsRemain) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  ReportAll();
+  ASSERT_TRUE(device_domain_->DeleteRig("a", "eve", "sold").ok());
+  // Another rig may have its name by then.
+  CreateDeviceRig("a");
+  ReportAll();
+  EXPECT_THAT(store_->ListSegments("a", Page())->items, IsEmpty());
+  EXPECT_TRUE(store_->GetRig("a").ok());
+  bool told = false;
+  const auto events = store_->ListEvents({100, ""}, "a");
+  for (const StoredEvent& event : events->items) {
+    told |= event.kind == EventKind::kRigDeleted &&
+            event.detail.find("sold") != std::string::npos;
+  }
+  EXPECT_TRUE(told);
+  ExpectSame("a");
+  ASSERT_TRUE(device_domain_->DeleteRig("a", "eve", "sold again").ok());
+  ReportAll();
+  EXPECT_TRUE(absl::IsNotFound(store_->GetRig("a").status()));
+  EXPECT_THAT(*device_->outbox()->List(), IsEmpty());
+}
+
+TEST_P(ReportsTest, RigOfADeviceCannotBeChangedAtTheHub) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  ReportAll();
+  const auto same = [](const StoredRig& stored) -> absl::StatusOr<StoredRig> {
+    return stored;
+  };
+  for (const absl::Status& status :
+       {domain_->PutSegment("a", Segment(1)).status(),
+        domain_->UpdateRig("a", same, "eve").status(),
+        domain_->DeleteSegment("a", {"s", 0}, "eve", "x").status(),
+        domain_->QuarantineSegments("a", "s", 0, "eve", "x").status(),
+        domain_->ActivateCalibration("a", 1, "eve", "x").status(),
+        domain_->CreateManualRun("a", true).status()}) {
+    EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+    EXPECT_THAT(std::string(status.message()), HasSubstr("by its device"));
+  }
+  ExpectSame("a");
+}
+
+TEST_P(ReportsTest, InstructionStaysUntilTheDeviceHasToldItsResult) {
+  CreateTestRig("own");
+  EXPECT_TRUE(absl::IsFailedPrecondition(
+      domain_->CreateInstruction("own", "eve", "x").status()));
+  CreateDeviceRig("a");
+  ReportAll();
+  for (const char* request : {"first", "second"}) {
+    const auto given = domain_->CreateInstruction("a", "eve", request);
+    ASSERT_TRUE(given.ok()) << given.status();
+  }
+  DeviceReport report;
+  report.rig = "a";
+  report.number = 2;
+  report.key = device_->outbox()->List()->front().key;
+  for (int k = 0; k < 2; ++k) {
+    const auto answer = domain_->TakeReport(report);
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    ASSERT_THAT(answer->instructions, SizeIs(2));
+    EXPECT_EQ(answer->instructions[0].request, "first");
+    EXPECT_EQ(answer->instructions[0].caller, "eve");
+  }
+  report.results = {{1, false, ""}, {2, true, "why"}, {3, true, "unknown"}};
+  EXPECT_THAT(domain_->TakeReport(report)->instructions, IsEmpty());
+  const auto listed = store_->ListInstructions("a", {});
+  ASSERT_TRUE(listed.ok()) << listed.status();
+  ASSERT_THAT(listed->items, SizeIs(2));
+  EXPECT_EQ(listed->items[0].state, InstructionState::kRefused);
+  EXPECT_EQ(listed->items[0].message, "why");
+  EXPECT_GT(listed->items[0].end_time_ns, 0);
+  EXPECT_EQ(listed->items[1].state, InstructionState::kDone);
+}
+
+TEST_P(ReportsTest, RigsOfTheHubAndOfOtherDevicesAreSafe) {
+  CreateTestRig("own");
+  CreateDeviceRig("own");
+  CreateDeviceRig("a");
+  ReportNewRigs(ReportedData::kNone);
+  std::vector<Report> reports;
+  const auto rigs = device_->outbox()->List();
+  for (const ReportedRig& rig : *rigs) {
+    reports.push_back(*device_->outbox()->Next(rig, kLarge));
+  }
+  ASSERT_THAT(reports, SizeIs(2));
+  EXPECT_TRUE(Give(reports[0]).ok());
+  const auto own = Give(reports[1]);
+  EXPECT_TRUE(absl::IsFailedPrecondition(own.status())) << own.status();
+  Report of_another = reports[0];
+  ++of_another.key;
+  const auto another = Give(of_another);
+  EXPECT_TRUE(absl::IsFailedPrecondition(another.status())) << another.status();
+  EXPECT_THAT(std::string(another.status().message()), HasSubstr("another"));
+}
+
+TEST_P(ReportsTest, WhatIsNoReportIsRefusedAndChangesNothing) {
+  const Rig rig = CreateDeviceRig("a");
+  PutOnDevice(rig, 0);
+  ScoreOnDevice(rig, 0, 1.0);
+  ReportNewRigs(ReportedData::kAll);
+  const Report report =
+      *device_->outbox()->Next(device_->outbox()->List()->front(), kLarge);
+  store::ReportedRecords good;
+  ASSERT_TRUE(good.ParseFromString(report.records));
+  const auto give = [&](const store::ReportedRecords& records) {
+    Report bad = report;
+    bad.records = records.SerializeAsString();
+    return Give(bad).status();
+  };
+  std::vector<store::ReportedRecords> bad;
+  bad.emplace_back();  // without the rig
+  bad.emplace_back(good).mutable_tables(0)->set_name("claims");
+  bad.emplace_back(good).mutable_tables(0)->set_columns(
+      0, "create_time_ns = 0; DROP TABLE rigs; --");
+  bad.emplace_back(good).mutable_records(0)->set_kind(99);
+  bad.emplace_back(good).mutable_records(0)->mutable_rows(0)->set_table(-1);
+  bad.emplace_back(good).mutable_records(0)->mutable_rows(0)->clear_values();
+  bad.emplace_back(good)
+      .mutable_records(0)
+      ->mutable_rows(0)
+      ->mutable_values(0)
+      ->set_text("x");
+  // Each blob damaged, with and without its checksum.
+  for (int r = 0; r < good.records_size(); ++r) {
+    for (int k = 0; k < good.records(r).rows_size(); ++k) {
+      const auto& row = good.records(r).rows(k);
+      for (int v = 0; v < row.values_size(); ++v) {
+        if (!row.values(v).has_blob()) continue;
+        auto* value = bad.emplace_back(good)
+                          .mutable_records(r)
+                          ->mutable_rows(k)
+                          ->mutable_values(v);
+        value->mutable_blob()->insert(0, "\xff\xff");
+      }
+    }
+  }
+  EXPECT_GT(bad.size(), 12u);
+  for (std::size_t k = 0; k < bad.size(); ++k) {
+    const absl::Status status = give(bad[k]);
+    EXPECT_TRUE(absl::IsInvalidArgument(status)) << k << ": " << status;
+    EXPECT_TRUE(absl::IsNotFound(store_->GetRig("a").status())) << k;
+  }
+  EXPECT_TRUE(give(good).ok());
+}
+
+TEST_P(ReportsTest, DataThatIsAllReportedStaysUntilThen) {
+  DomainOptions options;
+  const std::int64_t bytes = static_cast<std::int64_t>(
+      PackNewSegment(Segment(0))->payload.data.size());
+  options.quotas.max_unreported_bytes_per_rig = 40 * bytes;
+  OpenDevice(options);
+  const Rig rig = CreateDeviceRig("a");
+  ReportAll(ReportedData::kAll);
+  // None enters a table.
+  const int count = kReserve + 30;
+  for (int k = 0; k < count; ++k) {
+    PutOnDevice(rig, k);
+    const auto scored = device_domain_->CommitScore(
+        "a", {"s", k}, FakeInformation(rig, 99, 0, 1));
+    ASSERT_TRUE(scored.ok()) << scored.status();
+  }
+  const auto data_of = [&](int k) {
+    return device_->GetSegmentData("a", {"s", k}).ok();
+  };
+  // The oldest has made room, and an event says so.
+  const bool is_full = count > 40;
+  EXPECT_EQ(data_of(0), !is_full);
+  EXPECT_TRUE(data_of(count - 1));
+  bool told = false;
+  const auto events = device_->ListEvents({1000, ""}, "a");
+  for (const StoredEvent& event : events->items) {
+    told |= event.detail.find("is not reported") != std::string::npos;
+  }
+  EXPECT_EQ(told, is_full);
+  ReportAll(ReportedData::kAll);
+  EXPECT_TRUE(HasData("a", count - 1));
+  // It is not needed any more once the next segment was scored.
+  PutOnDevice(rig, count);
+  ASSERT_TRUE(
+      device_domain_
+          ->CommitScore("a", {"s", count}, FakeInformation(rig, 99, 0, 1))
+          .ok());
+  EXPECT_FALSE(data_of(count - kReserve - 1));
+}
+
+TEST_P(ReportsTest, HubKeepsTheDataWithinItsQuota) {
+  DomainOptions options;
+  const std::int64_t bytes = static_cast<std::int64_t>(
+      PackNewSegment(Segment(0))->payload.data.size());
+  options.quotas.max_payload_bytes_per_rig = 5 * bytes / 2;
+  Reopen(options);
+  const Rig rig = CreateDeviceRig("a");
+  for (int k = 0; k < 4; ++k) {
+    PutOnDevice(rig, k);
+    ScoreOnDevice(rig, k, 10.0 + k);
+  }
+  ReportAll(ReportedData::kAll);
+  int kept = 0;
+  for (int k = 0; k < 4; ++k) kept += HasData("a", k) ? 1 : 0;
+  EXPECT_EQ(kept, 2);
+  ExpectSame("a");
+}
+
+// Whatever happens on the device, and whatever is lost on the way to the hub.
+TEST_P(ReportsTest, HubHasWhatTheDeviceHasAfterAnything) {
+  Promise promise("the hub has what the device has, whatever happens");
+  for (unsigned seed = 1; seed <= static_cast<unsigned>(Trials(6)); ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto draw = [&](int n) {
+      return std::uniform_int_distribution<int>(0, n - 1)(random);
+    };
+    const std::string id = "rig" + std::to_string(seed);
+    Rig rig = CreateDeviceRig(id);
+    std::int64_t next = 0;
+    std::int64_t scored = 0;
+    for (int step = 0; step < 120; ++step) {
+      switch (draw(12)) {
+        case 0:
+        case 1:
+        case 2:
+        case 3:
+          PutOnDevice(rig, next++);
+          break;
+        case 4:
+        case 5:
+        case 6: {
+          if (scored == next) break;
+          // It may be deleted or in quarantine.
+          device_domain_
+              ->CommitScore(id,
+                            {"s", scored},
+                            FakeInformation(rig,
+                                            draw(50) - 25,
+                                            draw(3) > 0 ? 5 : 0,
+                                            static_cast<unsigned>(scored)))
+              .IgnoreError();
+          ++scored;
+          break;
+        }
+        case 7: {
+          device_domain_->CreateManualRun(id, true).IgnoreError();
+          const auto unfinished = device_->ListUnfinishedRuns();
+          for (const StoredRun& run : *unfinished) {
+            if (run.rig != id || !device_domain_->BeginRun(id, run.run).ok()) {
+              continue;
+            }
+            const int end = draw(4);
+            if (end == 0) {
+              ASSERT_TRUE(
+                  device_domain_->EndRun(id, run.run, RunState::kFailed, "why")
+                      .ok());
+            } else if (end == 1) {
+              StoredCalibration candidate =
+                  TestCalibration(rig, *device_->GetRun(id, run.run));
+              candidate.state = CalibrationState::kCandidate;
+              ASSERT_TRUE(
+                  device_domain_->StoreCandidate(id, run.run, candidate).ok());
+            } else {
+              StoredCalibration result =
+                  TestCalibration(rig, *device_->GetRun(id, run.run));
+              if (end == 3) {
+                result.state = CalibrationState::kRejected;
+                result.reasons = {"a trial"};
+              }
+              const auto finished =
+                  device_domain_->FinishRun(id, run.run, result);
+              ASSERT_TRUE(finished.ok()) << finished.status();
+            }
+          }
+          break;
+        }
+        case 8:
+          device_domain_->ActivateCalibration(id, 1 + draw(4), "eve", "a trial")
+              .status()
+              .IgnoreError();
+          break;
+        case 9:
+          device_domain_->QuarantineSegments(id, "s", draw(20), "eve", "x")
+              .IgnoreError();
+          break;
+        case 10:
+          device_domain_->DeleteSegment(id, {"s", draw(20)}, "eve", "x")
+              .IgnoreError();
+          break;
+        default:
+          break;
+      }
+      if (draw(3) == 0) {
+        ReportOnce(ReportedData::kNone, 1 << (4 + draw(14)), [&] {
+          return draw(3) == 0;
+        });
+      }
+      if (draw(60) == 0) {
+        EXPECT_TRUE(device_->outbox()->Close().ok());
+      }
+      if (HasFailure()) return;
+    }
+    ReportAll(ReportedData::kNone, 1 << 12);
+    ExpectSame(id);
+    ++promise.trials;
+    if (HasFailure()) {
+      ++promise.lost;
+      return;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::server
