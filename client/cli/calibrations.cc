@@ -7,6 +7,7 @@
 #include "client/cli/calibration_report.h"
 #include "client/cli/commands.h"
 #include "client/cli/filter_command.h"
+#include "client/cli/instruction.h"
 #include "client/cli/list_options.h"
 #include "client/cli/positive_number.h"
 #include "client/text/estimate_text.h"
@@ -109,7 +110,15 @@ int Activate(Context* context,
                                &CalibrationService::ActivateCalibration,
                                request,
                                &calibration);
-  if (!status.ok()) return Fail(*context, status);
+  v1::Instruction instruction;
+  *instruction.mutable_activate_calibration() = request;
+  grpc::Status failure = status;
+  if (const auto given =
+          InsteadOf(status, *context, rig, instruction, &failure)) {
+    PrintGiven(*context, *given);
+    return kDone;
+  }
+  if (!failure.ok()) return Fail(*context, failure);
   if (context->json) {
     context->PrintJson(calibration);
   } else {

@@ -17,6 +17,7 @@ void AddTableCommands(CLI::App* app, Context* context);
 void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
 void AddCohortCommands(CLI::App* app, Context* context);
+void AddInstructionCommands(CLI::App* app, Context* context);
 void AddEventCommands(CLI::App* app, Context* context);
 void AddDaemonCommands(CLI::App* app, Context* context);
 void AddCompletionCommand(CLI::App* app, Context* context);

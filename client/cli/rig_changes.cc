@@ -9,6 +9,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/component_settings.h"
+#include "client/cli/instruction.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/rig.grpc.pb.h"
 
@@ -148,7 +149,15 @@ int Update(Context* context, const UpdateOptions& options) {
                 {"rig.imu.gyro_max", "--gyro-max"},
                 {"rig.imu.accel_max", "--accel-max"}});
   status = Call<RigService>(stub.get(), &RigService::UpdateRig, request, &rig);
-  if (!status.ok()) return Fail(*context, status);
+  v1::Instruction instruction;
+  *instruction.mutable_update_rig() = request;
+  grpc::Status failure = status;
+  if (const auto given =
+          InsteadOf(status, *context, options.rig, instruction, &failure)) {
+    PrintGiven(*context, *given);
+    return kDone;
+  }
+  if (!failure.ok()) return Fail(*context, failure);
   if (context->json) {
     context->PrintJson(rig);
     return kDone;

@@ -12,6 +12,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/confirmation.h"
+#include "client/cli/instruction.h"
 #include "client/cli/time_input.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
@@ -81,8 +82,10 @@ void PrintPlans(const Context& context, const std::vector<Rollback>& plans) {
   context.Print(table);
 }
 
-// Goes on after a rig that fails; returns the number of these.
-int CarryOut(CalibrationService* stub,
+// Goes on after a rig that fails; returns the number of these. Where a device
+// reports the rig, the device is instructed.
+int CarryOut(const Context& context,
+             CalibrationService* stub,
              const std::vector<Rollback>& plans,
              const std::string& reason) {
   int failed = 0;
@@ -95,9 +98,18 @@ int CarryOut(CalibrationService* stub,
     const grpc::Status status = Call<CalibrationService>(
         stub, &CalibrationService::ActivateCalibration, request, &calibration);
     if (status.ok()) continue;
+    v1::Instruction instruction;
+    *instruction.mutable_activate_calibration() = request;
+    grpc::Status failure = status;
+    if (const auto given =
+            InsteadOf(status, context, plan.rig, instruction, &failure)) {
+      // With --json the versions alone are printed.
+      if (!context.json) PrintGiven(context, *given);
+      continue;
+    }
     ++failed;
     PrintError(fmt::format(
-        "{} is not rolled back: {}", plan.rig, status.error_message()));
+        "{} is not rolled back: {}", plan.rig, failure.error_message()));
   }
   return failed;
 }
@@ -133,7 +145,7 @@ int RollBack(Context* context, const Options& options) {
     PrintError("nothing was changed; use --yes to go on without a prompt");
     return kUsage;
   }
-  const int failed = CarryOut(stub.get(), plans, options.reason);
+  const int failed = CarryOut(*context, stub.get(), plans, options.reason);
   if (failed == 0) return kDone;
   PrintError(fmt::format("{} of {} failed", failed, rig_count));
   return kFailed;

@@ -28,6 +28,17 @@ std::string RunText(const v1::RigActivity& rig) {
   return text;
 }
 
+// The last report between a device and its hub, and the records that wait;
+// "-" where there is no hub.
+template <typename When>
+std::string ReportText(const v1::RigActivity& rig, const When& when) {
+  if (!rig.has_uplink() && !rig.has_device()) return "-";
+  const v1::ReportState& state = rig.has_uplink() ? rig.uplink() : rig.device();
+  std::string text = state.has_time() ? when(state.time()) : "never";
+  if (state.waiting() > 0) text += fmt::format(", {} wait", state.waiting());
+  return text;
+}
+
 // Removes the first line from *text and returns it.
 std::string_view TakeLine(std::string_view* text) {
   const std::size_t end = std::min(text->find('\n'), text->size());
@@ -61,7 +72,8 @@ Table ActivityTable(const v1::ListActivityResponse& activity, bool ages) {
                {"stored", true},
                {"per min", true},
                {"rejected", true},
-               {"run"}});
+               {"run"},
+               {"reports"}});
   for (const v1::RigActivity& rig : activity.rigs()) {
     table.Add({LastPart(rig.name()),
                when(rig.last_seen()),
@@ -72,7 +84,8 @@ Table ActivityTable(const v1::ListActivityResponse& activity, bool ages) {
                fmt::format("{}", rig.traffic().stored()),
                RateText(rig.traffic()),
                fmt::format("{}", rig.traffic().rejected()),
-               RunText(rig)});
+               RunText(rig),
+               ReportText(rig, when)});
   }
   return table;
 }

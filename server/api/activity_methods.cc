@@ -45,7 +45,7 @@ std::optional<RunUpdate> CurrentRun(const ApiContext& context,
 }
 
 v1::RigActivity EncodeRig(const ApiContext& context, const RigSummary& rig) {
-  v1::RigActivity message = Encode(rig);
+  v1::RigActivity message = Encode(rig, NowNs());
   *message.mutable_traffic() = EncodeTraffic(context.traffic->Of(rig.rig));
   if (rig.newest_run != 0 && IsUnfinished(rig.run_state)) {
     if (const auto update = CurrentRun(context, rig.rig, rig.newest_run)) {

@@ -27,6 +27,7 @@ Api::Api(Domain* domain,
   AddStoreMethods(&methods);
   AddActivityMethods(&methods);
   AddFleetMethods(&methods);
+  AddUplinkMethods(&methods);
   methods_ = methods.Take();
 }
 

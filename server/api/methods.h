@@ -154,5 +154,6 @@ void AddRecalibrationMethods(Methods* methods);
 void AddStoreMethods(Methods* methods);
 void AddActivityMethods(Methods* methods);
 void AddFleetMethods(Methods* methods);
+void AddUplinkMethods(Methods* methods);
 
 }  // namespace selfcal::server

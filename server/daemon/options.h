@@ -13,6 +13,7 @@
 #include "server/domain/domain_options.h"
 #include "server/grpc/server.h"
 #include "server/host/host_conditions.h"
+#include "server/uplink/uplink_options.h"
 
 namespace selfcal::server {
 
@@ -41,7 +42,8 @@ struct DaemonOptions {
   double session_idle_s = 60;    // 0: only the end of a stream ends a session
   std::string metrics = "off";   // or host:port of the loopback interface
   int metrics_rigs = 16;         // number of rigs with their own series
-  std::string console = "off";   // or host:port
+  UplinkOptions uplink;
+  std::string console = "off";      // or host:port
   Role console_role = Role::kRead;  // of users on the loopback interface
   std::string log_level = "info";
   std::string log_format = "text";

@@ -30,6 +30,7 @@
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
 #include "server/status/status_macros.h"
+#include "server/uplink/uplink.h"
 #include "server/worker/worker.h"
 
 namespace selfcal::server {
@@ -128,11 +129,22 @@ absl::Status CheckCeres(const DaemonOptions& options) {
                   scores ? "scorer" : "verify-share"));
 }
 
+absl::Status CheckUplinkSettings(const DaemonOptions& options) {
+  SELFCAL_RETURN_IF_ERROR(CheckUplink(options.uplink));
+  if (options.uplink.hub.empty() || options.store.empty()) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      "uplink is for a device, whose records are in a file; a hub on a "
+      "database reports to no other: remove uplink or store");
+}
+
 // Checks what can be checked without the state directory and the addresses.
 absl::Status CheckSettings(const DaemonOptions& options) {
   SELFCAL_RETURN_IF_ERROR(CheckCeres(options));
   SELFCAL_RETURN_IF_ERROR(CheckStoreSettings(options));
   SELFCAL_RETURN_IF_ERROR(CheckServerOptions(options.server));
+  SELFCAL_RETURN_IF_ERROR(CheckUplinkSettings(options));
   if (options.metrics != "off") {
     SELFCAL_RETURN_IF_ERROR(CheckMetricsAddress(options.metrics));
   }
@@ -147,6 +159,21 @@ absl::StatusOr<std::unique_ptr<Console>> OpenConsole(
   auto opened = MakeConsole(api, OptionsOfConsole(options));
   if (opened.ok()) spdlog::info("console: {}", (*opened)->url());
   return opened;
+}
+
+// Starts to report to the hub; null if there is none.
+absl::StatusOr<std::unique_ptr<Uplink>> OpenUplink(const DaemonOptions& options,
+                                                   Store* store,
+                                                   const Api* api) {
+  if (options.uplink.hub.empty()) {
+    SELFCAL_RETURN_IF_ERROR(ForgetUplink(store));
+    return nullptr;
+  }
+  auto uplink = std::make_unique<Uplink>(
+      store, api, MakeGrpcHub(options.uplink), options.uplink, SELFCAL_VERSION);
+  SELFCAL_RETURN_IF_ERROR(uplink->Start());
+  spdlog::info("uplink: reporting to {}", options.uplink.hub);
+  return uplink;
 }
 
 // What the daemon has on disk, while it runs.
@@ -255,6 +282,12 @@ std::optional<int> ServeOnce(
     return Failed("cannot serve", server.status());
   }
   if (*metrics != nullptr) (*metrics)->AddTls((*server)->tls());
+  const auto uplink = OpenUplink(options, store, &api);
+  if (!uplink.ok()) {
+    (*server)->Shutdown(kCallLimit);
+    pipeline->Stop();
+    return Failed("cannot report to the hub", uplink.status());
+  }
   spdlog::info("selfcald ready: listening on {}",
                fmt::join((*server)->addresses(), ", "));
   NotifyReady();
@@ -282,6 +315,7 @@ std::optional<int> ServeOnce(
         "stopping, to be restarted: the limit of open files was reached, and "
         "no new connections are accepted");
   }
+  if (*uplink != nullptr) (*uplink)->Stop();
   api.Stop();
   console->reset();
   (*server)->Shutdown(kCallLimit);

@@ -301,6 +301,65 @@ void DefineRuns(Definer* define, DaemonOptions* options) {
       ->capture_default_str();
 }
 
+std::map<std::string, ReportedData> ReportedDataNames() {
+  return {{"none", ReportedData::kNone},
+          {"kept", ReportedData::kKept},
+          {"all", ReportedData::kAll}};
+}
+
+void DefineUplink(Definer* define, DaemonOptions* options) {
+  UplinkOptions& uplink = options->uplink;
+  define->Add("uplink",
+              &uplink.hub,
+              "Address of the hub to which this device reports: host:port or, "
+              "without encryption, insecure:host:port or unix:/path [none]");
+  define->Add("uplink-tls-ca",
+              &uplink.ca,
+              "PEM file: authority of the hub's certificate [those of the "
+              "system]");
+  define->Add("uplink-tls-certificate",
+              &uplink.certificate,
+              "PEM file: certificate of this device for the hub");
+  define->Add(
+      "uplink-tls-key", &uplink.key, "PEM file: key of that certificate");
+  define
+      ->Add("uplink-data",
+            &uplink.data,
+            "Data of segments that is reported: none, kept (what is still kept "
+            "after the score) or all")
+      ->transform(CLI::CheckedTransformer(ReportedDataNames()))
+      ->default_str("none");
+  define
+      ->Add("uplink-max-bytes",
+            &options->domain.quotas.max_unreported_bytes_per_rig,
+            "Limit on the bytes of data of a rig that stays only until it was "
+            "reported (uplink-data all); beyond it, the oldest is not "
+            "reported; 0: no limit")
+      ->check(CLI::Range(std::int64_t{0}, kMaxBytes))
+      ->capture_default_str();
+  define
+      ->Add("uplink-rate",
+            &uplink.max_bytes_per_s,
+            "Limit on the bytes of reports in a second, on average; 0: no "
+            "limit")
+      ->check(CLI::Range(std::int64_t{0}, kMaxBytes))
+      ->capture_default_str();
+  define
+      ->Add("uplink-interval",
+            &uplink.interval_s,
+            "Seconds after which a report follows although nothing has "
+            "changed; instructions of the hub come with its answer")
+      ->check(CLI::Range(1.0, static_cast<double>(kMaxSeconds)))
+      ->capture_default_str();
+  define
+      ->Add("uplink-role",
+            &uplink.role,
+            "Role of the hub when it gives instructions: read (it gives none), "
+            "produce or administer")
+      ->transform(CLI::CheckedTransformer(Roles()))
+      ->default_str("administer");
+}
+
 void DefineReports(Definer* define, DaemonOptions* options) {
   define
       ->Add("metrics",
@@ -361,6 +420,7 @@ void DefineSettings(CLI::App* app,
   DefineQuotas(&define, &options->domain.quotas);
   DefineEstimation(&define, options);
   DefineRuns(&define, options);
+  DefineUplink(&define, options);
   DefineReports(&define, options);
 }
 

@@ -9,6 +9,10 @@
 namespace selfcal::server {
 namespace {
 
+constexpr std::int64_t kHour = std::int64_t{3600} * 1'000'000'000;
+constexpr std::int64_t kUnreachable = kHour;
+constexpr std::int64_t kSilent = 24 * kHour;
+
 void AddAlarms(const RigSummary& rig, v1::RigActivity* message) {
   if (rig.newest_state == CalibrationState::kRejected) {
     message->add_alarms("version " + std::to_string(rig.newest_version) +
@@ -30,9 +34,35 @@ void AddAlarms(const RigSummary& rig, v1::RigActivity* message) {
   }
 }
 
+// Alarms about reports that do not arrive.
+void AddReportAlarms(const RigSummary& rig,
+                     std::int64_t now_ns,
+                     v1::RigActivity* message) {
+  if (rig.uplink && rig.uplink->waiting > 0 &&
+      now_ns - rig.uplink->time_ns > kUnreachable) {
+    message->add_alarms(
+        std::to_string(rig.uplink->waiting) +
+        " records wait to be reported: the hub has taken no report for an "
+        "hour; see the log for why");
+  }
+  if (rig.device && now_ns - rig.device->time_ns > kSilent) {
+    message->add_alarms(
+        "its device has not reported for a day: see whether it runs and "
+        "reaches the hub");
+  }
+}
+
+v1::ReportState Encode(const ReportState& state) {
+  v1::ReportState message;
+  if (state.time_ns != 0) SetTime(state.time_ns, message.mutable_time());
+  message.set_waiting(state.waiting);
+  message.set_program_version(state.program_version);
+  return message;
+}
+
 }  // namespace
 
-v1::RigActivity Encode(const RigSummary& rig) {
+v1::RigActivity Encode(const RigSummary& rig, std::int64_t now_ns) {
   v1::RigActivity message;
   message.set_name(RigName(rig.rig));
   SetTime(rig.create_time_ns, message.mutable_create_time());
@@ -46,6 +76,9 @@ v1::RigActivity Encode(const RigSummary& rig) {
   message.set_table_capacity(fill.capacity);
   message.mutable_labels()->insert(rig.labels.begin(), rig.labels.end());
   AddAlarms(rig, &message);
+  AddReportAlarms(rig, now_ns, &message);
+  if (rig.uplink) *message.mutable_uplink() = Encode(*rig.uplink);
+  if (rig.device) *message.mutable_device() = Encode(*rig.device);
   return message;
 }
 

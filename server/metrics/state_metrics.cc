@@ -13,6 +13,7 @@
 
 #include "server/metrics/gauge.h"
 #include "server/pipeline/verdict.h"
+#include "server/store/outbox.h"
 
 namespace selfcal::server {
 namespace {
@@ -100,6 +101,26 @@ void AddQueue(Store* store, std::vector<MetricFamily>* families) {
   families->push_back(runs.Take());
 }
 
+void AddUplink(Store* store,
+               const std::vector<std::string>& rigs,
+               std::vector<MetricFamily>* families) {
+  Gauge waiting("selfcal_uplink_waiting_records",
+                "Records that wait to be reported to the hub.");
+  Gauge time("selfcal_uplink_last_report_timestamp_seconds",
+             "When the hub took the last report of the rig; 0: none so far.");
+  const auto reported = store->outbox()->List();
+  if (reported.ok()) {
+    for (const ReportedRig& rig : *reported) {
+      if (!std::binary_search(rigs.begin(), rigs.end(), rig.rig)) continue;
+      if (rig.deleted) continue;
+      waiting.Add({{"rig", rig.rig}}, static_cast<double>(rig.waiting));
+      time.Add({{"rig", rig.rig}}, Timestamp(rig.time_ns));
+    }
+  }
+  families->push_back(waiting.Take());
+  families->push_back(time.Take());
+}
+
 void AddDisk(const std::filesystem::path& database,
              std::vector<MetricFamily>* families) {
   Gauge bytes("selfcal_database_bytes", "Size of the database files.");
@@ -146,6 +167,7 @@ std::vector<MetricFamily> StateMetrics::Collect() const {
                       AddTables(store_, rigs, &families);
                       AddTimes(store_, rigs, &families);
                       AddQueue(store_, &families);
+                      AddUplink(store_, rigs, &families);
                       if (!database_.empty()) AddDisk(database_, &families);
                       AddMemory(&families);
                       return families;

@@ -24,6 +24,13 @@ void AnnouncementRelay::Act(const Announcement& announcement) {
   }
 }
 
+void AnnouncementRelay::PassOnRig(const std::string& rig) {
+  OnCalibration(rig);
+  for (const auto& [of, run] : run_watchers_->Topics()) {
+    if (of == rig) OnRun(rig, run);
+  }
+}
+
 // Should the store fail in one of the following, the listener reports soon that
 // announcements may have been missed.
 

@@ -1,6 +1,7 @@
 // Acts on what other daemons announce (server/store/announcements.h): passes
 // their activations and runs on to the watchers of this one, interrupts a run
 // that another one has ended, and looks for a run that another one has created.
+// Also passes on what devices report.
 #pragma once
 
 #include <cstdint>
@@ -32,6 +33,9 @@ class AnnouncementRelay {
   void Start();
   // No announcement is acted on afterwards.
   void Stop() { listener_.reset(); }
+
+  // Passes on what a device has reported of its rig.
+  void PassOnRig(const std::string& rig);
 
  private:
   void Act(const Announcement& announcement);

@@ -315,6 +315,12 @@ class PipelineImpl : public Pipeline {
     return active;
   }
 
+  absl::StatusOr<ReportAnswer> TakeReport(const DeviceReport& report) override {
+    auto answer = domain_->TakeReport(report);
+    if (answer.ok()) relay_.PassOnRig(report.rig);
+    return answer;
+  }
+
   absl::StatusOr<RigCoaching> AdviseMotion(const std::string& rig) override {
     return coach_.Advise(rig);
   }

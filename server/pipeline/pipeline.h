@@ -231,6 +231,10 @@ class Pipeline {
       const std::string& caller,
       const std::string& reason) = 0;
 
+  // Domain::TakeReport, then notifies the watchers.
+  virtual absl::StatusOr<ReportAnswer> TakeReport(
+      const DeviceReport& report) = 0;
+
   // The most informative next motion: RigCoach::Advise (coaching.h). The first
   // call for a version takes as long as simulating a segment of every motion.
   virtual absl::StatusOr<RigCoaching> AdviseMotion(const std::string& rig) = 0;

@@ -125,6 +125,10 @@ class FakePipeline final : public Pipeline {
     return active;
   }
 
+  absl::StatusOr<ReportAnswer> TakeReport(const DeviceReport& report) override {
+    return domain_->TakeReport(report);
+  }
+
   absl::StatusOr<RigCoaching> AdviseMotion(const std::string& rig) override {
     return coach_.Advise(rig);
   }

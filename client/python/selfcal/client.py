@@ -26,6 +26,8 @@ from selfcal.v1 import (
     session_pb2_grpc as session_grpc,
     store_service_pb2 as store,
     store_service_pb2_grpc as store_grpc,
+    uplink_pb2 as uplink,
+    uplink_pb2_grpc as uplink_grpc,
 )
 
 _PAGE_SIZE = 500
@@ -74,6 +76,7 @@ class Daemon:
         self.fleet_service = fleet_grpc.FleetServiceStub(channel)
         self.session_service = session_grpc.SessionServiceStub(channel)
         self.store_service = store_grpc.StoreServiceStub(channel)
+        self.uplink_service = uplink_grpc.UplinkServiceStub(channel)
 
     def __enter__(self) -> Daemon:
         return self
@@ -89,6 +92,12 @@ class Daemon:
             self.rig_service.ListRigs, rig.ListRigsRequest()
         ):
             yield from page.rigs
+
+    def instructions(self, rig_id: str) -> Iterator[uplink.Instruction]:
+        """What a hub has the device of the rig do; newest first."""
+        request = uplink.ListInstructionsRequest(parent=f"rigs/{rig_id}")
+        for page in self._pages(self.uplink_service.ListInstructions, request):
+            yield from page.instructions
 
     def segments(self, rig_id: str) -> Iterator[segment.Segment]:
         """Newest first."""

@@ -42,6 +42,8 @@ v1::ListActivityResponse TwoRigs() {
   rig->mutable_run()->set_state(v1::Recalibration::RUNNING);
   rig->mutable_run()->set_iteration(4);
   rig->mutable_run()->set_max_iterations(100);
+  rig->mutable_device()->mutable_time()->set_seconds(kNow - 2);
+  rig->mutable_device()->set_waiting(12);
   rig = activity.add_rigs();
   rig->set_name("rigs/silent");
   rig->set_active_version(1);
@@ -128,9 +130,10 @@ TEST_F(TopCommand, IsOneRecordALineInAPipe) {
   EXPECT_EQ(asked_for_, 50);
   EXPECT_THAT(
       Lines(outcome.out),
-      ElementsAre("tablet\t2026-11-21 04:10:00\t4\t2026-11-21 01:10:03\t20/24"
-                  "\t2\t17\t8.0\t1\t5 running 4/100",
-                  "silent\t-\t1\t2026-10-22 04:10:03\t0/0\t0\t0\t0.0\t0\t-"));
+      ElementsAre(
+          "tablet\t2026-11-21 04:10:00\t4\t2026-11-21 01:10:03\t20/24"
+          "\t2\t17\t8.0\t1\t5 running 4/100\t2026-11-21 04:10:01, 12 wait",
+          "silent\t-\t1\t2026-10-22 04:10:03\t0/0\t0\t0\t0.0\t0\t-\t-"));
 }
 
 TEST_F(TopCommand, IsTheMessageInJson) {

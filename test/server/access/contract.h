@@ -19,6 +19,7 @@
 #include "selfcal/v1/segment.pb.h"
 #include "selfcal/v1/session.pb.h"
 #include "selfcal/v1/store_service.pb.h"
+#include "selfcal/v1/uplink.pb.h"
 #include "server/access/grants.h"
 
 namespace selfcal::server {
@@ -36,7 +37,8 @@ inline std::vector<const google::protobuf::ServiceDescriptor*> Services() {
                            v1::ListEventsRequest::descriptor()->file(),
                            v1::ListSessionsRequest::descriptor()->file(),
                            v1::ListActivityRequest::descriptor()->file(),
-                           v1::DescribeCohortRequest::descriptor()->file()}) {
+                           v1::DescribeCohortRequest::descriptor()->file(),
+                           v1::ReportRequest::descriptor()->file()}) {
     for (int s = 0; s < file->service_count(); ++s) {
       services.push_back(file->service(s));
     }

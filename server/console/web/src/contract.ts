@@ -9,3 +9,4 @@ export type * from '../generated/selfcal/v1/rig';
 export type * from '../generated/selfcal/v1/segment';
 export type * from '../generated/selfcal/v1/session';
 export type * from '../generated/selfcal/v1/store_service';
+export type * from '../generated/selfcal/v1/uplink';

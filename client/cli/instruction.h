@@ -1,0 +1,27 @@
+// Calls about rigs that devices report: a hub refuses them, and has the device
+// make them instead.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <optional>
+#include <string>
+
+#include "client/cli/context.h"
+#include "selfcal/v1/uplink.pb.h"
+
+namespace selfcal::client {
+
+// The instruction by which a call is made that failed with this status.
+// nullopt if that would not help: the call failed for another reason than that
+// a device reports the rig. Sets *failure if the instruction was refused.
+std::optional<v1::Instruction> InsteadOf(const grpc::Status& failed,
+                                         const Context& context,
+                                         const std::string& rig,
+                                         const v1::Instruction& instruction,
+                                         grpc::Status* failure);
+
+// "instruction 4 is given to the device of rig tablet: ...", or JSON.
+void PrintGiven(const Context& context, const v1::Instruction& instruction);
+
+}  // namespace selfcal::client

@@ -1,0 +1,150 @@
+// instruction list: what a hub has devices do, and what became of it.
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/cli/instruction.h"
+#include "client/cli/list_options.h"
+#include "client/text/text.h"
+#include "proto/resource_names.h"
+#include "selfcal/v1/activity_service.grpc.pb.h"
+#include "selfcal/v1/uplink.grpc.pb.h"
+
+namespace selfcal::client {
+namespace {
+
+using ActivityService = v1::ActivityService::StubInterface;
+using UplinkService = v1::UplinkService::StubInterface;
+
+// "pending", "done" or "refused".
+std::string StateText(v1::Instruction::State state) {
+  switch (state) {
+    case v1::Instruction::DONE:
+      return "done";
+    case v1::Instruction::REFUSED:
+      return "refused";
+    default:
+      return "pending";
+  }
+}
+
+std::string RequestText(const v1::Instruction& instruction) {
+  switch (instruction.request_case()) {
+    case v1::Instruction::kActivateCalibration:
+      return fmt::format("activate version {}: {}",
+                         LastPart(instruction.activate_calibration().name()),
+                         instruction.activate_calibration().reason());
+    case v1::Instruction::kUpdateRig:
+      return "change the rig";
+    case v1::Instruction::kStartRecalibration:
+      return "recalibrate";
+    case v1::Instruction::kQuarantineSegments:
+      return fmt::format("quarantine segments of session {}: {}",
+                         instruction.quarantine_segments().session(),
+                         instruction.quarantine_segments().reason());
+    case v1::Instruction::REQUEST_NOT_SET:
+      break;
+  }
+  return "unknown";
+}
+
+int List(Context* context, const std::string& rig, const ListOptions& options) {
+  const auto stub = v1::UplinkService::NewStub(context->Channel());
+  v1::ListInstructionsRequest request;
+  request.set_parent(RigName(rig));
+  v1::ListInstructionsResponse instructions;
+  const auto status = CallForItems<UplinkService>(
+      stub.get(),
+      &UplinkService::ListInstructions,
+      request,
+      &v1::ListInstructionsResponse::mutable_instructions,
+      options.limit,
+      nullptr,
+      &instructions);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->PrintList(instructions)) return kDone;
+  Table table({{"instruction", true},
+               {"created"},
+               {"by"},
+               {"state"},
+               {"what"},
+               {"message", false, true}});
+  for (const v1::Instruction& instruction : instructions.instructions()) {
+    table.Add({LastPart(instruction.name()),
+               TimeText(instruction.create_time()),
+               instruction.caller(),
+               StateText(instruction.state()),
+               RequestText(instruction),
+               instruction.message()});
+  }
+  context->Print(table);
+  return kDone;
+}
+
+// Whether a device reports the rig.
+bool IsReported(const Context& context, const std::string& rig) {
+  const auto stub = v1::ActivityService::NewStub(context.Channel());
+  v1::ListActivityRequest request;
+  request.set_filter(fmt::format("name = \"{}\"", rig));
+  v1::ListActivityResponse activity;
+  const auto status = Call<ActivityService>(
+      stub.get(), &ActivityService::ListActivity, request, &activity);
+  return status.ok() && activity.rigs_size() == 1 &&
+         activity.rigs(0).has_device();
+}
+
+}  // namespace
+
+std::optional<v1::Instruction> InsteadOf(const grpc::Status& failed,
+                                         const Context& context,
+                                         const std::string& rig,
+                                         const v1::Instruction& instruction,
+                                         grpc::Status* failure) {
+  if (failed.error_code() != grpc::StatusCode::FAILED_PRECONDITION ||
+      !IsReported(context, rig)) {
+    return std::nullopt;
+  }
+  const auto stub = v1::UplinkService::NewStub(context.Channel());
+  v1::CreateInstructionRequest request;
+  request.set_parent(RigName(rig));
+  *request.mutable_instruction() = instruction;
+  v1::Instruction given;
+  *failure = Call<UplinkService>(
+      stub.get(), &UplinkService::CreateInstruction, request, &given);
+  if (!failure->ok()) return std::nullopt;
+  return given;
+}
+
+void PrintGiven(const Context& context, const v1::Instruction& instruction) {
+  if (context.json) return context.PrintJson(instruction);
+  const auto parts = ParseChildName(instruction.name(), "instructions");
+  const std::string rig = parts ? parts->rig : "";
+  PrintText(fmt::format(
+      "instruction {0} is given to the device of rig {1}: it is carried out "
+      "with the next report, and 'selfcal instruction list {1}' shows its "
+      "result\n",
+      LastPart(instruction.name()),
+      rig));
+}
+
+void AddInstructionCommands(CLI::App* app, Context* context) {
+  CLI::App* instruction =
+      app->add_subcommand("instruction", "Show what this hub has devices do");
+  instruction->require_subcommand(1);
+  CLI::App* list = instruction->add_subcommand(
+      "list", "List the instructions for the device of a rig, newest first");
+  const auto rig = std::make_shared<std::string>();
+  list->add_option("RIG", *rig)->required();
+  const auto options = std::make_shared<ListOptions>();
+  list->add_option("--limit", options->limit, "Only the newest; 0: all");
+  AddCsv(list, context);
+  list->callback([context, rig, options] {
+    context->command = [context, rig, options] {
+      return List(context, *rig, *options);
+    };
+  });
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,78 @@
+// Reports to the hub, one after the other. Used by one thread.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+
+#include "selfcal/v1/uplink.pb.h"
+#include "server/api/api.h"
+#include "server/pipeline/backoff.h"
+#include "server/store/outbox.h"
+#include "server/store/store.h"
+#include "server/uplink/hub.h"
+#include "server/uplink/uplink_options.h"
+
+namespace selfcal::server {
+
+class Reporter {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  // All must outlive it. Instructions are carried out by the methods of `api`.
+  Reporter(Store* store,
+           const Api* api,
+           Hub* hub,
+           const UplinkOptions& options,
+           std::string program_version)
+      : store_(store),
+        api_(api),
+        hub_(hub),
+        options_(options),
+        program_version_(std::move(program_version)) {}
+
+  struct Round {
+    std::int64_t reports = 0;
+    std::int64_t bytes = 0;
+    std::int64_t waiting = 0;  // records that are left
+    // Why the hub did not take a report; OK if it took all. The others were
+    // sent nevertheless, unless the hub cannot be reached.
+    absl::Status status;
+  };
+  // Sends one report of each rig that has something to report, or from which
+  // the hub has not heard for the interval. `pace` is called after each with
+  // its bytes, and may wait; false: the daemon is stopping. An error is one of
+  // the store.
+  absl::StatusOr<Round> ReportOnce(
+      Time now, const std::function<bool(std::int64_t bytes)>& pace);
+
+ private:
+  // What the reporter remembers of a rig, by its key.
+  struct Rig {
+    Time next{};     // report again at this time, whatever has changed
+    Time blocked{};  // after a refusal, nothing is reported before
+    Backoff backoff;
+    std::string refusal;
+    std::map<std::string, v1::InstructionResult> results;  // by name
+  };
+
+  absl::Status ReportRig(const ReportedRig& rig,
+                         Time now,
+                         Rig* known,
+                         Round* round);
+  v1::InstructionResult CarryOut(const v1::Instruction& instruction) const;
+
+  Store* const store_;
+  const Api* const api_;
+  Hub* const hub_;
+  const UplinkOptions options_;
+  const std::string program_version_;
+  std::map<std::int64_t, Rig> rigs_;
+};
+
+}  // namespace selfcal::server

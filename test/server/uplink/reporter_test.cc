@@ -1,0 +1,234 @@
+// Rounds of reports, step by step.
+#include "server/uplink/reporter.h"
+
+#include "test/server/uplink/uplink_fixture.h"
+
+namespace selfcal::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+class ReporterTest : public UplinkFixture {
+ protected:
+  void Begin(const UplinkOptions& options = {}) {
+    reporter_.emplace(
+        device_.store.get(), &*device_.api, &way_, options, "1.2.3");
+  }
+
+  Reporter::Round Report() {
+    const auto round = reporter_->ReportOnce(now_, [this](std::int64_t bytes) {
+      paced_ += bytes;
+      return true;
+    });
+    EXPECT_TRUE(round.ok()) << round.status();
+    return round.value_or(Reporter::Round());
+  }
+
+  v1::Instruction Give(const v1::Instruction& instruction) {
+    v1::CreateInstructionRequest request;
+    request.set_parent("rigs/a");
+    *request.mutable_instruction() = instruction;
+    v1::Instruction given;
+    const absl::Status status = CallHub(request, &given);
+    EXPECT_TRUE(status.ok()) << status;
+    return given;
+  }
+
+  static v1::Instruction NewLabel(const std::string& value) {
+    v1::Instruction instruction;
+    auto* rig = instruction.mutable_update_rig()->mutable_rig();
+    rig->set_name("rigs/a");
+    (*rig->mutable_labels())["batch"] = value;
+    return instruction;
+  }
+
+  v1::Instruction NewestInstruction() {
+    v1::ListInstructionsRequest request;
+    request.set_parent("rigs/a");
+    v1::ListInstructionsResponse response;
+    EXPECT_TRUE(CallHub(request, &response).ok());
+    EXPECT_GT(response.instructions_size(), 0);
+    return response.instructions_size() > 0 ? response.instructions(0)
+                                            : v1::Instruction();
+  }
+
+  FakeHub way_{&*hub_.api};
+  std::optional<Reporter> reporter_;
+  Reporter::Time now_{};
+  std::int64_t paced_ = 0;
+};
+
+TEST_F(ReporterTest, NewRigsAndWhatChangesAreReported) {
+  CreateDeviceRig();
+  Begin();
+  const Reporter::Round first = Report();
+  EXPECT_EQ(first.reports, 1);
+  EXPECT_EQ(first.waiting, 0);
+  EXPECT_EQ(paced_, first.bytes);
+  EXPECT_GT(first.bytes, 1000);
+  EXPECT_TRUE(hub_.store->GetRig("a").ok());
+  EXPECT_EQ(Report().reports, 0);
+  Put(0);
+  EXPECT_EQ(Report().reports, 1);
+  EXPECT_EQ(SegmentsAtHub(), 1u);
+  const auto summary = hub_.store->ListRigSummaries({}, {});
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  ASSERT_TRUE(summary->items[0].device.has_value());
+  EXPECT_EQ(summary->items[0].device->program_version, "1.2.3");
+}
+
+TEST_F(ReporterTest, WhatTheHubDoesNotTakeWaits) {
+  CreateDeviceRig();
+  Begin();
+  Report();
+  way_.reachable = false;
+  Put(0);
+  EXPECT_TRUE(absl::IsUnavailable(Report().status));
+  Put(1);
+  way_.reachable = true;
+  way_.answers_lost = 1;
+  EXPECT_FALSE(Report().status.ok());
+  EXPECT_EQ(SegmentsAtHub(), 2u);
+  EXPECT_TRUE(Report().status.ok());
+  EXPECT_EQ(SegmentsAtHub(), 2u);
+  EXPECT_EQ(device_.store->outbox()->List()->front().waiting, 0);
+}
+
+TEST_F(ReporterTest, AReportFollowsAfterTheInterval) {
+  CreateDeviceRig();
+  Begin({.interval_s = 10});
+  Report();
+  now_ += std::chrono::milliseconds(9'999);
+  EXPECT_EQ(Report().reports, 0);
+  now_ += std::chrono::milliseconds(2);
+  EXPECT_EQ(Report().reports, 1);
+  EXPECT_EQ(Report().reports, 0);
+}
+
+TEST_F(ReporterTest, ARefusedRigDoesNotHoldUpOthers) {
+  EXPECT_TRUE(hub_.domain->CreateRig(TestRig("a")).ok());
+  CreateDeviceRig("a");
+  CreateDeviceRig("b");
+  Begin();
+  const Reporter::Round round = Report();
+  EXPECT_EQ(round.reports, 1);
+  EXPECT_THAT(std::string(round.status.message()),
+              HasSubstr("of its own: give the rig of the device another name"));
+  EXPECT_TRUE(hub_.store->GetRig("b").ok());
+  // It is tried again later, not all the time.
+  const int calls = way_.calls;
+  EXPECT_FALSE(Report().status.ok());
+  EXPECT_EQ(way_.calls, calls);
+  now_ += std::chrono::seconds(1);
+  Report();
+  EXPECT_EQ(way_.calls, calls + 1);
+}
+
+TEST_F(ReporterTest, ADeviceReportsOnlyRigsOfItsCertificate) {
+  CreateDeviceRig("a");
+  CreateDeviceRig("b");
+  way_.caller.grants = {{Role::kProduce, "b"}};
+  Begin();
+  EXPECT_FALSE(Report().status.ok());
+  EXPECT_FALSE(hub_.store->GetRig("a").ok());
+  EXPECT_TRUE(hub_.store->GetRig("b").ok());
+}
+
+TEST_F(ReporterTest, InstructionsAreCarriedOutAndTheirResultIsTold) {
+  CreateDeviceRig();
+  Begin();
+  Report();
+  const v1::Instruction given = Give(NewLabel("2026-11"));
+  EXPECT_EQ(given.state(), v1::Instruction::PENDING);
+  EXPECT_EQ(given.caller(), "operator");
+  now_ += std::chrono::minutes(1);
+  Report();
+  EXPECT_EQ(device_.store->GetRig("a")->labels.at("batch"), "2026-11");
+  Report();
+  EXPECT_EQ(NewestInstruction().state(), v1::Instruction::DONE);
+  EXPECT_EQ(hub_.store->GetRig("a")->labels.at("batch"), "2026-11");
+  // The device records who it was.
+  const auto events = device_.store->ListNewestEvents({1, ""}, "a");
+  ASSERT_TRUE(events.ok()) << events.status();
+  EXPECT_THAT(events->items[0].detail, HasSubstr("hub/operator"));
+}
+
+TEST_F(ReporterTest, AnInstructionTheDeviceRefusesIsToldWithTheReason) {
+  CreateDeviceRig();
+  Begin();
+  Report();
+  v1::Instruction instruction;
+  auto* activate = instruction.mutable_activate_calibration();
+  activate->set_name("rigs/a/calibrations/7");
+  activate->set_reason("a trial");
+  Give(instruction);
+  now_ += std::chrono::minutes(1);
+  Report();
+  Report();
+  const v1::Instruction ended = NewestInstruction();
+  EXPECT_EQ(ended.state(), v1::Instruction::REFUSED);
+  EXPECT_THAT(ended.message(), HasSubstr("calibration 7"));
+}
+
+TEST_F(ReporterTest, AHubHasNoMoreRightsThanItsRole) {
+  CreateDeviceRig();
+  Begin({.role = Role::kRead});
+  Report();
+  Give(NewLabel("x"));
+  now_ += std::chrono::minutes(1);
+  Report();
+  Report();
+  EXPECT_EQ(NewestInstruction().state(), v1::Instruction::REFUSED);
+  EXPECT_TRUE(device_.store->GetRig("a")->labels.empty());
+}
+
+TEST_F(ReporterTest, AnInstructionMustBeAboutItsRig) {
+  CreateDeviceRig("a");
+  CreateDeviceRig("b");
+  Begin();
+  Report();
+  v1::CreateInstructionRequest request;
+  request.set_parent("rigs/b");
+  v1::Instruction given;
+  EXPECT_TRUE(absl::IsInvalidArgument(CallHub(request, &given)));
+  *request.mutable_instruction() = NewLabel("x");  // of a
+  EXPECT_TRUE(absl::IsInvalidArgument(CallHub(request, &given)));
+  // Of a rig that no device reports.
+  EXPECT_TRUE(hub_.domain->CreateRig(TestRig("own")).ok());
+  request.set_parent("rigs/own");
+  request.mutable_instruction()->mutable_update_rig()->mutable_rig()->set_name(
+      "rigs/own");
+  EXPECT_TRUE(absl::IsFailedPrecondition(CallHub(request, &given)));
+}
+
+TEST_F(ReporterTest, WatchersAtTheHubSeeWhatIsReported) {
+  CreateDeviceRig();
+  Begin();
+  Report();
+  std::vector<std::int64_t> versions;
+  const auto watch = hub_.pipeline->WatchCalibration(
+      "a", [&](const StoredCalibration& active) {
+        versions.push_back(active.version);
+      });
+  ASSERT_TRUE(watch.ok()) << watch.status();
+  Put(0);
+  ASSERT_TRUE(
+      device_.domain
+          ->CommitScore("a", {"s", 0}, FakeInformation(TestRig("a"), 1.0))
+          .ok());
+  const auto run = device_.domain->CreateManualRun("a", true);
+  ASSERT_TRUE(run.ok()) << run.status();
+  ASSERT_TRUE(device_.domain->BeginRun("a", run->run).ok());
+  StoredCalibration result;
+  result.state = CalibrationState::kActive;
+  result.theta = TestRig("a").factory;
+  const int size = TangentSize(result.theta);
+  result.covariance = Eigen::MatrixXd::Identity(size, size);
+  ASSERT_TRUE(device_.domain->FinishRun("a", run->run, result).ok());
+  Report();
+  EXPECT_THAT(versions, ::testing::ElementsAre(1, 2));
+}
+
+}  // namespace
+}  // namespace selfcal::server

@@ -1,0 +1,71 @@
+// The uplink as it runs.
+#include "server/uplink/uplink.h"
+
+#include "test/server/uplink/uplink_fixture.h"
+
+namespace selfcal::server {
+namespace {
+
+class UplinkTest : public UplinkFixture {
+ protected:
+  // The way to the hub that the uplink has; its owner is the uplink.
+  FakeHub* Begin(const UplinkOptions& options = {}) {
+    auto way = std::make_unique<FakeHub>(&*hub_.api);
+    FakeHub* const kept = way.get();
+    uplink_ = std::make_unique<Uplink>(
+        device_.store.get(), &*device_.api, std::move(way), options, "1.2.3");
+    const absl::Status started = uplink_->Start();
+    EXPECT_TRUE(started.ok()) << started;
+    return kept;
+  }
+
+  std::unique_ptr<Uplink> uplink_;
+};
+
+TEST_F(UplinkTest, ReportsByItself) {
+  CreateDeviceRig();
+  Begin();
+  for (int k = 0; k < 3; ++k) Put(k);
+  EXPECT_TRUE(Eventually([&] { return SegmentsAtHub() == 3; }));
+}
+
+TEST_F(UplinkTest, GoesOnWhenTheHubIsBack) {
+  CreateDeviceRig();
+  FakeHub* const way = Begin();
+  way->reachable = false;
+  for (int k = 0; k < 3; ++k) Put(k);
+  const int calls = way->calls;
+  EXPECT_TRUE(Eventually([&] { return way->calls > calls; }));
+  way->reachable = true;
+  EXPECT_TRUE(Eventually([&] { return SegmentsAtHub() == 3; }));
+}
+
+TEST_F(UplinkTest, WhatChangedBeforeAStartIsReported) {
+  CreateDeviceRig();
+  Begin();
+  EXPECT_TRUE(Eventually([&] { return hub_.store->GetRig("a").ok(); }));
+  uplink_.reset();
+  Put(0);
+  Begin();
+  EXPECT_TRUE(Eventually([&] { return SegmentsAtHub() == 1; }));
+}
+
+TEST_F(UplinkTest, StopsAtOnceWhileItIsLimited) {
+  CreateDeviceRig();
+  Begin({.max_bytes_per_s = 1});
+  EXPECT_TRUE(Eventually([&] { return hub_.store->GetRig("a").ok(); }));
+  uplink_->Stop();  // would wait for an hour
+}
+
+TEST_F(UplinkTest, WithoutAHubNothingIsNoted) {
+  CreateDeviceRig();
+  Begin();
+  EXPECT_TRUE(Eventually([&] { return hub_.store->GetRig("a").ok(); }));
+  uplink_.reset();
+  ASSERT_TRUE(ForgetUplink(device_.store.get()).ok());
+  Put(0);
+  EXPECT_TRUE(device_.store->outbox()->List()->empty());
+}
+
+}  // namespace
+}  // namespace selfcal::server
