@@ -31,6 +31,10 @@ void Add(const Eigen::VectorXd& delta, int offset, Vector* v) {
 
 Eigen::Vector3d Difference(const Eigen::Quaterniond& a,
                            const Eigen::Quaterniond& b) {
+  // Exactly zero also where products and sums are contracted (arm64), which
+  // would leave a rounding error: whether a segment was linearised at a
+  // calibration is a question of zero or not.
+  if (a.coeffs() == b.coeffs()) return Eigen::Vector3d::Zero();
   return Log(b.conjugate() * a);
 }
 Eigen::Matrix<double, 1, 1> Difference(double a, double b) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "test/core/factor/random_values.h"
+#include "test/core/model/rounding.h"
 #include "test/core/numeric_jacobian.h"
 
 namespace selfcal {
@@ -53,7 +54,7 @@ inline void ExpectJacobiansMatch(
     double step,
     double tolerance) {
   const CostEvaluation at = EvaluateCost(cost, blocks, true);
-  EXPECT_EQ(at.residuals, EvaluateCost(cost, blocks, false).residuals);
+  ExpectSameFormula(at.residuals, EvaluateCost(cost, blocks, false).residuals);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const ceres::Manifold* manifold = manifolds[i];
     const auto moved = [&](const Eigen::VectorXd& delta) -> Eigen::VectorXd {

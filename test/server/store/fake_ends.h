@@ -23,7 +23,9 @@ inline SegmentEnds FakeEnds(const Rig& rig, const SegmentKey& key) {
   ends.last.p_GI = {1.0 / 3, 2, 3};
   ends.last.q_GI = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
   ends.last.b_g = {0.1, 0.2, 0.3};
-  ends.Lambda = root * root.transpose();
+  // Symmetric to the bit, also where products and sums are contracted.
+  const Eigen::MatrixXd product = root * root.transpose();
+  ends.Lambda = product.selfadjointView<Eigen::Lower>();
   ends.eta = Eigen::VectorXd::Zero(size).unaryExpr(draw);
   ends.tail = {{ends.last.t_ns - 5, {1, 2, 3}, {4, 5, 6}},
                {ends.last.t_ns + 5, {7, 8, 9}, {1, 1, 0.1}}};

@@ -53,6 +53,14 @@ std::string PostgresCluster::WhyNot() {
   if (geteuid() == 0 && ServerUser() == nullptr) {
     return "PostgreSQL does not run as root, and there is no user postgres";
   }
+  // In a namespace of its own, root may be the only user.
+  const TempFolder folder;
+  if (const passwd* user = ServerUser();
+      user != nullptr &&
+      chown(folder.path().c_str(), user->pw_uid, user->pw_gid) != 0) {
+    return "PostgreSQL does not run as root, and files cannot be given to the "
+           "user postgres";
+  }
   return "";
 }
 
