@@ -75,6 +75,7 @@ install(FILES ${deploy}/selfcald.toml
 install(FILES
     ${deploy}/monitoring/alerts.yml ${deploy}/monitoring/client_alerts.yml
     ${deploy}/monitoring/dashboard.json
+    ${deploy}/monitoring/fleet_dashboard.json
   DESTINATION ${CMAKE_INSTALL_DATADIR}/selfcald/monitoring COMPONENT daemon)
 # In a container systemd-standalone-sysusers and -tmpfiles are enough.
 set(CPACK_DEBIAN_DAEMON_PACKAGE_DEPENDS

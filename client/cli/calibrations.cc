@@ -46,7 +46,7 @@ int ListCalibrations(Context* context,
   if (!wanted.ok()) return FailInput(wanted.status());
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::ListCalibrationsRequest request;
-  request.set_parent(RigName(rig));
+  if (!rig.empty()) request.set_parent(RigName(rig));
   v1::ListCalibrationsResponse calibrations;
   const auto status = CallForItems<CalibrationService>(
       stub.get(),
@@ -58,19 +58,24 @@ int ListCalibrations(Context* context,
       &calibrations);
   if (!status.ok()) return Fail(*context, status);
   if (context->PrintList(calibrations)) return kDone;
-  Table table({{"version", true},
-               {"state"},
-               {"created"},
-               {"origin"},
-               {"verdict"},
-               {"reasons", false, true}});
+  std::vector<Column> columns = {{"version", true},
+                                 {"state"},
+                                 {"created"},
+                                 {"origin"},
+                                 {"verdict"},
+                                 {"reasons", false, true}};
+  if (rig.empty()) columns.insert(columns.begin(), Column{"rig"});
+  Table table(std::move(columns));
   for (const v1::Calibration& calibration : calibrations.calibrations()) {
-    table.Add({fmt::format("{}", calibration.version()),
-               StateText(calibration.state()),
-               TimeText(calibration.create_time()),
-               OriginText(calibration),
-               VerdictText(calibration),
-               fmt::format("{}", fmt::join(calibration.reasons(), " "))});
+    std::vector<std::string> cells = {
+        fmt::format("{}", calibration.version()),
+        StateText(calibration.state()),
+        TimeText(calibration.create_time()),
+        OriginText(calibration),
+        VerdictText(calibration),
+        fmt::format("{}", fmt::join(calibration.reasons(), " "))};
+    if (rig.empty()) cells.insert(cells.begin(), RigPart(calibration.name()));
+    table.Add(std::move(cells));
   }
   context->Print(table);
   return kDone;
@@ -190,9 +195,9 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
   calibrations->require_subcommand(1);
   const auto rig = std::make_shared<std::string>();
 
-  CLI::App* list =
-      calibrations->add_subcommand("list", "List the versions, newest first");
-  list->add_option("RIG", *rig)->required();
+  CLI::App* list = calibrations->add_subcommand(
+      "list", "List the versions of a rig, or of all, newest first");
+  list->add_option("RIG", *rig);
   const auto options = std::make_shared<ListOptions>();
   AddListOptions(
       list,

@@ -124,6 +124,7 @@ int RunCommandLine(int argc, const char* const* argv) {
     AddRunCommands(&app, &context);
     AddCalibrationCommands(&app, &context);
     AddCohortCommands(&app, &context);
+    AddEstimateCommands(&app, &context);
     AddInstructionCommands(&app, &context);
     AddEventCommands(&app, &context);
     AddDaemonCommands(&app, &context);

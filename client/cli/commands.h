@@ -17,6 +17,7 @@ void AddTableCommands(CLI::App* app, Context* context);
 void AddRunCommands(CLI::App* app, Context* context);
 void AddCalibrationCommands(CLI::App* app, Context* context);
 void AddCohortCommands(CLI::App* app, Context* context);
+void AddEstimateCommands(CLI::App* app, Context* context);
 void AddInstructionCommands(CLI::App* app, Context* context);
 void AddEventCommands(CLI::App* app, Context* context);
 void AddDaemonCommands(CLI::App* app, Context* context);
@@ -25,6 +26,7 @@ void AddCompletionCommand(CLI::App* app, Context* context);
 // Verbs of rig.
 void AddRigCreation(CLI::App* rig, Context* context);
 void AddRigChanges(CLI::App* rig, Context* context);
+void AddAttention(CLI::App* rig, Context* context);
 CLI::App* AddCoach(CLI::App* parent, const std::string& name, Context* context);
 CLI::App* AddVerify(CLI::App* parent,
                     const std::string& name,

@@ -119,14 +119,12 @@ std::optional<v1::Instruction> InsteadOf(const grpc::Status& failed,
 
 void PrintGiven(const Context& context, const v1::Instruction& instruction) {
   if (context.json) return context.PrintJson(instruction);
-  const auto parts = ParseChildName(instruction.name(), "instructions");
-  const std::string rig = parts ? parts->rig : "";
   PrintText(fmt::format(
       "instruction {0} is given to the device of rig {1}: it is carried out "
       "with the next report, and 'selfcal instruction list {1}' shows its "
       "result\n",
       LastPart(instruction.name()),
-      rig));
+      RigPart(instruction.name())));
 }
 
 void AddInstructionCommands(CLI::App* app, Context* context) {

@@ -103,6 +103,7 @@ void AddRigCommands(CLI::App* app, Context* context) {
   });
 
   AddRigChanges(rig, context);
+  AddAttention(rig, context);
 
   CLI::App* show = rig->add_subcommand("show", "Show a rig");
   const auto id = std::make_shared<std::string>();

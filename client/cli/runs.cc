@@ -66,7 +66,7 @@ int ListRuns(Context* context,
   if (!wanted.ok()) return FailInput(wanted.status());
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::ListRecalibrationsRequest request;
-  request.set_parent(RigName(rig));
+  if (!rig.empty()) request.set_parent(RigName(rig));
   v1::ListRecalibrationsResponse runs;
   const auto status = CallForItems<RecalibrationService>(
       stub.get(),
@@ -78,23 +78,28 @@ int ListRuns(Context* context,
       &runs);
   if (!status.ok()) return Fail(*context, status);
   if (context->PrintList(runs)) return kDone;
-  Table table({{"run", true},
-               {"state"},
-               {"trigger"},
-               {"created"},
-               {"ended"},
-               {"segments", true},
-               {"calibration", true},
-               {"message", false, true}});
+  std::vector<Column> columns = {{"run", true},
+                                 {"state"},
+                                 {"trigger"},
+                                 {"created"},
+                                 {"ended"},
+                                 {"segments", true},
+                                 {"calibration", true},
+                                 {"message", false, true}};
+  if (rig.empty()) columns.insert(columns.begin(), Column{"rig"});
+  Table table(std::move(columns));
   for (const v1::Recalibration& run : runs.recalibrations()) {
-    table.Add({LastPart(run.name()),
-               StateText(run.state()),
-               TriggerText(run.trigger()),
-               TimeText(run.create_time()),
-               TimeText(run.end_time()),
-               fmt::format("{}", run.segments_size()),
-               run.calibration().empty() ? "-" : LastPart(run.calibration()),
-               run.message()});
+    std::vector<std::string> cells = {
+        LastPart(run.name()),
+        StateText(run.state()),
+        TriggerText(run.trigger()),
+        TimeText(run.create_time()),
+        TimeText(run.end_time()),
+        fmt::format("{}", run.segments_size()),
+        run.calibration().empty() ? "-" : LastPart(run.calibration()),
+        run.message()};
+    if (rig.empty()) cells.insert(cells.begin(), RigPart(run.name()));
+    table.Add(std::move(cells));
   }
   context->Print(table);
   return kDone;
@@ -173,9 +178,9 @@ void AddRunCommands(CLI::App* app, Context* context) {
   runs->require_subcommand(1);
   const auto options = std::make_shared<RunOptions>();
 
-  CLI::App* list =
-      runs->add_subcommand("list", "List the runs of a rig, newest first");
-  list->add_option("RIG", options->rig)->required();
+  CLI::App* list = runs->add_subcommand(
+      "list", "List the runs of a rig, or of all, newest first");
+  list->add_option("RIG", options->rig);
   const auto list_options = std::make_shared<ListOptions>();
   AddListOptions(list,
                  context,

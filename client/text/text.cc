@@ -73,6 +73,13 @@ std::string LastPart(std::string_view name) {
   return std::string(slash == name.npos ? name : name.substr(slash + 1));
 }
 
+std::string RigPart(std::string_view name) {
+  constexpr std::string_view kRigs = "rigs/";
+  if (!name.starts_with(kRigs)) return "";
+  name.remove_prefix(kRigs.size());
+  return std::string(name.substr(0, name.find('/')));
+}
+
 std::string StateText(v1::Calibration::State state) {
   return Words(v1::Calibration::State_Name(state));
 }

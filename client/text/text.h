@@ -33,6 +33,8 @@ std::string SigmaText(double sigma);
 
 // The part after the last '/': "walk~3" of "rigs/a/segments/walk~3".
 std::string LastPart(std::string_view name);
+// Returns the {rig} of a name that begins with rigs/{rig}; empty for another.
+std::string RigPart(std::string_view name);
 
 std::string StateText(v1::Calibration::State state);
 std::string StateText(v1::Segment::State state);

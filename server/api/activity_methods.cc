@@ -64,6 +64,7 @@ absl::StatusOr<v1::ListActivityResponse> ListActivity(
   query.descending = true;
   SELFCAL_RETURN_IF_ERROR(
       ReadRigQuery(request.filter(), request.order_by(), &query));
+  query.with_alarms = request.with_alarms();
   SELFCAL_ASSIGN_OR_RETURN(
       v1::ListActivityResponse response,
       FillPage<v1::ListActivityResponse>(

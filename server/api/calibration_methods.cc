@@ -1,6 +1,7 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.pb.h"
 #include "server/api/errors.h"
+#include "server/api/list_parent.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/api/read_version.h"
@@ -111,19 +112,18 @@ absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
     const ApiContext& context,
     const Call&,
     const v1::ListCalibrationsRequest& request) {
-  const auto rig = ParseRigName(request.parent());
-  if (!rig) return BadName("parent", "rigs/{rig}");
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
   return FillPage<v1::ListCalibrationsResponse>(
       request,
       request.parent(),
       [&](const Page& page) {
-        return context.store->ListCalibrations(*rig, page);
+        return context.store->ListCalibrations(rig, page);
       },
       [&](const StoredCalibration& calibration,
           v1::ListCalibrationsResponse* to) -> absl::Status {
         SELFCAL_ASSIGN_OR_RETURN(
             *to->add_calibrations(),
-            EncodeNamed(context, calibration, request.parent()));
+            EncodeNamed(context, calibration, RigName(calibration.rig)));
         return absl::OkStatus();
       });
 }

@@ -1,8 +1,11 @@
 #include "selfcal/v1/fleet.pb.h"
 #include "server/api/errors.h"
+#include "server/api/list_parent.h"
 #include "server/api/methods.h"
+#include "server/api/paging.h"
 #include "server/api/read_rig_query.h"
 #include "server/encode/encode_cohort.h"
+#include "server/encode/encode_estimate.h"
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
@@ -31,8 +34,42 @@ absl::StatusOr<v1::Cohort> DescribeCohort(
   return Encode(report);
 }
 
+absl::StatusOr<v1::ListEstimatesResponse> ListEstimates(
+    const ApiContext& context,
+    const Call&,
+    const v1::ListEstimatesRequest& request) {
+  EstimateQuery query;
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
+  if (!rig.empty()) {
+    if (!request.filter().empty()) {
+      return InvalidFields({{"filter", "has no effect with a parent"}});
+    }
+    const absl::Status found = context.store->GetRig(rig).status();
+    if (!found.ok()) {
+      return About(found, {kRigType, request.parent(), "parent"});
+    }
+    query.rigs.name = rig;
+  }
+  SELFCAL_RETURN_IF_ERROR(ReadRigQuery(request.filter(), "", &query.rigs));
+  query.component = request.component();
+  query.only_active = request.only_active();
+  return FillPage<v1::ListEstimatesResponse>(
+      request,
+      request.parent(),
+      [&](const Page& page) {
+        return context.store->ListEstimates(query, page);
+      },
+      [](const StoredEstimate& estimate, v1::ListEstimatesResponse* to) {
+        *to->add_estimates() = Encode(estimate);
+        return absl::OkStatus();
+      });
+}
+
 }  // namespace
 
-void AddFleetMethods(Methods* methods) { methods->Add(DescribeCohort); }
+void AddFleetMethods(Methods* methods) {
+  methods->Add(DescribeCohort);
+  methods->Add(ListEstimates);
+}
 
 }  // namespace selfcal::server

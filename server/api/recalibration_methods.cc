@@ -1,6 +1,7 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.pb.h"
 #include "server/api/errors.h"
+#include "server/api/list_parent.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/encode/encode.h"
@@ -54,12 +55,11 @@ absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
     const ApiContext& context,
     const Call&,
     const v1::ListRecalibrationsRequest& request) {
-  const auto rig = ParseRigName(request.parent());
-  if (!rig) return BadName("parent", "rigs/{rig}");
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
   return FillPage<v1::ListRecalibrationsResponse>(
       request,
       request.parent(),
-      [&](const Page& page) { return context.store->ListRuns(*rig, page); },
+      [&](const Page& page) { return context.store->ListRuns(rig, page); },
       [&](const StoredRun& run,
           v1::ListRecalibrationsResponse* to) -> absl::Status {
         SELFCAL_ASSIGN_OR_RETURN(*to->add_recalibrations(),

@@ -1,6 +1,7 @@
 #include "proto/resource_names.h"
 #include "selfcal/v1/store_service.pb.h"
 #include "server/api/errors.h"
+#include "server/api/list_parent.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/domain/clock.h"
@@ -77,15 +78,12 @@ absl::StatusOr<v1::ListEventsResponse> ListEvents(
     const ApiContext& context,
     const Call&,
     const v1::ListEventsRequest& request) {
-  std::string rig;
-  if (!request.parent().empty()) {
-    const auto parsed = ParseRigName(request.parent());
-    if (!parsed) return BadName("parent", "rigs/{rig}");
-    const absl::Status found = context.store->GetRig(*parsed).status();
+  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
+  if (!rig.empty()) {
+    const absl::Status found = context.store->GetRig(rig).status();
     if (!found.ok()) {
       return About(found, {kRigType, request.parent(), "parent"});
     }
-    rig = *parsed;
   }
   const bool newest_first = request.order_by() == "number desc";
   if (!newest_first && !request.order_by().empty() &&

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/domain/age_trigger.h"
+#include "server/domain/alarms.h"
 #include "server/domain/calibration_life.h"
 #include "server/domain/deletion.h"
 #include "server/domain/intake.h"
@@ -18,6 +19,8 @@
 #include "server/domain/run_results.h"
 #include "server/domain/session_trigger.h"
 #include "server/status/status_macros.h"
+#include "server/store/calibrations.h"
+#include "server/store/estimates.h"
 #include "server/store/events.h"
 #include "server/store/report.h"
 #include "server/store/table_rows.h"
@@ -40,20 +43,48 @@ constexpr TimeTrigger kTimeTriggers[] = {
      CreateAgedRun},
 };
 
-// TransactFor, unless a device reports the rig.
+// TransactFor, with the alarms of the rig afterwards.
+template <typename Work>
+auto Change(Store* store,
+            const RigClaim& claim,
+            const Moment& now,
+            const Work& work) -> std::invoke_result_t<Work, UnitOfWork*> {
+  return TransactFor(
+      store,
+      claim,
+      now,
+      [&](UnitOfWork* tx) -> std::invoke_result_t<Work, UnitOfWork*> {
+        auto result = work(tx);
+        if (result.ok()) SELFCAL_RETURN_IF_ERROR(UpdateAlarms(tx));
+        return result;
+      });
+}
+
+// The same without a result.
+template <typename Work>
+absl::Status ChangeOnly(Store* store,
+                        const RigClaim& claim,
+                        const Moment& now,
+                        const Work& work) {
+  return store->Transact(claim, now, [&](UnitOfWork* tx) {
+    const absl::Status status = work(tx);
+    return status.ok() ? UpdateAlarms(tx) : status;
+  });
+}
+
+// Change, unless a device reports the rig.
 template <typename Work>
 auto ChangeOwnRig(Store* store,
                   const std::string& rig,
                   const Moment& now,
                   const Work& work) -> std::invoke_result_t<Work, UnitOfWork*> {
-  return TransactFor(
-      store,
-      rig,
-      now,
-      [&](UnitOfWork* tx) -> std::invoke_result_t<Work, UnitOfWork*> {
-        SELFCAL_RETURN_IF_ERROR(CheckOwnRig(tx));
-        return work(tx);
-      });
+  return Change(store,
+                rig,
+                now,
+                [&](UnitOfWork* tx) -> std::invoke_result_t<Work, UnitOfWork*> {
+                  SELFCAL_RETURN_IF_ERROR(CheckOwnRig(tx));
+                  return work(tx);
+                });
 }
 
 }  // namespace
@@ -82,7 +113,7 @@ absl::StatusOr<RigUpdate> Domain::UpdateRig(const std::string& rig,
 absl::StatusOr<int> Domain::DeleteRig(const std::string& rig,
                                       const std::string& caller,
                                       const std::string& reason) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return Change(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::DeleteRig(tx, caller, reason);
   });
 }
@@ -136,7 +167,7 @@ absl::StatusOr<ScoreCommit> Domain::CommitScore(
                            InspectFor(store_, claim.rig, [&](UnitOfWork* tx) {
                              return DecideJointly(tx, key, information);
                            }));
-  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::CommitScore(
         tx, key, information, ends, decided, options_.change);
   });
@@ -146,7 +177,7 @@ absl::Status Domain::ReplaceScore(const RigClaim& claim,
                                   const SegmentKey& key,
                                   const SegmentInformation& information,
                                   const SegmentEnds& ends) {
-  return store_->Transact(claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::ReplaceScore(tx, key, information, ends);
   });
 }
@@ -154,7 +185,7 @@ absl::Status Domain::ReplaceScore(const RigClaim& claim,
 absl::Status Domain::MarkUnusable(const RigClaim& claim,
                                   const SegmentKey& key,
                                   const std::string& problem) {
-  return store_->Transact(claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::MarkUnusable(tx, key, problem);
   });
 }
@@ -204,10 +235,30 @@ absl::StatusOr<StoredCalibration> Domain::ActivateCalibration(
   });
 }
 
+absl::StatusOr<int> Domain::CompleteEstimates(int limit) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto versions,
+                           store_->ListWithoutEstimates(limit));
+  int written = 0;
+  for (const auto& [rig, version] : versions) {
+    const absl::Status status = store_->Transact(
+        rig, clock_(), [number = version](UnitOfWork* tx) -> absl::Status {
+          SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration calibration,
+                                   ReadCalibration(tx, number));
+          return InsertEstimates(tx, calibration);
+        });
+    if (status.ok()) {
+      ++written;
+    } else if (!absl::IsNotFound(status) && !absl::IsDataLoss(status)) {
+      return status;
+    }
+  }
+  return written;
+}
+
 absl::Status Domain::ReportDisagreement(const std::string& rig,
                                         std::int64_t version,
                                         const std::string& finding) {
-  return store_->Transact(rig, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOnly(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::ReportDisagreement(tx, version, finding);
   });
 }
@@ -231,13 +282,19 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartTimedRuns(
     for (const TimeTrigger& trigger : kTimeTriggers) {
       if (!trigger.applies(rig->policy)) continue;
       SELFCAL_ASSIGN_OR_RETURN(
-          auto run, TransactFor(store_, name, clock_(), [&](UnitOfWork* tx) {
+          auto run, Change(store_, name, clock_(), [&](UnitOfWork* tx) {
             return trigger.create_run(tx, *rig, now_ns);
           }));
       if (run) started.push_back(*std::move(run));
     }
   }
   return started;
+}
+
+absl::Status Domain::NoteSilentDevices() {
+  return store_->RaiseSilent(
+      clock_().time_ns - kSilentAfterNs,
+      std::int64_t{1} << static_cast<int>(Alarm::kSilent));
 }
 
 absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
@@ -253,7 +310,7 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
     // Neither a damaged rig nor one that is gone must hold up the others.
     if (!due.ok() || !*due) continue;
     SELFCAL_ASSIGN_OR_RETURN(
-        auto run, TransactFor(store_, name, clock_(), [&](UnitOfWork* tx) {
+        auto run, Change(store_, name, clock_(), [&](UnitOfWork* tx) {
           return CreateSessionRun(tx);
         }));
     if (run) started.push_back(*std::move(run));
@@ -264,21 +321,21 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
 absl::Status Domain::DeferRun(const RigClaim& claim,
                               std::int64_t run,
                               const std::string& reason) {
-  return store_->Transact(claim, clock_(), [&](UnitOfWork* tx) {
+  return ChangeOnly(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::DeferRun(tx, run, reason);
   });
 }
 
 absl::StatusOr<StoredRun> Domain::BeginRun(const RigClaim& claim,
                                            std::int64_t run) {
-  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::BeginRun(tx, run);
   });
 }
 
 absl::StatusOr<StoredRun> Domain::ReleaseRun(const RigClaim& claim,
                                              std::int64_t run) {
-  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::ReleaseRun(tx, run);
   });
 }
@@ -287,7 +344,7 @@ absl::StatusOr<StoredCalibration> Domain::StoreCandidate(
     const RigClaim& claim,
     std::int64_t run,
     const StoredCalibration& calibration) {
-  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::StoreCandidate(tx, run, calibration);
   });
 }
@@ -296,7 +353,7 @@ absl::StatusOr<StoredCalibration> Domain::FinishRun(
     const RigClaim& claim,
     std::int64_t run,
     const StoredCalibration& calibration) {
-  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::FinishRun(tx, run, calibration, options_.change);
   });
 }
@@ -305,14 +362,14 @@ absl::StatusOr<StoredRun> Domain::EndRun(const RigClaim& claim,
                                          std::int64_t run,
                                          RunState state,
                                          const std::string& message) {
-  return TransactFor(store_, claim, clock_(), [&](UnitOfWork* tx) {
+  return Change(store_, claim, clock_(), [&](UnitOfWork* tx) {
     return server::EndRun(tx, run, state, message);
   });
 }
 
 absl::StatusOr<ReportAnswer> Domain::TakeReport(const DeviceReport& report) {
   const Moment now = clock_();
-  const auto taken = TransactFor(store_, report.rig, now, [&](UnitOfWork* tx) {
+  const auto taken = Change(store_, report.rig, now, [&](UnitOfWork* tx) {
     return server::TakeReport(tx, report, options_.quotas);
   });
   const bool is_first = report.number == 1;
@@ -338,7 +395,7 @@ absl::StatusOr<StoredInstruction> Domain::CreateInstruction(
     const std::string& rig,
     const std::string& caller,
     const std::string& request) {
-  return TransactFor(store_, rig, clock_(), [&](UnitOfWork* tx) {
+  return Change(store_, rig, clock_(), [&](UnitOfWork* tx) {
     return server::CreateInstruction(tx, caller, request);
   });
 }

@@ -150,6 +150,10 @@ class Domain {
       const std::string& caller,
       const std::string& reason);
 
+  // Writes the estimates of at most `limit` versions that have none, from
+  // before they were stored with the version. Returns how many it has written.
+  absl::StatusOr<int> CompleteEstimates(int limit);
+
   // Records the finding of a verification by which the two cores disagree, with
   // the version concerned and in an event. A version keeps the first finding.
   absl::Status ReportDisagreement(const std::string& rig,
@@ -165,6 +169,8 @@ class Domain {
   // Creates the runs that the rules about time start (age_trigger.h), of all
   // rigs, at the steady time `now_ns`.
   absl::StatusOr<std::vector<StoredRun>> StartTimedRuns(std::int64_t now_ns);
+  // Gives an alarm to the rigs whose devices have not reported for a day.
+  absl::Status NoteSilentDevices();
   // Creates the runs of all rigs whose session has ended (session_trigger.h):
   // the rig is one of `ended`, or none of its segments arrived after the steady
   // time `idle_since_ns`.

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "server/domain/alarms.h"
 #include "server/domain/quotas.h"
 #include "server/status/status_macros.h"
 #include "server/store/instructions.h"
@@ -25,12 +26,14 @@ absl::Status Take(UnitOfWork* tx,
         return MakeRoomForReported(tx, bytes, quotas);
       }));
   if (report.deleted) return DeleteRigRows(tx);
-  return WriteReportingDevice(tx,
-                              {.key = report.key,
-                               .report = report.number,
-                               .time_ns = tx->time_ns(),
-                               .waiting = report.waiting,
-                               .program_version = report.program_version});
+  SELFCAL_RETURN_IF_ERROR(
+      WriteReportingDevice(tx,
+                           {.key = report.key,
+                            .report = report.number,
+                            .time_ns = tx->time_ns(),
+                            .waiting = report.waiting,
+                            .program_version = report.program_version}));
+  return StoreAlarms(tx);
 }
 
 }  // namespace

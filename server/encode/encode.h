@@ -19,6 +19,8 @@ v1::TableExclusion Encode(const std::string& rig, const Exclusion& exclusion);
 v1::Event Encode(const StoredEvent& event);
 v1::Table Encode(const std::string& rig, const Table& table);
 
+v1::Calibration::State EncodeCalibrationState(CalibrationState state);
+
 // Encodes a calibration with an estimate for each tangent component: its value,
 // its difference from the factory value, its sigma from the covariance, and the
 // random walk density that the rig states.

@@ -11,8 +11,6 @@
 #include "server/store/validation_record.h"
 
 namespace selfcal::server {
-namespace {
-
 v1::Calibration::State EncodeCalibrationState(CalibrationState state) {
   switch (state) {
     case CalibrationState::kActive:
@@ -28,6 +26,8 @@ v1::Calibration::State EncodeCalibrationState(CalibrationState state) {
   }
   return v1::Calibration::STATE_UNSPECIFIED;
 }
+
+namespace {
 
 void FillEstimates(const StoredCalibration& calibration,
                    const StoredRig& rig,

@@ -38,12 +38,16 @@ absl::Status ParseRigFilter(std::string_view filter, RigQuery* query) {
 absl::Status ParseRigOrder(std::string_view order_by, RigQuery* query) {
   if (order_by.empty()) return absl::OkStatus();
   SELFCAL_ASSIGN_OR_RETURN(const ListOrder order, ParseOrder(order_by, "asc"));
-  if (order.field != "name" && order.field != "last_seen") {
+  if (order.field == "name") {
+    query->order = RigQuery::Order::kName;
+  } else if (order.field == "last_seen") {
+    query->order = RigQuery::Order::kLastSeen;
+  } else if (order.field == "alarms") {
+    query->order = RigQuery::Order::kAlarms;
+  } else {
     return NotWhatIsExpected(order.field,
-                             "a field to sort by: name or last_seen");
+                             "a field to sort by: name, last_seen or alarms");
   }
-  query->order = order.field == "name" ? RigQuery::Order::kName
-                                       : RigQuery::Order::kLastSeen;
   query->descending = order.descending;
   return absl::OkStatus();
 }

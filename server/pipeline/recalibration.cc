@@ -12,6 +12,12 @@
 #include "server/status/status_macros.h"
 
 namespace selfcal::server {
+namespace {
+
+// Versions from before estimates were stored that get them at once.
+constexpr int kEstimates = 1000;
+
+}  // namespace
 
 Recalibrator::Executor::Executor(const RunContext& shared) : context(shared) {
   context.current = &current;
@@ -191,6 +197,12 @@ absl::Status Recalibrator::StartDueRuns() {
   if (is_first) {
     SELFCAL_RETURN_IF_ERROR(
         shared_.domain->StartTimedRuns(shared_.options.now_ns()).status());
+    SELFCAL_RETURN_IF_ERROR(shared_.domain->NoteSilentDevices());
+    if (!estimates_complete_) {
+      SELFCAL_ASSIGN_OR_RETURN(const int written,
+                               shared_.domain->CompleteEstimates(kEstimates));
+      estimates_complete_ = written == 0;
+    }
   }
   std::set<std::string> busy;
   SELFCAL_ASSIGN_OR_RETURN(

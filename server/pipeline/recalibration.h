@@ -88,7 +88,8 @@ class Recalibrator {
   const RunContext shared_;  // without a current run
   Watchers<StoredCalibration>* const calibration_watchers_;
   SessionEnds sessions_;
-  std::mutex starting_;  // one thread at a time creates runs
+  std::mutex starting_;              // one thread at a time creates runs
+  bool estimates_complete_ = false;  // guarded by starting_
   std::vector<std::unique_ptr<Executor>> executors_;
 
   mutable std::mutex mutex_;  // guards what follows

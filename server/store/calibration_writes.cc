@@ -4,6 +4,7 @@
 #include "server/store/calibrations.h"
 #include "server/store/checksum.h"
 #include "server/store/driver/statement.h"
+#include "server/store/estimates.h"
 #include "server/store/records.h"
 
 namespace selfcal::server {
@@ -47,7 +48,7 @@ absl::Status InsertCalibration(UnitOfWork* tx,
                   key.index)
             .Run());
   }
-  return absl::OkStatus();
+  return InsertEstimates(tx, calibration);
 }
 
 absl::Status InsertValidation(UnitOfWork* tx,

@@ -10,6 +10,7 @@
 #include "server/store/paging.h"
 #include "server/store/records.h"
 #include "server/store/rigs.h"
+#include "server/store/time_place.h"
 
 namespace selfcal::server {
 namespace {
@@ -21,7 +22,8 @@ constexpr char kCalibrationColumns[] =
     "   WHERE a.rig = c.rig AND a.version = c.version), "
     "  (SELECT coalesce(max(d.finding), '') FROM disagreements d "
     "   WHERE d.rig = c.rig AND d.version = c.version), "
-    "  c.create_steady_ns "
+    "  c.create_steady_ns, c.rig, "
+    "  (SELECT g.id FROM rigs g WHERE g.rig = c.rig) "
     "FROM calibrations c LEFT JOIN validations v USING (rig, version) ";
 
 absl::Status ReadSegmentKeys(Connection* db,
@@ -63,10 +65,10 @@ absl::Status ReadTemperatures(Connection* db,
 }
 
 absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
-                                                     const Statement& row,
-                                                     std::int64_t rig_id,
-                                                     const std::string& rig) {
+                                                     const Statement& row) {
   const std::int64_t version = row.Int(0);
+  const std::int64_t rig_id = row.Int(11);
+  const std::string rig = row.Text(12);
   const std::string what =
       fmt::format("calibration {} of rig {}", version, rig);
   const std::string content = row.Text(4);
@@ -110,6 +112,39 @@ absl::StatusOr<std::int64_t> ActiveVersionOf(Connection* db, std::int64_t rig) {
   return read.Int(0);
 }
 
+// A version whose record is damaged is left out, as one must not hide those of
+// all other rigs.
+absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfAll(
+    Connection* db, const Page& page) {
+  constexpr std::string_view kList = "calibrations";
+  SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(kList, page));
+  const int size = PageSize(page);
+  Statement read(db,
+                 std::string(kCalibrationColumns) +
+                     "WHERE (c.create_steady_ns, c.rig, c.version) < "
+                     "  (?1, ?2, ?3) "
+                     "ORDER BY c.create_steady_ns DESC, c.rig DESC, "
+                     "  c.version DESC LIMIT ?4",
+                 place.steady_ns,
+                 place.rig,
+                 place.number,
+                 size + 1);
+  Listed<StoredCalibration> listed;
+  for (int count = 0; read.Next(); ++count) {
+    if (count == size) {
+      listed.next_token = TokenAfter(kList, place);
+      break;
+    }
+    place = {read.Int(10), read.Int(11), read.Int(0)};
+    auto calibration = CalibrationFromRow(db, read);
+    if (absl::IsDataLoss(calibration.status())) continue;
+    SELFCAL_RETURN_IF_ERROR(calibration.status());
+    listed.items.push_back(*std::move(calibration));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return listed;
+}
+
 }  // namespace
 
 absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
@@ -127,7 +162,7 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
     return absl::NotFoundError(
         fmt::format("rig {} has no calibration {}", rig, version));
   }
-  return CalibrationFromRow(db, read, rig_id, rig);
+  return CalibrationFromRow(db, read);
 }
 
 absl::StatusOr<StoredCalibration> ReadActiveCalibration(
@@ -140,6 +175,7 @@ absl::StatusOr<StoredCalibration> ReadActiveCalibration(
 
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
     Connection* db, const std::string& rig, const Page& page) {
+  if (rig.empty()) return ListCalibrationsOfAll(db, page);
   const std::string list = "calibrations/" + rig;
   SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
@@ -154,7 +190,7 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
   Listed<StoredCalibration> listed;
   while (read.Next()) {
     SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration,
-                             CalibrationFromRow(db, read, rig_id, rig));
+                             CalibrationFromRow(db, read));
     listed.items.push_back(std::move(calibration));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());

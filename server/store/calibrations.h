@@ -22,7 +22,7 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
 absl::StatusOr<StoredCalibration> ReadActiveCalibration(Connection* db,
                                                         const std::string& rig);
 
-// Newest first.
+// Store::ListCalibrations.
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
     Connection* db, const std::string& rig, const Page& page);
 

@@ -10,6 +10,7 @@
 #include "server/store/change_rows.h"
 #include "server/store/clock_record.h"
 #include "server/store/driver/transaction.h"
+#include "server/store/estimates.h"
 #include "server/store/events.h"
 #include "server/store/exclusions.h"
 #include "server/store/instructions.h"
@@ -104,6 +105,13 @@ class DatabaseStore final : public Store {
         [&](Connection* db) { return ListSummaryRows(db, query, page); });
   }
 
+  absl::Status RaiseSilent(std::int64_t before_ns,
+                           std::int64_t alarms) override {
+    return db_->Write([&](Connection* db) {
+      return server::RaiseSilent(db, before_ns, alarms);
+    });
+  }
+
   absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
                                            const SegmentKey& key) override {
     return Read([&](Connection* db) { return ReadSegment(db, rig, key); });
@@ -189,6 +197,18 @@ class DatabaseStore final : public Store {
       const std::string& rig, const Page& page) override {
     return Read(
         [&](Connection* db) { return ListCalibrationRows(db, rig, page); });
+  }
+
+  absl::StatusOr<Listed<StoredEstimate>> ListEstimates(
+      const EstimateQuery& query, const Page& page) override {
+    return Read(
+        [&](Connection* db) { return ListEstimateRows(db, query, page); });
+  }
+
+  absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>>
+  ListWithoutEstimates(int limit) override {
+    return Read(
+        [&](Connection* db) { return VersionsWithoutEstimates(db, limit); });
   }
 
   absl::StatusOr<StoredRun> GetRun(const std::string& rig,

@@ -13,6 +13,7 @@
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
 #include "server/store/driver/statement.h"
+#include "server/store/estimates.h"
 #include "server/store/inventory.h"
 #include "server/store/records.h"
 #include "server/store/reported_tables.h"
@@ -214,7 +215,9 @@ absl::Status ApplyCalibration(UnitOfWork* tx,
     }
     SELFCAL_RETURN_IF_ERROR(WriteRow(tx, more, version, OnConflict::kKeep));
   }
-  return ReadCalibration(tx, version).status();
+  SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration written,
+                           ReadCalibration(tx, version));
+  return is_there ? absl::OkStatus() : InsertEstimates(tx, written);
 }
 
 absl::Status ApplyActivation(UnitOfWork* tx,

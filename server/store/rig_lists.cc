@@ -20,33 +20,41 @@ namespace {
 // A rig of the page, with its row.
 struct Found {
   std::int64_t rowid = 0;
+  std::int64_t place = 0;  // Place::value
   RigSummary summary;
 };
 
 // The position after which a page begins.
 struct Place {
-  std::int64_t last_seen_ns = 0;
+  std::int64_t value = 0;  // of the column that the list is sorted by
   std::string id;
 };
 
-// A line for each label, between line feeds. Names and values have none.
-std::string LinesOf(const std::map<std::string, std::string>& labels) {
-  std::string lines = "\n";
-  for (const auto& [name, value] : labels) lines += name + "=" + value + "\n";
-  return lines;
+// The column that a list is sorted by, before the name; empty: by name alone.
+std::string ColumnOf(RigQuery::Order order) {
+  switch (order) {
+    case RigQuery::Order::kName:
+      return "";
+    case RigQuery::Order::kLastSeen:
+      return "last_seen_ns";
+    case RigQuery::Order::kAlarms:
+      return "alarms";
+  }
+  return "";
 }
 
 std::string ListOf(const RigQuery& query) {
-  return fmt::format("rigs by {}{} with {}{}{}",
-                     query.order == RigQuery::Order::kName ? "name" : "seen",
+  return fmt::format("rigs by {}{} with {}{}{}{}",
+                     ColumnOf(query.order),
                      query.descending ? " desc" : "",
                      query.text,
                      LinesOf(query.labels),
-                     query.name);
+                     query.name,
+                     query.with_alarms ? " and alarms" : "");
 }
 
-std::string KeyOf(const RigSummary& summary) {
-  return fmt::format("{} {}", summary.last_seen_ns, summary.rig);
+std::string KeyOf(const Found& found) {
+  return fmt::format("{} {}", found.place, found.summary.rig);
 }
 
 // The position before the first rig.
@@ -60,8 +68,7 @@ absl::StatusOr<Place> PlaceOf(const RigQuery& query, const Page& page) {
   if (!key) return Beginning(query);
   Place place;
   const char* end = key->data() + key->size();
-  const auto [rest, error] =
-      std::from_chars(key->data(), end, place.last_seen_ns);
+  const auto [rest, error] = std::from_chars(key->data(), end, place.value);
   if (error != std::errc() || rest == end || *rest != ' ') {
     return absl::InvalidArgumentError(
         "the page token is not one of this list; ask for the first page");
@@ -71,30 +78,25 @@ absl::StatusOr<Place> PlaceOf(const RigQuery& query, const Page& page) {
 }
 
 std::string SqlOf(const RigQuery& query) {
-  const bool by_name = query.order == RigQuery::Order::kName;
+  const std::string column = ColumnOf(query.order);
+  const bool by_name = column.empty();
   const char* direction = query.descending ? "DESC" : "ASC";
   const char* beyond = query.descending ? "<" : ">";
-  const std::string place = by_name ? fmt::format("id {} ?2", beyond)
-                                    : fmt::format(
-                                          "(last_seen_ns, id) {} "
-                                          "(?1, ?2)",
-                                          beyond);
+  const std::string place =
+      by_name ? fmt::format("id {} ?2", beyond)
+              : fmt::format("({}, id) {} (?1, ?2)", column, beyond);
   const std::string order =
       by_name ? fmt::format("id {}", direction)
-              : fmt::format("last_seen_ns {0}, id {0}", direction);
-  // The condition on the name does not use ?1, so it is used here. A text
-  // contains another if it changes when that is removed.
+              : fmt::format("{0} {1}, id {1}", column, direction);
+  // The condition on the name does not use ?1, so it is used here.
   return fmt::format(
-      "SELECT rig, id, create_time_ns, last_seen_ns FROM rigs "
-      "WHERE {} AND (?4 = '' OR replace(id, ?4, '') <> id) "
-      "AND CAST(?1 AS BIGINT) IS NOT NULL "
-      "AND (?6 = 0 OR ?6 = "
-      "  (SELECT count(*) FROM rig_labels l WHERE l.rig = rigs.rig "
-      "   AND replace(?5, '\n' || l.name || '=' || l.value || '\n', '') "
-      "     <> ?5)) "
-      "AND (?7 = '' OR id = ?7) "
+      "SELECT rig, id, create_time_ns, last_seen_ns, {} FROM rigs "
+      "WHERE {} AND CAST(?1 AS BIGINT) IS NOT NULL AND {} {}"
       "ORDER BY {} LIMIT ?3",
+      by_name ? "last_seen_ns" : column,
       place,
+      RigCondition("rigs", 4),
+      query.with_alarms ? "AND alarms > 0 " : "",
       order);
 }
 
@@ -104,7 +106,7 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
                                             int limit) {
   Statement read(db,
                  SqlOf(query),
-                 place.last_seen_ns,
+                 place.value,
                  place.id,
                  limit,
                  query.text,
@@ -118,6 +120,7 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
     rig.summary.rig = read.Text(1);
     rig.summary.create_time_ns = read.Int(2);
     rig.summary.last_seen_ns = read.Int(3);
+    rig.place = read.Int(4);
     found.push_back(std::move(rig));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
@@ -155,27 +158,30 @@ absl::Status ReadLabels(Connection* db, std::int64_t rig, RigSummary* summary) {
   return read.status();
 }
 
-absl::Status ReadReports(Connection* db,
-                         std::int64_t rig,
-                         RigSummary* summary) {
-  Statement uplink(db,
-                   "SELECT time_ns, (SELECT count(*) FROM outbox o "
-                   "  WHERE o.rig = u.rig) FROM uplinks u WHERE rig = ?1",
-                   rig);
-  if (uplink.Next()) summary->uplink = {uplink.Int(0), uplink.Int(1), ""};
-  SELFCAL_RETURN_IF_ERROR(uplink.status());
-  Statement device(db,
-                   "SELECT time_ns, waiting, program_version "
-                   "FROM reported_rigs WHERE rig = ?1",
-                   rig);
-  if (device.Next()) {
-    summary->device = {device.Int(0), device.Int(1), device.Text(2)};
-  }
-  return device.status();
+// On a device, how far its reports are.
+absl::Status ReadUplink(Connection* db, std::int64_t rig, RigSummary* summary) {
+  Statement read(db,
+                 "SELECT time_ns, (SELECT count(*) FROM outbox o "
+                 "  WHERE o.rig = u.rig) FROM uplinks u WHERE rig = ?1",
+                 rig);
+  if (read.Next()) summary->uplink = {read.Int(0), read.Int(1), ""};
+  return read.status();
 }
 
-absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
-  SELFCAL_RETURN_IF_ERROR(ReadLabels(db, rig, summary));
+// At a hub, of the device that reports the rig.
+absl::Status ReadDevice(Connection* db, std::int64_t rig, RigSummary* summary) {
+  Statement read(db,
+                 "SELECT time_ns, waiting, program_version "
+                 "FROM reported_rigs WHERE rig = ?1",
+                 rig);
+  if (read.Next()) {
+    summary->device = {read.Int(0), read.Int(1), read.Text(2)};
+  }
+  return read.status();
+}
+
+// What alarms depend on.
+absl::Status ReadState(Connection* db, std::int64_t rig, RigSummary* summary) {
   SELFCAL_RETURN_IF_ERROR(ReadVersions(db, rig, summary));
   SELFCAL_ASSIGN_OR_RETURN(summary->tables, ReadTables(db, rig));
   Statement run(db,
@@ -192,7 +198,13 @@ absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
                                    "SELECT time_ns FROM changes WHERE rig = ?1 "
                                    "ORDER BY change DESC LIMIT 1",
                                    rig));
-  return ReadReports(db, rig, summary);
+  return ReadDevice(db, rig, summary);
+}
+
+absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
+  SELFCAL_RETURN_IF_ERROR(ReadLabels(db, rig, summary));
+  SELFCAL_RETURN_IF_ERROR(ReadUplink(db, rig, summary));
+  return ReadState(db, rig, summary);
 }
 
 // A page of what `read` makes of each rig that is found.
@@ -208,8 +220,7 @@ absl::StatusOr<Listed<Item>> ListFound(Connection* db,
   Listed<Item> listed;
   for (std::size_t k = 0; k < found.size(); ++k) {
     if (static_cast<int>(k) == size) {
-      listed.next_token =
-          MakePageToken(ListOf(query), KeyOf(found[k - 1].summary));
+      listed.next_token = MakePageToken(ListOf(query), KeyOf(found[k - 1]));
       break;
     }
     SELFCAL_ASSIGN_OR_RETURN(Item item, read(found[k]));
@@ -220,6 +231,29 @@ absl::StatusOr<Listed<Item>> ListFound(Connection* db,
 
 }  // namespace
 
+// Names and values have no line feeds.
+std::string LinesOf(const std::map<std::string, std::string>& labels) {
+  std::string lines = "\n";
+  for (const auto& [name, value] : labels) lines += name + "=" + value + "\n";
+  return lines;
+}
+
+// A text contains another if it changes when that is removed.
+std::string RigCondition(std::string_view rigs, int first_parameter) {
+  return fmt::format(
+      "(?{1} = '' OR replace({0}.id, ?{1}, '') <> {0}.id) "
+      "AND (?{3} = 0 OR ?{3} = "
+      "  (SELECT count(*) FROM rig_labels l WHERE l.rig = {0}.rig "
+      "   AND replace(?{2}, '\n' || l.name || '=' || l.value || '\n', '') "
+      "     <> ?{2})) "
+      "AND (?{4} = '' OR {0}.id = ?{4})",
+      rigs,
+      first_parameter,
+      first_parameter + 1,
+      first_parameter + 2,
+      first_parameter + 3);
+}
+
 absl::StatusOr<Listed<RigSummary>> ListSummaryRows(Connection* db,
                                                    const RigQuery& query,
                                                    const Page& page) {
@@ -229,6 +263,13 @@ absl::StatusOr<Listed<RigSummary>> ListSummaryRows(Connection* db,
         SELFCAL_RETURN_IF_ERROR(ReadRest(db, found.rowid, &summary));
         return summary;
       });
+}
+
+absl::StatusOr<RigSummary> ReadRigState(UnitOfWork* tx) {
+  RigSummary summary;
+  summary.rig = tx->rig();
+  SELFCAL_RETURN_IF_ERROR(ReadState(tx->db(), tx->rig_row(), &summary));
+  return summary;
 }
 
 absl::StatusOr<Listed<StoredRig>> ListRigRows(Connection* db,

@@ -9,9 +9,11 @@ namespace selfcal::server {
 struct RigQuery {
   std::string text = {};  // part of the name; empty: every rig
   std::map<std::string, std::string> labels = {};  // which the rig must have
-  enum class Order { kName, kLastSeen } order = Order::kName;
+  // kAlarms: by how urgent they are.
+  enum class Order { kName, kLastSeen, kAlarms } order = Order::kName;
   bool descending = false;
-  std::string name = {};  // the whole name; empty: every rig
+  std::string name = {};     // the whole name; empty: every rig
+  bool with_alarms = false;  // only rigs that have some
 };
 
 }  // namespace selfcal::server

@@ -145,6 +145,7 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
                             "change_groups",
                             "changes",
                             "calibration_segments",
+                            "estimates",
                             "calibrations",
                             "run_segments",
                             "runs",
@@ -186,6 +187,27 @@ absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig) {
 
 absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx) {
   return ReadRig(tx->db(), tx->rig());
+}
+
+absl::Status WriteAlarms(UnitOfWork* tx, std::int64_t alarms) {
+  return Statement(tx->db(),
+                   "UPDATE rigs SET alarms = ?2 "
+                   "WHERE rig = ?1 AND alarms <> ?2",
+                   tx->rig_row(),
+                   alarms)
+      .Run();
+}
+
+absl::Status RaiseSilent(Connection* db,
+                         std::int64_t before_ns,
+                         std::int64_t alarms) {
+  return Statement(db,
+                   "UPDATE rigs SET alarms = alarms | ?2 "
+                   "WHERE rig IN (SELECT rig FROM reported_rigs "
+                   "  WHERE time_ns < ?1) AND (alarms & ?2) <> ?2",
+                   before_ns,
+                   alarms)
+      .Run();
 }
 
 absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx) {

@@ -27,6 +27,14 @@ absl::StatusOr<std::int64_t> LockRig(Connection* db, const std::string& rig);
 // NOT_FOUND; DATA_LOSS if the record is damaged.
 absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig);
 absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);
+// The bits of server/domain/alarms.h.
+absl::Status WriteAlarms(UnitOfWork* tx, std::int64_t alarms);
+// Sets these bits of the rigs from which their devices have not reported since
+// then.
+absl::Status RaiseSilent(Connection* db,
+                         std::int64_t before_ns,
+                         std::int64_t alarms);
+
 // Number of rigs in the database.
 absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx);
 

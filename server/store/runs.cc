@@ -9,6 +9,7 @@
 #include "server/store/driver/statement.h"
 #include "server/store/paging.h"
 #include "server/store/rigs.h"
+#include "server/store/time_place.h"
 
 namespace selfcal::server {
 namespace {
@@ -117,6 +118,34 @@ absl::StatusOr<std::int64_t> NewestWhere(UnitOfWork* tx,
       tx->rig_row());
 }
 
+absl::StatusOr<Listed<StoredRun>> ListRunsOfAll(Connection* db,
+                                                const Page& page) {
+  constexpr std::string_view kList = "runs";
+  SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(kList, page));
+  const int size = PageSize(page);
+  Statement read(db,
+                 std::string(kRunColumns) +
+                     "WHERE (r.create_steady_ns, r.rig, r.run) < (?1, ?2, ?3) "
+                     "ORDER BY r.create_steady_ns DESC, r.rig DESC, "
+                     "  r.run DESC LIMIT ?4",
+                 place.steady_ns,
+                 place.rig,
+                 place.number,
+                 size + 1);
+  Listed<StoredRun> listed;
+  while (read.Next()) {
+    if (static_cast<int>(listed.items.size()) == size) {
+      listed.next_token = TokenAfter(kList, place);
+      break;
+    }
+    place = {read.Int(13), read.Int(10), read.Int(1)};
+    SELFCAL_ASSIGN_OR_RETURN(StoredRun run, RunFromRow(db, read));
+    listed.items.push_back(std::move(run));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return listed;
+}
+
 }  // namespace
 
 absl::StatusOr<StoredRun> ReadRun(Connection* db,
@@ -138,6 +167,7 @@ absl::StatusOr<StoredRun> ReadRun(Connection* db,
 absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
                                               const std::string& rig,
                                               const Page& page) {
+  if (rig.empty()) return ListRunsOfAll(db, page);
   const std::string list = "runs/" + rig;
   SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));

@@ -19,7 +19,7 @@ namespace selfcal::server {
 absl::StatusOr<StoredRun> ReadRun(Connection* db,
                                   const std::string& rig,
                                   std::int64_t run);
-// Newest first.
+// Store::ListRuns.
 absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
                                               const std::string& rig,
                                               const Page& page);

@@ -36,6 +36,7 @@
 #include "core/model/segment.h"
 #include "core/selection/tables.h"
 #include "server/store/clock_record.h"
+#include "server/store/estimate_query.h"
 #include "server/store/moment.h"
 #include "server/store/rig_claim.h"
 #include "server/store/rig_query.h"
@@ -196,6 +197,19 @@ struct StoredCalibration {
   std::int64_t rig_key = 0;
 };
 
+// A parameter of a version.
+struct StoredEstimate {
+  std::string rig;
+  std::int64_t version = 0;
+  std::int64_t create_time_ns = 0;  // of the version
+  CalibrationState state = CalibrationState::kActive;
+  std::string component;
+  std::string unit;
+  double value = 0;
+  std::optional<double> sigma;         // nullopt: not a number
+  std::optional<double> from_factory;  // nullopt: of other cameras
+};
+
 enum class RunState { kPending, kRunning, kSucceeded, kFailed, kCancelled };
 enum class RunTrigger {
   kTablesFull,
@@ -333,6 +347,10 @@ class Store {
   virtual absl::StatusOr<std::vector<std::string>> ListIdleRigs(
       std::int64_t idle_since_ns) = 0;
 
+  // RaiseSilent of rigs.h.
+  virtual absl::Status RaiseSilent(std::int64_t before_ns,
+                                   std::int64_t alarms) = 0;
+
   // --- Segments.
   virtual absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
                                                    const SegmentKey& key) = 0;
@@ -381,8 +399,18 @@ class Store {
       const std::string& rig, std::int64_t version) = 0;
   virtual absl::StatusOr<StoredCalibration> GetActiveCalibration(
       const std::string& rig) = 0;
+  // Newest first, of one rig or, if `rig` is empty, of all by their steady
+  // time, without damaged ones.
   virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
       const std::string& rig, const Page& page) = 0;
+  // Parameters of versions, of all rigs of the query, in the order of keys of
+  // rigs, versions and components.
+  virtual absl::StatusOr<Listed<StoredEstimate>> ListEstimates(
+      const EstimateQuery& query, const Page& page) = 0;
+  // Versions that have no such records: from before they were written, or
+  // without values that are numbers.
+  virtual absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>>
+  ListWithoutEstimates(int limit) = 0;
   // The candidate that a run has stored; NOT_FOUND if it has none.
   virtual absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
                                                          std::int64_t run) = 0;
@@ -390,6 +418,8 @@ class Store {
   // --- Runs.
   virtual absl::StatusOr<StoredRun> GetRun(const std::string& rig,
                                            std::int64_t run) = 0;
+  // Newest first, of one rig or, if `rig` is empty, of all by their steady
+  // time.
   virtual absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
                                                      const Page& page) = 0;
   // Pending and running runs of these rigs, or of those that a replica has

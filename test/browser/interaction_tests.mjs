@@ -68,6 +68,22 @@ export const interactionTests = {
     await r.heading(last);
   },
 
+  async 'rigs with alarms are listed alone'(r) {
+    await r.open('/', 'Rigs');
+    await r.page.locator('tbody tr').first().waitFor();
+    await r.page.getByLabel('only with alarms').check();
+    const { rigs } = await r.api('activity?page_size=1000&order_by=alarms%20desc&with_alarms=true');
+    const all = await r.api('activity?page_size=1000');
+    assert.ok(rigs.length < all.rigs.length && rigs.every(({ alarms }) => alarms.length > 0));
+    if (rigs.length === 0) {
+      await r.sees('No rig has alarms.');
+    } else {
+      await r.rows((names) => names[0] === rigs[0].name.split('/').pop());
+    }
+    await r.page.getByLabel('only with alarms').uncheck();
+    await r.page.locator('tbody tr').first().waitFor();
+  },
+
   async 'keys go to the search field and show themselves'(r) {
     await r.open('/rigs/tablet/segments', 'Segments of tablet');
     await r.sees('walk~0');

@@ -37,6 +37,11 @@ _Request = TypeVar("_Request")
 _Response = TypeVar("_Response")
 
 
+def _parent(rig_id: str) -> str:
+    """Of a list of one rig, or of all."""
+    return f"rigs/{rig_id}" if rig_id else ""
+
+
 @dataclasses.dataclass(frozen=True)
 class Tls:
     """PEM files for a TCP target with mutual TLS."""
@@ -138,9 +143,12 @@ class Daemon:
             timeout=self._timeout_s,
         )
 
-    def calibrations(self, rig_id: str) -> Iterator[calibration.Calibration]:
-        """All versions, including rejected ones; newest first."""
-        request = calibration.ListCalibrationsRequest(parent=f"rigs/{rig_id}")
+    def calibrations(
+        self, rig_id: str = ""
+    ) -> Iterator[calibration.Calibration]:
+        """All versions, including rejected ones, of a rig or of all; newest
+        first."""
+        request = calibration.ListCalibrationsRequest(parent=_parent(rig_id))
         for page in self._pages(
             self.calibration_service.ListCalibrations, request
         ):
@@ -160,6 +168,24 @@ class Daemon:
             fleet.DescribeCohortRequest(filter=filter, max_rigs=max_rigs),
             timeout=self._timeout_s,
         )
+
+    def estimates(
+        self,
+        rig_id: str = "",
+        *,
+        component: str = "",
+        only_active: bool = False,
+        filter: str = "",
+    ) -> Iterator[fleet.Estimate]:
+        """Parameters of the versions of a rig, or of all rigs of a filter."""
+        request = fleet.ListEstimatesRequest(
+            parent=_parent(rig_id),
+            component=component,
+            only_active=only_active,
+            filter=filter,
+        )
+        for page in self._pages(self.fleet_service.ListEstimates, request):
+            yield from page.estimates
 
     def sessions(self, rig_id: str) -> Iterator[session.Session]:
         """By name."""
@@ -208,11 +234,11 @@ class Daemon:
             yield from page.events
 
     def recalibrations(
-        self, rig_id: str
+        self, rig_id: str = ""
     ) -> Iterator[recalibration.Recalibration]:
-        """Newest first."""
+        """The runs of a rig or of all; newest first."""
         request = recalibration.ListRecalibrationsRequest(
-            parent=f"rigs/{rig_id}"
+            parent=_parent(rig_id)
         )
         for page in self._pages(
             self.recalibration_service.ListRecalibrations, request

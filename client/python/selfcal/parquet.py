@@ -2,8 +2,9 @@
 
     python -m selfcal.parquet TARGET LIST [RIG] FILE
 
-where LIST is rigs, segments, calibrations, recalibrations, sessions, events,
-activity or cohort; or, with messages of one type from anywhere::
+where LIST is rigs, segments, calibrations, recalibrations, sessions,
+instructions, estimates, events, activity or cohort; or, with messages of one
+type from anywhere::
 
     selfcal.parquet.write("runs.parquet", daemon.recalibrations("tablet"))
 
@@ -173,15 +174,20 @@ def _keys(kind: Any, values: Any) -> list[str]:
     return keys if all(keys) and len(set(keys)) == len(keys) else []
 
 
+_NO, _YES, _MAYBE = range(3)
+
+# Each with whether it is of one rig.
 _LISTS = {
-    "rigs": (Daemon.rigs, False),
-    "segments": (Daemon.segments, True),
-    "calibrations": (Daemon.calibrations, True),
-    "recalibrations": (Daemon.recalibrations, True),
-    "sessions": (Daemon.sessions, True),
-    "events": (Daemon.events, False),
-    "activity": (lambda daemon: daemon.activity(1000).rigs, False),
-    "cohort": (lambda daemon: daemon.cohort().components, False),
+    "rigs": (Daemon.rigs, _NO),
+    "segments": (Daemon.segments, _YES),
+    "calibrations": (Daemon.calibrations, _MAYBE),
+    "recalibrations": (Daemon.recalibrations, _MAYBE),
+    "sessions": (Daemon.sessions, _YES),
+    "instructions": (Daemon.instructions, _YES),
+    "estimates": (Daemon.estimates, _MAYBE),
+    "events": (Daemon.events, _NO),
+    "activity": (lambda daemon: daemon.activity(1000).rigs, _NO),
+    "cohort": (lambda daemon: daemon.cohort().components, _NO),
 }
 
 
@@ -192,19 +198,22 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("target", help="unix:/path or host:port")
     parser.add_argument("list", choices=_LISTS)
-    parser.add_argument("rig", nargs="?", help="of a list of one rig")
+    parser.add_argument(
+        "rig",
+        nargs="?",
+        help="of a list of one rig; without it, calibrations, recalibrations "
+        "and estimates are of all",
+    )
     parser.add_argument("file")
     options = parser.parse_args(arguments)
     read, of_rig = _LISTS[options.list]
-    if of_rig != (options.rig is not None):
-        parser.error(
-            f"{options.list}: name the rig"
-            if of_rig
-            else f"{options.list} are not of one rig"
-        )
+    if of_rig == _YES and options.rig is None:
+        parser.error(f"{options.list}: name the rig")
+    if of_rig == _NO and options.rig is not None:
+        parser.error(f"{options.list} are not of one rig")
     with connect(options.target) as daemon:
         try:
-            rig = [options.rig] if of_rig else []
+            rig = [] if options.rig is None else [options.rig]
             write(options.file, read(daemon, *rig))
         except (grpc.RpcError, OSError, ValueError) as error:
             text = (

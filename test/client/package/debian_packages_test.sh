@@ -49,7 +49,8 @@ if command -v lintian >/dev/null; then
     fail 'lintian finds mistakes'
 fi
 [[ -f $work/root/etc/selfcal/selfcald.toml ]] || fail 'no settings'
-for file in alerts.yml client_alerts.yml dashboard.json; do
+for file in alerts.yml client_alerts.yml dashboard.json \
+  fleet_dashboard.json; do
   [[ -f $work/root/usr/share/selfcald/monitoring/$file ]] ||
     fail "selfcald has no $file"
 done

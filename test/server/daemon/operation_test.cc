@@ -440,11 +440,19 @@ TEST_F(OperationTest, RequestsThatTheMetricsRefuseDoNotEndTheDaemon) {
 
 TEST_F(OperationTest, AlertsAndDashboardShowSeriesThatThereAre) {
   const Certificates certificates;
-  const auto daemon = StartWithTls(certificates, {"--metrics", "127.0.0.1:0"});
+  const auto daemon = StartWithTls(
+      certificates,
+      {"--metrics", "127.0.0.1:0", "--uplink", "unix:/nonexistent/hub.sock"});
   const Rig rig = CreateRig();
   Stream(TestSegments(rig, 4));
   ASSERT_TRUE(AllScored());
-  const std::string series = HttpGet(daemon->Word("metrics: "));
+  const std::string url = daemon->Word("metrics: ");
+  // The uplink has begun.
+  EXPECT_TRUE(Eventually([&] {
+    return HttpGet(url).find("selfcal_uplink_waiting_records{") !=
+           std::string::npos;
+  }));
+  const std::string series = HttpGet(url);
   EXPECT_THAT(series,
               HasSubstr("selfcal_segments_total{verdict=\"stored\"} 4"));
   EXPECT_THAT(series,

@@ -155,13 +155,23 @@ TEST_F(CalibrationServiceTest, PagesHoldEveryVersionNewestFirst) {
 
 TEST_F(CalibrationServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
   v1::ListCalibrationsResponse page;
-  EXPECT_THAT(BadFields(List("", 0, "", &page)), ElementsAre("parent"));
+  EXPECT_THAT(BadFields(List("r", 0, "", &page)), ElementsAre("parent"));
   ExpectNotFound(List("rigs/r", 0, "", &page), "rigs/r");
   AddRig();
   EXPECT_THAT(BadFields(List("rigs/r", -1, "", &page)),
               ElementsAre("page_size"));
   EXPECT_THAT(BadFields(List("rigs/r", 1, "x", &page)),
               ElementsAre("page_token"));
+}
+
+TEST_F(CalibrationServiceTest, ListWithoutAParentIsOfAllRigs) {
+  v1::ListCalibrationsResponse page;
+  ASSERT_TRUE(List("", 0, "", &page).ok());
+  EXPECT_EQ(page.calibrations_size(), 0);
+  AddRig();
+  ASSERT_TRUE(List("", 0, "", &page).ok());
+  ASSERT_EQ(page.calibrations_size(), 1);
+  EXPECT_EQ(page.calibrations(0).name(), "rigs/r/calibrations/1");
 }
 
 TEST_F(CalibrationServiceTest, WatchBeginsWithTheActiveAndGetsTheNext) {

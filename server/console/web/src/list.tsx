@@ -87,7 +87,8 @@ export function ListPage<R extends { nextPageToken: string }, T extends object>(
   const address = useAddress().searchParams;
   const query = new URLSearchParams(props.fixed);
   for (const key of ['page_token', ...(props.query ?? [])]) {
-    query.set(key, address.get(key) ?? '');
+    const value = address.get(key);
+    if (value) query.set(key, value);
   }
   query.set('page_size', address.get('page_size') ?? kPageSize);
   if (props.order) {

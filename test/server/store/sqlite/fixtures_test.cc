@@ -58,6 +58,23 @@ class FixturesTest : public SqliteTest {
     EXPECT_EQ(exclusions->size(), kept ? FixtureRig().groups.size() : 0u);
   }
 
+  // Parameters of both versions, which databases from before schema version 16
+  // get later.
+  void ExpectEstimates(bool kept) {
+    const auto rows = [&] {
+      const auto listed = store_->ListEstimates({}, {1000, ""});
+      EXPECT_TRUE(listed.ok()) << listed.status();
+      return listed.ok() ? listed->items.size() : 0;
+    };
+    const auto all =
+        static_cast<std::size_t>(2 * TangentSize(FixtureRig().factory));
+    EXPECT_EQ(rows(), kept ? all : 0u);
+    const auto written = domain_->CompleteEstimates(100);
+    ASSERT_TRUE(written.ok()) << written.status();
+    EXPECT_EQ(*written, kept ? 0 : 2);
+    EXPECT_EQ(rows(), all);
+  }
+
   static std::int64_t Version(const std::string& path) {
     return ReadIntInFile(path, "PRAGMA user_version").value_or(-1);
   }
@@ -95,6 +112,7 @@ TEST_F(FixturesTest, EverySchemaThatWasReleasedOpensWithAllItHeld) {
     }
     ExpectFixture(store_.get());
     ExpectMotion(version >= 7);
+    ExpectEstimates(version >= 16);
     // And works on.
     MotionSegment segment = FixtureSegments()[0];
     segment.key = {"later", 0};

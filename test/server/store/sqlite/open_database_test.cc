@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 14u);
+  ASSERT_EQ(migrations.size(), 16u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -113,6 +113,12 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[13].name, "0014_keys_by_rig.sql");
   EXPECT_EQ(migrations[13].sha256,
             "63865eaac3862d8157738cfab94b77972faed78ff694de5e3f797b7ed9258add");
+  EXPECT_EQ(migrations[14].name, "0015_reports.sql");
+  EXPECT_EQ(migrations[14].sha256,
+            "e32609c5d1a8a5ca03e74c4969a0cd88267133d895f700ffce9809919ca5a3d2");
+  EXPECT_EQ(migrations[15].name, "0016_fleet.sql");
+  EXPECT_EQ(migrations[15].sha256,
+            "6356ebd35485990c682458999de9e260fe37719424c3917cb08670d07b6de0f0");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

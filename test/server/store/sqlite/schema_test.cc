@@ -1,4 +1,6 @@
 // What the schema itself refuses, whoever writes, and how it is searched.
+#include <algorithm>
+#include <iterator>
 #include <set>
 #include <sstream>
 #include <string>
@@ -58,7 +60,9 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
       "outbox",
       "reported_rigs",
       "instructions",
-      // The hub has its own key, and derives the last time from segments.
+      // The hub has its own key, and derives the rest from what is reported.
+      "estimates",
+      "rigs.alarms",
       "rigs.rig",
       "rigs.id",
       "rigs.last_seen_ns",
@@ -79,7 +83,7 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
       ReadTextInFile(Path(),
                      "SELECT group_concat(t.name || '.' || c.name, ' ') "
                      "FROM sqlite_schema t JOIN pragma_table_info(t.name) c "
-                     "WHERE t.type = 'table'");
+                     "WHERE t.type = 'table' AND t.name NOT LIKE 'sqlite%'");
   ASSERT_TRUE(columns.ok()) << columns.status();
   std::istringstream words(*columns);
   std::set<std::string> there;
@@ -88,7 +92,13 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
     if (expected.contains(table) || expected.contains(column)) continue;
     there.insert(column);
   }
-  EXPECT_EQ(there, reported);
+  std::vector<std::string> differences;
+  std::set_symmetric_difference(there.begin(),
+                                there.end(),
+                                reported.begin(),
+                                reported.end(),
+                                std::back_inserter(differences));
+  EXPECT_THAT(differences, ::testing::IsEmpty());
 }
 
 TEST_F(SchemaTest, CalibrationInAnotherRowIsNoticed) {
@@ -213,7 +223,23 @@ TEST_F(SchemaTest, StatementsReadTheRowsThatTheyNeed) {
       {"SELECT event FROM events WHERE (steady_ns, rig, event) > (1, 'a', 1) "
        "ORDER BY steady_ns, rig, event LIMIT 10",
        {"SEARCH events USING COVERING INDEX events_by_time "
-        "((steady_ns,rig,event)>(?,?,?))"}}};
+        "((steady_ns,rig,event)>(?,?,?))"}},
+      {"SELECT r.run FROM runs r JOIN rigs g USING (rig) "
+       "WHERE (r.create_steady_ns, r.rig, r.run) < (1, 1, 1) "
+       "ORDER BY r.create_steady_ns DESC, r.rig DESC, r.run DESC LIMIT 10",
+       {"SEARCH r USING COVERING INDEX runs_by_time "
+        "((create_steady_ns,rig,run)<(?,?,?))",
+        "SEARCH g USING INTEGER PRIMARY KEY (rowid=?)"}},
+      {"SELECT id FROM rigs WHERE (alarms, id) < (1, 'a') AND alarms > 0 "
+       "ORDER BY alarms DESC, id DESC LIMIT 10",
+       {"SEARCH rigs USING COVERING INDEX rigs_by_alarms "
+        "(alarms>? AND (alarms,id)<(?,?))"}},
+      {"SELECT e.value FROM estimates e JOIN rigs r ON r.rig = e.rig "
+       "WHERE e.component = 'x' AND (e.rig, e.version) > (1, 1) "
+       "ORDER BY e.rig, e.version, e.component LIMIT 10",
+       {"SEARCH e USING INDEX estimates_by_component "
+        "(component=? AND (rig,version)>(?,?))",
+        "SEARCH r USING INTEGER PRIMARY KEY (rowid=?)"}}};
   for (const auto& [sql, expected] : plans) {
     Statement plan(db->get(), std::string("EXPLAIN QUERY PLAN ") + sql);
     std::vector<std::string> steps;

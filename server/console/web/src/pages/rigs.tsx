@@ -54,12 +54,13 @@ const kColumns: Column<RigActivity>[] = [
   {
     head: 'Alarms',
     cell: (rig) => <Alarms of={rig.alarms} />,
-    value: (rig) => rig.alarms.length,
+    order: 'alarms',
     wide: true,
   },
 ];
 
-function Nothing(props: { filter: string }) {
+function Nothing(props: { filter: string; withAlarms: boolean }) {
+  if (props.withAlarms) return <p>No rig has alarms.</p>;
   return props.filter ? (
     <p>No rig matches '{props.filter}'. Clear the filter to see all.</p>
   ) : (
@@ -73,6 +74,7 @@ function Nothing(props: { filter: string }) {
 export function Rigs(props: { version: number }) {
   const query = useAddress().searchParams;
   const filter = query.get('filter') ?? '';
+  const withAlarms = query.get('with_alarms') === 'true';
   const search = (event: JSX.TargetedInputEvent<HTMLInputElement>) =>
     go(withQuery({ filter: event.currentTarget.value, page_token: '' }), true);
   return (
@@ -80,12 +82,12 @@ export function Rigs(props: { version: number }) {
       title="Rigs"
       path="activity"
       items={(response: ListActivityResponse) => response.rigs}
-      query={['filter']}
+      query={['filter', 'with_alarms']}
       order={['name', 'asc']}
       version={props.version}
       columns={kColumns}
       next="Next rigs"
-      empty={<Nothing filter={filter} />}
+      empty={<Nothing filter={filter} withAlarms={withAlarms} />}
       above={(mistake) => (
         <form class="bar" role="search" onSubmit={(event) => event.preventDefault()}>
           <label>
@@ -97,6 +99,23 @@ export function Rigs(props: { version: number }) {
               size={40}
               onInput={search}
             />
+          </label>
+          <label>
+            <input
+              type="checkbox"
+              checked={withAlarms}
+              onChange={(event) =>
+                go(
+                  withQuery({
+                    with_alarms: event.currentTarget.checked ? 'true' : '',
+                    order_by: event.currentTarget.checked ? 'alarms desc' : '',
+                    page_token: '',
+                  }),
+                  true,
+                )
+              }
+            />
+            only with alarms, the most urgent first
           </label>
           {mistake && <Problem error={mistake} />}
         </form>
