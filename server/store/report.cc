@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
 #include "selfcal/store/report.pb.h"
 #include "server/status/status_macros.h"
 #include "server/store/announcements.h"
@@ -108,7 +110,11 @@ absl::Status ApplyRig(UnitOfWork* tx, const Rows& rows) {
   if (stored.rig.id != tx->rig()) {
     return BadReport(fmt::format("it defines the rig {}", stored.rig.id));
   }
-  return absl::OkStatus();
+  const std::vector<Violation> violations = Validate(stored.rig);
+  if (violations.empty()) return absl::OkStatus();
+  return BadReport(fmt::format("{} of the rig {}",
+                               violations.front().field,
+                               violations.front().message));
 }
 
 absl::Status ApplySegment(UnitOfWork* tx,
@@ -217,6 +223,12 @@ absl::Status ApplyCalibration(UnitOfWork* tx,
   }
   SELFCAL_ASSIGN_OR_RETURN(const StoredCalibration written,
                            ReadCalibration(tx, version));
+  // A value that is no number would spoil what is computed over all rigs.
+  if (!ReadableValues(written.theta).allFinite() ||
+      !written.covariance.allFinite()) {
+    return BadReport(
+        fmt::format("version {} has values that are no numbers", version));
+  }
   return is_there ? absl::OkStatus() : InsertEstimates(tx, written);
 }
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
+#include <functional>
 #include <utility>
 
 #include "server/pipeline/backoff.h"
@@ -17,6 +19,16 @@ using SteadyClock = std::chrono::steady_clock;
 
 // How often the outbox is looked at.
 constexpr std::chrono::milliseconds kLookAfter{500};
+
+// A round of reports; what it throws, e.g. for a lack of memory, is its error.
+absl::StatusOr<Reporter::Round> ReportGuarded(
+    Reporter* reporter, const std::function<bool(std::int64_t)>& pace) {
+  try {
+    return reporter->ReportOnce(SteadyClock::now(), pace);
+  } catch (const std::exception& error) {
+    return absl::InternalError(error.what());
+  }
+}
 
 }  // namespace
 
@@ -69,7 +81,7 @@ void Uplink::Run() {
   Backoff backoff;
   SteadyClock::duration wait = SteadyClock::duration::zero();
   while (Wait(wait)) {
-    const auto round = reporter.ReportOnce(SteadyClock::now(), pace);
+    const auto round = ReportGuarded(&reporter, pace);
     const absl::Status status = round.ok() ? round->status : round.status();
     if (absl::IsCancelled(status)) break;
     if (status.message() != problem) {

@@ -1,9 +1,12 @@
 // Reports of a device to its hub: the hub has what the device has, whatever is
 // lost on the way; a rig that is reported belongs to its device.
+#include <cmath>
 #include <random>
 
 #include "selfcal/store/report.pb.h"
+#include "server/store/checksum.h"
 #include "server/store/outbox.h"
+#include "server/store/records.h"
 #include "server/store/report.h"
 #include "test/promise.h"
 #include "test/server/store/store_test.h"
@@ -131,6 +134,19 @@ class ReportsTest : public StoreTest {
       }
       EXPECT_TRUE(store->outbox()->Confirm(*report, 1).ok());
     }
+  }
+
+  // The records with another definition of the rig.
+  static store::ReportedRecords WithDefinition(store::ReportedRecords records,
+                                               const StoredRig& rig) {
+    for (auto& record : *records.mutable_records()) {
+      if (record.kind() != static_cast<int>(RecordKind::kRig)) continue;
+      auto* row = record.mutable_rows(0);
+      const std::string definition = SerializeRig(rig);
+      row->mutable_values(1)->set_blob(definition);
+      row->mutable_values(2)->set_blob(Sha256(definition));
+    }
+    return records;
   }
 
   void ExpectSame(const std::string& rig, bool with_data = false) {
@@ -389,7 +405,14 @@ TEST_P(ReportsTest, WhatIsNoReportIsRefusedAndChangesNothing) {
       }
     }
   }
-  EXPECT_GT(bad.size(), 12u);
+  // A definition that no daemon would have accepted, with its checksum.
+  Rig invalid = rig;
+  invalid.pixel_sigma_px = std::nan("");
+  bad.push_back(WithDefinition(good, {invalid, 0}));
+  invalid = rig;
+  invalid.table_size = -1;
+  bad.push_back(WithDefinition(good, {invalid, 0}));
+  EXPECT_GT(bad.size(), 14u);
   for (std::size_t k = 0; k < bad.size(); ++k) {
     const absl::Status status = give(bad[k]);
     EXPECT_TRUE(absl::IsInvalidArgument(status)) << k << ": " << status;
