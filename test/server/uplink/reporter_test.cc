@@ -7,7 +7,6 @@ namespace selfcal::server {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::SizeIs;
 
 class ReporterTest : public UplinkFixture {
  protected:
