@@ -83,7 +83,7 @@ int List(Context* context, const std::string& rig, const ListOptions& options) {
   return kDone;
 }
 
-// Whether a device reports the rig.
+// True if a device reports the rig.
 bool IsReported(const Context& context, const std::string& rig) {
   const auto stub = v1::ActivityService::NewStub(context.Channel());
   v1::ListActivityRequest request;

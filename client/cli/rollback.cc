@@ -103,7 +103,7 @@ int CarryOut(const Context& context,
     grpc::Status failure = status;
     if (const auto given =
             InsteadOf(status, context, plan.rig, instruction, &failure)) {
-      // With --json the versions alone are printed.
+      // --json prints the versions alone.
       if (!context.json) PrintGiven(context, *given);
       continue;
     }

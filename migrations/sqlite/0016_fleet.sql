@@ -1,7 +1,7 @@
 -- Lists over all rigs.
 
--- What an operator should look at, as bits (Alarm of server/domain/alarms.h):
--- kept up to date by each transaction, so that the rigs concerned are found
+-- Alarms of a rig as bits (Alarm of server/domain/alarms.h): kept up to date by
+-- each transaction, so that the rigs concerned are found
 -- without reading the others. A rig from before has them with its next change.
 ALTER TABLE rigs ADD COLUMN alarms INTEGER NOT NULL DEFAULT 0;
 

@@ -40,17 +40,11 @@ absl::StatusOr<v1::ListEstimatesResponse> ListEstimates(
     const v1::ListEstimatesRequest& request) {
   EstimateQuery query;
   SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
-  if (!rig.empty()) {
-    if (!request.filter().empty()) {
-      return InvalidFields({{"filter", "has no effect with a parent"}});
-    }
-    const absl::Status found = context.store->GetRig(rig).status();
-    if (!found.ok()) {
-      return About(found, {kRigType, request.parent(), "parent"});
-    }
-    query.rigs.name = rig;
+  if (!rig.empty() && !request.filter().empty()) {
+    return InvalidFields({{"filter", "has no effect with a parent"}});
   }
   SELFCAL_RETURN_IF_ERROR(ReadRigQuery(request.filter(), "", &query.rigs));
+  if (!rig.empty()) query.rigs.name = rig;
   query.component = request.component();
   query.only_active = request.only_active();
   return FillPage<v1::ListEstimatesResponse>(

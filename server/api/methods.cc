@@ -16,19 +16,6 @@ namespace {
 
 using google::protobuf::MethodDescriptor;
 
-// The method with this type of request, in the file of its service.
-const MethodDescriptor* DescriptorOf(const Message& request) {
-  const auto& file = *request.GetDescriptor()->file();
-  for (int s = 0; s < file.service_count(); ++s) {
-    for (int m = 0; m < file.service(s)->method_count(); ++m) {
-      const MethodDescriptor* method = file.service(s)->method(m);
-      if (method->input_type() == request.GetDescriptor()) return method;
-    }
-  }
-  throw std::logic_error(request.GetTypeName() +
-                         " is not the request of a method");
-}
-
 absl::Status Authorised(const Call& call,
                         const MethodDescriptor& method,
                         const Message& request) {
@@ -95,8 +82,20 @@ class AuthorisedExchange final : public Exchange {
 
 }  // namespace
 
+const MethodDescriptor* MethodOf(const Message& request) {
+  const auto& file = *request.GetDescriptor()->file();
+  for (int s = 0; s < file.service_count(); ++s) {
+    for (int m = 0; m < file.service(s)->method_count(); ++m) {
+      const MethodDescriptor* method = file.service(s)->method(m);
+      if (method->input_type() == request.GetDescriptor()) return method;
+    }
+  }
+  throw std::logic_error(request.GetTypeName() +
+                         " is not the request of a method");
+}
+
 void Methods::AddUnary(Method method, UnaryHandler handler) {
-  method.descriptor = DescriptorOf(*method.request);
+  method.descriptor = MethodOf(*method.request);
   method.handler = UnaryHandler(
       [this_method = method.descriptor,
        context = context_,
@@ -111,7 +110,7 @@ void Methods::AddUnary(Method method, UnaryHandler handler) {
 }
 
 void Methods::AddStreaming(Method method, StreamingHandler handler) {
-  method.descriptor = DescriptorOf(*method.request);
+  method.descriptor = MethodOf(*method.request);
   method.handler = StreamingHandler(
       [this_method = method.descriptor,
        context = context_,
@@ -130,7 +129,7 @@ void Methods::AddStreaming(Method method, StreamingHandler handler) {
 }
 
 void Methods::AddWatch(Method method, WatchHandler handler) {
-  method.descriptor = DescriptorOf(*method.request);
+  method.descriptor = MethodOf(*method.request);
   method.handler = WatchHandler([this_method = method.descriptor,
                                  context = context_,
                                  handler = std::move(handler)](
@@ -154,7 +153,7 @@ void Methods::AddWatch(Method method, WatchHandler handler) {
 }
 
 void Methods::AddUpload(Method method, UploadHandler handler) {
-  method.descriptor = DescriptorOf(*method.request);
+  method.descriptor = MethodOf(*method.request);
   method.handler = UploadHandler(
       [this_method = method.descriptor,
        empty = method.request,
@@ -170,7 +169,7 @@ void Methods::AddUpload(Method method, UploadHandler handler) {
 }
 
 void Methods::AddExchange(Method method, ExchangeHandler handler) {
-  method.descriptor = DescriptorOf(*method.request);
+  method.descriptor = MethodOf(*method.request);
   method.handler =
       ExchangeHandler([this_method = method.descriptor,
                        response = method.response,

@@ -146,6 +146,9 @@ class Methods {
   std::vector<Method> methods_;
 };
 
+// The method with this type of request, in the file of its service.
+const google::protobuf::MethodDescriptor* MethodOf(const Message& request);
+
 void AddRigMethods(Methods* methods);
 void AddSegmentMethods(Methods* methods);
 void AddSessionMethods(Methods* methods);

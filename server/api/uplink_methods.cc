@@ -2,6 +2,7 @@
 
 #include "proto/resource_names.h"
 #include "selfcal/v1/uplink.pb.h"
+#include "server/access/rules.h"
 #include "server/api/errors.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
@@ -67,10 +68,11 @@ absl::StatusOr<v1::Instruction> CreateInstruction(
     const v1::CreateInstructionRequest& request) {
   const auto rig = ParseRigName(request.parent());
   if (!rig) return BadName("parent", "rigs/{rig}");
-  if (RequestOf(request.instruction()) == nullptr) {
+  const Message* called = RequestOf(request.instruction());
+  if (called == nullptr) {
     return InvalidFields({{"instruction", "has no request"}});
   }
-  if (RigOfRequest(request.instruction()) != *rig) {
+  if (RigOf(*MethodOf(*called), *called) != *rig) {
     return InvalidFields(
         {{"instruction",
           "has a request that is not about " + request.parent()}});

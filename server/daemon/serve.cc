@@ -30,6 +30,7 @@
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
 #include "server/status/status_macros.h"
+#include "server/store/outbox.h"
 #include "server/uplink/uplink.h"
 #include "server/worker/worker.h"
 
@@ -166,7 +167,7 @@ absl::StatusOr<std::unique_ptr<Uplink>> OpenUplink(const DaemonOptions& options,
                                                    Store* store,
                                                    const Api* api) {
   if (options.uplink.hub.empty()) {
-    SELFCAL_RETURN_IF_ERROR(ForgetUplink(store));
+    SELFCAL_RETURN_IF_ERROR(store->outbox()->Close());
     return nullptr;
   }
   auto uplink = std::make_unique<Uplink>(

@@ -34,7 +34,7 @@ absl::Status StoreAlarms(UnitOfWork* tx) {
   SELFCAL_ASSIGN_OR_RETURN(const RigSummary summary, ReadRigState(tx));
   std::int64_t bits = 0;
   for (const Alarm alarm : AlarmsOf(summary, tx->time_ns())) {
-    bits |= std::int64_t{1} << static_cast<int>(alarm);
+    bits |= BitOf(alarm);
   }
   return WriteAlarms(tx, bits);
 }

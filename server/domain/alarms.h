@@ -1,4 +1,4 @@
-// What an operator should look at. The alarms of a rig are stored with it, so
+// Alarms: reasons for an operator to look at a rig. They are stored with it, so
 // that a list of the rigs that need attention reads no others.
 #pragma once
 
@@ -22,6 +22,10 @@ enum class Alarm {
   kRejected = 3,       // the newest version
   kDeviceChanged = 4,  // since the active version became active
 };
+
+constexpr std::int64_t BitOf(Alarm alarm) {
+  return std::int64_t{1} << static_cast<int>(alarm);
+}
 
 inline constexpr std::int64_t kSilentAfterNs =
     std::int64_t{24} * 3600 * 1'000'000'000;

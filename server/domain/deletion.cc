@@ -44,7 +44,7 @@ absl::StatusOr<bool> DeleteSegment(UnitOfWork* tx,
 absl::StatusOr<int> DeleteRig(UnitOfWork* tx,
                               const std::string& caller,
                               const std::string& reason) {
-  // What a device reports is neither scored nor computed here.
+  // The hub neither scores nor computes a rig that a device reports.
   const bool is_own = CheckOwnRig(tx).ok();
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t unfinished, UnfinishedRun(tx));
   if (is_own && unfinished != 0) {

@@ -292,9 +292,8 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartTimedRuns(
 }
 
 absl::Status Domain::NoteSilentDevices() {
-  return store_->RaiseSilent(
-      clock_().time_ns - kSilentAfterNs,
-      std::int64_t{1} << static_cast<int>(Alarm::kSilent));
+  return store_->RaiseSilent(clock_().time_ns - kSilentAfterNs,
+                             BitOf(Alarm::kSilent));
 }
 
 absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(

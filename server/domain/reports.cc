@@ -14,9 +14,8 @@
 namespace selfcal::server {
 namespace {
 
-// An answer has no more than this, and a device no more that wait.
-constexpr int kMaxInstructions = 20;
-constexpr int kMaxPending = 1000;
+constexpr int kMaxInstructions = 20;  // in one answer
+constexpr int kMaxPending = 1000;     // for one device
 
 absl::Status Take(UnitOfWork* tx,
                   const DeviceReport& report,
@@ -25,7 +24,6 @@ absl::Status Take(UnitOfWork* tx,
       ApplyReport(tx, report.records, [&](std::int64_t bytes) {
         return MakeRoomForReported(tx, bytes, quotas);
       }));
-  if (report.deleted) return DeleteRigRows(tx);
   SELFCAL_RETURN_IF_ERROR(
       WriteReportingDevice(tx,
                            {.key = report.key,
@@ -34,6 +32,15 @@ absl::Status Take(UnitOfWork* tx,
                             .waiting = report.waiting,
                             .program_version = report.program_version}));
   return StoreAlarms(tx);
+}
+
+// Takes the last report of a rig, whatever was missed before.
+absl::StatusOr<ReportAnswer> TakeDeletion(UnitOfWork* tx,
+                                          const DeviceReport& report) {
+  SELFCAL_RETURN_IF_ERROR(
+      ApplyReport(tx, report.records, [](std::int64_t) { return false; }));
+  SELFCAL_RETURN_IF_ERROR(DeleteRigRows(tx));
+  return ReportAnswer();
 }
 
 }  // namespace
@@ -51,6 +58,12 @@ absl::StatusOr<ReportAnswer> TakeReport(UnitOfWork* tx,
                                         const DeviceReport& report,
                                         const Quotas& quotas) {
   SELFCAL_ASSIGN_OR_RETURN(const auto device, ReadReportingDevice(tx));
+  if (report.deleted) {
+    // A rig of this name that is another's has nothing to do with it.
+    const bool is_its = device && device->key == report.key;
+    if (!is_its) return ReportAnswer();
+    return TakeDeletion(tx, report);
+  }
   if (!device) {
     return absl::FailedPreconditionError(fmt::format(
         "the hub has a rig {} of its own: give the rig of the device another "
@@ -70,7 +83,6 @@ absl::StatusOr<ReportAnswer> TakeReport(UnitOfWork* tx,
   answer.begin_anew = !follows;
   if (!follows) return answer;
   SELFCAL_RETURN_IF_ERROR(Take(tx, report, quotas));
-  if (report.deleted) return answer;
   for (const DeviceReport::Result& result : report.results) {
     SELFCAL_RETURN_IF_ERROR(EndInstruction(
         tx,

@@ -1,4 +1,4 @@
-// What a hub takes from the devices that report to it (server/store/outbox.h).
+// Reports that a hub takes from devices (server/store/outbox.h).
 // A rig that a device reports belongs to the device: the hub has its records
 // and changes none of them.
 #pragma once
@@ -25,7 +25,7 @@ struct DeviceReport {
   std::string records = {};  // Report::records
   std::int64_t waiting = 0;
   std::string program_version = {};
-  // Of instructions that the device has carried out or refused.
+  // Result of an instruction that the device has carried out or refused.
   struct Result {
     std::int64_t instruction = 0;
     bool refused = false;

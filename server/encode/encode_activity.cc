@@ -44,7 +44,7 @@ std::vector<std::string> SentencesOf(Alarm alarm, const RigSummary& rig) {
   return {};
 }
 
-// Of the device alone, whose hub knows nothing of it.
+// The alarm of a device alone, whose hub knows nothing of it.
 void AddUplinkAlarm(const RigSummary& rig,
                     std::int64_t now_ns,
                     v1::RigActivity* message) {

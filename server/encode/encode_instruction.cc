@@ -8,13 +8,11 @@
 namespace selfcal::server {
 namespace {
 
-constexpr char kRequest[] = "request";  // the oneof
-
-std::optional<std::string> RigOfChild(const std::string& name,
-                                      std::string_view collection) {
-  const auto parts = ParseChildName(name, collection);
-  if (!parts) return std::nullopt;
-  return parts->rig;
+// The field of its request; null if it has none.
+const google::protobuf::FieldDescriptor* FieldOf(
+    const v1::Instruction& instruction) {
+  return instruction.GetReflection()->GetOneofFieldDescriptor(
+      instruction, instruction.GetDescriptor()->FindOneofByName("request"));
 }
 
 }  // namespace
@@ -42,40 +40,18 @@ absl::StatusOr<v1::Instruction> Encode(const StoredInstruction& instruction) {
 }
 
 const google::protobuf::Message* RequestOf(const v1::Instruction& instruction) {
-  const auto* reflection = instruction.GetReflection();
-  const auto* field = reflection->GetOneofFieldDescriptor(
-      instruction, instruction.GetDescriptor()->FindOneofByName(kRequest));
-  return field == nullptr ? nullptr
-                          : &reflection->GetMessage(instruction, field);
-}
-
-std::optional<std::string> RigOfRequest(const v1::Instruction& instruction) {
-  switch (instruction.request_case()) {
-    case v1::Instruction::kActivateCalibration:
-      return RigOfChild(instruction.activate_calibration().name(),
-                        "calibrations");
-    case v1::Instruction::kUpdateRig:
-      return ParseRigName(instruction.update_rig().rig().name());
-    case v1::Instruction::kStartRecalibration:
-      return ParseRigName(instruction.start_recalibration().parent());
-    case v1::Instruction::kQuarantineSegments: {
-      const std::string& parent = instruction.quarantine_segments().parent();
-      return ParseRigName(parent);
-    }
-    case v1::Instruction::REQUEST_NOT_SET:
-      break;
-  }
-  return std::nullopt;
+  const auto* field = FieldOf(instruction);
+  return field == nullptr
+             ? nullptr
+             : &instruction.GetReflection()->GetMessage(instruction, field);
 }
 
 std::string SerializeRequest(const v1::Instruction& instruction) {
   v1::Instruction request;
-  const auto* reflection = instruction.GetReflection();
-  const auto* oneof = instruction.GetDescriptor()->FindOneofByName(kRequest);
-  if (const auto* field =
-          reflection->GetOneofFieldDescriptor(instruction, oneof)) {
-    reflection->MutableMessage(&request, field)
-        ->CopyFrom(reflection->GetMessage(instruction, field));
+  if (const auto* field = FieldOf(instruction)) {
+    request.GetReflection()
+        ->MutableMessage(&request, field)
+        ->CopyFrom(*RequestOf(instruction));
   }
   return request.SerializeAsString();
 }

@@ -4,7 +4,6 @@
 #include <absl/status/statusor.h>
 #include <google/protobuf/message.h>
 
-#include <optional>
 #include <string>
 
 #include "selfcal/v1/uplink.pb.h"
@@ -17,8 +16,6 @@ absl::StatusOr<v1::Instruction> Encode(const StoredInstruction& instruction);
 
 // The request that the instruction has; null if it has none.
 const google::protobuf::Message* RequestOf(const v1::Instruction& instruction);
-// The rig that its request is about; nullopt if it names none.
-std::optional<std::string> RigOfRequest(const v1::Instruction& instruction);
 // The request alone, as it is stored.
 std::string SerializeRequest(const v1::Instruction& instruction);
 

@@ -48,6 +48,20 @@ absl::StatusOr<EstimatePlace> EstimatePlaceOf(const std::string& list,
   return BadPageToken();
 }
 
+// The condition that finds the rows after ?1, ?2 and ?3 in an index: of one
+// rig, of one component (?8), or of all.
+const char* ConditionOf(const EstimateQuery& query) {
+  if (!query.rigs.name.empty()) {
+    return "e.rig = ?1 AND (e.version, e.component) > (?2, ?3) "
+           "AND (?8 = '' OR e.component = ?8)";
+  }
+  if (query.component.empty()) {
+    return "(e.rig, e.version, e.component) > (?1, ?2, ?3) AND ?8 = ''";
+  }
+  return "e.component = ?8 AND (e.rig, e.version) > (?1, ?2) "
+         "AND CAST(?3 AS TEXT) IS NOT NULL";
+}
+
 std::optional<double> IfFinite(double value) {
   if (!std::isfinite(value)) return std::nullopt;
   return value;
@@ -102,12 +116,9 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
   const std::string list = ListOf(query);
   SELFCAL_ASSIGN_OR_RETURN(EstimatePlace place, EstimatePlaceOf(list, page));
   const auto size = static_cast<std::size_t>(PageSize(page));
-  // With a component, the index begins with it.
-  const char* const condition =
-      query.component.empty()
-          ? "(e.rig, e.version, e.component) > (?1, ?2, ?3) AND ?8 = ''"
-          : "e.component = ?8 AND (e.rig, e.version) > (?1, ?2) "
-            "AND CAST(?3 AS TEXT) IS NOT NULL";
+  if (!query.rigs.name.empty()) {
+    SELFCAL_ASSIGN_OR_RETURN(place.rig, FindRigId(db, query.rigs.name));
+  }
   Statement read(
       db,
       fmt::format("SELECT r.id, e.version, c.create_time_ns, c.state, "
@@ -119,7 +130,7 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
                   "JOIN rigs r ON r.rig = e.rig "
                   "WHERE {} AND {} {} "
                   "ORDER BY e.rig, e.version, e.component LIMIT ?9",
-                  condition,
+                  ConditionOf(query),
                   RigCondition("r", 4),
                   query.only_active ? "AND c.state = 1" : ""),
       place.rig,

@@ -59,15 +59,12 @@ class DatabaseStore final : public Store {
   absl::Status InsertRig(const StoredRig& rig,
                          const Moment& now,
                          const Work& work) override {
-    return db_->Write([&](Connection* db) -> absl::Status {
-      Transaction transaction(db);
-      SELFCAL_RETURN_IF_ERROR(transaction.status());
+    return WriteInTransaction(db_.get(), [&](Connection* db) -> absl::Status {
       SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row,
                                server::InsertRig(db, rig));
       UnitOfWork tx(db, rig.rig.id, row, now);
       SELFCAL_RETURN_IF_ERROR(work(&tx));
-      SELFCAL_RETURN_IF_ERROR(NoteChanges(&tx));
-      return transaction.Commit();
+      return NoteChanges(&tx);
     });
   }
 
@@ -261,12 +258,9 @@ class DatabaseStore final : public Store {
 
   absl::Status WriteClock(const ClockRecord& clock,
                           const std::optional<StoredEvent>& event) override {
-    return db_->Write([&](Connection* db) -> absl::Status {
-      Transaction transaction(db);
-      SELFCAL_RETURN_IF_ERROR(transaction.status());
+    return WriteInTransaction(db_.get(), [&](Connection* db) -> absl::Status {
       SELFCAL_RETURN_IF_ERROR(WriteClockRecord(db, clock));
-      if (event) SELFCAL_RETURN_IF_ERROR(InsertEvent(db, *event).status());
-      return transaction.Commit();
+      return event ? InsertEvent(db, *event).status() : absl::OkStatus();
     });
   }
 

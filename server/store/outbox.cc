@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <climits>
 #include <utility>
 
 #include "selfcal/store/report.pb.h"
@@ -10,7 +11,7 @@
 #include "server/store/driver/statement.h"
 #include "server/store/driver/transaction.h"
 #include "server/store/inventory.h"
-#include "server/store/reported_tables.h"
+#include "server/store/reported_rows.h"
 #include "server/store/rigs.h"
 
 namespace selfcal::server {
@@ -34,34 +35,14 @@ absl::Status Put(UnitOfWork* tx, RecordKind kind, std::int64_t number) {
       .Run();
 }
 
-// Puts all records of a kind into the outbox: the numbers in a table, whose
-// column `rig` has the key or, for events, the name.
+// Puts all records of a kind into the outbox.
 absl::Status PutAll(UnitOfWork* tx, RecordKind kind) {
-  for (const ReportedTable& table : ReportedTables()) {
-    if (table.kind != kind || table.number.empty()) continue;
-    const bool by_name = kind == RecordKind::kEvent;
-    const std::string sql =
-        fmt::format("SELECT {} FROM {} WHERE rig = ?1 ORDER BY {}",
-                    table.number,
-                    table.name,
-                    table.number);
-    std::vector<std::int64_t> numbers;
-    {
-      Statement read(tx->db(), sql);
-      if (by_name) {
-        read.BindNext(tx->rig());
-      } else {
-        read.BindNext(tx->rig_row());
-      }
-      while (read.Next()) numbers.push_back(read.Int(0));
-      SELFCAL_RETURN_IF_ERROR(read.status());
-    }
-    for (const std::int64_t number : numbers) {
-      SELFCAL_RETURN_IF_ERROR(Put(tx, kind, number));
-    }
-    return absl::OkStatus();  // the first table has a row for each record
+  SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::int64_t> numbers,
+                           NumbersOf(tx, kind));
+  for (const std::int64_t number : numbers) {
+    SELFCAL_RETURN_IF_ERROR(Put(tx, kind, number));
   }
-  return Put(tx, kind, 0);
+  return absl::OkStatus();
 }
 
 // Puts versions and activations into the outbox: each version before the next
@@ -146,7 +127,7 @@ class OutboxOfDatabase final : public Outbox {
   }
 
   absl::Status BeginAnew(const std::string& rig, ReportedData data) override {
-    return Write([&](Connection* db) -> absl::Status {
+    return WriteInTransaction(db_, [&](Connection* db) -> absl::Status {
       SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, rig));
       UnitOfWork tx(db, rig, row, 0);
       SELFCAL_RETURN_IF_ERROR(
@@ -164,7 +145,7 @@ class OutboxOfDatabase final : public Outbox {
   }
 
   absl::Status SetData(ReportedData data) override {
-    return Write([&](Connection* db) {
+    return WriteInTransaction(db_, [&](Connection* db) {
       return Statement(
                  db, "UPDATE uplinks SET data = ?1", static_cast<int>(data))
           .Run();
@@ -179,16 +160,15 @@ class OutboxOfDatabase final : public Outbox {
       report.rig = rig.rig;
       report.key = rig.key;
       report.number = rig.report + 1;
+      report.deleted = rig.deleted;
       UnitOfWork tx(db, rig.rig, rig.key, 0);
-      SELFCAL_RETURN_IF_ERROR(Fill(&tx, max_bytes, &report));
-      report.deleted = rig.deleted && report.waiting == 0;
-      return absl::OkStatus();
+      return Fill(&tx, max_bytes, &report);
     }));
     return report;
   }
 
   absl::Status Confirm(const Report& report, std::int64_t time_ns) override {
-    return Write([&](Connection* db) -> absl::Status {
+    return WriteInTransaction(db_, [&](Connection* db) -> absl::Status {
       for (const Report::Entry& entry : report.entries) {
         SELFCAL_RETURN_IF_ERROR(
             Statement(db,
@@ -214,14 +194,15 @@ class OutboxOfDatabase final : public Outbox {
   }
 
   absl::Status Close() override {
-    return Write([&](Connection* db) -> absl::Status {
+    return WriteInTransaction(db_, [&](Connection* db) -> absl::Status {
       SELFCAL_RETURN_IF_ERROR(Statement(db, "DELETE FROM outbox").Run());
       return Statement(db, "DELETE FROM uplinks").Run();
     });
   }
 
  private:
-  // Reads the records with which the outbox begins.
+  // Reads the records with which the outbox begins; of a rig that was deleted,
+  // all of them, which are events.
   static absl::Status Fill(UnitOfWork* tx,
                            std::int64_t max_bytes,
                            Report* report) {
@@ -235,7 +216,7 @@ class OutboxOfDatabase final : public Outbox {
                    "SELECT place, revision, kind, number FROM outbox "
                    "WHERE rig = ?1 ORDER BY place LIMIT ?2",
                    tx->rig_row(),
-                   kMaxEntries);
+                   report->deleted ? INT_MAX : kMaxEntries);
     while (read.Next()) {
       all.push_back({{read.Int(0), read.Int(1)},
                      static_cast<RecordKind>(read.Int(2)),
@@ -252,14 +233,14 @@ class OutboxOfDatabase final : public Outbox {
               : PutRecord(tx, waiting.kind, waiting.number, &records));
       const auto size = static_cast<std::int64_t>(
           records.records(records.records_size() - 1).ByteSizeLong());
-      if (bytes > 0 && bytes + size > max_bytes) {
+      if (!report->deleted && bytes > 0 && bytes + size > max_bytes) {
         records.mutable_records()->RemoveLast();
         break;
       }
       bytes += size;
       report->entries.push_back(waiting.entry);
     }
-    report->records = records.SerializeAsString();
+    if (!all.empty()) report->records = records.SerializeAsString();
     SELFCAL_ASSIGN_OR_RETURN(
         const std::int64_t waiting,
         ReadInt(tx->db(),
@@ -268,17 +249,6 @@ class OutboxOfDatabase final : public Outbox {
     report->waiting =
         waiting - static_cast<std::int64_t>(report->entries.size());
     return absl::OkStatus();
-  }
-
-  // `work` in a transaction.
-  template <typename Work>
-  absl::Status Write(const Work& work) {
-    return db_->Write([&](Connection* db) -> absl::Status {
-      Transaction transaction(db);
-      SELFCAL_RETURN_IF_ERROR(transaction.status());
-      SELFCAL_RETURN_IF_ERROR(work(db));
-      return transaction.Commit();
-    });
   }
 
   Database* const db_;

@@ -42,8 +42,9 @@ struct Report {
   std::string rig;
   std::int64_t key = 0;
   std::int64_t number = 0;
-  bool deleted = false;      // the rig, and nothing more follows
-  std::string records;       // selfcal.store.ReportedRecords, serialised
+  bool deleted = false;  // the rig; the records are its last events
+  // selfcal.store.ReportedRecords, serialised; empty: there are none.
+  std::string records;
   std::int64_t waiting = 0;  // records that are left for later reports
   // Of the records in the outbox, for the confirmation.
   struct Entry {

@@ -57,7 +57,7 @@ class ReplicasOfDatabase final : public Replicas {
   explicit ReplicasOfDatabase(Database* db) : db_(db) {}
 
   absl::Status Add(const std::string& replica) override {
-    return Write([&](Connection* db) {
+    return WriteInTransaction(db_, [&](Connection* db) {
       return Statement(db,
                        "INSERT INTO replicas (replica, beat) VALUES (?1, 1)",
                        replica)
@@ -66,7 +66,7 @@ class ReplicasOfDatabase final : public Replicas {
   }
 
   absl::Status Beat(const std::string& replica) override {
-    return Write([&](Connection* db) -> absl::Status {
+    return WriteInTransaction(db_, [&](Connection* db) -> absl::Status {
       SELFCAL_ASSIGN_OR_RETURN(
           const std::int64_t beat,
           InsertReturning(db,
@@ -89,7 +89,7 @@ class ReplicasOfDatabase final : public Replicas {
   }
 
   absl::Status Remove(const ReplicaRecord& record) override {
-    return Write([&](Connection* db) {
+    return WriteInTransaction(db_, [&](Connection* db) {
       return Statement(db,
                        "DELETE FROM replicas WHERE replica = ?1 AND beat = ?2",
                        record.replica,
@@ -99,7 +99,7 @@ class ReplicasOfDatabase final : public Replicas {
   }
 
   absl::Status Remove(const std::string& replica) override {
-    return Write([&](Connection* db) {
+    return WriteInTransaction(db_, [&](Connection* db) {
       return Statement(db, "DELETE FROM replicas WHERE replica = ?1", replica)
           .Run();
     });
@@ -150,26 +150,28 @@ class ReplicasOfDatabase final : public Replicas {
   absl::StatusOr<std::optional<RigClaim>> Claim(
       const std::string& rig, const std::string& replica) override {
     std::optional<RigClaim> claimed;
-    SELFCAL_RETURN_IF_ERROR(Write([&](Connection* db) -> absl::Status {
-      claimed.reset();
-      SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, rig));
-      SELFCAL_ASSIGN_OR_RETURN(const bool may, Exists(db, replica));
-      if (!may) return NoRecord(replica);
-      SELFCAL_ASSIGN_OR_RETURN(StoredClaim claim, ReadClaim(db, row));
-      if (claim.replica != replica) {
-        SELFCAL_ASSIGN_OR_RETURN(const bool is_held, Exists(db, claim.replica));
-        if (is_held) return absl::OkStatus();
-      }
-      claim = {replica, claim.number + 1};
-      SELFCAL_RETURN_IF_ERROR(WriteClaim(db, row, claim));
-      claimed.emplace(rig, row, claim.number);
-      return absl::OkStatus();
-    }));
+    SELFCAL_RETURN_IF_ERROR(
+        WriteInTransaction(db_, [&](Connection* db) -> absl::Status {
+          claimed.reset();
+          SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, rig));
+          SELFCAL_ASSIGN_OR_RETURN(const bool may, Exists(db, replica));
+          if (!may) return NoRecord(replica);
+          SELFCAL_ASSIGN_OR_RETURN(StoredClaim claim, ReadClaim(db, row));
+          if (claim.replica != replica) {
+            SELFCAL_ASSIGN_OR_RETURN(const bool is_held,
+                                     Exists(db, claim.replica));
+            if (is_held) return absl::OkStatus();
+          }
+          claim = {replica, claim.number + 1};
+          SELFCAL_RETURN_IF_ERROR(WriteClaim(db, row, claim));
+          claimed.emplace(rig, row, claim.number);
+          return absl::OkStatus();
+        }));
     return claimed;
   }
 
   absl::Status Release(const RigClaim& claim) override {
-    return Write([&](Connection* db) -> absl::Status {
+    return WriteInTransaction(db_, [&](Connection* db) -> absl::Status {
       SELFCAL_ASSIGN_OR_RETURN(const std::int64_t row, LockRig(db, claim.rig));
       SELFCAL_ASSIGN_OR_RETURN(const StoredClaim stored, ReadClaim(db, row));
       if (row != claim.key || stored.number != claim.number) {
@@ -180,17 +182,6 @@ class ReplicasOfDatabase final : public Replicas {
   }
 
  private:
-  // `work` in a transaction.
-  template <typename Work>
-  absl::Status Write(const Work& work) {
-    return db_->Write([&](Connection* db) -> absl::Status {
-      Transaction transaction(db);
-      SELFCAL_RETURN_IF_ERROR(transaction.status());
-      SELFCAL_RETURN_IF_ERROR(work(db));
-      return transaction.Commit();
-    });
-  }
-
   Database* const db_;
 };
 

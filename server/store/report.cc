@@ -18,7 +18,7 @@
 #include "server/store/estimates.h"
 #include "server/store/inventory.h"
 #include "server/store/records.h"
-#include "server/store/reported_tables.h"
+#include "server/store/reported_rows.h"
 #include "server/store/rigs.h"
 #include "server/store/runs.h"
 #include "server/store/segment_rows.h"
@@ -32,12 +32,15 @@ using Rows = std::vector<ReportedRow>;
 // A message of data beyond this is not taken: it could not be read here.
 constexpr std::int64_t kMaxReportedBytes = std::int64_t{256} << 20;
 
-// The numbers of CalibrationState in the database.
-constexpr std::int64_t kActive = 1;
-constexpr std::int64_t kSuperseded = 2;
-constexpr std::int64_t kRejected = 3;
-constexpr std::int64_t kCandidate = 4;
-constexpr std::int64_t kRolledBack = 5;
+// The value of the column state.
+constexpr std::int64_t Number(CalibrationState state) {
+  return static_cast<std::int64_t>(state) + 1;
+}
+constexpr std::int64_t kActive = Number(CalibrationState::kActive);
+constexpr std::int64_t kSuperseded = Number(CalibrationState::kSuperseded);
+constexpr std::int64_t kRejected = Number(CalibrationState::kRejected);
+constexpr std::int64_t kCandidate = Number(CalibrationState::kCandidate);
+constexpr std::int64_t kRolledBack = Number(CalibrationState::kRolledBack);
 
 absl::Status BadReport(const std::string& why) {
   return absl::InvalidArgumentError("the report cannot be read: " + why);

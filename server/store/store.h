@@ -404,7 +404,7 @@ class Store {
   virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
       const std::string& rig, const Page& page) = 0;
   // Parameters of versions, of all rigs of the query, in the order of keys of
-  // rigs, versions and components.
+  // rigs, versions and components. NOT_FOUND for the name of no rig.
   virtual absl::StatusOr<Listed<StoredEstimate>> ListEstimates(
       const EstimateQuery& query, const Page& page) = 0;
   // Versions that have no such records: from before they were written, or

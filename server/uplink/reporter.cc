@@ -51,9 +51,7 @@ absl::StatusOr<Reporter::Round> Reporter::ReportOnce(
         rig.waiting > 0 || rig.deleted || !known.results.empty();
     if (now < known.blocked || (!has_news && now < known.next)) {
       round.waiting += rig.waiting;
-      if (now < known.blocked) {
-        round.status = absl::FailedPreconditionError(known.refusal);
-      }
+      if (now < known.blocked) round.refusal = known.refusal;
       continue;
     }
     const std::int64_t before = round.bytes;
@@ -90,20 +88,17 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
   if (!response.ok()) {
     if (IsUnreachable(response.status())) return response.status();
     // Only this rig is refused.
-    const std::string refusal =
-        fmt::format("the hub refuses the report of rig {}: {}",
-                    rig.rig,
-                    std::string(response.status().message()));
-    if (refusal != known->refusal) spdlog::error("{}", refusal);
-    known->refusal = refusal;
+    round->refusal = fmt::format("the hub refuses the report of rig {}: {}",
+                                 rig.rig,
+                                 std::string(response.status().message()));
+    if (round->refusal != known->refusal) spdlog::error("{}", round->refusal);
+    known->refusal = round->refusal;
     known->blocked = now + known->backoff.Next();
-    round->status = absl::FailedPreconditionError(refusal);
     round->waiting += rig.waiting;
     return absl::OkStatus();
   }
   known->refusal.clear();
   known->backoff.Reset();
-  known->results.clear();
   known->next = now + Seconds(options_.interval_s);
   ++round->reports;
   round->bytes += static_cast<std::int64_t>(request.ByteSizeLong());
@@ -113,6 +108,7 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
     const absl::Status begun = outbox->BeginAnew(rig.rig, options_.data);
     return absl::IsNotFound(begun) ? absl::OkStatus() : begun;
   }
+  known->results.clear();
   SELFCAL_RETURN_IF_ERROR(outbox->Confirm(report, NowNs()));
   round->waiting += report.waiting;
   if (report.deleted) {
@@ -120,13 +116,13 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
     return absl::OkStatus();
   }
   for (const v1::Instruction& instruction : response->instructions()) {
-    known->results[instruction.name()] = CarryOut(instruction);
+    known->results[instruction.name()] = CarryOut(rig.rig, instruction);
   }
   return absl::OkStatus();
 }
 
 v1::InstructionResult Reporter::CarryOut(
-    const v1::Instruction& instruction) const {
+    const std::string& rig, const v1::Instruction& instruction) const {
   v1::InstructionResult result;
   result.set_name(instruction.name());
   const auto refuse = [&](const std::string& why) {
@@ -144,7 +140,7 @@ v1::InstructionResult Reporter::CarryOut(
     if (method.descriptor->input_type() != request->GetDescriptor()) continue;
     Call call;
     call.caller.name = PrintableName("hub/" + instruction.caller());
-    call.caller.grants = {{options_.role, ""}};
+    call.caller.grants = {{options_.role, rig}};
     const std::unique_ptr<google::protobuf::Message> response(
         method.response->New());
     const auto* handler = std::get_if<UnaryHandler>(&method.handler);

@@ -40,9 +40,10 @@ class Reporter {
     std::int64_t reports = 0;
     std::int64_t bytes = 0;
     std::int64_t waiting = 0;  // records that are left
-    // Why the hub did not take a report; OK if it took all. The others were
-    // sent nevertheless, unless the hub cannot be reached.
-    absl::Status status;
+    absl::Status status;       // an error: the hub cannot be reached
+    // Why the hub has refused the reports of a rig, which are tried again
+    // later; empty: it has refused none. Those of the others were sent.
+    std::string refusal;
   };
   // Sends one report of each rig that has something to report, or from which
   // the hub has not heard for the interval. `pace` is called after each with
@@ -65,7 +66,8 @@ class Reporter {
                          Time now,
                          Rig* known,
                          Round* round);
-  v1::InstructionResult CarryOut(const v1::Instruction& instruction) const;
+  v1::InstructionResult CarryOut(const std::string& rig,
+                                 const v1::Instruction& instruction) const;
 
   Store* const store_;
   const Api* const api_;

@@ -94,17 +94,14 @@ void Uplink::Run() {
                      problem);
       }
     }
-    const bool has_sent = round.ok() && round->reports > 0;
-    if (status.ok() || has_sent) {
-      backoff.Reset();
-      const bool has_more = has_sent && round->waiting > 0;
-      wait = has_more ? SteadyClock::duration::zero() : kLookAfter;
-    } else {
+    if (!status.ok()) {
       wait = std::max<SteadyClock::duration>(backoff.Next(), kLookAfter);
+      continue;
     }
+    backoff.Reset();
+    const bool has_more = round->reports > 0 && round->waiting > 0;
+    wait = has_more ? SteadyClock::duration::zero() : kLookAfter;
   }
 }
-
-absl::Status ForgetUplink(Store* store) { return store->outbox()->Close(); }
 
 }  // namespace selfcal::server

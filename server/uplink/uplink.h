@@ -51,7 +51,4 @@ class Uplink {
   std::thread thread_;
 };
 
-// Notes that there is no hub: what changes is not recorded for reports.
-absl::Status ForgetUplink(Store* store);
-
 }  // namespace selfcal::server

@@ -28,6 +28,17 @@ class Transaction {
   bool open_ = false;
 };
 
+// Database::Write of `work`, which takes a Connection*, as one transaction.
+template <typename Work>
+absl::Status WriteInTransaction(Database* database, const Work& work) {
+  return database->Write([&](Connection* db) -> absl::Status {
+    Transaction transaction(db);
+    if (!transaction.status().ok()) return transaction.status();
+    const absl::Status status = work(db);
+    return status.ok() ? transaction.Commit() : status;
+  });
+}
+
 // One state of the database for several statements that only read.
 class Snapshot {
  public:

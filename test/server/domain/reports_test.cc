@@ -238,6 +238,59 @@ TEST_P(ReportsTest, HubThatHasLostRecordsIsToldAllOfThem) {
   EXPECT_THAT(store_->ListSegments("a", Page())->items, SizeIs(2));
 }
 
+TEST_P(ReportsTest, HubThatMissesOneReportIsToldAllOfThem) {
+  const Rig rig = CreateDeviceRig("a");
+  ReportAll();
+  PutOnDevice(rig, 0);
+  // Confirmed, but the hub does not have it: it was restored from a backup.
+  const auto lost =
+      device_->outbox()->Next(device_->outbox()->List()->front(), kLarge);
+  ASSERT_TRUE(lost.ok()) << lost.status();
+  ASSERT_TRUE(device_->outbox()->Confirm(*lost, 1).ok());
+  PutOnDevice(rig, 1);
+  ReportAll();
+  EXPECT_EQ(anew_, 1);
+  ExpectSame("a");
+}
+
+TEST_P(ReportsTest, NothingToReportIsAnEmptyReport) {
+  CreateDeviceRig("a");
+  ReportAll();
+  const auto report =
+      device_->outbox()->Next(device_->outbox()->List()->front(), kLarge);
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->records, "");
+  EXPECT_TRUE(Give(*report).ok());
+}
+
+TEST_P(ReportsTest, DeletionOfARigThatTheHubDoesNotHaveIsTaken) {
+  CreateTestRig("own");
+  for (const char* id : {"unseen", "own", "missed"}) {
+    const Rig rig = CreateDeviceRig(id);
+    PutOnDevice(rig, 0);
+    ReportNewRigs(ReportedData::kNone);
+    if (rig.id == "missed") {
+      // The hub took the first report, and lost the second one.
+      ASSERT_TRUE(
+          Give(*device_->outbox()->Next(device_->outbox()->List()->front(), 1))
+              .ok());
+      for (int k = 0; k < 2; ++k) {
+        ASSERT_TRUE(device_->outbox()
+                        ->Confirm(*device_->outbox()->Next(
+                                      device_->outbox()->List()->front(), 1),
+                                  1)
+                        .ok());
+      }
+    }
+    ASSERT_TRUE(device_domain_->DeleteRig(id, "eve", "sold").ok());
+    ReportAll();
+    EXPECT_THAT(*device_->outbox()->List(), IsEmpty()) << id;
+  }
+  EXPECT_EQ(anew_, 0);
+  EXPECT_TRUE(store_->GetRig("own").ok());
+  EXPECT_TRUE(absl::IsNotFound(store_->GetRig("missed").status()));
+}
+
 TEST_P(ReportsTest, SegmentsDeletedWhileNothingWasReportedAreGoneAtTheHub) {
   const Rig rig = CreateDeviceRig("a");
   for (int k = 0; k < 4; ++k) PutOnDevice(rig, k);

@@ -140,6 +140,12 @@ TEST_P(FleetListsTest, ParametersAreThoseOfTheVersion) {
   }
 }
 
+TEST_P(FleetListsTest, ParametersOfNoRigAreNotFound) {
+  EstimateQuery query;
+  query.rigs.name = "nobody";
+  EXPECT_TRUE(absl::IsNotFound(store_->ListEstimates(query, {}).status()));
+}
+
 TEST_P(FleetListsTest, ATokenIsOfItsList) {
   Run("a", 1);
   Run("b", 2);

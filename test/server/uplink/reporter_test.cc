@@ -1,6 +1,7 @@
 // Rounds of reports, step by step.
 #include "server/uplink/reporter.h"
 
+#include "server/store/report.h"
 #include "test/server/uplink/uplink_fixture.h"
 
 namespace selfcal::server {
@@ -112,12 +113,13 @@ TEST_F(ReporterTest, ARefusedRigDoesNotHoldUpOthers) {
   Begin();
   const Reporter::Round round = Report();
   EXPECT_EQ(round.reports, 1);
-  EXPECT_THAT(std::string(round.status.message()),
+  EXPECT_TRUE(round.status.ok()) << round.status;
+  EXPECT_THAT(round.refusal,
               HasSubstr("of its own: give the rig of the device another name"));
   EXPECT_TRUE(hub_.store->GetRig("b").ok());
   // It is tried again later, not all the time.
   const int calls = way_.calls;
-  EXPECT_FALSE(Report().status.ok());
+  EXPECT_NE(Report().refusal, "");
   EXPECT_EQ(way_.calls, calls);
   now_ += std::chrono::seconds(1);
   Report();
@@ -129,7 +131,7 @@ TEST_F(ReporterTest, ADeviceReportsOnlyRigsOfItsCertificate) {
   CreateDeviceRig("b");
   way_.caller.grants = {{Role::kProduce, "b"}};
   Begin();
-  EXPECT_FALSE(Report().status.ok());
+  EXPECT_THAT(Report().refusal, HasSubstr("needs the role 'produce'"));
   EXPECT_FALSE(hub_.store->GetRig("a").ok());
   EXPECT_TRUE(hub_.store->GetRig("b").ok());
 }
@@ -180,6 +182,45 @@ TEST_F(ReporterTest, AHubHasNoMoreRightsThanItsRole) {
   Report();
   EXPECT_EQ(NewestInstruction().state(), v1::Instruction::REFUSED);
   EXPECT_TRUE(device_.store->GetRig("a")->labels.empty());
+}
+
+TEST_F(ReporterTest, AnInstructionActsOnItsRigAlone) {
+  CreateDeviceRig("a");
+  CreateDeviceRig("b");
+  Begin();
+  Report();
+  // As no hub of this program would store it.
+  v1::Instruction of_b = NewLabel("x");
+  of_b.mutable_update_rig()->mutable_rig()->set_name("rigs/b");
+  ASSERT_TRUE(
+      hub_.domain->CreateInstruction("a", "eve", of_b.SerializeAsString())
+          .ok());
+  now_ += std::chrono::minutes(1);
+  Report();
+  EXPECT_TRUE(device_.store->GetRig("b")->labels.empty());
+}
+
+TEST_F(ReporterTest, ResultsOutliveAHubThatHasLostRecords) {
+  CreateDeviceRig();
+  Begin();
+  Report();
+  Give(NewLabel("x"));
+  now_ += std::chrono::minutes(1);
+  Report();
+  // The hub is put back to before the last report.
+  ASSERT_TRUE(hub_.store
+                  ->Transact("a",
+                             1,
+                             [](UnitOfWork* tx) -> absl::Status {
+                               auto device = ReadReportingDevice(tx);
+                               if (!device.ok()) return device.status();
+                               (*device)->report -= 2;
+                               return WriteReportingDevice(tx, **device);
+                             })
+                  .ok());
+  Report();  // begins anew
+  Report();
+  EXPECT_EQ(NewestInstruction().state(), v1::Instruction::DONE);
 }
 
 TEST_F(ReporterTest, AnInstructionMustBeAboutItsRig) {

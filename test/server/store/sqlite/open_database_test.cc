@@ -118,7 +118,7 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
             "e32609c5d1a8a5ca03e74c4969a0cd88267133d895f700ffce9809919ca5a3d2");
   EXPECT_EQ(migrations[15].name, "0016_fleet.sql");
   EXPECT_EQ(migrations[15].sha256,
-            "6356ebd35485990c682458999de9e260fe37719424c3917cb08670d07b6de0f0");
+            "6f36f91c2ed9246dff77dd3afb7219a78dc9a65fe92c385a80477608663199a6");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

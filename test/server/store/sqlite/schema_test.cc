@@ -235,6 +235,11 @@ TEST_F(SchemaTest, StatementsReadTheRowsThatTheyNeed) {
        {"SEARCH rigs USING COVERING INDEX rigs_by_alarms "
         "(alarms>? AND (alarms,id)<(?,?))"}},
       {"SELECT e.value FROM estimates e JOIN rigs r ON r.rig = e.rig "
+       "WHERE e.rig = 1 AND (e.version, e.component) > (1, 'x') "
+       "ORDER BY e.rig, e.version, e.component LIMIT 10",
+       {"SEARCH r USING INTEGER PRIMARY KEY (rowid=?)",
+        "SEARCH e USING PRIMARY KEY (rig=? AND (version,component)>(?,?))"}},
+      {"SELECT e.value FROM estimates e JOIN rigs r ON r.rig = e.rig "
        "WHERE e.component = 'x' AND (e.rig, e.version) > (1, 1) "
        "ORDER BY e.rig, e.version, e.component LIMIT 10",
        {"SEARCH e USING INDEX estimates_by_component "
