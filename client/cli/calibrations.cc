@@ -47,6 +47,7 @@ int ListCalibrations(Context* context,
   const auto stub = v1::CalibrationService::NewStub(context->Channel());
   v1::ListCalibrationsRequest request;
   if (!rig.empty()) request.set_parent(RigName(rig));
+  request.set_rig_filter(options.rigs);
   v1::ListCalibrationsResponse calibrations;
   const auto status = CallForItems<CalibrationService>(
       stub.get(),
@@ -197,7 +198,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
 
   CLI::App* list = calibrations->add_subcommand(
       "list", "List the versions of a rig, or of all, newest first");
-  list->add_option("RIG", *rig);
+  CLI::Option* const of = list->add_option("RIG", *rig);
   const auto options = std::make_shared<ListOptions>();
   AddListOptions(
       list,
@@ -205,6 +206,7 @@ void AddCalibrationCommands(CLI::App* app, Context* context) {
       "the newest",
       FilterHelp("state = rejected AND created >= 30d", CalibrationFields()),
       options.get());
+  AddRigFilter(list, of, options.get());
   list->callback([context, rig, options] {
     context->command = [context, rig, options] {
       return ListCalibrations(context, *rig, *options);

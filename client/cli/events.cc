@@ -87,6 +87,7 @@ grpc::Status Read(Context* context,
   const auto stub = v1::StoreService::NewStub(context->Channel());
   v1::ListEventsRequest request;
   if (!options.rig.empty()) request.set_parent(RigName(options.rig));
+  request.set_rig_filter(options.list.rigs);
   request.set_page_size(kPageSize);
   do {
     v1::ListEventsResponse page;
@@ -151,7 +152,7 @@ CLI::App* AddEventList(CLI::App* parent,
   CLI::App* events = parent->add_subcommand(
       name, "List the events of one rig or of all, oldest first");
   const auto options = std::make_shared<EventOptions>();
-  events->add_option("RIG", options->rig);
+  CLI::Option* const rig = events->add_option("RIG", options->rig);
   events->add_option("--kind", options->kinds, "Only this kind; repeatable")
       ->check(OneOf(KindNames()));
   events->add_option("--since",
@@ -164,6 +165,7 @@ CLI::App* AddEventList(CLI::App* parent,
       "the newest",
       FilterHelp("kind = data-evicted AND rig != tablet-7", EventFields()),
       &options->list);
+  AddRigFilter(events, rig, &options->list);
   events->callback([context, options] {
     context->command = [context, options] {
       return ListEvents(context, *options);

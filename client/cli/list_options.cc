@@ -21,4 +21,12 @@ void AddListOptions(CLI::App* list,
   AddCsv(list, context);
 }
 
+void AddRigFilter(CLI::App* list, CLI::Option* rig, ListOptions* options) {
+  list->add_option("--rigs",
+                   options->rigs,
+                   "Without RIG: only of these rigs, e.g. 'labels.model = "
+                   "\"t4\"'")
+      ->excludes(rig);
+}
+
 }  // namespace selfcal::client

@@ -18,6 +18,7 @@ namespace selfcal::client {
 struct ListOptions {
   std::size_t limit = 0;  // 0: all
   std::string filter;
+  std::string rigs;  // a filter of rigs, for a list of many
 };
 
 // Adds --csv, of a command that calls Context::PrintList.
@@ -30,6 +31,9 @@ void AddListOptions(CLI::App* list,
                     const std::string& order,
                     const std::string& filter_help,
                     ListOptions* options);
+
+// Adds --rigs, of a list that is of one rig, the option `rig`, or of many.
+void AddRigFilter(CLI::App* list, CLI::Option* rig, ListOptions* options);
 
 // Calls a list method page by page until there are `limit` items, or all if it
 // is 0, that `wanted` accepts (all without it); *found has these alone, and no

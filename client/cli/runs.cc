@@ -67,6 +67,7 @@ int ListRuns(Context* context,
   const auto stub = v1::RecalibrationService::NewStub(context->Channel());
   v1::ListRecalibrationsRequest request;
   if (!rig.empty()) request.set_parent(RigName(rig));
+  request.set_rig_filter(options.rigs);
   v1::ListRecalibrationsResponse runs;
   const auto status = CallForItems<RecalibrationService>(
       stub.get(),
@@ -180,13 +181,14 @@ void AddRunCommands(CLI::App* app, Context* context) {
 
   CLI::App* list = runs->add_subcommand(
       "list", "List the runs of a rig, or of all, newest first");
-  list->add_option("RIG", options->rig);
+  CLI::Option* const of = list->add_option("RIG", options->rig);
   const auto list_options = std::make_shared<ListOptions>();
   AddListOptions(list,
                  context,
                  "the newest",
                  FilterHelp("state = failed AND created >= 7d", RunFields()),
                  list_options.get());
+  AddRigFilter(list, of, list_options.get());
   list->callback([context, options, list_options] {
     context->command = [context, options, list_options] {
       return ListRuns(context, options->rig, *list_options);

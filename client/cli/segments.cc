@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,13 +30,16 @@ std::string TemperatureText(const v1::Segment& segment) {
              : "-";
 }
 
-// Returns the groups of the rig, in its order, from any scored segment.
+// Returns the groups of the rigs, in the order of the first that has them.
 std::vector<std::string> Groups(const v1::ListSegmentsResponse& segments) {
   std::vector<std::string> groups;
   for (const v1::Segment& segment : segments.segments()) {
-    if (segment.scores().empty()) continue;
-    for (const auto& score : segment.scores()) groups.push_back(score.group());
-    break;
+    for (const auto& score : segment.scores()) {
+      if (std::find(groups.begin(), groups.end(), score.group()) ==
+          groups.end()) {
+        groups.push_back(score.group());
+      }
+    }
   }
   return groups;
 }
@@ -59,17 +63,23 @@ std::string TablesText(const v1::Segment& segment) {
   return text.empty() ? "-" : text;
 }
 
-Table UnusableTable(const v1::ListSegmentsResponse& segments) {
-  Table table({{"segment"}, {"received"}, {"problem", false, true}});
+// A list of the segments of many rigs has the rig before each.
+Table UnusableTable(const v1::ListSegmentsResponse& segments, bool of_many) {
+  std::vector<Column> columns = {
+      {"segment"}, {"received"}, {"problem", false, true}};
+  if (of_many) columns.insert(columns.begin(), Column{"rig"});
+  Table table(std::move(columns));
   for (const v1::Segment& segment : segments.segments()) {
-    table.Add({LastPart(segment.name()),
-               TimeText(segment.receive_time()),
-               segment.problem()});
+    std::vector<std::string> row = {LastPart(segment.name()),
+                                    TimeText(segment.receive_time()),
+                                    segment.problem()};
+    if (of_many) row.insert(row.begin(), RigPart(segment.name()));
+    table.Add(std::move(row));
   }
   return table;
 }
 
-Table ListTable(const v1::ListSegmentsResponse& segments) {
+Table ListTable(const v1::ListSegmentsResponse& segments, bool of_many) {
   std::vector<Column> columns = {{"segment"},
                                  {"state"},
                                  {"data", true},
@@ -83,6 +93,7 @@ Table ListTable(const v1::ListSegmentsResponse& segments) {
   }
   columns.push_back({"in tables"});
   columns.push_back({"T [C]", true});
+  if (of_many) columns.insert(columns.begin(), Column{"rig"});
   Table table(std::move(columns));
   for (const v1::Segment& segment : segments.segments()) {
     std::vector<std::string> row = {
@@ -98,6 +109,7 @@ Table ListTable(const v1::ListSegmentsResponse& segments) {
     }
     row.push_back(TablesText(segment));
     row.push_back(TemperatureText(segment));
+    if (of_many) row.insert(row.begin(), RigPart(segment.name()));
     table.Add(std::move(row));
   }
   return table;
@@ -184,14 +196,18 @@ std::string FilterOf(const SegmentListOptions& options) {
 int ListSegments(Context* context, const SegmentListOptions& options) {
   const auto stub = v1::SegmentService::NewStub(context->Channel());
   v1::ListSegmentsRequest request;
-  request.set_parent(RigName(options.rig));
   request.set_filter(FilterOf(options));
   request.set_order_by(options.order_by);
-  const absl::Status known = CheckGroups(
-      *context,
-      options.rig,
-      {{"--filter", options.list.filter}, {"--order-by", options.order_by}});
-  if (!known.ok()) return FailInput(known);
+  if (options.rig.empty()) {
+    request.set_rig_filter(options.list.rigs);
+  } else {
+    request.set_parent(RigName(options.rig));
+    const absl::Status known = CheckGroups(
+        *context,
+        options.rig,
+        {{"--filter", options.list.filter}, {"--order-by", options.order_by}});
+    if (!known.ok()) return FailInput(known);
+  }
   v1::ListSegmentsResponse segments;
   const auto status =
       CallForItems<SegmentService>(stub.get(),
@@ -203,8 +219,9 @@ int ListSegments(Context* context, const SegmentListOptions& options) {
                                    &segments);
   if (!status.ok()) return Fail(*context, status);
   if (context->PrintList(segments)) return kDone;
-  context->Print(options.quarantined ? UnusableTable(segments)
-                                     : ListTable(segments));
+  const bool of_many = options.rig.empty();
+  context->Print(options.quarantined ? UnusableTable(segments, of_many)
+                                     : ListTable(segments, of_many));
   return kDone;
 }
 
@@ -358,17 +375,21 @@ void AddSegmentCommands(CLI::App* app, Context* context) {
   const auto options = std::make_shared<SegmentListOptions>();
   CLI::App* list = segments->add_subcommand(
       "list",
-      "List the segments of a rig, newest first, with the entropy of each "
-      "group [nat] (lower is more informative) and the tables that hold it");
-  list->add_option("RIG", options->rig)->required();
+      "List the segments of a rig, or of all, newest first, with the entropy "
+      "of each group [nat] (lower is more informative) and the tables that "
+      "hold "
+      "it");
+  CLI::Option* const of = list->add_option("RIG", options->rig);
   AddListOptions(list,
                  context,
                  "the first of the list",
                  kSegmentFilterHelp,
                  &options->list);
+  AddRigFilter(list, of, &options->list);
   list->add_option("--order-by",
                    options->order_by,
-                   "A field, then asc or desc, e.g. 'entropy.camera asc'");
+                   "A field, then asc or desc, e.g. 'entropy.camera asc'; "
+                   "without RIG: receive_time or gain.GROUP");
   list->add_flag("--quarantined",
                  options->quarantined,
                  "List only unusable and quarantined segments, with the "

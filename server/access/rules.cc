@@ -1,6 +1,6 @@
 #include "server/access/rules.h"
 
-#include <algorithm>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,38 +33,62 @@ std::string RigOf(std::string_view name) {
   return std::string(name.substr(0, name.find('/')));
 }
 
-// True if a grant gives the role on the rig of this name or, if the name is
-// empty, on any rig.
-bool Holds(const Caller& caller, Role role, const std::string& name) {
+using Labels = std::map<std::string, std::string>;
+
+// The labels at this path, a map of strings.
+Labels LabelsAt(const Message& message, std::string_view path) {
+  const std::size_t dot = path.find('.');
+  const auto* field = message.GetDescriptor()->FindFieldByName(
+      std::string(path.substr(0, dot)));
+  if (field == nullptr) return {};
+  const auto& reflection = *message.GetReflection();
+  if (dot != path.npos) {
+    return LabelsAt(reflection.GetMessage(message, field),
+                    path.substr(dot + 1));
+  }
+  Labels labels;
+  for (int k = 0; k < reflection.FieldSize(message, field); ++k) {
+    const Message& entry = reflection.GetRepeatedMessage(message, field, k);
+    labels[TextAt(entry, "key")] = TextAt(entry, "value");
+  }
+  return labels;
+}
+
+// True if these rights are on the rig of this name.
+absl::StatusOr<bool> IncludeNamed(const RigRights& rights,
+                                  const std::string& name,
+                                  const v1::AccessRule& rule,
+                                  const Message& request,
+                                  const LabelsOf& labels_of) {
   const std::string rig = RigOf(name);
-  return std::any_of(
-      caller.grants.begin(), caller.grants.end(), [&](const Grant& grant) {
-        if (grant.role < role) return false;
-        const bool named = !rig.empty() && grant.rig == rig;
-        return grant.rig.empty() || name.empty() || named;
-      });
+  if (rig.empty()) return false;
+  if (rights.rigs.contains(rig)) return true;
+  if (rights.labels.empty()) return false;
+  if (!rule.labels_field().empty()) {
+    return Include(rights, rig, LabelsAt(request, rule.labels_field()));
+  }
+  const auto labels = labels_of(rig);
+  if (absl::IsNotFound(labels.status())) return false;
+  if (!labels.ok()) return labels.status();
+  return Include(rights, rig, *labels);
 }
 
-bool HoldsOnEveryRig(const Caller& caller, Role role) {
-  return std::any_of(
-      caller.grants.begin(), caller.grants.end(), [&](const Grant& grant) {
-        return grant.role >= role && grant.rig.empty();
-      });
-}
-
-bool Passes(const Caller& caller,
-            const v1::AccessRule& rule,
-            Role role,
-            const Message& request) {
-  if (rule.rig_field().empty()) return HoldsOnEveryRig(caller, role);
-  return std::all_of(rule.rig_field().begin(),
-                     rule.rig_field().end(),
-                     [&](const std::string& field) {
-                       const std::string name = TextAt(request, field);
-                       return name.empty() && rule.empty_means_all()
-                                  ? HoldsOnEveryRig(caller, role)
-                                  : Holds(caller, role, name);
-                     });
+absl::StatusOr<bool> Passes(const Caller& caller,
+                            const v1::AccessRule& rule,
+                            Role role,
+                            const Message& request,
+                            const LabelsOf& labels_of) {
+  const std::optional<RigRights> rights = RightsOf(caller, role);
+  if (!rights) return true;  // on every rig
+  if (rights->empty()) return false;
+  if (rule.rig_field().empty()) return rule.limited_to_rights();
+  for (const std::string& field : rule.rig_field()) {
+    const std::string name = TextAt(request, field);
+    if (name.empty()) continue;
+    const auto includes = IncludeNamed(*rights, name, rule, request, labels_of);
+    if (!includes.ok() || !*includes) return includes;
+  }
+  return true;
 }
 
 std::optional<Role> RoleOf(v1::AccessRule::Role role) {
@@ -84,7 +108,8 @@ std::optional<Role> RoleOf(v1::AccessRule::Role role) {
 
 absl::Status Authorise(const Caller& caller,
                        const google::protobuf::MethodDescriptor& method,
-                       const Message& request) {
+                       const Message& request,
+                       const LabelsOf& labels_of) {
   const v1::AccessRule& rule = method.options().GetExtension(v1::access);
   if (rule.role() == v1::AccessRule::ANYBODY) return absl::OkStatus();
   const std::optional<Role> role = RoleOf(rule.role());
@@ -92,10 +117,16 @@ absl::Status Authorise(const Caller& caller,
     return absl::PermissionDeniedError(
         "nobody may call this method: it has no access rule");
   }
-  if (Passes(caller, rule, *role, request)) return absl::OkStatus();
+  const auto passes = Passes(caller, rule, *role, request, labels_of);
+  if (!passes.ok()) return passes.status();
+  if (*passes) return absl::OkStatus();
   std::string message = "this needs the role '";
   message += RoleName(*role);
-  message += rule.rig_field().empty() ? "' on every rig" : "' on the rig";
+  if (rule.limited_to_rights() && rule.rig_field().empty()) {
+    message += "' on some rig";
+  } else {
+    message += rule.rig_field().empty() ? "' on every rig" : "' on the rig";
+  }
   message += ", which '" + caller.name +
              "' does not have; ask the operator for a certificate that grants "
              "it";

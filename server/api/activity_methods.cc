@@ -57,13 +57,13 @@ v1::RigActivity EncodeRig(const ApiContext& context, const RigSummary& rig) {
 
 absl::StatusOr<v1::ListActivityResponse> ListActivity(
     const ApiContext& context,
-    const Call&,
+    const Call& call,
     const v1::ListActivityRequest& request) {
   RigQuery query;
   query.order = RigQuery::Order::kLastSeen;
   query.descending = true;
   SELFCAL_RETURN_IF_ERROR(
-      ReadRigQuery(request.filter(), request.order_by(), &query));
+      ReadRigQuery(call, request.filter(), request.order_by(), &query));
   query.with_alarms = request.with_alarms();
   SELFCAL_ASSIGN_OR_RETURN(
       v1::ListActivityResponse response,
@@ -79,12 +79,23 @@ absl::StatusOr<v1::ListActivityResponse> ListActivity(
           }));
   SetTime(NowNs(), response.mutable_time());
   SetTime(context.traffic->start_time_ns(), response.mutable_start_time());
-  *response.mutable_traffic() = EncodeTraffic(context.traffic->OfAll());
+  if (!query.choice) {
+    *response.mutable_traffic() = EncodeTraffic(context.traffic->OfAll());
+  }
   return response;
+}
+
+// A rig that cannot be read now does not show.
+bool MayRead(const RigRights& rights, Store* store, const std::string& rig) {
+  if (rights.rigs.contains(rig)) return true;
+  if (rights.labels.empty()) return false;
+  const auto stored = store->GetRig(rig);
+  return stored.ok() && Include(rights, rig, stored->labels);
 }
 
 absl::StatusOr<std::shared_ptr<void>> WatchChanges(
     const ApiContext& context,
+    const Call& call,
     const v1::WatchChangesRequest& request,
     const Watch<v1::Change>& watch) {
   std::string rig;
@@ -97,10 +108,15 @@ absl::StatusOr<std::shared_ptr<void>> WatchChanges(
     }
     rig = *parsed;
   }
-  const auto put = [watch](v1::Change::What what, const std::string& of) {
+  const auto rights = RightsOf(call.caller, Role::kRead);
+  const auto put = [watch, rights, store = context.store](
+                       v1::Change::What what, const std::string& of) {
     const std::string name = of.empty() ? "" : RigName(of);
     watch.Put(std::to_string(what) + name,
               [=](v1::Change* to) -> absl::StatusOr<bool> {
+                if (rights && !of.empty() && !MayRead(*rights, store, of)) {
+                  return false;
+                }
                 to->set_what(what);
                 to->set_rig(name);
                 return true;
@@ -124,6 +140,9 @@ absl::StatusOr<v1::Caller> GetCaller(const ApiContext& context,
     v1::Caller::Grant* added = response.add_grants();
     added->set_role(std::string(RoleName(grant.role)));
     if (!grant.rig.empty()) added->set_rig(RigName(grant.rig));
+    if (grant.label) {
+      added->set_label(grant.label->first + "=" + grant.label->second);
+    }
   }
   response.set_program_version(context.program_version);
   return response;

@@ -110,14 +110,16 @@ absl::Status VerifyRig(const ApiContext& context,
 
 absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
     const ApiContext& context,
-    const Call&,
+    const Call& call,
     const v1::ListCalibrationsRequest& request) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const ListParent parent,
+      ReadListParent(call, request.parent(), request.rig_filter()));
   return FillPage<v1::ListCalibrationsResponse>(
       request,
       request.parent(),
       [&](const Page& page) {
-        return context.store->ListCalibrations(rig, page);
+        return context.store->ListCalibrations(parent.rig, page, parent.of);
       },
       [&](const StoredCalibration& calibration,
           v1::ListCalibrationsResponse* to) -> absl::Status {
@@ -130,6 +132,7 @@ absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
 
 absl::StatusOr<std::shared_ptr<void>> WatchCalibration(
     const ApiContext& context,
+    const Call&,
     const v1::WatchCalibrationRequest& request,
     const Watch<v1::Calibration>& watch) {
   const auto rig = ParseRigName(request.parent());

@@ -16,7 +16,7 @@ constexpr int kMostRigs = 2000;
 
 absl::StatusOr<v1::Cohort> DescribeCohort(
     const ApiContext& context,
-    const Call&,
+    const Call& call,
     const v1::DescribeCohortRequest& request) {
   if (request.max_rigs() < 0 || request.max_rigs() > kMostRigs) {
     return InvalidFields({{"max_rigs", "must be from 0 to 2000"}});
@@ -24,7 +24,7 @@ absl::StatusOr<v1::Cohort> DescribeCohort(
   RigQuery query;
   query.order = RigQuery::Order::kLastSeen;
   query.descending = true;
-  SELFCAL_RETURN_IF_ERROR(ReadRigQuery(request.filter(), "", &query));
+  SELFCAL_RETURN_IF_ERROR(ReadRigQuery(call, request.filter(), "", &query));
   SELFCAL_ASSIGN_OR_RETURN(
       const CohortReport report,
       DescribeCohort(
@@ -36,17 +36,13 @@ absl::StatusOr<v1::Cohort> DescribeCohort(
 
 absl::StatusOr<v1::ListEstimatesResponse> ListEstimates(
     const ApiContext& context,
-    const Call&,
+    const Call& call,
     const v1::ListEstimatesRequest& request) {
-  EstimateQuery query;
-  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
-  if (!rig.empty() && !request.filter().empty()) {
-    return InvalidFields({{"filter", "has no effect with a parent"}});
-  }
-  SELFCAL_RETURN_IF_ERROR(ReadRigQuery(request.filter(), "", &query.rigs));
-  if (!rig.empty()) query.rigs.name = rig;
-  query.component = request.component();
-  query.only_active = request.only_active();
+  SELFCAL_ASSIGN_OR_RETURN(
+      const ListParent parent,
+      ReadListParent(call, request.parent(), request.filter(), "filter"));
+  EstimateQuery query{parent.of, request.component(), request.only_active()};
+  if (!parent.rig.empty()) query.rigs.name = parent.rig;
   return FillPage<v1::ListEstimatesResponse>(
       request,
       request.parent(),

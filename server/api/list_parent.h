@@ -1,21 +1,27 @@
-// The parent of a list that is of one rig or of all.
+// What a list is of: one rig, or the rigs of a filter.
 #pragma once
 
 #include <absl/status/statusor.h>
 
 #include <string>
 
-#include "proto/resource_names.h"
-#include "server/api/errors.h"
+#include "server/api/call.h"
+#include "server/store/rig_query.h"
 
 namespace selfcal::server {
 
-// The {rig} of rigs/{rig}; empty for an empty parent, which means all rigs.
-inline absl::StatusOr<std::string> RigOrAll(const std::string& parent) {
-  if (parent.empty()) return std::string();
-  const auto rig = ParseRigName(parent);
-  if (!rig) return BadName("parent", "rigs/{rig}");
-  return *rig;
-}
+struct ListParent {
+  std::string rig;  // empty: the rigs of `of`
+  RigQuery of;
+};
+
+// Reads rigs/{rig}, or nothing for those that the filter selects and the caller
+// may read. INVALID_ARGUMENT names the field; `filter_field` is that of the
+// filter, which must be empty with a rig.
+absl::StatusOr<ListParent> ReadListParent(
+    const Call& call,
+    const std::string& parent,
+    const std::string& filter,
+    const std::string& filter_field = "rig_filter");
 
 }  // namespace selfcal::server

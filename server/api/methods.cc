@@ -4,7 +4,9 @@
 #include <spdlog/spdlog.h>
 
 #include <array>
+#include <map>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "server/access/rules.h"
@@ -16,10 +18,20 @@ namespace {
 
 using google::protobuf::MethodDescriptor;
 
-absl::Status Authorised(const Call& call,
+absl::Status Authorised(const ApiContext& context,
+                        const Call& call,
                         const MethodDescriptor& method,
                         const Message& request) {
-  absl::Status status = Authorise(call.caller, method, request);
+  absl::Status status =
+      Authorise(call.caller,
+                method,
+                request,
+                [&context](const std::string& rig)
+                    -> absl::StatusOr<std::map<std::string, std::string>> {
+                  SELFCAL_ASSIGN_OR_RETURN(const StoredRig stored,
+                                           context.store->GetRig(rig));
+                  return stored.labels;
+                });
   if (!status.ok()) {
     spdlog::debug("denied to '{}': {}", call.caller.name, method.full_name());
   }
@@ -64,7 +76,7 @@ class AuthorisedExchange final : public Exchange {
 
   void Take(const Message& request, const Done& done) override {
     const absl::Status refused = Guarded(context_, [&] {
-      const absl::Status may = Authorised(call_, method_, request);
+      const absl::Status may = Authorised(context_, call_, method_, request);
       if (!may.ok()) return may;
       exchange_->Take(request, done);
       return absl::OkStatus();
@@ -102,7 +114,8 @@ void Methods::AddUnary(Method method, UnaryHandler handler) {
        handler = std::move(handler)](
           const Call& call, const Message& request, Message* response) {
         return Guarded(context, [&] {
-          absl::Status status = Authorised(call, *this_method, request);
+          absl::Status status =
+              Authorised(context, call, *this_method, request);
           return status.ok() ? handler(call, request, response) : status;
         });
       });
@@ -111,20 +124,20 @@ void Methods::AddUnary(Method method, UnaryHandler handler) {
 
 void Methods::AddStreaming(Method method, StreamingHandler handler) {
   method.descriptor = MethodOf(*method.request);
-  method.handler = StreamingHandler(
-      [this_method = method.descriptor,
-       context = context_,
-       handler = std::move(handler)](const Call& call,
-                                     const Message& request,
-                                     const WriteResponse& write) {
-        return Guarded(context, [&] {
-          absl::Status status = Authorised(call, *this_method, request);
-          if (!status.ok()) return status;
-          return handler(call, request, [&](const Message& response) {
-            return !context.stopping->load() && write(response);
-          });
-        });
+  method.handler = StreamingHandler([this_method = method.descriptor,
+                                     context = context_,
+                                     handler = std::move(handler)](
+                                        const Call& call,
+                                        const Message& request,
+                                        const WriteResponse& write) {
+    return Guarded(context, [&] {
+      absl::Status status = Authorised(context, call, *this_method, request);
+      if (!status.ok()) return status;
+      return handler(call, request, [&](const Message& response) {
+        return !context.stopping->load() && write(response);
       });
+    });
+  });
   methods_.push_back(std::move(method));
 }
 
@@ -138,7 +151,7 @@ void Methods::AddWatch(Method method, WatchHandler handler) {
                                     const std::shared_ptr<WatchQueue>& queue)
                                     -> absl::StatusOr<std::shared_ptr<void>> {
     return Guarded(context, [&]() -> absl::StatusOr<std::shared_ptr<void>> {
-      absl::Status status = Authorised(call, *this_method, request);
+      absl::Status status = Authorised(context, call, *this_method, request);
       if (!status.ok()) return status;
       const std::string rig = RigOf(*this_method, request);
       // Registered first: a rig that is deleted meanwhile is not missed.
@@ -161,7 +174,7 @@ void Methods::AddUpload(Method method, UploadHandler handler) {
        handler = std::move(handler)](
           const Call& call, const ReadRequest& read, Message* response) {
         return Guarded(context, [&] {
-          absl::Status status = Authorised(call, *this_method, *empty);
+          absl::Status status = Authorised(context, call, *this_method, *empty);
           return status.ok() ? handler(call, read, response) : status;
         });
       });

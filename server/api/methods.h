@@ -88,13 +88,14 @@ class Methods {
 
   template <typename Request, typename Response>
   void Add(absl::StatusOr<std::shared_ptr<void>> (*handler)(
-      const ApiContext&, const Request&, const Watch<Response>&)) {
+      const ApiContext&, const Call&, const Request&, const Watch<Response>&)) {
     AddWatch(Of<Request, Response>(),
              [context = context_, handler](
-                 const Call&,
+                 const Call& call,
                  const Message& request,
                  const std::shared_ptr<WatchQueue>& queue) {
                return handler(context,
+                              call,
                               static_cast<const Request&>(request),
                               Watch<Response>(queue));
              });

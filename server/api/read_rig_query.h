@@ -5,14 +5,18 @@
 
 #include <string>
 
+#include "server/api/call.h"
 #include "server/store/rig_query.h"
 
 namespace selfcal::server {
 
-// Changes *query as the two texts say; what they do not say stays.
-// INVALID_ARGUMENT names the field.
-absl::Status ReadRigQuery(const std::string& filter,
+// Changes *query as the two texts say, and so that it selects only rigs that
+// the caller may read; what the texts do not say stays. INVALID_ARGUMENT names
+// the field; `filter_field` is that of the filter.
+absl::Status ReadRigQuery(const Call& call,
+                          const std::string& filter,
                           const std::string& order_by,
-                          RigQuery* query);
+                          RigQuery* query,
+                          const std::string& filter_field = "filter");
 
 }  // namespace selfcal::server

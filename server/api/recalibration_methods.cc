@@ -53,13 +53,17 @@ absl::StatusOr<v1::Recalibration> GetRecalibration(
 
 absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
     const ApiContext& context,
-    const Call&,
+    const Call& call,
     const v1::ListRecalibrationsRequest& request) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
+  SELFCAL_ASSIGN_OR_RETURN(
+      const ListParent parent,
+      ReadListParent(call, request.parent(), request.rig_filter()));
   return FillPage<v1::ListRecalibrationsResponse>(
       request,
       request.parent(),
-      [&](const Page& page) { return context.store->ListRuns(rig, page); },
+      [&](const Page& page) {
+        return context.store->ListRuns(parent.rig, page, parent.of);
+      },
       [&](const StoredRun& run,
           v1::ListRecalibrationsResponse* to) -> absl::Status {
         SELFCAL_ASSIGN_OR_RETURN(*to->add_recalibrations(),
@@ -70,6 +74,7 @@ absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
 
 absl::StatusOr<std::shared_ptr<void>> WatchRecalibration(
     const ApiContext& context,
+    const Call&,
     const v1::WatchRecalibrationRequest& request,
     const Watch<v1::Recalibration>& watch) {
   SELFCAL_ASSIGN_OR_RETURN(const RunId id, ParseRun(request.name()));

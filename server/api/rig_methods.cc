@@ -172,11 +172,11 @@ absl::StatusOr<v1::Rig> GetRig(const ApiContext& context,
 
 absl::StatusOr<v1::ListRigsResponse> ListRigs(
     const ApiContext& context,
-    const Call&,
+    const Call& call,
     const v1::ListRigsRequest& request) {
   RigQuery query;
   SELFCAL_RETURN_IF_ERROR(
-      ReadRigQuery(request.filter(), request.order_by(), &query));
+      ReadRigQuery(call, request.filter(), request.order_by(), &query));
   return FillPage<v1::ListRigsResponse>(
       request,
       "",

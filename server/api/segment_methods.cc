@@ -9,6 +9,7 @@
 #include "proto/safe_text.h"
 #include "selfcal/v1/segment.pb.h"
 #include "server/api/errors.h"
+#include "server/api/list_parent.h"
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/api/segment_stream.h"
@@ -36,10 +37,11 @@ void ClearDirections(v1::Segment* segment) {
 
 absl::StatusOr<v1::ListSegmentsResponse> ListSegments(
     const ApiContext& context,
-    const Call&,
+    const Call& call,
     const v1::ListSegmentsRequest& request) {
-  const auto rig = ParseRigName(request.parent());
-  if (!rig) return BadName("parent", "rigs/{rig}");
+  SELFCAL_ASSIGN_OR_RETURN(
+      const ListParent parent,
+      ReadListParent(call, request.parent(), request.rig_filter()));
   SegmentQuery query;
   if (const auto filter = ParseSegmentFilter(request.filter(), &query);
       !filter.ok()) {
@@ -53,7 +55,7 @@ absl::StatusOr<v1::ListSegmentsResponse> ListSegments(
       request,
       request.parent(),
       [&](const Page& page) {
-        return context.store->ListSegments(*rig, query, page);
+        return context.store->ListSegments(parent.rig, query, page, parent.of);
       },
       [&](const StoredSegment& segment, v1::ListSegmentsResponse* to) {
         v1::Segment* added = to->add_segments();

@@ -76,11 +76,13 @@ absl::StatusOr<v1::RestoreStoreResponse> RestoreStore(
 
 absl::StatusOr<v1::ListEventsResponse> ListEvents(
     const ApiContext& context,
-    const Call&,
+    const Call& call,
     const v1::ListEventsRequest& request) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::string rig, RigOrAll(request.parent()));
-  if (!rig.empty()) {
-    const absl::Status found = context.store->GetRig(rig).status();
+  SELFCAL_ASSIGN_OR_RETURN(
+      const ListParent parent,
+      ReadListParent(call, request.parent(), request.rig_filter()));
+  if (!parent.rig.empty()) {
+    const absl::Status found = context.store->GetRig(parent.rig).status();
     if (!found.ok()) {
       return About(found, {kRigType, request.parent(), "parent"});
     }
@@ -94,8 +96,10 @@ absl::StatusOr<v1::ListEventsResponse> ListEvents(
       request,
       request.parent(),
       [&](const Page& page) {
-        return newest_first ? context.store->ListNewestEvents(page, rig)
-                            : context.store->ListEvents(page, rig);
+        return newest_first
+                   ? context.store->ListNewestEvents(
+                         page, parent.rig, parent.of)
+                   : context.store->ListEvents(page, parent.rig, parent.of);
       },
       [](const StoredEvent& event, v1::ListEventsResponse* to) {
         *to->add_events() = Encode(event);

@@ -9,6 +9,7 @@
 #include "server/store/driver/statement.h"
 #include "server/store/paging.h"
 #include "server/store/records.h"
+#include "server/store/rig_lists.h"
 #include "server/store/rigs.h"
 #include "server/store/time_place.h"
 
@@ -22,9 +23,9 @@ constexpr char kCalibrationColumns[] =
     "   WHERE a.rig = c.rig AND a.version = c.version), "
     "  (SELECT coalesce(max(d.finding), '') FROM disagreements d "
     "   WHERE d.rig = c.rig AND d.version = c.version), "
-    "  c.create_steady_ns, c.rig, "
-    "  (SELECT g.id FROM rigs g WHERE g.rig = c.rig) "
-    "FROM calibrations c LEFT JOIN validations v USING (rig, version) ";
+    "  c.create_steady_ns, c.rig, g.id "
+    "FROM calibrations c JOIN rigs g ON g.rig = c.rig "
+    "LEFT JOIN validations v ON v.rig = c.rig AND v.version = c.version ";
 
 absl::Status ReadSegmentKeys(Connection* db,
                              std::int64_t rig,
@@ -114,25 +115,28 @@ absl::StatusOr<std::int64_t> ActiveVersionOf(Connection* db, std::int64_t rig) {
 
 // A version whose record is damaged is left out, as one must not hide those of
 // all other rigs.
-absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfAll(
-    Connection* db, const Page& page) {
-  constexpr std::string_view kList = "calibrations";
-  SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(kList, page));
+absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfMany(
+    Connection* db, const Page& page, const RigQuery& of) {
+  const std::string list = "calibrations of many " + FilterText(of);
+  SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(list, page));
   const int size = PageSize(page);
+  const RigCondition condition(of, "g", 5);
   Statement read(db,
                  std::string(kCalibrationColumns) +
                      "WHERE (c.create_steady_ns, c.rig, c.version) < "
-                     "  (?1, ?2, ?3) "
-                     "ORDER BY c.create_steady_ns DESC, c.rig DESC, "
+                     "  (?1, ?2, ?3) AND " +
+                     condition.sql() +
+                     " ORDER BY c.create_steady_ns DESC, c.rig DESC, "
                      "  c.version DESC LIMIT ?4",
                  place.steady_ns,
                  place.rig,
                  place.number,
                  size + 1);
+  condition.Bind(&read);
   Listed<StoredCalibration> listed;
   for (int count = 0; read.Next(); ++count) {
     if (count == size) {
-      listed.next_token = TokenAfter(kList, place);
+      listed.next_token = TokenAfter(list, place);
       break;
     }
     place = {read.Int(10), read.Int(11), read.Int(0)};
@@ -174,8 +178,11 @@ absl::StatusOr<StoredCalibration> ReadActiveCalibration(
 }
 
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
-    Connection* db, const std::string& rig, const Page& page) {
-  if (rig.empty()) return ListCalibrationsOfAll(db, page);
+    Connection* db,
+    const std::string& rig,
+    const Page& page,
+    const RigQuery& of) {
+  if (rig.empty()) return ListCalibrationsOfMany(db, page, of);
   const std::string list = "calibrations/" + rig;
   SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));

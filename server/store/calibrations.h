@@ -24,7 +24,10 @@ absl::StatusOr<StoredCalibration> ReadActiveCalibration(Connection* db,
 
 // Store::ListCalibrations.
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
-    Connection* db, const std::string& rig, const Page& page);
+    Connection* db,
+    const std::string& rig,
+    const Page& page,
+    const RigQuery& of);
 
 // The version of the run's candidate; nullopt if it has none.
 absl::StatusOr<std::optional<std::int64_t>> CandidateOfRun(Connection* db,

@@ -26,12 +26,10 @@ struct EstimatePlace {
 };
 
 std::string ListOf(const EstimateQuery& query) {
-  return fmt::format("estimates of {}{} with {}{}{}",
+  return fmt::format("estimates of {}{} with {}",
                      query.component,
                      query.only_active ? " active" : "",
-                     query.rigs.text,
-                     LinesOf(query.rigs.labels),
-                     query.rigs.name);
+                     FilterText(query.rigs));
 }
 
 absl::StatusOr<EstimatePlace> EstimatePlaceOf(const std::string& list,
@@ -49,16 +47,16 @@ absl::StatusOr<EstimatePlace> EstimatePlaceOf(const std::string& list,
 }
 
 // The condition that finds the rows after ?1, ?2 and ?3 in an index: of one
-// rig, of one component (?8), or of all.
+// rig, of one component (?4), or of all.
 const char* ConditionOf(const EstimateQuery& query) {
   if (!query.rigs.name.empty()) {
     return "e.rig = ?1 AND (e.version, e.component) > (?2, ?3) "
-           "AND (?8 = '' OR e.component = ?8)";
+           "AND (?4 = '' OR e.component = ?4)";
   }
   if (query.component.empty()) {
-    return "(e.rig, e.version, e.component) > (?1, ?2, ?3) AND ?8 = ''";
+    return "(e.rig, e.version, e.component) > (?1, ?2, ?3) AND ?4 = ''";
   }
-  return "e.component = ?8 AND (e.rig, e.version) > (?1, ?2) "
+  return "e.component = ?4 AND (e.rig, e.version) > (?1, ?2) "
          "AND CAST(?3 AS TEXT) IS NOT NULL";
 }
 
@@ -119,6 +117,7 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
   if (!query.rigs.name.empty()) {
     SELFCAL_ASSIGN_OR_RETURN(place.rig, FindRigId(db, query.rigs.name));
   }
+  const RigCondition condition(query.rigs, "r", 6);
   Statement read(
       db,
       fmt::format("SELECT r.id, e.version, c.create_time_ns, c.state, "
@@ -129,19 +128,16 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
                   "  AND c.version = e.version "
                   "JOIN rigs r ON r.rig = e.rig "
                   "WHERE {} AND {} {} "
-                  "ORDER BY e.rig, e.version, e.component LIMIT ?9",
+                  "ORDER BY e.rig, e.version, e.component LIMIT ?5",
                   ConditionOf(query),
-                  RigCondition("r", 4),
+                  condition.sql(),
                   query.only_active ? "AND c.state = 1" : ""),
       place.rig,
       place.version,
       place.component,
-      query.rigs.text,
-      LinesOf(query.rigs.labels),
-      static_cast<std::int64_t>(query.rigs.labels.size()),
-      query.rigs.name,
       query.component,
       static_cast<std::int64_t>(size + 1));
+  condition.Bind(&read);
   Listed<StoredEstimate> listed;
   while (read.Next()) {
     if (listed.items.size() == size) {

@@ -9,6 +9,7 @@
 #include "server/status/status_macros.h"
 #include "server/store/driver/statement.h"
 #include "server/store/paging.h"
+#include "server/store/rig_lists.h"
 
 namespace selfcal::server {
 namespace {
@@ -68,24 +69,33 @@ absl::StatusOr<Listed<StoredEvent>> ReadEvents(Statement* read) {
   return listed;
 }
 
-absl::StatusOr<Listed<StoredEvent>> ListOfAll(Connection* db,
-                                              const Page& page,
-                                              bool newest_first) {
-  const std::string list = newest_first ? "newest-events" : "events";
+absl::StatusOr<Listed<StoredEvent>> ListOfMany(Connection* db,
+                                               const Page& page,
+                                               const RigQuery& of,
+                                               bool newest_first) {
+  const RigCondition condition(of, "r", 5);
+  const std::string list =
+      (newest_first ? "newest-events of many " : "events of many ") +
+      FilterText(of);
   SELFCAL_ASSIGN_OR_RETURN(const EventPlace place,
                            PlaceOfPage(list, page, newest_first));
   const int size = PageSize(page);
   Statement read(
       db,
-      fmt::format("{0} WHERE (steady_ns, rig, event) {1} (?1, ?2, ?3) "
+      fmt::format("{0} e WHERE (steady_ns, rig, event) {1} (?1, ?2, ?3) {3}"
                   "ORDER BY steady_ns {2}, rig {2}, event {2} LIMIT ?4",
                   kEventColumns,
                   newest_first ? "<" : ">",
-                  newest_first ? "DESC" : "ASC"),
+                  newest_first ? "DESC" : "ASC",
+                  condition.is_every_rig() ? ""
+                                           : "AND EXISTS (SELECT 1 FROM rigs r "
+                                             "  WHERE r.id = e.rig AND " +
+                                                 condition.sql() + ") "),
       place.steady_ns,
       place.rig,
       place.event,
       size + 1);
+  condition.Bind(&read);
   SELFCAL_ASSIGN_OR_RETURN(auto listed, ReadEvents(&read));
   CutPage(list, size, PlaceText, &listed);
   return listed;
@@ -155,14 +165,17 @@ absl::StatusOr<std::int64_t> InsertEvent(Connection* db,
 
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
                                                   const Page& page,
-                                                  const std::string& rig) {
-  return rig.empty() ? ListOfAll(db, page, false)
+                                                  const std::string& rig,
+                                                  const RigQuery& of) {
+  return rig.empty() ? ListOfMany(db, page, of, false)
                      : ListOfRig(db, page, rig, false);
 }
 
-absl::StatusOr<Listed<StoredEvent>> ListNewestEventRows(
-    Connection* db, const Page& page, const std::string& rig) {
-  return rig.empty() ? ListOfAll(db, page, true)
+absl::StatusOr<Listed<StoredEvent>> ListNewestEventRows(Connection* db,
+                                                        const Page& page,
+                                                        const std::string& rig,
+                                                        const RigQuery& of) {
+  return rig.empty() ? ListOfMany(db, page, of, true)
                      : ListOfRig(db, page, rig, true);
 }
 

@@ -20,13 +20,15 @@ absl::Status AppendEvent(UnitOfWork* tx,
 absl::StatusOr<std::int64_t> InsertEvent(Connection* db,
                                          const StoredEvent& event);
 
-// Events of one rig by number, or of all by steady time if `rig` is empty;
-// oldest first.
+// Store::ListEvents and ListNewestEvents: of one rig by number, or of those of
+// `of` by steady time if `rig` is empty.
 absl::StatusOr<Listed<StoredEvent>> ListEventRows(Connection* db,
                                                   const Page& page,
-                                                  const std::string& rig);
+                                                  const std::string& rig,
+                                                  const RigQuery& of);
 absl::StatusOr<Listed<StoredEvent>> ListNewestEventRows(Connection* db,
                                                         const Page& page,
-                                                        const std::string& rig);
+                                                        const std::string& rig,
+                                                        const RigQuery& of);
 
 }  // namespace selfcal::server

@@ -118,9 +118,11 @@ class DatabaseStore final : public Store {
   absl::StatusOr<Listed<StoredSegment>> ListSegments(
       const std::string& rig,
       const SegmentQuery& query,
-      const Page& page) override {
-    return Read(
-        [&](Connection* db) { return ListSegmentRows(db, rig, query, page); });
+      const Page& page,
+      const RigQuery& of) override {
+    return Read([&](Connection* db) {
+      return ListSegmentRows(db, rig, query, page, of);
+    });
   }
 
   absl::StatusOr<MotionSegment> GetSegmentData(const std::string& rig,
@@ -191,9 +193,9 @@ class DatabaseStore final : public Store {
   }
 
   absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
-      const std::string& rig, const Page& page) override {
+      const std::string& rig, const Page& page, const RigQuery& of) override {
     return Read(
-        [&](Connection* db) { return ListCalibrationRows(db, rig, page); });
+        [&](Connection* db) { return ListCalibrationRows(db, rig, page, of); });
   }
 
   absl::StatusOr<Listed<StoredEstimate>> ListEstimates(
@@ -214,8 +216,9 @@ class DatabaseStore final : public Store {
   }
 
   absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
-                                             const Page& page) override {
-    return Read([&](Connection* db) { return ListRunRows(db, rig, page); });
+                                             const Page& page,
+                                             const RigQuery& of) override {
+    return Read([&](Connection* db) { return ListRunRows(db, rig, page, of); });
   }
 
   absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns(
@@ -236,15 +239,17 @@ class DatabaseStore final : public Store {
         [&](Connection* db) { return ListInstructionRows(db, rig, page); });
   }
 
-  absl::StatusOr<Listed<StoredEvent>> ListEvents(
-      const Page& page, const std::string& rig) override {
-    return Read([&](Connection* db) { return ListEventRows(db, page, rig); });
+  absl::StatusOr<Listed<StoredEvent>> ListEvents(const Page& page,
+                                                 const std::string& rig,
+                                                 const RigQuery& of) override {
+    return Read(
+        [&](Connection* db) { return ListEventRows(db, page, rig, of); });
   }
 
   absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(
-      const Page& page, const std::string& rig) override {
+      const Page& page, const std::string& rig, const RigQuery& of) override {
     return Read(
-        [&](Connection* db) { return ListNewestEventRows(db, page, rig); });
+        [&](Connection* db) { return ListNewestEventRows(db, page, rig, of); });
   }
 
   absl::Status AppendEvent(const StoredEvent& event) override {

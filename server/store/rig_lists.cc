@@ -1,10 +1,10 @@
 #include "server/store/rig_lists.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <charconv>
 #include <limits>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -44,13 +44,10 @@ std::string ColumnOf(RigQuery::Order order) {
 }
 
 std::string ListOf(const RigQuery& query) {
-  return fmt::format("rigs by {}{} with {}{}{}{}",
+  return fmt::format("rigs by {}{} with {}",
                      ColumnOf(query.order),
                      query.descending ? " desc" : "",
-                     query.text,
-                     LinesOf(query.labels),
-                     query.name,
-                     query.with_alarms ? " and alarms" : "");
+                     FilterText(query));
 }
 
 std::string KeyOf(const Found& found) {
@@ -77,7 +74,7 @@ absl::StatusOr<Place> PlaceOf(const RigQuery& query, const Page& page) {
   return place;
 }
 
-std::string SqlOf(const RigQuery& query) {
+std::string SqlOf(const RigQuery& query, const RigCondition& condition) {
   const std::string column = ColumnOf(query.order);
   const bool by_name = column.empty();
   const char* direction = query.descending ? "DESC" : "ASC";
@@ -91,12 +88,11 @@ std::string SqlOf(const RigQuery& query) {
   // The condition on the name does not use ?1, so it is used here.
   return fmt::format(
       "SELECT rig, id, create_time_ns, last_seen_ns, {} FROM rigs "
-      "WHERE {} AND CAST(?1 AS BIGINT) IS NOT NULL AND {} {}"
+      "WHERE {} AND CAST(?1 AS BIGINT) IS NOT NULL AND {} "
       "ORDER BY {} LIMIT ?3",
       by_name ? "last_seen_ns" : column,
       place,
-      RigCondition("rigs", 4),
-      query.with_alarms ? "AND alarms > 0 " : "",
+      condition.sql(),
       order);
 }
 
@@ -104,15 +100,9 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
                                             const RigQuery& query,
                                             const Place& place,
                                             int limit) {
-  Statement read(db,
-                 SqlOf(query),
-                 place.value,
-                 place.id,
-                 limit,
-                 query.text,
-                 LinesOf(query.labels),
-                 static_cast<std::int64_t>(query.labels.size()),
-                 query.name);
+  const RigCondition condition(query, "rigs", 4);
+  Statement read(db, SqlOf(query, condition), place.value, place.id, limit);
+  condition.Bind(&read);
   std::vector<Found> found;
   while (read.Next()) {
     Found rig;
@@ -231,27 +221,63 @@ absl::StatusOr<Listed<Item>> ListFound(Connection* db,
 
 }  // namespace
 
-// Names and values have no line feeds.
-std::string LinesOf(const std::map<std::string, std::string>& labels) {
-  std::string lines = "\n";
-  for (const auto& [name, value] : labels) lines += name + "=" + value + "\n";
-  return lines;
+RigCondition::RigCondition(const RigQuery& query,
+                           std::string_view rigs,
+                           int first_parameter)
+    : rigs_(rigs), next_(first_parameter) {
+  if (!query.text.empty()) {
+    // A text contains another if it changes when that is removed.
+    const std::string text = Parameter(query.text);
+    And(fmt::format("replace({0}.id, {1}, '') <> {0}.id", rigs_, text));
+  }
+  if (!query.name.empty()) {
+    And(fmt::format("{}.id = {}", rigs_, Parameter(query.name)));
+  }
+  for (const auto& [name, value] : query.labels) And(HasLabel(name, value));
+  if (query.with_alarms) And(rigs_ + ".alarms > 0");
+  if (query.choice) {
+    std::vector<std::string> any = {"FALSE"};
+    for (const std::string& name : query.choice->names) {
+      any.push_back(fmt::format("{}.id = {}", rigs_, Parameter(name)));
+    }
+    for (const auto& [name, value] : query.choice->labels) {
+      any.push_back(HasLabel(name, value));
+    }
+    And(fmt::format("({})", fmt::join(any, " OR ")));
+  }
 }
 
-// A text contains another if it changes when that is removed.
-std::string RigCondition(std::string_view rigs, int first_parameter) {
+void RigCondition::Bind(Statement* statement) const {
+  for (const std::string& value : values_) statement->BindNext(value);
+}
+
+std::string RigCondition::Parameter(std::string_view value) {
+  values_.emplace_back(value);
+  return fmt::format("?{}", next_++);
+}
+
+std::string RigCondition::HasLabel(const std::string& name,
+                                   const std::string& value) {
+  const std::string first = Parameter(name);
   return fmt::format(
-      "(?{1} = '' OR replace({0}.id, ?{1}, '') <> {0}.id) "
-      "AND (?{3} = 0 OR ?{3} = "
-      "  (SELECT count(*) FROM rig_labels l WHERE l.rig = {0}.rig "
-      "   AND replace(?{2}, '\n' || l.name || '=' || l.value || '\n', '') "
-      "     <> ?{2})) "
-      "AND (?{4} = '' OR {0}.id = ?{4})",
-      rigs,
-      first_parameter,
-      first_parameter + 1,
-      first_parameter + 2,
-      first_parameter + 3);
+      "{}.rig IN (SELECT l.rig FROM rig_labels l "
+      "  WHERE l.name = {} AND l.value = {})",
+      rigs_,
+      first,
+      Parameter(value));
+}
+
+void RigCondition::And(const std::string& condition) {
+  sql_ = sql_ == "TRUE" ? condition : sql_ + " AND " + condition;
+}
+
+// Names and values of labels have no line feeds.
+std::string FilterText(const RigQuery& query) {
+  std::string text = query.text + "\n";
+  for (const auto& [name, value] : query.labels) {
+    text += name + "=" + value + "\n";
+  }
+  return text + query.name + (query.with_alarms ? " and alarms" : "");
 }
 
 absl::StatusOr<Listed<RigSummary>> ListSummaryRows(Connection* db,

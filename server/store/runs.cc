@@ -8,6 +8,7 @@
 #include "server/store/announcements.h"
 #include "server/store/driver/statement.h"
 #include "server/store/paging.h"
+#include "server/store/rig_lists.h"
 #include "server/store/rigs.h"
 #include "server/store/time_place.h"
 
@@ -118,24 +119,29 @@ absl::StatusOr<std::int64_t> NewestWhere(UnitOfWork* tx,
       tx->rig_row());
 }
 
-absl::StatusOr<Listed<StoredRun>> ListRunsOfAll(Connection* db,
-                                                const Page& page) {
-  constexpr std::string_view kList = "runs";
-  SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(kList, page));
+absl::StatusOr<Listed<StoredRun>> ListRunsOfMany(Connection* db,
+                                                 const Page& page,
+                                                 const RigQuery& of) {
+  const std::string list = "runs of many " + FilterText(of);
+  SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(list, page));
   const int size = PageSize(page);
+  const RigCondition condition(of, "g", 5);
   Statement read(db,
                  std::string(kRunColumns) +
                      "WHERE (r.create_steady_ns, r.rig, r.run) < (?1, ?2, ?3) "
-                     "ORDER BY r.create_steady_ns DESC, r.rig DESC, "
+                     "AND " +
+                     condition.sql() +
+                     " ORDER BY r.create_steady_ns DESC, r.rig DESC, "
                      "  r.run DESC LIMIT ?4",
                  place.steady_ns,
                  place.rig,
                  place.number,
                  size + 1);
+  condition.Bind(&read);
   Listed<StoredRun> listed;
   while (read.Next()) {
     if (static_cast<int>(listed.items.size()) == size) {
-      listed.next_token = TokenAfter(kList, place);
+      listed.next_token = TokenAfter(list, place);
       break;
     }
     place = {read.Int(13), read.Int(10), read.Int(1)};
@@ -166,8 +172,9 @@ absl::StatusOr<StoredRun> ReadRun(Connection* db,
 
 absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
                                               const std::string& rig,
-                                              const Page& page) {
-  if (rig.empty()) return ListRunsOfAll(db, page);
+                                              const Page& page,
+                                              const RigQuery& of) {
+  if (rig.empty()) return ListRunsOfMany(db, page, of);
   const std::string list = "runs/" + rig;
   SELFCAL_ASSIGN_OR_RETURN(const auto before, PageNumber(list, page));
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));

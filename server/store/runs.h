@@ -22,7 +22,8 @@ absl::StatusOr<StoredRun> ReadRun(Connection* db,
 // Store::ListRuns.
 absl::StatusOr<Listed<StoredRun>> ListRunRows(Connection* db,
                                               const std::string& rig,
-                                              const Page& page);
+                                              const Page& page,
+                                              const RigQuery& of);
 // Store::ListUnfinishedRuns.
 absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRunRows(
     Connection* db, const std::string& replica);

@@ -1,25 +1,27 @@
 #include "server/store/segment_query_sql.h"
 
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_split.h>
 #include <fmt/format.h>
 
-#include <charconv>
 #include <limits>
 #include <string_view>
+#include <vector>
 
 #include "server/status/status_macros.h"
 #include "server/store/paging.h"
+#include "server/store/rig_lists.h"
 
 namespace selfcal::server {
 namespace {
 
 // A cast states the type of a parameter that may be NULL.
 constexpr char kConditions[] =
-    "WHERE s.rig = ?1 "
-    "AND (CAST(?2 AS BIGINT) IS NULL OR s.state = ?2) "
+    "WHERE (CAST(?2 AS BIGINT) IS NULL OR s.state = ?2) "
     "AND (CAST(?3 AS TEXT) IS NULL OR s.session = ?3) "
     "AND (CAST(?4 AS BOOLEAN) IS NULL OR ?4 = EXISTS ("
     "  SELECT 1 FROM payloads p "
-    "  WHERE p.rig = ?1 AND p.sequence = s.sequence)) "
+    "  WHERE p.rig = s.rig AND p.sequence = s.sequence)) "
     "AND (CAST(?5 AS TEXT) IS NULL OR EXISTS (SELECT 1 FROM table_entries e "
     "  WHERE e.rig = s.rig AND e.group_name = ?5 "
     "  AND e.sequence = s.sequence)) "
@@ -41,8 +43,11 @@ constexpr char kConditions[] =
     "  AND (CAST(?19 AS DOUBLE PRECISION) IS NULL OR c.gain >= ?19) "
     "  AND (CAST(?20 AS DOUBLE PRECISION) IS NULL OR c.gain <= ?20))) "
     // Not every order uses these, but every parameter is used.
+    "AND CAST(?1 AS BIGINT) IS NOT NULL "
     "AND CAST(?21 AS TEXT) IS NOT NULL "
-    "AND CAST(?22 AS DOUBLE PRECISION) IS NOT NULL ";
+    "AND CAST(?22 AS DOUBLE PRECISION) IS NOT NULL "
+    "AND CAST(?25 AS BIGINT) IS NOT NULL "
+    "AND CAST(?26 AS BIGINT) IS NOT NULL ";
 
 bool IsOfGroup(SegmentQuery::Order order) {
   return order == SegmentQuery::Order::kEntropy ||
@@ -67,32 +72,72 @@ std::string_view KeyColumn(SegmentQuery::Order order) {
   return "s.sequence";
 }
 
-// The inner query finds the rows of the page, the outer one reads their
-// content.
-std::string Sql(const std::string& columns, const SegmentQuery& query) {
-  const bool by_arrival = query.order == SegmentQuery::Order::kArrival;
+// The rows of a list in their order: what comes after a position, and what they
+// are sorted by.
+struct OrderSql {
+  std::string key;
+  std::string after;
+  std::string order_by;
+};
+
+OrderSql OrderOfRig(const SegmentQuery& query) {
   const std::string_view way = query.descending ? "DESC" : "ASC";
   const std::string_view beyond = query.descending ? "<" : ">";
-  const std::string_view key = KeyColumn(query.order);
+  const std::string key(KeyColumn(query.order));
+  if (query.order == SegmentQuery::Order::kArrival) {
+    return {key,
+            fmt::format("s.rig = ?1 AND s.sequence {} ?23", beyond),
+            fmt::format("s.sequence {}", way)};
+  }
+  return {key,
+          fmt::format("s.rig = ?1 AND "
+                      "(CAST({} AS DOUBLE PRECISION), s.sequence) {} "
+                      "(?22, ?23)",
+                      key,
+                      beyond),
+          fmt::format("{} {}, s.sequence {}", key, way, way)};
+}
+
+OrderSql OrderOfAll(const SegmentQuery& query) {
+  const std::string_view way = query.descending ? "DESC" : "ASC";
+  const std::string_view beyond = query.descending ? "<" : ">";
+  if (query.order == SegmentQuery::Order::kArrival) {
+    return {"s.steady_ns",
+            fmt::format("(s.steady_ns, s.rig, s.sequence) {} (?26, ?25, ?23)",
+                        beyond),
+            fmt::format("s.steady_ns {0}, s.rig {0}, s.sequence {0}", way)};
+  }
+  return {"o.gain",
+          fmt::format("(o.gain, o.rig, o.sequence) {} (?22, ?25, ?23)", beyond),
+          fmt::format("o.gain {0}, o.rig {0}, o.sequence {0}", way)};
+}
+
+// The inner query finds the rows of the page, the outer one reads their
+// content.
+std::string Sql(const std::string& columns,
+                const SegmentQuery& query,
+                bool of_all,
+                const RigCondition& condition) {
+  const OrderSql order = of_all ? OrderOfAll(query) : OrderOfRig(query);
+  const std::string_view way = query.descending ? "DESC" : "ASC";
+  const bool some = of_all && !condition.is_every_rig();
   return fmt::format(
       "SELECT {}, page.key FROM (SELECT s.rig, s.sequence, {} AS key "
-      "FROM segments s {} {} AND {} ORDER BY {} {} LIMIT ?24) page "
+      "FROM segments s {} {} {} AND {} {} ORDER BY {} LIMIT ?24) page "
       "JOIN segments s USING (rig, sequence) "
       "LEFT JOIN segment_information i USING (rig, sequence) "
-      "ORDER BY page.key {}, s.sequence {}",
+      "ORDER BY page.key {}, s.rig {}, s.sequence {}",
       columns,
-      key,
+      order.key,
       IsOfGroup(query.order) ? "JOIN segment_scores o "
                                "ON o.rig = s.rig AND o.sequence = s.sequence "
                                "AND o.group_name = ?21"
                              : "",
+      some ? "JOIN rigs r ON r.rig = s.rig" : "",
       kConditions,
-      by_arrival ? fmt::format("s.sequence {} ?23", beyond)
-                 : fmt::format("(CAST({} AS DOUBLE PRECISION), s.sequence) {} "
-                               "(?22, ?23)",
-                               key,
-                               beyond),
-      by_arrival ? "s.sequence" : fmt::format("{} {}, s.sequence", key, way),
+      order.after,
+      some ? "AND " + condition.sql() : "",
+      order.order_by,
       way,
       way,
       way);
@@ -112,8 +157,11 @@ std::string RangeText(const Range<T>& range) {
 
 }  // namespace
 
-std::string ListName(const std::string& rig, const SegmentQuery& query) {
+std::string ListName(const std::string& rig,
+                     const SegmentQuery& query,
+                     const RigQuery& rigs) {
   std::string name = "segments/" + rig;
+  if (rig.empty()) name += FilterText(rigs);
   if (query == SegmentQuery()) return name;
   const auto text = [](const std::optional<std::string>& value) {
     return value ? fmt::format("={}:{}", value->size(), *value) : "";
@@ -139,37 +187,56 @@ std::string ListName(const std::string& rig, const SegmentQuery& query) {
                      query.descending);
 }
 
+absl::Status CheckOrderOfAll(const SegmentQuery& query) {
+  if (query.order == SegmentQuery::Order::kArrival ||
+      query.order == SegmentQuery::Order::kGain) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      "the segments of all rigs can be sorted by receive_time or gain.GROUP: "
+      "name a rig to sort by this field");
+}
+
 absl::StatusOr<SegmentPlace> PlaceOfPage(const std::string& list,
                                          const SegmentQuery& query,
                                          const Page& page) {
   SELFCAL_ASSIGN_OR_RETURN(const auto text, PageKey(list, page));
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (!text) {
-    return query.descending ? SegmentPlace{kInfinity, INT64_MAX}
-                            : SegmentPlace{-kInfinity, -1};
+    using Doubles = std::numeric_limits<double>;
+    if (query.descending) {
+      return SegmentPlace{Doubles::infinity(), INT64_MAX, INT64_MAX, INT64_MAX};
+    }
+    return SegmentPlace{-Doubles::infinity(), INT64_MIN, -1, -1};
   }
   SegmentPlace place;
-  const char* const end = text->data() + text->size();
-  const auto key = std::from_chars(text->data(), end, place.key);
-  if (key.ec == std::errc() && key.ptr != end && *key.ptr == ' ') {
-    const auto sequence = std::from_chars(key.ptr + 1, end, place.sequence);
-    if (sequence.ec == std::errc() && sequence.ptr == end) return place;
+  const std::vector<std::string> numbers = absl::StrSplit(*text, ' ');
+  if (numbers.size() == 4 && absl::SimpleAtod(numbers[0], &place.key) &&
+      absl::SimpleAtoi(numbers[1], &place.steady_ns) &&
+      absl::SimpleAtoi(numbers[2], &place.rig) &&
+      absl::SimpleAtoi(numbers[3], &place.sequence)) {
+    return place;
   }
   return BadPageToken();
 }
 
 std::string TokenAfter(const std::string& list, const SegmentPlace& place) {
-  return MakePageToken(list, fmt::format("{} {}", place.key, place.sequence));
+  return MakePageToken(list,
+                       fmt::format("{} {} {} {}",
+                                   place.key,
+                                   place.steady_ns,
+                                   place.rig,
+                                   place.sequence));
 }
 
 Statement SelectSegments(Connection* db,
                          const std::string& columns,
                          std::int64_t rig,
                          const SegmentQuery& query,
+                         const RigCondition& condition,
                          const SegmentPlace& after,
                          int limit) {
   return Statement(db,
-                   Sql(columns, query),
+                   Sql(columns, query, rig == 0, condition),
                    rig,
                    StateNumber(query.state),
                    query.session,
@@ -193,7 +260,9 @@ Statement SelectSegments(Connection* db,
                    query.order_group,
                    after.key,
                    after.sequence,
-                   limit);
+                   limit,
+                   after.rig,
+                   after.steady_ns);
 }
 
 }  // namespace selfcal::server

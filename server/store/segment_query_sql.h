@@ -9,20 +9,29 @@
 #include <string>
 
 #include "server/store/driver/statement.h"
+#include "server/store/rig_lists.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
 
-// The position of a page: it begins after the segment with this key and
-// sequence.
+// The position of a page: it begins after the segment with this key, arrival
+// (in a list by arrival of all rigs), key of the rig, and sequence.
 struct SegmentPlace {
   double key = 0;
+  std::int64_t steady_ns = 0;
+  std::int64_t rig = 0;
   std::int64_t sequence = 0;
 };
 
-// Name of the list of the rig for page tokens; different queries have different
-// names.
-std::string ListName(const std::string& rig, const SegmentQuery& query);
+// Name of the list for page tokens, of one rig or, if `rig` is empty, of those
+// of `rigs`; different queries have different names.
+std::string ListName(const std::string& rig,
+                     const SegmentQuery& query,
+                     const RigQuery& rigs);
+
+// OK if the segments of all rigs can be sorted like that: by an index, so that
+// a page is read without the others. INVALID_ARGUMENT names these orders.
+absl::Status CheckOrderOfAll(const SegmentQuery& query);
 
 // The position in the token of a page, or the beginning of the list.
 // INVALID_ARGUMENT for a token of another list.
@@ -32,11 +41,15 @@ absl::StatusOr<SegmentPlace> PlaceOfPage(const std::string& list,
 std::string TokenAfter(const std::string& list, const SegmentPlace& place);
 
 // Selects `columns` of segments `s` and their information `i`, for at most
-// `limit` rows after the position. The key follows as the last column.
+// `limit` rows after the position: of the rig with this key or, if it is 0, of
+// those of the condition (on `r`, from kRigParameter on), which the caller
+// binds next. The key follows as the last column.
+inline constexpr int kRigParameter = 27;
 Statement SelectSegments(Connection* db,
                          const std::string& columns,
                          std::int64_t rig,
                          const SegmentQuery& query,
+                         const RigCondition& condition,
                          const SegmentPlace& after,
                          int limit);
 

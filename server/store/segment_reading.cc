@@ -24,13 +24,16 @@ constexpr char kSegmentColumns[] =
     "  s.keyframes, s.imu_samples, s.landmarks, s.observations, "
     "  i.information, i.sha256, "
     "  (SELECT length(p.data) FROM payloads p "
-    "    WHERE p.rig = ?1 AND p.sequence = s.sequence), "
-    "  s.temperature_c";
-constexpr int kKeyColumn = 17;  // after the columns of a list
+    "    WHERE p.rig = s.rig AND p.sequence = s.sequence), "
+    "  s.temperature_c, s.steady_ns, s.rig, "
+    "  (SELECT g.id FROM rigs g WHERE g.rig = s.rig)";
+constexpr int kSteadyColumn = 17;
+constexpr int kRigColumn = 18;
+constexpr int kKeyColumn = 20;  // after the columns of a list
 
-StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
+StoredSegment MetadataFromRow(const Statement& row) {
   StoredSegment segment;
-  segment.rig = rig;
+  segment.rig = row.Text(19);
   segment.key = {row.Text(0), row.Int(1)};
   segment.sequence = row.Int(2);
   segment.state = static_cast<SegmentState>(row.Int(3) - 1);
@@ -52,17 +55,16 @@ StoredSegment MetadataFromRow(const Statement& row, const std::string& rig) {
 // Fills what it can; the status is that of the information.
 absl::Status FillFromRow(Connection* db,
                          const Statement& row,
-                         std::int64_t rig_id,
-                         const std::string& rig,
                          StoredSegment* segment) {
-  *segment = MetadataFromRow(row, rig);
-  SELFCAL_ASSIGN_OR_RETURN(segment->tables,
-                           TablesOfSegment(db, rig_id, segment->sequence));
+  *segment = MetadataFromRow(row);
+  SELFCAL_ASSIGN_OR_RETURN(
+      segment->tables,
+      TablesOfSegment(db, row.Int(kRigColumn), segment->sequence));
   if (row.IsNull(13)) {
     return absl::OkStatus();
   }
   const std::string what =
-      "the information of " + SegmentText(rig, segment->key);
+      "the information of " + SegmentText(segment->rig, segment->key);
   const std::string bytes = row.Text(13);
   SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(14), what));
   SELFCAL_ASSIGN_OR_RETURN(segment->information, ParseInformation(bytes, what));
@@ -90,21 +92,34 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
     return absl::NotFoundError(SegmentText(rig, key) + " was never received");
   }
   StoredSegment segment;
-  SELFCAL_RETURN_IF_ERROR(FillFromRow(db, read, rig_id, rig, &segment));
+  SELFCAL_RETURN_IF_ERROR(FillFromRow(db, read, &segment));
   return segment;
 }
 
 absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
                                                       const std::string& rig,
                                                       const SegmentQuery& query,
-                                                      const Page& page) {
-  const std::string list = ListName(rig, query);
+                                                      const Page& page,
+                                                      const RigQuery& of) {
+  if (rig.empty()) SELFCAL_RETURN_IF_ERROR(CheckOrderOfAll(query));
+  const std::string list = ListName(rig, query, of);
   SELFCAL_ASSIGN_OR_RETURN(const SegmentPlace after,
                            PlaceOfPage(list, query, page));
-  SELFCAL_ASSIGN_OR_RETURN(const std::int64_t rig_id, FindRigId(db, rig));
+  std::int64_t rig_id = 0;
+  if (!rig.empty()) {
+    SELFCAL_ASSIGN_OR_RETURN(rig_id, FindRigId(db, rig));
+  }
   const auto size = static_cast<std::size_t>(PageSize(page));
-  Statement read = SelectSegments(
-      db, kSegmentColumns, rig_id, query, after, static_cast<int>(size) + 1);
+  const RigCondition condition(
+      rig.empty() ? of : RigQuery(), "r", kRigParameter);
+  Statement read = SelectSegments(db,
+                                  kSegmentColumns,
+                                  rig_id,
+                                  query,
+                                  condition,
+                                  after,
+                                  static_cast<int>(size) + 1);
+  condition.Bind(&read);
   Listed<StoredSegment> listed;
   SegmentPlace last;
   while (read.Next()) {
@@ -113,13 +128,16 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
       break;
     }
     StoredSegment segment;
-    const absl::Status status = FillFromRow(db, read, rig_id, rig, &segment);
+    const absl::Status status = FillFromRow(db, read, &segment);
     if (absl::IsDataLoss(status)) {
       segment.problem = std::string(status.message());
     } else if (!status.ok()) {
       return status;
     }
-    last = {read.Double(kKeyColumn), segment.sequence};
+    last = {read.Double(kKeyColumn),
+            read.Int(kSteadyColumn),
+            read.Int(kRigColumn),
+            segment.sequence};
     listed.items.push_back(std::move(segment));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());

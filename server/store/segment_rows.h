@@ -53,12 +53,13 @@ absl::StatusOr<StoredSegment> ReadSegment(Connection* db,
                                           const std::string& rig,
                                           const SegmentKey& key);
 
-// A segment with damaged information is listed with a `problem`, so that one
-// damaged row does not hide the others.
+// Store::ListSegments. A segment with damaged information is listed with a
+// `problem`, so that one damaged row does not hide the others.
 absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
                                                       const std::string& rig,
                                                       const SegmentQuery& query,
-                                                      const Page& page);
+                                                      const Page& page,
+                                                      const RigQuery& of);
 
 // FAILED_PRECONDITION if the data was dropped.
 absl::StatusOr<Payload> ReadPayload(Connection* db,

@@ -354,8 +354,13 @@ class Store {
   // --- Segments.
   virtual absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
                                                    const SegmentKey& key) = 0;
+  // Of one rig or, if `rig` is empty, of those of `of`; then in an order by
+  // arrival (steady time) or gain. INVALID_ARGUMENT for another order.
   virtual absl::StatusOr<Listed<StoredSegment>> ListSegments(
-      const std::string& rig, const SegmentQuery& query, const Page& page) = 0;
+      const std::string& rig,
+      const SegmentQuery& query,
+      const Page& page,
+      const RigQuery& of = {}) = 0;
   // All segments, newest first.
   absl::StatusOr<Listed<StoredSegment>> ListSegments(const std::string& rig,
                                                      const Page& page) {
@@ -399,10 +404,10 @@ class Store {
       const std::string& rig, std::int64_t version) = 0;
   virtual absl::StatusOr<StoredCalibration> GetActiveCalibration(
       const std::string& rig) = 0;
-  // Newest first, of one rig or, if `rig` is empty, of all by their steady
-  // time, without damaged ones.
+  // Newest first, of one rig or, if `rig` is empty, of those of `of` by their
+  // steady time, without damaged ones.
   virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
-      const std::string& rig, const Page& page) = 0;
+      const std::string& rig, const Page& page, const RigQuery& of = {}) = 0;
   // Parameters of versions, of all rigs of the query, in the order of keys of
   // rigs, versions and components. NOT_FOUND for the name of no rig.
   virtual absl::StatusOr<Listed<StoredEstimate>> ListEstimates(
@@ -418,10 +423,10 @@ class Store {
   // --- Runs.
   virtual absl::StatusOr<StoredRun> GetRun(const std::string& rig,
                                            std::int64_t run) = 0;
-  // Newest first, of one rig or, if `rig` is empty, of all by their steady
-  // time.
-  virtual absl::StatusOr<Listed<StoredRun>> ListRuns(const std::string& rig,
-                                                     const Page& page) = 0;
+  // Newest first, of one rig or, if `rig` is empty, of those of `of` by their
+  // steady time.
+  virtual absl::StatusOr<Listed<StoredRun>> ListRuns(
+      const std::string& rig, const Page& page, const RigQuery& of = {}) = 0;
   // Pending and running runs of these rigs, or of those that a replica has
   // claimed, oldest first. After a restart, a running one starts again.
   virtual absl::StatusOr<std::vector<StoredRun>> ListUnfinishedRuns(
@@ -432,7 +437,8 @@ class Store {
       const std::string& rig, const Page& page) = 0;
 
   // --- Events, oldest or newest first, of one rig or, if `rig` is empty, of
-  // all. They are only ever appended.
+  // those of `of`: of every rig, also those of the daemon and of deleted rigs.
+  // They are only ever appended.
   //
   // Those of one rig are in the order of their numbers, in which they were
   // committed: whoever reads on after the last one misses none. Those of all
@@ -441,9 +447,13 @@ class Store {
   // read, by the duration of a transaction or by what the clocks of several
   // daemons differ.
   virtual absl::StatusOr<Listed<StoredEvent>> ListEvents(
-      const Page& page, const std::string& rig = "") = 0;
+      const Page& page,
+      const std::string& rig = "",
+      const RigQuery& of = {}) = 0;
   virtual absl::StatusOr<Listed<StoredEvent>> ListNewestEvents(
-      const Page& page, const std::string& rig = "") = 0;
+      const Page& page,
+      const std::string& rig = "",
+      const RigQuery& of = {}) = 0;
   // Appends an event of the daemon (without a rig); its number is assigned.
   virtual absl::Status AppendEvent(const StoredEvent& event) = 0;
 

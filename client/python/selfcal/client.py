@@ -104,9 +104,21 @@ class Daemon:
         for page in self._pages(self.uplink_service.ListInstructions, request):
             yield from page.instructions
 
-    def segments(self, rig_id: str) -> Iterator[segment.Segment]:
-        """Newest first."""
-        request = segment.ListSegmentsRequest(parent=f"rigs/{rig_id}")
+    def segments(
+        self,
+        rig_id: str = "",
+        *,
+        filter: str = "",
+        order_by: str = "",
+        rig_filter: str = "",
+    ) -> Iterator[segment.Segment]:
+        """The segments of a rig, or of all rigs of a filter; newest first."""
+        request = segment.ListSegmentsRequest(
+            parent=_parent(rig_id),
+            filter=filter,
+            order_by=order_by,
+            rig_filter=rig_filter,
+        )
         for page in self._pages(self.segment_service.ListSegments, request):
             yield from page.segments
 
@@ -144,11 +156,13 @@ class Daemon:
         )
 
     def calibrations(
-        self, rig_id: str = ""
+        self, rig_id: str = "", *, rig_filter: str = ""
     ) -> Iterator[calibration.Calibration]:
-        """All versions, including rejected ones, of a rig or of all; newest
-        first."""
-        request = calibration.ListCalibrationsRequest(parent=_parent(rig_id))
+        """All versions, including rejected ones, of a rig or of all rigs of a
+        filter; newest first."""
+        request = calibration.ListCalibrationsRequest(
+            parent=_parent(rig_id), rig_filter=rig_filter
+        )
         for page in self._pages(
             self.calibration_service.ListCalibrations, request
         ):
@@ -226,19 +240,22 @@ class Daemon:
             timeout=self._timeout_s,
         )
 
-    def events(self, rig_id: str = "") -> Iterator[store.Event]:
-        """Oldest first; of every rig without an id."""
-        parent = f"rigs/{rig_id}" if rig_id else ""
-        request = store.ListEventsRequest(parent=parent)
+    def events(
+        self, rig_id: str = "", *, rig_filter: str = ""
+    ) -> Iterator[store.Event]:
+        """Oldest first, of a rig, or of all or those of a filter."""
+        request = store.ListEventsRequest(
+            parent=_parent(rig_id), rig_filter=rig_filter
+        )
         for page in self._pages(self.store_service.ListEvents, request):
             yield from page.events
 
     def recalibrations(
-        self, rig_id: str = ""
+        self, rig_id: str = "", *, rig_filter: str = ""
     ) -> Iterator[recalibration.Recalibration]:
-        """The runs of a rig or of all; newest first."""
+        """The runs of a rig, or of all rigs of a filter; newest first."""
         request = recalibration.ListRecalibrationsRequest(
-            parent=_parent(rig_id)
+            parent=_parent(rig_id), rig_filter=rig_filter
         )
         for page in self._pages(
             self.recalibration_service.ListRecalibrations, request

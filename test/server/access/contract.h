@@ -63,6 +63,11 @@ inline bool IsOpenToAnybody(const MethodDescriptor& method) {
          v1::AccessRule::ANYBODY;
 }
 
+// True if the method answers for the rigs of the caller.
+inline bool IsLimitedToRights(const MethodDescriptor& method) {
+  return method.options().GetExtension(v1::access).limited_to_rights();
+}
+
 // The methods that need a role.
 inline std::vector<const MethodDescriptor*> Methods() {
   return MethodsThat(

@@ -32,12 +32,21 @@ class AccessTest : public ServiceTest {
     certificates_.Add("admin", "ca", role + "administer");
     certificates_.Add("reader", "ca", role + "read");
     certificates_.Add("device-a", "ca", role + "produce/rigs/a");
+    certificates_.Add("north", "ca", role + "administer/labels/site/north");
     certificates_.Add("nothing", "ca", "DNS:nothing,URI:https://x/administer");
     certificates_.AddAuthority("other");
     certificates_.Add("stranger", "other", role + "administer");
     certificates_.Add("expired", "ca", role + "administer", -1);
     AddRig("a");
     AddRig("b");
+    const auto labelled = domain_->UpdateRig(
+        "b",
+        [](StoredRig rig) -> absl::StatusOr<StoredRig> {
+          rig.labels["site"] = "north";
+          return rig;
+        },
+        "test");
+    if (!labelled.ok()) throw std::runtime_error(labelled.status().ToString());
     ServerOptions options;
     options.listen = {"127.0.0.1:0"};
     options.tls = {certificates_.Pem("server"),
@@ -120,10 +129,12 @@ TEST_F(AccessTest, EveryMethodAsksForTheRole) {
   }
 }
 
-// What the rules let pass because no method takes an empty name.
+// What the rules let pass because no method takes an empty name; lists without
+// one are of the rigs of the caller (LimitedCallerTest).
 TEST_F(AccessTest, EmptyNameIsNoWayRoundTheRig) {
   const auto device = As("device-a");
   for (const MethodDescriptor* method : Methods()) {
+    if (IsLimitedToRights(*method)) continue;
     EXPECT_FALSE(
         CallWith(device, *method, *RequestFor(*method, ""), kDeadline).ok() &&
         !method->client_streaming())
@@ -171,6 +182,12 @@ TEST_F(AccessTest, NobodyDoesWhatItMayNot) {
       {"nothing", true, {}},
       {"reader", true, {{Role::kRead, ""}}},
       {"device-a", true, {{Role::kProduce, "a"}}},
+      {"north", true, {{Role::kAdminister, "", Label("site", "north")}}},
+  };
+  const LabelsOf labels_of = [](const std::string& rig) {
+    std::map<std::string, std::string> labels;
+    if (rig == "b") labels["site"] = "north";
+    return labels;
   };
   Promise promise("only those who may, do");
   const int trials = Trials(50);
@@ -184,7 +201,8 @@ TEST_F(AccessTest, NobodyDoesWhatItMayNot) {
     const std::string name = pick(std::vector<std::string>{"rigs/a", "rigs/b"});
     const auto request = RequestFor(method, name);
     const bool may =
-        kind.known && Authorise({"x", kind.grants}, method, *request).ok();
+        kind.known &&
+        Authorise({"x", kind.grants}, method, *request, labels_of).ok();
     const auto code = CallWith(As(kind.certificate),
                                method,
                                *request,

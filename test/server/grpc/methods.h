@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "test/server/access/contract.h"
 
@@ -13,10 +14,12 @@ namespace selfcal::server {
 
 // Sends one request and reads what comes until the end, but not longer than
 // the deadline: a watch goes on for ever. On the wire a unary call is a stream.
+// *responses, if given, gets what was read, encoded.
 inline grpc::Status CallWith(const std::shared_ptr<grpc::Channel>& channel,
                              const MethodDescriptor& method,
                              const google::protobuf::Message& request,
-                             std::chrono::milliseconds deadline) {
+                             std::chrono::milliseconds deadline,
+                             std::vector<std::string>* responses = nullptr) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + deadline);
   const std::string path =
@@ -33,6 +36,11 @@ inline grpc::Status CallWith(const std::shared_ptr<grpc::Channel>& channel,
   stream->WritesDone();
   grpc::ByteBuffer response;
   while (stream->Read(&response)) {
+    if (responses == nullptr) continue;
+    grpc::Slice whole;
+    if (response.DumpToSingleSlice(&whole).ok()) {
+      responses->emplace_back(whole.begin(), whole.end());
+    }
   }
   return stream->Finish();
 }

@@ -1,6 +1,9 @@
 // Lists over all rigs: by time, page by page.
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "core/model/calibration.h"
 #include "test/server/store/store_test.h"
@@ -9,6 +12,7 @@
 namespace selfcal::server {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::SizeIs;
 
@@ -31,6 +35,19 @@ class FleetListsTest : public StoreTest {
     const auto finished = domain_->FinishRun(
         id, run->run, TestCalibration(rig, *store_->GetRun(id, run->run)));
     ASSERT_TRUE(finished.ok()) << finished.status();
+  }
+
+  void SetLabel(const std::string& id,
+                const std::string& name,
+                const std::string& value) {
+    const auto updated = domain_->UpdateRig(
+        id,
+        [&](StoredRig rig) -> absl::StatusOr<StoredRig> {
+          rig.labels[name] = value;
+          return rig;
+        },
+        "eve");
+    ASSERT_TRUE(updated.ok()) << updated.status();
   }
 
   template <typename Fetch, typename Text>
@@ -102,15 +119,7 @@ TEST_P(FleetListsTest, ParametersGoByRigAndVersion) {
                                               "b2 " + query.component));
   query.rigs.labels = {{"model", "t4"}};
   EXPECT_THAT(all(query), SizeIs(0));
-  ASSERT_TRUE(domain_
-                  ->UpdateRig(
-                      "b",
-                      [](StoredRig rig) -> absl::StatusOr<StoredRig> {
-                        rig.labels["model"] = "t4";
-                        return rig;
-                      },
-                      "eve")
-                  .ok());
+  SetLabel("b", "model", "t4");
   EXPECT_THAT(all(query), ElementsAre("b2 " + query.component));
 }
 
@@ -158,6 +167,125 @@ TEST_P(FleetListsTest, ATokenIsOfItsList) {
       store_->ListCalibrations("", {1, all->next_token}).status()));
   EXPECT_TRUE(
       absl::IsInvalidArgument(store_->ListRuns("", {1, "nonsense"}).status()));
+}
+
+TEST_P(FleetListsTest, SegmentsOfAllRigsGoByArrivalOrGain) {
+  const auto add = [&](const std::string& id, int index, double gain) {
+    now_ns_ += 1'000'000'000;
+    Put(id, index);
+    Score(TestRig(id), index, 1.0, gain);
+  };
+  for (const std::string id : {"b", "a", "c"}) {
+    ASSERT_TRUE(domain_->CreateRig(TestRig(id)).ok());
+  }
+  add("b", 0, 2.0);
+  add("a", 0, 4.0);
+  add("c", 0, 3.0);
+  add("a", 1, 1.0);
+  const auto all = [&](const SegmentQuery& query, const RigQuery& of) {
+    return Pages(
+        [&](const Page& page) {
+          return store_->ListSegments("", query, page, of);
+        },
+        [](const StoredSegment& segment) {
+          return segment.rig + std::to_string(segment.key.index);
+        });
+  };
+  EXPECT_THAT(all({}, {}), ElementsAre("a1", "c0", "a0", "b0"));
+  SegmentQuery query;
+  query.descending = false;
+  EXPECT_THAT(all(query, {}), ElementsAre("b0", "a0", "c0", "a1"));
+  query.order = SegmentQuery::Order::kGain;
+  query.order_group = TestRig("a").groups[0].name;
+  EXPECT_THAT(all(query, {}), ElementsAre("a1", "b0", "c0", "a0"));
+  query.descending = true;
+  EXPECT_THAT(all(query, {}), ElementsAre("a0", "c0", "b0", "a1"));
+  query.scored_group = query.order_group;
+  query.gain_nats.least = 2.5;
+  EXPECT_THAT(all(query, {}), ElementsAre("a0", "c0"));
+
+  RigQuery of;
+  of.name = "a";
+  EXPECT_THAT(all({}, of), ElementsAre("a1", "a0"));
+  of.name = "";
+  SetLabel("c", "model", "t4");
+  of.labels = {{"model", "t4"}};
+  EXPECT_THAT(all({}, of), ElementsAre("c0"));
+  of.labels = {};
+  of.choice = RigChoice{{"b"}, {{"model", "t4"}}};
+  EXPECT_THAT(all({}, of), ElementsAre("c0", "b0"));
+  EXPECT_THAT(all(query, of), ElementsAre("c0"));
+  of.choice = RigChoice{};
+  EXPECT_THAT(all({}, of), SizeIs(0));
+
+  query.order = SegmentQuery::Order::kLandmarks;
+  EXPECT_TRUE(absl::IsInvalidArgument(
+      store_->ListSegments("", query, Page{}).status()));
+  EXPECT_TRUE(store_->ListSegments("a", query, Page{}).ok());
+}
+
+// Every list of many rigs has those that have one of the names or labels, and
+// all conditions of a filter besides.
+TEST_P(FleetListsTest, ListsAreLimitedToAChoiceOfRigs) {
+  for (const std::string id : {"a", "b", "c", "d"}) Run(id, 1);
+  SetLabel("b", "site", "north");
+  SetLabel("c", "site", "south");
+  SetLabel("d", "site", "north");
+  SetLabel("d", "model", "t4");
+  const auto rigs = [&](const RigQuery& of) {
+    std::vector<std::set<std::string>> lists;
+    const auto add = [&](const auto& fetch, const auto& text) {
+      const auto names = Pages(fetch, text);
+      lists.emplace_back(names.begin(), names.end());
+    };
+    const auto rig_of = [](const auto& item) { return item.rig; };
+    add([&](const Page& page) { return store_->ListRuns("", page, of); },
+        rig_of);
+    add(
+        [&](const Page& page) {
+          return store_->ListCalibrations("", page, of);
+        },
+        rig_of);
+    add(
+        [&](const Page& page) {
+          return store_->ListSegments("", {}, page, of);
+        },
+        rig_of);
+    add([&](const Page& page) { return store_->ListEvents(page, "", of); },
+        rig_of);
+    add(
+        [&](const Page& page) {
+          return store_->ListNewestEvents(page, "", of);
+        },
+        rig_of);
+    add(
+        [&](const Page& page) {
+          return store_->ListEstimates({of, "", false}, page);
+        },
+        rig_of);
+    add([&](const Page& page) { return store_->ListRigSummaries(of, page); },
+        rig_of);
+    add([&](const Page& page) { return store_->ListRigs(of, page); },
+        [](const StoredRig& stored) { return stored.rig.id; });
+    return lists;
+  };
+  using Names = std::set<std::string>;
+  EXPECT_THAT(rigs({}), Each(Names{"a", "b", "c", "d"}));
+  RigQuery of;
+  of.choice = RigChoice{{"a"}, {{"site", "north"}}};
+  EXPECT_THAT(rigs(of), Each(Names{"a", "b", "d"}));
+  of.labels = {{"model", "t4"}};
+  EXPECT_THAT(rigs(of), Each(Names{"d"}));
+  of.labels = {{"model", "t4"}, {"site", "south"}};
+  EXPECT_THAT(rigs(of), Each(Names{}));
+  of.labels = {};
+  of.text = "c";
+  EXPECT_THAT(rigs(of), Each(Names{}));
+  of.choice = RigChoice{{"c"}, {}};
+  EXPECT_THAT(rigs(of), Each(Names{"c"}));
+  of = {};
+  of.choice = RigChoice{};
+  EXPECT_THAT(rigs(of), Each(Names{}));
 }
 
 TEST_P(FleetListsTest, DamagedVersionsDoNotHideOthers) {

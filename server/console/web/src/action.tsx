@@ -6,7 +6,8 @@ import { Failure, type ApiError } from './api';
 import type { Caller } from './contract';
 import { Problem } from './parts';
 
-// `rig` is the name of the resource, rigs/{rig}.
+// `rig` is the name of the resource, rigs/{rig}. A role on the rigs with a label
+// may be one on this rig: then the daemon decides.
 export function mayAdminister(caller: Caller | null, rig: string): boolean {
   return (caller?.grants ?? []).some(
     (grant) => grant.role === 'administer' && (grant.rig === '' || grant.rig === rig),
