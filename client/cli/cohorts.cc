@@ -1,13 +1,17 @@
 // cohort: what the devices of one model have in common.
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "client/cli/commands.h"
 #include "client/cli/list_options.h"
 #include "client/text/estimate_text.h"
 #include "client/text/text.h"
+#include "proto/resource_names.h"
 #include "selfcal/v1/fleet.grpc.pb.h"
 
 namespace selfcal::client {
@@ -106,6 +110,150 @@ int ShowCohort(Context* context, const v1::DescribeCohortRequest& request) {
   return kDone;
 }
 
+struct VersionOptions {
+  std::string cohort;  // LABEL=VALUE
+  std::int64_t version = 0;
+  std::string rig;
+  ListOptions list;
+};
+
+// Puts LABEL=VALUE into the request.
+absl::Status NameCohort(const std::string& cohort,
+                        v1::ListCohortsRequest* request) {
+  const std::size_t sign = cohort.find('=');
+  if (sign == 0 || sign == cohort.npos || sign + 1 == cohort.size()) {
+    return absl::InvalidArgumentError("'" + cohort +
+                                      "' is not a cohort: give LABEL=VALUE, "
+                                      "e.g. model=t4");
+  }
+  request->set_label(cohort.substr(0, sign));
+  request->set_value(cohort.substr(sign + 1));
+  return absl::OkStatus();
+}
+
+grpc::Status CallForCohorts(
+    Context* context,
+    const v1::ListCohortsRequest& request,
+    std::size_t limit,
+    const std::function<bool(const v1::CohortVersion&)>& wanted,
+    v1::ListCohortsResponse* cohorts) {
+  const auto stub = v1::FleetService::NewStub(context->Channel());
+  return CallForItems<FleetService>(stub.get(),
+                                    &FleetService::ListCohorts,
+                                    request,
+                                    &v1::ListCohortsResponse::mutable_cohorts,
+                                    limit,
+                                    wanted,
+                                    cohorts);
+}
+
+int ListCohorts(Context* context, const VersionOptions& options) {
+  v1::ListCohortsRequest request;
+  if (!options.cohort.empty()) {
+    const absl::Status named = NameCohort(options.cohort, &request);
+    if (!named.ok()) return FailInput(named);
+  }
+  v1::ListCohortsResponse cohorts;
+  const auto status =
+      CallForCohorts(context, request, options.list.limit, nullptr, &cohorts);
+  if (!status.ok()) return Fail(*context, status);
+  if (context->PrintList(cohorts)) return kDone;
+  Table table({{"cohort"},
+               {"version", true},
+               {"computed"},
+               {"rigs", true},
+               {"calibrated", true},
+               {"outliers", true},
+               {"prior"}});
+  for (const v1::CohortVersion& version : cohorts.cohorts()) {
+    const v1::Cohort& cohort = version.cohort();
+    table.Add({version.label() + "=" + version.value(),
+               fmt::format("{}", version.version()),
+               TimeText(version.create_time()),
+               fmt::format("{}", cohort.rigs()),
+               fmt::format("{}", cohort.calibrated()),
+               fmt::format("{}", cohort.outliers_size()),
+               cohort.has_prior() ? "yes" : "no"});
+  }
+  context->Print(table);
+  return kDone;
+}
+
+int PrintPrior(Context* context, const VersionOptions& options) {
+  v1::ListCohortsRequest request;
+  const absl::Status named = NameCohort(options.cohort, &request);
+  if (!named.ok()) return FailInput(named);
+  v1::ListCohortsResponse cohorts;
+  const auto status = CallForCohorts(
+      context,
+      request,
+      1,
+      [&](const v1::CohortVersion& version) {
+        return options.version == 0 || version.version() == options.version;
+      },
+      &cohorts);
+  if (!status.ok()) return Fail(*context, status);
+  if (cohorts.cohorts().empty()) {
+    return FailInput(absl::NotFoundError(
+        options.version == 0
+            ? "there are no statistics of the cohort " + options.cohort +
+                  "; 'selfcal cohort list' shows those that there are"
+            : "the cohort has no such version; 'selfcal cohort list " +
+                  options.cohort + "' shows those that it has"));
+  }
+  const v1::Cohort& cohort = cohorts.cohorts(0).cohort();
+  if (!cohort.has_prior()) {
+    return FailInput(absl::FailedPreconditionError(
+        fmt::format("only {} devices of the cohort are calibrated, too few for "
+                    "a prior",
+                    cohort.calibrated())));
+  }
+  v1::Rig rig = cohort.prior();
+  rig.set_name(RigName(options.rig));
+  const auto [label, value] =
+      std::pair(cohorts.cohorts(0).label(), cohorts.cohorts(0).value());
+  (*rig.mutable_labels())[label] = value;
+  context->PrintJson(rig);
+  return kDone;
+}
+
+void AddVersionCommands(CLI::App* cohorts, Context* context) {
+  const auto options = std::make_shared<VersionOptions>();
+  CLI::App* list = cohorts->add_subcommand(
+      "list",
+      "List the newest statistics of each cohort that a hub describes "
+      "(cohort-label), or every version of those of one");
+  list->add_option("COHORT", options->cohort, "LABEL=VALUE, e.g. model=t4");
+  list->add_option("--limit",
+                   options->list.limit,
+                   "Only this many, the first of the list [all]");
+  AddCsv(list, context);
+  list->callback([context, options] {
+    context->command = [context, options] {
+      return ListCohorts(context, *options);
+    };
+  });
+
+  CLI::App* prior = cohorts->add_subcommand(
+      "prior",
+      "Print the rig of a new device of a cohort, for 'rig create': with the "
+      "mean of the devices as its factory calibration, and their spread as "
+      "its prior sigmas");
+  prior->add_option("COHORT", options->cohort, "LABEL=VALUE, e.g. model=t4")
+      ->required();
+  prior->add_option("RIG", options->rig, "Name of the new rig")->required();
+  prior
+      ->add_option("--version",
+                   options->version,
+                   "Of the statistics, as in the list [newest]")
+      ->check(CLI::Range(std::int64_t{1}, INT64_MAX));
+  prior->callback([context, options] {
+    context->command = [context, options] {
+      return PrintPrior(context, *options);
+    };
+  });
+}
+
 }  // namespace
 
 void AddCohortCommands(CLI::App* app, Context* context) {
@@ -133,6 +281,7 @@ void AddCohortCommands(CLI::App* app, Context* context) {
       return ShowCohort(context, *request);
     };
   });
+  AddVersionCommands(cohorts, context);
 }
 
 }  // namespace selfcal::client

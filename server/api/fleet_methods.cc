@@ -34,6 +34,29 @@ absl::StatusOr<v1::Cohort> DescribeCohort(
   return Encode(report);
 }
 
+absl::StatusOr<v1::ListCohortsResponse> ListCohorts(
+    const ApiContext& context,
+    const Call&,
+    const v1::ListCohortsRequest& request) {
+  if (request.label().empty() != request.value().empty()) {
+    return InvalidFields({{request.label().empty() ? "label" : "value",
+                           "is empty; give both, or neither for the newest "
+                           "version of every cohort"}});
+  }
+  return FillPage<v1::ListCohortsResponse>(
+      request,
+      "",
+      [&](const Page& page) {
+        return context.store->ListCohorts(
+            request.label(), request.value(), page);
+      },
+      [](const StoredCohort& cohort,
+         v1::ListCohortsResponse* to) -> absl::Status {
+        SELFCAL_ASSIGN_OR_RETURN(*to->add_cohorts(), Encode(cohort));
+        return absl::OkStatus();
+      });
+}
+
 absl::StatusOr<v1::ListEstimatesResponse> ListEstimates(
     const ApiContext& context,
     const Call& call,
@@ -59,6 +82,7 @@ absl::StatusOr<v1::ListEstimatesResponse> ListEstimates(
 
 void AddFleetMethods(Methods* methods) {
   methods->Add(DescribeCohort);
+  methods->Add(ListCohorts);
   methods->Add(ListEstimates);
 }
 

@@ -13,6 +13,7 @@
 #include "server/domain/domain_options.h"
 #include "server/grpc/server.h"
 #include "server/host/host_conditions.h"
+#include "server/population/population_options.h"
 #include "server/uplink/uplink_options.h"
 
 namespace selfcal::server {
@@ -43,6 +44,7 @@ struct DaemonOptions {
   std::string metrics = "off";   // or host:port of the loopback interface
   int metrics_rigs = 16;         // number of rigs with their own series
   UplinkOptions uplink;
+  PopulationOptions population;
   std::string console = "off";      // or host:port
   Role console_role = Role::kRead;  // of users on the loopback interface
   std::string log_level = "info";

@@ -29,6 +29,7 @@
 #include "server/host/machine_clocks.h"
 #include "server/metrics/metrics.h"
 #include "server/pipeline/pipeline.h"
+#include "server/population/population.h"
 #include "server/status/status_macros.h"
 #include "server/store/outbox.h"
 #include "server/uplink/uplink.h"
@@ -283,12 +284,15 @@ std::optional<int> ServeOnce(
     return Failed("cannot serve", server.status());
   }
   if (*metrics != nullptr) (*metrics)->AddTls((*server)->tls());
+  Population population(
+      &domain, options.population, [&] { return (*clock)->Now().time_ns; });
   const auto uplink = OpenUplink(options, store, &api);
   if (!uplink.ok()) {
     (*server)->Shutdown(kCallLimit);
     pipeline->Stop();
     return Failed("cannot report to the hub", uplink.status());
   }
+  population.Start();
   spdlog::info("selfcald ready: listening on {}",
                fmt::join((*server)->addresses(), ", "));
   NotifyReady();
@@ -316,6 +320,7 @@ std::optional<int> ServeOnce(
         "stopping, to be restarted: the limit of open files was reached, and "
         "no new connections are accepted");
   }
+  population.Stop();
   if (*uplink != nullptr) (*uplink)->Stop();
   api.Stop();
   console->reset();

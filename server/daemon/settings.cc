@@ -360,6 +360,30 @@ void DefineUplink(Definer* define, DaemonOptions* options) {
       ->default_str("administer");
 }
 
+// A label has the form that labels of rigs have.
+void DefinePopulation(Definer* define, PopulationOptions* options) {
+  define
+      ->Add("cohort-label",
+            &options->label,
+            "Label of which each value is a cohort, whose statistics are "
+            "computed and stored from time to time, e.g. model; default: none")
+      ->check([](const std::string& label) -> std::string {
+        constexpr char kLetters[] = "abcdefghijklmnopqrstuvwxyz";
+        constexpr char kAll[] = "abcdefghijklmnopqrstuvwxyz0123456789_-";
+        if (label.empty()) return "";
+        const bool is_name = label.size() <= 63 &&
+                             label.find_first_of(kLetters) == 0 &&
+                             label.find_first_not_of(kAll) == label.npos;
+        return is_name ? "" : "'" + label + "' is not the name of a label";
+      });
+  define
+      ->Add("cohort-interval",
+            &options->interval_s,
+            "Seconds between these computations")
+      ->check(CLI::Range(60.0, static_cast<double>(kMaxSeconds)))
+      ->capture_default_str();
+}
+
 void DefineReports(Definer* define, DaemonOptions* options) {
   define
       ->Add("metrics",
@@ -421,6 +445,7 @@ void DefineSettings(CLI::App* app,
   DefineEstimation(&define, options);
   DefineRuns(&define, options);
   DefineUplink(&define, options);
+  DefinePopulation(&define, &options->population);
   DefineReports(&define, options);
 }
 

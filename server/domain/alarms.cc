@@ -10,6 +10,9 @@ namespace selfcal::server {
 
 std::vector<Alarm> AlarmsOf(const RigSummary& rig, std::int64_t now_ns) {
   std::vector<Alarm> alarms;
+  if (rig.unlike_cohort != 0 && rig.unlike_cohort == rig.active_version) {
+    alarms.push_back(Alarm::kUnlikeCohort);
+  }
   if (rig.newest_change_ns > rig.active_since_ns) {
     alarms.push_back(Alarm::kDeviceChanged);
   }

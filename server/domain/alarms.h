@@ -21,6 +21,7 @@ enum class Alarm {
   kRunFailed = 2,      // the newest one
   kRejected = 3,       // the newest version
   kDeviceChanged = 4,  // since the active version became active
+  kUnlikeCohort = 5,   // the active version contradicts the cohort of the rig
 };
 
 constexpr std::int64_t BitOf(Alarm alarm) {

@@ -1,6 +1,7 @@
 #include "server/domain/domain.h"
 
 #include <future>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -20,6 +21,7 @@
 #include "server/domain/session_trigger.h"
 #include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
+#include "server/store/cohorts.h"
 #include "server/store/estimates.h"
 #include "server/store/events.h"
 #include "server/store/report.h"
@@ -294,6 +296,31 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartTimedRuns(
 absl::Status Domain::NoteSilentDevices() {
   return store_->RaiseSilent(clock_().time_ns - kSilentAfterNs,
                              BitOf(Alarm::kSilent));
+}
+
+absl::Status Domain::NoteOutliers(
+    const std::map<std::string, std::int64_t>& outliers, bool all) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto before, store_->ListOutliers());
+  std::map<std::string, std::int64_t> changes;  // 0: not an outlier any more
+  for (const auto& [rig, version] : before) {
+    if (all && !outliers.contains(rig)) changes[rig] = 0;
+  }
+  for (const auto& outlier : outliers) {
+    const auto known = before.find(outlier.first);
+    if (known == before.end() || known->second != outlier.second) {
+      changes.insert(outlier);
+    }
+  }
+  for (const auto& [rig, version] : changes) {
+    const absl::Status noted =
+        ChangeOnly(store_, rig, clock_(), [version = version](UnitOfWork* tx) {
+          SELFCAL_RETURN_IF_ERROR(WriteOutlier(tx, version));
+          return StoreAlarms(tx);
+        });
+    // A rig that is gone is no outlier.
+    if (!noted.ok() && !absl::IsNotFound(noted)) return noted;
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(

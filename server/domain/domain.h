@@ -16,6 +16,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -171,6 +172,11 @@ class Domain {
   absl::StatusOr<std::vector<StoredRun>> StartTimedRuns(std::int64_t now_ns);
   // Gives an alarm to the rigs whose devices have not reported for a day.
   absl::Status NoteSilentDevices();
+  // Gives an alarm to the rigs whose versions contradict their cohorts, as long
+  // as these are active, and takes it from all others, unless not `all` cohorts
+  // were described.
+  absl::Status NoteOutliers(const std::map<std::string, std::int64_t>& outliers,
+                            bool all);
   // Creates the runs of all rigs whose session has ended (session_trigger.h):
   // the rig is one of `ended`, or none of its segments arrived after the steady
   // time `idle_since_ns`.

@@ -16,6 +16,10 @@ constexpr std::int64_t kUnreachableNs = std::int64_t{3600} * 1'000'000'000;
 // The sentences of an alarm: one, or one for each table.
 std::vector<std::string> SentencesOf(Alarm alarm, const RigSummary& rig) {
   switch (alarm) {
+    case Alarm::kUnlikeCohort:
+      return {"version " + std::to_string(rig.active_version) +
+              " contradicts the other devices of its cohort; see in which "
+              "components by 'selfcal cohort show'"};
     case Alarm::kDeviceChanged:
       return {"the device has changed since version " +
               std::to_string(rig.active_version) +

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/calibration.h"
+#include "core/population/estimate.h"
 #include "proto/resource_names.h"
+#include "server/encode/encode.h"
+#include "server/encode/set_time.h"
 
 namespace selfcal::server {
 namespace {
@@ -32,16 +36,35 @@ void EncodeOutlier(const CohortReport::Outlier& outlier,
   }
 }
 
+// A rig for a new device. Correlations are left out: prior sigmas have none.
+v1::Rig EncodePrior(const CohortReport& report,
+                    const std::vector<TangentComponent>& components) {
+  const DevicePrediction device = PredictDevice(report.cohort);
+  StoredRig prior = report.reference;
+  prior.rig.factory = BoxPlus(report.cohort.reference, device.mean);
+  prior.rig.prior_sigmas.clear();
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    const double sigma = Sigma(device.covariance, static_cast<Eigen::Index>(k));
+    if (sigma > 0)
+      prior.rig.prior_sigmas.push_back({components[k].name, sigma});
+  }
+  prior.labels.clear();
+  v1::Rig message = Encode(prior);
+  message.clear_name();
+  message.clear_create_time();
+  return message;
+}
+
 }  // namespace
 
 v1::Cohort Encode(const CohortReport& report) {
   v1::Cohort message;
   const Cohort& cohort = report.cohort;
-  message.set_reference(RigName(report.reference));
+  message.set_reference(RigName(report.reference.rig.id));
   message.set_rigs(report.rigs);
   message.set_calibrated(report.calibrated);
   message.set_truncated(report.truncated);
-  message.set_estimated(!cohort.devices.empty());
+  message.set_estimated(std::ssize(cohort.devices) >= kLeastCohort);
   const auto components = TangentComponents(cohort.reference);
   const Eigen::VectorXd values = ReadableValues(cohort.reference);
   for (std::size_t k = 0; k < components.size(); ++k) {
@@ -60,6 +83,14 @@ v1::Cohort Encode(const CohortReport& report) {
     component->set_spread(Sigma(cohort.S, j));
     component->set_spread_degrees(cohort.degrees(j));
   }
+  if (message.estimated()) {
+    *message.mutable_prior() = EncodePrior(report, components);
+  }
+  for (const CohortReport::Device& device : report.devices) {
+    v1::CohortDevice* added = message.add_devices();
+    added->set_rig(RigName(device.rig));
+    added->set_version(device.version);
+  }
   for (const CohortReport::Outlier& outlier : report.outliers) {
     EncodeOutlier(outlier, components, message.add_outliers());
   }
@@ -67,6 +98,19 @@ v1::Cohort Encode(const CohortReport& report) {
     v1::SkippedRig* rig = message.add_skipped();
     rig->set_rig(RigName(skipped.rig));
     rig->set_reason(skipped.reason);
+  }
+  return message;
+}
+
+absl::StatusOr<v1::CohortVersion> Encode(const StoredCohort& cohort) {
+  v1::CohortVersion message;
+  message.set_label(cohort.label);
+  message.set_value(cohort.value);
+  message.set_version(cohort.version);
+  SetTime(cohort.time_ns, message.mutable_create_time());
+  if (!message.mutable_cohort()->ParseFromString(cohort.content)) {
+    return absl::DataLossError("the statistics of the cohort " + cohort.label +
+                               "=" + cohort.value + " cannot be read");
   }
   return message;
 }

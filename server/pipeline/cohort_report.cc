@@ -26,7 +26,7 @@ class Reader {
   absl::Status Read(const StoredRig& stored) {
     const Rig& rig = stored.rig;
     if (report_->rigs++ == 0) {
-      report_->reference = rig.id;
+      report_->reference = stored;
       reference_ = rig.factory;
       scale_ = PriorSigmas(rig);
     } else if (!SameShape(rig.factory, reference_)) {
@@ -52,6 +52,12 @@ class Reader {
     report_->calibrated = static_cast<int>(devices_.size());
     report_->cohort = EstimateCohort(reference_, scale_, informations_);
     FindQuantiles();
+    for (const Device& device : devices_) {
+      report_->devices.push_back({device.rig, device.version});
+    }
+    std::sort(report_->devices.begin(),
+              report_->devices.end(),
+              [](const auto& a, const auto& b) { return a.rig < b.rig; });
     for (const int index : report_->cohort.outliers) {
       report_->outliers.push_back(
           {devices_[index].rig,

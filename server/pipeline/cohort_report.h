@@ -29,12 +29,18 @@ struct CohortReport {
   static constexpr std::array<double, 5> kShares = {
       0.05, 0.25, 0.5, 0.75, 0.95};
 
-  std::string reference;  // rig whose factory calibration is cohort.reference
-  int rigs = 0;           // looked at
+  struct Device {
+    std::string rig;
+    std::int64_t version = 0;
+  };
+
+  StoredRig reference;  // whose factory calibration is cohort.reference
+  int rigs = 0;         // looked at
   int calibrated = 0;
   bool truncated = false;  // there are more
   Cohort cohort;
   Eigen::MatrixXd quantiles;      // D x kShares.size(), of offsets [reference]
+  std::vector<Device> devices;    // the calibrated ones, by name
   std::vector<Outlier> outliers;  // the least likely first
   std::vector<Skipped> skipped;
 };

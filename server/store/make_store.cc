@@ -9,6 +9,7 @@
 #include "server/store/calibrations.h"
 #include "server/store/change_rows.h"
 #include "server/store/clock_record.h"
+#include "server/store/cohorts.h"
 #include "server/store/driver/transaction.h"
 #include "server/store/estimates.h"
 #include "server/store/events.h"
@@ -237,6 +238,32 @@ class DatabaseStore final : public Store {
       const std::string& rig, const Page& page) override {
     return Read(
         [&](Connection* db) { return ListInstructionRows(db, rig, page); });
+  }
+
+  absl::StatusOr<Listed<StoredCohort>> ListCohorts(const std::string& label,
+                                                   const std::string& value,
+                                                   const Page& page) override {
+    return Read(
+        [&](Connection* db) { return ListCohortRows(db, label, value, page); });
+  }
+
+  absl::StatusOr<std::vector<std::string>> ListLabelValues(
+      const std::string& label) override {
+    return Read([&](Connection* db) { return LabelValues(db, label); });
+  }
+
+  absl::StatusOr<std::map<std::string, std::int64_t>> ListOutliers() override {
+    return Read([&](Connection* db) { return Outliers(db); });
+  }
+
+  absl::StatusOr<std::int64_t> PutCohort(const StoredCohort& cohort,
+                                         std::int64_t kept) override {
+    absl::StatusOr<std::int64_t> version;
+    SELFCAL_RETURN_IF_ERROR(WriteInTransaction(db_.get(), [&](Connection* db) {
+      version = InsertCohort(db, cohort, kept);
+      return version.status();
+    }));
+    return version;
   }
 
   absl::StatusOr<Listed<StoredEvent>> ListEvents(const Page& page,

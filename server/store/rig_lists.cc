@@ -188,6 +188,9 @@ absl::Status ReadState(Connection* db, std::int64_t rig, RigSummary* summary) {
                                    "SELECT time_ns FROM changes WHERE rig = ?1 "
                                    "ORDER BY change DESC LIMIT 1",
                                    rig));
+  SELFCAL_ASSIGN_OR_RETURN(
+      summary->unlike_cohort,
+      ReadInt(db, "SELECT version FROM cohort_outliers WHERE rig = ?1", rig));
   return ReadDevice(db, rig, summary);
 }
 

@@ -152,6 +152,7 @@ absl::Status DeleteRigRows(UnitOfWork* tx) {
                             "segments",
                             "claims",
                             "rig_labels",
+                            "cohort_outliers",
                             "instructions",
                             "reported_rigs",
                             "rigs"}) {

@@ -268,6 +268,15 @@ struct StoredInstruction {
   std::int64_t end_time_ns = 0;  // 0 while it is pending
 };
 
+// The statistics of a cohort, the rigs with this label, as they were once.
+struct StoredCohort {
+  std::string label;
+  std::string value;
+  std::int64_t version = 0;  // counts from 1 in a cohort
+  std::int64_t time_ns = 0;  // since the Unix epoch
+  std::string content;       // selfcal.v1.Cohort, serialised
+};
+
 // The state of the reports of a device to its hub, about one rig.
 struct ReportState {
   std::int64_t time_ns = 0;     // of the last that was taken; 0: none
@@ -289,6 +298,7 @@ struct RigSummary {
   std::int64_t newest_run = 0;  // 0: none, as for the change
   RunState run_state = RunState::kPending;
   std::int64_t newest_change_ns = 0;  // device change
+  std::int64_t unlike_cohort = 0;     // version that contradicts the cohort
   std::optional<ReportState> uplink;  // on a device that has a hub
   std::optional<ReportState> device;  // at the hub, if a device reports it
 };
@@ -435,6 +445,23 @@ class Store {
   // --- Instructions for the device of a rig, newest first.
   virtual absl::StatusOr<Listed<StoredInstruction>> ListInstructions(
       const std::string& rig, const Page& page) = 0;
+
+  // --- Cohorts. Their statistics are of no one rig.
+  // Every version of a cohort, newest first, or the newest of each if the label
+  // is empty.
+  virtual absl::StatusOr<Listed<StoredCohort>> ListCohorts(
+      const std::string& label, const std::string& value, const Page& page) = 0;
+  // The values that rigs have of a label, in their order.
+  virtual absl::StatusOr<std::vector<std::string>> ListLabelValues(
+      const std::string& label) = 0;
+  // The rigs of which a version contradicted its cohort, with that version.
+  virtual absl::StatusOr<std::map<std::string, std::int64_t>>
+  ListOutliers() = 0;
+  // Stores the next version of a cohort, whatever the record states, and
+  // deletes all but the newest `kept`. Returns its number; 0 if another daemon
+  // stored it at the same time.
+  virtual absl::StatusOr<std::int64_t> PutCohort(const StoredCohort& cohort,
+                                                 std::int64_t kept) = 0;
 
   // --- Events, oldest or newest first, of one rig or, if `rig` is empty, of
   // those of `of`: of every rig, also those of the daemon and of deleted rigs.

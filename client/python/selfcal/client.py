@@ -183,6 +183,15 @@ class Daemon:
             timeout=self._timeout_s,
         )
 
+    def cohorts(
+        self, label: str = "", value: str = ""
+    ) -> Iterator[fleet.CohortVersion]:
+        """The newest statistics of each cohort that a hub describes, or every
+        version of those of one; newest first."""
+        request = fleet.ListCohortsRequest(label=label, value=value)
+        for page in self._pages(self.fleet_service.ListCohorts, request):
+            yield from page.cohorts
+
     def estimates(
         self,
         rig_id: str = "",

@@ -230,6 +230,18 @@ struct CannedDaemon final : v1::RigService::Service,
     *response = cohort;
     return grpc::Status::OK;
   }
+  grpc::Status ListCohorts(grpc::ServerContext*,
+                           const v1::ListCohortsRequest* request,
+                           v1::ListCohortsResponse* response) override {
+    for (const v1::CohortVersion& version : cohorts.cohorts()) {
+      const bool chosen = request->label() == version.label() &&
+                          request->value() == version.value();
+      if (request->label().empty() || chosen) {
+        *response->add_cohorts() = version;
+      }
+    }
+    return grpc::Status::OK;
+  }
   grpc::Status CompareCalibrations(
       grpc::ServerContext*,
       const v1::CompareCalibrationsRequest* request,
@@ -334,6 +346,7 @@ struct CannedDaemon final : v1::RigService::Service,
 
   std::string target;
   v1::Cohort cohort;
+  v1::ListCohortsResponse cohorts;  // newest first
   v1::DescribeCohortRequest cohort_request;
   GrpcServer server{{static_cast<v1::RigService::Service*>(this),
                      static_cast<v1::SegmentService::Service*>(this),

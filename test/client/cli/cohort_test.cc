@@ -1,4 +1,4 @@
-// selfcal cohort show.
+// selfcal cohort.
 #include <gmock/gmock.h>
 
 #include "test/client/cli/commands_fixture.h"
@@ -75,6 +75,67 @@ TEST_F(CohortShow, SaysWhereTooFewAreCalibrated) {
 
 TEST_F(CohortShow, RefusesMoreRigsThanTheDaemonTakes) {
   EXPECT_EQ(Selfcal({"cohort", "show", "--max-rigs", "2001"}).code, 2);
+}
+
+class CohortVersions : public Commands {
+ protected:
+  CohortVersions() {
+    for (const int version : {3, 2}) Add("t4", version, true);
+    Add("t5", 1, false);
+  }
+
+  void Add(const std::string& value, int version, bool estimated) {
+    v1::CohortVersion* added = daemon_.cohorts.add_cohorts();
+    added->set_label("model");
+    added->set_value(value);
+    added->set_version(version);
+    v1::Cohort* cohort = added->mutable_cohort();
+    cohort->set_rigs(10 + version);
+    cohort->set_calibrated(estimated ? 10 : 4);
+    cohort->set_estimated(estimated);
+    if (estimated) cohort->mutable_prior()->set_pixel_sigma_px(version);
+  }
+};
+
+TEST_F(CohortVersions, AreListed) {
+  const Outcome all = Selfcal({"cohort", "list"});
+  ASSERT_EQ(all.code, 0) << all.err;
+  EXPECT_THAT(all.out,
+              AllOf(HasSubstr("model=t4\t3\t"),
+                    HasSubstr("\t13\t10\t0\tyes"),
+                    HasSubstr("model=t5\t1\t")));
+  const Outcome one = Selfcal({"cohort", "list", "model=t5"});
+  EXPECT_THAT(one.out, AllOf(HasSubstr("model=t5"), Not(HasSubstr("t4"))));
+  EXPECT_THAT(one.out, HasSubstr("\t11\t4\t0\tno"));
+}
+
+TEST_F(CohortVersions, PriorIsARigWithTheNameAndTheLabel) {
+  const Outcome newest = Selfcal({"cohort", "prior", "model=t4", "tablet-9"});
+  ASSERT_EQ(newest.code, 0) << newest.err;
+  EXPECT_THAT(newest.out,
+              AllOf(HasSubstr("\"rigs/tablet-9\""),
+                    HasSubstr("\"model\""),
+                    HasSubstr("\"t4\""),
+                    HasSubstr("3")));
+  const Outcome second =
+      Selfcal({"cohort", "prior", "model=t4", "tablet-9", "--version", "2"});
+  EXPECT_NE(second.out, newest.out);
+}
+
+TEST_F(CohortVersions, WhatThereIsNotIsExplained) {
+  const auto error = [&](std::vector<std::string> arguments) {
+    const Outcome outcome = Selfcal(std::move(arguments));
+    EXPECT_NE(outcome.code, 0);
+    EXPECT_THAT(outcome.out, testing::IsEmpty());
+    return outcome.err;
+  };
+  EXPECT_THAT(error({"cohort", "prior", "t4", "x"}), HasSubstr("LABEL=VALUE"));
+  EXPECT_THAT(error({"cohort", "prior", "model=t6", "x"}),
+              HasSubstr("selfcal cohort list"));
+  EXPECT_THAT(error({"cohort", "prior", "model=t5", "x"}),
+              HasSubstr("only 4 devices"));
+  EXPECT_THAT(error({"cohort", "prior", "model=t4", "x", "--version", "9"}),
+              HasSubstr("no such version"));
 }
 
 }  // namespace

@@ -91,13 +91,18 @@ TEST_F(TlsTest, CertificateSaysWhichRigs) {
         "/api/v1/rigs/b/calibrations/1:compare?b=rigs/b/calibrations/1",
         "/api/v1/rigs/b/recalibrations",
         "/api/v1/rigs/b/events",
-        "/api/v1/rigs",
-        "/api/v1/events",
-        "/api/v1/activity",
-        "/api/v1/changes:watch",
         "/api/v1/rigs/b/changes:watch",
         "/api/v1/rigs/b/recalibrations/1:watch"}) {
     EXPECT_EQ(Ask("owner", path).status, 403) << path;
+    EXPECT_EQ(Ask("nobody", path).status, 403) << path;
+  }
+  EXPECT_EQ(Ask("nobody", "/api/v1/changes:watch").status, 403);
+  for (const char* path :
+       {"/api/v1/rigs", "/api/v1/events", "/api/v1/activity"}) {
+    const Reply reply = Ask("owner", path);
+    EXPECT_EQ(reply.status, 200) << path;
+    EXPECT_THAT(reply.body, HasSubstr("rigs/a")) << path;
+    EXPECT_THAT(reply.body, ::testing::Not(HasSubstr("rigs/b"))) << path;
     EXPECT_EQ(Ask("nobody", path).status, 403) << path;
   }
 }

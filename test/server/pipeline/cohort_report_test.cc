@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "test/server/pipeline/pipeline_test.h"
+#include "test/server/pipeline/calibrated_devices.h"
 
 namespace selfcal::server {
 namespace {
@@ -13,38 +13,7 @@ constexpr int kFocal = 15 + 6;  // of camera 0: after the IMU and its pose
 constexpr double kMean_px = 3;
 constexpr double kSpread_px = 0.5;
 
-class CohortReportTest : public PipelineTest {
- protected:
-  CohortReportTest() {
-    estimators_.calibrate = [this](const Rig& rig,
-                                   const Calibration& start,
-                                   const SegmentSource&,
-                                   const CalibrateOptions&,
-                                   const ProgressCallback&,
-                                   const auto&) {
-      CalibrationResult result = Converged(rig, start);
-      result.theta = start;
-      result.theta.cameras[0].f.x() += offset_px_;
-      result.covariance *= 1e-4;  // known well
-      return result;
-    };
-    StartOne();
-  }
-
-  // A rig, whose focal length is found to be off by so much.
-  void Calibrate(const std::string& rig, double offset_px) {
-    offset_px_ = offset_px;
-    CreateRig(rig);
-    Submit(0, rig);
-    Submit(1, rig);
-    ASSERT_TRUE(Eventually([&] {
-      const auto active = store_->GetActiveCalibration(rig);
-      return active.ok() && active->version == 2;
-    }));
-  }
-
-  std::atomic<double> offset_px_ = 0;
-};
+using CohortReportTest = CalibratedDevices;
 
 TEST_F(CohortReportTest, FindsMeanSpreadAndWhoIsNotLikeTheOthers) {
   // Evenly about the mean, with the standard deviation of the spread.
@@ -72,6 +41,10 @@ TEST_F(CohortReportTest, FindsMeanSpreadAndWhoIsNotLikeTheOthers) {
   EXPECT_EQ(report->outliers[0].version, 2);
   EXPECT_LT(report->outliers[0].consistency.probability, 1e-4);
   EXPECT_EQ(report->outliers[0].consistency.components[0].component, kFocal);
+  ASSERT_EQ(report->devices.size(), kDevices + 1u);
+  EXPECT_EQ(report->devices[0].rig, "device0");
+  EXPECT_EQ(report->devices.back().rig, "knocked");
+  EXPECT_EQ(report->devices.back().version, 2);
   ASSERT_EQ(report->skipped.size(), 1u);
   EXPECT_EQ(report->skipped[0].rig, "new");
   EXPECT_THAT(report->skipped[0].reason, HasSubstr("factory"));
@@ -96,7 +69,7 @@ TEST_F(CohortReportTest, DevicesWithOtherCamerasDoNotCount) {
   ASSERT_TRUE(domain_->CreateRig(other).ok());
   const auto report = DescribeCohort(store_.get(), {}, 10);
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->reference, "a");
+  EXPECT_EQ(report->reference.rig.id, "a");
   ASSERT_EQ(report->skipped.size(), 2u);
   EXPECT_THAT(report->skipped[1].reason, HasSubstr("cameras"));
 }

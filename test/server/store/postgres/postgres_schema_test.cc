@@ -124,6 +124,7 @@ TEST_F(PostgresSchemaTest, KeysBeginWithTheRig) {
       "  AND x.indisunique AND a.attname <> 'rig' ORDER BY 1");
   EXPECT_THAT(others,
               ElementsAre("clock by clock",
+                          "cohorts by label",
                           "replicas by replica",
                           "rigs by id",
                           "schema_migrations by version"));

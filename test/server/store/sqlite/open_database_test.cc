@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 17u);
+  ASSERT_EQ(migrations.size(), 18u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -122,6 +122,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[16].name, "0017_lists_over_rigs.sql");
   EXPECT_EQ(migrations[16].sha256,
             "99a8680853b476090635f29974a1cfeb4c004b6d42a50438a903a6337f613763");
+  EXPECT_EQ(migrations[17].name, "0018_cohorts.sql");
+  EXPECT_EQ(migrations[17].sha256,
+            "94a91f646a88b7037e6cd2530c445c79ae59d9ddf5c64cd481d1d5a860397f7f");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

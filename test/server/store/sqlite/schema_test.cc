@@ -60,6 +60,9 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
       "outbox",
       "reported_rigs",
       "instructions",
+      // Of the hub alone.
+      "cohorts",
+      "cohort_outliers",
       // The hub has its own key, and derives the rest from what is reported.
       "estimates",
       "rigs.alarms",
@@ -168,7 +171,7 @@ TEST_F(SchemaTest, KeysBeginWithTheRig) {
       "JOIN pragma_index_info(i.name) c "
       "WHERE i.\"unique\" AND c.seqno = 0 AND c.name <> 'rig' ORDER BY text)");
   ASSERT_TRUE(others.ok()) << others.status();
-  EXPECT_EQ(*others, "replicas by replica,rigs by id");
+  EXPECT_EQ(*others, "cohorts by label,replicas by replica,rigs by id");
   const auto rowids = ReadTextInFile(
       Path(),
       "SELECT group_concat(text) FROM (SELECT t.name || ' by ' || c.name text "
@@ -176,7 +179,8 @@ TEST_F(SchemaTest, KeysBeginWithTheRig) {
       "WHERE c.pk = 1 AND c.name <> 'rig' ORDER BY text)");
   ASSERT_TRUE(rowids.ok()) << rowids.status();
   EXPECT_EQ(*rowids,
-            "clock by clock,replicas by replica,schema_migrations by version");
+            "clock by clock,cohorts by label,replicas by replica,"
+            "schema_migrations by version");
   EXPECT_EQ(ReadIntInFile(Path(),
                           "SELECT count(*) FROM sqlite_schema "
                           "WHERE sql LIKE '%AUTOINCREMENT%'")
