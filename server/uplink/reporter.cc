@@ -88,25 +88,23 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
   if (!response.ok()) {
     if (IsUnreachable(response.status())) return response.status();
     // Only this rig is refused.
-    round->refusal = fmt::format("the hub refuses the report of rig {}: {}",
-                                 rig.rig,
-                                 std::string(response.status().message()));
-    if (round->refusal != known->refusal) spdlog::error("{}", round->refusal);
-    known->refusal = round->refusal;
-    known->blocked = now + known->backoff.Next();
+    Block(fmt::format("the hub refuses the report of rig {}: {}",
+                      rig.rig,
+                      std::string(response.status().message())),
+          now,
+          known,
+          round);
     round->waiting += rig.waiting;
     return absl::OkStatus();
   }
-  known->refusal.clear();
-  known->backoff.Reset();
   known->next = now + Seconds(options_.interval_s);
   ++round->reports;
   round->bytes += static_cast<std::int64_t>(request.ByteSizeLong());
-  if (response->begin_anew()) {
-    spdlog::warn("the hub has lost records of rig {}: all are reported again",
-                 rig.rig);
-    const absl::Status begun = outbox->BeginAnew(rig.rig, options_.data);
-    return absl::IsNotFound(begun) ? absl::OkStatus() : begun;
+  if (response->begin_anew()) return BeginAnew(rig.rig, now, known, round);
+  if (report.waiting == 0) known->begins_anew = false;
+  if (!known->begins_anew) {
+    known->refusal.clear();
+    known->backoff.Reset();
   }
   known->results.clear();
   SELFCAL_RETURN_IF_ERROR(outbox->Confirm(report, NowNs()));
@@ -119,6 +117,39 @@ absl::Status Reporter::ReportRig(const ReportedRig& rig,
     known->results[instruction.name()] = CarryOut(rig.rig, instruction);
   }
   return absl::OkStatus();
+}
+
+absl::Status Reporter::BeginAnew(const std::string& rig,
+                                 Time now,
+                                 Rig* known,
+                                 Round* round) {
+  if (known->begins_anew) {
+    Block(fmt::format("the hub asks again for all records of rig {}, before it "
+                      "has them: some of them contradict what it has, or it "
+                      "cannot write them",
+                      rig),
+          now,
+          known,
+          round);
+  } else {
+    spdlog::warn(
+        "the hub does not have what was reported of rig {}: all records are "
+        "reported again",
+        rig);
+  }
+  known->begins_anew = true;
+  const absl::Status begun = store_->outbox()->BeginAnew(rig, options_.data);
+  return absl::IsNotFound(begun) ? absl::OkStatus() : begun;
+}
+
+void Reporter::Block(const std::string& refusal,
+                     Time now,
+                     Rig* known,
+                     Round* round) {
+  if (refusal != known->refusal) spdlog::error("{}", refusal);
+  known->refusal = refusal;
+  known->blocked = now + known->backoff.Next();
+  round->refusal = refusal;
 }
 
 v1::InstructionResult Reporter::CarryOut(

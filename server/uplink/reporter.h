@@ -59,6 +59,8 @@ class Reporter {
     Time blocked{};  // after a refusal, nothing is reported before
     Backoff backoff;
     std::string refusal;
+    // The hub has asked for all records, and does not have them yet.
+    bool begins_anew = false;
     std::map<std::string, v1::InstructionResult> results;  // by name
   };
 
@@ -66,6 +68,17 @@ class Reporter {
                          Time now,
                          Rig* known,
                          Round* round);
+  // Puts all records into the outbox, because the hub asks for them: at once if
+  // it may have lost some, but not again and again.
+  absl::Status BeginAnew(const std::string& rig,
+                         Time now,
+                         Rig* known,
+                         Round* round);
+  // Reports nothing of a rig for a while.
+  static void Block(const std::string& refusal,
+                    Time now,
+                    Rig* known,
+                    Round* round);
   v1::InstructionResult CarryOut(const std::string& rig,
                                  const v1::Instruction& instruction) const;
 

@@ -1,6 +1,7 @@
 // Rounds of reports, step by step.
 #include "server/uplink/reporter.h"
 
+#include "server/store/events.h"
 #include "server/store/report.h"
 #include "test/server/uplink/uplink_fixture.h"
 
@@ -41,6 +42,18 @@ class ReporterTest : public UplinkFixture {
     rig->set_name("rigs/a");
     (*rig->mutable_labels())["batch"] = value;
     return instruction;
+  }
+
+  void PutEvents(int count) {
+    const auto append = [&](UnitOfWork* tx) {
+      absl::Status status;
+      for (int k = 0; k < count && status.ok(); ++k) {
+        status = AppendEvent(tx, EventKind::kRigUpdated, "of the test");
+      }
+      return status;
+    };
+    const absl::Status status = device_.store->Transact("a", 1, append);
+    ASSERT_TRUE(status.ok()) << status;
   }
 
   v1::Instruction NewestInstruction() {
@@ -221,6 +234,41 @@ TEST_F(ReporterTest, ResultsOutliveAHubThatHasLostRecords) {
   Report();  // begins anew
   Report();
   EXPECT_EQ(NewestInstruction().state(), v1::Instruction::DONE);
+}
+
+TEST_F(ReporterTest, AHubThatNeverTakesSomeRecordIsNotSentAllOfThemAtOnce) {
+  CreateDeviceRig("a");
+  CreateDeviceRig("b");
+  Begin();
+  Report();
+  PutEvents(600);  // more than go into one report
+  Put(0);
+  way_.last_taken = 1;
+  EXPECT_EQ(Report().refusal, "");  // it may have lost records: begins anew
+  EXPECT_GT(Report().waiting, 0);   // number 1, and there are more
+  EXPECT_THAT(Report().refusal, HasSubstr("asks again for all records"));
+  // It is tried again later, and later each time.
+  int calls = way_.calls;
+  for (const int wait_ms : {250, 500, 1000}) {
+    now_ += std::chrono::milliseconds(wait_ms - 1);
+    Report();
+    EXPECT_EQ(way_.calls, calls) << wait_ms;
+    now_ += std::chrono::milliseconds(1);
+    Report();
+    EXPECT_NE(Report().refusal, "");
+    EXPECT_EQ(way_.calls, calls + 2) << wait_ms;
+    calls = way_.calls;
+  }
+  // Others are reported meanwhile.
+  Put(0, "b");
+  way_.last_taken = std::numeric_limits<std::int64_t>::max();
+  Report();
+  EXPECT_EQ(SegmentsAtHub("b"), 1u);
+  now_ += std::chrono::seconds(2);
+  while (Report().waiting > 0) {
+  }
+  EXPECT_EQ(SegmentsAtHub("a"), 1u);
+  EXPECT_EQ(Report().refusal, "");
 }
 
 TEST_F(ReporterTest, AnInstructionMustBeAboutItsRig) {

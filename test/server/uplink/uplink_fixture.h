@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -84,6 +86,10 @@ class FakeHub final : public Hub {
     ++calls;
     if (!reachable) return absl::UnavailableError("the network is down");
     v1::ReportResponse response;
+    if (request.number() > last_taken) {
+      response.set_begin_anew(true);
+      return response;
+    }
     absl::Status status = CallApi(*api_, caller, request, &response);
     if (!status.ok()) return status;
     if (answers_lost > 0) {
@@ -99,6 +105,9 @@ class FakeHub final : public Hub {
   std::atomic<bool> reachable = true;
   std::atomic<int> answers_lost = 0;
   std::atomic<int> calls = 0;
+  // Later reports are answered as by a hub that they contradict.
+  std::atomic<std::int64_t> last_taken =
+      std::numeric_limits<std::int64_t>::max();
   std::atomic<bool> cancelled = false;
 
  private:
