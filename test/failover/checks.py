@@ -10,6 +10,7 @@ from hub.one_machine import ADDRESS
 import selfcal
 from failover import recording
 from failover.device import Device
+from failover.local_daemon import LocalDaemon
 from failover.running_fleet import RunningFleet
 from selfcal.v1 import rig_pb2, segment_pb2, store_service_pb2
 
@@ -207,7 +208,7 @@ def _ended_runs(fleet: RunningFleet, rig_id: str) -> int:
 
 def tables(
     daemon: selfcal.Daemon,
-    reference: recording.Reference,
+    reference: LocalDaemon,
     fleet: RunningFleet,
     device: Device,
 ) -> list:

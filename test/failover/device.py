@@ -63,6 +63,16 @@ class Device(threading.Thread):
             self._burst += count
             self._changed.notify_all()
 
+    def extend(self, count: int) -> None:
+        """Sends so many more than it would, and returns at once."""
+        with self._changed:
+            self._limit += count
+            self._changed.notify_all()
+
+    def use(self, source: recording.Recording) -> None:
+        """Sends segments of another recording from now on."""
+        self._source = source
+
     def close(self) -> None:
         """Sends nothing new; the thread ends when all is acknowledged."""
         with self._changed:
@@ -159,15 +169,19 @@ class Device(threading.Thread):
             if message is None:
                 with self._changed:
                     self._changed.wait_for(
-                        lambda: over.is_set() or self._closing, 3600
+                        lambda: over.is_set() or self._closing or self._may(),
+                        3600,
                     )
-                return
+                continue
             yield message
 
+    def _may(self) -> bool:
+        return len(self.sent) < self._limit
+
     def _next(self):
-        number = len(self.sent)
-        if number >= self._limit:
+        if not self._may():
             return None
+        number = len(self.sent)
         segment = self._source.segment(number)
         segment.session = f"s{number // _SESSION}"
         segment.index = number % _SESSION

@@ -5,9 +5,7 @@ import os
 import random
 import re
 import signal
-import statistics
 import time
-from collections.abc import Callable, Iterator
 
 import grpc
 
@@ -15,59 +13,12 @@ from failover import checks
 from failover.load import Context, Load
 from failover.proxy import Proxy
 from failover.sender import Sender
+from failover.tried import Tried, rounds, wait
 from selfcal.v1 import recalibration_pb2
 
 _PER_SECOND = 3  # segments of a device
 _FAILOVER_S = 60
 _TAKEOVER_S = 60
-
-
-class Tried:
-    """What a guarantee has come to."""
-
-    def __init__(self, name: str, say: Callable) -> None:
-        self.name = name
-        self.trials = 0
-        self.lost: list = []
-        self.seconds: list = []  # until the hub was back
-        self.after = "acknowledges again"
-        self.segments = 0
-        self.attempts: list = []
-        self._say = say
-
-    def trial(self, text: str) -> None:
-        self.trials += 1
-        self._say(f"{self.name}: {self.trials}: {text}")
-
-    def fail(self, text: str) -> None:
-        self.lost.append(text)
-        self._say(f"{self.name}: LOST: {text[:1000]}")
-
-    def finish(self, load: Load) -> None:
-        self._say(f"{self.name}: checks {load.acknowledged()} segments")
-        for text in load.finish():
-            self.fail(text)
-        self.segments += load.acknowledged()
-        self.attempts += load.attempts
-
-    def summary(self) -> str:
-        parts = [f"{self.segments} segments", f"{len(self.attempts)} runs"]
-        again = sum(attempts > 1 for attempts in self.attempts)
-        if again:
-            parts.append(f"{again} of them begun again")
-        if self.seconds:
-            median = statistics.median(self.seconds)
-            parts.append(
-                f"{self.after} after {median:.1f} s (median), "
-                f"{max(self.seconds):.1f} s at most"
-            )
-        return ", ".join(parts)
-
-
-def _rounds(trials: int, length: int = 10) -> Iterator[range]:
-    """Trials with one set of rigs."""
-    for first in range(0, trials, length):
-        yield range(first, min(trials, first + length))
 
 
 def _load(context: Context, port: int = 0) -> Load:
@@ -78,7 +29,7 @@ def _load(context: Context, port: int = 0) -> Load:
 
 def lose_primary(context: Context, tried: Tried, trials: int) -> None:
     fleet = context.fleet
-    for numbers in _rounds(trials):
+    for numbers in rounds(trials):
         load = _load(context)
         for number in numbers:
             time.sleep(random.uniform(0.2, 2))
@@ -131,7 +82,7 @@ def _wait_until_back(
 
 def lose_replica(context: Context, tried: Tried, trials: int) -> None:
     fleet = context.fleet
-    for numbers in _rounds(trials):
+    for numbers in rounds(trials):
         load = _load(context)
         for _ in numbers:
             name = random.choice(fleet.replicas())
@@ -152,7 +103,7 @@ def partition(context: Context, tried: Tried, trials: int) -> None:
     try:
         fleet.connect_replicas({n: p.port for n, p in databases.items()})
         everyone = list(databases.values())
-        for numbers in _rounds(trials):
+        for numbers in rounds(trials):
             load = _load(context, devices.port)
             for number in numbers:
                 _partition(context, tried, load, number, devices, everyone)
@@ -192,7 +143,7 @@ def _partition(context, tried, load, number, devices, databases) -> None:
 def stop_worker(context: Context, tried: Tried, trials: int) -> None:
     tried.after = "others take over"
     fleet = context.fleet
-    for numbers in _rounds(trials, 6):
+    for numbers in rounds(trials, 6):
         load = _load(context)
         for number in numbers:
             trial = _stop_executor if number % 2 else _stop_scorer
@@ -223,7 +174,7 @@ def _stop_scorer(context: Context, tried: Tried, load: Load) -> bool:
 def _stop_executor(context: Context, tried: Tried, load: Load) -> bool:
     rig_id = load.of_kind("runs")[0].rig_id
     # One that was stopped in each trial would not be started again.
-    _wait(lambda: not _unfinished(context.fleet, rig_id), 60)
+    wait(lambda: not _unfinished(context.fleet, rig_id), 60)
     with checks.connect(context.fleet) as daemon:
         request = recalibration_pb2.StartRecalibrationRequest(
             parent=f"rigs/{rig_id}", force=True
@@ -261,7 +212,7 @@ def _stop(
         read = len(fleet.log(name))
         if not fleet.query(works, rig_id)[0][0]:
             return False
-        if not _wait(lambda: _claim(fleet, rig_id) > before, _TAKEOVER_S):
+        if not wait(lambda: _claim(fleet, rig_id) > before, _TAKEOVER_S):
             tried.trial(f"{name} {what}: stopped")
             tried.fail(f"{rig_id}: nobody took over within {_TAKEOVER_S} s")
             return True
@@ -275,9 +226,9 @@ def _stop(
     def knows(pattern) -> bool:
         return bool(pattern.search(fleet.log(name)[read:]))
 
-    if not _wait(lambda: knows(lost) or knows(dead), 30):
+    if not wait(lambda: knows(lost) or knows(dead), 30):
         tried.fail(f"{name} does not notice that its claim is lost")
-    _wait(lambda: knows(lost), 3)
+    wait(lambda: knows(lost), 3)
     tried.seconds.append(seconds)
     tried.trial(
         f"{name} {what} and was stopped; another took over after "
@@ -300,12 +251,3 @@ def _claim(fleet, rig_id: str) -> int:
         "SELECT number FROM claims JOIN rigs USING (rig) WHERE id = %s", rig_id
     )
     return rows[0][0] if rows else 0
-
-
-def _wait(condition: Callable, seconds: float) -> bool:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.1)
-    return True

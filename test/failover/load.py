@@ -9,6 +9,7 @@ from hub.one_machine import ADDRESS
 
 from failover import checks, recording
 from failover.device import Device
+from failover.local_daemon import LocalDaemon
 from failover.running_fleet import RunningFleet
 from selfcal.v1 import rig_pb2
 
@@ -27,15 +28,18 @@ class Context:
         self,
         fleet: RunningFleet,
         source: recording.Recording,
-        reference: recording.Reference,
-        send_segments: Optional[str],
+        reference: LocalDaemon,
+        programs: dict,
+        week: int,
     ) -> None:
         self.fleet = fleet
         self.source = source
         self.reference = reference
-        self.send_segments = send_segments
+        self.program = programs["selfcald"]
+        self.send_segments = programs.get("send_segments")
+        self.week = week  # segments of a week
         self.sent_by_program: Optional[list] = None
-        self.rounds = 0
+        self.rounds = 0  # gives each rig another name
 
 
 class Load:
@@ -109,7 +113,19 @@ class Load:
                     f"not acknowledged after {_DRAIN_S} s"
                 )
                 device.abandon()
-        return wrong + self._check()
+        wrong += self._check()
+        if not wrong:
+            self._remove()
+        return wrong
+
+    def _remove(self) -> None:
+        """Deletes the rigs, so that later checks need not read them again."""
+        with checks.connect(self._context.fleet) as daemon:
+            for device in self.devices:
+                request = rig_pb2.DeleteRigRequest(
+                    name=device.rig.name, reason="the round is done"
+                )
+                daemon.rig_service.DeleteRig(request, timeout=120)
 
     def _check(self) -> list:
         context = self._context

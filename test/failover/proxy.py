@@ -14,12 +14,14 @@ class Proxy:
 
     def __init__(self, target: int) -> None:
         self.port = 0
+        self.forwarded = 0  # bytes of clients
         self._target = target
         self._writers: set[asyncio.StreamWriter] = set()
         self._refuses = False
         self._loop = asyncio.new_event_loop()
-        self._flows = asyncio.Event()
-        self._flows.set()
+        self._requests = asyncio.Event()  # set: they flow
+        self._answers = asyncio.Event()
+        self._flow()
         self._server = None
         self._thread = threading.Thread(target=self._loop.run_forever)
         self._thread.daemon = True
@@ -32,7 +34,11 @@ class Proxy:
 
     def stall(self) -> None:
         """Lets no byte through in either direction until heal()."""
-        self._tell(self._flows.clear)
+        self._tell(self._stall)
+
+    def hold_answers(self) -> None:
+        """Lets no byte through to clients until heal()."""
+        self._tell(self._answers.clear)
 
     def heal(self) -> None:
         self._tell(self._heal)
@@ -49,15 +55,23 @@ class Proxy:
 
         asyncio.run_coroutine_threadsafe(act(), self._loop).result()
 
+    def _flow(self) -> None:
+        self._requests.set()
+        self._answers.set()
+
+    def _stall(self) -> None:
+        self._requests.clear()
+        self._answers.clear()
+
     def _heal(self) -> None:
         self._refuses = False
-        self._flows.set()
+        self._flow()
 
     def _drop(self) -> None:
         self._refuses = True
         for writer in list(self._writers):
             _reset(writer)
-        self._flows.set()
+        self._flow()
 
     async def _listen(self) -> None:
         self._server = await asyncio.start_server(self._accept, ADDRESS, 0)
@@ -76,20 +90,22 @@ class Proxy:
         both = (writer, there_writer)
         self._writers.update(both)
         await asyncio.gather(
-            self._pump(reader, there_writer),
-            self._pump(there_reader, writer),
+            self._pump(reader, there_writer, self._requests),
+            self._pump(there_reader, writer, self._answers),
         )
         self._writers.difference_update(both)
         for end in both:
             end.close()
 
-    async def _pump(self, reader, writer) -> None:
+    async def _pump(self, reader, writer, flows: asyncio.Event) -> None:
         try:
             while chunk := await reader.read(_CHUNK):
-                await self._flows.wait()
+                await flows.wait()
+                if flows is self._requests:
+                    self.forwarded += len(chunk)
                 writer.write(chunk)
                 await writer.drain()
-            await self._flows.wait()
+            await flows.wait()
             writer.write_eof()
         except OSError:
             _reset(writer)

@@ -2,46 +2,22 @@
 the demo makes. Copies differ from each other, and so do their scores.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import hashlib
 import pathlib
 import subprocess
 import time
 
-import grpc
 from hub import processes
 
 import selfcal
+from failover.local_daemon import LocalDaemon
 from selfcal.v1 import rig_pb2, segment_pb2
 
 _SECONDS = 120  # of the recording
-
-
-class Reference:
-    """One daemon on SQLite, in its own folder."""
-
-    def __init__(self, folder: pathlib.Path, name: str, daemon: str) -> None:
-        self._folder = folder
-        self._name = name
-        state = folder / name
-        state.mkdir(mode=0o700, exist_ok=True)
-        processes.launch(folder, name, [daemon, "--state-dir", str(state)])
-        self.target = f"unix:{state}/selfcald.sock"
-        self.daemon = selfcal.connect(self.target)
-        processes.wait_until(
-            self._serves, 60, lambda: processes.log_end(folder, name)
-        )
-
-    def _serves(self) -> bool:
-        try:
-            list(self.daemon.rigs())
-        except grpc.RpcError:
-            return False
-        return True
-
-    def stop(self) -> None:
-        self.daemon.close()
-        processes.end(self._folder, self._name, 15, 20)
+_KNOCK_PX = 2.0
 
 
 @dataclasses.dataclass
@@ -61,6 +37,21 @@ class Recording:
         copy.calibration_version = 1
         return copy
 
+    def knocked(self) -> Recording:
+        """As the device would record after its principal points have moved."""
+        # The daemon leaves out what is outside of the image.
+        cameras = self.rig.factory.cameras
+        largest_px = min(camera.width_px for camera in cameras) - 1
+        moved = Recording(self.rig, [])
+        for segment in self.segments:
+            copy = segment_pb2.MotionSegment()
+            copy.CopyFrom(segment)
+            z_px = copy.observations.z_px
+            for k in range(0, len(z_px), 2):
+                z_px[k] = min(z_px[k] + _KNOCK_PX, largest_px)
+            moved.segments.append(copy)
+        return moved
+
 
 def record(folder: pathlib.Path, demo: str, daemon: str) -> Recording:
     kept = folder / "recording"
@@ -74,7 +65,7 @@ def record(folder: pathlib.Path, demo: str, daemon: str) -> Recording:
         stdout=subprocess.DEVNULL,
     )
     (kept / "state").rename(folder / "source")
-    source = Reference(folder, "source", daemon)
+    source = LocalDaemon(folder, "source", daemon)
     try:
         rig = next(iter(source.daemon.rigs()))
         request = segment_pb2.DownloadSegmentsRequest(parent=rig.name)
