@@ -259,22 +259,23 @@ def _is_reported(device: ReportingDevice) -> bool:
 
 def _week(context: Context, tried: Tried, number: int, proxy: Proxy) -> None:
     kind = number % 3
-    week = _Week(context, tried, "all" if kind else "kept", proxy)
+    week = _Week(context, tried, "kept" if kind == 2 else "all", proxy)
     drain = Drain(context, week.device, proxy)
+    seconds = 60 if context.week > _LONG else 10
     if kind == 0:
-        drain.run()
-        text = "nothing else fails"
-    elif kind == 1:
-        rate = drain.limit(seconds=60 if context.week > _LONG else 6)
-        drain.run()
-        text = f"at most {rate / 1e6:.2f} MB/s are allowed"
-    else:
-        drain.limit(seconds=60 if context.week > _LONG else 8)
+        drain.limit(seconds)  # for time to kill something
         kills = _Kills(context, week.device)
         drain.run(kills)
         text = str(kills)
         if kills.replicas == 0:
             drain.wrong.append("all was reported before a replica was killed")
+    elif kind == 1:
+        rate = drain.limit(seconds)
+        drain.run()
+        text = f"at most {rate / 1e6:.2f} MB/s are allowed"
+    else:
+        drain.run()
+        text = "nothing else fails"
     tried.seconds.append(drain.seconds)
     tried.trial(f"{week.acknowledged()} segments; {text}; {drain.text()}")
     week.wrong += drain.wrong
