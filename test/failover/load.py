@@ -2,9 +2,11 @@
 hold afterwards.
 """
 
+import contextlib
 import time
 from typing import Optional
 
+import grpc
 from hub.one_machine import ADDRESS
 
 from failover import checks, recording
@@ -125,7 +127,9 @@ class Load:
                 request = rig_pb2.DeleteRigRequest(
                     name=device.rig.name, reason="the round is done"
                 )
-                daemon.rig_service.DeleteRig(request, timeout=120)
+                # The end of a session may have begun a run: then it stays.
+                with contextlib.suppress(grpc.RpcError):
+                    daemon.rig_service.DeleteRig(request, timeout=120)
 
     def _check(self) -> list:
         context = self._context
