@@ -303,6 +303,7 @@ class _Kills:
         else:
             replica = random.choice(self._fleet.replicas())
             self._fleet.signal(signal.SIGKILL, replica)
+            wait(lambda: self._fleet.pid(replica) == 0, 10)
             self._fleet.start_replica(replica)
             self.replicas += 1
         self._due = time.monotonic() + random.uniform(0.3, 1.5)
