@@ -175,6 +175,8 @@ std::string ConflictClause(const ReportedRow& row,
       updates.push_back(fmt::format("{0} = excluded.{0}", column));
     }
   }
+  // All of its columns identify it.
+  if (updates.empty()) return "ON CONFLICT DO NOTHING";
   return fmt::format("ON CONFLICT ({}) DO UPDATE SET {}",
                      fmt::join(identity, ", "),
                      fmt::join(updates, ", "));

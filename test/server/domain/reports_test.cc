@@ -4,6 +4,7 @@
 #include <random>
 
 #include "selfcal/store/report.pb.h"
+#include "server/store/change_rows.h"
 #include "server/store/checksum.h"
 #include "server/store/outbox.h"
 #include "server/store/records.h"
@@ -250,6 +251,26 @@ TEST_P(ReportsTest, HubThatMissesOneReportIsToldAllOfThem) {
   PutOnDevice(rig, 1);
   ReportAll();
   EXPECT_EQ(anew_, 1);
+  ExpectSame("a");
+}
+
+TEST_P(ReportsTest, DeviceChangesAreReported) {
+  CreateDeviceRig("a");
+  ReportAll();
+  StoredChange change;
+  change.rig = "a";
+  change.change = 1;
+  change.base_version = 1;
+  change.first_sequence = 1;
+  change.groups = {"imu", "camera"};
+  const absl::Status inserted = device_->Transact(
+      "a", 1, [&](UnitOfWork* tx) { return InsertChange(tx, change); });
+  ASSERT_TRUE(inserted.ok()) << inserted;
+  ReportAll();
+  EXPECT_EQ(anew_, 0);
+  const auto reported = store_->GetChange("a", 1);
+  ASSERT_TRUE(reported.ok()) << reported.status();
+  EXPECT_EQ(reported->groups, change.groups);
   ExpectSame("a");
 }
 
