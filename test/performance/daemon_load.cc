@@ -3,13 +3,17 @@
 // daemon's resident memory.
 //
 //   selfcal_daemon_load --daemon build/release/server/daemon/selfcald
-//       --folder DIR [--clients N] [--seconds N]
+//       --folder DIR [--clients N] [--seconds N] [--replica ADDRESS...]
+//
+// Replicas are other daemons on the same database, which SELFCAL_STORE names:
+// each of them, and the daemon that is started, serves as many of the clients.
 #include <fmt/format.h>
 #include <grpcpp/create_channel.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <string>
@@ -33,6 +37,7 @@ struct Options : LoadOptions {
   int clients = 200;
   int seconds = 60;
   int unacknowledged = 4;  // of one client, as the library's default
+  std::vector<std::string> replicas;
 };
 
 // A device with a connection and a rig of its own; its recording restarts
@@ -177,15 +182,20 @@ void Run(const Options& options) {
   const double idle = Memory(daemon->pid(), "VmRSS");
 
   const std::vector<MotionSegment> recording = Record();
+  std::vector<std::string> targets = {daemon->target()};
+  targets.insert(
+      targets.end(), options.replicas.begin(), options.replicas.end());
   std::vector<std::unique_ptr<Device>> devices;
   for (int k = 0; k < options.clients; ++k) {
+    const std::string& target = targets[k % targets.size()];
     const std::string rig = fmt::format("load{}", k);
     const absl::Status created =
-        DaemonView(daemon->target(), rig).CreateRig(HandheldRig(rig));
+        DaemonView(target, rig).CreateRig(HandheldRig(rig));
     if (!created.ok()) throw std::runtime_error(created.ToString());
-    devices.push_back(
-        std::make_unique<Device>(daemon->target(), rig, recording));
+    devices.push_back(std::make_unique<Device>(target, rig, recording));
   }
+  fmt::print("{} clients begin\n", devices.size());
+  std::fflush(stdout);
   const double busy = StreamAll(options, daemon->pid(), &devices);
   PrintDevices(options, devices);
   devices.clear();
@@ -209,6 +219,7 @@ int main(int argc, char** argv) {
   selfcal::client::AddLoadOptions(&app, &options);
   app.add_option("--clients", options.clients)->check(CLI::Range(1, 1000));
   app.add_option("--seconds", options.seconds)->check(CLI::Range(1, 86'400));
+  app.add_option("--replica", options.replicas, "Address of another daemon");
   CLI11_PARSE(app, argc, argv);
   return selfcal::client::RunLoad([&] { selfcal::client::Run(options); });
 }

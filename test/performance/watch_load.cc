@@ -3,6 +3,9 @@
 //
 //   selfcal_watch_load --daemon build/release/server/daemon/selfcald
 //       --folder DIR [--watches N] [--activations N]
+//
+// The daemon takes its other settings from the environment: with SELFCAL_STORE
+// it is a replica of a hub.
 #include <fmt/format.h>
 #include <grpcpp/create_channel.h>
 
@@ -69,7 +72,34 @@ class Watcher final : public grpc::ClientReadReactor<v1::Calibration> {
   std::atomic<Clock::time_point> last_{Clock::time_point()};
 };
 
-using Watchers = std::vector<std::unique_ptr<Watcher>>;
+// Ends its watches before it removes them, also when the program fails.
+class Watchers {
+ public:
+  ~Watchers() {
+    for (const auto& watcher : all_) watcher->Cancel();
+    for (const auto& watcher : all_) {
+      while (!watcher->done()) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    }
+  }
+  Watchers() = default;
+  Watchers(const Watchers&) = delete;
+  Watchers& operator=(const Watchers&) = delete;
+
+  void Add(v1::CalibrationService::Stub* stub, const std::string& rig) {
+    all_.push_back(std::make_unique<Watcher>(stub, rig));
+  }
+  bool HaveAll(int versions) const {
+    return std::all_of(all_.begin(), all_.end(), [&](const auto& watcher) {
+      return watcher->received() >= versions;
+    });
+  }
+  const std::vector<std::unique_ptr<Watcher>>& all() const { return all_; }
+
+ private:
+  std::vector<std::unique_ptr<Watcher>> all_;
+};
 
 void WaitUntil(const std::function<bool()>& condition) {
   const auto end = Clock::now() + std::chrono::minutes(2);
@@ -77,12 +107,6 @@ void WaitUntil(const std::function<bool()>& condition) {
     if (Clock::now() > end) throw std::runtime_error("waited for 2 minutes");
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-}
-
-bool HaveAll(const Watchers& watchers, int versions) {
-  return std::all_of(watchers.begin(), watchers.end(), [&](const auto& w) {
-    return w->received() >= versions;
-  });
 }
 
 std::shared_ptr<grpc::Channel> Connect(const std::string& target) {
@@ -142,9 +166,9 @@ void Run(const Options& options) {
       stubs.push_back(
           v1::CalibrationService::NewStub(Connect(daemon->target())));
     }
-    watchers.push_back(std::make_unique<Watcher>(stubs.back().get(), rig));
+    watchers.Add(stubs.back().get(), rig);
   }
-  WaitUntil([&] { return HaveAll(watchers, 1); });
+  WaitUntil([&] { return watchers.HaveAll(1); });
   fmt::print(
       "{} watches on {} connections: {:.1f} KiB of the daemon's resident "
       "memory "
@@ -168,8 +192,8 @@ void Run(const Options& options) {
     const grpc::Status status =
         admin->ActivateCalibration(&context, request, &active);
     if (!status.ok()) throw std::runtime_error(status.error_message());
-    WaitUntil([&] { return HaveAll(watchers, k + 2); });
-    for (const auto& watcher : watchers) {
+    WaitUntil([&] { return watchers.HaveAll(k + 2); });
+    for (const auto& watcher : watchers.all()) {
       latencies.push_back(
           std::chrono::duration<double>(watcher->last() - begin).count());
     }
@@ -182,10 +206,6 @@ void Run(const Options& options) {
       latencies[latencies.size() / 2],
       latencies[latencies.size() * 99 / 100],
       latencies.back());
-  for (const auto& watcher : watchers) watcher->Cancel();
-  for (const auto& watcher : watchers) {
-    WaitUntil([&] { return watcher->done(); });
-  }
 }
 
 }  // namespace
