@@ -4,11 +4,15 @@ import contextlib
 import os
 import pathlib
 
+from hub import processes
+
 _TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def cpu_s(pid: int) -> float:
     """CPU time of a process, and of its children, also of those that ended."""
+    if pid == 0:
+        raise processes.Failed("a process has ended that was measured")
     total = 0
     for entry in pathlib.Path("/proc").iterdir():
         if not entry.name.isdigit():

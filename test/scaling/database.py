@@ -96,12 +96,16 @@ class Server:
         return connection
 
     def create_database(self, name: str) -> None:
+        """An empty one, in place of one that an interrupted call left."""
+        self.drop_database(name)
         with contextlib.closing(self.connect("postgres")) as connection:
             connection.cursor().execute(f"CREATE DATABASE {name}")
 
     def drop_database(self, name: str) -> None:
         with contextlib.closing(self.connect("postgres")) as connection:
-            connection.cursor().execute(f"DROP DATABASE {name} WITH (FORCE)")
+            connection.cursor().execute(
+                f"DROP DATABASE IF EXISTS {name} WITH (FORCE)"
+            )
 
     @property
     def pid(self) -> int:

@@ -5,8 +5,8 @@ A rig has the runs, versions and tables of a real one, and repeats its segments
 as often as needed. One in a thousand is heavy: these have a fifth of all
 segments together. One in twenty (and one in ten of the heavy ones) is
 *complete*: the information of its segments has all of its bytes; that of the
-others lacks its matrix. Rows are written in an order of time, so that those of a
-rig are apart.
+others lacks its matrix. Rows are written in an order of time, so that those of
+a rig are apart.
 """
 
 import time
