@@ -120,8 +120,10 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfMany(
   const std::string list = "calibrations of many " + FilterText(of);
   SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(list, page));
   const int size = PageSize(page);
-  const RigCondition condition(of, "g", 5);
+  SqlCondition condition(5);
+  AddRigConditions(of, "g", &condition);
   Statement read(db,
+                 condition.reuse(),
                  std::string(kCalibrationColumns) +
                      "WHERE (c.create_steady_ns, c.rig, c.version) < "
                      "  (?1, ?2, ?3) AND " +

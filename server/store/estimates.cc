@@ -117,9 +117,11 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
   if (!query.rigs.name.empty()) {
     SELFCAL_ASSIGN_OR_RETURN(place.rig, FindRigId(db, query.rigs.name));
   }
-  const RigCondition condition(query.rigs, "r", 6);
+  SqlCondition condition(6);
+  AddRigConditions(query.rigs, "r", &condition);
   Statement read(
       db,
+      condition.reuse(),
       fmt::format("SELECT r.id, e.version, c.create_time_ns, c.state, "
                   "  e.component, e.unit, e.value, e.sigma, e.from_factory, "
                   "  e.rig "

@@ -73,7 +73,8 @@ absl::StatusOr<Listed<StoredEvent>> ListOfMany(Connection* db,
                                                const Page& page,
                                                const RigQuery& of,
                                                bool newest_first) {
-  const RigCondition condition(of, "r", 5);
+  SqlCondition condition(5);
+  AddRigConditions(of, "r", &condition);
   const std::string list =
       (newest_first ? "newest-events of many " : "events of many ") +
       FilterText(of);
@@ -82,15 +83,16 @@ absl::StatusOr<Listed<StoredEvent>> ListOfMany(Connection* db,
   const int size = PageSize(page);
   Statement read(
       db,
+      condition.reuse(),
       fmt::format("{0} e WHERE (steady_ns, rig, event) {1} (?1, ?2, ?3) {3}"
                   "ORDER BY steady_ns {2}, rig {2}, event {2} LIMIT ?4",
                   kEventColumns,
                   newest_first ? "<" : ">",
                   newest_first ? "DESC" : "ASC",
-                  condition.is_every_rig() ? ""
-                                           : "AND EXISTS (SELECT 1 FROM rigs r "
-                                             "  WHERE r.id = e.rig AND " +
-                                                 condition.sql() + ") "),
+                  condition.is_empty() ? ""
+                                       : "AND EXISTS (SELECT 1 FROM rigs r "
+                                         "  WHERE r.id = e.rig AND " +
+                                             condition.sql() + ") "),
       place.steady_ns,
       place.rig,
       place.event,

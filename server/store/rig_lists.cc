@@ -74,7 +74,7 @@ absl::StatusOr<Place> PlaceOf(const RigQuery& query, const Page& page) {
   return place;
 }
 
-std::string SqlOf(const RigQuery& query, const RigCondition& condition) {
+std::string SqlOf(const RigQuery& query, const SqlCondition& condition) {
   const std::string column = ColumnOf(query.order);
   const bool by_name = column.empty();
   const char* direction = query.descending ? "DESC" : "ASC";
@@ -100,8 +100,14 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
                                             const RigQuery& query,
                                             const Place& place,
                                             int limit) {
-  const RigCondition condition(query, "rigs", 4);
-  Statement read(db, SqlOf(query, condition), place.value, place.id, limit);
+  SqlCondition condition(4);
+  AddRigConditions(query, "rigs", &condition);
+  Statement read(db,
+                 condition.reuse(),
+                 SqlOf(query, condition),
+                 place.value,
+                 place.id,
+                 limit);
   condition.Bind(&read);
   std::vector<Found> found;
   while (read.Next()) {
@@ -224,54 +230,40 @@ absl::StatusOr<Listed<Item>> ListFound(Connection* db,
 
 }  // namespace
 
-RigCondition::RigCondition(const RigQuery& query,
-                           std::string_view rigs,
-                           int first_parameter)
-    : rigs_(rigs), next_(first_parameter) {
+void AddRigConditions(const RigQuery& query,
+                      const std::string& rigs,
+                      SqlCondition* condition) {
+  const auto has_label = [&](const auto& label) {
+    const std::string name = condition->Parameter(label.first);
+    return fmt::format(
+        "{}.rig IN (SELECT l.rig FROM rig_labels l "
+        "  WHERE l.name = {} AND l.value = {})",
+        rigs,
+        name,
+        condition->Parameter(label.second));
+  };
+  const auto has_name = [&](const std::string& name) {
+    return fmt::format("{}.id = {}", rigs, condition->Parameter(name));
+  };
   if (!query.text.empty()) {
     // A text contains another if it changes when that is removed.
-    const std::string text = Parameter(query.text);
-    And(fmt::format("replace({0}.id, {1}, '') <> {0}.id", rigs_, text));
+    condition->And(fmt::format("replace({0}.id, {1}, '') <> {0}.id",
+                               rigs,
+                               condition->Parameter(query.text)));
   }
-  if (!query.name.empty()) {
-    And(fmt::format("{}.id = {}", rigs_, Parameter(query.name)));
-  }
-  for (const auto& [name, value] : query.labels) And(HasLabel(name, value));
-  if (query.with_alarms) And(rigs_ + ".alarms > 0");
+  if (!query.name.empty()) condition->And(has_name(query.name));
+  for (const auto& label : query.labels) condition->And(has_label(label));
+  if (query.with_alarms) condition->And(rigs + ".alarms > 0");
   if (query.choice) {
     std::vector<std::string> any = {"FALSE"};
     for (const std::string& name : query.choice->names) {
-      any.push_back(fmt::format("{}.id = {}", rigs_, Parameter(name)));
+      any.push_back(has_name(name));
     }
-    for (const auto& [name, value] : query.choice->labels) {
-      any.push_back(HasLabel(name, value));
+    for (const auto& label : query.choice->labels) {
+      any.push_back(has_label(label));
     }
-    And(fmt::format("({})", fmt::join(any, " OR ")));
+    condition->And(fmt::format("({})", fmt::join(any, " OR ")));
   }
-}
-
-void RigCondition::Bind(Statement* statement) const {
-  for (const std::string& value : values_) statement->BindNext(value);
-}
-
-std::string RigCondition::Parameter(std::string_view value) {
-  values_.emplace_back(value);
-  return fmt::format("?{}", next_++);
-}
-
-std::string RigCondition::HasLabel(const std::string& name,
-                                   const std::string& value) {
-  const std::string first = Parameter(name);
-  return fmt::format(
-      "{}.rig IN (SELECT l.rig FROM rig_labels l "
-      "  WHERE l.name = {} AND l.value = {})",
-      rigs_,
-      first,
-      Parameter(value));
-}
-
-void RigCondition::And(const std::string& condition) {
-  sql_ = sql_ == "TRUE" ? condition : sql_ + " AND " + condition;
 }
 
 // Names and values of labels have no line feeds.

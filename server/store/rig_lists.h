@@ -5,41 +5,18 @@
 #include <absl/status/statusor.h>
 
 #include <string>
-#include <string_view>
-#include <vector>
 
-#include "server/store/driver/statement.h"
+#include "server/store/driver/sql_condition.h"
 #include "server/store/store.h"
 #include "server/store/unit_of_work.h"
 
 namespace selfcal::server {
 
-// The condition of a query on rigs, without its order.
-class RigCondition {
- public:
-  // On a row of rigs under the name `rigs`. Its parameters are numbered from
-  // `first_parameter` on.
-  RigCondition(const RigQuery& query,
-               std::string_view rigs,
-               int first_parameter);
-
-  // A condition of SQL; "TRUE" for every rig.
-  const std::string& sql() const { return sql_; }
-  bool is_every_rig() const { return values_.empty() && sql_ == "TRUE"; }
-  // Binds its parameters, which must be the next ones of the statement.
-  void Bind(Statement* statement) const;
-
- private:
-  // Adds a value; returns its parameter.
-  std::string Parameter(std::string_view value);
-  std::string HasLabel(const std::string& name, const std::string& value);
-  void And(const std::string& condition);
-
-  std::string rigs_;
-  int next_;
-  std::string sql_ = "TRUE";
-  std::vector<std::string> values_;
-};
+// Adds the conditions of a query, without its order, on a row of rigs under the
+// name `rigs`.
+void AddRigConditions(const RigQuery& query,
+                      const std::string& rigs,
+                      SqlCondition* condition);
 
 // What the filter of the query says, to identify its list in page tokens.
 std::string FilterText(const RigQuery& query);

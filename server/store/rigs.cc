@@ -226,11 +226,12 @@ absl::StatusOr<std::vector<std::string>> RigNames(Connection* db) {
 absl::StatusOr<std::vector<std::string>> IdleRigNames(
     Connection* db, std::int64_t idle_since_ns) {
   Statement read(db,
-                 "SELECT id FROM rigs r WHERE (SELECT s.steady_ns "
+                 "WITH own AS MATERIALIZED (SELECT rig, id FROM rigs r "
+                 "  WHERE NOT EXISTS (SELECT 1 FROM reported_rigs p "
+                 "    WHERE p.rig = r.rig)) "
+                 "SELECT id FROM own r WHERE (SELECT s.steady_ns "
                  "  FROM segments s WHERE s.rig = r.rig "
-                 "  ORDER BY s.sequence DESC LIMIT 1) <= ?1 "
-                 "AND NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                 "  WHERE p.rig = r.rig) ORDER BY id",
+                 "  ORDER BY s.sequence DESC LIMIT 1) <= ?1 ORDER BY id",
                  idle_since_ns);
   return ReadNames(&read);
 }

@@ -125,8 +125,10 @@ absl::StatusOr<Listed<StoredRun>> ListRunsOfMany(Connection* db,
   const std::string list = "runs of many " + FilterText(of);
   SELFCAL_ASSIGN_OR_RETURN(TimePlace place, TimePlaceOf(list, page));
   const int size = PageSize(page);
-  const RigCondition condition(of, "g", 5);
+  SqlCondition condition(5);
+  AddRigConditions(of, "g", &condition);
   Statement read(db,
+                 condition.reuse(),
                  std::string(kRunColumns) +
                      "WHERE (r.create_steady_ns, r.rig, r.run) < (?1, ?2, ?3) "
                      "AND " +

@@ -3,6 +3,7 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_split.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <limits>
 #include <string_view>
@@ -15,39 +16,62 @@
 namespace selfcal::server {
 namespace {
 
-// A cast states the type of a parameter that may be NULL.
-constexpr char kConditions[] =
-    "WHERE (CAST(?2 AS BIGINT) IS NULL OR s.state = ?2) "
-    "AND (CAST(?3 AS TEXT) IS NULL OR s.session = ?3) "
-    "AND (CAST(?4 AS BOOLEAN) IS NULL OR ?4 = EXISTS ("
-    "  SELECT 1 FROM payloads p "
-    "  WHERE p.rig = s.rig AND p.sequence = s.sequence)) "
-    "AND (CAST(?5 AS TEXT) IS NULL OR EXISTS (SELECT 1 FROM table_entries e "
-    "  WHERE e.rig = s.rig AND e.group_name = ?5 "
-    "  AND e.sequence = s.sequence)) "
-    "AND (CAST(?6 AS BIGINT) IS NULL OR s.receive_time_ns >= ?6) "
-    "AND (CAST(?7 AS BIGINT) IS NULL OR s.receive_time_ns <= ?7) "
-    "AND (CAST(?8 AS BIGINT) IS NULL OR s.calibration_version >= ?8) "
-    "AND (CAST(?9 AS BIGINT) IS NULL OR s.calibration_version <= ?9) "
-    "AND (CAST(?10 AS BIGINT) IS NULL OR s.landmarks >= ?10) "
-    "AND (CAST(?11 AS BIGINT) IS NULL OR s.landmarks <= ?11) "
-    "AND (CAST(?12 AS BIGINT) IS NULL OR s.observations >= ?12) "
-    "AND (CAST(?13 AS BIGINT) IS NULL OR s.observations <= ?13) "
-    "AND (CAST(?14 AS DOUBLE PRECISION) IS NULL OR s.temperature_c >= ?14) "
-    "AND (CAST(?15 AS DOUBLE PRECISION) IS NULL OR s.temperature_c <= ?15) "
-    "AND (?16 = '' OR EXISTS (SELECT 1 FROM segment_scores c "
-    "  WHERE c.rig = s.rig AND c.sequence = s.sequence "
-    "  AND c.group_name = ?16 "
-    "  AND (CAST(?17 AS DOUBLE PRECISION) IS NULL OR c.entropy >= ?17) "
-    "  AND (CAST(?18 AS DOUBLE PRECISION) IS NULL OR c.entropy <= ?18) "
-    "  AND (CAST(?19 AS DOUBLE PRECISION) IS NULL OR c.gain >= ?19) "
-    "  AND (CAST(?20 AS DOUBLE PRECISION) IS NULL OR c.gain <= ?20))) "
-    // Not every order uses these, but every parameter is used.
-    "AND CAST(?1 AS BIGINT) IS NOT NULL "
-    "AND CAST(?21 AS TEXT) IS NOT NULL "
-    "AND CAST(?22 AS DOUBLE PRECISION) IS NOT NULL "
-    "AND CAST(?25 AS BIGINT) IS NOT NULL "
-    "AND CAST(?26 AS BIGINT) IS NOT NULL ";
+template <typename T>
+void AndRange(const std::string& column,
+              const Range<T>& range,
+              SqlCondition* to) {
+  if (range.least) to->And(column + " >= " + to->Parameter(*range.least));
+  if (range.most) to->And(column + " <= " + to->Parameter(*range.most));
+}
+
+void AndScores(const SegmentQuery& query, SqlCondition* to) {
+  if (query.scored_group.empty()) return;
+  std::string scores = "c.group_name = " + to->Parameter(query.scored_group);
+  const auto add = [&](const char* column, const Range<double>& range) {
+    if (range.least) {
+      scores +=
+          fmt::format(" AND c.{} >= {}", column, to->Parameter(*range.least));
+    }
+    if (range.most) {
+      scores +=
+          fmt::format(" AND c.{} <= {}", column, to->Parameter(*range.most));
+    }
+  };
+  add("entropy", query.entropy_nats);
+  add("gain", query.gain_nats);
+  to->And(
+      "EXISTS (SELECT 1 FROM segment_scores c WHERE c.rig = s.rig "
+      "  AND c.sequence = s.sequence AND " +
+      scores + ")");
+}
+
+void AndFilter(const SegmentQuery& query, SqlCondition* to) {
+  if (query.state) {
+    to->And("s.state = " +
+            to->Parameter(std::int64_t{static_cast<int>(*query.state) + 1}));
+  }
+  if (query.session) {
+    to->And("s.session = " + to->Parameter(*query.session));
+  }
+  if (query.has_data) {
+    to->And(
+        fmt::format("{} (SELECT 1 FROM payloads p WHERE p.rig = s.rig "
+                    "  AND p.sequence = s.sequence)",
+                    *query.has_data ? "EXISTS" : "NOT EXISTS"));
+  }
+  if (query.in_table) {
+    to->And(
+        "EXISTS (SELECT 1 FROM table_entries e WHERE e.rig = s.rig "
+        "  AND e.sequence = s.sequence AND e.group_name = " +
+        to->Parameter(*query.in_table) + ")");
+  }
+  AndRange("s.receive_time_ns", query.receive_time_ns, to);
+  AndRange("s.calibration_version", query.calibration_version, to);
+  AndRange("s.landmarks", query.landmarks, to);
+  AndRange("s.observations", query.observations, to);
+  AndRange("s.temperature_c", query.temperature_c, to);
+  AndScores(query, to);
+}
 
 bool IsOfGroup(SegmentQuery::Order order) {
   return order == SegmentQuery::Order::kEntropy ||
@@ -72,75 +96,39 @@ std::string_view KeyColumn(SegmentQuery::Order order) {
   return "s.sequence";
 }
 
-// The rows of a list in their order: what comes after a position, and what they
-// are sorted by.
-struct OrderSql {
-  std::string key;
-  std::string after;
-  std::string order_by;
-};
-
-OrderSql OrderOfRig(const SegmentQuery& query) {
-  const std::string_view way = query.descending ? "DESC" : "ASC";
-  const std::string_view beyond = query.descending ? "<" : ">";
-  const std::string key(KeyColumn(query.order));
-  if (query.order == SegmentQuery::Order::kArrival) {
-    return {key,
-            fmt::format("s.rig = ?1 AND s.sequence {} ?23", beyond),
-            fmt::format("s.sequence {}", way)};
+// The columns that a list is sorted by; the first is the key. The index of the
+// order has them all.
+std::vector<std::string> OrderColumns(const SegmentQuery& query, bool of_all) {
+  const bool by_arrival = query.order == SegmentQuery::Order::kArrival;
+  const char* const table = IsOfGroup(query.order) ? "o" : "s";
+  std::vector<std::string> columns;
+  if (by_arrival && of_all) {
+    columns.push_back("s.steady_ns");
+  } else if (!by_arrival) {
+    columns.emplace_back(KeyColumn(query.order));
   }
-  return {key,
-          fmt::format("s.rig = ?1 AND "
-                      "(CAST({} AS DOUBLE PRECISION), s.sequence) {} "
-                      "(?22, ?23)",
-                      key,
-                      beyond),
-          fmt::format("{} {}, s.sequence {}", key, way, way)};
+  if (of_all) columns.push_back(fmt::format("{}.rig", table));
+  columns.push_back(fmt::format("{}.sequence", table));
+  return columns;
 }
 
-OrderSql OrderOfAll(const SegmentQuery& query) {
-  const std::string_view way = query.descending ? "DESC" : "ASC";
-  const std::string_view beyond = query.descending ? "<" : ">";
-  if (query.order == SegmentQuery::Order::kArrival) {
-    return {"s.steady_ns",
-            fmt::format("(s.steady_ns, s.rig, s.sequence) {} (?26, ?25, ?23)",
-                        beyond),
-            fmt::format("s.steady_ns {0}, s.rig {0}, s.sequence {0}", way)};
+// The values of these columns at the position, as parameters.
+std::vector<std::string> OrderValues(const SegmentQuery& query,
+                                     bool of_all,
+                                     const SegmentPlace& after,
+                                     SqlCondition* to) {
+  const bool by_arrival = query.order == SegmentQuery::Order::kArrival;
+  std::vector<std::string> values;
+  if (by_arrival && of_all) {
+    values.push_back(to->Parameter(after.steady_ns));
+  } else if (!by_arrival) {
+    // The column may be one of whole numbers, which has no infinity.
+    values.push_back(
+        fmt::format("CAST({} AS DOUBLE PRECISION)", to->Parameter(after.key)));
   }
-  return {"o.gain",
-          fmt::format("(o.gain, o.rig, o.sequence) {} (?22, ?25, ?23)", beyond),
-          fmt::format("o.gain {0}, o.rig {0}, o.sequence {0}", way)};
-}
-
-// The inner query finds the rows of the page, the outer one reads their
-// content.
-std::string Sql(const std::string& columns,
-                const SegmentQuery& query,
-                bool of_all,
-                const RigCondition& condition) {
-  const OrderSql order = of_all ? OrderOfAll(query) : OrderOfRig(query);
-  const std::string_view way = query.descending ? "DESC" : "ASC";
-  const bool some = of_all && !condition.is_every_rig();
-  return fmt::format(
-      "SELECT {}, page.key FROM (SELECT s.rig, s.sequence, {} AS key "
-      "FROM segments s {} {} {} AND {} {} ORDER BY {} LIMIT ?24) page "
-      "JOIN segments s USING (rig, sequence) "
-      "LEFT JOIN segment_information i USING (rig, sequence) "
-      "ORDER BY page.key {}, s.rig {}, s.sequence {}",
-      columns,
-      order.key,
-      IsOfGroup(query.order) ? "JOIN segment_scores o "
-                               "ON o.rig = s.rig AND o.sequence = s.sequence "
-                               "AND o.group_name = ?21"
-                             : "",
-      some ? "JOIN rigs r ON r.rig = s.rig" : "",
-      kConditions,
-      order.after,
-      some ? "AND " + condition.sql() : "",
-      order.order_by,
-      way,
-      way,
-      way);
+  if (of_all) values.push_back(to->Parameter(after.rig));
+  values.push_back(to->Parameter(after.sequence));
+  return values;
 }
 
 std::optional<int> StateNumber(const std::optional<SegmentState>& state) {
@@ -228,41 +216,56 @@ std::string TokenAfter(const std::string& list, const SegmentPlace& place) {
                                    place.sequence));
 }
 
-Statement SelectSegments(Connection* db,
-                         const std::string& columns,
-                         std::int64_t rig,
-                         const SegmentQuery& query,
-                         const RigCondition& condition,
-                         const SegmentPlace& after,
-                         int limit) {
-  return Statement(db,
-                   Sql(columns, query, rig == 0, condition),
-                   rig,
-                   StateNumber(query.state),
-                   query.session,
-                   query.has_data,
-                   query.in_table,
-                   query.receive_time_ns.least,
-                   query.receive_time_ns.most,
-                   query.calibration_version.least,
-                   query.calibration_version.most,
-                   query.landmarks.least,
-                   query.landmarks.most,
-                   query.observations.least,
-                   query.observations.most,
-                   query.temperature_c.least,
-                   query.temperature_c.most,
-                   query.scored_group,
-                   query.entropy_nats.least,
-                   query.entropy_nats.most,
-                   query.gain_nats.least,
-                   query.gain_nats.most,
-                   query.order_group,
-                   after.key,
-                   after.sequence,
-                   limit,
-                   after.rig,
-                   after.steady_ns);
+// The inner query finds the rows of the page, the outer one reads their
+// content.
+std::string SelectSegments(const std::string& columns,
+                           std::int64_t rig,
+                           const SegmentQuery& query,
+                           const RigQuery& rigs,
+                           const SegmentPlace& after,
+                           int limit,
+                           SqlCondition* condition) {
+  const bool of_all = rig == 0;
+  const char* const table = IsOfGroup(query.order) ? "o" : "s";
+  if (IsOfGroup(query.order)) {
+    condition->And("o.group_name = " + condition->Parameter(query.order_group));
+  }
+  if (!of_all) {
+    condition->And(
+        fmt::format("{}.rig = {}", table, condition->Parameter(rig)));
+  }
+  AndFilter(query, condition);
+  const auto order = OrderColumns(query, of_all);
+  const auto values = OrderValues(query, of_all, after, condition);
+  condition->And(fmt::format("({}) {} ({})",
+                             fmt::join(order, ", "),
+                             query.descending ? "<" : ">",
+                             fmt::join(values, ", ")));
+  SqlCondition of_rigs = condition->Next();
+  if (of_all) AddRigConditions(rigs, "r", &of_rigs);
+  const bool some_rigs = !of_rigs.is_empty();
+  if (some_rigs) condition->And(of_rigs);
+  const std::string_view way = query.descending ? "DESC" : "ASC";
+  const std::string sorted =
+      fmt::format("{} {}", fmt::join(order, fmt::format(" {}, ", way)), way);
+  return fmt::format(
+      "SELECT {}, page.key FROM (SELECT s.rig, s.sequence, {} AS key "
+      "FROM segments s {} {} WHERE {} ORDER BY {} LIMIT {}) page "
+      "JOIN segments s USING (rig, sequence) "
+      "LEFT JOIN segment_information i USING (rig, sequence) "
+      "ORDER BY page.key {}, s.rig {}, s.sequence {}",
+      columns,
+      order.front(),
+      IsOfGroup(query.order)
+          ? "JOIN segment_scores o ON o.rig = s.rig AND o.sequence = s.sequence"
+          : "",
+      some_rigs ? "JOIN rigs r ON r.rig = s.rig" : "",
+      condition->sql(),
+      sorted,
+      limit,
+      way,
+      way,
+      way);
 }
 
 }  // namespace selfcal::server

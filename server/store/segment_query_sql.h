@@ -1,6 +1,4 @@
-// A SegmentQuery in SQL. There is one text for each order, and filters that are
-// not set are NULL, so that a connection keeps few statements whatever clients
-// ask for.
+// A SegmentQuery in SQL.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -8,8 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "server/store/driver/statement.h"
-#include "server/store/rig_lists.h"
+#include "server/store/driver/sql_condition.h"
 #include "server/store/store.h"
 
 namespace selfcal::server {
@@ -40,17 +37,16 @@ absl::StatusOr<SegmentPlace> PlaceOfPage(const std::string& list,
                                          const Page& page);
 std::string TokenAfter(const std::string& list, const SegmentPlace& place);
 
-// Selects `columns` of segments `s` and their information `i`, for at most
-// `limit` rows after the position: of the rig with this key or, if it is 0, of
-// those of the condition (on `r`, from kRigParameter on), which the caller
-// binds next. The key follows as the last column.
-inline constexpr int kRigParameter = 27;
-Statement SelectSegments(Connection* db,
-                         const std::string& columns,
-                         std::int64_t rig,
-                         const SegmentQuery& query,
-                         const RigCondition& condition,
-                         const SegmentPlace& after,
-                         int limit);
+// Selects segments `s` with their information `i`, at most `limit` after the
+// position: of the rig with this key or, if it is 0, of those of `rigs`. The
+// parameters of the text are those of *condition, which must be new. The key of
+// each row follows as the column after `columns`.
+std::string SelectSegments(const std::string& columns,
+                           std::int64_t rig,
+                           const SegmentQuery& query,
+                           const RigQuery& rigs,
+                           const SegmentPlace& after,
+                           int limit,
+                           SqlCondition* condition);
 
 }  // namespace selfcal::server

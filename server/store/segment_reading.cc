@@ -110,15 +110,15 @@ absl::StatusOr<Listed<StoredSegment>> ListSegmentRows(Connection* db,
     SELFCAL_ASSIGN_OR_RETURN(rig_id, FindRigId(db, rig));
   }
   const auto size = static_cast<std::size_t>(PageSize(page));
-  const RigCondition condition(
-      rig.empty() ? of : RigQuery(), "r", kRigParameter);
-  Statement read = SelectSegments(db,
-                                  kSegmentColumns,
-                                  rig_id,
-                                  query,
-                                  condition,
-                                  after,
-                                  static_cast<int>(size) + 1);
+  SqlCondition condition;
+  const std::string sql = SelectSegments(kSegmentColumns,
+                                         rig_id,
+                                         query,
+                                         of,
+                                         after,
+                                         static_cast<int>(size) + 1,
+                                         &condition);
+  Statement read(db, Reuse::kOnce, sql);
   condition.Bind(&read);
   Listed<StoredSegment> listed;
   SegmentPlace last;

@@ -139,6 +139,11 @@ class Connection {
   // longer than running it, or a new one. It is given back by Keep.
   absl::StatusOr<std::unique_ptr<PreparedStatement>> Take(std::string_view sql);
   void Keep(std::unique_ptr<PreparedStatement> prepared);
+  // A new one for a text that is not worth keeping. It is given back as well.
+  absl::StatusOr<std::unique_ptr<PreparedStatement>> TakeOnce(
+      std::string_view sql) {
+    return Prepare(sql);
+  }
 
  protected:
   Connection() = default;

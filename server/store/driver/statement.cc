@@ -16,8 +16,9 @@ absl::Status Statement::Run() {
   return status_;
 }
 
-void Statement::Prepare(std::string_view sql) {
-  auto prepared = connection_->Take(sql);
+void Statement::Prepare(std::string_view sql, Reuse reuse) {
+  auto prepared = reuse == Reuse::kKept ? connection_->Take(sql)
+                                        : connection_->TakeOnce(sql);
   if (prepared.ok()) {
     prepared_ = *std::move(prepared);
   } else {

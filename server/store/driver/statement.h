@@ -23,14 +23,25 @@ struct BlobView {
   std::string_view bytes;
 };
 
+// Whether the connection keeps the prepared statement for the next use of the
+// same text. kOnce is for texts of which there are many: they would take the
+// places of others. An engine then also plans for the values that are bound.
+enum class Reuse { kKept, kOnce };
+
 // The connection and the bytes that are bound must outlive the statement.
 class Statement {
  public:
   // Prepares `sql` and binds the arguments to ?1, ?2, ...
   template <typename... Args>
   Statement(Connection* connection, std::string_view sql, const Args&... args)
+      : Statement(connection, Reuse::kKept, sql, args...) {}
+  template <typename... Args>
+  Statement(Connection* connection,
+            Reuse reuse,
+            std::string_view sql,
+            const Args&... args)
       : connection_(connection) {
-    Prepare(sql);
+    Prepare(sql, reuse);
     (BindNext(args), ...);
   }
   ~Statement() { connection_->Keep(std::move(prepared_)); }
@@ -57,7 +68,7 @@ class Statement {
   bool IsNull(int column) const { return prepared_->IsNull(column); }
 
  private:
-  void Prepare(std::string_view sql);
+  void Prepare(std::string_view sql, Reuse reuse);
   void Bind(int index, std::int64_t value);
   void Bind(int index, int value) { Bind(index, std::int64_t{value}); }
   void Bind(int index, double value);

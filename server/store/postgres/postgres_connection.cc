@@ -91,11 +91,13 @@ absl::Status PostgresConnection::SetUp() {
   }
   // A transaction that is acknowledged must be on disk, whatever the settings
   // of the server, of the database and of the user are. One whose client does
-  // not go on must not hold the lock on its rig for ever.
+  // not go on must not hold the lock on its rig for ever. Compilation takes
+  // longer than any of the statements.
   return Execute(
       "SELECT set_config('synchronous_commit', 'on', false) "
       "WHERE current_setting('synchronous_commit') IN ('off', 'local');"
-      "SET idle_in_transaction_session_timeout = '60s'");
+      "SET idle_in_transaction_session_timeout = '60s';"
+      "SET jit = off");
 }
 
 PostgresConnection::~PostgresConnection() { DropPrepared(); }

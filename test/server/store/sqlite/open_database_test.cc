@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 18u);
+  ASSERT_EQ(migrations.size(), 19u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -125,6 +125,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[17].name, "0018_cohorts.sql");
   EXPECT_EQ(migrations[17].sha256,
             "94a91f646a88b7037e6cd2530c445c79ae59d9ddf5c64cd481d1d5a860397f7f");
+  EXPECT_EQ(migrations[18].name, "0019_scores_by_rig.sql");
+  EXPECT_EQ(migrations[18].sha256,
+            "525d1c3af0167c4cd9fdae1a3e066342e41101f0843eebbd7c730b8d808cebd7");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

@@ -1,0 +1,46 @@
+// A condition of SQL whose parts are known only when it is made, with the
+// values of their parameters. Such a statement is not kept (Reuse::kOnce), as
+// there are many texts.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "server/store/driver/statement.h"
+
+namespace selfcal::server {
+
+class SqlCondition {
+ public:
+  using Value = std::variant<std::int64_t, double, std::string>;
+
+  // Its parameters are numbered from this one on.
+  explicit SqlCondition(int first_parameter = 1) : next_(first_parameter) {}
+
+  // Adds a value; returns its parameter, such as ?3.
+  std::string Parameter(Value value);
+  void And(const std::string& condition);
+  // An empty condition whose parameters follow those of this one; once it is
+  // added, its values follow as well.
+  SqlCondition Next() const { return SqlCondition(next_); }
+  void And(const SqlCondition& next);
+
+  bool is_empty() const { return sql_.empty(); }
+  // "TRUE" if it is empty.
+  std::string sql() const { return is_empty() ? "TRUE" : sql_; }
+  // Binds the values, as the next parameters of the statement. They must
+  // outlive it.
+  void Bind(Statement* statement) const;
+  // A statement whose text contains the condition is worth keeping if that is
+  // empty.
+  Reuse reuse() const { return is_empty() ? Reuse::kKept : Reuse::kOnce; }
+
+ private:
+  int next_;
+  std::string sql_;
+  std::vector<Value> values_;
+};
+
+}  // namespace selfcal::server
