@@ -126,4 +126,15 @@ Calibration PerturbCalibration(const Calibration& theta,
                                const CalibrationError& error,
                                std::uint64_t seed);
 
+// A change of the device: its first camera is turned, and its focal lengths
+// grow.
+struct CameraChange {
+  double turn_rad = 0;
+  double focal_relative = 0;
+};
+
+// Returns theta after the change. The axis of the turn is (1, -2, 2) / 3 of the
+// body, which is askew to all axes of a device.
+Calibration ChangeCamera(const Calibration& theta, const CameraChange& change);
+
 }  // namespace selfcal

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "core/calibration/calibrate.h"
-#include "core/model/so3.h"
 #include "core/simulation/simulate.h"
 #include "test/evaluation/estimators.h"
 
@@ -58,13 +57,9 @@ ChangeDevice MakeChangeDevice(int index, const Trajectory& motion) {
 
 Calibration DeviceChange::After(const Calibration& before, int n) const {
   const double share = drift ? n : 1;
-  const double turn_rad = share * turn_deg * std::numbers::pi / 180;
-  Calibration after = before;
-  CameraCalibration& camera = after.cameras[0];
-  const Eigen::Vector3d axis = Eigen::Vector3d(1, -2, 2) / 3;
-  camera.q_CI = (camera.q_CI * Exp(turn_rad * axis)).normalized();
-  camera.f *= 1 + share * focal_relative;
-  return after;
+  return ChangeCamera(before,
+                      {.turn_rad = share * turn_deg * std::numbers::pi / 180,
+                       .focal_relative = share * focal_relative});
 }
 
 ChangeUse::ChangeUse(const ChangeDevice& device,

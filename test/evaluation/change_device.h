@@ -26,8 +26,7 @@ ChangeDevice MakeChangeDevice(int index);
 // Of a session of that motion.
 ChangeDevice MakeChangeDevice(int index, const Trajectory& motion);
 
-// The first camera turns about an axis askew to all others, or its focal
-// lengths grow: at once, or by as much with every segment.
+// A CameraChange, at once or by as much with every segment.
 struct DeviceChange {
   std::string name;
   std::string group;  // concerned

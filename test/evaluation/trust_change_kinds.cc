@@ -3,7 +3,6 @@
 
 #include <numbers>
 
-#include "core/model/so3.h"
 #include "test/evaluation/trust_kinds.h"
 #include "test/evaluation/trust_simulation.h"
 
@@ -22,10 +21,8 @@ TrustDevice Turned(std::uint64_t seed) {
              "before",
              TrustOptions(seed),
              &device);
-  const Eigen::Vector3d axis = Eigen::Vector3d(1, -2, 2) / 3;
-  CameraCalibration& camera = device.truth->cameras[0];
-  const double turn_rad = kTurn_deg * std::numbers::pi / 180;
-  camera.q_CI = (camera.q_CI * Exp(turn_rad * axis)).normalized();
+  device.truth = ChangeCamera(*device.truth,
+                              {.turn_rad = kTurn_deg * std::numbers::pi / 180});
   device.changed_session = 1;
   AddSession(MakeHandheld(1.5 * kTrustSession_s, kCalm, seed + 1),
              "after",
