@@ -67,6 +67,31 @@ absl::Status DaemonView::CreateRig(const Rig& rig) {
   return ToAbsl(stubs_->rigs.CreateRig(&context, request, &response));
 }
 
+absl::StatusOr<v1::Calibration> DaemonView::GetActive() {
+  v1::GetCalibrationRequest request;
+  request.set_name(parent_ + "/calibrations/active");
+  grpc::ClientContext context;
+  v1::Calibration response;
+  const grpc::Status status =
+      stubs_->calibrations.GetCalibration(&context, request, &response);
+  if (!status.ok()) return ToAbsl(status);
+  return response;
+}
+
+absl::StatusOr<bool> DaemonView::HasUnscored() {
+  v1::ListSegmentsRequest request;
+  request.set_parent(parent_);
+  request.set_page_size(1);
+  request.set_filter("state = STORED");
+  request.set_view(v1::ListSegmentsRequest::BASIC);
+  grpc::ClientContext context;
+  v1::ListSegmentsResponse response;
+  const grpc::Status status =
+      stubs_->segments.ListSegments(&context, request, &response);
+  if (!status.ok()) return ToAbsl(status);
+  return response.segments_size() > 0;
+}
+
 absl::StatusOr<std::vector<v1::Table>> DaemonView::GetTables() {
   v1::ListTablesRequest request;
   request.set_parent(parent_);

@@ -30,8 +30,11 @@ class DaemonView {
   ~DaemonView();
 
   absl::Status CreateRig(const Rig& rig);
+  absl::StatusOr<v1::Calibration> GetActive();
   absl::StatusOr<DaemonState> GetState();
   absl::StatusOr<std::vector<v1::Table>> GetTables();
+  // True while a segment that was stored is not scored.
+  absl::StatusOr<bool> HasUnscored();
   // Lists runs, newest first.
   absl::StatusOr<std::vector<v1::Recalibration>> GetRuns();
   absl::StatusOr<v1::Recalibration> StartRun();

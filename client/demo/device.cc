@@ -7,11 +7,16 @@
 
 namespace selfcal::client {
 
-Device SimulateDevice(std::uint64_t seed, double seconds) {
+Device SimulatedDevice(const std::string& rig, std::uint64_t seed) {
   Device device;
-  device.rig = HandheldRig("simulated");
+  device.rig = HandheldRig(rig);
   device.truth = device.rig.factory;
   device.rig.factory = PerturbCalibration(*device.truth, {}, seed);
+  return device;
+}
+
+Device SimulateDevice(std::uint64_t seed, double seconds) {
+  Device device = SimulatedDevice("simulated", seed);
   SimulationOptions options;
   options.seed = seed;
   device.segments = Simulate(device.rig,
@@ -27,6 +32,31 @@ Device SimulateDevice(std::uint64_t seed, double seconds) {
       "1 cm, scales 1 %, misalignments 0.01, accelerometer 1 deg",
       seconds);
   return device;
+}
+
+absl::StatusOr<std::vector<MotionSegment>> SimulateUse(
+    const Device& device,
+    const SimulatedUse& use,
+    const Calibration& theta_slam,
+    std::int64_t version) {
+  if (!SameShape(theta_slam, *device.truth)) {
+    return absl::InvalidArgumentError(
+        fmt::format("rigs/{} is not a simulated device: its cameras are others",
+                    device.rig.id));
+  }
+  SimulationOptions options;
+  // Not the seeds that neighbouring devices have.
+  options.seed = use.seed + (static_cast<std::uint64_t>(use.session - 1) << 32);
+  std::vector<MotionSegment> segments =
+      Simulate(device.rig,
+               ChangeCamera(*device.truth, use.change),
+               theta_slam,
+               *MakeMixed(use.seconds, options.seed),
+               fmt::format("session-{}", use.session),
+               options)
+          .segments;
+  for (MotionSegment& segment : segments) segment.calibration_version = version;
+  return segments;
 }
 
 absl::StatusOr<Device> ReadDevice(const std::vector<std::string>& folders,

@@ -11,6 +11,7 @@
 #include "core/model/calibration.h"
 #include "core/model/rig.h"
 #include "core/model/segment.h"
+#include "core/simulation/simulate.h"
 
 namespace selfcal::client {
 
@@ -24,6 +25,28 @@ struct Device {
 // A hand-held device whose factory calibration is off by a realistic amount
 // (CalibrationError), in calm and excited motion for `seconds`.
 Device SimulateDevice(std::uint64_t seed, double seconds);
+
+// A simulated device in use, for one session.
+struct SimulatedUse {
+  std::uint64_t seed = 1;  // of the device
+  // Sessions of a device differ in their motion and noise, and are named after
+  // their number, from 1.
+  int session = 1;
+  double seconds = 60;
+  CameraChange change = {};  // what has become of the device
+};
+
+// The device of SimulateDevice under another name, without segments.
+Device SimulatedDevice(const std::string& rig, std::uint64_t seed);
+
+// The segments of a session in which the SLAM system runs on `theta_slam`,
+// which is `version`. INVALID_ARGUMENT if that is not a calibration of this
+// device.
+absl::StatusOr<std::vector<MotionSegment>> SimulateUse(
+    const Device& device,
+    const SimulatedUse& use,
+    const Calibration& theta_slam,
+    std::int64_t version);
 
 struct RecordingOptions {
   int keyframes_per_segment = 40;

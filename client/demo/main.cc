@@ -1,11 +1,13 @@
 // selfcal-demo: shows how data of a device becomes a versioned calibration that
-// survives a kill.
+// survives a kill. `selfcal-demo stream` streams a simulated device to a daemon
+// that is running.
 #include <fmt/format.h>
 #include <stdlib.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "client/demo/demo.h"
 #include "client/demo/device.h"
 #include "client/demo/report.h"
+#include "client/demo/stream_device.h"
 
 namespace {
 
@@ -24,6 +27,12 @@ struct Flags {
   std::uint64_t seed = 1;
   double seconds = 120;
   selfcal::client::RecordingOptions recording;
+};
+
+struct StreamFlags {
+  selfcal::client::StreamOptions options;
+  double turn_deg = 0;
+  double focal_percent = 0;
 };
 
 // Creates the folder `keep`, or a temporary one. Prints errors.
@@ -77,12 +86,60 @@ int Run(const Flags& flags) {
   return report.failed() ? 1 : 0;
 }
 
+int Stream(StreamFlags flags) {
+  using namespace selfcal::client;
+  flags.options.use.change = {
+      .turn_rad = flags.turn_deg * std::numbers::pi / 180,
+      .focal_relative = flags.focal_percent / 100};
+  Report report;
+  const absl::Status status = StreamDevice(flags.options, &report);
+  if (status.ok()) return 0;
+  fmt::print(stderr, "{}\n", std::string(status.message()));
+  return 1;
+}
+
+CLI::App* AddStream(CLI::App* app, StreamFlags* flags) {
+  CLI::App* stream = app->add_subcommand(
+      "stream",
+      "Stream a session of a simulated device to a daemon that is running");
+  selfcal::client::StreamOptions& options = flags->options;
+  stream
+      ->add_option("--target",
+                   options.target,
+                   "The daemon, without TLS: unix:PATH or HOST:PORT")
+      ->required();
+  stream
+      ->add_option(
+          "--rig", options.rig, "Its rig, which is created if it is not there")
+      ->required();
+  stream->add_option("--seed", options.use.seed, "Of the device");
+  stream
+      ->add_option("--session",
+                   options.use.session,
+                   "Number of the session: another motion for each")
+      ->check(CLI::Range(1, 1'000'000));
+  stream->add_option("--seconds", options.use.seconds, "Its length [s]")
+      ->check(CLI::Range(5.0, 3600.0));
+  stream
+      ->add_option("--turn-deg",
+                   flags->turn_deg,
+                   "The camera was turned by this angle [degrees]")
+      ->check(CLI::Range(-10.0, 10.0));
+  stream
+      ->add_option("--focal-percent",
+                   flags->focal_percent,
+                   "The focal lengths are longer by this [%]")
+      ->check(CLI::Range(-10.0, 10.0));
+  return stream;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   Flags flags;
+  StreamFlags stream_flags;
   CLI::App app("From a device to a versioned calibration, as one watches it.");
-  app.add_option("--daemon", flags.daemon, "Path of selfcald")->required();
+  app.add_option("--daemon", flags.daemon, "Path of selfcald; required");
   app.add_option("--vi-map",
                  flags.vi_map,
                  "A real recording: a maplab VI-map folder, or several that "
@@ -103,6 +160,9 @@ int main(int argc, char** argv) {
   app.add_option("--accel-bias-walk",
                  flags.recording.accel_bias_walk,
                  "Instead of the recording's [m/s^3/sqrt(Hz)]");
+  const CLI::App* stream = AddStream(&app, &stream_flags);
   CLI11_PARSE(app, argc, argv);
+  if (stream->parsed()) return Stream(stream_flags);
+  if (flags.daemon.empty()) return app.exit(CLI::RequiredError("--daemon"));
   return Run(flags);
 }
