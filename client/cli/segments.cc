@@ -7,6 +7,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/group_check.h"
+#include "client/cli/instruction.h"
 #include "client/cli/list_options.h"
 #include "client/text/text.h"
 #include "proto/resource_names.h"
@@ -286,7 +287,15 @@ int Quarantine(Context* context, const QuarantineOptions& options) {
   v1::QuarantineSegmentsResponse response;
   const auto status = Call<SegmentService>(
       stub.get(), &SegmentService::QuarantineSegments, request, &response);
-  if (!status.ok()) return Fail(*context, status);
+  v1::Instruction instruction;
+  *instruction.mutable_quarantine_segments() = request;
+  grpc::Status failure = status;
+  if (const auto given =
+          InsteadOf(status, *context, options.rig, instruction, &failure)) {
+    PrintGiven(*context, *given);
+    return kDone;
+  }
+  if (!failure.ok()) return Fail(*context, failure);
   if (context->json) {
     context->PrintJson(response);
     return kDone;
