@@ -56,7 +56,8 @@ class Estimation {
   Spread Fit(const std::vector<int>& which, double correlation) const {
     std::vector<ThetaInformation> devices;
     for (const int i : which) devices.push_back(devices_[i]);
-    return FitSpread(devices, cohort_.scale.size(), correlation);
+    return FitSpread(
+        devices, cohort_.scale.size(), correlation, options_.cancelled);
   }
 
   // Pulls the spread towards the scale, the more the less devices determine it.

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,10 @@ struct CohortOptions {
   // A device is left out if the chance that one of a cohort of this size is as
   // far from the others is smaller.
   double false_alarm = 0.01;
+  // Asked between steps, if there is one: true ends the estimate early, whose
+  // result is then of no use. Of hundreds of devices that do not differ
+  // measurably it takes a minute.
+  std::function<bool()> cancelled = {};
 };
 
 struct Cohort {

@@ -36,13 +36,16 @@ class Fit {
  public:
   Fit(std::span<const ThetaInformation> devices,
       Eigen::Index size,
-      double correlation)
+      double correlation,
+      const std::function<bool()>& cancelled)
       : devices_(devices),
         correlation_(correlation),
+        cancelled_(cancelled),
         spread_(InitialSpread(size)) {}
 
   Spread Run() {
     for (int i = 0; i < kMaxSteps; ++i) {
+      if (cancelled_ && cancelled_()) break;
       const VectorXd before = spread_.S.diagonal();
       Step();
       const VectorXd change =
@@ -108,6 +111,7 @@ class Fit {
 
   const std::span<const ThetaInformation> devices_;
   const double correlation_;
+  const std::function<bool()>& cancelled_;
   Spread spread_;
 };
 
@@ -159,8 +163,9 @@ Spread RobustSpread(std::span<const ThetaInformation> devices,
 
 Spread FitSpread(std::span<const ThetaInformation> devices,
                  Eigen::Index size,
-                 double correlation) {
-  return Fit(devices, size, correlation).Run();
+                 double correlation,
+                 const std::function<bool()>& cancelled) {
+  return Fit(devices, size, correlation, cancelled).Run();
 }
 
 double LogLikelihood(const ThetaInformation& device, const Spread& spread) {

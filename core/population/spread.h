@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -31,10 +32,12 @@ Spread RobustSpread(std::span<const ThetaInformation> devices,
 // Restricted maximum likelihood by expectation-maximisation. Devices need not
 // observe all directions. `correlation` in [0, 1) is the share of the
 // correlations of S that is kept. A gamma(2) prior on the standard deviations
-// keeps them from zero (Chung et al., Psychometrika 2013).
+// keeps them from zero (Chung et al., Psychometrika 2013). Ends early once
+// `cancelled`, if there is one, returns true.
 Spread FitSpread(std::span<const ThetaInformation> devices,
                  Eigen::Index size,
-                 double correlation);
+                 double correlation,
+                 const std::function<bool()>& cancelled = {});
 
 // Log-likelihood of the data of a device, up to what depends on the data alone.
 double LogLikelihood(const ThetaInformation& device, const Spread& spread);

@@ -30,7 +30,8 @@ absl::StatusOr<v1::Cohort> DescribeCohort(
       DescribeCohort(
           context.store,
           query,
-          request.max_rigs() == 0 ? kDefaultRigs : request.max_rigs()));
+          request.max_rigs() == 0 ? kDefaultRigs : request.max_rigs(),
+          [&] { return call.cancelled() || context.stopping->load(); }));
   return Encode(report);
 }
 

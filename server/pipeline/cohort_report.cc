@@ -48,9 +48,12 @@ class Reader {
     return absl::OkStatus();
   }
 
-  void Conclude() {
+  void Conclude(const std::function<bool()>& cancelled) {
     report_->calibrated = static_cast<int>(devices_.size());
-    report_->cohort = EstimateCohort(reference_, scale_, informations_);
+    CohortOptions options;
+    options.cancelled = cancelled;
+    report_->cohort =
+        EstimateCohort(reference_, scale_, informations_, options);
     FindQuantiles();
     for (const Device& device : devices_) {
       report_->devices.push_back({device.rig, device.version});
@@ -106,9 +109,11 @@ class Reader {
 
 }  // namespace
 
-absl::StatusOr<CohortReport> DescribeCohort(Store* store,
-                                            const RigQuery& query,
-                                            int max_rigs) {
+absl::StatusOr<CohortReport> DescribeCohort(
+    Store* store,
+    const RigQuery& query,
+    int max_rigs,
+    const std::function<bool()>& cancelled) {
   CohortReport report;
   Reader reader(store, &report);
   Page page{std::min(kRigsOfPage, max_rigs), ""};
@@ -120,6 +125,7 @@ absl::StatusOr<CohortReport> DescribeCohort(Store* store,
         report.truncated = true;
         break;
       }
+      if (cancelled()) return absl::CancelledError("cancelled");
       SELFCAL_RETURN_IF_ERROR(reader.Read(rig));
     }
     page.token = rigs.next_token;
@@ -127,7 +133,8 @@ absl::StatusOr<CohortReport> DescribeCohort(Store* store,
   if (report.rigs == 0) {
     return absl::NotFoundError("no rig is like that");
   }
-  reader.Conclude();
+  reader.Conclude(cancelled);
+  if (cancelled()) return absl::CancelledError("cancelled");
   return report;
 }
 

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -47,9 +48,12 @@ struct CohortReport {
 
 // Looks at `max_rigs` of the rigs of the query, in its order. The first one is
 // the reference; rigs with other cameras do not count, nor do those whose
-// factory calibration is active. NOT_FOUND if there is no rig.
-absl::StatusOr<CohortReport> DescribeCohort(Store* store,
-                                            const RigQuery& query,
-                                            int max_rigs);
+// factory calibration is active. NOT_FOUND if there is no rig, CANCELLED soon
+// after `cancelled` returns true.
+absl::StatusOr<CohortReport> DescribeCohort(
+    Store* store,
+    const RigQuery& query,
+    int max_rigs,
+    const std::function<bool()>& cancelled = [] { return false; });
 
 }  // namespace selfcal::server

@@ -15,7 +15,7 @@
 namespace selfcal::server {
 namespace {
 
-constexpr int kMostRigs = 2000;      // of a cohort: those that were seen last
+constexpr int kMostRigs = 500;       // of a cohort: those that were seen last
 constexpr std::int64_t kKept = 400;  // versions of a cohort
 constexpr std::size_t kMostShown = 100;  // characters of a label in the log
 
@@ -36,17 +36,19 @@ struct Described {
   std::map<std::string, std::int64_t> outliers;
 };
 
-absl::StatusOr<Described> DescribeAndStore(Store* store,
-                                           const std::string& label,
-                                           const std::string& value,
-                                           std::int64_t now_ns) {
+absl::StatusOr<Described> DescribeAndStore(
+    Store* store,
+    const std::string& label,
+    const std::string& value,
+    std::int64_t now_ns,
+    const std::function<bool()>& stopping) {
   RigQuery query;
   query.order = RigQuery::Order::kLastSeen;
   query.descending = true;
   query.labels[label] = value;
   Described described;
   SELFCAL_ASSIGN_OR_RETURN(const CohortReport report,
-                           DescribeCohort(store, query, kMostRigs));
+                           DescribeCohort(store, query, kMostRigs, stopping));
   if (report.calibrated == 0) return described;
   for (const CohortReport::Outlier& outlier : report.outliers) {
     described.outliers[outlier.rig] = outlier.version;
@@ -83,7 +85,8 @@ absl::StatusOr<int> UpdateCohorts(Domain* domain,
   std::map<std::string, std::int64_t> outliers;
   for (const std::string& value : values) {
     if (stopping()) return stored;
-    const auto described = DescribeAndStore(store, label, value, now_ns);
+    const auto described =
+        DescribeAndStore(store, label, value, now_ns, stopping);
     if (described.ok()) {
       stored += described->is_new;
       outliers.insert(described->outliers.begin(), described->outliers.end());
@@ -91,6 +94,7 @@ absl::StatusOr<int> UpdateCohorts(Domain* domain,
     }
     // Its last rig is gone, or has another label, since the values were read.
     if (absl::IsNotFound(described.status())) continue;
+    if (stopping()) return stored;
     all = false;
     spdlog::warn("cannot describe the cohort {}={}: {}",
                  label,

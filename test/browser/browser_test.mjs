@@ -295,6 +295,25 @@ const tests = {
     await r.shows('/events', 'Events', ['rig created'], 'all-events');
   },
 
+  async 'a parameter of all rigs is compared'(r) {
+    await r.shows('/parameters', 'Parameters', ['tablet', 'headset'], 'parameters');
+    await r.page.locator('.uplot canvas').first().waitFor();
+    await r.page.getByLabel('Rigs').fill('name = tablet');
+    await r.page.getByRole('link', { name: 'headset' }).waitFor({ state: 'detached' });
+    assert.match(r.page.url(), /filter=name/);
+    await r.page.getByRole('link', { name: 'tablet', exact: true }).waitFor();
+    await r.shows('/parameters?component=cam9.focal.x', 'Parameters', ['No active version']);
+    r.expectProblems = true;
+    await r.shows('/parameters?filter=nonsense+%3D+1', 'Parameters', ['is not a condition']);
+    r.expectProblems = false;
+  },
+
+  async 'a daemon without a hub says what cohorts and instructions are'(r) {
+    await r.shows('/cohorts', 'Cohorts', ['cohort-label'], 'cohorts-none');
+    await r.shows('/rigs/tablet/instructions', 'Instructions for tablet',
+      ['There are no instructions'], 'instructions-none');
+  },
+
   async 'the coach follows the segments as they come'(r, other, daemon, send) {
     await r.open('/rigs/headset', 'headset');
     await r.page.getByRole('link', { name: 'Coach' }).click();

@@ -24,6 +24,7 @@ function pagesOf(rig, session, segment) {
     recalibrations: page('/recalibrations'),
     recalibration: page('/recalibrations/1'),
     events: page('/events'),
+    instructions: page('/instructions'),
   };
 }
 
@@ -91,12 +92,19 @@ async function checkPages(r, pages, name) {
   await r.page.setViewportSize({ width: 1200, height: 800 });
 }
 
+const kFleetPages = {
+  rigs: '/',
+  'all-events': '/events',
+  parameters: '/parameters',
+  cohorts: '/cohorts',
+};
+
 export const layoutTests = {
   async 'every page fits a phone, a laptop and a wide screen'(r) {
     const { tables } = await r.api('rigs/tablet/tables');
     const kept = tables[0].entries[0].segment.split('/').pop();
     const pages = pagesOf('tablet', 'walk', kept);
-    await checkPages(r, { rigs: '/', 'all-events': '/events', ...pages }, 'fits-');
+    await checkPages(r, { ...kFleetPages, ...pages }, 'fits-');
   },
 
   async 'names of 63 and sessions of 128 characters fit, too'(r, other, daemon, send) {
@@ -113,6 +121,6 @@ export const layoutTests = {
       return recalibrations.length > 0 && recalibrations.every((run) => run.state === 'SUCCEEDED');
     });
     const pages = pagesOf(kLongRig, kLongSession, kLongSession + '~0');
-    await checkPages(r, { rigs: '/', 'all-events': '/events', ...pages }, 'long-');
+    await checkPages(r, { ...kFleetPages, ...pages }, 'long-');
   },
 };

@@ -127,6 +127,22 @@ TEST(EstimateCohort, KeepsMostOfACohortThatAgreesOnNothing) {
   EXPECT_GE(cohort.devices.size(), 3u);
 }
 
+TEST(EstimateCohort, EndsSoonIfItIsCancelled) {
+  RandomCohort truth(kSize, 0.5, 3);
+  const auto devices = truth.Devices(20);
+  int asked = 0;
+  CohortOptions options;
+  options.cancelled = [&] { return ++asked < 0; };
+  const Eigen::VectorXd scale = Eigen::VectorXd::Ones(kSize);
+  EstimateCohort({}, scale, devices, options);
+  const int steps = asked;
+  asked = 0;
+  options.cancelled = [&] { return ++asked > 3; };
+  EstimateCohort({}, scale, devices, options);
+  EXPECT_GT(asked, 3);
+  EXPECT_LT(3 * asked, steps);
+}
+
 TEST(CompareWithCohort, FindsTheComponentThatDiffers) {
   RandomCohort truth(kSize, 0.3, 21);
   const Cohort cohort = Estimate(truth.Devices(50));

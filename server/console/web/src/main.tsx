@@ -9,7 +9,10 @@ import { Empty, Link, Problem, Title } from './parts';
 import { useAddress, useLive, useRead } from './state';
 import { Calibrations } from './pages/calibrations';
 import { CoachPage } from './pages/coach';
+import { Cohorts } from './pages/cohorts';
 import { Events } from './pages/events';
+import { FleetParameters } from './pages/fleet_parameters';
+import { Instructions } from './pages/instructions';
 import { RigPage } from './pages/rig';
 import { Rigs } from './pages/rigs';
 import { RunPage } from './pages/run';
@@ -26,6 +29,7 @@ const kRigPages: [string, string][] = [
   ['calibrations', 'Calibrations'],
   ['recalibrations', 'Runs'],
   ['events', 'Events'],
+  ['instructions', 'Instructions'],
 ];
 
 function RigNav(props: { rig: string; page: string }) {
@@ -49,11 +53,14 @@ function Page(props: { parts: string[]; caller: Caller | null; version: number }
   const { version, caller } = props;
   if (!top) return <Rigs version={version} />;
   if (top === 'events' && !rig) return <Events rig="" version={version} />;
+  if (top === 'parameters' && !rig) return <FleetParameters version={version} />;
+  if (top === 'cohorts' && !rig) return <Cohorts version={version} />;
   if (top === 'rigs' && rig) {
     const shown = () => {
       if (!page) return <RigPage rig={rig} caller={caller} version={version} />;
       if (page === 'coach') return <CoachPage rig={rig} version={version} />;
       if (page === 'events') return <Events rig={rig} version={version} />;
+      if (page === 'instructions') return <Instructions rig={rig} version={version} />;
       if (page === 'calibrations' && !id) {
         return <Calibrations rig={rig} caller={caller} version={version} />;
       }
@@ -124,6 +131,12 @@ function App() {
         <nav aria-label="Main">
           <Link to="/" current={parts.length === 0 || rig !== ''}>
             Rigs
+          </Link>
+          <Link to="/parameters" current={parts[0] === 'parameters'}>
+            Parameters
+          </Link>
+          <Link to="/cohorts" current={parts[0] === 'cohorts'}>
+            Cohorts
           </Link>
           <Link to="/events" current={parts[0] === 'events'}>
             Events

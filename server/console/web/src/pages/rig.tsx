@@ -1,5 +1,4 @@
 import { useMemo, useState } from 'preact/hooks';
-import uPlot from 'uplot';
 import { ActionDialog, mayAdminister } from '../action';
 import { idOf, remove, rigPath } from '../api';
 import type {
@@ -13,10 +12,10 @@ import type {
   Table_Entry,
 } from '../contract';
 import { number } from '../format';
+import { Histogram } from '../histogram';
 import { EditLabels, Labels } from '../labels';
 import { Certainty, knownOf } from '../parameters';
 import { Choice, Empty, Loaded, Meter, Problem, SegmentLink, Title } from '../parts';
-import { kColours, Plot } from '../plot';
 import { RigVerdict, WhatChanged, WhatToDo } from './rig_summary';
 import { NewestSession } from './session';
 import { go, useRead } from '../state';
@@ -77,54 +76,23 @@ function Tables(props: { of: Table[] }) {
   );
 }
 
-const kBins = 24;
-
-function Histogram(props: { segments: Segment[]; group: string }) {
-  const { data, low, high } = useMemo(() => {
+function EntropyHistogram(props: { segments: Segment[]; group: string }) {
+  const of = useMemo(() => {
     const scores = props.segments
       .flatMap((segment) => segment.scores)
       .filter((s) => s.group === props.group && Number.isFinite(s.entropyNats));
-    const all = scores.map((s) => s.entropyNats);
-    const low = Math.min(...all);
-    const width = (Math.max(...all) - low || 1) / kBins;
-    const count = (wanted: boolean) => {
-      const bins = new Array<number>(kBins).fill(0);
-      for (const s of scores) {
-        if (wanted && !s.inTable) continue;
-        bins[Math.min(kBins - 1, Math.floor((s.entropyNats - low) / width))]++;
-      }
-      return bins;
-    };
-    const centres = Array.from({ length: kBins }, (_, i) => low + (i + 0.5) * width);
-    return {
-      data: [centres, count(false), count(true)] as uPlot.AlignedData,
-      low,
-      high: low + kBins * width,
-    };
+    const values = (chosen: typeof scores) => chosen.map((s) => s.entropyNats);
+    return [
+      { label: 'all', values: values(scores) },
+      { label: 'kept in the table', values: values(scores.filter((s) => s.inTable)) },
+    ];
   }, [props.segments, props.group]);
-  const bars = uPlot.paths.bars!({ size: [0.9, 60] });
   return (
-    <Plot
+    <Histogram
       label={`Histogram of the entropy of segments for the group ${props.group}`}
-      data={data}
-      x={{ label: 'entropy [nat]; lower is more informative', range: [low, high] }}
+      x="entropy [nat]; lower is more informative"
       y="number of segments"
-      series={[
-        {
-          label: 'all',
-          fill: kColours[0] + '66',
-          stroke: kColours[0],
-          paths: bars,
-          points: { show: false },
-        },
-        {
-          label: 'kept in the table',
-          fill: kColours[1],
-          stroke: kColours[1],
-          paths: bars,
-          points: { show: false },
-        },
-      ]}
+      of={of}
     />
   );
 }
@@ -159,7 +127,7 @@ function Entropies(props: { rig: string; groups: string[]; version: number }) {
                   onChoice={setGroup}
                 />
               </div>
-              <Histogram segments={scored} group={group} />
+              <EntropyHistogram segments={scored} group={group} />
               <p class="quiet">For the newest {scored.length} scored segments.</p>
             </>
           );
