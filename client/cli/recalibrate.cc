@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "client/cli/commands.h"
+#include "client/cli/instruction.h"
 #include "client/cli/run_following.h"
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.grpc.pb.h"
@@ -26,7 +27,15 @@ int Recalibrate(Context* context, const RecalibrateOptions& options) {
   v1::Recalibration run;
   const grpc::Status status = Call<RecalibrationService>(
       stub.get(), &RecalibrationService::StartRecalibration, request, &run);
-  if (!status.ok()) return Fail(*context, status);
+  v1::Instruction instruction;
+  *instruction.mutable_start_recalibration() = request;
+  grpc::Status failure = status;
+  if (const auto given =
+          InsteadOf(status, *context, options.rig, instruction, &failure)) {
+    PrintGiven(*context, *given);
+    return kDone;
+  }
+  if (!failure.ok()) return Fail(*context, failure);
   if (!options.no_wait) return FollowRun(context, stub.get(), std::move(run));
   PrintRun(*context, run);
   return kDone;
