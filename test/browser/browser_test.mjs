@@ -296,12 +296,12 @@ const tests = {
   },
 
   async 'a parameter of all rigs is compared'(r) {
-    await r.shows('/parameters', 'Parameters', ['tablet', 'headset'], 'parameters');
+    await r.shows('/parameters', 'Parameters', ['phone-'], 'parameters');
     await r.page.locator('.uplot canvas').first().waitFor();
-    await r.page.getByLabel('Rigs').fill('name = tablet');
-    await r.page.getByRole('link', { name: 'headset' }).waitFor({ state: 'detached' });
-    assert.match(r.page.url(), /filter=name/);
+    await r.page.getByRole('searchbox', { name: 'Rigs' }).fill('name = tablet');
     await r.page.getByRole('link', { name: 'tablet', exact: true }).waitFor();
+    assert.match(r.page.url(), /filter=name/);
+    assert.equal(await r.page.getByRole('link', { name: /^phone-/ }).count(), 0);
     await r.shows('/parameters?component=cam9.focal.x', 'Parameters', ['No active version']);
     r.expectProblems = true;
     await r.shows('/parameters?filter=nonsense+%3D+1', 'Parameters', ['is not a condition']);
