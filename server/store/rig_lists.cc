@@ -123,29 +123,41 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
   return found;
 }
 
-absl::Status ReadVersions(Connection* db,
-                          std::int64_t rig,
-                          RigSummary* summary) {
-  Statement active(db,
-                   "SELECT c.version, (SELECT a.time_ns FROM activations a "
-                   "    WHERE a.rig = c.rig AND a.version = c.version "
-                   "    ORDER BY a.activation DESC LIMIT 1) "
-                   "FROM calibrations c WHERE c.rig = ?1 AND c.state = 1",
-                   rig);
-  if (active.Next()) {
-    summary->active_version = active.Int(0);
-    summary->active_since_ns = active.Int(1);
+// Versions, newest run, change, and whether it is an outlier: one statement, as
+// a list of rigs asks for each of them.
+absl::Status ReadNewest(Connection* db, std::int64_t rig, RigSummary* summary) {
+  Statement read(
+      db,
+      "SELECT c.version, (SELECT a.time_ns FROM activations a "
+      "    WHERE a.rig = c.rig AND a.version = c.version "
+      "    ORDER BY a.activation DESC LIMIT 1), "
+      "  n.version, n.state, r.run, r.state, "
+      "  (SELECT d.time_ns FROM changes d WHERE d.rig = g.rig "
+      "   ORDER BY d.change DESC LIMIT 1), "
+      "  (SELECT o.version FROM cohort_outliers o WHERE o.rig = g.rig) "
+      "FROM rigs g "
+      "LEFT JOIN calibrations c ON c.rig = g.rig AND c.state = 1 "
+      "LEFT JOIN calibrations n ON n.rig = g.rig AND n.version = "
+      "  (SELECT max(version) FROM calibrations WHERE rig = ?1) "
+      "LEFT JOIN runs r ON r.rig = g.rig AND r.run = "
+      "  (SELECT max(run) FROM runs WHERE rig = ?1) "
+      "WHERE g.rig = ?1",
+      rig);
+  if (read.Next()) {
+    summary->active_version = read.Int(0);
+    summary->active_since_ns = read.Int(1);
+    if (!read.IsNull(2)) {
+      summary->newest_version = read.Int(2);
+      summary->newest_state = static_cast<CalibrationState>(read.Int(3) - 1);
+    }
+    if (!read.IsNull(4)) {
+      summary->newest_run = read.Int(4);
+      summary->run_state = static_cast<RunState>(read.Int(5) - 1);
+    }
+    summary->newest_change_ns = read.Int(6);
+    summary->unlike_cohort = read.Int(7);
   }
-  SELFCAL_RETURN_IF_ERROR(active.status());
-  Statement newest(db,
-                   "SELECT version, state FROM calibrations WHERE rig = ?1 "
-                   "ORDER BY version DESC LIMIT 1",
-                   rig);
-  if (newest.Next()) {
-    summary->newest_version = newest.Int(0);
-    summary->newest_state = static_cast<CalibrationState>(newest.Int(1) - 1);
-  }
-  return newest.status();
+  return read.status();
 }
 
 absl::Status ReadLabels(Connection* db, std::int64_t rig, RigSummary* summary) {
@@ -178,25 +190,8 @@ absl::Status ReadDevice(Connection* db, std::int64_t rig, RigSummary* summary) {
 
 // What alarms depend on.
 absl::Status ReadState(Connection* db, std::int64_t rig, RigSummary* summary) {
-  SELFCAL_RETURN_IF_ERROR(ReadVersions(db, rig, summary));
+  SELFCAL_RETURN_IF_ERROR(ReadNewest(db, rig, summary));
   SELFCAL_ASSIGN_OR_RETURN(summary->tables, ReadTables(db, rig));
-  Statement run(db,
-                "SELECT run, state FROM runs WHERE rig = ?1 "
-                "ORDER BY run DESC LIMIT 1",
-                rig);
-  if (run.Next()) {
-    summary->newest_run = run.Int(0);
-    summary->run_state = static_cast<RunState>(run.Int(1) - 1);
-  }
-  SELFCAL_RETURN_IF_ERROR(run.status());
-  SELFCAL_ASSIGN_OR_RETURN(summary->newest_change_ns,
-                           ReadInt(db,
-                                   "SELECT time_ns FROM changes WHERE rig = ?1 "
-                                   "ORDER BY change DESC LIMIT 1",
-                                   rig));
-  SELFCAL_ASSIGN_OR_RETURN(
-      summary->unlike_cohort,
-      ReadInt(db, "SELECT version FROM cohort_outliers WHERE rig = ?1", rig));
   return ReadDevice(db, rig, summary);
 }
 
