@@ -118,6 +118,33 @@ def _fleet_wide(of: Fleet, size: int) -> list[Request]:
             "activity of a label that no rig has",
             page("activity", filter=nothing),
         ),
+        Request("segments of all", page("segments"), "segments", True),
+        Request(
+            "segments of all by gain",
+            page("segments", order_by="gain.camera desc"),
+            "segments",
+            True,
+        ),
+        Request(
+            "segments of all of a model",
+            page("segments", rig_filter=model),
+            "segments",
+            True,
+        ),
+        Request(
+            "segments of all of a label that no rig has",
+            page("segments", rig_filter=nothing),
+        ),
+        Request(
+            "runs of a model",
+            page("recalibrations", rig_filter=model),
+            "",
+            True,
+        ),
+        Request(
+            "events of a label that no rig has",
+            page("events", rig_filter=nothing),
+        ),
         Request(
             "attention",
             page("activity", with_alarms="true", order_by="alarms desc"),
