@@ -118,13 +118,9 @@ int Activate(Context* context,
                                &calibration);
   v1::Instruction instruction;
   *instruction.mutable_activate_calibration() = request;
-  grpc::Status failure = status;
-  if (const auto given =
-          InsteadOf(status, *context, rig, instruction, &failure)) {
-    PrintGiven(*context, *given);
-    return kDone;
+  if (const auto code = EndFailed(status, *context, rig, instruction)) {
+    return *code;
   }
-  if (!failure.ok()) return Fail(*context, failure);
   if (context->json) {
     context->PrintJson(calibration);
   } else {

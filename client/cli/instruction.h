@@ -24,4 +24,12 @@ std::optional<v1::Instruction> InsteadOf(const grpc::Status& failed,
 // "instruction 4 is given to the device of rig tablet: ...", or JSON.
 void PrintGiven(const Context& context, const v1::Instruction& instruction);
 
+// Ends a command whose call has this status, unless it succeeded: gives the
+// instruction and prints it, or prints the error. Returns the exit code;
+// nullopt if the call succeeded.
+std::optional<int> EndFailed(const grpc::Status& status,
+                             const Context& context,
+                             const std::string& rig,
+                             const v1::Instruction& instruction);
+
 }  // namespace selfcal::client

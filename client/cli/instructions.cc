@@ -127,6 +127,18 @@ void PrintGiven(const Context& context, const v1::Instruction& instruction) {
       RigPart(instruction.name())));
 }
 
+std::optional<int> EndFailed(const grpc::Status& status,
+                             const Context& context,
+                             const std::string& rig,
+                             const v1::Instruction& instruction) {
+  if (status.ok()) return std::nullopt;
+  grpc::Status failure = status;
+  const auto given = InsteadOf(status, context, rig, instruction, &failure);
+  if (!given) return Fail(context, failure);
+  PrintGiven(context, *given);
+  return kDone;
+}
+
 void AddInstructionCommands(CLI::App* app, Context* context) {
   CLI::App* instruction =
       app->add_subcommand("instruction", "Show what this hub has devices do");

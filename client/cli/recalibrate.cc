@@ -29,13 +29,9 @@ int Recalibrate(Context* context, const RecalibrateOptions& options) {
       stub.get(), &RecalibrationService::StartRecalibration, request, &run);
   v1::Instruction instruction;
   *instruction.mutable_start_recalibration() = request;
-  grpc::Status failure = status;
-  if (const auto given =
-          InsteadOf(status, *context, options.rig, instruction, &failure)) {
-    PrintGiven(*context, *given);
-    return kDone;
+  if (const auto code = EndFailed(status, *context, options.rig, instruction)) {
+    return *code;
   }
-  if (!failure.ok()) return Fail(*context, failure);
   if (!options.no_wait) return FollowRun(context, stub.get(), std::move(run));
   PrintRun(*context, run);
   return kDone;

@@ -151,13 +151,9 @@ int Update(Context* context, const UpdateOptions& options) {
   status = Call<RigService>(stub.get(), &RigService::UpdateRig, request, &rig);
   v1::Instruction instruction;
   *instruction.mutable_update_rig() = request;
-  grpc::Status failure = status;
-  if (const auto given =
-          InsteadOf(status, *context, options.rig, instruction, &failure)) {
-    PrintGiven(*context, *given);
-    return kDone;
+  if (const auto code = EndFailed(status, *context, options.rig, instruction)) {
+    return *code;
   }
-  if (!failure.ok()) return Fail(*context, failure);
   if (context->json) {
     context->PrintJson(rig);
     return kDone;

@@ -289,13 +289,9 @@ int Quarantine(Context* context, const QuarantineOptions& options) {
       stub.get(), &SegmentService::QuarantineSegments, request, &response);
   v1::Instruction instruction;
   *instruction.mutable_quarantine_segments() = request;
-  grpc::Status failure = status;
-  if (const auto given =
-          InsteadOf(status, *context, options.rig, instruction, &failure)) {
-    PrintGiven(*context, *given);
-    return kDone;
+  if (const auto code = EndFailed(status, *context, options.rig, instruction)) {
+    return *code;
   }
-  if (!failure.ok()) return Fail(*context, failure);
   if (context->json) {
     context->PrintJson(response);
     return kDone;
