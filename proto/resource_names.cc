@@ -3,18 +3,14 @@
 #include <charconv>
 #include <system_error>
 
+#include "proto/percent_encoding.h"
+
 namespace selfcal {
 namespace {
 
 constexpr std::string_view kRigs = "rigs/";
 constexpr std::string_view kSegments = "/segments/";
-constexpr std::string_view kUpperHex = "0123456789ABCDEF";
 constexpr std::size_t kMaxRigId = 63;
-
-bool IsUnreserved(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-         (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
-}
 
 bool IsRigId(std::string_view id) {
   const bool characters =
@@ -22,38 +18,13 @@ bool IsRigId(std::string_view id) {
   return !id.empty() && id.size() <= kMaxRigId && characters;
 }
 
-std::string Encode(std::string_view text) {
-  std::string encoded;
-  encoded.reserve(text.size());
-  for (const char c : text) {
-    if (IsUnreserved(c)) {
-      encoded += c;
-      continue;
-    }
-    const auto byte = static_cast<unsigned char>(c);
-    encoded += '%';
-    encoded += kUpperHex[byte >> 4];
-    encoded += kUpperHex[byte & 0xf];
-  }
-  return encoded;
-}
-
-// Accepts only what Encode writes, so that a resource has exactly one name.
+// Accepts only what PercentEncode writes, so that a resource has exactly one
+// name.
 std::optional<std::string> Decode(std::string_view encoded) {
-  std::string text;
-  for (std::size_t i = 0; i < encoded.size(); ++i) {
-    if (encoded[i] != '%') {
-      text += encoded[i];
-      continue;
-    }
-    if (i + 2 >= encoded.size()) return std::nullopt;
-    const auto high = kUpperHex.find(encoded[i + 1]);
-    const auto low = kUpperHex.find(encoded[i + 2]);
-    if (high == kUpperHex.npos || low == kUpperHex.npos) return std::nullopt;
-    text += static_cast<char>(high << 4 | low);
-    i += 2;
+  auto text = PercentDecode(encoded);
+  if (!text || text->empty() || PercentEncode(*text) != encoded) {
+    return std::nullopt;
   }
-  if (text.empty() || Encode(text) != encoded) return std::nullopt;
   return text;
 }
 
@@ -97,8 +68,8 @@ std::optional<std::string> ParseRigName(std::string_view name) {
 }
 
 std::string SegmentName(std::string_view rig, const SegmentKey& key) {
-  return RigName(rig) + std::string(kSegments) + Encode(key.session) + '~' +
-         std::to_string(key.index);
+  return RigName(rig) + std::string(kSegments) + PercentEncode(key.session) +
+         '~' + std::to_string(key.index);
 }
 
 std::optional<SegmentNameParts> ParseSegmentName(std::string_view name) {
@@ -115,7 +86,7 @@ std::optional<SegmentNameParts> ParseSegmentName(std::string_view name) {
 std::string ChildName(std::string_view rig,
                       std::string_view collection,
                       std::string_view id) {
-  return RigName(rig) + '/' + std::string(collection) + '/' + Encode(id);
+  return RigName(rig) + '/' + std::string(collection) + '/' + PercentEncode(id);
 }
 
 std::optional<ChildNameParts> ParseChildName(std::string_view name,

@@ -24,8 +24,7 @@ struct CohortOptions {
   // far from the others is smaller.
   double false_alarm = 0.01;
   // Asked between steps, if there is one: true ends the estimate early, whose
-  // result is then of no use. Of hundreds of devices that do not differ
-  // measurably it takes a minute.
+  // result is then of no use. The less devices differ, the more steps it takes.
   std::function<bool()> cancelled = {};
 };
 

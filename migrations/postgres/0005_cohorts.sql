@@ -10,7 +10,7 @@ CREATE TABLE cohorts (
   PRIMARY KEY (label, value, version)
 );
 
--- At a hub: the version of a rig that contradicts its cohort.
+-- The version of a rig that contradicts its cohort, at a hub.
 CREATE TABLE cohort_outliers (
   rig BIGINT PRIMARY KEY REFERENCES rigs,
   version BIGINT NOT NULL

@@ -10,7 +10,7 @@ CREATE TABLE cohorts (
   PRIMARY KEY (label, value, version)
 ) STRICT;
 
--- At a hub: the version of a rig that contradicts its cohort.
+-- The version of a rig that contradicts its cohort, at a hub.
 CREATE TABLE cohort_outliers (
   rig INTEGER PRIMARY KEY REFERENCES rigs,
   version INTEGER NOT NULL

@@ -1,4 +1,4 @@
-// What a list is of: one rig, or the rigs of a filter.
+// The parent of a list: one rig, or the rigs of a filter.
 #pragma once
 
 #include <absl/status/statusor.h>

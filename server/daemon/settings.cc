@@ -7,6 +7,7 @@
 #include <map>
 #include <string>
 
+#include "proto/label_text.h"
 #include "server/store/postgres/store_uri.h"
 
 namespace selfcal::server {
@@ -360,21 +361,16 @@ void DefineUplink(Definer* define, DaemonOptions* options) {
       ->default_str("administer");
 }
 
-// A label has the form that labels of rigs have.
 void DefinePopulation(Definer* define, PopulationOptions* options) {
   define
       ->Add("cohort-label",
             &options->label,
             "Label of which each value is a cohort, whose statistics are "
             "computed and stored from time to time, e.g. model; default: none")
-      ->check([](const std::string& label) -> std::string {
-        constexpr char kLetters[] = "abcdefghijklmnopqrstuvwxyz";
-        constexpr char kAll[] = "abcdefghijklmnopqrstuvwxyz0123456789_-";
-        if (label.empty()) return "";
-        const bool is_name = label.size() <= 63 &&
-                             label.find_first_of(kLetters) == 0 &&
-                             label.find_first_not_of(kAll) == label.npos;
-        return is_name ? "" : "'" + label + "' is not the name of a label";
+      ->check([](const std::string& label) {
+        return label.empty() || IsLabelName(label)
+                   ? ""
+                   : "'" + label + "' is not the name of a label";
       });
   define
       ->Add("cohort-interval",

@@ -161,7 +161,7 @@ Written WrittenOf(const ReportedRow& row) {
   return written;
 }
 
-// What an insertion does about a row that is there.
+// The treatment of a row that is there already.
 std::string ConflictClause(const ReportedRow& row,
                            const std::vector<std::string_view>& columns,
                            OnConflict on_conflict) {

@@ -166,7 +166,7 @@ absl::Status ReadLabels(Connection* db, std::int64_t rig, RigSummary* summary) {
   return read.status();
 }
 
-// On a device, how far its reports are.
+// The progress of the reports, on a device.
 absl::Status ReadUplink(Connection* db, std::int64_t rig, RigSummary* summary) {
   Statement read(db,
                  "SELECT time_ns, (SELECT count(*) FROM outbox o "
@@ -176,7 +176,7 @@ absl::Status ReadUplink(Connection* db, std::int64_t rig, RigSummary* summary) {
   return read.status();
 }
 
-// At a hub, of the device that reports the rig.
+// The device that reports the rig, at a hub.
 absl::Status ReadDevice(Connection* db, std::int64_t rig, RigSummary* summary) {
   Statement read(db,
                  "SELECT time_ns, waiting, program_version "
@@ -188,7 +188,7 @@ absl::Status ReadDevice(Connection* db, std::int64_t rig, RigSummary* summary) {
   return read.status();
 }
 
-// What alarms depend on.
+// The state on which alarms depend.
 absl::Status ReadState(Connection* db, std::int64_t rig, RigSummary* summary) {
   SELFCAL_RETURN_IF_ERROR(ReadNewest(db, rig, summary));
   SELFCAL_ASSIGN_OR_RETURN(summary->tables, ReadTables(db, rig));

@@ -18,7 +18,7 @@ void AddRigConditions(const RigQuery& query,
                       const std::string& rigs,
                       SqlCondition* condition);
 
-// What the filter of the query says, to identify its list in page tokens.
+// The filter of the query as a text, which identifies its list in page tokens.
 std::string FilterText(const RigQuery& query);
 
 // INVALID_ARGUMENT for a token of another list or another query.

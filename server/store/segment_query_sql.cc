@@ -26,23 +26,15 @@ void AndRange(const std::string& column,
 
 void AndScores(const SegmentQuery& query, SqlCondition* to) {
   if (query.scored_group.empty()) return;
-  std::string scores = "c.group_name = " + to->Parameter(query.scored_group);
-  const auto add = [&](const char* column, const Range<double>& range) {
-    if (range.least) {
-      scores +=
-          fmt::format(" AND c.{} >= {}", column, to->Parameter(*range.least));
-    }
-    if (range.most) {
-      scores +=
-          fmt::format(" AND c.{} <= {}", column, to->Parameter(*range.most));
-    }
-  };
-  add("entropy", query.entropy_nats);
-  add("gain", query.gain_nats);
-  to->And(
+  SqlCondition scores = to->Next();
+  scores.And("c.group_name = " + scores.Parameter(query.scored_group));
+  AndRange("c.entropy", query.entropy_nats, &scores);
+  AndRange("c.gain", query.gain_nats, &scores);
+  to->AndWithin(
       "EXISTS (SELECT 1 FROM segment_scores c WHERE c.rig = s.rig "
-      "  AND c.sequence = s.sequence AND " +
-      scores + ")");
+      "  AND c.sequence = s.sequence AND ",
+      scores,
+      ")");
 }
 
 void AndFilter(const SegmentQuery& query, SqlCondition* to) {

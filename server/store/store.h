@@ -364,8 +364,8 @@ class Store {
   // --- Segments.
   virtual absl::StatusOr<StoredSegment> GetSegment(const std::string& rig,
                                                    const SegmentKey& key) = 0;
-  // Of one rig or, if `rig` is empty, of those of `of`; then in an order by
-  // arrival (steady time) or gain. INVALID_ARGUMENT for another order.
+  // The segments of one rig or, if `rig` is empty, of those of `of`; then in an
+  // order by arrival (steady time) or gain. INVALID_ARGUMENT for another order.
   virtual absl::StatusOr<Listed<StoredSegment>> ListSegments(
       const std::string& rig,
       const SegmentQuery& query,

@@ -14,8 +14,10 @@ void SqlCondition::And(const std::string& condition) {
   sql_ += condition;
 }
 
-void SqlCondition::And(const SqlCondition& next) {
-  And(next.sql());
+void SqlCondition::AndWithin(const std::string& before,
+                             const SqlCondition& next,
+                             const std::string& after) {
+  And(before + next.sql() + after);
   values_.insert(values_.end(), next.values_.begin(), next.values_.end());
   next_ = next.next_;
 }

@@ -25,7 +25,11 @@ class SqlCondition {
   // An empty condition whose parameters follow those of this one; once it is
   // added, its values follow as well.
   SqlCondition Next() const { return SqlCondition(next_); }
-  void And(const SqlCondition& next);
+  void And(const SqlCondition& next) { AndWithin("", next, ""); }
+  // The same with texts before and after it.
+  void AndWithin(const std::string& before,
+                 const SqlCondition& next,
+                 const std::string& after);
 
   bool is_empty() const { return sql_.empty(); }
   // "TRUE" if it is empty.

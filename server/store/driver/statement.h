@@ -23,9 +23,10 @@ struct BlobView {
   std::string_view bytes;
 };
 
-// Whether the connection keeps the prepared statement for the next use of the
-// same text. kOnce is for texts of which there are many: they would take the
-// places of others. An engine then also plans for the values that are bound.
+// The life of a prepared statement: a connection keeps kKept for the next use
+// of the same text. kOnce is for texts of which there are many: they would take
+// the places of others. An engine then also plans for the values that are
+// bound.
 enum class Reuse { kKept, kOnce };
 
 // The connection and the bytes that are bound must outlive the statement.

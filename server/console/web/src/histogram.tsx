@@ -1,4 +1,4 @@
-// How many values lie in each of equal intervals.
+// A histogram: the number of values in each of equal intervals.
 import { useMemo } from 'preact/hooks';
 import uPlot from 'uplot';
 import { kColours, Plot } from './plot';

@@ -124,7 +124,7 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
             "99a8680853b476090635f29974a1cfeb4c004b6d42a50438a903a6337f613763");
   EXPECT_EQ(migrations[17].name, "0018_cohorts.sql");
   EXPECT_EQ(migrations[17].sha256,
-            "94a91f646a88b7037e6cd2530c445c79ae59d9ddf5c64cd481d1d5a860397f7f");
+            "eb5e60563d326e63d218276d3a604cd7811df5e0c5dc82ca3332e8178e4f06d5");
   EXPECT_EQ(migrations[18].name, "0019_scores_by_rig.sql");
   EXPECT_EQ(migrations[18].sha256,
             "525d1c3af0167c4cd9fdae1a3e066342e41101f0843eebbd7c730b8d808cebd7");

@@ -5,7 +5,7 @@ import { ListPage } from '../list';
 import { Badge, When } from '../parts';
 import type { Column } from '../table';
 
-// What the device is to do.
+// The request of an instruction, in words.
 function requestOf(instruction: Instruction): string {
   const { activateCalibration, updateRig, startRecalibration, quarantineSegments } = instruction;
   if (activateCalibration) {
