@@ -2,6 +2,7 @@
 returns a sentence for each thing that does not.
 """
 
+import json
 import time
 
 import grpc
@@ -18,10 +19,31 @@ _SETTLE_S = 120
 _MAX_ATTEMPTS = 3  # of a run (server/pipeline/run_execution.h)
 
 
+# A call on a connection to a replica that was just killed is tried again: the
+# proxy gives it another one.
+_SERVICE_CONFIG = {
+    "methodConfig": [
+        {
+            "name": [{}],
+            "retryPolicy": {
+                "maxAttempts": 5,
+                "initialBackoff": "0.5s",
+                "maxBackoff": "4s",
+                "backoffMultiplier": 2,
+                "retryableStatusCodes": ["UNAVAILABLE"],
+            },
+        }
+    ]
+}
+
+
 def connect(fleet: RunningFleet) -> selfcal.Daemon:
     options = [
         ("grpc.use_local_subchannel_pool", 1),
         ("grpc.max_receive_message_length", 64 << 20),
+        ("grpc.initial_reconnect_backoff_ms", 100),
+        ("grpc.max_reconnect_backoff_ms", 1000),
+        ("grpc.service_config", json.dumps(_SERVICE_CONFIG)),
     ]
     target = f"{ADDRESS}:{fleet.service_port}"
     return selfcal.Daemon(grpc.insecure_channel(target, options))

@@ -1,4 +1,4 @@
-"""A TCP proxy that cuts or stalls its connections when told to."""
+"""Proxies that cut or stall their connections when told to."""
 
 import asyncio
 import socket
@@ -7,10 +7,14 @@ import threading
 
 ADDRESS = "127.0.0.1"
 _CHUNK = 65536
+# Of HTTP/2: the bytes before the payload of a frame, with its length and type,
+# and the types that carry what a server answers: DATA, HEADERS, CONTINUATION.
+_FRAME_HEADER = 9
+_ANSWERS = (0, 1, 9)
 
 
 class Proxy:
-    """Forwards its `port` to another one, on a thread, until close()."""
+    """Forwards its `port` of TCP to another one, on a thread, until close()."""
 
     def __init__(self, target: int) -> None:
         self.port = 0
@@ -19,9 +23,8 @@ class Proxy:
         self._writers: set[asyncio.StreamWriter] = set()
         self._refuses = False
         self._loop = asyncio.new_event_loop()
-        self._requests = asyncio.Event()  # set: they flow
-        self._answers = asyncio.Event()
-        self._flow()
+        self._flows = asyncio.Event()
+        self._flows.set()
         self._server = None
         self._thread = threading.Thread(target=self._loop.run_forever)
         self._thread.daemon = True
@@ -34,11 +37,7 @@ class Proxy:
 
     def stall(self) -> None:
         """Lets no byte through in either direction until heal()."""
-        self._tell(self._stall)
-
-    def hold_answers(self) -> None:
-        """Lets no byte through to clients until heal()."""
-        self._tell(self._answers.clear)
+        self._tell(self._flows.clear)
 
     def heal(self) -> None:
         self._tell(self._heal)
@@ -55,23 +54,15 @@ class Proxy:
 
         asyncio.run_coroutine_threadsafe(act(), self._loop).result()
 
-    def _flow(self) -> None:
-        self._requests.set()
-        self._answers.set()
-
-    def _stall(self) -> None:
-        self._requests.clear()
-        self._answers.clear()
-
     def _heal(self) -> None:
         self._refuses = False
-        self._flow()
+        self._flows.set()
 
     def _drop(self) -> None:
         self._refuses = True
         for writer in list(self._writers):
             _reset(writer)
-        self._flow()
+        self._flows.set()
 
     async def _listen(self) -> None:
         self._server = await asyncio.start_server(self._accept, ADDRESS, 0)
@@ -90,25 +81,65 @@ class Proxy:
         both = (writer, there_writer)
         self._writers.update(both)
         await asyncio.gather(
-            self._pump(reader, there_writer, self._requests),
-            self._pump(there_reader, writer, self._answers),
+            self._pump(self._requests(reader), there_writer),
+            self._pump(self._answers(there_reader), writer),
         )
         self._writers.difference_update(both)
         for end in both:
             end.close()
 
-    async def _pump(self, reader, writer, flows: asyncio.Event) -> None:
+    async def _requests(self, reader):
+        while chunk := await reader.read(_CHUNK):
+            await self._flows.wait()
+            self.forwarded += len(chunk)
+            yield chunk
+
+    async def _answers(self, reader):
+        while chunk := await reader.read(_CHUNK):
+            await self._flows.wait()
+            yield chunk
+
+    async def _pump(self, chunks, writer) -> None:
         try:
-            while chunk := await reader.read(_CHUNK):
-                await flows.wait()
-                if flows is self._requests:
-                    self.forwarded += len(chunk)
+            async for chunk in chunks:
                 writer.write(chunk)
                 await writer.drain()
-            await flows.wait()
+            await self._flows.wait()
             writer.write_eof()
         except OSError:
             _reset(writer)
+
+
+class Http2Proxy(Proxy):
+    """One that can lose answers as well, if nothing is encrypted."""
+
+    _loses_answers = False
+
+    def lose_answers(self) -> None:
+        """Loses the answers to calls until drop(). What is left of HTTP/2 gets
+        through, so that a large request arrives whole.
+        """
+
+        def lose() -> None:
+            self._loses_answers = True
+
+        self._tell(lose)
+
+    def _drop(self) -> None:
+        self._loses_answers = False
+        super()._drop()
+
+    async def _answers(self, reader):
+        while True:
+            try:
+                header = await reader.readexactly(_FRAME_HEADER)
+                length = int.from_bytes(header[:3], "big")
+                frame = header + await reader.readexactly(length)
+            except asyncio.IncompleteReadError:
+                return
+            await self._flows.wait()
+            if not (self._loses_answers and header[3] in _ANSWERS):
+                yield frame
 
 
 def _reset(writer) -> None:

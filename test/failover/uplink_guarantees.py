@@ -10,7 +10,7 @@ from hub import processes
 from failover import checks
 from failover.drain import Drain
 from failover.load import Context
-from failover.proxy import Proxy
+from failover.proxy import Http2Proxy, Proxy
 from failover.reporting_device import (
     OPERATIONS,
     ReportingDevice,
@@ -102,7 +102,7 @@ class _Devices:
 
 def cut_uplink(context: Context, tried: Tried, trials: int) -> None:
     tried.after = "reports again"
-    proxy = Proxy(context.fleet.service_port)
+    proxy = Http2Proxy(context.fleet.service_port)
     try:
         for numbers in rounds(trials):
             devices = _Devices(context, proxy.port, ("all", "kept"))
@@ -119,16 +119,16 @@ def _cut(
     tried: Tried,
     devices: _Devices,
     number: int,
-    proxy: Proxy,
+    proxy: Http2Proxy,
 ) -> None:
-    how = (_reset, _hold_answers, _stall, _flap)[number % 4]
+    how = (_reset, _lose_answers, _stall, _flap)[number % 4]
     fleet = context.fleet
     replica = random.choice(fleet.replicas())
     time.sleep(random.uniform(0.2, 1))
-    # The devices have to turn to another replica as well.
-    fleet.signal(signal.SIGKILL, replica)
     try:
         what = f"{how(context, devices, proxy)}, {replica} killed"
+        # The devices may have to turn to another replica as well.
+        fleet.signal(signal.SIGKILL, replica)
         for device in devices.devices:
             if device.uplink().waiting == 0:
                 tried.fail(f"{what}: nothing waited on {device.rig_id}")
@@ -172,9 +172,11 @@ def _stall(context: Context, devices: _Devices, proxy: Proxy) -> str:
     return f"stalled for {length:.1f} s"
 
 
-def _hold_answers(context: Context, devices: _Devices, proxy: Proxy) -> str:
+def _lose_answers(
+    context: Context, devices: _Devices, proxy: Http2Proxy
+) -> str:
     """The hub takes reports, and their answers are lost."""
-    proxy.hold_answers()
+    proxy.lose_answers()
     devices.instruct()
 
     def taken(device: ReportingDevice) -> bool:
@@ -183,11 +185,13 @@ def _hold_answers(context: Context, devices: _Devices, proxy: Proxy) -> str:
         here = device.uplink().time
         return (there.seconds, there.nanos) > (here.seconds, here.nanos)
 
-    answers = sum(wait(lambda d=d: taken(d), 10) for d in devices.devices)
+    for device in devices.devices:
+        if not wait(lambda d=device: taken(d), 10):
+            raise processes.Failed(f"{device.rig_id}: no report was taken")
     devices.operate()
     time.sleep(random.uniform(0.5, 1.5))
     proxy.drop()
-    return f"answers to {answers} reports lost"
+    return "answers to reports lost"
 
 
 def _flap(context: Context, devices: _Devices, proxy: Proxy) -> str:
