@@ -1,3 +1,6 @@
+#include <map>
+#include <set>
+
 #include "proto/resource_names.h"
 #include "selfcal/v1/calibration_service.pb.h"
 #include "server/api/errors.h"
@@ -115,17 +118,25 @@ absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
   SELFCAL_ASSIGN_OR_RETURN(
       const ListParent parent,
       ReadListParent(call, request.parent(), request.rig_filter()));
+  std::map<std::string, StoredRig> rigs;
   return FillPage<v1::ListCalibrationsResponse>(
       request,
       request.parent(),
-      [&](const Page& page) {
-        return context.store->ListCalibrations(parent.rig, page, parent.of);
+      [&](const Page& page) -> absl::StatusOr<Listed<StoredCalibration>> {
+        SELFCAL_ASSIGN_OR_RETURN(
+            Listed<StoredCalibration> listed,
+            context.store->ListCalibrations(parent.rig, page, parent.of));
+        std::set<std::string> names;
+        for (const auto& item : listed.items) names.insert(item.rig);
+        SELFCAL_ASSIGN_OR_RETURN(rigs, context.store->GetRigs(names));
+        return listed;
       },
       [&](const StoredCalibration& calibration,
-          v1::ListCalibrationsResponse* to) -> absl::Status {
-        SELFCAL_ASSIGN_OR_RETURN(
-            *to->add_calibrations(),
-            EncodeNamed(context, calibration, RigName(calibration.rig)));
+          v1::ListCalibrationsResponse* to) {
+        // A rig may be deleted meanwhile.
+        if (const auto rig = rigs.find(calibration.rig); rig != rigs.end()) {
+          *to->add_calibrations() = Encode(calibration, rig->second);
+        }
         return absl::OkStatus();
       });
 }

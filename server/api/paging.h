@@ -35,7 +35,7 @@ absl::StatusOr<Response> FillPage(const Request& request,
   page.size = request.page_size() == 0
                   ? kDefaultPageSize
                   : std::min<int>(request.page_size(), kMaxPageSize);
-  for (;; page.size /= 2) {
+  for (;;) {
     const auto listed = fetch(page);
     if (!listed.ok()) {
       return About(listed.status(), {kRigType, parent, "page_token"});
@@ -45,9 +45,11 @@ absl::StatusOr<Response> FillPage(const Request& request,
       if (absl::Status added = add(item, &response); !added.ok()) return added;
     }
     response.set_next_page_token(listed->next_token);
-    if (page.size == 1 || response.ByteSizeLong() <= kMaxPageBytes) {
-      return response;
-    }
+    const std::size_t bytes = response.ByteSizeLong();
+    if (page.size == 1 || bytes <= kMaxPageBytes) return response;
+    // As many as probably fit; a tenth less than their mean size says.
+    const double fits = 0.9 * kMaxPageBytes / bytes * listed->items.size();
+    page.size = std::clamp(static_cast<int>(fits), 1, page.size - 1);
   }
 }
 

@@ -1,3 +1,7 @@
+#include <map>
+#include <utility>
+#include <vector>
+
 #include "proto/resource_names.h"
 #include "selfcal/v1/recalibration.pb.h"
 #include "server/api/errors.h"
@@ -51,6 +55,25 @@ absl::StatusOr<v1::Recalibration> GetRecalibration(
   return EncodeWithConvergence(context.store, *run);
 }
 
+// The versions that the runs made, but damaged ones.
+absl::StatusOr<std::map<VersionId, StoredCalibration>> VersionsOf(
+    Store* store, const std::vector<StoredRun>& runs) {
+  std::vector<VersionId> ids;
+  for (const StoredRun& run : runs) {
+    if (run.calibration_version != 0) {
+      ids.emplace_back(run.rig, run.calibration_version);
+    }
+  }
+  SELFCAL_ASSIGN_OR_RETURN(std::vector<StoredCalibration> read,
+                           store->GetCalibrations(ids));
+  std::map<VersionId, StoredCalibration> versions;
+  for (StoredCalibration& version : read) {
+    VersionId id(version.rig, version.version);
+    versions.emplace(std::move(id), std::move(version));
+  }
+  return versions;
+}
+
 absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
     const ApiContext& context,
     const Call& call,
@@ -58,16 +81,22 @@ absl::StatusOr<v1::ListRecalibrationsResponse> ListRecalibrations(
   SELFCAL_ASSIGN_OR_RETURN(
       const ListParent parent,
       ReadListParent(call, request.parent(), request.rig_filter()));
+  std::map<VersionId, StoredCalibration> versions;
   return FillPage<v1::ListRecalibrationsResponse>(
       request,
       request.parent(),
-      [&](const Page& page) {
-        return context.store->ListRuns(parent.rig, page, parent.of);
+      [&](const Page& page) -> absl::StatusOr<Listed<StoredRun>> {
+        SELFCAL_ASSIGN_OR_RETURN(
+            Listed<StoredRun> listed,
+            context.store->ListRuns(parent.rig, page, parent.of));
+        SELFCAL_ASSIGN_OR_RETURN(versions,
+                                 VersionsOf(context.store, listed.items));
+        return listed;
       },
-      [&](const StoredRun& run,
-          v1::ListRecalibrationsResponse* to) -> absl::Status {
-        SELFCAL_ASSIGN_OR_RETURN(*to->add_recalibrations(),
-                                 EncodeWithReport(context.store, run, {}));
+      [&](const StoredRun& run, v1::ListRecalibrationsResponse* to) {
+        const auto version = versions.find({run.rig, run.calibration_version});
+        *to->add_recalibrations() = Encode(
+            run, {}, version == versions.end() ? nullptr : &version->second);
         return absl::OkStatus();
       });
 }

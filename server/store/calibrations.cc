@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <map>
+#include <utility>
 
 #include "server/status/status_macros.h"
 #include "server/store/checksum.h"
@@ -27,46 +30,51 @@ constexpr char kCalibrationColumns[] =
     "FROM calibrations c JOIN rigs g ON g.rig = c.rig "
     "LEFT JOIN validations v ON v.rig = c.rig AND v.version = c.version ";
 
-absl::Status ReadSegmentKeys(Connection* db,
-                             std::int64_t rig,
-                             StoredCalibration* calibration) {
-  Statement read(db,
-                 "SELECT s.session, s.session_index FROM calibration_segments "
-                 "c CROSS JOIN segments s "
-                 "WHERE s.rig = c.rig AND s.sequence = c.sequence "
-                 "AND c.rig = ?1 AND c.version = ?2 ORDER BY c.sequence",
-                 rig,
-                 calibration->version);
-  while (read.Next()) {
-    calibration->segments.push_back({read.Text(0), read.Int(1)});
+void Include(double temperature_c,
+             std::optional<SegmentTemperatures>* temperatures) {
+  if (!*temperatures) {
+    *temperatures = {1, temperature_c, temperature_c, temperature_c};
+    return;
   }
-  return read.status();
+  SegmentTemperatures& all = **temperatures;
+  ++all.segments;
+  all.mean_c += (temperature_c - all.mean_c) / all.segments;
+  all.min_c = std::min(all.min_c, temperature_c);
+  all.max_c = std::max(all.max_c, temperature_c);
 }
 
-absl::Status ReadTemperatures(Connection* db,
-                              std::int64_t rig,
-                              StoredCalibration* calibration) {
+// Reads the segments of the versions, with their temperatures.
+absl::Status ReadSegments(Connection* db,
+                          std::vector<StoredCalibration>* calibrations) {
+  if (calibrations->empty()) return absl::OkStatus();
+  std::map<std::pair<std::int64_t, std::int64_t>, StoredCalibration*> by_key;
+  std::vector<std::vector<SqlCondition::Value>> keys;
+  for (StoredCalibration& calibration : *calibrations) {
+    by_key[{calibration.rig_key, calibration.version}] = &calibration;
+    keys.push_back({calibration.rig_key, calibration.version});
+  }
+  SqlCondition condition;
+  condition.AndIn("(c.rig, c.version)", keys);
+  // A single version is read often.
   Statement read(db,
-                 "SELECT count(*), avg(s.temperature_c), min(s.temperature_c), "
-                 "  max(s.temperature_c) FROM calibration_segments c "
+                 keys.size() == 1 ? Reuse::kKept : Reuse::kOnce,
+                 "SELECT c.rig, c.version, s.session, s.session_index, "
+                 "  s.temperature_c FROM calibration_segments c "
                  "CROSS JOIN segments s "
-                 "WHERE s.rig = c.rig AND s.sequence = c.sequence "
-                 "AND c.rig = ?1 AND c.version = ?2 "
-                 "AND s.temperature_c IS NOT NULL",
-                 rig,
-                 calibration->version);
-  if (read.Next() && read.Int(0) > 0) {
-    calibration->temperatures =
-        SegmentTemperatures{static_cast<int>(read.Int(0)),
-                            read.Double(1),
-                            read.Double(2),
-                            read.Double(3)};
+                 "WHERE s.rig = c.rig AND s.sequence = c.sequence AND " +
+                     condition.sql() +
+                     " ORDER BY c.rig, c.version, c.sequence");
+  condition.Bind(&read);
+  while (read.Next()) {
+    StoredCalibration* calibration = by_key.at({read.Int(0), read.Int(1)});
+    calibration->segments.push_back({read.Text(2), read.Int(3)});
+    if (!read.IsNull(4)) Include(read.Double(4), &calibration->temperatures);
   }
   return read.status();
 }
 
-absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
-                                                     const Statement& row) {
+// Without its segments.
+absl::StatusOr<StoredCalibration> CalibrationFromRow(const Statement& row) {
   const std::int64_t version = row.Int(0);
   const std::int64_t rig_id = row.Int(11);
   const std::string rig = row.Text(12);
@@ -95,8 +103,6 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(Connection* db,
   calibration.activation = row.Int(8);
   calibration.disagreement = row.Text(9);
   calibration.create_steady_ns = row.Int(10);
-  SELFCAL_RETURN_IF_ERROR(ReadSegmentKeys(db, rig_id, &calibration));
-  SELFCAL_RETURN_IF_ERROR(ReadTemperatures(db, rig_id, &calibration));
   return calibration;
 }
 
@@ -142,16 +148,40 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfMany(
       break;
     }
     place = {read.Int(10), read.Int(11), read.Int(0)};
-    auto calibration = CalibrationFromRow(db, read);
+    auto calibration = CalibrationFromRow(read);
     if (absl::IsDataLoss(calibration.status())) continue;
     SELFCAL_RETURN_IF_ERROR(calibration.status());
     listed.items.push_back(*std::move(calibration));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &listed.items));
   return listed;
 }
 
 }  // namespace
+
+absl::StatusOr<std::vector<StoredCalibration>> ReadCalibrations(
+    Connection* db, const std::vector<VersionId>& versions) {
+  std::vector<StoredCalibration> calibrations;
+  if (versions.empty()) return calibrations;
+  std::vector<std::vector<SqlCondition::Value>> ids;
+  for (const auto& [rig, version] : versions) ids.push_back({rig, version});
+  SqlCondition condition;
+  condition.AndIn("(g.id, c.version)", ids);
+  Statement read(db,
+                 condition.reuse(),
+                 kCalibrationColumns + ("WHERE " + condition.sql()));
+  condition.Bind(&read);
+  while (read.Next()) {
+    auto calibration = CalibrationFromRow(read);
+    if (absl::IsDataLoss(calibration.status())) continue;
+    SELFCAL_RETURN_IF_ERROR(calibration.status());
+    calibrations.push_back(*std::move(calibration));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &calibrations));
+  return calibrations;
+}
 
 absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
                                                   const std::string& rig,
@@ -168,7 +198,10 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
     return absl::NotFoundError(
         fmt::format("rig {} has no calibration {}", rig, version));
   }
-  return CalibrationFromRow(db, read);
+  std::vector<StoredCalibration> one(1);
+  SELFCAL_ASSIGN_OR_RETURN(one.front(), CalibrationFromRow(read));
+  SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &one));
+  return std::move(one.front());
 }
 
 absl::StatusOr<StoredCalibration> ReadActiveCalibration(
@@ -199,10 +232,11 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
   Listed<StoredCalibration> listed;
   while (read.Next()) {
     SELFCAL_ASSIGN_OR_RETURN(StoredCalibration calibration,
-                             CalibrationFromRow(db, read));
+                             CalibrationFromRow(read));
     listed.items.push_back(std::move(calibration));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &listed.items));
   CutPage(
       list, size, [](const auto& item) { return item.version; }, &listed);
   return listed;

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/store/store.h"
 #include "server/store/unit_of_work.h"
@@ -21,6 +22,10 @@ absl::StatusOr<StoredCalibration> ReadCalibration(Connection* db,
                                                   std::int64_t version);
 absl::StatusOr<StoredCalibration> ReadActiveCalibration(Connection* db,
                                                         const std::string& rig);
+
+// Store::GetCalibrations.
+absl::StatusOr<std::vector<StoredCalibration>> ReadCalibrations(
+    Connection* db, const std::vector<VersionId>& versions);
 
 // Store::ListCalibrations.
 absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(

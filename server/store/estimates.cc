@@ -163,8 +163,8 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
   return listed;
 }
 
-absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>>
-VersionsWithoutEstimates(Connection* db, int limit) {
+absl::StatusOr<std::vector<VersionId>> VersionsWithoutEstimates(Connection* db,
+                                                                int limit) {
   Statement read(db,
                  "SELECT r.id, c.version FROM calibrations c "
                  "JOIN rigs r ON r.rig = c.rig WHERE NOT EXISTS "
@@ -172,7 +172,7 @@ VersionsWithoutEstimates(Connection* db, int limit) {
                  "   AND e.version = c.version) "
                  "ORDER BY c.rig, c.version LIMIT ?1",
                  limit);
-  std::vector<std::pair<std::string, std::int64_t>> versions;
+  std::vector<VersionId> versions;
   while (read.Next()) versions.emplace_back(read.Text(0), read.Int(1));
   SELFCAL_RETURN_IF_ERROR(read.status());
   return versions;

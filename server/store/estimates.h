@@ -26,7 +26,7 @@ absl::Status InsertEstimates(UnitOfWork* tx,
 absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
     Connection* db, const EstimateQuery& query, const Page& page);
 // Store::ListWithoutEstimates.
-absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>>
-VersionsWithoutEstimates(Connection* db, int limit);
+absl::StatusOr<std::vector<VersionId>> VersionsWithoutEstimates(Connection* db,
+                                                                int limit);
 
 }  // namespace selfcal::server

@@ -81,6 +81,11 @@ class DatabaseStore final : public Store {
     return Read([&](Connection* db) { return ReadRig(db, rig); });
   }
 
+  absl::StatusOr<std::map<std::string, StoredRig>> GetRigs(
+      const std::set<std::string>& names) override {
+    return Read([&](Connection* db) { return ReadRigs(db, names); });
+  }
+
   absl::StatusOr<std::vector<std::string>> ListRigNames() override {
     return Read([&](Connection* db) { return RigNames(db); });
   }
@@ -193,6 +198,11 @@ class DatabaseStore final : public Store {
     return Read([&](Connection* db) { return ReadActiveCalibration(db, rig); });
   }
 
+  absl::StatusOr<std::vector<StoredCalibration>> GetCalibrations(
+      const std::vector<VersionId>& versions) override {
+    return Read([&](Connection* db) { return ReadCalibrations(db, versions); });
+  }
+
   absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
       const std::string& rig, const Page& page, const RigQuery& of) override {
     return Read(
@@ -205,8 +215,8 @@ class DatabaseStore final : public Store {
         [&](Connection* db) { return ListEstimateRows(db, query, page); });
   }
 
-  absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>>
-  ListWithoutEstimates(int limit) override {
+  absl::StatusOr<std::vector<VersionId>> ListWithoutEstimates(
+      int limit) override {
     return Read(
         [&](Connection* db) { return VersionsWithoutEstimates(db, limit); });
   }

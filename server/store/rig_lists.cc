@@ -5,6 +5,8 @@
 
 #include <charconv>
 #include <limits>
+#include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -123,12 +125,36 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
   return found;
 }
 
-// Versions, newest run, change, and whether it is an outlier: one statement, as
-// a list of rigs asks for each of them.
-absl::Status ReadNewest(Connection* db, std::int64_t rig, RigSummary* summary) {
-  Statement read(
+// The summaries of some rigs, by the keys of these.
+using Summaries = std::map<std::int64_t, RigSummary*>;
+
+// Passes the rows of `sql` of the rigs, whose first column is
+// the key of one, with the summary of that. `sql` names the table with this key
+// g, and has no condition.
+template <typename Take>
+absl::Status ReadEach(Connection* db,
+                      const Summaries& summaries,
+                      const std::string& sql,
+                      const Take& take) {
+  SqlCondition condition;
+  std::vector<std::vector<SqlCondition::Value>> keys;
+  for (const auto& [rig, summary] : summaries) keys.push_back({rig});
+  condition.AndIn("g.rig", keys);
+  // That of a single rig is read with each score.
+  Statement read(db,
+                 keys.size() == 1 ? Reuse::kKept : Reuse::kOnce,
+                 sql + " WHERE " + condition.sql());
+  condition.Bind(&read);
+  while (read.Next()) take(read, summaries.at(read.Int(0)));
+  return read.status();
+}
+
+// Versions, newest run, change, and whether it is an outlier.
+absl::Status ReadNewest(Connection* db, const Summaries& summaries) {
+  return ReadEach(
       db,
-      "SELECT c.version, (SELECT a.time_ns FROM activations a "
+      summaries,
+      "SELECT g.rig, c.version, (SELECT a.time_ns FROM activations a "
       "    WHERE a.rig = c.rig AND a.version = c.version "
       "    ORDER BY a.activation DESC LIMIT 1), "
       "  n.version, n.state, r.run, r.state, "
@@ -138,87 +164,82 @@ absl::Status ReadNewest(Connection* db, std::int64_t rig, RigSummary* summary) {
       "FROM rigs g "
       "LEFT JOIN calibrations c ON c.rig = g.rig AND c.state = 1 "
       "LEFT JOIN calibrations n ON n.rig = g.rig AND n.version = "
-      "  (SELECT max(version) FROM calibrations WHERE rig = ?1) "
+      "  (SELECT max(version) FROM calibrations m WHERE m.rig = g.rig) "
       "LEFT JOIN runs r ON r.rig = g.rig AND r.run = "
-      "  (SELECT max(run) FROM runs WHERE rig = ?1) "
-      "WHERE g.rig = ?1",
-      rig);
-  if (read.Next()) {
-    summary->active_version = read.Int(0);
-    summary->active_since_ns = read.Int(1);
-    if (!read.IsNull(2)) {
-      summary->newest_version = read.Int(2);
-      summary->newest_state = static_cast<CalibrationState>(read.Int(3) - 1);
-    }
-    if (!read.IsNull(4)) {
-      summary->newest_run = read.Int(4);
-      summary->run_state = static_cast<RunState>(read.Int(5) - 1);
-    }
-    summary->newest_change_ns = read.Int(6);
-    summary->unlike_cohort = read.Int(7);
-  }
-  return read.status();
+      "  (SELECT max(run) FROM runs m WHERE m.rig = g.rig)",
+      [](const Statement& row, RigSummary* summary) {
+        summary->active_version = row.Int(1);
+        summary->active_since_ns = row.Int(2);
+        if (!row.IsNull(3)) {
+          summary->newest_version = row.Int(3);
+          summary->newest_state = static_cast<CalibrationState>(row.Int(4) - 1);
+        }
+        if (!row.IsNull(5)) {
+          summary->newest_run = row.Int(5);
+          summary->run_state = static_cast<RunState>(row.Int(6) - 1);
+        }
+        summary->newest_change_ns = row.Int(7);
+        summary->unlike_cohort = row.Int(8);
+      });
 }
 
-absl::Status ReadLabels(Connection* db, std::int64_t rig, RigSummary* summary) {
-  Statement read(db, "SELECT name, value FROM rig_labels WHERE rig = ?1", rig);
-  while (read.Next()) summary->labels[read.Text(0)] = read.Text(1);
-  return read.status();
+absl::Status ReadLabels(Connection* db, const Summaries& summaries) {
+  return ReadEach(db,
+                  summaries,
+                  "SELECT g.rig, g.name, g.value FROM rig_labels g",
+                  [](const Statement& row, RigSummary* summary) {
+                    summary->labels[row.Text(1)] = row.Text(2);
+                  });
 }
 
 // The progress of the reports, on a device.
-absl::Status ReadUplink(Connection* db, std::int64_t rig, RigSummary* summary) {
-  Statement read(db,
-                 "SELECT time_ns, (SELECT count(*) FROM outbox o "
-                 "  WHERE o.rig = u.rig) FROM uplinks u WHERE rig = ?1",
-                 rig);
-  if (read.Next()) summary->uplink = {read.Int(0), read.Int(1), ""};
-  return read.status();
+absl::Status ReadUplinks(Connection* db, const Summaries& summaries) {
+  return ReadEach(db,
+                  summaries,
+                  "SELECT g.rig, g.time_ns, (SELECT count(*) FROM outbox o "
+                  "  WHERE o.rig = g.rig) FROM uplinks g",
+                  [](const Statement& row, RigSummary* summary) {
+                    summary->uplink = {row.Int(1), row.Int(2), ""};
+                  });
 }
 
 // The device that reports the rig, at a hub.
-absl::Status ReadDevice(Connection* db, std::int64_t rig, RigSummary* summary) {
-  Statement read(db,
-                 "SELECT time_ns, waiting, program_version "
-                 "FROM reported_rigs WHERE rig = ?1",
-                 rig);
-  if (read.Next()) {
-    summary->device = {read.Int(0), read.Int(1), read.Text(2)};
-  }
-  return read.status();
+absl::Status ReadDevices(Connection* db, const Summaries& summaries) {
+  return ReadEach(db,
+                  summaries,
+                  "SELECT g.rig, g.time_ns, g.waiting, g.program_version "
+                  "FROM reported_rigs g",
+                  [](const Statement& row, RigSummary* summary) {
+                    summary->device = {row.Int(1), row.Int(2), row.Text(3)};
+                  });
 }
 
 // The state on which alarms depend.
-absl::Status ReadState(Connection* db, std::int64_t rig, RigSummary* summary) {
-  SELFCAL_RETURN_IF_ERROR(ReadNewest(db, rig, summary));
-  SELFCAL_ASSIGN_OR_RETURN(summary->tables, ReadTables(db, rig));
-  return ReadDevice(db, rig, summary);
+absl::Status ReadState(Connection* db, const Summaries& summaries) {
+  SELFCAL_RETURN_IF_ERROR(ReadNewest(db, summaries));
+  SELFCAL_RETURN_IF_ERROR(ReadDevices(db, summaries));
+  std::vector<std::int64_t> rigs;
+  for (const auto& [rig, summary] : summaries) rigs.push_back(rig);
+  SELFCAL_ASSIGN_OR_RETURN(auto tables, ReadTables(db, rigs));
+  for (auto& [rig, of_rig] : tables) {
+    summaries.at(rig)->tables = std::move(of_rig);
+  }
+  return absl::OkStatus();
 }
 
-absl::Status ReadRest(Connection* db, std::int64_t rig, RigSummary* summary) {
-  SELFCAL_RETURN_IF_ERROR(ReadLabels(db, rig, summary));
-  SELFCAL_RETURN_IF_ERROR(ReadUplink(db, rig, summary));
-  return ReadState(db, rig, summary);
-}
-
-// A page of what `read` makes of each rig that is found.
-template <typename Item, typename Read>
-absl::StatusOr<Listed<Item>> ListFound(Connection* db,
-                                       const RigQuery& query,
-                                       const Page& page,
-                                       const Read& read) {
+// A page of rigs.
+absl::StatusOr<Listed<Found>> ListFound(Connection* db,
+                                        const RigQuery& query,
+                                        const Page& page) {
   SELFCAL_ASSIGN_OR_RETURN(const Place place, PlaceOf(query, page));
-  const int size = PageSize(page);
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<Found> found,
-                           FindRigs(db, query, place, size + 1));
-  Listed<Item> listed;
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    if (static_cast<int>(k) == size) {
-      listed.next_token = MakePageToken(ListOf(query), KeyOf(found[k - 1]));
-      break;
-    }
-    SELFCAL_ASSIGN_OR_RETURN(Item item, read(found[k]));
-    listed.items.push_back(std::move(item));
+  const std::size_t size = PageSize(page);
+  Listed<Found> listed;
+  SELFCAL_ASSIGN_OR_RETURN(
+      listed.items, FindRigs(db, query, place, static_cast<int>(size) + 1));
+  if (listed.items.size() > size) {
+    listed.items.pop_back();
+    listed.next_token =
+        MakePageToken(ListOf(query), KeyOf(listed.items.back()));
   }
   return listed;
 }
@@ -273,27 +294,42 @@ std::string FilterText(const RigQuery& query) {
 absl::StatusOr<Listed<RigSummary>> ListSummaryRows(Connection* db,
                                                    const RigQuery& query,
                                                    const Page& page) {
-  return ListFound<RigSummary>(
-      db, query, page, [db](const Found& found) -> absl::StatusOr<RigSummary> {
-        RigSummary summary = found.summary;
-        SELFCAL_RETURN_IF_ERROR(ReadRest(db, found.rowid, &summary));
-        return summary;
-      });
+  SELFCAL_ASSIGN_OR_RETURN(Listed<Found> found, ListFound(db, query, page));
+  Listed<RigSummary> listed;
+  listed.next_token = found.next_token;
+  if (found.items.empty()) return listed;
+  Summaries summaries;
+  for (Found& rig : found.items) summaries[rig.rowid] = &rig.summary;
+  SELFCAL_RETURN_IF_ERROR(ReadLabels(db, summaries));
+  SELFCAL_RETURN_IF_ERROR(ReadUplinks(db, summaries));
+  SELFCAL_RETURN_IF_ERROR(ReadState(db, summaries));
+  for (Found& rig : found.items) {
+    listed.items.push_back(std::move(rig.summary));
+  }
+  return listed;
 }
 
 absl::StatusOr<RigSummary> ReadRigState(UnitOfWork* tx) {
   RigSummary summary;
   summary.rig = tx->rig();
-  SELFCAL_RETURN_IF_ERROR(ReadState(tx->db(), tx->rig_row(), &summary));
+  SELFCAL_RETURN_IF_ERROR(ReadState(tx->db(), {{tx->rig_row(), &summary}}));
   return summary;
 }
 
 absl::StatusOr<Listed<StoredRig>> ListRigRows(Connection* db,
                                               const RigQuery& query,
                                               const Page& page) {
-  return ListFound<StoredRig>(db, query, page, [db](const Found& found) {
-    return ReadRig(db, found.summary.rig);
-  });
+  SELFCAL_ASSIGN_OR_RETURN(const Listed<Found> found,
+                           ListFound(db, query, page));
+  std::set<std::string> names;
+  for (const Found& rig : found.items) names.insert(rig.summary.rig);
+  SELFCAL_ASSIGN_OR_RETURN(auto rigs, ReadRigs(db, names));
+  Listed<StoredRig> listed;
+  listed.next_token = found.next_token;
+  for (const Found& rig : found.items) {
+    listed.items.push_back(std::move(rigs.at(rig.summary.rig)));
+  }
+  return listed;
 }
 
 }  // namespace selfcal::server

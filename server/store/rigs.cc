@@ -6,6 +6,7 @@
 
 #include "server/status/status_macros.h"
 #include "server/store/checksum.h"
+#include "server/store/driver/sql_condition.h"
 #include "server/store/driver/statement.h"
 #include "server/store/records.h"
 
@@ -17,14 +18,16 @@ absl::Status NoSuchRig(const std::string& rig) {
       fmt::format("rig {} does not exist; create it first", rig));
 }
 
-// Reads the columns id, create_time_ns, definition, sha256, from `column` on.
-absl::StatusOr<StoredRig> RigFromRow(const Statement& row, int column) {
-  const std::string what = "rig " + row.Text(column);
-  const std::string bytes = row.Text(column + 2);
-  SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(column + 3), what));
+constexpr char kRigColumns[] =
+    "SELECT id, create_time_ns, definition, sha256 FROM rigs ";
+
+absl::StatusOr<StoredRig> RigFromRow(const Statement& row) {
+  const std::string what = "rig " + row.Text(0);
+  const std::string bytes = row.Text(2);
+  SELFCAL_RETURN_IF_ERROR(VerifySha256(bytes, row.Text(3), what));
   StoredRig stored;
   SELFCAL_ASSIGN_OR_RETURN(stored, ParseRig(bytes, what));
-  stored.create_time_ns = row.Int(column + 1);
+  stored.create_time_ns = row.Int(1);
   return stored;
 }
 
@@ -174,16 +177,31 @@ absl::StatusOr<std::int64_t> LockRig(Connection* db, const std::string& rig) {
 }
 
 absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig) {
-  Statement read(db,
-                 "SELECT id, create_time_ns, definition, sha256 "
-                 "FROM rigs WHERE id = ?1",
-                 rig);
+  Statement read(db, std::string(kRigColumns) + "WHERE id = ?1", rig);
   const bool found = read.Next();
   SELFCAL_RETURN_IF_ERROR(read.status());
   if (!found) {
     return NoSuchRig(rig);
   }
-  return RigFromRow(read, 0);
+  return RigFromRow(read);
+}
+
+absl::StatusOr<std::map<std::string, StoredRig>> ReadRigs(
+    Connection* db, const std::set<std::string>& names) {
+  std::map<std::string, StoredRig> rigs;
+  if (names.empty()) return rigs;
+  std::vector<std::vector<SqlCondition::Value>> ids;
+  for (const std::string& name : names) ids.push_back({name});
+  SqlCondition condition;
+  condition.AndIn("id", ids);
+  Statement read(
+      db, condition.reuse(), kRigColumns + ("WHERE " + condition.sql()));
+  condition.Bind(&read);
+  while (read.Next()) {
+    SELFCAL_ASSIGN_OR_RETURN(rigs[read.Text(0)], RigFromRow(read));
+  }
+  SELFCAL_RETURN_IF_ERROR(read.status());
+  return rigs;
 }
 
 absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx) {

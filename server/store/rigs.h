@@ -4,6 +4,8 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,9 @@ absl::StatusOr<std::int64_t> LockRig(Connection* db, const std::string& rig);
 // NOT_FOUND; DATA_LOSS if the record is damaged.
 absl::StatusOr<StoredRig> ReadRig(Connection* db, const std::string& rig);
 absl::StatusOr<StoredRig> ReadRig(UnitOfWork* tx);
+// Store::GetRigs.
+absl::StatusOr<std::map<std::string, StoredRig>> ReadRigs(
+    Connection* db, const std::set<std::string>& names);
 // The bits of server/domain/alarms.h.
 absl::Status WriteAlarms(UnitOfWork* tx, std::int64_t alarms);
 // Sets these bits of the rigs from which their devices have not reported since

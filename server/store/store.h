@@ -23,6 +23,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -162,6 +163,9 @@ struct SegmentTemperatures {
   double min_c = 0;
   double max_c = 0;
 };
+
+// The name of a rig, and the number of a version of it.
+using VersionId = std::pair<std::string, std::int64_t>;
 
 struct StoredCalibration {
   std::string rig;
@@ -341,6 +345,9 @@ class Store {
 
   // --- Rigs.
   virtual absl::StatusOr<StoredRig> GetRig(const std::string& rig) = 0;
+  // Those that exist, by name.
+  virtual absl::StatusOr<std::map<std::string, StoredRig>> GetRigs(
+      const std::set<std::string>& names) = 0;
   // Both read no more than the page, however many rigs there are, unless the
   // query has conditions.
   virtual absl::StatusOr<Listed<StoredRig>> ListRigs(const RigQuery& query,
@@ -414,6 +421,9 @@ class Store {
       const std::string& rig, std::int64_t version) = 0;
   virtual absl::StatusOr<StoredCalibration> GetActiveCalibration(
       const std::string& rig) = 0;
+  // Those that exist and are not damaged, in any order.
+  virtual absl::StatusOr<std::vector<StoredCalibration>> GetCalibrations(
+      const std::vector<VersionId>& versions) = 0;
   // Newest first, of one rig or, if `rig` is empty, of those of `of` by their
   // steady time, without damaged ones.
   virtual absl::StatusOr<Listed<StoredCalibration>> ListCalibrations(
@@ -424,8 +434,8 @@ class Store {
       const EstimateQuery& query, const Page& page) = 0;
   // Versions that have no such records: from before they were written, or
   // without values that are numbers.
-  virtual absl::StatusOr<std::vector<std::pair<std::string, std::int64_t>>>
-  ListWithoutEstimates(int limit) = 0;
+  virtual absl::StatusOr<std::vector<VersionId>> ListWithoutEstimates(
+      int limit) = 0;
   // The candidate that a run has stored; NOT_FOUND if it has none.
   virtual absl::StatusOr<StoredCalibration> GetCandidate(const std::string& rig,
                                                          std::int64_t run) = 0;

@@ -1,51 +1,83 @@
 #include "server/store/table_rows.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "server/status/status_macros.h"
+#include "server/store/driver/sql_condition.h"
 #include "server/store/driver/statement.h"
 
 namespace selfcal::server {
 namespace {
 
-absl::Status ReadEntries(Connection* db, std::int64_t rig, Table* table) {
+std::vector<std::vector<SqlCondition::Value>> RowsOf(
+    const std::vector<std::int64_t>& rigs) {
+  std::vector<std::vector<SqlCondition::Value>> rows;
+  for (const std::int64_t rig : rigs) rows.push_back({rig});
+  return rows;
+}
+
+// Reads the entries of the tables of these rigs.
+absl::Status ReadEntries(Connection* db,
+                         Reuse reuse,
+                         const SqlCondition& of_rigs,
+                         std::map<std::int64_t, std::vector<Table>>* tables) {
   Statement read(db,
-                 "SELECT s.session, s.session_index, s.sequence, e.entropy, "
-                 "  e.gain "
-                 "FROM table_entries e CROSS JOIN segments s "
-                 "WHERE s.rig = e.rig AND s.sequence = e.sequence "
-                 "AND e.rig = ?1 AND e.group_name = ?2",
-                 rig,
-                 table->group);
+                 reuse,
+                 "SELECT t.rig, t.group_name, s.session, s.session_index, "
+                 "  s.sequence, t.entropy, t.gain "
+                 "FROM table_entries t CROSS JOIN segments s "
+                 "WHERE s.rig = t.rig AND s.sequence = t.sequence AND " +
+                     of_rigs.sql());
+  of_rigs.Bind(&read);
   while (read.Next()) {
-    table->entries.push_back({{read.Text(0), read.Int(1)},
-                              read.Int(2),
-                              read.Double(3),
-                              read.Double(4)});
+    for (Table& table : tables->at(read.Int(0))) {
+      if (table.group != read.Text(1)) continue;
+      table.entries.push_back({{read.Text(2), read.Int(3)},
+                               read.Int(4),
+                               read.Double(5),
+                               read.Double(6)});
+    }
   }
-  std::sort(table->entries.begin(), table->entries.end(), Better);
+  for (auto& [rig, of_rig] : *tables) {
+    for (Table& table : of_rig) {
+      std::sort(table.entries.begin(), table.entries.end(), Better);
+    }
+  }
   return read.status();
 }
 
 }  // namespace
 
-absl::StatusOr<std::vector<Table>> ReadTables(Connection* db,
-                                              std::int64_t rig) {
+absl::StatusOr<std::map<std::int64_t, std::vector<Table>>> ReadTables(
+    Connection* db, const std::vector<std::int64_t>& rigs) {
+  std::map<std::int64_t, std::vector<Table>> tables;
+  if (rigs.empty()) return tables;
+  SqlCondition of_rigs;
+  of_rigs.AndIn("t.rig", RowsOf(rigs));
+  // Those of a single rig are read with each score.
+  const Reuse reuse = rigs.size() == 1 ? Reuse::kKept : Reuse::kOnce;
   Statement read(db,
-                 "SELECT group_name, capacity, scored FROM tables "
-                 "WHERE rig = ?1 ORDER BY position",
-                 rig);
-  std::vector<Table> tables;
+                 reuse,
+                 "SELECT t.rig, t.group_name, t.capacity, t.scored "
+                 "FROM tables t WHERE " +
+                     of_rigs.sql() + " ORDER BY t.rig, t.position");
+  of_rigs.Bind(&read);
   while (read.Next()) {
-    Table table;
-    table.group = read.Text(0);
-    table.capacity = static_cast<int>(read.Int(1));
-    table.scored = read.Int(2);
-    SELFCAL_RETURN_IF_ERROR(ReadEntries(db, rig, &table));
-    tables.push_back(std::move(table));
+    Table& table = tables[read.Int(0)].emplace_back();
+    table.group = read.Text(1);
+    table.capacity = static_cast<int>(read.Int(2));
+    table.scored = read.Int(3);
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
+  SELFCAL_RETURN_IF_ERROR(ReadEntries(db, reuse, of_rigs, &tables));
   return tables;
+}
+
+absl::StatusOr<std::vector<Table>> ReadTables(Connection* db,
+                                              std::int64_t rig) {
+  SELFCAL_ASSIGN_OR_RETURN(auto tables, ReadTables(db, std::vector{rig}));
+  return std::move(tables[rig]);
 }
 
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(

@@ -5,6 +5,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,9 @@ namespace selfcal::server {
 // Tables in the order of the rig's groups, with the entries sorted as Table
 // says.
 absl::StatusOr<std::vector<Table>> ReadTables(Connection* db, std::int64_t rig);
+// The same of several rigs, by their keys.
+absl::StatusOr<std::map<std::int64_t, std::vector<Table>>> ReadTables(
+    Connection* db, const std::vector<std::int64_t>& rigs);
 // Groups whose table holds the segment, in the order of the rig.
 absl::StatusOr<std::vector<std::string>> TablesOfSegment(Connection* db,
                                                          std::int64_t rig,

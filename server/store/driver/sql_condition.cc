@@ -1,8 +1,18 @@
 #include "server/store/driver/sql_condition.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
 #include <utility>
 
 namespace selfcal::server {
+namespace {
+
+// Of the types of Value.
+constexpr std::array kSqlTypes = {"BIGINT", "DOUBLE PRECISION", "TEXT"};
+
+}  // namespace
 
 std::string SqlCondition::Parameter(Value value) {
   values_.push_back(std::move(value));
@@ -12,6 +22,23 @@ std::string SqlCondition::Parameter(Value value) {
 void SqlCondition::And(const std::string& condition) {
   if (!is_empty()) sql_ += " AND ";
   sql_ += condition;
+}
+
+void SqlCondition::AndIn(const std::string& columns,
+                         const std::vector<std::vector<Value>>& rows) {
+  std::vector<std::string> texts;
+  for (const std::vector<Value>& row : rows) {
+    std::vector<std::string> parameters;
+    for (const Value& value : row) {
+      const std::string parameter = Parameter(value);
+      parameters.push_back(texts.empty() ? fmt::format("CAST({} AS {})",
+                                                       parameter,
+                                                       kSqlTypes[value.index()])
+                                         : parameter);
+    }
+    texts.push_back(fmt::format("({})", fmt::join(parameters, ", ")));
+  }
+  And(fmt::format("{} IN (VALUES {})", columns, fmt::join(texts, ", ")));
 }
 
 void SqlCondition::AndWithin(const std::string& before,

@@ -22,6 +22,10 @@ class SqlCondition {
   // Adds a value; returns its parameter, such as ?3.
   std::string Parameter(Value value);
   void And(const std::string& condition);
+  // `columns`, e.g. "(a, b)", are one of these rows of values, of which there
+  // must be some. Their first one sets the types.
+  void AndIn(const std::string& columns,
+             const std::vector<std::vector<Value>>& rows);
   // An empty condition whose parameters follow those of this one; once it is
   // added, its values follow as well.
   SqlCondition Next() const { return SqlCondition(next_); }

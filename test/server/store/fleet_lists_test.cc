@@ -31,9 +31,13 @@ class FleetListsTest : public StoreTest {
     }
     const auto run = domain_->CreateManualRun(id, true);
     ASSERT_TRUE(run.ok()) << run.status();
-    ASSERT_TRUE(domain_->BeginRun(id, run->run).ok());
+    Finish(id, run->run);
+  }
+
+  void Finish(const std::string& id, std::int64_t run) {
+    ASSERT_TRUE(domain_->BeginRun(id, run).ok());
     const auto finished = domain_->FinishRun(
-        id, run->run, TestCalibration(rig, *store_->GetRun(id, run->run)));
+        id, run, TestCalibration(TestRig(id), *store_->GetRun(id, run)));
     ASSERT_TRUE(finished.ok()) << finished.status();
   }
 
@@ -301,6 +305,75 @@ TEST_P(FleetListsTest, DamagedVersionsDoNotHideOthers) {
     EXPECT_EQ(version.rig, "b");
   }
   EXPECT_THAT(listed->items, SizeIs(2));
+  const auto several = store_->GetCalibrations({{"a", 1}, {"b", 2}});
+  ASSERT_TRUE(several.ok()) << several.status();
+  ASSERT_THAT(*several, SizeIs(1));
+  EXPECT_EQ(several->front().rig, "b");
+}
+
+TEST_P(FleetListsTest, RecordsOfSeveralRigsAreThoseOfEach) {
+  for (const std::string id : {"a", "b", "c"}) {
+    ASSERT_TRUE(domain_->CreateRig(TestRig(id)).ok());
+    for (int index = 0; index < 3; ++index) {
+      MotionSegment segment = Segment(index);
+      segment.temperature_c = 20.0 + index + (id == "b" ? 10 : 0);
+      ASSERT_TRUE(domain_->PutSegment(id, segment).ok());
+      Score(TestRig(id), index, 1.0 + index);
+    }
+    SetLabel(id, "batch", id);
+  }
+  Finish("b", 1);  // full tables started it
+  Finish("c", 1);
+  Run("c", 3);
+
+  const auto versions = store_->GetCalibrations(
+      {{"c", 2}, {"nobody", 1}, {"b", 2}, {"a", 2}, {"a", 1}});
+  ASSERT_TRUE(versions.ok()) << versions.status();
+  EXPECT_THAT(*versions, SizeIs(3));
+  for (const StoredCalibration& version : *versions) {
+    const auto one = store_->GetCalibration(version.rig, version.version);
+    ASSERT_TRUE(one.ok()) << one.status();
+    EXPECT_EQ(version.theta.cameras.size(), one->theta.cameras.size());
+    EXPECT_EQ(version.covariance, one->covariance);
+    EXPECT_EQ(version.create_time_ns, one->create_time_ns);
+    EXPECT_EQ(version.segments, one->segments);
+    EXPECT_EQ(version.segments.size(), version.rig == "a" ? 0u : 2u);
+    ASSERT_EQ(version.temperatures.has_value(), version.rig != "a");
+    if (!version.temperatures) continue;
+    EXPECT_EQ(version.temperatures->segments, 2);
+    EXPECT_EQ(version.temperatures->min_c, version.rig == "b" ? 30 : 20);
+    EXPECT_EQ(version.temperatures->max_c, version.rig == "b" ? 31 : 21);
+    EXPECT_EQ(version.temperatures->mean_c, version.rig == "b" ? 30.5 : 20.5);
+  }
+
+  const auto rigs = store_->GetRigs({"a", "c", "nobody"});
+  ASSERT_TRUE(rigs.ok()) << rigs.status();
+  EXPECT_THAT(*rigs, SizeIs(2));
+  for (const auto& [id, rig] : *rigs) {
+    EXPECT_EQ(rig.rig.id, id);
+    EXPECT_EQ(rig.labels.at("batch"), id);
+  }
+
+  const auto summaries = store_->ListRigSummaries({}, {});
+  ASSERT_TRUE(summaries.ok()) << summaries.status();
+  ASSERT_THAT(summaries->items, SizeIs(3));
+  for (const RigSummary& summary : summaries->items) {
+    const auto tables = store_->GetTables(summary.rig);
+    ASSERT_TRUE(tables.ok()) << tables.status();
+    ASSERT_EQ(summary.tables.size(), tables->size());
+    for (std::size_t k = 0; k < tables->size(); ++k) {
+      EXPECT_EQ(summary.tables[k].group, (*tables)[k].group);
+      EXPECT_EQ(summary.tables[k].scored, 3);
+      EXPECT_THAT(summary.tables[k].entries, SizeIs(2));
+      EXPECT_EQ(summary.tables[k].entries[0].key, (*tables)[k].entries[0].key);
+      EXPECT_EQ(summary.tables[k].entries[1].key, (*tables)[k].entries[1].key);
+    }
+    EXPECT_EQ(summary.labels.at("batch"), summary.rig);
+    const int versions = summary.rig == "a" ? 1 : summary.rig == "b" ? 2 : 3;
+    EXPECT_EQ(summary.active_version, versions);
+    EXPECT_EQ(summary.newest_version, versions);
+    EXPECT_EQ(summary.newest_run, summary.rig == "c" ? 2 : 1);
+  }
 }
 
 }  // namespace
