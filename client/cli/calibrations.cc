@@ -48,6 +48,9 @@ int ListCalibrations(Context* context,
   v1::ListCalibrationsRequest request;
   if (!rig.empty()) request.set_parent(RigName(rig));
   request.set_rig_filter(options.rigs);
+  if (!context->json && !context->csv) {
+    request.set_view(v1::ListCalibrationsRequest::BASIC);
+  }
   v1::ListCalibrationsResponse calibrations;
   const auto status = CallForItems<CalibrationService>(
       stub.get(),

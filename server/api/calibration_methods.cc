@@ -111,6 +111,18 @@ absl::Status VerifyRig(const ApiContext& context,
   return absl::OkStatus();
 }
 
+// ListCalibrationsRequest::BASIC.
+void LeaveOutDetails(v1::Calibration* calibration) {
+  calibration->clear_covariance();
+  calibration->clear_estimates();
+  if (calibration->has_provenance()) {
+    calibration->mutable_provenance()->clear_settings();
+  }
+  if (calibration->has_solver()) {
+    calibration->mutable_solver()->clear_segment_fits();
+  }
+}
+
 absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
     const ApiContext& context,
     const Call& call,
@@ -134,8 +146,12 @@ absl::StatusOr<v1::ListCalibrationsResponse> ListCalibrations(
       [&](const StoredCalibration& calibration,
           v1::ListCalibrationsResponse* to) {
         // A rig may be deleted meanwhile.
-        if (const auto rig = rigs.find(calibration.rig); rig != rigs.end()) {
-          *to->add_calibrations() = Encode(calibration, rig->second);
+        const auto rig = rigs.find(calibration.rig);
+        if (rig == rigs.end()) return absl::OkStatus();
+        v1::Calibration* added = to->add_calibrations();
+        *added = Encode(calibration, rig->second);
+        if (request.view() == v1::ListCalibrationsRequest::BASIC) {
+          LeaveOutDetails(added);
         }
         return absl::OkStatus();
       });

@@ -118,7 +118,7 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
     SELFCAL_ASSIGN_OR_RETURN(place.rig, FindRigId(db, query.rigs.name));
   }
   SqlCondition condition(6);
-  AddRigConditions(query.rigs, "r", &condition);
+  AddRigConditions(query.rigs, "r", &condition, "?1");
   Statement read(
       db,
       condition.reuse(),
@@ -129,7 +129,7 @@ absl::StatusOr<Listed<StoredEstimate>> ListEstimateRows(
                   "JOIN calibrations c ON c.rig = e.rig "
                   "  AND c.version = e.version "
                   "JOIN rigs r ON r.rig = e.rig "
-                  "WHERE {} AND {} {} "
+                  "WHERE {} AND c.rig >= ?1 AND r.rig >= ?1 AND {} {} "
                   "ORDER BY e.rig, e.version, e.component LIMIT ?5",
                   ConditionOf(query),
                   condition.sql(),

@@ -161,7 +161,18 @@ def _fleet_wide(of: Fleet, size: int) -> list[Request]:
             ),
             "rigs",
         ),
-        Request("calibrations", page("calibrations"), "calibrations", True),
+        Request(
+            "calibrations",
+            page("calibrations", view="BASIC"),
+            "calibrations",
+            True,
+        ),
+        Request(
+            "calibrations with all details",
+            page("calibrations"),
+            "calibrations",
+            True,
+        ),
         Request("runs", page("recalibrations"), "recalibrations", True),
         Request("events, oldest first", page("events"), "events", True),
         Request(

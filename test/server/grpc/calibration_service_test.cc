@@ -153,6 +153,35 @@ TEST_F(CalibrationServiceTest, PagesHoldEveryVersionNewestFirst) {
   EXPECT_EQ(page.calibrations(0).version(), 1);
 }
 
+TEST_F(CalibrationServiceTest, ABasicListLacksTheDetails) {
+  AddCalibrated();
+  v1::ListCalibrationsResponse full;
+  ASSERT_TRUE(List("rigs/r", 0, "", &full).ok());
+  Context context;
+  v1::ListCalibrationsRequest request;
+  request.set_parent("rigs/r");
+  request.set_view(v1::ListCalibrationsRequest::BASIC);
+  v1::ListCalibrationsResponse basic;
+  ASSERT_TRUE(calibrations_->ListCalibrations(&context, request, &basic).ok());
+  ASSERT_EQ(basic.calibrations_size(), full.calibrations_size());
+  for (int k = 0; k < full.calibrations_size(); ++k) {
+    v1::Calibration expected = full.calibrations(k);
+    EXPECT_GT(expected.covariance_size(), 0);
+    EXPECT_GT(expected.estimates_size(), 0);
+    expected.clear_covariance();
+    expected.clear_estimates();
+    if (expected.has_provenance()) {
+      EXPECT_GT(expected.provenance().segments_size(), 0);
+      expected.mutable_provenance()->clear_settings();
+    }
+    if (expected.has_solver()) {
+      expected.mutable_solver()->clear_segment_fits();
+    }
+    EXPECT_EQ(basic.calibrations(k).SerializeAsString(),
+              expected.SerializeAsString());
+  }
+}
+
 TEST_F(CalibrationServiceTest, ListOfAnUnknownRigOrPageIsRefused) {
   v1::ListCalibrationsResponse page;
   EXPECT_THAT(BadFields(List("r", 0, "", &page)), ElementsAre("parent"));

@@ -50,7 +50,15 @@ TEST_P(RigSummariesTest, TextIsLookedForInTheName) {
   for (const char* id : {"tablet-1", "phone-1", "tablet-2"}) CreateTestRig(id);
   EXPECT_THAT(Names({"tablet", {}, RigOrder::kName, false, ""}, 1),
               ElementsAre("tablet-1", "tablet-2"));
-  EXPECT_THAT(Names({"%", {}, RigOrder::kName, false, ""}), IsEmpty());
+  const auto with = [&](const std::string& text) {
+    return Names({text, {}, RigOrder::kName, false, ""});
+  };
+  for (const char* nowhere : {"%", "_", "TABLET", "t%t", "t_blet", "\\", "'"}) {
+    EXPECT_THAT(with(nowhere), IsEmpty()) << nowhere;
+  }
+  CreateTestRig("t_blet");
+  EXPECT_THAT(with("t_b"), ElementsAre("t_blet"));
+  EXPECT_THAT(with("-1"), ElementsAre("phone-1", "tablet-1"));
 }
 
 TEST_P(RigSummariesTest, ANameIsComparedAsAWhole) {
