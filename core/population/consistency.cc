@@ -6,42 +6,72 @@
 
 #include "core/change/chi_square.h"
 #include "core/model/symmetric_eigen.h"
+#include "core/population/device.h"
 
 namespace selfcal {
+namespace {
+
+// The information of a device in coordinates in which its prediction has zero
+// mean and unit covariance, along its own directions.
+struct Whitened {
+  Eigen::MatrixXd directions;  // columns, in the coordinates of theta
+  // How much better the device knows each direction than the prediction does;
+  // at least 0.
+  Eigen::ArrayXd information;
+  Eigen::VectorXd e;  // information times offset
+};
+
+Whitened Whiten(const DevicePrediction& prediction,
+                const ThetaInformation& device) {
+  const Eigen::LLT<Eigen::MatrixXd> root(prediction.covariance);
+  const Eigen::MatrixXd L = root.matrixL();
+  const SymmetricEigen eigen(L.transpose() * device.Lambda * L);
+  return {L * eigen.eigenvectors(),
+          eigen.eigenvalues().array().max(0),
+          eigen.eigenvectors().transpose() * L.transpose() *
+              (device.eta - device.Lambda * prediction.mean)};
+}
+
+// Of the directions that the device knows at least as well as the prediction.
+struct Observed {
+  double statistic = 0;
+  int degrees = 0;
+};
+
+Observed SumObserved(const Whitened& device) {
+  Observed sum;
+  for (Eigen::Index k = 0; k < device.e.size(); ++k) {
+    const double information = device.information(k);
+    if (information < 1) continue;
+    sum.statistic +=
+        device.e(k) * device.e(k) / (information * (1 + information));
+    ++sum.degrees;
+  }
+  return sum;
+}
+
+}  // namespace
 
 CohortConsistency CompareWithCohort(const Cohort& cohort,
                                     const ThetaInformation& device) {
   const DevicePrediction prediction = PredictDevice(cohort);
-  const auto size = prediction.mean.size();
-  // In coordinates in which devices of the cohort have unit covariance, the
-  // directions of the information: its eigenvalue is how much better the device
-  // knows the direction than the cohort.
-  const Eigen::LLT<Eigen::MatrixXd> root(prediction.covariance);
-  const Eigen::MatrixXd L = root.matrixL();
-  const SymmetricEigen eigen(L.transpose() * device.Lambda * L);
-  const Eigen::VectorXd e = eigen.eigenvectors().transpose() * L.transpose() *
-                            (device.eta - device.Lambda * prediction.mean);
-
+  const Whitened whitened = Whiten(prediction, device);
   CohortConsistency result;
-  for (Eigen::Index k = 0; k < size; ++k) {
-    const double information = eigen.eigenvalues()(k);
-    if (information < 1) continue;
-    result.statistic += e(k) * e(k) / (information * (1 + information));
-    ++result.degrees;
-  }
+  const Observed observed = SumObserved(whitened);
+  result.statistic = observed.statistic;
+  result.degrees = observed.degrees;
   if (result.degrees == 0) return result;
   result.probability = ChiSquareTail(result.statistic, result.degrees);
 
   // Each component, given what the device knows of the others.
+  const Eigen::ArrayXd& information = whitened.information;
   const Eigen::MatrixXd posterior_gain =
-      L * eigen.eigenvectors() *
-      (eigen.eigenvalues().array().max(0) + 1).inverse().matrix().asDiagonal();
-  const Eigen::VectorXd difference = posterior_gain * e;
-  for (Eigen::Index j = 0; j < size; ++j) {
+      whitened.directions * (information + 1).inverse().matrix().asDiagonal();
+  const Eigen::VectorXd difference = posterior_gain * whitened.e;
+  for (Eigen::Index j = 0; j < difference.size(); ++j) {
     const double variance =
-        (posterior_gain.row(j).array().square() *
-         eigen.eigenvalues().array().max(0).transpose() *
-         (eigen.eigenvalues().array().max(0) + 1).transpose())
+        (posterior_gain.row(j).array().square() * information.transpose() *
+         (information + 1).transpose())
             .sum();
     if (variance < 0.5 * prediction.covariance(j, j)) continue;
     CohortComponent component;
@@ -62,6 +92,32 @@ CohortConsistency CompareWithCohort(const Cohort& cohort,
                          static_cast<double>(result.components.size());
     result.probability = std::min(1.0, 2 * std::min(result.probability, least));
   }
+  return result;
+}
+
+PriorAgreement CompareWithPrior(const Rig& rig,
+                                const Calibration& theta,
+                                const Eigen::MatrixXd& covariance) {
+  const std::vector<int> free = FreeComponents(rig);
+  const Eigen::VectorXd sigmas = PriorSigmas(rig)(free);
+  const ThetaInformation all =
+      DeviceInformation(rig, theta, covariance, rig.factory);
+  const Whitened device = Whiten(
+      {Eigen::VectorXd::Zero(sigmas.size()), sigmas.cwiseAbs2().asDiagonal()},
+      {all.Lambda(free, free), all.eta(free)});
+  PriorAgreement result;
+  const Observed observed = SumObserved(device);
+  result.statistic = observed.statistic;
+  result.degrees = observed.degrees;
+  if (result.degrees == 0) return result;
+  result.probability = ChiSquareTail(result.statistic, result.degrees);
+  // An error of the prior by that ratio adds to the error of the estimate as
+  // far as this still rests on the prior.
+  const double variance_ratio =
+      std::max(1.0, result.statistic / result.degrees);
+  result.prior_error_ratio = std::sqrt(variance_ratio);
+  result.error_ratio = std::sqrt(
+      1 + (variance_ratio - 1) * (device.information + 1).inverse().mean());
   return result;
 }
 

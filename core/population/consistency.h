@@ -1,9 +1,13 @@
-// Is a device like its cohort? Pure functions, callable from any thread.
+// Is a device like its cohort, and like what its rig states? Pure functions,
+// callable from any thread.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
 #include "core/information/fusion.h"
+#include "core/model/calibration.h"
+#include "core/model/rig.h"
 #include "core/population/estimate.h"
 
 namespace selfcal {
@@ -30,5 +34,25 @@ struct CohortConsistency {
 // `device` must not be among cohort.devices.
 CohortConsistency CompareWithCohort(const Cohort& cohort,
                                     const ThetaInformation& device);
+
+struct PriorAgreement {
+  double statistic = 0;  // chi-square over the directions that are observed
+  int degrees = 0;
+  double probability = 1;  // of a larger statistic, if the prior holds
+  // Errors that the data shows of the prior, over those that it states; 1 if
+  // they are smaller.
+  double prior_error_ratio = 1;
+  // Root mean square error of the estimate, over the stated one, if the prior
+  // is as wrong in the directions that the data does not show. 1 if it does not
+  // matter: the data determines everything, or agrees with the prior.
+  double error_ratio = 1;
+};
+
+// Compares the data of a device with the prior of its rig, PriorSigmas(rig)
+// about rig.factory. `theta` with `covariance` (D x D, tangent at theta) is the
+// calibration that started from it (DeviceInformation).
+PriorAgreement CompareWithPrior(const Rig& rig,
+                                const Calibration& theta,
+                                const Eigen::MatrixXd& covariance);
 
 }  // namespace selfcal

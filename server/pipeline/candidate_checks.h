@@ -34,7 +34,7 @@ void CheckFit(const CheckContext& context,
               std::vector<ValidationCheck>* checks);
 
 // candidate_estimate.cc: the estimate compared with the factory's and the
-// active one. prior_sigmas, rank, sigma_growth.
+// active one. prior_sigmas, prior_agreement, rank, sigma_growth.
 void CheckEstimate(const CheckContext& context,
                    std::vector<ValidationCheck>* checks);
 

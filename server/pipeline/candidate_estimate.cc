@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/population/consistency.h"
 #include "server/pipeline/candidate_checks.h"
 
 namespace selfcal::server {
@@ -45,6 +46,34 @@ void CheckValues(const CheckContext& context,
         limit);
   }
   AddResult("prior_sigmas", largest, limit, failure, checks);
+}
+
+void CheckPrior(const CheckContext& context,
+                std::vector<ValidationCheck>* checks) {
+  if (!context.evidence.has_factory_prior) return;
+  const PriorAgreement prior = CompareWithPrior(
+      context.rig, context.result.theta, context.result.covariance);
+  const double limit = context.limits.max_error_ratio;
+  const bool contradicts = prior.probability < context.limits.min_probability;
+  const double ratio = contradicts ? prior.error_ratio : 1;
+  std::string failure;
+  if (ratio > limit) {
+    failure = fmt::format(
+        "The segments contradict the prior: where they show theta, it is "
+        "{:.2g} "
+        "times as far from the factory's value as the tolerances say "
+        "(probability {:.1g}). If that is so of the rest, errors are {:.2f} "
+        "times as large as stated: at most {:.1f} times may become active. "
+        "Check whether the factory calibration is of such a device (selfcal "
+        "cohort show), widen the tolerances (prior_sigmas, selfcal rig "
+        "update), "
+        "or send richer motion.",
+        prior.prior_error_ratio,
+        prior.probability,
+        ratio,
+        limit);
+  }
+  AddResult("prior_agreement", ratio, limit, failure, checks);
 }
 
 void CheckRank(const CheckContext& context,
@@ -128,6 +157,7 @@ void CheckCertainty(const CheckContext& context,
 void CheckEstimate(const CheckContext& context,
                    std::vector<ValidationCheck>* checks) {
   CheckValues(context, checks);
+  CheckPrior(context, checks);
   CheckRank(context, checks);
   CheckCertainty(context, checks);
 }

@@ -63,10 +63,14 @@ struct CandidateLimits {
   // A component is treated as observed if its sigma is below this part of the
   // prior's. Chosen, not measured.
   double observed_below = 0.5;
-  // For the agreement of the halves, and of held-out segments with the
-  // candidate. Chosen, not measured: each of the two tests rejects at most one
-  // sound candidate in 10,000, if the noise is as assumed.
+  // For the agreement of the halves, of held-out segments with the candidate,
+  // and of the data with the prior. Chosen, not measured: each of the tests
+  // rejects at most one sound candidate in 10,000, if the noise is as assumed.
   double min_probability = 1e-4;
+  // Errors of the candidate over the stated ones, if the data contradicts the
+  // prior, and that is as wrong in what the data does not show. Chosen, not
+  // measured.
+  double max_error_ratio = 1.1;
   // Largest variance between segments over that which noise explains; more if
   // few degrees of freedom are tested, so that chance alone exceeds it once in
   // a thousand times. Simulated devices of ten kinds have 0.76 to 1.21, a Tango
@@ -76,6 +80,9 @@ struct CandidateLimits {
 };
 
 struct CandidateEvidence {
+  // Whether the run started from the prior of the rig. After a device change it
+  // starts from what is still known.
+  bool has_factory_prior = true;
   // The active calibration, its covariance aged to now (CovarianceAt). If it
   // does not account for the last device change, its covariance is that of the
   // prior for the components that `changed` lists.
@@ -110,6 +117,9 @@ struct CandidateValidation {
 //   that bias a calibration;
 // - prior_sigmas: no free component is further from the factory's value than
 //   the tolerances allow;
+// - prior_agreement: the data does not contradict the prior, or determines
+//   everything so well that this does not matter. Only of a candidate that
+//   started from the prior of the rig;
 // - rank: at least as many directions are estimated as by `active`, less the
 //   components that have changed since;
 // - sigma_growth: no component that `active` observes has become much less

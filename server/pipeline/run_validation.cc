@@ -146,6 +146,7 @@ absl::Status Validate(const RunContext& context,
                            context.store()->GetRig(run.rig));
   const CalibrationResult& result = candidate->report.value();
   CandidateEvidence evidence;
+  evidence.has_factory_prior = run.change == 0;
   SELFCAL_ASSIGN_OR_RETURN(evidence.active,
                            context.store()->GetActiveCalibration(run.rig));
   evidence.active.covariance =

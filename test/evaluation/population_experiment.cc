@@ -16,6 +16,7 @@
 #include "core/population/device.h"
 #include "core/population/estimate.h"
 #include "core/simulation/simulate.h"
+#include "server/pipeline/candidate_validation.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/estimators.h"
 #include "test/evaluation/statistics.h"
@@ -122,14 +123,34 @@ ThetaPrior CohortPrior(const Cohort& cohort) {
       predicted.covariance.llt().solve(Eigen::MatrixXd::Identity(size, size))};
 }
 
+// The rig of a new device as the daemon describes it: the mean as the factory's
+// calibration, the standard deviations of devices as its tolerances, without
+// their correlations.
+Rig DescribedRig(const Rig& rig, const Cohort& cohort) {
+  const DevicePrediction predicted = PredictDevice(cohort);
+  Rig described = rig;
+  described.factory = BoxPlus(cohort.reference, predicted.mean);
+  described.prior_sigmas.clear();
+  const auto components = TangentComponents(rig.factory);
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    described.prior_sigmas.push_back(
+        {components[k].name, std::sqrt(predicted.covariance(i, i))});
+  }
+  return described;
+}
+
 // Of a new device after each number of segments.
 struct Course {
   std::vector<double> sigma;  // rms over components, in tolerances
   std::vector<double> nees;
+  // Whether the daemon would reject it, as the data contradicts the prior.
+  std::vector<bool> rejected;
   double probability = 1;  // of the cohort, with all segments
   int contradicted = 0;    // number of segments that show it; 0: none does
 };
 
+// Relative to the tolerances of `rig`.
 double SigmaRms(const Rig& rig, const Eigen::MatrixXd& covariance) {
   const Eigen::VectorXd relative =
       covariance.diagonal().cwiseSqrt().cwiseQuotient(PriorSigmas(rig));
@@ -137,8 +158,19 @@ double SigmaRms(const Rig& rig, const Eigen::MatrixXd& covariance) {
                    static_cast<double>(relative.size()));
 }
 
+// As the check prior_agreement of the daemon does.
+bool IsRejected(const Rig& rig, const CalibrationResult& result) {
+  const server::CandidateLimits limits;
+  const PriorAgreement prior =
+      CompareWithPrior(rig, result.theta, result.covariance);
+  return prior.probability < limits.min_probability &&
+         prior.error_ratio > limits.max_error_ratio;
+}
+
+// Of a device that is calibrated as `rig`.
 Course Follow(const Rig& rig, const Device& device, const Cohort* cohort) {
   Course course;
+  const Rig reference = CohortRig();
   for (int n = 1; n <= kMostSegments; ++n) {
     CalibrationResult result = CalibrateDevice(rig, device, n, std::nullopt);
     if (cohort != nullptr) {
@@ -153,7 +185,8 @@ Course Follow(const Rig& rig, const Device& device, const Cohort* cohort) {
         course.contradicted = n;
       }
     }
-    course.sigma.push_back(SigmaRms(rig, result.covariance));
+    course.sigma.push_back(SigmaRms(reference, result.covariance));
+    course.rejected.push_back(cohort == nullptr && IsRejected(rig, result));
     course.nees.push_back(
         NormalisedSquaredError(BoxMinus(result.theta, device.truth),
                                result.covariance)
@@ -174,6 +207,22 @@ double MeanNees(const std::vector<Course>& courses, int segments) {
   double sum = 0;
   for (const Course& course : courses) sum += course.nees[segments - 1];
   return sum / static_cast<double>(courses.size());
+}
+
+int Rejected(const std::vector<Course>& courses, int segments) {
+  int rejected = 0;
+  for (const Course& course : courses) {
+    rejected += course.rejected[segments - 1];
+  }
+  return rejected;
+}
+
+double RmsSigma(const std::vector<Course>& courses, int segments) {
+  std::vector<double> sigmas;
+  for (const Course& course : courses) {
+    sigmas.push_back(course.sigma[segments - 1]);
+  }
+  return Rms(sigmas);
 }
 
 }  // namespace
@@ -224,22 +273,26 @@ void RunPopulation(Context* context) {
                   1.3);
 
   // New devices: with the factory's prior, and with that of the cohort.
-  std::vector<Course> factory(fresh), prior(fresh), other(foreign), broken(1);
-  context->ForEach(2 * fresh + foreign + 1, [&](int i) {
-    if (i < 2 * fresh) {
-      const std::uint64_t seed = 5000 + i / 2;
+  // As a rig that the daemon describes, they have no test against the cohort.
+  const Rig described = DescribedRig(rig, cohort);
+  std::vector<Course> factory(fresh), prior(fresh), as_described(fresh);
+  std::vector<Course> other(foreign), other_as_described(foreign), broken(1);
+  context->ForEach(fresh + foreign + 1, [&](int i) {
+    if (i < fresh) {
+      const std::uint64_t seed = 5000 + i;
       const Device device =
           MakeDevice(rig, DrawDevice(truths, seed), kCalm, seed);
-      (i % 2 ? prior : factory)[i / 2] =
-          Follow(rig, device, i % 2 ? &cohort : nullptr);
-    } else if (i < 2 * fresh + foreign) {
+      factory[i] = Follow(rig, device, nullptr);
+      prior[i] = Follow(rig, device, &cohort);
+      as_described[i] = Follow(described, device, nullptr);
+    } else if (i < fresh + foreign) {
       Truths elsewhere = truths;
       elsewhere.mu += kOtherCohort * truths.sigma;
-      const std::uint64_t seed = 7000 + i;
-      other[i - 2 * fresh] =
-          Follow(rig,
-                 MakeDevice(rig, DrawDevice(elsewhere, seed), kCalm, seed),
-                 &cohort);
+      const std::uint64_t seed = 7000 + fresh + i;
+      const Device device =
+          MakeDevice(rig, DrawDevice(elsewhere, seed), kCalm, seed);
+      other[i - fresh] = Follow(rig, device, &cohort);
+      other_as_described[i - fresh] = Follow(described, device, nullptr);
     } else {
       broken[0] = Follow(
           rig,
@@ -251,46 +304,71 @@ void RunPopulation(Context* context) {
   ResultTable table({"segments",
                      "sigma, factory's prior",
                      "sigma, cohort's prior",
+                     "sigma, as described",
                      "NEES, factory's prior",
                      "NEES, cohort's prior",
-                     "NEES, other cohort"});
+                     "NEES, as described",
+                     "NEES, other cohort",
+                     "NEES, other cohort as described",
+                     "rejected of them",
+                     "rejected of this cohort"});
   for (int n = 1; n <= kMostSegments; ++n) {
-    std::vector<double> with_factory, with_cohort;
-    for (int i = 0; i < fresh; ++i) {
-      with_factory.push_back(factory[i].sigma[n - 1]);
-      with_cohort.push_back(prior[i].sigma[n - 1]);
-    }
     table.Add({long{n},
-               Rms(with_factory),
-               Rms(with_cohort),
+               RmsSigma(factory, n),
+               RmsSigma(prior, n),
+               RmsSigma(as_described, n),
                MeanNees(factory, n),
                MeanNees(prior, n),
-               MeanNees(other, n)});
+               MeanNees(as_described, n),
+               MeanNees(other, n),
+               MeanNees(other_as_described, n),
+               long{Rejected(other_as_described, n)},
+               long{Rejected(as_described, n) + Rejected(factory, n)}});
   }
   context->WriteTable("new_devices", table);
 
   double segments_factory = 0;
   double segments_cohort = 0;
+  double segments_described = 0;
   for (int i = 0; i < fresh; ++i) {
     const double target = factory[i].sigma.back();
     segments_factory += kMostSegments;
     segments_cohort += Until(prior[i].sigma, target);
+    segments_described += Until(as_described[i].sigma, target);
   }
   context->AtLeast(
       "population.segments_saved", segments_factory / segments_cohort, 2);
+  context->AtLeast("population.described_segments_saved",
+                   segments_factory / segments_described,
+                   2);
   // Mean NEES of new devices, over all numbers of segments: its 95 % bounds are
   // those of as many independent devices.
   const double bound = size + 1.96 * std::sqrt(2.0 * size / fresh);
   const double other_bound = size + 1.96 * std::sqrt(2.0 * size / foreign);
   double largest = 0;
+  double largest_described = 0;
   double largest_other = 0;
   int found = 0;
   for (int n = 1; n <= kMostSegments; ++n) {
     largest = std::max(largest, MeanNees(prior, n));
+    largest_described = std::max(largest_described, MeanNees(as_described, n));
     largest_other = std::max(largest_other, MeanNees(other, n));
   }
   for (const Course& course : other) found += course.contradicted > 0;
   context->AtMost("population.nees", largest, bound);
+  context->AtMost("population.described_nees", largest_described, bound);
+  // The daemon would reject every device of the other cohort once it has as
+  // many segments as a table holds, and none of this one.
+  int rejected = 0;
+  for (int n = 1; n <= kMostSegments; ++n) {
+    rejected += Rejected(as_described, n) + Rejected(factory, n);
+  }
+  context->AtMost("population.described_rejected", rejected, 0);
+  context->AtLeast(
+      "population.described_other_rejected",
+      double(Rejected(other_as_described, kMostSegments)) / foreign,
+      1,
+      {.robust = true});
   context->AtMost("population.other_cohort_nees", largest_other, other_bound);
   context->AtLeast("population.other_cohort_found",
                    double(found) / foreign,

@@ -177,6 +177,32 @@ TEST_F(CandidateTest, ValuesMustLieWithinTenPriorSigmasOfTheFactory) {
   EXPECT_THAT(Problem("prior_sigmas"), HasSubstr(components[k].name));
 }
 
+// Three tolerances off in what is shown, and as uncertain as they are in the
+// rest.
+TEST_F(CandidateTest, DataMustAgreeWithThePriorUnlessItDecidesAlone) {
+  const Eigen::VectorXd prior = PriorSigmas(rig_);
+  result_.theta = BoxPlus(rig_.factory, 3 * prior);
+  EXPECT_THAT(Problems(), IsEmpty());
+  EXPECT_NEAR(Check("prior_agreement").value, 1, 0.01);
+  result_.covariance = (0.5 * prior).cwiseAbs2().asDiagonal();
+  evidence_.active.covariance = result_.covariance;
+  const std::string problem = Problem("prior_agreement");
+  EXPECT_THAT(problem, HasSubstr("prior_sigmas"));
+  // Data alone would be 4 tolerances off, with a sigma of 0.58: 3.5 times as
+  // far as expected, in a fourth of the variance.
+  EXPECT_THAT(problem, HasSubstr("3.5 times as far"));
+  EXPECT_NEAR(Check("prior_agreement").value,
+              std::sqrt(1 + (3.4641 * 3.4641 - 1) * 0.25),
+              0.01);
+  // After a device change another prior was used.
+  evidence_.has_factory_prior = false;
+  EXPECT_THAT(Problems(), IsEmpty());
+  evidence_.has_factory_prior = true;
+  result_.theta = BoxPlus(rig_.factory, 0.5 * prior);
+  EXPECT_THAT(Problems(), IsEmpty());
+  EXPECT_EQ(Check("prior_agreement").value, 1);
+}
+
 TEST_F(CandidateTest, ValuesMustBeThoseOfACalibration) {
   rig_.prior_sigmas = {{"*", 1e6}};
   result_.theta.cameras[0].f.x() = -5;

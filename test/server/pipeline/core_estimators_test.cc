@@ -59,6 +59,64 @@ TEST_F(CoreEstimatorsTest, ScoresAreTheSameAfterAStop) {
   EXPECT_EQ(matrices[0], matrices[1]);
 }
 
+// A rig that was described by the statistics of other devices.
+TEST_F(CoreEstimatorsTest, AWrongPriorIsRejectedUntilItIsWidened) {
+  const Rig device = TestRig("a");
+  const auto segments = TestSegments(device, 8);
+  const Eigen::VectorXd wide = PriorSigmas(device);
+  const Eigen::VectorXd narrow = 0.1 * wide;
+  Eigen::VectorXd off = 3 * narrow;
+  for (Eigen::Index k = 0; k < off.size(); k += 2) off(k) = -off(k);
+  Rig rig = device;
+  rig.table_size = 4;
+  rig.min_gain_nats = 0;
+  rig.factory = BoxPlus(device.factory, off);
+  rig.prior_sigmas.clear();
+  const auto components = TangentComponents(rig.factory);
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    rig.prior_sigmas.push_back({components[k].name, narrow(i)});
+  }
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  StartOne();
+  for (const MotionSegment& segment : segments) {
+    ASSERT_TRUE(pipeline_->Submit("a", segment, nullptr).ok());
+  }
+  ASSERT_TRUE(AllScored());
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  const auto rejected = store_->GetCalibration("a", 2);
+  ASSERT_TRUE(rejected.ok()) << rejected.status();
+  EXPECT_EQ(rejected->state, CalibrationState::kRejected);
+  EXPECT_THAT(rejected->reasons,
+              ::testing::Contains(
+                  ::testing::HasSubstr("The segments contradict the prior")));
+
+  const auto updated = pipeline_->UpdateRig(
+      "a",
+      [&](StoredRig stored) -> absl::StatusOr<StoredRig> {
+        stored.rig.prior_sigmas = device.prior_sigmas;
+        return stored;
+      },
+      "eve");
+  ASSERT_TRUE(updated.ok()) << updated.status();
+  ASSERT_TRUE(AllScored());
+  ASSERT_TRUE(pipeline_->StartRecalibration("a", true).ok());
+  ASSERT_TRUE(Eventually([&] {
+    const auto active = store_->GetActiveCalibration("a");
+    return active.ok() && active->version == 3;
+  }));
+  const auto active = store_->GetActiveCalibration("a");
+  const std::vector<int> free = FreeComponents(device);
+  const Eigen::VectorXd error =
+      BoxMinus(active->theta, device.factory)(free).cwiseQuotient(
+          Eigen::VectorXd(wide(free)));
+  const Eigen::VectorXd scale = wide(free).cwiseInverse();
+  const Eigen::MatrixXd covariance =
+      scale.asDiagonal() * active->covariance(free, free) * scale.asDiagonal();
+  // The 99.99 % bound of 26 degrees of freedom is 61.7.
+  EXPECT_LT(error.dot(covariance.llt().solve(error)), 61.7);
+}
+
 // Ids are unique within a session: the same ones in another mean nothing.
 TEST_F(CoreEstimatorsTest, LandmarksNeverMatchAcrossSessions) {
   constexpr std::uint64_t kFar = 1'000'000;
