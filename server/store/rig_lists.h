@@ -13,9 +13,9 @@
 namespace selfcal::server {
 
 // Adds the conditions of a query, without its order, on a row of rigs under the
-// name `rigs`. A list in the order of the keys of rigs names the parameter `from`
-// that has the key of its first rig, so that labels are not read from their
-// beginning.
+// name `rigs`. A list in the order of the keys of rigs names the parameter
+// `from` that has the key of its first rig, so that labels are not read from
+// their beginning.
 void AddRigConditions(const RigQuery& query,
                       const std::string& rigs,
                       SqlCondition* condition,
