@@ -38,7 +38,10 @@ void SqlCondition::AndIn(const std::string& columns,
     }
     texts.push_back(fmt::format("({})", fmt::join(parameters, ", ")));
   }
-  And(fmt::format("{} IN (VALUES {})", columns, fmt::join(texts, ", ")));
+  // SQLite reads all rows of a table that it compares with plain VALUES.
+  And(fmt::format("{} IN (SELECT * FROM (VALUES {}) AS any_of)",
+                  columns,
+                  fmt::join(texts, ", ")));
 }
 
 void SqlCondition::AndWithin(const std::string& before,

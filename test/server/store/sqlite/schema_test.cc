@@ -4,10 +4,12 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "server/domain/calibration_life.h"
+#include "server/store/driver/sql_condition.h"
 #include "server/store/reported_tables.h"
 #include "test/server/store/fixture_content.h"
 #include "test/server/store/sqlite/sqlite_test.h"
@@ -254,6 +256,48 @@ TEST_F(SchemaTest, StatementsReadTheRowsThatTheyNeed) {
     std::vector<std::string> steps;
     while (plan.Next()) steps.push_back(plan.Text(3));
     EXPECT_EQ(steps, expected) << sql;
+  }
+}
+
+TEST_F(SchemaTest, RowsOfSeveralKeysAreSearchedNotScanned) {
+  store_.reset();
+  const auto db = SqliteConnection::Open(Path(), SQLITE_OPEN_READWRITE);
+  ASSERT_TRUE(db.ok());
+  using Rows = std::vector<std::vector<SqlCondition::Value>>;
+  const std::int64_t one = 1;
+  const std::int64_t two = 2;
+  const std::tuple<const char*, const char*, Rows> lists[] = {
+      {"SELECT s.session FROM calibration_segments c CROSS JOIN segments s "
+       "WHERE s.rig = c.rig AND s.sequence = c.sequence AND ",
+       "(c.rig, c.version)",
+       {{one, one}, {one, two}, {two, one}}},
+      {"SELECT c.state FROM calibrations c JOIN rigs g ON g.rig = c.rig WHERE ",
+       "(g.id, c.version)",
+       {{"a", one}, {"a", two}, {"b", one}}},
+      {"SELECT rig FROM rigs WHERE ", "id", {{"a"}, {"b"}, {"c"}}},
+      {"SELECT t.entropy FROM table_entries t CROSS JOIN segments s "
+       "WHERE s.rig = t.rig AND s.sequence = t.sequence AND ",
+       "t.rig",
+       {{one}, {two}}}};
+  for (const auto& [sql, columns, rows] : lists) {
+    for (const std::size_t count : {std::size_t{1}, rows.size()}) {
+      SqlCondition condition;
+      condition.AndIn(columns, Rows(rows.begin(), rows.begin() + count));
+      Statement plan(
+          db->get(),
+          std::string("EXPLAIN QUERY PLAN ") + sql + condition.sql());
+      condition.Bind(&plan);
+      int searches = 0;
+      while (plan.Next()) {
+        const std::string step = plan.Text(3);
+        searches += step.starts_with("SEARCH");
+        for (const char* table : {"c", "g", "s", "t", "rigs"}) {
+          EXPECT_NE(step, std::string("SCAN ") + table) << sql << count;
+        }
+      }
+      EXPECT_TRUE(plan.status().ok()) << plan.status();
+      EXPECT_GT(searches, 0) << sql;
+    }
   }
 }
 
