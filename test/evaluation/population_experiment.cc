@@ -105,14 +105,16 @@ Device MakeDevice(const Rig& rig,
   return device;
 }
 
+// On the first segments; it may not converge.
 CalibrationResult CalibrateDevice(const Rig& rig,
                                   const Device& device,
                                   int segments,
                                   const std::optional<ThetaPrior>& prior) {
   CalibrateOptions options = ComparedOptions();
   options.prior = prior;
-  const SegmentSet set = AllSegments(segments);
-  return CalibrateOn(rig, device.segments, set, options);
+  const std::vector<MotionSegment> used(device.segments.begin(),
+                                        device.segments.begin() + segments);
+  return Calibrate(rig, rig.factory, used, options);
 }
 
 ThetaPrior CohortPrior(const Cohort& cohort) {
@@ -158,8 +160,9 @@ double SigmaRms(const Rig& rig, const Eigen::MatrixXd& covariance) {
                    static_cast<double>(relative.size()));
 }
 
-// As the check prior_agreement of the daemon does.
+// As the checks converged and prior_agreement of the daemon do.
 bool IsRejected(const Rig& rig, const CalibrationResult& result) {
+  if (result.status != CalibrateStatus::kConverged) return true;
   const server::CandidateLimits limits;
   const PriorAgreement prior =
       CompareWithPrior(rig, result.theta, result.covariance);
@@ -246,8 +249,8 @@ void RunPopulation(Context* context) {
     Eigen::VectorXd offset = DrawDevice(truths, 1000 + i);
     if (i == kBroken) offset = knocked(offset);
     const Device device = MakeDevice(rig, offset, kVigorous, 1000 + i);
-    const CalibrationResult result =
-        CalibrateDevice(rig, device, kMostSegments, std::nullopt);
+    const CalibrationResult result = CalibrateOn(
+        rig, device.segments, AllSegments(kMostSegments), ComparedOptions());
     information[i] =
         DeviceInformation(rig, result.theta, result.covariance, rig.factory);
   });

@@ -194,8 +194,10 @@ TEST_F(PostgresDatabaseTest, ADeadlockIsResolvedByCarryingOneOutAgain) {
       [&] { EXPECT_TRUE(other_database.Write(work(2, 1)).ok()); });
   EXPECT_TRUE(database_->Write(work(1, 2)).ok());
   other.join();
-  EXPECT_EQ(attempts, 3);
-  EXPECT_EQ(database_->retries() + other_database.retries(), 1);
+  // The two may meet like this once more before one has both rows.
+  const auto retries = database_->retries() + other_database.retries();
+  EXPECT_GE(retries, 1);
+  EXPECT_EQ(attempts, 2 + retries);
   EXPECT_EQ(Number("SELECT sum(x)::bigint FROM t"), 1 + 2 + 4 * 10);
 }
 
@@ -223,8 +225,10 @@ TEST_F(PostgresDatabaseTest, ASerializationFailureIsCarriedOutAgain) {
   std::thread other([&] { EXPECT_TRUE(other_database.Write(add_total).ok()); });
   EXPECT_TRUE(database_->Write(add_total).ok());
   other.join();
-  EXPECT_EQ(attempts, 3);
-  EXPECT_EQ(database_->retries() + other_database.retries(), 1);
+  // The two may meet like this once more before one has both rows.
+  const auto retries = database_->retries() + other_database.retries();
+  EXPECT_GE(retries, 1);
+  EXPECT_EQ(attempts, 2 + retries);
   // Each as if it had been alone: 1, 1 + 1 = 2 and then the sum of those.
   EXPECT_EQ(Number("SELECT sum(x)::bigint FROM t"), 4);
 }
