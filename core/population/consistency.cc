@@ -15,8 +15,8 @@ namespace {
 // mean and unit covariance, along its own directions.
 struct Whitened {
   Eigen::MatrixXd directions;  // columns, in the coordinates of theta
-  // How much better the device knows each direction than the prediction does;
-  // at least 0.
+  // The information of each direction, in units of the prediction's; at least
+  // 0.
   Eigen::ArrayXd information;
   Eigen::VectorXd e;  // information times offset
 };
@@ -32,7 +32,8 @@ Whitened Whiten(const DevicePrediction& prediction,
               (device.eta - device.Lambda * prediction.mean)};
 }
 
-// Of the directions that the device knows at least as well as the prediction.
+// Sums over the directions that the device knows at least as well as the
+// prediction does.
 struct Observed {
   double statistic = 0;
   int degrees = 0;

@@ -5,6 +5,7 @@
 
 #include "core/model/calibration.h"
 #include "core/population/estimate.h"
+#include "core/population/new_device.h"
 #include "proto/resource_names.h"
 #include "server/encode/encode.h"
 #include "server/encode/set_time.h"
@@ -36,18 +37,9 @@ void EncodeOutlier(const CohortReport::Outlier& outlier,
   }
 }
 
-// A rig for a new device. Correlations are left out: prior sigmas have none.
-v1::Rig EncodePrior(const CohortReport& report,
-                    const std::vector<TangentComponent>& components) {
-  const DevicePrediction device = PredictDevice(report.cohort);
+v1::Rig EncodePrior(const CohortReport& report) {
   StoredRig prior = report.reference;
-  prior.rig.factory = BoxPlus(report.cohort.reference, device.mean);
-  prior.rig.prior_sigmas.clear();
-  for (std::size_t k = 0; k < components.size(); ++k) {
-    const double sigma = Sigma(device.covariance, static_cast<Eigen::Index>(k));
-    if (sigma > 0)
-      prior.rig.prior_sigmas.push_back({components[k].name, sigma});
-  }
+  prior.rig = DescribeNewDevice(prior.rig, report.cohort);
   prior.labels.clear();
   v1::Rig message = Encode(prior);
   message.clear_name();
@@ -84,7 +76,7 @@ v1::Cohort Encode(const CohortReport& report) {
     component->set_spread_degrees(cohort.degrees(j));
   }
   if (message.estimated()) {
-    *message.mutable_prior() = EncodePrior(report, components);
+    *message.mutable_prior() = EncodePrior(report);
   }
   for (const CohortReport::Device& device : report.devices) {
     v1::CohortDevice* added = message.add_devices();

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/population/consistency.h"
 #include "server/pipeline/candidate_checks.h"
 
 namespace selfcal::server {
@@ -54,20 +53,17 @@ void CheckPrior(const CheckContext& context,
   const PriorAgreement prior = CompareWithPrior(
       context.rig, context.result.theta, context.result.covariance);
   const double limit = context.limits.max_error_ratio;
-  const bool contradicts = prior.probability < context.limits.min_probability;
-  const double ratio = contradicts ? prior.error_ratio : 1;
+  const double ratio = ErrorRatio(prior, context.limits);
   std::string failure;
   if (ratio > limit) {
     failure = fmt::format(
         "The segments contradict the prior: where they show theta, it is "
-        "{:.2g} "
-        "times as far from the factory's value as the tolerances say "
+        "{:.2g} times as far from the factory's value as the tolerances say "
         "(probability {:.1g}). If that is so of the rest, errors are {:.2f} "
         "times as large as stated: at most {:.1f} times may become active. "
         "Check whether the factory calibration is of such a device (selfcal "
         "cohort show), widen the tolerances (prior_sigmas, selfcal rig "
-        "update), "
-        "or send richer motion.",
+        "update), or send richer motion.",
         prior.prior_error_ratio,
         prior.probability,
         ratio,
@@ -153,6 +149,10 @@ void CheckCertainty(const CheckContext& context,
 }
 
 }  // namespace
+
+double ErrorRatio(const PriorAgreement& prior, const CandidateLimits& limits) {
+  return prior.probability < limits.min_probability ? prior.error_ratio : 1;
+}
 
 void CheckEstimate(const CheckContext& context,
                    std::vector<ValidationCheck>* checks) {

@@ -19,6 +19,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/model/rig.h"
+#include "core/population/consistency.h"
 #include "core/preflight/diagnose.h"
 #include "server/pipeline/held_out.h"
 #include "server/store/store.h"
@@ -80,7 +81,7 @@ struct CandidateLimits {
 };
 
 struct CandidateEvidence {
-  // Whether the run started from the prior of the rig. After a device change it
+  // True if the run started from the prior of the rig. After a device change it
   // starts from what is still known.
   bool has_factory_prior = true;
   // The active calibration, its covariance aged to now (CovarianceAt). If it
@@ -136,6 +137,10 @@ CandidateValidation ValidateCandidate(const Rig& rig,
                                       const CalibrationResult& result,
                                       const CandidateEvidence& evidence,
                                       const CandidateLimits& limits = {});
+
+// The errors of a candidate over the stated ones, as far as its prior is to
+// blame: 1 unless the data contradicts the prior.
+double ErrorRatio(const PriorAgreement& prior, const CandidateLimits& limits);
 
 // True if the numbers can be used: shape, finite values, no negative variance.
 bool HasUsableNumbers(const Rig& rig, const CalibrationResult& result);

@@ -55,9 +55,8 @@ absl::Status ReadSegments(Connection* db,
   }
   SqlCondition condition;
   condition.AndIn("(c.rig, c.version)", keys);
-  // A single version is read often.
   Statement read(db,
-                 keys.size() == 1 ? Reuse::kKept : Reuse::kOnce,
+                 condition.reuse(),
                  "SELECT c.rig, c.version, s.session, s.session_index, "
                  "  s.temperature_c FROM calibration_segments c "
                  "CROSS JOIN segments s "
@@ -73,7 +72,7 @@ absl::Status ReadSegments(Connection* db,
   return read.status();
 }
 
-// Without its segments.
+// Reads all but the segments.
 absl::StatusOr<StoredCalibration> CalibrationFromRow(const Statement& row) {
   const std::int64_t version = row.Int(0);
   const std::int64_t rig_id = row.Int(11);
@@ -104,6 +103,15 @@ absl::StatusOr<StoredCalibration> CalibrationFromRow(const Statement& row) {
   calibration.disagreement = row.Text(9);
   calibration.create_steady_ns = row.Int(10);
   return calibration;
+}
+
+absl::Status AddUnlessDamaged(const Statement& row,
+                              std::vector<StoredCalibration>* calibrations) {
+  auto calibration = CalibrationFromRow(row);
+  if (absl::IsDataLoss(calibration.status())) return absl::OkStatus();
+  SELFCAL_RETURN_IF_ERROR(calibration.status());
+  calibrations->push_back(*std::move(calibration));
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::int64_t> ActiveVersionOf(Connection* db, std::int64_t rig) {
@@ -148,10 +156,7 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationsOfMany(
       break;
     }
     place = {read.Int(10), read.Int(11), read.Int(0)};
-    auto calibration = CalibrationFromRow(read);
-    if (absl::IsDataLoss(calibration.status())) continue;
-    SELFCAL_RETURN_IF_ERROR(calibration.status());
-    listed.items.push_back(*std::move(calibration));
+    SELFCAL_RETURN_IF_ERROR(AddUnlessDamaged(read, &listed.items));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &listed.items));
@@ -173,10 +178,7 @@ absl::StatusOr<std::vector<StoredCalibration>> ReadCalibrations(
                  kCalibrationColumns + ("WHERE " + condition.sql()));
   condition.Bind(&read);
   while (read.Next()) {
-    auto calibration = CalibrationFromRow(read);
-    if (absl::IsDataLoss(calibration.status())) continue;
-    SELFCAL_RETURN_IF_ERROR(calibration.status());
-    calibrations.push_back(*std::move(calibration));
+    SELFCAL_RETURN_IF_ERROR(AddUnlessDamaged(read, &calibrations));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
   SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &calibrations));
@@ -236,9 +238,9 @@ absl::StatusOr<Listed<StoredCalibration>> ListCalibrationRows(
     listed.items.push_back(std::move(calibration));
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
-  SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &listed.items));
   CutPage(
       list, size, [](const auto& item) { return item.version; }, &listed);
+  SELFCAL_RETURN_IF_ERROR(ReadSegments(db, &listed.items));
   return listed;
 }
 

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <limits>
 #include <map>
+#include <ranges>
 #include <set>
 #include <string>
 #include <utility>
@@ -137,13 +138,8 @@ absl::Status ReadEach(Connection* db,
                       const std::string& sql,
                       const Take& take) {
   SqlCondition condition;
-  std::vector<std::vector<SqlCondition::Value>> keys;
-  for (const auto& [rig, summary] : summaries) keys.push_back({rig});
-  condition.AndIn("g.rig", keys);
-  // That of a single rig is read with each score.
-  Statement read(db,
-                 keys.size() == 1 ? Reuse::kKept : Reuse::kOnce,
-                 sql + " WHERE " + condition.sql());
+  condition.AndOneOf("g.rig", std::views::keys(summaries));
+  Statement read(db, condition.reuse(), sql + " WHERE " + condition.sql());
   condition.Bind(&read);
   while (read.Next()) take(read, summaries.at(read.Int(0)));
   return read.status();
@@ -218,9 +214,10 @@ absl::Status ReadDevices(Connection* db, const Summaries& summaries) {
 absl::Status ReadState(Connection* db, const Summaries& summaries) {
   SELFCAL_RETURN_IF_ERROR(ReadNewest(db, summaries));
   SELFCAL_RETURN_IF_ERROR(ReadDevices(db, summaries));
-  std::vector<std::int64_t> rigs;
-  for (const auto& [rig, summary] : summaries) rigs.push_back(rig);
-  SELFCAL_ASSIGN_OR_RETURN(auto tables, ReadTables(db, rigs));
+  const auto keys = std::views::keys(summaries);
+  SELFCAL_ASSIGN_OR_RETURN(
+      auto tables,
+      ReadTables(db, std::vector<std::int64_t>(keys.begin(), keys.end())));
   for (auto& [rig, of_rig] : tables) {
     summaries.at(rig)->tables = std::move(of_rig);
   }

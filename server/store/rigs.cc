@@ -190,10 +190,8 @@ absl::StatusOr<std::map<std::string, StoredRig>> ReadRigs(
     Connection* db, const std::set<std::string>& names) {
   std::map<std::string, StoredRig> rigs;
   if (names.empty()) return rigs;
-  std::vector<std::vector<SqlCondition::Value>> ids;
-  for (const std::string& name : names) ids.push_back({name});
   SqlCondition condition;
-  condition.AndIn("id", ids);
+  condition.AndOneOf("id", names);
   Statement read(
       db, condition.reuse(), kRigColumns + ("WHERE " + condition.sql()));
   condition.Bind(&read);

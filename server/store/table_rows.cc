@@ -10,20 +10,12 @@
 namespace selfcal::server {
 namespace {
 
-std::vector<std::vector<SqlCondition::Value>> RowsOf(
-    const std::vector<std::int64_t>& rigs) {
-  std::vector<std::vector<SqlCondition::Value>> rows;
-  for (const std::int64_t rig : rigs) rows.push_back({rig});
-  return rows;
-}
-
 // Reads the entries of the tables of these rigs.
 absl::Status ReadEntries(Connection* db,
-                         Reuse reuse,
                          const SqlCondition& of_rigs,
                          std::map<std::int64_t, std::vector<Table>>* tables) {
   Statement read(db,
-                 reuse,
+                 of_rigs.reuse(),
                  "SELECT t.rig, t.group_name, s.session, s.session_index, "
                  "  s.sequence, t.entropy, t.gain "
                  "FROM table_entries t CROSS JOIN segments s "
@@ -54,11 +46,9 @@ absl::StatusOr<std::map<std::int64_t, std::vector<Table>>> ReadTables(
   std::map<std::int64_t, std::vector<Table>> tables;
   if (rigs.empty()) return tables;
   SqlCondition of_rigs;
-  of_rigs.AndIn("t.rig", RowsOf(rigs));
-  // Those of a single rig are read with each score.
-  const Reuse reuse = rigs.size() == 1 ? Reuse::kKept : Reuse::kOnce;
+  of_rigs.AndOneOf("t.rig", rigs);
   Statement read(db,
-                 reuse,
+                 of_rigs.reuse(),
                  "SELECT t.rig, t.group_name, t.capacity, t.scored "
                  "FROM tables t WHERE " +
                      of_rigs.sql() + " ORDER BY t.rig, t.position");
@@ -70,7 +60,7 @@ absl::StatusOr<std::map<std::int64_t, std::vector<Table>>> ReadTables(
     table.scored = read.Int(3);
   }
   SELFCAL_RETURN_IF_ERROR(read.status());
-  SELFCAL_RETURN_IF_ERROR(ReadEntries(db, reuse, of_rigs, &tables));
+  SELFCAL_RETURN_IF_ERROR(ReadEntries(db, of_rigs, &tables));
   return tables;
 }
 

@@ -15,6 +15,7 @@
 #include "core/population/consistency.h"
 #include "core/population/device.h"
 #include "core/population/estimate.h"
+#include "core/population/new_device.h"
 #include "core/simulation/simulate.h"
 #include "server/pipeline/candidate_validation.h"
 #include "test/evaluation/context.h"
@@ -105,7 +106,7 @@ Device MakeDevice(const Rig& rig,
   return device;
 }
 
-// On the first segments; it may not converge.
+// Uses the first segments; the result may not have converged.
 CalibrationResult CalibrateDevice(const Rig& rig,
                                   const Device& device,
                                   int segments,
@@ -125,34 +126,17 @@ ThetaPrior CohortPrior(const Cohort& cohort) {
       predicted.covariance.llt().solve(Eigen::MatrixXd::Identity(size, size))};
 }
 
-// The rig of a new device as the daemon describes it: the mean as the factory's
-// calibration, the standard deviations of devices as its tolerances, without
-// their correlations.
-Rig DescribedRig(const Rig& rig, const Cohort& cohort) {
-  const DevicePrediction predicted = PredictDevice(cohort);
-  Rig described = rig;
-  described.factory = BoxPlus(cohort.reference, predicted.mean);
-  described.prior_sigmas.clear();
-  const auto components = TangentComponents(rig.factory);
-  for (std::size_t k = 0; k < components.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    described.prior_sigmas.push_back(
-        {components[k].name, std::sqrt(predicted.covariance(i, i))});
-  }
-  return described;
-}
-
-// Of a new device after each number of segments.
+// The course of a new device: after each number of segments.
 struct Course {
   std::vector<double> sigma;  // rms over components, in tolerances
   std::vector<double> nees;
-  // Whether the daemon would reject it, as the data contradicts the prior.
+  // True if the daemon would reject it.
   std::vector<bool> rejected;
   double probability = 1;  // of the cohort, with all segments
   int contradicted = 0;    // number of segments that show it; 0: none does
 };
 
-// Relative to the tolerances of `rig`.
+// The rms over the components, in tolerances of `rig`.
 double SigmaRms(const Rig& rig, const Eigen::MatrixXd& covariance) {
   const Eigen::VectorXd relative =
       covariance.diagonal().cwiseSqrt().cwiseQuotient(PriorSigmas(rig));
@@ -160,17 +144,15 @@ double SigmaRms(const Rig& rig, const Eigen::MatrixXd& covariance) {
                    static_cast<double>(relative.size()));
 }
 
-// As the checks converged and prior_agreement of the daemon do.
+// The checks converged and prior_agreement of the daemon.
 bool IsRejected(const Rig& rig, const CalibrationResult& result) {
   if (result.status != CalibrateStatus::kConverged) return true;
   const server::CandidateLimits limits;
-  const PriorAgreement prior =
-      CompareWithPrior(rig, result.theta, result.covariance);
-  return prior.probability < limits.min_probability &&
-         prior.error_ratio > limits.max_error_ratio;
+  return ErrorRatio(CompareWithPrior(rig, result.theta, result.covariance),
+                    limits) > limits.max_error_ratio;
 }
 
-// Of a device that is calibrated as `rig`.
+// Calibrates a device as `rig`, on more and more segments.
 Course Follow(const Rig& rig, const Device& device, const Cohort* cohort) {
   Course course;
   const Rig reference = CohortRig();
@@ -277,7 +259,7 @@ void RunPopulation(Context* context) {
 
   // New devices: with the factory's prior, and with that of the cohort.
   // As a rig that the daemon describes, they have no test against the cohort.
-  const Rig described = DescribedRig(rig, cohort);
+  const Rig described = DescribeNewDevice(rig, cohort);
   std::vector<Course> factory(fresh), prior(fresh), as_described(fresh);
   std::vector<Course> other(foreign), other_as_described(foreign), broken(1);
   context->ForEach(fresh + foreign + 1, [&](int i) {

@@ -9,7 +9,7 @@
 namespace selfcal::server {
 namespace {
 
-// Of the types of Value.
+// The types of Value, in its order.
 constexpr std::array kSqlTypes = {"BIGINT", "DOUBLE PRECISION", "TEXT"};
 
 }  // namespace
@@ -20,6 +20,7 @@ std::string SqlCondition::Parameter(Value value) {
 }
 
 void SqlCondition::And(const std::string& condition) {
+  reuse_ = Reuse::kOnce;
   if (!is_empty()) sql_ += " AND ";
   sql_ += condition;
 }
@@ -38,10 +39,12 @@ void SqlCondition::AndIn(const std::string& columns,
     }
     texts.push_back(fmt::format("({})", fmt::join(parameters, ", ")));
   }
+  const Reuse reuse = rows.size() == 1 ? reuse_ : Reuse::kOnce;
   // SQLite reads all rows of a table that it compares with plain VALUES.
   And(fmt::format("{} IN (SELECT * FROM (VALUES {}) AS any_of)",
                   columns,
                   fmt::join(texts, ", ")));
+  reuse_ = reuse;
 }
 
 void SqlCondition::AndWithin(const std::string& before,

@@ -1,6 +1,5 @@
 // A condition of SQL whose parts are known only when it is made, with the
-// values of their parameters. Such a statement is not kept (Reuse::kOnce), as
-// there are many texts.
+// values of their parameters.
 #pragma once
 
 #include <cstdint>
@@ -26,6 +25,13 @@ class SqlCondition {
   // must be some. Their first one sets the types.
   void AndIn(const std::string& columns,
              const std::vector<std::vector<Value>>& rows);
+  // The same of one column.
+  template <typename Values>
+  void AndOneOf(const std::string& column, const Values& values) {
+    std::vector<std::vector<Value>> rows;
+    for (const auto& value : values) rows.push_back({value});
+    AndIn(column, rows);
+  }
   // An empty condition whose parameters follow those of this one; once it is
   // added, its values follow as well.
   SqlCondition Next() const { return SqlCondition(next_); }
@@ -42,13 +48,14 @@ class SqlCondition {
   // outlive it.
   void Bind(Statement* statement) const;
   // A statement whose text contains the condition is worth keeping if that is
-  // empty.
-  Reuse reuse() const { return is_empty() ? Reuse::kKept : Reuse::kOnce; }
+  // empty, or a single row of AndIn: there are few such texts.
+  Reuse reuse() const { return reuse_; }
 
  private:
   int next_;
   std::string sql_;
   std::vector<Value> values_;
+  Reuse reuse_ = Reuse::kKept;
 };
 
 }  // namespace selfcal::server

@@ -38,9 +38,9 @@ class PriorAgreementTest : public testing::Test {
     double nees = 0;  // per component
   };
 
-  // Of a device that is `spread` times as far from the factory's calibration as
-  // the tolerances say, with `rows` measurements that are `precision` times as
-  // precise as the prior.
+  // Calibrates a device that is `spread` times as far from the factory's
+  // calibration as the tolerances say, with `rows` measurements that are
+  // `precision` times as precise as the prior.
   Trial Calibrate(double spread, int rows, double precision) {
     const Eigen::VectorXd sigmas = PriorSigmas(rig_);
     const auto size = sigmas.size();
@@ -84,7 +84,7 @@ TEST_F(PriorAgreementTest, IsCalibratedWhereThePriorHolds) {
   EXPECT_NEAR(unlikely / double{kTrials}, 0.05, 0.035);
 }
 
-// Of every second direction nothing is known but the prior.
+// Nothing but the prior is known of every second direction.
 TEST_F(PriorAgreementTest, TellsHowWrongTheEstimateIs) {
   for (const double spread : {2.0, 4.0}) {
     double nees = 0;
