@@ -6,7 +6,6 @@
 #include <charconv>
 #include <limits>
 #include <map>
-#include <ranges>
 #include <set>
 #include <string>
 #include <utility>
@@ -129,6 +128,12 @@ absl::StatusOr<std::vector<Found>> FindRigs(Connection* db,
 // The summaries of some rigs, by the keys of these.
 using Summaries = std::map<std::int64_t, RigSummary*>;
 
+std::vector<std::int64_t> KeysOf(const Summaries& summaries) {
+  std::vector<std::int64_t> keys;
+  for (const auto& [rig, summary] : summaries) keys.push_back(rig);
+  return keys;
+}
+
 // Passes the rows of `sql` of the rigs, whose first column is
 // the key of one, with the summary of that. `sql` names the table with this key
 // g, and has no condition.
@@ -138,7 +143,7 @@ absl::Status ReadEach(Connection* db,
                       const std::string& sql,
                       const Take& take) {
   SqlCondition condition;
-  condition.AndOneOf("g.rig", std::views::keys(summaries));
+  condition.AndOneOf("g.rig", KeysOf(summaries));
   Statement read(db, condition.reuse(), sql + " WHERE " + condition.sql());
   condition.Bind(&read);
   while (read.Next()) take(read, summaries.at(read.Int(0)));
@@ -214,10 +219,7 @@ absl::Status ReadDevices(Connection* db, const Summaries& summaries) {
 absl::Status ReadState(Connection* db, const Summaries& summaries) {
   SELFCAL_RETURN_IF_ERROR(ReadNewest(db, summaries));
   SELFCAL_RETURN_IF_ERROR(ReadDevices(db, summaries));
-  const auto keys = std::views::keys(summaries);
-  SELFCAL_ASSIGN_OR_RETURN(
-      auto tables,
-      ReadTables(db, std::vector<std::int64_t>(keys.begin(), keys.end())));
+  SELFCAL_ASSIGN_OR_RETURN(auto tables, ReadTables(db, KeysOf(summaries)));
   for (auto& [rig, of_rig] : tables) {
     summaries.at(rig)->tables = std::move(of_rig);
   }

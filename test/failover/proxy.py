@@ -7,8 +7,8 @@ import threading
 
 ADDRESS = "127.0.0.1"
 _CHUNK = 65536
-# The header of a frame of HTTP/2 has so many bytes, with its length and type. The
-# types that carry what a server answers are DATA, HEADERS and CONTINUATION.
+# The header of a frame of HTTP/2 has so many bytes, with its length and type.
+# The types that carry what a server answers are DATA, HEADERS, CONTINUATION.
 _FRAME_HEADER = 9
 _ANSWERS = (0, 1, 9)
 
