@@ -9,12 +9,14 @@ namespace selfcal::server {
 Api::Api(Domain* domain,
          Pipeline* pipeline,
          EventFeed* feed,
-         ApiOptions options) {
+         ApiOptions options)
+    : versions_(domain->store()) {
   Methods methods({domain,
                    domain->store(),
                    pipeline,
                    feed,
                    &watches_,
+                   &versions_,
                    &traffic_,
                    &stopping_,
                    std::move(options.restored),

@@ -14,6 +14,7 @@
 #include "server/api/method.h"
 #include "server/api/rig_watches.h"
 #include "server/api/traffic.h"
+#include "server/api/version_updates.h"
 #include "server/domain/domain.h"
 #include "server/pipeline/pipeline.h"
 
@@ -46,6 +47,7 @@ class Api {
  private:
   std::atomic<bool> stopping_ = false;
   RigWatches watches_;
+  VersionUpdates versions_;
   Traffic traffic_;
   std::vector<Method> methods_;
 };

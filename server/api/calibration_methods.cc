@@ -8,6 +8,7 @@
 #include "server/api/methods.h"
 #include "server/api/paging.h"
 #include "server/api/read_version.h"
+#include "server/api/version_updates.h"
 #include "server/encode/compare.h"
 #include "server/encode/encode.h"
 #include "server/encode/encode_coaching.h"
@@ -167,16 +168,19 @@ absl::StatusOr<std::shared_ptr<void>> WatchCalibration(
   // A version that was rolled back and became active again while the reader was
   // slow is the one that the reader has.
   auto sent = std::make_shared<std::int64_t>(0);
+  const Subject about{kCalibrationType, request.parent(), {}};
   auto subscription = context.pipeline->WatchCalibration(
-      *rig, [=, &context](const StoredCalibration& active) {
-        watch.Put(
-            "", [=, &context](v1::Calibration* to) -> absl::StatusOr<bool> {
-              if (active.version == std::exchange(*sent, active.version)) {
-                return false;
+      *rig, [=, &context](const auto& active) {
+        watch.PutShared(
+            "",
+            [=,
+             &context]() -> absl::StatusOr<std::shared_ptr<const WatchUpdate>> {
+              if (active->version == std::exchange(*sent, active->version)) {
+                return nullptr;
               }
-              SELFCAL_ASSIGN_OR_RETURN(
-                  *to, EncodeNamed(context, active, request.parent()));
-              return true;
+              auto update = context.versions->Get(active);
+              if (!update.ok()) return About(update.status(), about);
+              return update;
             });
       });
   if (!subscription.ok()) {

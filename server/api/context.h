@@ -10,9 +10,10 @@
 
 namespace selfcal::server {
 
-class EventFeed;   // event_feed.h
-class RigWatches;  // rig_watches.h
-class Traffic;     // traffic.h
+class EventFeed;       // event_feed.h
+class RigWatches;      // rig_watches.h
+class Traffic;         // traffic.h
+class VersionUpdates;  // version_updates.h
 
 struct ApiContext {
   Domain* domain = nullptr;
@@ -20,6 +21,7 @@ struct ApiContext {
   Pipeline* pipeline = nullptr;
   EventFeed* feed = nullptr;
   RigWatches* watches = nullptr;
+  VersionUpdates* versions = nullptr;
   Traffic* traffic = nullptr;  // of segments
   // True once the daemon is stopping: watches and streams end with UNAVAILABLE.
   const std::atomic<bool>* stopping = nullptr;

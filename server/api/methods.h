@@ -11,6 +11,7 @@
 #include "server/api/context.h"
 #include "server/api/errors.h"
 #include "server/api/method.h"
+#include "server/status/status_macros.h"
 
 namespace selfcal::server {
 
@@ -27,12 +28,17 @@ class Watch {
  public:
   // Writes the update; returns false if there is nothing to send.
   using Encode = std::function<absl::StatusOr<bool>(Response* update)>;
+  // Returns an update that other watches may send as well.
+  using Share = WatchQueue::Encode;
 
   explicit Watch(std::shared_ptr<WatchQueue> queue)
       : queue_(std::move(queue)) {}
 
   void Put(const std::string& key, Encode encode) const {
     queue_->Put(key, Erased(std::move(encode)));
+  }
+  void PutShared(const std::string& key, Share share) const {
+    queue_->Put(key, std::move(share));
   }
   void SetSummary(Encode encode) const {
     queue_->SetSummary(Erased(std::move(encode)));
@@ -41,9 +47,14 @@ class Watch {
 
  private:
   static WatchQueue::Encode Erased(Encode encode) {
-    return [encode = std::move(encode)](Message* message) {
-      return encode(static_cast<Response*>(message));
-    };
+    return
+        [encode = std::move(
+             encode)]() -> absl::StatusOr<std::shared_ptr<const WatchUpdate>> {
+          auto message = std::make_unique<Response>();
+          SELFCAL_ASSIGN_OR_RETURN(const bool send, encode(message.get()));
+          if (!send) return nullptr;
+          return std::make_shared<const WatchUpdate>(std::move(message));
+        };
   }
 
   std::shared_ptr<WatchQueue> queue_;

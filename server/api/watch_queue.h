@@ -4,25 +4,27 @@
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
-#include <google/protobuf/message.h>
 
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+
+#include "server/api/watch_update.h"
 
 namespace selfcal::server {
 
 class WatchQueue {
  public:
-  // Writes an update to the message of the watch when it is about to be sent;
-  // returns false if there is nothing to send.
+  // Returns an update when it is about to be sent; null: there is nothing to
+  // send.
   using Encode =
-      std::function<absl::StatusOr<bool>(google::protobuf::Message* update)>;
+      std::function<absl::StatusOr<std::shared_ptr<const WatchUpdate>>()>;
 
   // `arrived` is called without locks whenever there is something to take: an
   // update or the end. It must return at once and must not take.

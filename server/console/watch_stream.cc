@@ -10,12 +10,9 @@ namespace {
 
 class WatchStream final : public HttpStream {
  public:
-  WatchStream(const Method& method,
-              std::shared_ptr<WatchQueue> queue,
+  WatchStream(std::shared_ptr<WatchQueue> queue,
               std::shared_ptr<void> subscription)
-      : method_(method),
-        queue_(std::move(queue)),
-        subscription_(std::move(subscription)) {}
+      : queue_(std::move(queue)), subscription_(std::move(subscription)) {}
 
   std::optional<std::string> Take(std::chrono::milliseconds timeout) override {
     const WatchQueue::Taken taken = queue_->Take(timeout);
@@ -24,17 +21,17 @@ class WatchStream final : public HttpStream {
       if (taken.status.ok() || std::exchange(told_, true)) return std::nullopt;
       return ErrorEvent(taken.status);
     }
-    const std::unique_ptr<Message> update(method_.response->New());
-    const absl::StatusOr<bool> send = taken.update(update.get());
-    if (send.ok()) return *send ? MessageEvent(*update) : "";
-    queue_->Close(send.status());
+    const auto update = taken.update();
+    if (update.ok()) {
+      return *update != nullptr ? MessageEvent((*update)->message()) : "";
+    }
+    queue_->Close(update.status());
     return "";
   }
 
   void Close() override { queue_->Close(); }
 
  private:
-  const Method& method_;
   const std::shared_ptr<WatchQueue> queue_;
   const std::shared_ptr<void> subscription_;
   bool told_ = false;  // the error that has ended it
@@ -48,8 +45,8 @@ absl::StatusOr<std::shared_ptr<HttpStream>> OpenWatchStream(
   auto subscription =
       std::get<WatchHandler>(method.handler)(call, request, queue);
   if (!subscription.ok()) return subscription.status();
-  return std::make_shared<WatchStream>(
-      method, std::move(queue), *std::move(subscription));
+  return std::make_shared<WatchStream>(std::move(queue),
+                                       *std::move(subscription));
 }
 
 }  // namespace selfcal::server

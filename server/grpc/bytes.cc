@@ -4,6 +4,8 @@
 #include <grpcpp/support/proto_buffer_writer.h>
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 namespace selfcal::server {
 
@@ -26,6 +28,18 @@ grpc::ByteBuffer Serialise(const google::protobuf::Message& message) {
       &bytes, std::clamp(size, 1, kBlockBytes), size);
   message.SerializeToZeroCopyStream(&writer);
   return bytes;
+}
+
+grpc::ByteBuffer Serialise(std::shared_ptr<const WatchUpdate> update) {
+  using Held = std::shared_ptr<const WatchUpdate>;
+  const std::string& bytes = update->bytes();
+  // gRPC does not write to what it is given, but takes it as void*.
+  const grpc::Slice slice(
+      const_cast<char*>(bytes.data()),
+      bytes.size(),
+      [](void* held) { delete static_cast<Held*>(held); },
+      new Held(std::move(update)));
+  return {&slice, 1};
 }
 
 }  // namespace selfcal::server

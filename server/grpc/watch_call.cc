@@ -54,18 +54,18 @@ class WatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     }
     if (gone_) return End(absl::CancelledError("the caller has disconnected"));
     if (context_.api->stopping()) return End(ShuttingDown());
-    const std::unique_ptr<Message> update(method_.response->New());
-    for (;;) {
+    std::shared_ptr<const WatchUpdate> update;
+    while (update == nullptr) {
       WatchQueue::Taken taken = queue_->Take();
       if (taken.update == nullptr) {
         if (taken.ended) End(taken.status);
         return;
       }
-      const absl::StatusOr<bool> send = Encoded(taken.update, update.get());
-      if (!send.ok()) return End(ForClient(send.status()));
-      if (*send) break;
+      auto encoded = Encoded(taken.update);
+      if (!encoded.ok()) return End(ForClient(encoded.status()));
+      update = *std::move(encoded);
     }
-    bytes_ = Serialise(*update);
+    bytes_ = Serialise(std::move(update));
     {
       const std::lock_guard lock(mutex_);
       if (ended_) return;
@@ -100,10 +100,10 @@ class WatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   }
 
  private:
-  static absl::StatusOr<bool> Encoded(const WatchQueue::Encode& encode,
-                                      Message* update) {
+  static absl::StatusOr<std::shared_ptr<const WatchUpdate>> Encoded(
+      const WatchQueue::Encode& encode) {
     try {
-      return encode(update);
+      return encode();
     } catch (const std::exception& error) {
       return absl::InternalError(error.what());
     }

@@ -36,8 +36,8 @@ void AnnouncementRelay::PassOnRig(const std::string& rig) {
 
 void AnnouncementRelay::OnCalibration(const std::string& rig) {
   if (!calibration_watchers_->IsWatched(rig)) return;
-  const auto active = store_->GetActiveCalibration(rig);
-  if (active.ok()) calibration_watchers_->PassOn(*active);
+  auto active = store_->GetActiveCalibration(rig);
+  if (active.ok()) calibration_watchers_->PassOn(*std::move(active));
 }
 
 void AnnouncementRelay::OnRun(const std::string& rig, std::int64_t number) {

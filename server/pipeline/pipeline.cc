@@ -334,7 +334,8 @@ class PipelineImpl : public Pipeline {
 
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
-      std::function<void(const StoredCalibration&)> callback) override {
+      std::function<void(const std::shared_ptr<const StoredCalibration>&)>
+          callback) override {
     return calibration_watchers_.Watch(rig, std::move(callback), [&] {
       return store_->GetActiveCalibration(rig);
     });
@@ -354,7 +355,12 @@ class PipelineImpl : public Pipeline {
       }
       return update;
     };
-    return run_watchers_.Watch({rig, run}, std::move(callback), now);
+    return run_watchers_.Watch(
+        {rig, run},
+        [callback = std::move(callback)](const auto& update) {
+          callback(*update);
+        },
+        now);
   }
 
  private:

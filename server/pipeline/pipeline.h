@@ -252,10 +252,11 @@ class Pipeline {
 
   // The callback receives the active calibration of the rig at once (on the
   // calling thread), then each one that becomes active, in that order: each
-  // activation once.
+  // activation once. All watchers share the record of an activation.
   virtual absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
-      std::function<void(const StoredCalibration&)> callback) = 0;
+      std::function<void(const std::shared_ptr<const StoredCalibration>&)>
+          callback) = 0;
 
   // The callback receives the run in its present state at once, then every
   // change of state and iteration, including the end.

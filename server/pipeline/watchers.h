@@ -2,7 +2,7 @@
 //
 // Each watcher gets its first update on its own thread and the others from the
 // publishing threads, one at a time and in order: an update is passed on only
-// if it Follows the last one.
+// if it Follows the last one. All watchers of a topic share an update.
 #pragma once
 
 #include <absl/status/statusor.h>
@@ -23,18 +23,31 @@
 
 namespace selfcal::server {
 
+// What a watcher remembers of the last update.
+struct LastActivation {
+  std::int64_t rig_key = 0;
+  std::int64_t activation = 0;
+};
+inline LastActivation Remembered(const StoredCalibration& update) {
+  return {update.rig_key, update.activation};
+}
+struct LastRunUpdate {
+  RunState state = RunState::kPending;
+};
+inline LastRunUpdate Remembered(const RunUpdate& update) {
+  return {update.run.state};
+}
+
 // Each activation of a rig once, in order. The newest one need not have the
 // highest version: an older version may have been activated again. A rig that
 // was deleted and created again counts its activations from 1.
-inline bool Follows(const StoredCalibration& last,
-                    const StoredCalibration& next) {
+inline bool Follows(const LastActivation& last, const StoredCalibration& next) {
   return next.rig_key != last.rig_key || next.activation > last.activation;
 }
 
 // No update after the end of a run.
-inline bool Follows(const RunUpdate& last, const RunUpdate& /*next*/) {
-  return last.run.state == RunState::kPending ||
-         last.run.state == RunState::kRunning;
+inline bool Follows(const LastRunUpdate& last, const RunUpdate& /*next*/) {
+  return last.state == RunState::kPending || last.state == RunState::kRunning;
 }
 
 // The topic of an update: a rig, or a run of a rig.
@@ -49,11 +62,12 @@ template <typename Update>
 class Watchers {
  public:
   using Topic = decltype(TopicOf(std::declval<const Update&>()));
-  using Callback = std::function<void(const Update&)>;
+  using Callback = std::function<void(const std::shared_ptr<const Update>&)>;
+  using Observer = std::function<void(const Update&)>;
 
   // `every` receives each update of every topic before its watchers do; may be
   // empty.
-  explicit Watchers(Callback every = nullptr) : every_(std::move(every)) {}
+  explicit Watchers(Observer every = nullptr) : every_(std::move(every)) {}
 
   // Subscribes to `topic`. `now` returns the present state; it is called once
   // the subscription exists, so that nothing is missed in between.
@@ -70,20 +84,21 @@ class Watchers {
       watcher->ended = true;
       return first.status();
     }
-    watcher->Notify(*first);
+    watcher->Notify(std::make_shared<const Update>(*std::move(first)));
     return std::unique_ptr<Subscription>(new Handle(watcher));
   }
 
-  void Publish(const Update& update) {
+  void Publish(Update update) {
     if (every_) every_(update);
-    PassOn(update);
+    PassOn(std::move(update));
   }
 
   // Publishes what has happened in another daemon: not to `every`.
-  void PassOn(const Update& update) {
-    for (const std::shared_ptr<Watcher>& watcher : Living(TopicOf(update))) {
+  void PassOn(Update update) {
+    const auto shared = std::make_shared<const Update>(std::move(update));
+    for (const std::shared_ptr<Watcher>& watcher : Living(TopicOf(*shared))) {
       const std::lock_guard lock(watcher->mutex);
-      if (!watcher->ended) watcher->Notify(update);
+      if (!watcher->ended) watcher->Notify(shared);
     }
   }
 
@@ -107,12 +122,12 @@ class Watchers {
   struct Watcher {
     std::mutex mutex;  // held while the callback runs
     Callback callback;
-    std::optional<Update> last;
+    std::optional<decltype(Remembered(std::declval<const Update&>()))> last;
     bool ended = false;
 
-    void Notify(const Update& update) {
-      if (!last || Follows(*last, update)) {
-        last = update;
+    void Notify(const std::shared_ptr<const Update>& update) {
+      if (!last || Follows(*last, *update)) {
+        last = Remembered(*update);
         callback(update);
       }
     }
@@ -152,7 +167,7 @@ class Watchers {
     return living;
   }
 
-  const Callback every_;
+  const Observer every_;
   mutable std::mutex mutex_;
   // Guarded by mutex_; may have ended.
   std::multimap<Topic, std::weak_ptr<Watcher>> watchers_;

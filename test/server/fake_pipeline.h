@@ -149,11 +149,12 @@ class FakePipeline final : public Pipeline {
 
   absl::StatusOr<std::unique_ptr<Subscription>> WatchCalibration(
       const std::string& rig,
-      std::function<void(const StoredCalibration&)> callback) override {
+      std::function<void(const std::shared_ptr<const StoredCalibration>&)>
+          callback) override {
     const std::lock_guard lock(mutex_);
-    const auto active = store_->GetActiveCalibration(rig);
+    auto active = store_->GetActiveCalibration(rig);
     if (!active.ok()) return active.status();
-    callback(*active);
+    callback(std::make_shared<const StoredCalibration>(*std::move(active)));
     return Subscribe(&calibration_watchers_, std::move(callback));
   }
 
@@ -169,8 +170,9 @@ class FakePipeline final : public Pipeline {
   }
 
   void Publish(const StoredCalibration& calibration) {
+    const auto shared = std::make_shared<const StoredCalibration>(calibration);
     const std::lock_guard lock(mutex_);
-    for (const auto& watcher : calibration_watchers_) watcher(calibration);
+    for (const auto& watcher : calibration_watchers_) watcher(shared);
   }
 
   void Tell(const RunUpdate& update) {
@@ -218,7 +220,7 @@ class FakePipeline final : public Pipeline {
   Store* store_;
   RigCoach coach_;
   std::mutex mutex_;
-  Watchers<StoredCalibration> calibration_watchers_;
+  Watchers<std::shared_ptr<const StoredCalibration>> calibration_watchers_;
   Watchers<RunUpdate> run_watchers_;
   std::vector<std::string> ended_;
 };

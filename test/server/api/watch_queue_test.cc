@@ -7,23 +7,19 @@
 namespace selfcal::server {
 namespace {
 
-using google::protobuf::Message;
-
 WatchQueue::Encode Naming(const std::string& rig) {
-  return [rig](Message* message) -> absl::StatusOr<bool> {
-    static_cast<v1::Change*>(message)->set_rig(rig);
-    return true;
+  return [rig] {
+    auto change = std::make_unique<v1::Change>();
+    change->set_rig(rig);
+    return std::make_shared<const WatchUpdate>(std::move(change));
   };
 }
 
 // The update that is taken; empty if there is none.
 std::string Take(WatchQueue* queue) {
   const WatchQueue::Taken taken = queue->Take();
-  v1::Change change;
-  if (taken.update != nullptr) {
-    EXPECT_TRUE(taken.update(&change).ok());
-  }
-  return change.rig();
+  if (taken.update == nullptr) return "";
+  return static_cast<const v1::Change&>((*taken.update())->message()).rig();
 }
 
 TEST(WatchQueue, UpdatesWaitInOrderTheNewestOfEachKey) {

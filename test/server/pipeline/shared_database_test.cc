@@ -50,9 +50,9 @@ TEST_F(SharedDatabase, AWatchSeesActivationsOfEveryDaemonOnceAndInOrder) {
   std::mutex mutex;
   std::vector<std::int64_t> seen;
   const auto watch =
-      b_.pipeline->WatchCalibration("a", [&](const StoredCalibration& active) {
+      b_.pipeline->WatchCalibration("a", [&](const auto& active) {
         const std::lock_guard lock(mutex);
-        seen.push_back(active.version);
+        seen.push_back(active->version);
       });
   ASSERT_TRUE(watch.ok()) << watch.status();
   const auto has_seen = [&](const std::vector<std::int64_t>& versions) {

@@ -29,7 +29,7 @@ class WatchTest : public PipelineTest {
  protected:
   std::unique_ptr<Subscription> Watch(Told<std::int64_t>* told) {
     auto subscription = pipeline_->WatchCalibration(
-        "a", [told](const StoredCalibration& c) { told->Add(c.version); });
+        "a", [told](const auto& active) { told->Add(active->version); });
     EXPECT_TRUE(subscription.ok()) << subscription.status();
     return *std::move(subscription);
   }
@@ -45,15 +45,15 @@ TEST(Follows, ActivationsOfARigCountAndThoseOfANewOneBeginAgain) {
   last.rig_key = 7;
   last.activation = 2;
   StoredCalibration next = last;
-  EXPECT_FALSE(Follows(last, next));
+  EXPECT_FALSE(Follows(Remembered(last), next));
   next.activation = 1;
-  EXPECT_FALSE(Follows(last, next));
+  EXPECT_FALSE(Follows(Remembered(last), next));
   next.activation = 3;
-  EXPECT_TRUE(Follows(last, next));
+  EXPECT_TRUE(Follows(Remembered(last), next));
   // The rig was deleted and created again.
   next.rig_key = 8;
   next.activation = 1;
-  EXPECT_TRUE(Follows(last, next));
+  EXPECT_TRUE(Follows(Remembered(last), next));
 }
 
 TEST_F(WatchTest, EachVersionIsToldOnceInOrder) {

@@ -296,9 +296,7 @@ TEST_F(ReporterTest, WatchersAtTheHubSeeWhatIsReported) {
   Report();
   std::vector<std::int64_t> versions;
   const auto watch = hub_.pipeline->WatchCalibration(
-      "a", [&](const StoredCalibration& active) {
-        versions.push_back(active.version);
-      });
+      "a", [&](const auto& active) { versions.push_back(active->version); });
   ASSERT_TRUE(watch.ok()) << watch.status();
   Put(0);
   ASSERT_TRUE(
