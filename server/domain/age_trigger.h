@@ -11,10 +11,15 @@
 
 namespace selfcal::server {
 
-// Creates a run if the active calibration is the result of a run and has been
-// active for longer than the policy of the rig allows, the tables hold a
-// segment that the last run was not created with, no run is unfinished, and the
-// last one was created as long ago, at the steady time `now_ns`.
+// The steady time from which on the rule may start a run if no record of the
+// rig changes before; kNoCheck: it may not. The active calibration must be the
+// result of a run and have been active for as long as the policy of the rig
+// allows, no run may be unfinished, and the last one must have been created as
+// long ago.
+absl::StatusOr<std::int64_t> AgedRunDue(UnitOfWork* tx, const StoredRig& rig);
+
+// Creates a run if one is due at the steady time `now_ns` and the tables hold a
+// segment that the last run was not created with.
 absl::StatusOr<std::optional<StoredRun>> CreateAgedRun(UnitOfWork* tx,
                                                        const StoredRig& rig,
                                                        std::int64_t now_ns);

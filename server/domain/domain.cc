@@ -7,9 +7,9 @@
 #include <set>
 #include <utility>
 
-#include "server/domain/age_trigger.h"
 #include "server/domain/alarms.h"
 #include "server/domain/calibration_life.h"
+#include "server/domain/checks.h"
 #include "server/domain/deletion.h"
 #include "server/domain/intake.h"
 #include "server/domain/offers.h"
@@ -25,27 +25,24 @@
 #include "server/store/estimates.h"
 #include "server/store/events.h"
 #include "server/store/report.h"
+#include "server/store/rig_checks.h"
 #include "server/store/table_rows.h"
 #include "server/store/transact.h"
 
 namespace selfcal::server {
 namespace {
 
-// A rule about time, which may create a run of a rig with a policy to which it
-// applies.
-struct TimeTrigger {
-  bool (*applies)(const RigPolicy& policy);
-  absl::StatusOr<std::optional<StoredRun>> (*create_run)(UnitOfWork* tx,
-                                                         const StoredRig& rig,
-                                                         std::int64_t now_ns);
-};
+// Rigs that a pass over the rules about time looks at, each in a transaction;
+// the others wait for the next one.
+constexpr int kRigsOfPass = 1000;
 
-constexpr TimeTrigger kTimeTriggers[] = {
-    {[](const RigPolicy& policy) { return policy.calibration_max_age_ns > 0; },
-     CreateAgedRun},
-};
+// After a change of the records of a rig.
+absl::Status KeepUp(UnitOfWork* tx) {
+  SELFCAL_RETURN_IF_ERROR(UpdateAlarms(tx));
+  return RequestChecksAfterChange(tx);
+}
 
-// TransactFor, with the alarms of the rig afterwards.
+// TransactFor, with what follows from a change.
 template <typename Work>
 auto Change(Store* store,
             const RigClaim& claim,
@@ -57,7 +54,7 @@ auto Change(Store* store,
       now,
       [&](UnitOfWork* tx) -> std::invoke_result_t<Work, UnitOfWork*> {
         auto result = work(tx);
-        if (result.ok()) SELFCAL_RETURN_IF_ERROR(UpdateAlarms(tx));
+        if (result.ok()) SELFCAL_RETURN_IF_ERROR(KeepUp(tx));
         return result;
       });
 }
@@ -70,7 +67,7 @@ absl::Status ChangeOnly(Store* store,
                         const Work& work) {
   return store->Transact(claim, now, [&](UnitOfWork* tx) {
     const absl::Status status = work(tx);
-    return status.ok() ? UpdateAlarms(tx) : status;
+    return status.ok() ? KeepUp(tx) : status;
   });
 }
 
@@ -87,6 +84,39 @@ auto ChangeOwnRig(Store* store,
                   SELFCAL_RETURN_IF_ERROR(CheckOwnRig(tx));
                   return work(tx);
                 });
+}
+
+using CheckRig = absl::StatusOr<std::optional<StoredRun>> (*)(
+    UnitOfWork* tx, std::int64_t until_ns);
+
+// Checks the rigs whose check is due at this steady time, and appends the runs
+// that are created.
+absl::Status CheckRigs(Store* store,
+                       const Clock& clock,
+                       RigCheck check,
+                       std::int64_t until_ns,
+                       CheckRig look,
+                       std::vector<StoredRun>* started) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::vector<std::string> names,
+      store->ListRigsToCheck(check, until_ns, kRigsOfPass));
+  for (const std::string& name : names) {
+    auto run = Change(store, name, clock(), [&](UnitOfWork* tx) {
+      return look(tx, until_ns);
+    });
+    if (run.ok()) {
+      if (*run) started->push_back(**std::move(run));
+    } else if (absl::IsDataLoss(run.status())) {
+      // A damaged rig must not hold up the others.
+      SELFCAL_RETURN_IF_ERROR(
+          store->Transact(name, clock(), [&](UnitOfWork* tx) {
+            return SetCheck(tx, check, kNoCheck);
+          }));
+    } else if (!absl::IsNotFound(run.status())) {
+      return run.status();
+    }
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -274,22 +304,9 @@ absl::StatusOr<StoredRun> Domain::CreateManualRun(const std::string& rig,
 
 absl::StatusOr<std::vector<StoredRun>> Domain::StartTimedRuns(
     std::int64_t now_ns) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> names,
-                           store_->ListRigNames());
   std::vector<StoredRun> started;
-  for (const std::string& name : names) {
-    const auto rig = store_->GetRig(name);
-    // A damaged rig must not hold up the others.
-    if (!rig.ok()) continue;
-    for (const TimeTrigger& trigger : kTimeTriggers) {
-      if (!trigger.applies(rig->policy)) continue;
-      SELFCAL_ASSIGN_OR_RETURN(
-          auto run, Change(store_, name, clock_(), [&](UnitOfWork* tx) {
-            return trigger.create_run(tx, *rig, now_ns);
-          }));
-      if (run) started.push_back(*std::move(run));
-    }
-  }
+  SELFCAL_RETURN_IF_ERROR(
+      CheckRigs(store_, clock_, RigCheck::kTime, now_ns, CheckTimes, &started));
   return started;
 }
 
@@ -325,12 +342,8 @@ absl::Status Domain::NoteOutliers(
 
 absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
     const std::vector<std::string>& ended, std::int64_t idle_since_ns) {
-  SELFCAL_ASSIGN_OR_RETURN(const std::vector<std::string> idle,
-                           store_->ListIdleRigs(idle_since_ns));
-  std::set<std::string> names(idle.begin(), idle.end());
-  names.insert(ended.begin(), ended.end());
   std::vector<StoredRun> started;
-  for (const std::string& name : names) {
+  for (const std::string& name : ended) {
     const auto due = InspectFor(
         store_, name, [&](UnitOfWork* tx) { return IsSessionRunDue(tx); });
     // Neither a damaged rig nor one that is gone must hold up the others.
@@ -340,6 +353,14 @@ absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
           return CreateSessionRun(tx);
         }));
     if (run) started.push_back(*std::move(run));
+  }
+  if (idle_since_ns > 0) {
+    SELFCAL_RETURN_IF_ERROR(CheckRigs(store_,
+                                      clock_,
+                                      RigCheck::kSession,
+                                      idle_since_ns,
+                                      CheckSession,
+                                      &started));
   }
   return started;
 }

@@ -168,7 +168,8 @@ class Domain {
   absl::StatusOr<StoredRun> CreateManualRun(const std::string& rig,
                                             bool force = false);
   // Creates the runs that the rules about time start (age_trigger.h), of all
-  // rigs, at the steady time `now_ns`.
+  // rigs that are to be checked (checks.h), at the steady time `now_ns`. Of
+  // many, some wait for the next call.
   absl::StatusOr<std::vector<StoredRun>> StartTimedRuns(std::int64_t now_ns);
   // Gives an alarm to the rigs whose devices have not reported for a day.
   absl::Status NoteSilentDevices();
@@ -178,8 +179,8 @@ class Domain {
   absl::Status NoteOutliers(const std::map<std::string, std::int64_t>& outliers,
                             bool all);
   // Creates the runs of all rigs whose session has ended (session_trigger.h):
-  // the rig is one of `ended`, or none of its segments arrived after the steady
-  // time `idle_since_ns`.
+  // the rig is one of `ended`, or is to be checked (checks.h) and none of its
+  // segments arrived after the steady time `idle_since_ns`; 0: `ended` alone.
   absl::StatusOr<std::vector<StoredRun>> StartSessionRuns(
       const std::vector<std::string>& ended, std::int64_t idle_since_ns);
   // Records why a pending run is deferred; the first time also in an event.

@@ -86,14 +86,11 @@ class DatabaseStore final : public Store {
     return Read([&](Connection* db) { return ReadRigs(db, names); });
   }
 
-  absl::StatusOr<std::vector<std::string>> ListRigNames() override {
-    return Read([&](Connection* db) { return RigNames(db); });
-  }
-
-  absl::StatusOr<std::vector<std::string>> ListIdleRigs(
-      std::int64_t idle_since_ns) override {
-    return Read(
-        [&](Connection* db) { return IdleRigNames(db, idle_since_ns); });
+  absl::StatusOr<std::vector<std::string>> ListRigsToCheck(
+      RigCheck check, std::int64_t until_ns, int limit) override {
+    return Read([&](Connection* db) {
+      return RigsToCheck(db, check, until_ns, limit);
+    });
   }
 
   using Store::ListRigs;

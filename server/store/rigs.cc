@@ -42,13 +42,6 @@ absl::StatusOr<std::int64_t> FindRig(Connection* db,
   return read.Int(0);
 }
 
-absl::StatusOr<std::vector<std::string>> ReadNames(Statement* read) {
-  std::vector<std::string> names;
-  while (read->Next()) names.push_back(read->Text(0));
-  SELFCAL_RETURN_IF_ERROR(read->status());
-  return names;
-}
-
 // A positive key that no other daemon chooses: see decision 12.
 std::int64_t NewKey() {
   std::random_device random;
@@ -229,27 +222,6 @@ absl::Status RaiseSilent(Connection* db,
 
 absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx) {
   return ReadInt(tx->db(), "SELECT count(*) FROM rigs");
-}
-
-absl::StatusOr<std::vector<std::string>> RigNames(Connection* db) {
-  Statement read(db,
-                 "SELECT id FROM rigs r WHERE NOT EXISTS "
-                 "  (SELECT 1 FROM reported_rigs p WHERE p.rig = r.rig) "
-                 "ORDER BY id");
-  return ReadNames(&read);
-}
-
-absl::StatusOr<std::vector<std::string>> IdleRigNames(
-    Connection* db, std::int64_t idle_since_ns) {
-  Statement read(db,
-                 "WITH own AS MATERIALIZED (SELECT rig, id FROM rigs r "
-                 "  WHERE NOT EXISTS (SELECT 1 FROM reported_rigs p "
-                 "    WHERE p.rig = r.rig)) "
-                 "SELECT id FROM own r WHERE (SELECT s.steady_ns "
-                 "  FROM segments s WHERE s.rig = r.rig "
-                 "  ORDER BY s.sequence DESC LIMIT 1) <= ?1 ORDER BY id",
-                 idle_since_ns);
-  return ReadNames(&read);
 }
 
 }  // namespace selfcal::server

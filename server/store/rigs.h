@@ -43,10 +43,4 @@ absl::Status RaiseSilent(Connection* db,
 // Number of rigs in the database.
 absl::StatusOr<std::int64_t> CountRigs(UnitOfWork* tx);
 
-// Store::ListRigNames.
-absl::StatusOr<std::vector<std::string>> RigNames(Connection* db);
-// Store::ListIdleRigs.
-absl::StatusOr<std::vector<std::string>> IdleRigNames(
-    Connection* db, std::int64_t idle_since_ns);
-
 }  // namespace selfcal::server

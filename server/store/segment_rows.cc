@@ -122,6 +122,13 @@ absl::StatusOr<std::int64_t> NewestSequence(UnitOfWork* tx) {
                  tx->rig_row());
 }
 
+absl::StatusOr<std::int64_t> NewestArrival(UnitOfWork* tx) {
+  return ReadInt(tx->db(),
+                 "SELECT coalesce((SELECT steady_ns FROM segments "
+                 "  WHERE rig = ?1 ORDER BY sequence DESC LIMIT 1), 0)",
+                 tx->rig_row());
+}
+
 absl::StatusOr<std::vector<double>> NewestFits(UnitOfWork* tx, int limit) {
   Statement read(tx->db(),
                  "SELECT fit FROM segments WHERE rig = ?1 AND state = 2 "

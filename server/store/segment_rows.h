@@ -91,6 +91,9 @@ absl::StatusOr<std::int64_t> CountScored(UnitOfWork* tx,
                                          std::int64_t first_sequence);
 // 0 if there are none.
 absl::StatusOr<std::int64_t> NewestSequence(UnitOfWork* tx);
+// Steady time (Moment) at which the newest segment arrived; 0 if there are
+// none.
+absl::StatusOr<std::int64_t> NewestArrival(UnitOfWork* tx);
 // Fits of the newest scored segments.
 absl::StatusOr<std::vector<double>> NewestFits(UnitOfWork* tx, int limit);
 // Segments that are not waiting for their score and that no table, run or

@@ -39,6 +39,7 @@
 #include "server/store/clock_record.h"
 #include "server/store/estimate_query.h"
 #include "server/store/moment.h"
+#include "server/store/rig_checks.h"
 #include "server/store/rig_claim.h"
 #include "server/store/rig_query.h"
 #include "server/store/segment_query.h"
@@ -357,12 +358,10 @@ class Store {
   }
   virtual absl::StatusOr<Listed<RigSummary>> ListRigSummaries(
       const RigQuery& query, const Page& page) = 0;
-  // Names of all rigs, in their order, but those that devices report.
-  virtual absl::StatusOr<std::vector<std::string>> ListRigNames() = 0;
-  // Of these, the ones that have received segments, but none after this steady
-  // time (Moment).
-  virtual absl::StatusOr<std::vector<std::string>> ListIdleRigs(
-      std::int64_t idle_since_ns) = 0;
+  // Names of at most `limit` rigs whose check is due at this steady time
+  // (Moment), the one that is due first at the front.
+  virtual absl::StatusOr<std::vector<std::string>> ListRigsToCheck(
+      RigCheck check, std::int64_t until_ns, int limit) = 0;
 
   // RaiseSilent of rigs.h.
   virtual absl::Status RaiseSilent(std::int64_t before_ns,

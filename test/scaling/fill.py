@@ -150,6 +150,9 @@ def _fill_rigs(cursor) -> None:
             "definition": definition,
             "sha256": f"sha256({definition})",
             "last_seen_ns": "r.last_ns",
+            # Their devices look at them.
+            "session_check_ns": str(2**63 - 1),
+            "time_check_ns": "NULL",
         },
         "copied.chosen r JOIN copied.rigs t USING (seed) "
         "JOIN copied.definitions d USING (seed, labels) ORDER BY r.n",

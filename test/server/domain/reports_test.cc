@@ -183,7 +183,11 @@ TEST_P(ReportsTest, HubHasWhatTheDeviceHas) {
   // The hub computes nothing of it.
   EXPECT_THAT(*store_->ListUnscored(10), IsEmpty());
   EXPECT_THAT(*store_->ListUnfinishedRuns(), IsEmpty());
-  EXPECT_THAT(*store_->ListRigNames(), IsEmpty());
+  EXPECT_THAT(*domain_->StartTimedRuns(NowNs()), IsEmpty());
+  EXPECT_THAT(*domain_->StartSessionRuns({}, NowNs()), IsEmpty());
+  for (const RigCheck check : {RigCheck::kTime, RigCheck::kSession}) {
+    EXPECT_THAT(*store_->ListRigsToCheck(check, kNoCheck - 1, 10), IsEmpty());
+  }
   EXPECT_FALSE(HasData("a", 4));
 }
 

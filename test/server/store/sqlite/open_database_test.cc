@@ -69,7 +69,7 @@ class OpenDatabaseTest : public ::testing::Test {
 TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   // A released file never changes: add a migration, do not edit one.
   const auto migrations = SqliteMigrations();
-  ASSERT_EQ(migrations.size(), 19u);
+  ASSERT_EQ(migrations.size(), 20u);
   EXPECT_EQ(migrations[0].name, "0001_initial.sql");
   EXPECT_EQ(migrations[0].sha256,
             "37b3afad0f3669fcf267a1a27ae9144cad3b9d67cabff4285254de32c31c35ba");
@@ -128,6 +128,9 @@ TEST_F(OpenDatabaseTest, MigrationsAreThoseThatWereReleased) {
   EXPECT_EQ(migrations[18].name, "0019_scores_by_rig.sql");
   EXPECT_EQ(migrations[18].sha256,
             "525d1c3af0167c4cd9fdae1a3e066342e41101f0843eebbd7c730b8d808cebd7");
+  EXPECT_EQ(migrations[19].name, "0020_rig_checks.sql");
+  EXPECT_EQ(migrations[19].sha256,
+            "a3dbe08b5b5413caa17e6bba2678db9e8289d951deba6809e195388b078ff656");
 }
 
 TEST_F(OpenDatabaseTest, NewDatabaseIsMarkedAsOursWithItsVersion) {

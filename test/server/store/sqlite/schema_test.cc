@@ -68,6 +68,8 @@ TEST_F(SchemaTest, EveryColumnIsReportedOrKnownNotToBe) {
       // The hub has its own key, and derives the rest from what is reported.
       "estimates",
       "rigs.alarms",
+      "rigs.session_check_ns",
+      "rigs.time_check_ns",
       "rigs.rig",
       "rigs.id",
       "rigs.last_seen_ns",
@@ -240,6 +242,13 @@ TEST_F(SchemaTest, StatementsReadTheRowsThatTheyNeed) {
        "ORDER BY alarms DESC, id DESC LIMIT 10",
        {"SEARCH rigs USING COVERING INDEX rigs_by_alarms "
         "(alarms>? AND (alarms,id)<(?,?))"}},
+      {"SELECT id FROM rigs WHERE session_check_ns <= 1 "
+       "ORDER BY session_check_ns LIMIT 10",
+       {"SEARCH rigs USING INDEX rigs_by_session_check "
+        "(session_check_ns<?)"}},
+      {"SELECT id FROM rigs WHERE time_check_ns <= 1 "
+       "ORDER BY time_check_ns LIMIT 10",
+       {"SEARCH rigs USING INDEX rigs_by_time_check (time_check_ns<?)"}},
       {"SELECT e.value FROM estimates e JOIN rigs r ON r.rig = e.rig "
        "WHERE e.rig = 1 AND (e.version, e.component) > (1, 'x') "
        "ORDER BY e.rig, e.version, e.component LIMIT 10",
