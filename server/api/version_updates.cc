@@ -11,7 +11,7 @@ namespace selfcal::server {
 
 absl::StatusOr<std::shared_ptr<const WatchUpdate>> VersionUpdates::Get(
     const std::shared_ptr<const StoredCalibration>& version) {
-  // Whoever comes meanwhile wants the same.
+  // Held while it is encoded: others that come meanwhile want the same.
   const std::lock_guard lock(mutex_);
   const auto known = std::find_if(
       encoded_.begin(), encoded_.end(), [&](const Encoded& encoded) {

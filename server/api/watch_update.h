@@ -19,7 +19,7 @@ class WatchUpdate {
   WatchUpdate& operator=(const WatchUpdate&) = delete;
 
   const google::protobuf::Message& message() const { return *message_; }
-  // In the binary format of protobuf; valid as long as this object.
+  // The message in protobuf's binary format; valid as long as this object.
   const std::string& bytes() const {
     std::call_once(serialised_,
                    [this] { bytes_ = message_->SerializeAsString(); });

@@ -35,7 +35,7 @@ constexpr TimeTrigger kTimeTriggers[] = {
 // that changes all the time is checked once in a while.
 constexpr std::int64_t kTimeCheckDelayNs = 60'000'000'000;
 
-// What a device reports of itself is not checked here.
+// A device checks the rigs that it reports itself.
 absl::StatusOr<bool> IsReported(UnitOfWork* tx) {
   SELFCAL_ASSIGN_OR_RETURN(const auto device, ReadReportingDevice(tx));
   return device.has_value();

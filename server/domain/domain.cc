@@ -36,7 +36,7 @@ namespace {
 // the others wait for the next one.
 constexpr int kRigsOfPass = 1000;
 
-// After a change of the records of a rig.
+// Completes a change of the records of a rig.
 absl::Status KeepUp(UnitOfWork* tx) {
   SELFCAL_RETURN_IF_ERROR(UpdateAlarms(tx));
   return RequestChecksAfterChange(tx);

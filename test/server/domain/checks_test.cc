@@ -23,7 +23,7 @@ using ::testing::UnorderedElementsAreArray;
 constexpr std::int64_t kOneSecond_ns = 1'000'000'000;
 constexpr std::int64_t kIdle_ns = 60 * kOneSecond_ns;
 constexpr std::int64_t kMaxAge_ns = 150 * kOneSecond_ns;
-// Of a rule about time, after a change.
+// The delay of a rule about time after a change.
 constexpr std::int64_t kDelay_ns = 60 * kOneSecond_ns;
 
 class ChecksTest : public StoreTest {
