@@ -445,8 +445,8 @@ typedef struct selfcal_camera {
   int32_t width_px;
   int32_t height_px;
   int32_t distortion_size;  // coefficients of the model
-  // "fov" (w), "radial-tangential" (k1 k2 p1 p2), "equidistant" (k1 k2 k3 k4)
-  // or a later model. Valid while the library is loaded.
+  // "fov", "double-sphere": docs/concepts.md lists the models with the order of
+  // their coefficients. Valid while the library is loaded.
   const char* model;
   double distortion[SELFCAL_MAX_DISTORTION];  // the first distortion_size
   double f[2];                                // focal lengths x, y [px]
@@ -534,8 +534,8 @@ int32_t selfcal_calibration_correct_imu(const selfcal_calibration* calibration,
                                         selfcal_error* error);
 // Projects a point in the camera frame (any positive scale) to its pixel,
 // whether or not that is inside the image. SELFCAL_OUT_OF_RANGE: there is no
-// such camera, or the model has no answer: the point is behind the camera, or
-// the distortion is not one-to-one there.
+// such camera, or the model has no answer: it is not one-to-one at the point (a
+// pinhole: also if the point is not in front).
 int32_t selfcal_calibration_project(const selfcal_calibration* calibration,
                                     int32_t camera,
                                     const double p_C[3],

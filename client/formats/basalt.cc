@@ -6,12 +6,14 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "client/formats/basalt_camera.h"
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
 #include "client/formats/json_values.h"
 #include "client/formats/losses.h"
+#include "client/formats/tool_models.h"
 
 namespace selfcal::client {
 namespace {
@@ -172,10 +174,12 @@ ExportedFiles ExportBasalt(const Rig& rig,
   Json poses = Json::array();
   Json intrinsics = Json::array();
   Json sizes = Json::array();
-  for (const CameraCalibration& camera : theta.cameras) {
+  std::vector<CameraCalibration> cameras = theta.cameras;
+  UseModelsOf("basalt", &cameras);
+  for (const CameraCalibration& camera : cameras) {
     poses.push_back(
         PoseJson(RigidInverse(TransformFromBody(camera, body.R_BI))));
-    intrinsics.push_back(BasaltCameraJson(camera, intrinsics.size()));
+    intrinsics.push_back(BasaltCameraJson(camera));
     sizes.push_back({camera.width_px, camera.height_px});
   }
   const auto all_axes = [](double value) { return Json{value, value, value}; };

@@ -10,8 +10,8 @@
 // IMU's frame is therefore the one in which the accelerometer's matrix is lower
 // triangular. The format can express everything that selfcal has, except time
 // offsets that differ between cameras; constant biases are written as 0.
-// Cameras: kb4, pinhole-radtan8 with k3 .. k6 zero; pinhole. basalt-headers has
-// a FOV camera, too, but its loader does not.
+// Cameras: kb4, eucm, ds, pinhole-radtan8; pinhole. basalt-headers has a FOV
+// camera, too, but its loader does not.
 #pragma once
 
 #include <vector>

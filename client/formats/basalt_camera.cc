@@ -18,22 +18,6 @@ constexpr char kRadTan8[] = "pinhole-radtan8";
 // A camera without coefficients, which selfcal has as a radtan8.
 constexpr char kIdeal[] = "pinhole";
 
-// Checks the coefficients that selfcal does not have.
-void CheckRest(const ToolModel& model,
-               const Json& values,
-               std::vector<Loss>* losses) {
-  for (const std::string& key : Words(model.zeros)) {
-    if (JsonNumber(values, key, 0) == 0) continue;
-    throw FormatError(fmt::format("{} of a {} is not 0: selfcal's model has {}",
-                                  key,
-                                  model.name,
-                                  model.coefficients));
-  }
-  if (model.name != kRadTan8 || JsonNumber(values, "rpmax", 0) == 0) return;
-  losses->push_back(
-      {"rpmax", "selfcal computes the valid radius of a model", false});
-}
-
 }  // namespace
 
 CameraCalibration ReadBasaltCamera(const Json& node,
@@ -44,8 +28,11 @@ CameraCalibration ReadBasaltCamera(const Json& node,
   }
   const Json& values = JsonMember(node, "intrinsics");
   const bool ideal = type == kIdeal;
-  const auto found =
-      FindModel("basalt", ideal ? kRadTan8 : type.get<std::string>());
+  const auto found = FindModel(
+      "basalt",
+      ideal ? kRadTan8 : type.get<std::string>(),
+      {},
+      [&](const std::string& key) { return JsonNumber(values, key, 0) == 0; });
   if (!found) {
     throw FormatError(fmt::format("camera_type {} is not {} or one of {}",
                                   type.dump(),
@@ -53,18 +40,20 @@ CameraCalibration ReadBasaltCamera(const Json& node,
                                   ToolModelNames("basalt")));
   }
   CameraCalibration camera;
-  camera.model = *found;
+  camera.model = found->model;
   camera.distortion = Undistorted(camera.model);
   camera.f = {JsonNumber(values, "fx"), JsonNumber(values, "fy")};
   camera.c = {JsonNumber(values, "cx"), JsonNumber(values, "cy")};
   if (ideal) return camera;
-  const ToolModel& model = *FindToolModel("basalt", camera.model);
-  const std::vector<std::string> names = Words(model.coefficients);
+  const std::vector<std::string> names = Words(found->tool->coefficients);
   for (std::size_t i = 0; i < names.size(); ++i) {
     camera.distortion[static_cast<Eigen::Index>(i)] =
         JsonNumber(values, names[i]);
   }
-  CheckRest(model, values, losses);
+  if (found->tool->name == kRadTan8 && JsonNumber(values, "rpmax", 0) != 0) {
+    losses->push_back(
+        {"rpmax", "selfcal computes the valid radius of a model", false});
+  }
   return camera;
 }
 
@@ -85,8 +74,8 @@ void SetBasaltResolution(const Json& size, CameraCalibration* camera) {
   camera->height_px = pixels(size[1]);
 }
 
-Json BasaltCameraJson(const CameraCalibration& camera, std::size_t number) {
-  const ToolModel& model = ToolModelOf("basalt", number, camera.model);
+Json BasaltCameraJson(const CameraCalibration& camera) {
+  const ToolModel& model = *FindToolModel("basalt", camera.model);
   Json values = {{"fx", camera.f.x()},
                  {"fy", camera.f.y()},
                  {"cx", camera.c.x()},

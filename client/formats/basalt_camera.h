@@ -1,7 +1,6 @@
 // Cameras in Basalt's calibrations.
 #pragma once
 
-#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -10,14 +9,12 @@
 
 namespace selfcal::client {
 
-// Reads a camera. FormatError for other models, and for coefficients that
-// selfcal does not have.
+// Reads a camera. FormatError for other models.
 CameraCalibration ReadBasaltCamera(const nlohmann::ordered_json& node,
                                    std::vector<Loss>* losses);
 void SetBasaltResolution(const nlohmann::ordered_json& size,
                          CameraCalibration* camera);
-// FormatError for a model that Basalt does not have; `number` is the camera's.
-nlohmann::ordered_json BasaltCameraJson(const CameraCalibration& camera,
-                                        std::size_t number);
+// Of a model that Basalt has.
+nlohmann::ordered_json BasaltCameraJson(const CameraCalibration& camera);
 
 }  // namespace selfcal::client

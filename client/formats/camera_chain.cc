@@ -21,38 +21,38 @@ Eigen::VectorXd ReadList(const YAML::Node& node,
              : Eigen::VectorXd(GetMatrix(node, key, static_cast<int>(size), 1));
 }
 
-DistortionModel ReadModel(const YAML::Node& node) {
-  const std::string projection = GetText(node, "camera_model");
-  const std::string distortion = GetText(node, "distortion_model");
-  const auto model = FindModel(kTool, projection, distortion);
+FoundModel ReadModel(const std::string& projection,
+                     const std::string& distortion) {
+  const auto find = [&](std::string_view name) {
+    return FindModel(kTool, projection, name, [](const auto&) { return true; });
+  };
+  auto model = find(distortion);
+  // A model without distortion is one whose coefficients are zero.
+  if (!model && distortion == "none") model = find("radtan");
   if (model) return *model;
-  for (const DistortionModel other : DistortionModels()) {
-    const ToolModel* tool = FindToolModel(kTool, other);
-    if (tool == nullptr || tool->name != projection) continue;
-    throw FormatError(fmt::format("distortion_model '{}' is not one of {}",
-                                  distortion,
-                                  ToolModelNames(kTool)));
-  }
   throw FormatError(
-      fmt::format("camera_model '{}' is not supported: the models are {}",
+      fmt::format("camera_model '{}' with distortion_model '{}' is not "
+                  "supported: the models are {}",
                   projection,
+                  distortion,
                   ToolModelNames(kTool)));
 }
 
 void ReadIntrinsics(const YAML::Node& node, CameraCalibration* camera) {
-  const bool ideal = GetText(node, "camera_model") == "pinhole" &&
-                     GetText(node, "distortion_model") == "none";
-  camera->model = ideal ? DistortionModel::kRadialTangential : ReadModel(node);
-  camera->distortion = Undistorted(camera->model);
-  const ToolModel& tool = *FindToolModel(kTool, camera->model);
+  const std::string distortion = GetText(node, "distortion_model");
+  const auto [model, found] =
+      ReadModel(GetText(node, "camera_model"), distortion);
+  const ToolModel& tool = *found;
+  camera->model = model;
+  camera->distortion = Undistorted(model);
   const Eigen::VectorXd all =
       ReadList(node, "intrinsics", tool.before_pixels + 4);
   camera->f = all.segment<2>(tool.before_pixels);
   camera->c = all.tail<2>();
-  if (ideal) return;
+  camera->distortion.head(tool.before_pixels) = all.head(tool.before_pixels);
+  if (tool.distortion != distortion) return;
   const Eigen::Index rest = camera->distortion.size() - tool.before_pixels;
-  camera->distortion << all.head(tool.before_pixels),
-      ReadList(node, "distortion_coeffs", rest);
+  camera->distortion.tail(rest) = ReadList(node, "distortion_coeffs", rest);
 }
 
 }  // namespace

@@ -49,9 +49,21 @@ ImuMatrices ReadMatrices(const YAML::Node& imu, std::vector<Loss>* losses) {
   return result;
 }
 
-// Kalibr's loader stops at a principal point with a coordinate below 0.
+// Kalibr's loader stops at values below 0 of a principal point, and of some
+// coefficients.
 void CheckCamera(std::size_t number, const CameraCalibration& camera) {
-  ToolModelOf("kalibr", number, camera.model);
+  const ToolModel& tool = *FindToolModel("kalibr", camera.model);
+  for (int i = 0; i < tool.before_pixels; ++i) {
+    const std::string_view name = ModelInfo(camera.model).coefficients[i].name;
+    const bool any_sign = tool.name == "ds" && name == "xi";
+    if (any_sign || camera.distortion[i] >= 0) continue;
+    throw FormatError(fmt::format(
+        "cam{} has {} = {}, and kalibr's {} does not accept negative ones",
+        number,
+        name,
+        camera.distortion[i],
+        tool.name));
+  }
   if (camera.c.minCoeff() >= 0) return;
   throw FormatError(
       fmt::format("cam{} has a principal point at {}, {} px, which kalibr does "
@@ -108,8 +120,11 @@ ExportedFiles ExportKalibr(const Rig& rig,
   const AccelFrame body = ToAccelFrame(theta.imu);
   std::string chain;
   Eigen::Matrix4d before;
-  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
-    const CameraCalibration& camera = theta.cameras[j];
+  std::vector<CameraCalibration> cameras = theta.cameras;
+  UseModelsOf("kalibr", &cameras);
+  AddPinholeLosses("kalibr", cameras, &result.losses);
+  for (std::size_t j = 0; j < cameras.size(); ++j) {
+    const CameraCalibration& camera = cameras[j];
     CheckCamera(j, camera);
     const Eigen::Matrix4d T_CB = TransformFromBody(camera, body.R_BI);
     chain += fmt::format("cam{}:\n  T_cam_imu:\n{}", j, RowsText(T_CB, "  "));

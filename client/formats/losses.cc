@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "client/formats/tool_models.h"
+
 namespace selfcal::client {
 
 bool IsNominal(const ImuCalibration& imu) {
@@ -52,6 +54,33 @@ void AddSharedOffsetLosses(const std::string& tool,
                      tool,
                      more_s,
                      j),
+         true});
+  }
+}
+
+void AddPinholeLosses(const std::string& tool,
+                      const std::vector<CameraCalibration>& cameras,
+                      std::vector<Loss>* losses) {
+  for (std::size_t j = 0; j < cameras.size(); ++j) {
+    const CameraCalibration& camera = cameras[j];
+    if (FindToolModel(tool, camera.model)->name != "pinhole") continue;
+    const auto beyond = [&](double x, double y) {
+      Eigen::Vector3d bearing_C;
+      return Unproject(camera, {x, y}, &bearing_C) && !(bearing_C.z() > 0);
+    };
+    const double right = camera.width_px, bottom = camera.height_px;
+    const Eigen::Vector2d& c = camera.c;
+    if (!beyond(0, 0) && !beyond(right, 0) && !beyond(0, bottom) &&
+        !beyond(right, bottom) && !beyond(0, c.y()) && !beyond(right, c.y()) &&
+        !beyond(c.x(), 0) && !beyond(c.x(), bottom)) {
+      continue;
+    }
+    losses->push_back(
+        {fmt::format("cam{}.distortion", j),
+         fmt::format("{} has this model as a pinhole, without the pixels of "
+                     "rays at 90 degrees from the axis or beyond, which this "
+                     "image shows",
+                     tool),
          true});
   }
 }

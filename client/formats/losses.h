@@ -37,6 +37,13 @@ void KeepCameras(const std::string& tool,
                  Calibration* theta,
                  std::vector<Loss>* losses);
 
+// For tools that write some models as a pinhole, which has no pixel for a ray
+// at 90 degrees from the axis or beyond: cameras whose image shows such rays.
+// Cameras are of models that the tool has.
+void AddPinholeLosses(const std::string& tool,
+                      const std::vector<CameraCalibration>& cameras,
+                      std::vector<Loss>* losses);
+
 // Returns the given rate, or a usual one, which is then stated in the losses.
 double ImuRate(const FormatOptions& options,
                const std::string& field,

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
@@ -43,19 +44,30 @@ CameraCalibration ReadCamera(const YAML::Node& entry,
   const YAML::Node camera = Get(entry, "camera");
   CameraCalibration result;
   const YAML::Node distortion = Get(camera, "distortion");
+  const std::string projection =
+      Has(camera, "type") ? GetText(camera, "type") : "pinhole";
   const std::string type = GetText(distortion, "type");
-  const auto model = FindModel("maplab", "pinhole", type);
-  if (!model) {
-    throw FormatError(fmt::format("distortion type '{}' is not one of {}",
-                                  type,
-                                  ToolModelNames("maplab")));
+  const auto found =
+      FindModel("maplab", projection, type, [](const auto&) { return true; });
+  if (!found) {
+    throw FormatError(
+        fmt::format("distortion type '{}' of a camera of type '{}' is not one "
+                    "of {}",
+                    type,
+                    projection,
+                    ToolModelNames("maplab")));
   }
-  result.model = *model;
-  const Eigen::Vector4d intrinsics = GetMatrixData(camera, "intrinsics", 4, 1);
-  result.f = intrinsics.head<2>();
+  result.model = found->model;
+  const int before = found->tool->before_pixels;
+  const int size = DistortionSize(result.model);
+  const Eigen::VectorXd intrinsics =
+      GetMatrixData(camera, "intrinsics", before + 4, 1);
+  result.f = intrinsics.segment<2>(before);
   result.c = intrinsics.tail<2>();
-  result.distortion =
-      GetMatrixData(distortion, "parameters", DistortionSize(result.model), 1);
+  result.distortion.resize(size);
+  result.distortion.head(before) = intrinsics.head(before);
+  result.distortion.tail(size - before) =
+      GetMatrixData(distortion, "parameters", size - before, 1);
   result.width_px = GetInt(camera, "image_width");
   result.height_px = GetInt(camera, "image_height");
   const Eigen::Matrix4d T_BC =
@@ -127,7 +139,12 @@ std::string ImuText(const Rig& rig, const std::string& id) {
 std::string CameraText(const CameraCalibration& camera,
                        const std::string& id,
                        std::size_t number) {
+  const ToolModel& tool = *FindToolModel("maplab", camera.model);
   const DistortionVector& k = camera.distortion;
+  std::vector<double> intrinsics(k.begin(), k.begin() + tool.before_pixels);
+  intrinsics.insert(intrinsics.end(), camera.f.begin(), camera.f.end());
+  intrinsics.insert(intrinsics.end(), camera.c.begin(), camera.c.end());
+  const std::vector<double> parameters(k.begin() + tool.before_pixels, k.end());
   const Eigen::Matrix4d T_BC =
       RigidInverse(TransformFromBody(camera, Eigen::Matrix3d::Identity()));
   return fmt::format(
@@ -139,9 +156,9 @@ std::string CameraText(const CameraCalibration& camera,
       "          line-delay-nanoseconds: 0\n"
       "          image_height: {}\n"
       "          image_width: {}\n"
-      "          type: pinhole\n"
+      "          type: {}\n"
       "          intrinsics:\n"
-      "            cols: 1\n            rows: 4\n            data: {}\n"
+      "            cols: 1\n            rows: {}\n            data: {}\n"
       "          distortion:\n"
       "            type: {}\n"
       "            parameters:\n"
@@ -153,11 +170,12 @@ std::string CameraText(const CameraCalibration& camera,
       number,
       camera.height_px,
       camera.width_px,
-      ListText(
-          std::vector{camera.f.x(), camera.f.y(), camera.c.x(), camera.c.y()}),
-      ToolModelOf("maplab", number, camera.model).distortion,
-      k.size(),
-      ListText({k.data(), static_cast<std::size_t>(k.size())}),
+      tool.name,
+      intrinsics.size(),
+      ListText(intrinsics),
+      tool.distortion,
+      parameters.size(),
+      ListText(parameters),
       RowsText(T_BC, "            "));
 }
 
@@ -172,14 +190,15 @@ std::string PlaceText(const std::string& sensor, const std::string& base) {
 }
 
 // Values at which maplab's loader stops.
-void CheckValues(const Rig& rig, const Calibration& theta) {
+void CheckValues(const Rig& rig,
+                 const std::vector<CameraCalibration>& cameras) {
   if (!(rig.gravity_mps2 >= 9 && rig.gravity_mps2 <= 10)) {
     throw FormatError(fmt::format(
         "the rig has a gravity of {} m/s^2, and maplab accepts 9 to 10",
         rig.gravity_mps2));
   }
-  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
-    const CameraCalibration& camera = theta.cameras[j];
+  for (std::size_t j = 0; j < cameras.size(); ++j) {
+    const CameraCalibration& camera = cameras[j];
     if (!(camera.c.minCoeff() > 0)) {
       throw FormatError(
           fmt::format("cam{} has a principal point at {}, {} px, which maplab "
@@ -188,12 +207,21 @@ void CheckValues(const Rig& rig, const Calibration& theta) {
                       camera.c.x(),
                       camera.c.y()));
     }
-    const double w = camera.distortion[0];
-    if (camera.model != DistortionModel::kFov || (w >= 0.5 && w <= 1.5)) {
-      continue;
+    const double first = camera.distortion[0];
+    if (camera.model == DistortionModel::kFov &&
+        !(first >= 0.5 && first <= 1.5)) {
+      throw FormatError(fmt::format(
+          "cam{} has w = {}, and maplab's fisheye accepts 0.5 to 1.5",
+          j,
+          first));
     }
-    throw FormatError(fmt::format(
-        "cam{} has w = {}, and maplab's fisheye accepts 0.5 to 1.5", j, w));
+    if (FindToolModel("maplab", camera.model)->before_pixels > 0 &&
+        !(first >= 0)) {
+      throw FormatError(fmt::format(
+          "cam{} has xi = {}, and maplab does not accept negative ones",
+          j,
+          first));
+    }
   }
 }
 
@@ -228,8 +256,11 @@ ImportedRig ImportMaplab(const std::vector<TextFile>& files,
 ExportedFiles ExportMaplab(const Rig& rig,
                            const Calibration& theta,
                            const FormatOptions&) {
-  CheckValues(rig, theta);
+  std::vector<CameraCalibration> cameras = theta.cameras;
+  UseModelsOf("maplab", &cameras);
+  CheckValues(rig, cameras);
   ExportedFiles result;
+  AddPinholeLosses("maplab", cameras, &result.losses);
   const std::string imu = SensorId(rig.id + "/imu");
   const std::string system = SensorId(rig.id + "/cameras");
   std::string text = "sensors:\n" + ImuText(rig, imu);
@@ -240,9 +271,9 @@ ExportedFiles ExportMaplab(const Rig& rig,
       "    sensor_type: NCAMERA\n"
       "    cameras:\n",
       system);
-  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
-    text += CameraText(
-        theta.cameras[j], SensorId(fmt::format("{}/cam{}", rig.id, j)), j);
+  for (std::size_t j = 0; j < cameras.size(); ++j) {
+    text +=
+        CameraText(cameras[j], SensorId(fmt::format("{}/cam{}", rig.id, j)), j);
   }
   text += "extrinsics:\n" + PlaceText(imu, imu) + PlaceText(system, imu);
   AddImuLoss("maplab", theta.imu, &result.losses);

@@ -2,9 +2,9 @@
 //
 // T_B_C takes a point from the camera's frame to the body's, which is the
 // IMU's; extrinsics of the camera system are not used. fisheye is the FOV
-// model. The IMU's readings are used as they are, and there are no time
-// offsets; noise densities are for continuous time. The first IMU and the first
-// camera system are read.
+// model, unified-projection the unified one. The IMU's readings are used as
+// they are, and there are no time offsets; noise densities are for continuous
+// time. The first IMU and the first camera system are read.
 #pragma once
 
 #include <vector>

@@ -76,7 +76,9 @@ ImportedRig ImportOpenVins(const std::vector<TextFile>& files,
     CameraCalibration camera = ReadChainCamera(node);
     if (FindToolModel("openvins", camera.model) == nullptr) {
       throw FormatError(
-          fmt::format("distortion_model '{}' is not supported by OpenVINS",
+          fmt::format("camera_model '{}' with distortion_model '{}' is not "
+                      "supported by OpenVINS",
+                      GetText(node, "camera_model"),
                       GetText(node, "distortion_model")));
     }
     SetTransformFromBody(ReadExtrinsics(node), body.R_IB.transpose(), &camera);
@@ -98,9 +100,11 @@ ExportedFiles ExportOpenVins(const Rig& rig,
   ExportedFiles result;
   // cv::FileStorage requires this first line.
   std::string chain = "%YAML:1.0\n---\n";
-  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
-    CameraCalibration camera = theta.cameras[j];
-    ToolModelOf("openvins", j, camera.model);
+  std::vector<CameraCalibration> cameras = theta.cameras;
+  UseModelsOf("openvins", &cameras);
+  AddPinholeLosses("openvins", cameras, &result.losses);
+  for (std::size_t j = 0; j < cameras.size(); ++j) {
+    CameraCalibration& camera = cameras[j];
     camera.time_offset_s = theta.cameras[0].time_offset_s;
     const Eigen::Matrix4d T_IC =
         RigidInverse(TransformFromBody(camera, Eigen::Matrix3d::Identity()));

@@ -11,12 +11,16 @@
 namespace selfcal::client {
 namespace {
 
-constexpr char kPinhole[] = "PinHole";
 constexpr char kFisheye[] = "KannalaBrandt8";
 
-DistortionModel ReadModel(const YAML::Node& root) {
+FoundModel ReadModel(const YAML::Node& root, const std::string& camera) {
   const std::string type = GetText(root, "Camera.type");
-  if (const auto model = FindModel("orb_slam3", type)) return *model;
+  const auto is_zero = [&](const std::string& name) {
+    return GetDouble(root, camera + name, 0) == 0;
+  };
+  if (const auto model = FindModel("orb_slam3", type, {}, is_zero)) {
+    return *model;
+  }
   throw FormatError(fmt::format(
       "Camera.type '{}' is not one of {}; a rectified image has another "
       "calibration than the camera",
@@ -31,23 +35,16 @@ CameraCalibration ReadCamera(const YAML::Node& root, int number) {
   CameraCalibration camera;
   camera.f = {GetDouble(root, key("fx")), GetDouble(root, key("fy"))};
   camera.c = {GetDouble(root, key("cx")), GetDouble(root, key("cy"))};
-  camera.model = ReadModel(root);
-  camera.distortion = Undistorted(camera.model);
-  const ToolModel& tool = *FindToolModel("orb_slam3", camera.model);
+  const auto [model, tool] = ReadModel(root, key(""));
+  camera.model = model;
+  camera.distortion = Undistorted(model);
   // A pinhole may have no coefficients.
-  if (tool.name != kPinhole || Has(root, key("k1"))) {
-    const std::vector<std::string> names = Words(tool.coefficients);
+  if (tool->name == kFisheye || Has(root, key("k1"))) {
+    const std::vector<std::string> names = Words(tool->coefficients);
     for (std::size_t i = 0; i < names.size(); ++i) {
       camera.distortion[static_cast<Eigen::Index>(i)] =
           GetDouble(root, key(names[i]));
     }
-  }
-  for (const std::string& zero : Words(tool.zeros)) {
-    if (GetDouble(root, key(zero), 0) == 0) continue;
-    throw FormatError(fmt::format("{} is not 0: selfcal's {} model has {}",
-                                  key(zero),
-                                  DistortionName(camera.model),
-                                  tool.coefficients));
   }
   camera.width_px = GetInt(root, "Camera.width");
   camera.height_px = GetInt(root, "Camera.height");
@@ -78,10 +75,9 @@ std::string CameraText(const CameraCalibration& camera, std::size_t number) {
 }
 
 void CheckCameras(const std::vector<CameraCalibration>& cameras) {
-  for (std::size_t j = 0; j < cameras.size(); ++j) {
-    const CameraCalibration& camera = cameras[j];
-    ToolModelOf("orb_slam3", j, camera.model);
-    if (camera.model != cameras[0].model ||
+  for (const CameraCalibration& camera : cameras) {
+    if (FindToolModel("orb_slam3", camera.model)->name !=
+            FindToolModel("orb_slam3", cameras[0].model)->name ||
         camera.width_px != cameras[0].width_px ||
         camera.height_px != cameras[0].height_px) {
       throw FormatError(
@@ -144,6 +140,7 @@ ExportedFiles ExportOrbSlam3(const Rig& rig,
   ExportedFiles result;
   Calibration kept = theta;
   KeepCameras("orb_slam3", 2, &kept, &result.losses);
+  UseModelsOf("orb_slam3", &kept.cameras);
   const std::vector<CameraCalibration>& cameras = kept.cameras;
   CheckCameras(cameras);
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
@@ -153,7 +150,7 @@ ExportedFiles ExportOrbSlam3(const Rig& rig,
       "Camera.type: \"{}\"\n"
       "Camera.width: {}\n"
       "Camera.height: {}\n",
-      ToolModelOf("orb_slam3", 0, cameras[0].model).name,
+      FindToolModel("orb_slam3", cameras[0].model)->name,
       cameras[0].width_px,
       cameras[0].height_px);
   for (std::size_t j = 0; j < cameras.size(); ++j) {

@@ -37,7 +37,14 @@ YAML::Node FindConfiguration(const std::vector<TextFile>& files) {
 CameraCalibration ReadCamera(const TextFile& file) {
   const YAML::Node root = ParseYaml(file);
   const std::string type = GetText(root, "model_type");
-  const auto found = FindModel("vins_fusion", type);
+  const auto value = [&](const std::string& path) {
+    const std::size_t dot = path.find('.');
+    return GetDouble(Get(root, path.substr(0, dot)), path.substr(dot + 1));
+  };
+  const auto found =
+      FindModel("vins_fusion", type, {}, [&](const std::string& path) {
+        return value(path) == 0;
+      });
   if (!found) {
     throw FormatError(fmt::format("{}: model_type '{}' is not one of {}",
                                   file.name,
@@ -45,13 +52,9 @@ CameraCalibration ReadCamera(const TextFile& file) {
                                   ToolModelNames("vins_fusion")));
   }
   CameraCalibration camera;
-  camera.model = *found;
+  camera.model = found->model;
   camera.distortion = Undistorted(camera.model);
-  const ToolModel& tool = *FindToolModel("vins_fusion", camera.model);
-  const auto value = [&](const std::string& path) {
-    const std::size_t dot = path.find('.');
-    return GetDouble(Get(root, path.substr(0, dot)), path.substr(dot + 1));
-  };
+  const ToolModel& tool = *found->tool;
   const std::vector<std::string> names = Words(tool.coefficients);
   for (std::size_t i = 0; i < names.size(); ++i) {
     camera.distortion[static_cast<Eigen::Index>(i)] = value(names[i]);
@@ -97,6 +100,9 @@ std::string CameraText(const CameraCalibration& camera) {
              &section,
              &text);
   }
+  for (const std::string& zero : Words(tool.zeros)) {
+    AddValue(zero, 0, &section, &text);
+  }
   const std::vector<std::string> pixels = Words(tool.pixels);
   const Eigen::Vector4d values(
       camera.f.x(), camera.f.y(), camera.c.x(), camera.c.y());
@@ -105,10 +111,9 @@ std::string CameraText(const CameraCalibration& camera) {
 }
 
 void CheckCameras(const std::vector<CameraCalibration>& cameras) {
-  for (std::size_t j = 0; j < cameras.size(); ++j) {
-    ToolModelOf("vins_fusion", j, cameras[j].model);
-    if (cameras[j].width_px != cameras[0].width_px ||
-        cameras[j].height_px != cameras[0].height_px) {
+  for (const CameraCalibration& camera : cameras) {
+    if (camera.width_px != cameras[0].width_px ||
+        camera.height_px != cameras[0].height_px) {
       throw FormatError("vins_fusion has one image size for both cameras");
     }
   }
@@ -153,6 +158,7 @@ ExportedFiles ExportVinsFusion(const Rig& rig,
   ExportedFiles result;
   Calibration kept = theta;
   KeepCameras("vins_fusion", 2, &kept, &result.losses);
+  UseModelsOf("vins_fusion", &kept.cameras);
   CheckCameras(kept.cameras);
   const double by_sample =
       std::sqrt(ImuRate(options, "the rate of its noise", &result.losses));

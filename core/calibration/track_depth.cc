@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include "core/calibration/screening.h"
+#include "core/model/camera.h"
 #include "core/model/median.h"
 
 namespace selfcal {
@@ -17,8 +18,10 @@ struct InverseDepth {
 
 // A camera at a distance b from the others across the ray observes a point of
 // inverse depth rho rotated by b rho. The error is assumed to be one pixel, so
-// that the connections do not depend on the estimated noise.
+// that the connections do not depend on the estimated noise. scales_px are
+// those of the cameras [px/rad].
 InverseDepth Predict(const Rig& rig,
+                     std::span<const double> scales_px,
                      std::span<const KeyframeState> keyframes,
                      const Track& track,
                      const Eigen::Vector3d& landmark_G) {
@@ -40,8 +43,7 @@ InverseDepth Predict(const Rig& rig,
   for (const TrackObservation& seen : track.observations) {
     const double across_m =
         (position_G(seen) - middle_G).cross(ray_G).norm() / distance_m;
-    const double px_m =
-        rig.factory.cameras[seen.camera].f.minCoeff() * across_m;
+    const double px_m = scales_px[seen.camera] * across_m;
     result.information += px_m * px_m;
   }
   return result;
@@ -54,10 +56,15 @@ std::vector<bool> TracksWithDepth(
     std::span<const KeyframeState> keyframes,
     std::span<const Track> tracks,
     std::span<const Eigen::Vector3d> landmarks_G) {
+  std::vector<double> scales_px;
+  for (const CameraCalibration& camera : rig.factory.cameras) {
+    scales_px.push_back(PixelsPerRadian(camera).minCoeff());
+  }
   std::vector<InverseDepth> depths;
   std::vector<double> values;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
-    depths.push_back(Predict(rig, keyframes, tracks[t], landmarks_G[t]));
+    depths.push_back(
+        Predict(rig, scales_px, keyframes, tracks[t], landmarks_G[t]));
     values.push_back(depths.back().value);
   }
   std::vector<bool> with_depth;

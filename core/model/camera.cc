@@ -111,4 +111,13 @@ bool Unproject(const CameraCalibration& camera,
   return true;
 }
 
+Eigen::Vector2d PixelsPerRadian(const CameraCalibration& camera) {
+  Eigen::Vector2d z_px;
+  ProjectionJacobians jacobians;
+  if (!Project(camera, Eigen::Vector3d::UnitZ(), &z_px, &jacobians)) {
+    return camera.f;
+  }
+  return jacobians.point.leftCols<2>().diagonal();
+}
+
 }  // namespace selfcal

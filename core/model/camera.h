@@ -4,9 +4,12 @@
 // coordinates d, and these have the pixel
 //   z_x = f_x d_x + c_x,   z_y = f_y d_y + c_y.
 // A pinhole distorts u = (x/z, y/z): d = distort(u). Each model is a separate
-// file (distortion_fov.h, ...) with its mathematics; camera_models.h lists them
-// all. Pure functions, callable from any thread. A point that cannot be
-// projected is reported by the return value, never as a NaN.
+// file (distortion_fov.h, camera_unified.h, ...) with its mathematics;
+// camera_models.h lists them all. In the models that are not pinholes, rays at
+// 90 degrees from the axis and beyond have an image, too: a point in front of a
+// camera is one that lies on the ray of its pixel, at a positive distance. Pure
+// functions, callable from any thread. A point that cannot be projected is
+// reported by the return value, never as a NaN.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +23,7 @@ namespace selfcal {
 enum class DistortionModel : int {
   kFov,               // w: Devernay and Faugeras 2001
   kRadialTangential,  // k1 k2 p1 p2: Brown
-  kEquidistant,       // k1 k2 k3 k4: Kannala and Brandt
+  kEquidistant,       // k1 k2 k3 k4: Kannala and Brandt, beyond 90 degrees
 };
 
 // Room for the coefficients of every model, so that none are allocated.
@@ -80,5 +83,9 @@ bool Project(const CameraCalibration& camera,
 bool Unproject(const CameraCalibration& camera,
                const Eigen::Vector2d& z_px,
                Eigen::Vector3d* bearing_C);
+
+// Scales along x and y in the middle of the image [px/rad], which are f for
+// most models.
+Eigen::Vector2d PixelsPerRadian(const CameraCalibration& camera);
 
 }  // namespace selfcal

@@ -10,7 +10,9 @@
 //              whether p_C is where the model is one-to-one,
 //   Unproject  a ray in C, of any length, of the coordinates d = (z - c) / f,
 //              and whether there is one.
-// Its coefficients need not be those of a distortion. Internal to the project:
+// A model whose coefficients begin with those of another one extends it: with
+// the values `undistorted` of the further ones it is the other model. Its
+// coefficients need not be those of a distortion. Internal to the project:
 // not an installed header.
 #pragma once
 
@@ -38,14 +40,15 @@ struct CameraCoefficient {
   double undistorted = 0;  // value for a lens without distortion
 };
 
-// A model in the files of another tool. Lists are separated by spaces.
+// A model in the files of another tool. Lists are separated by spaces. A model
+// may be in a tool under several names: files are written under the first one.
 struct ToolModel {
   std::string_view tool;  // "kalibr"; "openvins", ...
   std::string_view name;  // of the model or, with `distortion`, the projection
   std::string_view distortion = {};
   // Names of the coefficients, where the tool names them; a path has dots.
   std::string_view coefficients = {};
-  // Further coefficients of the tool's model, which must be zero.
+  // Further coefficients of the tool's model, which are zero.
   std::string_view zeros = {};
   std::string_view pixels = "fx fy cx cy";  // names of f and c
   // Number of coefficients that precede f and c in a list of intrinsics; the

@@ -4,18 +4,22 @@
 //      declares.
 //   2. Include it here, and append it to CameraModels.
 //   3. Add its name to the enumeration DistortionModel of the contract.
-//   4. Add it to client/python/selfcal/cameras.py, and its name to the comment
-//      of selfcal_camera in client/c/selfcal.h.
+//   4. Add it to client/python/selfcal/cameras.py.
 // Everything else is derived, and its tests run over all of these models.
 // Internal to core/model and core/factor.
 #pragma once
 
 #include <span>
 
+#include "core/model/camera_double_sphere.h"
+#include "core/model/camera_equidistant.h"
+#include "core/model/camera_extended_unified.h"
 #include "core/model/camera_model.h"
-#include "core/model/distortion_equidistant.h"
+#include "core/model/camera_unified.h"
 #include "core/model/distortion_fov.h"
 #include "core/model/distortion_radial_tangential.h"
+#include "core/model/distortion_radial_tangential_5.h"
+#include "core/model/distortion_radial_tangential_8.h"
 #include "core/model/pinhole.h"
 
 namespace selfcal {
@@ -26,7 +30,12 @@ struct CameraModelList {};
 // The index of a model is its DistortionModel.
 using CameraModels = CameraModelList<Pinhole<DistortionFov>,
                                      Pinhole<DistortionRadialTangential>,
-                                     Pinhole<DistortionEquidistant>>;
+                                     CameraEquidistant,
+                                     Pinhole<DistortionRadialTangential5>,
+                                     Pinhole<DistortionRadialTangential8>,
+                                     CameraUnified,
+                                     CameraExtendedUnified,
+                                     CameraDoubleSphere>;
 
 // Calls visit(model) with the camera's model, prepared from its coefficients,
 // and returns its result. Returns false if there is no such model, or if the

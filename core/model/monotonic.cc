@@ -24,8 +24,17 @@ bool Positive(const double* a) {
 }  // namespace
 
 bool PositiveOnUnitInterval(const double* a, int degree) {
-  assert(degree == 2 || degree == 4);
-  return degree == 2 ? Positive<2>(a) : Positive<4>(a);
+  switch (degree) {
+    case 2:
+      return Positive<2>(a);
+    case 3:
+      return Positive<3>(a);
+    case 4:
+      return Positive<4>(a);
+    default:
+      assert(degree == 6);
+      return Positive<6>(a);
+  }
 }
 
 }  // namespace selfcal

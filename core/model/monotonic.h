@@ -36,16 +36,15 @@ bool PositiveInBernsteinForm(const std::array<double, N>& b, int halvings) {
 }
 
 // Returns true if the polynomial with the coefficients a[0] .. a[degree] is
-// positive on [0, 1]. The degree is 2 or 4.
+// positive on [0, 1]. The degree is 2, 3, 4 or 6.
 bool PositiveOnUnitInterval(const double* a, int degree);
 
-// Returns true if the derivative of r (1 + sum k_i r^(2i)) is positive on [0,
-// r], with q = r^2: the polynomial 1 + sum (2i + 1) k_i q^i on [0, q]. Returns
-// false if any input is NaN. T is double or Lanes, not an integer: powers would
+// Returns true if 1 + c_1 q + .. + c_N q^N is positive on [0, q]. Returns false
+// if any input is NaN. T is double or Lanes, not an integer: powers would
 // overflow.
 template <std::size_t N, typename T>
-requires(!std::is_integral_v<T>) auto ProfileRises(
-    const std::array<double, N>& k, T q) {
+requires(!std::is_integral_v<T>) auto PositiveUpTo(
+    const std::array<double, N>& c, T q) {
   // The variable is scaled to [0, 1]; only the powers of q that occur are
   // computed.
   std::array<T, N + 1> a;
@@ -54,7 +53,7 @@ requires(!std::is_integral_v<T>) auto ProfileRises(
   T negative(0);
   for (std::size_t i = 1; i <= N; ++i) {
     power *= q;
-    a[i] = static_cast<double>(2 * i + 1) * k[i - 1] * power;
+    a[i] = c[i - 1] * power;
     negative += Select(a[i] >= T(0), T(0), a[i]);
   }
   // This bound decides for nearly every point of a real lens.
@@ -65,6 +64,19 @@ requires(!std::is_integral_v<T>) auto ProfileRises(
            for (std::size_t i = 0; i <= N; ++i) of_lane[i] = Lane(a[i], lane);
            return PositiveOnUnitInterval(of_lane, static_cast<int>(N));
          });
+}
+
+// Returns true if the derivative of r (1 + sum k_i r^(2i)) is positive on [0,
+// r], with q = r^2: the polynomial 1 + sum (2i + 1) k_i q^i on [0, q]. False
+// for NaN.
+template <std::size_t N, typename T>
+requires(!std::is_integral_v<T>) auto ProfileRises(
+    const std::array<double, N>& k, T q) {
+  std::array<double, N> slope;
+  for (std::size_t i = 0; i < N; ++i) {
+    slope[i] = static_cast<double>(2 * i + 3) * k[i];
+  }
+  return PositiveUpTo(slope, q);
 }
 
 }  // namespace selfcal

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kMinViews = 50;
 // A median error below this many pixel sigmas is not a finding.
 constexpr double kFineSigmas = 2;
-// Fractions of the focal length: the error of an explanation is below
+// Fractions of the pixels per radian: the error of an explanation is below
 // kExplained; one above kUnexplained needs an explanation.
 constexpr double kExplained = 0.03;
 constexpr double kUnexplained = 0.1;
@@ -71,7 +71,7 @@ class ReprojectionCheck {
         j_(j),
         camera_(cameras[j]),
         views_(views),
-        f_px_(camera_.f.mean()),
+        f_px_(PixelsPerRadian(camera_).mean()),
         fine_px_(kFineSigmas * pixel_sigma_px),
         fed_(Measure(views, camera_, AsReceived)) {}
 

@@ -28,6 +28,8 @@ Timed = tuple[int, str, object]  # t_ns, topic, message
 # The models that Foxglove's schema knows.
 _DISTORTION = {
     v1.DISTORTION_MODEL_RADIAL_TANGENTIAL: "plumb_bob",
+    v1.DISTORTION_MODEL_RADIAL_TANGENTIAL_5: "plumb_bob",
+    v1.DISTORTION_MODEL_RADIAL_TANGENTIAL_8: "rational_polynomial",
     v1.DISTORTION_MODEL_EQUIDISTANT: "kannala_brandt",
 }
 

@@ -3,9 +3,9 @@ converts pixels to rays, as in C++ (core/model/imu.h, core/model/camera.h).
 
 The last axis of an array has the components of a vector; there may be any
 number of axes before it. Messages are those of the contract. Needs numpy. If
-the camera model has no result, the row is NaN: for a point behind the camera or
-where the distortion is not one-to-one, and for a pixel that no point projects
-to. The borders of the image are ignored.
+the camera model has no result, the row is NaN: for a point where it is not
+one-to-one (a pinhole: also behind the camera), and for a pixel that no point
+projects to. The borders of the image are ignored.
 """
 
 from __future__ import annotations

@@ -21,6 +21,13 @@ using Model = DistortionModel;
 constexpr double kRate_hz = 250;
 constexpr FormatOptions kOptions{.imu_rate_hz = kRate_hz};
 
+Model ModelNamed(std::string_view name) {
+  for (const Model model : DistortionModels()) {
+    if (DistortionName(model) == name) return model;
+  }
+  throw std::out_of_range(std::string(name));
+}
+
 struct Expressible {
   const char* format;
   std::vector<Model> models;
@@ -32,9 +39,20 @@ struct Expressible {
   double least_w = 0;  // of a FOV camera, in magnitude
 };
 
+const Model kRadialTangential5 = ModelNamed("radial-tangential-5");
+const Model kRadialTangential8 = ModelNamed("radial-tangential-8");
+const Model kUnified = ModelNamed("unified");
+const Model kExtendedUnified = ModelNamed("extended-unified");
+const Model kDoubleSphere = ModelNamed("double-sphere");
+
 const Expressible kExpressible[] = {
     {"kalibr",
-     {Model::kFov, Model::kRadialTangential, Model::kEquidistant},
+     {Model::kFov,
+      Model::kRadialTangential,
+      Model::kEquidistant,
+      kUnified,
+      kExtendedUnified,
+      kDoubleSphere},
      4,
      false,
      true,
@@ -48,28 +66,37 @@ const Expressible kExpressible[] = {
      true,
      false},
     {"orb_slam3",
-     {Model::kRadialTangential, Model::kEquidistant},
+     {Model::kRadialTangential, kRadialTangential5, Model::kEquidistant},
      2,
      true,
      false,
      false,
      false},
     {"vins_fusion",
-     {Model::kRadialTangential, Model::kEquidistant},
+     {Model::kRadialTangential,
+      kRadialTangential5,
+      kRadialTangential8,
+      Model::kEquidistant,
+      kUnified},
      2,
      false,
      false,
      true,
      false},
     {"basalt",
-     {Model::kRadialTangential, Model::kEquidistant},
+     {Model::kRadialTangential,
+      kRadialTangential5,
+      kRadialTangential8,
+      Model::kEquidistant,
+      kExtendedUnified,
+      kDoubleSphere},
      4,
      false,
      true,
      true,
      false},
     {"maplab",
-     {Model::kFov, Model::kRadialTangential, Model::kEquidistant},
+     {Model::kFov, Model::kRadialTangential, Model::kEquidistant, kUnified},
      4,
      false,
      false,
@@ -206,6 +233,7 @@ TEST_P(Export, NothingIsLostOfANominalDevice) {
   RandomValues random(10);
   Rig rig;
   rig.factory.cameras = {random.Camera(Model::kEquidistant)};
+  rig.factory.cameras[0].f = {400, 400};  // no ray is beyond 90 degrees
   const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
   ASSERT_TRUE(files.ok()) << files.status();
   for (const Loss& loss : files->losses) {
@@ -218,7 +246,9 @@ TEST_P(Export, AModelWithoutWordsIsRefused) {
   Rig rig;
   rig.factory.cameras = {random.Camera(Model::kFov)};
   const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
-  const bool has = GetParam().models.size() == 3;
+  const std::vector<Model>& models = GetParam().models;
+  const bool has =
+      std::find(models.begin(), models.end(), Model::kFov) != models.end();
   EXPECT_EQ(files.ok(), has);
   if (has) return;
   EXPECT_EQ(files.status().code(), absl::StatusCode::kFailedPrecondition);
@@ -226,6 +256,62 @@ TEST_P(Export, AModelWithoutWordsIsRefused) {
   EXPECT_THAT(message, HasSubstr("cam0 has the distortion model fov, but"));
   EXPECT_THAT(message, HasSubstr(GetParam().format));
   EXPECT_THAT(message, HasSubstr("; kalibr and maplab have it"));
+}
+
+// Coefficients that are zero are none: a camera is written as the model that
+// its own one extends.
+TEST_P(Export, AModelWithZeroCoefficientsIsTheSmallerOne) {
+  RandomValues random(18);
+  for (const Model model : {kRadialTangential5, kRadialTangential8}) {
+    Rig rig;
+    CameraCalibration camera = random.Camera(Model::kRadialTangential);
+    const DistortionVector four = camera.distortion;
+    camera.model = model;
+    camera.distortion = DistortionVector::Zero(DistortionSize(model));
+    camera.distortion.head<4>() = four;
+    rig.factory.cameras = {camera};
+    const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
+    ASSERT_TRUE(files.ok()) << files.status();
+    EXPECT_THAT(LoaderFaults(GetParam().format, files->files), IsEmpty());
+    const Tool tool = ReadAsTool(GetParam().format, files->files, kRate_hz);
+    ExpectSamePredictions(rig.factory, tool, &random);
+    const auto again = ImportRig(GetParam().format, files->files, kOptions);
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_EQ(again->rig.factory.cameras[0].model, Model::kRadialTangential);
+    // Any of them that is not zero makes it the larger one, or an error.
+    rig.factory.cameras[0].distortion[4] = 1e-3;
+    const auto larger =
+        ExportRig(GetParam().format, rig, rig.factory, kOptions);
+    const std::vector<Model>& models = GetParam().models;
+    const bool has =
+        std::find(models.begin(), models.end(), kRadialTangential5) !=
+        models.end();
+    ASSERT_EQ(larger.ok(), has) << larger.status();
+    if (!has) continue;
+    const auto read = ImportRig(GetParam().format, larger->files, kOptions);
+    ASSERT_TRUE(read.ok()) << read.status();
+    EXPECT_EQ(read->rig.factory.cameras[0].model, kRadialTangential5);
+  }
+}
+
+// Kalibr, OpenVINS and maplab have the equidistant model as a pinhole.
+TEST_P(Export, RaysBeyond90DegreesAreSaidToBeLostWhereThereIsAPinhole) {
+  RandomValues random(19);
+  const std::string format = GetParam().format;
+  Rig rig;
+  rig.factory.cameras = {random.Camera(Model::kEquidistant)};
+  CameraCalibration& camera = rig.factory.cameras[0];
+  camera.distortion.setZero();
+  for (const double f_px : {400.0, 200.0}) {
+    camera.f = {f_px, f_px};
+    const auto files = ExportRig(format, rig, rig.factory, kOptions);
+    ASSERT_TRUE(files.ok()) << files.status();
+    const bool pinhole =
+        format == "kalibr" || format == "openvins" || format == "maplab";
+    const auto names = Names(files->losses);
+    EXPECT_EQ(std::count(names.begin(), names.end(), "cam0.distortion"),
+              pinhole && f_px == 200.0);
+  }
 }
 
 // OpenCV and YAML 1.1 tell an integer from a number, and want an exponent to
@@ -304,6 +390,26 @@ TEST(Formats, AValueThatTheToolRefusesIsNotWritten) {
            {"kalibr",
             [](Rig* rig) { rig->factory.cameras[1].c.x() = -1; },
             "cam1 has a principal point at -1"},
+           {"kalibr",
+            [](Rig* rig) {
+              rig->factory.cameras[1].model = kUnified;
+              rig->factory.cameras[1].distortion =
+                  (Eigen::VectorXd(5) << -0.1, 0, 0, 0, 0).finished();
+            },
+            "cam1 has xi = -0.1"},
+           {"kalibr",
+            [](Rig* rig) {
+              rig->factory.cameras[1].model = kDoubleSphere;
+              rig->factory.cameras[1].distortion = Eigen::Vector2d(-0.1, -0.2);
+            },
+            "cam1 has alpha = -0.2"},
+           {"maplab",
+            [](Rig* rig) {
+              rig->factory.cameras[1].model = kUnified;
+              rig->factory.cameras[1].distortion =
+                  (Eigen::VectorXd(5) << -0.1, 0, 0, 0, 0).finished();
+            },
+            "cam1 has xi = -0.1"},
            {"maplab",
             [](Rig* rig) { rig->factory.cameras[1].c.y() = 0; },
             "cam1 has a principal point at"},

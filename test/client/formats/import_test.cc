@@ -310,19 +310,20 @@ TEST(ImportErrors, NameTheFieldAndWhatToDo) {
            {"openvins", "\"kalibr\"", "\"rpng\"", "not upper triangular"},
            {"openvins", "\"kalibr\"", "\"imu\"", "model 'imu'"},
            {"openvins", "T_cam_imu", "x", "'T_imu_cam' is missing"},
+           {"openvins",
+            "camera_model: pinhole",
+            "camera_model: omni",
+            "'intrinsics' needs 5"},
            {"orb_slam3", "PinHole", "Rectified", "Camera.type 'Rectified'"},
            {"orb_slam3", "File.version", "x", "File.version is missing"},
-           {"orb_slam3",
-            "Camera2.fx",
-            "Camera2.k3: 0.1\nCamera2.fx",
-            "Camera2.k3 is not 0"},
            {"orb_slam3", "Camera.width", "x", "'Camera.width' is missing"},
            {"vins_fusion", "imu: 1", "imu: 0", "imu is not 1"},
            {"vins_fusion", "left.yaml", "up.yaml", "up.yaml is missing"},
-           {"vins_fusion", "KANNALA_BRANDT", "MEI", "model_type 'MEI'"},
+           {"vins_fusion", "KANNALA_BRANDT", "SCARAMUZZA", "'SCARAMUZZA'"},
+           {"vins_fusion", "KANNALA_BRANDT", "MEI", "'mirror_parameters'"},
            {"vins_fusion", "num_of_cam: 2", "num_of_cam: 3", "not 1 or 2"},
-           {"basalt", "kb4", "ds", "camera_type \"ds\""},
-           {"basalt", "kb4", "fov", "one of pinhole-radtan8 and kb4"},
+           {"basalt", "kb4", "ds", "'xi' is missing"},
+           {"basalt", "kb4", "fov", "one of pinhole-radtan8, kb4, eucm and ds"},
            {"basalt", "value0", "value1", "'value0' is missing"},
            {"basalt", "\"qw\": ", "\"qw\": 1", "norm"},
            {"basalt", "[848, 800]", "[848.5, 800]", "resolution"},
@@ -331,6 +332,102 @@ TEST(ImportErrors, NameTheFieldAndWhatToDo) {
     EXPECT_EQ(rig.status().code(), absl::StatusCode::kInvalidArgument)
         << change.to;
     EXPECT_THAT(std::string(rig.status().message()), HasSubstr(change.answer));
+  }
+}
+
+// A file is read as the smallest model that represents it.
+TEST(ImportModels, AreTheSmallestThatRepresentTheFile) {
+  constexpr char kEquidistant[] =
+      "  distortion_coeffs: [0.01, -0.02, 0.003, -0.001]\n"
+      "  distortion_model: equidistant\n"
+      "  intrinsics: [190.9, 190.8, 254.9, 256.9]\n";
+  constexpr char kFull[] =
+      "%YAML:1.0\n---\nmodel_type: PINHOLE_FULL\nimage_width: 848\n"
+      "image_height: 800\ndistortion_parameters: {k1: -0.2, k2: 0.1, p1: 0.0, "
+      "p2: 0.0, ";
+  constexpr char kPixels[] =
+      "}\nprojection_parameters: {fx: 461, fy: 460, cx: 363, cy: 248}\n";
+  const std::string full(kFull), pixels(kPixels);
+  struct Case {
+    const char* format;
+    std::string from, to;
+    const char* model;
+  };
+  RandomValues random(6);
+  const std::string left = VinsFusionFiles(&random)[1].text;
+  const std::string kb4 = R"("kb4", "intrinsics": {)";
+  for (const Case& one : std::initializer_list<Case>{
+           {"kalibr", "equidistant", "radtan", "radial-tangential"},
+           {"kalibr",
+            std::string("  camera_model: pinhole\n") + kEquidistant,
+            "  camera_model: omni\n  distortion_coeffs: []\n"
+            "  distortion_model: none\n"
+            "  intrinsics: [0.9, 490.9, 490.8, 254.9, 256.9]\n",
+            "unified"},
+           {"kalibr",
+            std::string("  camera_model: pinhole\n") + kEquidistant,
+            "  camera_model: pinhole\n  distortion_coeffs: []\n"
+            "  distortion_model: none\n"
+            "  intrinsics: [490.9, 490.8, 254.9, 256.9]\n",
+            "radial-tangential"},
+           {"kalibr",
+            std::string("  camera_model: pinhole\n") + kEquidistant,
+            "  camera_model: eucm\n  distortion_coeffs: []\n"
+            "  distortion_model: none\n"
+            "  intrinsics: [0.6, 1.1, 190.9, 190.8, 254.9, 256.9]\n",
+            "extended-unified"},
+           {"kalibr",
+            std::string("  camera_model: pinhole\n") + kEquidistant,
+            "  camera_model: ds\n  distortion_coeffs: []\n"
+            "  distortion_model: none\n"
+            "  intrinsics: [-0.2, 0.59, 190.9, 190.8, 254.9, 256.9]\n",
+            "double-sphere"},
+           {"orb_slam3",
+            "Camera1.fx",
+            "Camera1.k3: 0\nCamera1.fx",
+            "radial-tangential"},
+           {"orb_slam3",
+            "Camera1.fx",
+            "Camera1.k3: 0.1\nCamera1.fx",
+            "radial-tangential-5"},
+           {"vins_fusion",
+            left,
+            full + "k3: 0, k4: 0, k5: 0, k6: 0" + pixels,
+            "radial-tangential"},
+           {"vins_fusion",
+            left,
+            full + "k3: 0.1, k4: 0, k5: 0, k6: 0" + pixels,
+            "radial-tangential-5"},
+           {"vins_fusion",
+            left,
+            full + "k3: 0, k4: 0, k5: 0.1, k6: 0" + pixels,
+            "radial-tangential-8"},
+           {"vins_fusion",
+            left,
+            "%YAML:1.0\n---\nmodel_type: MEI\nimage_width: 848\n"
+            "image_height: 800\nmirror_parameters: {xi: 2.1}\n"
+            "distortion_parameters: {k1: 0.02, k2: 1.6, p1: 0.0, p2: 0.0}\n"
+            "projection_parameters: {gamma1: 1300, gamma2: 1301, u0: 420, "
+            "v0: 400}\n",
+            "unified"},
+           {"basalt",
+            kb4,
+            R"("pinhole-radtan8", "intrinsics": {"p1": 0, "p2": 0, "k5": 0,
+               "k6": 0, "rpmax": 0, )",
+            "radial-tangential-8"},
+           {"basalt",
+            kb4,
+            R"("ds", "intrinsics": {"xi": -0.2, "alpha": 0.6, )",
+            "double-sphere"},
+           {"basalt",
+            kb4,
+            R"("eucm", "intrinsics": {"alpha": 0.6, "beta": 1.1, )",
+            "extended-unified"}}) {
+    const Change change = {
+        one.format, one.from.c_str(), one.to.c_str(), one.model};
+    const auto rig = Changed(change);
+    ASSERT_TRUE(rig.ok()) << rig.status() << " " << one.to;
+    EXPECT_EQ(DistortionName(rig->rig.factory.cameras[0].model), one.model);
   }
 }
 

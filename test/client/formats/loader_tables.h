@@ -55,15 +55,24 @@ constexpr Key Above0(const char* path, Type type = Type::kNumber) {
 inline constexpr Key kKalibrCamera[] = {
     {"rostopic", Type::kText},
     {"camera_model", Type::kText},
-    {"intrinsics", Type::kReals, Use::kRequired, 4, 1, kFrom0},
     {"distortion_model", Type::kText},
     {"resolution", Type::kIntegers, Use::kRequired, 2, 1, kAbove0},
     {"T_cam_imu", Type::kRows, Use::kOptional, 4, 4},
     {"timeshift_cam_imu", Type::kReal, Use::kOptional}};
+inline constexpr Key kKalibrPinhole[] = {
+    {"intrinsics", Type::kReals, Use::kRequired, 4, 1, kFrom0}};
+inline constexpr Key kKalibrOmni[] = {
+    {"intrinsics", Type::kReals, Use::kRequired, 5, 1, kFrom0}};
+inline constexpr Key kKalibrEucm[] = {
+    {"intrinsics", Type::kReals, Use::kRequired, 6, 1, kFrom0}};
+inline constexpr Key kKalibrDs[] = {  // xi may be negative
+    {"intrinsics", Type::kReals, Use::kRequired, 6}};
 inline constexpr Key kKalibrFourCoefficients[] = {
     {"distortion_coeffs", Type::kReals, Use::kRequired, 4}};
 inline constexpr Key kKalibrFov[] = {
     {"distortion_coeffs", Type::kReals, Use::kRequired, 1}};
+inline constexpr Key kKalibrNone[] = {
+    {"distortion_coeffs", Type::kReals, Use::kRequired, 0}};
 inline constexpr Key kKalibrNextCamera[] = {
     {"T_cn_cnm1", Type::kRows, Use::kRequired, 4, 4}};
 // ImuParameters, which --imu reads. IccSensors.py writes the others, and starts
@@ -135,10 +144,12 @@ inline constexpr Key kOrbSlam3[] = {
     {"ORBextractor.nLevels", Type::kInteger, Use::kSetting},
     {"ORBextractor.iniThFAST", Type::kInteger, Use::kSetting},
     {"ORBextractor.minThFAST", Type::kInteger, Use::kSetting}};
-inline constexpr Key kOrbSlam3Pinhole[] = {{"Camera1.k1", Type::kNumber},
-                                           {"Camera1.k2", Type::kNumber},
-                                           {"Camera1.p1", Type::kNumber},
-                                           {"Camera1.p2", Type::kNumber}};
+inline constexpr Key kOrbSlam3Pinhole[] = {
+    {"Camera1.k1", Type::kNumber},
+    {"Camera1.k2", Type::kNumber},
+    {"Camera1.p1", Type::kNumber},
+    {"Camera1.p2", Type::kNumber},
+    {"Camera1.k3", Type::kNumber, Use::kOptional}};
 inline constexpr Key kOrbSlam3Fisheye[] = {
     {"Camera1.k1", Type::kNumber},
     {"Camera1.k2", Type::kNumber},
@@ -153,10 +164,12 @@ inline constexpr Key kOrbSlam3Stereo[] = {
     {"Camera2.cy", Type::kNumber},
     {"Stereo.T_c1_c2", Type::kOpenCvMatrix, Use::kRequired, 4, 4},
     {"Stereo.ThDepth", Type::kNumber, Use::kSetting}};
-inline constexpr Key kOrbSlam3StereoPinhole[] = {{"Camera2.k1", Type::kNumber},
-                                                 {"Camera2.k2", Type::kNumber},
-                                                 {"Camera2.p1", Type::kNumber},
-                                                 {"Camera2.p2", Type::kNumber}};
+inline constexpr Key kOrbSlam3StereoPinhole[] = {
+    {"Camera2.k1", Type::kNumber},
+    {"Camera2.k2", Type::kNumber},
+    {"Camera2.p1", Type::kNumber},
+    {"Camera2.p2", Type::kNumber},
+    {"Camera2.k3", Type::kNumber, Use::kOptional}};
 // Some versions read the coefficients of the second camera from the first.
 inline constexpr Key kOrbSlam3StereoFisheye[] = {
     {"Camera2.k1", Type::kNumber},
@@ -198,7 +211,8 @@ inline constexpr Key kVinsFusionStereo[] = {
     {"cam1_calib", Type::kText},
     {"body_T_cam1", Type::kOpenCvMatrix, Use::kRequired, 4, 4},
     {"image1_topic", Type::kText, Use::kSetting}};
-// camodocal's PinholeCamera.cc and EquidistantCamera.cc.
+// camodocal's PinholeCamera.cc, PinholeFullCamera.cc, CataCamera.cc and
+// EquidistantCamera.cc.
 inline constexpr Key kVinsFusionCamera[] = {
     {"model_type", Type::kText},
     {"camera_name", Type::kText},
@@ -215,6 +229,23 @@ inline constexpr Key kVinsFusionPinhole[] = {
     {"projection_parameters.fy", Type::kNumber},
     {"projection_parameters.cx", Type::kNumber},
     {"projection_parameters.cy", Type::kNumber}};
+inline constexpr Key kVinsFusionFull[] = {
+    {"distortion_parameters.k3", Type::kNumber},
+    {"distortion_parameters.k4", Type::kNumber},
+    {"distortion_parameters.k5", Type::kNumber},
+    {"distortion_parameters.k6", Type::kNumber}};
+inline constexpr Key kVinsFusionMei[] = {
+    {"mirror_parameters", Type::kMap},
+    {"mirror_parameters.xi", Type::kNumber},
+    {"distortion_parameters", Type::kMap},
+    {"distortion_parameters.k1", Type::kNumber},
+    {"distortion_parameters.k2", Type::kNumber},
+    {"distortion_parameters.p1", Type::kNumber},
+    {"distortion_parameters.p2", Type::kNumber},
+    {"projection_parameters.gamma1", Type::kNumber},
+    {"projection_parameters.gamma2", Type::kNumber},
+    {"projection_parameters.u0", Type::kNumber},
+    {"projection_parameters.v0", Type::kNumber}};
 inline constexpr Key kVinsFusionFisheye[] = {
     {"projection_parameters.k2", Type::kNumber},
     {"projection_parameters.k3", Type::kNumber},
@@ -252,11 +283,15 @@ inline constexpr Key kBasaltCamera[] = {{"camera_type", Type::kText},
                                         {"intrinsics.fx", Type::kNumber},
                                         {"intrinsics.fy", Type::kNumber},
                                         {"intrinsics.cx", Type::kNumber},
-                                        {"intrinsics.cy", Type::kNumber},
-                                        {"intrinsics.k1", Type::kNumber},
-                                        {"intrinsics.k2", Type::kNumber},
-                                        {"intrinsics.k3", Type::kNumber},
-                                        {"intrinsics.k4", Type::kNumber}};
+                                        {"intrinsics.cy", Type::kNumber}};
+inline constexpr Key kBasaltKb4[] = {{"intrinsics.k1", Type::kNumber},
+                                     {"intrinsics.k2", Type::kNumber},
+                                     {"intrinsics.k3", Type::kNumber},
+                                     {"intrinsics.k4", Type::kNumber}};
+inline constexpr Key kBasaltEucm[] = {{"intrinsics.alpha", Type::kNumber},
+                                      {"intrinsics.beta", Type::kNumber}};
+inline constexpr Key kBasaltDs[] = {{"intrinsics.xi", Type::kNumber},
+                                    {"intrinsics.alpha", Type::kNumber}};
 inline constexpr Key kBasaltRadTan8[] = {{"intrinsics.p1", Type::kNumber},
                                          {"intrinsics.p2", Type::kNumber},
                                          {"intrinsics.k5", Type::kNumber},
@@ -264,7 +299,7 @@ inline constexpr Key kBasaltRadTan8[] = {{"intrinsics.p1", Type::kNumber},
                                          {"intrinsics.rpmax", Type::kNumber}};
 
 // sensor-manager.cc, sensor.cc, imu.cc, ncamera.cc, camera.cc,
-// camera-pinhole.cc and distortion-fisheye.cc.
+// camera-pinhole.cc, camera-unified-projection.cc and distortion-fisheye.cc.
 inline constexpr Key kMaplabImu[] = {
     {"id", Type::kText, Use::kOptional},
     {"topic", Type::kText, Use::kOptional},
@@ -299,10 +334,13 @@ inline constexpr Key kMaplabCamera[] = {
     {"camera.line-delay-nanoseconds", Type::kInteger, Use::kOptional},
     {"camera.image_width", Type::kInteger},
     {"camera.image_height", Type::kInteger},
-    {"camera.intrinsics", Type::kMapMatrix, Use::kRequired, 4, 1, kAbove0},
     {"camera.distortion", Type::kMap, Use::kOptional},
     {"camera.distortion.type", Type::kText},
     {"T_B_C", Type::kMapMatrix, Use::kRequired, 4, 4}};
+inline constexpr Key kMaplabPinhole[] = {
+    {"camera.intrinsics", Type::kMapMatrix, Use::kRequired, 4, 1, kAbove0}};
+inline constexpr Key kMaplabUnified[] = {
+    {"camera.intrinsics", Type::kMapMatrix, Use::kRequired, 5, 1, kFrom0}};
 inline constexpr Key kMaplabFourCoefficients[] = {
     {"camera.distortion.parameters", Type::kMapMatrix, Use::kRequired, 4, 1}};
 inline constexpr Key kMaplabFisheye[] = {{"camera.distortion.parameters",

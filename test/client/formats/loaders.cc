@@ -200,10 +200,17 @@ void CheckKalibr(const std::vector<TextFile>& files, Checker* checker) {
     const auto name = entry.first.as<std::string>();
     checker->Expect(name == fmt::format("cam{}", number),
                     name + " is counted as a camera");
-    const bool fov = Text(entry.second, "distortion_model") == "fov";
-    Table table = Joined(
-        {kKalibrCamera,
-         fov ? std::span<const Key>(kKalibrFov) : kKalibrFourCoefficients});
+    const std::string model = Text(entry.second, "camera_model");
+    const std::string distortion = Text(entry.second, "distortion_model");
+    Table table =
+        Joined({kKalibrCamera,
+                model == "omni"   ? std::span<const Key>(kKalibrOmni)
+                : model == "eucm" ? std::span<const Key>(kKalibrEucm)
+                : model == "ds"   ? std::span<const Key>(kKalibrDs)
+                                  : kKalibrPinhole,
+                distortion == "fov"    ? std::span<const Key>(kKalibrFov)
+                : distortion == "none" ? std::span<const Key>(kKalibrNone)
+                                       : kKalibrFourCoefficients});
     if (number > 0) table = Joined({table, kKalibrNextCamera});
     checker->Check(name, entry.second, table);
     ++number;
@@ -247,12 +254,12 @@ void CheckVinsFusion(const std::vector<TextFile>& files, Checker* checker) {
                   "there is not one file for each camera");
   for (std::size_t j = 1; j < files.size(); ++j) {
     const YAML::Node camera = Yaml(files[j]);
-    const bool pinhole = Text(camera, "model_type") == "PINHOLE";
-    checker->Check(files[j].name,
-                   camera,
-                   Joined({kVinsFusionCamera,
-                           pinhole ? std::span<const Key>(kVinsFusionPinhole)
-                                   : kVinsFusionFisheye}));
+    const std::string type = Text(camera, "model_type");
+    Table rest = type == "MEI"              ? Joined({kVinsFusionMei})
+                 : type == "KANNALA_BRANDT" ? Joined({kVinsFusionFisheye})
+                                            : Joined({kVinsFusionPinhole});
+    if (type == "PINHOLE_FULL") rest = Joined({rest, kVinsFusionFull});
+    checker->Check(files[j].name, camera, Joined({kVinsFusionCamera, rest}));
   }
 }
 
@@ -267,9 +274,13 @@ void CheckBasalt(const std::vector<TextFile>& files, Checker* checker) {
     const std::string type = Text(camera, "camera_type");
     // GenericCamera's alternatives are eucm, ds, kb4, ucm, pinhole and
     // pinhole-radtan8.
-    checker->Expect(type == "kb4" || type == "pinhole-radtan8",
+    const bool four = type == "kb4" || type == "pinhole-radtan8";
+    checker->Expect(four || type == "eucm" || type == "ds",
                     "camera_type " + type + " is none of Basalt's");
-    Table table = Joined({kBasaltCamera});
+    Table table = Joined({kBasaltCamera,
+                          four           ? std::span<const Key>(kBasaltKb4)
+                          : type == "ds" ? std::span<const Key>(kBasaltDs)
+                                         : kBasaltEucm});
     if (type == "pinhole-radtan8") table = Joined({table, kBasaltRadTan8});
     checker->Check("intrinsics", camera, table);
   }
@@ -303,6 +314,9 @@ void CheckMaplab(const std::vector<TextFile>& files, Checker* checker) {
       checker->Check("cameras",
                      camera,
                      Joined({kMaplabCamera,
+                             Text(camera["camera"], "type") == "pinhole"
+                                 ? std::span<const Key>(kMaplabPinhole)
+                                 : kMaplabUnified,
                              fisheye ? std::span<const Key>(kMaplabFisheye)
                                      : kMaplabFourCoefficients}));
     }

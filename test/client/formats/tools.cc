@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -17,9 +18,21 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Projection = std::function<Vector2d(const Vector3d& p_C)>;
 
-Projection Pinhole(const std::string& model,
-                   const std::vector<double>& f_c,
-                   const std::vector<double>& k) {
+// The rational model of OpenCV; coefficients that are left out are zero.
+Vector2d RadTan(double x, double y, std::vector<double> k) {
+  k.resize(8, 0);
+  const double r = std::hypot(x, y);
+  const double radial =
+      (1 + k[0] * r * r + k[1] * std::pow(r, 4) + k[4] * std::pow(r, 6)) /
+      (1 + k[5] * r * r + k[6] * std::pow(r, 4) + k[7] * std::pow(r, 6));
+  return {x * radial + 2 * k[2] * x * y + k[3] * (r * r + 2 * x * x),
+          y * radial + k[2] * (r * r + 2 * y * y) + 2 * k[3] * x * y};
+}
+
+// f_c follows the coefficients that stand before it.
+Projection Camera(const std::string& model,
+                  const std::vector<double>& f_c,
+                  const std::vector<double>& k) {
   return [=](const Vector3d& p) -> Vector2d {
     const double x = p.x() / p.z();
     const double y = p.y() / p.z();
@@ -27,10 +40,31 @@ Projection Pinhole(const std::string& model,
     double dx = x;
     double dy = y;
     if (model == "radtan") {
-      const double radial = 1 + k[0] * r * r + k[1] * std::pow(r, 4);
-      dx = x * radial + 2 * k[2] * x * y + k[3] * (r * r + 2 * x * x);
-      dy = y * radial + k[2] * (r * r + 2 * y * y) + 2 * k[3] * x * y;
-    } else if (model == "equidistant") {
+      const Vector2d d = RadTan(x, y, k);
+      dx = d.x();
+      dy = d.y();
+    } else if (model == "omni") {
+      const double z = p.z() + k[0] * p.norm();
+      const Vector2d d = RadTan(p.x() / z, p.y() / z, {k.begin() + 1, k.end()});
+      dx = d.x();
+      dy = d.y();
+    } else if (model == "eucm") {
+      const double D =
+          std::sqrt(k[1] * p.head<2>().squaredNorm() + p.z() * p.z());
+      dx = p.x() / (k[0] * D + (1 - k[0]) * p.z());
+      dy = p.y() / (k[0] * D + (1 - k[0]) * p.z());
+    } else if (model == "ds") {
+      const double z = p.z() + k[0] * p.norm();
+      const double D = std::hypot(std::hypot(p.x(), p.y()), z);
+      dx = p.x() / (k[1] * D + (1 - k[1]) * z);
+      dy = p.y() / (k[1] * D + (1 - k[1]) * z);
+    } else if (model == "kb") {  // at any angle
+      const double t = std::atan2(p.head<2>().norm(), p.z());
+      const double d = t + k[0] * std::pow(t, 3) + k[1] * std::pow(t, 5) +
+                       k[2] * std::pow(t, 7) + k[3] * std::pow(t, 9);
+      dx = p.x() * d / p.head<2>().norm();
+      dy = p.y() * d / p.head<2>().norm();
+    } else if (model == "equidistant") {  // of a pinhole
       const double t = std::atan(r);
       const double d = t + k[0] * std::pow(t, 3) + k[1] * std::pow(t, 5) +
                        k[2] * std::pow(t, 7) + k[3] * std::pow(t, 9);
@@ -84,6 +118,21 @@ std::string Name(const std::string& prefix, int j) {
   return prefix + std::to_string(j);
 }
 
+// aslam's projections; coefficients of omni, eucm and ds precede f and c.
+Projection KalibrCamera(const YAML::Node& cam) {
+  const auto model = cam["camera_model"].as<std::string>();
+  const auto distortion = cam["distortion_model"].as<std::string>();
+  std::vector<double> pixels = List(cam["intrinsics"]);
+  std::vector<double> k(pixels.begin(), pixels.end() - 4);
+  pixels.erase(pixels.begin(), pixels.end() - 4);
+  for (const double value : List(cam["distortion_coeffs"])) k.push_back(value);
+  if (model == "pinhole" && distortion == "none") {
+    return Camera("radtan", pixels, k);
+  }
+  if (model == "omni") k.resize(5, 0);  // those of "none" are zero
+  return Camera(model == "pinhole" ? distortion : model, pixels, k);
+}
+
 // Kalibr's wiki, "Yaml formats", and the residuals of its scale-misalignment
 // model of the IMU.
 Tool Kalibr(const std::vector<TextFile>& files) {
@@ -116,11 +165,8 @@ Tool Kalibr(const std::vector<TextFile>& files) {
     if (cam["T_cam_imu"] && !Mat<4>(cam["T_cam_imu"]).isApprox(T_CB, 1e-9)) {
       throw std::runtime_error("the chain contradicts itself");
     }
-    tool.cameras.push_back(At(T_CB,
-                              Pinhole(cam["distortion_model"].as<std::string>(),
-                                      List(cam["intrinsics"]),
-                                      List(cam["distortion_coeffs"])),
-                              cam["timeshift_cam_imu"].as<double>()));
+    tool.cameras.push_back(
+        At(T_CB, KalibrCamera(cam), cam["timeshift_cam_imu"].as<double>()));
   }
   return tool;
 }
@@ -159,9 +205,9 @@ Tool OpenVins(const std::vector<TextFile>& files) {
                               : Mat<4>(cam["T_cam_imu"]);
     const auto model = cam["distortion_model"].as<std::string>();
     tool.cameras.push_back(At(T_CB,
-                              Pinhole(model == "equidistant" ? model : "radtan",
-                                      List(cam["intrinsics"]),
-                                      List(cam["distortion_coeffs"])),
+                              Camera(model == "equidistant" ? model : "radtan",
+                                     List(cam["intrinsics"]),
+                                     List(cam["distortion_coeffs"])),
                               offset));
   }
   return tool;
@@ -190,21 +236,23 @@ Tool OrbSlam3(const std::vector<TextFile>& files) {
     };
     if (!root[Name("Camera", j) + ".fx"]) break;
     if (j == 2) T_BC = T_BC * Mat<4>(root["Stereo.T_c1_c2"]["data"]);
-    const std::vector<double> k =
+    std::vector<double> k =
         pinhole
             ? std::vector{value("k1"), value("k2"), value("p1"), value("p2")}
             : std::vector{value("k1"), value("k2"), value("k3"), value("k4")};
+    if (pinhole && root[Name("Camera", j) + ".k3"]) k.push_back(value("k3"));
     tool.cameras.push_back(
         At(T_BC.inverse(),
-           Pinhole(pinhole ? "radtan" : "equidistant",
-                   {value("fx"), value("fy"), value("cx"), value("cy")},
-                   k),
+           Camera(pinhole ? "radtan" : "kb",
+                  {value("fx"), value("fy"), value("cx"), value("cy")},
+                  k),
            0));
   }
   return tool;
 }
 
-// Its configurations, integration_base.h and camodocal's EquidistantCamera. A
+// Its configurations, integration_base.h and camodocal's EquidistantCamera,
+// PinholeFullCamera and CataCamera. A
 // reading has the standard deviation acc_n; in a step dt a bias moves by acc_w
 // dt.
 Tool VinsFusion(const std::vector<TextFile>& files, double rate_hz) {
@@ -224,22 +272,39 @@ Tool VinsFusion(const std::vector<TextFile>& files, double rate_hz) {
       if (file.name == name) cam = Yaml(file.text);
     }
     const YAML::Node p = cam["projection_parameters"];
-    const auto four = [](const YAML::Node& node, const char* names) {
-      std::vector<double> values;
-      for (int i = 0; i < 4; ++i) {
-        values.push_back(node[std::string(names + 2 * i, 2)].as<double>());
-      }
-      return values;
+    const YAML::Node d = cam["distortion_parameters"];
+    const auto values = [](const YAML::Node& node,
+                           std::initializer_list<const char*> names) {
+      std::vector<double> list;
+      for (const char* key : names) list.push_back(node[key].as<double>());
+      return list;
     };
-    const bool pinhole = cam["model_type"].as<std::string>() == "PINHOLE";
-    tool.cameras.push_back(At(
-        Mat<4>(root[Name("body_T_cam", j)]["data"]).inverse(),
-        pinhole
-            ? Pinhole("radtan",
-                      four(p, "fxfycxcy"),
-                      four(cam["distortion_parameters"], "k1k2p1p2"))
-            : Pinhole("equidistant", four(p, "mumvu0v0"), four(p, "k2k3k4k5")),
-        root["td"].as<double>()));
+    const auto type = cam["model_type"].as<std::string>();
+    Projection project =
+        Camera("kb",
+               type == "KANNALA_BRANDT" ? values(p, {"mu", "mv", "u0", "v0"})
+                                        : std::vector<double>(),
+               type == "KANNALA_BRANDT" ? values(p, {"k2", "k3", "k4", "k5"})
+                                        : std::vector<double>());
+    if (type == "PINHOLE" || type == "PINHOLE_FULL") {
+      std::vector<double> k = values(d, {"k1", "k2", "p1", "p2"});
+      if (type == "PINHOLE_FULL") {
+        for (const double rest : values(d, {"k3", "k4", "k5", "k6"})) {
+          k.push_back(rest);
+        }
+      }
+      project = Camera("radtan", values(p, {"fx", "fy", "cx", "cy"}), k);
+    } else if (type == "MEI") {
+      std::vector<double> k = values(cam["mirror_parameters"], {"xi"});
+      for (const double rest : values(d, {"k1", "k2", "p1", "p2"})) {
+        k.push_back(rest);
+      }
+      project = Camera("omni", values(p, {"gamma1", "gamma2", "u0", "v0"}), k);
+    }
+    tool.cameras.push_back(
+        At(Mat<4>(root[Name("body_T_cam", j)]["data"]).inverse(),
+           project,
+           root["td"].as<double>()));
   }
   return tool;
 }
@@ -274,18 +339,28 @@ Tool Basalt(const std::vector<TextFile>& files) {
     std::string model = "radtan";
     std::vector<double> k = {0, 0, 0, 0};
     if (type == "kb4") {
-      model = "equidistant";
+      model = "kb";
       k = {p["k1"], p["k2"], p["k3"], p["k4"]};
+    } else if (type == "eucm") {
+      model = type;
+      k = {p["alpha"], p["beta"]};
+    } else if (type == "ds") {
+      model = type;
+      k = {p["xi"], p["alpha"]};
     } else if (type == "pinhole-radtan8") {
-      // The rational model with a denominator of 1 and no third coefficient.
-      for (const char* zero : {"k3", "k4", "k5", "k6", "rpmax"}) {
-        if (p[zero] != 0) throw std::runtime_error("is not radtan");
-      }
-      k = {p["k1"], p["k2"], p["p1"], p["p2"]};
+      if (p["rpmax"] != 0) throw std::runtime_error("has a limit");
+      k = {p["k1"],
+           p["k2"],
+           p["p1"],
+           p["p2"],
+           p["k3"],
+           p["k4"],
+           p["k5"],
+           p["k6"]};
     }
     tool.cameras.push_back(
         At(T_BC.inverse().matrix(),
-           Pinhole(model, {p["fx"], p["fy"], p["cx"], p["cy"]}, k),
+           Camera(model, {p["fx"], p["fy"], p["cx"], p["cy"]}, k),
            1e-9 * root["cam_time_offset_ns"].get<double>()));
   }
   return tool;
@@ -315,12 +390,17 @@ Tool Maplab(const std::vector<TextFile>& files) {
       auto model = cam["distortion"]["type"].as<std::string>();
       if (model == "fisheye") model = "fov";
       if (model == "radial-tangential") model = "radtan";
-      tool.cameras.push_back(
-          At(Mat<4>(entry["T_B_C"]["data"]).inverse(),
-             Pinhole(model,
-                     List(cam["intrinsics"]["data"]),
-                     List(cam["distortion"]["parameters"]["data"])),
-             0));
+      std::vector<double> k = List(cam["distortion"]["parameters"]["data"]);
+      std::vector<double> pixels = List(cam["intrinsics"]["data"]);
+      if (cam["type"].as<std::string>() == "unified-projection") {
+        if (model != "radtan") throw std::runtime_error("is not tested");
+        model = "omni";
+        k.insert(k.begin(), pixels.front());
+        pixels.erase(pixels.begin());
+      }
+      tool.cameras.push_back(At(Mat<4>(entry["T_B_C"]["data"]).inverse(),
+                                Camera(model, pixels, k),
+                                0));
     }
   }
   return tool;

@@ -245,11 +245,23 @@ class McapTest(DemoDevice):
                 "plumb_bob",
                 [1, 2, 3, 4, 0],
             ),
+            v1.DISTORTION_MODEL_RADIAL_TANGENTIAL_5: (
+                "plumb_bob",
+                [1, 2, 3, 4, 5],
+            ),
+            v1.DISTORTION_MODEL_RADIAL_TANGENTIAL_8: (
+                "rational_polynomial",
+                [1, 2, 3, 4, 5, 6, 7, 8],
+            ),
             v1.DISTORTION_MODEL_EQUIDISTANT: ("kannala_brandt", [1, 2, 3, 4]),
         }
         for model, (name, coefficients) in known.items():
             calibration.cameras[0].distortion_model = model
-            calibration.cameras[0].distortion[:] = [1, 2, 3, 4]
+            calibration.cameras[0].distortion[:] = (
+                [1, 2, 3, 4]
+                if model == v1.DISTORTION_MODEL_RADIAL_TANGENTIAL
+                else coefficients
+            )
             file = io.BytesIO()
             self.assertEqual(
                 mcap.write(file, self.segments[:1], calibration), []

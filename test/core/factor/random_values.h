@@ -55,7 +55,7 @@ class RandomValues {
     CameraCalibration camera;
     camera.q_CI = Rotation();
     camera.p_CI = Normal3(0.1);
-    camera.f = {Uniform(200, 500), Uniform(200, 500)};
+    const Eigen::Vector2d px_per_rad(Uniform(200, 500), Uniform(200, 500));
     camera.c = {Uniform(300, 340), Uniform(220, 260)};
     camera.width_px = 640;
     camera.height_px = 480;
@@ -76,9 +76,11 @@ class RandomValues {
         camera.distortion = Undistorted(model);
         for (int i = 0; i < camera.distortion.size(); ++i) {
           const Interval usual = ModelInfo(model).coefficients[i].usual;
-          camera.distortion[i] = Uniform(usual.low, usual.high);
+          camera.distortion[i] = (usual.low + usual.high) / 2 +
+                                 Uniform(-0.1, 0.1) * (usual.high - usual.low);
         }
     }
+    camera.f = px_per_rad.cwiseQuotient(PixelsPerRadian(camera));
     return camera;
   }
 

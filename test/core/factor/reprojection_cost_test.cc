@@ -174,7 +174,7 @@ TEST(ReprojectionCost, APointBehindTheCameraIsZeroWithItsJacobians) {
     View view = RandomView(random);
     view.motion.reset();
     const CameraCalibration camera = view.Theta().cameras[view.camera];
-    const Vector3d p_C(random.Normal(), random.Normal(), -1);
+    const Vector3d p_C = -Vector3d::UnitZ();  // which no model sees
     const Vector3d p_G =
         view.q_GI * (camera.q_CI.conjugate() * (p_C - camera.p_CI)) + view.p_GI;
     const auto cost = MakeReprojectionCost(view.reference,

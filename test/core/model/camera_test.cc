@@ -2,15 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <string>
+#include <string_view>
+#include <unsupported/Eigen/AutoDiff>
 #include <vector>
 
 #include "core/model/camera_model.h"
 #include "test/core/model/random_values.h"
 #include "test/core/model/rounding.h"
+#include "test/core/model/textbook_cameras.h"
 #include "test/core/numeric_jacobian.h"
 
 namespace selfcal {
@@ -18,22 +22,39 @@ namespace {
 
 constexpr int kTrials = 3000;
 
-bool IsValid(const CameraCalibration& camera, const Eigen::Vector2d& u) {
-  Eigen::Vector2d z_px;
-  return Project(camera, u.homogeneous(), &z_px, nullptr);
+// Returns true for a pinhole with a distortion, which sees no ray at 90 degrees
+// or beyond.
+bool IsPinhole(DistortionModel model) {
+  const std::string_view name = DistortionName(model);
+  return name == "fov" || name.starts_with("radial-tangential");
 }
 
-// Radius in the normalised plane at which the valid region ends in a
-// direction, or `max_radius` if it reaches that far.
-double BorderRadius(const CameraCalibration& camera,
-                    const Eigen::Vector2d& direction,
-                    double max_radius) {
-  if (IsValid(camera, max_radius * direction)) return max_radius;
+// The largest angle to which the tests go: 71 degrees for a pinhole, whose
+// coordinates u go to infinity, and 178 for others.
+double MaxAngle(DistortionModel model) {
+  return IsPinhole(model) ? std::atan(3.0) : 3.1;
+}
+
+Eigen::Vector3d RayAt(double theta, const Eigen::Vector2d& direction) {
+  return (Eigen::Vector3d() << std::sin(theta) * direction, std::cos(theta))
+      .finished();
+}
+
+bool IsValid(const CameraCalibration& camera, const Eigen::Vector3d& ray_C) {
+  Eigen::Vector2d z_px;
+  return Project(camera, ray_C, &z_px, nullptr);
+}
+
+// Angle from the axis at which the valid region ends in a direction, or
+// MaxAngle if it reaches that far.
+double BorderAngle(const CameraCalibration& camera,
+                   const Eigen::Vector2d& direction) {
   double inside = 0;
-  double outside = max_radius;
+  double outside = MaxAngle(camera.model);
+  if (IsValid(camera, RayAt(outside, direction))) return outside;
   for (int i = 0; i < 60; ++i) {
     const double middle = (inside + outside) / 2;
-    (IsValid(camera, middle * direction) ? inside : outside) = middle;
+    (IsValid(camera, RayAt(middle, direction)) ? inside : outside) = middle;
   }
   return inside;
 }
@@ -43,17 +64,17 @@ Eigen::Vector2d RandomDirection2(RandomValues* random) {
   return Eigen::Vector2d(std::cos(angle), std::sin(angle));
 }
 
-// A random point of the normalised plane up to `part` of the way to the border,
-// which is at most 3 (71 degrees) away; every fourth near the axis.
-Eigen::Vector2d RandomNormalised(const CameraCalibration& camera,
-                                 double part,
-                                 RandomValues* random) {
+// A random ray up to `part` of the way to the border; every fourth near the
+// axis.
+Eigen::Vector3d RandomRay(const CameraCalibration& camera,
+                          double part,
+                          RandomValues* random) {
   const Eigen::Vector2d direction = RandomDirection2(random);
   if (random->Uniform(0, 1) < 0.25) {
-    return std::abs(random->SignedMagnitude(1e-12, 1e-2)) * direction;
+    return RayAt(std::abs(random->SignedMagnitude(1e-12, 1e-2)), direction);
   }
-  const double border = BorderRadius(camera, direction, 3);
-  return random->Uniform(0, part) * border * direction;
+  const double border = BorderAngle(camera, direction);
+  return RayAt(random->Uniform(0, part) * border, direction);
 }
 
 CameraCalibration Moved(const CameraCalibration& camera,
@@ -79,8 +100,8 @@ void ExpectJacobiansHold(const CameraCalibration& camera,
   Eigen::Vector2d z_px;
   ProjectionJacobians jacobians;
   ASSERT_TRUE(Project(camera, p_C, &z_px, &jacobians));
-  // Steps relative to the depth, as the pixel does not depend on the scale.
-  const double depth = p_C.z();
+  // Steps relative to the distance, as the pixel does not depend on the scale.
+  const double depth = 0.3 * p_C.norm();
   const auto by_point = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
     Eigen::Vector2d z;
     EXPECT_TRUE(Project(camera, p_C + depth * d, &z, nullptr));
@@ -132,8 +153,7 @@ TEST_P(CameraTest, PixelDoesNotDependOnTheScaleOfThePoint) {
   RandomValues random(2);
   for (int i = 0; i < kTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
-    const Eigen::Vector3d p_C =
-        RandomNormalised(camera, 0.95, &random).homogeneous();
+    const Eigen::Vector3d p_C = RandomRay(camera, 0.95, &random);
     const double scale = std::abs(random.SignedMagnitude(1e-9, 1e9));
     Eigen::Vector2d z_px;
     Eigen::Vector2d scaled_z_px;
@@ -146,14 +166,70 @@ TEST_P(CameraTest, PixelDoesNotDependOnTheScaleOfThePoint) {
   }
 }
 
-TEST_P(CameraTest, JacobiansAreTheDerivatives) {
+TEST_P(CameraTest, JacobiansAreTheDerivativesAroundTheAxis) {
   RandomValues random(3);
   for (int i = 0; i < kTrials; ++i) {
     const CameraCalibration camera =
         InNormalisedPlane(random.Camera(GetParam()));
-    const Eigen::Vector2d u = RandomNormalised(camera, 0.95, &random);
-    const double depth = std::abs(random.SignedMagnitude(1e-3, 1e3));
-    ExpectJacobiansHold(camera, depth * u.homogeneous(), 1e-4, 1e-10);
+    const double theta = i % 2 == 0
+                             ? std::abs(random.SignedMagnitude(1e-12, 1e-2))
+                             : random.Uniform(0, 0.5);
+    const double distance = std::abs(random.SignedMagnitude(1e-3, 1e3));
+    ExpectJacobiansHold(camera,
+                        distance * RayAt(theta, RandomDirection2(&random)),
+                        1e-4,
+                        1e-10);
+  }
+}
+
+// Derivatives by the point and by the coefficients.
+using Derivatives = Eigen::Matrix<double, 3 + kMaxDistortion, 1>;
+using Dual = Eigen::AutoDiffScalar<Derivatives>;
+
+TEST_P(CameraTest, IsTheTextbookFormulaWithItsAutomaticDerivatives) {
+  RandomValues random(17);
+  int with_border = 0;
+  for (int i = 0; i < 2 * kTrials; ++i) {
+    const CameraCalibration camera =
+        InNormalisedPlane(random.Camera(GetParam()));
+    const Eigen::Vector2d direction = RandomDirection2(&random);
+    const double border = BorderAngle(camera, direction);
+    if (border < MaxAngle(GetParam())) ++with_border;
+    const double gap = i % 2 == 0
+                           ? random.Uniform(1e-9, 0.999)
+                           : std::abs(random.SignedMagnitude(1e-9, 1e-1));
+    const double theta = border * (1 - gap);
+    const Eigen::Vector3d p_C =
+        random.Uniform(0.1, 10) * RayAt(theta, direction);
+    Eigen::Matrix<Dual, Eigen::Dynamic, 1, 0, kMaxDistortion, 1> k(
+        camera.distortion.size());
+    for (int j = 0; j < k.size(); ++j) {
+      k[j] = Dual(camera.distortion[j], Derivatives::Unit(3 + j));
+    }
+    Eigen::Matrix<Dual, 3, 1> p;
+    for (int j = 0; j < 3; ++j) p[j] = Dual(p_C[j], Derivatives::Unit(j));
+    const Image<Dual> expected =
+        TextbookImage<Dual>(GetParam(), k, p[0], p[1], p[2]);
+    Eigen::Vector2d d;
+    ProjectionJacobians J;
+    ASSERT_TRUE(Project(camera, p_C, &d, &J));
+    // What rounding the point may change.
+    const double by_ray = J.point.norm() * p_C.norm();
+    for (int row = 0; row < 2; ++row) {
+      EXPECT_NEAR(d[row], expected[row].value(), 1e-14 * (1 + by_ray));
+      const Derivatives& by = expected[row].derivatives();
+      EXPECT_LT((J.point.row(row).transpose() - by.head<3>()).norm(),
+                1e-11 * by.head<3>().norm() * (1 + by_ray))
+          << theta << " with " << camera.distortion.transpose();
+      const auto by_k = by.segment(3, k.size());
+      EXPECT_LT(
+          (J.intrinsics.row(row).tail(k.size()).transpose() - by_k).norm(),
+          1e-11 * (0.1 + by_k.norm()) * (1 + by_ray))
+          << theta << " with " << camera.distortion.transpose();
+    }
+  }
+  if (GetParam() != DistortionModel::kFov) {
+    EXPECT_GT(with_border, 100);
   }
 }
 
@@ -161,26 +237,18 @@ TEST_P(CameraTest, JacobiansInPixelsAreThoseOfThePlaneTimesTheFocalLength) {
   RandomValues random(4);
   for (int i = 0; i < kTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
-    const Eigen::Vector2d u = RandomNormalised(camera, 0.95, &random);
-    ExpectJacobiansHold(camera, u.homogeneous(), 1e-4, 1e-9);
-  }
-}
-
-TEST_P(CameraTest, JacobiansHoldUpToTheBorderOfTheRegion) {
-  RandomValues random(5);
-  int with_border = 0;
-  for (int i = 0; i < kTrials; ++i) {
-    const CameraCalibration camera =
-        InNormalisedPlane(random.Camera(GetParam()));
-    const Eigen::Vector2d direction = RandomDirection2(&random);
-    const double border = BorderRadius(camera, direction, 3);
-    if (border < 3) ++with_border;
-    const Eigen::Vector2d u = border * (1 - 1e-2) * direction;
-    ExpectJacobiansHold(camera, u.homogeneous(), 1e-5, 1e-9);
-  }
-  if (GetParam() == DistortionModel::kRadialTangential ||
-      GetParam() == DistortionModel::kEquidistant) {
-    EXPECT_GT(with_border, 100);
+    const Eigen::Vector3d ray_C = RandomRay(camera, 1 - 1e-9, &random);
+    Eigen::Vector2d z_px, d;
+    ProjectionJacobians J, plane;
+    ASSERT_TRUE(Project(camera, ray_C, &z_px, &J));
+    ASSERT_TRUE(Project(InNormalisedPlane(camera), ray_C, &d, &plane));
+    ExpectSameFormula(z_px, (d.cwiseProduct(camera.f) + camera.c).eval());
+    const Eigen::MatrixXd point = camera.f.asDiagonal() * plane.point;
+    EXPECT_LE((J.point - point).norm(), 1e-15 * point.norm());
+    Eigen::MatrixXd intrinsics = camera.f.asDiagonal() * plane.intrinsics;
+    intrinsics.leftCols<2>() = d.asDiagonal();
+    intrinsics.middleCols<2>(2).setIdentity();
+    EXPECT_LE((J.intrinsics - intrinsics).norm(), 1e-15 * intrinsics.norm());
   }
 }
 
@@ -203,8 +271,7 @@ TEST_P(CameraTest, UnprojectInvertsProject) {
   RandomValues random(7);
   for (int i = 0; i < kTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
-    const Eigen::Vector3d p_C =
-        RandomNormalised(camera, 0.95, &random).homogeneous();
+    const Eigen::Vector3d p_C = RandomRay(camera, 0.95, &random);
     Eigen::Vector2d z_px;
     Eigen::Vector3d bearing_C;
     ASSERT_TRUE(Project(camera, 7 * p_C, &z_px, nullptr));
@@ -217,23 +284,29 @@ TEST_P(CameraTest, UnprojectInvertsProject) {
 
 TEST_P(CameraTest, ProjectInvertsUnprojectUpToTheBorder) {
   RandomValues random(8);
+  int checked = 0;
   for (int i = 0; i < kTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     const Eigen::Vector2d direction = RandomDirection2(&random);
-    const double border = BorderRadius(camera, direction, 3);
+    const double border = BorderAngle(camera, direction);
     const double gap = std::abs(random.SignedMagnitude(1e-7, 1e-1));
     Eigen::Vector2d z_px;
     Eigen::Vector2d again_px;
     Eigen::Vector3d bearing_C;
-    ASSERT_TRUE(Project(camera,
-                        (border * (1 - gap) * direction).homogeneous(),
-                        &z_px,
-                        nullptr));
+    ProjectionJacobians jacobians;
+    ASSERT_TRUE(Project(
+        camera, RayAt(border * (1 - gap), direction), &z_px, &jacobians));
+    // Where coordinates go to infinity, those of an image have ended before.
+    if (!((z_px - camera.c).cwiseQuotient(camera.f).norm() < 100)) continue;
+    ++checked;
     ASSERT_TRUE(Unproject(camera, z_px, &bearing_C))
         << gap << " with " << camera.distortion.transpose();
     ASSERT_TRUE(Project(camera, bearing_C, &again_px, nullptr));
-    EXPECT_LT((z_px - again_px).norm(), 1e-9);
+    // What rounding the ray may change, where coordinates go to infinity.
+    EXPECT_LT((z_px - again_px).norm(), 1e-9 + 5e-15 * jacobians.point.norm())
+        << gap << " with " << camera.distortion.transpose();
   }
+  EXPECT_GT(checked, kTrials * 2 / 3);
 }
 
 TEST_P(CameraTest, UnprojectOfAnyPixelIsInvertedOrRefused) {
@@ -279,16 +352,9 @@ TEST(Unproject, RefusesPixelsOfRaysThatProjectRefuses) {
   EXPECT_GT(refused, kTrials / 10);
 }
 
-// Returns true for a pinhole with a distortion, which sees no ray at 90 degrees
-// or beyond.
-bool IsPinhole(DistortionModel model) {
-  return model == DistortionModel::kFov ||
-         model == DistortionModel::kRadialTangential ||
-         model == DistortionModel::kEquidistant;
-}
-
 TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefusedOrInverted) {
   RandomValues random(10);
+  int seen = 0;
   for (int i = 0; i < kTrials; ++i) {
     const CameraCalibration camera = random.Camera(GetParam());
     Eigen::Vector3d p_C = random.Vector(3, 1);
@@ -298,7 +364,7 @@ TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefusedOrInverted) {
     const Eigen::Vector2d before(1, 2);
     Eigen::Vector2d z_px = before;
     if (Project(camera, p_C, &z_px, nullptr)) {
-      EXPECT_FALSE(IsPinhole(GetParam()));
+      ++seen;
       Eigen::Vector3d bearing_C;
       ASSERT_TRUE(Unproject(camera, z_px, &bearing_C)) << p_C.transpose();
       EXPECT_LT((bearing_C - p_C.normalized()).norm(), 1e-6)
@@ -306,6 +372,23 @@ TEST_P(CameraTest, PointsBehindOrAtTheCameraPlaneAreRefusedOrInverted) {
     } else {
       EXPECT_EQ(z_px, before);
     }
+  }
+  if (IsPinhole(GetParam())) {
+    EXPECT_EQ(seen, 0);
+  } else {
+    EXPECT_GT(seen, kTrials / 10);
+  }
+}
+
+TEST_P(CameraTest, BackwardAxisIsRefused) {
+  RandomValues random(16);
+  for (int i = 0; i < kTrials; ++i) {
+    Eigen::Vector2d z_px;
+    EXPECT_FALSE(Project(
+        random.Camera(GetParam()),
+        -std::abs(random.SignedMagnitude(1e-9, 1e9)) * Eigen::Vector3d::UnitZ(),
+        &z_px,
+        nullptr));
   }
 }
 
@@ -335,7 +418,9 @@ TEST_P(CameraTest, ExtremePointsNeverGiveWhatIsNotFinite) {
         const CameraCalibration camera = random.Camera(GetParam());
         Eigen::Vector2d z_px;
         ProjectionJacobians jacobians;
-        const Eigen::Vector3d p_C(random.Uniform(-1, 1) < 0 ? -x : x, y, z);
+        const Eigen::Vector3d p_C(random.Uniform(-1, 1) < 0 ? -x : x,
+                                  y,
+                                  random.Uniform(-1, 1) < 0 ? -z : z);
         if (!Project(camera, p_C, &z_px, &jacobians)) continue;
         EXPECT_TRUE(z_px.allFinite()) << p_C.transpose();
         EXPECT_TRUE(jacobians.point.allFinite()) << p_C.transpose();
@@ -384,6 +469,35 @@ TEST_P(CameraTest, ExtremePixelsNeverGiveWhatIsNotFinite) {
       } else {
         EXPECT_EQ(bearing_C, before);
       }
+    }
+  }
+}
+
+TEST_P(CameraTest, ExtendsTheModelsWithWhoseCoefficientsItsOwnBegin) {
+  RandomValues random(18);
+  const auto all = ModelInfo(GetParam()).coefficients;
+  for (const DistortionModel other : DistortionModels()) {
+    const auto first = ModelInfo(other).coefficients;
+    if (first.size() >= all.size() ||
+        !std::equal(
+            first.begin(),
+            first.end(),
+            all.begin(),
+            [](const auto& a, const auto& b) { return a.name == b.name; })) {
+      continue;
+    }
+    for (int i = 0; i < kTrials; ++i) {
+      const CameraCalibration camera = random.Camera(other);
+      CameraCalibration extended = camera;
+      extended.model = GetParam();
+      extended.distortion = Undistorted(GetParam());
+      extended.distortion.head(camera.distortion.size()) = camera.distortion;
+      const Eigen::Vector3d p_C = random.Direction();
+      Eigen::Vector2d z_px, extended_px;
+      const bool seen = Project(camera, p_C, &z_px, nullptr);
+      ASSERT_EQ(seen, Project(extended, p_C, &extended_px, nullptr));
+      if (!seen) continue;
+      EXPECT_LT((z_px - extended_px).norm(), 1e-14 * (1 + z_px.norm()));
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -70,6 +71,40 @@ TEST(ProfileRises, DoesNotEndWhereTheSlopeStaysJustAboveZero) {
     EXPECT_TRUE(ProfileRises(k, a));
     EXPECT_TRUE(ProfileRises(k, 100 * a));
   }
+}
+
+// Coefficients of the product of (1 - q / a) over the zeros a; the first one,
+// 1, is left out.
+template <std::size_t N>
+std::array<double, N> WithZeros(const std::array<double, N>& zeros) {
+  std::array<double, N + 1> product = {1};
+  for (const double zero : zeros) {
+    for (std::size_t i = N; i > 0; --i) product[i] -= product[i - 1] / zero;
+  }
+  std::array<double, N> c;
+  for (std::size_t i = 0; i < N; ++i) c[i] = product[i + 1];
+  return c;
+}
+
+template <std::size_t N>
+void ExpectTheFirstZeroToBeTheEnd(unsigned seed) {
+  RandomValues random(seed);
+  for (int i = 0; i < kTrials; ++i) {
+    std::array<double, N> zeros;
+    for (double& zero : zeros) zero = random.Uniform(1, 3);
+    const double first = *std::min_element(zeros.begin(), zeros.end());
+    const std::array<double, N> c = WithZeros(zeros);
+    EXPECT_TRUE(PositiveUpTo(c, first * (1 - 1e-4)));
+    EXPECT_FALSE(PositiveUpTo(c, first * (1 + 1e-4)));
+    EXPECT_FALSE(PositiveUpTo(c, 4.0));
+  }
+}
+
+TEST(PositiveUpTo, EndsAtTheFirstZeroOfAnyDegree) {
+  ExpectTheFirstZeroToBeTheEnd<2>(4);
+  ExpectTheFirstZeroToBeTheEnd<3>(5);
+  ExpectTheFirstZeroToBeTheEnd<4>(6);
+  ExpectTheFirstZeroToBeTheEnd<6>(7);
 }
 
 TEST(ProfileRises, IsFalseForWhatIsNotANumber) {

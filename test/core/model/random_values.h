@@ -53,14 +53,16 @@ class RandomValues {
     return k;
   }
 
+  // With 200 to 600 px per radian in the middle of the image.
   CameraCalibration Camera(DistortionModel model) {
     CameraCalibration camera;
     camera.q_CI = Rotation();
     camera.p_CI = Vector(3, 0.2);
-    camera.f = Eigen::Vector2d(Uniform(200, 600), Uniform(200, 600));
-    camera.c = Eigen::Vector2d(Uniform(300, 340), Uniform(220, 260));
     camera.model = model;
     camera.distortion = Distortion(model);
+    const Eigen::Vector2d px_per_rad(Uniform(200, 600), Uniform(200, 600));
+    camera.f = px_per_rad.cwiseQuotient(PixelsPerRadian(camera));
+    camera.c = Eigen::Vector2d(Uniform(300, 340), Uniform(220, 260));
     camera.width_px = 640;
     camera.height_px = 480;
     return camera;

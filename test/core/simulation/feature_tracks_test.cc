@@ -117,6 +117,36 @@ TEST(FeatureTracksTest, EachCameraSeesTheWantedNumberInEveryKeyframe) {
   for (const auto& [key, count] : seen) EXPECT_EQ(count, 80);
 }
 
+TEST(FeatureTracksTest, AFishEyeSeesWhatIsBehindItsImagePlane) {
+  const auto keyframes = Keyframes(*MakeHandheld(20, 1, 3));
+  for (const DistortionModel model : DistortionModels()) {
+    const Rig rig = LensRig(model);
+    const CameraCalibration& camera = rig.factory.cameras[0];
+    const FeatureTracks tracks = Tracks(rig, 0, keyframes, {});
+    int behind = 0;
+    for (const FeatureObservation& z : tracks.observations) {
+      const KeyframeState& x = keyframes[z.keyframe];
+      const Eigen::Vector3d p_I =
+          x.q_GI.conjugate() * (tracks.landmarks_G[z.landmark] - x.p_GI);
+      const Eigen::Vector3d p_C = camera.q_CI * p_I + camera.p_CI;
+      behind += p_C.z() < 0;
+      // The landmark is on the ray of its pixel, not on the opposite one.
+      Eigen::Vector3d bearing_C;
+      ASSERT_TRUE(Unproject(camera, z.measured_px, &bearing_C));
+      EXPECT_LT((p_C.normalized() - bearing_C).norm(), 1e-7);
+    }
+    const bool pinhole = DistortionName(model) == "fov" ||
+                         DistortionName(model).starts_with("radial-tangential");
+    const double share =
+        behind / static_cast<double>(tracks.observations.size());
+    if (pinhole) {
+      EXPECT_EQ(behind, 0);
+    } else {
+      EXPECT_GT(share, 0.1) << DistortionName(model);
+    }
+  }
+}
+
 TEST(FeatureTracksTest, TheCamerasOfARigSeeTheSameLandmarks) {
   const FeatureTracks tracks =
       Tracks(StereoRig(), 0.8, Keyframes(*MakeHandheld(20, 1, 2)), {});

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "core/model/camera_model.h"
 #include "core/model/so3.h"
 #include "core/simulation/simulate.h"
 
@@ -47,6 +48,28 @@ inline Rig RigOfCameras(int cameras) {
   right.distortion[0] = 0.88;
   rig.factory.cameras = {first, beside, left, right};
   rig.factory.cameras.resize(cameras);
+  return rig;
+}
+
+// One camera of a model, in the middle of its usual values, of 640 x 640 px. A
+// model that is not a pinhole has a fish-eye, whose image ends at about 115
+// degrees from the axis at the middle of its sides.
+inline Rig LensRig(DistortionModel model) {
+  Rig rig = HandheldRig("lens");
+  CameraCalibration& camera = rig.factory.cameras[0];
+  camera.model = model;
+  camera.distortion.resize(DistortionSize(model));
+  for (int i = 0; i < camera.distortion.size(); ++i) {
+    const Interval usual = ModelInfo(model).coefficients[i].usual;
+    camera.distortion[i] = (3 * usual.low + 2 * usual.high) / 5;
+  }
+  camera.width_px = 640;
+  camera.height_px = 640;
+  camera.c = {318, 322};
+  camera.f.setOnes();
+  Eigen::Vector2d z_px;
+  const bool beyond = Project(camera, {1, 0, -0.1}, &z_px, nullptr);
+  camera.f = (beyond ? 160 : 300) / PixelsPerRadian(camera).array();
   return rig;
 }
 

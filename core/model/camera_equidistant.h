@@ -1,25 +1,32 @@
 // The equidistant fish-eye model of Kannala and Brandt, "A generic camera model
 // and calibration method for conventional, wide-angle, and fish-eye lenses"
-// (2006), with k1 .. k4. theta is the angle between the ray and the axis:
+// (2006), with k1 .. k4. theta is the angle between the ray p_C = (X, Y, Z) and
+// the axis, r = sqrt(X^2 + Y^2):
 //
-//   theta = atan(r_u),  theta_d = theta P(theta^2),
-//   P(Q) = 1 + k1 Q + k2 Q^2 + k3 Q^3 + k4 Q^4,   d = (theta_d / r_u) u.
+//   theta = atan2(r, Z),  theta_d = theta P(theta^2),
+//   P(Q) = 1 + k1 Q + k2 Q^2 + k3 Q^3 + k4 Q^4,   d = (theta_d / r) (X, Y).
 //
-// With q = r_u^2 and g(q) = atan(sqrt(q)) / sqrt(q), so that theta^2 = q g^2,
-// the model needs no division by the radius:
+// By half the angle, theta = 2 atan(r / w) with w = Z + |p_C|, the model needs
+// no division by r, and no cases. With v = (X, Y) / w, q = |v|^2 and
+// g(q) = atan(sqrt(q)) / sqrt(q), so that theta^2 = 4 q g^2,
 //
-//   d = s u,   s = g(q) P(Q),   Q = q g(q)^2.
+//   d = s v,   s = 2 g(q) P(Q),   Q = 4 q g(q)^2.
 //
-// Derivatives, with dQ/dq = g / (1 + q):
+// Derivatives, with dQ/dq = 4 g / (1 + q) and h = 2 / (1 + q) = w / |p_C|:
 //
-//   ds/dq  = g'(q) P(Q) + g P'(Q) g / (1 + q)
-//   dd/du  = s I + 2 ds/dq u u^T
-//   dd/dk_i = g Q^i u
+//   ds/dq  = 2 g'(q) P(Q) + 8 g^2 P'(Q) / (1 + q)
+//   dd/dv  = M = s I + 2 ds/dq v v^T
+//   dd/dp  = ( [M 0] - h M v (v_x, v_y, 1) ) / w
+//   dd/dk_i = 2 g Q^i v
+//
+// Beyond 90 degrees w = r^2 / (|p_C| - Z), which has no cancellation.
 //
 // The model is one-to-one as long as theta_d increases, up to the first zero of
-// 1 + 3 k1 Q + 5 k2 Q^2 + 7 k3 Q^3 + 9 k4 Q^4. The inverse solves
-// theta_d(theta) = |d| by Newton's method inside a bracket of [0, pi/2], with
-// bisection when a step leaves the bracket; then u = tan(theta) d / |d|.
+// 1 + 3 k1 Q + 5 k2 Q^2 + 7 k3 Q^3 + 9 k4 Q^4, and to an angle of
+// 2 atan(2000), 0.001 rad short of 180 degrees, where all directions meet. The
+// inverse solves theta_d(theta) = |d| by Newton's method inside a bracket of
+// the angles, with bisection when a step leaves the bracket; the ray is
+// (sin(theta) d / |d|, cos(theta)).
 #pragma once
 
 #include <Eigen/Core>
@@ -27,17 +34,18 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 #include <span>
 #include <string_view>
 
+#include "core/model/axial_camera.h"
 #include "core/model/camera_model.h"
 #include "core/model/distortion_series.h"
 #include "core/model/monotonic.h"
+#include "core/simd/lanes.h"
 
 namespace selfcal {
 
-class DistortionEquidistant {
+class CameraEquidistant {
   static constexpr Interval kValid = {-1e3, 1e3};
 
  public:
@@ -75,54 +83,73 @@ class DistortionEquidistant {
       {.tool = "maplab", .name = "pinhole", .distortion = "equidistant"}};
   static constexpr int kSize = std::size(kCoefficients);
 
-  explicit DistortionEquidistant(std::span<const double, kSize> k)
+  explicit CameraEquidistant(std::span<const double, kSize> k)
       : k_{k[0], k[1], k[2], k[3]} {}
 
-  // Computes d = distort(u), and its derivatives with respect to u and (k1 ..
-  // k4) unless these are null. Returns false where the model is not one-to-one;
-  // the outputs are then meaningless. T is double or Lanes.
   template <typename T>
-  auto Distort(const Eigen::Matrix<T, 2, 1>& u,
-               Eigen::Matrix<T, 2, 1>* d,
-               Eigen::Matrix<T, 2, 2>* d_by_u,
-               Eigen::Matrix<T, 2, kSize>* d_by_coefficients) const {
-    const T q = u[0] * u[0] + u[1] * u[1];
+  auto Project(const PixelMap& pixels,
+               const Eigen::Matrix<T, 3, 1>& p_C,
+               Eigen::Matrix<T, 2, 1>* z_px,
+               ProjectionParts<T, kSize>* parts) const {
+    const T Z = p_C[2];
+    const T r2 = p_C[0] * p_C[0] + p_C[1] * p_C[1];
+    const T square = r2 + Z * Z;
+    const auto usable = UsableSquare(square);
+    const T length = Sqrt(Select(usable, square, T(1)));
+    T w = length + Z;
+    const auto behind = Z < T(0);
+    if (Any(behind)) w = Select(behind, r2 / (length - Z), w);
+    // The comparison is false for NaN, and for w = 0.
+    const auto seen = usable && r2 < kMaxHalfTangent * kMaxHalfTangent * w * w;
+    const T inverse = 1.0 / Select(seen, w, T(1));
+    const Eigen::Matrix<T, 2, 1> v(Select(seen, inverse * p_C[0], T(0)),
+                                   Select(seen, inverse * p_C[1], T(0)));
+    const T q = v[0] * v[0] + v[1] * v[1];
     const ValueAndDerivative<T> g = AtanRatio(q);
-    const T Q = q * g.value * g.value;
+    const T Q = 4.0 * q * g.value * g.value;
     const T P = 1.0 + Q * (k_[0] + Q * (k_[1] + Q * (k_[2] + Q * k_[3])));
-    const T s = g.value * P;
-    *d = s * u;
-    if (d_by_u != nullptr) {
+    const T s = 2.0 * g.value * P;
+    const Eigen::Matrix<T, 2, 1> d(s * v[0], s * v[1]);
+    if (parts != nullptr) {
+      const T h = 2.0 / (1.0 + q);
       const T P_by_Q =
           k_[0] + Q * (2 * k_[1] + Q * (3 * k_[2] + Q * (4 * k_[3])));
       const T twice_s_by_q =
-          2.0 * (g.derivative * P + g.value * P_by_Q * g.value / (1.0 + q));
-      const T off_diagonal = twice_s_by_q * u[0] * u[1];
-      *d_by_u << s + twice_s_by_q * u[0] * u[0], off_diagonal, off_diagonal,
-          s + twice_s_by_q * u[1] * u[1];
-    }
-    if (d_by_coefficients != nullptr) {
-      Eigen::Matrix<T, 2, 1> column = g.value * u;
-      for (int i = 0; i < kSize; ++i) {
-        column *= Q;
-        d_by_coefficients->col(i) = column;
+          4.0 * (g.derivative * P + 2.0 * g.value * g.value * P_by_Q * h);
+      const T radial = s + twice_s_by_q * q;  // M v = radial v
+      for (int i = 0; i < 2; ++i) {
+        const T by_length = h * radial * v[i];
+        for (int j = 0; j < 2; ++j) {
+          const T M = twice_s_by_q * v[i] * v[j] + (i == j ? s : T(0));
+          parts->point(i, j) = inverse * (M - by_length * v[j]);
+        }
+        parts->point(i, 2) = -inverse * by_length;
+        T column = 2.0 * g.value * v[i];
+        for (int j = 0; j < kSize; ++j) {
+          column *= Q;
+          parts->distortion(i, j) = column;
+        }
       }
     }
-    return ProfileRises(k_, Q);
+    ToPixel<T, kSize>(pixels, d, z_px, parts);
+    return seen && ProfileRises(k_, Q);
   }
 
-  // Inverse of Distort. Returns false and sets nothing where there is none.
-  bool Undistort(const Eigen::Vector2d& d, Eigen::Vector2d* u) const {
+  bool Unproject(const Eigen::Vector2d& d, Eigen::Vector3d* ray_C) const {
     const double theta_d = d.stableNorm();
     double theta;
     if (!SolveAngle(theta_d, &theta)) return false;
     // The ratio of the two radii is 1 on the axis; computed, it would be 0/0.
-    *u = theta_d > 0 ? Eigen::Vector2d(std::tan(theta) * (d / theta_d)) : d;
+    const double ratio = theta_d > 0 ? std::sin(theta) / theta_d : 1;
+    *ray_C << ratio * d, std::cos(theta);
     return true;
   }
 
  private:
-  // Finds theta in [0, pi/2] with theta_d(theta) = theta_d, where theta_d
+  // Largest tangent of half the angle.
+  static constexpr double kMaxHalfTangent = 2000;
+
+  // Finds the angle theta with theta_d(theta) = theta_d, where theta_d
   // increases.
   bool SolveAngle(double theta_d, double* theta) const {
     const std::array<double, 4>& k = k_;
@@ -131,7 +158,7 @@ class DistortionEquidistant {
     // a larger error remains where the profile ends below theta_d.
     constexpr double kAccepted = 1e-12;
     double low = 0;
-    double high = std::numbers::pi / 2;
+    double high = 2 * std::atan(kMaxHalfTangent);
     double x = std::min(theta_d, high);
     for (int i = 0; i < kMaxIterations; ++i) {
       const double Q = x * x;
