@@ -65,6 +65,7 @@ Projection Camera(const std::string& model,
       dx = p.x() * d / p.head<2>().norm();
       dy = p.y() * d / p.head<2>().norm();
     } else if (model == "equidistant") {  // of a pinhole
+      if (p.z() <= 0) return {NAN, NAN};
       const double t = std::atan(r);
       const double d = t + k[0] * std::pow(t, 3) + k[1] * std::pow(t, 5) +
                        k[2] * std::pow(t, 7) + k[3] * std::pow(t, 9);

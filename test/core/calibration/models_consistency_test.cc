@@ -29,6 +29,14 @@ INSTANTIATE_TEST_SUITE_P(Models,
                            return name;
                          });
 
+// Directions in which these short sessions add nothing to what the factory
+// states: numerator and denominator of the rational model nearly cancel, and xi
+// acts as f and the distortion do.
+int UndeterminedDirections(DistortionModel model) {
+  if (DistortionName(model) == "radial-tangential-8") return 2;
+  return DistortionName(model) == "unified" ? 1 : 0;
+}
+
 // The sum of NEES of some devices is within 99.9 % of its chi-square
 // distribution (Wilson and Hilferty), and errors are within 3 sigma as often as
 // normal ones.
@@ -52,7 +60,9 @@ TEST_P(EachModel, IsFoundWithinItsSigmas) {
     ASSERT_EQ(result.status, CalibrateStatus::kConverged)
         << "seed " << seed << ": " << result.message;
     const std::vector<int> free = FreeComponents(rig);
-    EXPECT_EQ(result.rank, static_cast<int>(free.size()));
+    EXPECT_EQ(
+        result.rank,
+        static_cast<int>(free.size()) - UndeterminedDirections(GetParam()));
     const Eigen::VectorXd error = BoxMinus(result.theta, truth)(free);
     const Eigen::MatrixXd covariance = result.covariance(free, free);
     const double of_device = error.dot(covariance.ldlt().solve(error));

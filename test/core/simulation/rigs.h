@@ -1,7 +1,11 @@
 // Rigs and truth for the tests of the simulation.
 #pragma once
 
+#include <algorithm>
+#include <map>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "core/model/camera_model.h"
 #include "core/model/so3.h"
@@ -51,25 +55,43 @@ inline Rig RigOfCameras(int cameras) {
   return rig;
 }
 
-// One camera of a model, in the middle of its usual values, of 640 x 640 px. A
-// model that is not a pinhole has a fish-eye, whose image ends at about 115
-// degrees from the axis at the middle of its sides.
+// Coefficients of a lens of each model, which is one-to-one over the whole
+// image of LensRig; in the middle of the usual values for a model that is not
+// here.
+inline DistortionVector LensOf(DistortionModel model) {
+  const std::map<std::string_view, std::vector<double>> lenses = {
+      {"fov", {0.92}},
+      {"radial-tangential", {-0.28, 0.07, 2e-4, 2e-5}},
+      {"equidistant", {0.0035, 0.0007, -0.002, 0.0002}},
+      {"radial-tangential-5", {-0.28, 0.09, 2e-4, 2e-5, -0.005}},
+      {"radial-tangential-8", {0.5, 0.1, 2e-4, 2e-5, 0.005, 0.8, 0.2, 0.01}},
+      {"unified", {1.2, -0.05, 0.01, 2e-4, 2e-5}},
+      {"extended-unified", {0.6, 1.1}},
+      {"double-sphere", {-0.18, 0.59}}};
+  DistortionVector k(DistortionSize(model));
+  for (int i = 0; i < k.size(); ++i) {
+    const Interval usual = ModelInfo(model).coefficients[i].usual;
+    k[i] = (usual.low + usual.high) / 2;
+  }
+  const auto lens = lenses.find(DistortionName(model));
+  if (lens != lenses.end()) std::copy_n(lens->second.begin(), k.size(), &k[0]);
+  return k;
+}
+
+// One camera of a model, of 640 x 640 px. A model that is not a pinhole has a
+// fish-eye, whose image shows rays beyond 90 degrees.
 inline Rig LensRig(DistortionModel model) {
   Rig rig = HandheldRig("lens");
   CameraCalibration& camera = rig.factory.cameras[0];
   camera.model = model;
-  camera.distortion.resize(DistortionSize(model));
-  for (int i = 0; i < camera.distortion.size(); ++i) {
-    const Interval usual = ModelInfo(model).coefficients[i].usual;
-    camera.distortion[i] = (3 * usual.low + 2 * usual.high) / 5;
-  }
+  camera.distortion = LensOf(model);
   camera.width_px = 640;
   camera.height_px = 640;
   camera.c = {318, 322};
   camera.f.setOnes();
   Eigen::Vector2d z_px;
   const bool beyond = Project(camera, {1, 0, -0.1}, &z_px, nullptr);
-  camera.f = (beyond ? 160 : 300) / PixelsPerRadian(camera).array();
+  camera.f = (beyond ? 180 : 400) / PixelsPerRadian(camera).array();
   return rig;
 }
 
