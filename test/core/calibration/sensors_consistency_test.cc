@@ -3,16 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <numeric>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
 #include "core/information/segment_information.h"
 #include "core/simulation/simulate.h"
+#include "test/core/calibration/simulated_errors.h"
 #include "test/core/simulation/rigs.h"
 
 namespace selfcal {
@@ -29,63 +29,6 @@ Rig LateRig(int cameras) {
     rig.factory.cameras[j].time_offset_s = kTimeOffsets_s[j];
   }
   return rig;
-}
-
-// Errors of the estimated components.
-struct Errors {
-  Eigen::VectorXd error;
-  Eigen::MatrixXd covariance;
-
-  double Nees() const { return error.dot(covariance.ldlt().solve(error)); }
-  int Within(double sigmas) const {
-    return static_cast<int>((error.cwiseAbs().array() <=
-                             sigmas * covariance.diagonal().cwiseSqrt().array())
-                                .count());
-  }
-};
-
-// `rig` has the factory calibration; `truth` is the true one.
-Errors CalibrateSimulated(const Rig& rig,
-                          const Calibration& truth,
-                          std::uint64_t seed) {
-  SimulationOptions options;
-  options.seed = seed;
-  options.landmarks_in_view = 60;
-  options.keyframes_per_segment = 30;
-  const SimulatedSession session = Simulate(
-      rig, truth, rig.factory, *MakeHandheld(12.5, 1, seed), "s", options);
-  EXPECT_EQ(session.segments.size(), 4u);
-  const CalibrationResult result =
-      Calibrate(rig, rig.factory, session.segments);
-  EXPECT_EQ(result.status, CalibrateStatus::kConverged)
-      << "seed " << seed << ": " << result.message;
-  const std::vector<int> free = FreeComponents(rig);
-  EXPECT_EQ(result.rank, static_cast<int>(free.size()));
-  return {BoxMinus(result.theta, truth)(free), result.covariance(free, free)};
-}
-
-// Of some seeds together: the sum of NEES within 99.9 % of its chi-square
-// distribution (Wilson and Hilferty), 3 sigma at least as often as of
-// normal errors.
-template <typename Run>
-void ExpectConsistent(int seeds, const Run& run) {
-  double nees = 0;
-  int components = 0, within = 0;
-  for (int seed = 1; seed <= seeds; ++seed) {
-    const Errors errors = run(static_cast<std::uint64_t>(seed));
-    const auto size = static_cast<int>(errors.error.size());
-    std::printf("seed %d: NEES %.1f of %d\n", seed, errors.Nees(), size);
-    nees += errors.Nees();
-    components += size;
-    within += errors.Within(3);
-  }
-  const double n = components;
-  const auto quantile = [&](double z) {
-    return n * std::pow(1 - 2 / (9 * n) + z * std::sqrt(2 / (9 * n)), 3);
-  };
-  EXPECT_GT(nees, quantile(-3.29));
-  EXPECT_LT(nees, quantile(3.29));
-  EXPECT_GE(within, 0.985 * components);
 }
 
 class Cameras : public testing::TestWithParam<int> {};

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "test/core/factor/random_values.h"
+#include "test/core/model/each_model.h"
 #include "test/core/model/rounding.h"
 #include "test/core/numeric_jacobian.h"
 
@@ -136,13 +137,8 @@ class ReprojectionOfEachModel : public testing::TestWithParam<DistortionModel> {
 
 INSTANTIATE_TEST_SUITE_P(Models,
                          ReprojectionOfEachModel,
-                         testing::ValuesIn(DistortionModels().begin(),
-                                           DistortionModels().end()),
-                         [](const auto& info) {
-                           std::string name(DistortionName(info.param));
-                           std::erase(name, '-');
-                           return name;
-                         });
+                         EachCameraModel(),
+                         CameraModelName);
 
 TEST_P(ReprojectionOfEachModel, ObservesALandmarkWhereItsPointProjects) {
   RandomValues random(1);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/model/camera_model.h"
+#include "test/core/model/each_model.h"
 #include "test/core/model/random_values.h"
 #include "test/core/model/rounding.h"
 #include "test/core/model/textbook_cameras.h"
@@ -128,13 +129,8 @@ class CameraTest : public testing::TestWithParam<DistortionModel> {};
 
 INSTANTIATE_TEST_SUITE_P(Models,
                          CameraTest,
-                         testing::ValuesIn(DistortionModels().begin(),
-                                           DistortionModels().end()),
-                         [](const auto& model) {
-                           std::string name(DistortionName(model.param));
-                           std::erase(name, '-');
-                           return name;
-                         });
+                         EachCameraModel(),
+                         CameraModelName);
 
 TEST_P(CameraTest, WithoutDistortionInTheModelOnTheAxisIsAPinhole) {
   RandomValues random(1);

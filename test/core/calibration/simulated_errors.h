@@ -1,0 +1,83 @@
+// Errors of calibrations on simulated sessions, and what their covariances
+// claim of them.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/simulation/simulate.h"
+#include "core/simulation/trajectory.h"
+
+namespace selfcal {
+
+// Errors of the estimated components.
+struct Errors {
+  Eigen::VectorXd error;
+  Eigen::MatrixXd covariance;
+
+  double Nees() const { return error.dot(covariance.ldlt().solve(error)); }
+  int Within(double sigmas) const {
+    return static_cast<int>((error.cwiseAbs().array() <=
+                             sigmas * covariance.diagonal().cwiseSqrt().array())
+                                .count());
+  }
+};
+
+struct SessionKind {
+  int landmarks_in_view = 60;
+  int undetermined = 0;  // directions that the session does not determine
+};
+
+// `rig` has the factory calibration; `truth` is the true one.
+inline Errors CalibrateSimulated(const Rig& rig,
+                                 const Calibration& truth,
+                                 std::uint64_t seed,
+                                 const SessionKind& kind = {}) {
+  SimulationOptions options;
+  options.seed = seed;
+  options.landmarks_in_view = kind.landmarks_in_view;
+  options.keyframes_per_segment = 30;
+  const SimulatedSession session = Simulate(
+      rig, truth, rig.factory, *MakeHandheld(12.5, 1, seed), "s", options);
+  EXPECT_EQ(session.segments.size(), 4u);
+  const CalibrationResult result =
+      Calibrate(rig, rig.factory, session.segments);
+  EXPECT_EQ(result.status, CalibrateStatus::kConverged)
+      << "seed " << seed << ": " << result.message;
+  const std::vector<int> free = FreeComponents(rig);
+  EXPECT_EQ(result.rank, static_cast<int>(free.size()) - kind.undetermined);
+  return {BoxMinus(result.theta, truth)(free), result.covariance(free, free)};
+}
+
+// Expects of some seeds together: the sum of NEES within 99.9 % of its
+// chi-square distribution (Wilson and Hilferty), 3 sigma at least as often as
+// of normal errors.
+template <typename Run>
+void ExpectConsistent(int seeds, const Run& run) {
+  double nees = 0;
+  int components = 0, within = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Errors errors = run(static_cast<std::uint64_t>(seed));
+    const auto size = static_cast<int>(errors.error.size());
+    std::printf("seed %d: NEES %.1f of %d\n", seed, errors.Nees(), size);
+    nees += errors.Nees();
+    components += size;
+    within += errors.Within(3);
+  }
+  const double n = components;
+  const auto quantile = [&](double z) {
+    return n * std::pow(1 - 2 / (9 * n) + z * std::sqrt(2 / (9 * n)), 3);
+  };
+  EXPECT_GT(nees, quantile(-3.29));
+  EXPECT_LT(nees, quantile(3.29));
+  EXPECT_GE(within, 0.985 * components);
+}
+
+}  // namespace selfcal
