@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "selfcal/v1/calibration.pb.h"
+#include "selfcal/v1/calibration_service.pb.h"
 #include "server/encode/encode.h"
 #include "server/status/status_macros.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "selfcal/v1/calibration.pb.h"
+#include "selfcal/v1/calibration_service.pb.h"
 #include "server/domain/domain.h"
 #include "test/server/store/sqlite/open_sqlite_store.h"
 #include "test/server/test_segments.h"
