@@ -14,7 +14,7 @@ CameraCalibration ReadBasaltCamera(const nlohmann::ordered_json& node,
                                    std::vector<Loss>* losses);
 void SetBasaltResolution(const nlohmann::ordered_json& size,
                          CameraCalibration* camera);
-// Of a model that Basalt has.
+// Writes a camera, whose model Basalt has.
 nlohmann::ordered_json BasaltCameraJson(const CameraCalibration& camera);
 
 }  // namespace selfcal::client

@@ -7,9 +7,8 @@
 //   accel = M_a f + b_a,   gyro = M_g C_gyro_i w + A_g C_gyro_i f + b_g,
 // with M_g lower triangular, too. The format can express everything that
 // selfcal has but for radial-tangential models of more than 4 coefficients; yet
-// Kalibr reads no matrices. Reading ignores A_g, the
-// gyroscope's sensitivity to acceleration, and the lever arms of the
-// accelerometer's axes.
+// Kalibr reads no matrices. Reading ignores A_g, the gyroscope's sensitivity to
+// acceleration, and the lever arms of the accelerometer's axes.
 #pragma once
 
 #include <vector>

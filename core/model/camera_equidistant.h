@@ -6,8 +6,8 @@
 //   theta = atan2(r, Z),  theta_d = theta P(theta^2),
 //   P(Q) = 1 + k1 Q + k2 Q^2 + k3 Q^3 + k4 Q^4,   d = (theta_d / r) (X, Y).
 //
-// By half the angle, theta = 2 atan(r / w) with w = Z + |p_C|, the model needs
-// no division by r, and no cases. With v = (X, Y) / w, q = |v|^2 and
+// Half the angle, theta = 2 atan(r / w) with w = Z + |p_C|, leaves no division
+// by r, and no cases. With v = (X, Y) / w, q = |v|^2 and
 // g(q) = atan(sqrt(q)) / sqrt(q), so that theta^2 = 4 q g^2,
 //
 //   d = s v,   s = 2 g(q) P(Q),   Q = 4 q g(q)^2.

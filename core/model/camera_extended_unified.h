@@ -10,7 +10,7 @@
 //   a = alpha beta / D,   b = alpha Z / D + 1 - alpha,
 //   dw/dalpha = D - Z,    dw/dbeta = alpha (X^2 + Y^2) / (2 D).
 //
-// With phi = atan2(sqrt(beta) r, Z), r^2 = X^2 + Y^2, the radius of d is
+// Let phi = atan2(sqrt(beta) r, Z), r^2 = X^2 + Y^2: the radius of d is
 // proportional to sin(phi) / (alpha + (1 - alpha) cos(phi)). Its slope has the
 // sign of 1 - alpha + alpha cos(phi), so that the model is one-to-one where
 //

@@ -18,7 +18,6 @@
 #include "server/domain/run_creation.h"
 #include "server/domain/run_life.h"
 #include "server/domain/run_results.h"
-#include "server/domain/session_trigger.h"
 #include "server/status/status_macros.h"
 #include "server/store/calibrations.h"
 #include "server/store/cohorts.h"
@@ -32,9 +31,9 @@
 namespace selfcal::server {
 namespace {
 
-// Rigs that a pass over the rules about time looks at, each in a transaction;
-// the others wait for the next one.
-constexpr int kRigsOfPass = 1000;
+// Rigs that one pass checks, each in a transaction: runs that are due do not
+// wait for all of them.
+constexpr int kRigsOfPass = 100;
 
 // Completes a change of the records of a rig.
 absl::Status KeepUp(UnitOfWork* tx) {
@@ -89,17 +88,14 @@ auto ChangeOwnRig(Store* store,
 using CheckRig = absl::StatusOr<std::optional<StoredRun>> (*)(
     UnitOfWork* tx, std::int64_t until_ns);
 
-// Checks the rigs whose check is due at this steady time, and appends the runs
-// that are created.
+// Checks these rigs, and appends the runs that are created.
 absl::Status CheckRigs(Store* store,
                        const Clock& clock,
+                       const std::vector<std::string>& names,
                        RigCheck check,
                        std::int64_t until_ns,
                        CheckRig look,
                        std::vector<StoredRun>* started) {
-  SELFCAL_ASSIGN_OR_RETURN(
-      const std::vector<std::string> names,
-      store->ListRigsToCheck(check, until_ns, kRigsOfPass));
   for (const std::string& name : names) {
     auto run = Change(store, name, clock(), [&](UnitOfWork* tx) {
       return look(tx, until_ns);
@@ -117,6 +113,19 @@ absl::Status CheckRigs(Store* store,
     }
   }
   return absl::OkStatus();
+}
+
+// Checks the rigs whose check is due at this steady time.
+absl::Status CheckDueRigs(Store* store,
+                          const Clock& clock,
+                          RigCheck check,
+                          std::int64_t until_ns,
+                          CheckRig look,
+                          std::vector<StoredRun>* started) {
+  SELFCAL_ASSIGN_OR_RETURN(
+      const std::vector<std::string> names,
+      store->ListRigsToCheck(check, until_ns, kRigsOfPass));
+  return CheckRigs(store, clock, names, check, until_ns, look, started);
 }
 
 }  // namespace
@@ -305,9 +314,21 @@ absl::StatusOr<StoredRun> Domain::CreateManualRun(const std::string& rig,
 absl::StatusOr<std::vector<StoredRun>> Domain::StartTimedRuns(
     std::int64_t now_ns) {
   std::vector<StoredRun> started;
-  SELFCAL_RETURN_IF_ERROR(
-      CheckRigs(store_, clock_, RigCheck::kTime, now_ns, CheckTimes, &started));
+  SELFCAL_RETURN_IF_ERROR(CheckDueRigs(
+      store_, clock_, RigCheck::kTime, now_ns, CheckTimes, &started));
   return started;
+}
+
+absl::StatusOr<bool> Domain::AreChecksDue(std::int64_t now_ns,
+                                          std::int64_t idle_since_ns) {
+  SELFCAL_ASSIGN_OR_RETURN(const auto by_time,
+                           store_->ListRigsToCheck(RigCheck::kTime, now_ns, 1));
+  if (!by_time.empty()) return true;
+  if (idle_since_ns <= 0) return false;
+  SELFCAL_ASSIGN_OR_RETURN(
+      const auto by_session,
+      store_->ListRigsToCheck(RigCheck::kSession, idle_since_ns, 1));
+  return !by_session.empty();
 }
 
 absl::Status Domain::NoteSilentDevices() {
@@ -343,24 +364,21 @@ absl::Status Domain::NoteOutliers(
 absl::StatusOr<std::vector<StoredRun>> Domain::StartSessionRuns(
     const std::vector<std::string>& ended, std::int64_t idle_since_ns) {
   std::vector<StoredRun> started;
-  for (const std::string& name : ended) {
-    const auto due = InspectFor(
-        store_, name, [&](UnitOfWork* tx) { return IsSessionRunDue(tx); });
-    // Neither a damaged rig nor one that is gone must hold up the others.
-    if (!due.ok() || !*due) continue;
-    SELFCAL_ASSIGN_OR_RETURN(
-        auto run, Change(store_, name, clock_(), [&](UnitOfWork* tx) {
-          return CreateSessionRun(tx);
-        }));
-    if (run) started.push_back(*std::move(run));
-  }
+  // No segment is too new for a session that has ended.
+  SELFCAL_RETURN_IF_ERROR(CheckRigs(store_,
+                                    clock_,
+                                    ended,
+                                    RigCheck::kSession,
+                                    kNoCheck,
+                                    CheckSession,
+                                    &started));
   if (idle_since_ns > 0) {
-    SELFCAL_RETURN_IF_ERROR(CheckRigs(store_,
-                                      clock_,
-                                      RigCheck::kSession,
-                                      idle_since_ns,
-                                      CheckSession,
-                                      &started));
+    SELFCAL_RETURN_IF_ERROR(CheckDueRigs(store_,
+                                         clock_,
+                                         RigCheck::kSession,
+                                         idle_since_ns,
+                                         CheckSession,
+                                         &started));
   }
   return started;
 }

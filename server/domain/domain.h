@@ -169,8 +169,12 @@ class Domain {
                                             bool force = false);
   // Creates the runs that the rules about time start (age_trigger.h), of all
   // rigs that are to be checked (checks.h), at the steady time `now_ns`. Of
-  // many, some wait for the next call.
+  // many, some wait for the next call (AreChecksDue).
   absl::StatusOr<std::vector<StoredRun>> StartTimedRuns(std::int64_t now_ns);
+  // True if StartTimedRuns or StartSessionRuns has more to check at these
+  // times.
+  absl::StatusOr<bool> AreChecksDue(std::int64_t now_ns,
+                                    std::int64_t idle_since_ns);
   // Gives an alarm to the rigs whose devices have not reported for a day.
   absl::Status NoteSilentDevices();
   // Gives an alarm to the rigs whose versions contradict their cohorts, as long

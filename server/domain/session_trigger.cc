@@ -30,8 +30,6 @@ absl::StatusOr<bool> MemoryHasGrown(UnitOfWork* tx, const StoredRun& run) {
   return newer > 0 && kOneOf * newer >= std::ssize(arrivals);
 }
 
-}  // namespace
-
 absl::StatusOr<bool> IsSessionRunDue(UnitOfWork* tx) {
   SELFCAL_ASSIGN_OR_RETURN(const std::int64_t newest, NewestRun(tx));
   if (newest == 0) return false;
@@ -48,6 +46,8 @@ absl::StatusOr<bool> IsSessionRunDue(UnitOfWork* tx) {
   if (!unusable.empty()) return true;
   return MemoryHasGrown(tx, run);
 }
+
+}  // namespace
 
 absl::StatusOr<std::optional<StoredRun>> CreateSessionRun(UnitOfWork* tx) {
   std::optional<StoredRun> started;

@@ -12,10 +12,6 @@
 
 namespace selfcal::server {
 
-// True if a run is due at the end of the session (CreateSessionRun). Only
-// reads.
-absl::StatusOr<bool> IsSessionRunDue(UnitOfWork* tx);
-
 // Creates the run of a rig whose session has ended, if one is due: the tables
 // have started a run before (since the last device change), no run is
 // unfinished, all segments are scored, and one of these holds: the tables

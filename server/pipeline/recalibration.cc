@@ -194,9 +194,9 @@ absl::Status Recalibrator::StartDueRuns() {
   // Each of several daemons knows which sessions have ended at itself; one of
   // them looks at the times of all rigs.
   const bool is_first = shared_.claims->IsFirst();
+  const std::int64_t now_ns = shared_.options.now_ns();
   if (is_first) {
-    SELFCAL_RETURN_IF_ERROR(
-        shared_.domain->StartTimedRuns(shared_.options.now_ns()).status());
+    SELFCAL_RETURN_IF_ERROR(shared_.domain->StartTimedRuns(now_ns).status());
     SELFCAL_RETURN_IF_ERROR(shared_.domain->NoteSilentDevices());
     if (!estimates_complete_) {
       SELFCAL_ASSIGN_OR_RETURN(const int written,
@@ -217,11 +217,15 @@ absl::Status Recalibrator::StartDueRuns() {
 
   const std::chrono::nanoseconds idle = shared_.options.session_idle;
   const std::int64_t idle_since_ns =
-      idle.count() > 0 && is_first ? shared_.options.now_ns() - idle.count()
-                                   : 0;
+      idle.count() > 0 && is_first ? now_ns - idle.count() : 0;
   SELFCAL_RETURN_IF_ERROR(
       shared_.domain->StartSessionRuns(ended, idle_since_ns).status());
   for (const std::string& rig : ended) sessions_.Remove(rig);
+  if (is_first) {
+    SELFCAL_ASSIGN_OR_RETURN(
+        const bool more, shared_.domain->AreChecksDue(now_ns, idle_since_ns));
+    if (more) Wake();
+  }
   return absl::OkStatus();
 }
 

@@ -23,7 +23,7 @@
 
 namespace selfcal::server {
 
-// What a watcher remembers of the last update.
+// The part of the last update that a watcher remembers.
 struct LastActivation {
   std::int64_t rig_key = 0;
   std::int64_t activation = 0;

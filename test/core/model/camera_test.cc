@@ -209,7 +209,7 @@ TEST_P(CameraTest, IsTheTextbookFormulaWithItsAutomaticDerivatives) {
     Eigen::Vector2d d;
     ProjectionJacobians J;
     ASSERT_TRUE(Project(camera, p_C, &d, &J));
-    // What rounding the point may change.
+    // Rounding the point may change this.
     const double by_ray = J.point.norm() * p_C.norm();
     for (int row = 0; row < 2; ++row) {
       EXPECT_NEAR(d[row], expected[row].value(), 1e-14 * (1 + by_ray));
@@ -298,7 +298,8 @@ TEST_P(CameraTest, ProjectInvertsUnprojectUpToTheBorder) {
     ASSERT_TRUE(Unproject(camera, z_px, &bearing_C))
         << gap << " with " << camera.distortion.transpose();
     ASSERT_TRUE(Project(camera, bearing_C, &again_px, nullptr));
-    // What rounding the ray may change, where coordinates go to infinity.
+    // Rounding the ray may change the second part, where coordinates go to
+    // infinity.
     EXPECT_LT((z_px - again_px).norm(), 1e-9 + 5e-15 * jacobians.point.norm())
         << gap << " with " << camera.distortion.transpose();
   }

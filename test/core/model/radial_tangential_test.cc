@@ -120,7 +120,7 @@ TEST(RadialTangential, RationalWhoseTermsCancelIsAPinhole) {
 }
 
 TEST(RadialTangential, NoTwoPointsOfTheRegionShareAnImage) {
-  // What Undistort finds for the image of a point of the region is that point.
+  // Undistort finds each point of the region from its image.
   RandomValues random(5);
   int checked = 0;
   for (int i = 0; i < 3 * kTrials; ++i) {

@@ -53,7 +53,7 @@ class RandomValues {
     return k;
   }
 
-  // With 200 to 600 px per radian in the middle of the image.
+  // The middle of the image has 200 to 600 px per radian.
   CameraCalibration Camera(DistortionModel model) {
     CameraCalibration camera;
     camera.q_CI = Rotation();

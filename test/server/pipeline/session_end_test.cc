@@ -79,6 +79,20 @@ TEST_F(SessionEndTest, AnIdleSessionEndsAfterARestartToo) {
   ASSERT_TRUE(RunIs(RunState::kSucceeded, 2));
 }
 
+// One pass checks a part of them; the next one does not wait for its time.
+TEST_F(SessionEndTest, AllRigsAreCheckedAtOnceHoweverManyThereAre) {
+  for (int k = 0; k < 250; ++k) {
+    ASSERT_TRUE(domain_->CreateRig(TestRig("r" + std::to_string(k))).ok());
+  }
+  options_.recheck = std::chrono::hours(1);
+  StartOne();
+  for (const RigCheck check : {RigCheck::kSession, RigCheck::kTime}) {
+    EXPECT_TRUE(Eventually([&] {
+      return store_->ListRigsToCheck(check, kNoCheck - 1, 1)->empty();
+    }));
+  }
+}
+
 TEST_F(SessionEndTest, ASessionThatGoesOnHasNotEnded) {
   StopTheClock();
   options_.session_idle = std::chrono::milliseconds(150);
