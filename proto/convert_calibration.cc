@@ -2,6 +2,7 @@
 #include <google/protobuf/message.h>
 
 #include <cctype>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -113,6 +114,11 @@ void FillBlock(const BlockInfo& info,
   message->GetReflection()->SetDouble(message, FieldOf(info, *message), value);
 }
 void FillBlock(const BlockInfo& info,
+               const std::optional<double>& value,
+               google::protobuf::Message* message) {
+  if (value) FillBlock(info, *value, message);
+}
+void FillBlock(const BlockInfo& info,
                const DistortionVector& value,
                google::protobuf::Message* message) {
   for (const double coefficient : value) {
@@ -167,6 +173,15 @@ void ReadBlock(const BlockInfo& info,
                double* value,
                Violations*) {
   *value = message.GetReflection()->GetDouble(message, FieldOf(info, message));
+}
+void ReadBlock(const BlockInfo& info,
+               const google::protobuf::Message& message,
+               const std::string& prefix,
+               std::optional<double>* value,
+               Violations* violations) {
+  const auto* field = FieldOf(info, message);
+  if (!message.GetReflection()->HasField(message, field)) return;
+  ReadBlock(info, message, prefix, &value->emplace(), violations);
 }
 // ReadDistortion reads the coefficients with their model.
 void ReadBlock(const BlockInfo&,

@@ -55,8 +55,7 @@ void ReadBlocks(const v1::Rig& message,
 
 std::vector<ParameterGroup> ReadGroups(const v1::Rig& message, const Rig& rig) {
   if (message.groups().empty()) {
-    return DefaultGroups(rig.blocks,
-                         static_cast<int>(rig.factory.cameras.size()));
+    return DefaultGroups(rig.blocks, rig.factory);
   }
   std::vector<ParameterGroup> groups;
   for (const v1::ParameterGroup& group : message.groups()) {

@@ -1,6 +1,7 @@
 #include "core/model/calibration.h"
 
 #include <cassert>
+#include <optional>
 #include <type_traits>
 
 #include "core/model/parameter_blocks.h"
@@ -24,6 +25,11 @@ void Add(const Eigen::VectorXd& delta, int offset, Eigen::Quaterniond* q) {
 void Add(const Eigen::VectorXd& delta, int offset, double* value) {
   *value += delta[offset];
 }
+void Add(const Eigen::VectorXd& delta,
+         int offset,
+         std::optional<double>* value) {
+  **value += delta[offset];
+}
 template <class Vector>
 void Add(const Eigen::VectorXd& delta, int offset, Vector* v) {
   *v += delta.segment(offset, v->size());
@@ -40,6 +46,10 @@ Eigen::Vector3d Difference(const Eigen::Quaterniond& a,
 Eigen::Matrix<double, 1, 1> Difference(double a, double b) {
   return Eigen::Matrix<double, 1, 1>(a - b);
 }
+Eigen::Matrix<double, 1, 1> Difference(const std::optional<double>& a,
+                                       const std::optional<double>& b) {
+  return Difference(*a, *b);
+}
 template <class Vector>
 Vector Difference(const Vector& a, const Vector& b) {
   return a - b;
@@ -47,6 +57,7 @@ Vector Difference(const Vector& a, const Vector& b) {
 
 void SetZero(Eigen::Quaterniond* q) { q->setIdentity(); }
 void SetZero(double* value) { *value = 0; }
+void SetZero(std::optional<double>* value) { *value = 0; }
 template <class Vector>
 void SetZero(Vector* v) {
   v->setZero();
@@ -87,7 +98,8 @@ int CameraTangentOffset(const Calibration& theta, int camera) {
 }
 
 int TimeOffsetComponent(const Calibration& theta, int camera) {
-  return CameraTangentOffset(theta, camera + 1) - 1;
+  return CameraTangentOffset(theta, camera) + kCameraDistortion +
+         static_cast<int>(theta.cameras[camera].distortion.size());
 }
 
 int TangentSize(const Calibration& theta) {
@@ -135,9 +147,15 @@ bool SameShape(const Calibration& a, const Calibration& b) {
   if (a.cameras.size() != b.cameras.size()) return false;
   for (std::size_t j = 0; j < a.cameras.size(); ++j) {
     if (a.cameras[j].model != b.cameras[j].model) return false;
-    if (a.cameras[j].distortion.size() != b.cameras[j].distortion.size()) {
-      return false;
-    }
+    bool same = true;
+    VisitSensorBlocks(
+        kCameraBlocks,
+        [&](const BlockInfo&, const auto& value, const auto& other) {
+          same = same && TangentDimension(value) == TangentDimension(other);
+        },
+        a.cameras[j],
+        b.cameras[j]);
+    if (!same) return false;
   }
   return true;
 }

@@ -2,12 +2,13 @@
 // space of named components.
 //
 // Order of the tangent, kImuTangentSize + sum over cameras of (6 + 4 +
-// distortion + 1) components:
+// distortion + 1 or 2) components:
 //   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3;
-//   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1.
+//   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1, and
+//   line delay 1 if its shutter is a rolling one.
 // Rotations are perturbed on the right (so3.h); all other components are
 // additive. Source: Schneider et al., ICRA 2017, sections III-B and III-C; the
-// time offset is an extension.
+// time offset and the line delay are extensions.
 #pragma once
 
 #include <Eigen/Core>
@@ -72,7 +73,7 @@ int TangentSize(const Calibration& theta);
 // Dimension of the tangent of camera j, and its offset in that of theta.
 int CameraTangentSize(const CameraCalibration& camera);
 int CameraTangentOffset(const Calibration& theta, int camera);
-// Index of the time offset of camera j, the last component of its tangent.
+// Index of the time offset of camera j, which the line delay follows.
 int TimeOffsetComponent(const Calibration& theta, int camera);
 
 // The components in the order of the tangent.
@@ -81,8 +82,9 @@ std::vector<TangentComponent> TangentComponents(const Calibration& theta);
 // theta [+] delta; delta has TangentSize(theta) entries.
 Calibration BoxPlus(const Calibration& theta, const Eigen::VectorXd& delta);
 
-// a [-] b, the delta with b [+] delta = a. Both must have the same cameras and
-// distortion models (SameShape). Rotations give Log(R_b^T R_a).
+// a [-] b, the delta with b [+] delta = a. Both must have the same cameras,
+// distortion models and optional blocks (SameShape). Rotations give
+// Log(R_b^T R_a).
 Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b);
 
 // Derivative of (reference [+] d) [-] theta with respect to d, at
@@ -92,7 +94,8 @@ Eigen::VectorXd BoxMinus(const Calibration& a, const Calibration& b);
 Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
                               const Eigen::VectorXd& d);
 
-// Same number of cameras, each with the same distortion model.
+// Same number of cameras, each with the same distortion model, and the same
+// optional blocks.
 bool SameShape(const Calibration& a, const Calibration& b);
 
 // Value of each component for display: the scalar itself, and for a rotation

@@ -1,5 +1,6 @@
 // Validation of a calibration; all other modules rely on it.
 #include <iterator>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -69,6 +70,8 @@ std::string Fault(const BlockInfo& info, const Value& value) {
     return QuaternionFault(value, info.limit);
   } else if constexpr (std::is_same_v<Value, double>) {
     return Fault(info, Eigen::Matrix<double, 1, 1>(value));
+  } else if constexpr (std::is_same_v<Value, std::optional<double>>) {
+    return value ? Fault(info, *value) : "";
   } else {
     if (info.accepted == Accepted::kPositive) {
       return PositiveFault(value, info.limit);

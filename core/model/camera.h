@@ -14,6 +14,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <string_view>
 
 namespace selfcal {
@@ -52,6 +53,10 @@ struct CameraCalibration {
   // t_imu = t_camera + time_offset_s: an image with the timestamp t was exposed
   // at t + time_offset_s on the clock of the IMU.
   double time_offset_s = 0;
+  // Time from one row to the next of a rolling shutter: row v of an image is
+  // exposed v line_delay_s after its first one, to whose exposure the timestamp
+  // refers. Without a value, all rows are exposed at once.
+  std::optional<double> line_delay_s;
   int width_px = 0;  // of the image; constant, not estimated
   int height_px = 0;
 

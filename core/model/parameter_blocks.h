@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -59,7 +60,8 @@ struct BlockInfo {
 
 inline constexpr int kReferenceWidth_px = 640;
 
-// The default of the member is that of data from before the block existed.
+// The default of the member is that of data from before the block existed. A
+// sensor may lack an optional one, which then has no components.
 template <class Sensor>
 struct Block {
   BlockInfo info;
@@ -67,7 +69,8 @@ struct Block {
                Eigen::Vector2d Sensor::*,
                Eigen::Quaterniond Sensor::*,
                DistortionVector Sensor::*,
-               double Sensor::*>
+               double Sensor::*,
+               std::optional<double> Sensor::*>
       value;
 };
 
@@ -185,12 +188,22 @@ inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
       .estimated = false,
       .since = StoredSince::kTimeOffset},
      &CameraCalibration::time_offset_s},
+    {{.name = "line_delay",
+      .field = "line_delay_s",
+      .unit = "s",
+      .sigma_ref = 2e-6,
+      .limit = 1e-3,
+      .group = "time",
+      .words = "the time from one row to the next"},
+     &CameraCalibration::line_delay_s},
 };
 
 template <class Value>
 int TangentDimension(const Value& value) {
   if constexpr (std::is_same_v<Value, double>) {
     return 1;
+  } else if constexpr (std::is_same_v<Value, std::optional<double>>) {
+    return value ? 1 : 0;
   } else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
     return 3;
   } else {
@@ -199,7 +212,8 @@ int TangentDimension(const Value& value) {
 }
 
 // The sum of the dimensions of the blocks before the one with this value, or of
-// all if there is none; a distortion has none at compile time.
+// all if there is none; a distortion and an optional value have none at compile
+// time.
 template <class Sensor, std::size_t count, class Member = std::nullptr_t>
 consteval int OffsetOf(const Block<Sensor> (&blocks)[count],
                        Member value = nullptr) {
@@ -221,6 +235,8 @@ consteval int OffsetOf(const Block<Sensor> (&blocks)[count],
         []<class Value>(Value Sensor::*) {
           if constexpr (std::is_same_v<Value, double>) {
             return 1;
+          } else if constexpr (std::is_same_v<Value, std::optional<double>>) {
+            return 0;
           } else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
             return 3;
           } else {
@@ -260,8 +276,8 @@ struct BlockPlace {
   std::string Name() const { return Sensor() + "." + std::string(info.name); }
 };
 
-// Calls visit(info, value, values...) for each block of a sensor, with the
-// values of this sensor and of others of the same shape.
+// Calls visit(info, value, values...) for each block of a sensor, also for
+// those that it lacks, with the values of this sensor and of others.
 template <class Sensor, class Blocks, class Visitor, class... Sensors>
 void VisitSensorBlocks(const Blocks& blocks,
                        const Visitor& visit,
@@ -276,14 +292,15 @@ void VisitSensorBlocks(const Blocks& blocks,
   }
 }
 
-// Calls visit(place, value, values...) for each block of theta, with its values
-// in theta and in others of the same shape.
+// Calls visit(place, value, values...) for each block that theta has, with its
+// values in theta and in others of the same shape.
 template <class Visitor, class Theta, class... Thetas>
 void VisitBlocks(const Visitor& visit, Theta& theta, Thetas&... others) {
   int offset = 0;
   int camera = -1;
   const auto visit_block =
       [&](const BlockInfo& info, auto& value, auto&... values) {
+        if (TangentDimension(value) == 0) return;
         visit(BlockPlace{info, offset, camera}, value, values...);
         offset += TangentDimension(value);
       };

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <iterator>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <variant>
 
 #include "core/model/parameter_blocks.h"
@@ -14,7 +17,9 @@ namespace {
 // Matches the components of a block; `sensor` is "imu", or "*" for all cameras.
 template <class Sensor>
 std::string Pattern(const std::string& sensor, const Block<Sensor>& block) {
-  const bool scalar = std::holds_alternative<double Sensor::*>(block.value);
+  const bool scalar =
+      std::holds_alternative<double Sensor::*>(block.value) ||
+      std::holds_alternative<std::optional<double> Sensor::*>(block.value);
   return sensor + "." + std::string(block.info.name) + (scalar ? "" : ".*");
 }
 
@@ -71,33 +76,48 @@ bool IsDeclaredEstimated(std::string_view block) {
   return found != std::end(kCameraBlocks) && found->info.estimated;
 }
 
-}  // namespace
-
-bool IsEstimated(const std::vector<BlockSetting>& settings,
-                 const std::string& block) {
+// The setting of a block, or null.
+const BlockSetting* LastSetting(const std::vector<BlockSetting>& settings,
+                                const std::string& block) {
   const auto last = std::find_if(
       settings.rbegin(), settings.rend(), [&](const BlockSetting& setting) {
         return Matches(block, setting.pattern);
       });
-  return last != settings.rend() ? last->estimated : IsDeclaredEstimated(block);
+  return last != settings.rend() ? &*last : nullptr;
+}
+
+}  // namespace
+
+bool IsEstimated(const std::vector<BlockSetting>& settings,
+                 const std::string& block) {
+  const BlockSetting* last = LastSetting(settings, block);
+  return last != nullptr ? last->estimated : IsDeclaredEstimated(block);
 }
 
 std::vector<ParameterGroup> DefaultGroups(
     const std::vector<BlockSetting>& blocks, int cameras) {
+  Calibration theta;
+  theta.cameras.resize(cameras);
+  return DefaultGroups(blocks, theta);
+}
+
+std::vector<ParameterGroup> DefaultGroups(
+    const std::vector<BlockSetting>& blocks, const Calibration& theta) {
   std::vector<ParameterGroup> groups = {
       {"imu", {}}, {"camera", {}}, {"extrinsics", {}}};
-  const auto estimated = [&](const std::string& sensor, const auto& block) {
-    return IsEstimated(blocks, sensor + "." + std::string(block.info.name));
-  };
-  for (const auto& block : kImuBlocks) {
-    if (estimated("imu", block)) groups[0].patterns = {"imu.*"};
-  }
+  std::set<std::string_view> estimated;  // blocks of cameras
+  VisitBlocks(
+      [&](const BlockPlace& place, const auto&) {
+        if (!IsEstimated(blocks, place.Name())) return;
+        if (place.camera < 0) {
+          groups[0].patterns = {"imu.*"};
+        } else {
+          estimated.insert(place.info.name);
+        }
+      },
+      theta);
   for (const auto& block : kCameraBlocks) {
-    bool any = false;
-    for (int j = 0; j < cameras; ++j) {
-      any = any || estimated("cam" + std::to_string(j), block);
-    }
-    if (!any) continue;
+    if (!estimated.contains(block.info.name)) continue;
     const auto has_name = [&](const ParameterGroup& group) {
       return group.name == block.info.group;
     };
@@ -111,6 +131,23 @@ std::vector<ParameterGroup> DefaultGroups(
     return group.patterns.empty();
   });
   return groups;
+}
+
+void AddEstimatedBlocks(const std::vector<BlockSetting>& blocks,
+                        Calibration* theta) {
+  for (std::size_t j = 0; j < theta->cameras.size(); ++j) {
+    VisitSensorBlocks(
+        kCameraBlocks,
+        [&]<class Value>(const BlockInfo& info, Value& value) {
+          if constexpr (std::is_same_v<Value, std::optional<double>>) {
+            const std::string name =
+                "cam" + std::to_string(j) + "." + std::string(info.name);
+            const BlockSetting* setting = LastSetting(blocks, name);
+            if (!value && setting != nullptr && setting->estimated) value = 0;
+          }
+        },
+        theta->cameras[j]);
+  }
 }
 
 std::vector<int> MatchComponents(

@@ -45,10 +45,20 @@ bool IsEstimated(const std::vector<BlockSetting>& settings,
 
 // The three groups of the paper: "imu", "camera" (f, c, distortion of every
 // camera) and "extrinsics" (q_CI, p_CI of every camera); and "time" (the time
-// offset of every camera). Only those of which a block is estimated, in a rig
-// with this number of cameras.
+// offset of every camera, and the line delay of each with a rolling shutter).
+// Only those of which a block is estimated, in a rig with this number of
+// cameras without optional blocks.
 std::vector<ParameterGroup> DefaultGroups(
     const std::vector<BlockSetting>& blocks = {}, int cameras = 1);
+// The same for the blocks that theta has.
+std::vector<ParameterGroup> DefaultGroups(
+    const std::vector<BlockSetting>& blocks, const Calibration& theta);
+
+// Adds to the factory calibration of a new rig each optional block that it
+// lacks and that a setting says is estimated, with the value of a device
+// without the effect. Which blocks a rig has never changes afterwards.
+void AddEstimatedBlocks(const std::vector<BlockSetting>& blocks,
+                        Calibration* theta);
 
 // A value for all components that match a pattern.
 struct ComponentSetting {

@@ -1,4 +1,5 @@
 // Names, units and reference sigmas of the tangent of theta.
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -27,7 +28,8 @@ std::vector<TangentComponent> TangentComponents(const Calibration& theta) {
     const std::string block = place.Name();
     const std::string unit(place.info.unit);
     const double sigma_ref = ReferenceSigma(theta, place);
-    if constexpr (std::is_same_v<Value, double>) {
+    if constexpr (std::is_same_v<Value, double> ||
+                  std::is_same_v<Value, std::optional<double>>) {
       components.push_back({block, unit, sigma_ref});
     } else if constexpr (std::is_same_v<Value, DistortionVector>) {
       for (const CameraCoefficient& coefficient :

@@ -23,11 +23,16 @@
 namespace selfcal::server {
 namespace {
 
-// The rig of a request, checked; fields are named below "rig.".
-absl::StatusOr<StoredRig> ReadRig(const v1::Rig& message) {
+// The new rig of a request, checked; fields are named below "rig.".
+absl::StatusOr<StoredRig> ReadNewRig(const v1::Rig& message) {
   StoredRig stored;
-  auto violations = FromProto(message, "rig.", &stored.rig);
+  Rig& rig = stored.rig;
+  auto violations = FromProto(message, "rig.", &rig);
   if (!violations.empty()) return InvalidFields(violations);
+  AddEstimatedBlocks(rig.blocks, &rig.factory);
+  if (message.groups().empty()) {
+    rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  }
   violations = Validate(stored.rig);
   for (Violation& violation : violations) {
     violation.field = "rig." + RigFieldPath(violation.field);
@@ -51,7 +56,7 @@ absl::StatusOr<v1::Rig> CreateRig(const ApiContext& context,
                                   const Call&,
                                   const v1::CreateRigRequest& request) {
   if (!request.has_rig()) return InvalidFields({{"rig", "is missing"}});
-  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadRig(request.rig()));
+  SELFCAL_ASSIGN_OR_RETURN(const StoredRig rig, ReadNewRig(request.rig()));
   const auto created = context.domain->CreateRig(rig);
   if (!created.ok()) {
     return About(created.status(), {kRigType, request.rig().name(), "rig"});
