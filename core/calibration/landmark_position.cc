@@ -47,9 +47,10 @@ Linearised Linearise(const LandmarkScene& scene,
     }
     ++sum.projected;
     r *= scale;
-    const Eigen::Matrix3d& R_CG = scene.R_CG(seen);
-    p_C_by_position.leftCols<2>() = R_CG * position.anchor.R_GA.leftCols<2>();
-    p_C_by_position.col(2) = R_CG * position.anchor.a_G + scene.p_CG(seen);
+    const CameraPose camera = scene.PoseOf(seen);
+    p_C_by_position.leftCols<2>() =
+        camera.R_CG * position.anchor.R_GA.leftCols<2>();
+    p_C_by_position.col(2) = camera.R_CG * position.anchor.a_G + camera.p_CG;
     const Eigen::Matrix<double, 2, 3> J = scale * by_p_C * p_C_by_position;
     const double s = r.squaredNorm();
     const double weight = one.weight * loss.Weight(s);
@@ -85,34 +86,41 @@ LandmarkScene::LandmarkScene(const Calibration& theta,
                              std::span<const KeyframeState> keyframes,
                              const KeyframeMotions& motions,
                              double pixel_sigma_px)
-    : theta_(theta), pixel_sigma_px_(pixel_sigma_px) {
-  views_.reserve(keyframes.size() * theta.cameras.size());
+    : theta_(theta),
+      keyframes_(keyframes),
+      motions_(motions),
+      pixel_sigma_px_(pixel_sigma_px) {
+  poses_.reserve(keyframes.size() * theta.cameras.size());
   const int cameras = static_cast<int>(theta.cameras.size());
   for (int k = 0; k < static_cast<int>(keyframes.size()); ++k) {
     for (int j = 0; j < cameras; ++j) {
-      const CameraCalibration& camera = theta.cameras[j];
-      Eigen::Quaterniond q_GI = keyframes[k].q_GI;
-      Eigen::Vector3d p_GI = keyframes[k].p_GI;
-      if (const KeyframeMotion* motion = motions.At(k, j)) {
-        const ExposurePose exposure =
-            MovePose(q_GI, p_GI, *motion, camera.time_offset_s);
-        q_GI = exposure.q_GI;
-        p_GI = exposure.p_GI;
-      }
-      const Eigen::Matrix3d R_CG =
-          (camera.q_CI * q_GI.conjugate()).toRotationMatrix();
-      views_.push_back({R_CG, camera.p_CI - R_CG * p_GI});
+      poses_.push_back(ExposedAt(k, j, Eigen::Vector2d::Zero()));
     }
   }
+}
+
+CameraPose LandmarkScene::ExposedAt(int keyframe,
+                                    int camera,
+                                    const Eigen::Vector2d& z_px) const {
+  const CameraCalibration& c = theta_.cameras[camera];
+  Eigen::Quaterniond q_GI = keyframes_[keyframe].q_GI;
+  Eigen::Vector3d p_GI = keyframes_[keyframe].p_GI;
+  if (const KeyframeMotion* motion = motions_.At(keyframe, camera)) {
+    const ExposurePose exposure = MovePose(q_GI, p_GI, *motion, c, z_px);
+    q_GI = exposure.q_GI;
+    p_GI = exposure.p_GI;
+  }
+  const Eigen::Matrix3d R_CG = (c.q_CI * q_GI.conjugate()).toRotationMatrix();
+  return {R_CG, c.p_CI - R_CG * p_GI};
 }
 
 bool LandmarkScene::Residual(const TrackObservation& seen,
                              const Eigen::Vector4d& point_G,
                              Eigen::Vector2d* residual_px,
                              Eigen::Matrix<double, 2, 3>* by_p_C) const {
-  const View& view = views_[Index(seen)];
+  const CameraPose pose = PoseOf(seen);
   const Eigen::Vector3d p_C =
-      view.R_CG * point_G.head<3>() + point_G(3) * view.p_CG;
+      pose.R_CG * point_G.head<3>() + point_G(3) * pose.p_CG;
   ProjectionJacobians jacobians;
   Eigen::Vector2d z_px;
   if (p_C.norm() < kMinDistance_m * std::abs(point_G(3))) {
@@ -170,7 +178,8 @@ LandmarkPosition PositionAt(const LandmarkScene& scene,
                             const Eigen::Vector4d& point_G) {
   const TrackObservation& first = track.observations.front();
   LandmarkPosition position;
-  position.anchor.a_G = -(scene.R_CG(first).transpose() * scene.p_CG(first));
+  const CameraPose camera = scene.PoseOf(first);
+  position.anchor.a_G = -(camera.R_CG.transpose() * camera.p_CG);
   const Eigen::Vector3d ray =
       point_G.head<3>() - point_G(3) * position.anchor.a_G;
   position.anchor.R_GA =

@@ -35,10 +35,16 @@ inline constexpr double kMaxBeyondInfinity = 2;
 // A camera cannot observe a point that is nearer to its centre.
 inline constexpr double kMinDistance_m = 0.01;
 
+// A camera at an exposure: p_C = R_CG p_G + p_CG.
+struct CameraPose {
+  Eigen::Matrix3d R_CG;
+  Eigen::Vector3d p_CG;  // origin of G in C
+};
+
 // The poses of every camera at every keyframe.
 class LandmarkScene {
  public:
-  // theta must outlive the scene.
+  // All but pixel_sigma_px must outlive the scene.
   LandmarkScene(const Calibration& theta,
                 std::span<const KeyframeState> keyframes,
                 const KeyframeMotions& motions,
@@ -48,13 +54,12 @@ class LandmarkScene {
   const CameraCalibration& camera(const TrackObservation& seen) const {
     return theta_.cameras[seen.camera];
   }
-  // Rotation from G of the camera of an observation, and the origin of G in
-  // that camera.
-  const Eigen::Matrix3d& R_CG(const TrackObservation& seen) const {
-    return views_[Index(seen)].R_CG;
-  }
-  const Eigen::Vector3d& p_CG(const TrackObservation& seen) const {
-    return views_[Index(seen)].p_CG;
+  // The camera of an observation when its pixel was exposed.
+  CameraPose PoseOf(const TrackObservation& seen) const {
+    const bool rolling = camera(seen).line_delay_s.has_value();
+    return rolling
+               ? ExposedAt(seen.keyframe, seen.camera, seen.z_px)
+               : poses_[seen.keyframe * theta_.cameras.size() + seen.camera];
   }
 
   // Predicted minus measured [px] of a homogeneous point in G; by_p_C, unless
@@ -67,18 +72,16 @@ class LandmarkScene {
                 Eigen::Matrix<double, 2, 3>* by_p_C) const;
 
  private:
-  struct View {
-    Eigen::Matrix3d R_CG;
-    Eigen::Vector3d p_CG;
-  };
-
-  std::size_t Index(const TrackObservation& seen) const {
-    return seen.keyframe * theta_.cameras.size() + seen.camera;
-  }
+  CameraPose ExposedAt(int keyframe,
+                       int camera,
+                       const Eigen::Vector2d& z_px) const;
 
   const Calibration& theta_;
+  std::span<const KeyframeState> keyframes_;
+  const KeyframeMotions& motions_;
   double pixel_sigma_px_;
-  std::vector<View> views_;  // keyframe by keyframe
+  // Keyframe by keyframe; of a rolling shutter, its first row.
+  std::vector<CameraPose> poses_;
 };
 
 // A landmark by inverse depth from the camera that observed it first, with the

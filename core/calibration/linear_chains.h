@@ -38,9 +38,9 @@ struct ChainPlan {
   HalfWalk walk_in, walk_out;
 
   int keyframes() const { return range.end - range.begin; }
-  ChainShape Shape(std::span<const int> camera_sizes) const {
+  ChainShape Shape(std::span<const LandmarkRows> cameras) const {
     return {keyframes(),
-            camera_sizes,
+            cameras,
             tracks,
             track_keyframes,
             static_cast<int>(interface.size()),

@@ -11,12 +11,11 @@ void LinearSystem::EliminateChain(const LinearPoint& point,
                                   const ChainPlan& plan,
                                   ChainElimination* elimination,
                                   SharedInformation* result) {
-  std::vector<int> camera_sizes;
+  std::vector<LandmarkRows> cameras;
   for (const CameraCalibration& camera : point.theta.cameras) {
-    camera_sizes.push_back(CameraTangentSize(camera));
+    cameras.push_back(RowsOf(camera));
   }
-  elimination->Start(plan.Shape(camera_sizes),
-                     ChainElimination::Record::kSteps);
+  elimination->Start(plan.Shape(cameras), ChainElimination::Record::kSteps);
   const KeyframeChain& range = plan.range;
   for (int k = range.begin; k < range.end; ++k) {
     views_.AddKeyframe(point, observations_, k, range.begin, elimination);

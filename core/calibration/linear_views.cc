@@ -81,7 +81,7 @@ void LinearViews::AddKeyframe(const LinearPoint& point,
     }
     const std::size_t size = static_cast<std::size_t>(2) *
                              (run.count + kPanelPad) *
-                             RowsStride(CameraTangentSize(*run.camera));
+                             RowsOf(*run.camera).stride();
     if (rows_.size() < size) rows_.resize(size);
     reprojection_.Linearise(run,
                             observations.points(),

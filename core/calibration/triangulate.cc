@@ -37,8 +37,9 @@ std::vector<Ray> SpreadRays(const LandmarkScene& scene, const Track& track) {
     const TrackObservation& seen = track.observations[index];
     Eigen::Vector3d bearing_C;
     if (Unproject(scene.camera(seen), seen.z_px, &bearing_C)) {
-      const Eigen::Matrix3d R_GC = scene.R_CG(seen).transpose();
-      rays.push_back({-(R_GC * scene.p_CG(seen)), R_GC * bearing_C});
+      const CameraPose camera = scene.PoseOf(seen);
+      const Eigen::Matrix3d R_GC = camera.R_CG.transpose();
+      rays.push_back({-(R_GC * camera.p_CG), R_GC * bearing_C});
     }
   }
   return rays;

@@ -15,8 +15,12 @@ namespace selfcal {
 struct ChainLayout {
   ChainLayout() = default;
   explicit ChainLayout(const ChainShape& shape)
-      : camera_shared(std::accumulate(
-            shape.camera_sizes.begin(), shape.camera_sizes.end(), 0)),
+      : camera_shared(std::accumulate(shape.cameras.begin(),
+                                      shape.cameras.end(),
+                                      0,
+                                      [](int sum, const LandmarkRows& rows) {
+                                        return sum + rows.shared;
+                                      })),
         kept(shape.kept),
         camera_place(chain::kKeptPlace + WholeVectors(kept)),
         constant(camera_place + camera_shared),

@@ -19,18 +19,18 @@ void KeyframeEquations::Add(int keyframe,
                             const CameraColumns& camera,
                             const RowProducts& products,
                             const ChainPoseRotation* by_rotation) {
-  const int residual = RowsResidual(camera.size);
+  const LandmarkRows& rows = camera.rows;
   // by_pose(i, c): pose i and column c; poses(i, j): two of the pose.
   const auto add_pose = [&](const auto& by_pose, const auto& poses) {
     for (int i = 0; i < kPose; ++i) {
       double* row = &sums_[(keyframe * kPose + i) * stride_];
       for (int j = 0; j <= i; ++j) row[j] += poses(i, j);
       double* shared = row + kPose + camera.offset;
-      for (int c = 0; c < 3; ++c) shared[c] -= by_pose(i, kRowsTurn + c);
-      for (int c = 3; c < camera.size; ++c) {
-        shared[c] += by_pose(i, kRowsOwn + c - 3);
+      for (int c = 0; c < rows.shared; ++c) {
+        const double product = by_pose(i, rows.Column(c));
+        shared[c] += rows.IsNegative(c) ? -product : product;
       }
-      row[kPose + layout_.camera_shared] += by_pose(i, residual);
+      row[kPose + layout_.camera_shared] += by_pose(i, rows.residual());
     }
   };
   if (by_rotation == nullptr) {
@@ -55,19 +55,17 @@ void KeyframeEquations::Add(int keyframe,
 
 void KeyframeEquations::AddShared(const CameraColumns& camera,
                                   const RowProducts& products) {
-  const int rows = layout_.camera_shared + 1;
-  const int residual = RowsResidual(camera.size);
-  const auto column = [](int c) {
-    return c < 3 ? kRowsTurn + c : kRowsOwn + c - 3;
-  };
-  for (int j = 0; j < camera.size; ++j) {
-    double* to = &shared_sums_[(camera.offset + j) * rows];
-    for (int i = j; i < camera.size; ++i) {
-      const double product = products(column(i), column(j));
-      to[camera.offset + i] += (i < 3) == (j < 3) ? product : -product;
+  const LandmarkRows& rows = camera.rows;
+  for (int j = 0; j < rows.shared; ++j) {
+    double* to =
+        &shared_sums_[(camera.offset + j) * (layout_.camera_shared + 1)];
+    for (int i = j; i < rows.shared; ++i) {
+      const double product = products(rows.Column(i), rows.Column(j));
+      to[camera.offset + i] +=
+          rows.IsNegative(i) == rows.IsNegative(j) ? product : -product;
     }
-    const double product = products(residual, column(j));
-    to[layout_.camera_shared] += j < 3 ? -product : product;
+    const double product = products(rows.residual(), rows.Column(j));
+    to[layout_.camera_shared] += rows.IsNegative(j) ? -product : product;
   }
 }
 

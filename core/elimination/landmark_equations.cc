@@ -18,11 +18,11 @@ void LandmarkEquations::Start(const ChainShape& shape,
   sums_offsets_.clear();
   sums_size_ = 0;
   int offset = 0;
-  for (const int size : shape.camera_sizes) {
-    cameras_.push_back({size, offset});
-    offset += size;
+  for (const LandmarkRows& rows : shape.cameras) {
+    cameras_.push_back({rows, offset});
+    offset += rows.shared;
     sums_offsets_.push_back(sums_size_);
-    sums_size_ += 3 * RowsStride(size);
+    sums_size_ += 3 * rows.stride();
   }
   views_.Find(shape, structure);
   const auto landmarks = static_cast<std::size_t>(views_.landmarks());
@@ -77,13 +77,15 @@ Eigen::Matrix3d LandmarkEquations::PreparePanel(int landmark,
     for (int i = 0; i <= j; ++i) H(j, i) = prior[j * (j + 1) / 2 + i];
     row[camera_shared] = prior[6 + j];
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
-      const int size = cameras_[c].size;
-      const double* sums = &sums_[landmark * sums_size_ + sums_offsets_[c] +
-                                  j * RowsStride(size)];
+      const LandmarkRows& rows = cameras_[c].rows;
+      const double* sums =
+          &sums_[landmark * sums_size_ + sums_offsets_[c] + j * rows.stride()];
       double* shared = row + cameras_[c].offset;
-      for (int i = 0; i < 3; ++i) shared[i] = -sums[kRowsTurn + i];
-      for (int i = 3; i < size; ++i) shared[i] = sums[kRowsOwn + i - 3];
-      row[camera_shared] += sums[RowsResidual(size)];
+      for (int i = 0; i < rows.shared; ++i) {
+        const double sum = sums[rows.Column(i)];
+        shared[i] = rows.IsNegative(i) ? -sum : sum;
+      }
+      row[camera_shared] += sums[rows.residual()];
       for (int i = 0; i <= j; ++i) H(j, i) -= sums[kRowsPosition + i];
     }
   }

@@ -12,13 +12,14 @@
 #include "core/elimination/chain_structure.h"
 #include "core/elimination/chain_unknowns.h"
 #include "core/elimination/dense_lanes.h"
+#include "core/elimination/landmark_rows.h"
 #include "core/elimination/landmark_views.h"
 
 namespace selfcal {
 
 // The parameters of a camera.
 struct CameraColumns {
-  int size = 0;
+  LandmarkRows rows;
   int offset = 0;  // of the first among those of all cameras
 };
 

@@ -17,8 +17,8 @@ RowProducts ObservationProducts::Add(VectorWidth width,
                                      std::span<const int> observations,
                                      const ChainPoseRotation* by_rotation,
                                      LandmarkEquations* landmarks) {
-  const int size = landmarks->camera(camera).size;
-  const int stride = RowsStride(size);
+  const LandmarkRows& columns = landmarks->camera(camera).rows;
+  const int stride = columns.stride();
   const int gram_stride = stride + kPanelPad;
   const int count = static_cast<int>(observations.size());
   GrowTo(observations.size(), &targets_);
@@ -33,7 +33,7 @@ RowProducts ObservationProducts::Add(VectorWidth width,
     kernels.AddLandmarkProducts(rows, stride, count, targets_.data());
     kernels.AddSquare(1,
                       {rows, stride},
-                      RowsResidual(size) + 1,
+                      columns.residual() + 1,
                       2 * count,
                       {gram_.data(), gram_stride});
   });

@@ -1,8 +1,10 @@
 #include "core/factor/keyframe_motion.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <iterator>
+#include <optional>
 
 #include "core/model/imu_model.h"
 #include "core/model/so3.h"
@@ -21,6 +23,9 @@ constexpr double kReach_s = 0.03;
 // A rate is shrunk by this multiple of its noise, in squares, over three axes:
 // noise alone is larger 3 times in 100.
 constexpr double kNoiseSquares = 3 * 3;
+// The polynomials of a readout are fitted over at least this time on either
+// side of the middle row.
+constexpr double kLeastHalfReadout_s = 0.005;
 
 // Corrected readings about a keyframe. Times [s] are relative to the keyframe.
 class Readings {
@@ -57,13 +62,14 @@ class Readings {
     return Smooth(t_s, &variance_Hz);
   }
 
-  // Like Smooth, shrunk by white noise.
-  Vector3d Rate(double t_s, double noise_density) const {
+  // The rate of Smooth, shrunk by white noise, and to what share of it.
+  Vector3d Rate(double t_s, double noise_density, double* share) const {
     double variance_Hz;
     const Vector3d w_I = Smooth(t_s, &variance_Hz).w;
     const double noise =
         kNoiseSquares * noise_density * noise_density * variance_Hz;
-    return std::max(0.0, 1 - noise / w_I.squaredNorm()) * w_I;
+    *share = std::max(0.0, 1 - noise / w_I.squaredNorm());
+    return *share * w_I;
   }
 
  private:
@@ -134,6 +140,109 @@ class Readings {
   ImuModel<double> imu_;
 };
 
+// Integrates the readings about a keyframe. Times are relative to it, gravity
+// and the motion are in I at its time.
+class MotionIntegral {
+ public:
+  MotionIntegral(const Readings& readings, const Vector3d& g_I)
+      : readings_(readings), g_I_(g_I) {}
+
+  // Continues a motion that is measured up to motion->dt_s.
+  void Continue(double to_s, KeyframeMotion* motion) const {
+    if (motion->dt_s == to_s) return;
+    Readings::Reading here = readings_.Interpolate(motion->dt_s);
+    Vector3d a_I = motion->turn * here.f + g_I_;
+    while (motion->dt_s != to_s) {
+      const double next_s = readings_.Next(motion->dt_s, to_s);
+      const double h = next_s - motion->dt_s;
+      const Readings::Reading there = readings_.Interpolate(next_s);
+      motion->turn = motion->turn * Exp(0.5 * h * (here.w + there.w));
+      const Vector3d next_a_I = motion->turn * there.f + g_I_;
+      motion->shift_I += h * motion->v_I + h * h / 6 * (2 * a_I + next_a_I);
+      motion->v_I += h / 2 * (a_I + next_a_I);
+      motion->dt_s = next_s;
+      here = there;
+      a_I = next_a_I;
+    }
+  }
+
+ private:
+  const Readings& readings_;
+  const Vector3d& g_I_;
+};
+
+// Coefficients of s, s^2 and s^3 of the cubic polynomial with this slope at
+// zero and these values at -h and h.
+Eigen::Matrix3d Cubic(const Vector3d& slope,
+                      const Vector3d& before,
+                      const Vector3d& after,
+                      double h) {
+  Eigen::Matrix3d coefficients;
+  coefficients << slope, (before + after) / (2 * h * h),
+      ((after - before) / (2 * h) - slope) / (h * h);
+  return coefficients;
+}
+
+// The motion on either side of that to the middle row.
+ReadoutMotion MeasureReadout(const Readings& readings,
+                             const MotionIntegral& integral,
+                             const KeyframeMotion& middle,
+                             double rate_share,
+                             double half_s) {
+  KeyframeMotion before = middle, after = middle;
+  integral.Continue(middle.dt_s - half_s, &before);
+  integral.Continue(middle.dt_s + half_s, &after);
+  const Eigen::Quaterniond back = middle.turn.conjugate();
+  ReadoutMotion readout;
+  readout.turn = Cubic(readings.Interpolate(middle.dt_s).w,
+                       Log(back * before.turn),
+                       Log(back * after.turn),
+                       half_s);
+  readout.shift = Cubic(back * middle.v_I,
+                        back * (before.shift_I - middle.shift_I),
+                        back * (after.shift_I - middle.shift_I),
+                        half_s);
+  readout.rate_share = rate_share;
+  return readout;
+}
+
+KeyframeMotion Measure(std::span<const ImuSample> samples,
+                       const KeyframeState& x,
+                       const ImuCalibration& imu,
+                       const ImuNoise& noise,
+                       double gravity_mps2,
+                       double dt_s,
+                       std::optional<double> half_readout_s) {
+  const Readings readings(samples, x, imu);
+  const Eigen::Matrix3d R_IG = x.q_GI.toRotationMatrix().transpose();
+  const Vector3d g_I = R_IG * Vector3d(0, 0, -gravity_mps2);
+  const MotionIntegral integral(readings, g_I);
+  KeyframeMotion motion;
+  motion.v_I = R_IG * x.v_GI;
+  double rate_share = 1;
+  motion.w_I = readings.Rate(dt_s, noise.gyro_noise_density, &rate_share);
+  integral.Continue(dt_s, &motion);
+  if (half_readout_s) {
+    motion.readout =
+        MeasureReadout(readings, integral, motion, rate_share, *half_readout_s);
+  }
+  return motion;
+}
+
+// A pose moved by a motion: derivatives with respect to the rotation.
+ExposurePose Moved(const Eigen::Quaterniond& q_GI,
+                   const Vector3d& p_GI,
+                   const Eigen::Quaterniond& turn,
+                   const Vector3d& shift_I) {
+  const Eigen::Matrix3d R_GI = q_GI.toRotationMatrix();
+  ExposurePose pose;
+  pose.q_GI = q_GI * turn;
+  pose.p_GI = p_GI + R_GI * shift_I;
+  pose.by_rotation << turn.toRotationMatrix().transpose(),
+      -R_GI * Skew(shift_I);
+  return pose;
+}
+
 }  // namespace
 
 KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
@@ -142,45 +251,60 @@ KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
                              const ImuNoise& noise,
                              double gravity_mps2,
                              double dt_s) {
-  const Readings readings(samples, x, imu);
-  const Eigen::Matrix3d R_IG = x.q_GI.toRotationMatrix().transpose();
-  const Vector3d g_I = R_IG * Vector3d(0, 0, -gravity_mps2);
-  KeyframeMotion motion;
-  motion.dt_s = dt_s;
-  motion.v_I = R_IG * x.v_GI;
-  motion.w_I = readings.Rate(dt_s, noise.gyro_noise_density);
-  if (dt_s == 0) return motion;
-  Readings::Reading here = readings.Interpolate(0);
-  Vector3d a_I = here.f + g_I;
-  for (double t_s = 0; t_s != dt_s;) {
-    const double next_s = readings.Next(t_s, dt_s);
-    const double h = next_s - t_s;
-    const Readings::Reading there = readings.Interpolate(next_s);
-    motion.turn = motion.turn * Exp(0.5 * h * (here.w + there.w));
-    const Vector3d next_a_I = motion.turn * there.f + g_I;
-    motion.shift_I += h * motion.v_I + h * h / 6 * (2 * a_I + next_a_I);
-    motion.v_I += h / 2 * (a_I + next_a_I);
-    t_s = next_s;
-    here = there;
-    a_I = next_a_I;
+  return Measure(samples, x, imu, noise, gravity_mps2, dt_s, std::nullopt);
+}
+
+KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
+                             const KeyframeState& x,
+                             const ImuCalibration& imu,
+                             const ImuNoise& noise,
+                             double gravity_mps2,
+                             const CameraCalibration& camera) {
+  double dt_s = camera.time_offset_s;
+  std::optional<double> half_readout_s;
+  if (camera.line_delay_s) {
+    const double half_s = *camera.line_delay_s * camera.height_px / 2;
+    dt_s += half_s;
+    half_readout_s = std::max(std::abs(half_s), kLeastHalfReadout_s);
   }
-  return motion;
+  return Measure(samples, x, imu, noise, gravity_mps2, dt_s, half_readout_s);
 }
 
 ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
                       const Vector3d& p_GI,
                       const KeyframeMotion& motion,
-                      double time_offset_s) {
-  const double dt_s = time_offset_s - motion.dt_s;
-  const Eigen::Quaterniond turn = motion.turn * Exp(dt_s * motion.w_I);
-  const Vector3d shift_I = motion.shift_I + dt_s * motion.v_I;
-  const Eigen::Matrix3d R_GI = q_GI.toRotationMatrix();
-  ExposurePose pose;
-  pose.q_GI = q_GI * turn;
-  pose.p_GI = p_GI + R_GI * shift_I;
-  pose.by_rotation << turn.toRotationMatrix().transpose(),
-      -R_GI * Skew(shift_I);
-  pose.by_offset << motion.w_I, R_GI * motion.v_I;
+                      double exposure_s) {
+  const double dt_s = exposure_s - motion.dt_s;
+  ExposurePose pose = Moved(q_GI,
+                            p_GI,
+                            motion.turn * Exp(dt_s * motion.w_I),
+                            motion.shift_I + dt_s * motion.v_I);
+  pose.by_time << motion.w_I, q_GI.toRotationMatrix() * motion.v_I;
+  return pose;
+}
+
+ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
+                      const Vector3d& p_GI,
+                      const KeyframeMotion& motion,
+                      const CameraCalibration& camera,
+                      const Eigen::Vector2d& z_px) {
+  if (!camera.line_delay_s) {
+    return MovePose(q_GI, p_GI, motion, camera.time_offset_s);
+  }
+  const double s =
+      camera.time_offset_s + *camera.line_delay_s * z_px.y() - motion.dt_s;
+  const Vector3d powers(s, s * s, s * s * s);
+  const Vector3d slopes(1, 2 * s, 3 * s * s);
+  const ReadoutMotion& readout = motion.readout;
+  const Vector3d phi = readout.turn * powers;
+  ExposurePose pose =
+      Moved(q_GI,
+            p_GI,
+            motion.turn * Exp(phi),
+            motion.shift_I + motion.turn * (readout.shift * powers));
+  pose.by_time << readout.rate_share * RightJacobian(phi) *
+                      (readout.turn * slopes),
+      q_GI * (motion.turn * (readout.shift * slopes));
   return pose;
 }
 
@@ -195,7 +319,8 @@ void KeyframeMotions::FindCameras(const Calibration& theta,
   index_.assign(theta.cameras.size(), -1);
   stride_ = 0;
   for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
-    if (estimated[j] || theta.cameras[j].time_offset_s != 0) {
+    const CameraCalibration& camera = theta.cameras[j];
+    if (estimated[j] || camera.time_offset_s != 0 || camera.line_delay_s) {
       index_[j] = stride_++;
     }
   }

@@ -1,20 +1,23 @@
 // The motion of the body about a keyframe, as measured by the IMU: it moves the
 // keyframe's pose to the instant at which a camera was exposed, if the camera's
-// clock has an offset from that of the IMU (CameraCalibration).
+// clock has an offset from that of the IMU, and each row of an image to its
+// own, if the shutter is a rolling one (CameraCalibration).
 //
 // The samples between the keyframe's time and the exposure are integrated with
 // the current estimate. The result is a constant while factors are linearised
 // at that estimate; the pose then depends on the offset alone,
 //   q_GI(t + dt) = q_GI turn Exp(w_I (dt - dt0)),
 //   p_GI(t + dt) = p_GI + R_GI (shift_I + v_I (dt - dt0)).
-// It is expressed in the body frame, so that a common translation of the
-// keyframes of a problem, or rotation about gravity, changes nothing. Residuals
-// have exact derivatives with respect to the pose and the offset, and none with
-// respect to biases, velocity and IMU intrinsics through the motion. The
-// neglected terms are small (a velocity error of 1 cm/s moves the camera by 0.2
-// mm in 20 ms), and do not bias the estimate: the motion is measured again at
-// each new estimate, where the residuals are those of the complete model; only
-// terms weighted by the residuals at the optimum are neglected.
+// Of a rolling shutter, t + dt0 is the middle row, and from there on the motion
+// is a cubic polynomial of time (ReadoutMotion). It is expressed in the body
+// frame, so that a common translation of the keyframes of a problem, or
+// rotation about gravity, changes nothing. Residuals have exact derivatives
+// with respect to the pose and the offset, and none with respect to biases,
+// velocity and IMU intrinsics through the motion. The neglected terms are small
+// (a velocity error of 1 cm/s moves the camera by 0.2 mm in 20 ms), and do not
+// bias the estimate: the motion is measured again at each new estimate, where
+// the residuals are those of the complete model; only terms weighted by the
+// residuals at the optimum are neglected.
 //
 // Pure functions, callable from any thread.
 #pragma once
@@ -30,6 +33,20 @@
 
 namespace selfcal {
 
+// Motion of the body while a rolling shutter reads an image, as measured: in
+// the time s after the exposure of the middle row it turns by Exp(phi) and
+// moves by p, in its frame there, with
+//   phi = turn (s, s^2, s^3)^T,   p = shift (s, s^2, s^3)^T.
+// The values are those of the integrated samples at both ends of the readout,
+// and the slopes those in its middle.
+struct ReadoutMotion {
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d shift = Eigen::Matrix3d::Zero();
+  // Share of the angular rate that counts in derivatives, in [0, 1]: zero if it
+  // is not significant relative to the noise of the gyroscope.
+  double rate_share = 1;
+};
+
 // Motion about the time dt_s after that of the keyframe.
 struct KeyframeMotion {
   double dt_s = 0;
@@ -37,6 +54,8 @@ struct KeyframeMotion {
   Eigen::Vector3d shift_I = Eigen::Vector3d::Zero();  // [m], in I at t
   Eigen::Vector3d w_I = Eigen::Vector3d::Zero();      // [rad/s], in I there
   Eigen::Vector3d v_I = Eigen::Vector3d::Zero();      // [m/s], in I at t
+  // Of a rolling shutter; unused without.
+  ReadoutMotion readout = {};
 };
 
 // Measures the motion from the samples about the keyframe, in order of time, at
@@ -51,23 +70,38 @@ KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
                              double gravity_mps2,
                              double dt_s);
 
+// The same for a camera: to its exposure, or to that of its middle row with the
+// motion while it reads an image.
+KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
+                             const KeyframeState& x,
+                             const ImuCalibration& imu,
+                             const ImuNoise& noise,
+                             double gravity_mps2,
+                             const CameraCalibration& camera);
+
 // Pose of the body at the exposure, and its derivatives: those of the tangent
 // of that pose (rotation 3, position 3) with respect to the rotation of the
-// keyframe, and to the offset. The derivative with respect to the keyframe's
-// position is (0, 1).
+// keyframe, and to the time of the exposure. The derivative with respect to the
+// keyframe's position is (0, 1).
 struct ExposurePose {
   Eigen::Quaterniond q_GI;
   Eigen::Vector3d p_GI;
   Eigen::Matrix<double, 6, 3> by_rotation;
-  Eigen::Matrix<double, 6, 1> by_offset;
+  Eigen::Matrix<double, 6, 1> by_time;
 };
 
 ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
                       const Eigen::Vector3d& p_GI,
                       const KeyframeMotion& motion,
-                      double time_offset_s);
+                      double exposure_s);
+// The same for the exposure of a pixel, with a rolling shutter or without.
+ExposurePose MovePose(const Eigen::Quaterniond& q_GI,
+                      const Eigen::Vector3d& p_GI,
+                      const KeyframeMotion& motion,
+                      const CameraCalibration& camera,
+                      const Eigen::Vector2d& z_px);
 
-// The pose without a motion; nothing depends on the offset.
+// The pose without a motion; nothing depends on the time.
 ExposurePose PoseAtRest(const Eigen::Quaterniond& q_GI,
                         const Eigen::Vector3d& p_GI);
 
@@ -95,13 +129,12 @@ class KeyframeMotions {
     for (std::size_t k = 0; k < keyframes.size(); ++k) {
       for (std::size_t j = 0; j < index_.size(); ++j) {
         if (index_[j] < 0) continue;
-        motions_[k * stride_ + index_[j]] =
-            MeasureMotion(samples(k),
-                          keyframes[k],
-                          theta.imu,
-                          rig.imu_noise,
-                          rig.gravity_mps2,
-                          theta.cameras[j].time_offset_s);
+        motions_[k * stride_ + index_[j]] = MeasureMotion(samples(k),
+                                                          keyframes[k],
+                                                          theta.imu,
+                                                          rig.imu_noise,
+                                                          rig.gravity_mps2,
+                                                          theta.cameras[j]);
       }
     }
   }

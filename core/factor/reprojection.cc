@@ -21,7 +21,7 @@ bool Reproject(const Eigen::Quaterniond& q_GI,
                ReprojectionJacobians* jacobians,
                const KeyframeMotion* motion) {
   const ExposurePose exposure =
-      motion != nullptr ? MovePose(q_GI, p_GI, *motion, camera.time_offset_s)
+      motion != nullptr ? MovePose(q_GI, p_GI, *motion, camera, z_px)
                         : PoseAtRest(q_GI, p_GI);
   const Matrix3d R_IG = exposure.q_GI.toRotationMatrix().transpose();
   const Matrix3d R_CI = camera.q_CI.toRotationMatrix();
@@ -59,7 +59,11 @@ bool Reproject(const Eigen::Quaterniond& q_GI,
   jacobians->camera.middleCols<3>(kCameraPosition) = w * projection.point;
   jacobians->camera.middleCols(kCameraIntrinsics, intrinsics) =
       projection.intrinsics;
-  jacobians->camera.rightCols<1>() = by_exposure * exposure.by_offset;
+  const int time = kCameraIntrinsics + intrinsics;
+  jacobians->camera.col(time) = by_exposure * exposure.by_time;
+  if (camera.line_delay_s) {
+    jacobians->camera.col(time + 1) = z_px.y() * jacobians->camera.col(time);
+  }
   return true;
 }
 

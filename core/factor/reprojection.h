@@ -4,11 +4,12 @@
 // (w = 0) is not singular. Its image in the camera is
 //   p_C ~ R_CI R_GI^T (X - w p_GI) + w p_CI,   residual = project(p_C) - z,
 // with the pose of the body at the exposure: that of the keyframe or, if a
-// motion is given, that of the keyframe moved by it to the camera's time
-// offset. The scale must not change its sign with w: (X, w) is the direction of
-// X as w tends to zero, and (-X, -w) is behind a camera that observes (X, w).
-// The residual is not whitened: the caller divides by the pixel sigma. Pure,
-// callable from any thread. Source: Schneider et al., ICRA 2017, section III-C.
+// motion is given, that of the keyframe moved by it to the camera's time offset
+// and, if its shutter is a rolling one, to the row of z. The scale must not
+// change its sign with w: (X, w) is the direction of X as w tends to zero, and
+// (-X, -w) is behind a camera that observes (X, w). The residual is not
+// whitened: the caller divides by the pixel sigma. Pure, callable from any
+// thread. Source: Schneider et al., ICRA 2017, section III-C.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,8 +25,9 @@ struct ReprojectionJacobians {
   // perturbation.
   Eigen::Matrix<double, 2, 6> pose;
   // Derivative with respect to the camera's tangent (q_CI 3, p_CI 3, f 2, c 2,
-  // distortion, time offset); zero for the time offset without a motion.
-  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 7 + kMaxIntrinsics> camera;
+  // distortion, time offset, and line delay if it has one); zero for the latter
+  // two without a motion.
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 8 + kMaxIntrinsics> camera;
   // Derivative with respect to (X, w). If w = 1 the first three columns are
   // with respect to p_G.
   Eigen::Matrix<double, 2, 4> landmark;

@@ -10,10 +10,30 @@ void CopyByRows(const Eigen::Matrix3d& M, double* to) {
   map = M;
 }
 
+bool IsRolling(const ObservationRun& run) {
+  return run.camera->line_delay_s.has_value();
+}
+
+// The pose to which the rows refer.
 ExposurePose ExposureOf(const ObservationRun& run) {
   const KeyframeState& x = *run.keyframe;
   if (run.motion == nullptr) return PoseAtRest(x.q_GI, x.p_GI);
-  return MovePose(x.q_GI, x.p_GI, *run.motion, run.camera->time_offset_s);
+  return MovePose(
+      x.q_GI,
+      x.p_GI,
+      *run.motion,
+      IsRolling(run) ? run.motion->dt_s : run.camera->time_offset_s);
+}
+
+// The motion of the body while a rolling shutter reads an image.
+void SetReadout(const ObservationRun& run, RunGeometry* geometry) {
+  const KeyframeMotion at_rest;
+  const KeyframeMotion& motion = run.motion != nullptr ? *run.motion : at_rest;
+  geometry->first_row_s = run.camera->time_offset_s - motion.dt_s;
+  geometry->line_delay_s = *run.camera->line_delay_s;
+  geometry->rate_share = motion.readout.rate_share;
+  Eigen::Map<Eigen::Matrix3d>(geometry->turn) = motion.readout.turn;
+  Eigen::Map<Eigen::Matrix3d>(geometry->shift) = motion.readout.shift;
 }
 
 RunGeometry GeometryOf(const ObservationRun& run) {
@@ -22,10 +42,11 @@ RunGeometry GeometryOf(const ObservationRun& run) {
   CopyByRows(exposure.q_GI.toRotationMatrix().transpose(), geometry.R_IG);
   Eigen::Map<Eigen::Vector3d>(geometry.p_GI) = exposure.p_GI;
   Eigen::Map<Eigen::Matrix<double, 6, 1>>(geometry.by_offset) =
-      exposure.by_offset;
+      exposure.by_time;
   CopyByRows(run.camera->q_CI.toRotationMatrix(), geometry.R_CI);
   Eigen::Map<Eigen::Vector3d>(geometry.p_CI) = run.camera->p_CI;
   geometry.pixels = PixelMapOf(*run.camera);
+  if (IsRolling(run)) SetReadout(run, &geometry);
   return geometry;
 }
 
@@ -40,14 +61,23 @@ void WithKernels(VectorWidth width,
   VisitCameraModel(*run.camera, [&](const auto& model) {
     using Model = std::decay_t<decltype(model)>;
     WithLanes(width, [&]<int W>() {
-      function.template operator()<ReprojectionLanes<W, Model>>(geometry,
-                                                                model);
+      if (IsRolling(run)) {
+        function.template operator()<ReprojectionLanes<W, Model, true>>(
+            geometry, model);
+      } else {
+        function.template operator()<ReprojectionLanes<W, Model, false>>(
+            geometry, model);
+      }
     });
     return true;
   });
 }
 
 }  // namespace
+
+LandmarkRows RowsOf(const CameraCalibration& camera) {
+  return {CameraTangentSize(camera), camera.line_delay_s.has_value()};
+}
 
 std::optional<Eigen::Matrix<double, 6, 3>> PoseTurn(const ObservationRun& run) {
   if (run.motion == nullptr) return std::nullopt;

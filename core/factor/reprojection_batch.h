@@ -19,6 +19,9 @@
 
 namespace selfcal {
 
+// The columns of the rows of a camera.
+LandmarkRows RowsOf(const CameraCalibration& camera);
+
 // The observations of one keyframe by one camera, as arrays.
 struct ObservationRun {
   const KeyframeState* keyframe = nullptr;
@@ -27,13 +30,13 @@ struct ObservationRun {
   const std::int32_t* landmarks = nullptr;  // indices into points
   const double* z_px = nullptr;             // 2 each
   // Motion to the exposure of the camera; null: the exposure is at the
-  // keyframe, and derivatives with respect to the time offset are zero.
+  // keyframe, and derivatives with respect to the camera's time are zero.
   const KeyframeMotion* motion = nullptr;
 };
 
-// Matrix by which rows with respect to the pose at the exposure are multiplied
-// to get those with respect to the rotation of the keyframe; nullopt if the
-// poses are equal.
+// Matrix by which rows with respect to the pose at the exposure (of a rolling
+// shutter: at the time of the motion) are multiplied to get those with respect
+// to the rotation of the keyframe; nullopt if the poses are equal.
 std::optional<Eigen::Matrix<double, 6, 3>> PoseTurn(const ObservationRun& run);
 
 // Sums over the observations of a landmark for its refinement.
@@ -55,7 +58,7 @@ class ReprojectionBatch {
   explicit ReprojectionBatch(VectorWidth width = WidestVectors())
       : width_(width) {}
 
-  // Writes 2 count rows of RowsStride(n) doubles. `points` are homogeneous, 4
+  // Writes 2 count rows of RowsOf(camera). `points` are homogeneous, 4
   // doubles (X, w) each with p_G = X / w; rows are with respect to the pose,
   // the camera, and p_G. The factors are multiplied by `weights`, one for each
   // observation, or by 1 / sigma_px if that is null. `rows` must have room for

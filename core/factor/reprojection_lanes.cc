@@ -1,5 +1,6 @@
 #include "core/factor/reprojection_lanes.h"
 
+#include "core/model/so3_lanes.h"
 #include "core/simd/lanes.h"
 
 namespace selfcal {
@@ -10,6 +11,7 @@ using T = Lanes<kLanes>;
 using Vector2 = Eigen::Matrix<T, 2, 1>;
 using Vector3 = Eigen::Matrix<T, 3, 1>;
 using Matrix23 = Eigen::Matrix<T, 2, 3>;
+using Matrix3 = Eigen::Matrix<T, 3, 3>;
 
 // Observations first .. first + kLanes of a run; beyond its end, the last one.
 struct Batch {
@@ -65,28 +67,114 @@ Matrix23 Times(const Matrix23& J, const double* M) {
   return product;
 }
 
-// Residuals of a batch, with the derivative with respect to p_I.
+// c1 s + c2 s^2 + c3 s^3 for a matrix of coefficients by columns, and its
+// derivative.
+Vector3 ValueAt(T s, const double* c) {
+  return {s * (c[0] + s * (c[3] + s * c[6])),
+          s * (c[1] + s * (c[4] + s * c[7])),
+          s * (c[2] + s * (c[5] + s * c[8]))};
+}
+Vector3 SlopeAt(T s, const double* c) {
+  return {c[0] + s * (2.0 * c[3] + s * (3.0 * c[6])),
+          c[1] + s * (2.0 * c[4] + s * (3.0 * c[7])),
+          c[2] + s * (2.0 * c[5] + s * (3.0 * c[8]))};
+}
+
+// Poses of the body at the exposures of the rows of a batch, relative to the
+// pose of the run.
+struct RowPoses {
+  T s;
+  Vector3 phi;
+  Matrix3 R;
+  Vector3 p;
+
+  RowPoses(const RunGeometry& geometry, const Batch& batch)
+      : s(geometry.first_row_s + geometry.line_delay_s * batch.z_px[1]),
+        phi(ValueAt(s, geometry.turn)),
+        R(Exp<T>(phi).toRotationMatrix()),
+        p(ValueAt(s, geometry.shift)) {}
+
+  // p_I at the rows, times w, from that in the frame of the run.
+  Vector3 ToRows(const Vector3& p_run, T w) const {
+    const Vector3 from_row(
+        p_run[0] - w * p[0], p_run[1] - w * p[1], p_run[2] - w * p[2]);
+    return R.transpose() * from_row;
+  }
+};
+
+// p_I at the exposure, times w.
+template <bool kRolling>
+Vector3 ToExposedBody(const RunGeometry& geometry, const Batch& batch) {
+  const Vector3 p_run = ToBody(geometry, batch);
+  if constexpr (kRolling) {
+    return RowPoses(geometry, batch).ToRows(p_run, batch.w);
+  } else {
+    return p_run;
+  }
+}
+
+// Residuals of a batch, with the derivatives with respect to p_I at the
+// exposure and in the frame of the run.
 template <class Model>
 struct Evaluated {
   LaneMask<kLanes> valid;
-  Vector3 p_I;
+  Vector3 p_I, p_run;
   Vector2 r_px;
   ProjectionParts<T, Model::kSize> parts;
-  Matrix23 by_p_I;
+  Matrix23 by_p_I, by_p_run;
 };
 
-template <class Model>
+template <bool kRolling, class Model>
 Evaluated<Model> Evaluate(const RunGeometry& geometry,
                           const Model& model,
                           const Batch& batch) {
   Evaluated<Model> e;
-  e.p_I = ToBody(geometry, batch);
+  e.p_run = ToBody(geometry, batch);
+  e.p_I = e.p_run;
+  Matrix3 R;
+  if constexpr (kRolling) {
+    const RowPoses rows(geometry, batch);
+    R = rows.R;
+    e.p_I = rows.ToRows(e.p_run, batch.w);
+  }
   Vector2 z_px;
   e.valid = model.template Project<T>(
       geometry.pixels, ToCamera(geometry, e.p_I, batch.w), &z_px, &e.parts);
   e.r_px = Vector2(z_px[0] - batch.z_px[0], z_px[1] - batch.z_px[1]);
   e.by_p_I = Times(e.parts.point, geometry.R_CI);
+  e.by_p_run = e.by_p_I;
+  if constexpr (kRolling) e.by_p_run = e.by_p_I * R.transpose();
   return e;
+}
+
+// by_p [p]x for row r of a derivative: with respect to the rotation of a body
+// with the point p.
+template <class Columns>
+void SetTurn(const Matrix23& by_p, int r, const Vector3& p, Columns columns) {
+  const T x = by_p(r, 0), y = by_p(r, 1), z = by_p(r, 2);
+  columns[0] = y * p[2] - z * p[1];
+  columns[1] = z * p[0] - x * p[2];
+  columns[2] = x * p[1] - y * p[0];
+}
+
+// Derivative of row r with respect to the time of the exposure, `turn` that
+// with respect to the rotation of the body then.
+template <class Model>
+T ByTime(const RunGeometry& geometry,
+         const RowPoses& rows,
+         const Evaluated<Model>& e,
+         T w,
+         int r,
+         const T* turn) {
+  const Vector3 rate =
+      RightJacobian<T>(rows.phi) * SlopeAt(rows.s, geometry.turn);
+  const Vector3 v = SlopeAt(rows.s, geometry.shift);
+  T by_turn = 0.0, by_shift = 0.0;
+  for (int c = 0; c < 3; ++c) {
+    by_turn = by_turn + turn[c] * rate[c];
+    by_shift = by_shift + e.by_p_run(r, c) * v[c];
+  }
+  return geometry.rate_share * by_turn - w * by_shift;
 }
 
 // Stores the part of `values` that belongs to the run.
@@ -100,50 +188,62 @@ void StorePart(T values, int first, int count, double* to) {
 
 }  // namespace
 
-template <int W, class Model>
-void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
-                                            const Model& model,
-                                            const ObservationRun& run,
-                                            const double* points,
-                                            double sigma_px,
-                                            const double* weights,
-                                            double* rows) {
-  // p_CI, f, c, distortion, time offset
-  constexpr int kOwn = 3 + 4 + Model::kSize + 1;
-  constexpr int kStride = RowsStride(3 + kOwn);
+template <int W, class Model, bool kRolling>
+void ReprojectionLanes<W, Model, kRolling>::Linearise(
+    const RunGeometry& geometry,
+    const Model& model,
+    const ObservationRun& run,
+    const double* points,
+    double sigma_px,
+    const double* weights,
+    double* rows) {
+  // q_CI, p_CI, f, c, distortion, time offset, line delay
+  constexpr LandmarkRows kRows = {
+      3 + 3 + 4 + Model::kSize + 1 + (kRolling ? 1 : 0), kRolling};
+  constexpr int kStride = kRows.stride();
+  constexpr int kPosition = kRows.Column(3);
+  constexpr int kPixels = kPosition + 3;
+  constexpr int kOffset = kPixels + 4 + Model::kSize;
   for (int first = 0; first < run.count; first += W) {
     const Batch batch = Gather(run, points, first);
-    const Evaluated<Model> e = Evaluate(geometry, model, batch);
+    const Evaluated<Model> e = Evaluate<kRolling>(geometry, model, batch);
     T weight = 1 / sigma_px;
     if (weights != nullptr) {
       for (int i = 0; i < W; ++i) {
         weight.Set(i, first + i < run.count ? weights[first + i] : 0);
       }
     }
-    const Matrix23 by_X = Times(e.by_p_I, geometry.R_IG);
+    const Matrix23 by_X = Times(e.by_p_run, geometry.R_IG);
     for (int r = 0; r < 2; ++r) {
       T columns[kStride];
       for (T& column : columns) column = 0.0;
-      const T x = e.by_p_I(r, 0), y = e.by_p_I(r, 1), z = e.by_p_I(r, 2);
-      columns[kRowsTurn + 0] = y * e.p_I[2] - z * e.p_I[1];
-      columns[kRowsTurn + 1] = z * e.p_I[0] - x * e.p_I[2];
-      columns[kRowsTurn + 2] = x * e.p_I[1] - y * e.p_I[0];
+      SetTurn(e.by_p_run, r, e.p_run, columns + kRowsTurn);
       for (int c = 0; c < 3; ++c) {
         columns[kRowsPosition + c] = -batch.w * by_X(r, c);
-        columns[kRowsOwn + c] = batch.w * e.parts.point(r, c);
+        columns[kPosition + c] = batch.w * e.parts.point(r, c);
       }
-      columns[kRowsOwn + 3 + r] = e.parts.d[r];
-      columns[kRowsOwn + 5 + r] = 1.0;
+      columns[kPixels + r] = e.parts.d[r];
+      columns[kPixels + 2 + r] = 1.0;
       for (int c = 0; c < Model::kSize; ++c) {
-        columns[kRowsOwn + 7 + c] = e.parts.distortion(r, c);
+        columns[kPixels + 4 + c] = e.parts.distortion(r, c);
       }
-      T by_offset = 0.0;
-      for (int c = 0; c < 6; ++c) {
-        by_offset = by_offset + geometry.by_offset[c] * columns[kRowsTurn + c];
+      if constexpr (kRolling) {
+        T turn[3];
+        SetTurn(e.by_p_I, r, e.p_I, turn);
+        for (int c = 0; c < 3; ++c) columns[kRows.Column(c)] = -turn[c];
+        const RowPoses rows(geometry, batch);
+        columns[kOffset] = ByTime(geometry, rows, e, batch.w, r, turn);
+        columns[kOffset + 1] = batch.z_px[1] * columns[kOffset];
+      } else {
+        T by_offset = 0.0;
+        for (int c = 0; c < 6; ++c) {
+          by_offset =
+              by_offset + geometry.by_offset[c] * columns[kRowsTurn + c];
+        }
+        columns[kOffset] = by_offset;
       }
-      columns[kRowsOwn + kOwn - 1] = by_offset;
-      columns[RowsResidual(3 + kOwn)] = e.r_px[r];
-      for (int c = 0; c <= RowsResidual(3 + kOwn); ++c) {
+      columns[kRows.residual()] = e.r_px[r];
+      for (int c = 0; c <= kRows.residual(); ++c) {
         columns[c] = Select(e.valid, weight * columns[c], T(0.0));
       }
       for (int c = 0; c < kStride; c += W) {
@@ -156,20 +256,21 @@ void ReprojectionLanes<W, Model>::Linearise(const RunGeometry& geometry,
   }
 }
 
-template <int W, class Model>
-void ReprojectionLanes<W, Model>::AddLandmarkSums(const RunGeometry& geometry,
-                                                  const Model& model,
-                                                  const ObservationRun& run,
-                                                  const double* points,
-                                                  double sigma_px,
-                                                  double huber_sigmas,
-                                                  double* squares_px2,
-                                                  LandmarkSums* sums) {
+template <int W, class Model, bool kRolling>
+void ReprojectionLanes<W, Model, kRolling>::AddLandmarkSums(
+    const RunGeometry& geometry,
+    const Model& model,
+    const ObservationRun& run,
+    const double* points,
+    double sigma_px,
+    double huber_sigmas,
+    double* squares_px2,
+    LandmarkSums* sums) {
   const double inverse_sigma = 1 / sigma_px;
   for (int first = 0; first < run.count; first += W) {
     const Batch batch = Gather(run, points, first);
-    const Evaluated<Model> e = Evaluate(geometry, model, batch);
-    const Matrix23 by_X = Times(e.by_p_I, geometry.R_IG);
+    const Evaluated<Model> e = Evaluate<kRolling>(geometry, model, batch);
+    const Matrix23 by_X = Times(e.by_p_run, geometry.R_IG);
     const T square = e.r_px[0] * e.r_px[0] + e.r_px[1] * e.r_px[1];
     StorePart(Select(e.valid, square, T(-1.0)), first, run.count, squares_px2);
     const T norm = Sqrt(square) * inverse_sigma;
@@ -199,18 +300,18 @@ void ReprojectionLanes<W, Model>::AddLandmarkSums(const RunGeometry& geometry,
   }
 }
 
-template <int W, class Model>
-void ReprojectionLanes<W, Model>::Squares(const RunGeometry& geometry,
-                                          const Model& model,
-                                          const ObservationRun& run,
-                                          const double* points,
-                                          double* squares_px2) {
+template <int W, class Model, bool kRolling>
+void ReprojectionLanes<W, Model, kRolling>::Squares(const RunGeometry& geometry,
+                                                    const Model& model,
+                                                    const ObservationRun& run,
+                                                    const double* points,
+                                                    double* squares_px2) {
   for (int first = 0; first < run.count; first += W) {
     const Batch batch = Gather(run, points, first);
     Vector2 z_px;
     const auto valid = model.template Project<T>(
         geometry.pixels,
-        ToCamera(geometry, ToBody(geometry, batch), batch.w),
+        ToCamera(geometry, ToExposedBody<kRolling>(geometry, batch), batch.w),
         &z_px,
         nullptr);
     const T x = z_px[0] - batch.z_px[0];
@@ -223,9 +324,9 @@ void ReprojectionLanes<W, Model>::Squares(const RunGeometry& geometry,
 namespace {
 
 // Naming the kernels of a model instantiates them.
-template <class Model>
+template <class Model, bool kRolling>
 struct Kernels {
-  using Lanes = ReprojectionLanes<kLanes, Model>;
+  using Lanes = ReprojectionLanes<kLanes, Model, kRolling>;
   decltype(&Lanes::Linearise) linearise = &Lanes::Linearise;
   decltype(&Lanes::AddLandmarkSums) add_sums = &Lanes::AddLandmarkSums;
   decltype(&Lanes::Squares) squares = &Lanes::Squares;
@@ -233,7 +334,8 @@ struct Kernels {
 template <class List>
 struct AllKernels;
 template <class... Models>
-struct AllKernels<CameraModelList<Models...>> : Kernels<Models>... {};
+struct AllKernels<CameraModelList<Models...>> : Kernels<Models, false>...,
+                                                Kernels<Models, true>... {};
 [[gnu::used]] constexpr AllKernels<CameraModels> kAllKernels;
 
 }  // namespace

@@ -17,9 +17,17 @@ struct RunGeometry {
   double
       by_offset[6];  // derivative of the pose with respect to the time offset
   PixelMap pixels;
+  // Of a rolling shutter: ReadoutMotion, its matrices by columns; and when the
+  // first row is exposed, and how long after it the next, from the time of that
+  // motion on.
+  double turn[9];
+  double shift[9];
+  double rate_share;
+  double first_row_s;
+  double line_delay_s;
 };
 
-template <int W, class Model>
+template <int W, class Model, bool kRolling>
 struct ReprojectionLanes {
   static void Linearise(const RunGeometry& geometry,
                         const Model& model,

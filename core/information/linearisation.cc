@@ -109,8 +109,7 @@ void SegmentLineariser::LineariseViews(const Rig& rig,
   for (const ObservationRuns::Run& run : runs_.runs()) {
     // The kernels may write a whole vector past the last element.
     const std::size_t rows = 2 * (run.end - run.begin + kPanelPad);
-    const std::size_t size =
-        rows * RowsStride(CameraTangentSize(theta0.cameras[run.camera]));
+    const std::size_t size = rows * RowsOf(theta0.cameras[run.camera]).stride();
     if (rows_.size() < size) rows_.resize(size);
     const ObservationRun arrays = runs_.Arrays(run, segment, theta0, motions);
     reprojection_.Linearise(
@@ -167,13 +166,13 @@ void SegmentLineariser::StartChain(const Rig& rig,
                                    const InlierSelection& selection,
                                    const ObservationOrder& order,
                                    int kept) {
-  camera_sizes_.clear();
+  cameras_.clear();
   for (const CameraCalibration& camera : theta0.cameras) {
-    camera_sizes_.push_back(CameraTangentSize(camera));
+    cameras_.push_back(RowsOf(camera));
   }
   FindTracks(segment, selection, order);
   elimination_.Start({.keyframes = static_cast<int>(segment.keyframes.size()),
-                      .camera_sizes = camera_sizes_,
+                      .cameras = cameras_,
                       .tracks = tracks_,
                       .track_keyframes = track_keyframes_,
                       .kept = kept});

@@ -99,7 +99,7 @@ class SegmentLineariser {
 
   ObservationRuns runs_;
   std::vector<double> points_;  // homogeneous p_G of the landmarks, 4 each
-  std::vector<int> camera_sizes_;
+  std::vector<LandmarkRows> cameras_;
   // Inliers in the order of the elimination: by landmark.
   std::vector<int> tracks_, track_keyframes_;
   std::vector<int> factor_of_observation_;  // -1 for an outlier

@@ -2,6 +2,7 @@
 // those times: the true ones, and those according to its SLAM system.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "core/model/calibration.h"
@@ -11,13 +12,38 @@
 
 namespace selfcal {
 
-// States at the exposures of each camera, one for each keyframe: those of the
-// keyframes themselves for a camera without a time offset.
-using Exposures = std::vector<std::vector<KeyframeState>>;
+// States at the exposures of each camera: those of the keyframes themselves for
+// a camera without a time offset.
+class Exposures {
+ public:
+  // The state at the exposure of a row of a keyframe's image.
+  using OfRow = std::function<KeyframeState(int keyframe, double row_px)>;
+
+  // Of a camera that exposes all rows at once.
+  void AddCamera(std::vector<KeyframeState> states);
+  // Of one with a rolling shutter.
+  void AddCamera(OfRow of_row);
+
+  KeyframeState At(int camera, int keyframe, double row_px) const {
+    const Camera& c = cameras_[camera];
+    return c.of_row ? c.of_row(keyframe, row_px) : c.states[keyframe];
+  }
+  // Whether the state depends on the row.
+  bool IsRolling(int camera) const {
+    return static_cast<bool>(cameras_[camera].of_row);
+  }
+
+ private:
+  struct Camera {
+    std::vector<KeyframeState> states;
+    OfRow of_row;
+  };
+  std::vector<Camera> cameras_;
+};
 
 // Delay [s] of the instants to which the states of a SLAM system refer,
-// relative to the keyframes: its poses follow the images, and it assumes other
-// time offsets. Mean over the cameras.
+// relative to the keyframes: its poses follow the middle of the images, and it
+// assumes other time offsets and line delays. Mean over the cameras.
 double KeyframeDelay(const Calibration& theta_true,
                      const Calibration& theta_slam);
 
@@ -36,6 +62,7 @@ std::vector<KeyframeState> StatesLater(
     const ImuReadings& imu,
     double dt_s);
 
+// All but theta_true must outlive the result.
 Exposures TrueExposures(const Calibration& theta_true,
                         const std::vector<KeyframeState>& keyframes,
                         const Trajectory& trajectory,
@@ -43,7 +70,7 @@ Exposures TrueExposures(const Calibration& theta_true,
 
 // Exposures computed from the states of the SLAM system, which estimate the
 // true states `meant`, `delay_s` after those of the keyframes; between these
-// times the body moves as in truth.
+// times the body moves as in truth. All but theta_slam must outlive the result.
 Exposures SlamExposures(const Calibration& theta_slam,
                         const std::vector<KeyframeState>& slam_states,
                         const std::vector<KeyframeState>& meant,

@@ -17,6 +17,10 @@ constexpr int kRevisitPause = 10;
 // A tracked landmark may come nearer, or move farther, than the depths of new
 // ones by this factor.
 constexpr double kDepthSlack = 2;
+// A point that keeps up with the rows of a rolling shutter is in many of them:
+// it is not observed.
+constexpr int kMaxRowIterations = 50;
+constexpr double kRowConverged_px = 1e-9;
 
 bool InsideImage(const CameraCalibration& camera, const Eigen::Vector2d& z_px) {
   return z_px.x() >= 0 && z_px.y() >= 0 && z_px.x() <= camera.width_px - 1 &&
@@ -120,7 +124,7 @@ class Tracker {
     if (!Unproject(c, z_px, &bearing_C)) return -1;
     const Eigen::Vector3d p_I =
         c.q_CI.conjugate() * (depth_m * bearing_C - c.p_CI);
-    const KeyframeState& x = exposures_[camera][keyframe_];
+    const KeyframeState x = exposures_.At(camera, keyframe_, z_px.y());
     tracks_.landmarks_G.push_back(x.q_GI * p_I + x.p_GI);
     trackers_.push_back(0);
     last_seen_.push_back(-1);
@@ -166,13 +170,25 @@ class Tracker {
                  const Eigen::Vector3d& p_G,
                  Eigen::Vector2d* z_px) const {
     const CameraCalibration& c = theta_.cameras[camera];
-    const KeyframeState& x = exposures[camera][keyframe_];
-    const Eigen::Vector3d p_I = x.q_GI.conjugate() * (p_G - x.p_GI);
-    const Eigen::Vector3d p_C = c.q_CI * p_I + c.p_CI;
-    const double depth_m = p_C.norm();
-    return depth_m > options_.min_depth_m / kDepthSlack &&
-           depth_m < options_.max_depth_m * kDepthSlack &&
-           Project(c, p_C, z_px, nullptr) && InsideImage(c, *z_px);
+    double row_px = c.height_px / 2.0;
+    // Of a rolling shutter, the row at whose exposure the point is in that row.
+    for (int i = 0; i < kMaxRowIterations; ++i) {
+      const KeyframeState x = exposures.At(camera, keyframe_, row_px);
+      const Eigen::Vector3d p_I = x.q_GI.conjugate() * (p_G - x.p_GI);
+      const Eigen::Vector3d p_C = c.q_CI * p_I + c.p_CI;
+      const double depth_m = p_C.norm();
+      if (!(depth_m > options_.min_depth_m / kDepthSlack &&
+            depth_m < options_.max_depth_m * kDepthSlack &&
+            Project(c, p_C, z_px, nullptr) && InsideImage(c, *z_px))) {
+        return false;
+      }
+      if (!exposures.IsRolling(camera) ||
+          std::abs(z_px->y() - row_px) < kRowConverged_px) {
+        return true;
+      }
+      row_px = z_px->y();
+    }
+    return false;
   }
 
   // Error of the next pixel of a track, in sigmas: a first-order autoregressive
@@ -262,13 +278,12 @@ class Tracker {
 
 FeatureTracks SimulateTracks(const Calibration& theta,
                              double pixel_sigma_px,
+                             int keyframes,
                              const Exposures& exposures,
                              const SimulationOptions& options,
                              const Exposures& closed) {
   Tracker tracker(theta, pixel_sigma_px, exposures, closed, options);
-  for (std::size_t k = 0; k < exposures.front().size(); ++k) {
-    tracker.Step(static_cast<int>(k));
-  }
+  for (int k = 0; k < keyframes; ++k) tracker.Step(k);
   return std::move(tracker).Take();
 }
 

@@ -25,11 +25,13 @@ struct FeatureTracks {
   std::vector<FeatureObservation> observations;  // in order of the keyframes
 };
 
-// Simulates tracks over all keyframes, given their true exposures; `closed` are
-// those at the closing of the shutter, needed only with options.exposure_s > 0.
-// Every pixel, true and measured, lies inside the image.
+// Simulates tracks over this many keyframes, given their true exposures;
+// `closed` are those at the closing of the shutter, needed only with
+// options.exposure_s > 0. Every pixel, true and measured, lies inside the
+// image.
 FeatureTracks SimulateTracks(const Calibration& theta,
                              double pixel_sigma_px,
+                             int keyframes,
                              const Exposures& exposures,
                              const SimulationOptions& options,
                              const Exposures& closed = {});

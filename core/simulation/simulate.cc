@@ -138,18 +138,14 @@ class Cutter {
   std::size_t next_observation_ = 0;
 };
 
-// Poses of the cameras at the closing of the shutter; empty if the exposure
-// time is zero.
-Exposures ShutterClosed(const Calibration& theta_true,
-                        const Recording& recording,
-                        const Trajectory& trajectory,
-                        const SimulationOptions& options) {
-  if (options.exposure_s <= 0) return {};
+// The calibration by which shutters close when those of theta_true open.
+Calibration ShutterClosed(const Calibration& theta_true,
+                          const SimulationOptions& options) {
   Calibration later = theta_true;
   for (CameraCalibration& camera : later.cameras) {
     camera.time_offset_s += options.exposure_s;
   }
-  return TrueExposures(later, recording.truth, trajectory, recording.imu);
+  return later;
 }
 
 }  // namespace
@@ -168,12 +164,16 @@ SimulatedSession Simulate(const Rig& rig,
   const int N = options.keyframes_per_segment;
   const int segments = static_cast<int>(recording.truth.size()) / N;
   recording.truth.resize(static_cast<std::size_t>(segments) * N);
-  recording.tracks = SimulateTracks(
-      theta_true,
-      rig.pixel_sigma_px,
-      TrueExposures(theta_true, recording.truth, trajectory, recording.imu),
-      options,
-      ShutterClosed(theta_true, recording, trajectory, options));
+  const auto exposures = [&](const Calibration& theta) {
+    return TrueExposures(theta, recording.truth, trajectory, recording.imu);
+  };
+  recording.tracks =
+      SimulateTracks(theta_true,
+                     rig.pixel_sigma_px,
+                     segments * N,
+                     exposures(theta_true),
+                     options,
+                     exposures(ShutterClosed(theta_true, options)));
   const double delay_s = KeyframeDelay(theta_true, theta_slam);
   const std::vector<KeyframeState> meant =
       StatesLater(recording.truth, trajectory, recording.imu, delay_s);

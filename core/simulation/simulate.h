@@ -83,9 +83,10 @@ struct SimulatedSession {
 // SLAM system uses theta_slam: its landmarks are triangulated with that
 // calibration, and its biases absorb the mean of the resulting errors. Noise,
 // pixel sigma and gravity are those of the rig. Images are exposed later than
-// the time of their keyframe by the true time offset of their camera; if the
-// SLAM system assumes another offset, its states are those at its images rather
-// than those of the IMU.
+// the time of their keyframe by the true time offset of their camera, and the
+// rows of a rolling shutter one after the other; if the SLAM system assumes
+// other offsets and line delays, its states are those at the middle of its
+// images rather than those of the IMU.
 //
 // Segments of keyframes_per_segment fill the trajectory from its start;
 // remaining keyframes at the end that do not fill a segment are dropped. Times

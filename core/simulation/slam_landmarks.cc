@@ -122,8 +122,8 @@ std::vector<std::optional<Eigen::Vector3d>> TriangulateLandmarks(
   const std::size_t count = tracks.landmarks_G.size();
   std::vector<std::vector<View>> views(count);
   for (const FeatureObservation& observation : tracks.observations) {
-    const KeyframeState& state =
-        slam_exposures[observation.camera][observation.keyframe];
+    const KeyframeState state = slam_exposures.At(
+        observation.camera, observation.keyframe, observation.measured_px.y());
     views[observation.landmark].push_back(
         MakeView(theta_slam, state, observation));
   }

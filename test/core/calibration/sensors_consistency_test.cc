@@ -65,6 +65,50 @@ TEST_P(Cameras, AreFoundWithTheirTimeOffsets) {
   });
 }
 
+// Readouts of 10, 20 and 33 ms: of a rig that knows them, and of one that
+// believes that all rows are exposed at once.
+class RollingShutter : public testing::TestWithParam<int> {
+ protected:
+  static Calibration Truth() {
+    Calibration truth = RigOfCameras(1).factory;
+    truth.cameras[0].line_delay_s =
+        1e-3 * GetParam() / truth.cameras[0].height_px;
+    return truth;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Readouts, RollingShutter, testing::Values(10, 20, 33));
+
+TEST_P(RollingShutter, OfAKnownLineDelayIsFoundWithinItsSigmas) {
+  const Calibration truth = Truth();
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = RigOfCameras(1);
+    rig.factory = PerturbCalibration(truth, {}, seed);
+    rig.blocks = {{"*.line_delay", false}};
+    return CalibrateSimulated(rig, truth, seed);
+  });
+}
+
+TEST_P(RollingShutter, IsFoundWithItsLineDelay) {
+  const Calibration truth = Truth();
+  ExpectConsistent(4, [&](std::uint64_t seed) {
+    Rig rig = RigOfCameras(1);
+    rig.factory.cameras[0].line_delay_s = 0;
+    rig.factory = PerturbCalibration(rig.factory, {}, seed);
+    rig.prior_sigmas = {{"*.line_delay", 1e-4}};
+    rig.groups = DefaultGroups(rig.blocks, rig.factory);
+    const Errors errors = CalibrateSimulated(rig, truth, seed);
+    const auto last = errors.error.size() - 1;
+    const double sigma = std::sqrt(errors.covariance(last, last));
+    std::printf("line delay: %.2f us off, sigma %.2f us\n",
+                1e6 * errors.error(last),
+                1e6 * sigma);
+    EXPECT_LT(std::abs(errors.error(last)), 3.3 * sigma);
+    EXPECT_LT(sigma, 1e-6);
+    return errors;
+  });
+}
+
 // Other parameters of the same rig are known equally well, and estimated as
 // well.
 TEST(FreeParameters, AreThoseThatTheRigChooses) {

@@ -31,8 +31,9 @@ std::vector<RandomChainShape> Shapes() {
   for (int trial = 0; trial < 36; ++trial) {
     RandomChainShape shape;
     shape.keyframes = 2 + trial % 9;
-    shape.camera_sizes.assign(1 + trial % 3, 11 + trial % 4);
-    shape.camera_sizes.back() = 11;
+    shape.cameras.assign(1 + trial % 3,
+                         {.shared = 11 + trial % 4, .rolling = trial % 5 > 2});
+    shape.cameras.back() = {11};
     shape.max_track = 1 + trial % 7;
     shape.landmarks_per_keyframe = trial % 5;
     shape.found_again = trial % 2 == 0 ? 0 : 0.3;
@@ -190,7 +191,7 @@ TEST(ChainElimination, AReusedWorkspaceGivesTheSameBits) {
   const Chain chain = RandomChain(RandomChainShape(), &random);
   RandomChainShape larger;
   larger.keyframes = 20;
-  larger.camera_sizes = {11, 14};
+  larger.cameras = {{11}, {14}};
   ChainElimination fresh;
   const SharedInformation expected = Eliminate(chain, &fresh);
   ChainElimination reused;

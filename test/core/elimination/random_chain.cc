@@ -38,7 +38,7 @@ ChainObservation RandomObservation(int keyframe,
   ChainObservation observation;
   observation.keyframe = keyframe;
   observation.camera = camera;
-  observation.own.resize(2, shape.camera_sizes[camera] - 3);
+  observation.own.resize(2, shape.cameras[camera].own());
   FillNormal(random, &observation.residual);
   FillNormal(random, &observation.turn);
   FillNormal(random, &observation.own);
@@ -54,7 +54,7 @@ std::vector<ChainObservation> RandomTrack(int first,
   const int end = std::min(shape.keyframes, first + length(*random));
   std::vector<ChainObservation> track;
   for (int k = first; k < end; ++k) {
-    const int cameras = static_cast<int>(shape.camera_sizes.size());
+    const int cameras = static_cast<int>(shape.cameras.size());
     for (int camera = 0; camera < cameras; ++camera) {
       if ((k == first && camera == 0) || seen(*random)) {
         track.push_back(RandomObservation(k, camera, shape, random));
@@ -76,7 +76,9 @@ Eigen::Matrix<double, 2, 6> ByPose(const ChainObservation& observation) {
   J.leftCols<3>() = (J * observation.by_rotation).eval();
   return J;
 }
-Eigen::Matrix2Xd ByCamera(const ChainObservation& observation) {
+Eigen::Matrix2Xd ByCamera(const LandmarkRows& rows,
+                          const ChainObservation& observation) {
+  if (rows.rolling) return observation.own;
   Eigen::Matrix2Xd J(2, 3 + observation.own.cols());
   J << -observation.turn, observation.own;
   return J;
@@ -109,8 +111,8 @@ void AddObservations(const Chain& chain,
                      int keyframe,
                      int camera,
                      ChainElimination* elimination) {
-  const int size = chain.camera_sizes[camera];
-  const int stride = RowsStride(size);
+  const LandmarkRows& columns = chain.cameras[camera];
+  const int stride = columns.stride();
   std::vector<double> rows;
   std::vector<int> indices;
   ChainElimination::PoseRotation by_rotation =
@@ -123,8 +125,8 @@ void AddObservations(const Chain& chain,
           Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(stride);
           row.segment<3>(kRowsTurn) = observation.turn.row(r);
           row.segment<3>(kRowsPosition) = observation.position.row(r);
-          row.segment(kRowsOwn, size - 3) = observation.own.row(r);
-          row(RowsResidual(size)) = observation.residual(r);
+          row.segment(kRowsOwn, columns.own()) = observation.own.row(r);
+          row(columns.residual()) = observation.residual(r);
           rows.insert(rows.end(), row.data(), row.data() + stride);
         }
         indices.push_back(index);
@@ -145,7 +147,7 @@ void AddObservations(const Chain& chain,
 // Draws the pose rotation of each keyframe for the cameras of odd number.
 void TurnPoses(std::mt19937* random, Chain* chain) {
   for (int k = 0; k < chain->keyframes(); ++k) {
-    const auto cameras = static_cast<int>(chain->camera_sizes.size());
+    const auto cameras = static_cast<int>(chain->cameras.size());
     for (int camera = 1; camera < cameras; camera += 2) {
       ChainElimination::PoseRotation by_rotation;
       FillNormal(random, &by_rotation);
@@ -164,12 +166,15 @@ void TurnPoses(std::mt19937* random, Chain* chain) {
 
 int Chain::shared_size() const {
   return std::accumulate(
-      camera_sizes.begin(), camera_sizes.end(), kChainLinkShared + kept);
+      cameras.begin(),
+      cameras.end(),
+      kChainLinkShared + kept,
+      [](int sum, const LandmarkRows& rows) { return sum + rows.shared; });
 }
 
 Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
   Chain chain;
-  chain.camera_sizes = shape.camera_sizes;
+  chain.cameras = shape.cameras;
   chain.landmark_prior = 1e-2;
   chain.landmark_prior_slope = {0.01, -0.02, 0.03};
   for (int k = 0; k < shape.keyframes; ++k) {
@@ -224,14 +229,14 @@ SharedInformation Eliminate(const Chain& chain,
     tracks.push_back(static_cast<int>(keyframes.size()));
   }
   elimination->Start({chain.keyframes(),
-                      chain.camera_sizes,
+                      chain.cameras,
                       tracks,
                       keyframes,
                       chain.kept,
                       chain.kept_landmarks},
                      record);
   for (int k = 0; k < chain.keyframes(); ++k) {
-    for (int camera = 0; camera < static_cast<int>(chain.camera_sizes.size());
+    for (int camera = 0; camera < static_cast<int>(chain.cameras.size());
          ++camera) {
       AddObservations(chain, k, camera, elimination);
     }
@@ -296,15 +301,17 @@ DenseProblem MakeDense(const Chain& chain) {
     row += kChainStateSize;
   }
   std::vector<int> offsets = {shared + kChainLinkShared};
-  for (const int size : chain.camera_sizes) {
-    offsets.push_back(offsets.back() + size);
+  for (const LandmarkRows& rows : chain.cameras) {
+    offsets.push_back(offsets.back() + rows.shared);
   }
   for (int m = 0; m < landmarks; ++m) {
     for (const ChainObservation& a : chain.landmarks[m]) {
       dense.J.block<2, 3>(row, column(m)) = -a.position;
       dense.J.block<2, 6>(row, states + kChainStateSize * a.keyframe) =
           ByPose(a);
-      dense.J.block(row, offsets[a.camera], 2, 3 + a.own.cols()) = ByCamera(a);
+      const LandmarkRows& columns_of = chain.cameras[a.camera];
+      dense.J.block(row, offsets[a.camera], 2, columns_of.shared) =
+          ByCamera(columns_of, a);
       dense.r.segment<2>(row) = a.residual;
       row += 2;
     }

@@ -32,7 +32,7 @@ struct ChainRows {
 };
 
 struct Chain {
-  std::vector<int> camera_sizes;
+  std::vector<LandmarkRows> cameras;
   std::vector<ChainRows> links;  // one less than keyframes
   std::vector<ChainStateMatrix> priors;
   std::vector<std::vector<ChainObservation>> landmarks;
@@ -53,7 +53,7 @@ struct Chain {
 
 struct RandomChainShape {
   int keyframes = 8;
-  std::vector<int> camera_sizes = {11};
+  std::vector<LandmarkRows> cameras = {{11}};
   int landmarks_per_keyframe = 4;
   int max_track = 5;  // keyframes from the first to the last that sees it
   double seen = 0.8;  // of the keyframes within a track

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <vector>
 
 #include "test/core/factor/analytic_motion.h"
@@ -100,6 +102,51 @@ TEST(MeasureMotion, GoesOnWhereTheSamplesEnd) {
   EXPECT_LT(std::sqrt(sum_px2 / kTrials), 0.3);
 }
 
+// The polynomials of a readout against the true motion, and against a motion at
+// the rates of the middle row alone.
+TEST(MeasureMotion, MovesThePoseToEachRowOfARollingShutter) {
+  for (const double readout_s : {0.010, 0.020, 0.033, -0.033}) {
+    RandomValues random(9);
+    double worst_px = 0, worst_at_rates_px = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+      const Scene scene(random);
+      CameraCalibration camera;
+      camera.height_px = 480;
+      camera.time_offset_s = random.Uniform(-0.03, 0.03);
+      camera.line_delay_s = readout_s / camera.height_px;
+      const KeyframeMotion motion = MeasureMotion(
+          scene.samples, scene.x, scene.imu, {}, kGravity, camera);
+      for (const double row_px : {0.0, 100.5, 240.0, 333.0, 479.0}) {
+        const double dt_s =
+            camera.time_offset_s + *camera.line_delay_s * row_px;
+        const ExposurePose pose = MovePose(scene.x.q_GI,
+                                           scene.x.p_GI,
+                                           motion,
+                                           camera,
+                                           Eigen::Vector2d(7, row_px));
+        worst_px = std::max(worst_px, ErrorPixels(pose, scene.Truth(dt_s)));
+        const ExposurePose at_rates =
+            MovePose(scene.x.q_GI, scene.x.p_GI, motion, dt_s);
+        worst_at_rates_px = std::max(worst_at_rates_px,
+                                     ErrorPixels(at_rates, scene.Truth(dt_s)));
+        const double h_s = 1e-4;
+        const KeyframeState before = scene.Truth(dt_s - h_s);
+        const KeyframeState after = scene.Truth(dt_s + h_s);
+        Eigen::Matrix<double, 6, 1> by_time;
+        by_time << Log(before.q_GI.conjugate() * after.q_GI) / (2 * h_s),
+            (after.p_GI - before.p_GI) / (2 * h_s);
+        EXPECT_LT((pose.by_time - by_time).norm(), 0.01 * (1 + by_time.norm()));
+      }
+    }
+    std::printf("readout %.0f ms: off by at most %.3f px, at rates %.2f px\n",
+                1e3 * readout_s,
+                worst_px,
+                worst_at_rates_px);
+    // Over twice the time of MovesThePoseToTheExposure.
+    EXPECT_LT(worst_px, 0.05);
+  }
+}
+
 TEST(MeasureMotion, WithoutAnOffsetThePoseStays) {
   RandomValues random(4);
   const Scene scene(random);
@@ -108,7 +155,7 @@ TEST(MeasureMotion, WithoutAnOffsetThePoseStays) {
   EXPECT_EQ(pose.q_GI.coeffs(), scene.x.q_GI.coeffs());
   EXPECT_EQ(pose.p_GI, scene.x.p_GI);
   EXPECT_TRUE(pose.by_rotation.isIdentity(0));
-  EXPECT_LT((pose.by_offset.tail<3>() - scene.x.v_GI).norm(), 1e-14);
+  EXPECT_LT((pose.by_time.tail<3>() - scene.x.v_GI).norm(), 1e-14);
 }
 
 TEST(MeasureMotion, HoldsASingleSample) {

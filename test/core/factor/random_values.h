@@ -86,11 +86,14 @@ class RandomValues {
 
   // About some milliseconds after a keyframe.
   KeyframeMotion Motion() {
-    return {.dt_s = Uniform(-0.03, 0.03),
-            .turn = Exp(Normal3(0.05)),
-            .shift_I = Normal3(0.03),
-            .w_I = Normal3(2),
-            .v_I = Normal3(1)};
+    KeyframeMotion motion = {.dt_s = Uniform(-0.03, 0.03),
+                             .turn = Exp(Normal3(0.05)),
+                             .shift_I = Normal3(0.03),
+                             .w_I = Normal3(2),
+                             .v_I = Normal3(1)};
+    motion.readout.turn << motion.w_I, 4 * motion.v_I, -20 * motion.w_I;
+    motion.readout.shift << motion.v_I, 2 * motion.w_I, 10 * motion.v_I;
+    return motion;
   }
 
   KeyframeState State(std::int64_t t_ns) {

@@ -52,13 +52,15 @@ struct Scene {
 Scene RandomScene(RandomValues& random,
                   DistortionModel model,
                   int count,
-                  bool moves) {
+                  bool moves,
+                  bool rolling) {
   Scene scene;
   scene.keyframe.q_GI = random.Rotation();
   scene.keyframe.p_GI = random.Normal3(5);
   scene.camera = random.Camera(model);
   scene.camera.time_offset_s = random.Uniform(-0.03, 0.03);
   if (moves) scene.motion = random.Motion();
+  if (rolling) scene.camera.line_delay_s = moves ? 6e-5 : -4e-5;
   for (int i = 0; i < count; ++i) {
     const double depth = random.Uniform(0, 1) < 0.1 ? -1 : random.Uniform(1, 9);
     const Eigen::Vector3d p_C(depth * random.Uniform(-0.7, 0.7),
@@ -84,8 +86,9 @@ void ForRandomScenes(unsigned seed, const Check& check) {
   RandomValues random(seed);
   for (const DistortionModel model : DistortionModels()) {
     for (const int count : {1, 2, 3, 7, 8, 9, 50}) {
-      for (const bool moves : {false, true}) {
-        const Scene scene = RandomScene(random, model, count, moves);
+      for (const int kind : {0, 1, 2, 3}) {
+        const Scene scene =
+            RandomScene(random, model, count, kind % 2 == 1, kind > 1);
         for (const VectorWidth width : Widths()) {
           SCOPED_TRACE(VectorWidthName(width));
           check(scene, ReprojectionBatch(width), random);
@@ -113,10 +116,10 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
   int behind = 0;
   ForRandomScenes(1, [&](const Scene& scene, const auto& batch, auto& random) {
     const ObservationRun run = scene.Run();
-    const int size = CameraTangentSize(scene.camera);
     const auto turn = PoseTurn(run);
     EXPECT_EQ(turn.has_value(), scene.motion.has_value());
-    const int stride = RowsStride(size);
+    const LandmarkRows columns = RowsOf(scene.camera);
+    const int stride = columns.stride();
     std::vector<double> weights(run.count);
     for (double& weight : weights) weight = random.Uniform(0, 2);
     for (const bool weighted : {false, true}) {
@@ -131,16 +134,26 @@ TEST(ReprojectionBatch, RowsAreThoseOfThePlainFunction) {
         Eigen::Vector2d r(0, 0);
         ReprojectionJacobians J;
         if (Evaluate(scene, i, &r, &J)) {
-          expected.leftCols(3) = -J.camera.leftCols(3);
-          expected.middleCols(3, 3) = J.pose.rightCols(3);
-          expected.middleCols(kRowsOwn, size - 3) =
-              J.camera.rightCols(size - 3);
-          for (int row = 0; row < 2; ++row) {
-            expected(row, RowsResidual(size)) = r[row];
-          }
-          expected *= weighted ? weights[i] : 1 / kSigma_px;
+          // The rows of a rolling shutter have the derivative with respect to
+          // the rotation of one pose of all rows, from which that of the
+          // keyframe follows; the rotation of the camera acts at another.
           Eigen::Matrix<double, 2, 6> by_exposure;
           by_exposure << -J.camera.leftCols(3), J.pose.rightCols(3);
+          if (columns.rolling) {
+            by_exposure.leftCols<3>() = J.pose.leftCols<3>();
+          }
+          if (columns.rolling && turn) {
+            by_exposure.leftCols<3>() -=
+                J.pose.rightCols<3>() * turn->bottomRows<3>();
+            by_exposure.leftCols<3>() *= turn->topRows<3>().transpose();
+          }
+          expected.leftCols(6) = by_exposure;
+          expected.middleCols(kRowsOwn, columns.own()) =
+              J.camera.rightCols(columns.own());
+          for (int row = 0; row < 2; ++row) {
+            expected(row, columns.residual()) = r[row];
+          }
+          expected *= weighted ? weights[i] : 1 / kSigma_px;
           const Eigen::MatrixXd by_turn =
               turn ? Eigen::MatrixXd(by_exposure * *turn)
                    : Eigen::MatrixXd(by_exposure.leftCols(3));

@@ -52,6 +52,12 @@ View RandomView(RandomValues& random) {
       view.q_GI * (camera.q_CI.conjugate() * (p_C - camera.p_CI)) + view.p_GI;
   view.z_px = camera.c + Vector2d(10 * random.NormalVector(2));
   if (random.Index(2) == 0) view.motion = random.Motion();
+  // The last camera has a rolling shutter. Its observations are in the first
+  // rows, which move little with a step of the line delay.
+  view.reference.cameras.back().line_delay_s = 5e-5;
+  if (view.camera + 1 == std::ssize(view.reference.cameras)) {
+    view.z_px.y() *= 0.01;
+  }
   view.delta = 0.005 * random.NormalVector(TangentSize(view.reference));
   // A rotation far from the reference, for which derivatives with respect to
   // the offset and to the rotation differ.

@@ -39,10 +39,9 @@ Vector4d LandmarkAt(const View& view, const Vector3d& bearing_C, double w) {
   const Vector3d p_I =
       view.camera.q_CI.conjugate() * (bearing_C - w * view.camera.p_CI);
   const ExposurePose pose =
-      MovePose(view.q_GI,
-               view.p_GI,
-               view.motion.value_or(KeyframeMotion()),
-               view.motion ? view.camera.time_offset_s : 0);
+      view.motion
+          ? MovePose(view.q_GI, view.p_GI, *view.motion, view.camera, view.z_px)
+          : PoseAtRest(view.q_GI, view.p_GI);
   Vector4d landmark;
   landmark << pose.q_GI * p_I + w * pose.p_GI, w;
   return landmark;
@@ -114,21 +113,27 @@ void ExpectJacobiansMatch(const View& view) {
                         view.Motion()));
   ExpectSameFormula(ResidualAt(view, Argument::kLandmark, Vector4d::Zero()),
                     residual);
-  const auto numeric = [&](Argument argument, int n) {
+  const auto numeric = [&](Argument argument, const VectorXd& unit) {
     return NumericJacobian(
         [&](const VectorXd& delta) {
-          return ResidualAt(view, argument, delta);
+          return ResidualAt(view, argument, unit.cwiseProduct(delta));
         },
-        n,
+        static_cast<int>(unit.size()),
         kStep);
   };
   const int camera_size = CameraTangentSize(view.camera);
   ASSERT_EQ(J.camera.cols(), camera_size);
-  EXPECT_LT(RowwiseDifference(J.pose, numeric(Argument::kPose, 6)), kTolerance);
+  // Hundreds of rows multiply a step of the line delay.
+  VectorXd camera_unit = VectorXd::Ones(camera_size);
+  if (view.camera.line_delay_s) camera_unit.tail<1>().setConstant(2e-3);
   EXPECT_LT(
-      RowwiseDifference(J.camera, numeric(Argument::kCamera, camera_size)),
+      RowwiseDifference(J.pose, numeric(Argument::kPose, VectorXd::Ones(6))),
       kTolerance);
-  EXPECT_LT(RowwiseDifference(J.landmark, numeric(Argument::kLandmark, 4)),
+  EXPECT_LT(RowwiseDifference(J.camera * camera_unit.asDiagonal(),
+                              numeric(Argument::kCamera, camera_unit)),
+            kTolerance);
+  EXPECT_LT(RowwiseDifference(J.landmark,
+                              numeric(Argument::kLandmark, VectorXd::Ones(4))),
             kTolerance);
 }
 
@@ -169,6 +174,7 @@ TEST_P(ReprojectionOfEachModel, JacobiansMatchDifferencesAtRandomStates) {
   for (int trial = 0; trial < 1500; ++trial) {
     View view = RandomView(random, GetParam());
     if (trial % 2 == 0) view.motion = random.Motion();
+    if (trial % 3 == 0) view.camera.line_delay_s = 1e-5 * (trial % 13 - 6);
     Vector3d bearing_C;
     if (!HasRoom(view) || !Unproject(view.camera, view.z_px, &bearing_C)) {
       continue;
@@ -216,9 +222,10 @@ TEST_P(ReprojectionOfEachModel, WithAMotionIsThatOfTheMovedPose) {
   for (int trial = 0; trial < 200; ++trial) {
     View view = RandomView(random, GetParam());
     view.motion = random.Motion();
+    if (trial % 3 == 0) view.camera.line_delay_s = 1e-5 * (trial % 13 - 6);
     view.landmark_G = LandmarkAt(view, {0.1, -0.2, 1}, random.Uniform(0, 2));
     const ExposurePose pose =
-        MovePose(view.q_GI, view.p_GI, *view.motion, view.camera.time_offset_s);
+        MovePose(view.q_GI, view.p_GI, *view.motion, view.camera, view.z_px);
     Vector2d moved, there;
     const auto at = [&](const Quaterniond& q_GI,
                         const Vector3d& p_GI,

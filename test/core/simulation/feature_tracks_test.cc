@@ -64,9 +64,14 @@ FeatureTracks Tracks(const Rig& rig,
                      double pixel_sigma_px,
                      const std::vector<KeyframeState>& keyframes,
                      const SimulationOptions& options) {
+  Exposures exposures;
+  for (std::size_t j = 0; j < rig.factory.cameras.size(); ++j) {
+    exposures.AddCamera(keyframes);
+  }
   return SimulateTracks(rig.factory,
                         pixel_sigma_px,
-                        Exposures(rig.factory.cameras.size(), keyframes),
+                        static_cast<int>(keyframes.size()),
+                        exposures,
                         options);
 }
 
@@ -239,6 +244,41 @@ TEST(FeatureTracksTest, TheWantedFractionOfLandmarksMoves) {
   EXPECT_NEAR(moved / n, 0.2, 5 * std::sqrt(0.2 * 0.8 / n));
 }
 
+// Each point is where it projects when the row of its image is exposed: the
+// poses there are those of the trajectory.
+TEST(FeatureTracksTest, RowsOfARollingShutterAreExposedOneAfterTheOther) {
+  constexpr double kLineDelay_s = 33e-3 / 480;
+  constexpr double kRate_Hz = 10;
+  const Rig rig = HandheldRig("a");
+  const CameraCalibration& camera = rig.factory.cameras[0];
+  const auto motion = MakeHandheld(61, 1, 5);
+  const auto row_state = [&](int k, double row_px) {
+    const BodyMotion at = motion->At(k / kRate_Hz + kLineDelay_s * row_px);
+    return KeyframeState{.q_GI = at.q_GI, .p_GI = at.p_GI};
+  };
+  Exposures rows;
+  rows.AddCamera(row_state);
+  SimulationOptions options;
+  options.noise = false;
+  const FeatureTracks tracks =
+      SimulateTracks(rig.factory, 0, 600, rows, options);
+  ASSERT_GT(tracks.observations.size(), 10'000u);
+  double moved_px = 0;
+  for (const FeatureObservation& z : tracks.observations) {
+    const auto project = [&](double row_px) {
+      const KeyframeState x = row_state(z.keyframe, row_px);
+      const Eigen::Vector3d p_I =
+          x.q_GI.conjugate() * (tracks.landmarks_G[z.landmark] - x.p_GI);
+      Eigen::Vector2d z_px(0, 0);
+      Project(camera, camera.q_CI * p_I + camera.p_CI, &z_px, nullptr);
+      return z_px;
+    };
+    EXPECT_LT((project(z.true_px.y()) - z.true_px).norm(), 1e-6);
+    moved_px = std::max(moved_px, (project(0) - z.true_px).norm());
+  }
+  EXPECT_GT(moved_px, 10);
+}
+
 // The errors lie along the blur and have the stated size relative to it,
 // according to projections of the landmarks at both ends of the exposure.
 TEST(FeatureTracksTest, BlurMakesErrorsAlongTheWayOfALandmarkInTheImage) {
@@ -246,16 +286,23 @@ TEST(FeatureTracksTest, BlurMakesErrorsAlongTheWayOfALandmarkInTheImage) {
   const Rig rig = HandheldRig("a");
   const CameraCalibration& camera = rig.factory.cameras[0];
   const auto motion = MakeHandheld(60, 1, 5);
-  const Exposures open = {Keyframes(*motion)};
-  const Exposures closed = {Keyframes(*motion, kExposure_s)};
+  const std::vector<KeyframeState> keyframes = Keyframes(*motion);
+  Exposures open, closed;
+  open.AddCamera(keyframes);
+  closed.AddCamera(Keyframes(*motion, kExposure_s));
   SimulationOptions options;
   options.exposure_s = kExposure_s;
   options.blur_error = 0.2;
   const FeatureTracks tracks =
-      SimulateTracks(rig.factory, 0, open, options, closed);
+      SimulateTracks(rig.factory,
+                     0,
+                     static_cast<int>(keyframes.size()),
+                     open,
+                     options,
+                     closed);
   double square = 0, n = 0;
   for (const FeatureObservation& z : tracks.observations) {
-    const KeyframeState& x = closed[0][z.keyframe];
+    const KeyframeState x = closed.At(0, z.keyframe, z.true_px.y());
     const Eigen::Vector3d p_I =
         x.q_GI.conjugate() * (tracks.landmarks_G[z.landmark] - x.p_GI);
     Eigen::Vector2d end_px;

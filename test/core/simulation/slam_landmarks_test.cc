@@ -49,7 +49,9 @@ struct Scene {
 
   std::vector<std::optional<Eigen::Vector3d>> Triangulate(
       const SimulationOptions& options) const {
-    return TriangulateLandmarks(rig.factory, {states}, tracks, 0.8, options);
+    Exposures exposures;
+    exposures.AddCamera(states);
+    return TriangulateLandmarks(rig.factory, exposures, tracks, 0.8, options);
   }
 };
 
