@@ -38,8 +38,9 @@ struct ChainPlan {
   HalfWalk walk_in, walk_out;
 
   int keyframes() const { return range.end - range.begin; }
-  ChainShape Shape(std::span<const LandmarkRows> cameras) const {
+  ChainShape Shape(int link_size, std::span<const LandmarkRows> cameras) const {
     return {keyframes(),
+            link_size,
             cameras,
             tracks,
             track_keyframes,

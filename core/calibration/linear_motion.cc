@@ -70,15 +70,15 @@ void LinearMotion::Linearise(const LinearPoint& point,
                        links[i].samples});
     link_after_[links[i].before] = static_cast<int>(i);
   }
-  transitions_.resize(states_.size());
   inertial_.LineariseWithRoots(
-      states_, point.theta.imu, point.rig.gravity_mps2, roots, transitions_);
+      states_, point.theta.imu, point.rig.gravity_mps2, roots, &transitions_);
 }
 
 double LinearMotion::Squares() const {
   double squares = 0;
-  for (const InertialTransition& transition : transitions_) {
-    for (const double r : transition.whitened) squares += r * r;
+  for (std::size_t i = 0; i < transitions_.size(); ++i) {
+    const std::span whitened(transitions_[i].whitened, kChainStateSize);
+    for (const double r : whitened) squares += r * r;
   }
   return squares;
 }

@@ -25,16 +25,14 @@ class LinearMotion {
   int keyframes() const { return static_cast<int>(link_after_.size()); }
   // Index of the link between a keyframe and the next, which must exist.
   int LinkAfter(int keyframe) const { return link_after_[keyframe]; }
-  const InertialTransition& transition(int link) const {
-    return transitions_[link];
-  }
+  InertialTransition transition(int link) const { return transitions_[link]; }
   // Sum of all squared whitened residuals.
   double Squares() const;
 
  private:
   InertialBatch inertial_;
   std::vector<InertialLinkStates> states_;
-  std::vector<InertialTransition> transitions_;
+  InertialTransitions transitions_;
   std::vector<int> link_after_;
 };
 

@@ -15,7 +15,8 @@ void LinearSystem::EliminateChain(const LinearPoint& point,
   for (const CameraCalibration& camera : point.theta.cameras) {
     cameras.push_back(RowsOf(camera));
   }
-  elimination->Start(plan.Shape(cameras), ChainElimination::Record::kSteps);
+  elimination->Start(plan.Shape(ImuTangentSize(point.theta.imu), cameras),
+                     ChainElimination::Record::kSteps);
   const KeyframeChain& range = plan.range;
   for (int k = range.begin; k < range.end; ++k) {
     views_.AddKeyframe(point, observations_, k, range.begin, elimination);

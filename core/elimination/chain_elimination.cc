@@ -60,18 +60,17 @@ void ChainElimination::BeginKeyframe() {
 
 void ChainElimination::AddPrior(const ChainStateMatrix& information) {
   BeginKeyframe();
-  const int pose = front_.Pose(0);
+  const int pose = front_.Pose(0), motion = layout_.motion_place();
   for (int i = 0; i < kPose; ++i) {
     for (int j = 0; j <= i; ++j)
       front_(pose + i, pose + j) += information(i, j);
     for (int j = 0; j < kMotion; ++j) {
-      front_(pose + i, kMotionPlace + j) += information(i, kPose + j);
+      front_(pose + i, motion + j) += information(i, kPose + j);
     }
   }
   for (int i = 0; i < kMotion; ++i) {
     for (int j = 0; j <= i; ++j) {
-      front_(kMotionPlace + i, kMotionPlace + j) +=
-          information(kPose + i, kPose + j);
+      front_(motion + i, motion + j) += information(kPose + i, kPose + j);
     }
   }
 }
@@ -79,8 +78,8 @@ void ChainElimination::AddPrior(const ChainStateMatrix& information) {
 void ChainElimination::AddKeptBias(int kept, const KeptBiasRows& rows) {
   BeginKeyframe();
   for (int m = 0; m < rows.residual.size(); ++m) {
-    const int bias = kMotionPlace + 3 + m;
-    const int place = kKeptPlace + kept + m;
+    const int bias = layout_.motion_place() + 3 + m;
+    const int place = layout_.kept_place + kept + m;
     const double a = rows.by_bias[m], b = rows.by_kept[m];
     front_(bias, bias) += a * a;
     front_(place, bias) += a * b;
@@ -94,8 +93,9 @@ void ChainElimination::AddKeptState(int kept,
                                     const ChainStateVector& information) {
   BeginKeyframe();
   for (int m = 0; m < kState; ++m) {
-    const int state = m < kPose ? front_.Pose(0) + m : kMotionPlace + m - kPose;
-    const int place = kKeptPlace + kept + m;
+    const int state =
+        m < kPose ? front_.Pose(0) + m : layout_.motion_place() + m - kPose;
+    const int place = layout_.kept_place + kept + m;
     front_(state, state) += information[m];
     front_(place, place) += information[m];
     front_(std::max(state, place), std::min(state, place)) -= information[m];

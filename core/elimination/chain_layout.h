@@ -10,35 +10,41 @@
 namespace selfcal {
 
 // The front begins with `fixed` places for everything but poses: link
-// parameters, motion, kept unknowns, camera parameters, the constant, padded
-// to whole vectors.
+// parameters and motion, padded as in the columns of G, kept unknowns, camera
+// parameters, the constant, padded to whole vectors.
 struct ChainLayout {
   ChainLayout() = default;
   explicit ChainLayout(const ChainShape& shape)
-      : camera_shared(std::accumulate(shape.cameras.begin(),
+      : link_size(shape.link_size),
+        camera_shared(std::accumulate(shape.cameras.begin(),
                                       shape.cameras.end(),
                                       0,
                                       [](int sum, const LandmarkRows& rows) {
                                         return sum + rows.shared;
                                       })),
         kept(shape.kept),
-        camera_place(chain::kKeptPlace + WholeVectors(kept)),
+        kept_place(TransitionColumns(link_size).constant),
+        camera_place(kept_place + WholeVectors(kept)),
         constant(camera_place + camera_shared),
         fixed(WholeVectors(constant + 1)) {}
 
   // Link parameters, camera parameters and kept unknowns.
-  int shared_size() const { return kChainLinkShared + camera_shared + kept; }
+  int shared_size() const { return link_size + camera_shared + kept; }
 
   // Place of a shared parameter.
   int Place(int shared) const {
-    if (shared < kChainLinkShared) return shared;
-    const int camera = shared - kChainLinkShared;
+    if (shared < link_size) return shared;
+    const int camera = shared - link_size;
     return camera < camera_shared ? camera_place + camera
-                                  : chain::kKeptPlace + camera - camera_shared;
+                                  : kept_place + camera - camera_shared;
   }
+  // Place of the velocity of the current keyframe; its biases follow.
+  int motion_place() const { return link_size; }
 
+  int link_size = 0;      // number of link parameters
   int camera_shared = 0;  // number of camera parameters
   int kept = 0;           // number of kept unknowns
+  int kept_place = 0;     // of the first kept unknown: the same as in G
   int camera_place = 0;   // of the first camera parameter
   int constant = 0;       // place of the constant
   int fixed = 0;

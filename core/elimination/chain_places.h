@@ -15,14 +15,9 @@ namespace selfcal::chain {
 inline constexpr int kPose = kChainPoseSize;
 inline constexpr int kMotion = kChainMotionSize;
 inline constexpr int kState = kChainStateSize;
-// Places in the front.
-inline constexpr int kMotionPlace = kChainLinkShared;
-inline constexpr int kKeptPlace = WholeVectors(kMotionPlace + kMotion);
-static_assert(kTransitionConstant == kKeptPlace);
 inline constexpr int kEliminated = -1;
 // The size of a state in whole tiles.
 inline constexpr int kTileState = 16;
-inline constexpr int kLinkColumns = kTransitionPoseEnd;
 // Zeros that must follow the valid entries of a panel: the rows of the largest
 // tile.
 inline constexpr int kZeros = 3 * kPanelPad;

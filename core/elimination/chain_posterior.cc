@@ -112,7 +112,7 @@ class CovarianceWalk {
       for (int i = 0; i < size_; ++i) At(place, i) = row[i];
     };
     const auto place = [&](int m) {
-      return m < kPose ? pose + m : kMotionPlace + m - kPose;
+      return m < kPose ? pose + m : layout_.motion_place() + m - kPose;
     };
     for (int m = 0; m < kState; ++m) put(m, place(m));
     for (int j = 0; j < kState; ++j) {
@@ -170,13 +170,16 @@ class CovarianceWalk {
   // product_ = P covariance, and with_front_ = (G - root P) covariance.
   void Multiply(const ChainRecord::Step& step, std::span<const int> poses) {
     alignas(64) double root[kState][kTileState] = {};
-    alignas(64) double G[kKeptPlace + kPose][kTileState] = {};
+    alignas(64) double G[kMaxTransitionColumns][kTileState] = {};
+    const int kept_place = layout_.kept_place;
     for (int i = 0; i < kState; ++i) {
       for (int j = 0; j < kState; ++j) root[j][i] = step.root[i][j];
       if (!step.linked) continue;
-      for (int c = 0; c < kKeptPlace; ++c) G[c][i] = step.link.G[i][c];
+      const ChainTransition link = record_.Link(step);
+      const double* row = link.G + i * link.columns.stride;
+      for (int c = 0; c < kept_place; ++c) G[c][i] = row[c];
       for (int c = 0; c < kPose; ++c) {
-        G[kKeptPlace + c][i] = step.link.G[i][kTransitionNextPose + c];
+        G[kept_place + c][i] = row[link.columns.next_pose + c];
       }
     }
     const int next =
@@ -192,12 +195,12 @@ class CovarianceWalk {
                          size_,
                          {&G[0][0], kTileState},
                          kState,
-                         kKeptPlace,
+                         kept_place,
                          {with_front_.data(), stride_});
       kernels.AddProduct(1,
                          {&At(0, next), stride_},
                          size_,
-                         {&G[kKeptPlace][0], kTileState},
+                         {&G[kept_place][0], kTileState},
                          kState,
                          kPose,
                          {with_front_.data(), stride_});
@@ -225,13 +228,16 @@ class CovarianceWalk {
         RowMajorState<kTileState>(&step.root[0][0]).leftCols<kState>();
     state_ = (root - ByPanel(with_front_)) * root.transpose();
     if (step.linked) {
-      const RowMajorState<kTransitionColumns> G(&step.link.G[0][0]);
+      const ChainTransition link = record_.Link(step);
+      const TransitionColumns& at = link.columns;
+      const RowMajorPanel G(
+          link.G, kState, at.stride, Eigen::OuterStride<>(at.stride));
       const RowMajorPanel with_front(
           with_front_.data(), kState, size_, Eigen::OuterStride<>(stride_));
-      state_ += with_front.leftCols<kKeptPlace>() *
-                    G.leftCols<kKeptPlace>().transpose() +
+      state_ += with_front.leftCols(at.constant) *
+                    G.leftCols(at.constant).transpose() +
                 with_front.middleCols<kPose>(PlaceOf(poses[1])) *
-                    G.middleCols<kPose>(kTransitionNextPose).transpose();
+                    G.middleCols<kPose>(at.next_pose).transpose();
     }
     state_ = (0.5 * (state_ + state_.transpose())).eval();
   }

@@ -10,8 +10,10 @@ void ChainRecord::Start(const ChainLayout& layout,
                         const ChainStructure& structure,
                         bool wanted) {
   wanted_ = wanted;
+  columns_ = TransitionColumns(layout.link_size);
   steps_.clear();
   products_.clear();
+  transitions_.clear();
   if (!wanted) return;
   // Reserves exactly the memory for the recorded steps.
   const int keyframes = structure.keyframes();
@@ -22,6 +24,8 @@ void ChainRecord::Start(const ChainLayout& layout,
   }
   steps_.reserve(keyframes);
   products_.reserve(size);
+  transitions_.reserve(static_cast<std::size_t>(keyframes - 1) * kState *
+                       (columns_.stride + kTransitionNoise));
 }
 
 void ChainRecord::Add(const EliminatedState& state,
@@ -31,7 +35,13 @@ void ChainRecord::Add(const EliminatedState& state,
   step.product = products_.size();
   step.stride = state.size;
   step.linked = link != nullptr;
-  if (link != nullptr) step.link = *link;
+  step.transition = transitions_.size();
+  if (link != nullptr) {
+    transitions_.insert(
+        transitions_.end(), link->G, link->G + kState * columns_.stride);
+    transitions_.insert(
+        transitions_.end(), link->A, link->A + kState * kTransitionNoise);
+  }
   std::memcpy(step.root, state.root.root, sizeof(step.root));
   std::memcpy(step.factor, state.root.factor, sizeof(step.factor));
   for (int k = 0; k < kState; ++k) {

@@ -21,7 +21,7 @@ class ChainRecord {
     double root[chain::kState][16];
     double factor[chain::kState][16];
     bool linked;
-    ChainTransition link;
+    std::size_t transition;  // of its G in the transitions, and A behind it
   };
 
   // Begins a chain; unless it is `wanted`, nothing will be recorded.
@@ -37,11 +37,18 @@ class ChainRecord {
   const double* Product(const Step& step) const {
     return &products_[step.product];
   }
+  // Of a step that is linked.
+  ChainTransition Link(const Step& step) const {
+    const double* G = &transitions_[step.transition];
+    return {columns_, G, G + chain::kState * columns_.stride};
+  }
 
  private:
   bool wanted_ = false;
+  TransitionColumns columns_ = TransitionColumns(0);
   std::vector<Step> steps_;
   std::vector<double> products_;
+  std::vector<double> transitions_;  // of each link G, then A
 };
 
 // A chain whose elimination was recorded.

@@ -8,11 +8,12 @@
 
 namespace selfcal {
 
-// The observations, as in ChainStructure::Find, and for each camera the rows of
-// its observations. Its parameters are in the order of the cameras, after the
-// link parameters.
+// The number of link parameters, for each camera the rows of its observations,
+// whose parameters follow in the order of the cameras, and the observations, as
+// in ChainStructure::Find.
 struct ChainShape {
   int keyframes = 0;
+  int link_size = 0;  // at most kMaxChainLinkSize
   std::span<const LandmarkRows> cameras;
   std::span<const int> tracks;
   std::span<const int> track_keyframes;

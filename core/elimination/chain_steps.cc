@@ -11,8 +11,6 @@ using namespace chain;
 namespace {
 
 using RowMajorRoot = Eigen::Matrix<double, kState, kTileState, Eigen::RowMajor>;
-using RowMajorLink =
-    Eigen::Matrix<double, kState, kTransitionColumns, Eigen::RowMajor>;
 using RowMajorPanel =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -38,7 +36,8 @@ void PlaceStates(const EliminatedChain& chain,
         states[poses[s]].head<kPose>();
   }
   if (k + 1 < chain.structure.keyframes()) {
-    z->segment<kMotion>(kMotionPlace) = states[k + 1].tail<kMotion>();
+    z->segment<kMotion>(chain.layout.motion_place()) =
+        states[k + 1].tail<kMotion>();
   }
 }
 
@@ -57,11 +56,11 @@ void FindStateSteps(const EliminatedChain& chain,
     ChainStateVector& x = (*states)[k];
     x = -(root * (P * z.head(step.stride)));
     if (step.linked) {
-      const Eigen::Map<const RowMajorLink> G(&step.link.G[0][0]);
-      x += G.leftCols<kKeptPlace>() * z.head<kKeptPlace>() +
-           G.col(kTransitionConstant) +
-           G.middleCols<kPose>(kTransitionNextPose) *
-               (*states)[k + 1].head<kPose>();
+      const ChainTransition link = chain.record.Link(step);
+      const TransitionColumns& at = link.columns;
+      const Eigen::Map<const RowMajorPanel> G(link.G, kState, at.stride);
+      x += G.leftCols(at.constant) * z.head(at.constant) + G.col(at.constant) +
+           G.middleCols<kPose>(at.next_pose) * (*states)[k + 1].head<kPose>();
     }
   }
 }

@@ -9,24 +9,37 @@ namespace selfcal {
 // Sizes in memory are whole vectors of any width.
 inline constexpr int WholeVectors(int size) { return (size + 7) / 8 * 8; }
 
-// Columns of G: z = (link parameters, velocity 3, b_a 3 and b_g 3 of the next
-// keyframe, zeros up to whole vectors, the constant 1, pose 6 of the next,
-// zeros up to whole vectors).
-inline constexpr int kTransitionNextVelocity = kChainLinkShared;
-inline constexpr int kTransitionNextAccelBias = kTransitionNextVelocity + 3;
-inline constexpr int kTransitionMotionEnd =
-    kTransitionNextVelocity + kChainMotionSize;
-inline constexpr int kTransitionConstant = WholeVectors(kTransitionMotionEnd);
-inline constexpr int kTransitionNextPose = kTransitionConstant + 1;
-inline constexpr int kTransitionPoseEnd = kTransitionNextPose + kChainPoseSize;
-inline constexpr int kTransitionColumns = WholeVectors(kTransitionPoseEnd);
+// Columns of G for a number of link parameters: z = (link parameters, velocity
+// 3, b_a 3 and b_g 3 of the next keyframe, zeros up to whole vectors, the
+// constant 1, pose 6 of the next, zeros up to whole vectors).
+struct TransitionColumns {
+  explicit constexpr TransitionColumns(int link_size)
+      : link_size(link_size),
+        motion_end(link_size + kChainMotionSize),
+        constant(WholeVectors(motion_end)),
+        next_pose(constant + 1),
+        pose_end(next_pose + kChainPoseSize),
+        stride(WholeVectors(pose_end)) {}
+
+  int link_size;  // the velocity of the next keyframe comes next
+  int motion_end;
+  int constant;
+  int next_pose;
+  int pose_end;
+  int stride;  // all
+};
+
+inline constexpr int kMaxTransitionColumns =
+    TransitionColumns(kMaxChainLinkSize).stride;
 // Columns of A, the last of which is zero.
 inline constexpr int kTransitionNoise = WholeVectors(kChainStateSize);
 
-// Rows: pose 6, velocity 3, biases 6 of x0.
+// A view. Rows: pose 6, velocity 3, biases 6 of x0. The kernels load whole
+// vectors of G.
 struct ChainTransition {
-  alignas(64) double G[kChainStateSize][kTransitionColumns];
-  double A[kChainStateSize][kTransitionNoise];
+  TransitionColumns columns;
+  const double* G;  // 15 rows of columns.stride
+  const double* A;  // 15 rows of kTransitionNoise
 };
 
 }  // namespace selfcal

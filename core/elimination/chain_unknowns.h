@@ -14,8 +14,9 @@ namespace selfcal {
 inline constexpr int kChainPoseSize = 6;
 inline constexpr int kChainMotionSize = 9;
 inline constexpr int kChainStateSize = kChainPoseSize + kChainMotionSize;
-// Shared parameters on which links depend; they come first.
-inline constexpr int kChainLinkShared = kImuTangentSize;
+// Limit of the number of link parameters: shared parameters on which links
+// depend. They come first.
+inline constexpr int kMaxChainLinkSize = kMaxImuTangentSize;
 
 using ChainStateVector = Eigen::Matrix<double, kChainStateSize, 1>;
 using ChainStateMatrix =

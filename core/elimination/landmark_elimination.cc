@@ -39,7 +39,7 @@ void LandmarkElimination::KeepLandmark(int landmark,
                                        double* panel,
                                        int stride,
                                        ChainFront* front) {
-  const int place = kKeptPlace + kept_[landmark];
+  const int place = layout_.kept_place + kept_[landmark];
   const int shared = layout_.fixed - layout_.camera_place;
   const int poses = slots * kPose;
   for (int j = 0; j < 3; ++j) {
@@ -132,7 +132,7 @@ void LandmarkElimination::FindSteps(
   for (std::size_t m = 0; m < kept_.size(); ++m) {
     Eigen::Vector3d& x = (*landmarks)[m];
     if (kept_[m] != kEliminated) {
-      x = z.segment<3>(kKeptPlace + kept_[m]);
+      x = z.segment<3>(layout_.kept_place + kept_[m]);
       continue;
     }
     const Eigen::Vector3d y =

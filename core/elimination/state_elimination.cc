@@ -17,9 +17,9 @@ void StateElimination::Start(const ChainLayout& layout,
   for (auto* panel : {&coupling_, &substituted_, &product_, &half_}) {
     GrowTo(static_cast<std::size_t>(kTileState) * panel_stride_, panel);
   }
-  GrowTo(
-      static_cast<std::size_t>(layout.fixed + kPose + kPanelPad) * kLinkColumns,
-      &link_terms_);
+  GrowTo(static_cast<std::size_t>(layout.fixed + kPose + kPanelPad) *
+             TransitionColumns(layout.link_size).pose_end,
+         &link_terms_);
 }
 
 void StateElimination::TakeMemory(StateElimination* finished) {
@@ -59,24 +59,23 @@ EliminatedState StateElimination::ByItself(ChainFront* front) {
 // the next.
 void StateElimination::TakeState(ChainFront* all) {
   ChainFront& front = *all;
-  const int fixed = layout_.fixed;
+  const int fixed = layout_.fixed, motion = layout_.motion_place();
   const int pose = front.Pose(0);
   const int rest = front.PosesSize() - kPose;
   auto S = information_.topLeftCorner<kState, kState>();
   for (int i = 0; i < kPose; ++i) {
     double* y = Row(&coupling_, i);
     for (int j = 0; j < fixed; ++j) y[j] = front(pose + i, j);
-    for (int j = 0; j < kMotion; ++j) S(kPose + j, i) = y[kMotionPlace + j];
+    for (int j = 0; j < kMotion; ++j) S(kPose + j, i) = y[motion + j];
     for (int j = i; j < kPose; ++j) S(j, i) = front(pose + j, pose + i);
     std::copy_n(&front(pose + kPose, pose + i), rest, y + fixed);
   }
   for (int m = 0; m < kMotion; ++m) {
-    const int at = kMotionPlace + m;
+    const int at = motion + m;
     double* y = Row(&coupling_, kPose + m);
     for (int j = 0; j < at; ++j) y[j] = front(at, j);
     for (int j = at; j < fixed; ++j) y[j] = front(j, at);
-    for (int j = m; j < kMotion; ++j)
-      S(kPose + j, kPose + m) = y[kMotionPlace + j];
+    for (int j = m; j < kMotion; ++j) S(kPose + j, kPose + m) = y[motion + j];
     std::copy_n(&front(pose + kPose, at), rest, y + fixed);
     for (int j = 0; j < at; ++j) front(at, j) = 0;
     Zero(&front(at, at), fixed - at);
@@ -85,7 +84,7 @@ void StateElimination::TakeState(ChainFront* all) {
   S.triangularView<Eigen::StrictlyUpper>() = S.transpose();
   for (int k = 0; k < kState; ++k) {
     double* y = Row(&coupling_, k);
-    Zero(y + kMotionPlace, kMotion);
+    Zero(y + motion, kMotion);
     Zero(y + fixed + rest, kZeros);
   }
   front.CloseSlot();
@@ -96,7 +95,8 @@ void StateElimination::TakeState(ChainFront* all) {
 // G^T S G + G^T Y + Y^T G = G^T H + H^T G with H = Y + S G / 2.
 void StateElimination::Substitute(const ChainTransition& link,
                                   ChainFront* front) {
-  alignas(64) double by_S[kTileState][kTransitionColumns];
+  alignas(64) double by_S[kTileState * kMaxTransitionColumns];
+  const TransitionColumns& at = link.columns;
   const int fixed = layout_.fixed;
   const int size = fixed + front->PosesSize();
   for (int k = 0; k < kState; ++k) {
@@ -105,23 +105,24 @@ void StateElimination::Substitute(const ChainTransition& link,
     Zero(Row(&half_, k) + fixed + kPose, kPanelPad);
   }
   WithKernels(width_, [&](auto kernels) {
-    kernels.SetProduct({&link.G[0][0], kTransitionColumns},
-                       kLinkColumns,
+    kernels.SetProduct({link.G, at.stride},
+                       at.pose_end,
                        {information_.data(), kTileState},
                        kTileState,
                        kState,
-                       {&by_S[0][0], kTransitionColumns});
+                       {by_S, at.stride});
   });
   const auto add = [&](double factor, const double* terms, double* to) {
-    for (int c = 0; c < kKeptPlace; ++c) to[c] += factor * terms[c];
-    to[layout_.constant] += factor * terms[kTransitionConstant];
+    for (int c = 0; c < at.constant; ++c) to[c] += factor * terms[c];
+    to[layout_.constant] += factor * terms[at.constant];
     for (int c = 0; c < kPose; ++c) {
-      to[fixed + c] += factor * terms[kTransitionNextPose + c];
+      to[fixed + c] += factor * terms[at.next_pose + c];
     }
   };
   for (int k = 0; k < kState; ++k) {
-    add(1, by_S[k], Row(&substituted_, k));
-    add(0.5, by_S[k], Row(&half_, k));
+    const double* terms = by_S + k * at.stride;
+    add(1, terms, Row(&substituted_, k));
+    add(0.5, terms, Row(&half_, k));
   }
   AddHalf(link, front);
 
@@ -133,7 +134,7 @@ void StateElimination::Substitute(const ChainTransition& link,
     kernels.AddProduct(1,
                        {coupling_.data() + fixed + kPose, panel_stride_},
                        rest,
-                       {&link.G[0][kTransitionNextPose], kTransitionColumns},
+                       {link.G + at.next_pose, at.stride},
                        kPose,
                        kState,
                        front->At(pose + kPose, pose));
@@ -143,14 +144,15 @@ void StateElimination::Substitute(const ChainTransition& link,
 // Adds H^T G over the fixed part and the next pose, in both directions.
 void StateElimination::AddHalf(const ChainTransition& link, ChainFront* all) {
   ChainFront& front = *all;
+  const TransitionColumns& columns = link.columns;
   const int fixed = layout_.fixed;
   const int size_f = fixed + kPose;
   const int stride = size_f + kPanelPad;
   WithKernels(width_, [&](auto kernels) {
     kernels.SetProduct({half_.data(), panel_stride_},
                        size_f,
-                       {&link.G[0][0], kTransitionColumns},
-                       kLinkColumns,
+                       {link.G, columns.stride},
+                       columns.pose_end,
                        kState,
                        {link_terms_.data(), stride});
   });
@@ -163,11 +165,9 @@ void StateElimination::AddHalf(const ChainTransition& link, ChainFront* all) {
     front(at, at) += 2 * terms[to];
     for (int i = to + 1; i < size_f; ++i) front(place(i), at) += terms[i];
   };
-  for (int c = 0; c < kKeptPlace; ++c) fold(c, c);
-  fold(kTransitionConstant, layout_.constant);
-  for (int c = 0; c < kPose; ++c) {
-    fold(kTransitionNextPose + c, fixed + c);
-  }
+  for (int c = 0; c < columns.constant; ++c) fold(c, c);
+  fold(columns.constant, layout_.constant);
+  for (int c = 0; c < kPose; ++c) fold(columns.next_pose + c, fixed + c);
 }
 
 // root = A L^-T with L L^T = M, row-major; A is the transpose of `panel`.
@@ -189,7 +189,7 @@ void StateElimination::FindRootOf(const ChainTransition& link) {
   alignas(64) double by_S[kTileState][16];
   alignas(64) double M[kTileState][16];
   alignas(64) double panel[kState][16];
-  const ConstPanel A = {&link.A[0][0], 16};
+  const ConstPanel A = {link.A, kTransitionNoise};
   WithKernels(width_, [&](auto kernels) {
     kernels.SetProduct(A,
                        kState,
@@ -202,7 +202,8 @@ void StateElimination::FindRootOf(const ChainTransition& link) {
   });
   for (int i = 0; i < kState; ++i) {
     M[i][i] += 1;
-    for (int j = 0; j < kState; ++j) panel[i][j] = link.A[j][i];
+    for (int j = 0; j < kState; ++j)
+      panel[i][j] = link.A[j * kTransitionNoise + i];
   }
   FindRoot(M, panel);
 }
@@ -242,8 +243,9 @@ void StateElimination::AddPosesWithFixed(const ChainTransition& link,
   for (int k = 0; k < kState; ++k) {
     std::copy_n(Row(&product_, k) + fixed, kPose, next[k]);
     Zero(Row(&half_, k), fixed);
-    std::copy_n(link.G[k], kKeptPlace, Row(&half_, k));
-    Row(&half_, k)[layout_.constant] = link.G[k][kTransitionConstant];
+    const double* G = link.G + k * link.columns.stride;
+    std::copy_n(G, link.columns.constant, Row(&half_, k));
+    Row(&half_, k)[layout_.constant] = G[link.columns.constant];
   }
   const ConstPanel by_fixed = {product_.data(), panel_stride_};
   const int pose = front->Pose(0);

@@ -52,15 +52,34 @@ std::array<Item*, W> Outputs(std::span<Item> items,
 
 }  // namespace
 
+void InertialTransitions::Start(std::size_t count, int link_size) {
+  columns_ = TransitionColumns(link_size);
+  count_ = count;
+  numbers_.GrowTo(count * Stride());
+}
+
+template <int W>
+std::array<inertial::TransitionTarget, W> InertialBatch::Targets(
+    std::size_t first, std::size_t n, InertialTransitions* out) {
+  unused_transition_.Start(1, out->columns_.link_size);
+  std::array<inertial::TransitionTarget, W> lanes;
+  for (std::size_t lane = 0; lane < W; ++lane) {
+    InertialTransitions* to = lane < n ? out : &unused_transition_;
+    double* G =
+        to->numbers_.data() + (lane < n ? first + lane : 0) * to->Stride();
+    double* A = G + to->GSize();
+    lanes[lane] = {G, A, A + InertialTransitions::kASize};
+  }
+  return lanes;
+}
+
 template <int W>
 int InertialBatch::GatherReadings(std::span<const InertialLinkStates> links,
                                   const ImuNoise* noise) {
-  const auto row = [](std::vector<Chunk>* chunks, int size, int index) {
-    constexpr int kChunk = sizeof(Chunk) / sizeof(double);
+  const auto row = [](AlignedNumbers* numbers, int size, int index) {
     const std::size_t end = (static_cast<std::size_t>(index) + 1) * size * W;
-    const std::size_t needed = (end + kChunk - 1) / kChunk;
-    if (chunks->size() < needed) chunks->resize(2 * needed);
-    return Numbers(chunks) + (end - size * W);
+    numbers->GrowTo(end);
+    return numbers->data() + (end - size * W);
   };
   const auto reading = [&](int index) {
     return row(&readings_, kReadingSize, index);
@@ -119,6 +138,7 @@ void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
   WithLanes(width_, [&]<int W>() {
     KernelInput<W> input;
     input.imu = CorrectionOf(imu);
+    input.columns = TransitionColumns(ImuTangentSize(imu));
     input.gravity_mps2 = gravity_mps2;
     for (std::size_t first = 0; first < links.size(); first += W) {
       const std::size_t count = std::min<std::size_t>(W, links.size() - first);
@@ -134,8 +154,8 @@ void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
                            preintegration::kSecondsPerNanosecond;
       }
       input.rows = GatherReadings<W>(group, noise);
-      input.readings = Numbers(&readings_);
-      input.densities = Numbers(&densities_);
+      input.readings = readings_.data();
+      input.densities = densities_.data();
       run.template operator()<W>(input, first, count);
     }
   });
@@ -146,8 +166,9 @@ void InertialBatch::Linearise(std::span<const InertialLinkStates> links,
                               const ImuNoise& noise,
                               double gravity_mps2,
                               std::span<InertialNoiseRoot> roots,
-                              std::span<InertialTransition> out) {
-  assert(roots.size() == links.size() && out.size() == links.size());
+                              InertialTransitions* out) {
+  assert(roots.size() == links.size());
+  out->Start(links.size(), ImuTangentSize(imu));
   ForEachGroup(
       links,
       imu,
@@ -159,7 +180,7 @@ void InertialBatch::Linearise(std::span<const InertialLinkStates> links,
             input,
             noise,
             Outputs<W>(roots, first, n, &unused_root_).data(),
-            Outputs<W>(out, first, n, &unused_transition_).data());
+            Targets<W>(first, n, out).data());
       });
 }
 
@@ -168,8 +189,9 @@ void InertialBatch::LineariseWithRoots(
     const ImuCalibration& imu,
     double gravity_mps2,
     std::span<const InertialNoiseRoot> roots,
-    std::span<InertialTransition> out) {
-  assert(roots.size() == links.size() && out.size() == links.size());
+    InertialTransitions* out) {
+  assert(roots.size() == links.size());
+  out->Start(links.size(), ImuTangentSize(imu));
   ForEachGroup(
       links,
       imu,
@@ -177,10 +199,9 @@ void InertialBatch::LineariseWithRoots(
       gravity_mps2,
       [&]<int W>(
           const KernelInput<W>& input, std::size_t first, std::size_t n) {
-        inertial::LineariseLinksWithRoots<W>(
-            input,
-            Inputs<W>(roots, first, n).data(),
-            Outputs<W>(out, first, n, &unused_transition_).data());
+        inertial::LineariseLinksWithRoots<W>(input,
+                                             Inputs<W>(roots, first, n).data(),
+                                             Targets<W>(first, n, out).data());
       });
 }
 
@@ -190,6 +211,7 @@ void InertialBatch::Residuals(std::span<const InertialLinkStates> links,
                               std::span<const InertialNoiseRoot> roots,
                               std::span<InertialResidual> whitened) {
   assert(roots.size() == links.size() && whitened.size() == links.size());
+  double unused[kChainStateSize];
   ForEachGroup(
       links,
       imu,
@@ -199,8 +221,7 @@ void InertialBatch::Residuals(std::span<const InertialLinkStates> links,
           const KernelInput<W>& input, std::size_t first, std::size_t n) {
         double* to[W];
         for (std::size_t lane = 0; lane < W; ++lane) {
-          to[lane] = lane < n ? whitened[first + lane].data()
-                              : unused_transition_.whitened;
+          to[lane] = lane < n ? whitened[first + lane].data() : unused;
         }
         inertial::WhitenedResiduals<W>(
             input, Inputs<W>(roots, first, n).data(), to);

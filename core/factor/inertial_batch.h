@@ -13,6 +13,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -22,8 +24,60 @@
 
 namespace selfcal {
 
+namespace inertial {
+struct TransitionTarget;
+}  // namespace inertial
+
+// A view.
 struct InertialTransition : ChainTransition {
-  double whitened[15];  // U^-1 r, in the order of the residual
+  const double* whitened;  // U^-1 r, 15, in the order of the residual
+};
+
+// Numbers that begin on a cache line.
+class AlignedNumbers {
+ public:
+  void GrowTo(std::size_t size) {
+    const std::size_t chunks = (size + kChunk - 1) / kChunk;
+    if (chunks_.size() < chunks) chunks_.resize(chunks);
+  }
+  double* data() { return reinterpret_cast<double*>(chunks_.data()); }
+  const double* data() const {
+    return reinterpret_cast<const double*>(chunks_.data());
+  }
+
+ private:
+  static constexpr std::size_t kChunk = 8;
+  struct alignas(64) Chunk {
+    double values[kChunk];
+  };
+  std::vector<Chunk> chunks_;
+};
+
+// The transitions of several links.
+class InertialTransitions {
+ public:
+  // Forgets all, and makes room; the memory is reused.
+  void Start(std::size_t count, int link_size);
+
+  std::size_t size() const { return count_; }
+  InertialTransition operator[](std::size_t i) const {
+    const double* G = numbers_.data() + i * Stride();
+    return {{columns_, G, G + GSize()}, G + GSize() + kASize};
+  }
+
+ private:
+  friend class InertialBatch;
+
+  static constexpr int kASize = kChainStateSize * kTransitionNoise;
+  static constexpr int kWhitenedSize = WholeVectors(kChainStateSize);
+  std::size_t GSize() const {
+    return static_cast<std::size_t>(kChainStateSize) * columns_.stride;
+  }
+  std::size_t Stride() const { return GSize() + kASize + kWhitenedSize; }
+
+  TransitionColumns columns_ = TransitionColumns(0);
+  std::size_t count_ = 0;
+  AlignedNumbers numbers_;  // of each G, A and the whitened residual
 };
 
 // U, in the order of the residual: U^-1 is the SquareRootInformation of its
@@ -48,20 +102,20 @@ class InertialBatch {
  public:
   explicit InertialBatch(VectorWidth width) : width_(width) {}
 
-  // Fills roots and out, one for each link.
+  // Fills roots and out for each link.
   void Linearise(std::span<const InertialLinkStates> links,
                  const ImuCalibration& imu,
                  const ImuNoise& noise,
                  double gravity_mps2,
                  std::span<InertialNoiseRoot> roots,
-                 std::span<InertialTransition> out);
+                 InertialTransitions* out);
 
   // The same with given noise.
   void LineariseWithRoots(std::span<const InertialLinkStates> links,
                           const ImuCalibration& imu,
                           double gravity_mps2,
                           std::span<const InertialNoiseRoot> roots,
-                          std::span<InertialTransition> out);
+                          InertialTransitions* out);
 
   // Computes only U^-1 r.
   void Residuals(std::span<const InertialLinkStates> links,
@@ -71,14 +125,6 @@ class InertialBatch {
                  std::span<InertialResidual> whitened);
 
  private:
-  struct alignas(64) Chunk {
-    double values[8];
-  };
-  // All chunks as one array of numbers.
-  static double* Numbers(std::vector<Chunk>* chunks) {
-    return reinterpret_cast<double*>(chunks->data());
-  }
-
   // Calls run.operator()<W>(kernel input, first link, number of links) for each
   // group of W links.
   template <class Function>
@@ -88,6 +134,12 @@ class InertialBatch {
                     double gravity_mps2,
                     const Function& run);
 
+  // Where the kernel writes W transitions of `out`.
+  template <int W>
+  std::array<inertial::TransitionTarget, W> Targets(std::size_t first,
+                                                    std::size_t n,
+                                                    InertialTransitions* out);
+
   // Interleaves the readings of W links, and their noise unless null; returns
   // the number of rows.
   template <int W>
@@ -95,8 +147,8 @@ class InertialBatch {
                      const ImuNoise* noise);
 
   VectorWidth width_;
-  std::vector<Chunk> readings_, densities_;
-  InertialTransition unused_transition_;  // for lanes without a link
+  AlignedNumbers readings_, densities_;
+  InertialTransitions unused_transition_;  // for lanes without a link
   InertialNoiseRoot unused_root_;
 };
 

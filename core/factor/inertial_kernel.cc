@@ -120,47 +120,55 @@ NoiseRoot<Lanes<W>> RootOf(const Link<W>& link, const ImuNoise& noise) {
   return root;
 }
 
+// `rows` are 9 of `columns`, a multiple of W.
+template <int W>
+void StoreRows(const Lanes<W>* rows, int columns, double* (&to)[W]) {
+  for (int i = 0; i < 9 * columns; i += W) {
+    StoreTransposed<W>(rows + i, to);
+    for (int l = 0; l < W; ++l) to[l] += W;
+  }
+}
+
 template <int W>
 void StoreTransition(const MotionRows<Lanes<W>>& rows,
+                     const TransitionColumns& columns,
                      const NoiseRoot<Lanes<W>>& root,
                      const Eigen::Matrix<Lanes<W>, 15, 1>& residual,
-                     InertialTransition* const* out) {
-  for (int i = 0; i < 9; ++i) {
-    double* to[W];
-    for (int c = 0; c < kTransitionColumns; c += W) {
-      for (int l = 0; l < W; ++l) to[l] = out[l]->G[i] + c;
-      StoreTransposed<W>(rows.G[i] + c, to);
-    }
-    for (int c = 0; c < kTransitionNoise; c += W) {
-      for (int l = 0; l < W; ++l) to[l] = out[l]->A[i] + c;
-      StoreTransposed<W>(rows.A[i] + c, to);
-    }
+                     const TransitionTarget* out) {
+  double* G[W];
+  double* A[W];
+  for (int l = 0; l < W; ++l) {
+    G[l] = out[l].G;
+    A[l] = out[l].A;
   }
+  StoreRows<W>(rows.G, columns.stride, G);
+  StoreRows<W>(rows.A[0], kTransitionNoise, A);
   const Eigen::Matrix<Lanes<W>, 15, 1> white = Whiten(root, residual);
   for (int l = 0; l < W; ++l) {
     for (int i = 0; i < 6; ++i) {
-      double* G = out[l]->G[kStateAccelBias + i];
-      double* A = out[l]->A[kStateAccelBias + i];
-      for (int c = 0; c < kTransitionColumns; ++c) G[c] = 0;
-      for (int c = 0; c < kTransitionNoise; ++c) A[c] = 0;
-      G[kTransitionNextAccelBias + i] = 1;
-      G[kTransitionConstant] = residual[kResidualAccelBias + i][l];
-      A[9 + i] = -root.bias[i][l];
+      for (int c = 0; c < columns.stride; ++c) G[l][c] = 0;
+      for (int c = 0; c < kTransitionNoise; ++c) A[l][c] = 0;
+      G[l][columns.link_size + 3 + i] = 1;
+      G[l][columns.constant] = residual[kResidualAccelBias + i][l];
+      A[l][9 + i] = -root.bias[i][l];
+      G[l] += columns.stride;
+      A[l] += kTransitionNoise;
     }
-    for (int i = 0; i < 15; ++i) out[l]->whitened[i] = white[i][l];
+    for (int i = 0; i < 15; ++i) out[l].whitened[i] = white[i][l];
   }
 }
 
 template <int W>
 void SolveAndStore(const Link<W>& link,
+                   const TransitionColumns& columns,
                    const NoiseRoot<Lanes<W>>& root,
-                   InertialTransition* const* out) {
+                   const TransitionTarget* out) {
   using T = Lanes<W>;
   const TransitionSolver<T> solver(
       link.x0.q_GI.toRotationMatrix(), link.motion, link.dt, link.residual);
   MotionRows<T> rows;
-  solver.Solve(link.integrator.Derivatives(), root, &rows);
-  StoreTransition<W>(rows, root, link.residual, out);
+  solver.Solve(link.integrator.Derivatives(), root, columns, &rows);
+  StoreTransition<W>(rows, columns, root, link.residual, out);
 }
 
 }  // namespace
@@ -169,20 +177,20 @@ template <int W>
 void LineariseLinks(const KernelInput<W>& input,
                     const ImuNoise& noise,
                     InertialNoiseRoot* const* roots,
-                    InertialTransition* const* out) {
+                    const TransitionTarget* out) {
   const Link<W> link(input, noise, {.jacobians = true, .covariance = true});
   const NoiseRoot<Lanes<W>> root = RootOf<W>(link, noise);
   StoreRoot<W>(root, roots);
-  SolveAndStore<W>(link, root, out);
+  SolveAndStore<W>(link, input.columns, root, out);
 }
 
 template <int W>
 void LineariseLinksWithRoots(const KernelInput<W>& input,
                              const InertialNoiseRoot* const* roots,
-                             InertialTransition* const* out) {
+                             const TransitionTarget* out) {
   const Link<W> link(
       input, ImuNoise(), {.jacobians = true, .covariance = false});
-  SolveAndStore<W>(link, LoadRoot<W>(roots), out);
+  SolveAndStore<W>(link, input.columns, LoadRoot<W>(roots), out);
 }
 
 template <int W>
@@ -200,7 +208,7 @@ void WhitenedResiduals(const KernelInput<W>& input,
 using Input = KernelInput<SELFCAL_LANES>;
 using Roots = InertialNoiseRoot* const*;
 using ConstRoots = const InertialNoiseRoot* const*;
-using Transitions = InertialTransition* const*;
+using Transitions = const TransitionTarget*;
 
 template void LineariseLinks<SELFCAL_LANES>(const Input&,
                                             const ImuNoise&,

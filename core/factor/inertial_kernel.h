@@ -33,7 +33,16 @@ struct KernelInput {
   double dt_s[W];
   // Common to all links.
   ImuCorrection imu;
+  TransitionColumns columns = TransitionColumns(0);
   double gravity_mps2 = 0;
+};
+
+// Where the transition of a link is stored; G has the columns of
+// KernelInput::columns.
+struct TransitionTarget {
+  double* G;
+  double* A;
+  double* whitened;
 };
 
 // Fills out, and computes the roots from the noise.
@@ -41,13 +50,13 @@ template <int W>
 void LineariseLinks(const KernelInput<W>& input,
                     const ImuNoise& noise,
                     InertialNoiseRoot* const* roots,
-                    InertialTransition* const* out);
+                    const TransitionTarget* out);
 
 // Fills out with the given roots.
 template <int W>
 void LineariseLinksWithRoots(const KernelInput<W>& input,
                              const InertialNoiseRoot* const* roots,
-                             InertialTransition* const* out);
+                             const TransitionTarget* out);
 
 // Computes 15 numbers for each link.
 template <int W>

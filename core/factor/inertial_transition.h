@@ -114,11 +114,11 @@ Eigen::Matrix<T, 15, 1> Whiten(const NoiseRoot<T>& root,
   return white;
 }
 
-// Rows of the motion in InertialTransition; the columns of a row are
-// contiguous.
+// Rows of the motion in InertialTransition: of G the first 9 by
+// TransitionColumns::stride numbers.
 template <typename T>
 struct MotionRows {
-  T G[9][kTransitionColumns];
+  T G[9 * kMaxTransitionColumns];
   T A[9][kTransitionNoise];
 };
 
@@ -138,10 +138,12 @@ class TransitionSolver {
 
   void Solve(const preintegration::MotionDerivatives<T>& by,
              const NoiseRoot<T>& root,
+             const TransitionColumns& at,
              MotionRows<T>* rows) const {
-    for (int c = 0; c < kImuTangentSize; ++c) {
+    for (int i = 0; i < 9 * at.stride; ++i) rows->G[i] = T(0);
+    for (int c = 0; c < at.link_size; ++c) {
       const Eigen::Matrix<T, 9, 1> x = OfMeasured(by.theta.col(c));
-      Write<kTransitionColumns>(x, c, rows->G);
+      Write(x, c, at.stride, rows->G);
     }
     const Eigen::Matrix<T, 15, 1>& r = residual_;
     Eigen::Matrix<T, 9, 1> constant =
@@ -152,24 +154,18 @@ class TransitionSolver {
     const Matrix3<T> turn = -R_01_ * RightJacobian<T>(phi);
     for (int c = 0; c < 6; ++c) {
       const Eigen::Matrix<T, 9, 1> x = OfMeasured(by.bias.col(c));
-      Write<kTransitionColumns>(x, kTransitionNextAccelBias + c, rows->G);
+      Write(x, at.link_size + 3 + c, at.stride, rows->G);
       const Column u = root.motion_by_bias.col(c);
-      Write<kTransitionNoise>(
-          OfNoise(turn, u) - root.bias[c] * x, 9 + c, rows->A);
+      Write(OfNoise(turn, u) - root.bias[c] * x,
+            9 + c,
+            kTransitionNoise,
+            rows->A[0]);
       constant += r[kResidualAccelBias + c] * x;
     }
-    Write<kTransitionColumns>(constant, kTransitionConstant, rows->G);
-    WriteNextMotion(rows);
+    Write(constant, at.constant, at.stride, rows->G);
+    WriteNextMotion(at, rows);
     WriteMotionNoise(turn, root, rows);
-    for (int i = 0; i < 9; ++i) {
-      for (int c = kTransitionMotionEnd; c < kTransitionConstant; ++c) {
-        rows->G[i][c] = T(0);
-      }
-      for (int c = kTransitionPoseEnd; c < kTransitionColumns; ++c) {
-        rows->G[i][c] = T(0);
-      }
-      rows->A[i][kTransitionNoise - 1] = T(0);
-    }
+    for (int i = 0; i < 9; ++i) rows->A[i][kTransitionNoise - 1] = T(0);
   }
 
  private:
@@ -194,25 +190,24 @@ class TransitionSolver {
                  derivative.template tail<3>());
   }
 
-  template <int columns>
-  static void Write(const Column& x, int column, T (*rows)[columns]) {
-    for (int i = 0; i < 9; ++i) rows[i][column] = x[i];
+  static void Write(const Column& x, int column, int stride, T* rows) {
+    for (int i = 0; i < 9; ++i) rows[i * stride + column] = x[i];
   }
 
   // Pose and velocity of the next state.
-  void WriteNextMotion(MotionRows<T>* rows) const {
+  void WriteNextMotion(const TransitionColumns& at, MotionRows<T>* rows) const {
     const Vector3<T> zero = Vector3<T>::Zero();
     for (int c = 0; c < 3; ++c) {
-      Write<kTransitionColumns>(Carry(R_01_.col(c), zero, zero),
-                                kTransitionNextPose + kStateRotation + c,
-                                rows->G);
+      Write(Carry(R_01_.col(c), zero, zero),
+            at.next_pose + kStateRotation + c,
+            at.stride,
+            rows->G);
       Column x = Column::Zero();
       x[kStatePosition + c] = T(1);
-      Write<kTransitionColumns>(
-          x, kTransitionNextPose + kStatePosition + c, rows->G);
+      Write(x, at.next_pose + kStatePosition + c, at.stride, rows->G);
       x[kStatePosition + c] = -dt_;
       x[kStateVelocity + c] = T(1);
-      Write<kTransitionColumns>(x, kTransitionNextVelocity + c, rows->G);
+      Write(x, at.link_size + c, at.stride, rows->G);
     }
   }
 
@@ -230,7 +225,7 @@ class TransitionSolver {
     for (int c = 0; c < 9; ++c) {
       Column u = Column::Zero();
       for (int i = 0; i <= c; ++i) u[i] = root.motion(i, c);
-      Write<kTransitionNoise>(OfNoise(turn, u), c, rows->A);
+      Write(OfNoise(turn, u), c, kTransitionNoise, rows->A[0]);
     }
   }
 

@@ -127,13 +127,12 @@ void SegmentLineariser::LineariseLinks(const Rig& rig,
         {&segment.keyframes[k], &segment.keyframes[k + 1], segment.imu});
   }
   roots_.resize(std::max(roots_.size(), links_.size()));
-  transitions_.resize(std::max(transitions_.size(), links_.size()));
   inertial_.Linearise(links_,
                       theta0.imu,
                       rig.imu_noise,
                       rig.gravity_mps2,
                       std::span(roots_).first(links_.size()),
-                      std::span(transitions_).first(links_.size()));
+                      &transitions_);
   double squares[kKinds] = {};
   for (std::size_t i = 0; i < links_.size(); ++i) {
     for (int j = 0; j < kStateTangentSize; ++j) {
@@ -172,6 +171,7 @@ void SegmentLineariser::StartChain(const Rig& rig,
   }
   FindTracks(segment, selection, order);
   elimination_.Start({.keyframes = static_cast<int>(segment.keyframes.size()),
+                      .link_size = ImuTangentSize(theta0.imu),
                       .cameras = cameras_,
                       .tracks = tracks_,
                       .track_keyframes = track_keyframes_,

@@ -107,7 +107,7 @@ class SegmentLineariser {
   std::vector<double> rows_;                // of one run
   std::vector<InertialLinkStates> links_;
   std::vector<InertialNoiseRoot> roots_;
-  std::vector<InertialTransition> transitions_;
+  InertialTransitions transitions_;
 };
 
 }  // namespace selfcal

@@ -85,12 +85,16 @@ Eigen::Matrix3d ImuCalibration::T_a() const {
   return ScaleAndMisalignment(s_a, m_a);
 }
 
+int ImuTangentSize(const ImuCalibration& imu) {
+  return SensorTangentSize(kImuBlocks, imu);
+}
+
 int CameraTangentSize(const CameraCalibration& camera) {
   return SensorTangentSize(kCameraBlocks, camera);
 }
 
 int CameraTangentOffset(const Calibration& theta, int camera) {
-  int offset = kImuTangentSize;
+  int offset = ImuTangentSize(theta.imu);
   for (int j = 0; j < camera; ++j) {
     offset += CameraTangentSize(theta.cameras[j]);
   }

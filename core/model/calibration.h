@@ -30,6 +30,8 @@ inline constexpr int kAccelScale = kGyroMisalignment + 3;
 inline constexpr int kAccelMisalignment = kAccelScale + 3;
 inline constexpr int kAccelRotation = kAccelMisalignment + 3;
 inline constexpr int kImuTangentSize = kAccelRotation + 3;
+// With all optional blocks: g-sensitivity 9, position of the accelerometer 9.
+inline constexpr int kMaxImuTangentSize = kImuTangentSize + 9 + 9;
 // Offset of each block in a camera's tangent.
 inline constexpr int kCameraRotation = 0;
 inline constexpr int kCameraPosition = kCameraRotation + 3;
@@ -69,6 +71,9 @@ struct TangentComponent {
 
 // Dimension of the tangent of a calibration.
 int TangentSize(const Calibration& theta);
+
+// Dimension of the tangent of the IMU, the first part of that of theta.
+int ImuTangentSize(const ImuCalibration& imu);
 
 // Dimension of the tangent of camera j, and its offset in that of theta.
 int CameraTangentSize(const CameraCalibration& camera);

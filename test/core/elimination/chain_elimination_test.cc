@@ -26,11 +26,14 @@ void ExpectEqualsDense(const Chain& chain, ChainElimination* elimination) {
   EXPECT_TRUE(actual.Lambda == actual.Lambda.transpose());
 }
 
+constexpr int kLinkSizes[] = {1, 18, 24, kMaxChainLinkSize};
+
 std::vector<RandomChainShape> Shapes() {
   std::vector<RandomChainShape> shapes;
   for (int trial = 0; trial < 36; ++trial) {
     RandomChainShape shape;
     shape.keyframes = 2 + trial % 9;
+    shape.link_size = trial % 2 == 0 ? 15 : kLinkSizes[trial / 2 % 4];
     shape.cameras.assign(1 + trial % 3,
                          {.shared = 11 + trial % 4, .rolling = trial % 5 > 2});
     shape.cameras.back() = {11};

@@ -84,7 +84,16 @@ Eigen::Matrix2Xd ByCamera(const LandmarkRows& rows,
   return J;
 }
 
-ChainTransition Solve(const ChainRows& rows) {
+// G and A in memory.
+struct Link {
+  ChainTransition View() const { return {columns, G.data(), A.data()}; }
+
+  TransitionColumns columns;
+  Eigen::Matrix<double, kChainStateSize, Eigen::Dynamic, Eigen::RowMajor> G;
+  Eigen::Matrix<double, kChainStateSize, kTransitionNoise, Eigen::RowMajor> A;
+};
+
+Link Solve(const ChainRows& rows) {
   // Rows of different kinds differ by many orders: equilibrated before LU.
   const ChainStateVector scale =
       rows.x0.rowwise().lpNorm<Eigen::Infinity>().cwiseInverse();
@@ -92,17 +101,15 @@ ChainTransition Solve(const ChainRows& rows) {
   const auto solve = [&](const auto& columns) {
     return lu.solve(scale.asDiagonal() * columns).eval();
   };
-  ChainTransition link = {};
-  Eigen::Map<Eigen::Matrix<double, kChainStateSize, 32, Eigen::RowMajor>> G(
-      &link.G[0][0]);
-  Eigen::Map<Eigen::Matrix<double, kChainStateSize, 16, Eigen::RowMajor>> A(
-      &link.A[0][0]);
-  A.leftCols<15>() = solve(ChainStateMatrix::Identity());
-  G.leftCols<15>() = -solve(rows.shared);
+  const TransitionColumns at(static_cast<int>(rows.shared.cols()));
+  Link link = {at, {}, {}};
+  link.G.setZero(kChainStateSize, at.stride);
+  link.A << solve(ChainStateMatrix::Identity()), ChainStateVector::Zero();
+  link.G.leftCols(at.link_size) = -solve(rows.shared);
   const ChainStateMatrix next = -solve(rows.x1);
-  G.middleCols<9>(kTransitionNextVelocity) = next.rightCols<9>();
-  G.col(kTransitionConstant) = -solve(rows.residual);
-  G.middleCols<6>(kTransitionNextPose) = next.leftCols<6>();
+  link.G.middleCols<9>(at.link_size) = next.rightCols<9>();
+  link.G.col(at.constant) = -solve(rows.residual);
+  link.G.middleCols<6>(at.next_pose) = next.leftCols<6>();
   return link;
 }
 
@@ -168,12 +175,13 @@ int Chain::shared_size() const {
   return std::accumulate(
       cameras.begin(),
       cameras.end(),
-      kChainLinkShared + kept,
+      link_size + kept,
       [](int sum, const LandmarkRows& rows) { return sum + rows.shared; });
 }
 
 Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
   Chain chain;
+  chain.link_size = shape.link_size;
   chain.cameras = shape.cameras;
   chain.landmark_prior = 1e-2;
   chain.landmark_prior_slope = {0.01, -0.02, 0.03};
@@ -184,6 +192,7 @@ Chain RandomChain(const RandomChainShape& shape, std::mt19937* random) {
       FillNormal(random, &link.residual);
       link.x0 = NearRotation(random);
       link.x1 = NearRotation(random);
+      link.shared.resize(kChainStateSize, shape.link_size);
       FillNormal(random, &link.shared);
       chain.links.push_back(link);
     }
@@ -229,6 +238,7 @@ SharedInformation Eliminate(const Chain& chain,
     tracks.push_back(static_cast<int>(keyframes.size()));
   }
   elimination->Start({chain.keyframes(),
+                      chain.link_size,
                       chain.cameras,
                       tracks,
                       keyframes,
@@ -259,7 +269,7 @@ SharedInformation Eliminate(const Chain& chain,
       elimination->AddKeptState(chain.kept_state_at, chain.kept_state);
     }
     if (k + 1 < chain.keyframes()) {
-      elimination->Advance(Solve(chain.links[k]));
+      elimination->Advance(Solve(chain.links[k]).View());
     }
   }
   SharedInformation result;
@@ -300,7 +310,7 @@ DenseProblem MakeDense(const Chain& chain) {
         prior.llt().matrixU();
     row += kChainStateSize;
   }
-  std::vector<int> offsets = {shared + kChainLinkShared};
+  std::vector<int> offsets = {shared + chain.link_size};
   for (const LandmarkRows& rows : chain.cameras) {
     offsets.push_back(offsets.back() + rows.shared);
   }
@@ -321,7 +331,7 @@ DenseProblem MakeDense(const Chain& chain) {
     const ChainRows& a = chain.links[k];
     dense.J.block<15, 15>(row, at) = a.x0;
     dense.J.block<15, 15>(row, at + kChainStateSize) = a.x1;
-    dense.J.block<15, 15>(row, shared) = a.shared;
+    dense.J.block(row, shared, 15, chain.link_size) = a.shared;
     dense.r.segment<15>(row) = a.residual;
   }
   if (chain.kept_bias) {

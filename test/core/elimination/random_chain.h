@@ -28,10 +28,11 @@ struct ChainObservation {
 struct ChainRows {
   ChainStateVector residual;
   ChainStateMatrix x0, x1;
-  Eigen::Matrix<double, kChainStateSize, kChainLinkShared> shared;
+  Eigen::Matrix<double, kChainStateSize, Eigen::Dynamic> shared;
 };
 
 struct Chain {
+  int link_size = 0;
   std::vector<LandmarkRows> cameras;
   std::vector<ChainRows> links;  // one less than keyframes
   std::vector<ChainStateMatrix> priors;
@@ -53,6 +54,7 @@ struct Chain {
 
 struct RandomChainShape {
   int keyframes = 8;
+  int link_size = 15;
   std::vector<LandmarkRows> cameras = {{11}};
   int landmarks_per_keyframe = 4;
   int max_track = 5;  // keyframes from the first to the last that sees it

@@ -17,17 +17,18 @@ using Eigen::Vector3d;
 
 constexpr double kGravity = 9.81;
 
-using Transition = Eigen::Matrix<double, 15, kTransitionColumns>;
+using Transition = Eigen::Matrix<double, 15, Eigen::Dynamic>;
+
+template <int columns>
+using RowMajor =
+    Eigen::Map<const Eigen::Matrix<double, 15, columns, Eigen::RowMajor>>;
 
 Transition GOf(const InertialTransition& t) {
-  using RowMajor =
-      Eigen::Matrix<double, 15, kTransitionColumns, Eigen::RowMajor>;
-  return Eigen::Map<const RowMajor>(&t.G[0][0]);
+  return RowMajor<Eigen::Dynamic>(t.G, 15, t.columns.stride);
 }
 
 Eigen::Matrix<double, 15, kTransitionNoise> AOf(const InertialTransition& t) {
-  using RowMajor = Eigen::Matrix<double, 15, kTransitionNoise, Eigen::RowMajor>;
-  return Eigen::Map<const RowMajor>(&t.A[0][0]);
+  return RowMajor<kTransitionNoise>(t.A);
 }
 
 InertialResidual WhitenedOf(const InertialTransition& t) {
@@ -104,19 +105,18 @@ Problem RandomProblem(RandomValues& random, int count) {
 
 struct Result {
   std::vector<InertialNoiseRoot> roots;
-  std::vector<InertialTransition> transitions;
+  InertialTransitions transitions;
 };
 
 Result Linearise(InertialBatch* batch, const Problem& problem) {
   Result result;
   result.roots.resize(problem.links.size());
-  result.transitions.resize(problem.links.size());
   batch->Linearise(problem.States(),
                    problem.imu,
                    problem.noise,
                    kGravity,
                    result.roots,
-                   result.transitions);
+                   &result.transitions);
   return result;
 }
 
@@ -167,18 +167,19 @@ TEST_P(InertialBatchTest, SolvesEachFactorForTheEarlierState) {
                                                   kGravity,
                                                   &J,
                                                   &covariance);
-      Transition z = Transition::Zero();
-      z.leftCols<kImuTangentSize>() = J.theta;
-      z.middleCols<9>(kTransitionNextVelocity) = J.x1.rightCols<9>();
-      z.col(kTransitionConstant) = r;
-      z.middleCols<6>(kTransitionNextPose) = J.x1.leftCols<6>();
+      const TransitionColumns at(ImuTangentSize(problem.imu));
+      Transition z = Transition::Zero(15, at.stride);
+      z.leftCols(at.link_size) = J.theta;
+      z.middleCols<9>(at.link_size) = J.x1.rightCols<9>();
+      z.col(at.constant) = r;
+      z.middleCols<6>(at.next_pose) = J.x1.leftCols<6>();
       const Eigen::FullPivLU<InertialMatrix> J0(J.x0);
       const InertialMatrix W = SquareRootInformation(covariance);
       const InertialMatrix U = W.inverse();
       Eigen::Matrix<double, 15, kTransitionNoise> A;
       A << J0.solve(U), InertialResidual::Zero();
 
-      const InertialTransition& solved = result.transitions[i];
+      const InertialTransition solved = result.transitions[i];
       EXPECT_LT(WorstDifference(GOf(solved), Transition(-J0.solve(z))), 1e-11);
       EXPECT_LT(WorstDifference(AOf(solved), A), 1e-11);
       EXPECT_LT((MatrixOf(result.roots[i]) - U).norm(), 1e-12 * U.norm());
@@ -197,8 +198,8 @@ TEST_P(InertialBatchTest, ALinkDoesNotDependOnItsNeighbours) {
     Problem alone = problem;
     alone.links = {problem.links[i]};
     const Result one = Linearise(&batch, alone);
-    const InertialTransition& a = one.transitions[0];
-    const InertialTransition& b = together.transitions[i];
+    const InertialTransition a = one.transitions[0];
+    const InertialTransition b = together.transitions[i];
     EXPECT_LT(WorstDifference(GOf(a), GOf(b)), 1e-12);
     EXPECT_LT(WorstDifference(AOf(a), AOf(b)), 1e-12);
     EXPECT_LT((WhitenedOf(a) - WhitenedOf(b)).norm(),
@@ -215,14 +216,14 @@ TEST_P(InertialBatchTest, TakesRootsAsGiven) {
   louder.noise.accel_noise_density *= 0.5;
   louder.noise.accel_bias_random_walk *= 7;
   const Result expected = Linearise(&batch, louder);
-  std::vector<InertialTransition> transitions(problem.links.size());
+  InertialTransitions transitions;
   std::vector<InertialResidual> whitened(problem.links.size());
   batch.LineariseWithRoots(
-      problem.States(), problem.imu, kGravity, expected.roots, transitions);
+      problem.States(), problem.imu, kGravity, expected.roots, &transitions);
   batch.Residuals(
       problem.States(), problem.imu, kGravity, expected.roots, whitened);
   for (std::size_t i = 0; i < problem.links.size(); ++i) {
-    const InertialTransition& of = expected.transitions[i];
+    const InertialTransition of = expected.transitions[i];
     EXPECT_LT(WorstDifference(GOf(transitions[i]), GOf(of)), 1e-13);
     EXPECT_LT(WorstDifference(AOf(transitions[i]), AOf(of)), 1e-13);
     const double size = WhitenedOf(of).norm();
@@ -330,13 +331,14 @@ TEST_P(InertialBatchTest, AtRestBesideALongerLinkThatMoves) {
   EXPECT_TRUE(GOf(result.transitions[1]).allFinite());
   EXPECT_TRUE(AOf(result.transitions[1]).allFinite());
   // The residual vanishes but for rounding.
-  EXPECT_LT(GOf(result.transitions[1]).col(kTransitionConstant).norm(), 1e-15);
+  const InertialTransition t = result.transitions[1];
+  EXPECT_LT(GOf(t).col(t.columns.constant).norm(), 1e-15);
 }
 
 TEST_P(InertialBatchTest, NoLinksAreNoWork) {
   InertialBatch batch(GetParam());
   RandomValues random(7);
-  EXPECT_TRUE(Linearise(&batch, RandomProblem(random, 0)).transitions.empty());
+  EXPECT_EQ(Linearise(&batch, RandomProblem(random, 0)).transitions.size(), 0u);
 }
 
 }  // namespace

@@ -70,14 +70,14 @@ TEST(SegmentResiduals, IntervalsAreWhitenedAsTheScoreWhitensThem) {
     links.push_back({&keyframes[k], &keyframes[k + 1], device.segment.imu});
   }
   std::vector<InertialNoiseRoot> roots(links.size());
-  std::vector<InertialTransition> transitions(links.size());
+  InertialTransitions transitions;
   InertialBatch(WidestVectors())
       .Linearise(links,
                  device.theta.imu,
                  device.rig.imu_noise,
                  device.rig.gravity_mps2,
                  roots,
-                 transitions);
+                 &transitions);
   for (std::size_t k = 0; k < links.size(); ++k) {
     for (int j = 0; j < kStateTangentSize; ++j) {
       EXPECT_NEAR(residuals.intervals[k].whitened[j],
