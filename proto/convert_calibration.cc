@@ -127,6 +127,15 @@ void FillBlock(const BlockInfo& info,
   }
 }
 
+void FillBlock(const BlockInfo& info,
+               const OptionalVector& value,
+               google::protobuf::Message* message) {
+  for (const double number : value) {
+    message->GetReflection()->AddDouble(
+        message, FieldOf(info, *message), number);
+  }
+}
+
 // Reads the message of a block; one that stored data has had from the beginning
 // must be present.
 template <class Part, class Read>
@@ -182,6 +191,24 @@ void ReadBlock(const BlockInfo& info,
   const auto* field = FieldOf(info, message);
   if (!message.GetReflection()->HasField(message, field)) return;
   ReadBlock(info, message, prefix, &value->emplace(), violations);
+}
+void ReadBlock(const BlockInfo& info,
+               const google::protobuf::Message& message,
+               const std::string& prefix,
+               OptionalVector* value,
+               Violations* violations) {
+  const auto* field = FieldOf(info, message);
+  const auto* reflection = message.GetReflection();
+  const int size = reflection->FieldSize(message, field);
+  if (size > kMaxOptionalSize) {
+    violations->push_back({prefix + field->name(),
+                           "has " + std::to_string(size) + " values"});
+    return;
+  }
+  value->resize(size);
+  for (int i = 0; i < size; ++i) {
+    (*value)[i] = reflection->GetRepeatedDouble(message, field, i);
+  }
 }
 // ReadDistortion reads the coefficients with their model.
 void ReadBlock(const BlockInfo&,

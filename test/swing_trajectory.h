@@ -44,11 +44,16 @@ class SwingTrajectory final : public Trajectory {
     motion.a_GI = {p_[0].Second(t), p_[1].Second(t), p_[2].Second(t)};
     motion.q_GI = Eigen::Quaterniond::Identity();
     motion.w_I.setZero();
+    motion.dw_I.setZero();
     for (const int axis : {2, 1, 0}) {
       const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
       const Eigen::Quaterniond turn = Exp(angles_[axis].At(t) * e);
       motion.q_GI = motion.q_GI * turn;
-      motion.w_I = turn.conjugate() * motion.w_I + angles_[axis].First(t) * e;
+      const Eigen::Vector3d rate = angles_[axis].First(t) * e;
+      const Eigen::Vector3d before = turn.conjugate() * motion.w_I;
+      motion.w_I = before + rate;
+      motion.dw_I = turn.conjugate() * motion.dw_I - rate.cross(before) +
+                    angles_[axis].Second(t) * e;
     }
     return motion;
   }

@@ -8,7 +8,8 @@ namespace selfcal::client {
 
 bool IsNominal(const ImuCalibration& imu) {
   const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
-  return imu.T_g() == one && imu.T_a() == one && imu.q_AI.vec().isZero(0);
+  return imu.T_g() == one && imu.T_a() == one && imu.q_AI.vec().isZero(0) &&
+         imu.gyro_g_sensitivity.isZero(0) && imu.accel_position.isZero(0);
 }
 
 void AddImuLoss(const std::string& tool,
@@ -19,7 +20,8 @@ void AddImuLoss(const std::string& tool,
       {"imu",
        fmt::format("{} uses the readings as they are: give it those that "
                    "CorrectImu computes with this calibration (scales, "
-                   "misalignments and q_AI removed, both in frame I)",
+                   "misalignments, q_AI, g-sensitivity and the position of the "
+                   "accelerometer removed, both in frame I)",
                    tool),
        true});
 }

@@ -1,7 +1,8 @@
 // Derivatives with respect to biases and IMU intrinsics: the changes of
 // corrected readings on which they depend, and how they follow from the
-// response of the motion to those. The only file of core/factor that names the
-// parameters of the IMU. Internal to core/factor.
+// response of the motion to those, for two separate sensors;
+// coupled_derivatives.h is for a coupled IMU. Only these files of core/factor
+// name the parameters of the IMU. Internal to core/factor.
 //
 // A corrected rate w = B (gyro - b_g), B = T_g^-1, changes with (b, s, m) by
 // -B (db + dT w): by an offset of its axes, and by changes of an axis in
@@ -25,6 +26,7 @@ template <typename T>
 struct MotionDerivatives {
   Eigen::Matrix<T, 9, 6> bias;
   Eigen::Matrix<T, 9, kImuTangentSize> theta;
+  static constexpr int columns = kImuTangentSize;
 };
 
 // Derivatives with respect to changes of the corrected rates: an offset of each

@@ -47,7 +47,7 @@ void FillJacobians(const KeyframeState& x0,
       -imu.J_bias.bottomRows<6>();
 
   auto& J_theta = jacobians->theta;
-  J_theta.setZero();
+  J_theta.setZero(15, imu.J_theta.cols());
   J_theta.topRows<3>() = by_Delta_R * imu.J_theta.topRows<3>();
   J_theta.middleRows<6>(kResidualVelocity) = -imu.J_theta.bottomRows<6>();
 }

@@ -27,7 +27,8 @@ using InertialMatrix = Eigen::Matrix<double, 15, 15>;
 struct InertialJacobians {
   InertialMatrix x0;  // with respect to the first state, 15
   InertialMatrix x1;  // to the second
-  Eigen::Matrix<double, 15, kImuTangentSize> theta;  // to theta_i
+  // To theta_i.
+  Eigen::Matrix<double, 15, Eigen::Dynamic, 0, 15, kMaxImuTangentSize> theta;
 };
 
 // Residual 15, not whitened: (Log(Delta_R^T R_0^T R_1), velocity, position in

@@ -138,6 +138,7 @@ void InertialBatch::ForEachGroup(std::span<const InertialLinkStates> links,
   WithLanes(width_, [&]<int W>() {
     KernelInput<W> input;
     input.imu = CorrectionOf(imu);
+    input.coupled = IsCoupled(imu);
     input.columns = TransitionColumns(ImuTangentSize(imu));
     input.gravity_mps2 = gravity_mps2;
     for (std::size_t first = 0; first < links.size(); first += W) {

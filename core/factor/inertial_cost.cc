@@ -83,7 +83,7 @@ class InertialCost final : public ceres::CostFunction {
                        J.theta.middleCols<3>(kAccelRotation));
       Map<RowMajor15<Eigen::Dynamic>> by_theta(out, 15, theta_size_);
       by_theta.setZero();
-      by_theta.leftCols<kImuTangentSize>() = W_ * J.theta;
+      by_theta.leftCols(J.theta.cols()) = W_ * J.theta;
     }
     WriteStateJacobians(W_ * J.x0, x0.q_GI, jacobians + kState0);
     WriteStateJacobians(W_ * J.x1, x1.q_GI, jacobians + kState1);

@@ -23,8 +23,8 @@ State<Lanes<W>> LoadState(const double (&x)[kStateNumbers][W]) {
           .b_g = LoadVector<W>(x[13])};
 }
 
-// The links, up to the residual.
-template <int W>
+// The links, up to the residual. Imu is ImuModel or CoupledImuModel.
+template <int W, template <typename> class Imu>
 struct Link {
   using T = Lanes<W>;
 
@@ -62,8 +62,8 @@ struct Link {
 
   const State<T> x0, x1;
   const T dt;
-  const ImuModel<T> imu;
-  Integrator<T> integrator;
+  const Imu<T> imu;
+  Integrator<T, Imu<T>> integrator;
   StateMotion<T> motion;
   Eigen::Matrix<T, 15, 1> residual;
 };
@@ -103,8 +103,8 @@ void StoreRoot(const NoiseRoot<Lanes<W>>& root,
   }
 }
 
-template <int W>
-NoiseRoot<Lanes<W>> RootOf(const Link<W>& link, const ImuNoise& noise) {
+template <int W, class Link>
+NoiseRoot<Lanes<W>> RootOf(const Link& link, const ImuNoise& noise) {
   using T = Lanes<W>;
   NoiseRoot<T> root;
   const Vector3<T> r = link.residual.template segment<3>(kResidualRotation);
@@ -158,8 +158,8 @@ void StoreTransition(const MotionRows<Lanes<W>>& rows,
   }
 }
 
-template <int W>
-void SolveAndStore(const Link<W>& link,
+template <int W, class Link>
+void SolveAndStore(const Link& link,
                    const TransitionColumns& columns,
                    const NoiseRoot<Lanes<W>>& root,
                    const TransitionTarget* out) {
@@ -171,6 +171,19 @@ void SolveAndStore(const Link<W>& link,
   StoreTransition<W>(rows, columns, root, link.residual, out);
 }
 
+// Calls use(link) for the model of the IMU.
+template <int W, class Use>
+void WithLink(const KernelInput<W>& input,
+              const ImuNoise& noise,
+              const PreintegrationParts& parts,
+              const Use& use) {
+  if (input.coupled) {
+    use(Link<W, CoupledImuModel>(input, noise, parts));
+  } else {
+    use(Link<W, ImuModel>(input, noise, parts));
+  }
+}
+
 }  // namespace
 
 template <int W>
@@ -178,31 +191,35 @@ void LineariseLinks(const KernelInput<W>& input,
                     const ImuNoise& noise,
                     InertialNoiseRoot* const* roots,
                     const TransitionTarget* out) {
-  const Link<W> link(input, noise, {.jacobians = true, .covariance = true});
-  const NoiseRoot<Lanes<W>> root = RootOf<W>(link, noise);
-  StoreRoot<W>(root, roots);
-  SolveAndStore<W>(link, input.columns, root, out);
+  const PreintegrationParts parts = {.jacobians = true, .covariance = true};
+  WithLink<W>(input, noise, parts, [&](const auto& link) {
+    const NoiseRoot<Lanes<W>> root = RootOf<W>(link, noise);
+    StoreRoot<W>(root, roots);
+    SolveAndStore<W>(link, input.columns, root, out);
+  });
 }
 
 template <int W>
 void LineariseLinksWithRoots(const KernelInput<W>& input,
                              const InertialNoiseRoot* const* roots,
                              const TransitionTarget* out) {
-  const Link<W> link(
-      input, ImuNoise(), {.jacobians = true, .covariance = false});
-  SolveAndStore<W>(link, input.columns, LoadRoot<W>(roots), out);
+  const PreintegrationParts parts = {.jacobians = true, .covariance = false};
+  WithLink<W>(input, ImuNoise(), parts, [&](const auto& link) {
+    SolveAndStore<W>(link, input.columns, LoadRoot<W>(roots), out);
+  });
 }
 
 template <int W>
 void WhitenedResiduals(const KernelInput<W>& input,
                        const InertialNoiseRoot* const* roots,
                        double* const* whitened) {
-  const Link<W> link(
-      input, ImuNoise(), {.jacobians = false, .covariance = false});
-  const auto white = Whiten(LoadRoot<W>(roots), link.residual);
-  for (int l = 0; l < W; ++l) {
-    for (int i = 0; i < 15; ++i) whitened[l][i] = white[i][l];
-  }
+  const PreintegrationParts parts = {.jacobians = false, .covariance = false};
+  WithLink<W>(input, ImuNoise(), parts, [&](const auto& link) {
+    const auto white = Whiten(LoadRoot<W>(roots), link.residual);
+    for (int l = 0; l < W; ++l) {
+      for (int i = 0; i < 15; ++i) whitened[l][i] = white[i][l];
+    }
+  });
 }
 
 using Input = KernelInput<SELFCAL_LANES>;

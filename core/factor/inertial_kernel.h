@@ -33,6 +33,7 @@ struct KernelInput {
   double dt_s[W];
   // Common to all links.
   ImuCorrection imu;
+  bool coupled = false;
   TransitionColumns columns = TransitionColumns(0);
   double gravity_mps2 = 0;
 };

@@ -136,7 +136,9 @@ class TransitionSolver {
         dt_(dt),
         residual_(residual) {}
 
-  void Solve(const preintegration::MotionDerivatives<T>& by,
+  // `by` is MotionDerivatives or CoupledDerivatives.
+  template <class Derivatives>
+  void Solve(const Derivatives& by,
              const NoiseRoot<T>& root,
              const TransitionColumns& at,
              MotionRows<T>* rows) const {

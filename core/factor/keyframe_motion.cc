@@ -35,6 +35,14 @@ class Readings {
            const ImuCalibration& imu)
       : samples_(samples), x_(x), imu_(CorrectionOf(imu)) {}
 
+  // Of a reading, with the derivative of its rate.
+  Vector3d ForceAtOrigin(const CorrectedReading<double>& reading,
+                         const Vector3d& dw) const {
+    if (imu_.position_size == 0) return reading.f;
+    return imu_.ForceAtOrigin(reading.f,
+                              ForceByPosition<double>(reading.w, dw));
+  }
+
   using Reading = CorrectedReading<double>;
 
   // Time of the next sample after (dt > 0) or before the given time, or dt if
@@ -137,7 +145,7 @@ class Readings {
 
   std::span<const ImuSample> samples_;
   const KeyframeState& x_;
-  ImuModel<double> imu_;
+  CoupledImuModel<double> imu_;
 };
 
 // Integrates the readings about a keyframe. Times are relative to it, gravity
@@ -151,18 +159,22 @@ class MotionIntegral {
   void Continue(double to_s, KeyframeMotion* motion) const {
     if (motion->dt_s == to_s) return;
     Readings::Reading here = readings_.Interpolate(motion->dt_s);
-    Vector3d a_I = motion->turn * here.f + g_I_;
     while (motion->dt_s != to_s) {
       const double next_s = readings_.Next(motion->dt_s, to_s);
       const double h = next_s - motion->dt_s;
       const Readings::Reading there = readings_.Interpolate(next_s);
+      const Vector3d dw = (there.w - here.w) / h;
+      const auto acceleration =
+          [&](const Readings::Reading& reading) -> Vector3d {
+        return motion->turn * readings_.ForceAtOrigin(reading, dw) + g_I_;
+      };
+      const Vector3d a_I = acceleration(here);
       motion->turn = motion->turn * Exp(0.5 * h * (here.w + there.w));
-      const Vector3d next_a_I = motion->turn * there.f + g_I_;
+      const Vector3d next_a_I = acceleration(there);
       motion->shift_I += h * motion->v_I + h * h / 6 * (2 * a_I + next_a_I);
       motion->v_I += h / 2 * (a_I + next_a_I);
       motion->dt_s = next_s;
       here = there;
-      a_I = next_a_I;
     }
   }
 

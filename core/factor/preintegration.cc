@@ -11,7 +11,8 @@ namespace preintegration {
 namespace {
 
 // Converts to rotations perturbed on the right, as in Preintegration.
-Preintegration Result(const Integrator<double>& integrator,
+template <class Imu>
+Preintegration Result(const Integrator<double, Imu>& integrator,
                       const PreintegrationParts& parts,
                       double dt_s) {
   Preintegration result;
@@ -21,11 +22,11 @@ Preintegration Result(const Integrator<double>& integrator,
   result.Delta_p = integrator.motion().Delta_p;
   const Eigen::Matrix3d& R = integrator.Delta_R();
   if (parts.jacobians) {
-    const MotionDerivatives<double> by = integrator.Derivatives();
-    result.J_bias << R.transpose() * by.bias.topRows<3>(),
-        by.bias.bottomRows<6>();
-    result.J_theta << R.transpose() * by.theta.topRows<3>(),
-        by.theta.bottomRows<6>();
+    const auto by = integrator.Derivatives();
+    result.J_bias = by.bias;
+    result.J_theta = by.theta.leftCols(by.columns);
+    result.J_bias.template topRows<3>().applyOnTheLeft(R.transpose());
+    result.J_theta.template topRows<3>().applyOnTheLeft(R.transpose());
   }
   if (parts.covariance) {
     const MotionCovariance<double>& c = integrator.covariance();
@@ -41,27 +42,23 @@ Preintegration Result(const Integrator<double>& integrator,
   return result;
 }
 
-}  // namespace
-}  // namespace preintegration
-
-Preintegration Preintegrate(std::span<const ImuSample> samples,
-                            std::int64_t t0_ns,
-                            std::int64_t t1_ns,
-                            const ImuCalibration& imu,
-                            const Eigen::Vector3d& b_a,
-                            const Eigen::Vector3d& b_g,
-                            const ImuNoise& noise,
-                            const PreintegrationParts& parts) {
-  using namespace preintegration;
-  const ImuModel<double> model(CorrectionOf(imu));
-  std::optional<Integrator<double>> integrator;
+template <class Imu>
+Preintegration Integrate(const Imu& imu,
+                         std::span<const ImuSample> samples,
+                         std::int64_t t0_ns,
+                         std::int64_t t1_ns,
+                         const Eigen::Vector3d& b_a,
+                         const Eigen::Vector3d& b_g,
+                         const ImuNoise& noise,
+                         const PreintegrationParts& parts) {
+  std::optional<Integrator<double, Imu>> integrator;
   std::optional<Sampling> sampling;
   if (parts.covariance) sampling.emplace(samples, t0_ns, t1_ns, noise);
   const auto visit = [&](const ImuSample& sample, double h, std::size_t next) {
     const Reading<double> reading =
-        model.Correct(sample.gyro, sample.accel, b_g, b_a);
+        imu.Correct(sample.gyro, sample.accel, b_g, b_a);
     if (!integrator) {
-      integrator.emplace(model, noise, parts, reading);
+      integrator.emplace(imu, noise, parts, reading);
       return;
     }
     const StepDensities densities =
@@ -73,6 +70,26 @@ Preintegration Preintegrate(std::span<const ImuSample> samples,
   return Result(*integrator,
                 parts,
                 static_cast<double>(t1_ns - t0_ns) * kSecondsPerNanosecond);
+}
+
+}  // namespace
+}  // namespace preintegration
+
+Preintegration Preintegrate(std::span<const ImuSample> samples,
+                            std::int64_t t0_ns,
+                            std::int64_t t1_ns,
+                            const ImuCalibration& imu,
+                            const Eigen::Vector3d& b_a,
+                            const Eigen::Vector3d& b_g,
+                            const ImuNoise& noise,
+                            const PreintegrationParts& parts) {
+  const ImuCorrection correction = CorrectionOf(imu);
+  const auto integrate = [&](const auto& model) {
+    return preintegration::Integrate(
+        model, samples, t0_ns, t1_ns, b_a, b_g, noise, parts);
+  };
+  return IsCoupled(imu) ? integrate(CoupledImuModel<double>(correction))
+                        : integrate(ImuModel<double>(correction));
 }
 
 }  // namespace selfcal

@@ -13,11 +13,18 @@
 // one step beyond both ends; the partial steps at ends between samples are of
 // third order, and the errors of neighbouring intervals cancel there.
 //
+// The sensors of a coupled IMU correct each other (imu_model.h); then f is not
+// linear, and evaluated at the three places of Simpson's rule, with
+// dw/dt = (w_1 - w_0) / h.
+//
 // The derivatives are exactly those of this scheme. The noise of each sensor is
 // white: over a step its mean has the variance density^2 / h on the raw reading
 // and is transformed by T^-1; it is larger where samples are missing
-// (sampling.h). Biases random-walk from their given values at the beginning of
-// the interval (preintegration_bias_walk.h).
+// (sampling.h). Of a coupled IMU, what each sensor's noise does to the readings
+// of the other is included only for the gyroscope, without dw/dt: the rest is
+// less than a thousandth of the variance for 1e-3 rad s/m and a few cm. Biases
+// random-walk from their given values at the beginning of the interval
+// (preintegration_bias_walk.h).
 //
 // Pure, callable from any thread; allocates nothing.
 // Source: Schneider et al., ICRA 2017, III-B and III-D; Forster et al., "On-
@@ -49,8 +56,7 @@ struct Preintegration {
   // Derivatives with respect to (b_a 3, b_g 3), and to theta_i in the order of
   // calibration.h.
   Eigen::Matrix<double, 9, 6> J_bias = Eigen::Matrix<double, 9, 6>::Zero();
-  Eigen::Matrix<double, 9, kImuTangentSize> J_theta =
-      Eigen::Matrix<double, 9, kImuTangentSize>::Zero();
+  Eigen::Matrix<double, 9, Eigen::Dynamic, 0, 9, kMaxImuTangentSize> J_theta;
   // Covariance of the nine, from the white noise of the sensors and the walk of
   // their biases; and that of the nine with the walk of (b_a 3, b_g 3) at the
   // end.
@@ -59,7 +65,7 @@ struct Preintegration {
       Eigen::Matrix<double, 9, 6>::Zero();
 };
 
-// Parts to compute in addition to the motion; the rest remains zero.
+// Parts to compute in addition to the motion; the rest remains zero, or empty.
 struct PreintegrationParts {
   bool jacobians = true;
   bool covariance = true;

@@ -51,9 +51,11 @@ class MotionCovariance {
     vr_ = v_r;
   }
 
-  // Noise of the raw gyroscope that is constant over the step.
+  // Noise of the raw gyroscope that is constant over the step. The response is
+  // a RateResponse or a CoupledRateResponse, both of which begin with offsets.
+  template <class Response>
   void AddGyroNoise(const Stage<T>& s,
-                    const RateResponse<T>& response,
+                    const Response& response,
                     const Matrix3<T>& T_g_inverse,
                     T density) {
     const Matrix3<T> noise = Sigma(s, density) * T_g_inverse;

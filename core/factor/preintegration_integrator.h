@@ -8,7 +8,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <type_traits>
 
+#include "core/factor/coupled_derivatives.h"
 #include "core/factor/preintegration.h"
 #include "core/factor/preintegration_bias_walk.h"
 #include "core/factor/preintegration_covariance.h"
@@ -28,11 +30,12 @@ struct Motion {
 // Number of steps in a piece of the bias walk.
 inline constexpr int kWalkSteps = 24;
 
-template <typename T>
+// Imu is ImuModel or CoupledImuModel.
+template <typename T, class Imu>
 class Integrator {
  public:
   // Starts at a reading.
-  Integrator(const ImuModel<T>& imu,
+  Integrator(const Imu& imu,
              const ImuNoise& noise,
              const PreintegrationParts& parts,
              const Reading<T>& first)
@@ -62,13 +65,13 @@ class Integrator {
     s.R_m = R_ + TimesSkew<T>(A_m, turn_m.phi);
     Rotate(turn_1.phi);
     s.R_1 = R_;
-    s.f_m = s.R_m * (0.5 * (reading_.f + next.f));
-    s.f_1 = s.R_1 * next.f;
-    s.dv = h * (1.0 / 6) * (f_ + 4.0 * s.f_m + s.f_1);
-    s.dp = h2 * (1.0 / 6) * (f_ + 2.0 * s.f_m);
+    const auto forces = SetForces(next, &s);
+    s.dv = h * (1.0 / 6) * (s.f_0 + 4.0 * s.f_m + s.f_1);
+    s.dp = h2 * (1.0 / 6) * (s.f_0 + 2.0 * s.f_m);
 
     if (parts_.jacobians || parts_.covariance) {
-      Propagate(s, turn_m, A_m, turn_1, next, gyro_density, accel_density);
+      Propagate(
+          s, turn_m, A_m, turn_1, next, forces, gyro_density, accel_density);
     }
     motion_.Delta_p += h * motion_.Delta_v + s.dp;
     motion_.Delta_v += s.dv;
@@ -85,13 +88,36 @@ class Integrator {
 
   const Motion<T>& motion() const { return motion_; }
   const Matrix3<T>& Delta_R() const { return R_; }
-  MotionDerivatives<T> Derivatives() const {
-    return DerivativesOf(jacobians_.responses(), imu_, force_by_accel_);
+  auto Derivatives() const {
+    return jacobians_.Derivatives(imu_, force_by_accel_);
   }
   const MotionCovariance<T>& covariance() const { return covariance_; }
   const BiasWalk<T>& walk() const { return walk_; }
 
  private:
+  static constexpr bool kCoupled = std::is_same_v<Imu, CoupledImuModel<T>>;
+  struct NoForces {};
+  using Jacobians =
+      std::conditional_t<kCoupled, CoupledJacobians<T>, MotionJacobians<T>>;
+  using Forces = std::conditional_t<kCoupled, StepForces<T>, NoForces>;
+
+  // The forces of a step to `next` with known rotations. That at the end of a
+  // step is that at the beginning of the next, unless it depends on dw/dt.
+  Forces SetForces(const Reading<T>& next, Stage<T>* s) const {
+    if constexpr (kCoupled) {
+      const Forces forces(imu_, reading_, next, s->h);
+      s->f_0 = s->R_0 * forces.begin.f;
+      s->f_m = s->R_m * forces.middle.f;
+      s->f_1 = s->R_1 * forces.end.f;
+      return forces;
+    } else {
+      s->f_0 = f_;
+      s->f_m = s->R_m * (0.5 * (reading_.f + next.f));
+      s->f_1 = s->R_1 * next.f;
+      return {};
+    }
+  }
+
   [[gnu::noinline]] void AdvanceWalk() {
     walk_.Advance({t_,
                    motion_.Delta_v,
@@ -114,13 +140,30 @@ class Integrator {
                  const Matrix3<T>& A_m,
                  const Turn<T>& turn_1,
                  const Reading<T>& next,
+                 const Forces& forces,
                  T gyro_density,
                  T accel_density) {
-    const RateResponse<T> rates = RespondToRates(s, turn_m, A_m, turn_1);
     const ForceResponse<T> force = RespondToForce(s);
     // The walk of the biases also needs derivatives.
-    jacobians_.AddGyro(s, rates);
-    jacobians_.AddAccel(s, force, reading_, next);
+    if constexpr (kCoupled) {
+      const CoupledRateResponse<T> rates = RespondToCoupledRates(
+          s, turn_m, A_m, turn_1, reading_, next, forces, imu_);
+      jacobians_.Add(s, rates, force, forces, imu_);
+      AddNoise(s, rates, force, gyro_density, accel_density);
+    } else {
+      const RateResponse<T> rates = RespondToRates(s, turn_m, A_m, turn_1);
+      jacobians_.AddGyro(s, rates);
+      jacobians_.AddAccel(s, force, reading_, next);
+      AddNoise(s, rates, force, gyro_density, accel_density);
+    }
+  }
+
+  template <class Response>
+  void AddNoise(const Stage<T>& s,
+                const Response& rates,
+                const ForceResponse<T>& force,
+                T gyro_density,
+                T accel_density) {
     if (parts_.covariance) {
       covariance_.Propagate(s);
       covariance_.AddGyroNoise(s, rates, imu_.T_g_inverse, gyro_density);
@@ -129,14 +172,14 @@ class Integrator {
   }
 
   const PreintegrationParts parts_;
-  const ImuModel<T> imu_;
+  const Imu imu_;
   const Matrix3<T> force_by_accel_;
 
   Reading<T> reading_;  // at the end of the last step
   Vector3<T> f_;        // its force, in the frame of the first keyframe
   Motion<T> motion_;
   Matrix3<T> R_ = Matrix3<T>::Identity();
-  MotionJacobians<T> jacobians_;
+  Jacobians jacobians_;
   MotionCovariance<T> covariance_;
   int steps_ = 0;
   T t_ = T(0);  // since the beginning of the interval

@@ -15,13 +15,8 @@ template <typename T>
 class MotionJacobians {
  public:
   void AddGyro(const Stage<T>& s, const RateResponse<T>& response) {
-    for (int c = 0; c < kRateChanges; ++c) {
-      const Vector3<T> psi = of_.psi_by_rates.col(c);
-      const Vector3<T> v = of_.v_by_rates.col(c);
-      of_.p_by_rates.col(c) += s.h * v - s.dp.cross(psi) + response.p.col(c);
-      of_.v_by_rates.col(c) = v - s.dv.cross(psi) + response.v.col(c);
-      of_.psi_by_rates.col(c) = psi + response.psi.col(c);
-    }
+    PropagateColumns(
+        s, response, &of_.psi_by_rates, &of_.v_by_rates, &of_.p_by_rates);
   }
 
   void AddAccel(const Stage<T>& s,
@@ -53,7 +48,10 @@ class MotionJacobians {
             of_.p_by_forces[0].lazyProduct(force_by_accel)};
   }
 
-  const MotionResponses<T>& responses() const { return of_; }
+  MotionDerivatives<T> Derivatives(const ImuModel<T>& imu,
+                                   const Matrix3<T>& force_by_accel) const {
+    return DerivativesOf(of_, imu, force_by_accel);
+  }
 
  private:
   MotionResponses<T> of_;

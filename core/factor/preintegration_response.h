@@ -40,6 +40,22 @@ struct ForceResponse {
   Matrix3<T> v, p;
 };
 
+// Carries derivatives over a step, and adds its own response.
+template <typename T, int cols, class Response>
+void PropagateColumns(const Stage<T>& s,
+                      const Response& response,
+                      Eigen::Matrix<T, 3, cols>* psi,
+                      Eigen::Matrix<T, 3, cols>* v,
+                      Eigen::Matrix<T, 3, cols>* p) {
+  for (int c = 0; c < cols; ++c) {
+    const Vector3<T> psi_0 = psi->col(c);
+    const Vector3<T> v_0 = v->col(c);
+    p->col(c) += s.h * v_0 - s.dp.cross(psi_0) + response.p.col(c);
+    v->col(c) = v_0 - s.dv.cross(psi_0) + response.v.col(c);
+    psi->col(c) = psi_0 + response.psi.col(c);
+  }
+}
+
 template <typename T>
 ForceResponse<T> RespondToForce(const Stage<T>& s) {
   const T sixth = s.h * (1.0 / 6);

@@ -47,13 +47,12 @@ Matrix3<T> TimesSkew(const Matrix3<T>& M, const Vector3<T>& a) {
 }
 
 // One step: rotations at its beginning, middle and end (body there to the first
-// keyframe) and the forces at the latter two, in the frame of the first
-// keyframe.
+// keyframe) and the forces there, in the frame of the first keyframe.
 template <typename T>
 struct Stage {
   T h;
   Matrix3<T> R_0, R_m, R_1;
-  Vector3<T> f_m, f_1;
+  Vector3<T> f_0, f_m, f_1;
   // Integral and double integral of the force over the step.
   Vector3<T> dv, dp;
 };
@@ -66,6 +65,7 @@ struct Turn {
   // A change d of both rates changes phi by gain d + d x drift.
   T gain;
   Vector3<T> drift;
+  T weight_0, weight_1, coning;
 
   Turn(T weight_0,
        T weight_1,
@@ -76,7 +76,10 @@ struct Turn {
         kappa(coning * r0.w.cross(r1.w)),
         phi(alpha + kappa),
         gain(weight_0 + weight_1),
-        drift(coning * (r1.w - r0.w)) {}
+        drift(coning * (r1.w - r0.w)),
+        weight_0(weight_0),
+        weight_1(weight_1),
+        coning(coning) {}
 
   // Derivative with respect to phi of the left perturbation of the rotation
   // that follows R_0:

@@ -21,7 +21,7 @@ void ByRotationOffset(const double* d, Columns&& columns) {
 // The IMU part of the reference, at the offset at the beginning of the block.
 inline ImuCalibration OffsetImu(const ImuCalibration& reference,
                                 const double* theta) {
-  const Eigen::Map<const Eigen::Matrix<double, kImuTangentSize, 1>> d(theta);
+  const Eigen::Map<const Eigen::VectorXd> d(theta, ImuTangentSize(reference));
   return BoxPlus(Calibration{.imu = reference, .cameras = {}}, d).imu;
 }
 

@@ -101,7 +101,7 @@ void SessionChain::AddLink(const SegmentEnds& segment) {
   const InertialMatrix W = SquareRootInformation(covariance);
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(kState, eta_.size());
   for (const int i : FreeComponents(rig_)) {
-    if (i < kState) rows.col(i) = J.theta.col(i);
+    if (i < J.theta.cols()) rows.col(i) = J.theta.col(i);
   }
   rows.middleCols<kState>(theta_) = J.x0;
   rows.middleCols<kState>(theta_ + kState) = J.x1;

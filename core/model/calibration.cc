@@ -85,6 +85,23 @@ Eigen::Matrix3d ImuCalibration::T_a() const {
   return ScaleAndMisalignment(s_a, m_a);
 }
 
+Eigen::Matrix3d ImuCalibration::T_s() const {
+  if (gyro_g_sensitivity.size() == 0) return Eigen::Matrix3d::Zero();
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+      gyro_g_sensitivity.data());
+}
+
+Eigen::Matrix3d ImuCalibration::AccelPositions() const {
+  switch (accel_position.size()) {
+    case 3:
+      return accel_position.head<3>().rowwise().replicate<3>();
+    case 9:
+      return Eigen::Map<const Eigen::Matrix3d>(accel_position.data());
+    default:
+      return Eigen::Matrix3d::Zero();
+  }
+}
+
 int ImuTangentSize(const ImuCalibration& imu) {
   return SensorTangentSize(kImuBlocks, imu);
 }
@@ -149,19 +166,17 @@ Eigen::MatrixXd ThetaByOffset(const Calibration& reference,
 
 bool SameShape(const Calibration& a, const Calibration& b) {
   if (a.cameras.size() != b.cameras.size()) return false;
-  for (std::size_t j = 0; j < a.cameras.size(); ++j) {
+  bool same = true;
+  const auto compare =
+      [&](const BlockInfo&, const auto& value, const auto& other) {
+        same = same && TangentDimension(value) == TangentDimension(other);
+      };
+  VisitSensorBlocks(kImuBlocks, compare, a.imu, b.imu);
+  for (std::size_t j = 0; same && j < a.cameras.size(); ++j) {
     if (a.cameras[j].model != b.cameras[j].model) return false;
-    bool same = true;
-    VisitSensorBlocks(
-        kCameraBlocks,
-        [&](const BlockInfo&, const auto& value, const auto& other) {
-          same = same && TangentDimension(value) == TangentDimension(other);
-        },
-        a.cameras[j],
-        b.cameras[j]);
-    if (!same) return false;
+    VisitSensorBlocks(kCameraBlocks, compare, a.cameras[j], b.cameras[j]);
   }
-  return true;
+  return same;
 }
 
 Eigen::VectorXd ReadableValues(const Calibration& theta) {

@@ -1,14 +1,15 @@
 // theta, the calibration parameters of a device, as one value with a tangent
 // space of named components.
 //
-// Order of the tangent, kImuTangentSize + sum over cameras of (6 + 4 +
+// Order of the tangent, ImuTangentSize + sum over cameras of (6 + 4 +
 // distortion + 1 or 2) components:
-//   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3;
+//   imu: s_g 3, m_g 3, s_a 3, m_a 3, q_AI 3, and those that it has of
+//   g-sensitivity 9 and position of the accelerometer 3 or 9;
 //   for each camera: q_CI 3, p_CI 3, f 2, c 2, distortion n, time offset 1, and
 //   line delay 1 if its shutter is a rolling one.
 // Rotations are perturbed on the right (so3.h); all other components are
 // additive. Source: Schneider et al., ICRA 2017, sections III-B and III-C; the
-// time offset and the line delay are extensions.
+// time offset, the line delay and the optional parts of the IMU are extensions.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,8 +30,8 @@ inline constexpr int kGyroMisalignment = kGyroScale + 3;
 inline constexpr int kAccelScale = kGyroMisalignment + 3;
 inline constexpr int kAccelMisalignment = kAccelScale + 3;
 inline constexpr int kAccelRotation = kAccelMisalignment + 3;
+// Of an IMU without optional blocks, which follow, and with all of them.
 inline constexpr int kImuTangentSize = kAccelRotation + 3;
-// With all optional blocks: g-sensitivity 9, position of the accelerometer 9.
 inline constexpr int kMaxImuTangentSize = kImuTangentSize + 9 + 9;
 // Offset of each block in a camera's tangent.
 inline constexpr int kCameraRotation = 0;
@@ -38,19 +39,36 @@ inline constexpr int kCameraPosition = kCameraRotation + 3;
 inline constexpr int kCameraIntrinsics = kCameraPosition + 3;
 inline constexpr int kCameraDistortion = kCameraIntrinsics + 4;
 
-// theta_i: the gyroscope reads T_g w + b_g, the accelerometer
-// T_a R_AI f_I + b_a.
+// The value of an optional block: of size 0 if the sensor lacks it. Stored
+// without allocation.
+inline constexpr int kMaxOptionalSize = 9;
+using OptionalVector =
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxOptionalSize, 1>;
+
+// theta_i. At the angular rate w [rad/s] and acceleration dw/dt of the body and
+// the specific force f_I at its origin, axis j of the accelerometer feels, at
+// its position r_j,
+//   f_j = f_I + w x (w x r_j) + dw/dt x r_j,
+// and reads e_j^T T_a R_AI f_j + b_a_j. The gyroscope reads T_g w + T_s f + b_g
+// with f the force that the accelerometer reads, R_IA T_a^-1 (accel - b_a).
 struct ImuCalibration {
   Eigen::Vector3d s_g = Eigen::Vector3d::Ones();  // [-]
   Eigen::Vector3d m_g = Eigen::Vector3d::Zero();  // [-]
   Eigen::Vector3d s_a = Eigen::Vector3d::Ones();  // [-]
   Eigen::Vector3d m_a = Eigen::Vector3d::Zero();  // [-]
   Eigen::Quaterniond q_AI = Eigen::Quaterniond::Identity();
+  // T_s, 9, row by row [rad/s per m/s^2]; without it, zero.
+  OptionalVector gyro_g_sensitivity;
+  // In I [m]: 3, of all axes, or 9, of the axes x, y, z of A; without it, zero.
+  OptionalVector accel_position;
 
   // Upper triangular: scales on the diagonal, m = (m_x, m_y, m_z) at (0,1),
   // (0,2), (1,2).
   Eigen::Matrix3d T_g() const;
   Eigen::Matrix3d T_a() const;
+  Eigen::Matrix3d T_s() const;
+  // Columns r_x, r_y, r_z.
+  Eigen::Matrix3d AccelPositions() const;
 };
 
 struct Calibration {

@@ -63,6 +63,14 @@ std::string ImageSizeFault(int size_px) {
          std::to_string(kMaxImageSize_px) + "]";
 }
 
+std::string CountFault(const BlockInfo& info, int count) {
+  const auto [first, second] = info.sizes;
+  if (count == first || count == second) return "";
+  return "has " + std::to_string(count) + " values; it may have 0" +
+         (second > 0 ? ", " + std::to_string(second) : "") + " or " +
+         std::to_string(first);
+}
+
 // The fault of the value of a block; empty if there is none.
 template <class Value>
 std::string Fault(const BlockInfo& info, const Value& value) {
@@ -72,6 +80,10 @@ std::string Fault(const BlockInfo& info, const Value& value) {
     return Fault(info, Eigen::Matrix<double, 1, 1>(value));
   } else if constexpr (std::is_same_v<Value, std::optional<double>>) {
     return value ? Fault(info, *value) : "";
+  } else if constexpr (std::is_same_v<Value, OptionalVector>) {
+    if (value.size() == 0) return "";
+    const std::string fault = CountFault(info, static_cast<int>(value.size()));
+    return fault.empty() ? SizeFault(value, info.limit) : fault;
   } else {
     if (info.accepted == Accepted::kPositive) {
       return PositiveFault(value, info.limit);

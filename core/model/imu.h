@@ -1,6 +1,8 @@
 // The physical quantities behind the readings of an IMU under a calibration:
 // the inverse of
-//   gyro = T_g w_I + b_g,   accel = T_a R_AI f_I + b_a.
+//   gyro = T_g w_I + b_g,   accel = T_a R_AI f_I + b_a,
+// and of what ImuCalibration states of g-sensitivity and the position of the
+// accelerometer.
 // A program that applies a calibration needs only this header and camera.h.
 // Pure functions, callable from any thread.
 #pragma once
@@ -20,11 +22,16 @@ struct BodyRates {
 // Corrects a pair of readings with the calibration and the biases at its time:
 // b_g in I, b_a in the accelerometer frame A, both as the SLAM system estimates
 // them and as a keyframe of a segment stores them. A valid calibration
-// (positive scales) has an inverse.
+// (positive scales) has an inverse. The angular acceleration matters only to a
+// calibration with a position of the accelerometer, 1 cm by 0.1 m/s^2 at 10
+// rad/s^2; a program that does not know it better takes the difference of w_I
+// between samples.
 BodyRates CorrectImu(const ImuCalibration& imu,
                      const Eigen::Vector3d& gyro,   // [rad/s]
                      const Eigen::Vector3d& accel,  // [m/s^2]
                      const Eigen::Vector3d& b_g,    // [rad/s]
-                     const Eigen::Vector3d& b_a);   // [m/s^2]
+                     const Eigen::Vector3d& b_a,    // [m/s^2]
+                     const Eigen::Vector3d& dw_I =  // [rad/s^2]
+                     Eigen::Vector3d::Zero());
 
 }  // namespace selfcal

@@ -10,6 +10,7 @@ namespace {
 std::vector<ComponentSetting> Tolerances(double GradeTolerance::*grade) {
   std::vector<ComponentSetting> settings;
   for (const auto& block : kImuBlocks) {
+    if (block.info.tolerance.*grade == 0) continue;
     settings.push_back({"imu." + std::string(block.info.name) + ".*",
                         block.info.tolerance.*grade});
   }

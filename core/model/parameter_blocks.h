@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -55,6 +56,9 @@ struct BlockInfo {
   GradeTolerance tolerance = {};
   // If false, it is held constant unless the rig estimates it (BlockSetting).
   bool estimated = true;
+  // Of an optional vector: the numbers of components that it may have, the
+  // first of which it gets where it is added.
+  std::array<int, 2> sizes = {};
   StoredSince since = StoredSince::kNames;
 };
 
@@ -70,7 +74,8 @@ struct Block {
                Eigen::Quaterniond Sensor::*,
                DistortionVector Sensor::*,
                double Sensor::*,
-               std::optional<double> Sensor::*>
+               std::optional<double> Sensor::*,
+               OptionalVector Sensor::*>
       value;
 };
 
@@ -128,6 +133,24 @@ inline constexpr Block<ImuCalibration> kImuBlocks[] = {
       .tolerance = {2e-2, 2e-3},
       .since = StoredSince::kBegin},
      &ImuCalibration::q_AI},
+    {{.name = "gyro.g_sensitivity",
+      .field = "gyro_g_sensitivity",
+      .unit = "rad s/m",
+      .sigma_ref = 1e-4,
+      .limit = 0.1,
+      .words = "the gyroscope's sensitivity to acceleration on ",
+      .estimated = false,
+      .sizes = {9}},
+     &ImuCalibration::gyro_g_sensitivity},
+    {{.name = "accel.position",
+      .field = "accel_position",
+      .unit = "m",
+      .sigma_ref = 1e-2,
+      .limit = 10,
+      .words = "the accelerometer's position along ",
+      .estimated = false,
+      .sizes = {9, 3}},
+     &ImuCalibration::accel_position},
 };
 
 inline constexpr Block<CameraCalibration> kCameraBlocks[] = {
@@ -235,7 +258,8 @@ consteval int OffsetOf(const Block<Sensor> (&blocks)[count],
         []<class Value>(Value Sensor::*) {
           if constexpr (std::is_same_v<Value, double>) {
             return 1;
-          } else if constexpr (std::is_same_v<Value, std::optional<double>>) {
+          } else if constexpr (std::is_same_v<Value, std::optional<double>> ||
+                               std::is_same_v<Value, OptionalVector>) {
             return 0;
           } else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>) {
             return 3;

@@ -135,18 +135,23 @@ std::vector<ParameterGroup> DefaultGroups(
 
 void AddEstimatedBlocks(const std::vector<BlockSetting>& blocks,
                         Calibration* theta) {
+  const auto add_to = [&](const std::string& sensor) {
+    return [&blocks, sensor]<class Value>(const BlockInfo& info, Value& value) {
+      if (TangentDimension(value) > 0) return;
+      const BlockSetting* setting =
+          LastSetting(blocks, sensor + "." + std::string(info.name));
+      if (setting == nullptr || !setting->estimated) return;
+      if constexpr (std::is_same_v<Value, std::optional<double>>) {
+        value = 0;
+      } else if constexpr (std::is_same_v<Value, OptionalVector>) {
+        value.setZero(info.sizes[0]);
+      }
+    };
+  };
+  VisitSensorBlocks(kImuBlocks, add_to("imu"), theta->imu);
   for (std::size_t j = 0; j < theta->cameras.size(); ++j) {
     VisitSensorBlocks(
-        kCameraBlocks,
-        [&]<class Value>(const BlockInfo& info, Value& value) {
-          if constexpr (std::is_same_v<Value, std::optional<double>>) {
-            const std::string name =
-                "cam" + std::to_string(j) + "." + std::string(info.name);
-            const BlockSetting* setting = LastSetting(blocks, name);
-            if (!value && setting != nullptr && setting->estimated) value = 0;
-          }
-        },
-        theta->cameras[j]);
+        kCameraBlocks, add_to("cam" + std::to_string(j)), theta->cameras[j]);
   }
 }
 

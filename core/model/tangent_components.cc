@@ -38,6 +38,13 @@ std::vector<TangentComponent> TangentComponents(const Calibration& theta) {
                               unit,
                               coefficient.sigma_ref});
       }
+    } else if constexpr (std::is_same_v<Value, OptionalVector>) {
+      const Eigen::Index size = value.size();
+      for (Eigen::Index i = 0; i < size; ++i) {
+        std::string name = block;
+        if (size == 9) name += std::string(".") + "xyz"[i / 3];
+        components.push_back({name + "." + "xyz"[i % 3], unit, sigma_ref});
+      }
     } else {
       for (int i = 0; i < TangentDimension(value); ++i) {
         components.push_back({block + "." + "xyz"[i], unit, sigma_ref});

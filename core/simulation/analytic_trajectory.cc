@@ -8,6 +8,7 @@
 #include "core/model/so3.h"
 #include "core/simulation/envelope.h"
 #include "core/simulation/random.h"
+#include "core/simulation/rotation_rates.h"
 #include "core/simulation/sine_sum.h"
 #include "core/simulation/trajectory.h"
 
@@ -94,6 +95,9 @@ class AnalyticTrajectory : public Trajectory {
     const Eigen::Quaterniond q_yaw = Exp({0, 0, yaw.x[0]});
     const Eigen::Quaterniond q_phi = Exp(phi.x);
     const Eigen::Vector3d yaw_rate(0, 0, yaw.d1[0] * e.value);
+    const Eigen::Vector3d yaw_second(
+        0, 0, yaw.d2[0] * e.value * e.value + yaw.d1[0] * e.d1);
+    const RotationRates rates = RatesOf(phi);
     BodyMotion motion;
     motion.q_GI = q_yaw * q_phi;
     motion.p_GI = p.x.matrix() + Eigen::Vector3d(0, 0, 1.5);
@@ -101,6 +105,8 @@ class AnalyticTrajectory : public Trajectory {
     motion.a_GI = p.d2;
     motion.w_I =
         RightJacobian(phi.x) * phi.d1.matrix() + q_phi.conjugate() * yaw_rate;
+    motion.dw_I = rates.dw + q_phi.conjugate() * yaw_second -
+                  rates.w.cross(q_phi.conjugate() * yaw_rate);
     return motion;
   }
 

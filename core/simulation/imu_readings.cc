@@ -27,8 +27,10 @@ ImuReadings PerfectReadings(const Rig& rig,
     const BodyMotion motion =
         trajectory.At(static_cast<double>(sample.t_ns) * 1e-9);
     const Eigen::Vector3d f_I = motion.q_GI.conjugate() * (motion.a_GI - g);
-    sample.gyro = response.Gyro(motion.w_I, f_I);
-    sample.accel = response.Accel(motion.w_I, f_I);
+    const Eigen::Vector3d f_A =
+        response.ForceRead(motion.w_I, motion.dw_I, f_I);
+    sample.gyro = response.Gyro(motion.w_I, f_A);
+    sample.accel = response.Accel(f_A);
     readings.noise_free.push_back(sample);
     readings.w_I.push_back(motion.w_I);
     readings.f_I.push_back(f_I);

@@ -26,7 +26,8 @@ struct ImuReadings {
 // Simulates samples from time 0 to the end of the trajectory. Section III-B of
 // the paper:
 //   w~ = T_g w + b_g + n,  a~ = T_a R_AI R_IG (a_G - g) + b_a + n,
-// with n of standard deviation density * sqrt(rate), biases random walks.
+// and of g-sensitivity and positions what ImuCalibration states; with n of
+// standard deviation density * sqrt(rate), biases random walks.
 ImuReadings SimulateImu(const Rig& rig,
                         const ImuCalibration& imu,
                         const Trajectory& trajectory,

@@ -108,11 +108,12 @@ std::vector<KeyframeState> SlamStates(const std::vector<KeyframeState>& truth,
     error.segment<3>(kStateRotation) = truth[k].q_GI.conjugate() * rotation_G;
     error.segment<3>(kStatePosition) = position.Next(dt_s, &random);
     error.segment<3>(kStateVelocity) = velocity.Next(dt_s, &random);
-    // The biases absorb the mean error of the readings.
+    // The biases absorb the mean error of the readings, but for that due to
+    // the positions of the accelerometer.
     const Vector3d w_I = mean_w_I.Around(t_ns);
     const Vector3d f_I = mean_f_I.Around(t_ns);
     error.segment<3>(kStateAccelBias) =
-        accel_bias.Next(dt_s, &random) + mismatch.Accel(w_I, f_I);
+        accel_bias.Next(dt_s, &random) + mismatch.Accel(f_I);
     error.segment<3>(kStateGyroBias) =
         gyro_bias.Next(dt_s, &random) + mismatch.Gyro(w_I, f_I);
     states.push_back(BoxPlus(truth[k], error));

@@ -1,6 +1,7 @@
 // B-splines of position and quaternion: the position directly, the quaternion
 // normalised, q(t) = x / |x|, from which exactly
-//   q' = (x' - q (q . x')) / |x|,   w_I = 2 vec(q^-1 q').
+//   q' = (x' - q (q . x')) / |x|,   w_I = 2 vec(q^-1 q'),
+//   w_I' = 2 vec(q^-1 q'') = 2 (vec(q^-1 x'') - (q . x') w_I) / |x|.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -82,6 +83,11 @@ class SplineTrajectory : public Trajectory {
     motion.v_GI = p.d1;
     motion.a_GI = p.d2;
     motion.w_I = 2 * (motion.q_GI.conjugate() * q_dot).vec();
+    const Eigen::Quaterniond second(Eigen::Vector4d(x.d2));
+    motion.dw_I =
+        2 *
+        ((motion.q_GI.conjugate() * second).vec() - q.dot(d1) * motion.w_I) /
+        norm;
     return motion;
   }
 

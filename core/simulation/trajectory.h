@@ -21,6 +21,7 @@ struct BodyMotion {
   Eigen::Vector3d v_GI;  // [m/s], in G
   Eigen::Vector3d a_GI;  // [m/s^2], in G, gravity not included
   Eigen::Vector3d w_I;   // [rad/s], in I
+  Eigen::Vector3d dw_I;  // [rad/s^2], the derivative of w_I
 };
 
 class Trajectory {

@@ -46,14 +46,29 @@ def correct_imu(
     accel: np.ndarray,
     b_g: np.ndarray,
     b_a: np.ndarray,
+    dw_I: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns angular rate [rad/s] and specific force [m/s^2] in frame I."""
+    """Returns angular rate [rad/s] and specific force [m/s^2] in frame I.
+
+    The angular acceleration dw_I [rad/s^2], zero unless given, matters only to
+    a calibration with a position of the accelerometer.
+    """
     T_g = _upper(imu.s_g, imu.m_g)
-    T_a_R_AI = _upper(imu.s_a, imu.m_a) @ _rotation(imu.q_ai)
-    return (
-        (np.asarray(gyro) - b_g) @ np.linalg.inv(T_g).T,
-        (np.asarray(accel) - b_a) @ np.linalg.inv(T_a_R_AI).T,
-    )
+    M = _upper(imu.s_a, imu.m_a) @ _rotation(imu.q_ai)
+    force_by_accel = np.linalg.inv(M)
+    f_I = (np.asarray(accel) - b_a) @ force_by_accel.T
+    rate = np.asarray(gyro) - b_g
+    if imu.gyro_g_sensitivity:
+        rate = rate - f_I @ np.reshape(imu.gyro_g_sensitivity, (3, 3)).T
+    w_I = rate @ np.linalg.inv(T_g).T
+    if imu.accel_position:
+        # One position of each axis, or of all.
+        r = np.reshape(imu.accel_position, (-1, 3)) * np.ones((3, 1))
+        force = np.cross(w_I[..., None, :], np.cross(w_I[..., None, :], r))
+        if dw_I is not None:
+            force = force + np.cross(np.asarray(dw_I)[..., None, :], r)
+        f_I = f_I - np.sum(force * M, axis=-1) @ force_by_accel.T
+    return w_I, f_I
 
 
 def to_camera(camera: v1.CameraCalibration, p_I: np.ndarray) -> np.ndarray:

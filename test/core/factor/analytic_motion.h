@@ -40,13 +40,31 @@ class AnalyticMotion {
                     const Eigen::Vector3d& b_g,
                     double gravity_mps2) const {
     const double t = 1e-9 * static_cast<double>(t_ns);
-    const Eigen::Vector3d alpha = Alpha(t);
-    const Eigen::Vector3d w =
-        RightJacobian(alpha) * (turn_rate_ + turn_.Rate(t));
+    const Eigen::Vector3d w = AngularRate(t);
     const Eigen::Vector3d f =
-        (start_ * Exp(alpha)).conjugate() *
+        (start_ * Exp(Alpha(t))).conjugate() *
         (shift_.SecondRate(t) + Eigen::Vector3d(0, 0, gravity_mps2));
-    return {t_ns, imu.T_g() * w + b_g, imu.T_a() * (imu.q_AI * f) + b_a};
+    constexpr double h = 1e-4;
+    const Eigen::Vector3d dw =
+        (AngularRate(t + h) - AngularRate(t - h)) / (2 * h);
+    ImuSample reading = {t_ns, imu.T_g() * w + b_g, b_a};
+    for (int axis = 0; axis < 3; ++axis) {
+      Eigen::Vector3d r = Eigen::Vector3d::Zero();
+      if (imu.accel_position.size() == 3) r = imu.accel_position;
+      if (imu.accel_position.size() == 9) {
+        r = imu.accel_position.segment<3>(3 * axis);
+      }
+      const Eigen::Vector3d there = f + w.cross(w.cross(r)) + dw.cross(r);
+      reading.accel[axis] += imu.T_a().row(axis) * (imu.q_AI * there);
+    }
+    if (imu.gyro_g_sensitivity.size() > 0) {
+      const Eigen::Vector3d read =
+          imu.q_AI.conjugate() * (imu.T_a().inverse() * (reading.accel - b_a));
+      for (int i = 0; i < 3; ++i) {
+        reading.gyro[i] += imu.gyro_g_sensitivity.segment<3>(3 * i).dot(read);
+      }
+    }
+    return reading;
   }
 
   std::vector<ImuSample> Readings(std::int64_t t0_ns,
@@ -87,6 +105,9 @@ class AnalyticMotion {
     return sines;
   }
 
+  Eigen::Vector3d AngularRate(double t) const {
+    return RightJacobian(Alpha(t)) * (turn_rate_ + turn_.Rate(t));
+  }
   Eigen::Vector3d Alpha(double t) const {
     return turn_rate_ * t + turn_.Value(t);
   }

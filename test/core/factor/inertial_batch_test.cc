@@ -88,9 +88,9 @@ struct Problem {
   }
 };
 
-Problem RandomProblem(RandomValues& random, int count) {
+Problem RandomProblem(RandomValues& random, int count, bool coupled = false) {
   Problem problem;
-  problem.imu = random.Imu();
+  problem.imu = coupled ? random.CoupledImu() : random.Imu();
   for (int i = 0; i < count; ++i) {
     const double angle =
         i % 3 == 0 ? random.Uniform(0, 3.1) : random.LogUniform(1e-6, 0.1);
@@ -152,8 +152,9 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_P(InertialBatchTest, SolvesEachFactorForTheEarlierState) {
   RandomValues random(1);
   InertialBatch batch(GetParam());
-  for (int trial = 0; trial < 40; ++trial) {
-    const Problem problem = RandomProblem(random, 1 + trial);
+  for (int trial = 0; trial < 80; ++trial) {
+    const Problem problem =
+        RandomProblem(random, 1 + trial % 40, /*coupled=*/trial >= 40);
     const Result result = Linearise(&batch, problem);
     for (std::size_t i = 0; i < problem.links.size(); ++i) {
       const Link& link = problem.links[i];
@@ -192,7 +193,7 @@ TEST_P(InertialBatchTest, SolvesEachFactorForTheEarlierState) {
 TEST_P(InertialBatchTest, ALinkDoesNotDependOnItsNeighbours) {
   RandomValues random(2);
   InertialBatch batch(GetParam());
-  const Problem problem = RandomProblem(random, 23);
+  const Problem problem = RandomProblem(random, 23, /*coupled=*/true);
   const Result together = Linearise(&batch, problem);
   for (std::size_t i = 0; i < problem.links.size(); ++i) {
     Problem alone = problem;
@@ -210,7 +211,7 @@ TEST_P(InertialBatchTest, ALinkDoesNotDependOnItsNeighbours) {
 TEST_P(InertialBatchTest, TakesRootsAsGiven) {
   RandomValues random(3);
   InertialBatch batch(GetParam());
-  const Problem problem = RandomProblem(random, 11);
+  const Problem problem = RandomProblem(random, 11, /*coupled=*/true);
   Problem louder = problem;
   louder.noise.gyro_noise_density *= 3;
   louder.noise.accel_noise_density *= 0.5;

@@ -53,12 +53,15 @@ Blocks BlocksOf(const Factor& factor) {
           VelocityAndBiases(factor.x1)};
 }
 
-Factor RandomFactor(RandomValues& random, double duration_s) {
+Factor RandomFactor(RandomValues& random, double duration_s, bool coupled) {
   Factor factor;
-  factor.reference.imu = random.Imu();
+  factor.reference.imu = coupled ? random.CoupledImu() : random.Imu();
   factor.reference.cameras = {random.Camera(DistortionModel::kFov),
                               random.Camera(DistortionModel::kEquidistant)};
   factor.delta = 0.02 * random.NormalVector(TangentSize(factor.reference));
+  // Optional blocks: of the size of their values.
+  const int more = ImuTangentSize(factor.reference.imu) - kImuTangentSize;
+  factor.delta.segment(kImuTangentSize, more) *= 0.1;
   factor.delta.segment<3>(kAccelRotation) = random.Normal3(0.7);
   factor.samples = random.Samples(random.LogUniform(100, 1000), duration_s);
   factor.x0 = random.State(0);
@@ -82,7 +85,7 @@ Factor RandomFactor(RandomValues& random, double duration_s) {
 TEST(InertialCost, IsThePlainFactorWhitened) {
   RandomValues random(1);
   for (int trial = 0; trial < 500; ++trial) {
-    const Factor factor = RandomFactor(random, 0.1);
+    const Factor factor = RandomFactor(random, 0.1, trial % 2 == 1);
     const VectorXd expected = factor.W * factor.Plain(nullptr);
     const VectorXd residuals =
         EvaluateCost(*factor.Cost(), BlocksOf(factor), false).residuals;
@@ -95,7 +98,8 @@ TEST(InertialCost, JacobiansMatchDifferencesThroughBothManifolds) {
   const auto full = MakeRotationManifold();
   const auto gauge = MakeGaugeRotationManifold();
   for (int trial = 0; trial < 300; ++trial) {
-    const Factor factor = RandomFactor(random, trial % 20 == 0 ? 1 : 0.1);
+    const Factor factor =
+        RandomFactor(random, trial % 20 == 0 ? 1 : 0.1, trial % 3 == 0);
     const auto* manifold = trial % 2 == 0 ? full.get() : gauge.get();
     const auto cost = factor.Cost();
     // Whitened residuals reach 1e5 and more, and carry their rounding along.

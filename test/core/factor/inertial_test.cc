@@ -33,12 +33,13 @@ struct Factor {
 
 // Random states, except that the rotation residual is Exp(error).
 Factor RandomFactor(RandomValues& random,
+                    const ImuCalibration& imu,
                     double rate_hz,
                     double duration_s,
                     const Vector3d& error) {
   Factor factor;
   factor.samples = random.Samples(rate_hz, duration_s);
-  factor.imu = random.Imu();
+  factor.imu = imu;
   factor.x0 = random.State(0);
   factor.x1 = random.State(static_cast<std::int64_t>(1e9 * duration_s));
   const Preintegration motion = Preintegrate(factor.samples,
@@ -64,8 +65,8 @@ void ExpectJacobiansMatch(const Factor& factor) {
   InertialJacobians J;
   const InertialResidual residual = factor.Evaluate(&J);
   EXPECT_EQ(residual, factor.Evaluate());
-  const auto numeric = [](const auto& evaluate) {
-    return NumericJacobian(evaluate, 15, kStep);
+  const auto numeric = [](const auto& evaluate, int size = 15) {
+    return NumericJacobian(evaluate, size, kStep);
   };
   EXPECT_LT(RowwiseDifference(J.x0, numeric([&](const VectorXd& delta) {
                                 Factor moved = factor;
@@ -79,12 +80,14 @@ void ExpectJacobiansMatch(const Factor& factor) {
                                 return moved.Evaluate();
                               })),
             kTolerance);
-  EXPECT_LT(RowwiseDifference(J.theta, numeric([&](const VectorXd& delta) {
-                                Factor moved = factor;
-                                moved.imu = MovedImu(factor.imu, delta);
-                                return moved.Evaluate();
-                              })),
-            kTolerance);
+  const auto by_theta = [&](const VectorXd& delta) {
+    Factor moved = factor;
+    moved.imu = MovedImu(factor.imu, delta);
+    return moved.Evaluate();
+  };
+  EXPECT_LT(
+      RowwiseDifference(J.theta, numeric(by_theta, ImuTangentSize(factor.imu))),
+      kTolerance);
 }
 
 TEST(Inertial, JacobiansMatchDifferencesAtRandomStates) {
@@ -93,6 +96,7 @@ TEST(Inertial, JacobiansMatchDifferencesAtRandomStates) {
     const Vector3d error = random.Normal3(random.LogUniform(1e-6, 1));
     if (error.norm() > 3) continue;
     ExpectJacobiansMatch(RandomFactor(random,
+                                      random.Imu(),
                                       random.LogUniform(100, 1000),
                                       random.Uniform(0.02, 0.1),
                                       error));
@@ -100,11 +104,26 @@ TEST(Inertial, JacobiansMatchDifferencesAtRandomStates) {
   }
 }
 
+TEST(Inertial, JacobiansOfACoupledImuMatchDifferences) {
+  RandomValues random(21);
+  for (int trial = 0; trial < 1000; ++trial) {
+    ExpectJacobiansMatch(RandomFactor(random,
+                                      random.CoupledImu(),
+                                      random.LogUniform(100, 1000),
+                                      random.Uniform(0.02, 0.1),
+                                      random.Normal3(0.1)));
+    if (HasFailure()) FAIL() << "trial " << trial;
+  }
+}
+
 TEST(Inertial, JacobiansMatchDifferencesOverASecond) {
   RandomValues random(2);
   for (int trial = 0; trial < 100; ++trial) {
-    ExpectJacobiansMatch(RandomFactor(
-        random, random.LogUniform(100, 1000), 1.0, random.Normal3(0.1)));
+    ExpectJacobiansMatch(RandomFactor(random,
+                                      random.Imu(),
+                                      random.LogUniform(100, 1000),
+                                      1.0,
+                                      random.Normal3(0.1)));
     if (HasFailure()) FAIL() << "trial " << trial;
   }
 }
@@ -115,7 +134,7 @@ TEST(Inertial, JacobiansMatchDifferencesWhereTheRotationResidualNearsPi) {
     // The differences must not step over pi, where the residual jumps.
     const Vector3d error =
         (M_PI - random.LogUniform(2e-3, 0.3)) * random.Normal3(1).normalized();
-    ExpectJacobiansMatch(RandomFactor(random, 200, 0.1, error));
+    ExpectJacobiansMatch(RandomFactor(random, random.Imu(), 200, 0.1, error));
     if (HasFailure()) FAIL() << "trial " << trial;
   }
 }
@@ -145,7 +164,8 @@ TEST(Inertial, ResidualVanishesOnATrueMotion) {
 TEST(Inertial, ResidualDoesNotChangeWhenYawAndPlaceOfBothStatesDo) {
   RandomValues random(5);
   for (int trial = 0; trial < 200; ++trial) {
-    const Factor factor = RandomFactor(random, 200, 0.2, random.Normal3(0.5));
+    const Factor factor =
+        RandomFactor(random, random.Imu(), 200, 0.2, random.Normal3(0.5));
     const Eigen::Quaterniond yaw =
         Exp(Vector3d(0, 0, random.Uniform(-M_PI, M_PI)));
     const Vector3d shift = random.Normal3(100);
@@ -172,7 +192,8 @@ TEST(Inertial, BiasWalkGrowsWithTheSquareRootOfTime) {
 
 TEST(Inertial, CovarianceOfTheBiasesIsThatOfTheirWalkAlone) {
   RandomValues random(6);
-  const Factor factor = RandomFactor(random, 200, 0.5, Vector3d::Zero());
+  const Factor factor =
+      RandomFactor(random, random.Imu(), 200, 0.5, Vector3d::Zero());
   InertialMatrix covariance;
   factor.Evaluate(nullptr, &covariance);
   const Eigen::MatrixXd variances =

@@ -23,7 +23,11 @@ constexpr std::int64_t kKeyframe_ns = 501'700'000;
 // A keyframe of a shaken device with the samples about it.
 struct Scene {
   explicit Scene(RandomValues& random)
-      : motion(random), imu(random.Imu()), x(motion.State(kKeyframe_ns)) {
+      : Scene(AnalyticMotion(random), random.Imu(), random) {}
+  Scene(const AnalyticMotion& motion,
+        const ImuCalibration& imu,
+        RandomValues& random)
+      : motion(motion), imu(imu), x(motion.State(kKeyframe_ns)) {
     x.b_a = random.Normal3(0.2);
     x.b_g = random.Normal3(0.02);
     samples = motion.Readings(
@@ -53,7 +57,9 @@ double ErrorPixels(const ExposurePose& pose, const KeyframeState& truth) {
 TEST(MeasureMotion, MovesThePoseToTheExposure) {
   RandomValues random(1);
   for (int trial = 0; trial < 500; ++trial) {
-    const Scene scene(random);
+    const AnalyticMotion shaken(random);
+    const Scene scene(
+        shaken, trial % 2 == 0 ? random.Imu() : random.CoupledImu(), random);
     const double dt_s = random.Uniform(-0.03, 0.03);
     const KeyframeMotion motion = scene.Measure(dt_s);
     const KeyframeState truth = scene.Truth(dt_s);

@@ -51,6 +51,16 @@ class RandomValues {
     return imu;
   }
 
+  // With any of the optional blocks, at least one.
+  ImuCalibration CoupledImu() {
+    constexpr int kPositions[] = {0, 3, 9, 3, 9};
+    const int kind = Index(5);
+    ImuCalibration imu = Imu();
+    if (kind == 0 || kind > 2) imu.gyro_g_sensitivity = 5e-3 * NormalVector(9);
+    imu.accel_position = 0.05 * NormalVector(kPositions[kind]);
+    return imu;
+  }
+
   CameraCalibration Camera(DistortionModel model) {
     CameraCalibration camera;
     camera.q_CI = Rotation();

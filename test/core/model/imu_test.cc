@@ -26,5 +26,40 @@ TEST(CorrectImu, InvertsTheReadingsOfAnyCalibration) {
   }
 }
 
+// The readings are written out as the formulas of ImuCalibration have them.
+TEST(CorrectImu, InvertsTheReadingsOfSensorsThatAreCoupled) {
+  RandomValues random(2);
+  for (int trial = 0; trial < 1000; ++trial) {
+    ImuCalibration imu = random.Theta().imu;
+    const int positions = trial % 3 == 0 ? 0 : trial % 3 == 1 ? 3 : 9;
+    imu.accel_position = random.Vector(positions, 0.1);
+    if (trial % 2 == 0) imu.gyro_g_sensitivity = random.Vector(9, 1e-2);
+    const Eigen::Vector3d w = random.Vector(3, 5);
+    const Eigen::Vector3d dw = random.Vector(3, 50);
+    const Eigen::Vector3d f_I = random.Vector(3, 30);
+    const Eigen::Vector3d b_g = random.Vector(3, 0.05);
+    const Eigen::Vector3d b_a = random.Vector(3, 0.5);
+    Eigen::Vector3d accel = b_a;
+    for (int axis = 0; axis < 3; ++axis) {
+      Eigen::Vector3d r = Eigen::Vector3d::Zero();
+      for (int i = 0; i < 3; ++i) {
+        if (positions == 3) r[i] = imu.accel_position[i];
+        if (positions == 9) r[i] = imu.accel_position[3 * axis + i];
+      }
+      const Eigen::Vector3d f = f_I + w.cross(w.cross(r)) + dw.cross(r);
+      accel[axis] += (imu.T_a() * (imu.q_AI * f))[axis];
+    }
+    Eigen::Vector3d gyro = imu.T_g() * w + b_g;
+    const Eigen::Vector3d f_read =
+        imu.q_AI.conjugate() * (imu.T_a().inverse() * (accel - b_a));
+    for (int i = 0; i < 9 && trial % 2 == 0; ++i) {
+      gyro[i / 3] += imu.gyro_g_sensitivity[i] * f_read[i % 3];
+    }
+    const BodyRates rates = CorrectImu(imu, gyro, accel, b_g, b_a, dw);
+    EXPECT_LT((rates.w_I - w).norm(), 1e-13);
+    EXPECT_LT((rates.f_I - f_I).norm(), 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace selfcal

@@ -21,6 +21,8 @@ inline void ExpectDerivativesMatch(const Trajectory& trajectory, double t_s) {
   EXPECT_LT((at.v_GI - v).norm(), 1e-6 * (1 + v.norm())) << "at " << t_s;
   EXPECT_LT((at.a_GI - a).norm(), 2e-5 * (1 + a.norm())) << "at " << t_s;
   EXPECT_LT((at.w_I - w).norm(), 1e-5 * (1 + w.norm())) << "at " << t_s;
+  const Eigen::Vector3d dw = (after.w_I - before.w_I) / (2 * h);
+  EXPECT_LT((at.dw_I - dw).norm(), 2e-5 * (1 + dw.norm())) << "at " << t_s;
   EXPECT_NEAR(at.q_GI.norm(), 1, 1e-12);
 }
 

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "core/model/imu.h"
+
 namespace selfcal {
 namespace {
 
@@ -29,6 +31,29 @@ TEST(ImuReadingsTest, WithoutNoiseFollowTheSensorModel) {
         theta.T_a() * (theta.q_AI * f_I) + options.b_a0;
     EXPECT_LT((sample.gyro - gyro).norm(), 1e-12);
     EXPECT_LT((sample.accel - accel).norm(), 1e-12);
+  }
+}
+
+TEST(ImuReadingsTest, OfSensorsThatAreCoupledGiveTheMotionBack) {
+  Rig rig = HandheldRig("a");
+  ImuCalibration& theta = rig.factory.imu;
+  theta.gyro_g_sensitivity.resize(9);
+  theta.gyro_g_sensitivity << 5, -3, 2, 1, 4, -2, 3, 2, -6;
+  theta.gyro_g_sensitivity *= 1e-4;
+  theta.accel_position.resize(9);
+  theta.accel_position << 0.02, 0.01, -0.03, 0.03, 0, 0.01, -0.01, 0.02, 0.02;
+  const auto trajectory = MakeHandheld(5, 1, 3);
+  SimulationOptions options;
+  options.noise = false;
+  const ImuReadings imu = SimulateImu(rig, theta, *trajectory, options);
+  for (std::size_t i = 0; i < imu.measured.size(); ++i) {
+    const ImuSample& sample = imu.measured[i];
+    const BodyMotion motion =
+        trajectory->At(static_cast<double>(sample.t_ns) * 1e-9);
+    const BodyRates rates = CorrectImu(
+        theta, sample.gyro, sample.accel, imu.b_g[i], imu.b_a[i], motion.dw_I);
+    EXPECT_LT((rates.w_I - imu.w_I[i]).norm(), 1e-12);
+    EXPECT_LT((rates.f_I - imu.f_I[i]).norm(), 1e-11);
   }
 }
 
