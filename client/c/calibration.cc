@@ -90,6 +90,8 @@ selfcal_camera ToCamera(const CameraCalibration& given) {
   camera.q_CI = ToQuaternion(given.q_CI);
   Copy(given.p_CI, camera.p_CI);
   camera.time_offset_s = given.time_offset_s;
+  camera.rolling_shutter = given.line_delay_s.has_value();
+  camera.line_delay_s = given.line_delay_s.value_or(0);
   return camera;
 }
 
@@ -144,6 +146,7 @@ absl::Status FromCamera(const selfcal_camera* given,
   camera->q_CI = FromQuaternion(read.q_CI);
   camera->p_CI = Eigen::Vector3d(read.p_CI);
   camera->time_offset_s = read.time_offset_s;
+  if (read.rolling_shutter != 0) camera->line_delay_s = read.line_delay_s;
   camera->width_px = read.width_px;
   camera->height_px = read.height_px;
   return status;

@@ -458,6 +458,11 @@ typedef struct selfcal_camera {
   // t_imu = t_camera + time_offset_s: an image with the timestamp t was exposed
   // at t + time_offset_s on the clock of the IMU.
   double time_offset_s;
+  // Nonzero: row v of an image was exposed at t + time_offset_s + v
+  // line_delay_s; zero: all rows at once.
+  int32_t rolling_shutter;
+  uint32_t reserved;
+  double line_delay_s;
 } selfcal_camera;
 
 // One component of the tangent space of the calibration. The names and units

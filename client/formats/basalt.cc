@@ -200,6 +200,7 @@ ExportedFiles ExportBasalt(const Rig& rig,
   root["vignette"] = Json::array();
   AddOdometryLoss(theta.cameras[0].time_offset_s, &result.losses);
   AddSharedOffsetLosses("basalt", theta, &result.losses);
+  AddLineDelayLosses("basalt", theta, &result.losses);
   AddGravityLoss("basalt", rig, &result.losses);
   result.files = {{"calibration.json", Json{{"value0", root}}.dump(2) + "\n"}};
   return result;

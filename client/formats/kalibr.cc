@@ -123,6 +123,7 @@ ExportedFiles ExportKalibr(const Rig& rig,
   std::vector<CameraCalibration> cameras = theta.cameras;
   UseModelsOf("kalibr", &cameras);
   AddPinholeLosses("kalibr", cameras, &result.losses);
+  AddLineDelayLosses("kalibr", theta, &result.losses);
   for (std::size_t j = 0; j < cameras.size(); ++j) {
     const CameraCalibration& camera = cameras[j];
     CheckCamera(j, camera);

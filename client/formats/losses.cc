@@ -60,6 +60,23 @@ void AddSharedOffsetLosses(const std::string& tool,
   }
 }
 
+void AddLineDelayLosses(const std::string& tool,
+                        const Calibration& theta,
+                        std::vector<Loss>* losses) {
+  for (std::size_t j = 0; j < theta.cameras.size(); ++j) {
+    const CameraCalibration& camera = theta.cameras[j];
+    if (!camera.line_delay_s) continue;
+    losses->push_back(
+        {fmt::format("cam{}.line_delay", j),
+         fmt::format("{} exposes all rows of an image at once: add {} s to the "
+                     "timestamps of its images, so that they are those of the "
+                     "middle row, which is right for this row alone",
+                     tool,
+                     *camera.line_delay_s * camera.height_px / 2),
+         true});
+  }
+}
+
 void AddPinholeLosses(const std::string& tool,
                       const std::vector<CameraCalibration>& cameras,
                       std::vector<Loss>* losses) {

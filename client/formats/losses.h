@@ -26,6 +26,11 @@ void AddSharedOffsetLosses(const std::string& tool,
                            const Calibration& theta,
                            std::vector<Loss>* losses);
 
+// For tools that expose an image at one time.
+void AddLineDelayLosses(const std::string& tool,
+                        const Calibration& theta,
+                        std::vector<Loss>* losses);
+
 // For tools whose gravity is set elsewhere, or fixed.
 void AddGravityLoss(const std::string& tool,
                     const Rig& rig,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@
 
 namespace selfcal::client {
 namespace {
+
+constexpr double kNsPerS = 1e9;
 
 ImuNoise ReadNoise(const YAML::Node& imu) {
   const YAML::Node sigmas = Get(imu, "sigmas");
@@ -39,8 +42,7 @@ ImuFullScale ReadFullScale(const YAML::Node& imu) {
           read("saturation_accel_max_mps2", 150, defaults.accel_mps2)};
 }
 
-CameraCalibration ReadCamera(const YAML::Node& entry,
-                             std::vector<Loss>* losses) {
+CameraCalibration ReadCamera(const YAML::Node& entry) {
   const YAML::Node camera = Get(entry, "camera");
   CameraCalibration result;
   const YAML::Node distortion = Get(camera, "distortion");
@@ -74,11 +76,9 @@ CameraCalibration ReadCamera(const YAML::Node& entry,
       Rigid(GetMatrixData(entry, "T_B_C", 4, 4), "T_B_C");
   SetTransformFromBody(
       RigidInverse(T_BC), Eigen::Matrix3d::Identity(), &result);
-  if (GetDouble(camera, "line-delay-nanoseconds", 0) != 0) {
-    losses->push_back({"line-delay-nanoseconds",
-                       "selfcal treats an image as exposed at one time",
-                       true});
-  }
+  // Zero is a global shutter.
+  const double line_delay_ns = GetDouble(camera, "line-delay-nanoseconds", 0);
+  if (line_delay_ns != 0) result.line_delay_s = line_delay_ns / kNsPerS;
   return result;
 }
 
@@ -153,7 +153,7 @@ std::string CameraText(const CameraCalibration& camera,
       "          sensor_type: CAMERA\n"
       "          description: \"cam{}\"\n"
       "          topic: /cam{}/image_raw\n"
-      "          line-delay-nanoseconds: 0\n"
+      "          line-delay-nanoseconds: {}\n"
       "          image_height: {}\n"
       "          image_width: {}\n"
       "          type: {}\n"
@@ -168,6 +168,7 @@ std::string CameraText(const CameraCalibration& camera,
       id,
       number,
       number,
+      std::llround(camera.line_delay_s.value_or(0) * kNsPerS),
       camera.height_px,
       camera.width_px,
       tool.name,
@@ -248,7 +249,7 @@ ImportedRig ImportMaplab(const std::vector<TextFile>& files,
   result.rig.gravity_mps2 = GetDouble(imu, "gravity_magnitude_mps2");
   AddExtrinsicsLoss(root, system, &result.losses);
   for (const YAML::Node& entry : Get(system, "cameras")) {
-    result.rig.factory.cameras.push_back(ReadCamera(entry, &result.losses));
+    result.rig.factory.cameras.push_back(ReadCamera(entry));
   }
   return result;
 }

@@ -131,6 +131,7 @@ ExportedFiles ExportOpenVins(const Rig& rig,
       RowsText(theta.imu.q_AI.normalized().toRotationMatrix(), "    "),
       RowsText(Eigen::Matrix3d::Zero(), "    "));
   AddSharedOffsetLosses("openvins", theta, &result.losses);
+  AddLineDelayLosses("openvins", theta, &result.losses);
   AddGravityLoss("openvins", rig, &result.losses);
   result.files = {{"kalibr_imucam_chain.yaml", chain},
                   {"kalibr_imu_chain.yaml", imu}};

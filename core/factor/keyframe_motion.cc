@@ -272,12 +272,11 @@ KeyframeMotion MeasureMotion(std::span<const ImuSample> samples,
                              const ImuNoise& noise,
                              double gravity_mps2,
                              const CameraCalibration& camera) {
-  double dt_s = camera.time_offset_s;
+  const double dt_s = MiddleRowDelay(camera);
   std::optional<double> half_readout_s;
   if (camera.line_delay_s) {
-    const double half_s = *camera.line_delay_s * camera.height_px / 2;
-    dt_s += half_s;
-    half_readout_s = std::max(std::abs(half_s), kLeastHalfReadout_s);
+    half_readout_s =
+        std::max(std::abs(dt_s - camera.time_offset_s), kLeastHalfReadout_s);
   }
   return Measure(samples, x, imu, noise, gravity_mps2, dt_s, half_readout_s);
 }

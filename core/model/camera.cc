@@ -111,6 +111,11 @@ bool Unproject(const CameraCalibration& camera,
   return true;
 }
 
+double MiddleRowDelay(const CameraCalibration& camera) {
+  return camera.time_offset_s +
+         camera.line_delay_s.value_or(0) * camera.height_px / 2;
+}
+
 Eigen::Vector2d PixelsPerRadian(const CameraCalibration& camera) {
   Eigen::Vector2d z_px;
   ProjectionJacobians jacobians;

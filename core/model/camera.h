@@ -89,6 +89,9 @@ bool Unproject(const CameraCalibration& camera,
                const Eigen::Vector2d& z_px,
                Eigen::Vector3d* bearing_C);
 
+// Time from the timestamp of an image to the exposure of its middle row [s].
+double MiddleRowDelay(const CameraCalibration& camera);
+
 // Scales along x and y in the middle of the image [px/rad], which are f for
 // most models.
 Eigen::Vector2d PixelsPerRadian(const CameraCalibration& camera);

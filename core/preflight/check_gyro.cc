@@ -229,11 +229,15 @@ class GyroCheck {
   }
 
   // Returns true if keyframes may be at times of the IMU's clock, or at times
-  // of the images of a camera whose offset the calibration states.
+  // of the first or the middle row of images of a camera, whose times the
+  // calibration states.
   bool Stated(double offset_s, double tolerance_s) const {
     if (std::abs(offset_s) < tolerance_s) return true;
     for (const CameraCalibration& camera : theta_.cameras) {
-      if (std::abs(offset_s - camera.time_offset_s) < tolerance_s) return true;
+      if (std::abs(offset_s - camera.time_offset_s) < tolerance_s ||
+          std::abs(offset_s - MiddleRowDelay(camera)) < tolerance_s) {
+        return true;
+      }
     }
     return false;
   }

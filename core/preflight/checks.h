@@ -49,4 +49,11 @@ void CheckReprojection(const Rig& rig,
                        std::span<const MotionSegment> segments,
                        Diagnosis* diagnosis);
 
+// Rows of images that were exposed one after the other, by cameras whose
+// shutter is a global one.
+void CheckShutter(const Rig& rig,
+                  const Calibration& theta,
+                  std::span<const MotionSegment> segments,
+                  Diagnosis* diagnosis);
+
 }  // namespace selfcal

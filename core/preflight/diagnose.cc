@@ -1,9 +1,22 @@
 #include "core/preflight/diagnose.h"
 
+#include <algorithm>
+
 #include "core/preflight/checks.h"
 #include "core/preflight/motion_data.h"
 
 namespace selfcal {
+namespace {
+
+// Whether the motion in the image can be predicted in spite of a finding.
+bool LeavesMotion(FindingKind kind) {
+  return kind == FindingKind::kTimeOffset ||
+         kind == FindingKind::kDroppedSamples ||
+         kind == FindingKind::kRepeatedSamples ||
+         kind == FindingKind::kSaturation;
+}
+
+}  // namespace
 
 std::string_view FindingName(FindingKind kind) {
   switch (kind) {
@@ -29,6 +42,8 @@ std::string_view FindingName(FindingKind kind) {
       return "focal-length";
     case FindingKind::kLandmarkFrame:
       return "landmark-frame";
+    case FindingKind::kRollingShutter:
+      return "rolling-shutter";
     case FindingKind::kGyroMismatch:
       return "gyro-mismatch";
     case FindingKind::kAccelMismatch:
@@ -49,6 +64,13 @@ Diagnosis Diagnose(const Rig& rig,
   const GyroResult gyro = CheckGyro(theta, data, &diagnosis);
   CheckAccelerometer(rig, theta, data, gyro, &diagnosis);
   CheckReprojection(rig, theta, segments, &diagnosis);
+  if (std::all_of(diagnosis.findings.begin(),
+                  diagnosis.findings.end(),
+                  [](const Finding& one) { return LeavesMotion(one.kind); })) {
+    CheckShutter(rig, theta, segments, &diagnosis);
+  } else {
+    diagnosis.not_checked.push_back("shutter: not before the above is correct");
+  }
   return diagnosis;
 }
 

@@ -37,6 +37,7 @@ enum class FindingKind {
   kExtrinsics,       // inverted, or keyframes are poses of the camera
   kFocalLength,      // intrinsics of another resolution
   kLandmarkFrame,    // landmarks not in G
+  kRollingShutter,   // rows exposed one after the other
   // Wrong, but for none of the reasons above.
   kGyroMismatch,
   kAccelMismatch,
@@ -51,8 +52,9 @@ struct Finding {
   std::string cause;   // in words, with the figure that supports it
   std::string remedy;  // what to do about it
   // Measured value: the factor of a unit or a focal length, the offset [s], the
-  // share of samples that are dropped, repeated or saturated; otherwise the
-  // ratio of the error of the data as sent to that of the explanation.
+  // time from the first to the last row [s], the share of samples that are
+  // dropped, repeated or saturated; otherwise the ratio of the error of the
+  // data as sent to that of the explanation.
   double value = 0;
 };
 

@@ -12,11 +12,6 @@ double RowDelay(const CameraCalibration& camera, double row_px) {
   return camera.line_delay_s.value_or(0) * row_px;
 }
 
-// Time from a keyframe to the exposure of the middle of an image.
-double MiddleDelay(const CameraCalibration& camera) {
-  return camera.time_offset_s + RowDelay(camera, camera.height_px / 2.0);
-}
-
 KeyframeState StateLater(const KeyframeState& x,
                          const Trajectory& trajectory,
                          const ImuReadings& imu,
@@ -41,8 +36,8 @@ double KeyframeDelay(const Calibration& theta_true,
                      const Calibration& theta_slam) {
   double sum_s = 0;
   for (std::size_t j = 0; j < theta_true.cameras.size(); ++j) {
-    sum_s +=
-        MiddleDelay(theta_true.cameras[j]) - MiddleDelay(theta_slam.cameras[j]);
+    sum_s += MiddleRowDelay(theta_true.cameras[j]) -
+             MiddleRowDelay(theta_slam.cameras[j]);
   }
   return sum_s / static_cast<double>(theta_true.cameras.size());
 }

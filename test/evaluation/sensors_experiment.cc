@@ -1,5 +1,6 @@
-// One, two and four cameras, whose clocks are off from that of the IMU: with
-// the time offsets known, estimated, and ignored.
+// Models of sensors: one, two and four cameras, whose clocks are off from that
+// of the IMU; rolling shutters; a camera of each model. What a model adds is
+// known, estimated, and ignored.
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/model/camera_model.h"
 #include "test/core/simulation/rigs.h"
 #include "test/evaluation/context.h"
 #include "test/evaluation/estimators.h"
@@ -20,39 +22,89 @@ namespace {
 // Of the cameras in truth; the factory believes in none where they are not
 // known.
 constexpr double kTimeOffsets_s[] = {0.02, -0.015, 0.008, -0.003};
+constexpr int kReadouts_ms[] = {10, 20, 33};
+// Of the line delay of a rig that does not know it [s]: some camera.
+constexpr double kAnyLineDelay_s = 1e-4;
 
-enum class Offsets { kKnown, kEstimated, kIgnored };
+enum class Effect { kKnown, kEstimated, kIgnored };
+constexpr Effect kEffects[] = {
+    Effect::kKnown, Effect::kEstimated, Effect::kIgnored};
+
+std::string EffectName(Effect effect) {
+  static const char* const kNames[] = {"known", "estimated", "ignored"};
+  return kNames[static_cast<int>(effect)];
+}
 
 struct Setting {
-  int cameras;
-  Offsets offsets;
-
-  std::string Name() const {
-    static const char* const kNames[] = {"known", "estimated", "ignored"};
-    return std::to_string(cameras) + "_" + kNames[static_cast<int>(offsets)];
-  }
-};
-
-// A device whose factory calibration is off.
-struct Device {
+  std::string name;
+  std::uint64_t seed;  // of its first run
+  // Its factory calibration is perturbed for each run.
   Rig rig;
   Calibration truth;
+  bool ignored = false;
 };
 
-Device DeviceOf(const Setting& setting, std::uint64_t seed) {
-  Device device{RigOfCameras(setting.cameras), {}};
-  device.truth = device.rig.factory;
-  for (int j = 0; j < setting.cameras; ++j) {
-    device.truth.cameras[j].time_offset_s = kTimeOffsets_s[j];
+Setting OffsetSetting(int cameras, Effect effect) {
+  Setting setting;
+  setting.name = std::to_string(cameras) + "_" + EffectName(effect);
+  setting.seed = 100 * cameras;
+  setting.rig = RigOfCameras(cameras);
+  setting.truth = setting.rig.factory;
+  for (int j = 0; j < cameras; ++j) {
+    setting.truth.cameras[j].time_offset_s = kTimeOffsets_s[j];
   }
-  device.rig.factory = PerturbCalibration(
-      setting.offsets == Offsets::kKnown ? device.truth : device.rig.factory,
-      {},
-      seed);
-  device.rig.blocks = {
-      {"*.time_offset", setting.offsets == Offsets::kEstimated}};
-  device.rig.groups = DefaultGroups(device.rig.blocks);
-  return device;
+  if (effect == Effect::kKnown) setting.rig.factory = setting.truth;
+  setting.rig.blocks = {{"*.time_offset", effect == Effect::kEstimated}};
+  setting.ignored = effect == Effect::kIgnored;
+  return setting;
+}
+
+Setting RollingSetting(int readout_ms, Effect effect) {
+  Setting setting;
+  setting.name =
+      "rolling_" + std::to_string(readout_ms) + "ms_" + EffectName(effect);
+  setting.seed = 1000;
+  setting.rig = RigOfCameras(1);
+  setting.truth = setting.rig.factory;
+  CameraCalibration& camera = setting.truth.cameras[0];
+  camera.line_delay_s = 1e-3 * readout_ms / camera.height_px;
+  if (effect == Effect::kKnown) {
+    setting.rig.factory = setting.truth;
+    setting.rig.blocks = {{"*.line_delay", false}};
+  }
+  if (effect == Effect::kEstimated) {
+    setting.rig.factory.cameras[0].line_delay_s = 0;
+    setting.rig.prior_sigmas = {{"*.line_delay", kAnyLineDelay_s}};
+  }
+  setting.ignored = effect == Effect::kIgnored;
+  return setting;
+}
+
+Setting LensSetting(DistortionModel model) {
+  Setting setting;
+  setting.name = "lens_" + std::string(DistortionName(model));
+  setting.seed = 2000;
+  setting.rig = LensRig(model);
+  setting.truth = setting.rig.factory;
+  return setting;
+}
+
+std::vector<Setting> Settings() {
+  std::vector<Setting> settings;
+  for (const int cameras : {1, 2, 4}) {
+    for (const Effect effect : kEffects) {
+      settings.push_back(OffsetSetting(cameras, effect));
+    }
+  }
+  for (const int readout_ms : kReadouts_ms) {
+    for (const Effect effect : kEffects) {
+      settings.push_back(RollingSetting(readout_ms, effect));
+    }
+  }
+  for (const DistortionModel model : DistortionModels()) {
+    settings.push_back(LensSetting(model));
+  }
+  return settings;
 }
 
 // Errors and claimed sigmas of one calibration, of all components; sigma 0
@@ -64,25 +116,33 @@ struct Run {
 };
 
 Run RunOne(const Setting& setting, std::uint64_t seed, double duration_s) {
-  const Device device = DeviceOf(setting, seed);
+  Rig rig = setting.rig;
+  rig.factory = PerturbCalibration(rig.factory, {}, seed);
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
   SimulationOptions options;
   options.seed = seed;
   options.landmarks_in_view = 60;
-  const SimulatedSession session = Simulate(device.rig,
-                                            device.truth,
-                                            device.rig.factory,
+  const SimulatedSession session = Simulate(rig,
+                                            setting.truth,
+                                            rig.factory,
                                             *MakeHandheld(duration_s, 1, seed),
                                             "session",
                                             options);
-  const CalibrationResult result = Calibrate(
-      device.rig, device.rig.factory, session.segments, ComparedOptions());
-  if (result.status != CalibrateStatus::kConverged &&
-      setting.offsets != Offsets::kIgnored) {
-    throw std::runtime_error(setting.Name() + ", seed " + std::to_string(seed) +
+  const CalibrationResult result =
+      Calibrate(rig, rig.factory, session.segments, ComparedOptions());
+  if (result.status != CalibrateStatus::kConverged && !setting.ignored) {
+    throw std::runtime_error(setting.name + ", seed " + std::to_string(seed) +
                              ": " + result.message);
   }
+  // An ignored block is not a component.
+  Calibration truth = setting.truth;
+  for (std::size_t j = 0; j < truth.cameras.size(); ++j) {
+    if (!rig.factory.cameras[j].line_delay_s) {
+      truth.cameras[j].line_delay_s.reset();
+    }
+  }
   Run run;
-  run.error = BoxMinus(result.theta, device.truth);
+  run.error = BoxMinus(result.theta, truth);
   run.sigma = result.covariance.diagonal().cwiseSqrt();
   const SquaredError square =
       NormalisedSquaredError(run.error, result.covariance);
@@ -142,6 +202,7 @@ struct Block {
 };
 constexpr Block kBlocks[] = {
     {"time offset [ms]", "*.time_offset", 1e-3},
+    {"line delay [us]", "*.line_delay", 1e-6},
     {"q_CI [mrad]", "*.q_CI.*", 1e-3},
     {"p_CI [mm]", "*.p_CI.*", 1e-3},
     {"f [px]", "*.focal.*", 1},
@@ -151,7 +212,7 @@ constexpr Block kBlocks[] = {
 };
 
 ResultTable ConsistencyTable() {
-  return ResultTable({"cameras and offsets",
+  return ResultTable({"case",
                       "estimated",
                       "runs",
                       "mean NEES",
@@ -170,7 +231,7 @@ void AddConsistency(const Setting& setting,
   const std::vector<double> normalised = Normalised(runs, all);
   const auto [low, high] =
       NeesBounds(runs.front().degrees, static_cast<int>(runs.size()), 0.95);
-  table->Add({setting.Name(),
+  table->Add({setting.name,
               static_cast<long>(runs.front().degrees),
               static_cast<long>(runs.size()),
               MeanNees(runs),
@@ -184,9 +245,8 @@ void AddConsistency(const Setting& setting,
 void AddAccuracy(const Setting& setting,
                  const std::vector<Run>& runs,
                  ResultTable* table) {
-  const auto components =
-      TangentComponents(RigOfCameras(setting.cameras).factory);
-  std::vector<Cell> row = {setting.Name()};
+  const auto components = TangentComponents(setting.rig.factory);
+  std::vector<Cell> row = {setting.name};
   for (const Block& block : kBlocks) {
     const Accuracy accuracy =
         AccuracyOf(runs, MatchComponents(components, {block.pattern}));
@@ -197,7 +257,7 @@ void AddAccuracy(const Setting& setting,
 }
 
 ResultTable AccuracyTable() {
-  std::vector<std::string> columns = {"cameras and offsets"};
+  std::vector<std::string> columns = {"case"};
   for (const Block& block : kBlocks) {
     columns.push_back(std::string(block.name) + " rms error");
     columns.push_back("claimed");
@@ -212,29 +272,26 @@ void RunSensors(Context* context) {
   const double duration_s = context->quick() ? 8.5 : 24.5;
   ResultTable consistency = ConsistencyTable();
   ResultTable accuracy = AccuracyTable();
-  std::vector<double> offsets;
-  for (const int cameras : {1, 2, 4}) {
-    for (const Offsets kind :
-         {Offsets::kKnown, Offsets::kEstimated, Offsets::kIgnored}) {
-      const Setting setting{cameras, kind};
-      std::vector<Run> all(runs);
-      context->ForEach(runs, [&](int i) {
-        all[i] = RunOne(
-            setting, static_cast<std::uint64_t>(100 * cameras + i), duration_s);
-      });
-      context->Progress(setting.Name());
-      AddConsistency(setting, all, &consistency);
-      AddAccuracy(setting, all, &accuracy);
-      if (kind == Offsets::kIgnored) continue;
-      const auto [low, high] = NeesBounds(all.front().degrees, runs, 0.95);
-      context->Within(
-          "sensors.nees_" + setting.Name(), MeanNees(all), low, high);
-      if (kind != Offsets::kEstimated) continue;
-      const auto components = TangentComponents(RigOfCameras(cameras).factory);
-      const std::vector<double> some =
-          Normalised(all, MatchComponents(components, {"*.time_offset"}));
-      offsets.insert(offsets.end(), some.begin(), some.end());
-    }
+  std::vector<double> offsets, line_delays;
+  for (const Setting& setting : Settings()) {
+    std::vector<Run> all(runs);
+    context->ForEach(runs, [&](int i) {
+      all[i] = RunOne(setting, setting.seed + i, duration_s);
+    });
+    context->Progress(setting.name);
+    AddConsistency(setting, all, &consistency);
+    AddAccuracy(setting, all, &accuracy);
+    if (setting.ignored) continue;
+    const auto [low, high] = NeesBounds(all.front().degrees, runs, 0.95);
+    context->Within("sensors.nees_" + setting.name, MeanNees(all), low, high);
+    const auto collect = [&](const char* pattern, std::vector<double>* to) {
+      const std::vector<double> some = Normalised(
+          all,
+          MatchComponents(TangentComponents(setting.rig.factory), {pattern}));
+      to->insert(to->end(), some.begin(), some.end());
+    };
+    collect("*.time_offset", &offsets);
+    collect("*.line_delay", &line_delays);
   }
   context->WriteTable("consistency", consistency);
   context->WriteTable("accuracy", accuracy);
@@ -243,6 +300,12 @@ void RunSensors(Context* context) {
                    0.98,
                    {.robust = true});
   context->Within("sensors.time_offset_rms_in_sigmas", Rms(offsets), 0.8, 1.2);
+  context->AtLeast("sensors.line_delay_within_3_sigma",
+                   PartBelow(line_delays, 3),
+                   0.98,
+                   {.robust = true});
+  context->Within(
+      "sensors.line_delay_rms_in_sigmas", Rms(line_delays), 0.8, 1.2);
 }
 
 }  // namespace selfcal

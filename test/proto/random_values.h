@@ -58,6 +58,7 @@ class RandomValues {
     camera.width_px = Int(0, 10000);
     camera.height_px = Int(0, 10000);
     camera.time_offset_s = Double();
+    if (Int(0, 1) == 1) camera.line_delay_s = Double();
     return camera;
   }
 

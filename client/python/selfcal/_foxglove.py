@@ -248,6 +248,11 @@ def losses(calibration: v1.CalibrationParameters) -> list[str]:
                 f"cam{number}: the time offset of {camera.time_offset_s:g} s "
                 "is not included; images keep their own timestamps"
             )
+        if camera.HasField("line_delay_s"):
+            lost.append(
+                f"cam{number}: the line delay of {camera.line_delay_s:g} s is "
+                "not included; all rows of an image have its timestamp"
+            )
     scales = calibration.imu
     if any(
         value != nominal

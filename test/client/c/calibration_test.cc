@@ -42,6 +42,7 @@ Calibration Theta() {
   second.model = DistortionModel::kRadialTangential;
   second.distortion = Eigen::Vector4d(0.1, -0.05, 0.001, 0.002);
   second.f = {500, 510};
+  second.line_delay_s = 3e-5;
   return theta;
 }
 
@@ -132,6 +133,8 @@ TEST_F(CalibrationTest, HasTheValuesThatWerePublished) {
     EXPECT_EQ(camera.q_CI.z, -0.5);
     EXPECT_EQ(Eigen::Vector3d(camera.p_CI), expected.p_CI);
     EXPECT_EQ(camera.time_offset_s, 0.004);
+    EXPECT_EQ(camera.rolling_shutter, j == 1 ? 1 : 0);
+    EXPECT_EQ(camera.line_delay_s, j == 1 ? 3e-5 : 0);
   }
 }
 

@@ -145,6 +145,8 @@ TEST(Layout, OfTheCalibration) {
   EXPECT_MEMBER(selfcal_camera, q_CI, 120, 32);
   EXPECT_MEMBER(selfcal_camera, p_CI, 152, 24);
   EXPECT_MEMBER(selfcal_camera, time_offset_s, 176, 8);
+  EXPECT_MEMBER(selfcal_camera, rolling_shutter, 184, 4);
+  EXPECT_MEMBER(selfcal_camera, line_delay_s, 192, 8);
   EXPECT_EQ(c::kCameraSize, 184u);
 
   EXPECT_MEMBER(selfcal_component, struct_size, 0, 4);

@@ -208,6 +208,7 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
   rig.factory.cameras[0].time_offset_s = 0.003;
   rig.factory.cameras[1].time_offset_s = 0.004;
   rig.factory.cameras[2].time_offset_s = 0.003;
+  rig.factory.cameras[1].line_delay_s = 3e-5;
   const auto files = ExportRig(format, rig, rig.factory, {});
   ASSERT_TRUE(files.ok()) << files.status();
   const std::vector<std::string> names = Names(files->losses);
@@ -219,6 +220,8 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
   EXPECT_EQ(named("cam1.time_offset"), !GetParam().time_offsets);
   EXPECT_EQ(named("cam2.time_offset"),
             !GetParam().time_offset && GetParam().cameras > 2);
+  EXPECT_EQ(named("cam1.line_delay"), format != "maplab");
+  EXPECT_FALSE(named("cam0.line_delay"));
   EXPECT_EQ(named("cam2"), GetParam().cameras < 3);
   EXPECT_EQ(named("imu_rate"), format != "maplab");
   EXPECT_TRUE(named("sigmas"));

@@ -117,6 +117,20 @@ TEST(ExportMaplab, WritesTheRangeOfTheImu) {
   EXPECT_THAT(exported->losses, ElementsAre(Field(&Loss::name, "sigmas")));
 }
 
+TEST(ImportMaplab, ALineDelayIsARollingShutter) {
+  const std::string height = "          image_height: 480\n";
+  const auto imported = Import(
+      Replaced(height, "          line-delay-nanoseconds: 61500\n" + height));
+  ASSERT_TRUE(imported.ok()) << imported.status();
+  EXPECT_TRUE(imported->losses.empty());
+  EXPECT_EQ(imported->rig.factory.cameras[0].line_delay_s, 61.5e-6);
+  const auto exported =
+      ExportRig("maplab", imported->rig, imported->rig.factory, {});
+  ASSERT_TRUE(exported.ok()) << exported.status();
+  EXPECT_THAT(exported->files[0].text,
+              HasSubstr("line-delay-nanoseconds: 61500\n"));
+}
+
 TEST(ImportMaplab, EveryMistakeIsNamedWithTheFile) {
   EXPECT_THAT(Error(Replaced("fisheye", "unknown")),
               HasSubstr("sensors.yaml: distortion type 'unknown'"));

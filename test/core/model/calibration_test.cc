@@ -124,6 +124,30 @@ TEST(Calibration, ShapeIsTheNumberOfCamerasAndTheirModels) {
   EXPECT_FALSE(SameShape(theta, other));
 }
 
+TEST(Calibration, ABlockThatACameraLacksHasNoComponents) {
+  RandomValues random(12);
+  const Calibration without = random.Theta();
+  Calibration theta = without;
+  theta.cameras[1].line_delay_s = 3e-5;
+  EXPECT_FALSE(SameShape(theta, without));
+  EXPECT_EQ(TangentSize(theta), TangentSize(without) + 1);
+  const int at = TimeOffsetComponent(theta, 1) + 1;
+  EXPECT_EQ(at, CameraTangentOffset(theta, 2) - 1);
+  const auto components = TangentComponents(theta);
+  EXPECT_EQ(components[at].name, "cam1.line_delay");
+  EXPECT_EQ(components[at].unit, "s");
+  EXPECT_EQ(ReadableValues(theta)[at], 3e-5);
+  const VectorXd delta = random.Vector(TangentSize(theta), 1e-5);
+  const Calibration moved = BoxPlus(theta, delta);
+  EXPECT_EQ(moved.cameras[1].line_delay_s, 3e-5 + delta[at]);
+  EXPECT_FALSE(moved.cameras[0].line_delay_s);
+  EXPECT_LT((BoxMinus(moved, theta) - delta).norm(), 1e-12);
+  theta.cameras[1].line_delay_s = 2e-3;
+  const auto violations = Validate(theta, "");
+  ASSERT_EQ(violations.size(), 1u);
+  EXPECT_EQ(violations[0].field, "cameras[1].line_delay_s");
+}
+
 TEST(TangentComponents, AreAsManyAsTheTangentHasDimensions) {
   RandomValues random(8);
   const Calibration theta = random.Theta();

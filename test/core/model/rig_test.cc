@@ -105,6 +105,33 @@ TEST(DefaultGroups, HaveTimeOffsetsInOneOfTheirOwnWhereTheyAreEstimated) {
                           TimeOffsetComponent(rig.factory, 2)));
 }
 
+TEST(DefaultGroups, HaveTheLineDelayOfARollingShutterWithTheTimes) {
+  Rig rig = RandomRig();
+  rig.factory.cameras[1].line_delay_s = 3e-5;
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  ASSERT_EQ(rig.groups.size(), 4u);
+  EXPECT_EQ(rig.groups[3].name, "time");
+  EXPECT_THAT(GroupComponents(rig, rig.groups[3]),
+              ElementsAre(TimeOffsetComponent(rig.factory, 1) + 1));
+}
+
+TEST(EstimatedBlocks, AreAddedToANewRigThatLacksThem) {
+  Calibration theta = RandomRig().factory;
+  AddEstimatedBlocks({}, &theta);
+  AddEstimatedBlocks({{"*.time_offset", true}, {"imu.*", false}}, &theta);
+  for (const CameraCalibration& camera : theta.cameras) {
+    EXPECT_FALSE(camera.line_delay_s);
+  }
+  AddEstimatedBlocks({{"cam1.line_delay", true}}, &theta);
+  EXPECT_FALSE(theta.cameras[0].line_delay_s);
+  EXPECT_EQ(theta.cameras[1].line_delay_s, 0);
+  theta.cameras[1].line_delay_s = 3e-5;
+  AddEstimatedBlocks({{"*.line_delay", true}, {"cam2.*", false}}, &theta);
+  EXPECT_EQ(theta.cameras[0].line_delay_s, 0);
+  EXPECT_EQ(theta.cameras[1].line_delay_s, 3e-5);
+  EXPECT_FALSE(theta.cameras[2].line_delay_s);
+}
+
 TEST(TimeOffsets, AreKnownUnlessTheRigEstimatesThem) {
   Rig rig = RandomRig();
   const auto free = [&](int camera) {

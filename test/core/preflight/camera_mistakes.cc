@@ -2,8 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
 #include <utility>
+#include <vector>
 
+#include "core/factor/keyframe_motion.h"
+#include "core/factor/reprojection.h"
 #include "core/model/so3.h"
 #include "test/core/preflight/mistakes.h"
 
@@ -71,6 +75,42 @@ void AnchorLandmarks(FedData* data) {
       p = camera.q_CI * (state.q_GI.conjugate() * (p - state.p_GI)) +
           camera.p_CI;
     }
+  }
+}
+
+constexpr double kReadout_s = 20e-3;
+
+// Moves each pixel on its way in the image for as long as its row is exposed
+// after the middle one, for which the states are.
+void ExposeRowsOneAfterTheOther(FedData* data) {
+  const Calibration& theta = data->rig.factory;
+  for (MotionSegment& segment : data->segments) {
+    KeyframeMotions motions;
+    motions.Measure(data->rig,
+                    theta,
+                    std::vector<char>(theta.cameras.size(), 1),
+                    segment.keyframes,
+                    [&](std::size_t) { return std::span(segment.imu); });
+    std::erase_if(segment.observations, [&](Observation& o) {
+      const KeyframeState& x = segment.keyframes[o.keyframe];
+      const CameraCalibration& camera = theta.cameras[o.camera];
+      Eigen::Vector2d r_px;
+      ReprojectionJacobians J;
+      if (!Reproject(x.q_GI,
+                     x.p_GI,
+                     camera,
+                     segment.landmarks[o.landmark].p_G.homogeneous(),
+                     o.z_px,
+                     &r_px,
+                     &J,
+                     motions.At(o.keyframe, o.camera))) {
+        return true;
+      }
+      const double later_s = kReadout_s * (o.z_px.y() / camera.height_px - 0.5);
+      o.z_px += later_s * J.camera.rightCols<1>();
+      return o.z_px.x() < 0 || o.z_px.y() < 0 || o.z_px.x() > camera.width_px ||
+             o.z_px.y() > camera.height_px;
+    });
   }
 }
 
@@ -157,6 +197,11 @@ std::vector<Mistake> CameraMistakes() {
        "another frame",
        "same frame G",
        LandmarksOfFirstCamera},
+      {"rolling_shutter",
+       {Kind::kRollingShutter},
+       "one after the other",
+       "line_delay_s",
+       ExposeRowsOneAfterTheOther},
       {"landmarks_in_mm",
        {Kind::kLandmarkFrame},
        "when scaled by",

@@ -43,7 +43,7 @@ TEST(Diagnose, ReportsForNoDataThatNothingWasChecked) {
   const Diagnosis diagnosis = Diagnose(rig, rig.factory, {});
   EXPECT_TRUE(diagnosis.findings.empty());
   EXPECT_TRUE(diagnosis.checked.empty());
-  EXPECT_EQ(diagnosis.not_checked.size(), 5);
+  EXPECT_EQ(diagnosis.not_checked.size(), 6);
 }
 
 // A gap of 75 ms is only a few in a thousand of 4000 samples.

@@ -55,6 +55,7 @@ const kParts: Record<string, string> = {
   focal: 'focal length',
   principal: 'principal point',
   time_offset: 'time offset',
+  line_delay: 'line delay',
   q_CI: 'rotation to the IMU',
   p_CI: 'position to the IMU',
 };
