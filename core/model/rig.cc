@@ -194,6 +194,13 @@ Eigen::VectorXd PriorSigmas(const Rig& rig) {
   constexpr double kDefaultInReferenceSigmas = 10;
   const auto components = TangentComponents(rig.factory);
   Eigen::VectorXd sigmas = kDefaultInReferenceSigmas * ReferenceSigmas(rig);
+  VisitBlocks(
+      [&](const BlockPlace& place, const auto& value) {
+        if (place.info.prior_sigma == 0) return;
+        sigmas.segment(place.offset, TangentDimension(value))
+            .setConstant(place.info.prior_sigma);
+      },
+      rig.factory);
   for (const ComponentSetting& setting : rig.prior_sigmas) {
     for (const int i : MatchComponents(components, {setting.pattern})) {
       sigmas[i] = setting.value;

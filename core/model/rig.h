@@ -94,7 +94,8 @@ struct Rig {
   double gravity_mps2 = 9.81;  // g = (0, 0, -gravity) in G
   std::vector<ParameterGroup> groups = DefaultGroups();
   // Prior standard deviations (factory tolerances) by component, in its unit;
-  // later ones take precedence. Default: 10 sigma_ref.
+  // later ones take precedence. Default: 10 sigma_ref, or what a block
+  // declares.
   std::vector<ComponentSetting> prior_sigmas;
   // Patterns of components that are never estimated.
   std::vector<std::string> fixed;

@@ -23,8 +23,6 @@ namespace {
 // known.
 constexpr double kTimeOffsets_s[] = {0.02, -0.015, 0.008, -0.003};
 constexpr int kReadouts_ms[] = {10, 20, 33};
-// Of the line delay of a rig that does not know it [s]: some camera.
-constexpr double kAnyLineDelay_s = 1e-4;
 
 enum class Effect { kKnown, kEstimated, kIgnored };
 constexpr Effect kEffects[] = {
@@ -74,7 +72,6 @@ Setting RollingSetting(int readout_ms, Effect effect) {
   }
   if (effect == Effect::kEstimated) {
     setting.rig.factory.cameras[0].line_delay_s = 0;
-    setting.rig.prior_sigmas = {{"*.line_delay", kAnyLineDelay_s}};
   }
   setting.ignored = effect == Effect::kIgnored;
   return setting;

@@ -1,5 +1,5 @@
-// How the time of the score grows with threads, keyframes and observations, and
-// what wider vectors gain.
+// How the time of the score grows with threads, keyframes, observations and a
+// rolling shutter, and what wider vectors gain.
 #include <fmt/format.h>
 
 #include <string>
@@ -90,6 +90,13 @@ std::vector<Case> ScalingCases() {
        .measure =
            [](const TimingOptions& options) {
              return CompareScenes({.landmarks_in_view = 260}, {}, options);
+           }},
+      {.name = "score: rolling shutter against global",
+       .must = 1.5,
+       .higher_is_better = false,
+       .measure =
+           [](const TimingOptions& options) {
+             return CompareScenes({.readout_s = 20e-3}, {}, options);
            }},
   };
   for (const VectorWidth width : {VectorWidth::k4, VectorWidth::k8}) {

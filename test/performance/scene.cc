@@ -22,6 +22,11 @@ Scene MakeScene(const SceneOptions& options) {
   simulation.revisit_fraction = options.revisit_fraction;
   Scene scene;
   scene.rig = HandheldRig("benchmark");
+  if (options.readout_s > 0) {
+    CameraCalibration& camera = scene.rig.factory.cameras[0];
+    camera.line_delay_s = options.readout_s / camera.height_px;
+    scene.rig.groups = DefaultGroups(scene.rig.blocks, scene.rig.factory);
+  }
   const Calibration truth = scene.rig.factory;
   scene.rig.factory = PerturbCalibration(truth, {}, kSeed);
   const int count = (options.segments - 1) * options.every + 1;

@@ -95,7 +95,6 @@ TEST_P(RollingShutter, IsFoundWithItsLineDelay) {
     Rig rig = RigOfCameras(1);
     rig.factory.cameras[0].line_delay_s = 0;
     rig.factory = PerturbCalibration(rig.factory, {}, seed);
-    rig.prior_sigmas = {{"*.line_delay", 1e-4}};
     rig.groups = DefaultGroups(rig.blocks, rig.factory);
     const Errors errors = CalibrateSimulated(rig, truth, seed);
     const auto last = errors.error.size() - 1;

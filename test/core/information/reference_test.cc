@@ -26,19 +26,22 @@ struct Case {
 };
 
 // Two cameras with time offsets: known, estimated at another value, and one of
-// each, which begins where the pose does not move.
+// each, which begins where the pose does not move. Then with a rolling shutter
+// of one of them, and of both.
 std::vector<Case> TimeOffsetCases() {
   std::vector<Case> cases;
-  for (std::uint64_t seed = 5; seed <= 7; ++seed) {
+  for (std::uint64_t seed = 5; seed <= 9; ++seed) {
     Case c;
     c.rig = TwoCameraRig();
     c.rig.factory.cameras[0].time_offset_s = 0.02;
     c.rig.factory.cameras[1].time_offset_s = seed == 7 ? 0 : -0.013;
     if (seed > 5) {
       c.rig.blocks = {{"*.time_offset", true}};
-      c.rig.groups = DefaultGroups(c.rig.blocks);
     }
     if (seed == 7) c.rig.fixed = {"cam0.time_offset"};
+    if (seed > 7) c.rig.factory.cameras[1].line_delay_s = 6e-5;
+    if (seed > 8) c.rig.factory.cameras[0].line_delay_s = -2e-5;
+    c.rig.groups = DefaultGroups(c.rig.blocks, c.rig.factory);
     c.theta0 = PerturbCalibration(c.rig.factory, {}, seed);
     if (seed == 6) c.theta0.cameras[1].time_offset_s -= 0.002;
     SimulationOptions options;

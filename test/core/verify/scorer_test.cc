@@ -70,12 +70,13 @@ TEST(Scorers, AgreeOnEveryKindOfMotion) {
   }
 }
 
-TEST(Scorers, AgreeOnEveryLensWithTimeOffsetsAndHeldComponents) {
+TEST(Scorers, AgreeOnEveryLensWithTimesAndHeldComponents) {
   Rig rig = TwoCameraRig();
   rig.factory.cameras[0].time_offset_s = 0.02;
   rig.factory.cameras[1].time_offset_s = -0.013;
   rig.blocks = {{"*.time_offset", true}};
-  rig.groups = DefaultGroups(rig.blocks);
+  rig.factory.cameras[1].line_delay_s = 6e-5;
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
   rig.fixed = {"cam0.distortion.*", "imu.q_AI.y"};
   const Calibration theta0 = PerturbCalibration(rig.factory, {}, 3);
   SimulationOptions options;
