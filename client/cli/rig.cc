@@ -102,6 +102,7 @@ void AddRigCommands(CLI::App* app, Context* context) {
     };
   });
 
+  AddImuPresets(rig, context);
   AddRigChanges(rig, context);
   AddAttention(rig, context);
 

@@ -8,6 +8,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/foreign_files.h"
+#include "client/cli/positive_number.h"
 #include "client/cli/rig_input.h"
 #include "client/cli/rig_text.h"
 #include "selfcal/v1/rig.grpc.pb.h"
@@ -65,16 +66,44 @@ void NameFlags(const std::vector<FieldOption>& options, Context* context) {
   }
 }
 
+// Two forms of one density: as data sheets state it, or of readings.
+std::vector<FieldOption> AddDensityOptions(CLI::App* create,
+                                           CLI::Option* imu_rate,
+                                           RigInput* input) {
+  CLI::Option* const gyro =
+      create->add_option("--gyro-noise",
+                         input->gyro_noise,
+                         "Noise density, as in data sheets and for Kalibr "
+                         "[rad/s/sqrt(Hz)]");
+  CLI::Option* const accel = create->add_option(
+      "--accel-noise", input->accel_noise, "The same [m/s^2/sqrt(Hz)]");
+  CLI::Option* const gyro_rms =
+      create
+          ->add_option("--gyro-noise-rms",
+                       input->gyro_noise_rms,
+                       "Instead of the density: standard deviation of single "
+                       "readings at rest, at --imu-rate, with a filter that "
+                       "passes half that rate [rad/s]")
+          ->check(AboveZero())
+          ->needs(imu_rate)
+          ->excludes(gyro);
+  CLI::Option* const accel_rms =
+      create
+          ->add_option(
+              "--accel-noise-rms", input->accel_noise_rms, "The same [m/s^2]")
+          ->check(AboveZero())
+          ->needs(imu_rate)
+          ->excludes(accel);
+  return {{"rig.imu_noise.gyro_noise_density", gyro},
+          {"rig.imu_noise.gyro_noise_density", gyro_rms},
+          {"rig.imu_noise.accel_noise_density", accel},
+          {"rig.imu_noise.accel_noise_density", accel_rms}};
+}
+
 std::vector<FieldOption> AddNoiseOptions(CLI::App* create, RigInput* input) {
   return {
       {"rig.pixel_sigma_px",
        create->add_option("--pixel-sigma", input->pixel_sigma_px, "[px]")},
-      {"rig.imu_noise.gyro_noise_density",
-       create->add_option(
-           "--gyro-noise", input->gyro_noise, "[rad/s/sqrt(Hz)]")},
-      {"rig.imu_noise.accel_noise_density",
-       create->add_option(
-           "--accel-noise", input->accel_noise, "[m/s^2/sqrt(Hz)]")},
       {"rig.imu_noise.gyro_bias_random_walk",
        create->add_option(
            "--gyro-bias-walk", input->gyro_bias_walk, "[rad/s^2/sqrt(Hz)]")},
@@ -85,12 +114,13 @@ std::vector<FieldOption> AddNoiseOptions(CLI::App* create, RigInput* input) {
        create->add_option("--gyro-max",
                           input->gyro_max,
                           "Full scale of the gyroscope, beyond which readings "
-                          "are left out [rad/s]; 2000 deg/s by default")},
+                          "are left out [rad/s]; by default that of "
+                          "--imu-preset, or 2000 deg/s")},
       {"rig.imu.accel_max",
        create->add_option("--accel-max",
                           input->accel_max,
-                          "Full scale of the accelerometer [m/s^2]; 16 g by "
-                          "default")},
+                          "Full scale of the accelerometer [m/s^2]; by "
+                          "default that of --imu-preset, or 16 g")},
       {"rig.gravity_mps2",
        create->add_option("--gravity", input->gravity_mps2, "[m/s^2]")}};
 }
@@ -132,13 +162,21 @@ std::vector<FieldOption> AddPolicyOptions(CLI::App* create, RigInput* input) {
            "Age of the active version that triggers a run [s]")}};
 }
 
-std::vector<FieldOption> AddComponentOptions(CLI::App* create,
-                                             RigInput* input) {
+void AddImuOptions(CLI::App* create, RigInput* input) {
+  create->add_option("--imu-preset",
+                     input->imu_preset,
+                     "Noise, full scale and tolerances of this part, e.g. "
+                     "bmi088, instead of those of the file; other options "
+                     "take precedence; `selfcal rig presets` lists the parts");
   create->add_option("--imu",
                      input->imu,
                      "Tolerances of the IMU: consumer (scales to 2 %, angles "
                      "to 1 degree), factory-calibrated (0.3 %, 0.1 degrees) or "
                      "unknown; prior sigmas in the file take precedence");
+}
+
+std::vector<FieldOption> AddComponentOptions(CLI::App* create,
+                                             RigInput* input) {
   create
       ->add_option("--prior-sigma",
                    input->prior_sigmas,
@@ -166,12 +204,16 @@ std::vector<FieldOption> AddComponentOptions(CLI::App* create,
                             "The same as --block '*.time_offset=on'")}};
 }
 
-std::vector<FieldOption> AddOverrides(CLI::App* create, RigInput* input) {
+std::vector<FieldOption> AddOverrides(CLI::App* create,
+                                      CLI::Option* imu_rate,
+                                      RigInput* input) {
+  AddImuOptions(create, input);
   std::vector<FieldOption> options = {
       {"rig.name",
        create->add_option(
            "--id", input->id, "Id of the rig, instead of that in the file")}};
-  for (const auto& more : {AddNoiseOptions(create, input),
+  for (const auto& more : {AddDensityOptions(create, imu_rate, input),
+                           AddNoiseOptions(create, input),
                            AddPolicyOptions(create, input),
                            AddComponentOptions(create, input)}) {
     options.insert(options.end(), more.begin(), more.end());
@@ -199,10 +241,14 @@ void AddRigCreation(CLI::App* rig, Context* context) {
           "--from", input->from, "Take the calibration from files of this tool")
       ->check(FormatNames())
       ->needs(files);
-  create->add_option("--imu-rate",
-                     input->imu_rate_hz,
-                     "With --from: rate of the IMU, for tools that state noise "
-                     "per sample [Hz]");
+  CLI::Option* const imu_rate =
+      create
+          ->add_option("--imu-rate",
+                       input->imu_rate_hz,
+                       "Rate of the IMU, for noise that is stated per reading: "
+                       "by tools (--from), --gyro-noise-rms and "
+                       "--accel-noise-rms [Hz]")
+          ->check(AboveZero());
   create
       ->add_option("--cameras",
                    input->cameras,
@@ -214,7 +260,7 @@ void AddRigCreation(CLI::App* rig, Context* context) {
                    input->strict,
                    "With --from: create no rig if the predictions of the tool "
                    "differ from those of selfcal");
-  const auto options = AddOverrides(create, input.get());
+  const auto options = AddOverrides(create, imu_rate, input.get());
   create->callback([context, input, options] {
     if (input->files.empty() && input->vi_map.empty()) {
       throw CLI::RequiredError("FILE, --from FORMAT FILE... or --vi-map DIR");

@@ -13,9 +13,12 @@
 #include "client/cli/camera_choice.h"
 #include "client/cli/component_settings.h"
 #include "client/cli/foreign_files.h"
+#include "client/cli/imu_preset_choice.h"
 #include "client/import/read_file.h"
 #include "client/import/vi_map.h"
 #include "core/model/imu_grades.h"
+#include "core/model/imu_presets.h"
+#include "core/model/noise_density.h"
 #include "proto/convert.h"
 #include "proto/nearest_word.h"
 #include "proto/resource_names.h"
@@ -111,23 +114,80 @@ absl::Status SetSelection(const std::string& text, v1::Rig* rig) {
 
 // Puts the tolerances before those of the file, which are of single components
 // and take precedence.
-absl::Status SetImuTolerances(const std::string& text, v1::Rig* rig) {
-  const auto grade = ParseImuGrade(text);
-  if (!grade) {
-    return absl::InvalidArgumentError(fmt::format(
-        "--imu: '{}' must be one of consumer, factory-calibrated, unknown{}",
-        text,
-        DidYouMean(text, {"consumer", "factory-calibrated", "unknown"})));
-  }
+void SetImuTolerances(ImuGrade grade, v1::Rig* rig) {
   google::protobuf::RepeatedPtrField<v1::ComponentSetting> settings;
-  for (const ComponentSetting& tolerance : ImuTolerances(*grade)) {
+  for (const ComponentSetting& tolerance : ImuTolerances(grade)) {
     v1::ComponentSetting* added = settings.Add();
     added->set_pattern(tolerance.pattern);
     added->set_value(tolerance.value);
   }
   settings.MergeFrom(rig->prior_sigmas());
   *rig->mutable_prior_sigmas() = std::move(settings);
+}
+
+absl::StatusOr<ImuGrade> ReadGrade(const std::string& text) {
+  if (const auto grade = ParseImuGrade(text)) return *grade;
+  return absl::InvalidArgumentError(fmt::format(
+      "--imu: '{}' must be one of consumer, factory-calibrated, unknown{}",
+      text,
+      DidYouMean(text, {"consumer", "factory-calibrated", "unknown"})));
+}
+
+// Noise and full scale of the preset replace those of the file.
+absl::StatusOr<const ImuPreset*> SetImuPreset(const std::string& name,
+                                              v1::Rig* rig) {
+  const ImuPreset* const preset = FindImuPreset(name);
+  if (preset == nullptr) return UnknownImuPreset("--imu-preset: ", name);
+  Rig values;
+  values.imu_noise = preset->noise;
+  values.imu_full_scale = preset->full_scale;
+  const v1::Rig message = ToProto(values);
+  *rig->mutable_imu_noise() = message.imu_noise();
+  *rig->mutable_imu() = message.imu();
+  return preset;
+}
+
+// The tolerances are those of the grade, or of the preset's.
+absl::Status SetImu(const RigInput& input, v1::Rig* rig) {
+  std::optional<ImuGrade> grade;
+  if (input.imu_preset) {
+    const auto preset = SetImuPreset(*input.imu_preset, rig);
+    if (!preset.ok()) return preset.status();
+    grade = (*preset)->grade;
+  }
+  if (input.imu) {
+    const auto given = ReadGrade(*input.imu);
+    if (!given.ok()) return given.status();
+    grade = *given;
+  }
+  if (grade) SetImuTolerances(*grade, rig);
   return absl::OkStatus();
+}
+
+// A density, or that of readings with a standard deviation. The command line
+// has checked that only one is given, with the rate.
+std::optional<double> Density(const std::optional<double>& density,
+                              const std::optional<double>& rms,
+                              const RigInput& input) {
+  if (rms) return NoiseDensity(*rms, *input.imu_rate_hz);
+  return density;
+}
+
+void SetNoise(const RigInput& input, v1::Rig* rig) {
+  v1::ImuNoise noise = rig->imu_noise();
+  const auto gyro = Density(input.gyro_noise, input.gyro_noise_rms, input);
+  const auto accel = Density(input.accel_noise, input.accel_noise_rms, input);
+  if (gyro) noise.set_gyro_noise_density(*gyro);
+  if (accel) noise.set_accel_noise_density(*accel);
+  if (input.gyro_bias_walk) {
+    noise.set_gyro_bias_random_walk(*input.gyro_bias_walk);
+  }
+  if (input.accel_bias_walk) {
+    noise.set_accel_bias_random_walk(*input.accel_bias_walk);
+  }
+  if (gyro || accel || input.gyro_bias_walk || input.accel_bias_walk) {
+    *rig->mutable_imu_noise() = noise;
+  }
 }
 
 // Puts the sigmas after those of the file and the grade: they take precedence.
@@ -208,9 +268,8 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
     const absl::Status status = SetSelection(*input.selection, &*rig);
     if (!status.ok()) return status;
   }
-  if (input.imu) {
-    const absl::Status status = SetImuTolerances(*input.imu, &*rig);
-    if (!status.ok()) return status;
+  if (const absl::Status status = SetImu(input, &*rig); !status.ok()) {
+    return status;
   }
   const absl::Status sigmas = AddPriorSigmas(input, &*rig);
   if (!sigmas.ok()) return sigmas;
@@ -221,18 +280,7 @@ absl::StatusOr<v1::Rig> ReadRig(const RigInput& input,
   }
   if (input.reweight_noise) rig->set_reweight_noise(true);
   SetPolicy(input, &*rig);
-  v1::ImuNoise noise = rig->imu_noise();
-  if (input.gyro_noise) noise.set_gyro_noise_density(*input.gyro_noise);
-  if (input.accel_noise) noise.set_accel_noise_density(*input.accel_noise);
-  if (input.gyro_bias_walk) {
-    noise.set_gyro_bias_random_walk(*input.gyro_bias_walk);
-  }
-  if (input.accel_bias_walk) {
-    noise.set_accel_bias_random_walk(*input.accel_bias_walk);
-  }
-  const bool any_noise = input.gyro_noise || input.accel_noise ||
-                         input.gyro_bias_walk || input.accel_bias_walk;
-  if (any_noise) *rig->mutable_imu_noise() = noise;
+  SetNoise(input, &*rig);
   if (input.gyro_max) rig->mutable_imu()->set_gyro_max(*input.gyro_max);
   if (input.accel_max) rig->mutable_imu()->set_accel_max(*input.accel_max);
   rig->mutable_fixed()->Add(input.fixed.begin(), input.fixed.end());

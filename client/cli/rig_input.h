@@ -27,13 +27,17 @@ struct RigInput {
   std::optional<double> pixel_sigma_px;
   std::optional<double> gyro_noise;
   std::optional<double> accel_noise;
+  // Standard deviation of single readings at imu_rate_hz, instead of a density.
+  std::optional<double> gyro_noise_rms;   // [rad/s]
+  std::optional<double> accel_noise_rms;  // [m/s^2]
   std::optional<double> gyro_bias_walk;
   std::optional<double> accel_bias_walk;
   std::optional<double> gyro_max;   // [rad/s]
   std::optional<double> accel_max;  // [m/s^2]
   std::optional<double> gravity_mps2;
-  std::optional<std::string> imu;        // a grade, as ParseImuGrade() reads it
-  std::optional<std::string> selection;  // as SelectionText()
+  std::optional<std::string> imu;  // a grade, as ParseImuGrade() reads it
+  std::optional<std::string> imu_preset;  // as FindImuPreset() finds it
+  std::optional<std::string> selection;   // as SelectionText()
   std::optional<int> table_size;
   std::optional<double> min_gain_nats;
   std::optional<double> retrigger_fraction;

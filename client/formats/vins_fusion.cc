@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "client/formats/format_error.h"
 #include "client/formats/imu_matrices.h"
 #include "client/formats/losses.h"
 #include "client/formats/tool_models.h"
 #include "client/formats/yaml_values.h"
+#include "core/model/noise_density.h"
 
 namespace selfcal::client {
 namespace {
@@ -128,13 +127,15 @@ ImportedRig ImportVinsFusion(const std::vector<TextFile>& files,
   if (GetInt(root, "imu") != 1) {
     throw FormatError("imu is not 1: the configuration has no IMU");
   }
-  const double by_sample =
-      1 / std::sqrt(ImuRate(options, "the rate of its noise", &result.losses));
-  result.rig.imu_noise = {
-      .gyro_noise_density = GetDouble(root, "gyr_n") * by_sample,
-      .accel_noise_density = GetDouble(root, "acc_n") * by_sample,
-      .gyro_bias_random_walk = GetDouble(root, "gyr_w") * by_sample,
-      .accel_bias_random_walk = GetDouble(root, "acc_w") * by_sample};
+  const double rate_hz =
+      ImuRate(options, "the rate of its noise", &result.losses);
+  const auto density = [&](const char* key) {
+    return NoiseDensity(GetDouble(root, key), rate_hz);
+  };
+  result.rig.imu_noise = {.gyro_noise_density = density("gyr_n"),
+                          .accel_noise_density = density("acc_n"),
+                          .gyro_bias_random_walk = density("gyr_w"),
+                          .accel_bias_random_walk = density("acc_w")};
   result.rig.gravity_mps2 = GetDouble(root, "g_norm");
   const int count = GetInt(root, "num_of_cam");
   if (count != 1 && count != 2) throw FormatError("num_of_cam is not 1 or 2");
@@ -160,8 +161,8 @@ ExportedFiles ExportVinsFusion(const Rig& rig,
   KeepCameras("vins_fusion", 2, &kept, &result.losses);
   UseModelsOf("vins_fusion", &kept.cameras);
   CheckCameras(kept.cameras);
-  const double by_sample =
-      std::sqrt(ImuRate(options, "the rate of its noise", &result.losses));
+  const double rate_hz =
+      ImuRate(options, "the rate of its noise", &result.losses);
   const ImuNoise& noise = rig.imu_noise;
   std::string text = fmt::format(
       "%YAML:1.0\n---\n"
@@ -178,10 +179,10 @@ ExportedFiles ExportVinsFusion(const Rig& rig,
       kept.cameras.size(),
       kept.cameras[0].width_px,
       kept.cameras[0].height_px,
-      NumberText(noise.accel_noise_density * by_sample),
-      NumberText(noise.gyro_noise_density * by_sample),
-      NumberText(noise.accel_bias_random_walk * by_sample),
-      NumberText(noise.gyro_bias_random_walk * by_sample),
+      NumberText(ReadingSigma(noise.accel_noise_density, rate_hz)),
+      NumberText(ReadingSigma(noise.gyro_noise_density, rate_hz)),
+      NumberText(ReadingSigma(noise.accel_bias_random_walk, rate_hz)),
+      NumberText(ReadingSigma(noise.gyro_bias_random_walk, rate_hz)),
       NumberText(rig.gravity_mps2),
       NumberText(kept.cameras[0].time_offset_s));
   std::vector<TextFile> cameras;

@@ -20,10 +20,24 @@ std::vector<ComponentSetting> Tolerances(double GradeTolerance::*grade) {
 }  // namespace
 
 std::optional<ImuGrade> ParseImuGrade(std::string_view text) {
-  if (text == "consumer") return ImuGrade::kConsumer;
-  if (text == "factory-calibrated") return ImuGrade::kFactoryCalibrated;
-  if (text == "unknown") return ImuGrade::kUnknown;
+  for (const ImuGrade grade : {ImuGrade::kConsumer,
+                               ImuGrade::kFactoryCalibrated,
+                               ImuGrade::kUnknown}) {
+    if (text == ImuGradeName(grade)) return grade;
+  }
   return std::nullopt;
+}
+
+std::string_view ImuGradeName(ImuGrade grade) {
+  switch (grade) {
+    case ImuGrade::kConsumer:
+      return "consumer";
+    case ImuGrade::kFactoryCalibrated:
+      return "factory-calibrated";
+    case ImuGrade::kUnknown:
+      break;
+  }
+  return "unknown";
 }
 
 std::vector<ComponentSetting> ImuTolerances(ImuGrade grade) {

@@ -25,6 +25,7 @@ enum class ImuGrade {
 
 // Parses "consumer", "factory-calibrated" or "unknown"; nullopt for other text.
 std::optional<ImuGrade> ParseImuGrade(std::string_view text);
+std::string_view ImuGradeName(ImuGrade grade);
 
 // Prior standard deviations of the IMU's components, for Rig::prior_sigmas.
 std::vector<ComponentSetting> ImuTolerances(ImuGrade grade);

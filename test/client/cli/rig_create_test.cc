@@ -7,6 +7,7 @@
 
 #include "client/cli/camera_choice.h"
 #include "client/formats/format.h"
+#include "core/model/imu_presets.h"
 #include "test/client/cli/commands_fixture.h"
 
 namespace selfcal::client {
@@ -76,6 +77,102 @@ TEST_F(RigCreate, RefusesPriorsOfComponentsThatAreNotThere) {
       Selfcal(With(FromKalibr(1), {"--prior-sigma", "cam0.focal.x"})).err,
       HasSubstr("'cam0.focal.x' is not of the form COMPONENT=NUMBER"));
   EXPECT_TRUE(daemon_.rigs.empty());
+}
+
+TEST_F(RigCreate, APresetSetsNoiseFullScaleAndTolerances) {
+  ASSERT_EQ(Selfcal(With(FromKalibr(1), {"--imu-preset", "BMI088"})).code, 0);
+  const v1::Rig& rig = daemon_.rigs.back();
+  const ImuPreset& preset = *FindImuPreset("bmi088");
+  EXPECT_EQ(rig.imu_noise().gyro_noise_density(),
+            preset.noise.gyro_noise_density);
+  EXPECT_EQ(rig.imu_noise().accel_noise_density(),
+            preset.noise.accel_noise_density);
+  EXPECT_EQ(rig.imu_noise().gyro_bias_random_walk(),
+            preset.noise.gyro_bias_random_walk);
+  EXPECT_EQ(rig.imu_noise().accel_bias_random_walk(),
+            preset.noise.accel_bias_random_walk);
+  EXPECT_EQ(rig.imu().gyro_max(), preset.full_scale.gyro_radps);
+  EXPECT_EQ(rig.imu().accel_max(), preset.full_scale.accel_mps2);
+  ASSERT_GT(rig.prior_sigmas_size(), 0);
+  EXPECT_EQ(rig.prior_sigmas(0).pattern(), "imu.gyro.scale.*");
+  EXPECT_EQ(rig.prior_sigmas(0).value(), 0.02);
+}
+
+TEST_F(RigCreate, OtherOptionsTakePrecedenceOverAPreset) {
+  ASSERT_EQ(Selfcal(With(FromKalibr(1),
+                         {"--imu-preset",
+                          "bmi088",
+                          "--gyro-noise",
+                          "3e-4",
+                          "--accel-bias-walk",
+                          "1e-3",
+                          "--accel-max",
+                          "58",
+                          "--imu",
+                          "factory-calibrated"}))
+                .code,
+            0);
+  const v1::Rig& rig = daemon_.rigs.back();
+  const ImuPreset& preset = *FindImuPreset("bmi088");
+  EXPECT_EQ(rig.imu_noise().gyro_noise_density(), 3e-4);
+  EXPECT_EQ(rig.imu_noise().accel_noise_density(),
+            preset.noise.accel_noise_density);
+  EXPECT_EQ(rig.imu_noise().accel_bias_random_walk(), 1e-3);
+  EXPECT_EQ(rig.imu().accel_max(), 58);
+  EXPECT_EQ(rig.imu().gyro_max(), preset.full_scale.gyro_radps);
+  EXPECT_EQ(rig.prior_sigmas(0).value(), 0.003);
+}
+
+TEST_F(RigCreate, NamesThePresetsThatThereAre) {
+  const Outcome outcome =
+      Selfcal(With(FromKalibr(1), {"--imu-preset", "bmi08"}));
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("--imu-preset: 'bmi08' must be one of adis16448"),
+                    HasSubstr("did you mean 'bmi088'?")));
+  EXPECT_TRUE(daemon_.rigs.empty());
+}
+
+// 0.02 m/s^2 at 400 Hz is a density of 0.001 m/s^2/sqrt(Hz).
+TEST_F(RigCreate, TakesTheNoiseOfReadingsAtTheirRate) {
+  const Outcome outcome = Selfcal(With(FromKalibr(1),
+                                       {"--accel-noise-rms",
+                                        "0.02",
+                                        "--gyro-noise-rms",
+                                        "0.004",
+                                        "--imu-rate",
+                                        "400"}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const v1::ImuNoise& noise = daemon_.rigs.back().imu_noise();
+  EXPECT_DOUBLE_EQ(noise.accel_noise_density(), 0.001);
+  EXPECT_DOUBLE_EQ(noise.gyro_noise_density(), 0.0002);
+  EXPECT_THAT(Selfcal(With(FromKalibr(1), {"--gyro-noise-rms", "0.01"})).err,
+              HasSubstr("--imu-rate"));
+  EXPECT_THAT(Selfcal(With(FromKalibr(1),
+                           {"--gyro-noise-rms",
+                            "0.01",
+                            "--gyro-noise",
+                            "1e-4",
+                            "--imu-rate",
+                            "400"}))
+                  .err,
+              HasSubstr("--gyro-noise"));
+  EXPECT_EQ(daemon_.rigs.size(), 1u);
+}
+
+TEST_F(RigCreate, ListsThePresetsWithoutADaemon) {
+  const Outcome list = client::Selfcal({"rig", "presets"});
+  EXPECT_EQ(list.code, 0) << list.err;
+  EXPECT_THAT(
+      list.out,
+      HasSubstr("mpu9250\t10\t300\t1996\t16\tconsumer\tInvenSense MPU-9250"));
+  const Outcome one = client::Selfcal({"rig", "presets", "MPU-9250"});
+  EXPECT_THAT(one.out, HasSubstr("PS-MPU-9250A-01"));
+  EXPECT_THAT(client::Selfcal({"rig", "presets", "--json"}).out,
+              HasSubstr("\"gyro_noise_density\": 0.00017"));
+  const Outcome unknown = client::Selfcal({"rig", "presets", "mpu"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("did you mean 'mpu9250'?"));
 }
 
 TEST_F(RigCreate, UsesSomeOfTheCameras) {

@@ -51,6 +51,7 @@ TEST(ImuGradesTest, HaveNames) {
   EXPECT_EQ(ParseImuGrade("factory-calibrated"), ImuGrade::kFactoryCalibrated);
   EXPECT_EQ(ParseImuGrade("unknown"), ImuGrade::kUnknown);
   EXPECT_FALSE(ParseImuGrade("good").has_value());
+  EXPECT_EQ(ImuGradeName(ImuGrade::kFactoryCalibrated), "factory-calibrated");
 }
 
 }  // namespace
