@@ -236,11 +236,22 @@ void AddRigCreation(CLI::App* rig, Context* context) {
       ->add_option(
           "--vi-map", input->vi_map, "Take the rig from this maplab VI-map")
       ->excludes(files);
+  CLI::Option* const from =
+      create
+          ->add_option("--from",
+                       input->from,
+                       "Take the calibration from files of this tool")
+          ->check(FormatNames())
+          ->needs(files);
   create
-      ->add_option(
-          "--from", input->from, "Take the calibration from files of this tool")
-      ->check(FormatNames())
-      ->needs(files);
+      ->add_option("--extrinsics",
+                   input->extrinsics,
+                   "With --from: pose of a camera, as "
+                   "cam0=PX,PY,PZ,QX,QY,QZ,QW: the transform that takes points "
+                   "from the IMU's frame to the camera's (z forward), as tf "
+                   "shows it; repeatable")
+      ->allow_extra_args(false)
+      ->needs(from);
   CLI::Option* const imu_rate =
       create
           ->add_option("--imu-rate",

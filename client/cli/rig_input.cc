@@ -12,6 +12,7 @@
 
 #include "client/cli/camera_choice.h"
 #include "client/cli/component_settings.h"
+#include "client/cli/extrinsics_input.h"
 #include "client/cli/foreign_files.h"
 #include "client/cli/imu_preset_choice.h"
 #include "client/import/read_file.h"
@@ -40,6 +41,9 @@ absl::StatusOr<v1::Rig> ReadForeign(const RigInput& input,
       ImportRig(input.from, *files, {.imu_rate_hz = input.imu_rate_hz});
   if (!imported.ok()) return imported.status();
   *losses = imported->losses;
+  const absl::Status posed =
+      SetExtrinsics(input.extrinsics, &imported->rig, losses);
+  if (!posed.ok()) return posed;
   if (!input.cameras.empty()) {
     const absl::Status kept =
         KeepCameras(input.cameras, &imported->rig, losses);

@@ -23,6 +23,7 @@ struct RigInput {
   bool strict = false;  // fail if reading `from` has losses
   // The cameras to take from `from` or `vi_map`: cam0, ...; empty: all.
   std::vector<std::string> cameras;
+  std::vector<std::string> extrinsics;  // of cameras of `from`
   std::optional<std::string> id;
   std::optional<double> pixel_sigma_px;
   std::optional<double> gyro_noise;

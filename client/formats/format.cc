@@ -6,6 +6,7 @@
 #include <exception>
 
 #include "client/formats/basalt.h"
+#include "client/formats/camera_info.h"
 #include "client/formats/kalibr.h"
 #include "client/formats/maplab.h"
 #include "client/formats/openvins.h"
@@ -35,7 +36,11 @@ constexpr std::array kFormats = {
            ImportVinsFusion,
            ExportVinsFusion},
     Format{"basalt", "calibration.json", ImportBasalt, ExportBasalt},
-    Format{"maplab", "sensors.yaml", ImportMaplab, ExportMaplab}};
+    Format{"maplab", "sensors.yaml", ImportMaplab, ExportMaplab},
+    Format{"camera_info",
+           "cam0.yaml cam1.yaml",
+           ImportCameraInfo,
+           ExportCameraInfo}};
 
 absl::StatusOr<const Format*> FindFormat(const std::string& name) {
   std::vector<std::string> known;

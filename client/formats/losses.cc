@@ -79,10 +79,11 @@ void AddLineDelayLosses(const std::string& tool,
 
 void AddPinholeLosses(const std::string& tool,
                       const std::vector<CameraCalibration>& cameras,
-                      std::vector<Loss>* losses) {
+                      std::vector<Loss>* losses,
+                      std::string_view pinhole) {
   for (std::size_t j = 0; j < cameras.size(); ++j) {
     const CameraCalibration& camera = cameras[j];
-    if (FindToolModel(tool, camera.model)->name != "pinhole") continue;
+    if (FindToolModel(tool, camera.model)->name != pinhole) continue;
     const auto beyond = [&](double x, double y) {
       Eigen::Vector3d bearing_C;
       return Unproject(camera, {x, y}, &bearing_C) && !(bearing_C.z() > 0);

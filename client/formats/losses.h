@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/formats/format.h"
@@ -44,10 +45,12 @@ void KeepCameras(const std::string& tool,
 
 // For tools that write some models as a pinhole, which has no pixel for a ray
 // at 90 degrees from the axis or beyond: cameras whose image shows such rays.
-// Cameras are of models that the tool has.
+// `pinhole` is the tool's name of these models. Cameras are of models that the
+// tool has.
 void AddPinholeLosses(const std::string& tool,
                       const std::vector<CameraCalibration>& cameras,
-                      std::vector<Loss>* losses);
+                      std::vector<Loss>* losses,
+                      std::string_view pinhole = "pinhole");
 
 // Returns the given rate, or a usual one, which is then stated in the losses.
 double ImuRate(const FormatOptions& options,

@@ -80,7 +80,8 @@ class CameraEquidistant {
        .pixels = "projection_parameters.mu projection_parameters.mv "
                  "projection_parameters.u0 projection_parameters.v0"},
       {.tool = "basalt", .name = "kb4", .coefficients = "k1 k2 k3 k4"},
-      {.tool = "maplab", .name = "pinhole", .distortion = "equidistant"}};
+      {.tool = "maplab", .name = "pinhole", .distortion = "equidistant"},
+      {.tool = "camera_info", .name = "equidistant"}};
   static constexpr int kSize = std::size(kCoefficients);
 
   explicit CameraEquidistant(std::span<const double, kSize> k)

@@ -50,7 +50,11 @@ class DistortionRadialTangential
        .name = "pinhole-radtan8",
        .coefficients = "k1 k2 p1 p2",
        .zeros = "k3 k4 k5 k6"},
-      {.tool = "maplab", .name = "pinhole", .distortion = "radial-tangential"}};
+      {.tool = "maplab", .name = "pinhole", .distortion = "radial-tangential"},
+      {.tool = "camera_info", .name = "plumb_bob", .zeros = "k3"},
+      {.tool = "camera_info",
+       .name = "rational_polynomial",
+       .zeros = "k3 k4 k5 k6"}};
 
   using RadialTangential::RadialTangential;
 };

@@ -47,6 +47,10 @@ class DistortionRadialTangential5
       {.tool = "basalt",
        .name = "pinhole-radtan8",
        .coefficients = "k1 k2 p1 p2 k3",
+       .zeros = "k4 k5 k6"},
+      {.tool = "camera_info", .name = "plumb_bob"},
+      {.tool = "camera_info",
+       .name = "rational_polynomial",
        .zeros = "k4 k5 k6"}};
 
   using RadialTangential::RadialTangential;

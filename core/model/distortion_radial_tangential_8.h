@@ -51,7 +51,8 @@ class DistortionRadialTangential8 : public RadialTangential<RadialRational> {
                  "projection_parameters.cx projection_parameters.cy"},
       {.tool = "basalt",
        .name = "pinhole-radtan8",
-       .coefficients = "k1 k2 p1 p2 k3 k4 k5 k6"}};
+       .coefficients = "k1 k2 p1 p2 k3 k4 k5 k6"},
+      {.tool = "camera_info", .name = "rational_polynomial"}};
 
   using RadialTangential::RadialTangential;
 };

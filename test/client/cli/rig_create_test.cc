@@ -175,6 +175,50 @@ TEST_F(RigCreate, ListsThePresetsWithoutADaemon) {
   EXPECT_THAT(unknown.err, HasSubstr("did you mean 'mpu9250'?"));
 }
 
+// camera_info of ROS has neither poses nor an IMU.
+TEST_F(RigCreate, TakesPosesThatAFileDoesNotHaveFromTheCommandLine) {
+  const std::vector<std::string> line = {
+      "rig",
+      "create",
+      "--id",
+      "device",
+      "--strict",
+      "--imu-preset",
+      "bmi055",
+      "--from",
+      "camera_info",
+      WriteFile("image_width: 640\nimage_height: 480\n"
+                "camera_matrix:\n"
+                "  data: [400, 0, 320, 0, 401, 240, 0, 0, 1]\n"
+                "distortion_model: plumb_bob\n"
+                "distortion_coefficients:\n  data: [0.1, 0, 0, 0, 0]\n")};
+  const Outcome without = Selfcal(line);
+  EXPECT_EQ(without.code, 2);
+  EXPECT_THAT(
+      without.err,
+      AllOf(HasSubstr("lost: cam0.extrinsics: camera_info has no poses"),
+            HasSubstr("note: imu_noise")));
+  const Outcome with = Selfcal(
+      With(line, {"--extrinsics", "cam0=0.1,-0.2,0.03,0.5,-0.5,0.5,0.5"}));
+  ASSERT_EQ(with.code, 0) << with.err;
+  const auto& camera = daemon_.rigs.back().factory().cameras(0);
+  EXPECT_EQ(camera.p_ci().y(), -0.2);
+  EXPECT_EQ(camera.q_ci().x(), 0.5);
+  EXPECT_EQ(camera.q_ci().y(), -0.5);
+  EXPECT_EQ(camera.q_ci().w(), 0.5);
+  for (const auto& [pose, message] :
+       std::vector<std::pair<std::string, std::string>>{
+           {"cam1=0,0,0,0,0,0,1", "there is no camera 'cam1'"},
+           {"cam0=0,0,0,0,0,1", "is not of the form"},
+           {"cam0=0,0,0,0,0,0,1,2", "is not of the form"},
+           {"cam0=0,0,0,1,0,0,1", "a quaternion of length 1"},
+           {"cam0=0,0,nan,0,0,0,1", "is not of the form"}}) {
+    const Outcome wrong = Selfcal(With(line, {"--extrinsics", pose}));
+    EXPECT_EQ(wrong.code, 2);
+    EXPECT_THAT(wrong.err, HasSubstr(message));
+  }
+}
+
 TEST_F(RigCreate, UsesSomeOfTheCameras) {
   const Outcome outcome =
       Selfcal(With(FromKalibr(3), {"--cameras", "cam0,cam2"}));

@@ -1,5 +1,6 @@
 // Files that are written: each tool predicts from them what selfcal does, and
 // they read back as what they were written from.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -37,6 +38,8 @@ struct Expressible {
   bool time_offset;    // any
   bool time_offsets;   // one for each camera
   double least_w = 0;  // of a FOV camera, in magnitude
+  bool poses = true;   // of cameras
+  bool noise = true;   // of the IMU
 };
 
 const Model kRadialTangential5 = ModelNamed("radial-tangential-5");
@@ -102,7 +105,29 @@ const Expressible kExpressible[] = {
      false,
      false,
      false,
-     0.5}};
+     0.5},
+    {"camera_info",
+     {Model::kRadialTangential,
+      kRadialTangential5,
+      kRadialTangential8,
+      Model::kEquidistant},
+     4,
+     false,
+     false,
+     false,
+     false,
+     0,
+     false,
+     false}};
+
+// Cameras where a format without poses has them.
+void Place(const Expressible& format, Rig* rig) {
+  if (format.poses) return;
+  for (CameraCalibration& camera : rig->factory.cameras) {
+    camera.q_CI.setIdentity();
+    camera.p_CI.setZero();
+  }
+}
 
 std::size_t Pick(std::size_t count, RandomValues* random) {
   return std::min(count - 1,
@@ -116,10 +141,12 @@ Rig RandomRig(const Expressible& format, RandomValues* random) {
   rig.id = "device";
   rig.factory = random->Theta();
   rig.factory.cameras.clear();
-  rig.imu_noise = {.gyro_noise_density = random->Uniform(1e-4, 1e-3),
-                   .accel_noise_density = random->Uniform(1e-3, 1e-2),
-                   .gyro_bias_random_walk = random->Uniform(1e-6, 1e-4),
-                   .accel_bias_random_walk = random->Uniform(1e-5, 1e-3)};
+  if (format.noise) {
+    rig.imu_noise = {.gyro_noise_density = random->Uniform(1e-4, 1e-3),
+                     .accel_noise_density = random->Uniform(1e-3, 1e-2),
+                     .gyro_bias_random_walk = random->Uniform(1e-6, 1e-4),
+                     .accel_bias_random_walk = random->Uniform(1e-5, 1e-3)};
+  }
   const std::size_t cameras = 1 + Pick(format.cameras, random);
   const Model model = format.models[Pick(format.models.size(), random)];
   for (std::size_t j = 0; j < cameras; ++j) {
@@ -140,6 +167,7 @@ Rig RandomRig(const Expressible& format, RandomValues* random) {
     }
     rig.factory.cameras.push_back(camera);
   }
+  Place(format, &rig);
   return rig;
 }
 
@@ -182,7 +210,14 @@ TEST_P(Export, ReadsBackAsItWas) {
     ASSERT_TRUE(files.ok()) << files.status();
     const auto again = ImportRig(GetParam().format, files->files, kOptions);
     ASSERT_TRUE(again.ok()) << again.status();
-    EXPECT_THAT(again->losses, IsEmpty());
+    // What a format does not have is said to be missing when it is read.
+    std::vector<std::string> missing;
+    for (std::size_t j = 0; j < rig.factory.cameras.size(); ++j) {
+      if (!GetParam().poses)
+        missing.push_back(fmt::format("cam{}.extrinsics", j));
+    }
+    if (!GetParam().noise) missing.emplace_back("imu_noise");
+    EXPECT_EQ(Names(again->losses), missing);
     if (!GetParam().imu) rig.factory.imu = {};
     for (CameraCalibration& camera : rig.factory.cameras) {
       if (camera.model == Model::kFov) {
@@ -223,7 +258,9 @@ TEST_P(Export, WhatTheToolCannotSayHasAName) {
   EXPECT_EQ(named("cam1.line_delay"), format != "maplab");
   EXPECT_FALSE(named("cam0.line_delay"));
   EXPECT_EQ(named("cam2"), GetParam().cameras < 3);
-  EXPECT_EQ(named("imu_rate"), format != "maplab");
+  EXPECT_EQ(named("cam0.extrinsics"), !GetParam().poses);
+  EXPECT_EQ(named("imu_noise"), !GetParam().noise);
+  EXPECT_EQ(named("imu_rate"), format != "maplab" && GetParam().noise);
   EXPECT_TRUE(named("sigmas"));
   for (const Loss& loss : files->losses) {
     EXPECT_EQ(loss.changes_prediction,
@@ -237,6 +274,7 @@ TEST_P(Export, NothingIsLostOfANominalDevice) {
   Rig rig;
   rig.factory.cameras = {random.Camera(Model::kEquidistant)};
   rig.factory.cameras[0].f = {400, 400};  // no ray is beyond 90 degrees
+  Place(GetParam(), &rig);
   const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
   ASSERT_TRUE(files.ok()) << files.status();
   for (const Loss& loss : files->losses) {
@@ -273,6 +311,7 @@ TEST_P(Export, AModelWithZeroCoefficientsIsTheSmallerOne) {
     camera.distortion = DistortionVector::Zero(DistortionSize(model));
     camera.distortion.head<4>() = four;
     rig.factory.cameras = {camera};
+    Place(GetParam(), &rig);
     const auto files = ExportRig(GetParam().format, rig, rig.factory, kOptions);
     ASSERT_TRUE(files.ok()) << files.status();
     EXPECT_THAT(LoaderFaults(GetParam().format, files->files), IsEmpty());
@@ -297,7 +336,7 @@ TEST_P(Export, AModelWithZeroCoefficientsIsTheSmallerOne) {
   }
 }
 
-// Kalibr, OpenVINS and maplab have the equidistant model as a pinhole.
+// Kalibr, OpenVINS, maplab and ROS have the equidistant model as a pinhole.
 TEST_P(Export, RaysBeyond90DegreesAreSaidToBeLostWhereThereIsAPinhole) {
   RandomValues random(19);
   const std::string format = GetParam().format;
@@ -309,8 +348,8 @@ TEST_P(Export, RaysBeyond90DegreesAreSaidToBeLostWhereThereIsAPinhole) {
     camera.f = {f_px, f_px};
     const auto files = ExportRig(format, rig, rig.factory, kOptions);
     ASSERT_TRUE(files.ok()) << files.status();
-    const bool pinhole =
-        format == "kalibr" || format == "openvins" || format == "maplab";
+    const bool pinhole = format == "kalibr" || format == "openvins" ||
+                         format == "maplab" || format == "camera_info";
     const auto names = Names(files->losses);
     EXPECT_EQ(std::count(names.begin(), names.end(), "cam0.distortion"),
               pinhole && f_px == 200.0);

@@ -11,7 +11,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Matrix4d;
 using testing::HasSubstr;
-using testing::IsEmpty;
 
 std::string Numbers(const Eigen::MatrixXd& M) {
   std::vector<double> values;
@@ -213,12 +212,52 @@ std::vector<TextFile> BasaltFiles(RandomValues* random) {
   return {{"calibration.json", text}};
 }
 
+// As camera_calibration writes the cameras of a stereo rig.
+std::vector<TextFile> CameraInfoFiles() {
+  const std::string left =
+      "image_width: 752\nimage_height: 480\ncamera_name: narrow_stereo/left\n"
+      "camera_matrix:\n  rows: 3\n  cols: 3\n"
+      "  data: [458.6, 0.0, 367.2, 0., 457.3, 248.4, 0, 0, 1]\n"
+      "distortion_model: plumb_bob\n"
+      "distortion_coefficients:\n  rows: 1\n  cols: 5\n"
+      "  data: [-0.28, 0.07, 0.0002, 1.8e-05, 0.0]\n"
+      "rectification_matrix:\n  rows: 3\n  cols: 3\n"
+      "  data: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\n"
+      "projection_matrix:\n  rows: 3\n  cols: 4\n"
+      "  data: [435.2, 0, 367.4, 0, 0, 435.2, 252.2, 0, 0, 0, 1, 0]\n";
+  const std::string right =
+      "image_width: 848\nimage_height: 800\ncamera_name: right\n"
+      "camera_matrix:\n  rows: 3\n  cols: 3\n"
+      "  data: [286.2, 0, 421.5, 0, 286.5, 400.8, 0, 0, 1]\n"
+      "distortion_model: fisheye\n"
+      "distortion_coefficients:\n  rows: 1\n  cols: 4\n"
+      "  data: [-0.007, 0.0422, -0.0399, 0.00665]\n"
+      "rectification_matrix:\n  rows: 3\n  cols: 3\n"
+      "  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+      "projection_matrix:\n  rows: 3\n  cols: 4\n"
+      "  data: [286.2, 0, 421.5, 0, 0, 286.5, 400.8, 0, 0, 0, 1, 0]\n";
+  return {{"left.yaml", left}, {"right.yaml", right}};
+}
+
 std::vector<TextFile> Files(const std::string& format, RandomValues* random) {
   if (format == "kalibr") return KalibrFiles(random);
   if (format == "openvins") return OpenVinsFiles(random);
   if (format == "orb_slam3") return OrbSlam3Files(random);
   if (format == "vins_fusion") return VinsFusionFiles(random);
+  if (format == "camera_info") return CameraInfoFiles();
   return BasaltFiles(random);
+}
+
+// What a format does not have, in its files above.
+std::vector<std::string> Missing(const std::string& format) {
+  if (format != "camera_info") return {};
+  return {"cam0.extrinsics", "cam1.extrinsics", "imu_noise"};
+}
+
+std::vector<std::string> Names(const std::vector<Loss>& losses) {
+  std::vector<std::string> names;
+  for (const Loss& loss : losses) names.push_back(loss.name);
+  return names;
 }
 
 class Import : public testing::TestWithParam<const char*> {};
@@ -230,7 +269,7 @@ TEST_P(Import, PredictsThePixelsRatesAndTimesOfTheTool) {
     const std::vector<TextFile> files = Files(GetParam(), &random);
     const auto rig = ImportRig(GetParam(), files, {.imu_rate_hz = kRate_hz});
     ASSERT_TRUE(rig.ok()) << rig.status();
-    EXPECT_THAT(rig->losses, IsEmpty());
+    EXPECT_EQ(Names(rig->losses), Missing(GetParam()));
     const Tool tool = ReadAsTool(GetParam(), files, kRate_hz);
     ExpectSamePredictions(rig->rig.factory, tool, &random);
     ExpectSameNoise(rig->rig.imu_noise, tool.noise);
@@ -270,11 +309,17 @@ TEST_P(Import, AFileThatIsCutOffIsRefusedInWords) {
   EXPECT_GT(refused, 10);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Formats,
-    Import,
-    testing::Values("kalibr", "openvins", "orb_slam3", "vins_fusion", "basalt"),
-    [](const auto& info) { return std::string(info.param); });
+INSTANTIATE_TEST_SUITE_P(Formats,
+                         Import,
+                         testing::Values("kalibr",
+                                         "openvins",
+                                         "orb_slam3",
+                                         "vins_fusion",
+                                         "basalt",
+                                         "camera_info"),
+                         [](const auto& info) {
+                           return std::string(info.param);
+                         });
 
 struct Change {
   const char* format;
@@ -327,7 +372,24 @@ TEST(ImportErrors, NameTheFieldAndWhatToDo) {
            {"basalt", "value0", "value1", "'value0' is missing"},
            {"basalt", "\"qw\": ", "\"qw\": 1", "norm"},
            {"basalt", "[848, 800]", "[848.5, 800]", "resolution"},
-           {"basalt", "2124029", "\"soon\"", "cam_time_offset_ns"}}) {
+           {"basalt", "2124029", "\"soon\"", "cam_time_offset_ns"},
+           {"camera_info",
+            "plumb_bob",
+            "thin_prism",
+            "left.yaml right.yaml: cam0: distortion_model 'thin_prism' is not "
+            "one of plumb_bob, equidistant and rational_polynomial"},
+           {"camera_info", "458.6, 0.0", "458.6, 0.1", "a skew"},
+           {"camera_info", "camera_matrix", "matrix", "'camera_matrix' is"},
+           {"camera_info", "458.6", "0", "must be positive"},
+           {"camera_info", "image_width: 752", "image_width: wide", "integer"},
+           {"camera_info",
+            "1.8e-05, 0.0]",
+            "1.8e-05, 0, 0.1]",
+            "has 6 values, of which selfcal has a model for 5"},
+           {"camera_info",
+            "data: [-0.28",
+            "data: -0.28 #",
+            "no list of data"}}) {
     const auto rig = Changed(change);
     EXPECT_EQ(rig.status().code(), absl::StatusCode::kInvalidArgument)
         << change.to;
@@ -422,7 +484,25 @@ TEST(ImportModels, AreTheSmallestThatRepresentTheFile) {
            {"basalt",
             kb4,
             R"("eucm", "intrinsics": {"alpha": 0.6, "beta": 1.1, )",
-            "extended-unified"}}) {
+            "extended-unified"},
+           {"camera_info", "1.8e-05, 0.0]", "1.8e-05]", "radial-tangential"},
+           {"camera_info", "1.8e-05, 0.0]", "0, 0.1]", "radial-tangential-5"},
+           {"camera_info",
+            "distortion_model: plumb_bob\n",
+            "",
+            "radial-tangential"},
+           {"camera_info",
+            "plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n"
+            "  data: [-0.28, 0.07, 0.0002, 1.8e-05, 0.0]",
+            "rational_polynomial\ndistortion_coefficients:\n"
+            "  data: [0.3, 0.07, 0, 0, 0.01, 0.6, 0.1, 0.02, 0, 0, 0, 0]",
+            "radial-tangential-8"},
+           {"camera_info",
+            "plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n"
+            "  data: [-0.28, 0.07, 0.0002, 1.8e-05, 0.0]",
+            "rational_polynomial\ndistortion_coefficients:\n"
+            "  data: [0.3, 0.07, 0, 0, 0.01, 0, 0, 0]",
+            "radial-tangential-5"}}) {
     const Change change = {
         one.format, one.from.c_str(), one.to.c_str(), one.model};
     const auto rig = Changed(change);
@@ -453,6 +533,22 @@ TEST(ImportLosses, HaveAName) {
     ASSERT_TRUE(rig.ok()) << rig.status();
     ASSERT_EQ(rig->losses.size(), 1u) << change.answer;
     EXPECT_EQ(rig->losses[0].name, change.answer);
+  }
+}
+
+// Tracks are in the raw image: its rectification says nothing about them.
+TEST(ImportLosses, RectificationIsNotUsed) {
+  for (const Change& change : std::initializer_list<Change>{
+           {"camera_info",
+            "[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]",
+            "[1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0]",
+            ""},
+           {"camera_info", "367.4, 0, 0", "367.4, -47.9, 0", ""}}) {
+    const auto rig = Changed(change);
+    ASSERT_TRUE(rig.ok()) << rig.status();
+    ASSERT_EQ(rig->losses.size(), 4u);
+    EXPECT_EQ(rig->losses[0].name, "cam0.rectification");
+    EXPECT_FALSE(rig->losses[0].changes_prediction);
   }
 }
 

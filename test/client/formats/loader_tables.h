@@ -354,4 +354,22 @@ inline constexpr Key kMaplabExtrinsics[] = {
     {"base_sensor_id", Type::kText},
     {"T_B_S", Type::kMapMatrix, Use::kRequired, 4, 4}};
 
+// camera_calibration_parsers, parse_yml.cpp (a matrix is a map of rows, cols
+// and data, whose size is that of the array of sensor_msgs/CameraInfo), and
+// sensor_msgs/distortion_models.h.
+inline constexpr Key kCameraInfo[] = {
+    Above0("image_width", Type::kInteger),
+    Above0("image_height", Type::kInteger),
+    {"camera_name", Type::kText, Use::kOptional},
+    {"camera_matrix", Type::kMapMatrix, Use::kRequired, 3, 3},
+    {"distortion_model", Type::kText, Use::kOptional},
+    {"rectification_matrix", Type::kMapMatrix, Use::kRequired, 3, 3},
+    {"projection_matrix", Type::kMapMatrix, Use::kRequired, 3, 4}};
+inline constexpr Key kCameraInfoPlumbBob[] = {
+    {"distortion_coefficients", Type::kMapMatrix, Use::kRequired, 1, 5}};
+inline constexpr Key kCameraInfoRational[] = {
+    {"distortion_coefficients", Type::kMapMatrix, Use::kRequired, 1, 8}};
+inline constexpr Key kCameraInfoEquidistant[] = {
+    {"distortion_coefficients", Type::kMapMatrix, Use::kRequired, 1, 4}};
+
 }  // namespace selfcal::client

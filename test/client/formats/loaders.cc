@@ -323,6 +323,24 @@ void CheckMaplab(const std::vector<TextFile>& files, Checker* checker) {
   }
 }
 
+void CheckCameraInfo(const std::vector<TextFile>& files, Checker* checker) {
+  for (const TextFile& file : files) {
+    const YAML::Node root = Yaml(file);
+    const std::string type = Text(root, "distortion_model");
+    checker->Check(
+        file.name,
+        root,
+        Joined({kCameraInfo,
+                type == "plumb_bob" ? std::span<const Key>(kCameraInfoPlumbBob)
+                : type == "rational_polynomial"
+                    ? std::span<const Key>(kCameraInfoRational)
+                    : std::span<const Key>(kCameraInfoEquidistant)}));
+    checker->Expect(type == "plumb_bob" || type == "rational_polynomial" ||
+                        type == "equidistant",
+                    "distortion_model " + type);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> LoaderFaults(const std::string& format,
@@ -334,6 +352,7 @@ std::vector<std::string> LoaderFaults(const std::string& format,
   if (format == "vins_fusion") CheckVinsFusion(files, &checker);
   if (format == "basalt") CheckBasalt(files, &checker);
   if (format == "maplab") CheckMaplab(files, &checker);
+  if (format == "camera_info") CheckCameraInfo(files, &checker);
   return checker.Faults();
 }
 

@@ -407,6 +407,26 @@ Tool Maplab(const std::vector<TextFile>& files) {
   return tool;
 }
 
+// image_geometry's PinholeCameraModel, by OpenCV's projectPoints and
+// fisheye::projectPoints with K and D of a camera in the optical frame.
+Tool CameraInfo(const std::vector<TextFile>& files) {
+  Tool tool;
+  tool.correct = AsTheyAre;
+  for (const TextFile& file : files) {
+    const YAML::Node root = Yaml(file.text);
+    const auto type = root["distortion_model"].as<std::string>();
+    const std::vector<double> K = List(root["camera_matrix"]["data"]);
+    const std::vector<double> D = List(root["distortion_coefficients"]["data"]);
+    const bool fisheye = type == "equidistant" || type == "fisheye";
+    tool.cameras.push_back(At(Matrix4d::Identity(),
+                              Camera(fisheye ? "equidistant" : "radtan",
+                                     {K.at(0), K.at(4), K.at(2), K.at(5)},
+                                     D),
+                              0));
+  }
+  return tool;
+}
+
 }  // namespace
 
 Tool ReadAsTool(const std::string& format,
@@ -417,6 +437,7 @@ Tool ReadAsTool(const std::string& format,
   if (format == "orb_slam3") return OrbSlam3(files);
   if (format == "vins_fusion") return VinsFusion(files, imu_rate_hz);
   if (format == "basalt") return Basalt(files);
+  if (format == "camera_info") return CameraInfo(files);
   return Maplab(files);
 }
 
