@@ -180,6 +180,7 @@ void AddRestOfRig(const Rig& rig,
          true});
   }
   AddTimeOffsetLosses(kTool, theta, losses);
+  AddLineDelayLosses(kTool, theta, losses);
   AddGravityLoss(kTool, rig, losses);
   losses->push_back({"imu_noise",
                      "camera_info has no IMU: `selfcal rig show` has its noise",
