@@ -36,6 +36,46 @@ TEST_F(CoreEstimatorsTest, SimulatedSegmentsFillTheTablesAndGiveAVersion) {
   EXPECT_EQ(second->covariance.rows(), TangentSize(rig.factory));
 }
 
+// A rolling shutter of which nothing is known, and a gyroscope that reacts to
+// acceleration.
+TEST_F(CoreEstimatorsTest, OptionalBlocksOfANewRigAreEstimated) {
+  Rig rig = HandheldRig("a");
+  rig.table_size = 4;
+  rig.blocks = {{"*.line_delay", true}, {"imu.gyro.g_sensitivity", true}};
+  Calibration truth = rig.factory;
+  AddEstimatedBlocks(rig.blocks, &truth);
+  rig.factory = PerturbCalibration(truth, {}, 3);
+  rig.groups = DefaultGroups(rig.blocks, rig.factory);
+  truth.cameras[0].line_delay_s = 60e-6;
+  truth.imu.gyro_g_sensitivity.setConstant(3e-4);
+  ASSERT_TRUE(domain_->CreateRig(rig).ok());
+  SimulationOptions options;
+  options.seed = 3;
+  const auto segments =
+      Simulate(rig, truth, rig.factory, *MakeHandheld(50, 1, 3), "s", options)
+          .segments;
+  StartOne();
+  for (const MotionSegment& segment : segments) {
+    ASSERT_TRUE(pipeline_->Submit("a", segment, nullptr).ok());
+  }
+  ASSERT_TRUE(AllScored());
+  ASSERT_TRUE(RunIs(RunState::kSucceeded));
+  const auto version = store_->GetCalibration("a", 2);
+  ASSERT_TRUE(version.ok()) << version.status();
+  EXPECT_THAT(version->reasons, ::testing::IsEmpty());
+  EXPECT_EQ(version->state, CalibrationState::kActive);
+  ASSERT_TRUE(SameShape(version->theta, truth));
+  const Eigen::VectorXd error = BoxMinus(version->theta, truth);
+  const std::vector<int> added = MatchComponents(
+      TangentComponents(truth), {"*.line_delay", "imu.gyro.g_sensitivity.*"});
+  ASSERT_EQ(added.size(), 10u);
+  for (const int i : added) {
+    EXPECT_LT(std::abs(error(i)), 4 * std::sqrt(version->covariance(i, i)))
+        << i;
+  }
+  EXPECT_LT(std::sqrt(version->covariance(added.back(), added.back())), 1e-6);
+}
+
 TEST_F(CoreEstimatorsTest, ScoresAreTheSameAfterAStop) {
   const auto segments = TestSegments(TestRig("a"), 4);
   std::vector<Eigen::MatrixXd> matrices[2];
