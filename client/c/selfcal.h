@@ -126,8 +126,9 @@ typedef struct selfcal_calibration selfcal_calibration;
 // Add every IMU sample, and every keyframe with its observations, each in order
 // of time; either may run ahead of the other by up to max_gap_s. A segment is
 // complete when it has its number of keyframes (or seconds), the keyframe after
-// it has arrived, and the IMU samples have reached that keyframe. Take complete
-// segments after each call, and send them:
+// it has arrived, and the IMU samples have reached that keyframe, and 0.15 s
+// beyond the last one of the segment. Take complete segments after each call,
+// and send them:
 //   while ((segment = selfcal_builder_take(builder)) != NULL) {
 //     selfcal_stream_send(stream, segment, &error);
 //   }

@@ -5,9 +5,9 @@
 #include <unordered_set>
 #include <utility>
 
-#include "client/selfcal/state_time.h"
 #include "client/selfcal/track_positions.h"
 #include "core/calibration/problem.h"
+#include "core/factor/state_time.h"
 
 namespace selfcal::client {
 namespace {
@@ -211,13 +211,7 @@ MotionSegment Assemble(const ClosedSegment& closed,
   segment.calibration_version = closed.calibration_version;
   segment.temperature_c = closed.temperature_c;
   segment.keyframes = StatesAtImages(closed);
-  if (!closed.keyframes.empty()) {
-    const ObservedKeyframe& first = closed.keyframes.front();
-    segment.imu = ImuBetween(
-        closed.imu,
-        first.state.t_ns + std::min<std::int64_t>(first.state_offset_ns, 0),
-        closed.end_ns);
-  }
+  segment.imu = ImuBetween(closed.imu, closed.begin_ns, closed.end_ns);
   const KeyframeSightings sightings = WithoutDuplicates(closed.keyframes);
   Landmarks landmarks(sightings, closed.min_observations);
   landmarks.CompletePositions(

@@ -47,7 +47,9 @@ struct ClosedSegment {
   std::vector<ObservedKeyframe> keyframes;  // at least one, in order of time
   // Strictly increasing in time; samples far outside the segment are excluded.
   std::vector<ImuSample> imu;
-  std::int64_t end_ns = 0;  // time to which the segment's samples reach
+  // Times from and to which the samples are part of the segment.
+  std::int64_t begin_ns = 0;
+  std::int64_t end_ns = 0;
   std::optional<double> temperature_c = std::nullopt;  // of the device
   // The calibration that the SLAM system used, a valid one, or null if it is
   // not known: then landmarks without a position are left out, and states are

@@ -35,6 +35,16 @@ std::uint64_t Elapsed(std::int64_t later_ns, std::int64_t earlier_ns) {
          static_cast<std::uint64_t>(earlier_ns);
 }
 
+// Times that saturate at the ends of the type.
+std::int64_t Earlier(std::int64_t t_ns, std::int64_t by_ns) {
+  constexpr auto kLowest = std::numeric_limits<std::int64_t>::min();
+  return t_ns < kLowest + by_ns ? kLowest : t_ns - by_ns;
+}
+std::int64_t Later(std::int64_t t_ns, std::int64_t by_ns) {
+  constexpr auto kHighest = std::numeric_limits<std::int64_t>::max();
+  return t_ns > kHighest - by_ns ? kHighest : t_ns + by_ns;
+}
+
 bool Before(const ImuSample& sample, std::int64_t t_ns) {
   return sample.t_ns < t_ns;
 }
@@ -45,6 +55,7 @@ struct SegmentBuilder::State {
   SegmentBuilderOptions options;
   std::uint64_t max_gap_ns;
   std::uint64_t seconds_ns;
+  std::int64_t padding_ns;
   std::int64_t next_index;
   Estimation estimation;
   bool healthy = true;
@@ -52,8 +63,12 @@ struct SegmentBuilder::State {
   // Keyframes of the current segment and, while IMU samples lag behind, of
   // later ones.
   std::vector<PendingKeyframe> keyframes;
-  // Samples from the last one at or before the first keyframe.
+  // Samples from padding_ns before the first keyframe on.
   std::vector<ImuSample> imu;
+  // Time of the last sample of the newest segment, and of the keyframe that
+  // followed it when it was closed.
+  std::optional<std::int64_t> reach_ns;
+  std::optional<std::int64_t> successor_ns;
   std::optional<std::int64_t> last_keyframe_ns;
   std::optional<double> temperature_c;
   std::deque<ClosedSegment> closed;
@@ -63,6 +78,7 @@ struct SegmentBuilder::State {
       : options(given),
         max_gap_ns(static_cast<std::uint64_t>(Nanoseconds(given.max_gap_s))),
         seconds_ns(static_cast<std::uint64_t>(Nanoseconds(given.seconds))),
+        padding_ns(Nanoseconds(given.padding_s)),
         next_index(given.first_index) {
     estimation.version = given.calibration_version;
     if (given.theta) SetTheta(*given.theta);
@@ -80,6 +96,7 @@ struct SegmentBuilder::State {
     if (healthy) {
       filter.StartNewIds();
     } else {
+      CloseWhatIs(/*padded=*/false);
       statistics.keyframes_unhealthy += keyframes.size();
       keyframes.clear();
     }
@@ -116,15 +133,37 @@ struct SegmentBuilder::State {
     return first == imu.begin() || at ? first : first - 1;
   }
 
+  // True if the newest segment has samples up to the first keyframe, which did
+  // not follow it directly: the daemon would join them, although tracking was
+  // lost between them.
+  bool SeemsToFollow() const {
+    const std::int64_t first_ns = keyframes.front().t_ns();
+    return reach_ns && *reach_ns >= first_ns && successor_ns != first_ns;
+  }
+
+  // Time to which samples are needed for a segment of the first n keyframes: it
+  // is joined with the keyframe after it.
+  std::int64_t EndOf(std::size_t n) const {
+    const std::int64_t end_ns = keyframes[n - 1].end_ns();
+    return n < keyframes.size() ? std::max(keyframes[n].t_ns(), end_ns)
+                                : end_ns;
+  }
+
+  std::int64_t PaddedEndOf(std::size_t n) const {
+    return std::max(EndOf(n), Later(keyframes[n - 1].end_ns(), padding_ns));
+  }
+
   // Closes a segment of the first `size` keyframes, with samples up to
   // `end_ns`.
   void Close(std::size_t size, std::int64_t end_ns) {
     // Allocations come first: if one fails, nothing has changed.
     ClosedSegment segment;
-    segment.key = {options.session, next_index};
+    const std::int64_t index = next_index + (SeemsToFollow() ? 1 : 0);
+    segment.key = {options.session, index};
     segment.calibration_version = keyframes.front().estimation.version;
     segment.min_observations = options.min_observations;
     segment.temperature_c = temperature_c;
+    segment.begin_ns = Earlier(keyframes.front().begin_ns(), padding_ns);
     segment.end_ns = end_ns;
     segment.theta = keyframes[size - 1].estimation.theta;
     segment.pixel_sigma_px = options.pixel_sigma_px;
@@ -142,9 +181,17 @@ struct SegmentBuilder::State {
     const std::int64_t next_begin_ns =
         keyframes.empty() ? end_ns
                           : std::min(end_ns, keyframes.front().begin_ns());
-    next_imu.insert(next_imu.end(), SampleBefore(next_begin_ns), imu.end());
+    next_imu.insert(next_imu.end(),
+                    SampleBefore(Earlier(next_begin_ns, padding_ns)),
+                    imu.end());
     closed.back().imu = std::exchange(imu, std::move(next_imu));
-    ++next_index;
+    const std::vector<ImuSample>& sent = closed.back().imu;
+    const auto last =
+        std::lower_bound(sent.begin(), sent.end(), end_ns, Before);
+    reach_ns = last == sent.end() ? sent.back().t_ns : last->t_ns;
+    successor_ns.reset();
+    if (!keyframes.empty()) successor_ns = keyframes.front().t_ns();
+    next_index = index + 1;
     ++statistics.segments;
   }
 
@@ -164,28 +211,29 @@ struct SegmentBuilder::State {
     keyframes.erase(keyframes.begin(), end);
   }
 
-  void CloseWhatIs() {
+  // Closes the segments whose samples have arrived, with the padding or as far
+  // as it has arrived.
+  void CloseWhatIs(bool padded = true) {
     DropUncovered();
     while (const auto size = ClosedSize()) {
       if (*size < 2) {
         DropBefore(keyframes.begin() + 1);
         continue;
       }
-      const std::int64_t end_ns =
-          std::max(keyframes[*size].t_ns(), keyframes[*size - 1].end_ns());
-      if (!ImuReaches(end_ns)) return;
+      const std::int64_t end_ns = PaddedEndOf(*size);
+      if (!ImuReaches(padded ? end_ns : EndOf(*size))) return;
       Close(*size, end_ns);
     }
   }
 
   void Flush(int min_keyframes) {
-    CloseWhatIs();
+    CloseWhatIs(/*padded=*/false);
     std::size_t covered = keyframes.size();
     while (covered > 0 && !ImuReaches(keyframes[covered - 1].end_ns())) {
       --covered;
     }
     if (covered >= static_cast<std::size_t>(std::max(min_keyframes, 2))) {
-      Close(covered, keyframes[covered - 1].end_ns());
+      Close(covered, Later(keyframes[covered - 1].end_ns(), padding_ns));
     }
     DropBefore(keyframes.end());
   }
@@ -216,7 +264,7 @@ bool SegmentBuilder::State::AddImu(const ImuSample& sample) {
   if (keyframes.empty() && Elapsed(sample.t_ns, lowest) > max_gap_ns &&
       Elapsed(sample.t_ns, imu.front().t_ns) > 2 * max_gap_ns) {
     const auto oldest = sample.t_ns - static_cast<std::int64_t>(max_gap_ns);
-    imu.erase(imu.begin(), SampleBefore(oldest));
+    imu.erase(imu.begin(), SampleBefore(Earlier(oldest, padding_ns)));
   }
   return true;
 }

@@ -4,8 +4,10 @@
 // order of time; either stream may run ahead of the other by up to max_gap_s. A
 // segment is complete when it has its number of keyframes (or seconds), the
 // keyframe after it has arrived, and the IMU samples have reached that
-// keyframe: these samples belong to the segment, so that neighbours can be
-// joined. Take complete segments after each call:
+// keyframe, and padding_s beyond the last one of the segment: these samples
+// belong to the segment, so that neighbours can be joined, and no motion about
+// a keyframe is extrapolated. Samples about the first keyframe of the next
+// segment are part of both. Take complete segments after each call:
 //
 //   builder.AddImu(sample);
 //   builder.AddKeyframe(state, observations);
@@ -64,6 +66,9 @@ struct SegmentBuilderOptions {
   // Standard deviation of an observation, used in triangulation.
   double pixel_sigma_px = 1;
   double gravity_mps2 = 9.81;  // of the SLAM system, along -z of G
+  // A segment has the samples of this time before its first keyframe, and after
+  // its last one, as far as there are any when it is flushed.
+  double padding_s = kImuPadding_s;
 };
 
 struct SegmentBuilderStatistics {
@@ -151,11 +156,12 @@ class SegmentBuilder {
   // Ends the current segment, at the end of a session or where tracking was
   // lost. It is complete if the IMU samples cover at least
   // max(2, min_keyframes) of its keyframes, otherwise it is dropped. The
-  // builder continues with a new segment of the same session, with the next
-  // index.
+  // builder continues with a new segment of the same session. Its index is the
+  // next one; it is one more if the flushed segment has samples up to its first
+  // keyframe, so that they are not joined.
   void Flush(int min_keyframes) noexcept;
 
-  // Index of the next segment.
+  // Least index of the next segment.
   std::int64_t next_index() const noexcept;
   SegmentBuilderStatistics statistics() const noexcept;
 

@@ -106,7 +106,7 @@ void SegmentScorer::Score(const Rig& rig,
   result->theta0 = theta0;
   result->residuals = selection.statistics;
   result->residuals.inertial_rms = linearised.inertial_rms;
-  const SampleGaps gaps = FindGaps(segment.imu);
+  const SampleGaps gaps = FindGaps(SamplesBetweenKeyframes(segment));
   result->residuals.imu_gaps = gaps.count;
   result->residuals.longest_imu_gap_s = gaps.longest_s;
   SketchLandmarks(segment, selection.inliers, &result->landmarks);

@@ -15,17 +15,17 @@ bool IsSaturated(const ImuSample& sample, const ImuFullScale& full_scale) {
 
 }  // namespace
 
-std::size_t CountSaturatedReadings(const MotionSegment& segment,
+std::size_t CountSaturatedReadings(std::span<const ImuSample> samples,
                                    const ImuFullScale& full_scale) {
   return static_cast<std::size_t>(std::count_if(
-      segment.imu.begin(), segment.imu.end(), [&](const ImuSample& sample) {
+      samples.begin(), samples.end(), [&](const ImuSample& sample) {
         return IsSaturated(sample, full_scale);
       }));
 }
 
-bool IsTooSaturated(const MotionSegment& segment, std::size_t count) {
+bool IsTooSaturated(std::span<const ImuSample> samples, std::size_t count) {
   return static_cast<double>(count) >
-         kMaxSaturatedFraction * static_cast<double>(segment.imu.size());
+         kMaxSaturatedFraction * static_cast<double>(samples.size());
 }
 
 void RemoveSaturatedReadings(const ImuFullScale& full_scale,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "core/model/rig.h"
 #include "core/model/segment.h"
@@ -14,12 +15,12 @@ namespace selfcal {
 // wrong unit, or from a full scale that the rig does not state.
 inline constexpr double kMaxSaturatedFraction = 0.02;
 
-std::size_t CountSaturatedReadings(const MotionSegment& segment,
+// Of all readings, or of those between keyframes, which no other segment has.
+std::size_t CountSaturatedReadings(std::span<const ImuSample> samples,
                                    const ImuFullScale& full_scale);
 
-// True if `count` of the segment's readings are more than
-// kMaxSaturatedFraction.
-bool IsTooSaturated(const MotionSegment& segment, std::size_t count);
+// True if `count` of these readings are more than kMaxSaturatedFraction.
+bool IsTooSaturated(std::span<const ImuSample> samples, std::size_t count);
 
 void RemoveSaturatedReadings(const ImuFullScale& full_scale,
                              MotionSegment* segment);

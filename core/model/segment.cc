@@ -1,5 +1,7 @@
 #include "core/model/segment.h"
 
+#include <algorithm>
+
 #include "core/model/so3.h"
 
 namespace selfcal {
@@ -14,6 +16,25 @@ KeyframeState BoxPlus(const KeyframeState& state,
   moved.b_a += delta.segment<3>(kStateAccelBias);
   moved.b_g += delta.segment<3>(kStateGyroBias);
   return moved;
+}
+
+std::span<const ImuSample> SamplesBetweenKeyframes(
+    const MotionSegment& segment) {
+  const std::vector<ImuSample>& imu = segment.imu;
+  if (segment.keyframes.empty()) return imu;
+  const auto later = [](std::int64_t t_ns, const ImuSample& sample) {
+    return t_ns < sample.t_ns;
+  };
+  const auto earlier = [](const ImuSample& sample, std::int64_t t_ns) {
+    return sample.t_ns < t_ns;
+  };
+  auto first = std::upper_bound(
+      imu.begin(), imu.end(), segment.keyframes.front().t_ns, later);
+  if (first != imu.begin()) --first;
+  auto end = std::lower_bound(
+      first, imu.end(), segment.keyframes.back().t_ns, earlier);
+  if (end != imu.end()) ++end;
+  return {first, end};
 }
 
 }  // namespace selfcal

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,12 @@ struct SegmentKey {
   friend auto operator<=>(const SegmentKey&, const SegmentKey&) = default;
 };
 
+// Time by which the samples of a segment should extend beyond its first and its
+// last keyframe: a camera may be exposed up to 0.1 s before or after the stamp
+// of its image, the last row of an image 35 ms after the first, and the rate at
+// an exposure is that of the 15 ms about it.
+inline constexpr double kImuPadding_s = 0.15;
+
 struct MotionSegment {
   SegmentKey key;
   // Version of the calibration with which the SLAM system estimated the states;
@@ -73,8 +80,9 @@ struct MotionSegment {
   std::int64_t calibration_version = 1;
   std::vector<KeyframeState> keyframes;  // strictly increasing in time
   // Strictly increasing in time, from at or before the first keyframe to at or
-  // after the last. If the next segment of the session follows directly, the
-  // samples extend to its first keyframe, so that neighbours can be joined.
+  // after the last, and beyond both by kImuPadding_s where there are samples.
+  // If the next segment of the session follows directly, with the next index,
+  // the samples extend to its first keyframe, so that neighbours can be joined.
   std::vector<ImuSample> imu;
   std::vector<Landmark> landmarks;        // ids distinct
   std::vector<Observation> observations;  // any order, at most one for each
@@ -82,6 +90,13 @@ struct MotionSegment {
   // Temperature of the device in degrees Celsius, if known.
   std::optional<double> temperature_c = std::nullopt;
 };
+
+// Samples from the last at or before the first keyframe to the first at or
+// after the last one. Neighbouring segments share at most the sample between
+// them, unlike those of `imu`, which overlap: statistics use these. All samples
+// if there is no keyframe.
+std::span<const ImuSample> SamplesBetweenKeyframes(
+    const MotionSegment& segment);
 
 // One violated rule: the field, and what to do.
 struct Violation {

@@ -35,8 +35,9 @@ struct Counts {
 std::int64_t MedianStep(std::span<const MotionSegment> segments) {
   std::vector<std::int64_t> steps;
   for (const MotionSegment& segment : segments) {
-    for (std::size_t i = 1; i < segment.imu.size(); ++i) {
-      const std::int64_t step = segment.imu[i].t_ns - segment.imu[i - 1].t_ns;
+    const std::span<const ImuSample> imu = SamplesBetweenKeyframes(segment);
+    for (std::size_t i = 1; i < imu.size(); ++i) {
+      const std::int64_t step = imu[i].t_ns - imu[i - 1].t_ns;
       if (step > 0) steps.push_back(step);
     }
   }
@@ -46,10 +47,11 @@ std::int64_t MedianStep(std::span<const MotionSegment> segments) {
 Counts Count(std::span<const MotionSegment> segments, double usual_ns) {
   Counts counts;
   for (const MotionSegment& segment : segments) {
-    counts.samples += segment.imu.size();
-    for (std::size_t i = 1; i < segment.imu.size(); ++i) {
-      const ImuSample& a = segment.imu[i - 1];
-      const ImuSample& b = segment.imu[i];
+    const std::span<const ImuSample> imu = SamplesBetweenKeyframes(segment);
+    counts.samples += imu.size();
+    for (std::size_t i = 1; i < imu.size(); ++i) {
+      const ImuSample& a = imu[i - 1];
+      const ImuSample& b = imu[i];
       const auto step = static_cast<double>(b.t_ns - a.t_ns);
       if (step <= 0) ++counts.bad_stamps;
       if (a.gyro == b.gyro && a.accel == b.accel) ++counts.equal_readings;

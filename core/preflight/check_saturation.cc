@@ -39,13 +39,14 @@ struct Extent {
 Extent Measure(std::span<const MotionSegment> segments) {
   Extent extent;
   for (const MotionSegment& segment : segments) {
-    for (std::size_t i = 0; i < segment.imu.size(); ++i) {
-      const Reading reading = ReadingOf(segment.imu[i]);
+    const std::span<const ImuSample> imu = SamplesBetweenKeyframes(segment);
+    for (std::size_t i = 0; i < imu.size(); ++i) {
+      const Reading reading = ReadingOf(imu[i]);
       if (!reading.allFinite()) continue;
       extent.low = extent.low.cwiseMin(reading);
       extent.high = extent.high.cwiseMax(reading);
       if (i == 0) continue;
-      const Reading step = (reading - ReadingOf(segment.imu[i - 1])).cwiseAbs();
+      const Reading step = (reading - ReadingOf(imu[i - 1])).cwiseAbs();
       for (int axis = 0; axis < 6; ++axis) {
         if (step[axis] > 0 && step[axis] < extent.step[axis]) {
           extent.step[axis] = step[axis];
@@ -74,7 +75,7 @@ Pile CountPile(std::span<const MotionSegment> segments,
   Pile pile;
   for (const MotionSegment& segment : segments) {
     Eigen::Vector3d last = Eigen::Vector3d::Constant(std::nan(""));
-    for (const ImuSample& sample : segment.imu) {
+    for (const ImuSample& sample : SamplesBetweenKeyframes(segment)) {
       const Eigen::Vector3d& reading = axis < 3 ? sample.gyro : sample.accel;
       if (reading == last) continue;
       last = reading;
@@ -112,7 +113,9 @@ void Report(int axis,
 void CheckSaturation(std::span<const MotionSegment> segments,
                      Diagnosis* diagnosis) {
   std::size_t samples = 0;
-  for (const MotionSegment& segment : segments) samples += segment.imu.size();
+  for (const MotionSegment& segment : segments) {
+    samples += SamplesBetweenKeyframes(segment).size();
+  }
   if (samples == 0) {
     diagnosis->not_checked.push_back("saturation: no samples");
     return;

@@ -1,5 +1,6 @@
 #include "core/simulation/rotation_rates.h"
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 namespace selfcal {

@@ -92,14 +92,27 @@ class Cutter {
     truth->keyframes.assign(recording_.truth.begin() + begin,
                             recording_.truth.begin() + end);
     const std::vector<ImuSample>& imu = recording_.imu.measured;
-    const std::size_t from = SampleBefore(imu, recording_.truth[begin].t_ns);
+    const auto add = [&](std::size_t i) {
+      segment->imu.push_back(imu[i]);
+      truth->imu.push_back(recording_.imu.noise_free[i]);
+    };
+    const std::int64_t begin_ns = recording_.truth[begin].t_ns;
+    const std::size_t from = SampleBefore(imu, begin_ns);
     const std::int64_t to_ns = recording_.truth[imu_end].t_ns;
     std::size_t to = SampleBefore(imu, to_ns);
     if (imu[to].t_ns < to_ns) ++to;
+    const auto padding_ns =
+        static_cast<std::int64_t>(std::llround(options_.imu_padding_s * 1e9));
+    const std::int64_t padded_ns =
+        std::max(begin_ns - padding_ns, imu.front().t_ns);
+    for (std::size_t i = SampleBefore(imu, padded_ns); i < from; ++i) add(i);
     for (const std::size_t i :
          SamplesThatArrive(imu, from, to, options_, &lost_samples_)) {
-      segment->imu.push_back(imu[i]);
-      truth->imu.push_back(recording_.imu.noise_free[i]);
+      add(i);
+    }
+    const std::int64_t last_ns = recording_.truth[end - 1].t_ns + padding_ns;
+    for (std::size_t i = to; i + 1 < imu.size() && imu[i].t_ns < last_ns; ++i) {
+      add(i + 1);
     }
   }
 

@@ -55,6 +55,9 @@ struct SimulationOptions {
   // are never lost.
   double imu_lost_fraction = 0;
   double imu_gap_s = 0;
+  // Time before its first and after its last keyframe of which a segment has
+  // the samples, within the trajectory: there none is lost.
+  double imu_padding_s = kImuPadding_s;
   // Errors of the SLAM system, one standard deviation. Most of each drifts
   // slowly, a small part is independent in every keyframe.
   double slam_rotation_rad = 2e-3;  // roll and pitch; yaw drifts 3 times as far

@@ -95,14 +95,14 @@ absl::StatusOr<SegmentInformation> ScoreByCore(
   }
 }
 
-SubmitResult TooSaturated(const MotionSegment& segment, std::size_t saturated) {
+SubmitResult TooSaturated(std::size_t samples, std::size_t saturated) {
   return {SubmitResult::Verdict::kRejected,
           {{"imu",
             fmt::format("{} of {} readings are at or beyond the full scale; "
                         "send rad/s and m/s^2, and state the range of the "
                         "sensors as imu.gyro_max and imu.accel_max of the rig",
                         saturated,
-                        segment.imu.size())}}};
+                        samples)}}};
 }
 
 // Connects the three kinds of threads, and does on the caller's thread what
@@ -193,11 +193,12 @@ class PipelineImpl : public Pipeline {
     const ImuFullScale& full_scale = stored_rig->rig.imu_full_scale;
     const std::size_t stray =
         CountStrayObservations(segment, factory, options_.limits);
-    const std::size_t saturated = CountSaturatedReadings(segment, full_scale);
-    if (IsTooSaturated(segment, saturated)) {
-      return done(TooSaturated(segment, saturated));
+    const std::span<const ImuSample> samples = SamplesBetweenKeyframes(segment);
+    const std::size_t saturated = CountSaturatedReadings(samples, full_scale);
+    if (IsTooSaturated(samples, saturated)) {
+      return done(TooSaturated(samples.size(), saturated));
     }
-    if (stray == 0 && saturated == 0) {
+    if (stray == 0 && CountSaturatedReadings(segment.imu, full_scale) == 0) {
       return BeginStore(rig, factory, segment, cancelled, done);
     }
     MotionSegment rest = segment;

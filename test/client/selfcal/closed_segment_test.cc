@@ -27,6 +27,7 @@ class AssembledSegment : public ::testing::Test {
         MakeFilterSession({truth_}, theta_, *trajectory);
     closed_.key = {"s", 0};
     closed_.imu = session.imu;
+    closed_.begin_ns = session.imu.front().t_ns;
     closed_.end_ns = session.imu.back().t_ns;
     closed_.theta = std::make_shared<const Calibration>(theta_);
     for (const FilterStep& step : session.steps) {

@@ -181,21 +181,27 @@ TEST(SegmentBuilder, BuildsSegmentsThatAreValid) {
   }
 }
 
-TEST(SegmentBuilder, GivesEachSegmentTheSamplesUpToItsSuccessor) {
+TEST(SegmentBuilder, GivesEachSegmentTheSamplesUpToItsSuccessorAndThePadding) {
   std::mt19937 random(3);
   for (int trial = 0; trial < 60; ++trial) {
     const Session session = RandomSession(random, 100);
     SegmentBuilderOptions options = Options();
+    if (trial % 2 == 0) options.padding_s = 0;
+    const auto padding_ns =
+        static_cast<std::int64_t>(options.padding_s * 1000) * kMs;
     options.keyframes = 2 + static_cast<int>(random() % 40);
     const std::int64_t delay = (static_cast<int>(random() % 600) - 300) * kMs;
     const auto segments = Build(session, options, delay);
     std::size_t next = 0;
     for (const MotionSegment& segment : segments) {
       next += segment.keyframes.size();
-      const std::int64_t end =
-          session.states[std::min(next, session.states.size() - 1)].t_ns;
-      EXPECT_EQ(Times(segment.imu),
-                Covering(session.imu, segment.keyframes.front().t_ns, end));
+      const std::int64_t end = std::max(
+          session.states[std::min(next, session.states.size() - 1)].t_ns,
+          segment.keyframes.back().t_ns + padding_ns);
+      EXPECT_EQ(
+          Times(segment.imu),
+          Covering(
+              session.imu, segment.keyframes.front().t_ns - padding_ns, end));
     }
   }
 }
@@ -294,14 +300,36 @@ class RegularStream : public ::testing::Test {
 };
 
 TEST_F(RegularStream, WaitsForTheSampleThatReachesTheNextSegment) {
-  for (int k = 0; k < 6; ++k) ASSERT_TRUE(AddKeyframe(100 * k));
-  AddImuUntil(450);
+  for (int k = 0; k < 5; ++k) ASSERT_TRUE(AddKeyframe(100 * k));
+  ASSERT_TRUE(AddKeyframe(600));
+  AddImuUntil(550);
   EXPECT_FALSE(builder_.Take().has_value());
-  AddImuUntil(500);
+  AddImuUntil(600);
   const auto segment = builder_.Take();
   ASSERT_TRUE(segment.has_value());
   EXPECT_EQ(segment->keyframes.size(), 5u);
-  EXPECT_EQ(segment->imu.back().t_ns, 500 * kMs);
+  EXPECT_EQ(segment->imu.back().t_ns, 600 * kMs);
+  EXPECT_FALSE(builder_.Take().has_value());
+}
+
+// No motion about a keyframe is extrapolated: samples before the first one and
+// after the last one belong to the segment.
+TEST_F(RegularStream, WaitsForThePaddingAfterTheLastKeyframe) {
+  for (int k = 10; k < 16; ++k) ASSERT_TRUE(AddKeyframe(100 * k));
+  AddImuUntil(1500);
+  EXPECT_FALSE(builder_.Take().has_value()) << "0.15 s after 1400 ms";
+  AddImuUntil(1550);
+  const auto segment = builder_.Take();
+  ASSERT_TRUE(segment.has_value());
+  EXPECT_EQ(segment->keyframes.size(), 5u);
+  EXPECT_EQ(segment->imu.front().t_ns, 850 * kMs);
+  EXPECT_EQ(segment->imu.back().t_ns, 1550 * kMs);
+  for (int k = 16; k < 21; ++k) ASSERT_TRUE(AddKeyframe(100 * k));
+  AddImuUntil(3000);
+  const auto next = builder_.Take();
+  ASSERT_TRUE(next.has_value());
+  EXPECT_EQ(next->key.index, 1);
+  EXPECT_EQ(next->imu.front().t_ns, 1350 * kMs) << "overlaps";
   EXPECT_FALSE(builder_.Take().has_value());
 }
 
@@ -374,8 +402,7 @@ TEST_F(RegularStream, FlushesTheRestIfItIsLongEnough) {
   ASSERT_TRUE(rest.has_value());
   EXPECT_EQ(rest->key.index, 1);
   EXPECT_EQ(rest->keyframes.size(), 3u);
-  EXPECT_EQ(rest->imu.back().t_ns, 700 * kMs)
-      << "not joined with what comes after the loss of tracking";
+  EXPECT_EQ(rest->imu.back().t_ns, 850 * kMs);
 
   for (int k = 8; k < 10; ++k) AddKeyframe(100 * k);
   builder_.Flush(3);
@@ -384,6 +411,22 @@ TEST_F(RegularStream, FlushesTheRestIfItIsLongEnough) {
   EXPECT_EQ(builder_.next_index(), 2) << "no index is left out";
   builder_.Flush(0);
   EXPECT_FALSE(builder_.Take().has_value()) << "nothing is not a segment";
+}
+
+// Samples up to the next keyframe would join a segment with what comes after
+// the loss of tracking.
+TEST_F(RegularStream, LeavesOutAnIndexIfTrackingWasLostBeforeTheNextKeyframe) {
+  AddImuUntil(3000);
+  for (int k = 0; k < 4; ++k) AddKeyframe(100 * k);
+  builder_.Flush(3);
+  const auto before = builder_.Take();
+  ASSERT_TRUE(before.has_value());
+  EXPECT_EQ(before->imu.back().t_ns, 450 * kMs);
+  for (int k = 4; k < 10; ++k) AddKeyframe(100 * k);
+  EXPECT_EQ(builder_.Take()->key.index, 2) << "400 ms is within its samples";
+  builder_.Flush(0);
+  for (int k = 12; k < 18; ++k) AddKeyframe(100 * k);
+  EXPECT_EQ(builder_.Take()->key.index, 3) << "1200 ms is beyond 950 ms";
 }
 
 TEST_F(RegularStream, FlushLeavesOutKeyframesThatNoSampleCovers) {
@@ -420,7 +463,7 @@ TEST_F(RegularStream, EndsASegmentAtAGapBetweenKeyframes) {
   const auto next = builder_.Take();
   ASSERT_TRUE(next.has_value());
   EXPECT_EQ(next->keyframes.size(), 4u);
-  EXPECT_EQ(next->imu.front().t_ns, 58'000 * kMs);
+  EXPECT_EQ(next->imu.front().t_ns, 57'850 * kMs);
 }
 
 TEST_F(RegularStream, ASwitchOfTheVersionEndsTheSegmentAndLosesNothing) {
@@ -435,7 +478,7 @@ TEST_F(RegularStream, ASwitchOfTheVersionEndsTheSegmentAndLosesNothing) {
   EXPECT_EQ(before->calibration_version, 1);
   EXPECT_EQ(before->key.index, 0);
   EXPECT_EQ(before->keyframes.size(), 3u);
-  EXPECT_EQ(before->imu.back().t_ns, 300 * kMs) << "joined with the next";
+  EXPECT_EQ(before->imu.back().t_ns, 350 * kMs) << "joined with the next";
   const auto after = builder_.Take();
   ASSERT_TRUE(after.has_value());
   EXPECT_EQ(after->calibration_version, 2);
@@ -478,8 +521,19 @@ TEST_F(RegularStream, SendsNothingOfAnUnhealthyFilter) {
   ASSERT_TRUE(next.has_value());
   EXPECT_EQ(next->key.index, 1);
   EXPECT_EQ(next->keyframes.front().t_ns, 1500 * kMs);
-  EXPECT_EQ(next->imu.front().t_ns, 1500 * kMs);
+  EXPECT_EQ(next->imu.front().t_ns, 1350 * kMs);
   EXPECT_EQ(builder_.statistics().keyframes_dropped, 0u);
+}
+
+TEST_F(RegularStream, ASegmentThatWaitsForItsPaddingOutlivesTheFilter) {
+  for (int k = 0; k < 6; ++k) AddKeyframe(100 * k);
+  AddImuUntil(500);
+  EXPECT_FALSE(builder_.Take().has_value());
+  builder_.SetHealthy(false);
+  const auto segment = builder_.Take();
+  ASSERT_TRUE(segment.has_value());
+  EXPECT_EQ(segment->keyframes.size(), 5u);
+  EXPECT_EQ(segment->imu.back().t_ns, 500 * kMs);
 }
 
 // Ids of the landmarks of the next segment.
@@ -569,7 +623,7 @@ TEST_F(RegularStream, WaitsForTheSamplesThatMoveAState) {
   ASSERT_TRUE(covered.has_value());
   EXPECT_EQ(covered->keyframes.size(), 4u) << "the state of the fifth is later";
   EXPECT_EQ(covered->keyframes.back().t_ns, 300 * kMs);
-  EXPECT_EQ(covered->imu.back().t_ns, 350 * kMs);
+  EXPECT_EQ(covered->imu.back().t_ns, 400 * kMs) << "all that there is";
 }
 
 TEST_F(RegularStream, SendsTheSamplesFromAStateBeforeItsImageOn) {
@@ -579,10 +633,13 @@ TEST_F(RegularStream, SendsTheSamplesFromAStateBeforeItsImageOn) {
     state.t_ns = (100 * k - 30) * kMs;
     ASSERT_TRUE(builder_.AddKeyframe(state, 100 * k * kMs, {}));
   }
-  for (const std::int64_t begin_ms : {50, 550}) {
+  // From 150 ms before the states, at 70 and 570 ms.
+  for (const auto& [keyframe_ms, begin_ms] :
+       std::vector<std::pair<std::int64_t, std::int64_t>>{{100, 0},
+                                                          {600, 400}}) {
     const auto segment = builder_.Take();
     ASSERT_TRUE(segment.has_value());
-    EXPECT_EQ(segment->keyframes.front().t_ns, (begin_ms + 50) * kMs);
+    EXPECT_EQ(segment->keyframes.front().t_ns, keyframe_ms * kMs);
     EXPECT_EQ(segment->imu.front().t_ns, begin_ms * kMs);
   }
 }

@@ -153,6 +153,37 @@ TEST(MeasureMotion, MovesThePoseToEachRowOfARollingShutter) {
   }
 }
 
+// Samples for kImuPadding_s about a keyframe are as good as all of them, at
+// exposures up to 0.1 s before it and 0.135 s after it.
+TEST(MeasureMotion, NeedsNoSamplesBeyondThePadding) {
+  RandomValues random(9);
+  const auto padding_ns = static_cast<std::int64_t>(kImuPadding_s * 1e9);
+  double worst_px = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Scene scene(random);
+    const double dt_s = random.Uniform(-0.1, 0.135);
+    const KeyframeMotion all = scene.Measure(dt_s);
+    Scene beside = scene;  // only the samples on the other side
+    std::erase_if(scene.samples, [&](const ImuSample& sample) {
+      return std::abs(sample.t_ns - kKeyframe_ns) > padding_ns;
+    });
+    std::erase_if(beside.samples, [&](const ImuSample& sample) {
+      return (sample.t_ns > kKeyframe_ns) == (dt_s > 0);
+    });
+    const KeyframeMotion padded = scene.Measure(dt_s);
+    EXPECT_EQ(padded.turn.coeffs(), all.turn.coeffs());
+    EXPECT_EQ(padded.shift_I, all.shift_I);
+    EXPECT_EQ(padded.v_I, all.v_I);
+    EXPECT_EQ(padded.w_I, all.w_I);
+    worst_px = std::max(
+        worst_px,
+        ErrorPixels(
+            MovePose(scene.x.q_GI, scene.x.p_GI, beside.Measure(dt_s), dt_s),
+            scene.Truth(dt_s)));
+  }
+  EXPECT_GT(worst_px, 10) << "the padding matters";
+}
+
 TEST(MeasureMotion, WithoutAnOffsetThePoseStays) {
   RandomValues random(4);
   const Scene scene(random);

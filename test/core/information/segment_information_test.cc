@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -61,6 +62,42 @@ TEST(ScoreSegment, DoesNotDependOnTheKeyframeThatHoldsTheGauge) {
           ScoreSegment(rig, rig.factory, segment, options), first, 1e-6);
     }
   }
+}
+
+// Samples beyond the keyframes change neither what is integrated between them
+// nor any statistic.
+TEST(ScoreSegment, DoesNotDependOnThePaddingWithoutATimeOffset) {
+  const Rig rig = HandheldRig("handheld");
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const MotionSegment padded = MovingSegment(rig, seed);
+    MotionSegment bare = padded;
+    const auto between = SamplesBetweenKeyframes(padded);
+    bare.imu.assign(between.begin(), between.end());
+    ASSERT_LT(bare.imu.size(), padded.imu.size());
+    const SegmentInformation with = Score(rig, padded);
+    const SegmentInformation without = Score(rig, bare);
+    EXPECT_EQ(with.Lambda, without.Lambda);
+    EXPECT_EQ(with.eta, without.eta);
+    EXPECT_EQ(with.residuals.fit, without.residuals.fit);
+    ExpectSameScores(with, without, 0);
+  }
+}
+
+TEST(ScoreSegment, CountsGapsBetweenItsKeyframesOnly) {
+  const Rig rig = HandheldRig("handheld");
+  MotionSegment segment = MovingSegment(rig, 1);
+  const std::int64_t last_ns = segment.keyframes.back().t_ns;
+  const auto after = std::find_if(
+      segment.imu.begin(), segment.imu.end(), [&](const ImuSample& sample) {
+        return sample.t_ns > last_ns + 20'000'000;
+      });
+  ASSERT_GT(segment.imu.end() - after, 10);
+  segment.imu.erase(after, after + 5);
+  EXPECT_EQ(Score(rig, segment).residuals.imu_gaps, 0);
+  const auto middle =
+      segment.imu.begin() + static_cast<std::ptrdiff_t>(segment.imu.size() / 2);
+  segment.imu.erase(middle, middle + 5);
+  EXPECT_EQ(Score(rig, segment).residuals.imu_gaps, 1);
 }
 
 TEST(ScoreSegment, AtRestDoesNotDependOnTheGaugeEither) {

@@ -31,17 +31,17 @@ TEST(Saturation, ReadingsAtOrBeyondTheFullScaleAreRemoved) {
   segment.imu[51].gyro.x() = std::numeric_limits<double>::infinity();
   segment.imu[70].gyro.x() = 9.999;
   segment.imu[71].accel.x() = -49.999;
-  EXPECT_EQ(CountSaturatedReadings(segment, full_scale), 2u);
+  EXPECT_EQ(CountSaturatedReadings(segment.imu, full_scale), 2u);
   RemoveSaturatedReadings(full_scale, &segment);
   ASSERT_EQ(segment.imu.size(), 98u);
-  EXPECT_EQ(CountSaturatedReadings(segment, full_scale), 0u);
+  EXPECT_EQ(CountSaturatedReadings(segment.imu, full_scale), 0u);
   EXPECT_EQ(segment.imu[3].t_ns, 4);
   EXPECT_EQ(segment.imu[49].t_ns, 51);
 }
 
 TEST(Saturation, MoreThanOneInFiftyIsNoShock) {
-  EXPECT_FALSE(IsTooSaturated(Calm(), 2));
-  EXPECT_TRUE(IsTooSaturated(Calm(), 3));
+  EXPECT_FALSE(IsTooSaturated(Calm().imu, 2));
+  EXPECT_TRUE(IsTooSaturated(Calm().imu, 3));
   EXPECT_FALSE(IsTooSaturated({}, 0));
 }
 

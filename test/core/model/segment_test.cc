@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <vector>
+
 #include "core/model/so3.h"
 #include "test/core/model/random_values.h"
 
@@ -31,6 +34,35 @@ TEST(KeyframeState, BoxPlusTurnsOnTheRightAndAddsTheRest) {
     EXPECT_EQ(moved.b_a, x.b_a + delta.segment<3>(kStateAccelBias));
     EXPECT_EQ(moved.b_g, x.b_g + delta.segment<3>(kStateGyroBias));
   }
+}
+
+// By looking at each sample.
+TEST(SamplesBetweenKeyframes, AreThoseThatNoOtherSegmentHas) {
+  MotionSegment segment;
+  for (int t = 0; t < 100; t += 5) segment.imu.push_back({t});
+  const auto times = [&] {
+    std::vector<std::int64_t> all;
+    for (const ImuSample& sample : SamplesBetweenKeyframes(segment)) {
+      all.push_back(sample.t_ns);
+    }
+    return all;
+  };
+  EXPECT_EQ(times().size(), segment.imu.size()) << "no keyframe";
+  segment.keyframes.resize(2);
+  segment.keyframes[0].t_ns = 22;
+  segment.keyframes[1].t_ns = 33;
+  EXPECT_EQ(times(), (std::vector<std::int64_t>{20, 25, 30, 35}));
+  segment.keyframes[0].t_ns = 20;
+  segment.keyframes[1].t_ns = 30;
+  EXPECT_EQ(times(), (std::vector<std::int64_t>{20, 25, 30}));
+  // A segment that is not valid: as far as there are samples.
+  segment.keyframes[0].t_ns = -7;
+  segment.keyframes[1].t_ns = 200;
+  EXPECT_EQ(times().size(), segment.imu.size());
+  segment.keyframes[0].t_ns = 300;
+  EXPECT_EQ(times(), (std::vector<std::int64_t>{95}));
+  segment.imu.clear();
+  EXPECT_TRUE(times().empty());
 }
 
 }  // namespace

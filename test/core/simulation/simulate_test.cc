@@ -58,12 +58,24 @@ TEST(SimulateTest, ImuReachesToTheNextSegmentAndJoinsWithoutASeam) {
     }
     const MotionSegment& next = session.segments[s + 1];
     EXPECT_GE(segment.imu.back().t_ns, next.keyframes.front().t_ns);
-    // The overlap is the two samples about the next keyframe, identical.
-    const ImuSample& before = segment.imu[segment.imu.size() - 2];
-    EXPECT_EQ(before.t_ns, next.imu[0].t_ns);
-    EXPECT_EQ(before.accel, next.imu[0].accel);
-    EXPECT_EQ(segment.imu.back().t_ns, next.imu[1].t_ns);
-    EXPECT_EQ(segment.imu.back().gyro, next.imu[1].gyro);
+    // The overlap, from 0.15 s before the next keyframe to 0.15 s after the
+    // last one, is identical.
+    const auto first = std::find_if(
+        segment.imu.begin(), segment.imu.end(), [&](const ImuSample& sample) {
+          return sample.t_ns == next.imu.front().t_ns;
+        });
+    const auto padding_ns = static_cast<std::int64_t>(kImuPadding_s * 1e9);
+    EXPECT_LE(next.imu[0].t_ns, next.keyframes.front().t_ns - padding_ns);
+    EXPECT_GT(next.imu[1].t_ns, next.keyframes.front().t_ns - padding_ns);
+    EXPECT_GE(segment.imu.back().t_ns,
+              segment.keyframes.back().t_ns + padding_ns);
+    ASSERT_GT(segment.imu.end() - first, 2);
+    for (auto sample = first; sample != segment.imu.end(); ++sample) {
+      const ImuSample& same = next.imu[sample - first];
+      EXPECT_EQ(sample->t_ns, same.t_ns);
+      EXPECT_EQ(sample->accel, same.accel);
+      EXPECT_EQ(sample->gyro, same.gyro);
+    }
   }
 }
 
@@ -71,6 +83,7 @@ TEST(SimulateTest, LostSamplesAreMissingAndAllElseIsUnchanged) {
   const Rig rig = HandheldRig("a");
   const auto simulate = [&](double lost_fraction, double gap_s) {
     SimulationOptions options;
+    options.imu_padding_s = 0;  // of which none is lost
     options.imu_lost_fraction = lost_fraction;
     options.imu_gap_s = gap_s;
     return Simulate(rig,

@@ -1,9 +1,9 @@
-#include "client/selfcal/state_time.h"
+#include "core/factor/state_time.h"
 
 #include "core/factor/keyframe_motion.h"
 #include "core/model/rig.h"
 
-namespace selfcal::client {
+namespace selfcal {
 
 KeyframeState MoveState(const KeyframeState& state,
                         std::int64_t t_ns,
@@ -27,4 +27,4 @@ KeyframeState MoveState(const KeyframeState& state,
   return moved;
 }
 
-}  // namespace selfcal::client
+}  // namespace selfcal

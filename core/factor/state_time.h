@@ -10,7 +10,7 @@
 #include "core/model/calibration.h"
 #include "core/model/segment.h"
 
-namespace selfcal::client {
+namespace selfcal {
 
 // Returns the state at t_ns, from the one at state.t_ns. The samples, in order
 // of time, should cover both times; beyond them the readings are extrapolated
@@ -22,4 +22,4 @@ KeyframeState MoveState(const KeyframeState& state,
                         const ImuCalibration& imu,
                         double gravity_mps2);
 
-}  // namespace selfcal::client
+}  // namespace selfcal

@@ -1,11 +1,11 @@
-#include "client/selfcal/state_time.h"
+#include "core/factor/state_time.h"
 
 #include <gtest/gtest.h>
 
 #include "core/simulation/imu_readings.h"
 #include "core/simulation/simulate.h"
 
-namespace selfcal::client {
+namespace selfcal {
 namespace {
 
 // A hand-held device with scales, misalignments and biases, without noise.
@@ -65,4 +65,4 @@ TEST_F(StateTime, ChangesOnlyTheTimeWithoutSamples) {
 }
 
 }  // namespace
-}  // namespace selfcal::client
+}  // namespace selfcal
