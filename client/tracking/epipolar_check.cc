@@ -1,0 +1,190 @@
+#include "client/tracking/epipolar_check.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "core/model/median.h"
+#include "core/model/so3.h"
+
+namespace selfcal::client {
+namespace {
+
+constexpr int kRefinements = 6;
+constexpr double kMadToSigma = 1.4826;
+constexpr double kSigmas = 3.5;
+// A point that has moved against its parallax by more than this is behind a
+// camera.
+constexpr double kMaxBackward_px = 3;
+
+class Fitter {
+ public:
+  Fitter(const std::vector<RayPair>& pairs,
+         const Eigen::Quaterniond& q_BA,
+         const EpipolarOptions& options)
+      : pairs_(pairs), options_(options), q_(q_BA), given_(q_BA) {
+    Rotate();
+  }
+
+  void set_direction(const Eigen::Vector3d& t_B) { t_ = t_B.normalized(); }
+
+  // Distance of each match from its epipolar plane [px].
+  double Distance(std::size_t i) const {
+    const Eigen::Vector3d normal = t_.cross(rotated_[i]);
+    const double length = normal.norm();
+    if (length < 1e-9) return 0;
+    return options_.px_per_rad * pairs_[i].b.dot(normal) / length;
+  }
+
+  // The direction on which most matches agree.
+  void SearchDirection(double threshold_px) {
+    std::mt19937_64 engine(options_.seed);
+    double best = std::numeric_limits<double>::infinity();
+    Eigen::Vector3d best_t = t_;
+    for (int k = 0; k < options_.iterations; ++k) {
+      const std::size_t i = engine() % pairs_.size();
+      const std::size_t j = engine() % pairs_.size();
+      const Eigen::Vector3d normal_i = rotated_[i].cross(pairs_[i].b);
+      const Eigen::Vector3d normal_j = rotated_[j].cross(pairs_[j].b);
+      const Eigen::Vector3d t = normal_i.cross(normal_j);
+      const double length = t.norm();
+      if (i == j || length < 1e-12) continue;
+      t_ = t / length;
+      double cost = 0;
+      for (std::size_t n = 0; n < pairs_.size(); ++n) {
+        cost += std::min(std::abs(Distance(n)), threshold_px);
+      }
+      if (cost < best) {
+        best = cost;
+        best_t = t_;
+      }
+    }
+    t_ = best_t;
+  }
+
+  // Gauss-Newton steps on the direction and on the correction of the rotation,
+  // with Geman-McClure weights.
+  void Refine(double scale_px) {
+    for (int k = 0; k < kRefinements; ++k) Step(scale_px);
+  }
+
+  double RobustSigma() const {
+    std::vector<double> distances;
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      distances.push_back(std::abs(Distance(i)));
+    }
+    return kMadToSigma * UpperMedian(distances);
+  }
+
+  // Half of the matches, or all, lie in front if t points the right way.
+  void OrientDirection() {
+    double forward = 0;
+    for (std::size_t i = 0; i < pairs_.size(); ++i) forward += Parallax(i);
+    if (forward < 0) t_ = -t_;
+  }
+
+  EpipolarFit Result(double threshold_px) const {
+    EpipolarFit fit{{}, q_, t_};
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      fit.inliers.push_back(std::abs(Distance(i)) <= threshold_px &&
+                            options_.px_per_rad * Parallax(i) >=
+                                -std::max(kMaxBackward_px, threshold_px));
+    }
+    return fit;
+  }
+
+ private:
+  void Rotate() {
+    rotated_.clear();
+    for (const RayPair& pair : pairs_) rotated_.push_back(q_ * pair.a);
+  }
+
+  // Motion of a ray towards t [rad], positive for a point in front of both.
+  double Parallax(std::size_t i) const {
+    const Eigen::Vector3d& c = rotated_[i];
+    const Eigen::Vector3d towards = t_ - t_.dot(c) * c;
+    const double length = towards.norm();
+    return length < 1e-9 ? 0 : (pairs_[i].b - c).dot(towards) / length;
+  }
+
+  void Step(double scale_px) {
+    using Vector5 = Eigen::Matrix<double, 5, 1>;
+    using Matrix5 = Eigen::Matrix<double, 5, 5>;
+    const Eigen::Vector3d u = t_.unitOrthogonal();
+    const Eigen::Vector3d v = t_.cross(u);
+    Matrix5 H = Matrix5::Zero();
+    Vector5 g = Vector5::Zero();
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      const Eigen::Vector3d& b = pairs_[i].b;
+      const Eigen::Vector3d& c = rotated_[i];
+      const double length = t_.cross(c).norm();
+      if (length < 1e-3) continue;
+      const double to_px = options_.px_per_rad / length;
+      const double r = to_px * b.dot(t_.cross(c));
+      const double ratio = r / scale_px;
+      const double weight = 1 / std::pow(1 + ratio * ratio, 2);
+      Vector5 J;
+      J.head<3>() = t_.dot(c) * b - b.dot(c) * t_;
+      const Eigen::Vector3d by_t = c.cross(b);
+      J[3] = by_t.dot(u);
+      J[4] = by_t.dot(v);
+      J *= to_px;
+      H += weight * J * J.transpose();
+      g += weight * r * J;
+    }
+    const double prior = std::pow(scale_px / options_.rotation_sigma_rad, 2);
+    const Eigen::Vector3d offset = Log(q_ * given_.conjugate());
+    H.topLeftCorner<3, 3>().diagonal().array() += prior;
+    g.head<3>() += prior * offset;
+    H.diagonal().array() += 1e-6 * H.trace() + 1e-12;
+    const Vector5 step = -H.ldlt().solve(g);
+    q_ = (Exp(step.head<3>()) * q_).normalized();
+    t_ = (t_ + step[3] * u + step[4] * v).normalized();
+    Rotate();
+  }
+
+  const std::vector<RayPair>& pairs_;
+  const EpipolarOptions& options_;
+  Eigen::Quaterniond q_;
+  const Eigen::Quaterniond given_;
+  Eigen::Vector3d t_ = Eigen::Vector3d::UnitX();
+  std::vector<Eigen::Vector3d> rotated_;
+};
+
+}  // namespace
+
+EpipolarFit CheckEpipolar(const std::vector<RayPair>& pairs,
+                          const Eigen::Quaterniond& q_BA,
+                          const EpipolarOptions& options,
+                          const std::optional<Eigen::Vector3d>& t_B) {
+  if (static_cast<int>(pairs.size()) < kMinEpipolarPairs) {
+    return {std::vector<char>(pairs.size(), 1),
+            q_BA,
+            t_B.value_or(Eigen::Vector3d::UnitX())};
+  }
+  std::vector<double> flows;
+  for (const RayPair& pair : pairs) {
+    flows.push_back((pair.b - pair.a).norm() * options.px_per_rad);
+  }
+  const double coarse_px =
+      2 * options.max_distance_px + options.flow_share * UpperMedian(flows);
+  Fitter fitter(pairs, q_BA, options);
+  if (t_B) {
+    fitter.set_direction(*t_B);
+    // Matches of a wrong calibration are far from their planes: from coarse to
+    // fine.
+    fitter.Refine(std::max(coarse_px, fitter.RobustSigma()));
+  } else {
+    fitter.SearchDirection(coarse_px);
+  }
+  fitter.Refine(coarse_px);
+  fitter.Refine(
+      std::clamp(fitter.RobustSigma(), options.max_distance_px / 2, coarse_px));
+  fitter.OrientDirection();
+  return fitter.Result(
+      std::max(options.max_distance_px, kSigmas * fitter.RobustSigma()));
+}
+
+}  // namespace selfcal::client

@@ -1,0 +1,128 @@
+// Tracks of corners through the images of the cameras of a rig, of any camera
+// model.
+//
+// Corners begin one in each free cell of a grid. Each is followed from image to
+// image by Lucas-Kanade, from where the gyroscope's rotation predicts it, and
+// back; those that do not agree with one motion of the camera end
+// (epipolar_check.h). A new corner of one camera is looked for in the others,
+// and has one landmark if it is found; matches between cameras that do not
+// agree with their extrinsics end. Extrinsics and intrinsics of the rig need
+// not be exact: the checks fit small rotations, and their limits follow the
+// residuals.
+//
+// A tracker belongs to one thread at a time. It does no I/O; the same images
+// and readings give the same tracks on one machine.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "client/tracking/corner_grid.h"
+#include "client/tracking/epipolar_check.h"
+#include "client/tracking/gyro_rotation.h"
+#include "client/tracking/patch_flow.h"
+#include "core/model/calibration.h"
+
+namespace selfcal::client {
+
+struct TrackerOptions {
+  int max_tracks = 200;  // in each camera
+  CornerOptions corners;
+  FlowOptions flow;
+  // The distance of matches from their epipolar plane, between the images of
+  // one camera and between those of two.
+  double max_epipolar_px = 1.0;
+  double max_stereo_px = 1.5;
+  bool check_epipolar = true;  // false: nothing is rejected by geometry
+  // Distances at which a new corner is assumed to be when it is looked for in
+  // another camera.
+  std::vector<double> stereo_distances_m = {3, 1.2, 10};
+  // Rolling shutter: delay of each row after the one before, one value for each
+  // camera; empty: all rows at once.
+  std::vector<double> line_delays_s;
+  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();  // [rad/s]
+};
+
+// One point of a track.
+struct TrackPoint {
+  std::uint64_t landmark = 0;  // from 1, the same in all cameras
+  int camera = 0;
+  int image = 0;  // number of the call of Track, from 0
+  Eigen::Vector2d z_px = Eigen::Vector2d::Zero();
+};
+
+// How many points the last images lost, for diagnosis.
+struct TrackingCounts {
+  int followed = 0;         // points that were to be followed
+  int lost = 0;             // not found, or not the way back
+  int rejected = 0;         // against the motion of the camera
+  int begun = 0;            // new landmarks
+  int stereo_found = 0;     // of these, in a second camera
+  int stereo_rejected = 0;  // against the extrinsics
+};
+
+class FeatureTracker {
+ public:
+  FeatureTracker(const Calibration& theta, const TrackerOptions& options);
+
+  // Readings up to the last exposure of an image precede it. Prediction and
+  // checks are by the images alone without them.
+  void AddImu(const ImuSample& sample) { gyro_.Add(sample); }
+
+  // Follows all tracks into the next images, one of 8 bits for each camera,
+  // exposed at t_ns on the camera's own clock. An empty image was dropped: its
+  // camera continues with the next one. Images of another type or size than
+  // that of their camera are treated as dropped. Returns the points in these
+  // images, in the order of landmarks for each camera.
+  std::vector<TrackPoint> Track(std::int64_t t_ns,
+                                const std::vector<cv::Mat>& images);
+
+  const TrackingCounts& counts() const { return counts_; }
+
+ private:
+  struct Point {
+    std::uint64_t landmark;
+    cv::Point2f z_px;
+  };
+  struct Camera {
+    CameraCalibration theta;
+    Eigen::Vector3d origin_I;  // of the camera
+    double px_per_rad;
+    double line_delay_s;
+    double t_s = 0;  // of the last image, on the clock of the IMU
+    cv::Mat image;   // the last one; empty before the first
+    Pyramid pyramid;
+    std::vector<Point> points;
+  };
+
+  void Follow(int camera, const cv::Mat& image, double t_s);
+  // Ends the points of a camera that do not agree with one motion; `before` has
+  // the place of each in the image before.
+  void CheckMotion(Camera* camera,
+                   const std::vector<cv::Point2f>& before,
+                   double before_s);
+  void Replenish(int camera, const std::vector<char>& present);
+  void MatchNew(const Camera& from, std::size_t first, Camera* to);
+  void CheckStereo(Camera* a, Camera* b);
+
+  // Ray of a pixel in I, turned to the body at the exposure of row 0.
+  std::optional<Eigen::Vector3d> RayOf(const Camera& camera,
+                                       const cv::Point2f& z_px,
+                                       double t_s) const;
+  std::optional<cv::Point2f> PixelOf(const Camera& camera,
+                                     const Eigen::Vector3d& ray_I,
+                                     double row_delay_s,
+                                     double t_s) const;
+
+  TrackerOptions options_;
+  GyroRotation gyro_;
+  std::vector<Camera> cameras_;
+  int images_ = 0;
+  std::uint64_t next_landmark_ = 1;
+  TrackingCounts counts_;
+};
+
+}  // namespace selfcal::client
