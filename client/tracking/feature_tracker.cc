@@ -1,9 +1,12 @@
 #include "client/tracking/feature_tracker.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <unordered_map>
+#include <utility>
 
 namespace selfcal::client {
 namespace {
@@ -12,15 +15,26 @@ namespace {
 constexpr double kBrightnessTolerance = 0.01;
 // Cameras nearer to each other than this have no parallax to check.
 constexpr double kMinBaseline_m = 1e-3;
+// Of the images in which patches are aligned.
+constexpr double kSmoothing_px = 0.8;
+// A patch that appears larger or smaller by more begins anew.
+constexpr double kMaxStretch = 1.8;
+// Step of the derivatives of warps.
+constexpr double kDifference_px = 2;
+// Distance from the border of points that are followed, and of new patches.
+constexpr double kFlowBorder_px = 4;
+constexpr double kPatchBorder_px = PatchTemplate::kReach_px + 3;
 
 Eigen::Vector2d AsVector(const cv::Point2f& z) { return {z.x, z.y}; }
 
-bool IsInside(const CameraCalibration& camera,
-              const cv::Point2f& z,
-              double border_px) {
+cv::Point2f AsPoint(const Eigen::Vector2d& z) {
+  return {static_cast<float>(z.x()), static_cast<float>(z.y())};
+}
+
+bool IsInside(const cv::Mat& image, const cv::Point2f& z, double border_px) {
   return z.x >= border_px && z.y >= border_px &&
-         z.x <= camera.width_px - 1 - border_px &&
-         z.y <= camera.height_px - 1 - border_px;
+         z.x <= static_cast<float>(image.cols - 1 - border_px) &&
+         z.y <= static_cast<float>(image.rows - 1 - border_px);
 }
 
 // Keeps the elements whose mark is set.
@@ -90,48 +104,91 @@ std::vector<TrackPoint> FeatureTracker::Track(
   return points;
 }
 
-std::optional<Eigen::Vector3d> FeatureTracker::RayOf(const Camera& camera,
-                                                     const cv::Point2f& z_px,
-                                                     double t_s) const {
+std::optional<Eigen::Vector3d> FeatureTracker::RayOf(
+    const Camera& camera, const Eigen::Vector2d& z_px, double t_s) const {
   Eigen::Vector3d ray_C;
-  if (!Unproject(camera.theta, AsVector(z_px), &ray_C)) return std::nullopt;
+  if (!Unproject(camera.theta, z_px, &ray_C)) return std::nullopt;
   Eigen::Vector3d ray_I = camera.theta.q_CI.conjugate() * ray_C;
   if (camera.line_delay_s != 0) {
-    ray_I = gyro_.Between(t_s, t_s + z_px.y * camera.line_delay_s) * ray_I;
+    ray_I = gyro_.Between(t_s, t_s + z_px.y() * camera.line_delay_s) * ray_I;
   }
   return ray_I;
 }
 
-std::optional<cv::Point2f> FeatureTracker::PixelOf(const Camera& camera,
-                                                   const Eigen::Vector3d& ray_I,
-                                                   double row_delay_s,
-                                                   double t_s) const {
-  const Eigen::Quaterniond q = row_delay_s == 0
-                                   ? Eigen::Quaterniond::Identity()
-                                   : gyro_.Between(t_s + row_delay_s, t_s);
-  Eigen::Vector2d z_px;
-  if (!Project(camera.theta, camera.theta.q_CI * (q * ray_I), &z_px, nullptr)) {
+std::optional<Eigen::Vector2d> FeatureTracker::Transfer(
+    const Camera& from,
+    const Eigen::Vector2d& z_px,
+    const Camera& to,
+    double to_s,
+    std::optional<double> distance_m) const {
+  const auto ray_I = RayOf(from, z_px, from.t_s);
+  if (!ray_I) return std::nullopt;
+  // The row of the result is nearly that of the pixel itself.
+  const double row_s = to_s + z_px.y() * to.line_delay_s;
+  const Eigen::Quaterniond q = gyro_.Between(row_s, from.t_s);
+  const Eigen::Vector3d p_I =
+      distance_m ? q * (*distance_m * *ray_I + from.origin_I) - to.origin_I
+                 : q * *ray_I;
+  Eigen::Vector2d pixel;
+  if (!Project(to.theta, to.theta.q_CI * p_I, &pixel, nullptr)) {
     return std::nullopt;
   }
-  return cv::Point2f(static_cast<float>(z_px.x()),
-                     static_cast<float>(z_px.y()));
+  return pixel;
+}
+
+bool FeatureTracker::TransferWarp(const Camera& from,
+                                  const Point& point,
+                                  const Camera& to,
+                                  double to_s,
+                                  std::optional<double> distance_m,
+                                  PatchWarp* warp) const {
+  const Eigen::Vector2d z_px = AsVector(point.z_px);
+  const auto centre = Transfer(from, z_px, to, to_s, distance_m);
+  if (!centre) return false;
+  Eigen::Matrix2d J;
+  for (int axis = 0; axis < 2; ++axis) {
+    const Eigen::Vector2d beside =
+        z_px + kDifference_px * Eigen::Vector2d::Unit(axis);
+    const auto pixel = Transfer(from, beside, to, to_s, distance_m);
+    if (!pixel) return false;
+    J.col(axis) = (*pixel - *centre) / kDifference_px;
+  }
+  *warp = {J * point.A, *centre};
+  return true;
+}
+
+bool FeatureTracker::Align(const cv::Mat& smooth,
+                           PatchWarp warp,
+                           Point* point) const {
+  if (point->patch->Align(smooth, &warp) < options_.min_correlation) {
+    return false;
+  }
+  point->A = warp.A;
+  point->z_px = AsPoint(warp.z_px);
+  const Eigen::Vector2d stretch = warp.A.jacobiSvd().singularValues();
+  if ((stretch[0] > kMaxStretch || stretch[1] < 1 / kMaxStretch) &&
+      IsInside(smooth, point->z_px, kPatchBorder_px)) {
+    point->patch = std::make_shared<PatchTemplate>(smooth, warp.z_px);
+    point->A.setIdentity();
+  }
+  return true;
 }
 
 void FeatureTracker::Follow(int camera, const cv::Mat& image, double t_s) {
   Camera& c = cameras_[static_cast<std::size_t>(camera)];
   Pyramid next = BuildPyramid(image, options_.flow);
+  cv::Mat smooth;
+  cv::GaussianBlur(image, smooth, {0, 0}, kSmoothing_px);
   std::vector<cv::Point2f> before;
-  std::vector<cv::Point2f> found;
   if (!c.image.empty()) {
-    const Eigen::Quaterniond q_10 = gyro_.Between(t_s, c.t_s);
+    std::vector<PatchWarp> warps;
+    std::vector<cv::Point2f> found;
     for (const Point& point : c.points) {
+      PatchWarp warp{point.A, AsVector(point.z_px)};
+      TransferWarp(c, point, c, t_s, std::nullopt, &warp);
+      warps.push_back(warp);
       before.push_back(point.z_px);
-      // The row of the prediction is nearly that of the point itself.
-      const auto ray_I = RayOf(c, point.z_px, c.t_s);
-      const auto pixel =
-          ray_I ? PixelOf(c, q_10 * *ray_I, point.z_px.y * c.line_delay_s, t_s)
-                : std::nullopt;
-      found.push_back(pixel.value_or(point.z_px));
+      found.push_back(AsPoint(warp.z_px));
     }
     const double ratio =
         BrightnessRatio(c.image, image, before, found, options_.flow.window_px);
@@ -144,10 +201,15 @@ void FeatureTracker::Follow(int camera, const cv::Mat& image, double t_s) {
         FollowPatches(c.pyramid, next, before, options_.flow, &found);
     counts_.followed += static_cast<int>(before.size());
     for (std::size_t i = 0; i < found.size(); ++i) {
-      kept[i] = kept[i] &&
-                IsInside(c.theta, found[i], options_.corners.border_px / 2.0);
-      if (!kept[i]) ++counts_.lost;
+      kept[i] = kept[i] && IsInside(image, found[i], kFlowBorder_px);
       c.points[i].z_px = found[i];
+      if (!kept[i]) {
+        ++counts_.lost;
+      } else if (options_.align) {
+        warps[i].z_px = AsVector(found[i]);
+        kept[i] = Align(smooth, warps[i], &c.points[i]);
+        if (!kept[i]) ++counts_.changed;
+      }
     }
     Keep(kept, &before);
     Keep(kept, &c.points);
@@ -155,6 +217,7 @@ void FeatureTracker::Follow(int camera, const cv::Mat& image, double t_s) {
   const double before_s = c.t_s;
   c.t_s = t_s;
   c.image = image.clone();
+  c.smooth = smooth;
   c.pyramid = std::move(next);
   if (options_.check_epipolar) CheckMotion(&c, before, before_s);
 }
@@ -166,8 +229,9 @@ void FeatureTracker::CheckMotion(Camera* camera,
   std::vector<char> kept(before.size(), 1);
   std::vector<std::size_t> index;
   for (std::size_t i = 0; i < before.size(); ++i) {
-    const auto a = RayOf(*camera, before[i], before_s);
-    const auto b = RayOf(*camera, camera->points[i].z_px, camera->t_s);
+    const auto a = RayOf(*camera, AsVector(before[i]), before_s);
+    const auto b =
+        RayOf(*camera, AsVector(camera->points[i].z_px), camera->t_s);
     kept[i] = a && b;
     if (!kept[i]) continue;
     pairs.push_back({*a, *b});
@@ -198,7 +262,11 @@ void FeatureTracker::Replenish(int camera, const std::vector<char>& present) {
   const std::size_t first = c.points.size();
   for (const cv::Point2f& corner : corners) {
     if (static_cast<int>(c.points.size()) >= options_.max_tracks) break;
-    c.points.push_back({next_landmark_++, corner});
+    Point point{next_landmark_++, corner, nullptr};
+    if (options_.align) {
+      point.patch = std::make_shared<PatchTemplate>(c.smooth, AsVector(corner));
+    }
+    c.points.push_back(std::move(point));
     ++counts_.begun;
   }
   for (std::size_t j = 0; j < cameras_.size(); ++j) {
@@ -211,53 +279,55 @@ void FeatureTracker::Replenish(int camera, const std::vector<char>& present) {
 void FeatureTracker::MatchNew(const Camera& from,
                               std::size_t first,
                               Camera* to) {
-  const double step_s = to->t_s - from.t_s;
-  const Eigen::Quaterniond q = step_s == 0 ? Eigen::Quaterniond::Identity()
-                                           : gyro_.Between(to->t_s, from.t_s);
   std::vector<Point> open(
       from.points.begin() + static_cast<std::ptrdiff_t>(first),
       from.points.end());
   for (const double distance_m : options_.stereo_distances_m) {
     std::vector<cv::Point2f> points;
     std::vector<cv::Point2f> found;
+    std::vector<PatchWarp> warps;
     std::vector<std::size_t> index;
     for (std::size_t i = 0; i < open.size(); ++i) {
-      const auto ray_I = RayOf(from, open[i].z_px, from.t_s);
-      if (!ray_I) continue;
-      const Eigen::Vector3d p_I =
-          q * (distance_m * *ray_I + from.origin_I) - to->origin_I;
-      const auto pixel =
-          PixelOf(*to, p_I, open[i].z_px.y * to->line_delay_s, to->t_s);
-      if (!pixel || !IsInside(to->theta, *pixel, options_.corners.border_px)) {
+      PatchWarp warp;
+      if (!TransferWarp(from, open[i], *to, to->t_s, distance_m, &warp) ||
+          !IsInside(to->image, AsPoint(warp.z_px), kPatchBorder_px)) {
         continue;
       }
       points.push_back(open[i].z_px);
-      found.push_back(*pixel);
+      found.push_back(AsPoint(warp.z_px));
+      warps.push_back(warp);
       index.push_back(i);
     }
     const std::vector<char> ok =
         FollowPatches(from.pyramid, to->pyramid, points, options_.flow, &found);
     std::vector<char> still_open(open.size(), 1);
     for (std::size_t n = 0; n < ok.size(); ++n) {
-      if (!ok[n] ||
-          !IsInside(to->theta, found[n], options_.corners.border_px)) {
-        continue;
+      if (!ok[n] || !IsInside(to->image, found[n], kPatchBorder_px)) continue;
+      Point match = open[index[n]];
+      match.z_px = found[n];
+      if (options_.align) {
+        warps[n].z_px = AsVector(found[n]);
+        if (!Align(to->smooth, warps[n], &match)) continue;
       }
       still_open[index[n]] = 0;
-      const bool apart = std::all_of(
-          to->points.begin(), to->points.end(), [&](const Point& other) {
-            return cv::norm(other.z_px - found[n]) >=
-                   options_.corners.min_distance_px / 2;
-          });
-      if (!apart ||
-          static_cast<int>(to->points.size()) >= options_.max_tracks) {
-        continue;
+      if (HasRoom(*to, match.z_px)) {
+        to->points.push_back(match);
+        ++counts_.stereo_found;
       }
-      to->points.push_back({open[index[n]].landmark, found[n]});
-      ++counts_.stereo_found;
     }
     Keep(still_open, &open);
   }
+}
+
+bool FeatureTracker::HasRoom(const Camera& camera,
+                             const cv::Point2f& z_px) const {
+  return static_cast<int>(camera.points.size()) < options_.max_tracks &&
+         std::all_of(camera.points.begin(),
+                     camera.points.end(),
+                     [&](const Point& other) {
+                       return cv::norm(other.z_px - z_px) >=
+                              options_.corners.min_distance_px / 2;
+                     });
 }
 
 void FeatureTracker::CheckStereo(Camera* a, Camera* b) {
@@ -272,8 +342,9 @@ void FeatureTracker::CheckStereo(Camera* a, Camera* b) {
   for (std::size_t i = 0; i < b->points.size(); ++i) {
     const auto match = in_a.find(b->points[i].landmark);
     if (match == in_a.end()) continue;
-    const auto ray_a = RayOf(*a, a->points[match->second].z_px, a->t_s);
-    const auto ray_b = RayOf(*b, b->points[i].z_px, b->t_s);
+    const auto ray_a =
+        RayOf(*a, AsVector(a->points[match->second].z_px), a->t_s);
+    const auto ray_b = RayOf(*b, AsVector(b->points[i].z_px), b->t_s);
     if (!ray_a || !ray_b) continue;
     pairs.push_back({*ray_a, *ray_b});
     index.push_back(i);

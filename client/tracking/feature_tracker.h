@@ -3,12 +3,12 @@
 //
 // Corners begin one in each free cell of a grid. Each is followed from image to
 // image by Lucas-Kanade, from where the gyroscope's rotation predicts it, and
-// back; those that do not agree with one motion of the camera end
-// (epipolar_check.h). A new corner of one camera is looked for in the others,
-// and has one landmark if it is found; matches between cameras that do not
-// agree with their extrinsics end. Extrinsics and intrinsics of the rig need
-// not be exact: the checks fit small rotations, and their limits follow the
-// residuals.
+// back, and then aligned to its first patch (patch_template.h); those that do
+// not agree with one motion of the camera end (epipolar_check.h). A new corner
+// of one camera is looked for in the others, and has one landmark if it is
+// found; matches between cameras that do not agree with their extrinsics end.
+// Extrinsics and intrinsics of the rig need not be exact: the checks fit small
+// rotations, and their limits follow the residuals.
 //
 // A tracker belongs to one thread at a time. It does no I/O; the same images
 // and readings give the same tracks on one machine.
@@ -16,6 +16,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -24,6 +25,7 @@
 #include "client/tracking/epipolar_check.h"
 #include "client/tracking/gyro_rotation.h"
 #include "client/tracking/patch_flow.h"
+#include "client/tracking/patch_template.h"
 #include "core/model/calibration.h"
 
 namespace selfcal::client {
@@ -40,6 +42,10 @@ struct TrackerOptions {
   // Distances at which a new corner is assumed to be when it is looked for in
   // another camera.
   std::vector<double> stereo_distances_m = {3, 1.2, 10};
+  // Every point is aligned to the first patch of its track, which ends if it
+  // no longer resembles that. False: from image to image only.
+  bool align = true;
+  double min_correlation = 0.8;  // of the greys of both patches
   // Rolling shutter: delay of each row after the one before, one value for each
   // camera; empty: all rows at once.
   std::vector<double> line_delays_s;
@@ -58,6 +64,7 @@ struct TrackPoint {
 struct TrackingCounts {
   int followed = 0;         // points that were to be followed
   int lost = 0;             // not found, or not the way back
+  int changed = 0;          // do not resemble their first patch
   int rejected = 0;         // against the motion of the camera
   int begun = 0;            // new landmarks
   int stereo_found = 0;     // of these, in a second camera
@@ -86,6 +93,8 @@ class FeatureTracker {
   struct Point {
     std::uint64_t landmark;
     cv::Point2f z_px;
+    std::shared_ptr<const PatchTemplate> patch;
+    Eigen::Matrix2d A = Eigen::Matrix2d::Identity();  // of its warp
   };
   struct Camera {
     CameraCalibration theta;
@@ -95,8 +104,29 @@ class FeatureTracker {
     double t_s = 0;  // of the last image, on the clock of the IMU
     cv::Mat image;   // the last one; empty before the first
     Pyramid pyramid;
+    cv::Mat smooth;  // the last one for patches
     std::vector<Point> points;
   };
+
+  // A pixel of the last image of a camera, seen by another one, or by itself at
+  // another time; at infinity unless a distance is given.
+  std::optional<Eigen::Vector2d> Transfer(
+      const Camera& from,
+      const Eigen::Vector2d& z_px,
+      const Camera& to,
+      double to_s,
+      std::optional<double> distance_m) const;
+  // The same for a point with the surroundings of its patch. False if it has no
+  // image.
+  bool TransferWarp(const Camera& from,
+                    const Point& point,
+                    const Camera& to,
+                    double to_s,
+                    std::optional<double> distance_m,
+                    PatchWarp* warp) const;
+  // Moves a point to where its patch is, from warp.z_px. False if it is not
+  // there.
+  bool Align(const cv::Mat& smooth, PatchWarp warp, Point* point) const;
 
   void Follow(int camera, const cv::Mat& image, double t_s);
   // Ends the points of a camera that do not agree with one motion; `before` has
@@ -106,16 +136,13 @@ class FeatureTracker {
                    double before_s);
   void Replenish(int camera, const std::vector<char>& present);
   void MatchNew(const Camera& from, std::size_t first, Camera* to);
+  bool HasRoom(const Camera& camera, const cv::Point2f& z_px) const;
   void CheckStereo(Camera* a, Camera* b);
 
   // Ray of a pixel in I, turned to the body at the exposure of row 0.
   std::optional<Eigen::Vector3d> RayOf(const Camera& camera,
-                                       const cv::Point2f& z_px,
+                                       const Eigen::Vector2d& z_px,
                                        double t_s) const;
-  std::optional<cv::Point2f> PixelOf(const Camera& camera,
-                                     const Eigen::Vector3d& ray_I,
-                                     double row_delay_s,
-                                     double t_s) const;
 
   TrackerOptions options_;
   GyroRotation gyro_;

@@ -53,6 +53,8 @@ std::vector<RecordingKind> RecordingKinds() {
   const Rig stereo = StereoPairRig();
   std::vector<RecordingKind> kinds;
   kinds.push_back(Kind("mono", mono));
+  kinds.push_back(Kind("mono-unaligned", mono));
+  kinds.back().tracker.align = false;
   kinds.push_back(Kind("calm", mono));
   kinds.back().excitation = 0.2;
   kinds.push_back(Kind("blur-8ms", mono));
