@@ -12,7 +12,12 @@
 namespace selfcal::client {
 namespace {
 
-constexpr int kRefinements = 6;
+// Steps at each scale of the residuals, and the ratio of two scales.
+constexpr int kSteps = 3;
+constexpr double kNextScale = 0.6;
+// Of the direction from which a refinement begins: distant points do not
+// determine it.
+constexpr double kDirectionSigma_rad = 0.3;
 constexpr double kMadToSigma = 1.4826;
 constexpr double kSigmas = 3.5;
 // A point that has moved against its parallax by more than this is behind a
@@ -65,9 +70,15 @@ class Fitter {
   }
 
   // Gauss-Newton steps on the direction and on the correction of the rotation,
-  // with Geman-McClure weights.
-  void Refine(double scale_px) {
-    for (int k = 0; k < kRefinements; ++k) Step(scale_px);
+  // with Geman-McClure weights whose scale shrinks: what agrees with no motion
+  // loses its influence step by step (graduated non-convexity, Yang et al.
+  // 2020).
+  void Refine(double from_px, double to_px) {
+    given_t_ = t_;
+    for (double scale_px = from_px; scale_px > to_px; scale_px *= kNextScale) {
+      for (int k = 0; k < kSteps; ++k) Step(scale_px);
+    }
+    for (int k = 0; k < kSteps; ++k) Step(to_px);
   }
 
   double RobustSigma() const {
@@ -138,7 +149,10 @@ class Fitter {
     const Eigen::Vector3d offset = Log(q_ * given_.conjugate());
     H.topLeftCorner<3, 3>().diagonal().array() += prior;
     g.head<3>() += prior * offset;
-    H.diagonal().array() += 1e-6 * H.trace() + 1e-12;
+    const double direction_prior = std::pow(scale_px / kDirectionSigma_rad, 2);
+    H.bottomRightCorner<2, 2>().diagonal().array() += direction_prior;
+    g[3] -= direction_prior * given_t_.dot(u);
+    g[4] -= direction_prior * given_t_.dot(v);
     const Vector5 step = -H.ldlt().solve(g);
     q_ = (Exp(step.head<3>()) * q_).normalized();
     t_ = (t_ + step[3] * u + step[4] * v).normalized();
@@ -150,6 +164,7 @@ class Fitter {
   Eigen::Quaterniond q_;
   const Eigen::Quaterniond given_;
   Eigen::Vector3d t_ = Eigen::Vector3d::UnitX();
+  Eigen::Vector3d given_t_ = t_;
   std::vector<Eigen::Vector3d> rotated_;
 };
 
@@ -170,18 +185,16 @@ EpipolarFit CheckEpipolar(const std::vector<RayPair>& pairs,
   }
   const double coarse_px =
       2 * options.max_distance_px + options.flow_share * UpperMedian(flows);
+  const double fine_px = options.max_distance_px / 2;
   Fitter fitter(pairs, q_BA, options);
   if (t_B) {
+    // With a wrong calibration matches are far from their planes.
     fitter.set_direction(*t_B);
-    // Matches of a wrong calibration are far from their planes: from coarse to
-    // fine.
-    fitter.Refine(std::max(coarse_px, fitter.RobustSigma()));
+    fitter.Refine(std::max(coarse_px, 3 * fitter.RobustSigma()), fine_px);
   } else {
     fitter.SearchDirection(coarse_px);
+    fitter.Refine(coarse_px, fine_px);
   }
-  fitter.Refine(coarse_px);
-  fitter.Refine(
-      std::clamp(fitter.RobustSigma(), options.max_distance_px / 2, coarse_px));
   fitter.OrientDirection();
   return fitter.Result(
       std::max(options.max_distance_px, kSigmas * fitter.RobustSigma()));

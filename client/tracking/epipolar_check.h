@@ -31,7 +31,7 @@ struct EpipolarOptions {
   // flow, in addition.
   double flow_share = 0.03;
   double rotation_sigma_rad = 0.03;  // of the given rotation
-  int iterations = 60;
+  int iterations = 150;
   std::uint64_t seed = 1;
 };
 

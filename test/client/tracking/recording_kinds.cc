@@ -75,6 +75,7 @@ std::vector<RecordingKind> RecordingKinds() {
   kinds.back().tracker.check_epipolar = false;
   kinds.push_back(Kind("unchecked", mono));
   kinds.back().tracker.check_epipolar = false;
+  kinds.back().tracker.align = false;
   kinds.back().tracker.flow.max_return_px = 1e3;
   kinds.push_back(Kind("wrong-start", mono));
   kinds.back().start = WrongStart;
